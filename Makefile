@@ -1,0 +1,33 @@
+# Every recipe is one script: what it does and why stands there, in scripts/.
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-swiftshader soak lint bench docs wheel
+
+help: ## This list
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
+
+setup: ## Install what is missing (system packages, .venv) and build the Python module
+	@scripts/setup.sh
+
+demo: ## Cull a real mountain scene on the GPU; pictures and a report land in out/
+	@scripts/demo.sh
+
+test: ## All tests on Mesa's lavapipe (or on the driver that HIZVK_EXPECT_ADAPTER names)
+	@scripts/test.sh
+
+test-swiftshader: ## The same GPU tests on SwiftShader, a second software driver
+	@scripts/test.sh swiftshader
+
+soak: ## The tests that take minutes (marked slow), and later endless random search
+	@scripts/soak.sh
+
+lint: ## Format, clippy, ruff, mypy --strict, stubtest, shellcheck
+	@scripts/lint.sh
+
+bench: ## Benchmarks (a later piece of work: says what will be measured)
+	@scripts/bench.sh
+
+docs: ## The HTML documentation, in docs/_build/html
+	@scripts/docs.sh
+
+wheel: ## sdist and manylinux wheel in dist/, proven in an empty virtual environment
+	@scripts/wheel.sh

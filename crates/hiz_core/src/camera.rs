@@ -1,0 +1,528 @@
+//! Cameras in float64, on the host: what the inputs denote, before anything is rounded.
+//!
+//! A camera is four clip-space rows about an origin: `clip = rows * (p - origin, 1)`. Named cameras take the eye as the
+//! origin, so that a camera a million metres from the world's origin loses nothing. Clip space is that of Vulkan, Direct3D
+//! and WebGPU: NDC x right, y **up**, z in `0..1`; column vectors; pixel (0, 0) is the top-left one.
+
+use crate::error::{Error, Result};
+
+/// A 3-vector of float64.
+pub type Vec3 = [f64; 3];
+/// A row-major 3x3 matrix of float64 for column vectors.
+pub type Mat3 = [[f64; 3]; 3];
+/// A row-major 4x4 matrix of float64 for column vectors.
+pub type Mat4 = [[f64; 4]; 4];
+
+/// The largest image side that the certificates are derived for (pixel edges times 2^16 stay inside float32).
+pub const MAX_IMAGE_SIDE: u32 = 32_768;
+
+/// Which end of the depth range is far.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum DepthConvention {
+    /// Near 0, far 1.
+    Standard,
+    /// Near 1, far 0: with float depth the precision is spread evenly over the distance.
+    Reversed,
+}
+
+impl DepthConvention {
+    /// Whether depth 1 is near.
+    pub fn is_reversed(self) -> bool {
+        self == Self::Reversed
+    }
+
+    /// The depth of nothing: 1 (standard) or 0 (reversed).
+    pub fn far(self) -> f32 {
+        match self {
+            Self::Standard => 1.0,
+            Self::Reversed => 0.0,
+        }
+    }
+}
+
+/// The size of an image in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct ImageSize {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl ImageSize {
+    /// A size of `width` columns and `height` rows.
+    pub fn new(width: u32, height: u32) -> Self {
+        Self { width, height }
+    }
+
+    /// The number of pixels.
+    pub fn pixels(self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+}
+
+impl std::fmt::Display for ImageSize {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "(height {}, width {})", self.height, self.width)
+    }
+}
+
+/// Where a camera stands and what it looks at, in world units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// The centre of projection (for an orthographic camera: a point of its image plane).
+    pub eye: Vec3,
+    /// A point that appears on the optical axis.
+    pub target: Vec3,
+    /// A direction that appears upwards; not parallel to the viewing direction.
+    pub up: Vec3,
+}
+
+impl Pose {
+    /// The orthonormal rows (right, up, forward) of the camera's axes in the world.
+    fn axes(&self) -> Result<Mat3> {
+        for (name, v) in [("eye", self.eye), ("target", self.target), ("up", self.up)] {
+            if !v.iter().all(|x| x.is_finite()) {
+                return Err(Error::invalid(name, format!("expected finite numbers, got {v:?}")));
+            }
+        }
+        let forward = normalized(sub(self.target, self.eye))
+            .ok_or_else(|| Error::invalid("target", format!("expected a point apart from eye, got {:?} for both", self.eye)))?;
+        let up = normalized(self.up).ok_or_else(|| Error::invalid("up", "expected a direction, got a zero vector"))?;
+        let right = cross(forward, up);
+        // Below this sine of the angle between them the image would turn with the last bits of the input.
+        if dot(right, right) < 1e-20 {
+            return Err(Error::invalid(
+                "up",
+                format!("expected a direction that is not parallel to target - eye, got {:?}", self.up),
+            ));
+        }
+        let right = normalized(right).ok_or_else(|| Error::invalid("up", "expected a direction apart from target - eye"))?;
+        Ok([right, cross(right, forward), forward])
+    }
+}
+
+/// How camera space (x right, y up, z **forward**, so view depth is positive in front) becomes clip space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Projection {
+    /// A centred perspective; the horizontal field of view follows from the image's aspect ratio (square pixels).
+    Perspective {
+        /// Vertical field of view in radians, in (0, pi).
+        fov_y: f64,
+        /// View depth of the near plane, > 0.
+        near: f64,
+        /// View depth of the far plane, > near; `None`: infinitely far.
+        far: Option<f64>,
+        /// Which end of the depth range is far.
+        convention: DepthConvention,
+    },
+    /// An off-centre perspective: the image's borders as tangents, that is at view depth 1.
+    Frustum {
+        /// Tangent of the left border (negative: left of the axis).
+        left: f64,
+        /// Tangent of the right border, > left.
+        right: f64,
+        /// Tangent of the bottom border.
+        bottom: f64,
+        /// Tangent of the top border, > bottom.
+        top: f64,
+        /// View depth of the near plane, > 0.
+        near: f64,
+        /// View depth of the far plane, > near; `None`: infinitely far.
+        far: Option<f64>,
+        /// Which end of the depth range is far.
+        convention: DepthConvention,
+    },
+    /// A parallel projection; borders in world units.
+    Orthographic {
+        /// Left border.
+        left: f64,
+        /// Right border, > left.
+        right: f64,
+        /// Bottom border.
+        bottom: f64,
+        /// Top border, > bottom.
+        top: f64,
+        /// View depth of the near plane (may be negative).
+        near: f64,
+        /// View depth of the far plane, > near.
+        far: f64,
+        /// Which end of the depth range is far.
+        convention: DepthConvention,
+    },
+}
+
+impl Projection {
+    /// Which end of the depth range is far.
+    pub fn convention(&self) -> DepthConvention {
+        match *self {
+            Self::Perspective { convention, .. } | Self::Frustum { convention, .. } | Self::Orthographic { convention, .. } => {
+                convention
+            }
+        }
+    }
+
+    /// The clip-space rows for camera space (x right, y up, z forward).
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for borders, angles or planes out of range.
+    pub fn clip_from_camera(&self, size: ImageSize) -> Result<Mat4> {
+        check_size(size)?;
+        match *self {
+            Self::Perspective { fov_y, near, far, convention } => {
+                if !(fov_y > 0.0 && fov_y < std::f64::consts::PI) {
+                    return Err(Error::invalid("fov_y", format!("expected an angle in (0, 180) degrees, got {}", fov_y.to_degrees())));
+                }
+                let top = (fov_y / 2.0).tan();
+                let right = top * f64::from(size.width) / f64::from(size.height);
+                let [z, w] = perspective_depth(near, far, convention)?;
+                Ok([[1.0 / right, 0.0, 0.0, 0.0], [0.0, 1.0 / top, 0.0, 0.0], z, w])
+            }
+            Self::Frustum { left, right, bottom, top, near, far, convention } => {
+                check_borders(left, right, bottom, top)?;
+                let [z, w] = perspective_depth(near, far, convention)?;
+                let (dx, dy) = (right - left, top - bottom);
+                Ok([
+                    [2.0 / dx, 0.0, -(right + left) / dx, 0.0],
+                    [0.0, 2.0 / dy, -(top + bottom) / dy, 0.0],
+                    z,
+                    w,
+                ])
+            }
+            Self::Orthographic { left, right, bottom, top, near, far, convention } => {
+                check_borders(left, right, bottom, top)?;
+                if !(near.is_finite() && far.is_finite() && near < far) {
+                    return Err(Error::invalid("far", format!("expected a finite plane beyond near = {near}, got {far}")));
+                }
+                let (dx, dy, dz) = (right - left, top - bottom, far - near);
+                let z = match convention {
+                    DepthConvention::Standard => [0.0, 0.0, 1.0 / dz, -near / dz],
+                    DepthConvention::Reversed => [0.0, 0.0, -1.0 / dz, far / dz],
+                };
+                Ok([
+                    [2.0 / dx, 0.0, 0.0, -(right + left) / dx],
+                    [0.0, 2.0 / dy, 0.0, -(top + bottom) / dy],
+                    z,
+                    [0.0, 0.0, 0.0, 1.0],
+                ])
+            }
+        }
+    }
+}
+
+/// The z and w rows of a perspective with view depth as w.
+fn perspective_depth(near: f64, far: Option<f64>, convention: DepthConvention) -> Result<[[f64; 4]; 2]> {
+    if !(near.is_finite() && near > 0.0) {
+        return Err(Error::invalid("near", format!("expected a finite view depth > 0, got {near}")));
+    }
+    let far = far.filter(|f| *f != f64::INFINITY);
+    if let Some(far) = far
+        && !(far.is_finite() && far > near)
+    {
+        return Err(Error::invalid("far", format!("expected a view depth beyond near = {near}, or none, got {far}")));
+    }
+    let (slope, constant) = match (convention, far) {
+        (DepthConvention::Standard, Some(f)) => (f / (f - near), -f * near / (f - near)),
+        (DepthConvention::Standard, None) => (1.0, -near),
+        (DepthConvention::Reversed, Some(f)) => (-near / (f - near), f * near / (f - near)),
+        (DepthConvention::Reversed, None) => (0.0, near),
+    };
+    Ok([[0.0, 0.0, slope, constant], [0.0, 0.0, 1.0, 0.0]])
+}
+
+fn check_borders(left: f64, right: f64, bottom: f64, top: f64) -> Result<()> {
+    if !(left.is_finite() && right.is_finite() && left < right) {
+        return Err(Error::invalid("right", format!("expected a finite border beyond left = {left}, got {right}")));
+    }
+    if !(bottom.is_finite() && top.is_finite() && bottom < top) {
+        return Err(Error::invalid("top", format!("expected a finite border beyond bottom = {bottom}, got {top}")));
+    }
+    Ok(())
+}
+
+fn check_size(size: ImageSize) -> Result<()> {
+    if size.width == 0 || size.height == 0 {
+        return Err(Error::invalid("size", format!("expected at least one pixel a side, got {size}")));
+    }
+    let side = size.width.max(size.height);
+    if side > MAX_IMAGE_SIDE {
+        return Err(Error::limit("image side in pixels", u64::from(side), u64::from(MAX_IMAGE_SIDE)));
+    }
+    Ok(())
+}
+
+/// A view of the world: four clip-space rows about an origin, an image size and a depth convention.
+///
+/// The camera *denotes* exactly these float64 numbers; everything that the cull promises is promised about them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    rows: Mat4,
+    origin: Vec3,
+    size: ImageSize,
+    convention: DepthConvention,
+    /// Whether `origin` is where the camera stands (false for a bare matrix).
+    posed: bool,
+}
+
+impl Camera {
+    /// A camera from clip-space rows about an origin: `clip = rows * (p - origin, 1)`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for NaN or infinite entries, an empty image and singular matrices; [`Error::Limit`] for an image
+    /// side above [`MAX_IMAGE_SIDE`].
+    pub fn from_rows(rows: Mat4, origin: Vec3, size: ImageSize, convention: DepthConvention) -> Result<Self> {
+        check_size(size)?;
+        if let Some(bad) = rows.iter().flatten().chain(&origin).find(|x| !x.is_finite()) {
+            return Err(Error::invalid("camera", format!("expected finite matrix entries, got {bad}")));
+        }
+        check_regular(&rows)?;
+        Ok(Self { rows, origin, size, convention, posed: true })
+    }
+
+    /// A camera that stands at `pose` and sees through `projection`; its rows are formed about the eye.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] names the field that cannot be used.
+    pub fn look_at(pose: &Pose, projection: &Projection, size: ImageSize) -> Result<Self> {
+        let clip_from_camera = projection.clip_from_camera(size)?;
+        let axes = pose.axes()?;
+        Self::from_rows(linear_after(&clip_from_camera, &axes, [0.0; 3]), pose.eye, size, projection.convention())
+    }
+
+    /// A camera from one float64 matrix, `clip = m * (x, y, z, 1)`.
+    ///
+    /// # Errors
+    /// As [`Camera::from_rows`].
+    pub fn from_clip_from_world(m: Mat4, size: ImageSize, convention: DepthConvention) -> Result<Self> {
+        Ok(Self { posed: false, ..Self::from_rows(m, [0.0; 3], size, convention)? })
+    }
+
+    /// A camera from a projection and an affine world-to-camera matrix (any camera axes, as long as both agree).
+    ///
+    /// # Errors
+    /// As [`Camera::from_rows`], and for a `camera_from_world` whose last row is not (0, 0, 0, 1) or that is singular.
+    pub fn from_clip_from_camera(
+        clip_from_camera: Mat4,
+        camera_from_world: Mat4,
+        size: ImageSize,
+        convention: DepthConvention,
+    ) -> Result<Self> {
+        let (linear, translation) = affine_parts("camera_from_world", &camera_from_world)?;
+        let inverse = inverse3(&linear)
+            .ok_or_else(|| Error::invalid("camera_from_world", "expected an invertible matrix, got a singular one"))?;
+        // The rows stand about (nearly) the eye: what the rounded eye leaves over is kept as the residual.
+        let origin = mul3(&inverse, translation).map(|x| -x);
+        let residual: Vec3 = std::array::from_fn(|i| dot(linear[i], origin) + translation[i]);
+        Self::from_rows(linear_after(&clip_from_camera, &linear, residual), origin, size, convention)
+    }
+
+    /// A camera from a projection and an affine camera-to-world matrix, the camera's pose.
+    ///
+    /// # Errors
+    /// As [`Camera::from_clip_from_camera`].
+    pub fn from_clip_from_camera_pose(
+        clip_from_camera: Mat4,
+        world_from_camera: Mat4,
+        size: ImageSize,
+        convention: DepthConvention,
+    ) -> Result<Self> {
+        let (linear, eye) = affine_parts("world_from_camera", &world_from_camera)?;
+        let inverse = inverse3(&linear)
+            .ok_or_else(|| Error::invalid("world_from_camera", "expected an invertible matrix, got a singular one"))?;
+        Self::from_rows(linear_after(&clip_from_camera, &inverse, [0.0; 3]), eye, size, convention)
+    }
+
+    /// The same view in an image of another size.
+    ///
+    /// # Errors
+    /// As [`Camera::from_rows`].
+    pub fn with_size(&self, size: ImageSize) -> Result<Self> {
+        Ok(Self { posed: self.posed, ..Self::from_rows(self.rows, self.origin, size, self.convention)? })
+    }
+
+    /// The image's size.
+    pub fn size(&self) -> ImageSize {
+        self.size
+    }
+
+    /// Which end of the depth range is far.
+    pub fn convention(&self) -> DepthConvention {
+        self.convention
+    }
+
+    /// The clip-space rows x, y, z, w about [`Camera::origin`].
+    pub fn rows(&self) -> Mat4 {
+        self.rows
+    }
+
+    /// The point that the rows stand about, in world units; the eye of a named camera.
+    pub fn origin(&self) -> Vec3 {
+        self.origin
+    }
+
+    /// Whether [`Camera::origin`] is where the camera stands; a bare matrix does not say that.
+    pub fn is_posed(&self) -> bool {
+        self.posed
+    }
+
+    /// The float64 matrix about the world's origin, rounded: `clip = m * (x, y, z, 1)`.
+    pub fn clip_from_world(&self) -> Mat4 {
+        self.rows.map(|r| [r[0], r[1], r[2], r[3] - dot([r[0], r[1], r[2]], self.origin)])
+    }
+}
+
+/// Refuses matrices that squash the world to a plane: no depth test could mean anything there.
+fn check_regular(rows: &Mat4) -> Result<()> {
+    let linear = |r: usize| [rows[r][0], rows[r][1], rows[r][2]];
+    let third = if linear(3) == [0.0; 3] { 2 } else { 3 };
+    let unit = [linear(0), linear(1), linear(third)].map(normalized);
+    let regular = match unit {
+        [Some(x), Some(y), Some(t)] => dot(cross(x, y), t).abs() > 1e-12,
+        _ => false,
+    };
+    if regular && (third == 3 || rows[3][3] != 0.0) {
+        Ok(())
+    } else {
+        Err(Error::invalid("camera", "expected an invertible projection, got a singular matrix"))
+    }
+}
+
+/// `p * [linear | translation]` for an affine second factor.
+fn linear_after(p: &Mat4, linear: &Mat3, translation: Vec3) -> Mat4 {
+    p.map(|r| {
+        let head = [r[0], r[1], r[2]];
+        let column = |c: usize| dot(head, [linear[0][c], linear[1][c], linear[2][c]]);
+        [column(0), column(1), column(2), dot(head, translation) + r[3]]
+    })
+}
+
+fn affine_parts(name: &str, m: &Mat4) -> Result<(Mat3, Vec3)> {
+    if m[3] != [0.0, 0.0, 0.0, 1.0] {
+        return Err(Error::invalid(name, format!("expected an affine matrix with last row (0, 0, 0, 1), got {:?}", m[3])));
+    }
+    if let Some(bad) = m.iter().flatten().find(|x| !x.is_finite()) {
+        return Err(Error::invalid(name, format!("expected finite entries, got {bad}")));
+    }
+    Ok((std::array::from_fn(|i| [m[i][0], m[i][1], m[i][2]]), std::array::from_fn(|i| m[i][3])))
+}
+
+pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn sub(a: Vec3, b: Vec3) -> Vec3 {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// The unit vector, or nothing for a vector without a direction. Scaled first, so that no square over- or underflows.
+pub(crate) fn normalized(v: Vec3) -> Option<Vec3> {
+    let largest = v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    if !(largest > 0.0 && largest.is_finite()) {
+        return None;
+    }
+    let v = v.map(|x| x / largest);
+    let length = dot(v, v).sqrt();
+    Some(v.map(|x| x / length))
+}
+
+/// The solution of `m x = b`, or nothing where the rows are (nearly) dependent.
+pub(crate) fn solve3(m: &Mat3, b: Vec3) -> Option<Vec3> {
+    let inverse = inverse3(m)?;
+    let x = mul3(&inverse, b);
+    x.iter().all(|v| v.is_finite()).then_some(x)
+}
+
+pub(crate) fn mul3(m: &Mat3, v: Vec3) -> Vec3 {
+    m.map(|row| dot(row, v))
+}
+
+/// The inverse by cofactors of the rows scaled to length 1 (so that the test for singularity has no units).
+pub(crate) fn inverse3(m: &Mat3) -> Option<Mat3> {
+    let mut unit = [[0.0; 3]; 3];
+    let mut length = [0.0; 3];
+    for i in 0..3 {
+        unit[i] = normalized(m[i])?;
+        let along = m[i].iter().zip(&unit[i]).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+        length[i] = along.0 / along.1;
+    }
+    let columns = [cross(unit[1], unit[2]), cross(unit[2], unit[0]), cross(unit[0], unit[1])];
+    let determinant = dot(unit[0], columns[0]);
+    if determinant.abs() < 1e-12 {
+        return None;
+    }
+    Some(std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i] / determinant / length[j])))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: ImageSize = ImageSize { width: 4, height: 2 };
+
+    fn forward_camera(convention: DepthConvention, far: Option<f64>) -> Camera {
+        // At (10, 20, 30) looking along -z, so view depth = 30 - z.
+        let pose = Pose { eye: [10.0, 20.0, 30.0], target: [10.0, 20.0, 0.0], up: [0.0, 5.0, 0.0] };
+        let projection = Projection::Perspective { fov_y: std::f64::consts::FRAC_PI_2, near: 1.0, far, convention };
+        Camera::look_at(&pose, &projection, SIZE).unwrap()
+    }
+
+    fn clip(camera: &Camera, p: Vec3) -> [f64; 4] {
+        let d = sub(p, camera.origin());
+        camera.rows().map(|r| dot([r[0], r[1], r[2]], d) + r[3])
+    }
+
+    #[test]
+    fn look_at_maps_hand_worked_points() {
+        let camera = forward_camera(DepthConvention::Standard, Some(3.0));
+        // One unit right and up at view depth 2: ndc x = 1 / (2 * aspect 2) = 0.25, y = 1/2.
+        let [x, y, z, w] = clip(&camera, [11.0, 21.0, 28.0]);
+        assert!((w - 2.0).abs() < 1e-12 && (x / w - 0.25).abs() < 1e-12 && (y / w - 0.5).abs() < 1e-12);
+        // depth (f - f n / z) / (f - n) = (3 - 3 / 2) / 2
+        assert!((z / w - 0.75).abs() < 1e-12);
+        for (convention, at_near) in [(DepthConvention::Standard, 0.0), (DepthConvention::Reversed, 1.0)] {
+            for far in [Some(3.0), None] {
+                let [.., z, w] = clip(&forward_camera(convention, far), [10.0, 20.0, 29.0]);
+                assert!((z / w - at_near).abs() < 1e-12, "{convention:?} {far:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn poses_and_their_inverses_denote_the_same_camera() {
+        let p = Projection::Perspective { fov_y: 1.0, near: 0.1, far: None, convention: DepthConvention::Reversed };
+        let p = p.clip_from_camera(SIZE).unwrap();
+        // A rotation by 90 degrees about y and a translation; the inverse is written down by hand.
+        let pose = [[0.0, 0.0, 1.0, 5.0], [0.0, 1.0, 0.0, 6.0], [-1.0, 0.0, 0.0, 7.0], [0.0, 0.0, 0.0, 1.0]];
+        let inverse = [[0.0, 0.0, -1.0, 7.0], [0.0, 1.0, 0.0, -6.0], [1.0, 0.0, 0.0, -5.0], [0.0, 0.0, 0.0, 1.0]];
+        let a = Camera::from_clip_from_camera_pose(p, pose, SIZE, DepthConvention::Reversed).unwrap();
+        let b = Camera::from_clip_from_camera(p, inverse, SIZE, DepthConvention::Reversed).unwrap();
+        assert_eq!(a.origin(), [5.0, 6.0, 7.0]);
+        for point in [[1.0, 2.0, 3.0], [9.0, 6.0, 7.5]] {
+            for (x, y) in clip(&a, point).iter().zip(clip(&b, point)) {
+                assert!((x - y).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn unusable_cameras_are_refused_by_name() {
+        let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
+        let good = Projection::Perspective { fov_y: 1.0, near: 0.1, far: None, convention: DepthConvention::Reversed };
+        let message = |pose: &Pose, projection: &Projection, size| Camera::look_at(pose, projection, size).unwrap_err().to_string();
+        assert!(message(&Pose { target: [0.0; 3], ..pose }, &good, SIZE).starts_with("target:"));
+        assert!(message(&Pose { up: [0.0, 0.0, 2.0], ..pose }, &good, SIZE).starts_with("up:"));
+        assert!(message(&Pose { eye: [f64::NAN; 3], ..pose }, &good, SIZE).starts_with("eye:"));
+        assert!(message(&pose, &good, ImageSize::new(0, 1)).starts_with("size:"));
+        assert!(message(&pose, &good, ImageSize::new(32_769, 1)).contains("32768"));
+        let bad = |fov_y, near, far| Projection::Perspective { fov_y, near, far, convention: DepthConvention::Standard };
+        assert!(message(&pose, &bad(0.0, 0.1, None), SIZE).starts_with("fov_y:"));
+        assert!(message(&pose, &bad(1.0, 0.0, None), SIZE).starts_with("near:"));
+        assert!(message(&pose, &bad(1.0, 1.0, Some(1.0)), SIZE).starts_with("far:"));
+        let error = Camera::from_clip_from_world([[0.0; 4]; 4], SIZE, DepthConvention::Standard).unwrap_err();
+        assert!(error.to_string().contains("singular"));
+    }
+}

@@ -1,0 +1,36 @@
+//! The ordered compaction: from the plane of kept bits to an ascending list and the draw's instance count.
+
+use crate::context::HizContext;
+use crate::instances::Instances;
+use crate::pyramid::entry;
+use crate::visible::Visible;
+
+/// Words that one workgroup of `scatter` turns into indices; `shaders/compact.wgsl`.
+const SCATTER_WORKGROUP: u32 = 64;
+
+/// Records the compaction of every piece, in order: a later one needs to know what earlier ones left of the capacity.
+pub(crate) fn record(context: &HizContext, pass: &mut wgpu::ComputePass<'_>, instances: &Instances, visible: &Visible) {
+    let (scan, scatter) = (context.compact_pipeline("scan"), context.compact_pipeline("scatter"));
+    for (piece, output) in instances.pieces.iter().zip(&visible.pieces) {
+        if piece.count() == 0 {
+            continue;
+        }
+        let bind_group = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("hiz.compact.piece"),
+            layout: &context.layouts().compact,
+            entries: &[
+                entry(0, piece.uniform.as_entire_binding()),
+                entry(1, output.planes.as_entire_binding()),
+                entry(2, output.list.as_entire_binding()),
+                entry(3, visible.draws.as_entire_binding()),
+                entry(4, output.before.as_entire_binding()),
+                entry(5, visible.capacity_uniform.as_entire_binding()),
+            ],
+        });
+        pass.set_bind_group(0, &bind_group, &[]);
+        pass.set_pipeline(&scan);
+        pass.dispatch_workgroups(1, 1, 1);
+        pass.set_pipeline(&scatter);
+        pass.dispatch_workgroups(piece.words().div_ceil(SCATTER_WORKGROUP), 1, 1);
+    }
+}

@@ -1,0 +1,273 @@
+//! The cull pass: one camera, one pyramid, one set of instances; and the explanation of a single verdict.
+
+use crate::camera::Camera;
+use crate::compact;
+use crate::context::{CullKey, HizContext};
+use crate::error::{Error, Result};
+use crate::instances::{Instances, Piece};
+use crate::layout::CULL_WORKGROUP;
+use crate::pyramid::{Built, Pyramid, entry};
+use crate::view::{EPS, Row, ViewRows};
+use crate::visible::Visible;
+
+/// In which order the indices of the kept instances are listed.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum Order {
+    /// Ascending: the same list from every run and driver.
+    #[default]
+    Stable,
+    /// As invocations arrive: one pass fewer.
+    Any,
+}
+
+/// Where a volume must not be seen to be culled.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum Coverage {
+    /// Anywhere in the closed pixel squares that its projection meets.
+    #[default]
+    Area,
+    /// At pixel centres alone, for one sample a pixel and the same viewport and jitter.
+    Sample,
+}
+
+/// How instances are culled.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CullOptions {
+    /// The order of the packed list.
+    pub order: Order,
+    /// Area or sample coverage.
+    pub coverage: Coverage,
+    /// Extra distance in pixels, a multiple of 1/256 in 0..=16, that a projection must keep from what it does not touch. `None`: 0 in area
+    /// coverage, 1/64 in sample coverage (what a rasteriser's snapping may move a sample).
+    pub guard_px: Option<f64>,
+    /// Relative slack of the stored depth, 0..=0.5: 2^-23 covers depth that was rounded to nearest.
+    pub depth_slack: f64,
+    /// kappa, 0..=1e6: how many eps of `sum |M| |p|` the transform of the depth image's renderer may have cost; 0 for depth that
+    /// is exact for the camera's matrices, about 4 for a renderer that transforms world coordinates in float32.
+    pub transform_slack: f64,
+    /// Count the depth tests of each level.
+    pub statistics: bool,
+}
+
+impl Default for CullOptions {
+    fn default() -> Self {
+        Self {
+            order: Order::Stable,
+            coverage: Coverage::Area,
+            guard_px: None,
+            depth_slack: EPS,
+            transform_slack: 0.0,
+            statistics: true,
+        }
+    }
+}
+
+/// `shaders/shared/view.wgsl`, `View`.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct ViewUniform {
+    pub(crate) x: Row,
+    pub(crate) y: Row,
+    pub(crate) z: Row,
+    pub(crate) w: Row,
+    pub(crate) eye_hi: [f32; 3],
+    pub(crate) z_slope: f32,
+    pub(crate) eye_lo: [f32; 3],
+    pub(crate) coordinate_limit: f32,
+    pub(crate) half_size: [f32; 2],
+    pub(crate) reach: f32,
+    pub(crate) depth_factor: f32,
+    pub(crate) size: [i32; 2],
+    pub(crate) runtime_zero: u32,
+    pub(crate) padding: u32,
+}
+
+const _: () = assert!(size_of::<ViewUniform>() == 192);
+
+impl ViewUniform {
+    #[expect(clippy::cast_possible_truncation, reason = "multiples of 2^-8 and sizes below 2^15 are exact, the factor is rounded towards far")]
+    fn new(camera: &Camera, options: &CullOptions) -> Result<Self> {
+        let range = |name: &str, value: f64, most: f64| {
+            if (0.0..=most).contains(&value) {
+                Ok(value)
+            } else {
+                Err(Error::invalid(name, format!("expected a number in 0..={most}, got {value}")))
+            }
+        };
+        let slack = range("depth_slack", options.depth_slack, 0.5)?;
+        let kappa = range("transform_slack", options.transform_slack, 1e6)?;
+        let guard = match (options.guard_px, options.coverage) {
+            (Some(g), _) => range("guard_px", g, 16.0)?,
+            (None, Coverage::Area) => 0.0,
+            (None, Coverage::Sample) => 1.0 / 64.0,
+        };
+        if (guard * 256.0).fract() != 0.0 {
+            return Err(Error::invalid("guard_px", format!("expected a multiple of 1/256, got {guard}")));
+        }
+        let reach = match options.coverage {
+            Coverage::Area => guard,
+            Coverage::Sample => guard - 0.5,
+        };
+        // Rounded so that the product moves the depth at least as far as asked for.
+        let depth_factor = if camera.convention().is_reversed() {
+            -crate::view::round_up(slack - 1.0)
+        } else {
+            crate::view::round_up(1.0 + slack)
+        };
+        let rows = ViewRows::new(camera, kappa)?;
+        let size = camera.size();
+        Ok(Self {
+            x: rows.x,
+            y: rows.y,
+            z: rows.z,
+            w: rows.w,
+            eye_hi: rows.eye_hi,
+            z_slope: rows.z_slope,
+            eye_lo: rows.eye_lo,
+            coordinate_limit: rows.coordinate_limit,
+            half_size: [size.width as f32 / 2.0, size.height as f32 / 2.0],
+            reach: reach as f32,
+            depth_factor,
+            size: [size.width as i32, size.height as i32],
+            runtime_zero: 0,
+            padding: 0,
+        })
+    }
+}
+
+/// Everything that the shader knows of one cull, bound.
+struct Bound {
+    view: wgpu::BindGroup,
+    key: CullKey,
+}
+
+fn bind(
+    context: &HizContext,
+    instances: &Instances,
+    camera: &Camera,
+    pyramid: &Pyramid,
+    options: &CullOptions,
+) -> Result<Bound> {
+    context.check_device("instances", &instances.device)?;
+    context.check_device("pyramid", &pyramid.device)?;
+    let Built { source, source_kind, .. } = pyramid.built_for(camera)?;
+    let view = context.uniform("hiz.cull.view", &ViewUniform::new(camera, options)?);
+    let view = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("hiz.cull.view"),
+        layout: context.layouts().cull(source_kind),
+        entries: &[
+            entry(0, wgpu::BindingResource::TextureView(&source)),
+            entry(2, pyramid.uniform.as_entire_binding()),
+            entry(3, context.chunk(pyramid, 0).as_entire_binding()),
+            entry(4, context.chunk(pyramid, 1).as_entire_binding()),
+            entry(5, context.chunk(pyramid, 2).as_entire_binding()),
+            entry(6, view.as_entire_binding()),
+        ],
+    });
+    let key = CullKey {
+        source: source_kind,
+        kind: instances.kind,
+        reversed: camera.convention().is_reversed(),
+        chunks: pyramid.chunks.len(),
+        sample_coverage: options.coverage == Coverage::Sample,
+        append: options.order == Order::Any,
+        statistics: options.statistics,
+    };
+    Ok(Bound { view, key })
+}
+
+fn bind_piece(context: &HizContext, uniform: &wgpu::Buffer, piece: &Piece) -> wgpu::BindGroup {
+    context.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("hiz.cull.instances"),
+        layout: &context.layouts().instances,
+        entries: &[entry(0, uniform.as_entire_binding()), entry(1, piece.records.as_entire_binding())],
+    })
+}
+
+pub(crate) fn record(
+    context: &HizContext,
+    encoder: &mut wgpu::CommandEncoder,
+    instances: &Instances,
+    camera: &Camera,
+    pyramid: &Pyramid,
+    visible: &Visible,
+    options: &CullOptions,
+) -> Result<()> {
+    context.check_device("visible", &visible.device)?;
+    if !visible.counts().iter().copied().eq(instances.pieces.iter().map(Piece::count)) {
+        return Err(Error::mismatch("visible", "expected buffers that were created for these instances, got others"));
+    }
+    let bound = bind(context, instances, camera, pyramid, options)?;
+    encoder.copy_buffer_to_buffer(&visible.draws_template, 0, &visible.draws, 0, visible.draws.size());
+    encoder.clear_buffer(&visible.counters, 0, None);
+    let mut pass =
+        encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.cull.pass"), timestamp_writes: None });
+    pass.set_pipeline(&context.cull_pipeline(bound.key));
+    pass.set_bind_group(0, &bound.view, &[]);
+    for (piece, output) in instances.pieces.iter().zip(&visible.pieces) {
+        let outputs = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("hiz.cull.visible"),
+            layout: &context.layouts().visible,
+            entries: &[
+                entry(0, output.planes.as_entire_binding()),
+                entry(1, output.list.as_entire_binding()),
+                entry(2, visible.draws.as_entire_binding()),
+                entry(3, visible.counters.as_entire_binding()),
+                entry(4, visible.capacity_uniform.as_entire_binding()),
+            ],
+        });
+        pass.set_bind_group(1, &bind_piece(context, &piece.uniform, piece), &[]);
+        pass.set_bind_group(2, &outputs, &[]);
+        pass.dispatch_workgroups(piece.count().div_ceil(CULL_WORKGROUP), 1, 1);
+    }
+    if options.order == Order::Stable {
+        compact::record(context, &mut pass, instances, visible);
+    }
+    Ok(())
+}
+
+/// `shaders/explain.wgsl`, `Explanation`.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct ExplanationRecord {
+    pub(crate) verdict: u32,
+    pub(crate) stage: u32,
+    pub(crate) level: u32,
+    pub(crate) farthest_bits: u32,
+    pub(crate) pixels: [i32; 4],
+    pub(crate) texels: [u32; 4],
+    pub(crate) texel_bits: [u32; 4],
+    pub(crate) depths: [f32; 2],
+    pub(crate) padding: [f32; 2],
+}
+
+/// Records the explanation of instance `index` into `target`, `size_of::<ExplanationRecord>()` bytes of storage.
+pub(crate) fn record_explain(
+    context: &HizContext,
+    encoder: &mut wgpu::CommandEncoder,
+    instances: &Instances,
+    camera: &Camera,
+    pyramid: &Pyramid,
+    options: &CullOptions,
+    index: u32,
+    target: &wgpu::Buffer,
+) -> Result<()> {
+    let piece = instances.pieces.iter().find(|p| p.range.contains(&index)).ok_or_else(|| {
+        Error::invalid("index", format!("expected an instance below {}, got {index}", instances.len()))
+    })?;
+    let Bound { view, key } = bind(context, instances, camera, pyramid, options)?;
+    let which = context.uniform("hiz.explain.which", &[index - piece.range.start, 0, 0, 0]);
+    let output = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("hiz.explain.target"),
+        layout: &context.layouts().one_storage,
+        entries: &[entry(0, target.as_entire_binding())],
+    });
+    let mut pass =
+        encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.explain.pass"), timestamp_writes: None });
+    pass.set_pipeline(&context.explain_pipeline(CullKey { append: false, statistics: false, ..key }));
+    pass.set_bind_group(0, &view, &[]);
+    pass.set_bind_group(1, &bind_piece(context, &which, piece), &[]);
+    pass.set_bind_group(2, &output, &[]);
+    pass.dispatch_workgroups(1, 1, 1);
+    Ok(())
+}

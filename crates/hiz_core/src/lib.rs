@@ -1,0 +1,50 @@
+//! Certified hierarchical-Z occlusion culling on wgpu.
+//!
+//! Data flows one way:
+//!
+//! 1. [`Camera`] says, in float64, what is seen; [`DepthKind`] what a depth image's numbers mean; [`Bounds`] where the instances are.
+//! 2. [`Occluders`] are drawn into a depth texture, or the caller brings one.
+//! 3. [`HizContext::record_reduce`] builds the [`Pyramid`]: the farthest depth of every block of pixels.
+//! 4. [`HizContext::record_cull`] decides for each of the [`Instances`] and appends the kept ones to the [`Visible`] list, whose
+//!    count is the `instance_count` of a [`DrawIndexedIndirect`] record on the device.
+//! 5. The caller draws with [`Visible::draw_arguments`]; nothing visits the CPU.
+//!
+//! The promise: an instance is culled only if, for the exact real numbers that the inputs denote, every pixel that its
+//! bounds can touch holds a depth nearer than all of the bounds. It is kept by *certificates* computed in float32 with
+//! margins that cover every rounding (`shaders/shared/certificate.wgsl`); whatever is uncertain stays visible.
+//!
+//! Everything up to here records into the caller's encoder on the caller's device: nothing submits, polls or maps. The
+//! [`headless`] module owns a device, submits and reads back.
+
+pub mod headless;
+
+mod bounds;
+mod camera;
+mod compact;
+mod context;
+mod cull;
+mod depth;
+mod error;
+mod instances;
+mod layout;
+mod occluders;
+mod pyramid;
+mod readback;
+mod shader;
+mod view;
+mod visible;
+
+pub use wgpu;
+
+pub use bounds::{Bounds, BoundsKind, Floats};
+pub use camera::{Camera, DepthConvention, ImageSize, MAX_IMAGE_SIDE, Mat3, Mat4, Pose, Projection, Vec3};
+pub use context::HizContext;
+pub use cull::{Coverage, CullOptions, Order};
+pub use depth::{DepthKind, ndc_from_kind};
+pub use error::{Error, Result};
+pub use instances::{InstanceOptions, Instances};
+pub use layout::MAX_LEVELS;
+pub use occluders::{FaceCull, MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders};
+pub use pyramid::{Pyramid, PyramidOptions};
+pub use view::ERROR_ULPS;
+pub use visible::{CANARY_WORDS, DrawIndexedIndirect, DrawTemplate, Visible, VisibleOptions};

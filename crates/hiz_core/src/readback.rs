@@ -1,0 +1,139 @@
+//! From the device to the host: the only place that submits a copy, maps and waits.
+
+use crate::error::{Error, Result};
+
+/// What to copy.
+pub(crate) struct BufferRange<'a> {
+    pub(crate) buffer: &'a wgpu::Buffer,
+    pub(crate) offset: u64,
+    pub(crate) size: u64,
+}
+
+impl<'a> BufferRange<'a> {
+    /// The first `size` bytes (a multiple of 4).
+    pub(crate) fn first(buffer: &'a wgpu::Buffer, size: u64) -> Self {
+        Self { buffer, offset: 0, size }
+    }
+}
+
+/// Bytes of a staging buffer at most: larger reads come in several.
+const STAGING_BYTES: u64 = 1 << 28;
+
+/// Reads ranges of buffers, in their order.
+pub(crate) fn read_buffers(device: &wgpu::Device, queue: &wgpu::Queue, ranges: &[BufferRange<'_>]) -> Result<Vec<Vec<u8>>> {
+    let total: u64 = ranges.iter().map(|r| r.size).sum();
+    if total > STAGING_BYTES {
+        return ranges.iter().map(|r| read_in_bands(device, queue, r)).collect();
+    }
+    if total == 0 {
+        return Ok(vec![Vec::new(); ranges.len()]);
+    }
+    let staging = staging(device, total);
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("hiz.readback.encoder") });
+    let mut offset = 0;
+    for range in ranges.iter().filter(|r| r.size > 0) {
+        encoder.copy_buffer_to_buffer(range.buffer, range.offset, &staging, offset, range.size);
+        offset += range.size;
+    }
+    let submission = queue.submit([encoder.finish()]);
+    with_mapped(device, &staging, submission, |bytes| {
+        let mut begin = 0;
+        ranges
+            .iter()
+            .map(|r| {
+                let end = begin + r.size as usize;
+                let part = bytes[begin..end].to_vec();
+                begin = end;
+                part
+            })
+            .collect()
+    })
+}
+
+fn read_in_bands(device: &wgpu::Device, queue: &wgpu::Queue, range: &BufferRange<'_>) -> Result<Vec<u8>> {
+    let mut out = Vec::with_capacity(range.size as usize);
+    let mut done = 0;
+    while done < range.size {
+        let size = STAGING_BYTES.min(range.size - done);
+        let band = BufferRange { buffer: range.buffer, offset: range.offset + done, size };
+        out.extend(read_buffers(device, queue, &[band])?.swap_remove(0));
+        done += size;
+    }
+    Ok(out)
+}
+
+/// Reads a texture of 4 bytes a texel, row by row without padding.
+pub(crate) fn read_texture(device: &wgpu::Device, queue: &wgpu::Queue, texture: &wgpu::Texture) -> Result<Vec<u8>> {
+    let (width, height) = (texture.width(), texture.height());
+    let row = u64::from(width) * 4;
+    let padded = row.next_multiple_of(u64::from(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT));
+    let staging = staging(device, padded * u64::from(height));
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("hiz.readback.encoder") });
+    encoder.copy_texture_to_buffer(
+        texture.as_image_copy(),
+        wgpu::TexelCopyBufferInfo {
+            buffer: &staging,
+            layout: wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(u32::try_from(padded).map_err(|_| Error::limit("bytes per row", padded, u64::from(u32::MAX)))?),
+                rows_per_image: None,
+            },
+        },
+        texture.size(),
+    );
+    let submission = queue.submit([encoder.finish()]);
+    with_mapped(device, &staging, submission, |bytes| {
+        let mut out = Vec::with_capacity((row * u64::from(height)) as usize);
+        for line in bytes.chunks_exact(padded as usize) {
+            out.extend_from_slice(&line[..row as usize]);
+        }
+        out
+    })
+}
+
+/// Waits for a submission.
+pub(crate) fn wait(device: &wgpu::Device, submission: Option<wgpu::SubmissionIndex>) -> Result<()> {
+    device
+        .poll(wgpu::PollType::Wait { submission_index: submission, timeout: None })
+        .map(drop)
+        .map_err(|e| Error::DeviceLost(e.to_string()))
+}
+
+fn staging(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
+    device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("hiz.readback.staging"),
+        size,
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    })
+}
+
+fn with_mapped<T>(
+    device: &wgpu::Device,
+    staging: &wgpu::Buffer,
+    submission: wgpu::SubmissionIndex,
+    use_bytes: impl FnOnce(&[u8]) -> T,
+) -> Result<T> {
+    let (sender, receiver) = std::sync::mpsc::channel();
+    staging.map_async(wgpu::MapMode::Read, .., move |result| {
+        // The receiver lives until the end of this function; if it is gone nobody asks any more.
+        let _ = sender.send(result);
+    });
+    wait(device, Some(submission))?;
+    match receiver.try_recv() {
+        Ok(Ok(())) => {}
+        Ok(Err(e)) => return Err(Error::DeviceLost(format!("hiz.readback.staging could not be mapped: {e}"))),
+        // Another thread's poll may be running the callback at this moment.
+        Err(_) => match receiver.recv_timeout(std::time::Duration::from_secs(60)) {
+            Ok(Ok(())) => {}
+            other => return Err(Error::DeviceLost(format!("hiz.readback.staging could not be mapped: {other:?}"))),
+        },
+    }
+    let view = staging
+        .get_mapped_range(..)
+        .map_err(|e| Error::DeviceLost(format!("hiz.readback.staging could not be mapped: {e}")))?;
+    let out = use_bytes(&view);
+    drop(view);
+    staging.unmap();
+    Ok(out)
+}

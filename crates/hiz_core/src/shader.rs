@@ -1,0 +1,189 @@
+//! WGSL: which files make which module. Composition is ordered concatenation; there is no preprocessor.
+
+use crate::bounds::BoundsKind;
+
+macro_rules! wgsl {
+    ($name:literal) => {
+        include_str!(concat!("../shaders/", $name, ".wgsl"))
+    };
+}
+
+/// What level 0 of a pyramid is read from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum SourceKind {
+    /// A depth texture.
+    Depth,
+    /// A float color texture.
+    Float,
+    /// A texture of float32 bits.
+    Bits,
+}
+
+impl SourceKind {
+    fn wgsl(self) -> &'static str {
+        match self {
+            Self::Depth => wgsl!("shared/source_depth"),
+            Self::Float => wgsl!("shared/source_float"),
+            Self::Bits => wgsl!("shared/source_bits"),
+        }
+    }
+
+    pub(crate) fn sample_type(self) -> wgpu::TextureSampleType {
+        match self {
+            Self::Depth => wgpu::TextureSampleType::Depth,
+            Self::Float => wgpu::TextureSampleType::Float { filterable: false },
+            Self::Bits => wgpu::TextureSampleType::Uint,
+        }
+    }
+
+    /// The kind that fits a texture's format.
+    pub(crate) fn of(format: wgpu::TextureFormat) -> Option<Self> {
+        match format {
+            wgpu::TextureFormat::R32Float => Some(Self::Float),
+            wgpu::TextureFormat::R32Uint => Some(Self::Bits),
+            f if f.has_depth_aspect() => Some(Self::Depth),
+            _ => None,
+        }
+    }
+}
+
+/// The depth reduction.
+pub(crate) fn reduce(source: SourceKind) -> String {
+    [wgsl!("shared/depth_bits"), source.wgsl(), wgsl!("shared/pyramid"), wgsl!("reduce")].join("\n")
+}
+
+/// The cull (`entry` = its own file) or the explanation, which share everything up to the verdict.
+fn classifying(source: SourceKind, kind: BoundsKind, entry: &str) -> String {
+    let bounds = match kind {
+        BoundsKind::Sphere => wgsl!("shared/bounds_sphere").to_owned(),
+        BoundsKind::Box => [wgsl!("shared/bounds_box_support"), wgsl!("shared/bounds_box")].join("\n"),
+        BoundsKind::OrientedBox => [wgsl!("shared/bounds_box_support"), wgsl!("shared/bounds_oriented_box")].join("\n"),
+    };
+    [
+        wgsl!("shared/depth_bits"),
+        source.wgsl(),
+        wgsl!("shared/pyramid"),
+        wgsl!("shared/view"),
+        wgsl!("shared/validity"),
+        bounds.as_str(),
+        wgsl!("shared/certificate"),
+        wgsl!("shared/classify"),
+        entry,
+    ]
+    .join("\n")
+}
+
+/// The cull of instances of one kind.
+pub(crate) fn cull(source: SourceKind, kind: BoundsKind) -> String {
+    classifying(source, kind, &[wgsl!("shared/piece"), wgsl!("cull")].join("\n"))
+}
+
+/// The explanation of one instance's verdict.
+pub(crate) fn explain(source: SourceKind, kind: BoundsKind) -> String {
+    classifying(source, kind, wgsl!("explain"))
+}
+
+/// The ordered compaction.
+pub(crate) fn compact() -> String {
+    [wgsl!("shared/piece"), wgsl!("compact")].join("\n")
+}
+
+/// The occluder pass.
+pub(crate) fn occluders() -> String {
+    wgsl!("occluders").to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+    fn parse(source: &str) -> naga::Module {
+        let module = naga::front::wgsl::parse_str(source).unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
+        Validator::new(ValidationFlags::all(), Capabilities::default())
+            .validate(&module)
+            .unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
+        module
+    }
+
+    const SOURCES: [SourceKind; 3] = [SourceKind::Depth, SourceKind::Float, SourceKind::Bits];
+    const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
+
+    #[test]
+    fn every_module_is_valid_wgsl() {
+        for source in SOURCES {
+            parse(&reduce(source));
+            for kind in KINDS {
+                parse(&cull(source, kind));
+                parse(&explain(source, kind));
+            }
+        }
+        parse(&compact());
+        parse(&occluders());
+    }
+
+    /// Offsets of a WGSL struct's members, and its size.
+    fn layout(module: &naga::Module, name: &str) -> (Vec<(String, u32)>, u32) {
+        let (_, ty) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).expect(name);
+        let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("{name} is no struct") };
+        (members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect(), *span)
+    }
+
+    macro_rules! same_layout {
+        ($module:expr, $wgsl:literal, $rust:ty { $($theirs:literal = $ours:ident),* $(,)? }) => {{
+            let (members, span) = layout(&$module, $wgsl);
+            let expected = vec![$(($theirs.to_owned(), std::mem::offset_of!($rust, $ours) as u32)),*];
+            assert_eq!(members, expected, "{}", $wgsl);
+            assert_eq!(span as usize, size_of::<$rust>(), "{}", $wgsl);
+        }};
+    }
+
+    #[test]
+    fn rust_twins_have_the_offsets_of_wgsl() {
+        use crate::bounds::{BoxRecord, OrientedBoxRecord, SphereRecord};
+        use crate::cull::{ExplanationRecord, ViewUniform};
+        use crate::instances::PieceUniform;
+        use crate::layout::Level;
+        use crate::pyramid::PyramidUniform;
+        use crate::view::Row;
+        use crate::visible::{CounterRecord, DrawIndexedIndirect};
+
+        let module = parse(&cull(SourceKind::Depth, BoundsKind::Sphere));
+        same_layout!(module, "Row", Row { "m" = m, "a" = a });
+        same_layout!(module, "Level", Level { "offset" = offset, "stride" = stride, "width" = width, "height" = height });
+        same_layout!(module, "Pyramid", PyramidUniform {
+            "levels" = levels, "num_levels" = num_levels, "chunk_shift" = chunk_shift, "padding" = padding
+        });
+        same_layout!(module, "View", ViewUniform {
+            "x" = x, "y" = y, "z" = z, "w" = w, "eye_hi" = eye_hi, "z_slope" = z_slope, "eye_lo" = eye_lo,
+            "coordinate_limit" = coordinate_limit, "half_size" = half_size, "reach" = reach, "depth_factor" = depth_factor,
+            "size" = size, "runtime_zero" = runtime_zero, "padding" = padding
+        });
+        same_layout!(module, "Piece", PieceUniform { "base" = base, "count" = count, "index" = index, "words" = words });
+        same_layout!(module, "DrawIndexedIndirect", DrawIndexedIndirect {
+            "index_count" = index_count, "instance_count" = instance_count, "first_index" = first_index,
+            "base_vertex" = base_vertex, "first_instance" = first_instance
+        });
+        same_layout!(module, "Counters", CounterRecord {
+            "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid, "levels" = levels
+        });
+        assert_eq!(layout(&module, "SphereRecord").1 as usize, size_of::<SphereRecord>());
+        let boxes = parse(&cull(SourceKind::Depth, BoundsKind::Box));
+        assert_eq!(layout(&boxes, "BoxRecord").1 as usize, size_of::<BoxRecord>());
+        let oriented = parse(&explain(SourceKind::Depth, BoundsKind::OrientedBox));
+        assert_eq!(layout(&oriented, "OrientedBoxRecord").1 as usize, size_of::<OrientedBoxRecord>());
+        same_layout!(oriented, "Explanation", ExplanationRecord {
+            "verdict" = verdict, "stage" = stage, "level" = level, "farthest_bits" = farthest_bits, "pixels" = pixels,
+            "texels" = texels, "texel_bits" = texel_bits, "depths" = depths, "padding" = padding
+        });
+    }
+
+    #[test]
+    fn constants_agree_with_the_shaders() {
+        let margin = format!("ERROR_ULPS: f32 = {:.1};", crate::view::ERROR_ULPS);
+        assert!(wgsl!("shared/certificate").contains(&margin));
+        let workgroup = crate::layout::CULL_WORKGROUP;
+        assert!(wgsl!("cull").contains(&format!("WORKGROUP: u32 = {workgroup}u;")));
+        assert!(wgsl!("cull").contains(&format!("@workgroup_size({workgroup})")));
+    }
+}

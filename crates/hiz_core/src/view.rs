@@ -1,0 +1,301 @@
+//! From a float64 camera to what the cull shader reads: float32 rows about a reference point, with magnitude rows that bound
+//! every rounding. All of it in float64 on the host, once a camera.
+//!
+//! The certificates compare linear functions of the position. Written about the eye, with the depth row relative to w
+//! (`z = A w + Z'`), their rounding errors are proportional to the *distance* instead of the world coordinates: margins come
+//! out near 1e-5 of the distance. The magnitude rows carry the share that each coefficient can contribute to an error, in
+//! units of float32's eps; the shader multiplies them by the instance's own magnitudes.
+
+use crate::camera::{Camera, Mat3, Vec3, dot, solve3, sub};
+use crate::error::{Error, Result};
+
+/// float32's spacing at 1: WGSL calls a result "correctly rounded" when it is off by less than this, up or down.
+pub(crate) const EPS: f64 = 1.0 / 8_388_608.0; // 2^-23
+
+/// Half a spacing of float64 at 1: the relative error of one rounding on the host.
+const ROUNDING: f64 = f64::EPSILON / 2.0;
+
+/// The certificates' margin in eps, `docs/accuracy.md`, section "Counting the roundings". The shader's `ERROR_ULPS`.
+pub const ERROR_ULPS: f64 = 24.0;
+
+/// A linear function of the position about the reference point: `m . d + m3`, and the magnitudes that bound its error.
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct Row {
+    /// Three linear coefficients and the constant.
+    pub(crate) m: [f32; 4],
+    /// An upper bound of each coefficient's size, raised where its own error exceeds an eps.
+    pub(crate) a: [f32; 4],
+}
+
+/// A camera made ready for float32.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ViewRows {
+    /// Pixel column relative to the image's middle, times w.
+    pub(crate) x: Row,
+    /// Pixel row relative to the image's middle (downwards), times w.
+    pub(crate) y: Row,
+    /// Depth: z less `z_slope` times w.
+    pub(crate) z: Row,
+    /// w: view depth up to a power of two.
+    pub(crate) w: Row,
+    /// A of promise: `z = A w + Z'`.
+    pub(crate) z_slope: f32,
+    /// The reference point is exactly `eye_hi + eye_lo`.
+    pub(crate) eye_hi: [f32; 3],
+    /// See `eye_hi`.
+    pub(crate) eye_lo: [f32; 3],
+    /// Instances whose magnitudes reach this far are invalid for this camera: products could overflow float32.
+    pub(crate) coordinate_limit: f32,
+}
+
+impl ViewRows {
+    /// Rounds `camera` to float32. `transform_slack` is kappa: how many eps of `sum |M| |p|` another renderer's own transform
+    /// may have cost the depth image (0: the depth is exact for these matrices).
+    pub(crate) fn new(camera: &Camera, transform_slack: f64) -> Result<Self> {
+        let rows = camera.rows();
+        let linear = |r: usize| [rows[r][0], rows[r][1], rows[r][2]];
+        let origin = camera.origin();
+        let (w_lin, z_lin) = (linear(3), linear(2));
+        let orthographic = w_lin == [0.0; 3];
+
+        let (eye_hi, eye_lo, eye) = reference_point(camera, orthographic);
+        let about_eye = |r: usize| Affine::about(eye, rows[r], origin);
+        let size = camera.size();
+        let x = about_eye(0).scaled(f64::from(size.width) / 2.0);
+        let y = about_eye(1).scaled(-f64::from(size.height) / 2.0);
+        let w = about_eye(3);
+        let slope = dot(z_lin, w_lin) / dot(w_lin, w_lin);
+        #[expect(clippy::cast_possible_truncation, reason = "rounding to float32 is the point; what it leaves over stays in Z'")]
+        let z_slope = if orthographic || slope.is_nan() || slope.abs() >= 32_768.0 { 0.0 } else { slope as f32 };
+        let z = about_eye(2).minus(f64::from(z_slope), &w);
+
+        // One power of two for all rows: it changes no comparison and brings w near 1.
+        let unit = if orthographic { w.m[3].abs() } else { w_lin.iter().fold(0.0_f64, |m, v| m.max(v.abs())) };
+        if !(unit > 0.0 && unit.is_finite()) {
+            return Err(Error::invalid("camera", "expected a projection whose w is not zero everywhere"));
+        }
+        let scale = power_of_two_below(unit).recip();
+        let [x, y, z, w] = [x, y, z, w].map(|r| r.scaled(scale).rounded(transform_slack));
+
+        let linear_limit = [(&x, 1.0), (&y, 1.0), (&z, 1.0), (&w, 65_536.0)]
+            .iter()
+            .flat_map(|(r, factor)| r.a[..3].iter().map(move |a| f64::from(*a) * factor))
+            .fold(0.0_f64, f64::max);
+        let constant_limit = [(&x, 1.0), (&y, 1.0), (&z, 1.0), (&w, 65_536.0)]
+            .iter()
+            .map(|(r, factor)| f64::from(r.a[3]) * factor)
+            .fold(0.0_f64, f64::max);
+        // Written so that NaN fails, too.
+        if !(linear_limit <= 2.0_f64.powi(34) && constant_limit <= 2.0_f64.powi(58)) {
+            return Err(Error::invalid(
+                "camera",
+                format!(
+                    "expected rows whose coefficients stay below 2^34 and constants below 2^58 when w is scaled to 1, \
+                     got {linear_limit:e} and {constant_limit:e}"
+                ),
+            ));
+        }
+        let coordinate_limit = 2.0_f64.powf((58.0 - linear_limit.log2()).floor()).min(2.0_f64.powi(50));
+        if coordinate_limit < 1.0 {
+            return Err(Error::invalid("camera", "expected a projection that leaves room for coordinates of at least 1"));
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "a power of two in float32's range")]
+        let coordinate_limit = coordinate_limit as f32;
+        Ok(Self { x, y, z, w, z_slope, eye_hi, eye_lo, coordinate_limit })
+    }
+}
+
+/// The clip-space rows about the reference point, for a vertex shader.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ClipRows {
+    pub(crate) rows: [[f32; 4]; 4],
+    pub(crate) eye_hi: [f32; 3],
+    pub(crate) eye_lo: [f32; 3],
+}
+
+impl ClipRows {
+    /// Rounds `camera`'s rows to float32, with w scaled to be near 1.
+    pub(crate) fn new(camera: &Camera) -> Result<Self> {
+        // The cull's own view decides what float32 can hold: what it refuses is not worth drawing either.
+        ViewRows::new(camera, 0.0)?;
+        let rows = camera.rows();
+        let orthographic = rows[3][..3] == [0.0; 3];
+        let (eye_hi, eye_lo, eye) = reference_point(camera, orthographic);
+        let about_eye = rows.map(|row| Affine::about(eye, row, camera.origin()));
+        let w = about_eye[3].m;
+        let unit = if orthographic { w[3].abs() } else { w[..3].iter().fold(0.0_f64, |m, v| m.max(v.abs())) };
+        let scale = power_of_two_below(unit).recip();
+        let rows = about_eye.map(|row| row.scaled(scale).rounded(0.0).m);
+        Ok(Self { rows, eye_hi, eye_lo })
+    }
+}
+
+/// The eye (perspective: where x = y = w = 0) or the middle of the near or far plane (orthographic: x = y = z = 0); the
+/// world's origin where neither can be found. Any point would be *valid*, this one makes the margins small.
+fn reference_point(camera: &Camera, orthographic: bool) -> ([f32; 3], [f32; 3], Vec3) {
+    let rows = camera.rows();
+    let third = if orthographic { 2 } else { 3 };
+    let m: Mat3 = [0, 1, third].map(|r| [rows[r][0], rows[r][1], rows[r][2]]);
+    let b = [0, 1, third].map(|r: usize| -rows[r][3]);
+    let relative = solve3(&m, b).unwrap_or([0.0; 3]);
+    let origin = camera.origin();
+    let eye: Vec3 = std::array::from_fn(|k| origin[k] + relative[k]);
+    // Beyond 2^60 the shader would call everything invalid; the origin is as good as any point there.
+    let eye = if eye.iter().all(|v| v.abs() < 2.0_f64.powi(60)) { eye } else { [0.0; 3] };
+    let (hi, lo) = split3(eye);
+    // The two halves add up without rounding: `lo` holds bits of a float64 below those of `hi`.
+    (hi, lo, std::array::from_fn(|k| f64::from(hi[k]) + f64::from(lo[k])))
+}
+
+/// `v` as two float32: `hi` nearest, `lo` the rest, nearest; both flushed where subnormal.
+pub(crate) fn split3(v: Vec3) -> ([f32; 3], [f32; 3]) {
+    let halves = v.map(split);
+    (halves.map(|h| h.0), halves.map(|h| h.1))
+}
+
+/// See [`split3`].
+#[expect(clippy::cast_possible_truncation, reason = "rounding to float32 is the point")]
+pub(crate) fn split(v: f64) -> (f32, f32) {
+    let hi = flushed(v as f32);
+    let lo = if hi.is_finite() { flushed((v - f64::from(hi)) as f32) } else { 0.0 };
+    (hi, lo)
+}
+
+/// Subnormals as zero, as a device may read them anyway.
+fn flushed(v: f32) -> f32 {
+    if v.is_subnormal() { 0.0 } else { v }
+}
+
+/// The least float32 that is not below `v`; infinity where there is none, NaN for NaN.
+#[expect(clippy::cast_possible_truncation, reason = "rounded up in the next line")]
+pub(crate) fn round_up(v: f64) -> f32 {
+    let nearest = v as f32;
+    if f64::from(nearest) < v { nearest.next_up() } else { nearest }
+}
+
+fn power_of_two_below(v: f64) -> f64 {
+    // log2 may be off by an ulp at a power of two: then the unit lies a hair outside [1, 2), which no bound needs exactly.
+    2.0_f64.powf(v.log2().floor())
+}
+
+/// A row in float64, what is known about its errors, and the world-space sizes that kappa multiplies. Index 3: the constant.
+#[derive(Debug, Clone, Copy)]
+struct Affine {
+    m: [f64; 4],
+    error: [f64; 4],
+    world: [f64; 4],
+}
+
+impl Affine {
+    /// `row` (about `origin`) about `eye`. The linear part is exact; the constant is evaluated at the eye, and 8 roundings
+    /// of float64 cover its subtraction, three products and three sums with room.
+    fn about(eye: Vec3, row: [f64; 4], origin: Vec3) -> Self {
+        let lin = [row[0], row[1], row[2]];
+        let from_origin = sub(eye, origin);
+        let travelled: f64 = (0..3).map(|k| lin[k].abs() * (eye[k].abs() + origin[k].abs())).sum();
+        // kappa: |p| <= |d| + |eye|, and the renderer's own constant is the one about the world's origin.
+        let world: f64 = (0..3).map(|k| lin[k].abs() * eye[k].abs()).sum::<f64>() + (row[3] - dot(lin, origin)).abs();
+        Self {
+            m: [lin[0], lin[1], lin[2], dot(lin, from_origin) + row[3]],
+            error: [0.0, 0.0, 0.0, 8.0 * ROUNDING * (travelled + row[3].abs())],
+            world: [lin[0].abs(), lin[1].abs(), lin[2].abs(), world],
+        }
+    }
+
+    /// `s * self`; exact where `s` is a power of two, and one rounding is charged anyway.
+    fn scaled(&self, s: f64) -> Self {
+        Self {
+            m: self.m.map(|v| v * s),
+            error: std::array::from_fn(|k| (self.error[k] + ROUNDING * self.m[k].abs()) * s.abs()),
+            world: self.world.map(|v| v * s.abs()),
+        }
+    }
+
+    /// `self - slope * other`; what cancels leaves its rounding behind, in all four coefficients.
+    fn minus(&self, slope: f64, other: &Self) -> Self {
+        let each = |f: &dyn Fn(usize) -> f64| std::array::from_fn(f);
+        Self {
+            m: each(&|k| self.m[k] - slope * other.m[k]),
+            error: each(&|k| {
+                self.error[k]
+                    + slope.abs() * other.error[k]
+                    + 8.0 * ROUNDING * (self.m[k].abs() + (slope * other.m[k]).abs())
+            }),
+            world: each(&|k| self.world[k] + slope.abs() * other.world[k]),
+        }
+    }
+
+    /// Rounds to float32 and forms the magnitudes: `a >= |m|`, and `a * eps >=` the coefficient's own error.
+    #[expect(clippy::cast_possible_truncation, reason = "rounding to float32 is the point; the magnitude bounds it")]
+    fn rounded(&self, transform_slack: f64) -> Row {
+        let kappa = transform_slack / ERROR_ULPS;
+        let m = self.m.map(|v| flushed(v as f32));
+        let a = std::array::from_fn(|k| {
+            let error = self.error[k] + (self.m[k] - f64::from(m[k])).abs();
+            let a = f64::from(m[k]).abs().max(error / EPS) + kappa * self.world[k];
+            round_up(if error > 0.0 { a.max(2.0_f64.powi(-120)) } else { a })
+        });
+        Row { m, a }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{DepthConvention, ImageSize, Pose, Projection};
+
+    fn camera(eye: Vec3, near: f64, far: Option<f64>, convention: DepthConvention) -> Camera {
+        let pose = Pose { eye, target: [eye[0] + 1.0, eye[1] + 2.0, eye[2] - 3.0], up: [0.0, 1.0, 0.0] };
+        let projection = Projection::Perspective { fov_y: 1.0, near, far, convention };
+        Camera::look_at(&pose, &projection, ImageSize::new(641, 359)).unwrap()
+    }
+
+    #[test]
+    fn the_eye_is_exactly_its_two_halves() {
+        let eye = [1.0e6 + 0.1, -3.0e8 + 0.7, 1.0 / 3.0];
+        let rows = ViewRows::new(&camera(eye, 0.1, None, DepthConvention::Reversed), 0.0).unwrap();
+        for k in 0..3 {
+            let sum = f64::from(rows.eye_hi[k]) + f64::from(rows.eye_lo[k]);
+            assert!((sum - eye[k]).abs() <= eye[k].abs() * 2.0_f64.powi(-47));
+        }
+        // x, y and w vanish at the eye up to what the two halves leave over.
+        for row in [rows.x, rows.y, rows.w] {
+            assert!(f64::from(row.m[3]).abs() < 1e-4, "{row:?}");
+        }
+    }
+
+    #[test]
+    fn magnitudes_bound_the_coefficients_and_what_float32_cannot_hold() {
+        let camera = camera([12.3, -4.5, 6.7], 1e-3, Some(1e5), DepthConvention::Standard);
+        let view = ViewRows::new(&camera, 0.0).unwrap();
+        for row in [view.x, view.y, view.z, view.w] {
+            for k in 0..4 {
+                assert!(row.a[k] >= row.m[k].abs());
+            }
+        }
+        // Z' carries the near plane in its constant: -f n / (f - n) up to the power of two, and next to nothing in its linear part.
+        assert!(view.z.m[..3].iter().all(|v| v.abs() < 1e-6));
+        assert!(view.z.m[3] < 0.0);
+        // kappa adds kappa / 24 of the world-space size, never less.
+        let slack = ViewRows::new(&camera, 24.0).unwrap();
+        assert!(slack.z.a.iter().zip(view.z.a).all(|(a, b)| *a > b));
+    }
+
+    #[test]
+    fn rows_that_float32_cannot_hold_are_refused() {
+        let m = [[1e30, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+        let camera = Camera::from_clip_from_world(m, ImageSize::new(8, 8), DepthConvention::Standard).unwrap();
+        assert!(ViewRows::new(&camera, 0.0).unwrap_err().to_string().contains("2^34"));
+    }
+
+    #[test]
+    fn rounding_up_never_falls_below() {
+        for v in [0.0, 0.1, 1.0 / 3.0, 1e-40, 16_777_217.0, 3.5e38] {
+            let up = round_up(v);
+            assert!(f64::from(up) >= v);
+            assert!(up == 0.0 || up.is_infinite() || f64::from(up.next_down()) < v);
+        }
+        assert!(round_up(f64::NAN).is_nan());
+    }
+}

@@ -1,0 +1,77 @@
+//! What the device tests share: one engine a process, its adapter printed and checked, and a small seeded generator.
+#![allow(dead_code, reason = "each test binary uses its own part")]
+
+use std::sync::OnceLock;
+
+use hiz_core::headless::Engine;
+use hiz_core::{Camera, DepthConvention, ImageSize, Mat4};
+
+/// The engine of this process. `HIZVK_EXPECT_ADAPTER` (a part of the adapter's name or driver) refuses any other.
+pub(crate) fn engine() -> &'static Engine {
+    static ENGINE: OnceLock<Engine> = OnceLock::new();
+    ENGINE.get_or_init(|| {
+        let engine = Engine::new(None).expect("the device tests need a Vulkan driver");
+        let adapter = engine.adapter().to_string();
+        eprintln!("adapter: {adapter}");
+        if let Ok(expected) = std::env::var("HIZVK_EXPECT_ADAPTER") {
+            assert!(
+                adapter.to_lowercase().contains(&expected.to_lowercase()),
+                "expected the adapter {expected}, got {adapter}"
+            );
+        }
+        engine
+    })
+}
+
+/// A camera at the origin whose clip coordinates are written down: view depth is z, x and y span -1..1 at depth 1.
+pub(crate) fn camera_along_z(width: u32, height: u32, convention: DepthConvention) -> Camera {
+    // Near plane at 1, infinitely far: standard z = w - 1, reversed z = 1.
+    let z = match convention {
+        DepthConvention::Standard => [0.0, 0.0, 1.0, -1.0],
+        DepthConvention::Reversed => [0.0, 0.0, 0.0, 1.0],
+    };
+    let m: Mat4 = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], z, [0.0, 0.0, 1.0, 0.0]];
+    Camera::from_clip_from_world(m, ImageSize::new(width, height), convention).expect("a plain camera")
+}
+
+/// The NDC depth of view depth `z` for [`camera_along_z`]; exact for powers of two.
+pub(crate) fn ndc(z: f32, convention: DepthConvention) -> f32 {
+    match convention {
+        DepthConvention::Standard => 1.0 - 1.0 / z,
+        DepthConvention::Reversed => 1.0 / z,
+    }
+}
+
+pub(crate) const CONVENTIONS: [DepthConvention; 2] = [DepthConvention::Standard, DepthConvention::Reversed];
+
+/// SplitMix64 (Steele, Lea, Flood, OOPSLA 2014): small, seeded, the same everywhere.
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    /// Uniform in 0..1.
+    pub(crate) fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Uniform in `low..high`.
+    pub(crate) fn range(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    /// Uniform in `0..n`.
+    pub(crate) fn below(&mut self, n: u32) -> u32 {
+        (self.bits() % u64::from(n)) as u32
+    }
+
+    pub(crate) fn pick<T: Copy>(&mut self, from: &[T]) -> T {
+        from[self.below(from.len() as u32) as usize]
+    }
+}

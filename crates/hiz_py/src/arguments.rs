@@ -1,0 +1,71 @@
+//! Arrays and words from Python as the engine's borrowed types.
+
+use hiz_core::{Bounds, DepthConvention, DepthKind, Floats, ImageSize};
+use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// A float array of any shape. Held during a call, so that its memory stays; read without the interpreter lock.
+#[derive(FromPyObject)]
+pub(crate) enum FloatArray<'py> {
+    #[pyo3(transparent, annotation = "float32 array")]
+    F32(PyReadonlyArrayDyn<'py, f32>),
+    #[pyo3(transparent, annotation = "float64 array")]
+    F64(PyReadonlyArrayDyn<'py, f64>),
+}
+
+impl FloatArray<'_> {
+    /// Its numbers in C order, without a copy.
+    pub(crate) fn floats(&self) -> PyResult<Floats<'_>> {
+        Ok(match self {
+            Self::F32(array) => {
+                in_c_order(array.is_c_contiguous())?;
+                Floats::F32(array.as_slice()?)
+            }
+            Self::F64(array) => {
+                in_c_order(array.is_c_contiguous())?;
+                Floats::F64(array.as_slice()?)
+            }
+        })
+    }
+}
+
+/// `as_slice` also takes Fortran order, whose numbers come in another sequence.
+pub(crate) fn in_c_order(is_c_contiguous: bool) -> PyResult<()> {
+    if is_c_contiguous { Ok(()) } else { Err(PyValueError::new_err("expected an array in C order")) }
+}
+
+/// The bounds of this kind in these arrays.
+pub(crate) fn bounds<'a>(kind: &str, arrays: &'a [FloatArray<'_>]) -> PyResult<Bounds<'a>> {
+    match (kind, arrays) {
+        ("spheres", [centers, radii]) => Ok(Bounds::Spheres { centers: centers.floats()?, radii: radii.floats()? }),
+        ("boxes", [min, max]) => Ok(Bounds::Boxes { min: min.floats()?, max: max.floats()? }),
+        ("oriented_boxes", [centers, half_sizes, rotations]) => Ok(Bounds::OrientedBoxes {
+            centers: centers.floats()?,
+            half_sizes: half_sizes.floats()?,
+            rotations: rotations.floats()?,
+        }),
+        _ => Err(PyValueError::new_err(format!("bounds: no kind {kind:?} of {} arrays", arrays.len()))),
+    }
+}
+
+/// What a depth image's numbers mean.
+pub(crate) fn depth_kind(kind: &str) -> PyResult<DepthKind> {
+    match kind {
+        "ndc" => Ok(DepthKind::Ndc),
+        "reversed_ndc" => Ok(DepthKind::ReversedNdc),
+        "z" => Ok(DepthKind::Z),
+        "distance" => Ok(DepthKind::Distance),
+        _ => Err(PyValueError::new_err(format!("kind: no kind {kind:?}"))),
+    }
+}
+
+/// Python's `(height, width)`.
+pub(crate) fn image_size((height, width): (u32, u32)) -> ImageSize {
+    ImageSize { width, height }
+}
+
+/// Python's `reversed_z`.
+pub(crate) fn convention(reversed_z: bool) -> DepthConvention {
+    if reversed_z { DepthConvention::Reversed } else { DepthConvention::Standard }
+}

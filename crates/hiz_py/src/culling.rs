@@ -1,0 +1,141 @@
+//! The answer of a cull, read on request.
+
+use hiz_core::{Coverage, CullOptions, DrawTemplate, Order, VisibleOptions, headless};
+use numpy::PyArray1;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::errors::detached;
+
+/// The options of a cull as Python words them.
+pub(crate) struct CullArguments<'a> {
+    pub(crate) order: &'a str,
+    pub(crate) coverage: &'a str,
+    pub(crate) guard_px: Option<f64>,
+    pub(crate) depth_slack: f64,
+    pub(crate) transform_slack: f64,
+    pub(crate) capacity: Option<u32>,
+    /// Index count, first index, base vertex, first instance.
+    pub(crate) draw: (u32, u32, i32, u32),
+    pub(crate) statistics: bool,
+}
+
+impl CullArguments<'_> {
+    /// The engine's options.
+    pub(crate) fn options(&self) -> PyResult<CullOptions> {
+        let order = match self.order {
+            "stable" => Order::Stable,
+            "any" => Order::Any,
+            other => return Err(PyValueError::new_err(format!("order: no order {other:?}"))),
+        };
+        let coverage = match self.coverage {
+            "area" => Coverage::Area,
+            "sample" => Coverage::Sample,
+            other => return Err(PyValueError::new_err(format!("coverage: no coverage {other:?}"))),
+        };
+        Ok(CullOptions {
+            order,
+            coverage,
+            guard_px: self.guard_px,
+            depth_slack: self.depth_slack,
+            transform_slack: self.transform_slack,
+            statistics: self.statistics,
+        })
+    }
+
+    /// The room for the list, and what is drawn.
+    pub(crate) fn output(&self) -> VisibleOptions {
+        let (index_count, first_index, base_vertex, first_instance) = self.draw;
+        let draw = DrawTemplate { index_count, first_index, base_vertex, first_instance };
+        VisibleOptions { capacity: self.capacity, draw }
+    }
+}
+
+/// A submitted cull.
+#[pyclass(frozen, module = "hizvk._core")]
+pub(crate) struct Culling(pub(crate) headless::Culling);
+
+#[pymethods]
+impl Culling {
+    fn num_instances(&self) -> u32 {
+        self.0.instances().len()
+    }
+
+    fn mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        detached(py, || self.0.mask()).map(|mask| PyArray1::from_vec(py, mask))
+    }
+
+    fn verdicts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
+        detached(py, || self.0.verdicts()).map(|verdicts| PyArray1::from_vec(py, verdicts))
+    }
+
+    fn indices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
+        detached(py, || self.0.indices()).map(|indices| PyArray1::from_vec(py, indices))
+    }
+
+    /// The records one after the other, 20 bytes each.
+    fn draws<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        detached(py, || self.0.draws()).map(|draws| PyBytes::new(py, bytemuck::cast_slice(&draws)))
+    }
+
+    fn counts(&self, py: Python<'_>) -> PyResult<Counts> {
+        let counts = detached(py, || self.0.counts())?;
+        Ok(Counts {
+            tested: counts.tested,
+            outside: counts.outside,
+            occluded: counts.occluded,
+            visible: counts.visible,
+            invalid: counts.invalid,
+            demand: counts.demand,
+            written: counts.written,
+            levels: counts.levels,
+        })
+    }
+
+    /// Milliseconds to record, of the device, and to read back.
+    fn timings(&self) -> (f64, f64, f64) {
+        let timings = self.0.timings();
+        (timings.record_ms, timings.gpu_ms, timings.readback_ms)
+    }
+
+    fn explain(&self, py: Python<'_>, index: u64) -> PyResult<Explanation> {
+        let told = detached(py, || self.0.explain(index))?;
+        Ok(Explanation {
+            verdict: told.verdict,
+            reason: told.reason,
+            rectangle: told.rectangle,
+            level: told.level,
+            texels: told.texels,
+            texel_depths: told.texel_depths,
+            farthest: told.farthest,
+            nearest: told.nearest,
+        })
+    }
+}
+
+/// How many instances met which fate.
+#[pyclass(frozen, get_all, module = "hizvk._core")]
+pub(crate) struct Counts {
+    tested: u64,
+    outside: u64,
+    occluded: u64,
+    visible: u64,
+    invalid: u64,
+    demand: u64,
+    written: u64,
+    levels: [u64; 16],
+}
+
+/// How one verdict came about.
+#[pyclass(frozen, get_all, module = "hizvk._core")]
+pub(crate) struct Explanation {
+    verdict: u8,
+    reason: &'static str,
+    rectangle: Option<[i32; 4]>,
+    level: Option<u32>,
+    texels: Vec<[u32; 2]>,
+    texel_depths: Vec<f32>,
+    farthest: Option<f32>,
+    nearest: Option<f64>,
+}

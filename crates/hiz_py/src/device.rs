@@ -1,0 +1,222 @@
+//! The device and what lives on it.
+
+use std::sync::Arc;
+
+use hiz_core::headless::{self, AdapterSummary};
+use hiz_core::{FaceCull, InstanceOptions, MeshData, OccluderOptions};
+use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::arguments::{FloatArray, bounds, depth_kind, in_c_order};
+use crate::camera::Camera;
+use crate::culling::{CullArguments, Culling};
+use crate::errors::detached;
+
+/// Index, name, driver, its version, backend, type.
+type Summary = (usize, String, String, String, String, String);
+
+fn summary(adapter: &AdapterSummary) -> Summary {
+    let AdapterSummary { index, name, driver, driver_info, backend, device_type } = adapter.clone();
+    (index, name, driver, driver_info, backend, device_type)
+}
+
+/// The Vulkan adapters of this machine.
+#[pyfunction]
+pub(crate) fn adapters(py: Python<'_>) -> Vec<Summary> {
+    py.detach(headless::adapters).iter().map(summary).collect()
+}
+
+/// A device with its queue and pipelines.
+#[pyclass(frozen, module = "hizvk._core")]
+pub(crate) struct Engine(headless::Engine);
+
+#[pymethods]
+impl Engine {
+    #[new]
+    fn new(py: Python<'_>, adapter: Option<&str>) -> PyResult<Self> {
+        detached(py, || headless::Engine::new(adapter)).map(Self)
+    }
+
+    fn adapter(&self) -> Summary {
+        summary(self.0.adapter())
+    }
+
+    fn max_image_side(&self) -> u32 {
+        self.0.max_image_side()
+    }
+
+    fn instances(
+        &self,
+        py: Python<'_>,
+        kind: &str,
+        arrays: Vec<FloatArray<'_>>,
+        strict: bool,
+        piece_capacity: Option<u32>,
+    ) -> PyResult<Instances> {
+        let bounds = bounds(kind, &arrays)?;
+        let options = InstanceOptions { strict, piece_capacity };
+        detached(py, || self.0.instances(&bounds, &options)).map(Instances)
+    }
+
+    fn occluders(
+        &self,
+        py: Python<'_>,
+        meshes: Vec<(FloatArray<'_>, PyReadonlyArrayDyn<'_, u32>, Option<FloatArray<'_>>)>,
+        cull: &str,
+    ) -> PyResult<Occluders> {
+        let cull_mode = match cull {
+            "none" => FaceCull::None,
+            "back" => FaceCull::Back,
+            "front" => FaceCull::Front,
+            _ => return Err(PyValueError::new_err(format!("cull: no mode {cull:?}"))),
+        };
+        let mut data = Vec::with_capacity(meshes.len());
+        for (vertices, triangles, transforms) in &meshes {
+            in_c_order(triangles.is_c_contiguous())?;
+            data.push(MeshData {
+                vertices: vertices.floats()?,
+                triangles: triangles.as_slice()?,
+                transforms: transforms.as_ref().map(FloatArray::floats).transpose()?,
+            });
+        }
+        detached(py, || self.0.occluders(&data, &OccluderOptions { cull_mode })).map(Occluders)
+    }
+
+    fn render_depth(&self, py: Python<'_>, occluders: &Occluders, camera: &Camera) -> PyResult<DepthImage> {
+        detached(py, || self.0.render_depth(&occluders.0, &camera.0)).map(DepthImage)
+    }
+
+    fn upload_depth(
+        &self,
+        py: Python<'_>,
+        image: FloatArray<'_>,
+        kind: &str,
+        scale: f64,
+        camera: &Camera,
+    ) -> PyResult<DepthImage> {
+        let (image, kind) = (image.floats()?, depth_kind(kind)?);
+        detached(py, || {
+            let ndc = hiz_core::ndc_from_kind(image, kind, scale, &camera.0)?;
+            self.0.upload_depth(&ndc, &camera.0)
+        })
+        .map(DepthImage)
+    }
+
+    fn pyramid(&self, py: Python<'_>, depth: &DepthImage) -> PyResult<Pyramid> {
+        let pyramid = detached(py, || self.0.pyramid(&depth.0))?;
+        Ok(Pyramid { engine: self.0.clone(), pyramid })
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
+    fn cull(
+        &self,
+        py: Python<'_>,
+        instances: &Instances,
+        camera: &Camera,
+        pyramid: &Pyramid,
+        order: &str,
+        coverage: &str,
+        guard_px: Option<f64>,
+        depth_slack: f64,
+        transform_slack: f64,
+        capacity: Option<u32>,
+        draw: (u32, u32, i32, u32),
+        statistics: bool,
+    ) -> PyResult<Culling> {
+        let arguments =
+            CullArguments { order, coverage, guard_px, depth_slack, transform_slack, capacity, draw, statistics };
+        let (options, output) = (arguments.options()?, arguments.output());
+        detached(py, || self.0.cull(&instances.0, &camera.0, &pyramid.pyramid, &options, &output)).map(Culling)
+    }
+
+    fn wait(&self, py: Python<'_>) -> PyResult<()> {
+        detached(py, || self.0.wait())
+    }
+}
+
+/// Bounds on the device.
+#[pyclass(frozen, module = "hizvk._core")]
+pub(crate) struct Instances(Arc<hiz_core::Instances>);
+
+#[pymethods]
+impl Instances {
+    fn num_instances(&self) -> u32 {
+        self.0.len()
+    }
+
+    fn kind(&self) -> &'static str {
+        match self.0.kind() {
+            hiz_core::BoundsKind::Sphere => "spheres",
+            hiz_core::BoundsKind::Box => "boxes",
+            hiz_core::BoundsKind::OrientedBox => "oriented_boxes",
+        }
+    }
+
+    fn num_pieces(&self) -> usize {
+        self.0.num_pieces()
+    }
+
+    fn invalid<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u64>> {
+        PyArray1::from_slice(py, self.0.invalid())
+    }
+
+    fn device_bytes(&self) -> u64 {
+        self.0.device_bytes()
+    }
+}
+
+/// Triangle meshes on the device.
+#[pyclass(frozen, module = "hizvk._core")]
+pub(crate) struct Occluders(Arc<hiz_core::Occluders>);
+
+#[pymethods]
+impl Occluders {
+    fn num_triangles(&self) -> u64 {
+        self.0.num_triangles()
+    }
+
+    fn num_parts(&self) -> usize {
+        self.0.num_parts()
+    }
+
+    fn device_bytes(&self) -> u64 {
+        self.0.device_bytes()
+    }
+}
+
+/// A depth image on the device.
+#[pyclass(frozen, module = "hizvk._core")]
+pub(crate) struct DepthImage(headless::DepthImage);
+
+#[pymethods]
+impl DepthImage {
+    fn read<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        detached(py, || self.0.read()).map(|depth| PyArray1::from_vec(py, depth))
+    }
+}
+
+/// A depth pyramid on the device.
+#[pyclass(frozen, module = "hizvk._core")]
+pub(crate) struct Pyramid {
+    engine: headless::Engine,
+    pyramid: Arc<hiz_core::Pyramid>,
+}
+
+#[pymethods]
+impl Pyramid {
+    fn num_levels(&self) -> u32 {
+        self.pyramid.num_levels()
+    }
+
+    /// `((height, width), texels)` of a level.
+    fn read_level<'py>(&self, py: Python<'py>, k: u32) -> PyResult<((u32, u32), Bound<'py, PyArray1<f32>>)> {
+        let texels = detached(py, || self.engine.read_level(&self.pyramid, k))?;
+        let size = self.pyramid.level_size(k).map_or((0, 0), |size| (size.height, size.width));
+        Ok((size, PyArray1::from_vec(py, texels)))
+    }
+
+    fn device_bytes(&self) -> u64 {
+        self.pyramid.device_bytes()
+    }
+}

@@ -1,0 +1,58 @@
+//! Errors of the engine as the exceptions of `hizvk.errors`, or as plain `ValueError` for what an argument did wrong.
+
+use hiz_core::Error;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyType;
+
+/// A class of `hizvk.errors`, imported at its first use.
+struct Exception {
+    name: &'static str,
+    class: PyOnceLock<Py<PyType>>,
+}
+
+impl Exception {
+    const fn new(name: &'static str) -> Self {
+        Self { name, class: PyOnceLock::new() }
+    }
+
+    /// The exception with these arguments; the import's own error where that fails.
+    fn raise<A>(&self, py: Python<'_>, arguments: A) -> PyErr
+    where
+        A: pyo3::PyErrArguments + Send + Sync + 'static,
+    {
+        match self.class.import(py, "hizvk.errors", self.name) {
+            Ok(class) => PyErr::from_type(class.clone(), arguments),
+            Err(error) => error,
+        }
+    }
+}
+
+static HIZ_ERROR: Exception = Exception::new("HizError");
+static NO_ADAPTER: Exception = Exception::new("NoAdapterError");
+static LIMIT: Exception = Exception::new("LimitError");
+static DEVICE_LOST: Exception = Exception::new("DeviceLostError");
+static OUT_OF_MEMORY: Exception = Exception::new("OutOfMemoryError");
+
+/// The Python exception for an error of the engine.
+pub(crate) fn raised(py: Python<'_>, error: Error) -> PyErr {
+    let text = error.to_string();
+    match error {
+        Error::NoAdapter { request, seen, hint } => NO_ADAPTER.raise(py, (seen, hint, request)),
+        Error::Limit { name, requested, allowed } => LIMIT.raise(py, (name, requested, allowed)),
+        Error::DeviceLost(_) => DEVICE_LOST.raise(py, (text,)),
+        Error::OutOfMemory(_) => OUT_OF_MEMORY.raise(py, (text,)),
+        Error::Invalid { .. } | Error::Mismatch { .. } => PyValueError::new_err(text),
+        _ => HIZ_ERROR.raise(py, (text,)),
+    }
+}
+
+/// Runs `work` without the interpreter lock and turns its error into an exception.
+pub(crate) fn detached<T, F>(py: Python<'_>, work: F) -> PyResult<T>
+where
+    T: Send,
+    F: Send + FnOnce() -> Result<T, Error>,
+{
+    py.detach(work).map_err(|error| raised(py, error))
+}

@@ -1,0 +1,28 @@
+//! The module `hizvk._core`: conversion of arguments, release of the interpreter lock, errors. No algorithm lives here.
+//!
+//! The Python modules around it check every argument first, so what arrives here is float32 or float64 in C order; what is
+//! still wrong is refused by `hiz_core` in the same words. Every class is frozen and may be used from any thread.
+
+mod arguments;
+mod camera;
+mod culling;
+mod device;
+mod errors;
+mod reference;
+
+/// The compiled engine of `hizvk`. Not public: use the modules around it.
+#[pyo3::pymodule]
+mod _core {
+    #[pymodule_export]
+    use crate::camera::{Camera, frustum_matrix};
+    #[pymodule_export]
+    use crate::culling::{Counts, Culling, Explanation};
+    #[pymodule_export]
+    use crate::device::{DepthImage, Engine, Instances, Occluders, Pyramid, adapters};
+    #[pymodule_export]
+    use crate::reference::{reference_classify, reference_pyramid};
+
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "the name is Python's")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+}

@@ -1,0 +1,101 @@
+//! The oracle of `hiz_ref`: conversions only.
+
+use hiz_core::{Bounds, Floats};
+use hiz_ref::{Verdict, View, Volume};
+use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::arguments::{FloatArray, bounds, depth_kind, in_c_order};
+use crate::camera::Camera;
+use crate::errors::detached;
+
+/// Instances between two looks at whether the user wants to stop.
+const BATCH: usize = 256;
+
+// The codes of `hizvk.reference`.
+const HIDDEN: u8 = 1;
+const VISIBLE: u8 = 2;
+const INVALID: u8 = 3;
+const UNDECIDED: u8 = 4;
+
+/// What the oracle says about each instance.
+#[pyfunction]
+pub(crate) fn reference_classify<'py>(
+    py: Python<'py>,
+    bounds_kind: &str,
+    arrays: Vec<FloatArray<'py>>,
+    camera: &Camera,
+    image: FloatArray<'py>,
+    depth_kind: &str,
+    scale: f64,
+) -> PyResult<Bound<'py, PyArray1<u8>>> {
+    let volumes = bounds(bounds_kind, &arrays)?;
+    let (image, depth_kind) = (image.floats()?, self::depth_kind(depth_kind)?);
+    let camera = &camera.0;
+    let (count, ndc) = detached(py, || {
+        Ok((volumes.len()?, hiz_core::ndc_from_kind(image, depth_kind, scale, camera)?))
+    })?;
+    let view = View {
+        rows: camera.rows(),
+        origin: camera.origin(),
+        width: camera.size().width,
+        height: camera.size().height,
+        reversed: camera.convention().is_reversed(),
+    };
+    let mut codes = Vec::with_capacity(count);
+    while codes.len() < count {
+        let batch = codes.len()..count.min(codes.len() + BATCH);
+        let more: Result<Vec<u8>, hiz_ref::Error> =
+            py.detach(|| batch.map(|i| hiz_ref::classify(&view, &volume(&volumes, i), &ndc).map(code)).collect());
+        codes.extend(more.map_err(|error| PyValueError::new_err(error.to_string()))?);
+        py.check_signals()?;
+    }
+    Ok(PyArray1::from_vec(py, codes))
+}
+
+/// `((height, width), texels)` of every level, finest first.
+#[pyfunction]
+#[expect(clippy::type_complexity, reason = "a list of levels, as Python sees it")]
+pub(crate) fn reference_pyramid<'py>(
+    py: Python<'py>,
+    depth: PyReadonlyArrayDyn<'py, f32>,
+    width: u32,
+    height: u32,
+    reversed_z: bool,
+) -> PyResult<Vec<((u32, u32), Bound<'py, PyArray1<f32>>)>> {
+    in_c_order(depth.is_c_contiguous())?;
+    let depth = depth.as_slice()?;
+    let levels = py.detach(|| hiz_ref::pyramid(depth, width, height, reversed_z));
+    Ok(levels.into_iter().map(|level| ((level.height, level.width), PyArray1::from_vec(py, level.texels))).collect())
+}
+
+fn code(verdict: Verdict) -> u8 {
+    match verdict {
+        Verdict::Hidden => HIDDEN,
+        Verdict::Visible => VISIBLE,
+        Verdict::Invalid => INVALID,
+        Verdict::Undecided => UNDECIDED,
+    }
+}
+
+fn numbers<const N: usize>(array: &Floats<'_>, first: usize) -> [f64; N] {
+    std::array::from_fn(|k| array.get(first + k))
+}
+
+fn volume(bounds: &Bounds<'_>, i: usize) -> Volume {
+    match bounds {
+        Bounds::Spheres { centers, radii } => {
+            Volume::Sphere { center: numbers(centers, 3 * i), radius: radii.get(i) }
+        }
+        Bounds::Boxes { min, max } => Volume::Box { min: numbers(min, 3 * i), max: numbers(max, 3 * i) },
+        Bounds::OrientedBoxes { centers, half_sizes, rotations } => {
+            let rows: [f64; 9] = numbers(rotations, 9 * i);
+            Volume::OrientedBox {
+                center: numbers(centers, 3 * i),
+                half_sizes: numbers(half_sizes, 3 * i),
+                axes: std::array::from_fn(|row| std::array::from_fn(|column| rows[3 * row + column])),
+            }
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! Numbers that know what they know: the arithmetic every decision is written in.
+//!
+//! A decision of this crate is the sign of a polynomial in the inputs. It is written once, over [`Scalar`], and run twice:
+//! in [`Ball`] (float64 and a bound of its own error; nearly always enough) and, where a ball's sign is open, in
+//! [`Dyadic`](crate::dyadic::Dyadic) (exact).
+
+use std::cmp::Ordering;
+
+/// A number with ring operations and a sign that may be unknown. No division: every test is cross-multiplied instead, so that the
+/// dyadic fractions (to which every float64 belongs) are closed under all that is needed.
+pub(crate) trait Scalar: Clone {
+    /// The number that a finite float64 denotes, exactly.
+    fn exact(value: f64) -> Self;
+    fn plus(&self, other: &Self) -> Self;
+    fn minus(&self, other: &Self) -> Self;
+    fn times(&self, other: &Self) -> Self;
+    fn negated(&self) -> Self;
+    /// The sign of the true value, or `None` if it is open.
+    fn sign(&self) -> Option<Ordering>;
+
+    /// The absolute value. A ball around 0 may keep its centre's sign: it still contains the true absolute value.
+    fn magnitude(&self) -> Self;
+
+    fn is_zero(&self) -> bool {
+        self.sign() == Some(Ordering::Equal)
+    }
+}
+
+/// Half an ulp of a number in [1, 2): the relative error of one rounded operation.
+const UNIT: f64 = f64::EPSILON / 2.0;
+/// More than what the at most nine roundings of an error bound's own computation can lose: `(1 - UNIT)^9 * GROW > 1`.
+const GROW: f64 = 1.0 + 8.0 * f64::EPSILON;
+
+/// A float64 and a bound of its distance from the true value: the true value lies in `[mid - err, mid + err]`.
+///
+/// Overflow gives an infinite or NaN bound, which decides nothing. A bound of 0 means that `mid` is the true value; exact zeros
+/// are kept exact, because the coefficients of axis-aligned views and boxes are full of them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ball {
+    pub(crate) mid: f64,
+    err: f64,
+}
+
+impl Ball {
+    const ZERO: Ball = Ball { mid: 0.0, err: 0.0 };
+
+    fn is_exact_zero(self) -> bool {
+        self.mid == 0.0 && self.err == 0.0
+    }
+}
+
+impl Scalar for Ball {
+    fn exact(value: f64) -> Self {
+        Ball {
+            mid: value,
+            err: 0.0,
+        }
+    }
+
+    fn plus(&self, other: &Self) -> Self {
+        if self.is_exact_zero() {
+            return *other;
+        }
+        if other.is_exact_zero() {
+            return *self;
+        }
+        let mid = self.mid + other.mid;
+        // Half an ulp of the sum is at most UNIT |mid|, among the subnormals too, where sums are exact.
+        let err = (self.err + other.err + UNIT * mid.abs()) * GROW;
+        Ball { mid, err }
+    }
+
+    fn minus(&self, other: &Self) -> Self {
+        self.plus(&other.negated())
+    }
+
+    fn times(&self, other: &Self) -> Self {
+        if self.is_exact_zero() || other.is_exact_zero() {
+            return Ball::ZERO;
+        }
+        let mid = self.mid * other.mid;
+        // MIN_POSITIVE covers what the four products lose if they underflow (2^-1075 each).
+        let err = (self.mid.abs() * other.err
+            + other.mid.abs() * self.err
+            + self.err * other.err
+            + UNIT * mid.abs()
+            + f64::MIN_POSITIVE)
+            * GROW;
+        Ball { mid, err }
+    }
+
+    fn negated(&self) -> Self {
+        Ball {
+            mid: -self.mid,
+            err: self.err,
+        }
+    }
+
+    fn sign(&self) -> Option<Ordering> {
+        // Every comparison with NaN is false, so an overflow ends in `None`.
+        if self.mid > self.err {
+            Some(Ordering::Greater)
+        } else if self.mid < -self.err {
+            Some(Ordering::Less)
+        } else if self.is_exact_zero() {
+            Some(Ordering::Equal)
+        } else {
+            None
+        }
+    }
+
+    fn magnitude(&self) -> Self {
+        Ball {
+            mid: self.mid.abs(),
+            err: self.err,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dyadic::Dyadic;
+    use proptest::prelude::*;
+
+    /// Whether the ball contains the exact value.
+    fn contains(ball: Ball, truth: &Dyadic) -> bool {
+        if !(ball.mid.is_finite() && ball.err.is_finite()) {
+            return true;
+        }
+        let off = truth.minus(&Dyadic::exact(ball.mid)).magnitude();
+        off.minus(&Dyadic::exact(ball.err)).sign() != Some(Ordering::Greater)
+    }
+
+    fn run<S: Scalar>(inputs: &[f64], program: &[(u8, usize, usize)]) -> Vec<S> {
+        let mut values: Vec<S> = inputs.iter().map(|&x| S::exact(x)).collect();
+        for &(op, a, b) in program {
+            let (a, b) = (&values[a % values.len()], &values[b % values.len()]);
+            values.push(match op % 5 {
+                0 => a.plus(b),
+                1 => a.minus(b),
+                2 => a.times(b),
+                3 => a.negated(),
+                _ => a.magnitude(),
+            });
+        }
+        values
+    }
+
+    proptest! {
+        /// Random straight-line programs, extreme exponents and subnormals included.
+        #[test]
+        fn a_ball_contains_the_exact_value(
+            inputs in prop::collection::vec(prop_oneof![
+                any::<f64>().prop_filter("finite", |x| x.is_finite()),
+                -4.0f64..4.0,
+                (-8i32..8).prop_map(f64::from),
+                (1u64..1 << 60).prop_map(f64::from_bits),
+            ], 1..5),
+            program in prop::collection::vec((any::<u8>(), any::<usize>(), any::<usize>()), 1..9),
+        ) {
+            let balls = run::<Ball>(&inputs, &program);
+            let truths = run::<Dyadic>(&inputs, &program);
+            for (ball, truth) in balls.iter().zip(&truths) {
+                prop_assert!(contains(*ball, truth), "{ball:?} {truth:?}");
+                if let Some(sign) = ball.sign() {
+                    prop_assert_eq!(Some(sign), truth.sign());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_open_sign_is_reported_as_open() {
+        // (1 + e)^2 and 1 + 2e differ by e^2, which float64 cannot see.
+        let e = f64::EPSILON;
+        let square = Ball::exact(1.0 + e).times(&Ball::exact(1.0 + e));
+        assert_eq!(square.minus(&Ball::exact(1.0 + 2.0 * e)).sign(), None);
+        assert_eq!(
+            square.minus(&Ball::exact(1.0 + 4.0 * e)).sign(),
+            Some(Ordering::Less)
+        );
+        let huge = Ball::exact(f64::MAX).times(&Ball::exact(4.0));
+        assert_eq!(huge.sign(), None, "overflow decides nothing");
+        assert_eq!(huge.minus(&huge).sign(), None);
+        let zero = Ball::exact(-0.0).times(&huge);
+        assert_eq!(
+            zero.sign(),
+            Some(Ordering::Equal),
+            "0 times anything finite is 0"
+        );
+    }
+}

@@ -1,0 +1,74 @@
+"""Occlusion culling on the GPU that never hides what can be seen.
+
+How data flows, and which object holds it::
+
+    triangles ── Device.occluders ──> Occluders ─┐ Device.render_depth
+                                                 ├──> DepthImage ── Device.pyramid ──> Pyramid ─┐
+    depth array (kind= says what it holds) ──────┘                                              │ Device.cull
+    Spheres, Boxes, OrientedBoxes ── Device.instances ──> Instances ────────────────────────────┤
+    Camera ─────────────────────────────────────────────────────────────────────────────────────┘
+                                                                                                v
+                        CullResult: .mask .verdicts .indices .count .draws (indirect draw arguments) .stats .explain(i)
+
+A pyramid keeps the farthest depth of every 2^k x 2^k block of pixels on its level k. A cull looks up the few texels
+that cover an instance's bounds; when all of the bounds are provably farther than those, it hides the instance, and the
+others are appended to the list that an indirect draw takes. The promise: for the numbers as given, whatever could
+show in one pixel of the depth image is kept. `reference` holds the slow exact oracle, and `compare` counts false culls
+(there are none) and false keeps (a cost).
+
+    >>> import hizvk
+    >>> device = hizvk.Device()
+    >>> camera = hizvk.Camera.look_at(eye, target, fov_y_deg=60, size=(1080, 1920), near=0.1)
+    >>> crowd = device.instances(hizvk.Spheres(centers, radii))
+    >>> hiz = device.pyramid(device.render_depth(device.occluders(vertices, triangles), camera))
+    >>> seen = device.cull(crowd, camera, hiz)
+    >>> seen.mask, seen.indices, seen.draws
+
+or in one call ``hizvk.visible(hizvk.Boxes(lo, hi), camera, depth=image, kind="z")``.
+
+Conventions: matrices are C-order (4, 4) for column vectors, NDC is x right, y up, z in 0..1, sizes are (height, width),
+row 0 of an image is its top, and the first pixel's centre is at (0.5, 0.5). Bad arguments raise `TypeError` or
+`ValueError` with the parameter's name; everything that the device refuses is a `HizError`.
+"""
+
+from . import reference
+from ._core import __version__
+from .bounds import Boxes, OrientedBoxes, Spheres
+from .camera import Camera
+from .comparison import Comparison, compare
+from .device import Adapter, Device, adapters
+from .errors import DeviceLostError, HizError, LimitError, NoAdapterError, OutOfMemoryError
+from .oneline import visible
+from .resources import DepthImage, Instances, Mesh, Occluders, Pyramid
+from .result import DRAW_DTYPE, CullResult, CullStats, DrawTemplate, Explanation, Verdict
+
+__all__ = [
+    "DRAW_DTYPE",
+    "Adapter",
+    "Boxes",
+    "Camera",
+    "Comparison",
+    "CullResult",
+    "CullStats",
+    "DepthImage",
+    "Device",
+    "DeviceLostError",
+    "DrawTemplate",
+    "Explanation",
+    "HizError",
+    "Instances",
+    "LimitError",
+    "Mesh",
+    "NoAdapterError",
+    "Occluders",
+    "OrientedBoxes",
+    "OutOfMemoryError",
+    "Pyramid",
+    "Spheres",
+    "Verdict",
+    "__version__",
+    "adapters",
+    "compare",
+    "reference",
+    "visible",
+]

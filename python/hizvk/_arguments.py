@@ -1,0 +1,299 @@
+"""Checks of arguments, in one place, so that every message reads the same.
+
+``<parameter>: expected <what>, got <what came>``: a `TypeError` when the type or the kind of dtype is wrong, a
+`ValueError` when the shape or the value is. Nothing here copies an array that is already as the engine takes it
+(float32 or float64, C order, native byte order, aligned).
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+import operator
+from collections.abc import Iterable, Sequence
+from typing import Any, TypeAlias, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray: TypeAlias = npt.NDArray[np.float32] | npt.NDArray[np.float64]
+Size: TypeAlias = tuple[int, int]
+T = TypeVar("T")
+
+#: The largest image side of a camera; a device may allow less (`Device.max_image_side`).
+LARGEST_SIDE = 32768
+#: Whole numbers up to here are exact in float64.
+LARGEST_EXACT_INTEGER = 2**53
+
+
+def describe(value: object) -> str:
+    """What came, in a few words: ``(3, 100) int64`` for arrays, type and value for the rest."""
+    if isinstance(value, (np.ndarray, np.generic)) and value.ndim > 0:
+        return f"{_shape_text(value.shape)} {value.dtype}"
+    if value is None:
+        return "None"
+    text = repr(value)
+    if len(text) > 60:
+        text = text[:57] + "..."
+    return f"{type(value).__name__} {text}"
+
+
+def _shape_text(shape: Sequence[int | str]) -> str:
+    """``(N, 3)``: numpy's own spelling, with letters for the free sides."""
+    inner = ", ".join(str(side) for side in shape)
+    return f"({inner},)" if len(shape) == 1 else f"({inner})"
+
+
+def _wrong_type(name: str, expected: str, value: object) -> TypeError:
+    return TypeError(f"{name}: expected {expected}, got {describe(value)}")
+
+
+def _wrong_value(name: str, expected: str, value: object) -> ValueError:
+    return ValueError(f"{name}: expected {expected}, got {describe(value)}")
+
+
+def _as_array(name: str, expected: str, value: object) -> npt.NDArray[Any]:
+    """`value` as an array of numbers, without a copy where it is one; lists of Python ints become float64."""
+    if isinstance(value, np.ma.MaskedArray):
+        raise TypeError(f"{name}: expected {expected}, got a masked array; fill it first, e.g. with .filled(np.nan)")
+    if isinstance(value, (str, bytes)) or value is None:
+        raise _wrong_type(name, expected, value)
+    try:
+        array = np.asarray(value)
+    except ValueError as error:  # a ragged list
+        raise ValueError(f"{name}: expected {expected}, got a sequence that is no array ({error})") from None
+    if array.dtype.kind in "iu" and not hasattr(value, "dtype"):
+        if array.size and max(abs(int(array.min())), abs(int(array.max()))) > LARGEST_EXACT_INTEGER:
+            raise ValueError(f"{name}: expected {expected}, got integers that float64 cannot hold")
+        array = array.astype(np.float64)
+    return array
+
+
+def _check_shape(name: str, expected: str, array: npt.NDArray[Any], shape: Sequence[int | str]) -> None:
+    fits = array.ndim == len(shape) and all(
+        isinstance(wanted, str) or wanted == side for wanted, side in zip(shape, array.shape, strict=True)
+    )
+    if not fits:
+        raise ValueError(f"{name}: expected {expected}, got {_shape_text(array.shape)} {array.dtype}")
+
+
+def _ready(array: npt.NDArray[Any]) -> FloatArray:
+    """The array as the engine reads it: float32 or float64, native, aligned, C order; itself where it is that."""
+    wanted = np.float64 if array.dtype.itemsize == 8 else np.float32  # float16 widens exactly
+    return np.require(array, dtype=wanted, requirements=["C", "A"])
+
+
+def floats(name: str, value: object, shape: Sequence[int | str], *, why: str = "") -> FloatArray:
+    """A float array of this shape (letters are free sides), converted only where it has to be."""
+    expected = f"float {_shape_text(shape)}{why}"
+    array = _as_array(name, expected, value)
+    if array.dtype.kind != "f" or array.dtype.itemsize not in (2, 4, 8):
+        got = describe(array if array.ndim else value)
+        raise TypeError(f"{name}: expected {expected}, got {got}")
+    _check_shape(name, expected, array, shape)
+    return _ready(array)
+
+
+def floats_or_scalar(name: str, value: object, count: int) -> FloatArray:
+    """A float array ``(count,)``, or one number for all of them."""
+    if not isinstance(value, np.ndarray) and isinstance(value, numbers.Real) and not isinstance(value, bool):
+        try:
+            return np.full(count, float(value), dtype=np.float64)
+        except OverflowError:
+            raise _wrong_value(name, f"float ({count},) or one number", value) from None
+    if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind == "f":
+        return np.full(count, float(value), dtype=np.float64)
+    return floats(name, value, (count,), why=" or one number")
+
+
+def finite_floats(name: str, value: object, shape: Sequence[int | str]) -> FloatArray:
+    """`floats`, all of them finite."""
+    array = floats(name, value, shape)
+    if not np.isfinite(array).all():
+        bad = int(np.count_nonzero(~np.isfinite(array)))
+        raise ValueError(f"{name}: expected finite float {_shape_text(shape)}, got {bad} NaN or infinite numbers")
+    return array
+
+
+def numbers_of_shape(name: str, value: object, shape: Sequence[int]) -> npt.NDArray[np.float64]:
+    """A small float64 array of finite numbers (a vector or matrix of a camera); integers are welcome here."""
+    expected = f"{_shape_text(shape)} finite numbers"
+    array = _as_array(name, expected, value)
+    if array.dtype.kind not in "fiu" or array.dtype.itemsize > 8:
+        raise TypeError(f"{name}: expected {expected}, got {describe(array if array.ndim else value)}")
+    _check_shape(name, expected, array, shape)
+    result: npt.NDArray[np.float64] = np.array(array, dtype=np.float64, order="C")
+    if not np.isfinite(result).all():
+        raise ValueError(f"{name}: expected {expected}, got {' '.join(str(result.tolist()).split())}")
+    return result
+
+
+def vector(name: str, value: object) -> tuple[float, float, float]:
+    """Three finite numbers."""
+    x, y, z = numbers_of_shape(name, value, (3,)).tolist()
+    return (x, y, z)
+
+
+def matrix(name: str, value: object) -> npt.NDArray[np.float64]:
+    """A ``(4, 4)`` matrix of finite numbers that can be inverted."""
+    result = numbers_of_shape(name, value, (4, 4))
+    _refuse_singular(name, "an invertible (4, 4) matrix", result)
+    return result
+
+
+def pose(name: str, value: object) -> npt.NDArray[np.float64]:
+    """An invertible ``(4, 4)`` matrix that maps points to points: its last row is 0, 0, 0, 1."""
+    result = matrix(name, value)
+    check_affine(name, result)
+    return result
+
+
+def check_affine(name: str, matrices: npt.NDArray[Any]) -> None:
+    """Refuse a last row other than 0, 0, 0, 1; the usual cause is a transposed matrix, so say so."""
+    if not (matrices[..., 3, :] == (0.0, 0.0, 0.0, 1.0)).all():
+        rows = matrices[..., 3, :].reshape(-1, 4)
+        bad = rows[(rows != (0.0, 0.0, 0.0, 1.0)).any(axis=1)][0].tolist()
+        hint = ""
+        if (matrices[..., :, 3] == (0.0, 0.0, 0.0, 1.0)).all():
+            hint = "; it looks transposed: vectors are columns here, clip = M @ [x, y, z, 1]"
+        raise ValueError(f"{name}: expected the last row to be 0, 0, 0, 1, got {bad}{hint}")
+
+
+def _refuse_singular(name: str, expected: str, square: npt.NDArray[np.float64]) -> None:
+    """Exactly or hopelessly singular after rows and columns are brought to one scale (a far plane of 1e9 is fine)."""
+    scaled = square.copy()
+    for axis in (1, 0, 1, 0):
+        largest = np.abs(scaled).max(axis=axis, keepdims=True)
+        if not (largest > 0.0).all():
+            raise ValueError(f"{name}: expected {expected}, got a singular one (a row or column is zero)")
+        scaled = scaled / np.exp2(np.floor(np.log2(largest)))
+    if np.linalg.svd(scaled, compute_uv=False)[-1] < 1e-15:
+        raise ValueError(f"{name}: expected {expected}, got a singular one")
+
+
+def number(
+    name: str,
+    value: object,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    below: float | None = None,
+    at_most: float | None = None,
+) -> float:
+    """One finite real number, within the given bounds."""
+    parts = ["a finite number"]
+    parts += [f"above {above:g}"] if above is not None else []
+    parts += [f"at least {at_least:g}"] if at_least is not None else []
+    parts += [f"below {below:g}"] if below is not None else []
+    parts += [f"at most {at_most:g}"] if at_most is not None else []
+    expected = parts[0] + (" " + " and ".join(parts[1:]) if len(parts) > 1 else "")
+    if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "fiu":
+        value = value.item()
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, numbers.Real):
+        raise _wrong_type(name, expected, value)
+    try:
+        result = float(value)
+    except OverflowError:
+        raise _wrong_value(name, expected, value) from None
+    fits = math.isfinite(result)
+    fits = fits and (above is None or result > above) and (below is None or result < below)
+    fits = fits and (at_least is None or result >= at_least) and (at_most is None or result <= at_most)
+    if not fits:
+        raise _wrong_value(name, expected, value)
+    return result
+
+
+def integer(name: str, value: object, *, low: int, high: int) -> int:
+    """One whole number of ``low..high``, both included."""
+    expected = f"an integer in {low}..{high}"
+    if isinstance(value, (bool, np.bool_)):
+        raise _wrong_type(name, expected, value)
+    try:
+        result = operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise _wrong_type(name, expected, value) from None
+    if not low <= result <= high:
+        raise _wrong_value(name, expected, value)
+    return result
+
+
+def size(name: str, value: object) -> Size:
+    """An image size ``(height, width)`` of at least one pixel."""
+    expected = f"(height, width), two integers in 1..{LARGEST_SIDE}"
+    if isinstance(value, (str, bytes)) or not isinstance(value, (Sequence, np.ndarray)):
+        raise _wrong_type(name, expected, value)
+    if len(value) != 2:
+        raise _wrong_value(name, expected, value)
+    sides = []
+    for side in value:
+        try:
+            if isinstance(side, (bool, np.bool_)):
+                raise TypeError
+            sides.append(operator.index(side))
+        except TypeError:
+            raise _wrong_type(name, expected, value) from None
+    if not all(1 <= side <= LARGEST_SIDE for side in sides):
+        raise _wrong_value(name, expected, value)
+    return (sides[0], sides[1])
+
+
+def flag(name: str, value: object) -> bool:
+    """True or False, nothing that merely counts as one."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise _wrong_type(name, "True or False", value)
+    return bool(value)
+
+
+def choice(name: str, value: object, choices: Iterable[str]) -> str:
+    """One of a few words."""
+    known = tuple(choices)
+    expected = "one of " + ", ".join(f'"{word}"' for word in known)
+    if not isinstance(value, str):
+        raise _wrong_type(name, expected, value)
+    if value not in known:
+        raise _wrong_value(name, expected, value)
+    return value
+
+
+def instance(name: str, value: object, wanted: type[T], expected: str) -> T:
+    """An object of this class."""
+    if not isinstance(value, wanted):
+        raise _wrong_type(name, expected, value)
+    return value
+
+
+def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
+    """A ``(count,)`` bool array (any length for None)."""
+    shape: tuple[int | str, ...] = ("N" if count is None else count,)
+    expected = f"bool {_shape_text(shape)}"
+    if isinstance(value, (str, bytes)) or value is None or isinstance(value, np.ma.MaskedArray):
+        raise _wrong_type(name, expected, value)
+    array = np.asarray(value)
+    if array.size == 0 and not hasattr(value, "dtype"):
+        array = array.astype(np.bool_)
+    if array.dtype.kind != "b":
+        raise TypeError(f"{name}: expected {expected}, got {describe(array if array.ndim else value)}")
+    _check_shape(name, expected, array, shape)
+    return np.ascontiguousarray(array, dtype=np.bool_)
+
+
+def triangles(name: str, value: object, vertex_count: int) -> npt.NDArray[np.uint32]:
+    """``(T, 3)`` indices of vertices, as uint32; any integer dtype comes in."""
+    expected = "integer (T, 3)"
+    if isinstance(value, (str, bytes)) or value is None or isinstance(value, np.ma.MaskedArray):
+        raise _wrong_type(name, expected, value)
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(f"{name}: expected {expected}, got a sequence that is no array ({error})") from None
+    if array.size == 0 and not hasattr(value, "dtype"):
+        array = array.reshape(0, 3).astype(np.uint32)
+    if array.dtype.kind not in "iu":
+        raise TypeError(f"{name}: expected {expected}, got {describe(array if array.ndim else value)}")
+    _check_shape(name, expected, array, ("T", 3))
+    if array.size:
+        low, high = int(array.min()), int(array.max())
+        if low < 0 or high >= vertex_count:
+            wrong = low if low < 0 else high
+            raise ValueError(f"{name}: expected vertex indices in 0..{vertex_count - 1}, got {wrong}")
+    return np.require(array, dtype=np.uint32, requirements=["C", "A"])

@@ -1,0 +1,118 @@
+"""How a cull compares with the truth: what it must never do, and what it costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import _arguments, reference
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+__all__ = ["Comparison", "compare"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison:
+    """A mask beside the truth."""
+
+    false_culls: npt.NDArray[np.intp]
+    """Instances that are visible and were culled: each one is a bug."""
+    false_keeps: npt.NDArray[np.intp]
+    """Instances that are hidden and were kept: a cost."""
+    total: int
+    """Instances."""
+    kept: int
+    """Instances that the mask keeps."""
+    visible: int
+    """Instances that are visible in truth."""
+    hidden: int
+    """Instances that are hidden in truth (outside the view, or occluded)."""
+    undecided: int
+    """Instances that the truth leaves open; they count neither as false culls nor as false keeps."""
+
+    @property
+    def culled(self) -> int:
+        """Instances that the mask culls."""
+        return self.total - self.kept
+
+    @property
+    def kept_share(self) -> float:
+        """`kept` / `total`; 0 for no instances."""
+        return self.kept / self.total if self.total else 0.0
+
+    @property
+    def false_keep_share(self) -> float:
+        """Of the hidden, the share that was kept; 0 where nothing is hidden."""
+        return len(self.false_keeps) / self.hidden if self.hidden else 0.0
+
+    @property
+    def kept_over_visible(self) -> float:
+        """`kept` / `visible`: 1 is perfect; infinite where nothing is visible and something was kept."""
+        if self.visible:
+            return self.kept / self.visible
+        return float("inf") if self.kept else 1.0
+
+    def __repr__(self) -> str:
+        return f"<Comparison: {self}>"
+
+    def __str__(self) -> str:
+        return (
+            f"{self.total:,} instances, {self.kept:,} kept, {self.visible:,} visible, {self.hidden:,} hidden, "
+            f"{self.undecided:,} undecided; {len(self.false_culls):,} wrongly culled, {len(self.false_keeps):,} "
+            f"wrongly kept ({100.0 * self.false_keep_share:.1f} % of the hidden)"
+        )
+
+
+def compare(mask: npt.ArrayLike, truth: npt.ArrayLike) -> Comparison:
+    """Compares what a cull kept with what is visible.
+
+    Parameters
+    ----------
+    mask : (N,) bool array
+        True for what was kept, as `CullResult.mask`.
+    truth : (N,) bool or uint8 array
+        True for what is visible; or the codes of `hizvk.reference.classify`, where `reference.UNDECIDED` counts as
+        neither and `reference.INVALID` as visible (bad bounds have to be kept).
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    TypeError, ValueError
+        For other dtypes, or lengths that differ.
+
+    Examples
+    --------
+    >>> hizvk.compare([True, False, True], [True, True, False])
+    <Comparison: 3 instances, 2 kept, 2 visible, 1 hidden, 0 undecided; 1 wrongly culled, 1 wrongly kept (100.0 % of \
+the hidden)>
+    """
+    kept = _arguments.bools("mask", mask, None)
+    codes = np.asarray(truth)
+    if isinstance(truth, np.ndarray) and codes.dtype == np.uint8:
+        if codes.shape != kept.shape:
+            raise ValueError(f"truth: expected uint8 ({len(kept)},), got {_arguments.describe(truth)}")
+        known = (reference.HIDDEN, reference.VISIBLE, reference.INVALID, reference.UNDECIDED)
+        unknown = codes[~np.isin(codes, known)]
+        if unknown.size:
+            raise ValueError(f"truth: expected codes of hizvk.reference {known}, got {int(unknown[0])}")
+        is_visible = (codes == reference.VISIBLE) | (codes == reference.INVALID)
+        is_hidden = codes == reference.HIDDEN
+    else:
+        is_visible = _arguments.bools("truth", truth, len(kept))
+        is_hidden = ~is_visible
+    return Comparison(
+        false_culls=np.flatnonzero(is_visible & ~kept),
+        false_keeps=np.flatnonzero(is_hidden & kept),
+        total=len(kept),
+        kept=int(kept.sum()),
+        visible=int(is_visible.sum()),
+        hidden=int(is_hidden.sum()),
+        undecided=int((~is_visible & ~is_hidden).sum()),
+    )

@@ -1,0 +1,370 @@
+"""The device: it uploads, renders depth, builds pyramids and culls.
+
+Its methods keep to the order of the data: a depth image (rendered from occluders, or an array) becomes a pyramid, and a
+cull tests instances against the pyramid. The interpreter lock is released while the device works; all objects may be
+used from any thread, also at the same time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
+
+import numpy as np
+
+from . import _arguments, _core
+from .bounds import Bounds, as_arrays
+from .camera import Camera
+from .depth import checked_image
+from .errors import NoAdapterError
+from .resources import DepthImage, Instances, Mesh, Occluders, Pyramid, as_meshes
+from .result import CullResult, DrawTemplate
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from ._arguments import Size
+    from .depth import DepthKind
+
+__all__ = ["Adapter", "Device", "adapters"]
+
+# Unions of words: stubtest takes Literal["a", "b"] for something else at run time.
+Order: TypeAlias = Literal["stable"] | Literal["any"]
+Coverage: TypeAlias = Literal["area"] | Literal["sample"]
+FaceCull: TypeAlias = Literal["none"] | Literal["back"] | Literal["front"]
+
+
+@dataclass(frozen=True)
+class Adapter:
+    """A Vulkan adapter (a GPU, or a software driver)."""
+
+    index: int
+    """Its place in the list of `adapters`."""
+    name: str
+    """The adapter's name."""
+    driver: str
+    """The driver's name."""
+    driver_info: str
+    """The driver's version."""
+    backend: str
+    """The graphics interface, ``"vulkan"``."""
+    device_type: str
+    """``"discrete_gpu"``, ``"integrated_gpu"``, ``"virtual_gpu"``, ``"cpu"`` or ``"other"``."""
+
+    def __str__(self) -> str:
+        driver = " ".join(part for part in (self.driver, self.driver_info) if part)
+        return f"{self.index}: {self.name} [{self.device_type}, {driver}]"
+
+
+def adapters() -> list[Adapter]:
+    """The Vulkan adapters of this machine; an empty list without a Vulkan driver."""
+    return [Adapter(*summary) for summary in _core.adapters()]
+
+
+class Device:
+    """A Vulkan device with its queue and pipelines.
+
+    Parameters
+    ----------
+    adapter : str or int, optional
+        Which adapter: its index in `adapters`, or a part of its or its driver's name (``"lavapipe"``). None takes what
+        the environment variable ``HIZVK_ADAPTER`` says in the same words, else the best one, GPUs first.
+
+    Raises
+    ------
+    NoAdapterError
+        Without such an adapter; the error lists those there are and the line that installs a software driver.
+    TypeError
+        If `adapter` is neither.
+    """
+
+    def __init__(self, adapter: str | int | None = None) -> None:
+        expected = "an adapter's index, a part of its name, or None"
+        if isinstance(adapter, (bool, np.bool_)) or not isinstance(adapter, (str, int, np.integer, type(None))):
+            raise TypeError(f"adapter: expected {expected}, got {_arguments.describe(adapter)}")
+        if isinstance(adapter, str) and not adapter.strip():
+            raise ValueError(f"adapter: expected {expected}, got an empty string")
+        if isinstance(adapter, str):
+            self._engine = _core.Engine(adapter)
+            return
+        index = None if adapter is None else _arguments.integer("adapter", adapter, low=0, high=2**31 - 1)
+        self._engine = _core.Engine(None if index is None else str(index))
+        if index is not None and self.adapter.index != index:  # the text of a number can also be part of a name
+            raise NoAdapterError([str(seen) for seen in adapters()], "", f"has the index {index}")
+
+    @property
+    def adapter(self) -> Adapter:
+        """The adapter that it runs on."""
+        return Adapter(*self._engine.adapter())
+
+    @property
+    def max_image_side(self) -> int:
+        """The largest height or width of a depth image on this device."""
+        return self._engine.max_image_side()
+
+    def instances(self, bounds: Bounds, *, strict: bool = False) -> Instances:
+        """Uploads bounds, once for any number of culls.
+
+        Parameters
+        ----------
+        bounds : Spheres, Boxes or OrientedBoxes
+            The volumes. Positions may be float64; they are split so that nothing is lost far from the origin.
+        strict : bool
+            True refuses bounds that are no volume (NaN, infinite, a negative size, min > max). False keeps them
+            visible, and `Instances.invalid` and `CullStats.invalid` tell of them.
+
+        Raises
+        ------
+        TypeError, ValueError
+            For other bounds, or bad ones with ``strict=True``.
+        LimitError, OutOfMemoryError
+            If the device cannot hold them.
+        """
+        kind, arrays = as_arrays("bounds", bounds)
+        strict = _arguments.flag("strict", strict)
+        return Instances(self, self._engine.instances(kind, arrays, strict, None))
+
+    @overload
+    def occluders(
+        self,
+        vertices: npt.ArrayLike,
+        triangles: npt.ArrayLike,
+        *,
+        transforms: npt.ArrayLike | None = None,
+        cull: FaceCull = "none",
+    ) -> Occluders: ...
+
+    @overload
+    def occluders(
+        self,
+        vertices: Mesh | Sequence[Mesh | tuple[npt.ArrayLike, ...]],
+        triangles: None = None,
+        *,
+        cull: FaceCull = "none",
+    ) -> Occluders: ...
+
+    def occluders(
+        self, vertices: Any, triangles: Any = None, *, transforms: Any = None, cull: FaceCull = "none"
+    ) -> Occluders:
+        """Uploads triangle meshes that hide things, once for any number of renderings.
+
+        Parameters
+        ----------
+        vertices : (V, 3) float array; or a Mesh, or a list of Mesh
+            World positions (or the mesh's own, with `transforms`). A list may also hold plain tuples ``(vertices,
+            triangles)`` or ``(vertices, triangles, transforms)``.
+        triangles : (T, 3) integer array
+            Indices of vertices; left out when `vertices` is a Mesh or a list.
+        transforms : (K, 4, 4) or (4, 4) float array, optional
+            ``world_from_mesh`` of each copy.
+        cull : "none", "back" or "front"
+            Faces that are left out; the front is where the triangle runs counter-clockwise.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+        LimitError, OutOfMemoryError
+            If the device cannot hold them.
+        """
+        meshes = as_meshes(vertices, triangles, transforms)
+        cull_mode = _arguments.choice("cull", cull, ("none", "back", "front"))
+        raw = [(mesh.vertices, mesh.triangles, mesh.transforms) for mesh in meshes]
+        return Occluders(self, self._engine.occluders(raw, cull_mode))
+
+    def render_depth(self, occluders: Occluders, camera: Camera, *, size: Size | None = None) -> DepthImage:
+        """Renders occluders into a depth image that stays on the device.
+
+        Parameters
+        ----------
+        occluders : Occluders
+            Of this device.
+        camera : Camera
+            The view.
+        size : (height, width), optional
+            Another image size for the same view; the image's camera is then ``camera.resized(size)``, and the cull
+            promises for that image.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+        LimitError, OutOfMemoryError
+            If the image is larger than the device allows.
+        """
+        _arguments.instance("occluders", occluders, Occluders, "Occluders of Device.occluders")
+        self._own("occluders", occluders)
+        _arguments.instance("camera", camera, Camera, "a Camera")
+        if size is not None:
+            camera = camera.resized(size)
+        return DepthImage(self, self._engine.render_depth(occluders._inner, camera._inner), camera)
+
+    @overload
+    def pyramid(self, depth: DepthImage, camera: None = None, *, kind: None = None, scale: float = 1.0) -> Pyramid: ...
+
+    @overload
+    def pyramid(self, depth: npt.ArrayLike, camera: Camera, *, kind: DepthKind, scale: float = 1.0) -> Pyramid: ...
+
+    def pyramid(
+        self, depth: Any, camera: Camera | None = None, *, kind: DepthKind | None = None, scale: float = 1.0
+    ) -> Pyramid:
+        """Builds the depth pyramid of a depth image.
+
+        Parameters
+        ----------
+        depth : DepthImage or (height, width) array
+            A rendered image of this device, alone; or an array, with `camera` and `kind`. Arrays are float, or uint16
+            for the kinds ``"z"`` and ``"distance"``; row 0 is the top of the image.
+        camera : Camera
+            The camera that saw the array; its size is the array's shape.
+        kind : {"ndc", "reversed_ndc", "z", "distance"}
+            What the array's numbers are; there is no default, because a wrong guess hides things.
+
+            ``"ndc"``: depth buffer values, 0 near and 1 far (a camera with ``reversed_z=False``);
+            ``"reversed_ndc"``: 1 near and 0 far (``reversed_z=True``);
+            ``"z"``: depth along the view direction in world units;
+            ``"distance"``: distance to the eye along the pixel's ray in world units.
+            NaN, and for z and distance also zero, negative and infinite numbers, are "no data": as far as can be.
+        scale : float
+            World units of one step, for the kinds ``"z"`` and ``"distance"`` (0.001 for millimetres).
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+        LimitError, OutOfMemoryError
+            If the image is larger than the device allows.
+        """
+        if isinstance(depth, DepthImage):
+            for name, value in (("camera", camera), ("kind", kind)):
+                if value is not None:
+                    got = _arguments.describe(value)
+                    raise TypeError(f"{name}: expected nothing beside a DepthImage, which has its own, got {got}")
+            self._own("depth", depth)
+            return Pyramid(self, self._engine.pyramid(depth._inner), depth.camera)
+        camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")
+        image, kind, scale = checked_image("depth", depth, camera, kind, scale)
+        uploaded = self._engine.upload_depth(image, kind, scale, camera._inner)
+        return Pyramid(self, self._engine.pyramid(uploaded), camera)
+
+    def cull(
+        self,
+        instances: Instances,
+        camera: Camera,
+        pyramid: Pyramid,
+        *,
+        order: Order = "stable",
+        coverage: Coverage = "area",
+        guard_px: float | None = None,
+        depth_slack: float = 2.0**-23,
+        transform_slack: float = 0.0,
+        capacity: int | None = None,
+        draw: DrawTemplate | None = None,
+        statistics: bool = True,
+    ) -> CullResult:
+        """Tests instances against a pyramid. What could be seen in the depth image is never culled.
+
+        Parameters
+        ----------
+        instances : Instances
+            Of this device.
+        camera : Camera
+            The camera of the pyramid (`Pyramid.camera` or one equal to it).
+        pyramid : Pyramid
+            Of this device.
+        order : "stable" or "any"
+            Whether the list of the visible ascends, or comes as the device finished (faster).
+        coverage : "area" or "sample"
+            ``"area"``: visible is what meets any part of a pixel. ``"sample"``: what covers no pixel centre counts as
+            hidden; right for an image of one sample a pixel, the same viewport and no jitter.
+        guard_px : float, optional
+            Pixels by which bounds grow in the image, a multiple of 1/256 up to 16. None: 0 for area, 1/64 for sample.
+        depth_slack : float
+            Relative error of the depth image, up to 0.5; by default one ulp, for depth that was rounded to float32.
+        transform_slack : float
+            For depth images of a renderer that transforms in float32: ulps that its matrix product may have cost (about
+            4), up to 1e6.
+        capacity : int, optional
+            Most instances in the list. None: enough for all. Too small a capacity shows as ``count < demand``; mask and
+            verdicts stay complete.
+        draw : DrawTemplate, optional
+            The other numbers of the draw arguments; None leaves them 0.
+        statistics : bool
+            Whether to count the tests by level.
+
+        Returns
+        -------
+        CullResult
+            Recorded and submitted; reading it waits.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came; also for a camera other than the pyramid's.
+        LimitError, OutOfMemoryError
+            If the device cannot hold the outputs.
+        """
+        _arguments.instance("instances", instances, Instances, "Instances of Device.instances")
+        self._own("instances", instances)
+        _arguments.instance("camera", camera, Camera, "a Camera")
+        _arguments.instance("pyramid", pyramid, Pyramid, "a Pyramid of Device.pyramid")
+        self._own("pyramid", pyramid)
+        if camera != pyramid.camera:
+            raise ValueError(
+                f"camera: expected the camera of the pyramid, {pyramid.camera!r}, got {camera!r}; depth of one camera "
+                "says nothing about another one"
+            )
+        options = cull_options(
+            order=order, coverage=coverage, guard_px=guard_px, depth_slack=depth_slack,
+            transform_slack=transform_slack, capacity=capacity, draw=draw, statistics=statistics,
+        )  # fmt: skip
+        culling = self._engine.cull(instances._inner, camera._inner, pyramid._inner, *options)
+        return CullResult(culling, statistics=options[-1])
+
+    def wait(self) -> None:
+        """Waits until everything that was submitted is done."""
+        self._engine.wait()
+
+    def _own(self, name: str, thing: Instances | Occluders | DepthImage | Pyramid) -> None:
+        if thing.device is not self:
+            raise ValueError(f"{name}: expected {type(thing).__name__} of this device, got one of another Device")
+
+    def __repr__(self) -> str:
+        return f"<Device {self.adapter}>"
+
+
+def cull_options(
+    *,
+    order: object,
+    coverage: object,
+    guard_px: object,
+    depth_slack: object,
+    transform_slack: object,
+    capacity: object,
+    draw: object,
+    statistics: object,
+) -> tuple[str, str, float | None, float, float, int | None, tuple[int, int, int, int], bool]:
+    """The checked options of a cull, in the engine's order."""
+    if guard_px is not None:
+        guard_px = _arguments.number("guard_px", guard_px, at_least=0.0, at_most=16.0)
+        if guard_px * 256.0 != round(guard_px * 256.0):
+            raise ValueError(f"guard_px: expected a multiple of 1/256, got {guard_px}")
+    if capacity is not None:
+        capacity = _arguments.integer("capacity", capacity, low=0, high=2**32 - 1)
+    if draw is None:
+        template = (0, 0, 0, 0)
+    else:
+        draw = _arguments.instance("draw", draw, DrawTemplate, "a DrawTemplate or None")
+        template = (draw.index_count, draw.first_index, draw.base_vertex, draw.first_instance)
+    return (
+        _arguments.choice("order", order, ("stable", "any")),
+        _arguments.choice("coverage", coverage, ("area", "sample")),
+        guard_px,
+        _arguments.number("depth_slack", depth_slack, at_least=0.0, at_most=0.5),
+        _arguments.number("transform_slack", transform_slack, at_least=0.0, at_most=1e6),
+        capacity,
+        template,
+        _arguments.flag("statistics", statistics),
+    )

@@ -1,0 +1,71 @@
+"""What can go wrong beyond a bad argument: every error of the device is a `HizError`.
+
+Bad arguments are plain `TypeError` (a wrong type or kind of dtype) and `ValueError` (a wrong shape, a camera with
+NaN, a stale pyramid); their text names the parameter, what it expects and what came.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+__all__ = ["DeviceLostError", "HizError", "LimitError", "NoAdapterError", "OutOfMemoryError"]
+
+
+class HizError(Exception):
+    """Base of what the device, its driver or its limits refuse."""
+
+
+class NoAdapterError(HizError):
+    """There is no Vulkan adapter, or none that answers to the name that was asked for.
+
+    Attributes
+    ----------
+    seen : tuple of str
+        The adapters that were found, one line each; empty when there is no Vulkan driver.
+    hint : str
+        What to do about it, the line that installs a software driver among it.
+    request : str
+        What was asked for, in words.
+    """
+
+    def __init__(self, seen: Sequence[str] = (), hint: str = "", request: str = "") -> None:
+        self.seen = tuple(seen)
+        self.hint = hint
+        self.request = request
+        super().__init__(self.seen, hint, request)
+
+    def __str__(self) -> str:
+        found = ", ".join(self.seen) if self.seen else "none"
+        wanted = f" {self.request}" if self.request else ""
+        return f"no Vulkan adapter{wanted}; seen: {found}. {self.hint}".rstrip()
+
+
+class LimitError(HizError):
+    """Something is larger than this device can hold.
+
+    Attributes
+    ----------
+    name : str
+        The limit.
+    requested, allowed : int
+        What was asked for, and the most that the device allows.
+    """
+
+    def __init__(self, name: str, requested: int, allowed: int) -> None:
+        self.name = name
+        self.requested = requested
+        self.allowed = allowed
+        super().__init__(name, requested, allowed)
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.requested} requested, this device allows {self.allowed}"
+
+
+class DeviceLostError(HizError):
+    """The driver gave the device up (a reset, a removed GPU): make a new `Device` and upload again."""
+
+
+class OutOfMemoryError(HizError):
+    """The device has no memory left for what was asked."""

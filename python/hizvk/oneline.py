@@ -1,0 +1,112 @@
+"""The whole way in one call: bounds and a depth image in, a mask out."""
+
+from __future__ import annotations
+
+import os
+import threading
+from typing import TYPE_CHECKING
+
+from . import _arguments
+from .bounds import Bounds, as_arrays
+from .camera import Camera
+from .depth import checked_image
+from .device import Device, cull_options
+from .resources import DepthImage
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    from .depth import DepthKind
+    from .device import Coverage
+
+__all__ = ["visible"]
+
+_lock = threading.Lock()
+_default: tuple[int, Device] | None = None
+
+
+def default_device() -> Device:
+    """The device of callers who bring none; made at the first use, once a process."""
+    global _default
+    with _lock:
+        if _default is None or _default[0] != os.getpid():  # a forked child cannot use its parent's
+            _default = (os.getpid(), Device())
+        return _default[1]
+
+
+def visible(
+    bounds: Bounds,
+    camera: Camera,
+    *,
+    depth: npt.ArrayLike | DepthImage,
+    kind: DepthKind | None = None,
+    scale: float = 1.0,
+    device: Device | None = None,
+    coverage: Coverage = "area",
+    guard_px: float | None = None,
+    depth_slack: float = 2.0**-23,
+    transform_slack: float = 0.0,
+) -> npt.NDArray[np.bool_]:
+    """Which bounds can be seen: False only for what is surely outside the view or surely behind the depth image.
+
+    For many calls with the same bounds, upload them once (`Device.instances`) and use `Device.cull`.
+
+    Parameters
+    ----------
+    bounds : Spheres, Boxes or OrientedBoxes
+        The N volumes.
+    camera : Camera
+        The camera that saw `depth`.
+    depth : (height, width) array or DepthImage
+        The depth image, row 0 on top; its shape is the camera's size.
+    kind : {"ndc", "reversed_ndc", "z", "distance"}
+        What an array's numbers are (see `Device.pyramid`); left out for a `DepthImage`.
+    scale : float
+        World units of one step of `depth`, for the kinds ``"z"`` and ``"distance"``.
+    device : Device, optional
+        None: one that is made at the first call and kept.
+    coverage, guard_px, depth_slack, transform_slack
+        As in `Device.cull`.
+
+    Returns
+    -------
+    (N,) bool array
+        True for what is kept; bad bounds (NaN, negative sizes) are kept.
+
+    Raises
+    ------
+    TypeError, ValueError
+        They name the parameter, what it expects and what came.
+    NoAdapterError
+        Without a Vulkan driver.
+
+    Examples
+    --------
+    >>> mask = hizvk.visible(hizvk.Boxes(lo, hi), camera, depth=image, kind="z")  # doctest: +SKIP
+    """
+    as_arrays("bounds", bounds)
+    _arguments.instance("camera", camera, Camera, "a Camera")
+    options = cull_options(
+        order="any", coverage=coverage, guard_px=guard_px, depth_slack=depth_slack, transform_slack=transform_slack,
+        capacity=None, draw=None, statistics=False,
+    )  # fmt: skip
+    if device is not None:
+        _arguments.instance("device", device, Device, "a Device or None")
+    if isinstance(depth, DepthImage):
+        device = depth.device if device is None else device
+        if camera != depth.camera:
+            raise ValueError(f"camera: expected the camera of depth, {depth.camera!r}, got {camera!r}")
+        if kind is not None:
+            raise TypeError(f"kind: expected nothing beside a DepthImage, got {_arguments.describe(kind)}")
+        pyramid = device.pyramid(depth)
+    else:
+        image, kind, scale = checked_image("depth", depth, camera, kind, scale)
+        device = default_device() if device is None else device
+        pyramid = device.pyramid(image, camera, kind=kind, scale=scale)
+    _, coverage_, guard, slack, transform, *_ = options
+    result = device.cull(
+        device.instances(bounds), camera, pyramid, order="any", coverage=coverage_,  # type: ignore[arg-type]
+        guard_px=guard, depth_slack=slack, transform_slack=transform, statistics=False,
+    )  # fmt: skip
+    return result.mask.copy()

@@ -1,0 +1,258 @@
+"""What lives on a device: instances, occluders, depth images and pyramids. `Device` makes them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import _arguments
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from . import _core
+    from ._arguments import FloatArray, Size
+    from .camera import Camera
+    from .device import Device
+
+__all__ = ["DepthImage", "Instances", "Mesh", "Occluders", "Pyramid"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Mesh:
+    """A triangle mesh that hides things, placed once or many times.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float array
+        Positions, finite.
+    triangles : (T, 3) integer array
+        Indices of vertices; seen from the front they run counter-clockwise.
+    transforms : (K, 4, 4) or (4, 4) float array, optional
+        ``world_from_mesh`` of each copy, last row 0, 0, 0, 1. None: one copy, where the vertices are.
+
+    Raises
+    ------
+    TypeError, ValueError
+        They name the parameter, what it expects and what came.
+    """
+
+    vertices: FloatArray
+    triangles: npt.NDArray[np.uint32]
+    transforms: FloatArray | None
+
+    def __init__(
+        self, vertices: npt.ArrayLike, triangles: npt.ArrayLike, transforms: npt.ArrayLike | None = None
+    ) -> None:
+        checked = _arguments.finite_floats("vertices", vertices, ("V", 3))
+        object.__setattr__(self, "vertices", checked)
+        object.__setattr__(self, "triangles", _arguments.triangles("triangles", triangles, len(checked)))
+        placed: FloatArray | None = None
+        if transforms is not None:
+            single = np.ndim(transforms) == 2
+            placed = _arguments.finite_floats("transforms", transforms, (4, 4) if single else ("K", 4, 4))
+            _arguments.check_affine("transforms", placed)
+            placed = placed.reshape(-1, 4, 4)
+        object.__setattr__(self, "transforms", placed)
+
+    def __repr__(self) -> str:
+        copies = 1 if self.transforms is None else len(self.transforms)
+        return f"Mesh({len(self.vertices)} vertices, {len(self.triangles)} triangles, {copies} copies)"
+
+
+class Instances:
+    """Bounds on the device, ready to be tested; made by `Device.instances`."""
+
+    def __init__(self, device: Device, core: _core.Instances) -> None:
+        self._device = device
+        self._inner = core
+
+    @property
+    def device(self) -> Device:
+        """Where they live."""
+        return self._device
+
+    @property
+    def kind(self) -> str:
+        """``"spheres"``, ``"boxes"`` or ``"oriented_boxes"``."""
+        return self._inner.kind()
+
+    @property
+    def num_pieces(self) -> int:
+        """In how many buffers the list lies; a cull writes one draw record for each."""
+        return self._inner.num_pieces()
+
+    @property
+    def invalid(self) -> npt.NDArray[np.uint64]:
+        """``(B,)`` uint64: the instances whose bounds are no volume, as far as the upload could see it."""
+        return self._inner.invalid()
+
+    @property
+    def device_bytes(self) -> int:
+        """Memory that they take on the device."""
+        return self._inner.device_bytes()
+
+    def __len__(self) -> int:
+        return self._inner.num_instances()
+
+    def __repr__(self) -> str:
+        return f"<Instances: {len(self)} {self.kind}>"
+
+
+class Occluders:
+    """Triangle meshes on the device, ready to be rendered into depth; made by `Device.occluders`."""
+
+    def __init__(self, device: Device, core: _core.Occluders) -> None:
+        self._device = device
+        self._inner = core
+
+    @property
+    def device(self) -> Device:
+        """Where they live."""
+        return self._device
+
+    @property
+    def num_meshes(self) -> int:
+        """Meshes, counted once for each place that they stand in."""
+        return self._inner.num_parts()
+
+    @property
+    def num_triangles(self) -> int:
+        """Triangles in all places."""
+        return self._inner.num_triangles()
+
+    @property
+    def device_bytes(self) -> int:
+        """Memory that they take on the device."""
+        return self._inner.device_bytes()
+
+    def __repr__(self) -> str:
+        return f"<Occluders: {self.num_meshes} meshes, {self.num_triangles} triangles>"
+
+
+class DepthImage:
+    """A depth image on the device; made by `Device.render_depth`."""
+
+    def __init__(self, device: Device, core: _core.DepthImage, camera: Camera) -> None:
+        self._device = device
+        self._inner = core
+        self._camera = camera
+
+    @property
+    def device(self) -> Device:
+        """Where it lives."""
+        return self._device
+
+    @property
+    def camera(self) -> Camera:
+        """The camera that sees it; its size is the image's."""
+        return self._camera
+
+    @property
+    def size(self) -> Size:
+        """``(height, width)`` in pixels."""
+        return self._camera.size
+
+    @property
+    def kind(self) -> str:
+        """``"reversed_ndc"`` or ``"ndc"``, as the camera has it."""
+        return self._camera.depth_kind
+
+    def numpy(self) -> npt.NDArray[np.float32]:
+        """``(height, width)`` float32: the NDC depth, row 0 on top; a copy."""
+        return self._inner.read().reshape(self.size)
+
+    def __repr__(self) -> str:
+        return f"<DepthImage {self.size[0]}x{self.size[1]} of kind {self.kind}>"
+
+
+class Pyramid:
+    """A depth pyramid on the device: on level ``k`` a texel is the farthest depth of ``2^k x 2^k`` pixels.
+
+    Made by `Device.pyramid`.
+    """
+
+    def __init__(self, device: Device, core: _core.Pyramid, camera: Camera) -> None:
+        self._device = device
+        self._inner = core
+        self._camera = camera
+
+    @property
+    def device(self) -> Device:
+        """Where it lives."""
+        return self._device
+
+    @property
+    def camera(self) -> Camera:
+        """The camera that the depth belongs to; only this one can cull with it."""
+        return self._camera
+
+    @property
+    def size(self) -> Size:
+        """``(height, width)`` of level 0."""
+        return self._camera.size
+
+    @property
+    def num_levels(self) -> int:
+        """Levels from the full size down to one texel."""
+        return self._inner.num_levels()
+
+    @property
+    def device_bytes(self) -> int:
+        """Memory that it takes on the device."""
+        return self._inner.device_bytes()
+
+    def level(self, k: int) -> npt.NDArray[np.float32]:
+        """Level `k` as a ``(height, width)`` float32 array of NDC depth, row 0 on top; a copy.
+
+        Parameters
+        ----------
+        k : int
+            ``0 <= k < num_levels``; 0 is the finest.
+
+        Raises
+        ------
+        TypeError
+            If it is no integer.
+        IndexError
+            If there is no such level.
+        """
+        last = self.num_levels - 1
+        try:
+            k = _arguments.integer("k", k, low=0, high=last)
+        except ValueError:
+            raise IndexError(f"k: expected a level in 0..{last}, got {k}") from None
+        size, texels = self._inner.read_level(k)
+        return texels.reshape(size)
+
+    def __repr__(self) -> str:
+        return f"<Pyramid {self.size[0]}x{self.size[1]}, {self.num_levels} levels>"
+
+
+def as_meshes(vertices: Any, triangles: Any, transforms: Any) -> list[Mesh]:
+    """The meshes of either form of `Device.occluders`."""
+    if triangles is not None:
+        return [Mesh(vertices, triangles, transforms)]
+    if transforms is not None:
+        raise TypeError("transforms: expected nothing beside a list of meshes, which have their own")
+    if isinstance(vertices, Mesh):
+        return [vertices]
+    expected = "a Mesh or a list of Mesh when triangles is left out"
+    if not isinstance(vertices, Sequence) or isinstance(vertices, (str, bytes)):
+        raise TypeError(f"vertices: expected {expected}, got {_arguments.describe(vertices)}")
+    meshes = []
+    for number, item in enumerate(vertices):
+        if isinstance(item, Mesh):
+            meshes.append(item)
+        elif isinstance(item, tuple) and 2 <= len(item) <= 3:
+            try:
+                meshes.append(Mesh(*item))
+            except (TypeError, ValueError) as error:
+                raise type(error)(f"vertices[{number}]: {error}") from None
+        else:
+            got = _arguments.describe(item)
+            raise TypeError(f"vertices: expected {expected}, got {got} at {number}")
+    return meshes

@@ -1,0 +1,7 @@
+#!/usr/bin/env bash
+# The demo on the best adapter of this machine (a GPU before a software driver); what it leaves is in out/.
+set -euo pipefail
+source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+
+scripts/setup.sh
+step "demo" "$VENV/bin/hizvk" demo "$@"

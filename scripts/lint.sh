@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# Everything that a machine can say about style and types; runs to the end and fails if any part did.
+set -euo pipefail
+source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+
+scripts/setup.sh
+export PATH="$VENV/bin:$PATH" MYPYPATH=python
+failed=()
+check() {
+  step "$@" || failed+=("$1")
+}
+python_files=(python tests scripts docs)
+
+check "cargo fmt" cargo fmt --all --check
+check "clippy" cargo clippy --workspace --all-targets "${LOCKED[@]}" -- -D warnings
+check "ruff check" ruff check "${python_files[@]}"
+check "ruff format" ruff format --check "${python_files[@]}"
+check "mypy" mypy --strict python/hizvk
+# The stubs are written by hand: this compares them with the module as it was built.
+check "stubtest" python -m mypy.stubtest hizvk --concise
+if have shellcheck; then
+  check "shellcheck" shellcheck scripts/*.sh .ci/run
+else
+  printf 'shellcheck is not installed: the shell scripts were not checked\n'
+fi
+
+[ ${#failed[@]} -eq 0 ] || die "failed: $(printf '%s; ' "${failed[@]}")"

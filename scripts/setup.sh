@@ -1,0 +1,140 @@
+#!/usr/bin/env bash
+# Everything that `make demo` and `make test` need, from a fresh Debian or Ubuntu with Rust and Python on. Idempotent, and quick when all
+# is there. `setup.sh GROUP...` also installs those dependency groups of pyproject.toml (docs, wheel).
+set -euo pipefail
+source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+
+# ------------------------------------------------------------------------------------------------------------ system packages
+
+# Prints the first interpreter that is new enough.
+find_python() {
+  local candidate
+  for candidate in ${PYTHON:+"$PYTHON"} python3 python3.14 python3.13 python3.12 python3.11 /usr/bin/python3; do
+    if have "$candidate" && "$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
+      command -v "$candidate"
+      return
+    fi
+  done
+}
+
+can_make_venv() { "$1" -c 'import ensurepip, venv' 2>/dev/null; }
+
+has_vulkan_loader() {
+  local file
+  for file in /usr/lib/*/libvulkan.so.1 /usr/lib64/libvulkan.so.1 /usr/lib/libvulkan.so.1 /usr/local/lib/libvulkan.so.1; do
+    [ -e "$file" ] && return
+  done
+  return 1
+}
+
+# apt_install PACKAGE...: with root or a sudo that asks nothing; otherwise it says the exact line and stops.
+apt_install() {
+  local line="apt-get update && apt-get install -y $*" as_root=()
+  if ! have apt-get; then
+    die "these Debian packages, or what your system calls them, are missing: $*"
+  fi
+  if [ "$(id -u)" != 0 ]; then
+    if have sudo && sudo -n true 2>/dev/null; then
+      as_root=(sudo -n)
+    else
+      die "system packages are missing and this user may not install them; run:" "sudo sh -c '$line'" "and then make again"
+    fi
+  fi
+  say "installing system packages: $*"
+  # An unreachable third-party source fails the update; the packages may be had all the same.
+  "${as_root[@]}" apt-get update -qq </dev/null || printf 'warning: apt-get update failed; trying with the lists at hand\n' >&2
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" </dev/null ||
+    die "apt-get could not install: $*" "run it by hand to see why: $line"
+}
+
+system_packages() {
+  local missing=() python version
+  has_vulkan_loader || missing+=(libvulkan1)
+  [ -n "$(lavapipe_icd)" ] || missing+=(mesa-vulkan-drivers)
+  # rustc links through cc; some crates' build scripts and NumPy-less platforms want headers too.
+  have cc || missing+=(gcc libc6-dev)
+  python=$(find_python)
+  if [ -z "$python" ]; then
+    missing+=(python3 python3-venv)
+  elif ! [ -x "$VENV_PYTHON" ] && ! can_make_venv "$python" && ! "$python" -c 'import virtualenv' 2>/dev/null; then
+    version=$("$python" -c 'import sys; print("python%d.%d" % sys.version_info[:2])')
+    case $(readlink -f "$python") in
+      /usr/bin/*) missing+=("$version-venv") ;;
+      *) die "$python has neither ensurepip nor virtualenv" "run: $python -m pip install virtualenv, or name another one with PYTHON=" ;;
+    esac
+  fi
+  [ ${#missing[@]} -eq 0 ] || apt_install "${missing[@]}"
+}
+
+check_rust() {
+  local wanted found
+  wanted=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
+  if ! have cargo || ! have rustc; then
+    die "Rust $wanted or newer is needed and cargo or rustc is not on PATH" "install it with rustup: https://rustup.rs"
+  fi
+  found=$(rustc --version | awk '{print $2}')
+  if [ "$(printf '%s\n' "$wanted" "${found%%-*}" | sort -V | head -n 1)" != "$wanted" ]; then
+    die "Rust $wanted or newer is needed, $(command -v rustc) is $found" "a distribution's own Rust is often too old; install one with rustup: https://rustup.rs"
+  fi
+}
+
+# ------------------------------------------------------------------------------------------------------------ virtual environment
+
+make_venv() {
+  local python
+  # A new interpreter behind an old environment leaves dead links: such an environment is made anew.
+  if [ -x "$VENV_PYTHON" ] && "$VENV_PYTHON" -m pip --version >/dev/null 2>&1; then
+    return
+  fi
+  python=$(find_python)
+  [ -n "$python" ] || die "Python 3.11 or newer is needed" "name one with PYTHON=/path/to/python3"
+  say "virtual environment .venv with $("$python" --version)"
+  rm -rf "$VENV"
+  if can_make_venv "$python"; then
+    "$python" -m venv "$VENV"
+  else
+    "$python" -m virtualenv --quiet "$VENV"
+  fi
+  # The first pip that knows dependency groups; Debian 12 brings 23.0.
+  "$VENV_PYTHON" -m pip install 'pip>=25.1'
+}
+
+# install_group GROUP: a dependency group of pyproject.toml, when that file is not as it was last time.
+install_group() {
+  local group=$1 key
+  key=$(sha256sum <pyproject.toml)
+  if [ "$key" != "$(cat "$STAMPS/$group" 2>/dev/null)" ]; then
+    step "Python packages: $group" "$VENV_PYTHON" -m pip install --group "$group"
+    printf '%s\n' "$key" >"$STAMPS/$group"
+  fi
+}
+
+# ------------------------------------------------------------------------------------------------------------ the module
+
+# The Python sources need no build: the installation is editable and points at python/.
+module_inputs() {
+  find Cargo.toml Cargo.lock pyproject.toml shaders crates -type f -printf '%p %s %T@\n' | sort
+  rustc --version
+  "$VENV_PYTHON" --version
+}
+
+build_module() {
+  local key
+  key=$(module_inputs | sha256sum)
+  if [ "$key" = "$(cat "$STAMPS/module" 2>/dev/null)" ] && "$VENV_PYTHON" -c 'import hizvk._core' 2>/dev/null; then
+    return
+  fi
+  # The profile of the tests (its dependencies are optimised): wgpu is then compiled once for `cargo test` and for Python.
+  step "building the Python module (the first time takes some minutes)" \
+    env VIRTUAL_ENV="$VENV" PATH="$VENV/bin:$PATH" maturin develop --extras viz,scene "${LOCKED[@]}"
+  module_inputs | sha256sum >"$STAMPS/module"
+}
+
+check_rust
+system_packages
+make_venv
+mkdir -p "$STAMPS"
+for group in dev "$@"; do
+  install_group "$group"
+done
+build_module

@@ -1,0 +1,34 @@
+#!/usr/bin/env bash
+# test.sh [lavapipe | swiftshader]: the Rust and the Python tests on one software driver, whose name is printed and checked first.
+set -euo pipefail
+source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+
+driver=${1:-lavapipe}
+started=$SECONDS
+
+scripts/setup.sh
+case $driver in
+  lavapipe) use_test_driver ;;
+  swiftshader)
+    scripts/swiftshader.sh
+    use_driver "$ROOT/target/swiftshader/vk_swiftshader_icd.json"
+    export HIZVK_EXPECT_ADAPTER=SwiftShader
+    ;;
+  *) die "driver: expected lavapipe or swiftshader, got $driver" ;;
+esac
+
+say "the adapter under test"
+"$VENV_PYTHON" tests/adapter_check.py
+
+# Always the whole workspace: a smaller selection has other features in some dependencies, and wgpu would be compiled again.
+rust_tests() {
+  if have cargo-nextest; then
+    cargo nextest run --workspace "${LOCKED[@]}" --no-fail-fast
+  else
+    cargo test --workspace "${LOCKED[@]}" --no-fail-fast --lib --bins --tests --examples
+  fi
+}
+step "Rust tests" rust_tests
+step "Rust documentation tests" cargo test --workspace "${LOCKED[@]}" --doc --quiet
+step "Python tests" "$VENV_PYTHON" -m pytest -m "not slow"
+printf -- '-- all tests on %s: %d s\n' "$driver" $((SECONDS - started))

@@ -1,0 +1,26 @@
+#!/usr/bin/env bash
+# dist/: the sdist, and the wheel that it builds. The wheel is made from the unpacked sdist alone, which proves that nothing is missing in it.
+set -euo pipefail
+source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+
+# Symbols no newer than glibc 2.28 (Debian 10, RHEL 8); zig brings the libraries to link against.
+compatibility=manylinux_2_28
+
+scripts/setup.sh wheel
+export VIRTUAL_ENV="$VENV" PATH="$VENV/bin:$PATH"
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+rm -rf dist
+step "sdist" maturin sdist --out dist
+sdists=(dist/hizvk-*.tar.gz)
+tar xzf "${sdists[0]}" -C "$work"
+
+build_wheel() {
+  # The crates of the registry are compiled once, wherever the unpacked sources lie.
+  (cd "$work"/hizvk-* && CARGO_TARGET_DIR="$ROOT/target/wheel" \
+    maturin build --release --locked --zig --compatibility "$compatibility" --out "$ROOT/dist")
+}
+step "wheel out of the sdist" build_wheel
+step "the wheel in an empty virtual environment" scripts/check_wheel.sh dist/hizvk-*.whl
+ls -l dist

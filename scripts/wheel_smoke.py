@@ -1,0 +1,39 @@
+"""A few seconds with an installed wheel: `wheel_smoke.py`, or `wheel_smoke.py --no-driver` where no device is."""
+
+import sys
+
+import numpy as np
+
+import hizvk
+
+INSTALL_LINE = "apt install libvulkan1 mesa-vulkan-drivers"
+
+
+def without_driver() -> None:
+    """The import has worked; a device must say what to install."""
+    try:
+        hizvk.Device()
+    except hizvk.NoAdapterError as error:
+        assert INSTALL_LINE in str(error), f"NoAdapterError: expected the line {INSTALL_LINE!r}, got {error}"
+        print(f"no driver: NoAdapterError: {error}")
+    else:
+        raise AssertionError("Device(): expected NoAdapterError without a driver")
+
+
+def with_driver() -> None:
+    """One cull: of two spheres behind and before a wall that fills the view, the far one is hidden."""
+    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(90, 160), near=0.1)
+    wall = np.full((90, 160), 10.0)
+    spheres = hizvk.Spheres(np.array([[0.0, 0.0, -20.0], [0.0, 0.0, -5.0]]), np.array([1.0, 1.0]))
+    device = hizvk.Device()
+    mask = hizvk.visible(spheres, camera, depth=wall, kind="z", device=device)
+    assert mask.tolist() == [False, True], f"visible: expected [False, True], got {mask.tolist()}"
+    print(f"hizvk on {device.adapter}: one of two spheres is hidden, as it should be")
+
+
+if __name__ == "__main__":
+    assert "site-packages" in hizvk.__file__, f"hizvk comes from {hizvk.__file__}, not from the wheel"
+    if "--no-driver" in sys.argv[1:]:
+        without_driver()
+    else:
+        with_driver()

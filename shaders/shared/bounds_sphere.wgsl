@@ -1,0 +1,63 @@
+// Spheres (twin: `crates/hiz_core/src/bounds.rs`, SphereRecord). Read as bits: validity is decided on integers.
+
+struct SphereRecord {
+    // xyz: the centre's high half; w: the radius.
+    center_hi_radius: vec4<u32>,
+    // xyz: the centre's low half.
+    center_lo: vec4<u32>,
+}
+
+@group(1) @binding(1) var<storage, read> instances: array<SphereRecord>;
+
+struct Volume {
+    // About the reference point.
+    center: vec3<f32>,
+    // Bounds the size of everything that a row is multiplied with.
+    reach: vec3<f32>,
+    radius: f32,
+    valid: bool,
+}
+
+fn load_volume(i: u32) -> Volume {
+    let record = instances[i];
+    let hi = bitcast<vec3<f32>>(record.center_hi_radius.xyz);
+    let radius = bitcast<f32>(record.center_hi_radius.w);
+    let d_hi = bar3(hi - view.eye_hi);
+    let d_lo = bar3(bitcast<vec3<f32>>(record.center_lo.xyz) - view.eye_lo);
+    let reach = abs(d_hi) + abs(d_lo) + vec3<f32>(radius) + HALF_EPS * abs(hi);
+    let valid = all_small(record.center_hi_radius) && all_small(vec4<u32>(record.center_lo.xyz, 0u))
+        && radius >= 0.0 && in_reach(reach);
+    return Volume(d_hi + d_lo, reach, radius, valid);
+}
+
+fn on_half_axes(m: vec3<f32>, volume: Volume) -> vec3<f32> {
+    return m * volume.radius;
+}
+
+// The support of a sphere is a 2-norm, compared squared so that no square root needs trust; 1.000001 covers the roundings
+// of both squares, 2^-100 their underflow.
+fn exceeds_support(center: f32, half: vec3<f32>) -> bool {
+    return center > 0.0 && center * center > dot(half, half) * 1.000001 + 0x1p-100;
+}
+
+fn support(half: vec3<f32>) -> f32 {
+    return sqrt(dot(half, half));
+}
+
+// An estimate of the least and greatest r / w. Mara and McGuire, "2D Polyhedral Bounds of a Clipped, Perspective-Projected
+// 3D Sphere" (JCGT 2013), written for any two linear functions: t is the centre's ratio, and the two tangents are the roots of
+// a quadratic, each taken in the form that does not cancel.
+fn ratio_interval(r: Value, w: Value) -> vec2<f32> {
+    let n = w.half / w.center;
+    let q = max(1.0 - dot(n, n), 1e-30);
+    let t = r.center / w.center;
+    let g = (r.half - t * w.half) / w.center;
+    let gg = dot(g, g);
+    let p = dot(g, n);
+    let m = max(abs(p) + sqrt(p * p + q * gg), 1e-30);
+    let near_root = gg / m;
+    let far_root = m / q;
+    return vec2<f32>(
+        t - select(far_root, near_root, p > 0.0),
+        t + select(near_root, far_root, p > 0.0));
+}

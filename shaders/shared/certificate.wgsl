@@ -1,0 +1,39 @@
+// Certificates: "the whole volume lies strictly on one side of a plane", decided in float32 with a margin that covers every
+// rounding of this file and of the bounds (docs/accuracy.md counts them). Nothing else may hide an instance.
+
+// float32's spacing at 1. WGSL rounds a sum or product up or down, so each costs up to this much.
+const EPS: f32 = 0x1p-23;
+// The margin in eps; more than any path below can lose.
+const ERROR_ULPS: f32 = 24.0;
+// Covers what flushed subnormals lose.
+const ERROR_FLOOR: f32 = 0x1p-70;
+
+// A row on a volume: its value at the centre, a bound of the magnitudes that went into it, and its values on the half axes
+// (on a sphere: times the radius).
+struct Value {
+    center: f32,
+    size: f32,
+    half: vec3<f32>,
+}
+
+fn value_of(row: Row, volume: Volume) -> Value {
+    return Value(
+        dot(row.m.xyz, volume.center) + row.m.w,
+        dot(row.a.xyz, volume.reach) + row.a.w,
+        on_half_axes(row.m.xyz, volume));
+}
+
+// The most that `r - t w` can be off by.
+fn error_bound(r: Value, t: f32, w: Value) -> f32 {
+    return ERROR_ULPS * EPS * (r.size + abs(t) * w.size) + ERROR_FLOOR;
+}
+
+// True implies: r - t w > 0 on all of the volume.
+fn surely_above(r: Value, t: f32, w: Value) -> bool {
+    return exceeds_support((r.center - t * w.center) - error_bound(r, t, w), r.half - t * w.half);
+}
+
+// True implies: r - t w < 0 on all of the volume.
+fn surely_below(r: Value, t: f32, w: Value) -> bool {
+    return exceeds_support(-(r.center - t * w.center) - error_bound(r, t, w), r.half - t * w.half);
+}

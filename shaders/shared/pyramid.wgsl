@@ -1,0 +1,19 @@
+// The levels 1 and up: one list of texels, rows padded to 4, cut into chunks that each fit one storage binding.
+
+struct Level {
+    offset: u32,
+    stride: u32,
+    width: u32,
+    height: u32,
+}
+
+struct Pyramid {
+    levels: array<Level, 16>,
+    num_levels: u32,
+    // A chunk holds 1 << chunk_shift texels.
+    chunk_shift: u32,
+    padding: vec2<u32>,
+}
+
+// 1: everything lies in chunk_0, and the compiler drops the others.
+override CHUNKS: u32;

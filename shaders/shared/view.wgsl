@@ -1,0 +1,41 @@
+// What one cull knows of its camera (twin: `crates/hiz_core/src/cull.rs`, ViewUniform).
+
+// A linear function of the position d about the reference point: m . (d, 1). `a` bounds the size of each coefficient and,
+// times float32's eps, its error.
+struct Row {
+    m: vec4<f32>,
+    a: vec4<f32>,
+}
+
+struct View {
+    // Times w: pixel column right of the image's middle, pixel row below it, depth less z_slope times w; and w itself.
+    x: Row,
+    y: Row,
+    z: Row,
+    w: Row,
+    // The reference point is exactly eye_hi + eye_lo: the eye, or a point of an orthographic camera's near or far plane.
+    eye_hi: vec3<f32>,
+    z_slope: f32,
+    eye_lo: vec3<f32>,
+    // Magnitudes from here on could overflow a product: such an instance is invalid.
+    coordinate_limit: f32,
+    half_size: vec2<f32>,
+    // How far a volume's projection must stay away from a pixel square that it does not touch: the guard, less half a pixel
+    // in sample coverage.
+    reach: f32,
+    // What a stored depth is multiplied by before anything is called farther: 1 + slack, reversed 1 - slack.
+    depth_factor: f32,
+    size: vec2<i32>,
+    // 0, but no compiler knows: see `bar`.
+    runtime_zero: u32,
+    padding: u32,
+}
+
+// Keeps a compiler from folding what follows into the cancelling sum x was made by, as WGSL lets it.
+fn bar(x: f32) -> f32 {
+    return bitcast<f32>(bitcast<u32>(x) ^ view.runtime_zero);
+}
+
+fn bar3(x: vec3<f32>) -> vec3<f32> {
+    return bitcast<vec3<f32>>(bitcast<vec3<u32>>(x) ^ vec3<u32>(view.runtime_zero));
+}

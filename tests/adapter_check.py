@@ -1,0 +1,34 @@
+"""Which Vulkan adapter the tests run on, and whether it is the one that they expect.
+
+`python tests/adapter_check.py` prints it and fails on a wrong one; conftest.py does so when pytest starts.
+"""
+
+import os
+import sys
+
+# lavapipe calls its driver so. `HIZVK_EXPECT_ADAPTER=...` names another one: any part of its name or driver.
+DEFAULT_EXPECTATION = "llvmpipe"
+
+
+def check() -> tuple[str, str | None]:
+    """-> a line that describes the adapter, and why it is wrong (None: it is the right one)."""
+    # Mesa's device-select layer complains about XDG_RUNTIME_DIR otherwise.
+    os.environ.setdefault("NODEVICE_SELECT", "1")
+    import hizvk
+
+    expected = os.environ.get("HIZVK_EXPECT_ADAPTER") or DEFAULT_EXPECTATION
+    try:
+        adapter = hizvk.Device().adapter
+    except hizvk.HizError as error:
+        return "adapter: none", f"no device: {error}"
+    line = f"adapter: {adapter.name}; driver: {adapter.driver} {adapter.driver_info}"
+    if expected.lower() not in line.lower():
+        return line, f"HIZVK_EXPECT_ADAPTER: expected an adapter or driver called {expected!r}, got {line}"
+    return line, None
+
+
+if __name__ == "__main__":
+    description, wrong = check()
+    print(description)
+    if wrong:
+        sys.exit(f"error: {wrong}")

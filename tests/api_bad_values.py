@@ -1,0 +1,493 @@
+"""Bad arguments of every public function: the tables behind test_api_errors.py.
+
+One table a function: valid arguments, and for each parameter bad values with the exception and a part of its text.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import hizvk
+
+NAN = float("nan")
+INF = float("inf")
+EYE4 = np.eye(4)
+SINGULAR = np.diag([1.0, 1.0, 0.0, 1.0])
+TRANSPOSED_POSE = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [5, 6, 7, 1]])
+K = np.array([[100.0, 0, 32], [0, 100, 24], [0, 0, 1]])
+# OpenGL's own: near 1, far 3, 90 degrees.
+GL = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, -2, -3], [0, 0, -1, 0]])
+
+Bad = tuple[Any, type[Exception], str]
+BadValues = dict[str, list[Bad]]
+
+
+class Table(NamedTuple):
+    """`make(device)` gives the function and valid arguments; `bad` has the bad values by parameter."""
+
+    make: Callable[[hizvk.Device], tuple[Callable[..., Any], dict[str, Any]]]
+    bad: BadValues
+
+
+def camera(size: tuple[int, int] = (6, 8), **more: Any) -> hizvk.Camera:
+    """At the origin, looking along -z."""
+    return hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=size, near=0.1, **more)
+
+
+# -- bad values that several functions share -----------------------------------------------------------------
+
+VECTOR: list[Bad] = [
+    ("abc", TypeError, "expected (3,) finite numbers, got str 'abc'"),
+    (None, TypeError, "got None"),
+    ((1, 2), ValueError, "expected (3,) finite numbers, got (2,) float64"),
+    ((1, 2, NAN), ValueError, "nan"),
+    ((1, 2, INF), ValueError, "inf"),
+    ((1, 2, 3j), TypeError, "got (3,) complex128"),
+    ((True, False, True), TypeError, "got (3,) bool"),
+    (np.ma.masked_array([1.0, 2, 3]), TypeError, "masked array"),
+    ([[1, 2], [3]], ValueError, "no array"),
+]
+SIZE: list[Bad] = [
+    (480, TypeError, "expected (height, width), two integers in 1..32768, got int 480"),
+    ("ab", TypeError, "got str 'ab'"),
+    ((480,), ValueError, "got tuple (480,)"),
+    ((480, 640, 3), ValueError, "got tuple (480, 640, 3)"),
+    ((480.0, 640.0), TypeError, "got tuple (480.0, 640.0)"),
+    ((True, 640), TypeError, "got tuple (True, 640)"),
+    ((0, 640), ValueError, "got tuple (0, 640)"),
+    ((480, 32769), ValueError, "in 1..32768"),
+]
+NEAR: list[Bad] = [
+    ("0.1", TypeError, "expected a finite number above 0, got str '0.1'"),
+    (0, ValueError, "above 0, got int 0"),
+    (-1.0, ValueError, "got float -1.0"),
+    (NAN, ValueError, "got float nan"),
+    (True, TypeError, "got bool True"),
+    (None, TypeError, "got None"),
+]
+FAR: list[Bad] = [
+    (0.05, ValueError, "expected a finite number above 0.1, got float 0.05"),
+    (NAN, ValueError, "got float nan"),
+    ("far", TypeError, "got str 'far'"),
+]
+FLAG: list[Bad] = [
+    (1, TypeError, "expected True or False, got int 1"),
+    (None, TypeError, "got None"),
+    ("yes", TypeError, "got str 'yes'"),
+]
+NUMBER: list[Bad] = [
+    ("0", TypeError, "expected a finite number"),
+    (NAN, ValueError, "got float nan"),
+    (1j, TypeError, "1j"),
+]
+POSE: list[Bad] = [
+    (np.eye(3), ValueError, "expected (4, 4) finite numbers, got (3, 3) float64"),
+    ("pose", TypeError, "got str 'pose'"),
+    (np.full((4, 4), NAN), ValueError, "nan"),
+    (SINGULAR, ValueError, "singular"),
+    (np.zeros((4, 4)), ValueError, "singular"),
+    (
+        TRANSPOSED_POSE,
+        ValueError,
+        "expected the last row to be 0, 0, 0, 1, got [5.0, 6.0, 7.0, 1.0]; it looks transposed",
+    ),
+    (np.eye(4, dtype=complex), TypeError, "got (4, 4) complex128"),
+]
+MATRIX: list[Bad] = [
+    (np.eye(3), ValueError, "expected (4, 4) finite numbers, got (3, 3) float64"),
+    (EYE4 * NAN, ValueError, "nan"),
+    (SINGULAR, ValueError, "expected an invertible (4, 4) matrix, got a singular one"),
+    (np.ones((4, 4)), ValueError, "singular"),
+    ("m", TypeError, "got str 'm'"),
+    (np.eye(4, dtype=bool), TypeError, "got (4, 4) bool"),
+]
+
+
+def array_of(shape: str, *, wrong: tuple[int, ...]) -> list[Bad]:
+    """Bad values for a float array of positions."""
+    expected = f"expected float {shape}, got"
+    return [
+        (np.zeros(wrong), ValueError, f"{expected} {wrong} float64"),
+        (np.zeros(wrong, dtype=np.int64), TypeError, f"{expected} {wrong} int64"),
+        (np.zeros(wrong, dtype=bool), TypeError, "bool"),
+        (np.zeros(wrong, dtype=complex), TypeError, "complex128"),
+        (np.zeros(wrong, dtype=object), TypeError, "object"),
+        (np.array([["a"]]), TypeError, "<U1"),
+        (np.ma.zeros(wrong), TypeError, "masked array; fill it first"),
+        ("abc", TypeError, f"{expected} str 'abc'"),
+        (None, TypeError, f"{expected} None"),
+        ([[1.0, 2.0], [3.0]], ValueError, "no array"),
+        ([[2**60, 0, 0]], ValueError, "integers that float64 cannot hold"),
+    ]
+
+
+BOUNDS: list[Bad] = [
+    (np.zeros((2, 3)), TypeError, "expected Spheres, Boxes or OrientedBoxes, got (2, 3) float64"),
+    (None, TypeError, "got None"),
+]
+CAMERA: list[Bad] = [(None, TypeError, "expected a Camera"), (EYE4, TypeError, "got (4, 4) float64")]
+IMAGE: list[Bad] = [
+    (np.zeros((8, 6)), ValueError, "expected float (6, 8) (the camera's size), got (8, 6) float64"),
+    (np.zeros(48), ValueError, "got (48,) float64"),
+    (np.zeros((6, 8), dtype=np.int32), TypeError, "got (6, 8) int32"),
+    (np.zeros((6, 8), dtype=np.uint8), TypeError, "got (6, 8) uint8"),
+    (np.zeros((6, 8), dtype=bool), TypeError, "got (6, 8) bool"),
+    (np.ma.zeros((6, 8)), TypeError, "masked array"),
+    ("image", TypeError, "got str 'image'"),
+]
+KIND: list[Bad] = [
+    (None, TypeError, 'expected one of "ndc", "reversed_ndc", "z", "distance", got None; there is no default'),
+    ("depth", ValueError, 'expected one of "ndc", "reversed_ndc", "z", "distance", got str \'depth\''),
+    (3, TypeError, "got int 3"),
+    ("ndc", ValueError, 'expected "reversed_ndc" (1 near and 0 far) for a camera with reversed_z=True, got "ndc"'),
+]
+SCALE: list[Bad] = [
+    (0, ValueError, "above 0, got int 0"),
+    (-0.001, ValueError, "got float -0.001"),
+    (NAN, ValueError, "got float nan"),
+    ("mm", TypeError, "got str 'mm'"),
+]
+GUARD: list[Bad] = [
+    (0.3, ValueError, "expected a multiple of 1/256, got 0.3"),
+    (-1, ValueError, "at least 0, got int -1"),
+    ("1", TypeError, "got str '1'"),
+]
+COVERAGE: list[Bad] = [("pixel", ValueError, 'expected one of "area", "sample"'), (0, TypeError, "got int 0")]
+DEPTH_SLACK: list[Bad] = [
+    (-1e-7, ValueError, "at least 0"),
+    (1.0, ValueError, "below 1"),
+    ("a", TypeError, "got str 'a'"),
+]
+TRANSFORM_SLACK: list[Bad] = [
+    (-1, ValueError, "at least 0"),
+    (INF, ValueError, "got float inf"),
+    ([], TypeError, "list []"),
+]
+VERTICES: list[Bad] = [
+    (np.zeros((4, 2)), ValueError, "expected float (V, 3), got (4, 2) float64"),
+    (np.zeros((4, 3), dtype=int), TypeError, "got (4, 3) int64"),
+    (np.full((4, 3), NAN), ValueError, "expected finite float (V, 3), got 12 NaN or infinite numbers"),
+]
+TRIANGLES: list[Bad] = [
+    (np.zeros((1, 4), dtype=int), ValueError, "expected integer (T, 3), got (1, 4) int64"),
+    (np.zeros((1, 3)), TypeError, "got (1, 3) float64"),
+    ([[0, 1, 3]], ValueError, "expected vertex indices in 0..2, got 3"),
+    ([[0, 1, -1]], ValueError, "expected vertex indices in 0..2, got -1"),
+    ("abc", TypeError, "got str 'abc'"),
+    ([[0, 1], [2]], ValueError, "no array"),
+]
+TRANSFORMS: list[Bad] = [
+    (np.eye(3), ValueError, "expected float (4, 4), got (3, 3) float64"),
+    (np.zeros((2, 4, 3)), ValueError, "expected float (K, 4, 4), got (2, 4, 3) float64"),
+    (np.eye(4, dtype=int), TypeError, "got (4, 4) int64"),
+    (np.eye(4) * NAN, ValueError, "NaN or infinite"),
+    (TRANSPOSED_POSE, ValueError, "it looks transposed"),
+    (np.diag([1.0, 1, 1, 2]), ValueError, "expected the last row to be 0, 0, 0, 1, got [0.0, 0.0, 0.0, 2.0]"),
+]
+
+
+def unsigned(name: str) -> list[Bad]:
+    """Bad values of a 32-bit number in draw arguments."""
+    return [
+        (-1, ValueError, "expected an integer in 0..4294967295, got int -1"),
+        (2**32, ValueError, "0..4294967295"),
+        (1.0, TypeError, "got float 1.0"),
+        (True, TypeError, "got bool True"),
+        (name, TypeError, f"got str '{name}'"),
+    ]
+
+
+# -- the tables ----------------------------------------------------------------------------------------------
+
+VIEW: BadValues = {
+    "eye": VECTOR,
+    "target": [*VECTOR, ((0, 0, 0), ValueError, "eye")],
+    "up": [*VECTOR, ((0, 0, 0), ValueError, "expected a direction"), ((0, 0, 5), ValueError, "not parallel")],
+    "size": SIZE,
+    "near": NEAR,
+    "far": FAR,
+    "reversed_z": FLAG,
+}
+LOOK: dict[str, Any] = {"eye": (0, 0, 0), "target": (0, 0, -1), "up": (0, 1, 0), "size": (6, 8), "near": 0.1, "far": 10}
+LOOK["reversed_z"] = True
+FOV: list[Bad] = [
+    (0, ValueError, "expected a finite number above 0 and below 180, got int 0"),
+    (180, ValueError, "below 180, got int 180"),
+    (None, TypeError, "got None"),
+]
+ORTHO_NEAR: list[Bad] = [("near", TypeError, "expected a finite number, got str"), (NAN, ValueError, "got float nan")]
+CLIP: list[Bad] = [*MATRIX, (None, ValueError, "got neither")]
+
+
+def spheres() -> hizvk.Spheres:
+    return hizvk.Spheres(np.array([[0.0, 0.0, -5.0]]), 1.0)
+
+
+def cull_arguments(device: hizvk.Device) -> dict[str, Any]:
+    view = camera()
+    pyramid = device.pyramid(np.ones((6, 8)), view, kind="z")
+    return {"instances": device.instances(spheres()), "camera": view, "pyramid": pyramid}
+
+
+TABLES: dict[str, Table] = {
+    "Spheres": Table(
+        lambda _: (hizvk.Spheres, {"centers": np.zeros((2, 3)), "radii": np.ones(2)}),
+        {
+            "centers": array_of("(N, 3)", wrong=(3, 100)),
+            "radii": [
+                (np.ones(3), ValueError, "expected float (2,) or one number, got (3,) float64"),
+                (np.ones((2, 1)), ValueError, "got (2, 1) float64"),
+                (np.ones(2, dtype=int), TypeError, "got (2,) int64"),
+                ("1", TypeError, "got str '1'"),
+                (True, TypeError, "got bool True"),
+                (1j, TypeError, "got complex 1j"),
+                (None, TypeError, "got None"),
+                (10**400, ValueError, "expected float (2,) or one number, got int 1000"),
+            ],
+        },
+    ),
+    "Boxes": Table(
+        lambda _: (hizvk.Boxes, {"min": np.zeros((2, 3)), "max": np.ones((2, 3))}),
+        {"min": array_of("(N, 3)", wrong=(3, 100)), "max": array_of("(2, 3)", wrong=(3, 3))},
+    ),
+    "OrientedBoxes": Table(
+        lambda _: (
+            hizvk.OrientedBoxes,
+            {"centers": np.zeros((2, 3)), "half_sizes": np.ones((2, 3)), "rotations": np.zeros((2, 3, 3))},
+        ),
+        {
+            "centers": array_of("(N, 3)", wrong=(3, 100)),
+            "half_sizes": array_of("(2, 3)", wrong=(3, 3)),
+            "rotations": array_of("(2, 3, 3)", wrong=(2, 9)),
+        },
+    ),
+    "Camera": Table(lambda _: (hizvk.Camera, {}), {}),
+    "Camera.look_at": Table(lambda _: (hizvk.Camera.look_at, {**LOOK, "fov_y_deg": 60}), {**VIEW, "fov_y_deg": FOV}),
+    "Camera.frustum": Table(
+        lambda _: (hizvk.Camera.frustum, {**LOOK, "left": -1, "right": 2, "bottom": -1, "top": 1}),
+        {
+            **VIEW,
+            "left": NUMBER,
+            "right": [*NUMBER, (-1, ValueError, "above -1, got int -1")],
+            "bottom": NUMBER,
+            "top": [*NUMBER, (-2, ValueError, "above -1, got int -2")],
+        },
+    ),
+    "Camera.orthographic": Table(
+        lambda _: (hizvk.Camera.orthographic, {**LOOK, "height": 10, "width": 20}),
+        {
+            **VIEW,
+            "near": ORTHO_NEAR,
+            "far": [*FAR, (INF, ValueError, "got float inf"), (None, TypeError, "got None")],
+            "height": [(0, ValueError, "above 0, got int 0"), ("1", TypeError, "got str '1'")],
+            "width": [(-1, ValueError, "above 0, got int -1"), ("1", TypeError, "got str '1'")],
+        },
+    ),
+    "Camera.from_opencv": Table(
+        lambda _: (hizvk.Camera.from_opencv, {"k": K, "camera_from_world": EYE4, "size": (48, 64), "near": 0.1}),
+        {
+            "k": [
+                (EYE4, ValueError, "expected (3, 3) finite numbers, got (4, 4) float64"),
+                (K.T, ValueError, "it looks transposed"),
+                (K * 2, ValueError, "expected [[fx, skew, cx], [0, fy, cy], [0, 0, 1]]"),
+                (-K, ValueError, "got fx=-100 and fy=-100"),
+                (K * NAN, ValueError, "nan"),
+                ("k", TypeError, "got str 'k'"),
+            ],
+            "camera_from_world": [*POSE, (None, ValueError, "expected exactly one (4, 4) matrix, got neither")],
+            "world_from_camera": POSE,
+            "size": SIZE,
+            "near": NEAR,
+            "far": FAR,
+            "distortion": [
+                ([0.1, 0, 0, 0], ValueError, "undistort the depth image first (cv2.undistort"),
+                ("none", TypeError, "expected None or an array of zeros, got str 'none'"),
+                ([NAN], ValueError, "undistort"),
+            ],
+            "reversed_z": FLAG,
+        },
+    ),
+    "Camera.from_opengl": Table(
+        lambda _: (hizvk.Camera.from_opengl, {"projection": GL, "camera_from_world": EYE4, "size": (48, 64)}),
+        {
+            "projection": [*MATRIX, (GL.T, ValueError, "looks transposed; pass projection.T")],
+            "camera_from_world": POSE,
+            "world_from_camera": POSE,
+            "size": SIZE,
+        },
+    ),
+    "Camera.from_matrices": Table(
+        lambda _: (hizvk.Camera.from_matrices, {"clip_from_world": GL, "size": (48, 64), "reversed_z": False}),
+        {
+            "clip_from_world": CLIP,
+            "clip_from_camera": MATRIX,
+            "camera_from_world": POSE,
+            "world_from_camera": POSE,
+            "size": SIZE,
+            "reversed_z": FLAG,
+        },
+    ),
+    "Camera.resized": Table(lambda _: (camera().resized, {"size": (3, 4)}), {"size": SIZE}),
+    "Mesh": Table(
+        lambda _: (hizvk.Mesh, {"vertices": np.zeros((3, 3)), "triangles": [[0, 1, 2]], "transforms": EYE4}),
+        {"vertices": VERTICES, "triangles": TRIANGLES, "transforms": TRANSFORMS},
+    ),
+    "DrawTemplate": Table(
+        lambda _: (hizvk.DrawTemplate, {"index_count": 36}),
+        {
+            "index_count": unsigned("index_count"),
+            "first_index": unsigned("first_index"),
+            "first_instance": unsigned("first_instance"),
+            "base_vertex": [(2**31, ValueError, "in -2147483648..2147483647"), (0.5, TypeError, "got float 0.5")],
+        },
+    ),
+    "Device": Table(
+        lambda _: (hizvk.Device, {}),
+        {
+            "adapter": [
+                (1.5, TypeError, "expected an adapter's index, a part of its name, or None, got float 1.5"),
+                (True, TypeError, "got bool True"),
+                (-1, ValueError, "in 0..2147483647, got int -1"),
+                (" ", ValueError, "got an empty string"),
+            ]
+        },
+    ),
+    "Device.instances": Table(
+        lambda device: (device.instances, {"bounds": spheres()}),
+        {
+            "bounds": BOUNDS,
+            "strict": FLAG,
+        },
+    ),
+    "Device.occluders": Table(
+        lambda device: (device.occluders, {"vertices": np.zeros((3, 3)), "triangles": [[0, 1, 2]]}),
+        {
+            "vertices": [*VERTICES, (None, TypeError, "got None")],
+            "triangles": TRIANGLES,
+            "transforms": TRANSFORMS,
+            "cull": [
+                ("both", ValueError, 'expected one of "none", "back", "front", got str \'both\''),
+                (None, TypeError, "got None"),
+            ],
+        },
+    ),
+    "Device.render_depth": Table(
+        lambda device: (
+            device.render_depth,
+            {"occluders": device.occluders(np.zeros((3, 3)), [[0, 1, 2]]), "camera": camera()},
+        ),
+        {
+            "occluders": [(np.zeros((3, 3)), TypeError, "expected Occluders of Device.occluders, got (3, 3) float64")],
+            "camera": CAMERA,
+            "size": SIZE,
+        },
+    ),
+    "Device.pyramid": Table(
+        lambda device: (device.pyramid, {"depth": np.ones((6, 8)), "camera": camera(), "kind": "z"}),
+        {"depth": [*IMAGE, (None, TypeError, "got None")], "camera": CAMERA, "kind": KIND, "scale": SCALE},
+    ),
+    "Device.cull": Table(
+        lambda device: (device.cull, cull_arguments(device)),
+        {
+            "instances": [(spheres(), TypeError, "expected Instances of Device.instances, got Spheres Spheres(1")],
+            "camera": [*CAMERA, (camera((6, 9)), ValueError, "expected the camera of the pyramid")],
+            "pyramid": [(np.zeros((6, 8)), TypeError, "expected a Pyramid of Device.pyramid, got (6, 8) float64")],
+            "order": [("fast", ValueError, 'expected one of "stable", "any"'), (None, TypeError, "got None")],
+            "coverage": COVERAGE,
+            "guard_px": GUARD,
+            "depth_slack": DEPTH_SLACK,
+            "transform_slack": TRANSFORM_SLACK,
+            "capacity": [(-1, ValueError, "in 0..4294967295"), (1.5, TypeError, "got float 1.5")],
+            "draw": [((36,), TypeError, "expected a DrawTemplate or None, got tuple (36,)")],
+            "statistics": FLAG,
+        },
+    ),
+    "Device.wait": Table(lambda device: (device.wait, {}), {}),
+    "DepthImage.numpy": Table(lambda device: (device.wait, {}), {}),
+    "Pyramid.level": Table(
+        lambda device: (device.pyramid(np.ones((6, 8)), camera(), kind="z").level, {"k": 0}),
+        {
+            "k": [
+                (4, IndexError, "expected a level in 0..3, got 4"),
+                (-1, IndexError, "expected a level in 0..3, got -1"),
+                (0.0, TypeError, "got float 0.0"),
+            ]
+        },
+    ),
+    "CullResult.explain": Table(
+        lambda device: (device.cull(**cull_arguments(device)).explain, {"index": 0}),
+        {
+            "index": [
+                (1, IndexError, "expected an integer in 0..0, got 1"),
+                (-1, IndexError, "got -1"),
+                ("0", TypeError, "got str '0'"),
+            ]
+        },
+    ),
+    "visible": Table(
+        lambda device: (
+            hizvk.visible,
+            {"bounds": spheres(), "camera": camera(), "depth": np.ones((6, 8)), "kind": "z", "device": device},
+        ),
+        {
+            "bounds": BOUNDS,
+            "camera": CAMERA,
+            "depth": [*IMAGE, (None, TypeError, "got None")],
+            "kind": KIND,
+            "scale": SCALE,
+            "device": [("lavapipe", TypeError, "expected a Device or None, got str 'lavapipe'")],
+            "coverage": COVERAGE,
+            "guard_px": GUARD,
+            "depth_slack": DEPTH_SLACK,
+            "transform_slack": TRANSFORM_SLACK,
+        },
+    ),
+    "compare": Table(
+        lambda _: (hizvk.compare, {"mask": [True, False], "truth": [True, True]}),
+        {
+            "mask": [
+                (np.array([1, 0]), TypeError, "expected bool (N,), got (2,) int64"),
+                (np.ones((2, 1), dtype=bool), ValueError, "got (2, 1) bool"),
+                ("ab", TypeError, "got str 'ab'"),
+                (None, TypeError, "got None"),
+            ],
+            "truth": [
+                ([True], ValueError, "expected bool (2,), got (1,) bool"),
+                (np.array([1.0, 0.0]), TypeError, "got (2,) float64"),
+                (np.array([1], dtype=np.uint8), ValueError, "expected uint8 (2,), got (1,) uint8"),
+                (np.array([1, 77], dtype=np.uint8), ValueError, "codes of hizvk.reference (1, 2, 3, 4), got 77"),
+                (None, TypeError, "got None"),
+            ],
+        },
+    ),
+    "adapters": Table(lambda _: (hizvk.adapters, {}), {}),
+    "reference.classify": Table(
+        lambda _: (
+            hizvk.reference.classify,
+            {"bounds": spheres(), "camera": camera(), "depth": np.ones((6, 8)), "kind": "z"},
+        ),
+        {
+            "bounds": BOUNDS,
+            "camera": CAMERA,
+            "depth": [*IMAGE, (None, TypeError, "got None")],
+            "kind": KIND,
+            "scale": SCALE,
+        },
+    ),
+    "reference.pyramid": Table(
+        lambda _: (hizvk.reference.pyramid, {"depth": np.ones((6, 8)), "reversed_z": False}),
+        {
+            "depth": [
+                (np.ones(6), ValueError, "expected float (height, width), got (6,) float64"),
+                (np.ones((0, 8)), ValueError, "expected at least one pixel, got (0, 8) float64"),
+                (np.ones((6, 8), dtype=int), TypeError, "got (6, 8) int64"),
+            ],
+            "reversed_z": FLAG,
+        },
+    ),
+}
+
+#: What the package makes and callers only read; nothing to get wrong.
+MADE_BY_THE_PACKAGE = {"Adapter", "Comparison", "CullResult", "CullStats", "DepthImage", "Explanation", "Instances"}
+MADE_BY_THE_PACKAGE |= {"Occluders", "Pyramid"}

@@ -1,0 +1,155 @@
+"""The command line, and the package on a machine without a Vulkan driver."""
+
+import importlib.machinery
+import json
+import os
+import pickle
+import subprocess
+import sys
+import types
+
+import pytest
+
+import hizvk
+from hizvk import cli
+
+INSTALL_LINE = "apt install libvulkan1 mesa-vulkan-drivers"
+
+
+def test_info(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["info"]) == 0
+    text = capsys.readouterr().out
+    assert hizvk.__version__ in text
+    for adapter in hizvk.adapters():
+        assert str(adapter) in text
+    assert cli.main(["info", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["hizvk"] == hizvk.__version__
+    assert [hizvk.Adapter(**adapter) for adapter in told["adapters"]] == hizvk.adapters()
+
+
+def test_doctor(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["doctor", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["healthy"] is True
+    found = {check["name"]: check["detail"] for check in told["checks"]}
+    assert found["cull (reversed depth)"] == found["cull (standard depth)"] == "visible, occluded, outside"
+    assert cli.main(["doctor"]) == 0
+    assert "ok   cull (standard depth): visible, occluded, outside" in capsys.readouterr().out
+
+
+def test_doctor_tells_what_is_wrong(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HIZVK_ADAPTER", "no such adapter")
+    assert cli.main(["doctor"]) == 1
+    text = capsys.readouterr().out
+    assert "FAIL device" in text
+    assert "HIZVK_ADAPTER has to name one of the adapters" in text
+    monkeypatch.delenv("HIZVK_ADAPTER")
+    monkeypatch.setenv("VK_DRIVER_FILES", "/nowhere/driver.json")
+    assert any(check.name == "vulkan drivers" and not check.passed for check in cli.checks())
+
+
+@pytest.mark.parametrize("name", ["demo", "bench"])
+def test_other_commands_are_modules_of_their_own(
+    name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[list[str]] = []
+    module = types.ModuleType(f"hizvk.{name}")
+    module.__spec__ = importlib.machinery.ModuleSpec(f"hizvk.{name}", None)
+    module.main = lambda arguments: seen.append(arguments) or 7  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, f"hizvk.{name}", module)
+    assert cli.main([name, "--json", "--help", "x"]) == 7
+    assert seen == [["--json", "--help", "x"]]
+    monkeypatch.setattr(cli.importlib.util, "find_spec", lambda _: None)  # type: ignore[attr-defined]
+    assert cli.main([name]) == 2
+    assert f"hizvk {name}: not part of this build" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("arguments", [[], ["nonsense"], ["info", "--nonsense"]])
+def test_wrong_usage(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        cli.main(arguments)
+    assert caught.value.code == 2
+    assert "usage: hizvk" in capsys.readouterr().err
+
+
+def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        cli.main(["--help"])
+    assert caught.value.code == 0
+    text = capsys.readouterr().out
+    for command in ("info", "doctor", "demo", "bench"):
+        assert command in text
+
+
+WITHOUT_DRIVER = """
+import hizvk
+assert hizvk.adapters() == []
+camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(4, 6), near=0.1)
+assert hizvk.reference.classify(hizvk.Spheres([[0.0, 0, 5]], 1), camera, [[9.0] * 6] * 4, kind="z").tolist() == [1]
+try:
+    hizvk.Device()
+except hizvk.NoAdapterError as error:
+    print(error)
+    print(error.hint)
+"""
+
+
+def test_without_a_driver() -> None:
+    environment = {**os.environ, "VK_DRIVER_FILES": "/nowhere.json", "VK_ICD_FILENAMES": "/nowhere.json"}
+    environment.pop("VK_ADD_DRIVER_FILES", None)
+    ran = subprocess.run(
+        [sys.executable, "-c", WITHOUT_DRIVER], env=environment, capture_output=True, text=True, check=True
+    )
+    text, hint = ran.stdout.strip().rsplit("\n", 1)
+    assert text.startswith("no Vulkan adapter")
+    assert INSTALL_LINE in text
+    assert INSTALL_LINE in hint
+    told = subprocess.run(
+        [sys.executable, "-m", "hizvk", "doctor"], env=environment, capture_output=True, text=True, check=False
+    )
+    assert told.returncode == 1
+    assert INSTALL_LINE in told.stdout
+    assert "Traceback" not in told.stdout + told.stderr
+
+
+def test_an_adapter_that_is_not_there() -> None:
+    with pytest.raises(hizvk.NoAdapterError) as caught:
+        hizvk.Device("no such adapter")
+    assert "no such adapter" in str(caught.value)
+    assert len(caught.value.seen) == len(hizvk.adapters())
+    with pytest.raises(hizvk.NoAdapterError):
+        hizvk.Device(10_000)
+
+
+def test_an_adapter_by_index_and_by_name() -> None:
+    chosen = hizvk.Device().adapter
+    assert hizvk.Device(chosen.index).adapter == chosen
+    assert hizvk.Device(chosen.name[:6].upper()).adapter.name.lower().startswith(chosen.name[:6].lower())
+
+
+def test_errors_are_one_family_and_can_be_pickled() -> None:
+    errors = [
+        hizvk.NoAdapterError(["0: one"], "install it", "called two"),
+        hizvk.LimitError("image side", 70_000, 16_384),
+        hizvk.DeviceLostError("gone"),
+        hizvk.OutOfMemoryError("full"),
+    ]
+    for error in errors:
+        assert isinstance(error, hizvk.HizError)
+        again = pickle.loads(pickle.dumps(error))
+        assert type(again) is type(error)
+        assert str(again) == str(error)
+        assert vars(again) == vars(error)
+    assert str(errors[0]) == "no Vulkan adapter called two; seen: 0: one. install it"
+    assert str(errors[1]) == "image side: 70000 requested, this device allows 16384"
+
+
+def test_a_limit_has_a_name_and_numbers() -> None:
+    device = hizvk.Device()
+    side = device.max_image_side + 1
+    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(1, side), near=0.1)
+    with pytest.raises(hizvk.LimitError) as caught:
+        device.render_depth(device.occluders([]), camera)
+    assert caught.value.requested == side
+    assert caught.value.allowed == device.max_image_side

@@ -1,0 +1,365 @@
+"""What comes back: shapes, dtypes and values, on scenes whose answers are derived by hand."""
+
+import numpy as np
+import pytest
+
+import hizvk
+from hizvk import Verdict
+from hizvk.reference import HIDDEN, INVALID, UNDECIDED, VISIBLE
+
+NAN = float("nan")
+
+
+@pytest.fixture(scope="module")
+def device() -> hizvk.Device:
+    return hizvk.Device()
+
+
+@pytest.fixture(scope="module", params=[True, False], ids=["reversed", "standard"])
+def camera(request: pytest.FixtureRequest) -> hizvk.Camera:
+    """At the origin, looking along -z: at depth d the image reaches from -d to d in x and y."""
+    return hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(8, 8), near=0.125, reversed_z=request.param)
+
+
+def left_wall(size: tuple[int, int] = (8, 8)) -> np.ndarray:
+    """A wall at depth 10 in the left half of the image, nothing in the right half."""
+    depth = np.full(size, np.inf)
+    depth[:, : size[1] // 2] = 10.0
+    return depth
+
+
+# Spheres of radius 1, and what becomes of them behind `left_wall`.
+SCENE: list[tuple[tuple[float, float, float], float, Verdict]] = [
+    ((-10, 0, -20), 1, Verdict.OCCLUDED),  # behind the wall
+    ((10, 0, -20), 1, Verdict.VISIBLE),  # in the open half
+    ((0, 0, -20), 1, Verdict.VISIBLE),  # across the wall's edge
+    ((-2, 0, -5), 1, Verdict.VISIBLE),  # before the wall
+    ((-5, 0, -10), 1, Verdict.VISIBLE),  # through the wall
+    ((0, 0, 20), 1, Verdict.OUTSIDE),  # behind the camera
+    ((-60, 0, -20), 1, Verdict.OUTSIDE),  # left of the view
+    ((0, 60, -20), 1, Verdict.OUTSIDE),  # above the view
+    ((0, 0, 0), 1, Verdict.VISIBLE),  # around the camera
+    ((-0.0625, 0, -0.125), 0.0625, Verdict.VISIBLE),  # across the near plane
+    ((-10, 0, -20), 0, Verdict.OCCLUDED),  # a point behind the wall
+    ((NAN, 0, -20), 1, Verdict.INVALID),
+    ((-10, 0, -20), NAN, Verdict.INVALID),
+    ((-10, 0, -20), -1, Verdict.INVALID),
+    ((float("inf"), 0, -20), 1, Verdict.INVALID),
+]
+VERDICTS = [verdict for *_, verdict in SCENE]
+KEPT = [i for i, verdict in enumerate(VERDICTS) if verdict in (Verdict.VISIBLE, Verdict.INVALID)]
+
+
+def scene() -> hizvk.Spheres:
+    return hizvk.Spheres(
+        np.array([center for center, *_ in SCENE]), np.array([float(radius) for _, radius, _ in SCENE])
+    )
+
+
+def culled(device: hizvk.Device, camera: hizvk.Camera, **options: object) -> hizvk.CullResult:
+    pyramid = device.pyramid(left_wall(), camera, kind="z")
+    return device.cull(device.instances(scene()), camera, pyramid, **options)  # type: ignore[arg-type]
+
+
+def test_verdicts(device: hizvk.Device, camera: hizvk.Camera) -> None:
+    result = culled(device, camera)
+    assert len(result) == len(SCENE)
+    assert result.verdicts.dtype == np.uint8
+    assert [Verdict(code) for code in result.verdicts] == VERDICTS
+    assert result.mask.dtype == np.bool_
+    assert np.flatnonzero(result.mask).tolist() == KEPT
+    assert result.indices.dtype == np.uint32
+    assert result.indices.tolist() == KEPT
+    assert result.count == result.demand == len(KEPT)
+    for array in (result.mask, result.verdicts, result.indices, result.draws):
+        assert not array.flags.writeable  # they are shared
+    assert result.mask is result.mask
+
+
+def test_boxes_and_oriented_boxes(device: hizvk.Device, camera: hizvk.Camera) -> None:
+    centers, radii = scene().centers.astype(np.float64), scene().radii.astype(np.float64)
+    half = np.repeat(radii[:, None], 3, axis=1)
+    quarter_turn = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    pyramid = device.pyramid(left_wall(), camera, kind="z")
+    for bounds in (
+        hizvk.Boxes(centers - half, centers + half),
+        hizvk.OrientedBoxes(centers, half, np.broadcast_to(quarter_turn, (len(half), 3, 3))),
+    ):
+        result = device.cull(device.instances(bounds), camera, pyramid)
+        assert [Verdict(code) for code in result.verdicts] == VERDICTS
+
+
+def test_stats_add_up(device: hizvk.Device, camera: hizvk.Camera) -> None:
+    stats = culled(device, camera).stats
+    assert stats.tested == len(SCENE)
+    assert stats.outside == VERDICTS.count(Verdict.OUTSIDE)
+    assert stats.occluded == VERDICTS.count(Verdict.OCCLUDED)
+    assert stats.kept == len(KEPT)
+    assert stats.invalid == VERDICTS.count(Verdict.INVALID)
+    assert stats.levels is not None
+    assert stats.occluded <= sum(stats.levels) <= stats.tested
+    assert stats.texels_read is None or stats.texels_read >= sum(stats.levels)
+    for milliseconds in (stats.record_ms, stats.gpu_ms, stats.readback_ms):
+        assert milliseconds >= 0
+    assert "15 tested: 10 kept (4 invalid), 5 culled (3 outside, 2 occluded)" in str(stats)
+    without = culled(device, camera, statistics=False).stats
+    assert without.levels is None
+    assert without.texels_read is None
+    assert without.kept == stats.kept
+
+
+def test_draw_arguments(device: hizvk.Device, camera: hizvk.Camera) -> None:
+    template = hizvk.DrawTemplate(36, first_index=6, base_vertex=-2, first_instance=0)
+    draws = culled(device, camera, draw=template).draws
+    assert draws.dtype == hizvk.DRAW_DTYPE
+    assert draws.dtype.itemsize == 20
+    assert draws.dtype.names == ("index_count", "instance_count", "first_index", "base_vertex", "first_instance")
+    assert draws.tolist() == [(36, len(KEPT), 6, -2, 0)]
+
+
+def test_any_order_has_the_same_members(device: hizvk.Device, camera: hizvk.Camera) -> None:
+    result = culled(device, camera, order="any")
+    assert sorted(result.indices.tolist()) == KEPT
+    assert [Verdict(code) for code in result.verdicts] == VERDICTS
+
+
+@pytest.mark.parametrize("order", ["stable", "any"])
+@pytest.mark.parametrize("capacity", [0, 3, len(KEPT), 1000])
+def test_capacity_and_demand(device: hizvk.Device, camera: hizvk.Camera, order: str, capacity: int) -> None:
+    result = culled(device, camera, order=order, capacity=capacity)
+    written = min(capacity, len(KEPT))
+    assert result.demand == len(KEPT)
+    assert result.count == written
+    assert result.draws["instance_count"].sum() == written
+    assert len(result.indices) == len(set(result.indices.tolist())) == written
+    assert set(result.indices.tolist()) <= set(KEPT)
+    assert np.flatnonzero(result.mask).tolist() == KEPT  # nothing is lost silently
+    assert result.stats.kept == len(KEPT)
+
+
+def test_explain_by_hand(device: hizvk.Device, camera: hizvk.Camera) -> None:
+    # Centre (-10, 0, -20), radius 1: x / depth from -(200 + 499^0.5) / 399 to -(200 - 499^0.5) / 399, that is columns
+    # 1.77 to 2.22; y / depth within 1 / 399^0.5, rows 3.80 to 4.20. So pixels 1..2 by 3..4, four texels of level 0.
+    told = culled(device, camera).explain(0)
+    assert told.index == 0
+    assert told.verdict is Verdict.OCCLUDED
+    assert told.rectangle == (1, 3, 2, 4)
+    assert told.level == 0
+    assert set(told.texels) == {(1, 3), (2, 3), (1, 4), (2, 4)}
+    wall, sphere = 0.125 / 10, 0.125 / 19
+    if not camera.reversed_z:
+        wall, sphere = 1 - wall, 1 - sphere
+    assert told.texel_depths == pytest.approx((wall,) * 4, rel=1e-6)
+    assert told.farthest == pytest.approx(wall, rel=1e-6)
+    assert told.nearest == pytest.approx(sphere, rel=1e-3)
+    text = str(told)
+    assert "instance 0: occluded" in text
+    assert "x 1..2, y 3..4" in text
+
+
+@pytest.mark.parametrize("index", range(len(SCENE)))
+def test_explain_agrees_with_the_verdict(device: hizvk.Device, camera: hizvk.Camera, index: int) -> None:
+    told = culled(device, camera).explain(index)
+    assert told.verdict is VERDICTS[index]
+    assert told.reason
+    assert VERDICTS[index].name.lower() in str(told)
+    if told.verdict is Verdict.OUTSIDE:
+        assert told.texels == ()
+
+
+def test_invalid_bounds_are_listed(device: hizvk.Device) -> None:
+    instances = device.instances(scene())
+    assert instances.invalid.dtype == np.uint64
+    assert instances.invalid.tolist() == [i for i, verdict in enumerate(VERDICTS) if verdict is Verdict.INVALID]
+
+
+def test_no_instances(device: hizvk.Device, camera: hizvk.Camera) -> None:
+    pyramid = device.pyramid(left_wall(), camera, kind="z")
+    empty = np.zeros((0, 3))
+    for bounds in (
+        hizvk.Spheres(empty, np.zeros(0)),
+        hizvk.Spheres(empty, 1.0),
+        hizvk.Boxes(empty, empty),
+        hizvk.OrientedBoxes(empty, empty, np.zeros((0, 3, 3))),
+    ):
+        for order in ("stable", "any"):
+            result = device.cull(device.instances(bounds), camera, pyramid, order=order)  # type: ignore[arg-type]
+            assert len(result) == len(bounds) == 0
+            assert result.mask.shape == result.verdicts.shape == result.indices.shape == (0,)
+            assert result.count == result.demand == result.stats.tested == 0
+            assert result.draws["instance_count"].sum() == 0
+            with pytest.raises(IndexError):
+                result.explain(0)
+        assert hizvk.visible(bounds, camera, depth=left_wall(), kind="z", device=device).shape == (0,)
+
+
+@pytest.mark.parametrize(("x", "kept"), [(-10.0, False), (10.0, True)])
+def test_one_instance(device: hizvk.Device, camera: hizvk.Camera, x: float, kept: bool) -> None:
+    pyramid = device.pyramid(left_wall(), camera, kind="z")
+    result = device.cull(device.instances(hizvk.Spheres([[x, 0.0, -20.0]], 1)), camera, pyramid)
+    assert result.mask.tolist() == [kept]
+    assert result.indices.tolist() == [0] * kept
+
+
+def test_sample_coverage_and_guard(device: hizvk.Device, camera: hizvk.Camera) -> None:
+    # A point-like sphere in a corner of pixel (6, 6): it meets the pixel's area, not its centre.
+    corner = hizvk.Spheres([[20 * (6.125 - 4) / 4, -20 * (6.125 - 4) / 4, -20.0]], 0.01)
+    pyramid = device.pyramid(left_wall(), camera, kind="z")
+    instances = device.instances(corner)
+    assert device.cull(instances, camera, pyramid).mask.tolist() == [True]
+    assert device.cull(instances, camera, pyramid, coverage="sample").mask.tolist() == [False]
+    assert device.cull(instances, camera, pyramid, coverage="sample", guard_px=0.5).mask.tolist() == [True]
+
+
+@pytest.mark.parametrize("kind", ["ndc", "z", "distance"])
+def test_kinds_of_depth(device: hizvk.Device, camera: hizvk.Camera, kind: str) -> None:
+    # A plane at depth 10: the ray through a pixel's centre is longer than the depth.
+    rows, columns = np.mgrid[0:8, 0:8]
+    x, y = (columns + 0.5 - 4) / 4, (rows + 0.5 - 4) / 4
+    images = {
+        "ndc": np.full((8, 8), 0.0125 if camera.reversed_z else 1 - 0.0125),
+        "z": np.full((8, 8), 10.0),
+        "distance": 10.0 * np.sqrt(1 + x**2 + y**2),
+    }
+    image, kind = images[kind], camera.depth_kind if kind == "ndc" else kind
+    pyramid = device.pyramid(image, camera, kind=kind)  # type: ignore[call-overload]
+    expected = 0.0125 if camera.reversed_z else 1 - 0.0125
+    assert pyramid.level(0) == pytest.approx(np.full((8, 8), expected), rel=1e-6)
+    spheres = hizvk.Spheres([[-1.0, 0, -10.5], [-1, 0, -9.5]], 0.25)
+    mask = hizvk.visible(spheres, camera, depth=image, kind=kind, device=device)  # type: ignore[arg-type]
+    assert mask.tolist() == [False, True]
+    if kind in ("z", "distance"):  # the same in half units
+        mask = hizvk.visible(spheres, camera, depth=2 * image, kind=kind, scale=0.5, device=device)  # type: ignore[arg-type]
+        assert mask.tolist() == [False, True]
+
+
+def test_pyramid_levels_by_hand(device: hizvk.Device) -> None:
+    depth = np.array([[0.5, 0.25, 0.75, 0.5, 0.125], [0.5, 0.5, 0.5, 0.5, 0.5], [0.25, 1.0, 0.5, 0.375, 0.625]])
+    far_is_0 = [depth, [[0.25, 0.5, 0.125], [0.25, 0.375, 0.625]], [[0.25, 0.125]], [[0.125]]]
+    far_is_1 = [depth, [[0.5, 0.75, 0.5], [1.0, 0.5, 0.625]], [[1.0, 0.625]], [[1.0]]]
+    for reversed_z, expected in ((True, far_is_0), (False, far_is_1)):
+        camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(3, 5), near=1, reversed_z=reversed_z)
+        pyramid = device.pyramid(depth, camera, kind=camera.depth_kind)  # type: ignore[call-overload]
+        reference = hizvk.reference.pyramid(depth, reversed_z=reversed_z)
+        assert pyramid.num_levels == len(reference) == 4
+        assert pyramid.size == (3, 5)
+        assert pyramid.camera == camera
+        assert pyramid.device_bytes >= 4 * (15 + 6 + 2 + 1)
+        for k, values in enumerate(expected):
+            for level in (pyramid.level(k), reference[k]):
+                assert level.dtype == np.float32
+                assert level.tolist() == np.asarray(values).tolist()
+
+
+def test_rendered_depth_by_hand(device: hizvk.Device, camera: hizvk.Camera) -> None:
+    # The square x in -10..0, y in -10..10 at depth 10 covers the left half of the image.
+    corners = np.array([[-10.0, -10, -10], [0, -10, -10], [0, 10, -10], [-10, 10, -10]])
+    image = device.render_depth(device.occluders(corners, [[0, 1, 2], [0, 2, 3]]), camera)
+    assert image.size == (8, 8)
+    assert image.kind == camera.depth_kind
+    assert image.camera == camera
+    depth = image.numpy()
+    assert depth.dtype == np.float32
+    near, far = (0.0125, 0.0) if camera.reversed_z else (1 - 0.0125, 1.0)
+    assert depth == pytest.approx(np.tile([near] * 4 + [far] * 4, (8, 1)), rel=1e-5)
+    result = device.cull(device.instances(scene()), camera, device.pyramid(image))
+    assert [Verdict(code) for code in result.verdicts] == VERDICTS
+    mask = hizvk.visible(scene(), camera, depth=image)
+    assert np.flatnonzero(mask).tolist() == KEPT
+
+
+def test_occluders_placed_culled_and_resized(device: hizvk.Device, camera: hizvk.Camera) -> None:
+    corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    faces = [[0, 1, 2], [0, 2, 3]]  # counter-clockwise for the camera
+    placed = np.array([np.diag([5.0, 10, 1, 1])] * 2)
+    placed[0, :3, 3] = (-5, 0, -10)
+    placed[1, :3, 3] = (-5, 0, -30)
+    far = 0.0 if camera.reversed_z else 1.0
+    expected = device.render_depth(device.occluders(corners, faces, transforms=placed), camera).numpy()
+    assert (expected[:, :4] != far).all()
+    assert (expected[:, 4:] == far).all()
+    for meshes in (
+        [(corners, faces, placed)],
+        [hizvk.Mesh(corners, faces, m) for m in placed],
+        hizvk.Mesh(corners, faces, placed),
+    ):
+        assert (device.render_depth(device.occluders(meshes), camera).numpy() == expected).all()  # type: ignore[call-overload]
+    back = device.occluders(corners, faces, transforms=placed, cull="back")
+    assert (device.render_depth(back, camera).numpy() == expected).all()
+    front = device.occluders(corners, faces, transforms=placed, cull="front")
+    assert (device.render_depth(front, camera).numpy() == far).all()
+    assert (device.render_depth(device.occluders([]), camera).numpy() == far).all()
+    small = device.render_depth(back, camera, size=(4, 2))
+    assert small.camera == camera.resized((4, 2))
+    assert (small.numpy() != far).tolist() == [[True, False]] * 4
+
+
+def test_the_default_device_is_made_once(camera: hizvk.Camera) -> None:
+    from hizvk.oneline import default_device
+
+    assert np.flatnonzero(hizvk.visible(scene(), camera, depth=left_wall(), kind="z")).tolist() == KEPT
+    assert default_device() is default_device()
+
+
+def test_instances_and_repr(device: hizvk.Device, camera: hizvk.Camera) -> None:
+    spheres = scene()
+    instances = device.instances(spheres)
+    assert repr(spheres) == "Spheres(15 of float64)"
+    assert (len(instances), instances.kind, instances.num_pieces) == (15, "spheres", 1)
+    assert instances.device is device
+    assert instances.device_bytes >= 15 * 16
+    assert repr(instances) == "<Instances: 15 spheres>"
+    pyramid = device.pyramid(left_wall(), camera, kind="z")
+    assert repr(pyramid) == "<Pyramid 8x8, 4 levels>"
+    assert repr(device.cull(instances, camera, pyramid)) == "<CullResult of 15 instances>"
+    corners = np.zeros((3, 3))
+    assert repr(hizvk.Mesh(corners, [[0, 1, 2]], [np.eye(4)] * 2)) == "Mesh(3 vertices, 1 triangles, 2 copies)"
+    occluders = device.occluders([hizvk.Mesh(corners, [[0, 1, 2]], [np.eye(4)] * 2)] * 3)
+    assert repr(occluders) == "<Occluders: 3 meshes, 6 triangles>"
+    assert repr(device.render_depth(occluders, camera)) == f"<DepthImage 8x8 of kind {camera.depth_kind}>"
+    assert repr(device) == f"<Device {device.adapter}>"
+    assert device.adapter in hizvk.adapters()
+    assert device.max_image_side >= 8192
+    device.wait()
+
+
+# -- the oracle and the comparison ---------------------------------------------------------------------------
+
+TRUTH = {Verdict.OUTSIDE: HIDDEN, Verdict.OCCLUDED: HIDDEN, Verdict.VISIBLE: VISIBLE, Verdict.INVALID: INVALID}
+
+
+def test_the_oracle_by_hand(camera: hizvk.Camera) -> None:
+    codes = hizvk.reference.classify(scene(), camera, left_wall(), kind="z")
+    assert codes.dtype == np.uint8
+    assert codes.tolist() == [TRUTH[verdict] for verdict in VERDICTS]
+    centers, radii = scene().centers, np.repeat(scene().radii[:, None], 3, axis=1)
+    boxes = hizvk.Boxes(centers - radii, centers + radii)
+    assert hizvk.reference.classify(boxes, camera, left_wall(), kind="z").tolist() == codes.tolist()
+    turned = hizvk.OrientedBoxes(centers, radii, np.broadcast_to(np.eye(3), (len(centers), 3, 3)))
+    assert hizvk.reference.classify(turned, camera, left_wall(), kind="z").tolist() == codes.tolist()
+
+
+def test_compare_by_hand() -> None:
+    mask = np.array([True, True, False, False, True, False])
+    codes = np.array([VISIBLE, HIDDEN, VISIBLE, HIDDEN, UNDECIDED, INVALID], dtype=np.uint8)
+    found = hizvk.compare(mask, codes)
+    assert found.false_culls.tolist() == [2, 5]  # bad bounds have to be kept
+    assert found.false_keeps.tolist() == [1]
+    assert (found.total, found.kept, found.culled) == (6, 3, 3)
+    assert (found.visible, found.hidden, found.undecided) == (3, 2, 1)
+    assert found.kept_share == 0.5
+    assert found.false_keep_share == 0.5
+    assert found.kept_over_visible == 1.0
+    assert "2 wrongly culled, 1 wrongly kept (50.0 % of the hidden)" in str(found)
+    plain = hizvk.compare([True, False], [True, True])
+    assert (plain.false_culls.tolist(), plain.false_keeps.tolist()) == ([1], [])
+    none = hizvk.compare([], [])
+    assert (none.total, none.kept_share, none.false_keep_share, none.kept_over_visible) == (0, 0.0, 0.0, 1.0)
+    assert hizvk.compare([True], [False]).kept_over_visible == float("inf")
+
+
+def test_the_cull_agrees_with_the_oracle(device: hizvk.Device, camera: hizvk.Camera) -> None:
+    codes = hizvk.reference.classify(scene(), camera, left_wall(), kind="z")
+    found = hizvk.compare(culled(device, camera).mask, codes)
+    assert found.false_culls.size == 0
+    assert found.false_keeps.size == 0
