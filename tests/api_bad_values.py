@@ -150,13 +150,13 @@ SCALE: list[Bad] = [
 ]
 GUARD: list[Bad] = [
     (0.3, ValueError, "expected a multiple of 1/256, got 0.3"),
-    (-1, ValueError, "at least 0, got int -1"),
+    (-1, ValueError, "expected a finite number at least 0 and at most 16, got int -1"),
     ("1", TypeError, "got str '1'"),
 ]
 COVERAGE: list[Bad] = [("pixel", ValueError, 'expected one of "area", "sample"'), (0, TypeError, "got int 0")]
 DEPTH_SLACK: list[Bad] = [
     (-1e-7, ValueError, "at least 0"),
-    (1.0, ValueError, "below 1"),
+    (0.75, ValueError, "at most 0.5, got float 0.75"),
     ("a", TypeError, "got str 'a'"),
 ]
 TRANSFORM_SLACK: list[Bad] = [

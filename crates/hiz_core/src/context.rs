@@ -28,6 +28,7 @@ pub struct HizContext {
 #[derive(Debug)]
 struct Shared {
     device: wgpu::Device,
+    edits: Vec<(String, String)>,
     layouts: Layouts,
     sampler: wgpu::Sampler,
     /// Stand in for the chunks that a small pyramid does not have.
@@ -80,6 +81,13 @@ impl HizContext {
     /// # Errors
     /// [`Error::Limit`] where the device offers less than [`HizContext::required_limits`].
     pub fn new(device: &wgpu::Device) -> Result<Self> {
+        Self::with_planted_faults(device, &[])
+    }
+
+    /// For tests: a context whose shaders have texts replaced, `(what, by what)`. A suite is trusted once a planted fault
+    /// turns it red.
+    #[doc(hidden)]
+    pub fn with_planted_faults(device: &wgpu::Device, faults: &[(&str, &str)]) -> Result<Self> {
         let (have, need) = (device.limits(), Self::required_limits());
         for (name, need, have) in [
             ("max_storage_buffers_per_shader_stage", need.max_storage_buffers_per_shader_stage, have.max_storage_buffers_per_shader_stage),
@@ -107,6 +115,7 @@ impl HizContext {
         });
         let shared = Shared {
             device: device.clone(),
+            edits: faults.iter().map(|(what, by)| ((*what).to_owned(), (*by).to_owned())).collect(),
             layouts: Layouts::new(device),
             sampler,
             no_chunk,
@@ -311,6 +320,7 @@ impl HizContext {
         constants: &[(&str, f64)],
     ) -> wgpu::ComputePipeline {
         let device = &self.shared.device;
+        let source = self.shared.edits.iter().fold(source.to_owned(), |text, (what, by)| text.replace(what, by));
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(label),
             source: wgpu::ShaderSource::Wgsl(source.into()),

@@ -124,6 +124,12 @@ impl Engine {
     /// # Errors
     /// [`Error::NoAdapter`] where none fits, with the adapters that were seen and the line that installs a software driver.
     pub fn new(adapter: Option<&str>) -> Result<Self> {
+        Self::with_planted_faults(adapter, &[])
+    }
+
+    /// For tests: see [`HizContext::with_planted_faults`].
+    #[doc(hidden)]
+    pub fn with_planted_faults(adapter: Option<&str>, faults: &[(&str, &str)]) -> Result<Self> {
         let from_environment = std::env::var(ADAPTER_VARIABLE).ok().filter(|s| !s.is_empty());
         let request = adapter.map(str::to_owned).or(from_environment);
         let mut found = enumerate();
@@ -154,7 +160,7 @@ impl Engine {
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             locked(&uncaught_to).get_or_insert(error.to_string());
         }));
-        let context = HizContext::new(&device)?;
+        let context = HizContext::with_planted_faults(&device, faults)?;
         Ok(Self { shared: Arc::new(Shared { context, device, queue, adapter: summary, lost, uncaught }) })
     }
 

@@ -11,7 +11,7 @@
 //!    (reversed Z: `< 0`), the parts outside of the frustum included. Depths are cleaned up first ([`sanitized_depth`]).
 //! 4. [`classify`]: if some touched pixel does not hide the volume, it is [`Verdict::Visible`], and to cull it would be a false cull.
 //!    Otherwise it is [`Verdict::Hidden`]: outside of the frustum, or occluded.
-//! 5. [`pyramid`] is the reference of the depth pyramid, each texel computed from all of its pixels.
+//! 5. [`pyramid()`] is the reference of the depth pyramid, each texel computed from all of its pixels.
 //!
 //! Inside, "touched" is the question whether a convex volume meets a few half-spaces, and "hides" whether it lies on one side of a
 //! plane; both come down to signs of polynomials in the inputs. These are evaluated in float64 with a running bound of

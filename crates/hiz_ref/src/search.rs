@@ -97,7 +97,7 @@ impl<'a> Projected<'a> {
                 [&self.float.width_x, &self.float.height_y, &self.float.w].map(|form| {
                     form.middle.mid + (0..3).map(|k| form.along[k].mid * s[k]).sum::<f64>()
                 });
-            if !(w > 0.0) {
+            if w <= 0.0 || w.is_nan() {
                 return image;
             }
             let pixel = [

@@ -17,7 +17,7 @@ const MAX_SIDE: u32 = 32768;
 /// x_pixel = width/2 + width/2 * ndc.x          y_pixel = height/2 - height/2 * ndc.y
 /// ```
 ///
-/// so row 0 is on top, as in a NumPy image. A point is inside the frustum if `w > 0`, `0 <= z <= w` and its pixel coordinates lie
+/// so row 0 is on top, as in an image array. A point is inside the frustum if `w > 0`, `0 <= z <= w` and its pixel coordinates lie
 /// in the closed image rectangle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {

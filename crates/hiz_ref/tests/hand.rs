@@ -7,7 +7,7 @@ use hiz_ref::{
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// From the origin along +z, 90 degrees, near plane 1, infinite far plane, standard Z. With 4x4 pixels a point has
-/// x_pixel = 2 + 2 x/z, y_pixel = 2 - 2 y/z, depth 1 - 1/z.
+/// `x_pixel = 2 + 2 x/z`, `y_pixel = 2 - 2 y/z`, depth `1 - 1/z`.
 fn perspective(width: u32, height: u32) -> View {
     View {
         rows: [
@@ -31,7 +31,7 @@ fn reversed(width: u32, height: u32) -> View {
     view
 }
 
-/// World coordinates are NDC. With 4x4 pixels x_pixel = 2 + 2 x, y_pixel = 2 - 2 y.
+/// World coordinates are NDC. With 4x4 pixels `x_pixel = 2 + 2 x`, `y_pixel = 2 - 2 y`.
 fn orthographic(width: u32, height: u32) -> View {
     let mut view = perspective(width, height);
     view.rows[2] = [0.0, 0.0, 1.0, 0.0];
@@ -233,6 +233,10 @@ fn special_depths() {
     for far in [f32::NAN, f32::NEG_INFINITY, -0.5, 1.5, 0.0, -0.0, 1e-40] {
         assert_eq!(verdict(&back, far_away, &[far]), Verdict::Visible, "{far}");
     }
+    // Beyond the far plane a depth of 1 is nearer than everything; it stands for "nothing there" and hides nothing all the same.
+    let beyond = sphere([0.0, 0.0, 5.0], 1.0);
+    assert!(!hides(&orthographic(1, 1), &beyond, 1.0).expect("valid"));
+    assert!(hides(&orthographic(1, 1), &beyond, 1.0f32.next_down()).expect("valid"));
     for near in [0.0, -0.0, 1e-40, 0.5] {
         assert_eq!(verdict(&view, far_away, &[near]), Verdict::Hidden, "{near}");
     }
@@ -299,6 +303,32 @@ fn huge_and_tiny_numbers_are_decided_exactly() {
     scaled.rows = view.rows.map(|row| row.map(|x| x * 2.0f64.powi(-600)));
     assert_eq!(verdict(&scaled, wall, &nearer), Verdict::Hidden);
     assert_eq!(verdict(&scaled, wall, &[0.75; 16]), Verdict::Visible);
+}
+
+#[test]
+fn a_matrix_that_float64_cannot_follow() {
+    // x = 5 K p.x - 4 K p.y - K p.z + 0.6 is 0.6 for p = (t, t, t), but each product is rounded by up to 32: in plain float64 the point
+    // lands anywhere. `x_pixel` = 2 + 1.2: column 3; `y_pixel` = 2 - 0.2: row 1. Mirrored, and with x and y exchanged, likewise.
+    const K: f64 = 1e17;
+    for (sign, exchanged, pixel) in [
+        (1.0, false, [3, 1]),
+        (-1.0, false, [0, 1]),
+        (1.0, true, [2, 0]),
+        (-1.0, true, [2, 3]),
+    ] {
+        let mut view = orthographic(4, 4);
+        view.rows[0] = [5.0 * K, -4.0 * K, -K, 0.6].map(|x| sign * x);
+        view.rows[1] = [0.0, 0.0, 0.0, 0.1];
+        view.rows[2] = [0.0, 0.0, 0.0, 0.5];
+        if exchanged {
+            view.rows.swap(0, 1);
+        }
+        for tenths in 11..40u8 {
+            let t = f64::from(tenths) / 10.0;
+            let touched = touched_pixels(&view, &sphere([t; 3], 0.0), Coverage::Area);
+            assert_eq!(touched.expect("valid"), [pixel], "{t}");
+        }
+    }
 }
 
 #[test]

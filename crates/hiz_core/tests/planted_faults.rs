@@ -1,0 +1,113 @@
+//! Faults planted into the shaders: each must turn the suite red. A fault that stays green means that a margin, a clamp or an
+//! order is not tested.
+
+mod common;
+
+#[path = "common/campaign.rs"]
+mod campaign;
+
+use campaign::{Campaign, Tally};
+use common::{CONVENTIONS, Random, camera_along_z};
+use hiz_core::Coverage;
+use hiz_core::headless::Engine;
+
+fn faulty(faults: &[(&str, &str)]) -> Engine {
+    Engine::with_planted_faults(None, faults).expect("the device tests need a Vulkan driver")
+}
+
+fn campaign(faults: &[(&str, &str)], coverage: Coverage) -> Tally {
+    Campaign { seed: 21, rounds: 150, volumes: 32, coverage, count_keeps: false }.run(&faulty(faults))
+}
+
+fn assert_red(name: &str, faults: &[(&str, &str)]) {
+    let tally = campaign(faults, Coverage::Area);
+    eprintln!("{name}: {} false culls in {} cases, {} culled", tally.false_culls, tally.cases, tally.culled);
+    assert!(tally.false_culls > 0, "{name}: the campaign stayed green: {tally:?}");
+}
+
+#[test]
+fn without_faults_it_is_green() {
+    for coverage in [Coverage::Area, Coverage::Sample] {
+        assert_eq!(campaign(&[], coverage).false_culls, 0);
+    }
+}
+
+#[test]
+fn no_margin() {
+    assert_red("margin 0", &[("ERROR_ULPS: f32 = 24.0", "ERROR_ULPS: f32 = 0.0")]);
+}
+
+#[test]
+fn a_level_too_fine_without_block_certificates() {
+    assert_red(
+        "level",
+        &[
+            ("level += 1u;", ""),
+            ("if inside_block(x, w, t.x, t.z, level, view.half_size.x, view.size.x)", "if true"),
+            ("&& inside_block(y, w, t.y, t.w, level, view.half_size.y, view.size.y)", ""),
+        ],
+    );
+}
+
+#[test]
+fn nearest_instead_of_farthest() {
+    assert_red("swap", &[("select(max(a, b), min(a, b), REVERSED)", "select(min(a, b), max(a, b), REVERSED)")]);
+}
+
+#[test]
+fn a_depth_certificate_at_the_centre_alone() {
+    assert_red(
+        "depth",
+        &[
+            ("surely_above(z, bar(d - a), w)", "z.center - bar(d - a) * w.center > 0.0"),
+            ("surely_below(z, bar(d - a), w)", "z.center - bar(d - a) * w.center < 0.0"),
+        ],
+    );
+}
+
+#[test]
+fn a_rectangle_that_is_too_small_without_block_certificates() {
+    // The rectangle alone, unwidened: the edges are what certificates are for.
+    assert_red(
+        "rectangle",
+        &[
+            ("1.25 * error_bound(r, max(abs(interval.x), abs(interval.y)), w) / w_min + view.reach", "view.reach"),
+            ("if inside_block(x, w, t.x, t.z, level, view.half_size.x, view.size.x)", "if true"),
+            ("&& inside_block(y, w, t.y, t.w, level, view.half_size.y, view.size.y)", ""),
+        ],
+    );
+}
+
+#[test]
+fn texels_clamped_one_off() {
+    assert_red(
+        "clamp",
+        &[("clamp(last, -1, size - 1)", "clamp(last, -1, size - 2)"), ("end >= size ||", "end >= size - 1 ||")],
+    );
+}
+
+/// Reduction faults, seen by the pyramid itself.
+#[test]
+fn dropped_rows_and_columns() {
+    for (what, by) in [
+        // The last column or row of an odd level: the neighbour before it is read twice.
+        ("min(2u * x + 1u, level.width - 1u)", "min(2u * x, level.width - 1u)"),
+        ("min(2u * y + 1u, level.height - 1u)", "min(2u * y, level.height - 1u)"),
+        ("f32(2u * x + 1u)", "f32(min(2u * x + 1u, textureDimensions(source).x - 2u))"),
+        ("f32(2u * y + 1u)", "f32(min(2u * y + 1u, textureDimensions(source).y - 2u))"),
+    ] {
+        let engine = faulty(&[(what, by)]);
+        let mut random = Random(5);
+        let (width, height) = (37, 29);
+        let depth: Vec<f32> = (0..width * height).map(|_| random.unit() as f32).collect();
+        let mut red = false;
+        for convention in CONVENTIONS {
+            let image = engine.upload_depth(&depth, &camera_along_z(width, height, convention)).unwrap();
+            let pyramid = engine.pyramid(&image).unwrap();
+            for (k, level) in hiz_ref::pyramid(&depth, width, height, convention.is_reversed()).iter().enumerate() {
+                red |= engine.read_level(&pyramid, k as u32).unwrap() != level.texels;
+            }
+        }
+        assert!(red, "{what} -> {by}: the pyramid stayed the same");
+    }
+}
