@@ -27,14 +27,20 @@ die() {
   exit 1
 }
 
-# step NAME COMMAND...: runs it and says how long it took.
+# step NAME COMMAND...: runs it and says how long it took. (set -e is off inside of it: a step is one command, or checks its own.)
 step() {
-  local name=$1 start=$SECONDS
+  local name=$1 start=$SECONDS status=0
   shift
   say "$name"
-  "$@"
-  printf -- '-- %s: %d s\n' "$name" $((SECONDS - start))
+  "$@" || status=$?
+  printf -- '-- %s: %d s%s\n' "$name" $((SECONDS - start)) "$([ $status = 0 ] || printf ', failed')"
+  return $status
 }
+
+# check NAME COMMAND...: a step after whose failure the others still run; `checked` at the end fails then.
+FAILED=()
+check() { step "$@" || FAILED+=("$1"); }
+checked() { [ ${#FAILED[@]} -eq 0 ] || die "failed: $(printf '%s; ' "${FAILED[@]}")"; }
 
 # The manifest of lavapipe, Mesa's software driver; empty if it is not installed.
 lavapipe_icd() {

@@ -6,5 +6,5 @@ source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 scripts/setup.sh docs
 step "Python documentation" "$VENV_PYTHON" -m sphinx --fail-on-warning --keep-going -q -b html docs docs/_build/html
 # rustdoc's own dependencies are not documented: that would take minutes.
-RUSTDOCFLAGS="-D warnings" step "Rust documentation" cargo doc --workspace "${LOCKED[@]}" --no-deps --exclude hiz_py
+RUSTDOCFLAGS="-D warnings" step "Rust documentation" cargo doc --workspace "${LOCKED[@]}" --no-deps
 printf 'open docs/_build/html/index.html and target/doc/hiz_core/index.html\n'

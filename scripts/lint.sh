@@ -5,13 +5,9 @@ source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 scripts/setup.sh
 export PATH="$VENV/bin:$PATH" MYPYPATH=python
-failed=()
-check() {
-  step "$@" || failed+=("$1")
-}
 python_files=(python tests scripts docs)
 
-check "cargo fmt" cargo fmt --all --check
+check "cargo fmt" cargo fmt --all -- --check -l
 check "clippy" cargo clippy --workspace --all-targets "${LOCKED[@]}" -- -D warnings
 check "ruff check" ruff check "${python_files[@]}"
 check "ruff format" ruff format --check "${python_files[@]}"
@@ -24,4 +20,4 @@ else
   printf 'shellcheck is not installed: the shell scripts were not checked\n'
 fi
 
-[ ${#failed[@]} -eq 0 ] || die "failed: $(printf '%s; ' "${failed[@]}")"
+checked

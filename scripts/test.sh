@@ -28,7 +28,8 @@ rust_tests() {
     cargo test --workspace "${LOCKED[@]}" --no-fail-fast --lib --bins --tests --examples
   fi
 }
-step "Rust tests" rust_tests
-step "Rust documentation tests" cargo test --workspace "${LOCKED[@]}" --doc --quiet
-step "Python tests" "$VENV_PYTHON" -m pytest -m "not slow"
+check "Rust tests" rust_tests
+check "Rust documentation tests" cargo test --workspace "${LOCKED[@]}" --doc --quiet
+check "Python tests" "$VENV_PYTHON" -m pytest -m "not slow"
 printf -- '-- all tests on %s: %d s\n' "$driver" $((SECONDS - started))
+checked

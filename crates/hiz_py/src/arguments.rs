@@ -1,9 +1,12 @@
 //! Arrays and words from Python as the engine's borrowed types.
 
 use hiz_core::{Bounds, DepthConvention, DepthKind, Floats, ImageSize};
-use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+
+/// `(height, width)` of a level and its texels in C order.
+pub(crate) type LevelArray<'py> = ((u32, u32), Bound<'py, PyArray1<f32>>);
 
 /// A float array of any shape. Held during a call, so that its memory stays; read without the interpreter lock.
 #[derive(FromPyObject)]

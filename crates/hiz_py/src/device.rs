@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use hiz_core::headless::{self, AdapterSummary};
-use hiz_core::{FaceCull, InstanceOptions, MeshData, OccluderOptions};
+use hiz_core::{DepthConvention, DepthKind, FaceCull, Floats, InstanceOptions, MeshData, OccluderOptions};
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arguments::{FloatArray, bounds, depth_kind, in_c_order};
+use crate::arguments::{FloatArray, LevelArray, bounds, depth_kind, in_c_order};
 use crate::camera::Camera;
 use crate::culling::{CullArguments, Culling};
 use crate::errors::detached;
@@ -96,9 +96,14 @@ impl Engine {
         camera: &Camera,
     ) -> PyResult<DepthImage> {
         let (image, kind) = (image.floats()?, depth_kind(kind)?);
-        detached(py, || {
-            let ndc = hiz_core::ndc_from_kind(image, kind, scale, &camera.0)?;
-            self.0.upload_depth(&ndc, &camera.0)
+        let own_kind = match camera.0.convention() {
+            DepthConvention::Standard => DepthKind::Ndc,
+            DepthConvention::Reversed => DepthKind::ReversedNdc,
+        };
+        detached(py, || match image {
+            // Already what is uploaded: no copy in between.
+            Floats::F32(ndc) if kind == own_kind && scale == 1.0 => self.0.upload_depth(ndc, &camera.0),
+            _ => self.0.upload_depth(&hiz_core::ndc_from_kind(image, kind, scale, &camera.0)?, &camera.0),
         })
         .map(DepthImage)
     }
@@ -210,7 +215,7 @@ impl Pyramid {
     }
 
     /// `((height, width), texels)` of a level.
-    fn read_level<'py>(&self, py: Python<'py>, k: u32) -> PyResult<((u32, u32), Bound<'py, PyArray1<f32>>)> {
+    fn read_level<'py>(&self, py: Python<'py>, k: u32) -> PyResult<LevelArray<'py>> {
         let texels = detached(py, || self.engine.read_level(&self.pyramid, k))?;
         let size = self.pyramid.level_size(k).map_or((0, 0), |size| (size.height, size.width));
         Ok((size, PyArray1::from_vec(py, texels)))

@@ -6,7 +6,7 @@ use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arguments::{FloatArray, bounds, depth_kind, in_c_order};
+use crate::arguments::{FloatArray, LevelArray, bounds, depth_kind, in_c_order};
 use crate::camera::Camera;
 use crate::errors::detached;
 
@@ -33,9 +33,8 @@ pub(crate) fn reference_classify<'py>(
     let volumes = bounds(bounds_kind, &arrays)?;
     let (image, depth_kind) = (image.floats()?, self::depth_kind(depth_kind)?);
     let camera = &camera.0;
-    let (count, ndc) = detached(py, || {
-        Ok((volumes.len()?, hiz_core::ndc_from_kind(image, depth_kind, scale, camera)?))
-    })?;
+    let (count, ndc) =
+        detached(py, || Ok((volumes.len()?, hiz_core::ndc_from_kind(image, depth_kind, scale, camera)?)))?;
     let view = View {
         rows: camera.rows(),
         origin: camera.origin(),
@@ -56,14 +55,13 @@ pub(crate) fn reference_classify<'py>(
 
 /// `((height, width), texels)` of every level, finest first.
 #[pyfunction]
-#[expect(clippy::type_complexity, reason = "a list of levels, as Python sees it")]
 pub(crate) fn reference_pyramid<'py>(
     py: Python<'py>,
     depth: PyReadonlyArrayDyn<'py, f32>,
     width: u32,
     height: u32,
     reversed_z: bool,
-) -> PyResult<Vec<((u32, u32), Bound<'py, PyArray1<f32>>)>> {
+) -> PyResult<Vec<LevelArray<'py>>> {
     in_c_order(depth.is_c_contiguous())?;
     let depth = depth.as_slice()?;
     let levels = py.detach(|| hiz_ref::pyramid(depth, width, height, reversed_z));
@@ -85,9 +83,7 @@ fn numbers<const N: usize>(array: &Floats<'_>, first: usize) -> [f64; N] {
 
 fn volume(bounds: &Bounds<'_>, i: usize) -> Volume {
     match bounds {
-        Bounds::Spheres { centers, radii } => {
-            Volume::Sphere { center: numbers(centers, 3 * i), radius: radii.get(i) }
-        }
+        Bounds::Spheres { centers, radii } => Volume::Sphere { center: numbers(centers, 3 * i), radius: radii.get(i) },
         Bounds::Boxes { min, max } => Volume::Box { min: numbers(min, 3 * i), max: numbers(max, 3 * i) },
         Bounds::OrientedBoxes { centers, half_sizes, rotations } => {
             let rows: [f64; 9] = numbers(rotations, 9 * i);

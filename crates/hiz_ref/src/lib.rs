@@ -69,7 +69,8 @@ pub enum Arithmetic {
     /// Float64 with error bounds, and exact arithmetic for what that leaves open.
     #[default]
     Escalate,
-    /// Exact arithmetic for every decision about blocks and depths. Slow; the tests compare the others with it.
+    /// Exact arithmetic wherever a verdict hangs on it; float64 proofs serve only to leave out what lies far away. Slow; the tests compare
+    /// the others with it.
     Exact,
 }
 
