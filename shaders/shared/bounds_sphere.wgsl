@@ -45,8 +45,8 @@ fn support(half: vec3<f32>) -> f32 {
 }
 
 // An estimate of the least and greatest r / w. Mara and McGuire, "2D Polyhedral Bounds of a Clipped, Perspective-Projected
-// 3D Sphere" (JCGT 2013), written for any two linear functions: t is the centre's ratio, and the two tangents are the roots of
-// a quadratic, each taken in the form that does not cancel.
+// 3D Sphere" (JCGT 2013), written for any two linear functions: about the centre's ratio t, the ratio of a point u of the unit
+// sphere is t + g.u / (1 + n.u); its extremes are the roots of q d^2 + 2 p d - g.g = 0, each in the form that does not cancel.
 fn ratio_interval(r: Value, w: Value) -> vec2<f32> {
     let n = w.half / w.center;
     let q = max(1.0 - dot(n, n), 1e-30);
@@ -55,9 +55,9 @@ fn ratio_interval(r: Value, w: Value) -> vec2<f32> {
     let gg = dot(g, g);
     let p = dot(g, n);
     let m = max(abs(p) + sqrt(p * p + q * gg), 1e-30);
-    let near_root = gg / m;
-    let far_root = m / q;
+    let small_root = gg / m;
+    let large_root = m / q;
     return vec2<f32>(
-        t - select(far_root, near_root, p > 0.0),
-        t + select(near_root, far_root, p > 0.0));
+        t - select(small_root, large_root, p > 0.0),
+        t + select(large_root, small_root, p > 0.0));
 }

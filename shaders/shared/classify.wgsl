@@ -66,9 +66,10 @@ fn pixel_interval(interval: vec2<f32>, margin: f32, half_size: f32, size: i32) -
     return vec2<i32>(clamp(first, 0, size), clamp(last, -1, size - 1));
 }
 
-// How much wider than its estimate a projected interval may be, and a little more.
-fn widening(r: Value, w: Value, interval: vec2<f32>, w_min: f32) -> f32 {
-    return 1.25 * error_bound(r, max(abs(interval.x), abs(interval.y)), w) / w_min + view.reach;
+// How much wider than its estimate a projected interval may be, and a little more; and what adding half an image rounds away
+// (without it a volume that ends exactly on a pixel border would be tested without the pixel beyond, and kept for that).
+fn widening(r: Value, w: Value, interval: vec2<f32>, w_min: f32, half_size: f32) -> f32 {
+    return 1.25 * error_bound(r, max(abs(interval.x), abs(interval.y)), w) / w_min + 4.0 * EPS * half_size + view.reach;
 }
 
 // Sample coverage: the volume lies between the centres of pixels first - 1 and first.
@@ -119,8 +120,8 @@ fn classify(i: u32) -> Outcome {
     out.stage = AT_RECTANGLE;
     let interval_x = ratio_interval(x, w);
     let interval_y = ratio_interval(y, w);
-    let columns = pixel_interval(interval_x, widening(x, w, interval_x, w_min), view.half_size.x, view.size.x);
-    let rows = pixel_interval(interval_y, widening(y, w, interval_y, w_min), view.half_size.y, view.size.y);
+    let columns = pixel_interval(interval_x, widening(x, w, interval_x, w_min, view.half_size.x), view.half_size.x, view.size.x);
+    let rows = pixel_interval(interval_y, widening(y, w, interval_y, w_min, view.half_size.y), view.half_size.y, view.size.y);
     out.pixels = vec4<i32>(columns.x, rows.x, columns.y, rows.y);
     if columns.x > columns.y || rows.x > rows.y {
         if SAMPLE_COVERAGE {

@@ -142,10 +142,9 @@ impl Bounds<'_> {
             let valid = match *self {
                 Self::Spheres { centers, radii } => push(out, &SphereRecord::new(centers.array(i), radii.get(i))),
                 Self::Boxes { min, max } => push(out, &BoxRecord::new(min.array(i), max.array(i))),
-                Self::OrientedBoxes { centers, half_sizes, rotations } => push(
-                    out,
-                    &OrientedBoxRecord::new(centers.array(i), half_sizes.array(i), rotations.array(i)),
-                ),
+                Self::OrientedBoxes { centers, half_sizes, rotations } => {
+                    push(out, &OrientedBoxRecord::new(centers.array(i), half_sizes.array(i), rotations.array(i)))
+                }
             };
             if !valid {
                 invalid.push(i as u64);
@@ -207,7 +206,8 @@ pub(crate) struct OrientedBoxRecord {
     padding: f32,
 }
 
-const _: () = assert!(size_of::<SphereRecord>() == 32 && size_of::<BoxRecord>() == 48 && size_of::<OrientedBoxRecord>() == 64);
+const _: () =
+    assert!(size_of::<SphereRecord>() == 32 && size_of::<BoxRecord>() == 48 && size_of::<OrientedBoxRecord>() == 64);
 
 /// A position as two halves, and what they cannot hold, axis by axis (0 for float32 input).
 struct Position {
@@ -234,9 +234,11 @@ fn sum_up(a: f64, b: f64) -> f64 {
 impl SphereRecord {
     fn new(center: [f64; 3], radius: f64) -> Self {
         let p = Position::new(center);
-        // The 1-norm bounds the distance by which the stored centre is off. A negative radius stays negative.
-        let moved = if radius >= 0.0 { p.rest.iter().fold(0.0, |sum, r| sum_up(sum, *r)) } else { 0.0 };
-        Self { center_hi: p.hi, radius: round_up(sum_up(radius, moved)), center_lo: p.lo, padding: 0.0 }
+        // The 1-norm bounds the distance by which the stored centre is off.
+        let moved = p.rest.iter().fold(0.0, |sum, r| sum_up(sum, *r));
+        // A negative radius stays negative, however small.
+        let radius = if radius < 0.0 { -1.0 } else { round_up(sum_up(radius, moved)) };
+        Self { center_hi: p.hi, radius, center_lo: p.lo, padding: 0.0 }
     }
 }
 
@@ -329,9 +331,8 @@ mod tests {
         // 1 + 2^-53 * k needs more bits than two float32 of this pair hold exactly.
         let center = [1.0 + 4.0 * TINY + 1.0e-9, 1.0e7 + 1.0 / 3.0, -1.0e-30];
         let record = SphereRecord::new(center, 0.1);
-        let off: f64 = (0..3)
-            .map(|k| (center[k] - f64::from(record.center_hi[k]) - f64::from(record.center_lo[k])).abs())
-            .sum();
+        let off: f64 =
+            (0..3).map(|k| (center[k] - f64::from(record.center_hi[k]) - f64::from(record.center_lo[k])).abs()).sum();
         assert!(f64::from(record.radius) >= 0.1 + off);
         assert!(f64::from(record.radius) < 0.100_001);
         assert!(record.is_valid());
@@ -369,11 +370,14 @@ mod tests {
         let oriented = Bounds::OrientedBoxes {
             centers: Floats::F32(&[0.0; 9]),
             half_sizes: Floats::F32(&[0.0, 0.0, 0.0, 1.0, -1.0, 1.0, 0.0, 1.0, 1.0]),
-            rotations: Floats::F64(&[
-                [0.0; 9],
-                [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-                [f64::INFINITY, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-            ].concat()),
+            rotations: Floats::F64(
+                &[
+                    [0.0; 9],
+                    [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+                    [f64::INFINITY, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+                ]
+                .concat(),
+            ),
         };
         invalid.clear();
         oriented.pack(0..3, &mut bytes, &mut invalid);

@@ -86,8 +86,9 @@ impl Pose {
                 return Err(Error::invalid(name, format!("expected finite numbers, got {v:?}")));
             }
         }
-        let forward = normalized(sub(self.target, self.eye))
-            .ok_or_else(|| Error::invalid("target", format!("expected a point apart from eye, got {:?} for both", self.eye)))?;
+        let forward = normalized(sub(self.target, self.eye)).ok_or_else(|| {
+            Error::invalid("target", format!("expected a point apart from eye, got {:?} for both", self.eye))
+        })?;
         let up = normalized(self.up).ok_or_else(|| Error::invalid("up", "expected a direction, got a zero vector"))?;
         let right = cross(forward, up);
         // Below this sine of the angle between them the image would turn with the last bits of the input.
@@ -97,7 +98,8 @@ impl Pose {
                 format!("expected a direction that is not parallel to target - eye, got {:?}", self.up),
             ));
         }
-        let right = normalized(right).ok_or_else(|| Error::invalid("up", "expected a direction apart from target - eye"))?;
+        let right =
+            normalized(right).ok_or_else(|| Error::invalid("up", "expected a direction apart from target - eye"))?;
         Ok([right, cross(right, forward), forward])
     }
 }
@@ -156,9 +158,9 @@ impl Projection {
     /// Which end of the depth range is far.
     pub fn convention(&self) -> DepthConvention {
         match *self {
-            Self::Perspective { convention, .. } | Self::Frustum { convention, .. } | Self::Orthographic { convention, .. } => {
-                convention
-            }
+            Self::Perspective { convention, .. }
+            | Self::Frustum { convention, .. }
+            | Self::Orthographic { convention, .. } => convention,
         }
     }
 
@@ -171,7 +173,10 @@ impl Projection {
         match *self {
             Self::Perspective { fov_y, near, far, convention } => {
                 if !(fov_y > 0.0 && fov_y < std::f64::consts::PI) {
-                    return Err(Error::invalid("fov_y", format!("expected an angle in (0, 180) degrees, got {}", fov_y.to_degrees())));
+                    return Err(Error::invalid(
+                        "fov_y",
+                        format!("expected an angle in (0, 180) degrees, got {}", fov_y.to_degrees()),
+                    ));
                 }
                 let top = (fov_y / 2.0).tan();
                 let right = top * f64::from(size.width) / f64::from(size.height);
@@ -182,17 +187,15 @@ impl Projection {
                 check_borders(left, right, bottom, top)?;
                 let [z, w] = perspective_depth(near, far, convention)?;
                 let (dx, dy) = (right - left, top - bottom);
-                Ok([
-                    [2.0 / dx, 0.0, -(right + left) / dx, 0.0],
-                    [0.0, 2.0 / dy, -(top + bottom) / dy, 0.0],
-                    z,
-                    w,
-                ])
+                Ok([[2.0 / dx, 0.0, -(right + left) / dx, 0.0], [0.0, 2.0 / dy, -(top + bottom) / dy, 0.0], z, w])
             }
             Self::Orthographic { left, right, bottom, top, near, far, convention } => {
                 check_borders(left, right, bottom, top)?;
                 if !(near.is_finite() && far.is_finite() && near < far) {
-                    return Err(Error::invalid("far", format!("expected a finite plane beyond near = {near}, got {far}")));
+                    return Err(Error::invalid(
+                        "far",
+                        format!("expected a finite plane beyond near = {near}, got {far}"),
+                    ));
                 }
                 let (dx, dy, dz) = (right - left, top - bottom, far - near);
                 let z = match convention {
@@ -398,7 +401,10 @@ fn linear_after(p: &Mat4, linear: &Mat3, translation: Vec3) -> Mat4 {
 
 fn affine_parts(name: &str, m: &Mat4) -> Result<(Mat3, Vec3)> {
     if m[3] != [0.0, 0.0, 0.0, 1.0] {
-        return Err(Error::invalid(name, format!("expected an affine matrix with last row (0, 0, 0, 1), got {:?}", m[3])));
+        return Err(Error::invalid(
+            name,
+            format!("expected an affine matrix with last row (0, 0, 0, 1), got {:?}", m[3]),
+        ));
     }
     if let Some(bad) = m.iter().flatten().find(|x| !x.is_finite()) {
         return Err(Error::invalid(name, format!("expected finite entries, got {bad}")));
@@ -512,13 +518,16 @@ mod tests {
     fn unusable_cameras_are_refused_by_name() {
         let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
         let good = Projection::Perspective { fov_y: 1.0, near: 0.1, far: None, convention: DepthConvention::Reversed };
-        let message = |pose: &Pose, projection: &Projection, size| Camera::look_at(pose, projection, size).unwrap_err().to_string();
+        let message = |pose: &Pose, projection: &Projection, size| {
+            Camera::look_at(pose, projection, size).unwrap_err().to_string()
+        };
         assert!(message(&Pose { target: [0.0; 3], ..pose }, &good, SIZE).starts_with("target:"));
         assert!(message(&Pose { up: [0.0, 0.0, 2.0], ..pose }, &good, SIZE).starts_with("up:"));
         assert!(message(&Pose { eye: [f64::NAN; 3], ..pose }, &good, SIZE).starts_with("eye:"));
         assert!(message(&pose, &good, ImageSize::new(0, 1)).starts_with("size:"));
         assert!(message(&pose, &good, ImageSize::new(32_769, 1)).contains("32768"));
-        let bad = |fov_y, near, far| Projection::Perspective { fov_y, near, far, convention: DepthConvention::Standard };
+        let bad =
+            |fov_y, near, far| Projection::Perspective { fov_y, near, far, convention: DepthConvention::Standard };
         assert!(message(&pose, &bad(0.0, 0.1, None), SIZE).starts_with("fov_y:"));
         assert!(message(&pose, &bad(1.0, 0.0, None), SIZE).starts_with("near:"));
         assert!(message(&pose, &bad(1.0, 1.0, Some(1.0)), SIZE).starts_with("far:"));

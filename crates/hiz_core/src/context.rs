@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::hash::Hash;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use wgpu::util::DeviceExt;
@@ -25,8 +26,20 @@ pub struct HizContext {
     shared: Arc<Shared>,
 }
 
+/// Tells objects of one context from those of another. (wgpu's own handles compare equal across its instances.)
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct ContextId(u64);
+
+impl ContextId {
+    fn next() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        Self(NEXT.fetch_add(1, Ordering::Relaxed))
+    }
+}
+
 #[derive(Debug)]
 struct Shared {
+    id: ContextId,
     device: wgpu::Device,
     edits: Vec<(String, String)>,
     layouts: Layouts,
@@ -90,8 +103,16 @@ impl HizContext {
     pub fn with_planted_faults(device: &wgpu::Device, faults: &[(&str, &str)]) -> Result<Self> {
         let (have, need) = (device.limits(), Self::required_limits());
         for (name, need, have) in [
-            ("max_storage_buffers_per_shader_stage", need.max_storage_buffers_per_shader_stage, have.max_storage_buffers_per_shader_stage),
-            ("max_compute_invocations_per_workgroup", need.max_compute_invocations_per_workgroup, have.max_compute_invocations_per_workgroup),
+            (
+                "max_storage_buffers_per_shader_stage",
+                need.max_storage_buffers_per_shader_stage,
+                have.max_storage_buffers_per_shader_stage,
+            ),
+            (
+                "max_compute_invocations_per_workgroup",
+                need.max_compute_invocations_per_workgroup,
+                have.max_compute_invocations_per_workgroup,
+            ),
             ("max_compute_workgroup_size_x", need.max_compute_workgroup_size_x, have.max_compute_workgroup_size_x),
             ("max_bind_groups", need.max_bind_groups, have.max_bind_groups),
         ] {
@@ -114,6 +135,7 @@ impl HizContext {
             ..Default::default()
         });
         let shared = Shared {
+            id: ContextId::next(),
             device: device.clone(),
             edits: faults.iter().map(|(what, by)| ((*what).to_owned(), (*by).to_owned())).collect(),
             layouts: Layouts::new(device),
@@ -241,11 +263,15 @@ impl HizContext {
         })
     }
 
-    pub(crate) fn check_device(&self, parameter: &str, theirs: &wgpu::Device) -> Result<()> {
-        if *theirs == self.shared.device {
+    pub(crate) fn id(&self) -> ContextId {
+        self.shared.id
+    }
+
+    pub(crate) fn check_context(&self, parameter: &str, theirs: ContextId) -> Result<()> {
+        if theirs == self.shared.id {
             Ok(())
         } else {
-            Err(Error::mismatch(parameter, "expected an object of this device, got one of another device"))
+            Err(Error::mismatch(parameter, "expected an object of this device and context, got one of another"))
         }
     }
 
@@ -264,11 +290,7 @@ impl HizContext {
                 &shader::reduce(source),
                 "reduce",
                 &[layouts.reduce(source), &layouts.one_uniform],
-                &[
-                    ("REVERSED", flag(key.reversed)),
-                    ("CHUNKS", chunks as f64),
-                    ("FROM_SOURCE", flag(from_source)),
-                ],
+                &[("REVERSED", flag(key.reversed)), ("CHUNKS", chunks as f64), ("FROM_SOURCE", flag(from_source))],
             )
         })
     }
@@ -337,7 +359,10 @@ impl HizContext {
             module: &module,
             entry_point: Some(entry_point),
             // The shaders write workgroup memory before they read it.
-            compilation_options: wgpu::PipelineCompilationOptions { constants, zero_initialize_workgroup_memory: false },
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants,
+                zero_initialize_workgroup_memory: false,
+            },
             cache: None,
         })
     }
@@ -348,11 +373,7 @@ fn flag(value: bool) -> f64 {
 }
 
 fn classify_constants(key: &CullKey) -> [(&'static str, f64); 3] {
-    [
-        ("REVERSED", flag(key.reversed)),
-        ("CHUNKS", key.chunks as f64),
-        ("SAMPLE_COVERAGE", flag(key.sample_coverage)),
-    ]
+    [("REVERSED", flag(key.reversed)), ("CHUNKS", key.chunks as f64), ("SAMPLE_COVERAGE", flag(key.sample_coverage))]
 }
 
 /// The bind group layouts, one place for all passes.
@@ -390,14 +411,23 @@ impl Layouts {
         };
         Self {
             reduce: SOURCES.map(|s| {
-                layout("hiz.reduce.layout", &[(0, Texture(s)), (1, Sampler), (2, Uniform), (3, Write), (4, Write), (5, Write)])
+                layout(
+                    "hiz.reduce.layout",
+                    &[(0, Texture(s)), (1, Sampler), (2, Uniform), (3, Write), (4, Write), (5, Write)],
+                )
             }),
             cull: SOURCES.map(|s| {
-                layout("hiz.cull.view_layout", &[(0, Texture(s)), (2, Uniform), (3, Read), (4, Read), (5, Read), (6, Uniform)])
+                layout(
+                    "hiz.cull.view_layout",
+                    &[(0, Texture(s)), (2, Uniform), (3, Read), (4, Read), (5, Read), (6, Uniform)],
+                )
             }),
             instances: layout("hiz.cull.instances_layout", &[(0, Uniform), (1, Read)]),
             visible: layout("hiz.cull.visible_layout", &[(0, Write), (1, Write), (2, Write), (3, Write), (4, Uniform)]),
-            compact: layout("hiz.compact.layout", &[(0, Uniform), (1, Read), (2, Write), (3, Write), (4, Write), (5, Uniform)]),
+            compact: layout(
+                "hiz.compact.layout",
+                &[(0, Uniform), (1, Read), (2, Write), (3, Write), (4, Write), (5, Uniform)],
+            ),
             one_uniform: layout("hiz.uniform_layout", &[(0, Uniform)]),
             one_storage: layout("hiz.storage_layout", &[(0, Write)]),
             occluder_view: device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {

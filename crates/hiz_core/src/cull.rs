@@ -85,7 +85,10 @@ pub(crate) struct ViewUniform {
 const _: () = assert!(size_of::<ViewUniform>() == 192);
 
 impl ViewUniform {
-    #[expect(clippy::cast_possible_truncation, reason = "multiples of 2^-8 and sizes below 2^15 are exact, the factor is rounded towards far")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "multiples of 2^-8 and sizes below 2^15 are exact, the factor is rounded towards far"
+    )]
     fn new(camera: &Camera, options: &CullOptions) -> Result<Self> {
         let range = |name: &str, value: f64, most: f64| {
             if (0.0..=most).contains(&value) {
@@ -148,8 +151,8 @@ fn bind(
     pyramid: &Pyramid,
     options: &CullOptions,
 ) -> Result<Bound> {
-    context.check_device("instances", &instances.device)?;
-    context.check_device("pyramid", &pyramid.device)?;
+    context.check_context("instances", instances.context)?;
+    context.check_context("pyramid", pyramid.context)?;
     let Built { source, source_kind, .. } = pyramid.built_for(camera)?;
     let view = context.uniform("hiz.cull.view", &ViewUniform::new(camera, options)?);
     let view = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
@@ -193,15 +196,15 @@ pub(crate) fn record(
     visible: &Visible,
     options: &CullOptions,
 ) -> Result<()> {
-    context.check_device("visible", &visible.device)?;
+    context.check_context("visible", visible.context)?;
     if !visible.counts().iter().copied().eq(instances.pieces.iter().map(Piece::count)) {
         return Err(Error::mismatch("visible", "expected buffers that were created for these instances, got others"));
     }
     let bound = bind(context, instances, camera, pyramid, options)?;
     encoder.copy_buffer_to_buffer(&visible.draws_template, 0, &visible.draws, 0, visible.draws.size());
     encoder.clear_buffer(&visible.counters, 0, None);
-    let mut pass =
-        encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.cull.pass"), timestamp_writes: None });
+    let mut pass = encoder
+        .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.cull.pass"), timestamp_writes: None });
     pass.set_pipeline(&context.cull_pipeline(bound.key));
     pass.set_bind_group(0, &bound.view, &[]);
     for (piece, output) in instances.pieces.iter().zip(&visible.pieces) {
@@ -262,8 +265,8 @@ pub(crate) fn record_explain(
         layout: &context.layouts().one_storage,
         entries: &[entry(0, target.as_entire_binding())],
     });
-    let mut pass =
-        encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.explain.pass"), timestamp_writes: None });
+    let mut pass = encoder
+        .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.explain.pass"), timestamp_writes: None });
     pass.set_pipeline(&context.explain_pipeline(CullKey { append: false, statistics: false, ..key }));
     pass.set_bind_group(0, &view, &[]);
     pass.set_bind_group(1, &bind_piece(context, &which, piece), &[]);

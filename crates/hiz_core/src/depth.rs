@@ -165,7 +165,8 @@ mod tests {
     const POSE: Pose = Pose { eye: [1.0, 2.0, 3.0], target: [1.0, 2.0, -7.0], up: [0.0, 1.0, 0.0] };
 
     fn perspective(convention: DepthConvention) -> Camera {
-        let projection = Projection::Perspective { fov_y: std::f64::consts::FRAC_PI_2, near: 1.0, far: Some(9.0), convention };
+        let projection =
+            Projection::Perspective { fov_y: std::f64::consts::FRAC_PI_2, near: 1.0, far: Some(9.0), convention };
         Camera::look_at(&POSE, &projection, ImageSize::new(2, 2)).unwrap()
     }
 
@@ -173,10 +174,13 @@ mod tests {
     fn view_depth_and_distance_give_hand_worked_ndc_depth() {
         // Pixel centres lie at tangents +-1/2, so a ray is sqrt(1 + 1/4 + 1/4) times its view depth long.
         let length = 1.5_f64.sqrt();
-        for (convention, expected) in [(DepthConvention::Standard, (9.0 - 9.0 / 3.0) / 8.0), (DepthConvention::Reversed, (9.0 / 3.0 - 1.0) / 8.0)] {
+        for (convention, expected) in
+            [(DepthConvention::Standard, (9.0 - 9.0 / 3.0) / 8.0), (DepthConvention::Reversed, (9.0 / 3.0 - 1.0) / 8.0)]
+        {
             let camera = perspective(convention);
             let z = ndc_from_kind(Floats::F64(&[3.0; 4]), DepthKind::Z, 1.0, &camera).unwrap();
-            let distance = ndc_from_kind(Floats::F64(&[3000.0 * length; 4]), DepthKind::Distance, 0.001, &camera).unwrap();
+            let distance =
+                ndc_from_kind(Floats::F64(&[3000.0 * length; 4]), DepthKind::Distance, 0.001, &camera).unwrap();
             for d in z.iter().chain(&distance) {
                 let off = f64::from(*d) - expected;
                 assert!(off.abs() < 1e-7, "{d} {expected}");
@@ -193,7 +197,10 @@ mod tests {
                 assert_eq!(ndc_from_kind(Floats::F64(&bad), kind, 1.0, &camera).unwrap(), [far; 4]);
             }
             // Before the near plane and beyond the far one.
-            assert_eq!(ndc_from_kind(Floats::F64(&[0.5, 9.5, 0.99, 1e9]), DepthKind::Z, 1.0, &camera).unwrap(), [far; 4]);
+            assert_eq!(
+                ndc_from_kind(Floats::F64(&[0.5, 9.5, 0.99, 1e9]), DepthKind::Z, 1.0, &camera).unwrap(),
+                [far; 4]
+            );
         }
     }
 
@@ -208,7 +215,8 @@ mod tests {
     #[test]
     fn contradictions_are_refused() {
         let camera = perspective(DepthConvention::Reversed);
-        let message = |kind, scale| ndc_from_kind(Floats::F32(&[0.5; 4]), kind, scale, &camera).unwrap_err().to_string();
+        let message =
+            |kind, scale| ndc_from_kind(Floats::F32(&[0.5; 4]), kind, scale, &camera).unwrap_err().to_string();
         assert!(message(DepthKind::Ndc, 1.0).starts_with("kind: expected the camera's convention, reversed Z"));
         assert!(message(DepthKind::ReversedNdc, 2.0).starts_with("scale:"));
         assert!(message(DepthKind::Z, 0.0).starts_with("scale:"));

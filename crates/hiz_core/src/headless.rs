@@ -65,9 +65,12 @@ impl AdapterSummary {
     }
 
     fn matches(&self, request: &str) -> bool {
+        // Digits are an index and nothing else: "1" is also part of many a version.
+        if let Ok(index) = request.parse::<usize>() {
+            return index == self.index;
+        }
         let request = request.to_lowercase();
-        request.parse() == Ok(self.index)
-            || [&self.name, &self.driver, &self.driver_info].iter().any(|text| text.to_lowercase().contains(&request))
+        [&self.name, &self.driver, &self.driver_info].iter().any(|text| text.to_lowercase().contains(&request))
     }
 }
 
@@ -138,7 +141,8 @@ impl Engine {
         if let Some(request) = &request {
             found.retain(|(summary, _)| summary.matches(request));
         }
-        let Some((summary, adapter)) = found.into_iter().min_by_key(|(summary, _)| (summary.rank(), summary.index)) else {
+        let Some((summary, adapter)) = found.into_iter().min_by_key(|(summary, _)| (summary.rank(), summary.index))
+        else {
             let request = request.map_or_else(|| "was found".to_owned(), |r| format!("matches {r:?}"));
             return Err(no_adapter(request, seen));
         };
@@ -248,7 +252,11 @@ impl Engine {
                         ..depth.texture.as_image_copy()
                     },
                     bytemuck::cast_slice(rows),
-                    wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * size.width), rows_per_image: None },
+                    wgpu::TexelCopyBufferLayout {
+                        offset: 0,
+                        bytes_per_row: Some(4 * size.width),
+                        rows_per_image: None,
+                    },
                     wgpu::Extent3d { width: size.width, height, depth_or_array_layers: 1 },
                 );
                 if band > 0 {
@@ -273,7 +281,7 @@ impl Engine {
     /// # Errors
     /// As [`Engine::pyramid`].
     pub fn pyramid_with(&self, depth: &DepthImage, options: &PyramidOptions) -> Result<Arc<Pyramid>> {
-        self.shared.context.check_device("depth", &depth.engine.shared.device)?;
+        self.context().check_context("depth", depth.engine.context().id())?;
         self.scoped(|| {
             let pyramid = self.context().create_pyramid(depth.size(), options)?;
             let mut encoder = self.encoder("hiz.reduce.encoder");
@@ -288,13 +296,13 @@ impl Engine {
     /// # Errors
     /// [`Error::Invalid`] past the last level, [`Error::Mismatch`] for a pyramid that was never built.
     pub fn read_level(&self, pyramid: &Pyramid, level: u32) -> Result<Vec<f32>> {
-        self.shared.context.check_device("pyramid", &pyramid.device)?;
+        self.context().check_context("pyramid", pyramid.context)?;
         let layout = pyramid.layout.levels.get(level as usize).ok_or_else(|| {
             Error::invalid("level", format!("expected a level below {}, got {level}", pyramid.num_levels()))
         })?;
-        let built = pyramid
-            .built()
-            .ok_or_else(|| Error::mismatch("pyramid", "expected one that was built from a depth image, got one that never was"))?;
+        let built = pyramid.built().ok_or_else(|| {
+            Error::mismatch("pyramid", "expected one that was built from a depth image, got one that never was")
+        })?;
         if level == 0 {
             let bytes = self.scoped(|| readback::read_texture(self.device(), self.queue(), built.source.texture()))?;
             let convention = built.camera.convention();
@@ -307,7 +315,11 @@ impl Engine {
             .map(|c| {
                 let begin = first.max(c * chunk);
                 let end = (first + count).min((c + 1) * chunk);
-                BufferRange { buffer: &pyramid.chunks[c as usize], offset: 4 * (begin - c * chunk), size: 4 * (end - begin) }
+                BufferRange {
+                    buffer: &pyramid.chunks[c as usize],
+                    offset: 4 * (begin - c * chunk),
+                    size: 4 * (end - begin),
+                }
             })
             .collect();
         let bytes = self.scoped(|| readback::read_buffers(self.device(), self.queue(), &ranges))?.concat();
@@ -360,7 +372,12 @@ impl Engine {
         self.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) })
     }
 
-    fn depth_image(&self, camera: &Camera, format: wgpu::TextureFormat, usage: wgpu::TextureUsages) -> Result<DepthImage> {
+    fn depth_image(
+        &self,
+        camera: &Camera,
+        format: wgpu::TextureFormat,
+        usage: wgpu::TextureUsages,
+    ) -> Result<DepthImage> {
         let size = camera.size();
         let side = size.width.max(size.height);
         let allowed = self.device().limits().max_texture_dimension_2d;
@@ -636,7 +653,8 @@ impl Culling {
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn counts(&self) -> Result<Counts> {
         let (counters, draws) = (&self.visible.counters, &self.visible.draws);
-        let bytes = self.read(&[BufferRange::first(counters, counters.size()), BufferRange::first(draws, draws.size())])?;
+        let bytes =
+            self.read(&[BufferRange::first(counters, counters.size()), BufferRange::first(draws, draws.size())])?;
         let record: CounterRecord = bytemuck::pod_read_unaligned(&bytes[0]);
         let draws: Vec<DrawIndexedIndirect> = bytemuck::pod_collect_to_vec(&bytes[1]);
         Ok(Counts {

@@ -1,7 +1,7 @@
 //! Instances on the device: the bounding volumes of one call, cut into pieces that fit a binding and a dispatch.
 
 use crate::bounds::{Bounds, BoundsKind};
-use crate::context::HizContext;
+use crate::context::{ContextId, HizContext};
 use crate::error::{Error, Result};
 use crate::layout::{CULL_WORKGROUP, piece_capacity};
 
@@ -45,7 +45,7 @@ impl Piece {
 /// Bounding volumes on the device.
 #[derive(Debug)]
 pub struct Instances {
-    pub(crate) device: wgpu::Device,
+    pub(crate) context: ContextId,
     pub(crate) kind: BoundsKind,
     /// At least one, so that there is always a draw to consume; an empty one for no instances.
     pub(crate) pieces: Vec<Piece>,
@@ -91,7 +91,7 @@ impl Instances {
                 ),
             ));
         }
-        Ok(Self { device: device.clone(), kind, pieces, invalid })
+        Ok(Self { context: context.id(), kind, pieces, invalid })
     }
 
     /// The number of instances.
@@ -152,7 +152,7 @@ fn upload(
         view.copy_from_slice(&packed);
     }
     records.unmap();
-    let uniform =
-        context.uniform("hiz.instances.piece", &PieceUniform { base: range.start, count, index, words: count.div_ceil(32) });
+    let uniform = context
+        .uniform("hiz.instances.piece", &PieceUniform { base: range.start, count, index, words: count.div_ceil(32) });
     Ok(Piece { range, records, uniform })
 }

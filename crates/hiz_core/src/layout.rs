@@ -46,7 +46,8 @@ impl PyramidLayout {
         while width > 1 || height > 1 {
             (width, height) = (width.div_ceil(2), height.div_ceil(2));
             let stride = width.next_multiple_of(ROW_ALIGNMENT);
-            let offset = u32::try_from(texels).map_err(|_| Error::limit("pyramid texels", texels, u64::from(u32::MAX)))?;
+            let offset =
+                u32::try_from(texels).map_err(|_| Error::limit("pyramid texels", texels, u64::from(u32::MAX)))?;
             levels.push(Level { offset, stride, width, height });
             texels += u64::from(stride) * u64::from(height);
         }

@@ -4,7 +4,7 @@ use wgpu::util::DeviceExt;
 
 use crate::bounds::Floats;
 use crate::camera::{Camera, DepthConvention, Vec3, dot, sub};
-use crate::context::HizContext;
+use crate::context::{ContextId, HizContext};
 use crate::error::{Error, Result};
 use crate::pyramid::entry;
 use crate::shader;
@@ -78,7 +78,7 @@ struct Part {
 /// Triangle meshes on the device, in world coordinates.
 #[derive(Debug)]
 pub struct Occluders {
-    device: wgpu::Device,
+    context: ContextId,
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
     parts: Vec<Part>,
@@ -113,8 +113,12 @@ impl Occluders {
             device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
         };
         Ok(Self {
-            device: device.clone(),
-            vertices: buffer("hiz.occluders.vertices", bytemuck::cast_slice(&baked.vertices), wgpu::BufferUsages::VERTEX),
+            context: context.id(),
+            vertices: buffer(
+                "hiz.occluders.vertices",
+                bytemuck::cast_slice(&baked.vertices),
+                wgpu::BufferUsages::VERTEX,
+            ),
             indices: buffer("hiz.occluders.indices", bytemuck::cast_slice(&baked.indices), wgpu::BufferUsages::INDEX),
             triangles: (baked.indices.len() / 3) as u64,
             parts: baked.parts,
@@ -158,7 +162,10 @@ impl Baked {
             None => vec![None],
             Some(t) if t.len().is_multiple_of(16) => (0..t.len() / 16).map(|k| Some(t.array(k))).collect(),
             Some(t) => {
-                return Err(Error::invalid("transforms", format!("expected 16 numbers a matrix, got {} numbers", t.len())));
+                return Err(Error::invalid(
+                    "transforms",
+                    format!("expected 16 numbers a matrix, got {} numbers", t.len()),
+                ));
             }
         };
         for (k, place) in places.iter().enumerate() {
@@ -177,7 +184,10 @@ impl Baked {
             if m[12..] != [0.0, 0.0, 0.0, 1.0] || !m.iter().all(|v| v.is_finite()) {
                 return Err(Error::invalid(
                     "transforms",
-                    format!("expected finite affine matrices with last row (0, 0, 0, 1), got {:?} in matrix {k}", &m[12..]),
+                    format!(
+                        "expected finite affine matrices with last row (0, 0, 0, 1), got {:?} in matrix {k}",
+                        &m[12..]
+                    ),
                 ));
             }
             let column = |c: usize| [m[c], m[4 + c], m[8 + c]];
@@ -191,7 +201,10 @@ impl Baked {
             let p = world(mesh.vertices.array(v));
             // float32 must hold it: beyond, the halves would be infinite.
             if !p.iter().all(|x| x.abs() < 1e30) {
-                return Err(Error::invalid("vertices", format!("expected finite positions below 1e30, got {p:?} at vertex {v}")));
+                return Err(Error::invalid(
+                    "vertices",
+                    format!("expected finite positions below 1e30, got {p:?} at vertex {v}"),
+                ));
             }
             for i in 0..3 {
                 min[i] = min[i].min(p[i]);
@@ -221,7 +234,9 @@ fn outside_frustum(camera: &Camera, min: Vec3, max: Vec3) -> bool {
         let d = sub(p, camera.origin());
         rows.map(|r| dot([r[0], r[1], r[2]], d) + r[3])
     });
-    let all = |f: &dyn Fn(&[f64; 4]) -> f64| clip.iter().all(|c| f(c) < -1e-9 * c.iter().fold(0.0_f64, |m, v| m.max(v.abs())));
+    let all = |f: &dyn Fn(&[f64; 4]) -> f64| {
+        clip.iter().all(|c| f(c) < -1e-9 * c.iter().fold(0.0_f64, |m, v| m.max(v.abs())))
+    };
     all(&|c| c[0] + c[3])
         || all(&|c| c[3] - c[0])
         || all(&|c| c[1] + c[3])
@@ -267,7 +282,11 @@ pub(crate) fn pipeline(context: &HizContext, key: PipelineKey) -> wgpu::RenderPi
         depth_stencil: Some(wgpu::DepthStencilState {
             format: OCCLUDER_DEPTH_FORMAT,
             depth_write_enabled: Some(true),
-            depth_compare: Some(if key.reversed { wgpu::CompareFunction::Greater } else { wgpu::CompareFunction::Less }),
+            depth_compare: Some(if key.reversed {
+                wgpu::CompareFunction::Greater
+            } else {
+                wgpu::CompareFunction::Less
+            }),
             stencil: wgpu::StencilState::default(),
             bias: wgpu::DepthBiasState::default(),
         }),
@@ -285,7 +304,7 @@ pub(crate) fn record(
     camera: &Camera,
     target: &wgpu::TextureView,
 ) -> Result<()> {
-    context.check_device("occluders", &occluders.device)?;
+    context.check_context("occluders", occluders.context)?;
     let texture = target.texture();
     let (want, have) = (camera.size(), (texture.width(), texture.height()));
     if have != (want.width, want.height) || texture.format() != OCCLUDER_DEPTH_FORMAT {

@@ -3,7 +3,7 @@
 use std::sync::Mutex;
 
 use crate::camera::{Camera, ImageSize};
-use crate::context::HizContext;
+use crate::context::{ContextId, HizContext};
 use crate::error::{Error, Result};
 use crate::layout::{Level, MAX_LEVELS, PYRAMID_CHUNKS, PyramidLayout};
 use crate::shader::SourceKind;
@@ -40,7 +40,7 @@ pub struct PyramidOptions {
 /// between the reduction and the culls that use it**.
 #[derive(Debug)]
 pub struct Pyramid {
-    pub(crate) device: wgpu::Device,
+    pub(crate) context: ContextId,
     pub(crate) layout: PyramidLayout,
     pub(crate) chunks: Vec<wgpu::Buffer>,
     pub(crate) uniform: wgpu::Buffer,
@@ -92,7 +92,7 @@ impl Pyramid {
             .step_by(LEVELS_PER_STEP as usize)
             .map(|from| context.uniform("hiz.reduce.step", &[from, 0, 0, 0]))
             .collect();
-        Ok(Self { device: device.clone(), layout, chunks, uniform, steps, built: Mutex::new(None) })
+        Ok(Self { context: context.id(), layout, chunks, uniform, steps, built: Mutex::new(None) })
     }
 
     /// The depth image's size.
@@ -126,9 +126,9 @@ impl Pyramid {
 
     /// The built state for a cull with `camera`, or why there is none.
     pub(crate) fn built_for(&self, camera: &Camera) -> Result<Built> {
-        let built = self
-            .built()
-            .ok_or_else(|| Error::mismatch("pyramid", "expected one that was built from a depth image, got one that never was"))?;
+        let built = self.built().ok_or_else(|| {
+            Error::mismatch("pyramid", "expected one that was built from a depth image, got one that never was")
+        })?;
         if built.camera == *camera {
             return Ok(built);
         }
@@ -152,20 +152,27 @@ pub(crate) fn record_reduce(
     camera: &Camera,
     pyramid: &Pyramid,
 ) -> Result<()> {
-    context.check_device("pyramid", &pyramid.device)?;
+    context.check_context("pyramid", pyramid.context)?;
     let texture = depth.texture();
     let size = ImageSize::new(texture.width(), texture.height());
     if size != pyramid.size() {
         return Err(Error::mismatch("depth", format!("expected the pyramid's size {}, got {size}", pyramid.size())));
     }
     if size != camera.size() {
-        return Err(Error::mismatch("camera", format!("expected the depth image's size {size}, got {}", camera.size())));
+        return Err(Error::mismatch(
+            "camera",
+            format!("expected the depth image's size {size}, got {}", camera.size()),
+        ));
     }
     let source_kind = SourceKind::of(texture.format()).ok_or_else(|| {
-        Error::invalid("depth", format!("expected a depth format, R32Float or R32Uint (float bits), got {:?}", texture.format()))
+        Error::invalid(
+            "depth",
+            format!("expected a depth format, R32Float or R32Uint (float bits), got {:?}", texture.format()),
+        )
     })?;
     let layouts = context.layouts();
-    let pipeline = |from_source| context.reduce_pipeline(source_kind, camera.convention(), pyramid.chunks.len(), from_source);
+    let pipeline =
+        |from_source| context.reduce_pipeline(source_kind, camera.convention(), pyramid.chunks.len(), from_source);
     let source = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("hiz.reduce.pyramid"),
         layout: layouts.reduce(source_kind),

@@ -20,7 +20,11 @@ impl<'a> BufferRange<'a> {
 const STAGING_BYTES: u64 = 1 << 28;
 
 /// Reads ranges of buffers, in their order.
-pub(crate) fn read_buffers(device: &wgpu::Device, queue: &wgpu::Queue, ranges: &[BufferRange<'_>]) -> Result<Vec<Vec<u8>>> {
+pub(crate) fn read_buffers(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    ranges: &[BufferRange<'_>],
+) -> Result<Vec<Vec<u8>>> {
     let total: u64 = ranges.iter().map(|r| r.size).sum();
     if total > STAGING_BYTES {
         return ranges.iter().map(|r| read_in_bands(device, queue, r)).collect();
@@ -29,7 +33,8 @@ pub(crate) fn read_buffers(device: &wgpu::Device, queue: &wgpu::Queue, ranges: &
         return Ok(vec![Vec::new(); ranges.len()]);
     }
     let staging = staging(device, total);
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("hiz.readback.encoder") });
+    let mut encoder =
+        device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("hiz.readback.encoder") });
     let mut offset = 0;
     for range in ranges.iter().filter(|r| r.size > 0) {
         encoder.copy_buffer_to_buffer(range.buffer, range.offset, &staging, offset, range.size);
@@ -68,14 +73,17 @@ pub(crate) fn read_texture(device: &wgpu::Device, queue: &wgpu::Queue, texture: 
     let row = u64::from(width) * 4;
     let padded = row.next_multiple_of(u64::from(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT));
     let staging = staging(device, padded * u64::from(height));
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("hiz.readback.encoder") });
+    let mut encoder =
+        device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("hiz.readback.encoder") });
     encoder.copy_texture_to_buffer(
         texture.as_image_copy(),
         wgpu::TexelCopyBufferInfo {
             buffer: &staging,
             layout: wgpu::TexelCopyBufferLayout {
                 offset: 0,
-                bytes_per_row: Some(u32::try_from(padded).map_err(|_| Error::limit("bytes per row", padded, u64::from(u32::MAX)))?),
+                bytes_per_row: Some(
+                    u32::try_from(padded).map_err(|_| Error::limit("bytes per row", padded, u64::from(u32::MAX)))?,
+                ),
                 rows_per_image: None,
             },
         },

@@ -66,7 +66,10 @@ impl ViewRows {
         let y = about_eye(1).scaled(-f64::from(size.height) / 2.0);
         let w = about_eye(3);
         let slope = dot(z_lin, w_lin) / dot(w_lin, w_lin);
-        #[expect(clippy::cast_possible_truncation, reason = "rounding to float32 is the point; what it leaves over stays in Z'")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "rounding to float32 is the point; what it leaves over stays in Z'"
+        )]
         let z_slope = if orthographic || slope.is_nan() || slope.abs() >= 32_768.0 { 0.0 } else { slope as f32 };
         let z = about_eye(2).minus(f64::from(z_slope), &w);
 
@@ -98,7 +101,10 @@ impl ViewRows {
         }
         let coordinate_limit = 2.0_f64.powf((58.0 - linear_limit.log2()).floor()).min(2.0_f64.powi(50));
         if coordinate_limit < 1.0 {
-            return Err(Error::invalid("camera", "expected a projection that leaves room for coordinates of at least 1"));
+            return Err(Error::invalid(
+                "camera",
+                "expected a projection that leaves room for coordinates of at least 1",
+            ));
         }
         #[expect(clippy::cast_possible_truncation, reason = "a power of two in float32's range")]
         let coordinate_limit = coordinate_limit as f32;

@@ -2,7 +2,7 @@
 
 use wgpu::util::DeviceExt;
 
-use crate::context::HizContext;
+use crate::context::{ContextId, HizContext};
 use crate::instances::Instances;
 
 /// The arguments of `draw_indexed_indirect`, as the device reads them.
@@ -75,7 +75,7 @@ pub(crate) struct PieceOutput {
 /// arguments. The lists hold the caller's indices and begin as 0xFFFFFFFF.
 #[derive(Debug)]
 pub struct Visible {
-    pub(crate) device: wgpu::Device,
+    pub(crate) context: ContextId,
     pub(crate) pieces: Vec<PieceOutput>,
     pub(crate) draws: wgpu::Buffer,
     pub(crate) draws_template: wgpu::Buffer,
@@ -112,7 +112,7 @@ impl Visible {
         let template = vec![draw; instances.num_pieces()];
         let draws_bytes = (template.len() * size_of::<DrawIndexedIndirect>()) as u64;
         Self {
-            device: device.clone(),
+            context: context.id(),
             pieces,
             draws: buffer("hiz.visible.draws", draws_bytes, storage | wgpu::BufferUsages::INDIRECT),
             draws_template: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {

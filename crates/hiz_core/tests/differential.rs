@@ -9,14 +9,16 @@ use campaign::Campaign;
 use common::engine;
 use hiz_core::Coverage;
 
-
 #[test]
 fn no_false_cull_in_area_coverage() {
     let campaign = Campaign { seed: 11, rounds: 600, volumes: 32, coverage: Coverage::Area, count_keeps: false };
     let tally = campaign.run(engine());
     eprintln!("area: {tally:?}");
     assert_eq!(tally.false_culls, 0);
-    assert!(tally.cases > 50_000 && tally.culled > tally.cases / 4, "a campaign without culls proves nothing: {tally:?}");
+    assert!(
+        tally.cases > 50_000 && tally.culled > tally.cases / 4,
+        "a campaign without culls proves nothing: {tally:?}"
+    );
 }
 
 #[test]

@@ -71,7 +71,10 @@ fn a_rectangle_that_is_too_small_without_block_certificates() {
     assert_red(
         "rectangle",
         &[
-            ("1.25 * error_bound(r, max(abs(interval.x), abs(interval.y)), w) / w_min + view.reach", "view.reach"),
+            (
+                "1.25 * error_bound(r, max(abs(interval.x), abs(interval.y)), w) / w_min + 4.0 * EPS * half_size + view.reach",
+                "view.reach",
+            ),
             ("if inside_block(x, w, t.x, t.z, level, view.half_size.x, view.size.x)", "if true"),
             ("&& inside_block(y, w, t.y, t.w, level, view.half_size.y, view.size.y)", ""),
         ],

@@ -21,10 +21,7 @@ impl Dyadic {
 
     fn combine(&self, other: &Self, op: impl Fn(BigInt, BigInt) -> BigInt) -> Self {
         let exponent = self.exponent.min(other.exponent);
-        Dyadic {
-            mantissa: op(self.mantissa_at(exponent), other.mantissa_at(exponent)),
-            exponent,
-        }
+        Dyadic { mantissa: op(self.mantissa_at(exponent), other.mantissa_at(exponent)), exponent }
     }
 }
 
@@ -35,16 +32,9 @@ impl Scalar for Dyadic {
         let field = i32::try_from((bits >> 52) & 0x7ff).expect("eleven bits");
         let fraction = bits & ((1 << 52) - 1);
         // IEEE 754: exponent field 0 means a subnormal, which has no hidden bit and the exponent of field 1.
-        let (integer, exponent) = if field == 0 {
-            (fraction, -1074)
-        } else {
-            (fraction | (1 << 52), field - 1075)
-        };
+        let (integer, exponent) = if field == 0 { (fraction, -1074) } else { (fraction | (1 << 52), field - 1075) };
         if integer == 0 {
-            return Dyadic {
-                mantissa: BigInt::ZERO,
-                exponent: 0,
-            };
+            return Dyadic { mantissa: BigInt::ZERO, exponent: 0 };
         }
         // Odd mantissas keep the integers short: most inputs are round numbers.
         let zeros = integer.trailing_zeros();
@@ -76,17 +66,11 @@ impl Scalar for Dyadic {
     }
 
     fn times(&self, other: &Self) -> Self {
-        Dyadic {
-            mantissa: &self.mantissa * &other.mantissa,
-            exponent: self.exponent + other.exponent,
-        }
+        Dyadic { mantissa: &self.mantissa * &other.mantissa, exponent: self.exponent + other.exponent }
     }
 
     fn negated(&self) -> Self {
-        Dyadic {
-            mantissa: -&self.mantissa,
-            exponent: self.exponent,
-        }
+        Dyadic { mantissa: -&self.mantissa, exponent: self.exponent }
     }
 
     fn sign(&self) -> Option<Ordering> {
@@ -98,10 +82,7 @@ impl Scalar for Dyadic {
     }
 
     fn magnitude(&self) -> Self {
-        Dyadic {
-            mantissa: self.mantissa.magnitude().clone().into(),
-            exponent: self.exponent,
-        }
+        Dyadic { mantissa: self.mantissa.magnitude().clone().into(), exponent: self.exponent }
     }
 }
 
@@ -150,15 +131,9 @@ mod tests {
     #[test]
     fn one_tenth_three_times_is_not_three_tenths() {
         // The float64 nearest 0.1 lies above it and the one nearest 0.3 below: 3 * 0.1 > 0.3, although the two are within an ulp.
-        let difference = Dyadic::exact(0.1)
-            .times(&Dyadic::exact(3.0))
-            .minus(&Dyadic::exact(0.3));
+        let difference = Dyadic::exact(0.1).times(&Dyadic::exact(3.0)).minus(&Dyadic::exact(0.3));
         assert_eq!(difference.sign(), Some(Ordering::Greater));
         let least = Dyadic::exact(f64::from_bits(1));
-        assert_eq!(
-            least.times(&least).sign(),
-            Some(Ordering::Greater),
-            "no underflow"
-        );
+        assert_eq!(least.times(&least).sign(), Some(Ordering::Greater), "no underflow");
     }
 }

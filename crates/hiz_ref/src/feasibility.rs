@@ -36,10 +36,7 @@ pub(crate) struct Form<S> {
 impl<S: Scalar> Form<S> {
     pub(crate) fn scaled(&self, factor: f64) -> Form<S> {
         let factor = S::exact(factor);
-        Form {
-            middle: self.middle.times(&factor),
-            along: [0, 1, 2].map(|k| self.along[k].times(&factor)),
-        }
+        Form { middle: self.middle.times(&factor), along: [0, 1, 2].map(|k| self.along[k].times(&factor)) }
     }
 
     pub(crate) fn minus(&self, other: &Form<S>) -> Form<S> {
@@ -84,28 +81,18 @@ pub(crate) struct Constraint<S> {
 
 impl<S> Constraint<S> {
     pub(crate) fn at_least_zero(form: Form<S>) -> Self {
-        Constraint {
-            form,
-            equality: false,
-        }
+        Constraint { form, equality: false }
     }
 
     pub(crate) fn zero(form: Form<S>) -> Self {
-        Constraint {
-            form,
-            equality: true,
-        }
+        Constraint { form, equality: true }
     }
 }
 
 /// Whether some point of the volume satisfies every constraint. With an exact scalar the answer is never `None`.
 ///
 /// `consistent` says that some point, of the volume or not, is known to satisfy them; it saves work.
-pub(crate) fn feasible<S: Scalar>(
-    constraints: &[Constraint<S>],
-    shape: Shape,
-    consistent: bool,
-) -> Option<bool> {
+pub(crate) fn feasible<S: Scalar>(constraints: &[Constraint<S>], shape: Shape, consistent: bool) -> Option<bool> {
     let separated = match shape {
         Shape::Cube => cube_separated(constraints, consistent),
         Shape::Ball => {
@@ -124,10 +111,7 @@ pub(crate) fn feasible<S: Scalar>(
 /// The same in float64, with shortcuts for what is plain: one plane separates, or a guessed point satisfies everything.
 pub(crate) fn feasible_in_float(constraints: &[Constraint<Ball>], shape: Shape) -> Option<bool> {
     for constraint in constraints.iter().filter(|c| !c.equality) {
-        let negated = Form {
-            middle: constraint.form.middle.negated(),
-            along: constraint.form.along,
-        };
+        let negated = Form { middle: constraint.form.middle.negated(), along: constraint.form.along };
         if negated.is_positive_on(shape) == Some(true) {
             return Some(false);
         }
@@ -152,15 +136,10 @@ pub(crate) fn is_consistent(constraints: &[Constraint<Ball>]) -> bool {
     // Cramer's rule, columns i, j, k of the three rows.
     let det = |i: usize, j: usize, k: usize| {
         let [a, b, c] = &rows;
-        a[i] * (b[j] * c[k] - b[k] * c[j]) - a[j] * (b[i] * c[k] - b[k] * c[i])
-            + a[k] * (b[i] * c[j] - b[j] * c[i])
+        a[i] * (b[j] * c[k] - b[k] * c[j]) - a[j] * (b[i] * c[k] - b[k] * c[i]) + a[k] * (b[i] * c[j] - b[j] * c[i])
     };
     let scale = det(0, 1, 2);
-    let point = [
-        det(3, 1, 2) / scale,
-        det(0, 3, 2) / scale,
-        det(0, 1, 3) / scale,
-    ];
+    let point = [det(3, 1, 2) / scale, det(0, 3, 2) / scale, det(0, 1, 3) / scale];
     satisfies(constraints, point)
 }
 
@@ -244,10 +223,7 @@ fn cube_separated<S: Scalar>(constraints: &[Constraint<S>], consistent: bool) ->
     let cross = |a: &S, b: &S, c: &S, d: &S| a.times(b).minus(&c.times(d));
     let mut result = Some(false);
     let mut try_weights = |members: &[usize], weights: &[S], vanishing: &[usize]| {
-        result = or(
-            result,
-            is_certificate(constraints, members, weights, vanishing),
-        );
+        result = or(result, is_certificate(constraints, members, weights, vanishing));
         result == Some(true)
     };
 
@@ -287,8 +263,7 @@ fn cube_separated<S: Scalar>(constraints: &[Constraint<S>], consistent: bool) ->
     }
     // Cramer: the weights that make four vectors of three components vanish are their 3x3 minors with alternating signs.
     let minor = |i: usize, j: usize, l: usize| {
-        let [a, b, c] =
-            [[1, 2], [2, 0], [0, 1]].map(|[p, q]| cross(v(j, p), v(l, q), v(j, q), v(l, p)));
+        let [a, b, c] = [[1, 2], [2, 0], [0, 1]].map(|[p, q]| cross(v(j, p), v(l, q), v(j, q), v(l, p)));
         let [a, b, c] = [a.times(v(i, 0)), b.times(v(i, 1)), c.times(v(i, 2))];
         a.plus(&b).plus(&c)
     };
@@ -296,12 +271,7 @@ fn cube_separated<S: Scalar>(constraints: &[Constraint<S>], consistent: bool) ->
         for j in i + 1..n {
             for l in j + 1..n {
                 for m in l + 1..n {
-                    let weights = [
-                        minor(j, l, m),
-                        minor(i, l, m).negated(),
-                        minor(i, j, m),
-                        minor(i, j, l).negated(),
-                    ];
+                    let weights = [minor(j, l, m), minor(i, l, m).negated(), minor(i, j, m), minor(i, j, l).negated()];
                     if try_weights(&[i, j, l, m], &weights, &[0, 1, 2]) {
                         return Some(true);
                     }
@@ -349,10 +319,7 @@ fn is_certificate<S: Scalar>(
         .map(|k| combine(&|form| form.along[k].clone()).magnitude())
         .fold(S::exact(0.0), |a, b| a.plus(&b));
     let below = |middle: S| middle.plus(&spread).sign().map(Ordering::is_lt);
-    or(
-        and(positive, below(middle.clone())),
-        and(negative, below(middle.negated())),
-    )
+    or(and(positive, below(middle.clone())), and(negative, below(middle.negated())))
 }
 
 /// Whether the nearest point to the centre of some active set of at most three planes is outside the unit ball.
@@ -360,9 +327,7 @@ fn ball_separated<S: Scalar>(constraints: &[Constraint<S>]) -> Option<bool> {
     let n = constraints.len();
     let form = |i: usize| &constraints[i].form;
     let value = |i: usize| &form(i).middle;
-    let gram: Vec<Vec<S>> = (0..n)
-        .map(|i| (0..n).map(|j| form(i).dot(form(j))).collect())
-        .collect();
+    let gram: Vec<Vec<S>> = (0..n).map(|i| (0..n).map(|j| form(i).dot(form(j))).collect()).collect();
     let g = |i: usize, j: usize| &gram[i][j];
     // a b - c d
     let cross = |a: &S, b: &S, c: &S, d: &S| a.times(b).minus(&c.times(d));
@@ -397,10 +362,7 @@ fn ball_separated<S: Scalar>(constraints: &[Constraint<S>]) -> Option<bool> {
     }
     for i in 0..n {
         for j in i + 1..n {
-            let solution = [
-                cross(g(j, j), value(i), g(i, j), value(j)),
-                cross(g(i, i), value(j), g(i, j), value(i)),
-            ];
+            let solution = [cross(g(j, j), value(i), g(i, j), value(j)), cross(g(i, i), value(j), g(i, j), value(i))];
             let square = cross(g(i, i), g(j, j), g(i, j), g(i, j));
             if try_solution(&[i, j], &solution, &square) {
                 return Some(true);
@@ -417,15 +379,9 @@ fn ball_separated<S: Scalar>(constraints: &[Constraint<S>]) -> Option<bool> {
                 let jj = cross(g(i, i), g(l, l), g(i, l), g(i, l));
                 let jl = cross(g(i, j), g(i, l), g(i, i), g(j, l));
                 let ll = cross(g(i, i), g(j, j), g(i, j), g(i, j));
-                let row = |a: &S, b: &S, c: &S, x: &S, y: &S, z: &S| {
-                    a.times(x).plus(&b.times(y)).plus(&c.times(z))
-                };
+                let row = |a: &S, b: &S, c: &S, x: &S, y: &S, z: &S| a.times(x).plus(&b.times(y)).plus(&c.times(z));
                 let apply = |a: &S, b: &S, c: &S| row(a, b, c, value(i), value(j), value(l));
-                let solution = [
-                    apply(&ii, &ij, &il),
-                    apply(&ij, &jj, &jl),
-                    apply(&il, &jl, &ll),
-                ];
+                let solution = [apply(&ii, &ij, &il), apply(&ij, &jj, &jl), apply(&il, &jl, &ll)];
                 let square = row(&ii, &ij, &il, g(i, i), g(i, j), g(i, l));
                 if try_solution(&[i, j, l], &solution, &square) {
                     return Some(true);

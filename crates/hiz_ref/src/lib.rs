@@ -142,38 +142,19 @@ pub fn classify(view: &View, volume: &Volume, depth: &[f32]) -> Result<Verdict, 
 /// # Errors
 ///
 /// Those of [`classify`].
-pub fn classify_with(
-    view: &View,
-    volume: &Volume,
-    depth: &[f32],
-    options: Options,
-) -> Result<Outcome, Error> {
+pub fn classify_with(view: &View, volume: &Volume, depth: &[f32], options: Options) -> Result<Outcome, Error> {
     view.check()?;
     view.check_depth(depth)?;
     if !volume.is_valid() {
-        return Ok(Outcome {
-            verdict: Verdict::Invalid,
-            outside: None,
-            witness: None,
-            nearest_depth: None,
-        });
+        return Ok(Outcome { verdict: Verdict::Invalid, outside: None, witness: None, nearest_depth: None });
     }
     let projected = Projected::new(view, volume, options);
     let (verdict, outside, witness) = match find_open_pixel(&projected, depth) {
         Found::Open(witness) => (Verdict::Visible, Some(false), witness),
         Found::Nothing => (Verdict::Hidden, is_not(projected.meets(view.image())), None),
-        Found::Unknown => (
-            Verdict::Undecided,
-            is_not(projected.meets(view.image())),
-            None,
-        ),
+        Found::Unknown => (Verdict::Undecided, is_not(projected.meets(view.image())), None),
     };
-    Ok(Outcome {
-        verdict,
-        outside,
-        witness,
-        nearest_depth: projected.nearest_depth(),
-    })
+    Ok(Outcome { verdict, outside, witness, nearest_depth: projected.nearest_depth() })
 }
 
 /// Whether no point of `volume` is inside the frustum: `w > 0`, `0 <= z <= w`, pixel coordinates in the closed image.
@@ -214,19 +195,12 @@ pub fn hides(view: &View, volume: &Volume, depth: f32) -> Result<bool, Error> {
 /// # Errors
 ///
 /// If the view is not finite or its size is wrong.
-pub fn touched_pixels(
-    view: &View,
-    volume: &Volume,
-    coverage: Coverage,
-) -> Result<Vec<[u32; 2]>, Error> {
+pub fn touched_pixels(view: &View, volume: &Volume, coverage: Coverage) -> Result<Vec<[u32; 2]>, Error> {
     view.check()?;
     if !volume.is_valid() {
         return Ok(Vec::new());
     }
-    let options = Options {
-        coverage,
-        ..Options::default()
-    };
+    let options = Options { coverage, ..Options::default() };
     let (pixels, decided) = Projected::new(view, volume, options).touched();
     debug_assert!(decided, "exact arithmetic decides everything");
     Ok(pixels)

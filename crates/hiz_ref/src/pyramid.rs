@@ -47,39 +47,24 @@ pub struct Level {
 /// If a side is 0 or `depth` does not hold `width * height` values.
 #[must_use]
 pub fn pyramid(depth: &[f32], width: u32, height: u32, reversed: bool) -> Vec<Level> {
-    assert!(
-        width > 0 && height > 0,
-        "image size: expected at least 1x1, got {width}x{height}"
-    );
-    assert_eq!(
-        depth.len(),
-        width as usize * height as usize,
-        "depth: expected {width}x{height} values"
-    );
+    assert!(width > 0 && height > 0, "image size: expected at least 1x1, got {width}x{height}");
+    assert_eq!(depth.len(), width as usize * height as usize, "depth: expected {width}x{height} values");
     let farther = |a: f32, b: f32| if reversed { a.min(b) } else { a.max(b) };
     let mut levels = Vec::new();
     for k in 0.. {
         let side = 1usize << k;
         let size = [width, height].map(|n| n.div_ceil(1 << k));
-        let block = |texel: u32, n: u32| {
-            texel as usize * side..((texel as usize + 1) * side).min(n as usize)
-        };
+        let block = |texel: u32, n: u32| texel as usize * side..((texel as usize + 1) * side).min(n as usize);
         let mut texels = Vec::with_capacity(size[0] as usize * size[1] as usize);
         for y in 0..size[1] {
             for x in 0..size[0] {
                 let rows = block(y, height).map(|row| &depth[row * width as usize..]);
                 let pixels = rows.flat_map(|row| &row[block(x, width)]);
-                let texel = pixels
-                    .map(|&pixel| sanitized_depth(pixel, reversed))
-                    .reduce(farther);
+                let texel = pixels.map(|&pixel| sanitized_depth(pixel, reversed)).reduce(farther);
                 texels.push(texel.expect("a block of the image is not empty"));
             }
         }
-        levels.push(Level {
-            width: size[0],
-            height: size[1],
-            texels,
-        });
+        levels.push(Level { width: size[0], height: size[1], texels });
         if size == [1, 1] {
             break;
         }
@@ -129,10 +114,7 @@ mod tests {
             0.3, 0.7, 0.1, 0.2, f32::NAN,
         ];
         let far = pyramid(&depth, 5, 3, false);
-        let sizes: Vec<_> = far
-            .iter()
-            .map(|level| (level.width, level.height))
-            .collect();
+        let sizes: Vec<_> = far.iter().map(|level| (level.width, level.height)).collect();
         assert_eq!(sizes, [(5, 3), (3, 2), (2, 1), (1, 1)]);
         assert_eq!(far[0].texels[..14], depth[..14]);
         assert_eq!(far[1].texels, [0.2, 0.9, 0.6, 0.7, 0.2, 1.0]);

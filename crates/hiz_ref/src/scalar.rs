@@ -51,10 +51,7 @@ impl Ball {
 
 impl Scalar for Ball {
     fn exact(value: f64) -> Self {
-        Ball {
-            mid: value,
-            err: 0.0,
-        }
+        Ball { mid: value, err: 0.0 }
     }
 
     fn plus(&self, other: &Self) -> Self {
@@ -90,10 +87,7 @@ impl Scalar for Ball {
     }
 
     fn negated(&self) -> Self {
-        Ball {
-            mid: -self.mid,
-            err: self.err,
-        }
+        Ball { mid: -self.mid, err: self.err }
     }
 
     fn sign(&self) -> Option<Ordering> {
@@ -110,10 +104,7 @@ impl Scalar for Ball {
     }
 
     fn magnitude(&self) -> Self {
-        Ball {
-            mid: self.mid.abs(),
-            err: self.err,
-        }
+        Ball { mid: self.mid.abs(), err: self.err }
     }
 }
 
@@ -176,18 +167,11 @@ mod tests {
         let e = f64::EPSILON;
         let square = Ball::exact(1.0 + e).times(&Ball::exact(1.0 + e));
         assert_eq!(square.minus(&Ball::exact(1.0 + 2.0 * e)).sign(), None);
-        assert_eq!(
-            square.minus(&Ball::exact(1.0 + 4.0 * e)).sign(),
-            Some(Ordering::Less)
-        );
+        assert_eq!(square.minus(&Ball::exact(1.0 + 4.0 * e)).sign(), Some(Ordering::Less));
         let huge = Ball::exact(f64::MAX).times(&Ball::exact(4.0));
         assert_eq!(huge.sign(), None, "overflow decides nothing");
         assert_eq!(huge.minus(&huge).sign(), None);
         let zero = Ball::exact(-0.0).times(&huge);
-        assert_eq!(
-            zero.sign(),
-            Some(Ordering::Equal),
-            "0 times anything finite is 0"
-        );
+        assert_eq!(zero.sign(), Some(Ordering::Equal), "0 times anything finite is 0");
     }
 }

@@ -33,16 +33,11 @@ impl<'a> Projected<'a> {
     }
 
     fn exact(&self) -> &Clip<Dyadic> {
-        self.exact
-            .get_or_init(|| Clip::new(self.view, &Frame::new(self.volume, self.view.origin)))
+        self.exact.get_or_init(|| Clip::new(self.view, &Frame::new(self.volume, self.view.origin)))
     }
 
     /// Runs a decision in the arithmetic that the options name.
-    fn decide(
-        &self,
-        float: impl FnOnce() -> Option<bool>,
-        exact: impl FnOnce() -> Option<bool>,
-    ) -> Option<bool> {
+    fn decide(&self, float: impl FnOnce() -> Option<bool>, exact: impl FnOnce() -> Option<bool>) -> Option<bool> {
         match self.options.arithmetic {
             Arithmetic::Float => float(),
             Arithmetic::Escalate => float().or_else(exact),
@@ -73,10 +68,7 @@ impl<'a> Projected<'a> {
         fn beyond<S: Scalar>(clip: &Clip<S>, depth: f32, p: &Projected) -> Option<bool> {
             clip.beyond(depth, p.view.reversed).is_positive_on(p.shape)
         }
-        self.decide(
-            || beyond(&self.float, depth, self),
-            || beyond(self.exact(), depth, self),
-        )
+        self.decide(|| beyond(&self.float, depth, self), || beyond(self.exact(), depth, self))
     }
 
     /// Whether all of the volume has w > 0. If that is open, so be it: it only saves work.
@@ -93,17 +85,12 @@ impl<'a> Projected<'a> {
         let mut high = [f64::NEG_INFINITY; 2];
         for corner in 0..8u8 {
             let s = [1, 2, 4].map(|bit| if corner & bit == 0 { -1.0 } else { 1.0 });
-            let [x, y, w] =
-                [&self.float.width_x, &self.float.height_y, &self.float.w].map(|form| {
-                    form.middle.mid + (0..3).map(|k| form.along[k].mid * s[k]).sum::<f64>()
-                });
+            let [x, y, w] = [&self.float.width_x, &self.float.height_y, &self.float.w]
+                .map(|form| form.middle.mid + (0..3).map(|k| form.along[k].mid * s[k]).sum::<f64>());
             if w <= 0.0 || w.is_nan() {
                 return image;
             }
-            let pixel = [
-                0.5 * (f64::from(self.view.width) + x / w),
-                0.5 * (f64::from(self.view.height) - y / w),
-            ];
+            let pixel = [0.5 * (f64::from(self.view.width) + x / w), 0.5 * (f64::from(self.view.height) - y / w)];
             for axis in 0..2 {
                 low[axis] = low[axis].min(pixel[axis]);
                 high[axis] = high[axis].max(pixel[axis]);
@@ -120,24 +107,14 @@ impl<'a> Projected<'a> {
         let empty = |block: Block| self.meets_in_float(block) == Some(false);
         let mut kept = image;
         let [x, y] = guess;
-        if x[0] > 0
-            && empty(Block {
-                x: [0, x[0]],
-                ..kept
-            })
-        {
+        if x[0] > 0 && empty(Block { x: [0, x[0]], ..kept }) {
             kept.x[0] = x[0];
         }
         let right = [x[1], image.x[1]];
         if x[1] < image.x[1] && empty(Block { x: right, ..kept }) {
             kept.x[1] = x[1];
         }
-        if y[0] > 0
-            && empty(Block {
-                y: [0, y[0]],
-                ..kept
-            })
-        {
+        if y[0] > 0 && empty(Block { y: [0, y[0]], ..kept }) {
             kept.y[0] = y[0];
         }
         let bottom = [y[1], image.y[1]];
@@ -214,12 +191,7 @@ struct Hiding<'a> {
 
 impl<'a> Hiding<'a> {
     fn new(projected: &'a Projected<'a>) -> Self {
-        Hiding {
-            projected,
-            monotone: projected.is_in_front(),
-            hides_to: -1,
-            open_from: i64::MAX,
-        }
+        Hiding { projected, monotone: projected.is_in_front(), hides_to: -1, open_from: i64::MAX }
     }
 
     /// Whether a pixel with this depth hides the volume.
@@ -282,11 +254,7 @@ pub(crate) fn find_open_pixel(projected: &Projected, depth: &[f32]) -> Found {
                 }
             }
         }
-        if all {
-            Pixels::AllHide
-        } else {
-            Pixels::NoneHides
-        }
+        if all { Pixels::AllHide } else { Pixels::NoneHides }
     };
 
     let mut unknown = false;
@@ -311,20 +279,13 @@ pub(crate) fn find_open_pixel(projected: &Projected, depth: &[f32]) -> Found {
             blocks.extend(block.halves());
         }
     }
-    if unknown {
-        Found::Unknown
-    } else {
-        Found::Nothing
-    }
+    if unknown { Found::Unknown } else { Found::Nothing }
 }
 
 /// A touched pixel of a block that the volume meets.
 fn follow(projected: &Projected, mut block: Block) -> Option<[u32; 2]> {
     while !block.is_pixel() {
-        block = *block
-            .halves()
-            .iter()
-            .find(|&&half| projected.meets(half) == Some(true))?;
+        block = *block.halves().iter().find(|&&half| projected.meets(half) == Some(true))?;
     }
     Some([block.x[0], block.y[0]])
 }

@@ -39,17 +39,8 @@ impl View {
         if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
             return Err(Error::Size { width, height });
         }
-        let finite = self
-            .rows
-            .iter()
-            .flatten()
-            .chain(&self.origin)
-            .all(|x| x.is_finite());
-        if finite {
-            Ok(())
-        } else {
-            Err(Error::NonFiniteView)
-        }
+        let finite = self.rows.iter().flatten().chain(&self.origin).all(|x| x.is_finite());
+        if finite { Ok(()) } else { Err(Error::NonFiniteView) }
     }
 
     pub(crate) fn check_depth(&self, depth: &[f32]) -> Result<(), Error> {
@@ -57,21 +48,13 @@ impl View {
         if depth.len() == expected {
             Ok(())
         } else {
-            Err(Error::DepthLength {
-                expected,
-                got: depth.len(),
-                width: self.width,
-                height: self.height,
-            })
+            Err(Error::DepthLength { expected, got: depth.len(), width: self.width, height: self.height })
         }
     }
 
     /// All pixels of the image.
     pub(crate) fn image(&self) -> Block {
-        Block {
-            x: [0, self.width],
-            y: [0, self.height],
-        }
+        Block { x: [0, self.width], y: [0, self.height] }
     }
 }
 
@@ -134,11 +117,7 @@ impl<S: Scalar> Clip<S> {
     /// `z - depth w`, signed so that it is positive where a point lies strictly farther than `depth`.
     pub(crate) fn beyond(&self, depth: f32, reversed: bool) -> Form<S> {
         let threshold = self.w.scaled(f64::from(depth));
-        if reversed {
-            threshold.minus(&self.z)
-        } else {
-            self.z.minus(&threshold)
-        }
+        if reversed { threshold.minus(&self.z) } else { self.z.minus(&threshold) }
     }
 
     /// The conditions under which a point is inside the frustum and inside the block (its closed rectangle, or the hull of its samples).
@@ -146,19 +125,13 @@ impl<S: Scalar> Clip<S> {
     /// `w > 0` needs no condition of its own: `0 <= z <= w` gives `w >= 0`, and `w = 0` leaves only the points with
     /// `x = y = z = w = 0`, which a matrix of full rank does not have. For a singular matrix such a point counts as inside, so that
     /// the answer errs towards visible.
-    pub(crate) fn inside(
-        &self,
-        view: &View,
-        block: Block,
-        coverage: Coverage,
-    ) -> Vec<Constraint<S>> {
+    pub(crate) fn inside(&self, view: &View, block: Block, coverage: Coverage) -> Vec<Constraint<S>> {
         let inset = match coverage {
             Coverage::Area => 0.0,
             Coverage::Sample => 1.0,
         };
         // Edges in half pixels, so that samples are whole numbers too (and all of them exact).
-        let edges =
-            |[from, to]: [u32; 2]| (2.0 * f64::from(from) + inset, 2.0 * f64::from(to) - inset);
+        let edges = |[from, to]: [u32; 2]| (2.0 * f64::from(from) + inset, 2.0 * f64::from(to) - inset);
         let (width, height) = (f64::from(view.width), f64::from(view.height));
         let (left, right) = edges(block.x);
         let (top, bottom) = edges(block.y);
@@ -171,17 +144,13 @@ impl<S: Scalar> Clip<S> {
             all.push(Constraint::zero(from_left));
         } else {
             all.push(Constraint::at_least_zero(from_left));
-            all.push(Constraint::at_least_zero(
-                self.w.scaled(right - width).minus(&self.width_x),
-            ));
+            all.push(Constraint::at_least_zero(self.w.scaled(right - width).minus(&self.width_x)));
         }
         if top == bottom {
             all.push(Constraint::zero(from_top));
         } else {
             all.push(Constraint::at_least_zero(from_top));
-            all.push(Constraint::at_least_zero(
-                self.height_y.minus(&self.w.scaled(height - bottom)),
-            ));
+            all.push(Constraint::at_least_zero(self.height_y.minus(&self.w.scaled(height - bottom))));
         }
         all.push(Constraint::at_least_zero(self.z.clone()));
         all.push(Constraint::at_least_zero(self.w.minus(&self.z)));
@@ -195,17 +164,11 @@ mod tests {
 
     #[test]
     fn halves_partition_a_block() {
-        let block = Block {
-            x: [3, 8],
-            y: [2, 4],
-        };
+        let block = Block { x: [3, 8], y: [2, 4] };
         let [a, b] = block.halves();
         assert_eq!((a.x, b.x), ([3, 5], [5, 8]));
         assert_eq!((a.y, b.y), (block.y, block.y));
-        let column = Block {
-            x: [0, 1],
-            y: [0, 2],
-        };
+        let column = Block { x: [0, 1], y: [0, 2] };
         let [a, b] = column.halves();
         assert_eq!((a.y, b.y), ([0, 1], [1, 2]));
         assert!(!column.is_pixel() && a.is_pixel() && b.is_pixel());

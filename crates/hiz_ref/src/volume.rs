@@ -39,17 +39,11 @@ impl Volume {
     pub fn is_valid(&self) -> bool {
         let finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
         match self {
-            Volume::Sphere { center, radius } => {
-                finite(center) && radius.is_finite() && *radius >= 0.0
-            }
+            Volume::Sphere { center, radius } => finite(center) && radius.is_finite() && *radius >= 0.0,
             Volume::Box { min, max } => {
                 finite(min) && finite(max) && min.iter().zip(max).all(|(low, high)| low <= high)
             }
-            Volume::OrientedBox {
-                center,
-                half_sizes,
-                axes,
-            } => {
+            Volume::OrientedBox { center, half_sizes, axes } => {
                 finite(center)
                     && finite(half_sizes)
                     && finite(axes.as_flattened())
@@ -84,41 +78,26 @@ impl<S: Scalar> Frame<S> {
         let diagonal = |lengths: [S; 3]| {
             let zero = || number(0.0);
             let [x, y, z] = lengths;
-            [
-                [x, zero(), zero()],
-                [zero(), y, zero()],
-                [zero(), zero(), z],
-            ]
+            [[x, zero(), zero()], [zero(), y, zero()], [zero(), zero(), z]]
         };
         match *volume {
-            Volume::Sphere { center, radius } => Frame {
-                center: relative(center),
-                axes: diagonal([radius; 3].map(number)),
-            },
+            Volume::Sphere { center, radius } => {
+                Frame { center: relative(center), axes: diagonal([radius; 3].map(number)) }
+            }
             Volume::Box { min, max } => {
                 // Relative to the origin first: far from it the halves would otherwise cost float64 its last digits.
                 let (low, high) = (relative(min), relative(max));
                 let half = number(0.5);
                 let axis = |i: usize| low[i].plus(&high[i]).times(&half);
                 let length = |i: usize| number(max[i]).minus(&number(min[i])).times(&half);
-                Frame {
-                    center: [axis(0), axis(1), axis(2)],
-                    axes: diagonal([length(0), length(1), length(2)]),
-                }
+                Frame { center: [axis(0), axis(1), axis(2)], axes: diagonal([length(0), length(1), length(2)]) }
             }
-            Volume::OrientedBox {
-                center,
-                half_sizes,
-                axes,
-            } => {
+            Volume::OrientedBox { center, half_sizes, axes } => {
                 let axis = |k: usize| {
                     let half = number(half_sizes[k]);
                     axes.map(|row| number(row[k]).times(&half))
                 };
-                Frame {
-                    center: relative(center),
-                    axes: [axis(0), axis(1), axis(2)],
-                }
+                Frame { center: relative(center), axes: [axis(0), axis(1), axis(2)] }
             }
         }
     }
@@ -126,16 +105,8 @@ impl<S: Scalar> Frame<S> {
     /// A matrix row as a function of the local coordinates.
     pub(crate) fn form(&self, row: &[f64; 4]) -> Form<S> {
         let row = row.map(S::exact);
-        let dot = |v: &[S; 3]| {
-            row[0]
-                .times(&v[0])
-                .plus(&row[1].times(&v[1]))
-                .plus(&row[2].times(&v[2]))
-        };
-        Form {
-            middle: dot(&self.center).plus(&row[3]),
-            along: [0, 1, 2].map(|k| dot(&self.axes[k])),
-        }
+        let dot = |v: &[S; 3]| row[0].times(&v[0]).plus(&row[1].times(&v[1])).plus(&row[2].times(&v[2]));
+        Form { middle: dot(&self.center).plus(&row[3]), along: [0, 1, 2].map(|k| dot(&self.axes[k])) }
     }
 }
 
@@ -148,16 +119,9 @@ mod tests {
 
     #[test]
     fn bad_numbers_are_invalid_and_degenerate_volumes_are_not() {
-        let sphere = |radius| Volume::Sphere {
-            center: ZERO,
-            radius,
-        };
+        let sphere = |radius| Volume::Sphere { center: ZERO, radius };
         let aabb = |min, max| Volume::Box { min, max };
-        let oriented = |half_sizes, axes| Volume::OrientedBox {
-            center: ZERO,
-            half_sizes,
-            axes,
-        };
+        let oriented = |half_sizes, axes| Volume::OrientedBox { center: ZERO, half_sizes, axes };
         for good in [
             sphere(0.0),
             sphere(-0.0),
@@ -174,10 +138,7 @@ mod tests {
             sphere(-1e-300),
             sphere(nan),
             sphere(f64::INFINITY),
-            Volume::Sphere {
-                center: [0.0, nan, 0.0],
-                radius: 1.0,
-            },
+            Volume::Sphere { center: [0.0, nan, 0.0], radius: 1.0 },
             aabb([0.0, 0.0, 1.0], [1.0, 1.0, 0.5]),
             aabb([nan, 0.0, 0.0], [1.0; 3]),
             aabb([f64::NEG_INFINITY; 3], [f64::INFINITY; 3]),

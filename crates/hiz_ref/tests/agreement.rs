@@ -16,10 +16,7 @@ fn all_arithmetics_agree_on_scenes() {
         let volume = volume(&mut random, &scene);
         let view = &scene.view;
         let run = |depth: &[f32], arithmetic, coverage| {
-            let options = Options {
-                arithmetic,
-                coverage,
-            };
+            let options = Options { arithmetic, coverage };
             classify_with(view, &volume, depth, options).expect("valid")
         };
         let probe = run(&[0.5; 48], Arithmetic::Float, Coverage::Area);
@@ -48,15 +45,9 @@ fn all_arithmetics_agree_on_scenes() {
             }
         }
     }
-    println!(
-        "{visible} visible, {hidden} occluded, {undecided} undecided in float64, of {}",
-        2 * CASES
-    );
+    println!("{visible} visible, {hidden} occluded, {undecided} undecided in float64, of {}", 2 * CASES);
     assert!(visible > 500 && hidden > 500);
-    assert!(
-        undecided < 2 * CASES / 50,
-        "float64 leaves {undecided} open"
-    );
+    assert!(undecided < 2 * CASES / 50, "float64 leaves {undecided} open");
 }
 
 /// The search with its shortcuts against the definition: pixel by pixel, nothing left out.
@@ -68,18 +59,13 @@ fn the_search_agrees_with_the_definition() {
         let volume = volume(&mut random, &scene);
         let view = &scene.view;
         for coverage in [Coverage::Area, Coverage::Sample] {
-            let options = Options {
-                coverage,
-                ..Options::default()
-            };
+            let options = Options { coverage, ..Options::default() };
             let all_far = vec![if view.reversed { 0.0 } else { 1.0 }; 16 * 11];
             let probe = classify_with(view, &volume, &all_far, options).expect("valid");
             let depth = image(&mut random, view, probe.nearest_depth);
             let touched = touched_pixels(view, &volume, coverage).expect("valid");
             assert_eq!(probe.verdict == Verdict::Visible, !touched.is_empty());
-            let open = |&[x, y]: &[u32; 2]| {
-                !hides(view, &volume, depth[(y * 16 + x) as usize]).expect("valid")
-            };
+            let open = |&[x, y]: &[u32; 2]| !hides(view, &volume, depth[(y * 16 + x) as usize]).expect("valid");
             let outcome = classify_with(view, &volume, &depth, options).expect("valid");
             let visible = touched.iter().any(open);
             let name = format!("case {number} {coverage:?}: {view:?} {volume:?}");

@@ -1,8 +1,7 @@
 //! Cases worked by hand: every expectation follows from the few lines of arithmetic beside it.
 
 use hiz_ref::{
-    Coverage, Error, Options, Verdict, View, Volume, classify, classify_with, hides, is_outside,
-    touched_pixels,
+    Coverage, Error, Options, Verdict, View, Volume, classify, classify_with, hides, is_outside, touched_pixels,
 };
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -10,12 +9,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 /// `x_pixel = 2 + 2 x/z`, `y_pixel = 2 - 2 y/z`, depth `1 - 1/z`.
 fn perspective(width: u32, height: u32) -> View {
     View {
-        rows: [
-            [1.0, 0.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0, 0.0],
-            [0.0, 0.0, 1.0, -1.0],
-            [0.0, 0.0, 1.0, 0.0],
-        ],
+        rows: [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0], [0.0, 0.0, 1.0, 0.0]],
         origin: [0.0; 3],
         width,
         height,
@@ -65,10 +59,7 @@ fn a_pixel_is_closed() {
     let plate = |left| aabb([left, 0.1, 2.0], [1.5, 0.2, 2.0]);
     let image = hole(&view, 0.25, [2, 1], 1.0);
     assert_eq!(verdict(&view, plate(1.0), &image), Verdict::Visible);
-    assert_eq!(
-        verdict(&view, plate(1.0f64.next_up()), &image),
-        Verdict::Hidden
-    );
+    assert_eq!(verdict(&view, plate(1.0f64.next_up()), &image), Verdict::Hidden);
     let touched = |left| touched_pixels(&view, &plate(left), Coverage::Area).expect("valid");
     assert_eq!(touched(1.0), [[2, 1], [3, 1]]);
     assert_eq!(touched(1.0f64.next_up()), [[3, 1]]);
@@ -91,10 +82,9 @@ fn equal_depth_is_visible_and_one_step_nearer_hides() {
         },
     ] {
         // The oriented box reaches from z = 10 - 2 to 10 + 2: its axis 1 is along z.
-        for (view, depth, nearer) in [
-            (perspective(5, 3), 0.875f32, 0.875f32.next_down()),
-            (reversed(5, 3), 0.125, 0.125f32.next_up()),
-        ] {
+        for (view, depth, nearer) in
+            [(perspective(5, 3), 0.875f32, 0.875f32.next_down()), (reversed(5, 3), 0.125, 0.125f32.next_up())]
+        {
             assert!(!hides(&view, &volume, depth).expect("valid"), "{volume:?}");
             assert!(hides(&view, &volume, nearer).expect("valid"), "{volume:?}");
             assert_eq!(verdict(&view, volume, &[depth; 15]), Verdict::Visible);
@@ -113,15 +103,10 @@ fn a_sphere_tangent_to_a_pixel_edge() {
     // Eight columns: x_pixel = 4 + 4 x/z, so x_pixel = 7 is the plane 4 x - 3 z = 0. From (0, 0, 10) it is 30/5 = 6 away, and the
     // foot is (4.8, 0, 6.4), well in front of the near plane: radius 6 touches column 7, the float64 below 6 does not.
     let view = perspective(8, 8);
-    let image: Vec<f32> = (0..64)
-        .map(|i| if i % 8 == 7 { 1.0 } else { 0.0 })
-        .collect();
+    let image: Vec<f32> = (0..64).map(|i| if i % 8 == 7 { 1.0 } else { 0.0 }).collect();
     let ball = |radius: f64| sphere([0.0, 0.0, 10.0], radius);
     assert_eq!(verdict(&view, ball(6.0), &image), Verdict::Visible);
-    assert_eq!(
-        verdict(&view, ball(6.0f64.next_down()), &image),
-        Verdict::Hidden
-    );
+    assert_eq!(verdict(&view, ball(6.0f64.next_down()), &image), Verdict::Hidden);
     let options = Options::default();
     let outcome = classify_with(&view, &ball(6.0), &image, options).expect("valid");
     // y = 0 is the edge between rows 3 and 4.
@@ -166,10 +151,7 @@ fn the_near_plane_and_what_lies_behind() {
     let view = perspective(4, 4);
     let nearest = [0.0f32; 16];
     // Around the camera, and across the near plane inside the frustum: visible whatever the image says.
-    assert_eq!(
-        verdict(&view, sphere([0.0; 3], 3.0), &nearest),
-        Verdict::Visible
-    );
+    assert_eq!(verdict(&view, sphere([0.0; 3], 3.0), &nearest), Verdict::Visible);
     let across = aabb([-0.1, -0.1, 0.5], [0.1, 0.1, 5.0]);
     assert_eq!(verdict(&view, across, &nearest), Verdict::Visible);
     // Across the near plane, but beside the image (|x| > z everywhere): outside.
@@ -249,10 +231,7 @@ fn special_depths() {
 fn samples_count_alone_where_asked() {
     // Pixel (2, 1) of 4x4 has its centre at (2.5, 1.5), the NDC point (0.25, 0.25).
     let view = orthographic(4, 4);
-    let options = Options {
-        coverage: Coverage::Sample,
-        ..Options::default()
-    };
+    let options = Options { coverage: Coverage::Sample, ..Options::default() };
     let sample = |volume: Volume| {
         let outcome = classify_with(&view, &volume, &[1.0; 16], options).expect("valid");
         (outcome.verdict, outcome.witness)
@@ -260,11 +239,7 @@ fn samples_count_alone_where_asked() {
     let plate = |right| aabb([0.01, 0.01, 0.5], [right, 0.4, 0.5]);
     assert_eq!(sample(plate(0.25)), (Verdict::Visible, Some([2, 1])));
     assert_eq!(sample(plate(0.25f64.next_down())), (Verdict::Hidden, None));
-    assert_eq!(
-        verdict(&view, plate(0.2), &[1.0; 16]),
-        Verdict::Visible,
-        "the square is touched"
-    );
+    assert_eq!(verdict(&view, plate(0.2), &[1.0; 16]), Verdict::Visible, "the square is touched");
     let ball = |radius| sphere([-0.05, 0.65, 0.5], radius);
     // The sample nearest to (-0.05, 0.65) is (-0.25, 0.75), the centre of pixel (1, 0): sqrt(0.05) = 0.2236 away.
     assert_eq!(sample(ball(0.22)), (Verdict::Hidden, None));
@@ -277,10 +252,7 @@ fn samples_count_alone_where_asked() {
 fn far_from_the_origin() {
     // The first case again, 1e9 units out: the view is relative to its origin, so nothing changes.
     let origin = [1e9, -1e9, 1e9];
-    let view = View {
-        origin,
-        ..perspective(4, 4)
-    };
+    let view = View { origin, ..perspective(4, 4) };
     let moved = |p: [f64; 3]| [p[0] + origin[0], p[1] + origin[1], p[2] + origin[2]];
     let plate = |left| aabb(moved([left, 0.125, 2.0]), moved([1.5, 0.25, 2.0]));
     let image = hole(&view, 0.25, [2, 1], 1.0);
@@ -310,12 +282,9 @@ fn a_matrix_that_float64_cannot_follow() {
     // x = 5 K p.x - 4 K p.y - K p.z + 0.6 is 0.6 for p = (t, t, t), but each product is rounded by up to 32: in plain float64 the point
     // lands anywhere. `x_pixel` = 2 + 1.2: column 3; `y_pixel` = 2 - 0.2: row 1. Mirrored, and with x and y exchanged, likewise.
     const K: f64 = 1e17;
-    for (sign, exchanged, pixel) in [
-        (1.0, false, [3, 1]),
-        (-1.0, false, [0, 1]),
-        (1.0, true, [2, 0]),
-        (-1.0, true, [2, 3]),
-    ] {
+    for (sign, exchanged, pixel) in
+        [(1.0, false, [3, 1]), (-1.0, false, [0, 1]), (1.0, true, [2, 0]), (-1.0, true, [2, 3])]
+    {
         let mut view = orthographic(4, 4);
         view.rows[0] = [5.0 * K, -4.0 * K, -K, 0.6].map(|x| sign * x);
         view.rows[1] = [0.0, 0.0, 0.0, 0.1];
@@ -336,11 +305,7 @@ fn strange_matrices() {
     // Negated rows: 0 <= z <= w asks for points behind the camera whose z/w is that of points before it. There are none.
     let mut negated = perspective(4, 4);
     negated.rows = negated.rows.map(|row| row.map(|x| -x));
-    for volume in [
-        sphere([0.0, 0.0, 10.0], 5.0),
-        sphere([0.0, 0.0, -10.0], 5.0),
-        aabb([-1e6; 3], [1e6; 3]),
-    ] {
+    for volume in [sphere([0.0, 0.0, 10.0], 5.0), sphere([0.0, 0.0, -10.0], 5.0), aabb([-1e6; 3], [1e6; 3])] {
         assert!(is_outside(&negated, &volume).expect("valid"), "{volume:?}");
     }
     // A singular matrix has a point with clip = (0, 0, 0, 0): it counts as touched everywhere, the safe side.
@@ -350,10 +315,7 @@ fn strange_matrices() {
     assert_eq!(verdict(&singular, eye, &[0.0; 16]), Verdict::Visible);
     // All zero: every point is such a point.
     singular.rows = [[0.0; 4]; 4];
-    assert_eq!(
-        verdict(&singular, sphere([3.0; 3], 1.0), &[0.5; 16]),
-        Verdict::Visible
-    );
+    assert_eq!(verdict(&singular, sphere([3.0; 3], 1.0), &[0.5; 16]), Verdict::Visible);
 }
 
 #[test]
@@ -368,10 +330,7 @@ fn invalid_volumes_and_bad_input_have_names() {
 
     let good = sphere([0.0; 3], 1.0);
     let text = |result: Result<Verdict, Error>| result.expect_err("bad input").to_string();
-    assert_eq!(
-        text(classify(&view, &good, &[0.0; 15])),
-        "depth: expected 16 values (4x4), got 15"
-    );
+    assert_eq!(text(classify(&view, &good, &[0.0; 15])), "depth: expected 16 values (4x4), got 15");
     assert_eq!(
         text(classify(&perspective(0, 4), &good, &[])),
         "view size: expected sides of 1 to 32768 pixels, got 0x4"

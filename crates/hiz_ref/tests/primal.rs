@@ -6,9 +6,7 @@
 mod common;
 
 use common::Random;
-use hiz_ref::{
-    Arithmetic, Coverage, Options, Verdict, View, Volume, classify_with, is_outside, touched_pixels,
-};
+use hiz_ref::{Arithmetic, Coverage, Options, Verdict, View, Volume, classify_with, is_outside, touched_pixels};
 
 /// `v . s + m >= 0`, in local coordinates of the volume.
 #[derive(Clone, Copy)]
@@ -37,11 +35,7 @@ impl Case {
             // A pinhole like those of real cameras, or an orthographic view, or anything at all.
             -3..=0 => {
                 let (a, b) = (w(2).abs() + 1, w(2).abs() + 1);
-                let z = if w(1) > 0 {
-                    [0, 0, 0, 1]
-                } else {
-                    [0, 0, 1, -1]
-                };
+                let z = if w(1) > 0 { [0, 0, 0, 1] } else { [0, 0, 1, -1] };
                 [[a, 0, w(1), 0], [0, b, w(1), 0], z, [0, 0, 1, 0]]
             }
             1 => {
@@ -64,15 +58,7 @@ impl Case {
         let reversed = rows[2] == [0, 0, 0, 1];
         let usual = w(4) + 4;
         let pixels = (0..size[0] * size[1]).map(|_| if w(2) > 1 { w(4) + 4 } else { usual });
-        Case {
-            rows,
-            center,
-            axes,
-            ball,
-            size,
-            reversed,
-            depth: pixels.collect(),
-        }
+        Case { rows, center, axes, ball, size, reversed, depth: pixels.collect() }
     }
 
     /// The case as the oracle takes it.
@@ -90,19 +76,13 @@ impl Case {
         let center = self.center.map(float);
         let [x, y, z] = self.axes.map(|axis| axis.map(float));
         if self.ball {
-            return Volume::Sphere {
-                center,
-                radius: x[0],
-            };
+            return Volume::Sphere { center, radius: x[0] };
         }
         let diagonal = [x[0], y[1], z[2]];
         let off: f64 = [x, y, z].as_flattened().iter().map(|a| a.abs()).sum();
         if diagonal.iter().all(|&d| d >= 0.0) && off == diagonal.iter().sum() {
             let corner = |sign: f64| [0, 1, 2].map(|k| center[k] + sign * diagonal[k]);
-            return Volume::Box {
-                min: corner(-1.0),
-                max: corner(1.0),
-            };
+            return Volume::Box { min: corner(-1.0), max: corner(1.0) };
         }
         // Column k of the matrix is axis k; the factor 2 moves to the half sizes.
         Volume::OrientedBox {
@@ -114,13 +94,9 @@ impl Case {
 
     /// `sum_r weights[r] * rows[r]` as a function of local coordinates.
     fn plane(&self, weights: [i128; 4]) -> Plane {
-        let row: [i128; 4] =
-            [0, 1, 2, 3].map(|c| (0..4).map(|r| weights[r] * self.rows[r][c]).sum());
+        let row: [i128; 4] = [0, 1, 2, 3].map(|c| (0..4).map(|r| weights[r] * self.rows[r][c]).sum());
         let along = |p: [i128; 3]| (0..3).map(|i| row[i] * p[i]).sum::<i128>();
-        Plane {
-            v: self.axes.map(along),
-            m: along(self.center) + row[3],
-        }
+        Plane { v: self.axes.map(along), m: along(self.center) + row[3] }
     }
 
     /// Inside 0 <= z <= w and between pixel coordinates, given in halves.
@@ -154,11 +130,7 @@ impl Case {
 
     /// Whether a depth (in eighths) is nearer than every point.
     fn is_hidden_by(&self, depth: i128) -> bool {
-        let plane = if self.reversed {
-            self.plane([0, 0, -8, depth])
-        } else {
-            self.plane([0, 0, 8, -depth])
-        };
+        let plane = if self.reversed { self.plane([0, 0, -8, depth]) } else { self.plane([0, 0, 8, -depth]) };
         if self.ball {
             return plane.m > 0 && plane.m * plane.m > dot(plane.v, plane.v);
         }
@@ -178,8 +150,7 @@ fn dot(a: [i128; 3], b: [i128; 3]) -> i128 {
 }
 
 fn det([a, b, c]: [[i128; 3]; 3]) -> i128 {
-    a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
-        + a[2] * (b[0] * c[1] - b[1] * c[0])
+    a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0])
 }
 
 /// Solves `matrix x = right` by Cramer's rule: numerators and a positive denominator.
@@ -199,9 +170,7 @@ fn solve(matrix: [[i128; 3]; 3], right: [i128; 3]) -> Option<([i128; 3], i128)> 
 }
 
 fn satisfies(planes: &[Plane], (x, d): ([i128; 3], i128)) -> bool {
-    planes
-        .iter()
-        .all(|plane| dot(plane.v, x) + plane.m * d >= 0)
+    planes.iter().all(|plane| dot(plane.v, x) + plane.m * d >= 0)
 }
 
 /// A bounded polytope is not empty if three of its planes meet in a point of it.
@@ -211,8 +180,7 @@ fn polytope_is_not_empty(planes: &[Plane]) -> bool {
         (i + 1..n).any(|j| {
             (j + 1..n).any(|l| {
                 let [a, b, c] = [planes[i], planes[j], planes[l]];
-                solve([a.v, b.v, c.v], [-a.m, -b.m, -c.m])
-                    .is_some_and(|point| satisfies(planes, point))
+                solve([a.v, b.v, c.v], [-a.m, -b.m, -c.m]).is_some_and(|point| satisfies(planes, point))
             })
         })
     })
@@ -242,9 +210,7 @@ fn ball_meets(planes: &[Plane]) -> bool {
             if solve([a.v, b.v, across], [-a.m, -b.m, 0]).is_some_and(close) {
                 return true;
             }
-            planes[j + 1..]
-                .iter()
-                .any(|c| solve([a.v, b.v, c.v], [-a.m, -b.m, -c.m]).is_some_and(close))
+            planes[j + 1..].iter().any(|c| solve([a.v, b.v, c.v], [-a.m, -b.m, -c.m]).is_some_and(close))
         })
     })
 }
@@ -271,11 +237,7 @@ fn certificates_and_points_agree() {
                     }
                 }
             }
-            let expected = if visible {
-                Verdict::Visible
-            } else {
-                Verdict::Hidden
-            };
+            let expected = if visible { Verdict::Visible } else { Verdict::Hidden };
             let name = || format!("case {number}, {coverage:?}: {view:?} {volume:?} {depth:?}");
             let found = touched_pixels(&view, &volume, coverage).expect("valid");
             assert_eq!(found, touched, "{}", name());
@@ -289,10 +251,7 @@ fn certificates_and_points_agree() {
                 if arithmetic == Arithmetic::Exact && number % 16 != 0 {
                     continue;
                 }
-                let options = Options {
-                    arithmetic,
-                    coverage,
-                };
+                let options = Options { arithmetic, coverage };
                 let outcome = classify_with(&view, &volume, &depth, options).expect("valid");
                 if outcome.verdict != Verdict::Undecided {
                     assert_eq!(outcome.verdict, expected, "{arithmetic:?} {}", name());
@@ -302,10 +261,7 @@ fn certificates_and_points_agree() {
                     assert!(touched.contains(&[x, y]), "{}", name());
                     assert!(pixel == far || !case.is_hidden_by(pixel), "{}", name());
                 }
-                let key = (
-                    format!("{coverage:?} {arithmetic:?} {:?}", outcome.verdict),
-                    outside,
-                );
+                let key = (format!("{coverage:?} {arithmetic:?} {:?}", outcome.verdict), outside);
                 *tally.entry(key).or_insert(0) += 1;
             }
         }

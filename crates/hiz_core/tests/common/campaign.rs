@@ -65,7 +65,8 @@ impl Campaign {
             reversed: scene.camera.convention().is_reversed(),
         };
         // No slack: it would hide a margin that is too small.
-        let options = CullOptions { coverage: self.coverage, depth_slack: 0.0, statistics: false, ..CullOptions::default() };
+        let options =
+            CullOptions { coverage: self.coverage, depth_slack: 0.0, statistics: false, ..CullOptions::default() };
         for kind in [Kind::Sphere, Kind::Box, Kind::OrientedBox] {
             let volumes: Vec<Volume> = (0..self.volumes).map(|_| scene.volume(kind, random)).collect();
             let arrays = Arrays::new(&volumes);
@@ -141,7 +142,11 @@ impl Scene {
         let near = 10.0_f64.powf(random.range(-3.0, 1.0)) * if far_away > 1e5 { 1e3 } else { 1.0 };
         let far = near * 10.0_f64.powf(random.range(0.5, 8.0));
         let half = [10.0_f64.powf(random.range(-1.5, 0.7)), 10.0_f64.powf(random.range(-1.5, 0.7))];
-        let middle = if random.below(2) == 0 { [0.0; 2] } else { [random.range(-1.0, 1.0) * half[0], random.range(-1.0, 1.0) * half[1]] };
+        let middle = if random.below(2) == 0 {
+            [0.0; 2]
+        } else {
+            [random.range(-1.0, 1.0) * half[0], random.range(-1.0, 1.0) * half[1]]
+        };
         let orthographic = random.below(4) == 0;
         let (left, right) = (middle[0] - half[0], middle[0] + half[0]);
         let (bottom, top) = (middle[1] - half[1], middle[1] + half[1]);
@@ -159,7 +164,11 @@ impl Scene {
             v.map(|x| x / length)
         };
         let lin = |r: usize| [rows[r][0], rows[r][1], rows[r][2]];
-        let forward = if orthographic { unit(lin(2)).map(|x| if convention.is_reversed() { -x } else { x }) } else { unit(lin(3)) };
+        let forward = if orthographic {
+            unit(lin(2)).map(|x| if convention.is_reversed() { -x } else { x })
+        } else {
+            unit(lin(3))
+        };
         let clean = |r: usize| {
             let along: f64 = (0..3).map(|k| rows[r][k] * forward[k]).sum();
             unit(std::array::from_fn(|k| rows[r][k] - along * forward[k]))
@@ -230,7 +239,8 @@ impl Scene {
         // An interval in pixels: random, or ending a hair beside a pixel border of the hole.
         let interval = |side: u32, hole: u32, random: &mut Random| {
             let hair = random.pick(&[0.0, 1e-7, -1e-7, 3e-6, -3e-6, 1e-4, -1e-4, 1e-12, -1e-12]);
-            let length = random.pick(&[0.0, 0.01, 0.5, 1.0, 2.0, 4.0]) + f64::from(random.below(side + 1)) * random.unit();
+            let length =
+                random.pick(&[0.0, 0.01, 0.5, 1.0, 2.0, 4.0]) + f64::from(random.below(side + 1)) * random.unit();
             match random.below(4) {
                 0 => (f64::from(hole) - length, f64::from(hole) + hair),
                 1 => (f64::from(hole + 1) + hair, f64::from(hole + 1) + length),
@@ -269,7 +279,10 @@ impl Scene {
             Kind::Box => {
                 let center = self.world([middle[0], middle[1], z + thickness]);
                 let h: [f64; 3] = std::array::from_fn(|_| random.unit() * half[0].max(half[1]));
-                Volume::Box { min: std::array::from_fn(|k| center[k] - h[k]), max: std::array::from_fn(|k| center[k] + h[k]) }
+                Volume::Box {
+                    min: std::array::from_fn(|k| center[k] - h[k]),
+                    max: std::array::from_fn(|k| center[k] + h[k]),
+                }
             }
             Kind::OrientedBox => {
                 let (right, up, forward) = (self.axes[0], self.axes[1], self.axes[2]);

@@ -32,21 +32,9 @@ impl Random {
         };
         let [w, x, y, z] = q;
         [
-            [
-                1.0 - 2.0 * (y * y + z * z),
-                2.0 * (x * y - w * z),
-                2.0 * (x * z + w * y),
-            ],
-            [
-                2.0 * (x * y + w * z),
-                1.0 - 2.0 * (x * x + z * z),
-                2.0 * (y * z - w * x),
-            ],
-            [
-                2.0 * (x * z - w * y),
-                2.0 * (y * z + w * x),
-                1.0 - 2.0 * (x * x + y * y),
-            ],
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
         ]
     }
 }
@@ -59,11 +47,8 @@ pub struct Scene {
 
 /// Perspective or orthographic, standard or reversed, finite or infinite, off-centre, somewhere in a large world.
 pub fn scene(random: &mut Random, width: u32, height: u32) -> Scene {
-    let axes = if random.whole(0, 3) == 0 {
-        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-    } else {
-        random.rotation()
-    };
+    let axes =
+        if random.whole(0, 3) == 0 { [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] } else { random.rotation() };
     let [right, up, forward] = axes;
     let reversed = random.whole(0, 1) == 1;
     let scale = random.uniform(0.5, 2.0);
@@ -91,12 +76,7 @@ pub fn scene(random: &mut Random, width: u32, height: u32) -> Scene {
             [a, b, c, constant]
         };
         let z = depth_row(slope, offset);
-        [
-            lens(right, shift_x),
-            lens(up, shift_y),
-            z,
-            [0.0, 0.0, 0.0, 1.0],
-        ]
+        [lens(right, shift_x), lens(up, shift_y), z, [0.0, 0.0, 0.0, 1.0]]
     } else {
         let (slope, offset) = match (reversed, random.whole(0, 1)) {
             (false, 0) => (1.0, -near),
@@ -104,25 +84,10 @@ pub fn scene(random: &mut Random, width: u32, height: u32) -> Scene {
             (false, _) => (far / (far - near), -near * far / (far - near)),
             (true, _) => (-near / (far - near), near * far / (far - near)),
         };
-        [
-            row(right, shift_x, 0.0),
-            row(up, shift_y, 0.0),
-            depth_row(slope, offset),
-            depth_row(1.0, 0.0),
-        ]
+        [row(right, shift_x, 0.0), row(up, shift_y, 0.0), depth_row(slope, offset), depth_row(1.0, 0.0)]
     };
-    let world = if random.whole(0, 1) == 0 {
-        0.0
-    } else {
-        random.power(2.0, 7.0)
-    };
-    let view = View {
-        rows,
-        origin: [0; 3].map(|_| random.uniform(-world, world)),
-        width,
-        height,
-        reversed,
-    };
+    let world = if random.whole(0, 1) == 0 { 0.0 } else { random.power(2.0, 7.0) };
+    let view = View { rows, origin: [0; 3].map(|_| random.uniform(-world, world)), width, height, reversed };
     Scene { view, axes }
 }
 
@@ -130,11 +95,7 @@ pub fn scene(random: &mut Random, width: u32, height: u32) -> Scene {
 pub fn volume(random: &mut Random, scene: &Scene) -> Volume {
     let depth = random.power(-1.0, 2.5);
     let spread = 1.3 * depth;
-    let local = [
-        random.uniform(-spread, spread),
-        random.uniform(-spread, spread),
-        depth,
-    ];
+    let local = [random.uniform(-spread, spread), random.uniform(-spread, spread), depth];
     let center = [0, 1, 2].map(|i| {
         let column = scene.axes.map(|axis| axis[i]);
         scene.view.origin[i] + dot(column, local)
@@ -142,19 +103,12 @@ pub fn volume(random: &mut Random, scene: &Scene) -> Volume {
     let size = depth * random.power(-3.0, 0.3);
     let half_sizes = [0; 3].map(|_| size * random.uniform(0.0, 1.0));
     match random.whole(0, 2) {
-        0 => Volume::Sphere {
-            center,
-            radius: size,
-        },
+        0 => Volume::Sphere { center, radius: size },
         1 => Volume::Box {
             min: [0, 1, 2].map(|i| center[i] - half_sizes[i]),
             max: [0, 1, 2].map(|i| center[i] + half_sizes[i]),
         },
-        _ => Volume::OrientedBox {
-            center,
-            half_sizes,
-            axes: random.rotation(),
-        },
+        _ => Volume::OrientedBox { center, half_sizes, axes: random.rotation() },
     }
 }
 
@@ -163,18 +117,12 @@ pub fn image(random: &mut Random, view: &View, nearest: Option<f64>) -> Vec<f32>
     let count = view.width as usize * view.height as usize;
     let nearest = nearest.unwrap_or(0.5).clamp(0.0, 1.0) as f32;
     let toward_near = |x: f32| {
-        if view.reversed {
-            x.next_up()
-        } else {
-            x.next_down()
-        }
+        if view.reversed { x.next_up() } else { x.next_down() }
     };
     match random.whole(0, 4) {
         0 => vec![nearest; count],
         1 => vec![toward_near(toward_near(nearest)); count],
-        2 => (0..count)
-            .map(|_| random.uniform(0.0, 1.0) as f32)
-            .collect(),
+        2 => (0..count).map(|_| random.uniform(0.0, 1.0) as f32).collect(),
         kind => {
             let mut pixels = vec![toward_near(nearest); count];
             for _ in 0..random.whole(1, if kind == 3 { 3 } else { 300 }) {

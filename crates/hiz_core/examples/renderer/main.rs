@@ -1,0 +1,69 @@
+//! A renderer with a device of its own draws a town twice, with and without culling, and compares the pictures:
+//!
+//! ```text
+//! cargo run -p hiz_core --example renderer [FOLDER]
+//! ```
+//!
+//! The pictures land in FOLDER (`out/renderer`): what was drawn with culling, and which box each pixel shows. `renderer.rs`
+//! shows how the crate is embedded, `scene.rs` what is drawn. `tests/renderer.rs` runs the same code.
+
+mod renderer;
+mod scene;
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use hiz_core::ImageSize;
+use renderer::{Picture, Renderer};
+use scene::{ORIGINS, Scene, shots};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let folder = std::env::args_os().nth(1).map_or_else(|| PathBuf::from("out/renderer"), PathBuf::from);
+    std::fs::create_dir_all(&folder)?;
+    let renderer = Renderer::open(&[])?;
+    println!("adapter: {} ({} {})", renderer.adapter.name, renderer.adapter.driver, renderer.adapter.driver_info);
+    println!(
+        "{:>22}  {:>9}  {:>9} {:>6} {:>8} {:>7}  differing pixels",
+        "camera", "image", "instances", "kept", "occluded", "outside"
+    );
+    let mut differing_in_all = 0;
+    let towns = ORIGINS.map(|origin| renderer.build(&Scene::new(origin)));
+    for size in [ImageSize::new(640, 360), ImageSize::new(321, 203)] {
+        for shot in shots(size)? {
+            let town = towns[shot.town].as_ref().map_err(ToString::to_string)?;
+            let all = renderer.draw_all(town, &shot);
+            let culled = renderer.draw_culled(town, &shot)?;
+            let differing = all.differing_pixels(&culled.picture);
+            differing_in_all += differing;
+            let (counts, image) = (culled.counts, format!("{}x{}", size.width, size.height));
+            println!(
+                "{:>22}  {image:>9}  {:>9} {:>6} {:>8} {:>7}  {differing}",
+                shot.name,
+                counts.kept + counts.occluded + counts.outside,
+                counts.kept,
+                counts.occluded,
+                counts.outside,
+            );
+            let path = |what| folder.join(format!("{}_{image}{what}.png", shot.name));
+            save(&path(""), &culled.picture, &culled.picture.colour)?;
+            save(&path("_ids"), &culled.picture, &id_colours(&culled.picture))?;
+        }
+    }
+    println!("pictures: {}", folder.display());
+    if differing_in_all == 0 { Ok(()) } else { Err(format!("{differing_in_all} pixels differ").into()) }
+}
+
+/// Box numbers as colours that neighbours do not share.
+fn id_colours(picture: &Picture) -> Vec<u8> {
+    let colour = |id: u32| (id.wrapping_mul(0x9E37_79B1) | 0xFF).to_be_bytes();
+    picture.ids.iter().flat_map(|id| colour(*id)).collect()
+}
+
+fn save(path: &Path, picture: &Picture, rgba: &[u8]) -> Result<(), Box<dyn Error>> {
+    let file = std::io::BufWriter::new(std::fs::File::create(path)?);
+    let mut encoder = png::Encoder::new(file, picture.size.width, picture.size.height);
+    encoder.set_color(png::ColorType::Rgba);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.write_header()?.write_image_data(rgba)?;
+    Ok(())
+}

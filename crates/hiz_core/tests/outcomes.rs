@@ -1,0 +1,368 @@
+//! The named outcomes: one test each, every expectation worked out by hand.
+//!
+//! The camera stands at the origin and looks along +z; x and y span -1..1 at depth 1, the near plane is at 1, there is no far
+//! plane. The depth image is a wall at depth 4 unless a test says otherwise.
+
+mod common;
+
+use std::sync::Arc;
+
+use common::{CONVENTIONS, camera_along_z, engine, ndc};
+use hiz_core::headless::{Culling, Engine};
+use hiz_core::{
+    Bounds, Camera, Coverage, CullOptions, DepthConvention, Error, Floats, InstanceOptions, Instances, Pyramid,
+    PyramidOptions, VisibleOptions,
+};
+
+const OUTSIDE: u8 = 0;
+const OCCLUDED: u8 = 1;
+const VISIBLE: u8 = 2;
+const INVALID: u8 = 3;
+
+const SIDE: u32 = 16;
+
+fn spheres(list: &[([f64; 3], f64)]) -> Arc<Instances> {
+    let centers: Vec<f64> = list.iter().flat_map(|s| s.0).collect();
+    let radii: Vec<f64> = list.iter().map(|s| s.1).collect();
+    let bounds = Bounds::Spheres { centers: Floats::F64(&centers), radii: Floats::F64(&radii) };
+    engine().instances(&bounds, &InstanceOptions::default()).unwrap()
+}
+
+fn boxes(list: &[([f64; 3], [f64; 3])]) -> Arc<Instances> {
+    let min: Vec<f64> = list.iter().flat_map(|b| b.0).collect();
+    let max: Vec<f64> = list.iter().flat_map(|b| b.1).collect();
+    let bounds = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };
+    engine().instances(&bounds, &InstanceOptions::default()).unwrap()
+}
+
+fn oriented(list: &[([f64; 3], [f64; 3], [f64; 9])]) -> Arc<Instances> {
+    let centers: Vec<f64> = list.iter().flat_map(|b| b.0).collect();
+    let half: Vec<f64> = list.iter().flat_map(|b| b.1).collect();
+    let rotations: Vec<f64> = list.iter().flat_map(|b| b.2).collect();
+    let bounds = Bounds::OrientedBoxes {
+        centers: Floats::F64(&centers),
+        half_sizes: Floats::F64(&half),
+        rotations: Floats::F64(&rotations),
+    };
+    engine().instances(&bounds, &InstanceOptions::default()).unwrap()
+}
+
+const IDENTITY: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+
+fn pyramid_of(depth: &[f32], camera: &Camera) -> Arc<Pyramid> {
+    engine().pyramid(&engine().upload_depth(depth, camera).unwrap()).unwrap()
+}
+
+fn cull_with(instances: &Arc<Instances>, depth: &[f32], camera: &Camera, options: &CullOptions) -> Culling {
+    engine().cull(instances, camera, &pyramid_of(depth, camera), options, &VisibleOptions::default()).unwrap()
+}
+
+/// Verdicts before a wall at depth 4, the same in both conventions.
+fn before_a_wall(instances: &Arc<Instances>) -> Vec<u8> {
+    let mut seen: Vec<Vec<u8>> = CONVENTIONS
+        .iter()
+        .map(|convention| {
+            let camera = camera_along_z(SIDE, SIDE, *convention);
+            let wall = [ndc(4.0, *convention); (SIDE * SIDE) as usize];
+            cull_with(instances, &wall, &camera, &CullOptions::default()).verdicts().unwrap()
+        })
+        .collect();
+    assert_eq!(seen[0], seen[1], "both conventions agree");
+    seen.remove(0)
+}
+
+#[test]
+fn behind_and_before_the_wall() {
+    let list =
+        spheres(&[([0.0, 0.0, 8.0], 1.0), ([0.0, 0.0, 2.5], 1.0), ([1.0, -1.0, 4.5], 0.25), ([1.0, -1.0, 4.0], 0.25)]);
+    assert_eq!(before_a_wall(&list), [OCCLUDED, VISIBLE, OCCLUDED, VISIBLE]);
+    let list = boxes(&[([-1.0, -1.0, 5.0], [1.0, 1.0, 6.0]), ([-1.0, -1.0, 3.0], [1.0, 1.0, 6.0])]);
+    assert_eq!(before_a_wall(&list), [OCCLUDED, VISIBLE]);
+}
+
+#[test]
+fn outside_each_plane() {
+    // |x| and |y| reach as far as z; the near plane is at 1.
+    let away =
+        [[-9.0, 0.0, 4.0], [9.0, 0.0, 4.0], [0.0, -9.0, 4.0], [0.0, 9.0, 4.0], [0.0, 0.0, 0.5], [0.0, 0.0, -5.0]];
+    let list = spheres(&away.map(|c| (c, 0.25)));
+    assert_eq!(before_a_wall(&list), [OUTSIDE; 6]);
+    let list = boxes(&away.map(|c| (c.map(|x| x - 0.25), c.map(|x| x + 0.25))));
+    assert_eq!(before_a_wall(&list), [OUTSIDE; 6]);
+    let list = oriented(&away.map(|c| (c, [0.25; 3], IDENTITY)));
+    assert_eq!(before_a_wall(&list), [OUTSIDE; 6]);
+}
+
+/// Darnell's shader culls a sphere that holds the camera.
+#[test]
+fn the_camera_inside_is_visible() {
+    assert_eq!(before_a_wall(&spheres(&[([0.0; 3], 10.0), ([0.0, 0.0, 3.0], 3.5)])), [VISIBLE; 2]);
+    assert_eq!(before_a_wall(&boxes(&[([-1.0; 3], [1.0; 3]), ([-50.0; 3], [50.0; 3])])), [VISIBLE; 2]);
+    assert_eq!(before_a_wall(&oriented(&[([0.0; 3], [2.0; 3], IDENTITY)])), [VISIBLE]);
+}
+
+#[test]
+fn crossing_the_near_plane_or_the_eye_plane_inside_the_frustum_is_visible() {
+    let list = boxes(&[([-0.1, -0.1, 0.5], [0.1, 0.1, 8.0]), ([-0.1, -0.1, -1.0], [0.1, 0.1, 8.0])]);
+    assert_eq!(before_a_wall(&list), [VISIBLE; 2]);
+    assert_eq!(before_a_wall(&spheres(&[([0.0, 0.0, 1.0], 0.25), ([0.0, 0.0, 0.5], 0.75)])), [VISIBLE; 2]);
+}
+
+#[test]
+fn equal_depth_is_visible_and_a_hair_behind_is_hidden() {
+    let list = boxes(&[([-1.0, -1.0, 4.0], [1.0, 1.0, 5.0]), ([-1.0, -1.0, 4.001], [1.0, 1.0, 5.0])]);
+    assert_eq!(before_a_wall(&list), [VISIBLE, OCCLUDED]);
+    let list = spheres(&[([0.0, 0.0, 5.0], 1.0), ([0.0, 0.0, 5.001], 1.0)]);
+    assert_eq!(before_a_wall(&list), [VISIBLE, OCCLUDED]);
+}
+
+#[test]
+fn bad_bounds_are_kept_counted_and_listed() {
+    let (nan, inf, good) = (f64::NAN, f64::INFINITY, [0.0, 0.0, 8.0]);
+    let list = spheres(&[
+        (good, 1.0),
+        ([nan, 0.0, 8.0], 1.0),
+        ([0.0, inf, 8.0], 1.0),
+        ([0.0, 0.0, 1e300], 1.0),
+        (good, nan),
+        (good, inf),
+        (good, -1.0),
+        (good, -1e-300),
+        ([2e18, 0.0, 8.0], 1.0),
+    ]);
+    let verdicts = before_a_wall(&list);
+    assert_eq!(verdicts, [OCCLUDED, INVALID, INVALID, INVALID, INVALID, INVALID, INVALID, INVALID, INVALID]);
+    assert_eq!(list.invalid(), [1, 2, 3, 4, 5, 6, 7, 8]);
+    let list = boxes(&[
+        ([-1.0, -1.0, 5.0], [1.0, 1.0, 6.0]),
+        ([-1.0, 1.0, 5.0], [1.0, -1.0, 6.0]),
+        ([-1.0, -1.0, nan], [1.0, 1.0, 6.0]),
+        ([-1.0, -1.0, 5.0], [1.0, inf, 6.0]),
+    ]);
+    assert_eq!(before_a_wall(&list), [OCCLUDED, INVALID, INVALID, INVALID]);
+    assert_eq!(list.invalid(), [1, 2, 3]);
+    let mut mirror = IDENTITY;
+    mirror[0] = nan;
+    let list = oriented(&[(good, [1.0; 3], IDENTITY), (good, [1.0, -1.0, 1.0], IDENTITY), (good, [1.0; 3], mirror)]);
+    assert_eq!(before_a_wall(&list), [OCCLUDED, INVALID, INVALID]);
+    assert_eq!(list.invalid(), [1, 2]);
+}
+
+#[test]
+fn strict_instances_refuse_bad_bounds_by_index() {
+    let bounds =
+        Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0, 0.0, f32::NAN, 8.0]), radii: Floats::F32(&[1.0, 1.0]) };
+    let options = InstanceOptions { strict: true, ..InstanceOptions::default() };
+    let message = engine().instances(&bounds, &options).unwrap_err().to_string();
+    assert!(
+        message.starts_with("bounds: expected finite numbers")
+            && message.ends_with("got 1 bad of 2, the first at index 1"),
+        "{message}"
+    );
+}
+
+#[test]
+fn too_far_for_this_camera_is_invalid_and_kept() {
+    // 2^55 passes the test of the bits but not the camera's coordinate limit, 2^50 at most.
+    assert_eq!(before_a_wall(&spheres(&[([0.0, 0.0, 2.0_f64.powi(55)], 1.0)])), [INVALID]);
+}
+
+#[test]
+fn zero_sizes_flat_mirrored_and_singular_boxes_are_valid() {
+    let behind = [0.0, 0.0, 8.0];
+    assert_eq!(before_a_wall(&spheres(&[(behind, 0.0), ([0.0, 0.0, 2.0], 0.0)])), [OCCLUDED, VISIBLE]);
+    assert_eq!(before_a_wall(&boxes(&[(behind, behind), ([0.0, 0.0, 2.0], [0.0, 0.0, 2.0])])), [OCCLUDED, VISIBLE]);
+    let mirrored = [-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    let singular = [1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0];
+    let list = oriented(&[
+        (behind, [1.0, 1.0, 0.0], IDENTITY),
+        (behind, [1.0; 3], mirrored),
+        (behind, [1.0; 3], singular),
+        (behind, [1.0; 3], [0.0; 9]),
+        ([0.0, 0.0, 2.0], [0.5, 0.5, 9.0], singular),
+    ]);
+    assert_eq!(before_a_wall(&list), [OCCLUDED, OCCLUDED, OCCLUDED, OCCLUDED, VISIBLE]);
+}
+
+#[test]
+fn far_depth_and_what_is_no_depth_never_occlude() {
+    let list = spheres(&[([0.0, 0.0, 1e6], 1.0)]);
+    for convention in CONVENTIONS {
+        let camera = camera_along_z(SIDE, SIDE, convention);
+        let far = convention.far();
+        let wall = ndc(4.0, convention);
+        let bad = [
+            far,
+            f32::NAN,
+            f32::from_bits(0xFFC0_1234),
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+            -0.5,
+            -1e-40,
+            1.5,
+            1.0_f32.next_up(),
+        ];
+        for value in bad {
+            assert_eq!(
+                cull_with(&list, &[value; 256], &camera, &CullOptions::default()).verdicts().unwrap(),
+                [VISIBLE]
+            );
+            // One such pixel in the middle of the wall is a hole that the sphere could be seen through.
+            let mut depth = [wall; 256];
+            depth[8 * 16 + 8] = value;
+            assert_eq!(
+                cull_with(&list, &depth, &camera, &CullOptions::default()).verdicts().unwrap(),
+                [VISIBLE],
+                "{value}"
+            );
+        }
+        let nothing_wrong = [wall; 256];
+        assert_eq!(cull_with(&list, &nothing_wrong, &camera, &CullOptions::default()).verdicts().unwrap(), [OCCLUDED]);
+    }
+    // Standard Z: 0, -0 and subnormals are the near plane, which hides all that lies behind it.
+    let camera = camera_along_z(SIDE, SIDE, DepthConvention::Standard);
+    for near in [0.0, -0.0, 1e-40] {
+        assert_eq!(cull_with(&list, &[near; 256], &camera, &CullOptions::default()).verdicts().unwrap(), [OCCLUDED]);
+    }
+}
+
+#[test]
+fn one_pixel_holes_are_seen_through_at_every_level() {
+    // A sphere behind the wall that covers the whole image: any hole shows it.
+    let list = boxes(&[([-20.0, -20.0, 8.0], [20.0, 20.0, 9.0])]);
+    for convention in CONVENTIONS {
+        for (width, height) in [(1, 1), (5, 3), (16, 16), (33, 17)] {
+            let camera = camera_along_z(width, height, convention);
+            for hole in 0..(width * height) as usize {
+                let mut depth = vec![ndc(4.0, convention); (width * height) as usize];
+                depth[hole] = ndc(16.0, convention);
+                assert_eq!(cull_with(&list, &depth, &camera, &CullOptions::default()).verdicts().unwrap(), [VISIBLE]);
+            }
+        }
+    }
+}
+
+#[test]
+fn sample_coverage_drops_what_falls_between_pixel_centres() {
+    // Pixel centres lie at odd multiples of 1/16 at depth 1: a speck at x = 0 falls between two of them.
+    let list = spheres(&[([0.0, 0.0, 2.0], 0.01), ([2.0 / 16.0, 2.0 / 16.0, 2.0], 0.01)]);
+    let camera = camera_along_z(SIDE, SIDE, DepthConvention::Standard);
+    let wall = [ndc(4.0, DepthConvention::Standard); 256];
+    let verdicts = |coverage| {
+        cull_with(&list, &wall, &camera, &CullOptions { coverage, ..CullOptions::default() }).verdicts().unwrap()
+    };
+    assert_eq!(verdicts(Coverage::Area), [VISIBLE, VISIBLE]);
+    assert_eq!(verdicts(Coverage::Sample), [OUTSIDE, VISIBLE]);
+}
+
+#[test]
+fn pyramids_that_do_not_belong_are_refused() {
+    let list = spheres(&[([0.0, 0.0, 8.0], 1.0)]);
+    let camera = camera_along_z(SIDE, SIDE, DepthConvention::Standard);
+    let message = |camera: &Camera, pyramid: &Arc<Pyramid>| {
+        engine()
+            .cull(&list, camera, pyramid, &CullOptions::default(), &VisibleOptions::default())
+            .unwrap_err()
+            .to_string()
+    };
+    let never_built = Arc::new(engine().context().create_pyramid(camera.size(), &PyramidOptions::default()).unwrap());
+    assert!(message(&camera, &never_built).contains("never was"));
+    let pyramid = pyramid_of(&[0.5; 256], &camera);
+    let other_size = camera_along_z(SIDE, 8, DepthConvention::Standard);
+    assert!(
+        message(&other_size, &pyramid)
+            .starts_with("camera: expected the camera of the pyramid's depth image, size (height 16")
+    );
+    let mut moved = camera.clip_from_world();
+    moved[0][3] = 1e-9;
+    let moved = Camera::from_clip_from_world(moved, camera.size(), DepthConvention::Standard).unwrap();
+    assert!(message(&moved, &pyramid).contains("got another one"));
+    let reversed = camera_along_z(SIDE, SIDE, DepthConvention::Reversed);
+    assert!(message(&reversed, &pyramid).contains("got another one"));
+}
+
+#[test]
+fn objects_of_another_device_are_refused() {
+    let other = Engine::new(None).unwrap();
+    let camera = camera_along_z(SIDE, SIDE, DepthConvention::Standard);
+    let list = spheres(&[([0.0, 0.0, 8.0], 1.0)]);
+    let theirs = other.pyramid(&other.upload_depth(&[0.5; 256], &camera).unwrap()).unwrap();
+    let error =
+        engine().cull(&list, &camera, &theirs, &CullOptions::default(), &VisibleOptions::default()).unwrap_err();
+    assert!(matches!(error, Error::Mismatch { .. }) && error.to_string().contains("got one of another"), "{error}");
+    let error = engine().pyramid(&other.upload_depth(&[0.5; 256], &camera).unwrap()).unwrap_err();
+    assert!(error.to_string().contains("got one of another"), "{error}");
+}
+
+#[test]
+fn options_out_of_range_are_refused_by_name() {
+    let list = spheres(&[([0.0, 0.0, 8.0], 1.0)]);
+    let camera = camera_along_z(SIDE, SIDE, DepthConvention::Standard);
+    let pyramid = pyramid_of(&[0.5; 256], &camera);
+    let message = |options: CullOptions| {
+        engine().cull(&list, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap_err().to_string()
+    };
+    let plain = CullOptions::default;
+    assert!(
+        message(CullOptions { guard_px: Some(0.3), ..plain() }).starts_with("guard_px: expected a multiple of 1/256")
+    );
+    assert!(
+        message(CullOptions { guard_px: Some(-1.0), ..plain() }).starts_with("guard_px: expected a number in 0..=16")
+    );
+    assert!(message(CullOptions { depth_slack: f64::NAN, ..plain() }).starts_with("depth_slack:"));
+    assert!(message(CullOptions { transform_slack: -1.0, ..plain() }).starts_with("transform_slack:"));
+}
+
+#[test]
+fn slack_and_guard_only_ever_keep_more() {
+    // A hair behind the wall: hidden without slack, kept with it; a box that ends a quarter pixel beside a hole, with a guard.
+    let camera = camera_along_z(SIDE, SIDE, DepthConvention::Reversed);
+    let wall = [0.25; 256];
+    let list = boxes(&[([-1.0, -1.0, 4.01], [1.0, 1.0, 5.0])]);
+    let verdict = |depth: &[f32], list: &Arc<Instances>, options: CullOptions| {
+        cull_with(list, depth, &camera, &options).verdicts().unwrap()[0]
+    };
+    assert_eq!(verdict(&wall, &list, CullOptions::default()), OCCLUDED);
+    assert_eq!(verdict(&wall, &list, CullOptions { depth_slack: 0.01, ..CullOptions::default() }), VISIBLE);
+    assert_eq!(verdict(&wall, &list, CullOptions { transform_slack: 1e6, ..CullOptions::default() }), VISIBLE);
+    let mut hole = wall;
+    for row in 0..16 {
+        hole[row * 16 + 8] = 0.0;
+    }
+    // At depth 8 a pixel is one unit wide; column 8 begins at x = 0.
+    let list = boxes(&[([-1.5, -0.5, 8.0], [-0.25, 0.5, 8.0])]);
+    assert_eq!(verdict(&hole, &list, CullOptions::default()), OCCLUDED);
+    assert_eq!(verdict(&hole, &list, CullOptions { guard_px: Some(0.5), ..CullOptions::default() }), VISIBLE);
+}
+
+#[test]
+fn explain_agrees_with_the_verdict_and_names_what_was_read() {
+    let list = spheres(&[
+        ([0.0, 0.0, 8.0], 1.0),
+        ([0.0, 0.0, 2.5], 1.0),
+        ([-90.0, 0.0, 4.0], 1.0),
+        ([0.0; 3], 2.0),
+        ([0.0; 3], -1.0),
+    ]);
+    for convention in CONVENTIONS {
+        let camera = camera_along_z(SIDE, SIDE, convention);
+        let wall = [ndc(4.0, convention); 256];
+        let culling = cull_with(&list, &wall, &camera, &CullOptions::default());
+        let verdicts = culling.verdicts().unwrap();
+        let explained: Vec<_> = (0..5).map(|i| culling.explain(i).unwrap()).collect();
+        assert_eq!(verdicts, explained.iter().map(|e| e.verdict).collect::<Vec<_>>());
+        let hidden = &explained[0];
+        // Nearest point at depth 7; the silhouette spans +-1/sqrt(63) at depth 1, a pixel is 1/8 wide: pixels 6 to 9.
+        assert!((hidden.nearest.unwrap() - f64::from(ndc(7.0, convention))).abs() < 1e-6);
+        assert_eq!(hidden.rectangle, Some([6, 6, 9, 9]));
+        assert_eq!((hidden.level, hidden.texels.len()), (Some(1), 4));
+        assert_eq!(hidden.texels[0], [3, 3]);
+        assert_eq!(hidden.farthest, Some(ndc(4.0, convention)));
+        assert!(
+            explained[2].reason.contains("outside")
+                && explained[3].reason.contains("eye")
+                && explained[4].reason.contains("finite")
+        );
+        assert!(culling.explain(5).unwrap_err().to_string().contains("below 5"));
+    }
+}
