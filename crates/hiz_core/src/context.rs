@@ -9,7 +9,7 @@ use wgpu::util::DeviceExt;
 
 use crate::bounds::{Bounds, BoundsKind};
 use crate::camera::{Camera, DepthConvention, ImageSize};
-use crate::cull::{self, CullOptions};
+use crate::cull::{self, CullInputs, CullOptions};
 use crate::error::{Error, Result};
 use crate::instances::{InstanceOptions, Instances};
 use crate::layout::CULL_WORKGROUP;
@@ -238,7 +238,7 @@ impl HizContext {
         visible: &Visible,
         options: &CullOptions,
     ) -> Result<()> {
-        cull::record(self, encoder, instances, camera, pyramid, visible, options)
+        cull::record(self, encoder, &CullInputs { instances, camera, pyramid, options }, visible)
     }
 
     pub(crate) fn layouts(&self) -> &Layouts {

@@ -144,13 +144,17 @@ struct Bound {
     key: CullKey,
 }
 
-fn bind(
-    context: &HizContext,
-    instances: &Instances,
-    camera: &Camera,
-    pyramid: &Pyramid,
-    options: &CullOptions,
-) -> Result<Bound> {
+/// What a cull reads.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct CullInputs<'a> {
+    pub(crate) instances: &'a Instances,
+    pub(crate) camera: &'a Camera,
+    pub(crate) pyramid: &'a Pyramid,
+    pub(crate) options: &'a CullOptions,
+}
+
+fn bind(context: &HizContext, inputs: &CullInputs<'_>) -> Result<Bound> {
+    let CullInputs { instances, camera, pyramid, options } = *inputs;
     context.check_context("instances", instances.context)?;
     context.check_context("pyramid", pyramid.context)?;
     let Built { source, source_kind, .. } = pyramid.built_for(camera)?;
@@ -190,17 +194,15 @@ fn bind_piece(context: &HizContext, uniform: &wgpu::Buffer, piece: &Piece) -> wg
 pub(crate) fn record(
     context: &HizContext,
     encoder: &mut wgpu::CommandEncoder,
-    instances: &Instances,
-    camera: &Camera,
-    pyramid: &Pyramid,
+    inputs: &CullInputs<'_>,
     visible: &Visible,
-    options: &CullOptions,
 ) -> Result<()> {
+    let CullInputs { instances, options, .. } = *inputs;
     context.check_context("visible", visible.context)?;
     if !visible.counts().iter().copied().eq(instances.pieces.iter().map(Piece::count)) {
         return Err(Error::mismatch("visible", "expected buffers that were created for these instances, got others"));
     }
-    let bound = bind(context, instances, camera, pyramid, options)?;
+    let bound = bind(context, inputs)?;
     encoder.copy_buffer_to_buffer(&visible.draws_template, 0, &visible.draws, 0, visible.draws.size());
     encoder.clear_buffer(&visible.counters, 0, None);
     let mut pass = encoder
@@ -248,17 +250,15 @@ pub(crate) struct ExplanationRecord {
 pub(crate) fn record_explain(
     context: &HizContext,
     encoder: &mut wgpu::CommandEncoder,
-    instances: &Instances,
-    camera: &Camera,
-    pyramid: &Pyramid,
-    options: &CullOptions,
+    inputs: &CullInputs<'_>,
     index: u32,
     target: &wgpu::Buffer,
 ) -> Result<()> {
+    let instances = inputs.instances;
     let piece = instances.pieces.iter().find(|p| p.range.contains(&index)).ok_or_else(|| {
         Error::invalid("index", format!("expected an instance below {}, got {index}", instances.len()))
     })?;
-    let Bound { view, key } = bind(context, instances, camera, pyramid, options)?;
+    let Bound { view, key } = bind(context, inputs)?;
     let which = context.uniform("hiz.explain.which", &[index - piece.range.start, 0, 0, 0]);
     let output = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("hiz.explain.target"),

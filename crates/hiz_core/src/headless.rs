@@ -8,7 +8,7 @@ use std::time::Instant;
 use crate::bounds::Bounds;
 use crate::camera::{Camera, ImageSize};
 use crate::context::HizContext;
-use crate::cull::{CullOptions, ExplanationRecord, record_explain};
+use crate::cull::{CullInputs, CullOptions, ExplanationRecord, record_explain};
 use crate::error::{Error, Result};
 use crate::instances::{InstanceOptions, Instances};
 use crate::occluders::{MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders};
@@ -684,16 +684,13 @@ impl Culling {
                 mapped_at_creation: false,
             });
             let mut encoder = engine.encoder("hiz.explain.encoder");
-            record_explain(
-                engine.context(),
-                &mut encoder,
-                &self.instances,
-                &self.camera,
-                &self.pyramid,
-                &self.options,
-                index,
-                &target,
-            )?;
+            let inputs = CullInputs {
+                instances: &self.instances,
+                camera: &self.camera,
+                pyramid: &self.pyramid,
+                options: &self.options,
+            };
+            record_explain(engine.context(), &mut encoder, &inputs, index, &target)?;
             engine.queue().submit([encoder.finish()]);
             readback::read_buffers(engine.device(), engine.queue(), &[BufferRange::first(&target, target.size())])
         })?;

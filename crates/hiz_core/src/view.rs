@@ -261,9 +261,9 @@ mod tests {
     fn the_eye_is_exactly_its_two_halves() {
         let eye = [1.0e6 + 0.1, -3.0e8 + 0.7, 1.0 / 3.0];
         let rows = ViewRows::new(&camera(eye, 0.1, None, DepthConvention::Reversed), 0.0).unwrap();
-        for k in 0..3 {
+        for (k, coordinate) in eye.iter().enumerate() {
             let sum = f64::from(rows.eye_hi[k]) + f64::from(rows.eye_lo[k]);
-            assert!((sum - eye[k]).abs() <= eye[k].abs() * 2.0_f64.powi(-47));
+            assert!((sum - coordinate).abs() <= coordinate.abs() * 2.0_f64.powi(-47));
         }
         // x, y and w vanish at the eye up to what the two halves leave over.
         for row in [rows.x, rows.y, rows.w] {

@@ -1,0 +1,206 @@
+//! Occluder meshes: drawn at any size, relative to the eye, one- or two-sided; and pyramids of textures that were not uploaded.
+
+mod common;
+
+use common::{CONVENTIONS, Random, camera_along_z, engine, ndc};
+use hiz_core::wgpu;
+use hiz_core::{
+    Camera, DepthConvention, FaceCull, Floats, ImageSize, MeshData, OccluderOptions, Pose, Projection, PyramidOptions,
+};
+
+/// A square at depth `z` from (-r, -r) to (r, r), seen counter-clockwise by a camera with x right, y up that looks along +z... which
+/// is a left-handed one: in this world a triangle that appears counter-clockwise in the image is listed so.
+fn square(z: f64, r: f64) -> (Vec<f64>, Vec<u32>) {
+    (vec![-r, -r, z, r, -r, z, r, r, z, -r, r, z], vec![0, 1, 2, 0, 2, 3])
+}
+
+fn draw(vertices: &[f64], triangles: &[u32], transforms: Option<&[f64]>, cull_mode: FaceCull, camera: &Camera) -> Vec<f32> {
+    let mesh = MeshData { vertices: Floats::F64(vertices), triangles, transforms: transforms.map(Floats::F64) };
+    let occluders = engine().occluders(&[mesh], &OccluderOptions { cull_mode }).unwrap();
+    engine().render_depth(&occluders, camera).unwrap().read().unwrap()
+}
+
+/// A camera at the world's `eye` that looks along -z, y up: the usual right-handed one.
+fn right_handed(eye: [f64; 3], size: ImageSize, convention: DepthConvention) -> Camera {
+    let pose = Pose { eye, target: [eye[0], eye[1], eye[2] - 1.0], up: [0.0, 1.0, 0.0] };
+    let fov_y = std::f64::consts::FRAC_PI_2;
+    Camera::look_at(&pose, &Projection::Perspective { fov_y, near: 1.0, far: None, convention }, size).unwrap()
+}
+
+#[test]
+fn a_wall_has_its_depth_and_nothing_is_far() {
+    for convention in CONVENTIONS {
+        for (width, height) in [(1, 1), (1, 9), (16, 16), (37, 23), (640, 360)] {
+            let camera = camera_along_z(width, height, convention);
+            let (vertices, triangles) = square(4.0, 100.0);
+            let depth = draw(&vertices, &triangles, None, FaceCull::None, &camera);
+            assert!(depth.iter().all(|d| *d == ndc(4.0, convention)), "{width}x{height} {convention:?}");
+            let nothing = draw(&[], &[], None, FaceCull::None, &camera);
+            assert!(nothing.iter().all(|d| *d == convention.far()));
+            // Behind the camera and beside the frustum: culled by their bounds.
+            for place in [[0.0, 0.0, -20.0], [500.0, 0.0, 0.0]] {
+                let moved: Vec<f64> = vertices.iter().enumerate().map(|(i, v)| v + place[i % 3]).collect();
+                let depth = draw(&moved, &triangles, None, FaceCull::None, &camera);
+                assert!(depth.iter().all(|d| *d == convention.far()));
+            }
+        }
+    }
+}
+
+#[test]
+fn the_nearer_of_two_walls_wins() {
+    for convention in CONVENTIONS {
+        let camera = camera_along_z(8, 8, convention);
+        let (mut vertices, mut triangles) = square(8.0, 100.0);
+        let (near, second) = square(2.0, 1.0);
+        vertices.extend(near);
+        triangles.extend(second.iter().map(|i| i + 4));
+        let depth = draw(&vertices, &triangles, None, FaceCull::None, &camera);
+        // The near square spans half the image: pixels 2 to 5.
+        for (i, d) in depth.iter().enumerate() {
+            let inside = (2..6).contains(&(i % 8)) && (2..6).contains(&(i / 8));
+            assert_eq!(*d, ndc(if inside { 2.0 } else { 8.0 }, convention), "pixel {i}");
+        }
+    }
+}
+
+/// Row 0 is the top of the image, where y is greatest; column 0 the left.
+#[test]
+fn images_are_the_right_way_up() {
+    let camera = right_handed([0.0; 3], ImageSize::new(4, 4), DepthConvention::Reversed);
+    let quarter = [0.0, 0.0, -2.0, 2.0, 0.0, -2.0, 2.0, 2.0, -2.0, 0.0, 2.0, -2.0];
+    let depth = draw(&quarter, &[0, 1, 2, 0, 2, 3], None, FaceCull::None, &camera);
+    let covered: Vec<usize> = (0..16).filter(|i| depth[*i] != 0.0).collect();
+    assert_eq!(covered, [2, 3, 6, 7], "the upper right quarter");
+}
+
+#[test]
+fn faces_are_culled_by_their_orientation_in_the_world() {
+    let camera = right_handed([0.0; 3], ImageSize::new(8, 8), DepthConvention::Reversed);
+    // Counter-clockwise seen from +z, that is from the camera.
+    let (vertices, front) = square(-4.0, 100.0);
+    let back: Vec<u32> = front.chunks(3).flat_map(|t| [t[0], t[2], t[1]]).collect();
+    let mirror = [-1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+    let seen = |triangles: &[u32], transform: Option<&[f64]>, mode| {
+        draw(&vertices, triangles, transform, mode, &camera).iter().all(|d| *d == 0.25)
+    };
+    assert!(seen(&front, None, FaceCull::None) && seen(&back, None, FaceCull::None));
+    assert!(seen(&front, None, FaceCull::Back) && !seen(&back, None, FaceCull::Back));
+    assert!(!seen(&front, None, FaceCull::Front) && seen(&back, None, FaceCull::Front));
+    // A mirror does not turn a mesh inside out.
+    assert!(seen(&front, Some(&mirror), FaceCull::Back) && !seen(&back, Some(&mirror), FaceCull::Back));
+    // Nor does a left-handed camera: the same faces are seen from the same side.
+    let flipped = Camera::from_clip_from_world(
+        [[-1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, -1.0, 0.0]],
+        ImageSize::new(8, 8),
+        DepthConvention::Reversed,
+    )
+    .unwrap();
+    let depth = draw(&vertices, &front, None, FaceCull::Back, &flipped);
+    assert!(depth.iter().all(|d| *d == 0.25));
+}
+
+#[test]
+fn transforms_place_a_mesh_many_times() {
+    let camera = camera_along_z(8, 8, DepthConvention::Reversed);
+    let (vertices, triangles) = square(0.0, 1.0);
+    let place = |x: f64, y: f64, z: f64| [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0];
+    let transforms = [place(-1.0, 1.0, 2.0), place(1.0, -1.0, 2.0)].concat();
+    let depth = draw(&vertices, &triangles, Some(&transforms), FaceCull::None, &camera);
+    for (i, d) in depth.iter().enumerate() {
+        // The upper left and the lower right quarter.
+        let covered = (i % 8 < 4) == (i / 8 < 4);
+        assert_eq!(*d, if covered { 0.5 } else { 0.0 }, "pixel {i}");
+    }
+}
+
+/// A wall as far from the origin as a city or a planet's surface trembles by no more than float64's own positions do.
+#[test]
+fn distance_from_the_origin_costs_nothing() {
+    let size = ImageSize::new(32, 32);
+    for offset in [0.0, 1e3, 1e6, 1e9] {
+        let camera = right_handed([offset, -offset, offset], size, DepthConvention::Reversed);
+        let vertices: Vec<f64> = [[-100.0, -100.0, -4.0], [100.0, -100.0, -4.0], [0.0, 300.0, -4.0]]
+            .iter()
+            .flat_map(|p| [p[0] + offset, p[1] - offset, p[2] + offset])
+            .collect();
+        let depth = draw(&vertices, &[0, 1, 2], None, FaceCull::None, &camera);
+        assert!(depth.iter().all(|d| (d - 0.25).abs() <= 4.0 * f32::EPSILON * 0.25), "offset {offset}: {:?}", &depth[..4]);
+    }
+}
+
+#[test]
+fn bad_meshes_are_refused_by_name() {
+    let message = |vertices: &[f64], triangles: &[u32], transforms: Option<&[f64]>| {
+        let mesh = MeshData { vertices: Floats::F64(vertices), triangles, transforms: transforms.map(Floats::F64) };
+        engine().occluders(&[mesh], &OccluderOptions::default()).unwrap_err().to_string()
+    };
+    assert!(message(&[0.0; 4], &[], None).starts_with("vertices: expected 3 numbers a vertex"));
+    assert!(message(&[0.0; 9], &[0, 1], None).starts_with("triangles: expected 3 indices"));
+    assert!(message(&[0.0; 9], &[0, 1, 3], None).contains("below the 3 vertices, got 3 in triangle 0"));
+    assert!(message(&[f64::NAN; 9], &[0, 1, 2], None).starts_with("vertices: expected finite positions"));
+    assert!(message(&[0.0; 9], &[0, 1, 2], Some(&[1.0; 15])).starts_with("transforms: expected 16 numbers"));
+    assert!(message(&[0.0; 9], &[0, 1, 2], Some(&[1.0; 16])).contains("last row"));
+}
+
+/// The pyramid of a depth texture: what the rasteriser left, bit for bit.
+#[test]
+fn pyramids_of_rendered_depth_are_bit_exact() {
+    let mut random = Random(8);
+    let vertices: Vec<f64> = (0..300 * 3)
+        .flat_map(|_| [random.range(-6.0, 6.0), random.range(-6.0, 6.0), random.range(0.5, 9.0)])
+        .collect();
+    let triangles: Vec<u32> = (0..900).collect();
+    let mesh = MeshData { vertices: Floats::F64(&vertices), triangles: &triangles, transforms: None };
+    let occluders = engine().occluders(&[mesh], &OccluderOptions::default()).unwrap();
+    for convention in CONVENTIONS {
+        for (width, height) in [(1, 1), (2, 3), (17, 31), (640, 360), (1001, 563)] {
+            let camera = camera_along_z(width, height, convention);
+            let image = engine().render_depth(&occluders, &camera).unwrap();
+            let depth = image.read().unwrap();
+            let pyramid = engine().pyramid(&image).unwrap();
+            for (k, level) in hiz_ref::pyramid(&depth, width, height, convention.is_reversed()).iter().enumerate() {
+                assert_eq!(engine().read_level(&pyramid, k as u32).unwrap(), level.texels, "{width}x{height} level {k}");
+            }
+        }
+    }
+}
+
+/// A caller's own R32Float texture.
+#[test]
+fn pyramids_of_float_textures_are_bit_exact() {
+    let (device, queue) = (engine().device(), engine().queue());
+    let mut random = Random(9);
+    for (width, height) in [(5, 7), (65, 33)] {
+        let depth: Vec<f32> = (0..width * height).map(|_| random.unit() as f32).collect();
+        let extent = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("test.depth"),
+            size: extent,
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::R32Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * width), rows_per_image: None };
+        let bytes: Vec<u8> = depth.iter().flat_map(|d| d.to_le_bytes()).collect();
+        queue.write_texture(texture.as_image_copy(), &bytes, layout, extent);
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        for convention in CONVENTIONS {
+            let camera = camera_along_z(width, height, convention);
+            let pyramid = engine().context().create_pyramid(camera.size(), &PyramidOptions::default()).unwrap();
+            let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            engine().context().record_reduce(&mut encoder, &view, &camera, &pyramid).unwrap();
+            queue.submit([encoder.finish()]);
+            for (k, level) in hiz_ref::pyramid(&depth, width, height, convention.is_reversed()).iter().enumerate() {
+                assert_eq!(engine().read_level(&pyramid, k as u32).unwrap(), level.texels, "{width}x{height} level {k}");
+            }
+            let other = camera_along_z(width + 1, height, convention);
+            let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let error = engine().context().record_reduce(&mut encoder, &view, &other, &pyramid).unwrap_err();
+            assert!(error.to_string().starts_with("camera: expected the depth image's size"), "{error}");
+        }
+    }
+}

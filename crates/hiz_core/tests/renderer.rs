@@ -1,0 +1,130 @@
+//! The example renderer: with culling and without, pixel for pixel; and how much slack a driver's depth needs for that.
+
+#[path = "../examples/renderer/renderer.rs"]
+mod renderer;
+#[path = "../examples/renderer/scene.rs"]
+mod scene;
+
+use hiz_core::{Camera, ImageSize};
+use renderer::{Culled, Picture, Renderer, Town, depth_slack};
+use scene::{Block, ORIGINS, Scene, Shot, shots};
+
+/// A row of 321 pixels is padded where it is copied.
+const SIZES: [(u32, u32); 2] = [(640, 360), (321, 203)];
+
+fn open(faults: &[(&str, &str)]) -> Renderer {
+    let renderer = Renderer::open(faults).expect("the device tests need a Vulkan driver");
+    let adapter = format!("{} ({} {})", renderer.adapter.name, renderer.adapter.driver, renderer.adapter.driver_info);
+    eprintln!("adapter: {adapter}");
+    if let Ok(expected) = std::env::var("HIZVK_EXPECT_ADAPTER") {
+        assert!(
+            adapter.to_lowercase().contains(&expected.to_lowercase()),
+            "expected the adapter {expected}, got {adapter}"
+        );
+    }
+    renderer
+}
+
+/// Draws every shot at `size` with culling and without.
+fn draw_each(renderer: &Renderer, size: (u32, u32), mut look: impl FnMut(&Shot, &Scene, &Picture, &Culled)) {
+    let scenes = ORIGINS.map(Scene::new);
+    let towns: Vec<Town> = scenes.iter().map(|scene| renderer.build(scene).unwrap()).collect();
+    for shot in shots(ImageSize::new(size.0, size.1)).unwrap() {
+        let town = &towns[shot.town];
+        look(&shot, &scenes[shot.town], &renderer.draw_all(town, &shot), &renderer.draw_culled(town, &shot).unwrap());
+    }
+}
+
+#[test]
+fn pictures_with_culling_equal_those_without() {
+    let renderer = open(&[]);
+    for size in SIZES {
+        draw_each(&renderer, size, |shot, scene, all, culled| {
+            let (name, counts) = (shot.name, culled.counts);
+            assert_eq!(all.differing_pixels(&culled.picture), 0, "{name} {size:?}");
+            assert_eq!(counts.drawn, counts.kept, "{name} {size:?}");
+            assert_eq!(counts.kept + counts.occluded + counts.outside, scene.crowd);
+            // Equal pictures prove nothing where nothing is hidden or nobody is seen.
+            assert!(counts.kept < scene.crowd / 2 && counts.occluded > scene.crowd / 8, "{name} {size:?}: {counts:?}");
+            assert!(all.ids.iter().any(|id| (1..=scene.crowd).contains(id)), "{name} {size:?}: an empty street");
+        });
+    }
+}
+
+/// Cameras whose pictures differ, with the pixels that do.
+fn with_fault(what: &str, by: &str) -> Vec<(&'static str, usize)> {
+    let mut differing = Vec::new();
+    draw_each(&open(&[(what, by)]), SIZES[1], |shot, _, all, culled| {
+        differing.push((shot.name, all.differing_pixels(&culled.picture)));
+    });
+    differing.retain(|(_, pixels)| *pixels > 0);
+    eprintln!("{by}: {differing:?}");
+    differing
+}
+
+/// The comparison would see a false cull: the pyramid holds the nearest depth instead of the farthest.
+#[test]
+fn a_pyramid_upside_down_is_seen() {
+    let swapped = with_fault("select(max(a, b), min(a, b), REVERSED)", "select(min(a, b), max(a, b), REVERSED)");
+    assert!(swapped.len() > 6, "{swapped:?}");
+}
+
+/// And a single box that the draw forgets: the last of each list.
+#[test]
+fn a_forgotten_box_is_seen() {
+    let forgotten = with_fault(
+        "instance_count = min(sums[lane], room());",
+        "instance_count = max(1u, min(sums[lane], room())) - 1u;",
+    );
+    assert!(!forgotten.is_empty());
+}
+
+/// A box's least and greatest depth in float64; nothing if it crosses the near plane.
+fn depth_range(block: &Block, camera: &Camera) -> Option<[f64; 2]> {
+    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+    for corner in 0..8 {
+        let d: [f64; 3] =
+            [0, 1, 2].map(|k| if corner >> k & 1 == 0 { block.min[k] } else { block.max[k] } - camera.origin()[k]);
+        let [_, _, z, w] = camera.rows().map(|r| r[0] * d[0] + r[1] * d[1] + r[2] * d[2] + r[3]);
+        if w <= 0.0 || z < 0.0 || z > w {
+            return None;
+        }
+        range = [range[0].min(z / w), range[1].max(z / w)];
+    }
+    Some(range)
+}
+
+/// What [`depth_slack`] has to cover. A culled box lies behind the prepass exactly; it stays unseen only if its own rasterised
+/// depth comes out no nearer than its bounds, and the walls' no farther than in the prepass, both up to the slack together.
+#[test]
+fn the_slack_covers_the_driver() {
+    let renderer = open(&[]);
+    let [mut boxes, mut walls] = [0.0_f64; 2];
+    for size in SIZES {
+        draw_each(&renderer, size, |shot, scene, all, culled| {
+            let reversed = shot.camera.convention().is_reversed();
+            let ranges: Vec<_> = scene.blocks.iter().map(|block| depth_range(block, &shot.camera)).collect();
+            // How much nearer `b` is than `a`, relative.
+            let nearer = |a: f64, b: f64| if reversed { 1.0 - a / b } else { a / b - 1.0 };
+            let (mut shot_boxes, mut shot_walls) = (0.0_f64, 0.0_f64);
+            for ((id, depth), prepass) in all.ids.iter().zip(&all.depth).zip(&culled.prepass) {
+                if *id > scene.crowd || (*id > 0 && shot.crowd_occludes) {
+                    shot_walls = shot_walls.max(nearer(f64::from(*depth), f64::from(*prepass)));
+                }
+                if (1..=scene.crowd).contains(id)
+                    && let Some([least, greatest]) = ranges[*id as usize - 1]
+                {
+                    let nearest = if reversed { greatest } else { least };
+                    shot_boxes = shot_boxes.max(nearer(nearest, f64::from(*depth)));
+                }
+            }
+            eprintln!("{:>22} {size:?}: boxes {shot_boxes:.2e} walls {shot_walls:.2e}", shot.name);
+            (boxes, walls) = (boxes.max(shot_boxes), walls.max(shot_walls));
+        });
+    }
+    let slack = depth_slack(&renderer.adapter);
+    eprintln!(
+        "boxes are drawn up to {boxes:.2e} nearer than their bounds, walls {walls:.2e} farther than in the prepass; slack {slack:.2e}"
+    );
+    assert!((1.0 + boxes) * (1.0 + walls) <= 1.0 + slack, "{boxes:e} {walls:e}");
+}
