@@ -13,7 +13,7 @@ check "ruff check" ruff check "${python_files[@]}"
 check "ruff format" ruff format --check "${python_files[@]}"
 check "mypy" mypy --strict python/hizvk
 # The stubs are written by hand: this compares them with the module as it was built.
-check "stubtest" python -m mypy.stubtest hizvk --concise
+check "stubtest" python -m mypy.stubtest hizvk --concise --mypy-config-file pyproject.toml
 if have shellcheck; then
   check "shellcheck" shellcheck scripts/*.sh .ci/run
 else

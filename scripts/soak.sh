@@ -14,7 +14,7 @@ slow_rust_tests() {
   if have cargo-nextest; then
     cargo nextest run --workspace "${LOCKED[@]}" --run-ignored only --no-tests pass
   else
-    cargo test --workspace "${LOCKED[@]}" --lib --bins --tests -- --ignored
+    cargo test --workspace "${LOCKED[@]}" --tests -- --ignored
   fi
 }
 slow_python_tests() {

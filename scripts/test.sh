@@ -25,7 +25,7 @@ rust_tests() {
   if have cargo-nextest; then
     cargo nextest run --workspace "${LOCKED[@]}" --no-fail-fast
   else
-    cargo test --workspace "${LOCKED[@]}" --no-fail-fast --lib --bins --tests --examples
+    cargo test --workspace "${LOCKED[@]}" --no-fail-fast --tests --examples
   fi
 }
 check "Rust tests" rust_tests

@@ -14,7 +14,8 @@ trap 'rm -rf "$work"' EXIT
 rm -rf dist
 step "sdist" maturin sdist --out dist
 sdists=(dist/hizvk-*.tar.gz)
-tar xzf "${sdists[0]}" -C "$work"
+# Touched: the times in an sdist are long past, and cargo would take the crates for those that it has compiled before.
+tar xzf "${sdists[0]}" --touch -C "$work"
 
 build_wheel() {
   # The crates of the registry are compiled once, wherever the unpacked sources lie.

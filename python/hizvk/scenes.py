@@ -9,20 +9,19 @@ caster that checks a cull starts from the same numbers as the cull.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from .camera import Camera
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from ._arguments import Size
 
-    Floats = npt.NDArray[np.float64]
-
 __all__ = ["Scene", "Terrain", "View", "box_mesh", "elevation", "mountains", "room"]
+
+Floats: TypeAlias = npt.NDArray[np.float64]
 
 #: All positions are multiples of this, in metres.
 GRID: Final = 1.0 / 64.0
@@ -44,13 +43,16 @@ FLIGHT: Final = (
     (12.1, 10.9, 70.0),
     (11.3, 9.6, 80.0),
     (11.0, 8.3, 70.0),
-    (11.9, 6.9, 70.0),
-    (13.2, 6.1, 80.0),
-    (14.4, 5.1, 120.0),
-    (15.4, 4.4, 230.0),
+    (11.7, 7.1, 70.0),
+    (12.7, 6.3, 90.0),
+    (14.0, 5.9, 150.0),
+    (15.2, 6.5, 190.0),
+    (15.6, 7.8, 110.0),
+    (15.5, 9.2, 90.0),
+    (15.3, 10.6, 90.0),
 )
 #: The disc where trees stand: kilometres east and north of the corner, and its radius.
-FOREST: Final = (13.6, 8.7, 4.6)
+FOREST: Final = (13.6, 8.6, 4.7)
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,9 @@ class Terrain:
         x, y = np.meshgrid(np.arange(columns) * self.step[0], np.arange(rows) * self.step[1])
         vertices = np.stack([x, y, self.heights], axis=-1).reshape(-1, 3) + self.corner
         number = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
-        sw, se, nw, ne = (part.reshape(-1) for part in (number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]))
+        sw, se, nw, ne = (
+            part.reshape(-1) for part in (number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:])
+        )
         return vertices, np.concatenate([np.stack([sw, se, ne], axis=1), np.stack([sw, ne, nw], axis=1)])
 
     def _cells(self, x: Floats, y: Floats) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Floats, Floats]:
@@ -146,7 +150,8 @@ class Terrain:
 
     def normal_at(self, x: Floats, y: Floats) -> Floats:
         """Unit normals of the smoothed surface, for shading."""
-        north, east = np.gradient(self.heights, self.step[1], self.step[0])
+        north: Floats = np.asarray(np.gradient(self.heights, self.step[1], axis=0))
+        east: Floats = np.asarray(np.gradient(self.heights, self.step[0], axis=1))
         row, column, u, v = self._cells(x, y)
 
         def smooth(grid: Floats) -> Floats:
@@ -224,7 +229,8 @@ def elevation() -> Terrain:
     try:
         from matplotlib.cbook import get_sample_data
 
-        with get_sample_data("jacksboro_fault_dem.npz") as data:
+        sample: Any = get_sample_data("jacksboro_fault_dem.npz")
+        with sample as data:
             heights = np.asarray(data["elevation"], np.float64)[::-1]
             degrees = float(data["dx"]), float(data["dy"])
             latitude = (float(data["ymin"]) + float(data["ymax"])) / 2.0
@@ -246,7 +252,7 @@ def mountains(trees: int = 20_000, views: int = 12, *, seed: int = 2010) -> Scen
     Parameters
     ----------
     trees : int
-        Instances; they stand in groves on a disc of 9 km, feet in the ground, 12 to 36 m high.
+        Instances; they stand in groves on a disc of 9 km, feet in the ground, 14 to 40 m high.
     views : int
         Stations of the flight.
     seed : int
@@ -260,7 +266,7 @@ def mountains(trees: int = 20_000, views: int = 12, *, seed: int = 2010) -> Scen
     terrain = elevation()
     rng = np.random.default_rng(seed)
     x, y = _groves(rng, trees)
-    height = rng.uniform(12.0, 26.0, trees) + 10.0 * rng.random(trees) ** 4
+    height = rng.uniform(14.0, 28.0, trees) + 12.0 * rng.random(trees) ** 4
     width = height * rng.uniform(0.34, 0.46, trees)
     shape, faces = _conifer()
     turn = rng.uniform(0.0, 2.0 * np.pi, trees)[:, None]
@@ -280,8 +286,8 @@ def mountains(trees: int = 20_000, views: int = 12, *, seed: int = 2010) -> Scen
         instance_vertices=vertices.reshape(-1, 3),
         instance_triangles=triangles.reshape(-1, 3).astype(np.uint32),
         owner=np.repeat(np.arange(trees, dtype=np.int32), len(faces)),
-        box_min=vertices.min(axis=1) if trees else np.empty((0, 3)),
-        box_max=vertices.max(axis=1) if trees else np.empty((0, 3)),
+        box_min=vertices.min(axis=1),
+        box_max=vertices.max(axis=1),
         views=_flight(terrain, views),
         terrain=terrain,
     )
@@ -359,7 +365,12 @@ def _conifer() -> tuple[Floats, npt.NDArray[np.intp]]:
     """A unit tree (width 1, height 1, its foot at 0): a three-sided trunk and three cones of seven sides."""
     corners: list[tuple[float, float, float]] = []
     faces: list[tuple[int, int, int]] = []
-    for sides, bottom, top, radius in ((3, 0.0, 0.4, 0.05), (7, 0.14, 0.56, 0.5), (7, 0.36, 0.78, 0.37), (7, 0.6, 1.0, 0.24)):
+    for sides, bottom, top, radius in (
+        (3, 0.0, 0.4, 0.05),
+        (7, 0.14, 0.56, 0.5),
+        (7, 0.36, 0.78, 0.37),
+        (7, 0.6, 1.0, 0.24),
+    ):
         first = len(corners)
         angles = 2.0 * np.pi * np.arange(sides) / sides + bottom
         corners += [(radius * float(np.cos(a)), radius * float(np.sin(a)), bottom) for a in angles]

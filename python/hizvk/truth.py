@@ -1,0 +1,321 @@
+"""What is really seen, for checking a cull: rays through the pixel centres, or pixels against the boxes.
+
+With `embreex` (the extra ``scene``) rays are cast at the real triangles of occluders and instances together; neither
+the rendered depth nor any matrix of the library takes part. Without it the instances' boxes are intersected with the
+pixels' rays in float64 and compared with the depth image as given: that says nothing about the depth image, and
+`Sight.method` says so in the report.
+
+An instance is visible when it owns a pixel: when the nearest thing on the ray through the pixel's centre is one of its
+triangles. Where an instance is visible by a hair, a rasteriser may hide it rightly: Vulkan lets it move corners by
+1/16 of a pixel, and float32 depth cannot tell surfaces apart that are 1e-6 of the distance from each other. `firm`
+tells those from the others, as measured by rays alone, and a check lists them apart.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, Protocol, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from . import reference
+from .bounds import Boxes
+from .comparison import Comparison, compare
+
+if TYPE_CHECKING:
+    from ._arguments import Size
+    from .scenes import Floats, Scene, View
+
+__all__ = ["OCCLUDER", "SKY", "BoxCaster", "Caster", "Check", "RayCaster", "Sight", "check", "make_caster"]
+
+Indices: TypeAlias = npt.NDArray[np.intp]
+
+#: `Sight.owner` where nothing is seen, and where an occluder is; instances have their index there.
+SKY: Final = -1
+OCCLUDER: Final = -2
+#: How far Vulkan lets a rasteriser move a corner (``subPixelPrecisionBits`` is at least 4), in pixels.
+SNAP: Final = 1.0 / 16.0
+#: Surfaces nearer to each other than this part of their distance fight for the pixel.
+TIE: Final = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What is seen in each pixel of a view."""
+
+    owner: npt.NDArray[np.int32]
+    """``(height, width)``: an instance, `OCCLUDER` or `SKY`."""
+    depth: Floats
+    """``(height, width)``: view depth, infinite for the sky."""
+    normal: npt.NDArray[np.float32]
+    """``(height, width, 3)``: unit normals towards the eye, 0 for the sky."""
+    method: str
+    """How it was found, in words."""
+
+    def pixels(self, count: int) -> npt.NDArray[np.intp]:
+        """``(count,)``: the pixels that each instance owns."""
+        return np.bincount(self.owner[self.owner >= 0], minlength=count)
+
+
+class Caster(Protocol):
+    """Finds out what is seen."""
+
+    method: str
+    """How, in words."""
+
+    def look(self, view: View, size: Size, given: Floats) -> Sight:
+        """What `view` shows; `given` is the view depth of the occluders as the depth image under test has it."""
+        ...
+
+    def firm(self, view: View, sight: Sight, given: Floats, instance: int) -> bool:
+        """Whether one visible instance owns a pixel by more than a hair."""
+        ...
+
+
+class RayCaster:
+    """Casts rays at the real triangles with Embree.
+
+    Embree (float32, watertight) chooses the triangle; the depth is that of the triangle's plane, in float64.
+    """
+
+    method = "rays through the pixel centres (Embree) at the real triangles of occluders and instances"
+
+    def __init__(self, scene: Scene) -> None:
+        self._origin = np.array(scene.origin)
+        self._owner = scene.owner
+        ground = (scene.vertices - self._origin, scene.triangles)
+        things = (scene.instance_vertices - self._origin, scene.instance_triangles)
+        self._meshes = [ground, things]
+        self._all = _embree_scene(self._meshes)
+        self._occluders = _embree_scene(self._meshes[:1])
+
+    def look(self, view: View, size: Size, given: Floats | None = None) -> Sight:
+        """What `view` shows; the depth image under test has no part in it."""
+        return self.look_shifted(view, size, (0.0, 0.0))
+
+    def look_shifted(self, view: View, size: Size, shift: tuple[float, float]) -> Sight:
+        """As `look`, through points `shift` pixels beside the centres."""
+        owner, depth, normal = self._cast(self._all, view, view.rays(size, shift).reshape(-1, 3))
+        return Sight(owner.reshape(size), depth.reshape(size), normal.reshape(*size, 3), self.method)
+
+    def occluder_depth(self, view: View, rays: Floats) -> Floats:
+        """View depth of the occluders alone along `rays` ``(..., 3)``, infinite where there are none."""
+        return self._cast(self._occluders, view, rays.reshape(-1, 3))[1].reshape(rays.shape[:-1])
+
+    def firm(self, view: View, sight: Sight, given: Floats | None, instance: int) -> bool:
+        """Whether `instance` owns a pixel that no occluder takes when the ray moves by `SNAP` or the depth by `TIE`."""
+        rows, columns = np.nonzero(sight.owner == instance)
+        limit = sight.depth[rows, columns] * (1.0 + TIE)
+        kept = np.ones(len(rows), dtype=bool)
+        for shift in ((0.0, 0.0), (-SNAP, -SNAP), (SNAP, -SNAP), (-SNAP, SNAP), (SNAP, SNAP)):
+            rays = view.rays(sight.owner.shape, shift)[rows, columns]
+            kept &= self.occluder_depth(view, rays) > limit
+        return bool(kept.any())
+
+    def in_light(self, points: Floats, sun: Floats) -> npt.NDArray[np.bool_]:
+        """Whether nothing lies between `points` ``(P, 3)`` (just off a surface) and the sun. For pictures."""
+        start = (points - self._origin).astype(np.float32)
+        towards = np.broadcast_to(sun.astype(np.float32), start.shape).copy()
+        hit: npt.NDArray[np.int32] = self._all.run(start, towards, query="INTERSECT")
+        return hit < 0
+
+    def _cast(
+        self, embree: Any, view: View, rays: Floats
+    ) -> tuple[npt.NDArray[np.int32], Floats, npt.NDArray[np.float32]]:
+        eye = np.array(view.eye) - self._origin
+        start = np.broadcast_to(eye.astype(np.float32), rays.shape).copy()
+        answer = embree.run(start, rays.astype(np.float32), query="INTERSECT", output=True)
+        owner = np.full(len(rays), SKY, np.int32)
+        depth = np.full(len(rays), np.inf)
+        normal = np.zeros((len(rays), 3), np.float32)
+        for number, (vertices, triangles) in enumerate(self._meshes):
+            hit = np.flatnonzero((answer["primID"] >= 0) & (answer["geomID"] == number))
+            triangle = answer["primID"][hit]
+            a, b, c = (vertices[triangles[triangle, k]] - eye for k in range(3))
+            across = np.cross(b - a, c - a)
+            ray = rays[hit]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                at = np.einsum("ij,ij->i", across, a) / np.einsum("ij,ij->i", across, ray)
+            at = np.where(np.isfinite(at), at, answer["tfar"][hit])
+            owner[hit] = self._owner[triangle] if number else OCCLUDER
+            depth[hit] = at
+            across *= -np.sign(np.einsum("ij,ij->i", across, ray))[:, None]
+            normal[hit] = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-30)
+        return owner, depth, normal
+
+
+class BoxCaster:
+    """Intersects rays with the instances' boxes, in float64, in front of the depth image as given."""
+
+    method = (
+        "pixel centres against the instances' boxes (numpy, float64) in front of the depth image as given; the image "
+        "itself is not checked without embreex (the extra `scene`)"
+    )
+    #: Pairs of a box and a pixel that are looked at in one go.
+    CHUNK = 2_000_000
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+
+    def look(self, view: View, size: Size, given: Floats) -> Sight:
+        """What `view` shows, boxes instead of the real triangles."""
+        rays = view.rays(size).reshape(-1, 3)
+        owner = np.where(np.isfinite(given), OCCLUDER, SKY).astype(np.int32).reshape(-1)
+        depth = given.astype(np.float64).reshape(-1)
+        normal = np.zeros((len(rays), 3), np.float32)
+        normal[owner == OCCLUDER] = (0.0, 0.0, 1.0)
+        boxes, x0, y0, x1, y1 = _pixel_rectangles(self._scene, view, size)
+        area = (x1 - x0) * (y1 - y0)
+        edges = np.searchsorted(np.cumsum(area), np.arange(self.CHUNK, max(int(area.sum()), 1), self.CHUNK))
+        for part in np.split(np.arange(len(boxes)), np.unique(edges)):
+            turn = np.repeat(part, area[part])
+            within = np.arange(len(turn)) - np.repeat(np.cumsum(area[part]) - area[part], area[part])
+            wide = (x1 - x0)[turn]
+            pixel = (y0[turn] + within // wide) * size[1] + x0[turn] + within % wide
+            enter, side = self._enter(view, boxes[turn], rays[pixel])
+            seen = enter < depth[pixel]
+            pixel, box, enter, side = pixel[seen], boxes[turn[seen]], enter[seen], side[seen]
+            last = np.argsort(-enter, kind="stable")  # of several on one pixel, the nearest is written last
+            pixel, box, enter, side = pixel[last], box[last], enter[last], side[last]
+            depth[pixel] = enter
+            owner[pixel] = box
+            normal[pixel] = np.eye(3, dtype=np.float32)[side] * -np.sign(
+                np.take_along_axis(rays[pixel], side[:, None], 1)
+            )
+        return Sight(owner.reshape(size), depth.reshape(size), normal.reshape(*size, 3), self.method)
+
+    def firm(self, view: View, sight: Sight, given: Floats, instance: int) -> bool:
+        """Whether `instance` owns a pixel where it is nearer than the depth image by more than `TIE`."""
+        own = sight.owner == instance
+        return bool((given[own] > sight.depth[own] * (1.0 + TIE)).any())
+
+    def _enter(self, view: View, box: Indices, rays: Floats) -> tuple[Floats, Indices]:
+        """The view depth where rays enter their boxes, infinite for a miss; and through which pair of sides."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inverse = 1.0 / rays
+            a = (self._scene.box_min[box] - view.eye) * inverse
+            b = (self._scene.box_max[box] - view.eye) * inverse
+        first, last = np.fmin(a, b), np.fmax(a, b)
+        side = first.argmax(axis=1)
+        enter, leave = np.maximum(first.max(axis=1), view.near), last.min(axis=1)
+        return np.where(enter <= leave, enter, np.inf), side
+
+
+def make_caster(scene: Scene) -> Caster:
+    """Rays if `embreex` is installed, boxes against the given depth otherwise."""
+    return RayCaster(scene) if importlib.util.find_spec("embreex") else BoxCaster(scene)
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """One cull beside the truth."""
+
+    comparison: Comparison
+    """Kept against visible."""
+    false_culls: list[int]
+    """Visible instances that were culled: each one is a bug of the library."""
+    hairs: list[int]
+    """Culled instances that are visible by a hair only, which the depth image may rightly hide."""
+    broken_promises: list[int]
+    """Culled instances that the exact oracle calls visible in the depth image as given: each one is a bug."""
+    required: int
+    """Instances that the promise has to keep: the oracle does not call their boxes hidden (a box may show where its
+    tree does not, or between two pixel centres, or behind another tree)."""
+
+    @property
+    def passed(self) -> bool:
+        """Nothing that is visible was culled."""
+        return not self.false_culls and not self.broken_promises
+
+
+def check(
+    scene: Scene,
+    view: View,
+    mask: npt.NDArray[np.bool_],
+    depth: npt.NDArray[np.float32],
+    sight: Sight,
+    caster: Caster,
+) -> Check:
+    """Holds a cull against what is seen, and against the oracle.
+
+    Parameters
+    ----------
+    scene, view
+        What was culled, from where.
+    mask : (N,) bool array
+        What the cull kept.
+    depth : (height, width) float32 array
+        The depth image that it culled with, as NDC of ``view.camera(size)``.
+    sight, caster
+        What is seen in `view`, and who found it out.
+    """
+    size: Size = depth.shape
+    given = linear_depth(depth, view.near)
+    comparison = compare(mask, sight.pixels(len(scene)) > 0)
+    firm = [caster.firm(view, sight, given, int(k)) for k in comparison.false_culls]
+    # The oracle is asked where float64 does not see at once that a box is outside: it is slow there.
+    asked = np.flatnonzero(~_outside(scene, view, size))
+    boxes = Boxes(scene.box_min[asked], scene.box_max[asked])
+    codes = reference.classify(boxes, view.camera(size), depth, kind="reversed_ndc")
+    return Check(
+        comparison=comparison,
+        false_culls=[int(k) for k, real in zip(comparison.false_culls, firm, strict=True) if real],
+        hairs=[int(k) for k, real in zip(comparison.false_culls, firm, strict=True) if not real],
+        broken_promises=[int(k) for k in asked[(codes == reference.VISIBLE) & ~mask[asked]]],
+        required=int((codes != reference.HIDDEN).sum()),
+    )
+
+
+def linear_depth(depth: npt.NDArray[np.float32], near: float) -> Floats:
+    """View depth of reversed NDC depth with an infinite far plane; infinite where nothing is."""
+    with np.errstate(divide="ignore"):
+        linear: Floats = near / depth.astype(np.float64)
+    return linear
+
+
+def _embree_scene(meshes: list[tuple[Floats, npt.NDArray[np.uint32]]]) -> Any:
+    # Not by `import`: it has no types, and no checker has to be told.
+    embree: Any = importlib.import_module("embreex.rtcore_scene").EmbreeScene(robust=True)
+    add_mesh: Any = importlib.import_module("embreex.mesh_construction").TriangleMesh
+    for vertices, triangles in meshes:
+        if len(triangles):
+            add_mesh(embree, vertices.astype(np.float32), triangles.astype(np.int32))
+    return embree
+
+
+def _corners(scene: Scene, view: View) -> Floats:
+    """``(N, 8, 3)``: the boxes' corners along right, up and forward of the view."""
+    corner = (np.arange(8)[:, None] >> np.arange(3)) & 1
+    world = np.where(corner, scene.box_max[:, None], scene.box_min[:, None])
+    corners: Floats = (world - view.eye) @ view.basis().T
+    return corners
+
+
+def _outside(scene: Scene, view: View, size: Size) -> npt.NDArray[np.bool_]:
+    """Boxes that lie wholly outside one plane of the view volume, by a margin that float64 cannot miss."""
+    x, y, z = np.moveaxis(_corners(scene, view), -1, 0)
+    tangent = np.tan(np.radians(view.fov_y_deg) / 2.0)
+    wide, tall = tangent * size[1] / size[0] * z, tangent * z
+    margin = 1e-6 * (np.abs(x) + np.abs(y) + np.abs(z))
+    sides = (x < -wide - margin, x > wide + margin, y < -tall - margin, y > tall + margin, z < view.near - margin)
+    outside: npt.NDArray[np.bool_] = np.any([side.all(axis=1) for side in sides], axis=0)
+    return outside
+
+
+def _pixel_rectangles(scene: Scene, view: View, size: Size) -> tuple[Indices, Indices, Indices, Indices, Indices]:
+    """Boxes that may be seen, and the pixels ``x0 <= x < x1``, ``y0 <= y < y1`` that they can meet."""
+    height, width = size
+    x, y, z = np.moveaxis(_corners(scene, view), -1, 0)
+    tangent = np.tan(np.radians(view.fov_y_deg) / 2.0)
+    crosses = z.min(axis=1) <= view.near
+    depth = np.where(z > view.near, z, view.near)
+    column = (x / depth / (tangent * width / height) + 1.0) / 2.0 * width
+    row = (1.0 - y / depth / tangent) / 2.0 * height
+    x0, x1 = (np.clip(edge, 0, width) for edge in (np.floor(column.min(1)), np.ceil(column.max(1))))
+    y0, y1 = (np.clip(edge, 0, height) for edge in (np.floor(row.min(1)), np.ceil(row.max(1))))
+    x0, y0, x1, y1 = (np.where(crosses, whole, edge) for whole, edge in ((0, x0), (0, y0), (width, x1), (height, y1)))
+    boxes = np.flatnonzero((x1 > x0) & (y1 > y0) & (z.max(axis=1) > view.near))
+    return boxes, *(edge[boxes].astype(np.intp) for edge in (x0, y0, x1, y1))  # type: ignore[return-value]
