@@ -9,7 +9,7 @@
 @group(0) @binding(3) var<storage, read_write> chunk_0: array<vec4<u32>>;
 @group(0) @binding(4) var<storage, read_write> chunk_1: array<vec4<u32>>;
 @group(0) @binding(5) var<storage, read_write> chunk_2: array<vec4<u32>>;
-// .x: the level that is read; the next three are written where they exist.
+// .x: the level that is read; the next three are written where they exist. .y: this reduction's number, for the header.
 @group(1) @binding(0) var<uniform> step: vec4<u32>;
 
 // True: level 0, the source texture, is read; otherwise a stored level.
@@ -79,6 +79,9 @@ fn store_pair(level: Level, x: u32, y: u32, pair: vec2<u32>) {
 @compute @workgroup_size(64, 1)
 fn reduce(@builtin(global_invocation_id) id: vec3<u32>) {
     let from_level = step.x;
+    if from_level == 0u && id.x == 0u && id.y == 0u {
+        chunk_0[0] = vec4<u32>(step.y, 0u, 0u, 0u);
+    }
     let source_level = pyramid.levels[from_level];
     let half = pyramid.levels[from_level + 1u];
     let x = 4u * id.x;

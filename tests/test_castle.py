@@ -1,7 +1,7 @@
 """Intel's castle with ray-cast ground truth: nothing visible is culled, and little that is hidden is kept.
 
-The scene and its judge are not part of the repository; where they are absent these tests are skipped. The judge knows what is truly
-visible (Embree rays against the real geometry) and what the best rectangle test at full resolution would keep.
+The scene and its judge are not part of the repository; where they are absent these tests are skipped. The judge knows
+what is truly visible (Embree rays against the real geometry) and what the best rectangle test at full resolution keeps.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ def judge() -> Any:
     if importlib.util.find_spec("embreex") is None:
         pytest.skip("the judge casts rays with embreex, which is not installed")
     spec = importlib.util.spec_from_file_location("judge", JUDGE / "judge.py")
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules["judge"] = module
     spec.loader.exec_module(module)

@@ -145,8 +145,11 @@ fn classify(i: u32) -> Outcome {
     out.level = level;
     out.texels = t;
 
-    // 5. The farthest depth there.
+    // 5. The farthest depth there, if this is the pyramid that was promised and not one whose reduction has yet to run.
     out.stage = AT_DEPTH;
+    if chunk_0[0] != view.reduction {
+        return out;
+    }
     out.farthest_bits = farthest4(footprint(level, t));
     let stored = bitcast<f32>(out.farthest_bits);
     var behind = false;

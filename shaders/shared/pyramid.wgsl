@@ -1,4 +1,4 @@
-// The levels 1 and up: one list of texels, rows padded to 4, cut into chunks that each fit one storage binding.
+// A header, whose first word numbers the reduction that filled the pyramid, and the levels 1 and up: one list of texels, rows padded to 4, cut into chunks that each fit one storage binding.
 
 struct Level {
     offset: u32,

@@ -28,7 +28,8 @@ struct View {
     size: vec2<i32>,
     // 0, but no compiler knows: see `bar`.
     runtime_zero: u32,
-    padding: u32,
+    // The number of the reduction that the pyramid has to hold.
+    reduction: u32,
 }
 
 // Keeps a compiler from folding what follows into the cancelling sum x was made by, as WGSL lets it.

@@ -86,7 +86,11 @@ impl Pose {
                 return Err(Error::invalid(name, format!("expected finite numbers, got {v:?}")));
             }
         }
-        let forward = normalized(sub(self.target, self.eye)).ok_or_else(|| {
+        let towards = sub(self.target, self.eye);
+        if !towards.iter().all(|x| x.is_finite()) {
+            return Err(Error::invalid("target", "expected a point whose difference to eye float64 can hold"));
+        }
+        let forward = normalized(towards).ok_or_else(|| {
             Error::invalid("target", format!("expected a point apart from eye, got {:?} for both", self.eye))
         })?;
         let up = normalized(self.up).ok_or_else(|| Error::invalid("up", "expected a direction, got a zero vector"))?;
@@ -257,7 +261,7 @@ fn check_size(size: ImageSize) -> Result<()> {
 /// A view of the world: four clip-space rows about an origin, an image size and a depth convention.
 ///
 /// The camera *denotes* exactly these float64 numbers; everything that the cull promises is promised about them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Camera {
     rows: Mat4,
     origin: Vec3,
@@ -265,6 +269,13 @@ pub struct Camera {
     convention: DepthConvention,
     /// Whether `origin` is where the camera stands (false for a bare matrix).
     posed: bool,
+}
+
+/// Cameras are equal that denote the same numbers, whichever constructor made them.
+impl PartialEq for Camera {
+    fn eq(&self, other: &Self) -> bool {
+        (self.rows, self.origin, self.size, self.convention) == (other.rows, other.origin, other.size, other.convention)
+    }
 }
 
 impl Camera {
@@ -366,6 +377,22 @@ impl Camera {
     /// Whether [`Camera::origin`] is where the camera stands; a bare matrix does not say that.
     pub fn is_posed(&self) -> bool {
         self.posed
+    }
+
+    /// Whether the rays are parallel: w is the same everywhere.
+    pub(crate) fn is_orthographic(&self) -> bool {
+        self.rows[3][..3] == [0.0; 3]
+    }
+
+    /// The rows times the power of two that brings w (orthographic: its constant; otherwise its largest coefficient) into
+    /// `[1, 2)`. It changes no comparison and has to come first: products with tiny rows would lose bits below float64's range.
+    pub(crate) fn rows_near_one(&self) -> Mat4 {
+        let w = self.rows[3];
+        let unit = if self.is_orthographic() { w[3].abs() } else { w[..3].iter().fold(0.0_f64, |m, v| m.max(v.abs())) };
+        // log2 may be off by an ulp at a power of two: then w lies a hair outside [1, 2), which no bound needs exactly. A
+        // subnormal unit makes an infinite scale, and rows that are refused.
+        let scale = 2.0_f64.powf(unit.log2().floor()).recip();
+        self.rows.map(|row| row.map(|v| v * scale))
     }
 
     /// The float64 matrix about the world's origin, rounded: `clip = m * (x, y, z, 1)`.

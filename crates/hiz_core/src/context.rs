@@ -5,8 +5,6 @@ use std::hash::Hash;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
-use wgpu::util::DeviceExt;
-
 use crate::bounds::{Bounds, BoundsKind};
 use crate::camera::{Camera, DepthConvention, ImageSize};
 use crate::cull::{self, CullInputs, CullOptions};
@@ -183,7 +181,10 @@ impl HizContext {
     }
 
     /// Buffers for what a cull of `instances` finds.
-    pub fn create_visible(&self, instances: &Instances, options: &VisibleOptions) -> Visible {
+    ///
+    /// # Errors
+    /// [`Error::Device`] where the device has no memory for them, or is lost.
+    pub fn create_visible(&self, instances: &Instances, options: &VisibleOptions) -> Result<Visible> {
         Visible::new(self, instances, options)
     }
 
@@ -211,7 +212,9 @@ impl HizContext {
 
     /// Records the reduction of a depth image of `camera` into `pyramid`.
     ///
-    /// `depth` is a view of a whole texture with a depth format, `R32Float`, or `R32Uint` holding float bits.
+    /// `depth` is a view of a whole 2D texture of one mip level, sample and layer, with the usage `TEXTURE_BINDING` and a depth
+    /// format (with stencil: the view's aspect is `DepthOnly`), `R32Float`, or `R32Uint` holding float bits. The reduction has
+    /// to be submitted before a cull that uses it, or with it: a cull that runs before it keeps everything.
     ///
     /// # Errors
     /// [`Error::Mismatch`] for sizes or devices that do not agree, [`Error::Invalid`] for other formats.
@@ -255,12 +258,22 @@ impl HizContext {
     }
 
     /// A uniform buffer that holds `value` from the start: no queue is needed, and every recording has its own.
-    pub(crate) fn uniform<T: bytemuck::Pod>(&self, label: &str, value: &T) -> wgpu::Buffer {
-        self.shared.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+    pub(crate) fn uniform<T: bytemuck::Pod>(&self, label: &str, value: &T) -> Result<wgpu::Buffer> {
+        self.filled(label, bytemuck::bytes_of(value), wgpu::BufferUsages::UNIFORM)
+    }
+
+    /// A buffer that holds `contents` (a multiple of 4 bytes) from the start. (wgpu's own helper panics where a lost device or
+    /// memory that ran out leave nothing to map.)
+    pub(crate) fn filled(&self, label: &str, contents: &[u8], usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
+        let buffer = self.shared.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
-            contents: bytemuck::bytes_of(value),
-            usage: wgpu::BufferUsages::UNIFORM,
-        })
+            size: contents.len() as u64,
+            usage,
+            mapped_at_creation: true,
+        });
+        write_mapped(label, &buffer, 0, contents)?;
+        buffer.unmap();
+        Ok(buffer)
     }
 
     pub(crate) fn id(&self) -> ContextId {
@@ -366,6 +379,15 @@ impl HizContext {
             cache: None,
         })
     }
+}
+
+/// Writes into a buffer that was mapped at its creation.
+pub(crate) fn write_mapped(label: &str, buffer: &wgpu::Buffer, offset: u64, contents: &[u8]) -> Result<()> {
+    let range = offset..offset + contents.len() as u64;
+    let mut view =
+        buffer.get_mapped_range_mut(range).map_err(|e| Error::Device(format!("{label} could not be mapped: {e}")))?;
+    view.copy_from_slice(contents);
+    Ok(())
 }
 
 fn flag(value: bool) -> f64 {

@@ -79,7 +79,7 @@ pub(crate) struct ViewUniform {
     pub(crate) depth_factor: f32,
     pub(crate) size: [i32; 2],
     pub(crate) runtime_zero: u32,
-    pub(crate) padding: u32,
+    pub(crate) reduction: u32,
 }
 
 const _: () = assert!(size_of::<ViewUniform>() == 192);
@@ -89,7 +89,7 @@ impl ViewUniform {
         clippy::cast_possible_truncation,
         reason = "multiples of 2^-8 and sizes below 2^15 are exact, the factor is rounded towards far"
     )]
-    fn new(camera: &Camera, options: &CullOptions) -> Result<Self> {
+    fn new(camera: &Camera, reduction: u32, options: &CullOptions) -> Result<Self> {
         let range = |name: &str, value: f64, most: f64| {
             if (0.0..=most).contains(&value) {
                 Ok(value)
@@ -133,7 +133,7 @@ impl ViewUniform {
             depth_factor,
             size: [size.width as i32, size.height as i32],
             runtime_zero: 0,
-            padding: 0,
+            reduction,
         })
     }
 }
@@ -157,8 +157,8 @@ fn bind(context: &HizContext, inputs: &CullInputs<'_>) -> Result<Bound> {
     let CullInputs { instances, camera, pyramid, options } = *inputs;
     context.check_context("instances", instances.context)?;
     context.check_context("pyramid", pyramid.context)?;
-    let Built { source, source_kind, .. } = pyramid.built_for(camera)?;
-    let view = context.uniform("hiz.cull.view", &ViewUniform::new(camera, options)?);
+    let Built { reduction, source, source_kind, .. } = pyramid.built_for(camera)?;
+    let view = context.uniform("hiz.cull.view", &ViewUniform::new(camera, reduction, options)?)?;
     let view = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("hiz.cull.view"),
         layout: context.layouts().cull(source_kind),
@@ -259,7 +259,7 @@ pub(crate) fn record_explain(
         Error::invalid("index", format!("expected an instance below {}, got {index}", instances.len()))
     })?;
     let Bound { view, key } = bind(context, inputs)?;
-    let which = context.uniform("hiz.explain.which", &[index - piece.range.start, 0, 0, 0]);
+    let which = context.uniform("hiz.explain.which", &[index - piece.range.start, 0, 0, 0])?;
     let output = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("hiz.explain.target"),
         layout: &context.layouts().one_storage,

@@ -4,7 +4,7 @@
 //! the camera's range; for sensors zero and negative) becomes far, which never occludes.
 
 use crate::bounds::Floats;
-use crate::camera::{Camera, DepthConvention, Mat3, Vec3, dot, inverse3, mul3};
+use crate::camera::{Camera, DepthConvention, Mat3, Mat4, Vec3, cross, dot, inverse3, mul3, normalized};
 use crate::error::{Error, Result};
 
 /// What the numbers of a depth image mean.
@@ -91,70 +91,124 @@ pub(crate) fn sanitized(bits: u32, convention: DepthConvention) -> f32 {
     }
 }
 
-/// How a camera's rays run: what turns a depth along them into clip coordinates.
+/// How a camera's rays run: what turns a depth along them into NDC depth.
 struct Lens {
-    camera: Camera,
-    /// Perspective: the inverse of the rows x, y, w, and the length of w's. Orthographic: nothing, rays are parallel.
-    perspective: Option<(Mat3, f64)>,
-    /// Clip z at the eye (perspective) or at the origin's plane (orthographic).
-    z_at_eye: f64,
-    z_lin: Vec3,
+    reversed: bool,
     half: [f64; 2],
+    rays: Rays,
 }
+
+enum Rays {
+    /// Clip z is `k . (x, y, w) + constant` everywhere, so NDC depth is `k . (ndc x, ndc y, 1) + constant / w`.
+    FromEye {
+        k: Vec3,
+        constant: f64,
+        /// How far each of them may be off.
+        k_error: Vec3,
+        constant_error: f64,
+        /// The inverse of the rows x, y, w: directions of rays. The length of w's linear part: w for a view depth of 1.
+        inverse: Mat3,
+        w_length: f64,
+    },
+    /// Depth starts at the plane through the origin and grows along the rays.
+    Parallel { slope: f64, constant: f64 },
+}
+
+/// Half a spacing of float64 at 1: the relative error of one rounding.
+const ROUNDING: f64 = f64::EPSILON / 2.0;
 
 impl Lens {
     fn new(camera: &Camera) -> Result<Self> {
-        let rows = camera.rows();
-        let lin = |r: usize| [rows[r][0], rows[r][1], rows[r][2]];
         let size = camera.size();
         let half = [f64::from(size.width) / 2.0, f64::from(size.height) / 2.0];
-        let z_lin = lin(2);
-        if lin(3) == [0.0; 3] {
-            if !camera.is_posed() {
-                return Err(Error::invalid(
-                    "kind",
-                    "expected ndc or reversed_ndc for an orthographic camera made from a bare matrix: it does not say where view depth starts",
-                ));
-            }
-            return Ok(Self { camera: camera.clone(), perspective: None, z_at_eye: rows[2][3], z_lin, half });
-        }
-        let inverse = inverse3(&[lin(0), lin(1), lin(3)])
-            .ok_or_else(|| Error::invalid("camera", "expected an invertible projection, got a singular matrix"))?;
-        let eye = mul3(&inverse, [-rows[0][3], -rows[1][3], -rows[3][3]]);
-        let perspective = Some((inverse, dot(lin(3), lin(3)).sqrt()));
-        Ok(Self { camera: camera.clone(), perspective, z_at_eye: dot(z_lin, eye) + rows[2][3], z_lin, half })
+        let rows = camera.rows_near_one();
+        let rays = if camera.is_orthographic() { parallel(camera, &rows)? } else { from_eye(&rows)? };
+        Ok(Self { reversed: camera.convention().is_reversed(), half, rays })
     }
 
     fn ndc(&self, column: u32, row: u32, value: f64, kind: DepthKind) -> f32 {
-        let reversed = self.camera.convention().is_reversed();
-        let Some((inverse, w_length)) = &self.perspective else {
-            // Rays are parallel: both kinds are the same. Depth grows (standard) or falls (reversed) along the view.
-            let slope = dot(self.z_lin, self.z_lin).sqrt() * if reversed { -1.0 } else { 1.0 };
-            let w = self.camera.rows()[3][3];
-            return biased(slope * value / w, self.z_at_eye / w, reversed);
-        };
-        let x = (f64::from(column) + 0.5) / self.half[0] - 1.0;
-        let y = 1.0 - (f64::from(row) + 0.5) / self.half[1];
-        // The direction of the ray, scaled so that w grows by 1.
-        let ray = mul3(inverse, [x, y, 1.0]);
-        let w = match kind {
-            // w = |w_lin| times the view depth.
-            DepthKind::Z => value * w_length,
-            _ => value / dot(ray, ray).sqrt(),
-        };
-        biased(dot(self.z_lin, ray), self.z_at_eye / w, reversed)
+        match &self.rays {
+            // Rays are parallel: both kinds are the same.
+            Rays::Parallel { slope, constant } => {
+                let terms = [slope * value, *constant];
+                toward_far_by(terms[0] + terms[1], 8.0 * ROUNDING * (terms[0].abs() + terms[1].abs()), self.reversed)
+            }
+            Rays::FromEye { k, constant, k_error, constant_error, inverse, w_length } => {
+                let x = (f64::from(column) + 0.5) / self.half[0] - 1.0;
+                let y = 1.0 - (f64::from(row) + 0.5) / self.half[1];
+                let at = [x, y, 1.0];
+                let w = match kind {
+                    DepthKind::Z => value * w_length,
+                    // The ray along which w grows by 1.
+                    _ => {
+                        let ray = mul3(inverse, at);
+                        value / dot(ray, ray).sqrt()
+                    }
+                };
+                let size: f64 = (0..3).map(|i| (k[i] * at[i]).abs()).sum::<f64>() + (constant / w).abs();
+                let inherited: f64 = (0..3).map(|i| k_error[i] * at[i].abs()).sum::<f64>() + constant_error / w.abs();
+                toward_far_by(dot(*k, at) + constant / w, 32.0 * ROUNDING * size + 2.0 * inherited, self.reversed)
+            }
+        }
     }
 }
 
-/// `a + b` as NDC depth, pushed towards far by more than float64 can have lost, then rounded towards far.
-fn biased(a: f64, b: f64, reversed: bool) -> f32 {
-    let lost = 16.0 * f64::EPSILON * (a.abs() + b.abs());
-    let d = a + b;
+/// The depth of rays through an eye. `k` solves `k . (x_lin, y_lin, w_lin) = z_lin`; its error is bounded by what its residual
+/// says, and the constant `z3 - k . (x3, y3, w3)`, which cancels for an eye far from the origin, inherits it.
+fn from_eye(rows: &Mat4) -> Result<Rays> {
+    let used = [0, 1, 3];
+    let lin = |r: usize| [rows[r][0], rows[r][1], rows[r][2]];
+    let inverse = inverse3(&used.map(lin))
+        .ok_or_else(|| Error::invalid("camera", "expected an invertible projection, got a singular matrix"))?;
+    let z_lin = lin(2);
+    let column = |m: &Mat3, j: usize| [m[0][j], m[1][j], m[2][j]];
+    let k: Vec3 = std::array::from_fn(|i| dot(column(&inverse, i), z_lin));
+    // What k misses of z_lin, and what evaluating that loses, per coordinate of the world.
+    let missing: Vec3 = std::array::from_fn(|c| {
+        let terms = [k[0] * rows[0][c], k[1] * rows[1][c], k[2] * rows[3][c]];
+        let size: f64 = terms.iter().map(|t| t.abs()).sum::<f64>() + z_lin[c].abs();
+        (z_lin[c] - terms.iter().sum::<f64>()).abs() + 4.0 * ROUNDING * size
+    });
+    let k_error: Vec3 = std::array::from_fn(|i| 2.0 * dot(column(&inverse, i).map(f64::abs), missing));
+    let constants = used.map(|r| rows[r][3]);
+    let constant = rows[2][3] - dot(k, constants);
+    let size: f64 = (0..3).map(|i| (k[i] * constants[i]).abs()).sum::<f64>() + rows[2][3].abs();
+    let constant_error = 8.0 * ROUNDING * size + dot(k_error, constants.map(f64::abs));
+    Ok(Rays::FromEye { k, constant, k_error, constant_error, inverse, w_length: dot(lin(3), lin(3)).sqrt() })
+}
+
+/// The depth of parallel rays, if the camera says where it starts and if it grows along them.
+fn parallel(camera: &Camera, rows: &Mat4) -> Result<Rays> {
+    if !camera.is_posed() {
+        return Err(Error::invalid(
+            "kind",
+            "expected ndc or reversed_ndc for an orthographic camera made from a bare matrix: it does not say where view depth starts",
+        ));
+    }
+    let unit = |r: usize| normalized([rows[r][0], rows[r][1], rows[r][2]]);
+    let along = match (unit(0), unit(1), unit(2)) {
+        (Some(x), Some(y), Some(z)) => normalized(cross(x, y)).map(|ray| cross(ray, z)),
+        _ => None,
+    };
+    if !along.is_some_and(|sine| dot(sine, sine) < 1e-24) {
+        return Err(Error::invalid(
+            "kind",
+            "expected ndc or reversed_ndc for an orthographic camera whose depth does not grow along its rays (a sheared or oblique matrix)",
+        ));
+    }
+    let (z, w) = (rows[2], rows[3][3]);
+    let length = dot([z[0], z[1], z[2]], [z[0], z[1], z[2]]).sqrt();
+    // Depth grows (standard) or falls (reversed) along the view.
+    let slope = if camera.convention().is_reversed() { -length } else { length };
+    Ok(Rays::Parallel { slope: slope / w.abs(), constant: z[3] / w })
+}
+
+/// `d`, pushed towards far by what float64 may have lost, then rounded towards far; far where it is outside 0..1.
+fn toward_far_by(d: f64, lost: f64, reversed: bool) -> f32 {
     if !(0.0..=1.0).contains(&d) {
         return if reversed { 0.0 } else { 1.0 };
     }
-    let d = if reversed { (d - lost).max(0.0) } else { (d + lost).min(1.0) };
-    toward_far(d, reversed)
+    toward_far(if reversed { (d - lost).max(0.0) } else { (d + lost).min(1.0) }, reversed)
 }
 
 #[cfg(test)]
@@ -185,6 +239,54 @@ mod tests {
                 let off = f64::from(*d) - expected;
                 assert!(off.abs() < 1e-7, "{d} {expected}");
             }
+        }
+    }
+
+    /// An eye far from the origin in a bare matrix: the constant cancels, and what that loses has to go towards far. The truth
+    /// is that of integers: at eye (0, 0, e) looking along +z, near 1, far 9, the matrix is exact, and so is (9 - 9 / z) / 8.
+    #[test]
+    fn a_cancelling_eye_rounds_towards_far() {
+        for e in [1.0e4, 1.0e6, 1.0e9] {
+            for (convention, z_row) in [
+                (DepthConvention::Standard, [0.0, 0.0, 9.0 / 8.0, -9.0 / 8.0 - 9.0 / 8.0 * e]),
+                (DepthConvention::Reversed, [0.0, 0.0, -1.0 / 8.0, 9.0 / 8.0 + e / 8.0]),
+            ] {
+                let m = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], z_row, [0.0, 0.0, 1.0, -e]];
+                let camera = Camera::from_clip_from_world(m, ImageSize::new(1, 1), convention).unwrap();
+                for z in [1.5, 2.0, 3.0, 7.7] {
+                    let d = f64::from(ndc_from_kind(Floats::F64(&[z]), DepthKind::Z, 1.0, &camera).unwrap()[0]);
+                    let truth = if convention.is_reversed() { (9.0 / z - 1.0) / 8.0 } else { (9.0 - 9.0 / z) / 8.0 };
+                    let nearer = if convention.is_reversed() { d - truth } else { truth - d };
+                    assert!(nearer <= 1e-15 && nearer > -1e-4, "{convention:?} eye {e} depth {z}: {d} for {truth}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn orthographic_depth_by_hand_and_tilted_rows_refused() {
+        for (convention, expected) in [(DepthConvention::Standard, 0.25), (DepthConvention::Reversed, 0.75)] {
+            let projection = Projection::Orthographic {
+                left: -1.0,
+                right: 1.0,
+                bottom: -1.0,
+                top: 1.0,
+                near: 1.0,
+                far: 9.0,
+                convention,
+            };
+            let camera = Camera::look_at(&POSE, &projection, ImageSize::new(2, 2)).unwrap();
+            for kind in [DepthKind::Z, DepthKind::Distance] {
+                let d = ndc_from_kind(Floats::F64(&[3.0; 4]), kind, 1.0, &camera).unwrap();
+                assert!(d.iter().all(|d| (f64::from(*d) - expected).abs() < 1e-7), "{d:?}");
+            }
+            // Depth that also depends on x: a wall of one view depth has no one NDC depth.
+            let s = if convention.is_reversed() { -1.0 } else { 1.0 };
+            let p = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.03 * s, 0.0, 0.04 * s, 0.5], [0.0, 0.0, 0.0, 1.0]];
+            let identity = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
+            let tilted = Camera::from_clip_from_camera(p, identity, ImageSize::new(2, 2), convention).unwrap();
+            let error = ndc_from_kind(Floats::F64(&[0.5; 4]), DepthKind::Z, 1.0, &tilted).unwrap_err();
+            assert!(error.to_string().contains("does not grow along its rays"), "{error}");
         }
     }
 

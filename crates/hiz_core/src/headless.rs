@@ -341,7 +341,7 @@ impl Engine {
     ) -> Result<Culling> {
         let start = Instant::now();
         self.scoped(|| {
-            let visible = self.context().create_visible(instances, output);
+            let visible = self.context().create_visible(instances, output)?;
             let mut encoder = self.encoder("hiz.cull.encoder");
             self.context().record_cull(&mut encoder, instances, camera, pyramid, &visible, options)?;
             let recorded = Instant::now();
@@ -408,6 +408,10 @@ impl Engine {
         let validation = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let internal = device.push_error_scope(wgpu::ErrorFilter::Internal);
         let result = work();
+        if result.is_err() {
+            // A loss is told by a callback, which runs when the device is polled; what it broke may be reported as anything.
+            drop(device.poll(wgpu::PollType::wait_indefinitely()));
+        }
         // The innermost scope goes first.
         let internal = pollster::block_on(internal.pop());
         let validation = pollster::block_on(validation.pop());

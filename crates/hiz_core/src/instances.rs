@@ -1,7 +1,7 @@
 //! Instances on the device: the bounding volumes of one call, cut into pieces that fit a binding and a dispatch.
 
 use crate::bounds::{Bounds, BoundsKind};
-use crate::context::{ContextId, HizContext};
+use crate::context::{ContextId, HizContext, write_mapped};
 use crate::error::{Error, Result};
 use crate::layout::{CULL_WORKGROUP, piece_capacity};
 
@@ -146,13 +146,10 @@ fn upload(
         packed.clear();
         bounds.pack(begin..end.min(begin + PACKED_AT_ONCE), &mut packed, invalid);
         let offset = (begin - first) as u64 * record_bytes;
-        let mut view = records
-            .get_mapped_range_mut(offset..offset + packed.len() as u64)
-            .map_err(|e| Error::OutOfMemory(format!("hiz.instances.records: {e}")))?;
-        view.copy_from_slice(&packed);
+        write_mapped("hiz.instances.records", &records, offset, &packed)?;
     }
     records.unmap();
     let uniform = context
-        .uniform("hiz.instances.piece", &PieceUniform { base: range.start, count, index, words: count.div_ceil(32) });
+        .uniform("hiz.instances.piece", &PieceUniform { base: range.start, count, index, words: count.div_ceil(32) })?;
     Ok(Piece { range, records, uniform })
 }

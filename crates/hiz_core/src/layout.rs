@@ -16,6 +16,10 @@ pub(crate) const PYRAMID_CHUNKS: usize = 3;
 /// Rows start at multiples of this many texels.
 const ROW_ALIGNMENT: u32 = 4;
 
+/// Texels before level 1. The first holds the number of the reduction that filled the pyramid: a cull that expects another one
+/// (recorded, but not submitted before it) keeps everything. 0, as buffers begin, is never a number.
+const HEADER_TEXELS: u64 = 4;
+
 /// Where a level lies in the list of texels. Level 0 lies in the depth texture: offset and stride are 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -31,7 +35,7 @@ pub(crate) struct Level {
 pub(crate) struct PyramidLayout {
     pub(crate) size: ImageSize,
     pub(crate) levels: Vec<Level>,
-    /// Texels of levels 1 and up, padding included.
+    /// Texels of the header and of levels 1 and up, padding included.
     pub(crate) texels: u64,
     /// A chunk holds `1 << chunk_shift` texels.
     pub(crate) chunk_shift: u32,
@@ -40,8 +44,9 @@ pub(crate) struct PyramidLayout {
 impl PyramidLayout {
     /// The layout for an image of `size`, with chunks of `1 << chunk_shift` texels.
     pub(crate) fn new(size: ImageSize, chunk_shift: u32) -> Result<Self> {
+        debug_assert!(1 << chunk_shift >= ROW_ALIGNMENT, "a vector store must not straddle chunks");
         let mut levels = vec![Level { offset: 0, stride: 0, width: size.width, height: size.height }];
-        let mut texels = 0_u64;
+        let mut texels = HEADER_TEXELS;
         let (mut width, mut height) = (size.width, size.height);
         while width > 1 || height > 1 {
             (width, height) = (width.div_ceil(2), height.div_ceil(2));
@@ -58,11 +63,11 @@ impl PyramidLayout {
         Ok(layout)
     }
 
-    /// Texels of each chunk; one of the least size where there is no level but 0.
+    /// Texels of each chunk.
     pub(crate) fn chunk_sizes(&self) -> Vec<u64> {
         let chunk = 1_u64 << self.chunk_shift;
-        let count = self.texels.div_ceil(chunk).max(1);
-        (0..count).map(|i| (self.texels - i * chunk).clamp(u64::from(ROW_ALIGNMENT), chunk)).collect()
+        let count = self.texels.div_ceil(chunk);
+        (0..count).map(|i| (self.texels - i * chunk).min(chunk)).collect()
     }
 
     /// The number of levels, level 0 included.
@@ -111,7 +116,7 @@ mod tests {
     fn levels_do_not_overlap_and_rows_are_aligned() {
         for (w, h) in [(7, 5), (1023, 769), (1, 17), (640, 360)] {
             let layout = PyramidLayout::new(ImageSize::new(w, h), 25).unwrap();
-            let mut end = 0;
+            let mut end = 4;
             for level in &layout.levels[1..] {
                 assert_eq!((level.offset, level.stride % 4), (end, 0));
                 assert!(level.stride >= level.width);

@@ -1,7 +1,5 @@
 //! Occluders: triangle meshes on the device, and the depth-only pass that draws them.
 
-use wgpu::util::DeviceExt;
-
 use crate::bounds::Floats;
 use crate::camera::{Camera, DepthConvention, Vec3, dot, sub};
 use crate::context::{ContextId, HizContext};
@@ -110,7 +108,7 @@ impl Occluders {
         let buffer = |label, contents: &[u8], usage| {
             // An empty buffer cannot be bound.
             let contents = if contents.is_empty() { &[0; 24][..] } else { contents };
-            device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
+            context.filled(label, contents, usage)
         };
         Ok(Self {
             context: context.id(),
@@ -118,8 +116,8 @@ impl Occluders {
                 "hiz.occluders.vertices",
                 bytemuck::cast_slice(&baked.vertices),
                 wgpu::BufferUsages::VERTEX,
-            ),
-            indices: buffer("hiz.occluders.indices", bytemuck::cast_slice(&baked.indices), wgpu::BufferUsages::INDEX),
+            )?,
+            indices: buffer("hiz.occluders.indices", bytemuck::cast_slice(&baked.indices), wgpu::BufferUsages::INDEX)?,
             triangles: (baked.indices.len() / 3) as u64,
             parts: baked.parts,
             cull_mode: options.cull_mode,
@@ -321,7 +319,7 @@ pub(crate) fn record(
     let ClipRows { rows, eye_hi, eye_lo } = ClipRows::new(camera)?;
     let wide = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
     let view =
-        context.uniform("hiz.occluders.view", &OccluderView { rows, eye_hi: wide(eye_hi), eye_lo: wide(eye_lo) });
+        context.uniform("hiz.occluders.view", &OccluderView { rows, eye_hi: wide(eye_hi), eye_lo: wide(eye_lo) })?;
     let bind_group = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("hiz.occluders.view"),
         layout: &context.layouts().occluder_view,

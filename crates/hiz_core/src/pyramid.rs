@@ -1,6 +1,7 @@
 //! The depth pyramid: its storage, and the pass that fills it.
 
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::camera::{Camera, ImageSize};
 use crate::context::{ContextId, HizContext};
@@ -44,14 +45,16 @@ pub struct Pyramid {
     pub(crate) layout: PyramidLayout,
     pub(crate) chunks: Vec<wgpu::Buffer>,
     pub(crate) uniform: wgpu::Buffer,
-    /// One uniform a dispatch: the level it reads.
-    steps: Vec<wgpu::Buffer>,
+    /// Levels that the dispatches read.
+    steps: Vec<u32>,
     built: Mutex<Option<Built>>,
 }
 
 /// What a pyramid was last built from.
 #[derive(Debug, Clone)]
 pub(crate) struct Built {
+    /// The number of the reduction, which stands in the pyramid's header once it has run.
+    pub(crate) reduction: u32,
     pub(crate) source: wgpu::TextureView,
     pub(crate) source_kind: SourceKind,
     pub(crate) camera: Camera,
@@ -68,7 +71,11 @@ impl Pyramid {
         if side == 0 || size.width.min(size.height) == 0 {
             return Err(Error::invalid("size", format!("expected at least one pixel a side, got {size}")));
         }
-        let chunk_shift = options.chunk_shift.unwrap_or_else(|| crate::layout::chunk_shift(&device.limits()));
+        let most = crate::layout::chunk_shift(&device.limits());
+        let chunk_shift = options.chunk_shift.unwrap_or(most);
+        if !(2..=most).contains(&chunk_shift) {
+            return Err(Error::invalid("chunk_shift", format!("expected 2 to {most}, got {chunk_shift}")));
+        }
         let layout = PyramidLayout::new(size, chunk_shift)?;
         let chunks = layout
             .chunk_sizes()
@@ -87,11 +94,9 @@ impl Pyramid {
         let uniform = context.uniform(
             "hiz.pyramid.layout",
             &PyramidUniform { levels, num_levels: layout.num_levels(), chunk_shift, padding: [0; 2] },
-        );
-        let steps = (0..layout.num_levels() - 1)
-            .step_by(LEVELS_PER_STEP as usize)
-            .map(|from| context.uniform("hiz.reduce.step", &[from, 0, 0, 0]))
-            .collect();
+        )?;
+        // One at least: it also writes the header.
+        let steps = (0..layout.num_levels().max(2) - 1).step_by(LEVELS_PER_STEP as usize).collect();
         Ok(Self { context: context.id(), layout, chunks, uniform, steps, built: Mutex::new(None) })
     }
 
@@ -170,6 +175,24 @@ pub(crate) fn record_reduce(
             format!("expected a depth format, R32Float or R32Uint (float bits), got {:?}", texture.format()),
         )
     })?;
+    // A view does not say which part of its texture it shows, so there must be one part only.
+    let parts = (texture.mip_level_count(), texture.sample_count(), texture.depth_or_array_layers());
+    if parts != (1, 1, 1) || texture.dimension() != wgpu::TextureDimension::D2 {
+        return Err(Error::invalid(
+            "depth",
+            format!(
+                "expected a 2D texture of one mip level, sample and layer, got {:?} with {} mip levels, {} samples, {} layers",
+                texture.dimension(),
+                parts.0,
+                parts.1,
+                parts.2
+            ),
+        ));
+    }
+    if !texture.usage().contains(wgpu::TextureUsages::TEXTURE_BINDING) {
+        return Err(Error::invalid("depth", format!("expected the usage TEXTURE_BINDING, got {:?}", texture.usage())));
+    }
+    let reduction = next_reduction();
     let layouts = context.layouts();
     let pipeline =
         |from_source| context.reduce_pipeline(source_kind, camera.convention(), pyramid.chunks.len(), from_source);
@@ -185,24 +208,35 @@ pub(crate) fn record_reduce(
             entry(5, context.chunk(pyramid, 2).as_entire_binding()),
         ],
     });
+    let uniforms = pyramid
+        .steps
+        .iter()
+        .map(|from| context.uniform("hiz.reduce.step", &[*from, reduction, 0, 0]))
+        .collect::<Result<Vec<_>>>()?;
     let mut pass = encoder
         .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.reduce.pass"), timestamp_writes: None });
     pass.set_bind_group(0, &source, &[]);
-    for (step, uniform) in pyramid.steps.iter().enumerate() {
-        let from = pyramid.layout.levels[LEVELS_PER_STEP as usize * step];
+    for (from, uniform) in pyramid.steps.iter().zip(&uniforms) {
+        let size = pyramid.layout.levels[*from as usize];
         let bind_group = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("hiz.reduce.step"),
             layout: &layouts.one_uniform,
             entries: &[entry(0, uniform.as_entire_binding())],
         });
-        pass.set_pipeline(&pipeline(step == 0));
+        pass.set_pipeline(&pipeline(*from == 0));
         pass.set_bind_group(1, &bind_group, &[]);
-        pass.dispatch_workgroups(from.width.div_ceil(BLOCK).div_ceil(REDUCE_WORKGROUP), from.height.div_ceil(BLOCK), 1);
+        pass.dispatch_workgroups(size.width.div_ceil(BLOCK).div_ceil(REDUCE_WORKGROUP), size.height.div_ceil(BLOCK), 1);
     }
     drop(pass);
     *pyramid.built.lock().unwrap_or_else(std::sync::PoisonError::into_inner) =
-        Some(Built { source: depth.clone(), source_kind, camera: camera.clone() });
+        Some(Built { reduction, source: depth.clone(), source_kind, camera: camera.clone() });
     Ok(())
+}
+
+/// Numbers reductions, never 0.
+fn next_reduction() -> u32 {
+    static NEXT: AtomicU32 = AtomicU32::new(1);
+    NEXT.fetch_add(1, Ordering::Relaxed).max(1)
 }
 
 pub(crate) fn entry(binding: u32, resource: wgpu::BindingResource<'_>) -> wgpu::BindGroupEntry<'_> {

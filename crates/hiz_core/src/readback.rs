@@ -130,16 +130,16 @@ fn with_mapped<T>(
     wait(device, Some(submission))?;
     match receiver.try_recv() {
         Ok(Ok(())) => {}
-        Ok(Err(e)) => return Err(Error::DeviceLost(format!("hiz.readback.staging could not be mapped: {e}"))),
+        Ok(Err(e)) => return Err(Error::Device(format!("hiz.readback.staging could not be mapped: {e}"))),
         // Another thread's poll may be running the callback at this moment.
         Err(_) => match receiver.recv_timeout(std::time::Duration::from_secs(60)) {
             Ok(Ok(())) => {}
-            other => return Err(Error::DeviceLost(format!("hiz.readback.staging could not be mapped: {other:?}"))),
+            other => return Err(Error::Device(format!("hiz.readback.staging could not be mapped: {other:?}"))),
         },
     }
     let view = staging
         .get_mapped_range(..)
-        .map_err(|e| Error::DeviceLost(format!("hiz.readback.staging could not be mapped: {e}")))?;
+        .map_err(|e| Error::Device(format!("hiz.readback.staging could not be mapped: {e}")))?;
     let out = use_bytes(&view);
     drop(view);
     staging.unmap();

@@ -157,7 +157,7 @@ mod tests {
         same_layout!(module, "View", ViewUniform {
             "x" = x, "y" = y, "z" = z, "w" = w, "eye_hi" = eye_hi, "z_slope" = z_slope, "eye_lo" = eye_lo,
             "coordinate_limit" = coordinate_limit, "half_size" = half_size, "reach" = reach, "depth_factor" = depth_factor,
-            "size" = size, "runtime_zero" = runtime_zero, "padding" = padding
+            "size" = size, "runtime_zero" = runtime_zero, "reduction" = reduction
         });
         same_layout!(module, "Piece", PieceUniform { "base" = base, "count" = count, "index" = index, "words" = words });
         same_layout!(module, "DrawIndexedIndirect", DrawIndexedIndirect {

@@ -53,13 +53,11 @@ impl ViewRows {
     /// Rounds `camera` to float32. `transform_slack` is kappa: how many eps of `sum |M| |p|` another renderer's own transform
     /// may have cost the depth image (0: the depth is exact for these matrices).
     pub(crate) fn new(camera: &Camera, transform_slack: f64) -> Result<Self> {
-        let rows = camera.rows();
+        let rows = camera.rows_near_one();
         let linear = |r: usize| [rows[r][0], rows[r][1], rows[r][2]];
         let origin = camera.origin();
         let (w_lin, z_lin) = (linear(3), linear(2));
-        let orthographic = w_lin == [0.0; 3];
-
-        let (eye_hi, eye_lo, eye) = reference_point(camera, orthographic);
+        let (eye_hi, eye_lo, eye) = reference_point(camera);
         let about_eye = |r: usize| Affine::about(eye, rows[r], origin);
         let size = camera.size();
         let x = about_eye(0).scaled(f64::from(size.width) / 2.0);
@@ -70,16 +68,9 @@ impl ViewRows {
             clippy::cast_possible_truncation,
             reason = "rounding to float32 is the point; what it leaves over stays in Z'"
         )]
-        let z_slope = if orthographic || slope.is_nan() || slope.abs() >= 32_768.0 { 0.0 } else { slope as f32 };
+        let z_slope = if slope.abs() < 32_768.0 { slope as f32 } else { 0.0 };
         let z = about_eye(2).minus(f64::from(z_slope), &w);
-
-        // One power of two for all rows: it changes no comparison and brings w near 1.
-        let unit = if orthographic { w.m[3].abs() } else { w_lin.iter().fold(0.0_f64, |m, v| m.max(v.abs())) };
-        if !(unit > 0.0 && unit.is_finite()) {
-            return Err(Error::invalid("camera", "expected a projection whose w is not zero everywhere"));
-        }
-        let scale = power_of_two_below(unit).recip();
-        let [x, y, z, w] = [x, y, z, w].map(|r| r.scaled(scale).rounded(transform_slack));
+        let [x, y, z, w] = [x, y, z, w].map(|r| r.rounded(transform_slack));
 
         let linear_limit = [(&x, 1.0), (&y, 1.0), (&z, 1.0), (&w, 65_536.0)]
             .iter()
@@ -125,23 +116,17 @@ impl ClipRows {
     pub(crate) fn new(camera: &Camera) -> Result<Self> {
         // The cull's own view decides what float32 can hold: what it refuses is not worth drawing either.
         ViewRows::new(camera, 0.0)?;
-        let rows = camera.rows();
-        let orthographic = rows[3][..3] == [0.0; 3];
-        let (eye_hi, eye_lo, eye) = reference_point(camera, orthographic);
-        let about_eye = rows.map(|row| Affine::about(eye, row, camera.origin()));
-        let w = about_eye[3].m;
-        let unit = if orthographic { w[3].abs() } else { w[..3].iter().fold(0.0_f64, |m, v| m.max(v.abs())) };
-        let scale = power_of_two_below(unit).recip();
-        let rows = about_eye.map(|row| row.scaled(scale).rounded(0.0).m);
+        let (eye_hi, eye_lo, eye) = reference_point(camera);
+        let rows = camera.rows_near_one().map(|row| Affine::about(eye, row, camera.origin()).rounded(0.0).m);
         Ok(Self { rows, eye_hi, eye_lo })
     }
 }
 
 /// The eye (perspective: where x = y = w = 0) or the middle of the near or far plane (orthographic: x = y = z = 0); the
 /// world's origin where neither can be found. Any point would be *valid*, this one makes the margins small.
-fn reference_point(camera: &Camera, orthographic: bool) -> ([f32; 3], [f32; 3], Vec3) {
-    let rows = camera.rows();
-    let third = if orthographic { 2 } else { 3 };
+fn reference_point(camera: &Camera) -> ([f32; 3], [f32; 3], Vec3) {
+    let rows = camera.rows_near_one();
+    let third = if camera.is_orthographic() { 2 } else { 3 };
     let m: Mat3 = [0, 1, third].map(|r| [rows[r][0], rows[r][1], rows[r][2]]);
     let b = [0, 1, third].map(|r: usize| -rows[r][3]);
     let relative = solve3(&m, b).unwrap_or([0.0; 3]);
@@ -178,11 +163,6 @@ fn flushed(v: f32) -> f32 {
 pub(crate) fn round_up(v: f64) -> f32 {
     let nearest = v as f32;
     if f64::from(nearest) < v { nearest.next_up() } else { nearest }
-}
-
-fn power_of_two_below(v: f64) -> f64 {
-    // log2 may be off by an ulp at a power of two: then the unit lies a hair outside [1, 2), which no bound needs exactly.
-    2.0_f64.powf(v.log2().floor())
 }
 
 /// A row in float64, what is known about its errors, and the world-space sizes that kappa multiplies. Index 3: the constant.
@@ -286,6 +266,21 @@ mod tests {
         // kappa adds kappa / 24 of the world-space size, never less.
         let slack = ViewRows::new(&camera, 24.0).unwrap();
         assert!(slack.z.a.iter().zip(view.z.a).all(|(a, b)| *a > b));
+    }
+
+    /// A matrix means the same times any positive number, down to where its products leave float64's range.
+    #[test]
+    fn the_scale_of_the_matrix_does_not_matter() {
+        for convention in [DepthConvention::Standard, DepthConvention::Reversed] {
+            let camera = camera([1e3 + 0.1, -20.0, 7.0], 0.1, Some(1e4), convention);
+            let rows = ViewRows::new(&camera, 1.0).unwrap();
+            for power in [-1000, -500, -1, 1, 500, 990] {
+                let scale = 2.0_f64.powi(power);
+                let m = camera.rows().map(|r| r.map(|v| v * scale));
+                let scaled = Camera::from_rows(m, camera.origin(), camera.size(), convention).unwrap();
+                assert_eq!(ViewRows::new(&scaled, 1.0).unwrap(), rows, "2^{power}");
+            }
+        }
     }
 
     #[test]

@@ -1,8 +1,7 @@
 //! What a cull finds, on the device: verdict planes, the packed list, draw arguments and counters.
 
-use wgpu::util::DeviceExt;
-
-use crate::context::{ContextId, HizContext};
+use crate::context::{ContextId, HizContext, write_mapped};
+use crate::error::Result;
 use crate::instances::Instances;
 
 /// The arguments of `draw_indexed_indirect`, as the device reads them.
@@ -86,7 +85,7 @@ pub struct Visible {
 }
 
 impl Visible {
-    pub(crate) fn new(context: &HizContext, instances: &Instances, options: &VisibleOptions) -> Self {
+    pub(crate) fn new(context: &HizContext, instances: &Instances, options: &VisibleOptions) -> Result<Self> {
         let device = context.device();
         let capacity = options.capacity.unwrap_or(instances.len());
         let storage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
@@ -99,32 +98,32 @@ impl Visible {
             .map(|piece| {
                 let list_capacity = piece.count().min(capacity);
                 let words = u64::from(piece.words().max(1));
-                PieceOutput {
+                Ok(PieceOutput {
                     planes: buffer("hiz.visible.planes", 2 * 4 * words, storage),
-                    list: filled_list(device, u64::from(list_capacity) + CANARY_WORDS),
+                    list: filled_list(device, u64::from(list_capacity) + CANARY_WORDS)?,
                     list_capacity,
                     before: buffer("hiz.compact.before", 4 * words, wgpu::BufferUsages::STORAGE),
-                }
+                })
             })
-            .collect();
+            .collect::<Result<_>>()?;
         let DrawTemplate { index_count, first_index, base_vertex, first_instance } = options.draw;
         let draw = DrawIndexedIndirect { index_count, instance_count: 0, first_index, base_vertex, first_instance };
         let template = vec![draw; instances.num_pieces()];
         let draws_bytes = (template.len() * size_of::<DrawIndexedIndirect>()) as u64;
-        Self {
+        Ok(Self {
             context: context.id(),
             pieces,
             draws: buffer("hiz.visible.draws", draws_bytes, storage | wgpu::BufferUsages::INDIRECT),
-            draws_template: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("hiz.visible.draws_template"),
-                contents: bytemuck::cast_slice(&template),
-                usage: wgpu::BufferUsages::COPY_SRC,
-            }),
+            draws_template: context.filled(
+                "hiz.visible.draws_template",
+                bytemuck::cast_slice(&template),
+                wgpu::BufferUsages::COPY_SRC,
+            )?,
             counters: buffer("hiz.visible.counters", size_of::<CounterRecord>() as u64, storage),
-            capacity_uniform: context.uniform("hiz.visible.capacity", &[capacity, 0, 0, 0]),
+            capacity_uniform: context.uniform("hiz.visible.capacity", &[capacity, 0, 0, 0])?,
             capacity,
             counts: instances.pieces.iter().map(crate::instances::Piece::count).collect(),
-        }
+        })
     }
 
     /// The draw arguments, one [`DrawIndexedIndirect`] a piece, for `draw_indexed_indirect` at [`Visible::draw_offset`].
@@ -143,12 +142,18 @@ impl Visible {
     }
 
     /// A piece's packed list of indices (u32, the caller's numbering); usable as storage and as an instance vertex buffer.
+    ///
+    /// # Panics
+    /// For a piece that is not below [`Visible::num_pieces`].
     pub fn list(&self, piece: usize) -> &wgpu::Buffer {
         &self.pieces[piece].list
     }
 
     /// A piece's bit planes: one bit an instance, kept or not, 32 a word, lowest first; behind them as many words that tell
     /// occluded (not kept, 1) from outside (0) and invalid (kept, 1) from visible (0).
+    ///
+    /// # Panics
+    /// For a piece that is not below [`Visible::num_pieces`].
     pub fn planes(&self, piece: usize) -> &wgpu::Buffer {
         &self.pieces[piece].planes
     }
@@ -170,25 +175,23 @@ impl Visible {
     }
 }
 
-fn filled_list(device: &wgpu::Device, words: u64) -> wgpu::Buffer {
+fn filled_list(device: &wgpu::Device, words: u64) -> Result<wgpu::Buffer> {
+    const LABEL: &str = "hiz.visible.list";
+    let size = 4 * words;
     let list = device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("hiz.visible.list"),
-        size: 4 * words,
+        label: Some(LABEL),
+        size,
         usage: wgpu::BufferUsages::STORAGE
             | wgpu::BufferUsages::COPY_SRC
             | wgpu::BufferUsages::COPY_DST
             | wgpu::BufferUsages::VERTEX,
         mapped_at_creation: true,
     });
-    if let Ok(mut view) = list.get_mapped_range_mut(..) {
-        let ones = vec![0xFF_u8; (4 * words).min(1 << 16) as usize];
-        let mut begin = 0;
-        while begin < view.len() {
-            let end = view.len().min(begin + ones.len());
-            view.slice(begin..end).copy_from_slice(&ones[..end - begin]);
-            begin = end;
-        }
+    let ones = vec![0xFF_u8; size.min(1 << 16) as usize];
+    for begin in (0..size).step_by(ones.len()) {
+        let part = ones.len().min((size - begin) as usize);
+        write_mapped(LABEL, &list, begin, &ones[..part])?;
     }
     list.unmap();
-    list
+    Ok(list)
 }

@@ -14,7 +14,13 @@ fn square(z: f64, r: f64) -> (Vec<f64>, Vec<u32>) {
     (vec![-r, -r, z, r, -r, z, r, r, z, -r, r, z], vec![0, 1, 2, 0, 2, 3])
 }
 
-fn draw(vertices: &[f64], triangles: &[u32], transforms: Option<&[f64]>, cull_mode: FaceCull, camera: &Camera) -> Vec<f32> {
+fn draw(
+    vertices: &[f64],
+    triangles: &[u32],
+    transforms: Option<&[f64]>,
+    cull_mode: FaceCull,
+    camera: &Camera,
+) -> Vec<f32> {
     let mesh = MeshData { vertices: Floats::F64(vertices), triangles, transforms: transforms.map(Floats::F64) };
     let occluders = engine().occluders(&[mesh], &OccluderOptions { cull_mode }).unwrap();
     engine().render_depth(&occluders, camera).unwrap().read().unwrap()
@@ -125,7 +131,11 @@ fn distance_from_the_origin_costs_nothing() {
             .flat_map(|p| [p[0] + offset, p[1] - offset, p[2] + offset])
             .collect();
         let depth = draw(&vertices, &[0, 1, 2], None, FaceCull::None, &camera);
-        assert!(depth.iter().all(|d| (d - 0.25).abs() <= 4.0 * f32::EPSILON * 0.25), "offset {offset}: {:?}", &depth[..4]);
+        assert!(
+            depth.iter().all(|d| (d - 0.25).abs() <= 4.0 * f32::EPSILON * 0.25),
+            "offset {offset}: {:?}",
+            &depth[..4]
+        );
     }
 }
 
@@ -147,9 +157,8 @@ fn bad_meshes_are_refused_by_name() {
 #[test]
 fn pyramids_of_rendered_depth_are_bit_exact() {
     let mut random = Random(8);
-    let vertices: Vec<f64> = (0..300 * 3)
-        .flat_map(|_| [random.range(-6.0, 6.0), random.range(-6.0, 6.0), random.range(0.5, 9.0)])
-        .collect();
+    let vertices: Vec<f64> =
+        (0..300 * 3).flat_map(|_| [random.range(-6.0, 6.0), random.range(-6.0, 6.0), random.range(0.5, 9.0)]).collect();
     let triangles: Vec<u32> = (0..900).collect();
     let mesh = MeshData { vertices: Floats::F64(&vertices), triangles: &triangles, transforms: None };
     let occluders = engine().occluders(&[mesh], &OccluderOptions::default()).unwrap();
@@ -160,13 +169,17 @@ fn pyramids_of_rendered_depth_are_bit_exact() {
             let depth = image.read().unwrap();
             let pyramid = engine().pyramid(&image).unwrap();
             for (k, level) in hiz_ref::pyramid(&depth, width, height, convention.is_reversed()).iter().enumerate() {
-                assert_eq!(engine().read_level(&pyramid, k as u32).unwrap(), level.texels, "{width}x{height} level {k}");
+                assert_eq!(
+                    engine().read_level(&pyramid, k as u32).unwrap(),
+                    level.texels,
+                    "{width}x{height} level {k}"
+                );
             }
         }
     }
 }
 
-/// A caller's own R32Float texture.
+/// A caller's own `R32Float` texture.
 #[test]
 fn pyramids_of_float_textures_are_bit_exact() {
     let (device, queue) = (engine().device(), engine().queue());
@@ -195,7 +208,11 @@ fn pyramids_of_float_textures_are_bit_exact() {
             engine().context().record_reduce(&mut encoder, &view, &camera, &pyramid).unwrap();
             queue.submit([encoder.finish()]);
             for (k, level) in hiz_ref::pyramid(&depth, width, height, convention.is_reversed()).iter().enumerate() {
-                assert_eq!(engine().read_level(&pyramid, k as u32).unwrap(), level.texels, "{width}x{height} level {k}");
+                assert_eq!(
+                    engine().read_level(&pyramid, k as u32).unwrap(),
+                    level.texels,
+                    "{width}x{height} level {k}"
+                );
             }
             let other = camera_along_z(width + 1, height, convention);
             let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());

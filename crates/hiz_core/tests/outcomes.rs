@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use common::{CONVENTIONS, camera_along_z, engine, ndc};
 use hiz_core::headless::{Culling, Engine};
+use hiz_core::wgpu;
 use hiz_core::{
     Bounds, Camera, Coverage, CullOptions, DepthConvention, Error, Floats, InstanceOptions, Instances, Pyramid,
     PyramidOptions, VisibleOptions,
@@ -279,6 +280,95 @@ fn pyramids_that_do_not_belong_are_refused() {
     assert!(message(&moved, &pyramid).contains("got another one"));
     let reversed = camera_along_z(SIDE, SIDE, DepthConvention::Reversed);
     assert!(message(&reversed, &pyramid).contains("got another one"));
+}
+
+/// A reduction that was recorded but has not run is no pyramid: whatever is culled against it is kept.
+#[test]
+fn a_reduction_that_never_ran_hides_nothing() {
+    let list = spheres(&[([0.0, 0.0, 8.0], 1.0), ([0.0, 0.0, 8.0], 0.01)]);
+    for convention in CONVENTIONS {
+        for (width, height) in [(1, 1), (16, 16)] {
+            let camera = camera_along_z(width, height, convention);
+            let wall = vec![ndc(4.0, convention); (width * height) as usize];
+            let image = engine().upload_depth(&wall, &camera).unwrap();
+            let pyramid =
+                Arc::new(engine().context().create_pyramid(camera.size(), &PyramidOptions::default()).unwrap());
+            let view = image.texture().create_view(&wgpu::TextureViewDescriptor::default());
+            let record = || {
+                let mut encoder = engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                engine().context().record_reduce(&mut encoder, &view, &camera, &pyramid).unwrap();
+                encoder.finish()
+            };
+            let verdicts = || {
+                let options = CullOptions::default();
+                let culling = engine().cull(&list, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap();
+                culling.verdicts().unwrap()
+            };
+            drop(record());
+            assert_eq!(verdicts(), [VISIBLE; 2], "never submitted");
+            engine().queue().submit([record()]);
+            assert_eq!(verdicts(), [OCCLUDED; 2]);
+            drop(record());
+            assert_eq!(verdicts(), [VISIBLE; 2], "an older reduction than the one that was recorded last");
+        }
+    }
+}
+
+#[test]
+fn textures_that_a_view_cannot_tell_apart_are_refused() {
+    let camera = camera_along_z(8, 8, DepthConvention::Standard);
+    let pyramid = engine().context().create_pyramid(camera.size(), &PyramidOptions::default()).unwrap();
+    let message = |change: &dyn Fn(&mut wgpu::TextureDescriptor<'_>)| {
+        let mut descriptor = wgpu::TextureDescriptor {
+            label: Some("test.depth"),
+            size: wgpu::Extent3d { width: 8, height: 8, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::R32Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        };
+        change(&mut descriptor);
+        let view = engine().device().create_texture(&descriptor).create_view(&wgpu::TextureViewDescriptor::default());
+        let mut encoder = engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        engine().context().record_reduce(&mut encoder, &view, &camera, &pyramid).unwrap_err().to_string()
+    };
+    assert!(message(&|d| d.mip_level_count = 2).contains("2 mip levels, 1 samples, 1 layers"));
+    assert!(message(&|d| d.size.depth_or_array_layers = 3).contains("3 layers"));
+    assert!(message(&|d| d.usage = wgpu::TextureUsages::COPY_SRC).contains("expected the usage TEXTURE_BINDING"));
+    assert!(message(&|d| d.format = wgpu::TextureFormat::R16Float).contains("got R16Float"));
+    assert!(message(&|d| d.size.width = 4).starts_with("depth: expected the pyramid's size"));
+    for chunk_shift in [0, 1, 31, 64] {
+        let options = PyramidOptions { chunk_shift: Some(chunk_shift) };
+        let error = engine().context().create_pyramid(camera.size(), &options).unwrap_err();
+        assert!(error.to_string().starts_with("chunk_shift: expected 2 to"), "{error}");
+    }
+}
+
+/// A lost device says so, and the next one works.
+#[test]
+fn a_lost_device_is_an_error_and_the_next_one_works() {
+    let camera = camera_along_z(SIDE, SIDE, DepthConvention::Standard);
+    for use_it in [0, 1, 2] {
+        let doomed = Engine::new(None).unwrap();
+        let image = doomed.upload_depth(&[0.5; 256], &camera).unwrap();
+        let bounds = Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0]), radii: Floats::F32(&[1.0]) };
+        let list = doomed.instances(&bounds, &InstanceOptions::default()).unwrap();
+        let pyramid = doomed.pyramid(&image).unwrap();
+        doomed.device().destroy();
+        let error = match use_it {
+            0 => doomed.pyramid(&image).unwrap_err(),
+            1 => doomed.instances(&bounds, &InstanceOptions::default()).unwrap_err(),
+            _ => doomed
+                .cull(&list, &camera, &pyramid, &CullOptions::default(), &VisibleOptions::default())
+                .and_then(|c| c.mask())
+                .unwrap_err(),
+        };
+        assert!(matches!(error, Error::DeviceLost(_)), "{use_it}: {error}");
+        let next = Engine::new(None).unwrap();
+        next.pyramid(&next.upload_depth(&[0.5; 256], &camera).unwrap()).unwrap();
+    }
 }
 
 #[test]

@@ -1,12 +1,13 @@
 //! A renderer with a device of its own draws a town twice, with and without culling, and compares the pictures:
 //!
 //! ```text
-//! cargo run -p hiz_core --example renderer [FOLDER]
+//! cargo run --example renderer [FOLDER]
 //! ```
 //!
 //! The pictures land in FOLDER (`out/renderer`): what was drawn with culling, and which box each pixel shows. `renderer.rs`
 //! shows how the crate is embedded, `scene.rs` what is drawn. `tests/renderer.rs` runs the same code.
 
+#[allow(dead_code, reason = "its test reads more of it")]
 mod renderer;
 mod scene;
 

@@ -155,7 +155,7 @@ impl Renderer {
         )?;
         // What the draw arguments say beside the count: one box has 36 indices.
         let draw = DrawTemplate { index_count: BLOCK_INDICES.len() as u32, ..DrawTemplate::default() };
-        let visible = self.hiz.create_visible(&crowd, &VisibleOptions { capacity: None, draw });
+        let visible = self.hiz.create_visible(&crowd, &VisibleOptions { capacity: None, draw })?;
         let occluders = |blocks: &[Block]| {
             let (vertices, triangles) = mesh(blocks);
             let mesh = MeshData { vertices: Floats::F64(&vertices), triangles: &triangles, transforms: None };

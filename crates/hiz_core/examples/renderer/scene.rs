@@ -95,9 +95,9 @@ impl Scene {
         let crowd = blocks.len() as u32;
         blocks.extend(walls);
         for block in &mut blocks {
-            for k in 0..3 {
-                block.min[k] += origin[k];
-                block.max[k] += origin[k];
+            for ((min, max), shift) in block.min.iter_mut().zip(&mut block.max).zip(origin) {
+                *min += shift;
+                *max += shift;
             }
         }
         Self { blocks, crowd }
