@@ -137,6 +137,12 @@ def test_integers_lists_and_small_floats_are_numbers_too() -> None:
 # -- cameras as values ---------------------------------------------------------------------------------------
 
 
+def shifted(by: float) -> np.ndarray:
+    matrix = np.eye(4)
+    matrix[0, 3] = by
+    return matrix
+
+
 def all_kinds() -> list[hizvk.Camera]:
     look = {"eye": (1, 2, 3), "target": (4, 5, -6), "size": (30, 40), "near": 0.2, "far": 50}
     k = np.array([[120.0, 1, 33.5], [0, 110, 21.25], [0, 0, 1]])
@@ -148,9 +154,9 @@ def all_kinds() -> list[hizvk.Camera]:
         hizvk.Camera.orthographic(**look, height=10),
         hizvk.Camera.from_opencv(k, world_from_camera=OPENCV_POSE, size=(30, 40), near=0.1),
         hizvk.Camera.from_opencv(k, camera_from_world=OPENCV_POSE, size=(30, 40), near=0.1),
-        hizvk.Camera.from_opengl(gl, camera_from_world=np.eye(4), size=(30, 40)),
+        hizvk.Camera.from_opengl(gl, camera_from_world=shifted(1), size=(30, 40)),
         hizvk.Camera.from_matrices(gl, size=(30, 40), reversed_z=False),
-        hizvk.Camera.from_matrices(clip_from_camera=gl, camera_from_world=np.eye(4), size=(30, 40), reversed_z=False),
+        hizvk.Camera.from_matrices(clip_from_camera=gl, camera_from_world=shifted(2), size=(30, 40), reversed_z=False),
         hizvk.Camera.look_at(**look, fov_y_deg=50).resized((15, 20)).resized((3, 5)),
     ]
 

@@ -197,7 +197,8 @@ pub(crate) fn shots(size: ImageSize) -> hiz_core::Result<Vec<Shot>> {
             walls_occlude,
         )?,
         shot("hill", hill.0, hill.1, perspective(50.0, 0.1, None, Reversed), walls_occlude)?,
-        shot("off_centre", [-41.0, 3.0, 62.0], [-39.0, 3.0, 0.0], off_centre(0.3, None, Standard), walls_occlude)?,
+        // Straight along an axis: faces towards the eye have one depth, those beside it are seen edge-on.
+        shot("off_centre", [-41.0, 3.0, 62.0], [-41.0, 3.0, 0.0], off_centre(0.3, None, Standard), walls_occlude)?,
         shot("parallel", [3.0, 9.0, 90.0], [3.0, 9.0, 0.0], parallel(16.0, 200.0, Standard), walls_occlude)?,
         shot("isometric", [80.0, 60.0, 70.0], [0.0, 0.0, 0.0], parallel(24.0, 250.0, Reversed), walls_occlude)?,
         // The eye is 3 cm off a wall and looks into it at less than a degree.
@@ -216,8 +217,14 @@ pub(crate) fn shots(size: ImageSize) -> hiz_core::Result<Vec<Shot>> {
             perspective(80.0, 0.3, Some(150.0), Standard),
             walls_occlude,
         )?,
-        shot("crowd_hides_crowd", hill.0, hill.1, perspective(50.0, 0.1, None, Reversed), (0, true))?,
-        shot("street_hides_crowd", street.0, street.1, perspective(60.0, 0.5, Some(160.0), Standard), (0, true))?,
+        shot("crowd_hides_crowd", hill.0, hill.1, perspective(50.0, 1.0, Some(220.0), Standard), (0, true))?,
+        shot(
+            "straight_hides_crowd",
+            [1.0, 1.7, 66.0],
+            [1.0, 1.7, 0.0],
+            perspective(60.0, 0.1, None, Reversed),
+            (0, true),
+        )?,
         // Faces parallel to the image: all of a box's pixels hold the depth of its nearest point.
         shot("parallel_hides_crowd", [3.0, 9.0, 90.0], [3.0, 9.0, 0.0], parallel(16.0, 200.0, Reversed), (0, true))?,
         shot("far_from_the_origin", hill.0, hill.1, perspective(50.0, 0.1, None, Reversed), (1, false))?,
