@@ -24,6 +24,9 @@ struct Counters {
     invalid: atomic<u32>,
     // How many instances were compared with the depths of each level.
     levels: array<atomic<u32>, 16>,
+    // Texels read, a 64-bit number in two halves.
+    texels_low: atomic<u32>,
+    texels_high: atomic<u32>,
 }
 
 @group(1) @binding(0) var<uniform> piece: Piece;
@@ -71,6 +74,8 @@ fn cull(
         if STATISTICS {
             if outcome.stage >= AT_DEPTH {
                 atomicAdd(&counters.levels[outcome.level], 1u);
+                let before = atomicAdd(&counters.texels_low, outcome.texels_read);
+                if before + outcome.texels_read < before { atomicAdd(&counters.texels_high, 1u); }
             }
         }
         if APPEND {

@@ -27,7 +27,7 @@ fn explain() {
     explanation.pixels = outcome.pixels;
     explanation.texels = outcome.texels;
     if outcome.stage >= AT_DEPTH {
-        explanation.texel_bits = footprint(outcome.level, outcome.texels);
+        explanation.texel_bits = corners(outcome.level, outcome.texels);
     }
     let volume = load_volume(which.x);
     let w = value_of(view.w, volume);

@@ -159,6 +159,12 @@ DEPTH_SLACK: list[Bad] = [
     (0.75, ValueError, "at most 0.5, got float 0.75"),
     ("a", TypeError, "got str 'a'"),
 ]
+FOOTPRINT: list[Bad] = [
+    (3, ValueError, "expected one of 2, 4, 8, got 3"),
+    (16, ValueError, "in 2..8"),
+    (2.0, TypeError, "got float 2.0"),
+]
+DESCENT: list[Bad] = [(-1, ValueError, "in 0..65536"), (70000, ValueError, "in 0..65536"), (None, TypeError, "got None")]
 TRANSFORM_SLACK: list[Bad] = [
     (-1, ValueError, "at least 0"),
     (INF, ValueError, "got float inf"),
@@ -398,6 +404,8 @@ TABLES: dict[str, Table] = {
             "guard_px": GUARD,
             "depth_slack": DEPTH_SLACK,
             "transform_slack": TRANSFORM_SLACK,
+            "footprint": FOOTPRINT,
+            "descent": DESCENT,
             "capacity": [(-1, ValueError, "in 0..4294967295"), (1.5, TypeError, "got float 1.5")],
             "draw": [((36,), TypeError, "expected a DrawTemplate or None, got tuple (36,)")],
             "statistics": FLAG,
@@ -441,6 +449,8 @@ TABLES: dict[str, Table] = {
             "guard_px": GUARD,
             "depth_slack": DEPTH_SLACK,
             "transform_slack": TRANSFORM_SLACK,
+            "footprint": FOOTPRINT,
+            "descent": DESCENT,
         },
     ),
     "compare": Table(

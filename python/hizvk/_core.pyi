@@ -119,6 +119,8 @@ class Engine:
         guard_px: float | None,
         depth_slack: float,
         transform_slack: float,
+        footprint: int,
+        descent: int,
         capacity: int | None,
         draw: tuple[int, int, int, int],
         statistics: bool,
@@ -167,6 +169,8 @@ class Counts:
     def written(self) -> int: ...
     @property
     def levels(self) -> list[int]: ...
+    @property
+    def texels_read(self) -> int: ...
 
 @final
 class Explanation:

@@ -260,6 +260,8 @@ class Device:
         guard_px: float | None = None,
         depth_slack: float = 2.0**-23,
         transform_slack: float = 0.0,
+        footprint: int = 2,
+        descent: int = 0,
         capacity: int | None = None,
         draw: DrawTemplate | None = None,
         statistics: bool = True,
@@ -286,13 +288,18 @@ class Device:
         transform_slack : float
             For depth images of a renderer that transforms in float32: ulps that its matrix product may have cost (about
             4), up to 1e6.
+        footprint : 2, 4 or 8
+            How many texels a side a test may read of one level: more mean a finer level, so less is kept and more read.
+        descent : int
+            How many texels of finer levels a test may read where the footprint cannot decide, up to 65536; 0: none. With
+            enough of them the answer is that of a rectangle test at full resolution.
         capacity : int, optional
             Most instances in the list. None: enough for all. Too small a capacity shows as ``count < demand``; mask and
             verdicts stay complete.
         draw : DrawTemplate, optional
             The other numbers of the draw arguments; None leaves them 0.
         statistics : bool
-            Whether to count the tests by level.
+            Whether to count the tests by level and the texels that they read.
 
         Returns
         -------
@@ -318,7 +325,8 @@ class Device:
             )
         options = cull_options(
             order=order, coverage=coverage, guard_px=guard_px, depth_slack=depth_slack,
-            transform_slack=transform_slack, capacity=capacity, draw=draw, statistics=statistics,
+            transform_slack=transform_slack, footprint=footprint, descent=descent, capacity=capacity, draw=draw,
+            statistics=statistics,
         )  # fmt: skip
         culling = self._engine.cull(instances._inner, camera._inner, pyramid._inner, *options)
         return CullResult(culling, statistics=options[-1])
@@ -335,6 +343,10 @@ class Device:
         return f"<Device {self.adapter}>"
 
 
+#: Texels a side that a test may read of one level.
+FOOTPRINTS = (2, 4, 8)
+
+
 def cull_options(
     *,
     order: object,
@@ -342,15 +354,20 @@ def cull_options(
     guard_px: object,
     depth_slack: object,
     transform_slack: object,
+    footprint: object,
+    descent: object,
     capacity: object,
     draw: object,
     statistics: object,
-) -> tuple[str, str, float | None, float, float, int | None, tuple[int, int, int, int], bool]:
+) -> tuple[str, str, float | None, float, float, int, int, int | None, tuple[int, int, int, int], bool]:
     """The checked options of a cull, in the engine's order."""
     if guard_px is not None:
         guard_px = _arguments.number("guard_px", guard_px, at_least=0.0, at_most=16.0)
         if guard_px * 256.0 != round(guard_px * 256.0):
             raise ValueError(f"guard_px: expected a multiple of 1/256, got {guard_px}")
+    footprint = _arguments.integer("footprint", footprint, low=2, high=8)
+    if footprint not in FOOTPRINTS:
+        raise ValueError(f"footprint: expected one of 2, 4, 8, got {footprint}")
     if capacity is not None:
         capacity = _arguments.integer("capacity", capacity, low=0, high=2**32 - 1)
     if draw is None:
@@ -364,6 +381,8 @@ def cull_options(
         guard_px,
         _arguments.number("depth_slack", depth_slack, at_least=0.0, at_most=0.5),
         _arguments.number("transform_slack", transform_slack, at_least=0.0, at_most=1e6),
+        footprint,
+        _arguments.integer("descent", descent, low=0, high=65536),
         capacity,
         template,
         _arguments.flag("statistics", statistics),

@@ -47,6 +47,8 @@ def visible(
     guard_px: float | None = None,
     depth_slack: float = 2.0**-23,
     transform_slack: float = 0.0,
+    footprint: int = 2,
+    descent: int = 0,
 ) -> npt.NDArray[np.bool_]:
     """Which bounds can be seen: False only for what is surely outside the view or surely behind the depth image.
 
@@ -66,7 +68,7 @@ def visible(
         World units of one step of `depth`, for the kinds ``"z"`` and ``"distance"``.
     device : Device, optional
         None: one that is made at the first call and kept.
-    coverage, guard_px, depth_slack, transform_slack
+    coverage, guard_px, depth_slack, transform_slack, footprint, descent
         As in `Device.cull`.
 
     Returns
@@ -89,7 +91,7 @@ def visible(
     _arguments.instance("camera", camera, Camera, "a Camera")
     options = cull_options(
         order="any", coverage=coverage, guard_px=guard_px, depth_slack=depth_slack, transform_slack=transform_slack,
-        capacity=None, draw=None, statistics=False,
+        footprint=footprint, descent=descent, capacity=None, draw=None, statistics=False,
     )  # fmt: skip
     if device is not None:
         _arguments.instance("device", device, Device, "a Device or None")
@@ -104,9 +106,9 @@ def visible(
         image, kind, scale = checked_image("depth", depth, camera, kind, scale)
         device = default_device() if device is None else device
         pyramid = device.pyramid(image, camera, kind=kind, scale=scale)
-    _, coverage_, guard, slack, transform, *_ = options
+    _, coverage_, guard, slack, transform, side, budget, *_ = options
     result = device.cull(
         device.instances(bounds), camera, pyramid, order="any", coverage=coverage_,  # type: ignore[arg-type]
-        guard_px=guard, depth_slack=slack, transform_slack=transform, statistics=False,
+        guard_px=guard, depth_slack=slack, transform_slack=transform, footprint=side, descent=budget, statistics=False,
     )  # fmt: skip
     return result.mask.copy()

@@ -34,10 +34,6 @@ DRAW_DTYPE: np.dtype[np.void] = np.dtype(
 )
 
 
-#: Texels that the cull reads for one instance on one level (2x2).
-FOOTPRINT = 4
-
-
 class Verdict(enum.IntEnum):
     """What a cull decides about one instance; the codes of `CullResult.verdicts`."""
 
@@ -222,7 +218,7 @@ class CullResult:
             kept=counts.visible + counts.invalid,
             invalid=counts.invalid,
             levels=tuple(counts.levels) if self._statistics else None,
-            texels_read=FOOTPRINT * sum(counts.levels) if self._statistics else None,
+            texels_read=counts.texels_read if self._statistics else None,
             record_ms=record_ms,
             gpu_ms=gpu_ms,
             readback_ms=readback_ms,

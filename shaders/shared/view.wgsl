@@ -30,6 +30,11 @@ struct View {
     runtime_zero: u32,
     // The number of the reduction that the pyramid has to hold.
     reduction: u32,
+    // How many texels a descent may read.
+    descent_budget: u32,
+    padding_0: u32,
+    padding_1: u32,
+    padding_2: u32,
 }
 
 // Keeps a compiler from folding what follows into the cancelling sum x was made by, as WGSL lets it.

@@ -67,6 +67,8 @@ pub(crate) struct CullKey {
     pub(crate) reversed: bool,
     pub(crate) chunks: usize,
     pub(crate) sample_coverage: bool,
+    pub(crate) footprint_log2: u32,
+    pub(crate) descent: bool,
     pub(crate) append: bool,
     pub(crate) statistics: bool,
 }
@@ -394,8 +396,14 @@ fn flag(value: bool) -> f64 {
     f64::from(u8::from(value))
 }
 
-fn classify_constants(key: &CullKey) -> [(&'static str, f64); 3] {
-    [("REVERSED", flag(key.reversed)), ("CHUNKS", key.chunks as f64), ("SAMPLE_COVERAGE", flag(key.sample_coverage))]
+fn classify_constants(key: &CullKey) -> [(&'static str, f64); 5] {
+    [
+        ("REVERSED", flag(key.reversed)),
+        ("CHUNKS", key.chunks as f64),
+        ("SAMPLE_COVERAGE", flag(key.sample_coverage)),
+        ("FOOTPRINT_LOG2", f64::from(key.footprint_log2)),
+        ("DESCENT", flag(key.descent)),
+    ]
 }
 
 /// The bind group layouts, one place for all passes.

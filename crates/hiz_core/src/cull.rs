@@ -30,6 +30,28 @@ pub enum Coverage {
     Sample,
 }
 
+/// How many texels of one level a test may read, as N x N. More texels mean a finer level: less is kept, more is read.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum Footprint {
+    /// 2 x 2.
+    #[default]
+    Two,
+    /// 4 x 4.
+    Four,
+    /// 8 x 8.
+    Eight,
+}
+
+impl Footprint {
+    fn log2(self) -> u32 {
+        match self {
+            Self::Two => 1,
+            Self::Four => 2,
+            Self::Eight => 3,
+        }
+    }
+}
+
 /// How instances are culled.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CullOptions {
@@ -45,7 +67,12 @@ pub struct CullOptions {
     /// kappa, 0..=1e6: how many eps of `sum |M| |p|` the transform of the depth image's renderer may have cost; 0 for depth that
     /// is exact for the camera's matrices, about 4 for a renderer that transforms world coordinates in float32.
     pub transform_slack: f64,
-    /// Count the depth tests of each level.
+    /// How many texels a test reads.
+    pub footprint: Footprint,
+    /// How many texels of finer levels a test may read where the footprint cannot decide, 0..=65536; 0: none. With enough of
+    /// them the answer is that of a rectangle test at full resolution.
+    pub descent: u32,
+    /// Count the depth tests of each level and the texels read.
     pub statistics: bool,
 }
 
@@ -57,6 +84,8 @@ impl Default for CullOptions {
             guard_px: None,
             depth_slack: EPS,
             transform_slack: 0.0,
+            footprint: Footprint::Two,
+            descent: 0,
             statistics: true,
         }
     }
@@ -80,9 +109,13 @@ pub(crate) struct ViewUniform {
     pub(crate) size: [i32; 2],
     pub(crate) runtime_zero: u32,
     pub(crate) reduction: u32,
+    pub(crate) descent_budget: u32,
+    pub(crate) padding_0: u32,
+    pub(crate) padding_1: u32,
+    pub(crate) padding_2: u32,
 }
 
-const _: () = assert!(size_of::<ViewUniform>() == 192);
+const _: () = assert!(size_of::<ViewUniform>() == 208);
 
 impl ViewUniform {
     #[expect(
@@ -98,6 +131,7 @@ impl ViewUniform {
             }
         };
         let slack = range("depth_slack", options.depth_slack, 0.5)?;
+        range("descent", f64::from(options.descent), 65_536.0)?;
         let kappa = range("transform_slack", options.transform_slack, 1e6)?;
         let guard = match (options.guard_px, options.coverage) {
             (Some(g), _) => range("guard_px", g, 16.0)?,
@@ -134,6 +168,10 @@ impl ViewUniform {
             size: [size.width as i32, size.height as i32],
             runtime_zero: 0,
             reduction,
+            descent_budget: options.descent,
+            padding_0: 0,
+            padding_1: 0,
+            padding_2: 0,
         })
     }
 }
@@ -177,6 +215,8 @@ fn bind(context: &HizContext, inputs: &CullInputs<'_>) -> Result<Bound> {
         reversed: camera.convention().is_reversed(),
         chunks: pyramid.chunks.len(),
         sample_coverage: options.coverage == Coverage::Sample,
+        footprint_log2: options.footprint.log2(),
+        descent: options.descent > 0,
         append: options.order == Order::Any,
         statistics: options.statistics,
     };

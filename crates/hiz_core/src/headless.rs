@@ -496,6 +496,8 @@ pub struct Counts {
     pub written: u64,
     /// Depth tests at each level (with [`CullOptions::statistics`]).
     pub levels: [u64; 16],
+    /// Texels read (with [`CullOptions::statistics`]).
+    pub texels_read: u64,
 }
 
 /// Wall times of one cull.
@@ -670,6 +672,7 @@ impl Culling {
             demand: u64::from(record.visible) + u64::from(record.invalid),
             written: draws.iter().map(|d| u64::from(d.instance_count)).sum(),
             levels: record.levels.map(u64::from),
+            texels_read: u64::from(record.texels_high) << 32 | u64::from(record.texels_low),
         })
     }
 
@@ -716,6 +719,8 @@ fn explanation(record: &ExplanationRecord, camera: &Camera) -> Explanation {
         (3, 0) => "between the pixel centres",
         (3, _) => "touches no pixel for sure, but no plane of the frustum separates it: kept",
         (4, _) => "not surely behind the farthest depth of the texels: kept",
+        (6, 1) => "behind the farthest depth of every pixel that it can touch",
+        (6, _) => "not surely behind every pixel that it can touch, or the budget ended: kept",
         (_, 1) => "behind the farthest depth of all texels that it can touch",
         _ => "behind the texels, but not surely inside their block: kept",
     };

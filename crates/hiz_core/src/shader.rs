@@ -157,7 +157,8 @@ mod tests {
         same_layout!(module, "View", ViewUniform {
             "x" = x, "y" = y, "z" = z, "w" = w, "eye_hi" = eye_hi, "z_slope" = z_slope, "eye_lo" = eye_lo,
             "coordinate_limit" = coordinate_limit, "half_size" = half_size, "reach" = reach, "depth_factor" = depth_factor,
-            "size" = size, "runtime_zero" = runtime_zero, "reduction" = reduction
+            "size" = size, "runtime_zero" = runtime_zero, "reduction" = reduction, "descent_budget" = descent_budget, "padding_0" = padding_0,
+            "padding_1" = padding_1, "padding_2" = padding_2
         });
         same_layout!(module, "Piece", PieceUniform { "base" = base, "count" = count, "index" = index, "words" = words });
         same_layout!(module, "DrawIndexedIndirect", DrawIndexedIndirect {
@@ -165,7 +166,8 @@ mod tests {
             "base_vertex" = base_vertex, "first_instance" = first_instance
         });
         same_layout!(module, "Counters", CounterRecord {
-            "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid, "levels" = levels
+            "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid, "levels" = levels,
+            "texels_low" = texels_low, "texels_high" = texels_high
         });
         assert_eq!(layout(&module, "SphereRecord").1 as usize, size_of::<SphereRecord>());
         let boxes = parse(&cull(SourceKind::Depth, BoundsKind::Box));

@@ -53,6 +53,8 @@ pub(crate) struct CounterRecord {
     pub(crate) visible: u32,
     pub(crate) invalid: u32,
     pub(crate) levels: [u32; 16],
+    pub(crate) texels_low: u32,
+    pub(crate) texels_high: u32,
 }
 
 /// Words behind each list that stay 0xFFFFFFFF: whoever writes past the capacity shows.

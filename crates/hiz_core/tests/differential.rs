@@ -5,13 +5,24 @@ mod common;
 #[path = "common/campaign.rs"]
 mod campaign;
 
-use campaign::Campaign;
+use campaign::{Campaign, PLAIN};
 use common::engine;
-use hiz_core::Coverage;
+use hiz_core::{Coverage, Footprint};
+
+/// Every footprint, and descents with and without budget to finish.
+const ALL: &[(Footprint, u32)] = &[
+    (Footprint::Two, 0),
+    (Footprint::Two, 0),
+    (Footprint::Eight, 0),
+    (Footprint::Two, 12),
+    (Footprint::Two, 4096),
+    (Footprint::Four, 4096),
+];
 
 #[test]
 fn no_false_cull_in_area_coverage() {
-    let campaign = Campaign { seed: 11, rounds: 600, volumes: 32, coverage: Coverage::Area, count_keeps: false };
+    let campaign =
+        Campaign { seed: 11, rounds: 600, volumes: 32, coverage: Coverage::Area, modes: ALL, count_keeps: false };
     let tally = campaign.run(engine());
     eprintln!("area: {tally:?}");
     assert_eq!(tally.false_culls, 0);
@@ -23,7 +34,8 @@ fn no_false_cull_in_area_coverage() {
 
 #[test]
 fn no_false_cull_in_sample_coverage() {
-    let campaign = Campaign { seed: 12, rounds: 200, volumes: 32, coverage: Coverage::Sample, count_keeps: false };
+    let campaign =
+        Campaign { seed: 12, rounds: 200, volumes: 32, coverage: Coverage::Sample, modes: ALL, count_keeps: false };
     let tally = campaign.run(engine());
     eprintln!("sample: {tally:?}");
     assert_eq!(tally.false_culls, 0);
@@ -32,7 +44,8 @@ fn no_false_cull_in_sample_coverage() {
 
 #[test]
 fn little_that_is_hidden_is_kept() {
-    let campaign = Campaign { seed: 13, rounds: 100, volumes: 32, coverage: Coverage::Area, count_keeps: true };
+    let campaign =
+        Campaign { seed: 13, rounds: 100, volumes: 32, coverage: Coverage::Area, modes: PLAIN, count_keeps: true };
     let tally = campaign.run(engine());
     eprintln!("keeps: {tally:?}");
     // Adversarial cases, made to be undecided; what plain scenes keep is measured on scenes.

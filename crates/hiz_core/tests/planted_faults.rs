@@ -6,21 +6,25 @@ mod common;
 #[path = "common/campaign.rs"]
 mod campaign;
 
-use campaign::{Campaign, Tally};
+use campaign::{Campaign, PLAIN, Tally};
 use common::{CONVENTIONS, Random, camera_along_z};
-use hiz_core::Coverage;
 use hiz_core::headless::Engine;
+use hiz_core::{Coverage, Footprint};
 
 fn faulty(faults: &[(&str, &str)]) -> Engine {
     Engine::with_planted_faults(None, faults).expect("the device tests need a Vulkan driver")
 }
 
-fn campaign(faults: &[(&str, &str)], coverage: Coverage) -> Tally {
-    Campaign { seed: 21, rounds: 150, volumes: 32, coverage, count_keeps: false }.run(&faulty(faults))
+fn campaign(faults: &[(&str, &str)], coverage: Coverage, modes: &'static [(Footprint, u32)]) -> Tally {
+    Campaign { seed: 21, rounds: 150, volumes: 32, coverage, modes, count_keeps: false }.run(&faulty(faults))
 }
 
 fn assert_red(name: &str, faults: &[(&str, &str)]) {
-    let tally = campaign(faults, Coverage::Area);
+    assert_red_with(name, faults, PLAIN);
+}
+
+fn assert_red_with(name: &str, faults: &[(&str, &str)], modes: &'static [(Footprint, u32)]) {
+    let tally = campaign(faults, Coverage::Area, modes);
     eprintln!("{name}: {} false culls in {} cases, {} culled", tally.false_culls, tally.cases, tally.culled);
     assert!(tally.false_culls > 0, "{name}: the campaign stayed green: {tally:?}");
 }
@@ -28,7 +32,7 @@ fn assert_red(name: &str, faults: &[(&str, &str)]) {
 #[test]
 fn without_faults_it_is_green() {
     for coverage in [Coverage::Area, Coverage::Sample] {
-        assert_eq!(campaign(&[], coverage).false_culls, 0);
+        assert_eq!(campaign(&[], coverage, PLAIN).false_culls, 0);
     }
 }
 
@@ -59,8 +63,8 @@ fn a_depth_certificate_at_the_centre_alone() {
     assert_red(
         "depth",
         &[
-            ("surely_above(z, bar(d - a), w)", "z.center - bar(d - a) * w.center > 0.0"),
-            ("surely_below(z, bar(d - a), w)", "z.center - bar(d - a) * w.center < 0.0"),
+            ("surely_above(z, bar(d - view.z_slope), w)", "z.center - bar(d - view.z_slope) * w.center > 0.0"),
+            ("surely_below(z, bar(d - view.z_slope), w)", "z.center - bar(d - view.z_slope) * w.center < 0.0"),
         ],
     );
 }
@@ -79,6 +83,13 @@ fn a_rectangle_that_is_too_small_without_block_certificates() {
             ("&& inside_block(y, w, t.y, t.w, level, view.half_size.y, view.size.y)", ""),
         ],
     );
+}
+
+#[test]
+fn a_descent_that_forgets_a_column() {
+    let fault =
+        ("corner + vec2<u32>(1u), last >> vec2<u32>(child)", "corner + vec2<u32>(0u, 1u), last >> vec2<u32>(child)");
+    assert_red_with("descent", &[fault], &[(Footprint::Two, 4096)]);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The answer of a cull, read on request.
 
-use hiz_core::{Coverage, CullOptions, DrawTemplate, Order, VisibleOptions, headless};
+use hiz_core::{Coverage, CullOptions, DrawTemplate, Footprint, Order, VisibleOptions, headless};
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -15,6 +15,8 @@ pub(crate) struct CullArguments<'a> {
     pub(crate) guard_px: Option<f64>,
     pub(crate) depth_slack: f64,
     pub(crate) transform_slack: f64,
+    pub(crate) footprint: u32,
+    pub(crate) descent: u32,
     pub(crate) capacity: Option<u32>,
     /// Index count, first index, base vertex, first instance.
     pub(crate) draw: (u32, u32, i32, u32),
@@ -34,12 +36,20 @@ impl CullArguments<'_> {
             "sample" => Coverage::Sample,
             other => return Err(PyValueError::new_err(format!("coverage: no coverage {other:?}"))),
         };
+        let footprint = match self.footprint {
+            2 => Footprint::Two,
+            4 => Footprint::Four,
+            8 => Footprint::Eight,
+            other => return Err(PyValueError::new_err(format!("footprint: no footprint {other}"))),
+        };
         Ok(CullOptions {
             order,
             coverage,
             guard_px: self.guard_px,
             depth_slack: self.depth_slack,
             transform_slack: self.transform_slack,
+            footprint,
+            descent: self.descent,
             statistics: self.statistics,
         })
     }
@@ -90,6 +100,7 @@ impl Culling {
             demand: counts.demand,
             written: counts.written,
             levels: counts.levels,
+            texels_read: counts.texels_read,
         })
     }
 
@@ -125,6 +136,7 @@ pub(crate) struct Counts {
     demand: u64,
     written: u64,
     levels: [u64; 16],
+    texels_read: u64,
 }
 
 /// How one verdict came about.

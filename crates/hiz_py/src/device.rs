@@ -125,12 +125,24 @@ impl Engine {
         guard_px: Option<f64>,
         depth_slack: f64,
         transform_slack: f64,
+        footprint: u32,
+        descent: u32,
         capacity: Option<u32>,
         draw: (u32, u32, i32, u32),
         statistics: bool,
     ) -> PyResult<Culling> {
-        let arguments =
-            CullArguments { order, coverage, guard_px, depth_slack, transform_slack, capacity, draw, statistics };
+        let arguments = CullArguments {
+            order,
+            coverage,
+            guard_px,
+            depth_slack,
+            transform_slack,
+            footprint,
+            descent,
+            capacity,
+            draw,
+            statistics,
+        };
         let (options, output) = (arguments.options()?, arguments.output());
         detached(py, || self.0.cull(&instances.0, &camera.0, &pyramid.pyramid, &options, &output)).map(Culling)
     }

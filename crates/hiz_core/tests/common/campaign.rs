@@ -6,8 +6,8 @@
 
 use hiz_core::headless::Engine;
 use hiz_core::{
-    Bounds, Camera, Coverage, CullOptions, DepthConvention, Floats, ImageSize, InstanceOptions, Pose, Projection,
-    VisibleOptions,
+    Bounds, Camera, Coverage, CullOptions, DepthConvention, Floats, Footprint, ImageSize, InstanceOptions, Pose,
+    Projection, VisibleOptions,
 };
 use hiz_ref::{Options, Verdict, View, Volume};
 
@@ -24,6 +24,9 @@ pub(crate) struct Tally {
     pub(crate) false_keeps: usize,
 }
 
+/// What a cull reads by default.
+pub(crate) const PLAIN: &[(Footprint, u32)] = &[(Footprint::Two, 0)];
+
 /// How to run one.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Campaign {
@@ -32,6 +35,8 @@ pub(crate) struct Campaign {
     /// Volumes of each kind in a round.
     pub(crate) volumes: usize,
     pub(crate) coverage: Coverage,
+    /// Footprints and descent budgets to choose from. (Each costs pipelines, and those cost time.)
+    pub(crate) modes: &'static [(Footprint, u32)],
     /// Whether false keeps are counted, too (asks the oracle about everything).
     pub(crate) count_keeps: bool,
 }
@@ -65,8 +70,15 @@ impl Campaign {
             reversed: scene.camera.convention().is_reversed(),
         };
         // No slack: it would hide a margin that is too small.
-        let options =
-            CullOptions { coverage: self.coverage, depth_slack: 0.0, statistics: false, ..CullOptions::default() };
+        let (footprint, descent) = random.pick(self.modes);
+        let options = CullOptions {
+            coverage: self.coverage,
+            depth_slack: 0.0,
+            footprint,
+            descent,
+            statistics: false,
+            ..CullOptions::default()
+        };
         for kind in [Kind::Sphere, Kind::Box, Kind::OrientedBox] {
             let volumes: Vec<Volume> = (0..self.volumes).map(|_| scene.volume(kind, random)).collect();
             let arrays = Arrays::new(&volumes);
