@@ -164,7 +164,11 @@ FOOTPRINT: list[Bad] = [
     (16, ValueError, "in 2..8"),
     (2.0, TypeError, "got float 2.0"),
 ]
-DESCENT: list[Bad] = [(-1, ValueError, "in 0..65536"), (70000, ValueError, "in 0..65536"), (None, TypeError, "got None")]
+DESCENT: list[Bad] = [
+    (-1, ValueError, "in 0..65536"),
+    (70000, ValueError, "in 0..65536"),
+    (None, TypeError, "got None"),
+]
 TRANSFORM_SLACK: list[Bad] = [
     (-1, ValueError, "at least 0"),
     (INF, ValueError, "got float inf"),

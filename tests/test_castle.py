@@ -20,8 +20,8 @@ JUDGE = Path(__file__).resolve().parents[2] / "shared" / "judge"
 SIZES = [(360, 640), (563, 1001)]
 CONVENTIONS = ["standard", "reversed"]
 
-# What exact arithmetic keeps with a footprint of 2x2, 4x4 and 8x8 is 1.237, 1.113 and 1.045 times what a rectangle test at full
-# resolution keeps (the judge's, on pixels); a descent with budget to finish is such a test.
+# What exact arithmetic keeps with a footprint of 2x2, 4x4 and 8x8 is 1.237, 1.113 and 1.045 times what the judge's
+# rectangle test at full resolution keeps; a descent with budget to finish is such a test.
 MOST_KEPT = [(2, 0, 1.26), (4, 0, 1.13), (8, 0, 1.06), (2, 4096, 1.02)]
 
 

@@ -291,8 +291,8 @@ class Device:
         footprint : 2, 4 or 8
             How many texels a side a test may read of one level: more mean a finer level, so less is kept and more read.
         descent : int
-            How many texels of finer levels a test may read where the footprint cannot decide, up to 65536; 0: none. With
-            enough of them the answer is that of a rectangle test at full resolution.
+            How many texels of finer levels a test may read where the footprint cannot decide, up to 65536; 0: none.
+            With enough of them the answer is that of a rectangle test at full resolution.
         capacity : int, optional
             Most instances in the list. None: enough for all. Too small a capacity shows as ``count < demand``; mask and
             verdicts stay complete.
