@@ -1,6 +1,6 @@
 //! The ordered compaction: from the plane of kept bits to an ascending list and the draw's instance count.
 
-use crate::context::HizContext;
+use crate::gpu::Gpu;
 use crate::instances::Instances;
 use crate::pyramid::entry;
 use crate::visible::Visible;
@@ -9,15 +9,15 @@ use crate::visible::Visible;
 const SCATTER_WORKGROUP: u32 = 64;
 
 /// Records the compaction of every piece, in order: a later one needs to know what earlier ones left of the capacity.
-pub(crate) fn record(context: &HizContext, pass: &mut wgpu::ComputePass<'_>, instances: &Instances, visible: &Visible) {
-    let (scan, scatter) = (context.compact_pipeline("scan"), context.compact_pipeline("scatter"));
+pub(crate) fn record(gpu: &Gpu, pass: &mut wgpu::ComputePass<'_>, instances: &Instances, visible: &Visible) {
+    let (scan, scatter) = (gpu.compact_pipeline("scan"), gpu.compact_pipeline("scatter"));
     for (piece, output) in instances.pieces.iter().zip(&visible.pieces) {
         if piece.count() == 0 {
             continue;
         }
-        let bind_group = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        let bind_group = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("hiz.compact.piece"),
-            layout: &context.layouts().compact,
+            layout: &gpu.layouts().compact,
             entries: &[
                 entry(0, piece.uniform.as_entire_binding()),
                 entry(1, output.planes.as_entire_binding()),

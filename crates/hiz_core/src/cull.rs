@@ -2,8 +2,8 @@
 
 use crate::camera::Camera;
 use crate::compact;
-use crate::context::{CullKey, HizContext};
 use crate::error::{Error, Result};
+use crate::gpu::{CullKey, Gpu};
 use crate::instances::{Instances, Piece};
 use crate::layout::CULL_WORKGROUP;
 use crate::pyramid::{Built, Pyramid, entry};
@@ -191,21 +191,21 @@ pub(crate) struct CullInputs<'a> {
     pub(crate) options: &'a CullOptions,
 }
 
-fn bind(context: &HizContext, inputs: &CullInputs<'_>) -> Result<Bound> {
+fn bind(gpu: &Gpu, inputs: &CullInputs<'_>) -> Result<Bound> {
     let CullInputs { instances, camera, pyramid, options } = *inputs;
-    context.check_context("instances", instances.context)?;
-    context.check_context("pyramid", pyramid.context)?;
+    gpu.check_context("instances", instances.context)?;
+    gpu.check_context("pyramid", pyramid.context)?;
     let Built { reduction, source, source_kind, .. } = pyramid.built_for(camera)?;
-    let view = context.uniform("hiz.cull.view", &ViewUniform::new(camera, reduction, options)?)?;
-    let view = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
+    let view = gpu.uniform("hiz.cull.view", &ViewUniform::new(camera, reduction, options)?)?;
+    let view = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("hiz.cull.view"),
-        layout: context.layouts().cull(source_kind),
+        layout: gpu.layouts().cull(source_kind),
         entries: &[
             entry(0, wgpu::BindingResource::TextureView(&source)),
             entry(2, pyramid.uniform.as_entire_binding()),
-            entry(3, context.chunk(pyramid, 0).as_entire_binding()),
-            entry(4, context.chunk(pyramid, 1).as_entire_binding()),
-            entry(5, context.chunk(pyramid, 2).as_entire_binding()),
+            entry(3, pyramid.chunk(gpu, 0).as_entire_binding()),
+            entry(4, pyramid.chunk(gpu, 1).as_entire_binding()),
+            entry(5, pyramid.chunk(gpu, 2).as_entire_binding()),
             entry(6, view.as_entire_binding()),
         ],
     });
@@ -223,36 +223,36 @@ fn bind(context: &HizContext, inputs: &CullInputs<'_>) -> Result<Bound> {
     Ok(Bound { view, key })
 }
 
-fn bind_piece(context: &HizContext, uniform: &wgpu::Buffer, piece: &Piece) -> wgpu::BindGroup {
-    context.device().create_bind_group(&wgpu::BindGroupDescriptor {
+fn bind_piece(gpu: &Gpu, uniform: &wgpu::Buffer, piece: &Piece) -> wgpu::BindGroup {
+    gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("hiz.cull.instances"),
-        layout: &context.layouts().instances,
+        layout: &gpu.layouts().instances,
         entries: &[entry(0, uniform.as_entire_binding()), entry(1, piece.records.as_entire_binding())],
     })
 }
 
 pub(crate) fn record(
-    context: &HizContext,
+    gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
     inputs: &CullInputs<'_>,
     visible: &Visible,
 ) -> Result<()> {
     let CullInputs { instances, options, .. } = *inputs;
-    context.check_context("visible", visible.context)?;
+    gpu.check_context("visible", visible.context)?;
     if !visible.counts().iter().copied().eq(instances.pieces.iter().map(Piece::count)) {
         return Err(Error::mismatch("visible", "expected buffers that were created for these instances, got others"));
     }
-    let bound = bind(context, inputs)?;
+    let bound = bind(gpu, inputs)?;
     encoder.copy_buffer_to_buffer(&visible.draws_template, 0, &visible.draws, 0, visible.draws.size());
     encoder.clear_buffer(&visible.counters, 0, None);
     let mut pass = encoder
         .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.cull.pass"), timestamp_writes: None });
-    pass.set_pipeline(&context.cull_pipeline(bound.key));
+    pass.set_pipeline(&gpu.cull_pipeline(bound.key));
     pass.set_bind_group(0, &bound.view, &[]);
     for (piece, output) in instances.pieces.iter().zip(&visible.pieces) {
-        let outputs = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        let outputs = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("hiz.cull.visible"),
-            layout: &context.layouts().visible,
+            layout: &gpu.layouts().visible,
             entries: &[
                 entry(0, output.planes.as_entire_binding()),
                 entry(1, output.list.as_entire_binding()),
@@ -261,12 +261,12 @@ pub(crate) fn record(
                 entry(4, visible.capacity_uniform.as_entire_binding()),
             ],
         });
-        pass.set_bind_group(1, &bind_piece(context, &piece.uniform, piece), &[]);
+        pass.set_bind_group(1, &bind_piece(gpu, &piece.uniform, piece), &[]);
         pass.set_bind_group(2, &outputs, &[]);
         pass.dispatch_workgroups(piece.count().div_ceil(CULL_WORKGROUP), 1, 1);
     }
     if options.order == Order::Stable {
-        compact::record(context, &mut pass, instances, visible);
+        compact::record(gpu, &mut pass, instances, visible);
     }
     Ok(())
 }
@@ -288,7 +288,7 @@ pub(crate) struct ExplanationRecord {
 
 /// Records the explanation of instance `index` into `target`, `size_of::<ExplanationRecord>()` bytes of storage.
 pub(crate) fn record_explain(
-    context: &HizContext,
+    gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
     inputs: &CullInputs<'_>,
     index: u32,
@@ -298,18 +298,18 @@ pub(crate) fn record_explain(
     let piece = instances.pieces.iter().find(|p| p.range.contains(&index)).ok_or_else(|| {
         Error::invalid("index", format!("expected an instance below {}, got {index}", instances.len()))
     })?;
-    let Bound { view, key } = bind(context, inputs)?;
-    let which = context.uniform("hiz.explain.which", &[index - piece.range.start, 0, 0, 0])?;
-    let output = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
+    let Bound { view, key } = bind(gpu, inputs)?;
+    let which = gpu.uniform("hiz.explain.which", &[index - piece.range.start, 0, 0, 0])?;
+    let output = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("hiz.explain.target"),
-        layout: &context.layouts().one_storage,
+        layout: &gpu.layouts().one_storage,
         entries: &[entry(0, target.as_entire_binding())],
     });
     let mut pass = encoder
         .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.explain.pass"), timestamp_writes: None });
-    pass.set_pipeline(&context.explain_pipeline(CullKey { append: false, statistics: false, ..key }));
+    pass.set_pipeline(&gpu.explain_pipeline(CullKey { append: false, statistics: false, ..key }));
     pass.set_bind_group(0, &view, &[]);
-    pass.set_bind_group(1, &bind_piece(context, &which, piece), &[]);
+    pass.set_bind_group(1, &bind_piece(gpu, &which, piece), &[]);
     pass.set_bind_group(2, &output, &[]);
     pass.dispatch_workgroups(1, 1, 1);
     Ok(())

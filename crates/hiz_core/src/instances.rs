@@ -1,8 +1,8 @@
 //! Instances on the device: the bounding volumes of one call, cut into pieces that fit a binding and a dispatch.
 
 use crate::bounds::{Bounds, BoundsKind};
-use crate::context::{ContextId, HizContext, write_mapped};
 use crate::error::{Error, Result};
+use crate::gpu::{ContextId, Gpu, write_mapped};
 use crate::layout::{CULL_WORKGROUP, piece_capacity};
 
 /// How instances are uploaded.
@@ -56,10 +56,10 @@ pub struct Instances {
 const PACKED_AT_ONCE: usize = 1 << 14;
 
 impl Instances {
-    pub(crate) fn new(context: &HizContext, bounds: &Bounds<'_>, options: &InstanceOptions) -> Result<Self> {
+    pub(crate) fn new(gpu: &Gpu, bounds: &Bounds<'_>, options: &InstanceOptions) -> Result<Self> {
         let n = bounds.len()?;
         let total = u32::try_from(n).map_err(|_| Error::limit("instances", n as u64, u64::from(u32::MAX)))?;
-        let device = context.device();
+        let device = gpu.device();
         let kind = bounds.kind();
         let most = piece_capacity(kind.record_bytes(), &device.limits());
         let capacity = match options.piece_capacity {
@@ -77,7 +77,7 @@ impl Instances {
             .map(|index| {
                 let start = index * capacity;
                 let range = start..total.min(start.saturating_add(capacity));
-                upload(context, bounds, index, range, &mut invalid)
+                upload(gpu, bounds, index, range, &mut invalid)
             })
             .collect::<Result<_>>()?;
         if options.strict
@@ -91,7 +91,7 @@ impl Instances {
                 ),
             ));
         }
-        Ok(Self { context: context.id(), kind, pieces, invalid })
+        Ok(Self { context: gpu.id(), kind, pieces, invalid })
     }
 
     /// The number of instances.
@@ -126,7 +126,7 @@ impl Instances {
 }
 
 fn upload(
-    context: &HizContext,
+    gpu: &Gpu,
     bounds: &Bounds<'_>,
     index: u32,
     range: std::ops::Range<u32>,
@@ -134,7 +134,7 @@ fn upload(
 ) -> Result<Piece> {
     let record_bytes = bounds.kind().record_bytes();
     let count = range.end - range.start;
-    let records = context.device().create_buffer(&wgpu::BufferDescriptor {
+    let records = gpu.device().create_buffer(&wgpu::BufferDescriptor {
         label: Some("hiz.instances.records"),
         size: u64::from(count.max(1)) * record_bytes,
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
@@ -149,7 +149,7 @@ fn upload(
         write_mapped("hiz.instances.records", &records, offset, &packed)?;
     }
     records.unmap();
-    let uniform = context
+    let uniform = gpu
         .uniform("hiz.instances.piece", &PieceUniform { base: range.start, count, index, words: count.div_ceil(32) })?;
     Ok(Piece { range, records, uniform })
 }

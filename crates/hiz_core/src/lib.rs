@@ -25,6 +25,7 @@ mod context;
 mod cull;
 mod depth;
 mod error;
+mod gpu;
 mod instances;
 mod layout;
 mod occluders;

@@ -2,8 +2,8 @@
 
 use crate::bounds::Floats;
 use crate::camera::{Camera, DepthConvention, Vec3, dot, sub};
-use crate::context::{ContextId, HizContext};
 use crate::error::{Error, Result};
+use crate::gpu::{ContextId, Gpu, OccluderKey};
 use crate::pyramid::entry;
 use crate::shader;
 use crate::view::{ClipRows, split3};
@@ -39,12 +39,6 @@ pub struct MeshData<'a> {
 pub struct OccluderOptions {
     /// Which triangles do not occlude.
     pub cull_mode: FaceCull,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) struct PipelineKey {
-    reversed: bool,
-    cull_mode: FaceCull,
 }
 
 /// A vertex: its world position as two halves; `shaders/occluders.wgsl`, locations 0 and 1.
@@ -93,12 +87,12 @@ struct Baked {
 }
 
 impl Occluders {
-    pub(crate) fn new(context: &HizContext, meshes: &[MeshData<'_>], options: &OccluderOptions) -> Result<Self> {
+    pub(crate) fn new(gpu: &Gpu, meshes: &[MeshData<'_>], options: &OccluderOptions) -> Result<Self> {
         let mut baked = Baked::default();
         for mesh in meshes {
             baked.add(mesh)?;
         }
-        let device = context.device();
+        let device = gpu.device();
         let allowed = device.limits().max_buffer_size;
         for bytes in [size_of_val(&baked.vertices[..]), size_of_val(&baked.indices[..])] {
             if bytes as u64 > allowed {
@@ -108,10 +102,10 @@ impl Occluders {
         let buffer = |label, contents: &[u8], usage| {
             // An empty buffer cannot be bound.
             let contents = if contents.is_empty() { &[0; 24][..] } else { contents };
-            context.filled(label, contents, usage)
+            gpu.filled(label, contents, usage)
         };
         Ok(Self {
-            context: context.id(),
+            context: gpu.id(),
             vertices: buffer(
                 "hiz.occluders.vertices",
                 bytemuck::cast_slice(&baked.vertices),
@@ -243,8 +237,8 @@ fn outside_frustum(camera: &Camera, min: Vec3, max: Vec3) -> bool {
         || all(&|c| c[3] - c[2])
 }
 
-pub(crate) fn pipeline(context: &HizContext, key: PipelineKey) -> wgpu::RenderPipeline {
-    let device = context.device();
+fn pipeline(gpu: &Gpu, key: OccluderKey) -> wgpu::RenderPipeline {
+    let device = gpu.device();
     let label = Some("hiz.occluders.pipeline");
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label,
@@ -252,7 +246,7 @@ pub(crate) fn pipeline(context: &HizContext, key: PipelineKey) -> wgpu::RenderPi
     });
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label,
-        bind_group_layouts: &[Some(&context.layouts().occluder_view)],
+        bind_group_layouts: &[Some(&gpu.layouts().occluder_view)],
         immediate_size: 0,
     });
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
@@ -270,11 +264,7 @@ pub(crate) fn pipeline(context: &HizContext, key: PipelineKey) -> wgpu::RenderPi
         },
         primitive: wgpu::PrimitiveState {
             front_face: wgpu::FrontFace::Ccw,
-            cull_mode: match key.cull_mode {
-                FaceCull::None => None,
-                FaceCull::Back => Some(wgpu::Face::Back),
-                FaceCull::Front => Some(wgpu::Face::Front),
-            },
+            cull_mode: key.cull_mode,
             ..Default::default()
         },
         depth_stencil: Some(wgpu::DepthStencilState {
@@ -296,13 +286,13 @@ pub(crate) fn pipeline(context: &HizContext, key: PipelineKey) -> wgpu::RenderPi
 }
 
 pub(crate) fn record(
-    context: &HizContext,
+    gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
     occluders: &Occluders,
     camera: &Camera,
     target: &wgpu::TextureView,
 ) -> Result<()> {
-    context.check_context("occluders", occluders.context)?;
+    gpu.check_context("occluders", occluders.context)?;
     let texture = target.texture();
     let (want, have) = (camera.size(), (texture.width(), texture.height()));
     if have != (want.width, want.height) || texture.format() != OCCLUDER_DEPTH_FORMAT {
@@ -318,16 +308,15 @@ pub(crate) fn record(
     }
     let ClipRows { rows, eye_hi, eye_lo } = ClipRows::new(camera)?;
     let wide = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
-    let view =
-        context.uniform("hiz.occluders.view", &OccluderView { rows, eye_hi: wide(eye_hi), eye_lo: wide(eye_lo) })?;
-    let bind_group = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
+    let view = gpu.uniform("hiz.occluders.view", &OccluderView { rows, eye_hi: wide(eye_hi), eye_lo: wide(eye_lo) })?;
+    let bind_group = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("hiz.occluders.view"),
-        layout: &context.layouts().occluder_view,
+        layout: &gpu.layouts().occluder_view,
         entries: &[entry(0, view.as_entire_binding())],
     });
-    let key = PipelineKey {
+    let key = OccluderKey {
         reversed: camera.convention() == DepthConvention::Reversed,
-        cull_mode: effective_cull(occluders.cull_mode, camera),
+        cull_mode: culled_face(occluders.cull_mode, camera),
     };
     let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         label: Some("hiz.occluders.pass"),
@@ -342,7 +331,7 @@ pub(crate) fn record(
         }),
         ..Default::default()
     });
-    pass.set_pipeline(&context.occluder_pipeline(key));
+    pass.set_pipeline(&gpu.occluder_pipeline(key, || pipeline(gpu, key)));
     pass.set_bind_group(0, &bind_group, &[]);
     pass.set_vertex_buffer(0, occluders.vertices.slice(..));
     pass.set_index_buffer(occluders.indices.slice(..), wgpu::IndexFormat::Uint32);
@@ -355,7 +344,7 @@ pub(crate) fn record(
 }
 
 /// A camera that mirrors the world (a left-handed one) turns every triangle around in the image.
-fn effective_cull(mode: FaceCull, camera: &Camera) -> FaceCull {
+fn culled_face(mode: FaceCull, camera: &Camera) -> Option<wgpu::Face> {
     let rows = camera.rows();
     let lin = |r: usize| [rows[r][0], rows[r][1], rows[r][2]];
     let (x, y) = (lin(0), lin(1));
@@ -368,9 +357,9 @@ fn effective_cull(mode: FaceCull, camera: &Camera) -> FaceCull {
         lin(2)
     };
     let mirrored = dot(crate::camera::cross(x, y), forward) > 0.0;
-    match mode {
-        FaceCull::Back if mirrored => FaceCull::Front,
-        FaceCull::Front if mirrored => FaceCull::Back,
-        other => other,
+    match (mode, mirrored) {
+        (FaceCull::None, _) => None,
+        (FaceCull::Back, false) | (FaceCull::Front, true) => Some(wgpu::Face::Back),
+        (FaceCull::Back, true) | (FaceCull::Front, false) => Some(wgpu::Face::Front),
     }
 }

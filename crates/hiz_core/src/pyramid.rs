@@ -4,8 +4,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::camera::{Camera, ImageSize};
-use crate::context::{ContextId, HizContext};
 use crate::error::{Error, Result};
+use crate::gpu::{ContextId, Gpu};
 use crate::layout::{Level, MAX_LEVELS, PYRAMID_CHUNKS, PyramidLayout};
 use crate::shader::SourceKind;
 
@@ -61,8 +61,8 @@ pub(crate) struct Built {
 }
 
 impl Pyramid {
-    pub(crate) fn new(context: &HizContext, size: ImageSize, options: &PyramidOptions) -> Result<Self> {
-        let device = context.device();
+    pub(crate) fn new(gpu: &Gpu, size: ImageSize, options: &PyramidOptions) -> Result<Self> {
+        let device = gpu.device();
         let side = size.width.max(size.height);
         let allowed = device.limits().max_texture_dimension_2d;
         if side > allowed {
@@ -91,13 +91,13 @@ impl Pyramid {
             .collect();
         let mut levels = [Level { offset: 0, stride: 0, width: 0, height: 0 }; MAX_LEVELS];
         levels[..layout.levels.len()].copy_from_slice(&layout.levels);
-        let uniform = context.uniform(
+        let uniform = gpu.uniform(
             "hiz.pyramid.layout",
             &PyramidUniform { levels, num_levels: layout.num_levels(), chunk_shift, padding: [0; 2] },
         )?;
         // One at least: it also writes the header.
         let steps = (0..layout.num_levels().max(2) - 1).step_by(LEVELS_PER_STEP as usize).collect();
-        Ok(Self { context: context.id(), layout, chunks, uniform, steps, built: Mutex::new(None) })
+        Ok(Self { context: gpu.id(), layout, chunks, uniform, steps, built: Mutex::new(None) })
     }
 
     /// The depth image's size.
@@ -123,6 +123,11 @@ impl Pyramid {
     /// The camera of the depth image that the pyramid was last built from.
     pub fn camera(&self) -> Option<Camera> {
         self.built().map(|b| b.camera)
+    }
+
+    /// Chunk `i`, or what stands in for it.
+    pub(crate) fn chunk<'a>(&'a self, gpu: &'a Gpu, i: usize) -> &'a wgpu::Buffer {
+        self.chunks.get(i).unwrap_or_else(|| gpu.no_chunk(i))
     }
 
     pub(crate) fn built(&self) -> Option<Built> {
@@ -151,13 +156,13 @@ impl Pyramid {
 
 /// Records the reduction of `depth` (all of its texture's first mip level) into `pyramid`.
 pub(crate) fn record_reduce(
-    context: &HizContext,
+    gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
     depth: &wgpu::TextureView,
     camera: &Camera,
     pyramid: &Pyramid,
 ) -> Result<()> {
-    context.check_context("pyramid", pyramid.context)?;
+    gpu.check_context("pyramid", pyramid.context)?;
     let texture = depth.texture();
     let size = ImageSize::new(texture.width(), texture.height());
     if size != pyramid.size() {
@@ -193,32 +198,32 @@ pub(crate) fn record_reduce(
         return Err(Error::invalid("depth", format!("expected the usage TEXTURE_BINDING, got {:?}", texture.usage())));
     }
     let reduction = next_reduction();
-    let layouts = context.layouts();
+    let layouts = gpu.layouts();
     let pipeline =
-        |from_source| context.reduce_pipeline(source_kind, camera.convention(), pyramid.chunks.len(), from_source);
-    let source = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        |from_source| gpu.reduce_pipeline(source_kind, camera.convention(), pyramid.chunks.len(), from_source);
+    let source = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("hiz.reduce.pyramid"),
         layout: layouts.reduce(source_kind),
         entries: &[
             entry(0, wgpu::BindingResource::TextureView(depth)),
-            entry(1, wgpu::BindingResource::Sampler(context.sampler())),
+            entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
             entry(2, pyramid.uniform.as_entire_binding()),
-            entry(3, context.chunk(pyramid, 0).as_entire_binding()),
-            entry(4, context.chunk(pyramid, 1).as_entire_binding()),
-            entry(5, context.chunk(pyramid, 2).as_entire_binding()),
+            entry(3, pyramid.chunk(gpu, 0).as_entire_binding()),
+            entry(4, pyramid.chunk(gpu, 1).as_entire_binding()),
+            entry(5, pyramid.chunk(gpu, 2).as_entire_binding()),
         ],
     });
     let uniforms = pyramid
         .steps
         .iter()
-        .map(|from| context.uniform("hiz.reduce.step", &[*from, reduction, 0, 0]))
+        .map(|from| gpu.uniform("hiz.reduce.step", &[*from, reduction, 0, 0]))
         .collect::<Result<Vec<_>>>()?;
     let mut pass = encoder
         .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.reduce.pass"), timestamp_writes: None });
     pass.set_bind_group(0, &source, &[]);
     for (from, uniform) in pyramid.steps.iter().zip(&uniforms) {
         let size = pyramid.layout.levels[*from as usize];
-        let bind_group = context.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        let bind_group = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("hiz.reduce.step"),
             layout: &layouts.one_uniform,
             entries: &[entry(0, uniform.as_entire_binding())],

@@ -1,7 +1,7 @@
 //! What a cull finds, on the device: verdict planes, the packed list, draw arguments and counters.
 
-use crate::context::{ContextId, HizContext, write_mapped};
 use crate::error::Result;
+use crate::gpu::{ContextId, Gpu, write_mapped};
 use crate::instances::Instances;
 
 /// The arguments of `draw_indexed_indirect`, as the device reads them.
@@ -87,8 +87,8 @@ pub struct Visible {
 }
 
 impl Visible {
-    pub(crate) fn new(context: &HizContext, instances: &Instances, options: &VisibleOptions) -> Result<Self> {
-        let device = context.device();
+    pub(crate) fn new(gpu: &Gpu, instances: &Instances, options: &VisibleOptions) -> Result<Self> {
+        let device = gpu.device();
         let capacity = options.capacity.unwrap_or(instances.len());
         let storage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         let buffer = |label, size, usage| {
@@ -113,16 +113,16 @@ impl Visible {
         let template = vec![draw; instances.num_pieces()];
         let draws_bytes = (template.len() * size_of::<DrawIndexedIndirect>()) as u64;
         Ok(Self {
-            context: context.id(),
+            context: gpu.id(),
             pieces,
             draws: buffer("hiz.visible.draws", draws_bytes, storage | wgpu::BufferUsages::INDIRECT),
-            draws_template: context.filled(
+            draws_template: gpu.filled(
                 "hiz.visible.draws_template",
                 bytemuck::cast_slice(&template),
                 wgpu::BufferUsages::COPY_SRC,
             )?,
             counters: buffer("hiz.visible.counters", size_of::<CounterRecord>() as u64, storage),
-            capacity_uniform: context.uniform("hiz.visible.capacity", &[capacity, 0, 0, 0])?,
+            capacity_uniform: gpu.uniform("hiz.visible.capacity", &[capacity, 0, 0, 0])?,
             capacity,
             counts: instances.pieces.iter().map(crate::instances::Piece::count).collect(),
         })

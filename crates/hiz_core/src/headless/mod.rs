@@ -2,102 +2,30 @@
 //!
 //! Everything here is `Send + Sync`; an [`Engine`] is cheap to clone and may be used from any thread.
 
+mod adapter;
+mod culling;
+mod depth_image;
+
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
+pub use adapter::{ADAPTER_VARIABLE, AdapterSummary, INSTALL_HINT, adapters};
+pub use culling::{Counts, Culling, Explanation, Timings};
+pub use depth_image::DepthImage;
+
 use crate::bounds::Bounds;
-use crate::camera::{Camera, ImageSize};
+use crate::camera::Camera;
 use crate::context::HizContext;
-use crate::cull::{CullInputs, CullOptions, ExplanationRecord, record_explain};
+use crate::cull::CullOptions;
 use crate::error::{Error, Result};
 use crate::instances::{InstanceOptions, Instances};
 use crate::occluders::{MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders};
 use crate::pyramid::{Pyramid, PyramidOptions};
 use crate::readback::{self, BufferRange};
-use crate::visible::{CounterRecord, DrawIndexedIndirect, Visible, VisibleOptions};
+use crate::visible::VisibleOptions;
 
-/// The environment variable that chooses an adapter.
-pub const ADAPTER_VARIABLE: &str = "HIZVK_ADAPTER";
-
-/// How to install a software driver.
-pub const INSTALL_HINT: &str = "A software Vulkan driver: apt install libvulkan1 mesa-vulkan-drivers";
-
-/// A Vulkan adapter, as text.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct AdapterSummary {
-    /// Its place in [`adapters`].
-    pub index: usize,
-    /// The device's name.
-    pub name: String,
-    /// The driver's name.
-    pub driver: String,
-    /// The driver's version.
-    pub driver_info: String,
-    /// The graphics API.
-    pub backend: String,
-    /// `discrete_gpu`, `integrated_gpu`, `virtual_gpu`, `cpu` or `other`.
-    pub device_type: String,
-}
-
-impl AdapterSummary {
-    fn new(index: usize, info: &wgpu::AdapterInfo) -> Self {
-        let device_type = match info.device_type {
-            wgpu::DeviceType::DiscreteGpu => "discrete_gpu",
-            wgpu::DeviceType::IntegratedGpu => "integrated_gpu",
-            wgpu::DeviceType::VirtualGpu => "virtual_gpu",
-            wgpu::DeviceType::Cpu => "cpu",
-            wgpu::DeviceType::Other => "other",
-        };
-        Self {
-            index,
-            name: info.name.clone(),
-            driver: info.driver.clone(),
-            driver_info: info.driver_info.clone(),
-            backend: info.backend.to_string(),
-            device_type: device_type.to_owned(),
-        }
-    }
-
-    /// Lower is better: real GPUs first.
-    fn rank(&self) -> usize {
-        let order = ["discrete_gpu", "integrated_gpu", "virtual_gpu", "cpu"];
-        order.iter().position(|t| *t == self.device_type).unwrap_or(order.len())
-    }
-
-    fn matches(&self, request: &str) -> bool {
-        // Digits are an index and nothing else: "1" is also part of many a version.
-        if let Ok(index) = request.parse::<usize>() {
-            return index == self.index;
-        }
-        let request = request.to_lowercase();
-        [&self.name, &self.driver, &self.driver_info].iter().any(|text| text.to_lowercase().contains(&request))
-    }
-}
-
-impl std::fmt::Display for AdapterSummary {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} ({}, {} {})", self.name, self.device_type, self.driver, self.driver_info)
-    }
-}
-
-fn instance() -> wgpu::Instance {
-    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-    descriptor.backends = wgpu::Backends::VULKAN;
-    wgpu::Instance::new(descriptor)
-}
-
-fn enumerate() -> Vec<(AdapterSummary, wgpu::Adapter)> {
-    pollster::block_on(instance().enumerate_adapters(wgpu::Backends::VULKAN))
-        .into_iter()
-        .enumerate()
-        .map(|(i, adapter)| (AdapterSummary::new(i, &adapter.get_info()), adapter))
-        .collect()
-}
-
-/// The Vulkan adapters of this machine; none without a driver.
-pub fn adapters() -> Vec<AdapterSummary> {
-    enumerate().into_iter().map(|(summary, _)| summary).collect()
-}
+/// Bytes of a depth image that one staging area takes.
+const UPLOAD_BYTES: u32 = 1 << 26;
 
 /// A device, its queue and the pipelines on it.
 #[derive(Debug, Clone)]
@@ -135,7 +63,7 @@ impl Engine {
     pub fn with_planted_faults(adapter: Option<&str>, faults: &[(&str, &str)]) -> Result<Self> {
         let from_environment = std::env::var(ADAPTER_VARIABLE).ok().filter(|s| !s.is_empty());
         let request = adapter.map(str::to_owned).or(from_environment);
-        let mut found = enumerate();
+        let mut found = adapter::enumerate();
         let no_adapter = |request: String, seen| Error::NoAdapter { request, seen, hint: INSTALL_HINT.to_owned() };
         let seen: Vec<String> = found.iter().map(|(summary, _)| summary.to_string()).collect();
         if let Some(request) = &request {
@@ -281,7 +209,7 @@ impl Engine {
     /// # Errors
     /// As [`Engine::pyramid`].
     pub fn pyramid_with(&self, depth: &DepthImage, options: &PyramidOptions) -> Result<Arc<Pyramid>> {
-        self.context().check_context("depth", depth.engine.context().id())?;
+        self.context().gpu.check_context("depth", depth.engine.context().gpu.id())?;
         self.scoped(|| {
             let pyramid = self.context().create_pyramid(depth.size(), options)?;
             let mut encoder = self.encoder("hiz.reduce.encoder");
@@ -296,7 +224,7 @@ impl Engine {
     /// # Errors
     /// [`Error::Invalid`] past the last level, [`Error::Mismatch`] for a pyramid that was never built.
     pub fn read_level(&self, pyramid: &Pyramid, level: u32) -> Result<Vec<f32>> {
-        self.context().check_context("pyramid", pyramid.context)?;
+        self.context().gpu.check_context("pyramid", pyramid.context)?;
         let layout = pyramid.layout.levels.get(level as usize).ok_or_else(|| {
             Error::invalid("level", format!("expected a level below {}, got {level}", pyramid.num_levels()))
         })?;
@@ -430,321 +358,10 @@ impl Engine {
     }
 }
 
-/// Bytes of a depth image that one staging area takes.
-const UPLOAD_BYTES: u32 = 1 << 26;
-
 fn milliseconds(start: Instant, end: Instant) -> f64 {
     end.duration_since(start).as_secs_f64() * 1e3
 }
 
 fn to_u32(bytes: &[u8]) -> impl Iterator<Item = u32> {
     bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-}
-
-/// A depth image on the device and the camera that it was made by.
-#[derive(Debug, Clone)]
-pub struct DepthImage {
-    engine: Engine,
-    texture: wgpu::Texture,
-    view: wgpu::TextureView,
-    camera: Camera,
-}
-
-impl DepthImage {
-    /// The image's size.
-    pub fn size(&self) -> ImageSize {
-        self.camera.size()
-    }
-
-    /// The camera that it was made by.
-    pub fn camera(&self) -> &Camera {
-        &self.camera
-    }
-
-    /// The texture.
-    pub fn texture(&self) -> &wgpu::Texture {
-        &self.texture
-    }
-
-    /// The depth as given, row 0 on top.
-    ///
-    /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
-    pub fn read(&self) -> Result<Vec<f32>> {
-        let engine = &self.engine;
-        let bytes = engine.scoped(|| readback::read_texture(engine.device(), engine.queue(), &self.texture))?;
-        Ok(to_u32(&bytes).map(f32::from_bits).collect())
-    }
-}
-
-/// How many instances met which end.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// All instances.
-    pub tested: u64,
-    /// Outside the frustum.
-    pub outside: u64,
-    /// Hidden by the depth image.
-    pub occluded: u64,
-    /// Possibly visible.
-    pub visible: u64,
-    /// Bad bounds, kept.
-    pub invalid: u64,
-    /// Visible and invalid: what the lists would hold without a capacity.
-    pub demand: u64,
-    /// What they hold.
-    pub written: u64,
-    /// Depth tests at each level (with [`CullOptions::statistics`]).
-    pub levels: [u64; 16],
-    /// Texels read (with [`CullOptions::statistics`]).
-    pub texels_read: u64,
-}
-
-/// Wall times of one cull.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Timings {
-    /// Making buffers and recording.
-    pub record_ms: f64,
-    /// From the submit to the end of the first wait for it.
-    pub gpu_ms: f64,
-    /// Copies to the host after that, so far.
-    pub readback_ms: f64,
-}
-
-/// Why an instance got its verdict.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Explanation {
-    /// 0 outside, 1 occluded, 2 visible, 3 invalid (kept).
-    pub verdict: u8,
-    /// First and last pixel column and row that the projection may touch, inclusive: x0, y0, x1, y1.
-    pub rectangle: Option<[i32; 4]>,
-    /// The level that was read.
-    pub level: Option<u32>,
-    /// The texels (x, y) of that level that were read.
-    pub texels: Vec<[u32; 2]>,
-    /// Their depths.
-    pub texel_depths: Vec<f32>,
-    /// The farthest of them.
-    pub farthest: Option<f32>,
-    /// The NDC depth of the bounds' nearest point, an estimate.
-    pub nearest: Option<f64>,
-    /// In words.
-    pub reason: &'static str,
-}
-
-/// A cull that was submitted. Reading waits for it.
-#[derive(Debug)]
-pub struct Culling {
-    engine: Engine,
-    instances: Arc<Instances>,
-    pyramid: Arc<Pyramid>,
-    camera: Camera,
-    options: CullOptions,
-    visible: Visible,
-    submission: wgpu::SubmissionIndex,
-    submitted: Instant,
-    timings: Mutex<Timings>,
-}
-
-impl Culling {
-    /// The buffers on the device.
-    pub fn visible(&self) -> &Visible {
-        &self.visible
-    }
-
-    /// The instances that were culled.
-    pub fn instances(&self) -> &Instances {
-        &self.instances
-    }
-
-    /// Waits until the device is done.
-    ///
-    /// # Errors
-    /// [`Error::DeviceLost`].
-    pub fn wait(&self) -> Result<()> {
-        self.engine.scoped(|| readback::wait(self.engine.device(), Some(self.submission.clone())))?;
-        let mut timings = locked(&self.timings);
-        if timings.gpu_ms == 0.0 {
-            timings.gpu_ms = milliseconds(self.submitted, Instant::now());
-        }
-        Ok(())
-    }
-
-    /// Wall times so far.
-    pub fn timings(&self) -> Timings {
-        *locked(&self.timings)
-    }
-
-    fn read(&self, ranges: &[BufferRange<'_>]) -> Result<Vec<Vec<u8>>> {
-        self.wait()?;
-        let start = Instant::now();
-        let bytes = self.engine.scoped(|| readback::read_buffers(self.engine.device(), self.engine.queue(), ranges))?;
-        locked(&self.timings).readback_ms += milliseconds(start, Instant::now());
-        Ok(bytes)
-    }
-
-    /// Whether each instance is kept.
-    ///
-    /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
-    pub fn mask(&self) -> Result<Vec<bool>> {
-        let ranges: Vec<_> = self
-            .instances
-            .pieces
-            .iter()
-            .zip(&self.visible.pieces)
-            .map(|(piece, output)| BufferRange::first(&output.planes, 4 * u64::from(piece.words())))
-            .collect();
-        let planes = self.read(&ranges)?;
-        let mut mask = Vec::with_capacity(self.instances.len() as usize);
-        for (piece, plane) in self.instances.pieces.iter().zip(planes) {
-            let words: Vec<u32> = to_u32(&plane).collect();
-            mask.extend((0..piece.count() as usize).map(|i| bit(&words, i) == 1));
-        }
-        Ok(mask)
-    }
-
-    /// Each instance's verdict: 0 outside, 1 occluded, 2 visible, 3 invalid (kept).
-    ///
-    /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
-    pub fn verdicts(&self) -> Result<Vec<u8>> {
-        let ranges: Vec<_> = self
-            .instances
-            .pieces
-            .iter()
-            .zip(&self.visible.pieces)
-            .map(|(piece, output)| BufferRange::first(&output.planes, 8 * u64::from(piece.words())))
-            .collect();
-        let planes = self.read(&ranges)?;
-        let mut verdicts = Vec::with_capacity(self.instances.len() as usize);
-        for (piece, plane) in self.instances.pieces.iter().zip(planes) {
-            let words: Vec<u32> = to_u32(&plane).collect();
-            let (kept, low) = words.split_at(piece.words() as usize);
-            verdicts.extend((0..piece.count() as usize).map(|i| 2 * bit(kept, i) + bit(low, i)));
-        }
-        Ok(verdicts)
-    }
-
-    /// The draw arguments, one record a piece.
-    ///
-    /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
-    pub fn draws(&self) -> Result<Vec<DrawIndexedIndirect>> {
-        let draws = &self.visible.draws;
-        let bytes = self.read(&[BufferRange::first(draws, draws.size())])?;
-        Ok(bytemuck::pod_collect_to_vec(&bytes[0]))
-    }
-
-    /// The packed list, the pieces joined.
-    ///
-    /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
-    pub fn indices(&self) -> Result<Vec<u32>> {
-        let draws = self.draws()?;
-        let ranges: Vec<_> = draws
-            .iter()
-            .zip(&self.visible.pieces)
-            .map(|(draw, output)| {
-                BufferRange::first(&output.list, 4 * u64::from(draw.instance_count.min(output.list_capacity)))
-            })
-            .collect();
-        let lists = self.read(&ranges)?;
-        Ok(lists.iter().flat_map(|bytes| to_u32(bytes)).collect())
-    }
-
-    /// How many instances met which end.
-    ///
-    /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
-    pub fn counts(&self) -> Result<Counts> {
-        let (counters, draws) = (&self.visible.counters, &self.visible.draws);
-        let bytes =
-            self.read(&[BufferRange::first(counters, counters.size()), BufferRange::first(draws, draws.size())])?;
-        let record: CounterRecord = bytemuck::pod_read_unaligned(&bytes[0]);
-        let draws: Vec<DrawIndexedIndirect> = bytemuck::pod_collect_to_vec(&bytes[1]);
-        Ok(Counts {
-            tested: u64::from(self.instances.len()),
-            outside: record.outside.into(),
-            occluded: record.occluded.into(),
-            visible: record.visible.into(),
-            invalid: record.invalid.into(),
-            demand: u64::from(record.visible) + u64::from(record.invalid),
-            written: draws.iter().map(|d| u64::from(d.instance_count)).sum(),
-            levels: record.levels.map(u64::from),
-            texels_read: u64::from(record.texels_high) << 32 | u64::from(record.texels_low),
-        })
-    }
-
-    /// Why instance `index` got its verdict: the cull's own steps, run for it once more.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] for an index past the end.
-    pub fn explain(&self, index: u64) -> Result<Explanation> {
-        let engine = &self.engine;
-        let index = u32::try_from(index).unwrap_or(u32::MAX);
-        let bytes = engine.scoped(|| {
-            let target = engine.device().create_buffer(&wgpu::BufferDescriptor {
-                label: Some("hiz.explain.target"),
-                size: size_of::<ExplanationRecord>() as u64,
-                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
-                mapped_at_creation: false,
-            });
-            let mut encoder = engine.encoder("hiz.explain.encoder");
-            let inputs = CullInputs {
-                instances: &self.instances,
-                camera: &self.camera,
-                pyramid: &self.pyramid,
-                options: &self.options,
-            };
-            record_explain(engine.context(), &mut encoder, &inputs, index, &target)?;
-            engine.queue().submit([encoder.finish()]);
-            readback::read_buffers(engine.device(), engine.queue(), &[BufferRange::first(&target, target.size())])
-        })?;
-        Ok(explanation(&bytemuck::pod_read_unaligned(&bytes[0]), &self.camera))
-    }
-}
-
-fn bit(words: &[u32], i: usize) -> u8 {
-    (words[i / 32] >> (i % 32) & 1) as u8
-}
-
-/// The stages of `shaders/shared/classify.wgsl`.
-fn explanation(record: &ExplanationRecord, camera: &Camera) -> Explanation {
-    let reached_depth = record.stage >= 4;
-    let reason = match (record.stage, record.verdict) {
-        (0, _) => "the bounds are not finite, negative, or too large for this camera: kept",
-        (1, _) => "outside one plane of the frustum",
-        (2, _) => "crosses the plane of the eye: kept",
-        (3, 0) => "between the pixel centres",
-        (3, _) => "touches no pixel for sure, but no plane of the frustum separates it: kept",
-        (4, _) => "not surely behind the farthest depth of the texels: kept",
-        (6, 1) => "behind the farthest depth of every pixel that it can touch",
-        (6, _) => "not surely behind every pixel that it can touch, or the budget ended: kept",
-        (_, 1) => "behind the farthest depth of all texels that it can touch",
-        _ => "behind the texels, but not surely inside their block: kept",
-    };
-    let [x0, y0, x1, y1] = record.texels;
-    let corners = [[x0, y0], [x1, y0], [x0, y1], [x1, y1]];
-    let (mut texels, mut texel_depths) = (Vec::new(), Vec::new());
-    if reached_depth {
-        for (texel, bits) in corners.iter().zip(record.texel_bits) {
-            if !texels.contains(texel) {
-                texels.push(*texel);
-                texel_depths.push(f32::from_bits(bits));
-            }
-        }
-    }
-    let [least, greatest] = record.depths.map(f64::from);
-    let nearest = if camera.convention().is_reversed() { greatest } else { least };
-    Explanation {
-        verdict: record.verdict as u8,
-        rectangle: reached_depth.then_some(record.pixels),
-        level: reached_depth.then_some(record.level),
-        texels,
-        texel_depths,
-        farthest: reached_depth.then(|| f32::from_bits(record.farthest_bits)),
-        nearest: (record.stage >= 3).then_some(nearest),
-        reason,
-    }
 }

@@ -1,0 +1,84 @@
+//! Which Vulkan adapters there are.
+
+/// The environment variable that chooses an adapter.
+pub const ADAPTER_VARIABLE: &str = "HIZVK_ADAPTER";
+
+/// How to install a software driver.
+pub const INSTALL_HINT: &str = "A software Vulkan driver: apt install libvulkan1 mesa-vulkan-drivers";
+
+/// A Vulkan adapter, as text.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AdapterSummary {
+    /// Its place in [`adapters`].
+    pub index: usize,
+    /// The device's name.
+    pub name: String,
+    /// The driver's name.
+    pub driver: String,
+    /// The driver's version.
+    pub driver_info: String,
+    /// The graphics API.
+    pub backend: String,
+    /// `discrete_gpu`, `integrated_gpu`, `virtual_gpu`, `cpu` or `other`.
+    pub device_type: String,
+}
+
+impl AdapterSummary {
+    fn new(index: usize, info: &wgpu::AdapterInfo) -> Self {
+        let device_type = match info.device_type {
+            wgpu::DeviceType::DiscreteGpu => "discrete_gpu",
+            wgpu::DeviceType::IntegratedGpu => "integrated_gpu",
+            wgpu::DeviceType::VirtualGpu => "virtual_gpu",
+            wgpu::DeviceType::Cpu => "cpu",
+            wgpu::DeviceType::Other => "other",
+        };
+        Self {
+            index,
+            name: info.name.clone(),
+            driver: info.driver.clone(),
+            driver_info: info.driver_info.clone(),
+            backend: info.backend.to_string(),
+            device_type: device_type.to_owned(),
+        }
+    }
+
+    /// Lower is better: real GPUs first.
+    pub(super) fn rank(&self) -> usize {
+        let order = ["discrete_gpu", "integrated_gpu", "virtual_gpu", "cpu"];
+        order.iter().position(|t| *t == self.device_type).unwrap_or(order.len())
+    }
+
+    pub(super) fn matches(&self, request: &str) -> bool {
+        // Digits are an index and nothing else: "1" is also part of many a version.
+        if let Ok(index) = request.parse::<usize>() {
+            return index == self.index;
+        }
+        let request = request.to_lowercase();
+        [&self.name, &self.driver, &self.driver_info].iter().any(|text| text.to_lowercase().contains(&request))
+    }
+}
+
+impl std::fmt::Display for AdapterSummary {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} ({}, {} {})", self.name, self.device_type, self.driver, self.driver_info)
+    }
+}
+
+fn instance() -> wgpu::Instance {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = wgpu::Backends::VULKAN;
+    wgpu::Instance::new(descriptor)
+}
+
+pub(super) fn enumerate() -> Vec<(AdapterSummary, wgpu::Adapter)> {
+    pollster::block_on(instance().enumerate_adapters(wgpu::Backends::VULKAN))
+        .into_iter()
+        .enumerate()
+        .map(|(i, adapter)| (AdapterSummary::new(i, &adapter.get_info()), adapter))
+        .collect()
+}
+
+/// The Vulkan adapters of this machine; none without a driver.
+pub fn adapters() -> Vec<AdapterSummary> {
+    enumerate().into_iter().map(|(summary, _)| summary).collect()
+}
