@@ -149,10 +149,16 @@ pub fn classify_with(view: &View, volume: &Volume, depth: &[f32], options: Optio
         return Ok(Outcome { verdict: Verdict::Invalid, outside: None, witness: None, nearest_depth: None });
     }
     let projected = Projected::new(view, volume, options);
-    let (verdict, outside, witness) = match find_open_pixel(&projected, depth) {
-        Found::Open(witness) => (Verdict::Visible, Some(false), witness),
-        Found::Nothing => (Verdict::Hidden, is_not(projected.meets(view.image())), None),
-        Found::Unknown => (Verdict::Undecided, is_not(projected.meets(view.image())), None),
+    // Asked first: what misses the image as a whole needs no search of its pixels.
+    let met = projected.meets(view.image());
+    let (verdict, outside, witness) = if met == Some(false) {
+        (Verdict::Hidden, Some(true), None)
+    } else {
+        match find_open_pixel(&projected, depth) {
+            Found::Open(witness) => (Verdict::Visible, Some(false), witness),
+            Found::Nothing => (Verdict::Hidden, is_not(met), None),
+            Found::Unknown => (Verdict::Undecided, is_not(met), None),
+        }
     };
     Ok(Outcome { verdict, outside, witness, nearest_depth: projected.nearest_depth() })
 }
