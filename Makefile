@@ -17,7 +17,7 @@ test: ## All tests on Mesa's lavapipe (or on the driver that HIZVK_EXPECT_ADAPTE
 test-swiftshader: ## The same GPU tests on SwiftShader, a second software driver
 	@scripts/test.sh swiftshader
 
-soak: ## The tests that take minutes (marked slow), and later endless random search
+soak: ## The tests that take minutes: millions of adversarial cases against the exact oracle
 	@scripts/soak.sh
 
 lint: ## Format, clippy, ruff, mypy --strict, stubtest, shellcheck

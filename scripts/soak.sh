@@ -1,20 +1,16 @@
 #!/usr/bin/env bash
-# The tests that take minutes. Later: random and adversarial search without an end, on both drivers, with a report of what it tried.
+# The tests that take minutes: the campaign of adversarial cases against the exact oracle, a million for each kind of volume
+# (HIZVK_SOAK_CASES), from seed HIZVK_SOAK_SEED on; each line it prints says how to go on from there.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 scripts/setup.sh
 use_test_driver
-cat <<'END'
-soak: runs the slow tests that exist. A search without an end (random cameras, bounds and depth images against the float64 oracle, on
-      both software drivers, until it is stopped or finds a false cull) comes later.
-END
-
 slow_rust_tests() {
   if have cargo-nextest; then
-    cargo nextest run --workspace "${LOCKED[@]}" --run-ignored only --no-tests pass
+    cargo nextest run --workspace "${LOCKED[@]}" --run-ignored only --no-capture
   else
-    cargo test --workspace "${LOCKED[@]}" --tests -- --ignored
+    cargo test --workspace "${LOCKED[@]}" --tests -- --ignored --nocapture
   fi
 }
 slow_python_tests() {
