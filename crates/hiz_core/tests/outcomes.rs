@@ -404,6 +404,24 @@ fn options_out_of_range_are_refused_by_name() {
 }
 
 #[test]
+fn depth_slack_moves_the_wall_back_in_both_conventions() {
+    // The wall at depth 4, slack a hundredth: ndc 0.75 becomes 0.7575 (depth 4.12), reversed 0.25 becomes 0.2475 (depth 4.04).
+    for (convention, hidden_without, hidden_with) in
+        [(DepthConvention::Standard, 4.1, 4.2), (DepthConvention::Reversed, 4.03, 4.1)]
+    {
+        let camera = camera_along_z(SIDE, SIDE, convention);
+        let list =
+            boxes(&[([-1.0, -1.0, hidden_without], [1.0, 1.0, 5.0]), ([-1.0, -1.0, hidden_with], [1.0, 1.0, 5.0])]);
+        let wall = [ndc(4.0, convention); 256];
+        let verdicts = |depth_slack| {
+            cull_with(&list, &wall, &camera, &CullOptions { depth_slack, ..CullOptions::default() }).verdicts().unwrap()
+        };
+        assert_eq!(verdicts(0.0), [OCCLUDED, OCCLUDED], "{convention:?}");
+        assert_eq!(verdicts(0.01), [VISIBLE, OCCLUDED], "{convention:?}");
+    }
+}
+
+#[test]
 fn slack_and_guard_only_ever_keep_more() {
     // A hair behind the wall: hidden without slack, kept with it; a box that ends a quarter pixel beside a hole, with a guard.
     let camera = camera_along_z(SIDE, SIDE, DepthConvention::Reversed);
