@@ -9,6 +9,9 @@ python_files=(python tests scripts docs)
 
 check "cargo fmt" cargo fmt --all -- --check -l
 check "clippy" cargo clippy --workspace --all-targets "${LOCKED[@]}" -- -D warnings
+# Links in documentation break silently otherwise.
+rust_links() { RUSTDOCFLAGS="-D warnings" cargo doc --workspace "${LOCKED[@]}" --no-deps; }
+check "rustdoc links" rust_links
 check "ruff check" ruff check "${python_files[@]}"
 check "ruff format" ruff format --check "${python_files[@]}"
 check "mypy" mypy --strict python/hizvk

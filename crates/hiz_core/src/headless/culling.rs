@@ -95,7 +95,7 @@ impl Culling {
     /// Waits until the device is done.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`].
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost).
     pub fn wait(&self) -> Result<()> {
         self.engine.scoped(|| readback::wait(self.engine.device(), Some(self.submission.clone())))?;
         let mut timings = locked(&self.timings);
@@ -121,7 +121,7 @@ impl Culling {
     /// Whether each instance is kept.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn mask(&self) -> Result<Vec<bool>> {
         let ranges: Vec<_> = self
             .instances
@@ -142,7 +142,7 @@ impl Culling {
     /// Each instance's verdict: 0 outside, 1 occluded, 2 visible, 3 invalid (kept).
     ///
     /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn verdicts(&self) -> Result<Vec<u8>> {
         let ranges: Vec<_> = self
             .instances
@@ -164,7 +164,7 @@ impl Culling {
     /// The draw arguments, one record a piece.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn draws(&self) -> Result<Vec<DrawIndexedIndirect>> {
         let draws = &self.visible.draws;
         let bytes = self.read(&[BufferRange::first(draws, draws.size())])?;
@@ -174,7 +174,7 @@ impl Culling {
     /// The packed list, the pieces joined.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn indices(&self) -> Result<Vec<u32>> {
         let draws = self.draws()?;
         let ranges: Vec<_> = draws
@@ -191,7 +191,7 @@ impl Culling {
     /// How many instances met which end.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn counts(&self) -> Result<Counts> {
         let (counters, draws) = (&self.visible.counters, &self.visible.draws);
         let bytes =
@@ -214,7 +214,7 @@ impl Culling {
     /// Why instance `index` got its verdict: the cull's own steps, run for it once more.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for an index past the end.
+    /// [`Error::Invalid`](crate::Error::Invalid) for an index past the end.
     pub fn explain(&self, index: u64) -> Result<Explanation> {
         let engine = &self.engine;
         let index = u32::try_from(index).unwrap_or(u32::MAX);

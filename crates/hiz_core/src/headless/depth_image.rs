@@ -33,7 +33,7 @@ impl DepthImage {
     /// The depth as given, row 0 on top.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn read(&self) -> Result<Vec<f32>> {
         let engine = &self.engine;
         let bytes = engine.scoped(|| readback::read_texture(engine.device(), engine.queue(), &self.texture))?;
