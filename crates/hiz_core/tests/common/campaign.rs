@@ -186,6 +186,12 @@ impl Scene {
             unit(std::array::from_fn(|k| rows[r][k] - along * forward[k]))
         };
         let axes = [clean(0), clean(1), forward];
+        // A bare matrix stands about the world's origin: its constants cancel at the eye, and the rows have to own up to it.
+        let camera = if random.below(3) == 0 {
+            Camera::from_clip_from_world(camera.clip_from_world(), size, convention).ok()?
+        } else {
+            camera
+        };
         let front = near * 10.0_f64.powf(random.range(-0.05, 3.0)).min(far / near * 1.01);
         let hole = [random.below(size.width), random.below(size.height)];
         Some(Self { camera, eye, axes, half, middle, orthographic, front, near, hole, aligned })
@@ -215,7 +221,7 @@ impl Scene {
     fn ndc(&self, z: f64) -> f64 {
         let p = self.world([0.0, 0.0, z]);
         let rows = self.camera.rows();
-        let clip = |r: usize| (0..3).map(|k| rows[r][k] * (p[k] - self.eye[k])).sum::<f64>() + rows[r][3];
+        let clip = |r: usize| (0..3).map(|k| rows[r][k] * (p[k] - self.camera.origin()[k])).sum::<f64>() + rows[r][3];
         clip(2) / clip(3)
     }
 
