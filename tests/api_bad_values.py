@@ -164,6 +164,10 @@ FOOTPRINT: list[Bad] = [
     (16, ValueError, "in 2..8"),
     (2.0, TypeError, "got float 2.0"),
 ]
+FIT: list[Bad] = [
+    ("box", ValueError, 'expected one of "rectangle", "volume"'),
+    (1, TypeError, "got int 1"),
+]
 DESCENT: list[Bad] = [
     (-1, ValueError, "in 0..65536"),
     (70000, ValueError, "in 0..65536"),
@@ -410,6 +414,7 @@ TABLES: dict[str, Table] = {
             "transform_slack": TRANSFORM_SLACK,
             "footprint": FOOTPRINT,
             "descent": DESCENT,
+            "fit": FIT,
             "capacity": [(-1, ValueError, "in 0..4294967295"), (1.5, TypeError, "got float 1.5")],
             "draw": [((36,), TypeError, "expected a DrawTemplate or None, got tuple (36,)")],
             "statistics": FLAG,
@@ -455,6 +460,7 @@ TABLES: dict[str, Table] = {
             "transform_slack": TRANSFORM_SLACK,
             "footprint": FOOTPRINT,
             "descent": DESCENT,
+            "fit": FIT,
         },
     ),
     "compare": Table(
@@ -487,6 +493,11 @@ TABLES: dict[str, Table] = {
             "depth": [*IMAGE, (None, TypeError, "got None")],
             "kind": KIND,
             "scale": SCALE,
+            "coverage": COVERAGE,
+            "own_depth": [
+                ("volume", ValueError, 'expected one of "nearest", "pixel"'),
+                (0, TypeError, "got int 0"),
+            ],
         },
     ),
     "reference.pyramid": Table(

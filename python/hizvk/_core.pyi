@@ -35,7 +35,14 @@ _Adapter: TypeAlias = tuple[int, str, str, str, str, str]
 def adapters() -> list[_Adapter]: ...
 def frustum_matrix(borders: _Borders, near: float, far: float | None, reversed_z: bool, size: _Size) -> _Matrix: ...
 def reference_classify(
-    bounds_kind: str, arrays: Sequence[_Floats], camera: Camera, image: _Floats, depth_kind: str, scale: float
+    bounds_kind: str,
+    arrays: Sequence[_Floats],
+    camera: Camera,
+    image: _Floats,
+    depth_kind: str,
+    scale: float,
+    coverage: str,
+    own_depth: str,
 ) -> npt.NDArray[np.uint8]: ...
 def reference_pyramid(
     depth: npt.NDArray[np.float32], width: int, height: int, reversed_z: bool
@@ -121,6 +128,7 @@ class Engine:
         transform_slack: float,
         footprint: int,
         descent: int,
+        fit: str,
         capacity: int | None,
         draw: tuple[int, int, int, int],
         statistics: bool,

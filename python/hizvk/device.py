@@ -33,6 +33,7 @@ __all__ = ["Adapter", "Device", "adapters"]
 # Unions of words: stubtest takes Literal["a", "b"] for something else at run time.
 Order: TypeAlias = Literal["stable"] | Literal["any"]
 Coverage: TypeAlias = Literal["area"] | Literal["sample"]
+Fit: TypeAlias = Literal["rectangle"] | Literal["volume"]
 FaceCull: TypeAlias = Literal["none"] | Literal["back"] | Literal["front"]
 
 
@@ -262,6 +263,7 @@ class Device:
         transform_slack: float = 0.0,
         footprint: int = 2,
         descent: int = 0,
+        fit: Fit = "rectangle",
         capacity: int | None = None,
         draw: DrawTemplate | None = None,
         statistics: bool = True,
@@ -292,7 +294,11 @@ class Device:
             How many texels a side a test may read of one level: more mean a finer level, so less is kept and more read.
         descent : int
             How many texels of finer levels a test may read where the footprint cannot decide, up to 65536; 0: none.
-            With enough of them the answer is that of a rectangle test at full resolution.
+            With enough of them the answer is that of a test at full resolution.
+        fit : "rectangle" or "volume"
+            What stands for the bounds: ``"rectangle"``, the rectangle around their projection at their nearest depth; or,
+            where that cannot decide, ``"volume"``: their own outline, and in each texel their own depth there. Keeps less
+            and computes more; with a descent it comes down to single pixels.
         capacity : int, optional
             Most instances in the list. None: enough for all. Too small a capacity shows as ``count < demand``; mask and
             verdicts stay complete.
@@ -325,7 +331,7 @@ class Device:
             )
         options = cull_options(
             order=order, coverage=coverage, guard_px=guard_px, depth_slack=depth_slack,
-            transform_slack=transform_slack, footprint=footprint, descent=descent, capacity=capacity, draw=draw,
+            transform_slack=transform_slack, footprint=footprint, descent=descent, fit=fit, capacity=capacity, draw=draw,
             statistics=statistics,
         )  # fmt: skip
         culling = self._engine.cull(instances._inner, camera._inner, pyramid._inner, *options)
@@ -356,10 +362,11 @@ def cull_options(
     transform_slack: object,
     footprint: object,
     descent: object,
+    fit: object,
     capacity: object,
     draw: object,
     statistics: object,
-) -> tuple[str, str, float | None, float, float, int, int, int | None, tuple[int, int, int, int], bool]:
+) -> tuple[str, str, float | None, float, float, int, int, str, int | None, tuple[int, int, int, int], bool]:
     """The checked options of a cull, in the engine's order."""
     if guard_px is not None:
         guard_px = _arguments.number("guard_px", guard_px, at_least=0.0, at_most=16.0)
@@ -383,6 +390,7 @@ def cull_options(
         _arguments.number("transform_slack", transform_slack, at_least=0.0, at_most=1e6),
         footprint,
         _arguments.integer("descent", descent, low=0, high=65536),
+        _arguments.choice("fit", fit, ("rectangle", "volume")),
         capacity,
         template,
         _arguments.flag("statistics", statistics),

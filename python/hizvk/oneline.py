@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from .depth import DepthKind
-    from .device import Coverage
+    from .device import Coverage, Fit
 
 __all__ = ["visible"]
 
@@ -49,6 +49,7 @@ def visible(
     transform_slack: float = 0.0,
     footprint: int = 2,
     descent: int = 0,
+    fit: Fit = "rectangle",
 ) -> npt.NDArray[np.bool_]:
     """Which bounds can be seen: False only for what is surely outside the view or surely behind the depth image.
 
@@ -68,7 +69,7 @@ def visible(
         World units of one step of `depth`, for the kinds ``"z"`` and ``"distance"``.
     device : Device, optional
         None: one that is made at the first call and kept.
-    coverage, guard_px, depth_slack, transform_slack, footprint, descent
+    coverage, guard_px, depth_slack, transform_slack, footprint, descent, fit
         As in `Device.cull`.
 
     Returns
@@ -91,7 +92,7 @@ def visible(
     _arguments.instance("camera", camera, Camera, "a Camera")
     options = cull_options(
         order="any", coverage=coverage, guard_px=guard_px, depth_slack=depth_slack, transform_slack=transform_slack,
-        footprint=footprint, descent=descent, capacity=None, draw=None, statistics=False,
+        footprint=footprint, descent=descent, fit=fit, capacity=None, draw=None, statistics=False,
     )  # fmt: skip
     if device is not None:
         _arguments.instance("device", device, Device, "a Device or None")
@@ -106,9 +107,10 @@ def visible(
         image, kind, scale = checked_image("depth", depth, camera, kind, scale)
         device = default_device() if device is None else device
         pyramid = device.pyramid(image, camera, kind=kind, scale=scale)
-    _, coverage_, guard, slack, transform, side, budget, *_ = options
+    _, coverage_, guard, slack, transform, side, budget, fit_, *_ = options
     result = device.cull(
         device.instances(bounds), camera, pyramid, order="any", coverage=coverage_,  # type: ignore[arg-type]
-        guard_px=guard, depth_slack=slack, transform_slack=transform, footprint=side, descent=budget, statistics=False,
+        guard_px=guard, depth_slack=slack, transform_slack=transform, footprint=side, descent=budget,
+        fit=fit_, statistics=False,  # type: ignore[arg-type]
     )  # fmt: skip
     return result.mask.copy()

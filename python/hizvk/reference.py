@@ -6,7 +6,7 @@ and for the last word about single instances.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 import numpy as np
 
@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from .depth import DepthKind
+    from .device import Coverage
+
+# A union of words: stubtest takes Literal["a", "b"] for something else at run time.
+OwnDepth: TypeAlias = Literal["nearest"] | Literal["pixel"]
 
 __all__ = ["HIDDEN", "INVALID", "UNDECIDED", "VISIBLE", "classify", "pyramid"]
 
@@ -33,9 +37,16 @@ UNDECIDED: Final = 4
 
 
 def classify(
-    bounds: Bounds, camera: Camera, depth: npt.ArrayLike, *, kind: DepthKind, scale: float = 1.0
+    bounds: Bounds,
+    camera: Camera,
+    depth: npt.ArrayLike,
+    *,
+    kind: DepthKind,
+    scale: float = 1.0,
+    coverage: Coverage = "area",
+    own_depth: OwnDepth = "nearest",
 ) -> npt.NDArray[np.uint8]:
-    """The truth about each instance, for area coverage.
+    """The truth about each instance.
 
     Parameters
     ----------
@@ -48,6 +59,11 @@ def classify(
     kind, scale
         What its numbers are, as in `Device.pyramid`; the kinds ``"z"`` and ``"distance"`` become NDC in the same way
         (rounded towards far), so that oracle and engine speak of the same image.
+    coverage : "area" or "sample"
+        What of a pixel counts: its closed square, or its centre.
+    own_depth : "nearest" or "pixel"
+        A pixel hides the bounds if it is nearer than all of them (``"nearest"``: what ``fit="rectangle"`` may cull at
+        most), or than the part of them that it can show (``"pixel"``, for ``fit="volume"``).
 
     Returns
     -------
@@ -62,7 +78,9 @@ def classify(
     bounds_kind, arrays = as_arrays("bounds", bounds)
     _arguments.instance("camera", camera, Camera, "a Camera")
     image, kind, scale = checked_image("depth", depth, camera, kind, scale)
-    return _core.reference_classify(bounds_kind, arrays, camera._inner, image, kind, scale)
+    coverage = _arguments.choice("coverage", coverage, ("area", "sample"))
+    own_depth = _arguments.choice("own_depth", own_depth, ("nearest", "pixel"))
+    return _core.reference_classify(bounds_kind, arrays, camera._inner, image, kind, scale, coverage, own_depth)
 
 
 def pyramid(depth: npt.ArrayLike, *, reversed_z: bool) -> list[npt.NDArray[np.float32]]:

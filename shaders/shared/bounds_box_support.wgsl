@@ -33,3 +33,42 @@ fn ratio_interval(r: Value, w: Value) -> vec2<f32> {
         min(min(least.x, least.y), min(least.z, least.w)),
         max(max(greatest.x, greatest.y), max(greatest.z, greatest.w)));
 }
+
+// The six faces and twelve edges: a plane through each.
+const CANDIDATES: u32 = 18u;
+// Of a box's extent along a plane's normal: how near its border counts as there.
+const BORDER_TOLERANCE: f32 = 1e-3;
+
+// Pixel position and depth of a corner, given by signs.
+fn corner(p: Projected, signs: vec3<f32>) -> vec3<f32> {
+    let r = vec3<f32>(
+        p.x.center + dot(p.x.half, signs), p.y.center + dot(p.y.half, signs), p.z.center + dot(p.z.half, signs));
+    return r / (p.w.center + dot(p.w.half, signs));
+}
+
+fn candidate(i: u32, p: Projected) -> Candidate {
+    let signs = vec2<f32>(select(-1.0, 1.0, (i & 1u) != 0u), select(-1.0, 1.0, (i & 2u) != 0u));
+    if i < 12u {
+        // An edge along e, beside the other two axes.
+        let e = vec3<f32>(vec3<u32>(i >> 2u) == vec3<u32>(0u, 1u, 2u));
+        let beside = signs.x * e.zxy + signs.y * e.yzx;
+        let begin = corner(p, beside - e).xy;
+        let along = corner(p, beside + e).xy - begin;
+        let across = vec2<f32>(along.y, -along.x) / max(abs(along.x), abs(along.y));
+        return Candidate(0.0, across, dot(across, begin));
+    }
+    // The face at one end of e.
+    let e = vec3<f32>(vec3<u32>((i - 12u) >> 1u) == vec3<u32>(0u, 1u, 2u));
+    let end = signs.x * e;
+    let begin = corner(p, end - e.zxy - e.yzx);
+    let normal = cross(
+        corner(p, end + e.zxy + e.yzx) - begin, corner(p, end - e.zxy + e.yzx) - corner(p, end + e.zxy - e.yzx));
+    let facing = farther_sign();
+    let slope = facing * normal.xy / normal.z;
+    return Candidate(facing, slope, facing * begin.z + dot(slope, begin.xy));
+}
+
+// A face shows, and an edge belongs to the outline, if the box lies on one side of its plane.
+fn on_border(own: f32, border: f32, extent: f32) -> bool {
+    return abs(own - border) <= BORDER_TOLERANCE * extent;
+}

@@ -61,3 +61,42 @@ fn ratio_interval(r: Value, w: Value) -> vec2<f32> {
         t - select(small_root, large_root, p > 0.0),
         t + select(large_root, small_root, p > 0.0));
 }
+
+// 16 directions of the outline (four are the rectangle's), and two rings of 4 points about the one that is nearest to the eye.
+const CANDIDATES: u32 = 24u;
+const TURN: f32 = 6.2831853;
+const RING_ANGLES: vec2<f32> = vec2<f32>(0.7, 1.2);
+
+// How r / w changes with the point, where it is r_point / w_point; times w.
+fn gradient(r: Value, w: Value, point: vec3<f32>) -> vec3<f32> {
+    return r.half - (r.center + dot(r.half, point)) / (w.center + dot(w.half, point)) * w.half;
+}
+
+fn candidate(i: u32, p: Projected) -> Candidate {
+    if i < 16u {
+        let angle = f32(i) * (TURN / 16.0);
+        return Candidate(0.0, vec2<f32>(cos(angle), sin(angle)), 0.0);
+    }
+    // Along a pixel's ray neither column nor row changes.
+    let center = vec3<f32>(0.0);
+    let columns = gradient(p.x, p.w, center);
+    let ray = normalize(cross(columns, gradient(p.y, p.w, center)));
+    let facing = farther_sign();
+    let toward_eye = -sign(facing * dot(gradient(p.z, p.w, center), ray)) * ray;
+    let right = normalize(columns);
+    let up = cross(toward_eye, right);
+    let angle = select(RING_ANGLES.x, RING_ANGLES.y, i >= 20u);
+    let turn = f32(i) * (TURN / 4.0);
+    let outward = cos(turn) * right + sin(turn) * up;
+    let point = cos(angle) * toward_eye + sin(angle) * outward;
+    // Two directions along the surface there, and how they run in the image.
+    let down = cos(angle) * outward - sin(angle) * toward_eye;
+    let image = mat3x3<f32>(gradient(p.x, p.w, point), gradient(p.y, p.w, point), gradient(p.z, p.w, point));
+    let normal = cross(down * image, cross(point, down) * image);
+    return Candidate(facing, facing * normal.xy / normal.z, 0.0);
+}
+
+// A plane of any slope touches a sphere.
+fn on_border(own: f32, border: f32, extent: f32) -> bool {
+    return true;
+}

@@ -22,6 +22,8 @@ override SAMPLE_COVERAGE: bool;
 override FOOTPRINT_LOG2: u32;
 // Descend to finer levels where the footprint cannot decide.
 override DESCENT: bool;
+// Compare each texel with the volume's own outline and front there, not with its rectangle at one nearest depth.
+override FIT_VOLUME: bool;
 
 const LEAST_NORMAL: f32 = 0x1p-126;
 
@@ -115,25 +117,35 @@ fn inside_block(r: Value, w: Value, lo: u32, hi: u32, level: u32, half_size: f32
         && (end >= size || surely_below(r, f32(end) - view.reach - half_size, w));
 }
 
+// The depth that a stored one stands for: with the slack, away from subnormals.
+fn occluding_depth(bits: u32) -> f32 {
+    let stored = bitcast<f32>(bits);
+    return select(max(stored, LEAST_NORMAL), min(stored, 1.0), REVERSED) * view.depth_factor;
+}
+
+// The far plane hides nothing.
+fn can_occlude(d: f32) -> bool {
+    return select(1.0 > d, d >= LEAST_NORMAL, REVERSED);
+}
+
 // True implies: all of the volume is farther than the stored depth.
 fn surely_behind(bits: u32, z: Value, w: Value) -> bool {
-    let stored = bitcast<f32>(bits);
+    let d = occluding_depth(bits);
+    let t = bar(d - view.z_slope);
     if REVERSED {
-        let d = min(stored, 1.0) * view.depth_factor;
-        return d >= LEAST_NORMAL && surely_below(z, bar(d - view.z_slope), w);
+        return can_occlude(d) && surely_below(z, t, w);
     }
-    let d = max(stored, LEAST_NORMAL) * view.depth_factor;
-    return d < 1.0 && surely_above(z, bar(d - view.z_slope), w);
+    return can_occlude(d) && surely_above(z, t, w);
 }
 
 // Texels that wait to be entered: at most the footprint's 64, and 3 siblings at each of 15 levels.
 const STACK: u32 = 112u;
 
-// Whether the volume is farther than every pixel of the rectangle first..last: a walk down the pyramid that enters only the
-// texels that are not near enough, and of them only what the rectangle touches. (Greene, Kass and Miller, "Hierarchical
-// Z-Buffer Visibility", SIGGRAPH 1993, descend so.) False where a pixel is not near enough, or the budget ends.
+// Whether no pixel of the rectangle first..last shows anything of the volume: a walk down the pyramid that enters only the
+// texels that cannot tell, and of them only what the rectangle touches. (Greene, Kass and Miller, "Hierarchical Z-Buffer
+// Visibility", SIGGRAPH 1993, descend so.) False where a pixel may show some of it, or the budget ends.
 fn descend(
-    level: u32, t: vec4<u32>, first: vec2<u32>, last: vec2<u32>, z: Value, w: Value, texels_read: ptr<function, u32>,
+    level: u32, t: vec4<u32>, first: vec2<u32>, last: vec2<u32>, p: Projected, texels_read: ptr<function, u32>,
 ) -> bool {
     // Packed: level, row, column. Pixels never wait, so 14 bits hold a coordinate of the largest image.
     var stack: array<u32, STACK>;
@@ -141,7 +153,11 @@ fn descend(
     var child = level;
     var begin = t.xy;
     var end = t.zw;
-    var left = view.descent_budget;
+    var left = view.descent_budget + *texels_read;
+    var planes: SupportingPlanes;
+    if FIT_VOLUME {
+        planes = supporting_planes(p);
+    }
     loop {
         for (var y = begin.y; y <= end.y; y += 1u) {
             for (var x = begin.x; x <= end.x; x += 1u) {
@@ -150,13 +166,23 @@ fn descend(
                 }
                 left -= 1u;
                 *texels_read += 1u;
-                if !surely_behind(texel(child, x, y), z, w) {
-                    if child == 0u {
-                        return false;
-                    }
-                    stack[height] = (child << 28u) | (y << 14u) | x;
-                    height += 1u;
+                let bits = texel(child, x, y);
+                if surely_behind(bits, p.z, p.w) {
+                    continue;
                 }
+                if FIT_VOLUME {
+                    let corner = vec2<u32>(x, y);
+                    let pixels_begin = max(corner << vec2<u32>(child), first);
+                    let pixels_end = min((corner + vec2<u32>(1u)) << vec2<u32>(child), last + vec2<u32>(1u));
+                    if surely_clear(&planes, pixels_begin, pixels_end, bits) {
+                        continue;
+                    }
+                }
+                if child == 0u || !DESCENT {
+                    return false;
+                }
+                stack[height] = (child << 28u) | (y << 14u) | x;
+                height += 1u;
             }
         }
         if height == 0u {
@@ -241,24 +267,23 @@ fn classify(i: u32) -> Outcome {
     // A variable of its own: the Vulkan backend of naga 30 cannot pass a pointer to a member.
     var texels_read = (t.z - t.x + 1u) * (t.w - t.y + 1u);
     out.texels_read = texels_read;
-    if surely_behind(out.farthest_bits, z, w) {
-        // 6. The texels were those of all pixels that matter.
+    var hidden = surely_behind(out.farthest_bits, z, w);
+    var block = t;
+    if hidden {
         out.stage = AT_BLOCK;
-        if inside_block(x, w, t.x, t.z, level, view.half_size.x, view.size.x)
-            && inside_block(y, w, t.y, t.w, level, view.half_size.y, view.size.y) {
-            out.verdict = OCCLUDED;
-        }
-        return out;
-    }
-    if DESCENT && level > 0u {
-        // 7. Finer levels, over the pixels of the rectangle alone: those are its texels of level 0.
+    } else if (DESCENT && level > 0u) || FIT_VOLUME {
+        // Texel by texel, and into finer levels, over the pixels of the rectangle alone: its texels of level 0.
         out.stage = AT_DESCENT;
-        let all_farther = descend(level, t, first, last, z, w, &texels_read);
+        hidden = descend(level, t, first, last, Projected(x, y, z, w, w_min), &texels_read);
         out.texels_read = texels_read;
-        if all_farther && inside_block(x, w, first.x, last.x, 0u, view.half_size.x, view.size.x)
-            && inside_block(y, w, first.y, last.y, 0u, view.half_size.y, view.size.y) {
-            out.verdict = OCCLUDED;
-        }
+        block = vec4<u32>(first, last);
+        level = 0u;
+    }
+
+    // 6. The texels were those of all pixels that matter.
+    if hidden && inside_block(x, w, block.x, block.z, level, view.half_size.x, view.size.x)
+        && inside_block(y, w, block.y, block.w, level, view.half_size.y, view.size.y) {
+        out.verdict = OCCLUDED;
     }
     return out;
 }

@@ -52,6 +52,17 @@ impl Footprint {
     }
 }
 
+/// As what a volume is compared with the depth image.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum Fit {
+    /// The rectangle around its projection, at its nearest depth.
+    #[default]
+    Rectangle,
+    /// Where the rectangle cannot decide: its own outline, and in each texel its own depth there. Less is kept, more is computed; with
+    /// a descent it comes down to single pixels.
+    Volume,
+}
+
 /// How instances are culled.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CullOptions {
@@ -72,6 +83,8 @@ pub struct CullOptions {
     /// How many texels of finer levels a test may read where the footprint cannot decide, 0..=65536; 0: none. With enough of
     /// them the answer is that of a rectangle test at full resolution.
     pub descent: u32,
+    /// What stands for a volume.
+    pub fit: Fit,
     /// Count the depth tests of each level and the texels read.
     pub statistics: bool,
 }
@@ -86,6 +99,7 @@ impl Default for CullOptions {
             transform_slack: 0.0,
             footprint: Footprint::Two,
             descent: 0,
+            fit: Fit::Rectangle,
             statistics: true,
         }
     }
@@ -217,6 +231,7 @@ fn bind(gpu: &Gpu, inputs: &CullInputs<'_>) -> Result<Bound> {
         sample_coverage: options.coverage == Coverage::Sample,
         footprint_log2: options.footprint.log2(),
         descent: options.descent > 0,
+        fit_volume: options.fit == Fit::Volume,
         append: options.order == Order::Any,
         statistics: options.statistics,
     };

@@ -56,6 +56,7 @@ pub(crate) struct CullKey {
     pub(crate) sample_coverage: bool,
     pub(crate) footprint_log2: u32,
     pub(crate) descent: bool,
+    pub(crate) fit_volume: bool,
     pub(crate) append: bool,
     pub(crate) statistics: bool,
 }
@@ -273,13 +274,14 @@ fn flag(value: bool) -> f64 {
     f64::from(u8::from(value))
 }
 
-fn classify_constants(key: &CullKey) -> [(&'static str, f64); 5] {
+fn classify_constants(key: &CullKey) -> [(&'static str, f64); 6] {
     [
         ("REVERSED", flag(key.reversed)),
         ("CHUNKS", key.chunks as f64),
         ("SAMPLE_COVERAGE", flag(key.sample_coverage)),
         ("FOOTPRINT_LOG2", f64::from(key.footprint_log2)),
         ("DESCENT", flag(key.descent)),
+        ("FIT_VOLUME", flag(key.fit_volume)),
     ]
 }
 

@@ -40,7 +40,7 @@ pub use wgpu;
 pub use bounds::{Bounds, BoundsKind, Floats};
 pub use camera::{Camera, DepthConvention, ImageSize, MAX_IMAGE_SIDE, Mat3, Mat4, Pose, Projection, Vec3};
 pub use context::HizContext;
-pub use cull::{Coverage, CullOptions, Footprint, Order};
+pub use cull::{Coverage, CullOptions, Fit, Footprint, Order};
 pub use depth::{DepthKind, ndc_from_kind};
 pub use error::{Error, Result};
 pub use instances::{InstanceOptions, Instances};

@@ -67,6 +67,7 @@ fn classifying(source: SourceKind, kind: BoundsKind, entry: &str) -> String {
         wgsl!("shared/validity"),
         bounds.as_str(),
         wgsl!("shared/certificate"),
+        wgsl!("shared/supporting_planes"),
         wgsl!("shared/classify"),
         entry,
     ]

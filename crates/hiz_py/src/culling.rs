@@ -1,6 +1,6 @@
 //! The answer of a cull, read on request.
 
-use hiz_core::{Coverage, CullOptions, DrawTemplate, Footprint, Order, VisibleOptions, headless};
+use hiz_core::{Coverage, CullOptions, DrawTemplate, Fit, Footprint, Order, VisibleOptions, headless};
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -17,6 +17,7 @@ pub(crate) struct CullArguments<'a> {
     pub(crate) transform_slack: f64,
     pub(crate) footprint: u32,
     pub(crate) descent: u32,
+    pub(crate) fit: &'a str,
     pub(crate) capacity: Option<u32>,
     /// Index count, first index, base vertex, first instance.
     pub(crate) draw: (u32, u32, i32, u32),
@@ -42,6 +43,11 @@ impl CullArguments<'_> {
             8 => Footprint::Eight,
             other => return Err(PyValueError::new_err(format!("footprint: no footprint {other}"))),
         };
+        let fit = match self.fit {
+            "rectangle" => Fit::Rectangle,
+            "volume" => Fit::Volume,
+            other => return Err(PyValueError::new_err(format!("fit: no fit {other:?}"))),
+        };
         Ok(CullOptions {
             order,
             coverage,
@@ -50,6 +56,7 @@ impl CullArguments<'_> {
             transform_slack: self.transform_slack,
             footprint,
             descent: self.descent,
+            fit,
             statistics: self.statistics,
         })
     }

@@ -1,7 +1,7 @@
 //! The oracle of `hiz_ref`: conversions only.
 
 use hiz_core::{Bounds, Floats};
-use hiz_ref::{Verdict, View, Volume};
+use hiz_ref::{Coverage, Options, OwnDepth, Verdict, View, Volume};
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -20,6 +20,7 @@ const INVALID: u8 = 3;
 const UNDECIDED: u8 = 4;
 
 /// What the oracle says about each instance.
+#[expect(clippy::too_many_arguments, reason = "the signature of Python's function")]
 #[pyfunction]
 pub(crate) fn reference_classify<'py>(
     py: Python<'py>,
@@ -29,6 +30,8 @@ pub(crate) fn reference_classify<'py>(
     image: FloatArray<'py>,
     depth_kind: &str,
     scale: f64,
+    coverage: &str,
+    own_depth: &str,
 ) -> PyResult<Bound<'py, PyArray1<u8>>> {
     let volumes = bounds(bounds_kind, &arrays)?;
     let (image, depth_kind) = (image.floats()?, self::depth_kind(depth_kind)?);
@@ -42,11 +45,24 @@ pub(crate) fn reference_classify<'py>(
         height: camera.size().height,
         reversed: camera.convention().is_reversed(),
     };
+    let options = Options {
+        coverage: match coverage {
+            "area" => Coverage::Area,
+            "sample" => Coverage::Sample,
+            other => return Err(PyValueError::new_err(format!("coverage: no coverage {other:?}"))),
+        },
+        own_depth: match own_depth {
+            "nearest" => OwnDepth::Nearest,
+            "pixel" => OwnDepth::PerPixel,
+            other => return Err(PyValueError::new_err(format!("own_depth: no own depth {other:?}"))),
+        },
+        ..Options::default()
+    };
+    let verdict = |i| hiz_ref::classify_with(&view, &volume(&volumes, i), &ndc, options).map(|o| code(o.verdict));
     let mut codes = Vec::with_capacity(count);
     while codes.len() < count {
         let batch = codes.len()..count.min(codes.len() + BATCH);
-        let more: Result<Vec<u8>, hiz_ref::Error> =
-            py.detach(|| batch.map(|i| hiz_ref::classify(&view, &volume(&volumes, i), &ndc).map(code)).collect());
+        let more: Result<Vec<u8>, hiz_ref::Error> = py.detach(|| batch.map(verdict).collect());
         codes.extend(more.map_err(|error| PyValueError::new_err(error.to_string()))?);
         py.check_signals()?;
     }

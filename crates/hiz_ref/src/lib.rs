@@ -8,7 +8,8 @@
 //! 2. A pixel is **touched** if some point of the volume with w > 0 and `0 <= z <= w` has pixel coordinates in the pixel's closed
 //!    square (or on its centre: [`Coverage`]).
 //! 3. A pixel **hides** the volume if its depth is strictly nearer than *all* of the volume: `z - depth w > 0` on all of it
-//!    (reversed Z: `< 0`), the parts outside of the frustum included. Depths are cleaned up first ([`sanitized_depth`]).
+//!    (reversed Z: `< 0`), the parts outside of the frustum included; or, with [`OwnDepth::PerPixel`], than the part of it that
+//!    the pixel can show. Depths are cleaned up first ([`sanitized_depth`]).
 //! 4. [`classify`]: if some touched pixel does not hide the volume, it is [`Verdict::Visible`], and to cull it would be a false cull.
 //!    Otherwise it is [`Verdict::Hidden`]: outside of the frustum, or occluded.
 //! 5. [`pyramid()`] is the reference of the depth pyramid, each texel computed from all of its pixels.
@@ -74,6 +75,16 @@ pub enum Arithmetic {
     Exact,
 }
 
+/// Which part of a volume a pixel's depth has to be nearer than to hide it there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OwnDepth {
+    /// All of it: one nearest depth stands for the whole volume.
+    #[default]
+    Nearest,
+    /// The part inside the frustum that projects into the pixel's square (or onto its centre: [`Coverage`]). Hides more.
+    PerPixel,
+}
+
 /// Choices for [`classify_with`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Options {
@@ -81,6 +92,8 @@ pub struct Options {
     pub arithmetic: Arithmetic,
     /// What of a pixel counts.
     pub coverage: Coverage,
+    /// What of a volume counts in a pixel.
+    pub own_depth: OwnDepth,
 }
 
 /// A verdict and what it rests on.
@@ -210,6 +223,31 @@ pub fn touched_pixels(view: &View, volume: &Volume, coverage: Coverage) -> Resul
     let (pixels, decided) = Projected::new(view, volume, options).touched();
     debug_assert!(decided, "exact arithmetic decides everything");
     Ok(pixels)
+}
+
+/// The nearest depth at which pixel (`column`, `row`) shows something of `volume`: every nearer one hides there what
+/// [`OwnDepth::PerPixel`] asks for. `None` if the pixel is not touched, or the volume invalid. Exact.
+///
+/// # Errors
+///
+/// If the view is not finite or its size is wrong.
+///
+/// # Panics
+///
+/// If the pixel lies outside of the image.
+pub fn own_depth(
+    view: &View,
+    volume: &Volume,
+    coverage: Coverage,
+    [column, row]: [u32; 2],
+) -> Result<Option<f32>, Error> {
+    view.check()?;
+    assert!(column < view.width && row < view.height, "pixel ({column}, {row}) of {}x{}", view.width, view.height);
+    if !volume.is_valid() {
+        return Ok(None);
+    }
+    let options = Options { coverage, ..Options::default() };
+    Ok(Projected::new(view, volume, options).own_depth([column, row]))
 }
 
 fn is_not(answer: Option<bool>) -> Option<bool> {

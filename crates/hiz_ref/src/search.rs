@@ -6,7 +6,7 @@ use crate::pyramid::{ONE, sanitized_depth};
 use crate::scalar::{Ball, Scalar};
 use crate::view::{Block, Clip, Coverage, View};
 use crate::volume::{Frame, Volume};
-use crate::{Arithmetic, Options};
+use crate::{Arithmetic, Options, OwnDepth};
 use std::cell::OnceCell;
 
 /// A volume as a view sees it, and the two questions about it: does it meet a block of pixels, does a depth hide it.
@@ -56,6 +56,39 @@ impl<'a> Projected<'a> {
                 feasible(&inside, self.shape, consistent)
             },
         )
+    }
+
+    /// Whether a point of the volume is inside the frustum and the block, and not farther than a depth in 0..=1.
+    pub(crate) fn meets_before(&self, block: Block, depth: f32) -> Option<bool> {
+        let coverage = self.options.coverage;
+        let before = self.float.inside_and_before(self.view, block, coverage, depth);
+        self.decide(
+            || feasible_in_float(&before, self.shape),
+            || {
+                let exact = self.exact().inside_and_before(self.view, block, coverage, depth);
+                feasible(&exact, self.shape, is_consistent(&before))
+            },
+        )
+    }
+
+    /// The nearest depth at which a pixel shows something of the volume: by bisection over the float32 numbers from near to far, for
+    /// what one depth shows the farther ones show, too.
+    pub(crate) fn own_depth(&self, [x, y]: [u32; 2]) -> Option<f32> {
+        let pixel = Block { x: [x, x + 1], y: [y, y + 1] };
+        let depth = |steps: u32| f32::from_bits(if self.view.reversed { ONE - steps } else { steps });
+        let shows = |steps: u32| self.meets_before(pixel, depth(steps)) == Some(true);
+        let (mut hidden, mut shown) = (0, ONE);
+        if !shows(shown) {
+            return None;
+        }
+        if shows(hidden) {
+            return Some(depth(hidden));
+        }
+        while shown - hidden > 1 {
+            let middle = hidden.midpoint(shown);
+            if shows(middle) { shown = middle } else { hidden = middle }
+        }
+        Some(depth(shown))
     }
 
     fn meets_in_float(&self, block: Block) -> Option<bool> {
@@ -237,6 +270,7 @@ enum Pixels {
 }
 
 /// Looks for a touched pixel that does not hide the volume: blocks are halved, and dropped where all pixels hide it or none is touched.
+/// With [`OwnDepth::PerPixel`] "hides" is asked anew in every block, against the farthest of its depths.
 pub(crate) fn find_open_pixel(projected: &Projected, depth: &[f32]) -> Found {
     let mut hiding = Hiding::new(projected);
     let width = projected.view.width as usize;
@@ -264,12 +298,16 @@ pub(crate) fn find_open_pixel(projected: &Projected, depth: &[f32]) -> Found {
         if pixels == Pixels::AllHide {
             continue;
         }
-        let meets = projected.meets(block);
+        let meets = match projected.options.own_depth {
+            OwnDepth::Nearest => projected.meets(block),
+            OwnDepth::PerPixel => projected.meets_before(block, farthest(projected.view, depth, block)),
+        };
         if meets == Some(false) {
             continue;
         }
-        // Squares cover their block; samples do not, so there only single pixels count.
-        let counts = projected.options.coverage == Coverage::Area || block.is_pixel();
+        // Squares cover their block; samples do not, nor does the farthest depth stand for all, so there only single pixels count.
+        let Options { coverage, own_depth, .. } = projected.options;
+        let counts = (coverage == Coverage::Area && own_depth == OwnDepth::Nearest) || block.is_pixel();
         if meets == Some(true) && pixels == Pixels::NoneHides && counts {
             return Found::Open(follow(projected, block));
         }
@@ -280,6 +318,16 @@ pub(crate) fn find_open_pixel(projected: &Projected, depth: &[f32]) -> Found {
         }
     }
     if unknown { Found::Unknown } else { Found::Nothing }
+}
+
+/// The farthest depth of a block, cleaned up.
+fn farthest(view: &View, depth: &[f32], block: Block) -> f32 {
+    let rows = block.y[0]..block.y[1];
+    let columns = block.x[0] as usize..block.x[1] as usize;
+    rows.flat_map(|y| &depth[y as usize * view.width as usize..][columns.clone()])
+        .map(|&pixel| sanitized_depth(pixel, view.reversed))
+        .reduce(if view.reversed { f32::min } else { f32::max })
+        .expect("a block is never empty")
 }
 
 /// A touched pixel of a block that the volume meets.

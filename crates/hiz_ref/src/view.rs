@@ -120,6 +120,25 @@ impl<S: Scalar> Clip<S> {
         if reversed { threshold.minus(&self.z) } else { self.z.minus(&threshold) }
     }
 
+    /// [`Clip::inside`] the block and not farther than `depth`: what a pixel of that depth does not hide.
+    pub(crate) fn inside_and_before(
+        &self,
+        view: &View,
+        block: Block,
+        coverage: Coverage,
+        depth: f32,
+    ) -> Vec<Constraint<S>> {
+        let mut all = self.inside(view, block, coverage);
+        // z >= 0 and w - z >= 0 stand last. One of them follows from the new condition and the other one, unless the depth is the near
+        // plane's: then they alone keep w from being negative.
+        let at_near_plane = depth == if view.reversed { 1.0 } else { 0.0 };
+        if !at_near_plane {
+            all.remove(all.len() - if view.reversed { 2 } else { 1 });
+        }
+        all.push(Constraint::at_least_zero(self.beyond(depth, !view.reversed)));
+        all
+    }
+
     /// The conditions under which a point is inside the frustum and inside the block (its closed rectangle, or the hull of its samples).
     ///
     /// `w > 0` needs no condition of its own: `0 <= z <= w` gives `w >= 0`, and `w = 0` leaves only the points with

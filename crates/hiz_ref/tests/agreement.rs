@@ -4,7 +4,7 @@ mod common;
 
 use common::Random;
 use common::scenes::{image, scene, volume};
-use hiz_ref::{Arithmetic, Coverage, Options, Verdict, classify_with, hides, touched_pixels};
+use hiz_ref::{Arithmetic, Coverage, Options, OwnDepth, Verdict, classify_with, hides, touched_pixels};
 
 #[test]
 fn all_arithmetics_agree_on_scenes() {
@@ -15,8 +15,9 @@ fn all_arithmetics_agree_on_scenes() {
         let scene = scene(&mut random, 8, 6);
         let volume = volume(&mut random, &scene);
         let view = &scene.view;
+        let own_depth = if number % 2 == 0 { OwnDepth::Nearest } else { OwnDepth::PerPixel };
         let run = |depth: &[f32], arithmetic, coverage| {
-            let options = Options { arithmetic, coverage };
+            let options = Options { arithmetic, coverage, own_depth };
             classify_with(view, &volume, depth, options).expect("valid")
         };
         let probe = run(&[0.5; 48], Arithmetic::Float, Coverage::Area);

@@ -1,7 +1,8 @@
 //! Cases worked by hand: every expectation follows from the few lines of arithmetic beside it.
 
 use hiz_ref::{
-    Coverage, Error, Options, Verdict, View, Volume, classify, classify_with, hides, is_outside, touched_pixels,
+    Coverage, Error, Options, OwnDepth, Verdict, View, Volume, classify, classify_with, hides, is_outside, own_depth,
+    touched_pixels,
 };
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -341,4 +342,32 @@ fn invalid_volumes_and_bad_input_have_names() {
         text(classify(&broken, &good, &[0.0; 16])),
         "view: expected finite rows and a finite origin, got NaN or infinity"
     );
+}
+
+#[test]
+fn a_pixel_shows_its_own_part_of_a_slope() {
+    // World is NDC: columns 0..4 are x in -1..1. A plate that recedes to the right: depth 0.5 at its middle (x = 0), 0.25 at
+    // x = -0.9, 0.75 at x = 0.9. In column 0 (x below -0.5) it reaches from 0.25 to 0.361, in column 3 from 0.639 to 0.75.
+    let view = orthographic(4, 1);
+    let slope = Volume::OrientedBox {
+        center: [0.0, 0.0, 0.5],
+        half_sizes: [1.0, 0.5, 0.0],
+        axes: [[0.9, 0.0, 0.0], [0.0, 1.0, 0.0], [0.25, 0.0, 1.0]],
+    };
+    let ask = |depth: [f32; 4], own_depth| {
+        classify_with(&view, &slope, &depth, Options { own_depth, ..Options::default() }).expect("valid input")
+    };
+    let following = [0.24, 0.36, 0.49, 0.63];
+    assert_eq!(ask(following, OwnDepth::PerPixel).verdict, Verdict::Hidden);
+    assert_eq!(ask(following, OwnDepth::Nearest).verdict, Verdict::Visible);
+    // What column 2 shows begins with the depth of x = 0.
+    let begins = |column| own_depth(&view, &slope, Coverage::Area, [column, 0]).expect("valid input");
+    assert_eq!(begins(2), Some(0.5));
+    assert!((f64::from(begins(3).expect("touched")) - (0.5 + 0.5 / 0.9 * 0.25)).abs() < 1e-7);
+    // At x = 0.5 it is 0.6389 deep.
+    let outcome = ask([0.24, 0.36, 0.49, 0.64], OwnDepth::PerPixel);
+    assert_eq!((outcome.verdict, outcome.witness), (Verdict::Visible, Some([3, 0])));
+    // Equal depth is visible: at x = 0 the third column begins with 0.5.
+    assert_eq!(ask([0.24, 0.36, 0.5, 0.63], OwnDepth::PerPixel).verdict, Verdict::Visible);
+    assert_eq!(ask([0.24, 0.36, 0.49, 1.0], OwnDepth::PerPixel).verdict, Verdict::Visible);
 }

@@ -6,7 +6,9 @@
 mod common;
 
 use common::Random;
-use hiz_ref::{Arithmetic, Coverage, Options, Verdict, View, Volume, classify_with, is_outside, touched_pixels};
+use hiz_ref::{
+    Arithmetic, Coverage, Options, OwnDepth, Verdict, View, Volume, classify_with, is_outside, touched_pixels,
+};
 
 /// `v . s + m >= 0`, in local coordinates of the volume.
 #[derive(Clone, Copy)]
@@ -128,6 +130,11 @@ impl Case {
         polytope_is_not_empty(&planes)
     }
 
+    /// Points that are not farther than a depth (in eighths).
+    fn before(&self, depth: i128) -> Plane {
+        self.plane(if self.reversed { [0, 0, 8, -depth] } else { [0, 0, -8, depth] })
+    }
+
     /// Whether a depth (in eighths) is nearer than every point.
     fn is_hidden_by(&self, depth: i128) -> bool {
         let plane = if self.reversed { self.plane([0, 0, -8, depth]) } else { self.plane([0, 0, 8, -depth]) };
@@ -219,6 +226,7 @@ fn ball_meets(planes: &[Plane]) -> bool {
 fn certificates_and_points_agree() {
     let mut random = Random(1);
     let mut tally = std::collections::BTreeMap::new();
+    let mut gained = 0;
     for number in 0..20_000 {
         let case = Case::random(&mut random);
         let (view, volume) = (case.view(), case.volume());
@@ -226,7 +234,7 @@ fn certificates_and_points_agree() {
         for coverage in [Coverage::Area, Coverage::Sample] {
             let inset = i128::from(coverage == Coverage::Sample);
             let far = if case.reversed { 0 } else { 8 };
-            let (mut touched, mut visible) = (Vec::new(), false);
+            let (mut touched, mut visible, mut open) = (Vec::new(), false, Vec::new());
             for y in 0..case.size[1] {
                 for x in 0..case.size[0] {
                     let edges = |i: i128| [2 * i + inset, 2 * i + 2 - inset];
@@ -234,6 +242,11 @@ fn certificates_and_points_agree() {
                         touched.push([x as u32, y as u32]);
                         let pixel = case.depth[(y * case.size[0] + x) as usize];
                         visible |= pixel == far || !case.is_hidden_by(pixel);
+                        let mut planes = case.frustum(edges(x), edges(y));
+                        planes.push(case.before(pixel));
+                        if pixel == far || case.meets(planes) {
+                            open.push([x as u32, y as u32]);
+                        }
                     }
                 }
             }
@@ -251,7 +264,7 @@ fn certificates_and_points_agree() {
                 if arithmetic == Arithmetic::Exact && number % 16 != 0 {
                     continue;
                 }
-                let options = Options { arithmetic, coverage };
+                let options = Options { arithmetic, coverage, own_depth: OwnDepth::Nearest };
                 let outcome = classify_with(&view, &volume, &depth, options).expect("valid");
                 if outcome.verdict != Verdict::Undecided {
                     assert_eq!(outcome.verdict, expected, "{arithmetic:?} {}", name());
@@ -263,10 +276,22 @@ fn certificates_and_points_agree() {
                 }
                 let key = (format!("{coverage:?} {arithmetic:?} {:?}", outcome.verdict), outside);
                 *tally.entry(key).or_insert(0) += 1;
+
+                let options = Options { arithmetic, coverage, own_depth: OwnDepth::PerPixel };
+                let outcome = classify_with(&view, &volume, &depth, options).expect("valid");
+                if outcome.verdict != Verdict::Undecided {
+                    let expected = if open.is_empty() { Verdict::Hidden } else { Verdict::Visible };
+                    assert_eq!(outcome.verdict, expected, "{arithmetic:?}, own depth in a pixel, {}", name());
+                }
+                if let Some(witness) = outcome.witness {
+                    assert!(open.contains(&witness), "{}", name());
+                }
+                gained += usize::from(visible && open.is_empty());
             }
         }
     }
-    println!("{tally:#?}");
+    println!("{tally:#?}, hidden only by their own depth in each pixel: {gained}");
+    assert!(gained > 1000, "{gained}");
     // The cases are worth something only if every kind of answer is among them.
     for (verdict, outside) in [("Visible", false), ("Hidden", false), ("Hidden", true)] {
         let count = tally[&(format!("Area Escalate {verdict}"), outside)];

@@ -52,7 +52,7 @@ impl Campaign {
     }
 
     fn round(&self, engine: &Engine, random: &mut Random, round: usize, tally: &mut Tally) {
-        let Some(scene) = Scene::new(random) else { return };
+        let Some(scene) = Scene::new(random, 48) else { return };
         let depth = scene.depth_image(random);
         let image = engine.upload_depth(&depth, &scene.camera).expect("upload");
         let pyramid = engine.pyramid(&image).expect("pyramid");
@@ -61,14 +61,7 @@ impl Campaign {
             Coverage::Sample => hiz_ref::Coverage::Sample,
         };
         let reference = Options { coverage, ..Options::default() };
-        let size = scene.camera.size();
-        let view = View {
-            rows: scene.camera.rows(),
-            origin: scene.camera.origin(),
-            width: size.width,
-            height: size.height,
-            reversed: scene.camera.convention().is_reversed(),
-        };
+        let view = scene.view();
         // No slack: it would hide a margin that is too small.
         let (footprint, descent) = random.pick(self.modes);
         let options = CullOptions {
@@ -115,23 +108,23 @@ impl Campaign {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+pub(crate) enum Kind {
     Sphere,
     Box,
     OrientedBox,
 }
 
 /// A camera, its axes, the depth that volumes begin at and a column and row with holes.
-struct Scene {
-    camera: Camera,
+pub(crate) struct Scene {
+    pub(crate) camera: Camera,
     eye: [f64; 3],
     /// Right, up, forward.
-    axes: [[f64; 3]; 3],
+    pub(crate) axes: [[f64; 3]; 3],
     /// Half the image in world units at view depth 1 (perspective) or anywhere (orthographic), and its middle.
-    half: [f64; 2],
-    middle: [f64; 2],
-    orthographic: bool,
-    front: f64,
+    pub(crate) half: [f64; 2],
+    pub(crate) middle: [f64; 2],
+    pub(crate) orthographic: bool,
+    pub(crate) front: f64,
     near: f64,
     hole: [u32; 2],
     /// Whether the camera's axes are the world's, so that boxes can face it.
@@ -139,8 +132,9 @@ struct Scene {
 }
 
 impl Scene {
-    fn new(random: &mut Random) -> Option<Self> {
-        let size = ImageSize::new(1 + random.below(48), 1 + random.below(48));
+    /// With sides of up to `largest` pixels.
+    pub(crate) fn new(random: &mut Random, largest: u32) -> Option<Self> {
+        let size = ImageSize::new(1 + random.below(largest), 1 + random.below(largest));
         let convention = random.pick(&[DepthConvention::Standard, DepthConvention::Reversed]);
         let far_away = random.pick(&[0.0, 0.0, 1.0, 1e3, 1e6, 1e9]);
         let eye: [f64; 3] = std::array::from_fn(|_| far_away * random.range(-1.0, 1.0));
@@ -197,7 +191,19 @@ impl Scene {
         Some(Self { camera, eye, axes, half, middle, orthographic, front, near, hole, aligned })
     }
 
-    fn world(&self, v: [f64; 3]) -> [f64; 3] {
+    /// The camera as the oracle takes it.
+    pub(crate) fn view(&self) -> View {
+        let size = self.camera.size();
+        View {
+            rows: self.camera.rows(),
+            origin: self.camera.origin(),
+            width: size.width,
+            height: size.height,
+            reversed: self.camera.convention().is_reversed(),
+        }
+    }
+
+    pub(crate) fn world(&self, v: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|k| self.eye[k] + (0..3).map(|j| self.axes[j][k] * v[j]).sum::<f64>())
     }
 
@@ -251,7 +257,7 @@ impl Scene {
             .collect()
     }
 
-    fn volume(&self, kind: Kind, random: &mut Random) -> Volume {
+    pub(crate) fn volume(&self, kind: Kind, random: &mut Random) -> Volume {
         let size = self.camera.size();
         let z = self.front;
         // An interval in pixels: random, or ending a hair beside a pixel border of the hole.
@@ -322,14 +328,14 @@ impl Scene {
 
 /// Volumes as the engine's flat arrays.
 #[derive(Default)]
-struct Arrays {
+pub(crate) struct Arrays {
     a: Vec<f64>,
     b: Vec<f64>,
     c: Vec<f64>,
 }
 
 impl Arrays {
-    fn new(volumes: &[Volume]) -> Self {
+    pub(crate) fn new(volumes: &[Volume]) -> Self {
         let mut arrays = Self::default();
         for volume in volumes {
             match volume {
@@ -351,7 +357,7 @@ impl Arrays {
         arrays
     }
 
-    fn bounds(&self, kind: Kind) -> Bounds<'_> {
+    pub(crate) fn bounds(&self, kind: Kind) -> Bounds<'_> {
         let (a, b, c) = (Floats::F64(&self.a), Floats::F64(&self.b), Floats::F64(&self.c));
         match kind {
             Kind::Sphere => Bounds::Spheres { centers: a, radii: b },

@@ -1,0 +1,122 @@
+// A volume's own outline and front: planes that bound all of it, tilted to its faces. A texel that lies beyond one of them
+// shows nothing of the volume, or only what is farther than its depth.
+//
+// A plane is a linear function of pixel position and depth, facing z / w + slope . (x, y) / w > offset on all of the volume.
+// Its slope is a guess; one certificate proves its offset, once; after that a texel costs a multiplication an axis.
+
+struct SupportingPlane {
+    // Depth units (an outline: pixels) per pixel.
+    slope: vec2<f32>,
+    // 1, reversed -1: bounds the depth of a front face. 0: bounds the outline.
+    facing: f32,
+    offset: f32,
+}
+
+struct SupportingPlanes {
+    // The sides of the rectangle around the volume, finer than pixels.
+    left_top: vec2<f32>,
+    right_bottom: vec2<f32>,
+    list: array<SupportingPlane, CANDIDATES>,
+    count: u32,
+}
+
+// A volume on the four rows.
+struct Projected {
+    x: Value,
+    y: Value,
+    z: Value,
+    w: Value,
+    // A lower bound of w, above 0.
+    w_min: f32,
+}
+
+// The bits of 2^16: steeper planes say nothing, and could overflow a product.
+const STEEPEST_BITS: u32 = 0x47800000u;
+
+// The sign that makes farther greater.
+fn farther_sign() -> f32 {
+    return select(1.0, -1.0, REVERSED);
+}
+
+// A guess: the plane through a face or edge that may bound the volume, and its value there.
+struct Candidate {
+    facing: f32,
+    slope: vec2<f32>,
+    own: f32,
+}
+
+// Beyond every image, from its middle.
+const BEYOND: f32 = 65536.0;
+
+// Bounds of r / w, in pixels, where certificates prove them.
+fn proved_interval(r: Value, w: Value, w_min: f32) -> vec2<f32> {
+    let guess = ratio_interval(r, w);
+    let widened = 3.0 * error_bound(r, max(abs(guess.x), abs(guess.y)), w) / w_min;
+    let low = clamp(guess.x - widened, -BEYOND, BEYOND);
+    let high = clamp(guess.y + widened, -BEYOND, BEYOND);
+    return vec2<f32>(
+        select(-BEYOND, low, surely_above(r, low, w)),
+        select(BEYOND, high, surely_below(r, high, w)));
+}
+
+// The planes of a volume's candidates that touch it, less a margin; those alone that a certificate proves.
+fn supporting_planes(p: Projected) -> SupportingPlanes {
+    var planes: SupportingPlanes;
+    planes.count = 0u;
+    let columns = proved_interval(p.x, p.w, p.w_min);
+    let rows = proved_interval(p.y, p.w, p.w_min);
+    planes.left_top = vec2<f32>(columns.x, rows.x);
+    planes.right_bottom = vec2<f32>(columns.y, rows.y);
+    for (var i = 0u; i < CANDIDATES; i += 1u) {
+        let guess = candidate(i, p);
+        if any((bitcast<vec2<u32>>(guess.slope) & vec2<u32>(0x7fffffffu)) > vec2<u32>(STEEPEST_BITS)) {
+            continue;
+        }
+        var r = Value(
+            guess.facing * p.z.center + guess.slope.x * p.x.center + guess.slope.y * p.y.center,
+            abs(guess.facing) * p.z.size + abs(guess.slope.x) * p.x.size + abs(guess.slope.y) * p.y.size,
+            guess.facing * p.z.half + guess.slope.x * p.x.half + guess.slope.y * p.y.half);
+        let interval = ratio_interval(r, p.w);
+        let extent = interval.y - interval.x;
+        var slope = guess.slope;
+        var least = interval.x;
+        if !on_border(guess.own, least, extent) {
+            // The other side of an outline is its other edge's; that of a front is a back.
+            if guess.facing != 0.0 || !on_border(guess.own, interval.y, extent) {
+                continue;
+            }
+            slope = -slope;
+            r = Value(-r.center, r.size, -r.half);
+            least = -interval.y;
+        }
+        let offset = least - 3.0 * error_bound(r, least, p.w) / p.w_min;
+        let small = all_small(vec4<u32>(bitcast<u32>(offset), 0u, 0u, 0u)) && r.size + abs(offset) * p.w.size < 0x1p60;
+        if small && surely_above(r, offset, p.w) {
+            planes.list[planes.count] = SupportingPlane(slope, guess.facing, offset);
+            planes.count += 1u;
+        }
+    }
+    return planes;
+}
+
+// True implies: pixels from `begin` to before `end` that are no farther than the stored depth show nothing of the volume.
+fn surely_clear(planes: ptr<function, SupportingPlanes>, begin: vec2<u32>, end: vec2<u32>, bits: u32) -> bool {
+    // Exact: multiples of 2^-8 below 2^16, and then one of two numbers.
+    let left_top = max(vec2<f32>(begin) - view.reach - view.half_size, (*planes).left_top);
+    let right_bottom = min(vec2<f32>(end) + view.reach - view.half_size, (*planes).right_bottom);
+    // At the far plane, too: what is farther is outside the view volume.
+    let depth = bar(occluding_depth(bits) - view.z_slope);
+    for (var i = 0u; i < (*planes).count; i += 1u) {
+        let plane = (*planes).list[i];
+        // The plane is nearest, or reaches farthest out, at this corner.
+        let corner = select(left_top, right_bottom, plane.slope > vec2<f32>(0.0));
+        let fall = plane.slope * corner;
+        let bound = plane.facing * depth;
+        // Two products, three differences and the depth's own: 6 roundings at most.
+        let margin = 8.0 * EPS * (abs(plane.offset) + abs(fall.x) + abs(fall.y) + abs(bound)) + 0x1p-100;
+        if plane.offset - fall.x - fall.y - margin > bound {
+            return true;
+        }
+    }
+    return false;
+}
