@@ -122,7 +122,7 @@ impl ViewUniform {
         clippy::cast_possible_truncation,
         reason = "multiples of 2^-8 and sizes below 2^15 are exact, the factor is rounded towards far"
     )]
-    fn new(camera: &Camera, reduction: u32, options: &CullOptions) -> Result<Self> {
+    pub(crate) fn new(camera: &Camera, reduction: u32, options: &CullOptions) -> Result<Self> {
         let range = |name: &str, value: f64, most: f64| {
             if (0.0..=most).contains(&value) {
                 Ok(value)

@@ -45,6 +45,7 @@ pub(crate) fn ndc(z: f32, convention: DepthConvention) -> f32 {
 pub(crate) const CONVENTIONS: [DepthConvention; 2] = [DepthConvention::Standard, DepthConvention::Reversed];
 
 /// `SplitMix64` (Steele, Lea, Flood, OOPSLA 2014): small, seeded, the same everywhere.
+#[derive(Debug)]
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
