@@ -77,7 +77,7 @@ fn soak() {
             coverage,
             modes: ALL,
             count_keeps: true,
-            classes: &Class::ALL,
+            ..Campaign::default()
         };
         report.merge(&chunk.run(engine()));
         done += 1;

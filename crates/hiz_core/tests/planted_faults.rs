@@ -3,10 +3,10 @@
 
 mod common;
 
-#[path = "common/campaign.rs"]
+#[path = "common/campaign/mod.rs"]
 mod campaign;
 
-use campaign::{Campaign, PLAIN, Tally};
+use campaign::{Campaign, Class, HEADER, PLAIN, Report};
 use common::{CONVENTIONS, Random, camera_along_z};
 use hiz_core::headless::Engine;
 use hiz_core::{Coverage, Footprint};
@@ -15,8 +15,8 @@ fn faulty(faults: &[(&str, &str)]) -> Engine {
     Engine::with_planted_faults(None, faults).expect("the device tests need a Vulkan driver")
 }
 
-fn campaign(faults: &[(&str, &str)], coverage: Coverage, modes: &'static [(Footprint, u32)]) -> Tally {
-    Campaign { seed: 21, rounds: 150, volumes: 32, coverage, modes, count_keeps: false }.run(&faulty(faults))
+fn campaign(faults: &[(&str, &str)], coverage: Coverage, modes: &'static [(Footprint, u32)]) -> Report {
+    Campaign { seed: 21, rounds: 10, coverage, modes, ..Campaign::default() }.run(&faulty(faults))
 }
 
 fn assert_red(name: &str, faults: &[(&str, &str)]) {
@@ -24,21 +24,44 @@ fn assert_red(name: &str, faults: &[(&str, &str)]) {
 }
 
 fn assert_red_with(name: &str, faults: &[(&str, &str)], modes: &'static [(Footprint, u32)]) {
-    let tally = campaign(faults, Coverage::Area, modes);
-    eprintln!("{name}: {} false culls in {} cases, {} culled", tally.false_culls, tally.cases, tally.culled);
-    assert!(tally.false_culls > 0, "{name}: the campaign stayed green: {tally:?}");
+    assert_report_red(name, &campaign(faults, Coverage::Area, modes));
+}
+
+fn assert_report_red(name: &str, report: &Report) {
+    let total = report.total();
+    let by_class: Vec<String> = report
+        .classes
+        .iter()
+        .filter(|(_, t)| t.false_culls > 0)
+        .map(|(class, t)| format!("{class:?} {}", t.false_culls))
+        .collect();
+    let (cases, false_culls) = (total.cases, total.false_culls);
+    eprintln!("{name}: {false_culls} false culls in {cases} cases ({})", by_class.join(", "));
+    assert!(false_culls > 0, "{name}: the campaign stayed green: {total:?}");
 }
 
 #[test]
 fn without_faults_it_is_green() {
     for coverage in [Coverage::Area, Coverage::Sample] {
-        assert_eq!(campaign(&[], coverage, PLAIN).false_culls, 0);
+        assert_eq!(campaign(&[], coverage, PLAIN).total().false_culls, 0);
     }
 }
 
+/// The campaign's power: every class finds that there is no margin, and all together that there is a 48th of it.
 #[test]
-fn no_margin() {
-    assert_red("margin 0", &[("ERROR_ULPS: f32 = 24.0", "ERROR_ULPS: f32 = 0.0")]);
+fn cuts_of_the_margin() {
+    for (ulps, rounds) in [("0.0", 40), ("0.25", 20), ("0.5", 20)] {
+        let margin = format!("ERROR_ULPS: f32 = {ulps}");
+        let engine = faulty(&[("ERROR_ULPS: f32 = 24.0", &margin)]);
+        let report = Campaign { seed: 22, rounds, ..Campaign::default() }.run(&engine);
+        assert_report_red(&margin, &report);
+        if ulps == "0.0" {
+            eprintln!("{HEADER}\n{report}");
+            let green: Vec<Class> =
+                report.classes.iter().filter(|(_, t)| t.false_culls == 0).map(|(class, _)| *class).collect();
+            assert!(green.is_empty(), "no margin, and green: {green:?}");
+        }
+    }
 }
 
 #[test]

@@ -41,13 +41,15 @@ pub(crate) enum Class {
     Holes,
     /// Images of one row or column, pixels and volumes up to 1e4 times as wide as high.
     AspectRatios,
+    /// Worlds from 1e-24 to 1e12 units across, the unit of the camera being 1.
+    Scale,
     /// A matrix about the world's origin, its camera far away: constants cancel at the eye, and the rows have to own up to it.
     BareMatrix,
 }
 
 impl Class {
     /// All of them.
-    pub(crate) const ALL: [Self; 17] = [
+    pub(crate) const ALL: [Self; 18] = [
         Self::Random,
         Self::PixelBorders,
         Self::Tiny,
@@ -64,6 +66,7 @@ impl Class {
         Self::EqualDepth,
         Self::Holes,
         Self::AspectRatios,
+        Self::Scale,
         Self::BareMatrix,
     ];
 
@@ -95,12 +98,24 @@ impl Class {
                 let stretch = 10.0_f64.powf(random.range(-2.0, 2.0));
                 s.half = [s.half[0] * stretch, s.half[1] / stretch];
             }
+            Self::Scale => {
+                s.stand_away(0.0, random);
+                let scale = 10.0_f64.powf(random.range(-24.0, 12.0));
+                (s.near, s.far) = (s.near * scale, s.far * scale);
+                if s.orthographic {
+                    (s.half, s.middle) = (s.half.map(|v| v * scale), s.middle.map(|v| v * scale));
+                }
+            }
             Self::BareMatrix => {
                 s.bare_matrix = true;
-                let near = s.near;
-                s.stand_away(10.0_f64.powf(random.range(0.0, 9.0)), random);
-                // Close by: what cancels in the constants is large beside the distance.
-                (s.near, s.far) = (near, s.far / s.near * near);
+                let distance = 10.0_f64.powf(random.range(0.0, 9.0));
+                s.stand_away(distance, random);
+                // A near plane so close that what float64 lost in the constants is large beside it, and volumes far behind it: there
+                // the margin of a depth is smallest.
+                let range = 10.0_f64.powf(random.range(0.5, 7.0));
+                s.near = distance * 10.0_f64.powf(random.range(-13.0, -9.0));
+                s.far = random.pick(&[f64::INFINITY, s.near * range]);
+                s.style = random.pick(&[DepthStyle::Equal, s.style]);
             }
         }
     }

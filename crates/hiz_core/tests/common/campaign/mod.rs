@@ -24,6 +24,7 @@ pub(crate) use arrays::Arrays;
 pub(crate) use checkpoint::Checkpoint;
 pub(crate) use class::Class;
 pub(crate) use report::{HEADER, Report, Tally};
+pub(crate) use volume::moved;
 
 /// Every kind of bounding volume.
 pub(crate) const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
@@ -44,6 +45,8 @@ pub(crate) struct Campaign {
     pub(crate) coverage: Coverage,
     /// Footprints and descent budgets to choose from. (Each costs pipelines, and those cost time.)
     pub(crate) modes: &'static [(Footprint, u32)],
+    /// Guards and slacks at random.
+    pub(crate) any_slack: bool,
     /// Whether false keeps are counted, too (asks the oracle about everything).
     pub(crate) count_keeps: bool,
 }
@@ -57,6 +60,7 @@ impl Default for Campaign {
             volumes: 32,
             coverage: Coverage::Area,
             modes: PLAIN,
+            any_slack: false,
             count_keeps: false,
         }
     }
@@ -73,6 +77,8 @@ pub(crate) struct Round {
     pub(crate) depth: Vec<f32>,
     pub(crate) options: CullOptions,
     pub(crate) volumes: Vec<(BoundsKind, Vec<Volume>)>,
+    /// For each volume the way, as long as its distance, on which it becomes hidden.
+    pub(crate) away: Vec<Vec<[f64; 3]>>,
 }
 
 impl Campaign {
@@ -87,7 +93,7 @@ impl Campaign {
         let class = self.classes[number % self.classes.len()];
         let scene = Scene::new(class, self.coverage, random)?;
         let (footprint, descent) = random.pick(self.modes);
-        let options = CullOptions {
+        let mut options = CullOptions {
             coverage: self.coverage,
             // No slack and no guard: they would hide a margin that is too small.
             guard_px: Some(0.0),
@@ -97,10 +103,20 @@ impl Campaign {
             statistics: false,
             ..CullOptions::default()
         };
-        let volumes =
-            KINDS.map(|kind| (kind, (0..self.volumes).map(|_| scene.volume(class, kind, random)).collect())).to_vec();
+        if self.any_slack {
+            options.guard_px = random.pick(&[Some(0.0), Some(1.0 / 64.0), Some(0.5), Some(3.0), None]);
+            options.depth_slack = random.pick(&[0.0, 1e-6, 1e-3]);
+            options.transform_slack = random.pick(&[0.0, 4.0]);
+        }
+        let mut volumes = Vec::new();
+        let mut away = Vec::new();
+        for kind in KINDS {
+            let (these, ways) = (0..self.volumes).map(|_| scene.volume(class, kind, random)).unzip();
+            volumes.push((kind, these));
+            away.push(ways);
+        }
         let Scene { camera, view, depth, .. } = scene;
-        Some(Round { seed: self.seed, number, class, camera, view, depth, options, volumes })
+        Some(Round { seed: self.seed, number, class, camera, view, depth, options, volumes, away })
     }
 
     /// Culls every round on the device and asks the oracle.

@@ -143,13 +143,8 @@ impl Scene {
         let camera = settings.camera(random)?;
         let rows = camera.rows();
         let reversed = settings.convention.is_reversed();
-        let view = View {
-            rows,
-            origin: camera.origin(),
-            width: settings.size.width,
-            height: settings.size.height,
-            reversed,
-        };
+        let view =
+            View { rows, origin: camera.origin(), width: settings.size.width, height: settings.size.height, reversed };
         // The axes as the camera has them, up to float64.
         let unit = |v: [f64; 3]| {
             let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -168,16 +163,19 @@ impl Scene {
         let axes = [across(0), across(1), forward];
         let (near, size) = (settings.near, settings.size);
         let range = (settings.far / near).min(1e9);
-        // Mostly within a thousand near planes; the whole range where it is thin or has to be deep.
-        let exponent = if class == Class::DeepRange { random.unit() } else { random.unit().min(3.0 / range.log10()) };
+        // Mostly within a thousand near planes; the whole range where it has to be deep.
+        let exponent = if matches!(class, Class::DeepRange | Class::BareMatrix) {
+            random.unit()
+        } else {
+            random.unit().min(3.0 / range.log10())
+        };
         let front = near * range.powf(exponent) * random.pick(&[1.0, 1.0, 1.0, 1.0 - 1e-6, 1.0 + 1e-6, 0.9]);
         let hole = [random.below(size.width), random.below(size.height)];
         let edges = match coverage {
             Coverage::Area => [0.0, 1.0],
             Coverage::Sample => [0.5, 0.5],
         };
-        let mut scene =
-            Self { settings, camera, view, axes, front, front_depth: 0.0, hole, depth: Vec::new(), edges };
+        let mut scene = Self { settings, camera, view, axes, front, front_depth: 0.0, hole, depth: Vec::new(), edges };
         scene.paint(random);
         Some(scene)
     }

@@ -12,16 +12,27 @@ use super::scene::{DepthStyle, Scene};
 /// How far beside a border an edge may be placed, in pixels.
 const HAIRS: [f64; 9] = [0.0, 1e-7, -1e-7, 3e-6, -3e-6, 1e-4, -1e-4, 1e-12, -1e-12];
 
+/// A direction, and whether a volume has come far enough on it.
+struct Way<'a> {
+    direction: [f64; 3],
+    cleared: Box<dyn Fn(&Volume) -> bool + 'a>,
+}
+
 impl Scene {
-    /// A volume of `kind` as `class` wants it.
-    pub(super) fn volume(&self, class: Class, kind: BoundsKind, random: &mut Random) -> Volume {
+    /// A volume of `kind` as `class` wants it, and the way, as long as its distance, on which it becomes hidden.
+    pub(super) fn volume(&self, class: Class, kind: BoundsKind, random: &mut Random) -> (Volume, [f64; 3]) {
         let placed = if class == Class::Grazing && kind != BoundsKind::Sphere {
             self.plate(kind, random)
         } else {
             self.placed(class, kind, random)
         };
+        let way = self.way(class, random);
+        let away = way.direction.map(|x| x * self.front.abs());
         // The rest stays where it was put: a hair beside a border, or anywhere.
-        if random.below(4) == 0 { placed } else { self.settled(class, placed, random).unwrap_or(placed) }
+        if random.below(4) == 0 {
+            return (placed, away);
+        }
+        (self.last_before(placed, away, &*way.cleared, random).unwrap_or(placed), away)
     }
 
     /// An interval in pixels along an axis: anywhere, or ending a hair beside the border of the hole or of a texel.
@@ -112,20 +123,23 @@ impl Scene {
         Volume::OrientedBox { center, half_sizes: [depth, height, 0.0], axes }
     }
 
-    /// `volume` moved to where it is visible by less than float32 can tell, in the way that the depth image asks for.
-    fn settled(&self, class: Class, volume: Volume, random: &mut Random) -> Option<Volume> {
+    /// A way on which volumes become hidden, as the depth image offers it.
+    fn way(&self, class: Class, random: &mut Random) -> Way<'_> {
         let [right, up, forward] = self.axes;
-        let outside = |view: &View, v: &Volume| hiz_ref::is_outside(view, v).unwrap_or(false);
-        let hidden = |v: &Volume| hiz_ref::hides(&self.view, v, self.front_depth).unwrap_or(false);
+        let outside = |view: View| move |v: &Volume| hiz_ref::is_outside(&view, v).unwrap_or(false);
         match self.settings.style {
-            // Backwards, until it is hidden.
-            DepthStyle::Equal | DepthStyle::Near => self.last_before(volume, forward, &hidden, random),
+            // Backwards, until it is behind the depth.
+            DepthStyle::Equal | DepthStyle::Near | DepthStyle::Noise => {
+                let hidden = |v: &Volume| hiz_ref::hides(&self.view, v, self.front_depth).unwrap_or(false);
+                Way { direction: forward, cleared: Box::new(hidden) }
+            }
             // Away from the frustum's middle, until it is outside.
             DepthStyle::Far => {
-                let planes = [right, up, forward];
-                let out = if class == Class::NearPlane { planes[2] } else { random.pick(&planes) };
-                let sign = if class == Class::NearPlane { -1.0 } else { random.pick(&[1.0, -1.0]) };
-                self.last_before(volume, out.map(|x| sign * x), &|v| outside(&self.view, v), random)
+                let (axis, sign) = match class {
+                    Class::NearPlane => (forward, -1.0),
+                    _ => (random.pick(&[right, up, forward]), random.pick(&[1.0, -1.0])),
+                };
+                Way { direction: axis.map(|x| sign * x), cleared: Box::new(outside(self.view.clone())) }
             }
             // Away from the hole, until it no longer touches it.
             DepthStyle::Column | DepthStyle::Row | DepthStyle::Cross | DepthStyle::Pixel => {
@@ -139,27 +153,24 @@ impl Scene {
                 // Towards smaller pixel coordinates, clear of the hole and all beyond it; or the other way.
                 let down = random.below(2) == 0;
                 let (begin, end) = if down { (hole + self.edges[0], size) } else { (0.0, hole + self.edges[1]) };
-                let view = self.cropped(axis, begin, end);
                 // Pixel rows count downwards.
                 let sign = if down == (axis == 0) { -1.0 } else { 1.0 };
-                let away = [right, up][axis].map(|x| sign * x);
-                self.last_before(volume, away, &|v| outside(&view, v), random)
+                let direction = [right, up][axis].map(|x| sign * x);
+                Way { direction, cleared: Box::new(outside(self.cropped(axis, begin, end))) }
             }
-            DepthStyle::Noise => None,
         }
     }
 
-    /// Moves `volume` along `direction` to the last place where it is not yet `cleared`, to within a hundred-millionth of its
-    /// distance, or some eps before it. Nothing where there is no such place nearby.
+    /// Moves `volume` along `away` to the last place where it is not yet `cleared`, to within 1e-10 of its distance, or some eps
+    /// before it. Nothing where there is no such place nearby.
     fn last_before(
         &self,
         volume: Volume,
-        direction: [f64; 3],
+        away: [f64; 3],
         cleared: &dyn Fn(&Volume) -> bool,
         random: &mut Random,
     ) -> Option<Volume> {
-        let unit = self.front.abs();
-        let at = |s: f64| moved(&volume, direction.map(|x| x * s * unit));
+        let at = |s: f64| moved(&volume, away.map(|x| x * s));
         let towards = if cleared(&volume) { -1.0 } else { 1.0 };
         // A bracket around the change: it is near, mostly.
         let (mut inner, mut outer) = (0.0, 1e-9 * towards);
@@ -186,7 +197,8 @@ fn spanned(a: [f64; 3], b: [f64; 3]) -> Volume {
     Volume::Box { min: [0, 1, 2].map(|k| a[k].min(b[k])), max: [0, 1, 2].map(|k| a[k].max(b[k])) }
 }
 
-fn moved(volume: &Volume, by: [f64; 3]) -> Volume {
+/// `volume`, shifted.
+pub(crate) fn moved(volume: &Volume, by: [f64; 3]) -> Volume {
     let plus = |p: [f64; 3]| [0, 1, 2].map(|k| p[k] + by[k]);
     match *volume {
         Volume::Sphere { center, radius } => Volume::Sphere { center: plus(center), radius },

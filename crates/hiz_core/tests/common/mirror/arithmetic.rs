@@ -31,6 +31,8 @@ pub(crate) struct Style {
     pub(crate) flushed: bool,
     /// The rectangle is anything: it only chooses what is certified.
     pub(crate) wild_rectangle: bool,
+    /// `bar` and `bar3` stop the compiler from folding a difference that cancels into what it was made of.
+    pub(crate) bars: bool,
 }
 
 const PLAIN: Style = Style {
@@ -40,7 +42,11 @@ const PLAIN: Style = Style {
     reassociated: false,
     flushed: false,
     wild_rectangle: false,
+    bars: true,
 };
+
+/// What reassociation may do where no bar stops it; no style that the margin covers.
+pub(crate) const WITHOUT_BARS: Style = Style { name: "no bars", bars: false, ..PLAIN };
 
 /// The first is the plain one.
 pub(crate) const STYLES: [Style; 14] = [

@@ -8,7 +8,7 @@ use hiz_core::{BoundsKind, CullOptions, Footprint};
 
 use crate::campaign::{Arrays, Round};
 
-pub(crate) use arithmetic::{Arithmetic, STYLES};
+pub(crate) use arithmetic::{Arithmetic, STYLES, Style, WITHOUT_BARS};
 use volume::Volume;
 
 const EPS: f32 = 1.0 / 8_388_608.0;
@@ -123,6 +123,18 @@ impl Mirror {
             .collect()
     }
 
+    /// Whether a volume is culled.
+    pub(crate) fn culls_volume(&self, volume: &hiz_ref::Volume, error_ulps: f32, arithmetic: &mut Arithmetic) -> bool {
+        let kind = match volume {
+            hiz_ref::Volume::Sphere { .. } => BoundsKind::Sphere,
+            hiz_ref::Volume::Box { .. } => BoundsKind::Box,
+            hiz_ref::Volume::OrientedBox { .. } => BoundsKind::OrientedBox,
+        };
+        let arrays = Arrays::new(std::slice::from_ref(volume));
+        let record = hiz_core::words::instances(&arrays.bounds(kind)).expect("arrays that agree");
+        self.culls(kind, &record, error_ulps, arithmetic)
+    }
+
     /// `classify.wgsl`, `classify`; the numbers are its steps.
     fn culls(&self, kind: BoundsKind, record: &[u32], error_ulps: f32, arithmetic: &mut Arithmetic) -> bool {
         let view = &self.view;
@@ -156,8 +168,7 @@ impl Mirror {
         for (k, r) in [&x, &y].into_iter().enumerate() {
             let [from, to] = volume::ratio_interval(kind, r, &w);
             let widest = from.abs().max(to.abs());
-            let widening =
-                1.25 * c.error_bound(r, widest, &w) / w_min + 4.0 * EPS * view.half_size[k] + view.reach;
+            let widening = 1.25 * c.error_bound(r, widest, &w) / w_min + 4.0 * EPS * view.half_size[k] + view.reach;
             [first[k], last[k]] = pixel_interval([from, to], widening, view.half_size[k], view.size[k]);
             if c.arithmetic.style.wild_rectangle && view.size[k] > 0 {
                 let wild = [0; 2].map(|_| c.arithmetic.below(view.size[k] as u32) as i32);
@@ -214,12 +225,10 @@ impl Mirror {
         c.arithmetic.part();
         if self.reversed {
             let d = c.arithmetic.mul(stored.min(1.0), view.depth_factor);
-            let t = c.arithmetic.sub(d, view.z_slope);
-            return d >= LEAST_NORMAL && c.surely_below(z, t, w);
+            return d >= LEAST_NORMAL && c.surely_deeper(-1.0, z, d, view.z_slope, w);
         }
         let d = c.arithmetic.mul(stored.max(LEAST_NORMAL), view.depth_factor);
-        let t = c.arithmetic.sub(d, view.z_slope);
-        d < 1.0 && c.surely_above(z, t, w)
+        d < 1.0 && c.surely_deeper(1.0, z, d, view.z_slope, w)
     }
 }
 
@@ -292,6 +301,21 @@ impl Certificates<'_> {
 
     fn surely_below(&mut self, r: &Value, t: f32, w: &Value) -> bool {
         self.surely(-1.0, r, t, w)
+    }
+
+    /// `sign (z - (d - z_slope) w) > 0`, the difference barred or folded.
+    fn surely_deeper(&mut self, sign: f32, z: &Value, d: f32, z_slope: f32, w: &Value) -> bool {
+        let t = self.arithmetic.sub(d, z_slope);
+        if self.arithmetic.style.bars {
+            return self.surely(sign, z, t, w);
+        }
+        let folded = self.arithmetic.mul_add(z_slope, w.center, z.center);
+        let half = [0, 1, 2].map(|k| self.arithmetic.mul_add(z_slope, w.half[k], z.half[k]));
+        let error = self.error_bound(z, t, w);
+        let difference = self.arithmetic.mul_add(-d, w.center, folded);
+        let center = self.arithmetic.sub(sign * difference, error);
+        let half = [0, 1, 2].map(|k| self.arithmetic.mul_add(-d, w.half[k], half[k]));
+        self.exceeds_support(center, half)
     }
 
     fn between_samples(&mut self, r: &Value, w: &Value, first: i32, view: &View, axis: usize) -> bool {

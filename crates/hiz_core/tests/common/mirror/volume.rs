@@ -39,7 +39,12 @@ impl Volume {
             f.part();
             d_hi[k] = f.sub(hi[k], view.eye_hi[k]);
             d_lo[k] = f.sub(lo[k], view.eye_lo[k]);
-            center[k] = f.add(d_hi[k], d_lo[k]);
+            center[k] = if f.style.bars {
+                f.add(d_hi[k], d_lo[k])
+            } else {
+                let (p, eye) = (f.add(hi[k], lo[k]), f.add(view.eye_hi[k], view.eye_lo[k]));
+                f.sub(p, eye)
+            };
             let half = match kind {
                 BoundsKind::OrientedBox => f.sum([0, 1, 2].map(|e| half_axes[e][k].abs())),
                 BoundsKind::Sphere | BoundsKind::Box => half_axes[k][k],
@@ -60,29 +65,27 @@ impl Volume {
     }
 }
 
-/// `ratio_interval`: an estimate, so float64 is as good as anything.
+/// `ratio_interval`: an estimate that nothing rests on, so plain float32 will do in every style.
 pub(super) fn ratio_interval(kind: BoundsKind, r: &Value, w: &Value) -> [f32; 2] {
-    let wide = |v: &Value| (f64::from(v.center), v.half.map(f64::from));
-    let ((r, r_half), (w, w_half)) = (wide(r), wide(w));
-    let [from, to] = if kind == BoundsKind::Sphere {
-        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let n = w_half.map(|v| v / w);
-        let t = r / w;
-        let g = [0, 1, 2].map(|k| (r_half[k] - t * w_half[k]) / w);
+    if kind == BoundsKind::Sphere {
+        let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let n = w.half.map(|v| v / w.center);
         let q = (1.0 - dot(n, n)).max(1e-30);
+        let t = r.center / w.center;
+        let g = [0, 1, 2].map(|k| (r.half[k] - t * w.half[k]) / w.center);
+        let gg = dot(g, g);
         let p = dot(g, n);
-        let m = (p.abs() + (p * p + q * dot(g, g)).sqrt()).max(1e-30);
-        let (small, large) = (dot(g, g) / m, m / q);
-        if p > 0.0 { [t - large, t + small] } else { [t - small, t + large] }
-    } else {
-        let mut interval = [f64::INFINITY, f64::NEG_INFINITY];
-        for corner in 0..8 {
-            let signs = [1, 2, 4].map(|bit| if corner & bit == 0 { -1.0 } else { 1.0 });
-            let at = |middle: f64, half: [f64; 3]| middle + (0..3).map(|k| signs[k] * half[k]).sum::<f64>();
-            let ratio = at(r, r_half) / at(w, w_half);
+        let m = (p.abs() + (p * p + q * gg).sqrt()).max(1e-30);
+        let (small, large) = (gg / m, m / q);
+        return if p > 0.0 { [t - large, t + small] } else { [t - small, t + large] };
+    }
+    let mut interval = [f32::INFINITY, f32::NEG_INFINITY];
+    for (y, z) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+        let face = |v: &Value| v.center + y * v.half[1] + z * v.half[2];
+        for x in [1.0, -1.0] {
+            let ratio = (face(r) + x * r.half[0]) / (face(w) + x * w.half[0]);
             interval = [interval[0].min(ratio), interval[1].max(ratio)];
         }
-        interval
-    };
-    [from as f32, to as f32]
+    }
+    interval
 }
