@@ -9,7 +9,7 @@ mod campaign;
 use campaign::{Campaign, Class, HEADER, PLAIN, Report};
 use common::{CONVENTIONS, Random, camera_along_z};
 use hiz_core::headless::Engine;
-use hiz_core::{Coverage, Footprint};
+use hiz_core::{Bounds, Coverage, CullOptions, DepthConvention, Floats, Footprint, InstanceOptions, VisibleOptions};
 
 fn faulty(faults: &[(&str, &str)]) -> Engine {
     Engine::with_planted_faults(None, faults).expect("the device tests need a Vulkan driver")
@@ -106,6 +106,53 @@ fn a_rectangle_that_is_too_small_without_block_certificates() {
             ("&& inside_block(y, w, t.y, t.w, level, view.half_size.y, view.size.y)", ""),
         ],
     );
+}
+
+/// The rectangle only chooses what is certified: 0.7 pixels too small on each side, it hides less and nothing wrongly. (The level
+/// that follows from it is integer arithmetic, and no heuristic: four corners are all texels of a 2 x 2 footprint only.)
+#[test]
+fn a_rectangle_that_is_too_small_is_harmless() {
+    let fault = ("+ 4.0 * EPS * half_size + view.reach;", "+ 4.0 * EPS * half_size + view.reach - 0.7;");
+    for coverage in [Coverage::Area, Coverage::Sample] {
+        let total = campaign(&[fault], coverage, PLAIN).total();
+        assert!(total.false_culls == 0 && total.culled > total.cases / 20, "{total:?}");
+    }
+}
+
+/// Boxes a quarter of a pixel beside a hole, left, right, above and below of it, with half a pixel of guard: are any culled?
+fn culls_within_the_guard(engine: &Engine) -> bool {
+    let camera = camera_along_z(16, 16, DepthConvention::Reversed);
+    let options = CullOptions { guard_px: Some(0.5), ..CullOptions::default() };
+    // At depth 8 a pixel is a unit wide; column 8 is x in 0..1, and row 8 is y in -1..0.
+    let (low, high) = ([-1.25, -0.25], [1.25, 2.25]);
+    [(0, low), (0, high), (1, low.map(|v: f64| -v)), (1, high.map(|v| -v))].into_iter().any(|(axis, span)| {
+        let mut depth = [0.25; 256];
+        for i in 0..16 {
+            depth[if axis == 0 { 16 * i + 8 } else { 128 + i }] = 0.0;
+        }
+        let pyramid = engine.pyramid(&engine.upload_depth(&depth, &camera).unwrap()).unwrap();
+        let (mut min, mut max) = ([-0.4, -0.4, 8.0], [0.4, 0.4, 8.0]);
+        (min[axis], max[axis]) = (span[0].min(span[1]), span[0].max(span[1]));
+        let bounds = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };
+        let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
+        !engine.cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap().mask().unwrap()[0]
+    })
+}
+
+/// The guard in the block's certificates. The rectangle is widened by it as well, so that in area coverage no input reaches them
+/// alone; with a rectangle that forgets the guard they have to keep what lies within it. (In sample coverage the same terms decide
+/// what is *culled*: `outcomes.rs`.)
+#[test]
+fn the_guard_stands_in_the_block_certificates_too() {
+    let forgetful = ("+ 4.0 * EPS * half_size + view.reach;", "+ 4.0 * EPS * half_size;");
+    assert!(!culls_within_the_guard(&faulty(&[])));
+    assert!(!culls_within_the_guard(&faulty(&[forgetful])));
+    for sign in [
+        ("f32(begin) + view.reach - half_size", "f32(begin) - view.reach - half_size"),
+        ("f32(end) - view.reach - half_size", "f32(end) + view.reach - half_size"),
+    ] {
+        assert!(culls_within_the_guard(&faulty(&[forgetful, sign])), "{sign:?} stayed green");
+    }
 }
 
 #[test]
