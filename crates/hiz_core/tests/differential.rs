@@ -5,7 +5,7 @@ mod common;
 #[path = "common/campaign/mod.rs"]
 mod campaign;
 
-use campaign::{Campaign, Checkpoint, Class, HEADER, Report};
+use campaign::{Campaign, Checkpoint, HEADER, Report};
 use common::engine;
 use hiz_core::{Coverage, Footprint};
 

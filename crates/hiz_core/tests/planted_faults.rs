@@ -16,7 +16,7 @@ fn faulty(faults: &[(&str, &str)]) -> Engine {
 }
 
 fn campaign(faults: &[(&str, &str)], coverage: Coverage, modes: &'static [(Footprint, u32)]) -> Report {
-    Campaign { seed: 21, rounds: 10, coverage, modes, ..Campaign::default() }.run(&faulty(faults))
+    Campaign { seed: 21, rounds: 6, coverage, modes, ..Campaign::default() }.run(&faulty(faults))
 }
 
 fn assert_red(name: &str, faults: &[(&str, &str)]) {
@@ -50,7 +50,7 @@ fn without_faults_it_is_green() {
 /// The campaign's power: every class finds that there is no margin, and all together that there is a 48th of it.
 #[test]
 fn cuts_of_the_margin() {
-    for (ulps, rounds) in [("0.0", 40), ("0.25", 20), ("0.5", 20)] {
+    for (ulps, rounds) in [("0.0", 25), ("0.25", 10), ("0.5", 20)] {
         let margin = format!("ERROR_ULPS: f32 = {ulps}");
         let engine = faulty(&[("ERROR_ULPS: f32 = 24.0", &margin)]);
         let report = Campaign { seed: 22, rounds, ..Campaign::default() }.run(&engine);

@@ -110,11 +110,10 @@ impl Class {
                 s.bare_matrix = true;
                 let distance = 10.0_f64.powf(random.range(0.0, 9.0));
                 s.stand_away(distance, random);
-                // A near plane so close that what float64 lost in the constants is large beside it, and volumes far behind it: there
-                // the margin of a depth is smallest.
-                let range = 10.0_f64.powf(random.range(0.5, 7.0));
-                s.near = distance * 10.0_f64.powf(random.range(-13.0, -9.0));
-                s.far = random.pick(&[f64::INFINITY, s.near * range]);
+                // A near plane so close that what float64 lost in the constants is large beside it, and volumes far behind it:
+                // there nothing else in the margin of a depth covers that. (Without a far plane z and w lose the same.)
+                s.near = distance * 10.0_f64.powf(random.range(-13.0, -10.0));
+                s.far = s.near * 10.0_f64.powf(random.range(4.0, 8.0));
                 s.style = random.pick(&[DepthStyle::Equal, s.style]);
             }
         }

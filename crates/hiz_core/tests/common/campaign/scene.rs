@@ -164,10 +164,10 @@ impl Scene {
         let (near, size) = (settings.near, settings.size);
         let range = (settings.far / near).min(1e9);
         // Mostly within a thousand near planes; the whole range where it has to be deep.
-        let exponent = if matches!(class, Class::DeepRange | Class::BareMatrix) {
-            random.unit()
-        } else {
-            random.unit().min(3.0 / range.log10())
+        let exponent = match class {
+            Class::DeepRange => random.unit(),
+            Class::BareMatrix => random.range(0.3, 1.0),
+            _ => random.unit().min(3.0 / range.log10()),
         };
         let front = near * range.powf(exponent) * random.pick(&[1.0, 1.0, 1.0, 1.0 - 1e-6, 1.0 + 1e-6, 0.9]);
         let hole = [random.below(size.width), random.below(size.height)];

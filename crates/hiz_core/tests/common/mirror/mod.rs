@@ -112,6 +112,15 @@ impl Mirror {
         })
     }
 
+    /// The same without the host's share in the magnitudes: they bound the coefficients, and not what float64 lost in them.
+    pub(crate) fn without_error_share(mut self) -> Self {
+        let view = &mut self.view;
+        for row in [&mut view.x, &mut view.y, &mut view.z, &mut view.w] {
+            row.a = row.m.map(f32::abs);
+        }
+        self
+    }
+
     /// What is kept, for each kind, with the margin `error_ulps`.
     pub(crate) fn masks(&self, error_ulps: f32, arithmetic: &mut Arithmetic) -> Vec<Vec<bool>> {
         self.words
