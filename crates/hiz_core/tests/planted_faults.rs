@@ -108,14 +108,32 @@ fn a_rectangle_that_is_too_small_without_block_certificates() {
     );
 }
 
-/// The rectangle only chooses what is certified: 0.7 pixels too small on each side, it hides less and nothing wrongly. (The level
-/// that follows from it is integer arithmetic, and no heuristic: four corners are all texels of a 2 x 2 footprint only.)
+/// A rectangle 0.7 pixels too small on each side.
+const TOO_SMALL: (&str, &str) =
+    ("+ 4.0 * EPS * half_size + view.reach;", "+ 4.0 * EPS * half_size + view.reach - 0.7;");
+
+/// The rectangle only chooses what is certified: where it is wrong, less is culled and nothing wrongly. (The level that follows
+/// from it is integer arithmetic, and no heuristic: four corners are all texels of a 2 x 2 footprint only.)
 #[test]
 fn a_rectangle_that_is_too_small_is_harmless() {
-    let fault = ("+ 4.0 * EPS * half_size + view.reach;", "+ 4.0 * EPS * half_size + view.reach - 0.7;");
     for coverage in [Coverage::Area, Coverage::Sample] {
-        let total = campaign(&[fault], coverage, PLAIN).total();
+        let total = campaign(&[TOO_SMALL], coverage, PLAIN).total();
         assert!(total.false_culls == 0 && total.culled > total.cases / 20, "{total:?}");
+    }
+}
+
+/// Each of the block's four certificates is what makes it harmless.
+#[test]
+fn each_block_certificate_is_needed() {
+    for gone in [
+        ("(lo == 0u || surely_above(r, f32(begin) + view.reach - half_size, w))", "true"),
+        ("(end >= size || surely_below(r, f32(end) - view.reach - half_size, w))", "true"),
+        ("inside_block(x, w, t.x, t.z, level, view.half_size.x, view.size.x)", "true"),
+        ("inside_block(y, w, t.y, t.w, level, view.half_size.y, view.size.y)", "true"),
+    ] {
+        let classes = &[Class::PixelBorders, Class::Grazing, Class::Holes];
+        let campaign = Campaign { seed: 23, rounds: 8, classes, ..Campaign::default() };
+        assert_report_red(gone.0, &campaign.run(&faulty(&[TOO_SMALL, gone])));
     }
 }
 
