@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # The tests that take minutes: the campaign of adversarial cases against the exact oracle, a million for each kind of volume
-# (HIZVK_SOAK_CASES), from seed HIZVK_SOAK_SEED on; each line it prints says how to go on from there.
+# (HIZVK_SOAK_CASES), from seed HIZVK_SOAK_SEED on, and the certificates in every arithmetic that WGSL permits. The campaign may be
+# stopped at any time: the next run with the same settings goes on where it was.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 

@@ -30,6 +30,11 @@ rust_tests() {
 }
 check "Rust tests" rust_tests
 check "Rust documentation tests" cargo test --workspace "${LOCKED[@]}" --doc --quiet
+if [ "$driver" = swiftshader ] && [ -n "$(lavapipe_icd)" ]; then
+  both=$ROOT/target/swiftshader/vk_swiftshader_icd.json:$(lavapipe_icd)
+  check "verdicts of both drivers" env VK_DRIVER_FILES="$both" VK_ICD_FILENAMES="$both" \
+    cargo test --workspace "${LOCKED[@]}" --test drivers -- --nocapture
+fi
 check "Python tests" "$VENV_PYTHON" -m pytest -m "not slow"
 printf -- '-- all tests on %s: %d s\n' "$driver" $((SECONDS - started))
 checked

@@ -350,6 +350,23 @@ mod tests {
         assert_eq!(record.half_size[2], 0.0);
     }
 
+    /// Far from the origin, where two halves cannot hold a centre: what they leave over is added, and rounded up.
+    #[test]
+    fn stored_boxes_contain_what_their_centres_cannot_hold() {
+        // Multiples of 2^-23 about 1e9, so that float64 takes these differences exactly.
+        let unit = 1.0 / 8_388_608.0;
+        for k in 0..500_u32 {
+            let middle = 1.0e9 + f64::from(k.wrapping_mul(2_654_435_761) >> 4) * unit;
+            let half = f64::from(k * 31 % 1000) * unit * if k % 2 == 0 { 1.0 } else { 1_000_003.0 };
+            let (min, max) = ([middle - half; 3], [middle + half; 3]);
+            let record = BoxRecord::new(min, max);
+            let (hi, lo) = (f64::from(record.center_hi[0]), f64::from(record.center_lo[0]));
+            let stored = f64::from(record.half_size[0]);
+            assert!(stored >= (max[0] - hi) - lo && stored >= lo - (min[0] - hi), "{k}: {min:?} {max:?} {record:?}");
+            assert!(stored <= (half + 2e-6) * (1.0 + 1e-6), "{k}: not much larger: {half} {record:?}");
+        }
+    }
+
     #[test]
     fn bad_bounds_are_counted_and_named() {
         let bounds = Bounds::Boxes {

@@ -136,7 +136,7 @@ impl ViewUniform {
         clippy::cast_possible_truncation,
         reason = "multiples of 2^-8 and sizes below 2^15 are exact, the factor is rounded towards far"
     )]
-    fn new(camera: &Camera, reduction: u32, options: &CullOptions) -> Result<Self> {
+    pub(crate) fn new(camera: &Camera, reduction: u32, options: &CullOptions) -> Result<Self> {
         let range = |name: &str, value: f64, most: f64| {
             if (0.0..=most).contains(&value) {
                 Ok(value)
@@ -328,4 +328,28 @@ pub(crate) fn record_explain(
     pass.set_bind_group(2, &output, &[]);
     pass.dispatch_workgroups(1, 1, 1);
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{DepthConvention, ImageSize};
+
+    /// Slack is never less than what was asked for: a factor rounded to nearest would be, half of the time.
+    #[test]
+    fn the_depth_factor_is_rounded_towards_far() {
+        for (convention, z) in
+            [(DepthConvention::Standard, [0.0, 0.0, 1.0, -1.0]), (DepthConvention::Reversed, [0.0, 0.0, 0.0, 1.0])]
+        {
+            let rows = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], z, [0.0, 0.0, 1.0, 0.0]];
+            let camera = Camera::from_clip_from_world(rows, ImageSize::new(8, 8), convention).unwrap();
+            for k in 0..100 {
+                let depth_slack = 0.5 * 10.0_f64.powf(-f64::from(k) / 8.0);
+                let options = CullOptions { depth_slack, ..CullOptions::default() };
+                let factor = f64::from(ViewUniform::new(&camera, 0, &options).unwrap().depth_factor);
+                let moved = if convention.is_reversed() { 1.0 - factor } else { factor - 1.0 };
+                assert!(moved >= depth_slack && moved <= depth_slack + EPS, "{convention:?} {depth_slack}: {factor}");
+            }
+        }
+    }
 }

@@ -34,6 +34,8 @@ mod readback;
 mod shader;
 mod view;
 mod visible;
+#[doc(hidden)]
+pub mod words;
 
 pub use wgpu;
 

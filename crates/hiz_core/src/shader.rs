@@ -181,6 +181,37 @@ mod tests {
         });
     }
 
+    /// How often `caller` calls `callee`.
+    fn calls(module: &naga::Module, caller: &str, callee: &str) -> usize {
+        let named = |name: &str| module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(name)).expect("it");
+        let (handle, _) = named(callee);
+        named(caller)
+            .1
+            .expressions
+            .iter()
+            .filter(|(_, e)| matches!(e, naga::Expression::CallResult(h) if *h == handle))
+            .count()
+    }
+
+    /// No driver at hand folds what cancels, so no verdict shows whether `bar` stands in the way. (What folding would do is shown by
+    /// `tests/mirror.rs`.)
+    #[test]
+    fn bars_stand_where_a_compiler_could_fold_what_cancels() {
+        for kind in KINDS {
+            let module = parse(&cull(SourceKind::Depth, kind));
+            for bar in ["bar", "bar3"] {
+                let (_, function) = module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(bar)).expect(bar);
+                let is_xor = |e: &naga::Expression| {
+                    matches!(e, naga::Expression::Binary { op: naga::BinaryOperator::ExclusiveOr, .. })
+                };
+                assert!(function.expressions.iter().any(|(_, e)| is_xor(e)), "{bar}");
+            }
+            assert_eq!(calls(&module, "load_volume", "bar3"), 2, "{kind:?}: d_hi and d_lo");
+            assert_eq!(calls(&module, "surely_behind", "bar"), 2, "d - A in both conventions");
+            assert_eq!(calls(&module, "classify", "bar"), 2, "-A and 1 - A");
+        }
+    }
+
     #[test]
     fn constants_agree_with_the_shaders() {
         let margin = format!("ERROR_ULPS: f32 = {:.1};", crate::view::ERROR_ULPS);

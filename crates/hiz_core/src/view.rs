@@ -251,6 +251,20 @@ mod tests {
         }
     }
 
+    /// The two halves are not the eye: what lies between stays in the constants.
+    #[test]
+    fn constants_stand_at_the_two_halves() {
+        let eye = [1.0e9 + 0.1, -3.0e8 + 0.7, 1.0e7 + 1.0 / 3.0];
+        let camera = camera(eye, 0.1, None, DepthConvention::Reversed);
+        let view = ViewRows::new(&camera, 0.0).unwrap();
+        let offset: Vec3 = std::array::from_fn(|k| f64::from(view.eye_hi[k]) + f64::from(view.eye_lo[k]) - eye[k]);
+        for (row, r, scale) in [(view.x, 0, 320.5), (view.y, 1, -179.5), (view.w, 3, 1.0)] {
+            let [a, b, c, _] = camera.rows_near_one()[r];
+            let expected = scale * dot([a, b, c], offset);
+            assert!(expected.abs() > 1e-9 && (f64::from(row.m[3]) / expected - 1.0).abs() < 1e-3, "{row:?} {expected}");
+        }
+    }
+
     #[test]
     fn magnitudes_bound_the_coefficients_and_what_float32_cannot_hold() {
         let camera = camera([12.3, -4.5, 6.7], 1e-3, Some(1e5), DepthConvention::Standard);

@@ -256,6 +256,46 @@ fn sample_coverage_drops_what_falls_between_pixel_centres() {
     assert_eq!(verdicts(Coverage::Sample), [OUTSIDE, VISIBLE]);
 }
 
+/// A box that reaches into a column or row of holes, but not to its samples, is hidden in sample coverage and visible in area
+/// coverage; one that reaches past the samples is visible in both. From all four sides.
+#[test]
+fn holes_are_seen_through_at_their_samples() {
+    let verdict = |depth: &[f32], camera: &Camera, (min, max): ([f64; 3], [f64; 3]), coverage, guard_px| {
+        let options = CullOptions { coverage, guard_px: Some(guard_px), ..CullOptions::default() };
+        cull_with(&boxes(&[(min, max)]), depth, camera, &options).verdicts().unwrap()[0]
+    };
+    for convention in CONVENTIONS {
+        let camera = camera_along_z(SIDE, SIDE, convention);
+        for axis in [0, 1] {
+            // At depth 8 a pixel is a unit wide: column 8 is x in 0..1, row 7 is y in 0..1.
+            let mut depth = [ndc(4.0, convention); 256];
+            for i in 0..16 {
+                depth[if axis == 0 { 16 * i + 8 } else { 16 * 7 + i }] = convention.far();
+            }
+            for below in [true, false] {
+                let reaching = |far: f64| {
+                    let (mut min, mut max) = ([-1.6, -1.6, 8.0], [-0.6, -0.6, 8.0]);
+                    (min[axis], max[axis]) = if below { (-1.4, far) } else { (1.0 - far, 2.4) };
+                    (min, max)
+                };
+                for (far, coverage, guard, expected) in [
+                    (-0.125, Coverage::Area, 0.0, OCCLUDED),
+                    (0.125, Coverage::Area, 0.0, VISIBLE),
+                    (0.375, Coverage::Sample, 0.0, OCCLUDED),
+                    (0.375, Coverage::Sample, 0.25, VISIBLE),
+                    (0.625, Coverage::Sample, 0.0, VISIBLE),
+                ] {
+                    assert_eq!(
+                        verdict(&depth, &camera, reaching(far), coverage, guard),
+                        expected,
+                        "{convention:?} axis {axis} below {below} reaching {far} {coverage:?} guard {guard}"
+                    );
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn pyramids_that_do_not_belong_are_refused() {
     let list = spheres(&[([0.0, 0.0, 8.0], 1.0)]);

@@ -20,7 +20,7 @@ fn main() {
                 let scene = scene(&mut random, width, height);
                 let volume = volume(&mut random, &scene);
                 let run = |depth: &[f32], arithmetic| {
-                    let options = Options { arithmetic, coverage };
+                    let options = Options { arithmetic, coverage, ..Options::default() };
                     let start = Instant::now();
                     let outcome = classify_with(&scene.view, &volume, depth, options);
                     (outcome.expect("valid"), start.elapsed())

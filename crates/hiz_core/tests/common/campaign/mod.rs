@@ -1,0 +1,195 @@
+//! Random and adversarial culls against the oracle.
+//!
+//! A round is a camera, a depth image and a few dozen volumes of each kind, of one [`Class`], made so that something is nearly
+//! decided the other way: their nearest points share a depth that the image repeats, their silhouettes end on pixel borders
+//! beside holes or at the frustum's planes, and most are moved by bisection to where the oracle's verdict hangs on the last
+//! bits. The oracle decides exactly; a volume that is culled although the oracle calls it visible is a false cull.
+#![allow(dead_code, unused_imports, reason = "each test binary uses its own part")]
+
+mod arrays;
+mod checkpoint;
+mod class;
+mod report;
+mod scene;
+mod volume;
+
+use hiz_core::headless::Engine;
+use hiz_core::{BoundsKind, Camera, Coverage, CullOptions, Fit, Footprint, InstanceOptions, VisibleOptions};
+use hiz_ref::{Options, Outcome, OwnDepth, Verdict, View, Volume};
+
+use crate::common::Random;
+use scene::Scene;
+
+pub(crate) use arrays::Arrays;
+pub(crate) use checkpoint::Checkpoint;
+pub(crate) use class::Class;
+pub(crate) use report::{HEADER, Report, Tally};
+pub(crate) use volume::moved;
+
+/// Every kind of bounding volume.
+pub(crate) const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
+
+/// What a cull reads by default.
+pub(crate) const PLAIN: &[(Footprint, u32)] = &[(Footprint::Two, 0)];
+
+/// How to run one.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Campaign {
+    pub(crate) seed: u64,
+    /// Taken in turn, one a round.
+    pub(crate) classes: &'static [Class],
+    /// Rounds of each class.
+    pub(crate) rounds: usize,
+    /// Volumes of each kind in a round.
+    pub(crate) volumes: usize,
+    pub(crate) coverage: Coverage,
+    /// Footprints and descent budgets to choose from. (Each costs pipelines, and those cost time.)
+    pub(crate) modes: &'static [(Footprint, u32)],
+    pub(crate) fit: Fit,
+    /// Guards and slacks at random.
+    pub(crate) any_slack: bool,
+    /// Whether false keeps are counted, too (asks the oracle about everything).
+    pub(crate) count_keeps: bool,
+}
+
+impl Default for Campaign {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            classes: &Class::ALL,
+            rounds: 10,
+            volumes: 32,
+            coverage: Coverage::Area,
+            modes: PLAIN,
+            fit: Fit::Rectangle,
+            any_slack: false,
+            count_keeps: false,
+        }
+    }
+}
+
+/// One camera, one depth image, volumes of each kind.
+#[derive(Debug)]
+pub(crate) struct Round {
+    pub(crate) seed: u64,
+    pub(crate) number: usize,
+    pub(crate) class: Class,
+    pub(crate) camera: Camera,
+    pub(crate) view: View,
+    pub(crate) depth: Vec<f32>,
+    pub(crate) options: CullOptions,
+    pub(crate) volumes: Vec<(BoundsKind, Vec<Volume>)>,
+    /// For each volume the way, as long as its distance, on which it becomes hidden.
+    pub(crate) away: Vec<Vec<[f64; 3]>>,
+}
+
+impl Campaign {
+    /// The rounds, made as they are asked for. Those whose camera float64 or float32 cannot hold are left out.
+    pub(crate) fn rounds(self) -> impl Iterator<Item = Round> {
+        (0..self.rounds * self.classes.len()).filter_map(move |number| self.round(number))
+    }
+
+    /// Round `number`, the same whenever it is asked for.
+    pub(crate) fn round(&self, number: usize) -> Option<Round> {
+        let random = &mut Random(self.seed.wrapping_mul(1_000_003).wrapping_add(number as u64));
+        let class = self.classes[number % self.classes.len()];
+        let scene = Scene::new(class, self.coverage, random)?;
+        let (footprint, descent) = random.pick(self.modes);
+        let mut options = CullOptions {
+            coverage: self.coverage,
+            // No slack and no guard: they would hide a margin that is too small.
+            guard_px: Some(0.0),
+            depth_slack: 0.0,
+            footprint,
+            descent,
+            fit: self.fit,
+            statistics: false,
+            ..CullOptions::default()
+        };
+        if self.any_slack {
+            options.guard_px = random.pick(&[Some(0.0), Some(1.0 / 64.0), Some(0.5), Some(3.0), None]);
+            options.depth_slack = random.pick(&[0.0, 1e-6, 1e-3]);
+            options.transform_slack = random.pick(&[0.0, 4.0]);
+        }
+        let mut volumes = Vec::new();
+        let mut away = Vec::new();
+        for kind in KINDS {
+            let (these, ways) = (0..self.volumes).map(|_| scene.volume(class, kind, random)).unzip();
+            volumes.push((kind, these));
+            away.push(ways);
+        }
+        let Scene { camera, view, depth, .. } = scene;
+        Some(Round { seed: self.seed, number, class, camera, view, depth, options, volumes, away })
+    }
+
+    /// Culls every round on the device and asks the oracle.
+    pub(crate) fn run(self, engine: &Engine) -> Report {
+        let mut report = Report::new(self.classes, self.count_keeps);
+        let mut told = false;
+        for round in self.rounds() {
+            let Some(masks) = round.masks(engine) else { continue };
+            for ((kind, volumes), mask) in round.volumes.iter().zip(&masks) {
+                for (volume, kept) in volumes.iter().zip(mask) {
+                    let tally = round.tally(volume, *kept, self.count_keeps);
+                    if tally.false_culls > 0 && !told {
+                        told = true;
+                        eprintln!("first false cull: {}", round.describe(*kind, volume));
+                    }
+                    report.add(round.class, tally);
+                }
+            }
+        }
+        report
+    }
+}
+
+impl Round {
+    /// What the device keeps, for each kind. Nothing for a camera that is refused: float32 cannot hold its rows.
+    pub(crate) fn masks(&self, engine: &Engine) -> Option<Vec<Vec<bool>>> {
+        let image = engine.upload_depth(&self.depth, &self.camera).expect("upload");
+        let pyramid = engine.pyramid(&image).expect("pyramid");
+        let mut masks = Vec::new();
+        for (kind, volumes) in &self.volumes {
+            let arrays = Arrays::new(volumes);
+            let instances = engine.instances(&arrays.bounds(*kind), &InstanceOptions::default()).expect("instances");
+            match engine.cull(&instances, &self.camera, &pyramid, &self.options, &VisibleOptions::default()) {
+                Ok(culling) => masks.push(culling.mask().expect("mask")),
+                Err(hiz_core::Error::Invalid { .. }) => return None,
+                Err(error) => panic!("{error}"),
+            }
+        }
+        Some(masks)
+    }
+
+    /// The oracle's answer.
+    pub(crate) fn outcome(&self, volume: &Volume) -> Outcome {
+        let coverage = match self.options.coverage {
+            Coverage::Area => hiz_ref::Coverage::Area,
+            Coverage::Sample => hiz_ref::Coverage::Sample,
+        };
+        let own_depth = match self.options.fit {
+            Fit::Rectangle => OwnDepth::Nearest,
+            Fit::Volume => OwnDepth::PerPixel,
+        };
+        let options = Options { coverage, own_depth, ..Options::default() };
+        hiz_ref::classify_with(&self.view, volume, &self.depth, options).expect("a finite view")
+    }
+
+    /// The count of one verdict. What is kept is right unless false keeps are asked for.
+    pub(crate) fn tally(&self, volume: &Volume, kept: bool, count_keeps: bool) -> Tally {
+        let mut tally = Tally { cases: 1, culled: usize::from(!kept), ..Tally::default() };
+        if !kept || count_keeps {
+            let hidden = self.outcome(volume).verdict == Verdict::Hidden;
+            tally.false_culls = usize::from(!kept && !hidden);
+            tally.false_keeps = usize::from(kept && hidden);
+        }
+        tally
+    }
+
+    /// Everything that is needed to see it again.
+    pub(crate) fn describe(&self, kind: BoundsKind, volume: &Volume) -> String {
+        let (seed, number, class) = (self.seed, self.number, self.class);
+        let outcome = self.outcome(volume);
+        format!("seed {seed} round {number} {class:?} {kind:?}: {volume:?}\n{:?}\noracle {outcome:?}", self.view)
+    }
+}

@@ -1,0 +1,189 @@
+//! float32 `+ - *` in every way that WGSL permits: a result may be either neighbour of the exact one, a product and a sum may
+//! be fused, sums may be taken in any order, subnormals may be flushed.
+
+use crate::common::Random;
+
+/// Which neighbour an inexact result becomes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Rounding {
+    /// To nearest, ties to even: what hardware does.
+    Nearest,
+    /// The greater one.
+    Up,
+    /// The lesser one.
+    Down,
+    /// Either, drawn for each operation.
+    Either,
+    /// Either, drawn for each *part* of the computation: what a part loses adds up, as the margin has to assume.
+    EitherByPart,
+}
+
+/// What a compiler does to the operations.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Style {
+    pub(crate) name: &'static str,
+    pub(crate) rounding: Rounding,
+    /// Fuse products into sums: in 1 of `n` places at random, 1: everywhere, 0: nowhere.
+    pub(crate) fused: u32,
+    /// Take sums in any order.
+    pub(crate) reassociated: bool,
+    /// Subnormals are 0.
+    pub(crate) flushed: bool,
+    /// The rectangle is anything: it only chooses what is certified.
+    pub(crate) wild_rectangle: bool,
+    /// `bar` and `bar3` stop the compiler from folding a difference that cancels into what it was made of.
+    pub(crate) bars: bool,
+}
+
+const PLAIN: Style = Style {
+    name: "nearest",
+    rounding: Rounding::Nearest,
+    fused: 0,
+    reassociated: false,
+    flushed: false,
+    wild_rectangle: false,
+    bars: true,
+};
+
+/// What reassociation may do where no bar stops it; no style that the margin covers.
+pub(crate) const WITHOUT_BARS: Style = Style { name: "no bars", bars: false, ..PLAIN };
+
+/// The first is the plain one.
+pub(crate) const STYLES: [Style; 14] = [
+    PLAIN,
+    Style { name: "up", rounding: Rounding::Up, ..PLAIN },
+    Style { name: "down", rounding: Rounding::Down, ..PLAIN },
+    Style { name: "up or down", rounding: Rounding::Either, ..PLAIN },
+    Style { name: "up or down by part", rounding: Rounding::EitherByPart, ..PLAIN },
+    Style { name: "fused", fused: 1, ..PLAIN },
+    Style { name: "reassociated", reassociated: true, ..PLAIN },
+    Style { name: "flushed", flushed: true, ..PLAIN },
+    Style { name: "fused, up", fused: 1, rounding: Rounding::Up, ..PLAIN },
+    Style { name: "fused, down", fused: 1, rounding: Rounding::Down, ..PLAIN },
+    Style { name: "all, up or down", rounding: Rounding::Either, fused: 2, reassociated: true, flushed: true, ..PLAIN },
+    Style {
+        name: "all, by part",
+        rounding: Rounding::EitherByPart,
+        fused: 2,
+        reassociated: true,
+        flushed: true,
+        ..PLAIN
+    },
+    Style { name: "wild rectangle", wild_rectangle: true, ..PLAIN },
+    Style { name: "wild, by part", wild_rectangle: true, rounding: Rounding::EitherByPart, ..PLAIN },
+];
+
+/// One device's float32.
+#[derive(Debug)]
+pub(crate) struct Arithmetic {
+    pub(crate) style: Style,
+    random: Random,
+    up: bool,
+}
+
+impl Arithmetic {
+    pub(crate) fn new(style: Style, seed: u64) -> Self {
+        let mut random = Random(seed);
+        let up = random.below(2) == 0;
+        Self { style, random, up }
+    }
+
+    /// Something else begins to be computed.
+    pub(crate) fn part(&mut self) {
+        if self.style.rounding == Rounding::EitherByPart {
+            self.up = self.random.below(2) == 0;
+        }
+    }
+
+    /// Uniform in 0..n, for what is left to chance outside of the arithmetic.
+    pub(crate) fn below(&mut self, n: u32) -> u32 {
+        self.random.below(n)
+    }
+
+    fn flush(&self, v: f32) -> f32 {
+        if self.style.flushed && v.is_subnormal() { 0.0 } else { v }
+    }
+
+    /// The float32 that the exact number `value + rest` becomes; `nearest` is what to nearest makes of it.
+    fn rounded(&mut self, value: f64, rest: f64, nearest: f32) -> f32 {
+        // Exact: `nearest` is within half a spacing of `value`. So the sign of the sum is that of the error.
+        let error = (value - f64::from(nearest)) + rest;
+        let up = match self.style.rounding {
+            Rounding::Nearest => return self.flush(nearest),
+            _ if error == 0.0 => return self.flush(nearest),
+            Rounding::Up => true,
+            Rounding::Down => false,
+            Rounding::Either => self.random.below(2) == 0,
+            Rounding::EitherByPart => self.up,
+        };
+        let result = match (up, error > 0.0) {
+            (true, true) => nearest.next_up(),
+            (false, false) => nearest.next_down(),
+            _ => nearest,
+        };
+        self.flush(result)
+    }
+
+    pub(crate) fn add(&mut self, a: f32, b: f32) -> f32 {
+        let (a, b) = (self.flush(a), self.flush(b));
+        let (sum, rest) = two_sum(f64::from(a), f64::from(b));
+        self.rounded(sum, rest, a + b)
+    }
+
+    pub(crate) fn sub(&mut self, a: f32, b: f32) -> f32 {
+        self.add(a, -b)
+    }
+
+    pub(crate) fn mul(&mut self, a: f32, b: f32) -> f32 {
+        let (a, b) = (self.flush(a), self.flush(b));
+        self.rounded(f64::from(a) * f64::from(b), 0.0, a * b)
+    }
+
+    /// `a b + c`, fused or not.
+    pub(crate) fn mul_add(&mut self, a: f32, b: f32, c: f32) -> f32 {
+        if self.style.fused == 0 || self.random.below(self.style.fused) != 0 {
+            let product = self.mul(a, b);
+            return self.add(product, c);
+        }
+        let (a, b, c) = (self.flush(a), self.flush(b), self.flush(c));
+        let (sum, rest) = two_sum(f64::from(a) * f64::from(b), f64::from(c));
+        self.rounded(sum, rest, a.mul_add(b, c))
+    }
+
+    /// The sum of the products and of the rest, in the order that is written or any other.
+    pub(crate) fn sum_of_products(&mut self, a: [f32; 3], b: [f32; 3], rest: Option<f32>) -> f32 {
+        let mut order = [0, 1, 2];
+        if self.style.reassociated {
+            order.swap(0, self.random.below(3) as usize);
+            order.swap(1, 1 + self.random.below(2) as usize);
+        }
+        let [i, j, k] = order;
+        let early = self.style.reassociated && self.random.below(2) == 0;
+        let mut sum = match rest {
+            Some(rest) if early => self.mul_add(a[i], b[i], rest),
+            _ => self.mul(a[i], b[i]),
+        };
+        for n in [j, k] {
+            sum = self.mul_add(a[n], b[n], sum);
+        }
+        match rest {
+            Some(rest) if !early => self.add(sum, rest),
+            _ => sum,
+        }
+    }
+
+    pub(crate) fn sum(&mut self, mut v: [f32; 3]) -> f32 {
+        if self.style.reassociated {
+            v.swap(0, self.random.below(3) as usize);
+        }
+        let sum = self.add(v[0], v[1]);
+        self.add(sum, v[2])
+    }
+}
+
+/// Knuth's: the float64 sum, and what it lost, exactly.
+fn two_sum(a: f64, b: f64) -> (f64, f64) {
+    let sum = a + b;
+    let bb = sum - a;
+    (sum, (a - (sum - bb)) + (b - bb))
+}

@@ -1,0 +1,343 @@
+//! The cull shader once more, on the host: the same words in, the same steps, but the arithmetic is an argument. It shows what
+//! the certificates would do on devices that round, fuse, reassociate and flush otherwise than the ones at hand. (No descent: its
+//! certificates are the footprint's.)
+mod arithmetic;
+mod volume;
+
+use hiz_core::{BoundsKind, CullOptions, Footprint};
+
+use crate::campaign::{Arrays, Round};
+
+pub(crate) use arithmetic::{Arithmetic, STYLES, Style, WITHOUT_BARS};
+use volume::Volume;
+
+const EPS: f32 = 1.0 / 8_388_608.0;
+const LEAST_NORMAL: f32 = f32::MIN_POSITIVE;
+
+/// `2^n`.
+fn two_to(n: i32) -> f32 {
+    2.0_f32.powi(n)
+}
+
+/// A linear function and its magnitudes (`view.wgsl`, `Row`).
+#[derive(Debug, Clone, Copy)]
+struct Row {
+    m: [f32; 4],
+    a: [f32; 4],
+}
+
+/// `view.wgsl`, `View`; read from the words that the shader reads.
+#[derive(Debug)]
+struct View {
+    x: Row,
+    y: Row,
+    z: Row,
+    w: Row,
+    eye_hi: [f32; 3],
+    z_slope: f32,
+    eye_lo: [f32; 3],
+    coordinate_limit: f32,
+    half_size: [f32; 2],
+    reach: f32,
+    depth_factor: f32,
+    size: [i32; 2],
+}
+
+impl View {
+    fn new(words: &[u32]) -> Self {
+        let four = |i: usize| [0, 1, 2, 3].map(|k| f32::from_bits(words[i + k]));
+        let row = |i: usize| Row { m: four(8 * i), a: four(8 * i + 4) };
+        let three = |i: usize| [0, 1, 2].map(|k| f32::from_bits(words[i + k]));
+        let one = |i: usize| f32::from_bits(words[i]);
+        Self {
+            x: row(0),
+            y: row(1),
+            z: row(2),
+            w: row(3),
+            eye_hi: three(32),
+            z_slope: one(35),
+            eye_lo: three(36),
+            coordinate_limit: one(39),
+            half_size: [one(40), one(41)],
+            reach: one(42),
+            depth_factor: one(43),
+            size: [words[44] as i32, words[45] as i32],
+        }
+    }
+}
+
+/// A row on a volume (`certificate.wgsl`, `Value`).
+#[derive(Debug, Clone, Copy)]
+struct Value {
+    center: f32,
+    size: f32,
+    half: [f32; 3],
+}
+
+/// A round's camera and depth image, made ready.
+#[derive(Debug)]
+pub(crate) struct Mirror {
+    view: View,
+    reversed: bool,
+    sample_coverage: bool,
+    footprint_log2: u32,
+    levels: Vec<hiz_ref::Level>,
+    words: Vec<(BoundsKind, Vec<u32>)>,
+}
+
+impl Mirror {
+    /// Nothing for a camera that is refused.
+    pub(crate) fn new(round: &Round) -> Option<Self> {
+        let CullOptions { footprint, coverage, .. } = round.options;
+        let view = View::new(&hiz_core::words::view(&round.camera, &round.options).ok()?);
+        let words = round
+            .volumes
+            .iter()
+            .map(|(kind, volumes)| {
+                let arrays = Arrays::new(volumes);
+                (*kind, hiz_core::words::instances(&arrays.bounds(*kind)).expect("arrays that agree"))
+            })
+            .collect();
+        Some(Self {
+            view,
+            reversed: round.view.reversed,
+            sample_coverage: coverage == hiz_core::Coverage::Sample,
+            footprint_log2: match footprint {
+                Footprint::Two => 1,
+                Footprint::Four => 2,
+                Footprint::Eight => 3,
+            },
+            levels: hiz_ref::pyramid(&round.depth, round.view.width, round.view.height, round.view.reversed),
+            words,
+        })
+    }
+
+    /// The same without the host's share in the magnitudes: they bound the coefficients, and not what float64 lost in them.
+    pub(crate) fn without_error_share(mut self) -> Self {
+        let view = &mut self.view;
+        for row in [&mut view.x, &mut view.y, &mut view.z, &mut view.w] {
+            row.a = row.m.map(f32::abs);
+        }
+        self
+    }
+
+    /// What is kept, for each kind, with the margin `error_ulps`.
+    pub(crate) fn masks(&self, error_ulps: f32, arithmetic: &mut Arithmetic) -> Vec<Vec<bool>> {
+        self.words
+            .iter()
+            .map(|(kind, words)| {
+                let stride = kind.record_bytes() as usize / 4;
+                words.chunks_exact(stride).map(|record| !self.culls(*kind, record, error_ulps, arithmetic)).collect()
+            })
+            .collect()
+    }
+
+    /// Whether a volume is culled.
+    pub(crate) fn culls_volume(&self, volume: &hiz_ref::Volume, error_ulps: f32, arithmetic: &mut Arithmetic) -> bool {
+        let kind = match volume {
+            hiz_ref::Volume::Sphere { .. } => BoundsKind::Sphere,
+            hiz_ref::Volume::Box { .. } => BoundsKind::Box,
+            hiz_ref::Volume::OrientedBox { .. } => BoundsKind::OrientedBox,
+        };
+        let arrays = Arrays::new(std::slice::from_ref(volume));
+        let record = hiz_core::words::instances(&arrays.bounds(kind)).expect("arrays that agree");
+        self.culls(kind, &record, error_ulps, arithmetic)
+    }
+
+    /// `classify.wgsl`, `classify`; the numbers are its steps.
+    fn culls(&self, kind: BoundsKind, record: &[u32], error_ulps: f32, arithmetic: &mut Arithmetic) -> bool {
+        let view = &self.view;
+        let Some(volume) = Volume::load(kind, record, view, arithmetic) else { return false };
+        let mut c = Certificates { kind, error_ulps, arithmetic };
+        let [x, y, z, w] = [&view.x, &view.y, &view.z, &view.w].map(|row| c.value_of(row, &volume));
+        let a = view.z_slope;
+
+        // 1. Outside one of the six planes of the frustum.
+        let border = view.half_size.map(|h| h + view.reach);
+        let far_plane = c.arithmetic.sub(1.0, a);
+        if c.surely_below(&x, -border[0], &w)
+            || c.surely_above(&x, border[0], &w)
+            || c.surely_below(&y, -border[1], &w)
+            || c.surely_above(&y, border[1], &w)
+            || c.surely_below(&z, -a, &w)
+            || c.surely_above(&z, far_plane, &w)
+        {
+            return true;
+        }
+
+        // 2. Crossing w = 0. From here to the level nothing needs trust, so it is computed in any way.
+        let w_min = w.center - c.support(w.half) - c.error_bound(&w, 0.0, &w);
+        if w_min.is_nan() || w_min <= 0.0 {
+            return false;
+        }
+
+        // 3. The pixels that the projection may touch.
+        let mut first = [0; 2];
+        let mut last = [0; 2];
+        for (k, r) in [&x, &y].into_iter().enumerate() {
+            let [from, to] = volume::ratio_interval(kind, r, &w);
+            let widest = from.abs().max(to.abs());
+            let widening = 1.25 * c.error_bound(r, widest, &w) / w_min + 4.0 * EPS * view.half_size[k] + view.reach;
+            [first[k], last[k]] = pixel_interval([from, to], widening, view.half_size[k], view.size[k]);
+            if c.arithmetic.style.wild_rectangle && view.size[k] > 0 {
+                let wild = [0; 2].map(|_| c.arithmetic.below(view.size[k] as u32) as i32);
+                if c.arithmetic.below(4) == 0 {
+                    [first[k], last[k]] = [wild[0].min(wild[1]), wild[0].max(wild[1])];
+                } else if first[k] < last[k] {
+                    // Near misses: a pixel too few on one side.
+                    if c.arithmetic.below(2) == 0 { first[k] += 1 } else { last[k] -= 1 }
+                }
+            }
+        }
+        let empty = [0, 1].map(|k| first[k] > last[k]);
+        if empty[0] || empty[1] {
+            return self.sample_coverage
+                && ((empty[0] && c.between_samples(&x, &w, first[0], view, 0))
+                    || (empty[1] && c.between_samples(&y, &w, first[1], view, 1)));
+        }
+
+        // 4. The finest level at which it spans no more texels than the footprint.
+        let (first, last) = (first.map(|v| v as u32), last.map(|v| v as u32));
+        let n = self.footprint_log2;
+        let extent = (last[0] - first[0]) | (last[1] - first[1]) | 1;
+        let mut level = extent.ilog2().max(n - 1) - (n - 1);
+        if (0..2).any(|k| (last[k] >> level) - (first[k] >> level) >= 1 << n) {
+            level += 1;
+        }
+        let (from, to) = (first.map(|v| v >> level), last.map(|v| v >> level));
+
+        // 5. All of it is farther than the farthest depth there, and 6. the texels were those of all pixels that matter.
+        let farthest = self.farthest(level as usize, from, to);
+        self.surely_behind(farthest, &z, &w, &mut c)
+            && c.inside_block(&x, &w, from[0], to[0], level, view, 0)
+            && c.inside_block(&y, &w, from[1], to[1], level, view, 1)
+    }
+
+    fn farthest(&self, level: usize, from: [u32; 2], to: [u32; 2]) -> f32 {
+        let texels = &self.levels[level];
+        let mut depth = 1.0 - self.far();
+        for y in from[1]..=to[1] {
+            for x in from[0]..=to[0] {
+                let d = texels.texels[(y * texels.width + x) as usize];
+                depth = if self.reversed { depth.min(d) } else { depth.max(d) };
+            }
+        }
+        depth
+    }
+
+    fn far(&self) -> f32 {
+        if self.reversed { 0.0 } else { 1.0 }
+    }
+
+    fn surely_behind(&self, stored: f32, z: &Value, w: &Value, c: &mut Certificates<'_>) -> bool {
+        let view = &self.view;
+        c.arithmetic.part();
+        if self.reversed {
+            let d = c.arithmetic.mul(stored.min(1.0), view.depth_factor);
+            return d >= LEAST_NORMAL && c.surely_deeper(-1.0, z, d, view.z_slope, w);
+        }
+        let d = c.arithmetic.mul(stored.max(LEAST_NORMAL), view.depth_factor);
+        d < 1.0 && c.surely_deeper(1.0, z, d, view.z_slope, w)
+    }
+}
+
+/// `pixel_interval`.
+fn pixel_interval([from, to]: [f32; 2], margin: f32, half_size: f32, size: i32) -> [i32; 2] {
+    let edge = (size + 1) as f32;
+    let pixel = |v: f32| (v + half_size).clamp(-2.0, edge).floor() as i32;
+    [pixel(from - margin).clamp(0, size), pixel(to + margin).clamp(-1, size - 1)]
+}
+
+/// `certificate.wgsl`, for one kind of volume in one arithmetic.
+struct Certificates<'a> {
+    kind: BoundsKind,
+    error_ulps: f32,
+    arithmetic: &'a mut Arithmetic,
+}
+
+impl Certificates<'_> {
+    fn value_of(&mut self, row: &Row, volume: &Volume) -> Value {
+        let three = |v: [f32; 4]| [v[0], v[1], v[2]];
+        self.arithmetic.part();
+        let center = self.arithmetic.sum_of_products(three(row.m), volume.center, Some(row.m[3]));
+        self.arithmetic.part();
+        let half = volume.on_half_axes(three(row.m), self.arithmetic);
+        self.arithmetic.part();
+        let size = self.arithmetic.sum_of_products(three(row.a), volume.reach, Some(row.a[3]));
+        Value { center, size, half }
+    }
+
+    fn error_bound(&mut self, r: &Value, t: f32, w: &Value) -> f32 {
+        let sizes = self.arithmetic.mul_add(t.abs(), w.size, r.size);
+        self.arithmetic.mul_add(self.error_ulps * EPS, sizes, two_to(-70))
+    }
+
+    fn support(&mut self, half: [f32; 3]) -> f32 {
+        match self.kind {
+            BoundsKind::Sphere => self.arithmetic.sum_of_products(half, half, None).sqrt(),
+            BoundsKind::Box | BoundsKind::OrientedBox => self.arithmetic.sum(half.map(f32::abs)),
+        }
+    }
+
+    fn exceeds_support(&mut self, center: f32, half: [f32; 3]) -> bool {
+        self.arithmetic.part();
+        match self.kind {
+            BoundsKind::Sphere => {
+                let squares = self.arithmetic.sum_of_products(half, half, None);
+                let most = self.arithmetic.mul_add(squares, 1.000_001, two_to(-100));
+                self.arithmetic.part();
+                center > 0.0 && self.arithmetic.mul(center, center) > most
+            }
+            BoundsKind::Box | BoundsKind::OrientedBox => center > self.support(half),
+        }
+    }
+
+    /// `sign (r - t w) > 0` on all of the volume.
+    fn surely(&mut self, sign: f32, r: &Value, t: f32, w: &Value) -> bool {
+        self.arithmetic.part();
+        let difference = self.arithmetic.mul_add(-t, w.center, r.center);
+        self.arithmetic.part();
+        let error = self.error_bound(r, t, w);
+        let center = self.arithmetic.sub(sign * difference, error);
+        self.arithmetic.part();
+        let half = [0, 1, 2].map(|k| self.arithmetic.mul_add(-t, w.half[k], r.half[k]));
+        self.exceeds_support(center, half)
+    }
+
+    fn surely_above(&mut self, r: &Value, t: f32, w: &Value) -> bool {
+        self.surely(1.0, r, t, w)
+    }
+
+    fn surely_below(&mut self, r: &Value, t: f32, w: &Value) -> bool {
+        self.surely(-1.0, r, t, w)
+    }
+
+    /// `sign (z - (d - z_slope) w) > 0`, the difference barred or folded.
+    fn surely_deeper(&mut self, sign: f32, z: &Value, d: f32, z_slope: f32, w: &Value) -> bool {
+        let t = self.arithmetic.sub(d, z_slope);
+        if self.arithmetic.style.bars {
+            return self.surely(sign, z, t, w);
+        }
+        let folded = self.arithmetic.mul_add(z_slope, w.center, z.center);
+        let half = [0, 1, 2].map(|k| self.arithmetic.mul_add(z_slope, w.half[k], z.half[k]));
+        let error = self.error_bound(z, t, w);
+        let difference = self.arithmetic.mul_add(-d, w.center, folded);
+        let center = self.arithmetic.sub(sign * difference, error);
+        let half = [0, 1, 2].map(|k| self.arithmetic.mul_add(-d, w.half[k], half[k]));
+        self.exceeds_support(center, half)
+    }
+
+    fn between_samples(&mut self, r: &Value, w: &Value, first: i32, view: &View, axis: usize) -> bool {
+        let left = first as f32 - view.half_size[axis];
+        self.surely_above(r, left + view.reach, w) && self.surely_below(r, left - view.reach, w)
+    }
+
+    /// Pixel edges are multiples of 2^-8 below 2^16, so sums of them are exact in any arithmetic.
+    #[allow(clippy::too_many_arguments, reason = "those of the shader's function")]
+    fn inside_block(&mut self, r: &Value, w: &Value, lo: u32, hi: u32, level: u32, view: &View, axis: usize) -> bool {
+        let (begin, end) = ((lo << level) as f32, ((hi + 1) << level) as f32);
+        let (half_size, size) = (view.half_size[axis], view.size[axis] as f32);
+        (lo == 0 || self.surely_above(r, begin + view.reach - half_size, w))
+            && (end >= size || self.surely_below(r, end - view.reach - half_size, w))
+    }
+}

@@ -1,0 +1,91 @@
+//! `bounds_*.wgsl`: records, and what of them differs from kind to kind.
+
+use hiz_core::BoundsKind;
+
+use super::{Arithmetic, Value, View, two_to};
+
+/// A volume about the reference point.
+#[derive(Debug)]
+pub(super) struct Volume {
+    pub(super) center: [f32; 3],
+    pub(super) reach: [f32; 3],
+    /// Spheres: the radius on each axis.
+    half_axes: [[f32; 3]; 3],
+    kind: BoundsKind,
+}
+
+impl Volume {
+    /// `load_volume`; nothing where it is not valid.
+    pub(super) fn load(kind: BoundsKind, record: &[u32], view: &View, f: &mut Arithmetic) -> Option<Self> {
+        let three = |i: usize| [0, 1, 2].map(|k| f32::from_bits(record[i + k]));
+        let one = |i: usize| f32::from_bits(record[i]);
+        let diagonal = |h: [f32; 3]| [[h[0], 0.0, 0.0], [0.0, h[1], 0.0], [0.0, 0.0, h[2]]];
+        let (hi, lo) = (three(0), three(4));
+        let half_axes = match kind {
+            BoundsKind::Sphere => diagonal([one(3); 3]),
+            BoundsKind::Box => diagonal(three(8)),
+            BoundsKind::OrientedBox => [three(8), three(12), [one(3), one(7), one(11)]],
+        };
+        let numbers = [hi, lo].into_iter().chain(half_axes).flatten();
+        let sizes_valid = kind == BoundsKind::OrientedBox || (0..3).all(|k| half_axes[k][k] >= 0.0);
+        if !sizes_valid || numbers.into_iter().any(|v| v.is_nan() || v.abs() >= two_to(60)) {
+            return None;
+        }
+        let mut d_hi = [0.0; 3];
+        let mut d_lo = [0.0; 3];
+        let mut center = [0.0; 3];
+        let mut reach = [0.0; 3];
+        for k in 0..3 {
+            f.part();
+            d_hi[k] = f.sub(hi[k], view.eye_hi[k]);
+            d_lo[k] = f.sub(lo[k], view.eye_lo[k]);
+            center[k] = if f.style.bars {
+                f.add(d_hi[k], d_lo[k])
+            } else {
+                let (p, eye) = (f.add(hi[k], lo[k]), f.add(view.eye_hi[k], view.eye_lo[k]));
+                f.sub(p, eye)
+            };
+            let half = match kind {
+                BoundsKind::OrientedBox => f.sum([0, 1, 2].map(|e| half_axes[e][k].abs())),
+                BoundsKind::Sphere | BoundsKind::Box => half_axes[k][k],
+            };
+            f.part();
+            let sum = f.sum([d_hi[k].abs(), d_lo[k].abs(), half]);
+            reach[k] = f.mul_add(two_to(-24), hi[k].abs(), sum);
+        }
+        reach.iter().all(|r| *r < view.coordinate_limit).then_some(Self { center, reach, half_axes, kind })
+    }
+
+    /// `on_half_axes`.
+    pub(super) fn on_half_axes(&self, m: [f32; 3], f: &mut Arithmetic) -> [f32; 3] {
+        [0, 1, 2].map(|k| match self.kind {
+            BoundsKind::OrientedBox => f.sum_of_products(m, self.half_axes[k], None),
+            BoundsKind::Sphere | BoundsKind::Box => f.mul(m[k], self.half_axes[k][k]),
+        })
+    }
+}
+
+/// `ratio_interval`: an estimate that nothing rests on, so plain float32 will do in every style.
+pub(super) fn ratio_interval(kind: BoundsKind, r: &Value, w: &Value) -> [f32; 2] {
+    if kind == BoundsKind::Sphere {
+        let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let n = w.half.map(|v| v / w.center);
+        let q = (1.0 - dot(n, n)).max(1e-30);
+        let t = r.center / w.center;
+        let g = [0, 1, 2].map(|k| (r.half[k] - t * w.half[k]) / w.center);
+        let gg = dot(g, g);
+        let p = dot(g, n);
+        let m = (p.abs() + (p * p + q * gg).sqrt()).max(1e-30);
+        let (small, large) = (gg / m, m / q);
+        return if p > 0.0 { [t - large, t + small] } else { [t - small, t + large] };
+    }
+    let mut interval = [f32::INFINITY, f32::NEG_INFINITY];
+    for (y, z) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+        let face = |v: &Value| v.center + y * v.half[1] + z * v.half[2];
+        for x in [1.0, -1.0] {
+            let ratio = (face(r) + x * r.half[0]) / (face(w) + x * w.half[0]);
+            interval = [interval[0].min(ratio), interval[1].max(ratio)];
+        }
+    }
+    interval
+}
