@@ -119,10 +119,10 @@ fn inside_block(r: Value, w: Value, lo: u32, hi: u32, level: u32, half_size: f32
 fn surely_behind(bits: u32, z: Value, w: Value) -> bool {
     let stored = bitcast<f32>(bits);
     if REVERSED {
-        let d = min(stored, 1.0) * view.depth_factor;
+        let d = bar(min(stored, 1.0) * view.depth_factor + view.depth_offset);
         return d >= LEAST_NORMAL && surely_below(z, bar(d - view.z_slope), w);
     }
-    let d = max(stored, LEAST_NORMAL) * view.depth_factor;
+    let d = bar(max(stored, LEAST_NORMAL) * view.depth_factor + view.depth_offset);
     return d < 1.0 && surely_above(z, bar(d - view.z_slope), w);
 }
 
