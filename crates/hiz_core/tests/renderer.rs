@@ -93,6 +93,26 @@ impl Seen<'_> {
         self.all.differing_pixels(&self.culled.picture)
     }
 
+    /// Those that the rasteriser does not account for. It does where the body that is missing was drawn nearer than its own bounds,
+    /// by more than the slack, or where the depth image was nearer than what the picture without culling shows: faces that are
+    /// seen edge-on take any depth.
+    fn unaccounted(&self, slack: Slack) -> usize {
+        let (camera, all) = (&self.shot.camera, self.all);
+        let pixels = all.ids.iter().zip(&self.culled.picture.ids).zip(all.depth.iter().zip(&self.culled.prepass));
+        let accounted = |id: u32, depth: f32, prepass: f32| {
+            let limit = if is_orthographic(camera) { slack.absolute } else { slack.relative };
+            let (depth, prepass) = (f64::from(depth), f64::from(prepass));
+            let out_of_bounds = self
+                .scene
+                .crowd
+                .get((id as usize).wrapping_sub(1))
+                .and_then(|body| depth_range(body, camera))
+                .is_some_and(|range| nearer(camera, nearest(camera, range), depth) > limit);
+            out_of_bounds || nearer(camera, depth, prepass) > limit
+        };
+        pixels.filter(|((id, culled), (depth, prepass))| id != culled && !accounted(**id, **depth, **prepass)).count()
+    }
+
     fn label(&self) -> String {
         let Self { scene, shot, way, .. } = self;
         format!("{} of {} {}, {way}", shot.name, scene.name, shot.camera.size())
@@ -134,10 +154,11 @@ fn pictures_with_culling_equal_those_without() {
     }
 }
 
-/// Random cameras, each with one of the ways by turns. Fails with all cameras whose pictures differ.
-fn random_cameras(number: usize, seed: u64, ways: impl Fn(usize) -> Vec<Way>) {
+/// Random cameras, each in some ways. Fails with all cameras whose pictures differ; `tolerant`: differ by more than the rasteriser
+/// accounts for.
+fn random_cameras(number: usize, seed: u64, tolerant: bool, ways: impl Fn(usize) -> Vec<Way>) {
     let renderer = open(&[]);
-    let mut differing = Vec::new();
+    let (mut differing, mut tolerated) = (Vec::new(), 0);
     for (place, (scene, _, origin)) in SCENES.iter().enumerate() {
         let scene = scene(*origin);
         // How many bodies were there, kept, and hidden.
@@ -149,8 +170,11 @@ fn random_cameras(number: usize, seed: u64, ways: impl Fn(usize) -> Vec<Way>) {
                 total += seen.scene.crowd.len() as u64;
                 kept += u64::from(counts.kept);
                 occluded += u64::from(counts.occluded);
-                if seen.differing() > 0 {
-                    let (pixels, label) = (seen.differing(), seen.label());
+                let pixels = seen.differing();
+                if pixels > 0 && tolerant && seen.unaccounted(slack(&renderer.adapter, &seen.shot.camera)) == 0 {
+                    tolerated += pixels;
+                } else if pixels > 0 {
+                    let label = seen.label();
                     eprintln!(
                         "{pixels} pixels differ: {label}, number {i} of seed {}: {:?}",
                         seed + place as u64,
@@ -167,19 +191,20 @@ fn random_cameras(number: usize, seed: u64, ways: impl Fn(usize) -> Vec<Way>) {
         );
         assert!(occluded > total / 50 && kept > total / 50, "{}: nothing is hidden or seen", scene.name);
     }
+    eprintln!("{tolerated} pixels of faces seen edge-on differ");
     assert!(differing.is_empty(), "{differing:?}");
 }
 
 #[test]
 fn so_do_those_of_random_cameras() {
     // Every kind of camera meets every way.
-    random_cameras(RANDOM, 3, |i| vec![WAYS[(i + i / KINDS.len()) % WAYS.len()]]);
+    random_cameras(RANDOM, 3, false, |i| vec![WAYS[(i + i / KINDS.len()) % WAYS.len()]]);
 }
 
 #[test]
 #[ignore = "minutes: make soak"]
 fn so_do_those_of_thousands_of_random_cameras() {
-    random_cameras(soak(), number("HIZVK_SOAK_SEED", 1000), |_| WAYS.to_vec());
+    random_cameras(soak(), number("HIZVK_SOAK_SEED", 1000), true, |_| WAYS.to_vec());
 }
 
 /// Labels of the example's pictures that differ under a fault, in one way.
@@ -275,6 +300,21 @@ fn depth_range(body: &Body, camera: &Camera) -> Option<[f64; 2]> {
     (a.min(b) >= 0.0 && a.max(b) <= 1.0).then_some([a.min(b), a.max(b)])
 }
 
+/// How much nearer depth `b` is than `a`: in proportion, or for orthographic cameras absolutely.
+fn nearer(camera: &Camera, a: f64, b: f64) -> f64 {
+    match (is_orthographic(camera), camera.convention().is_reversed()) {
+        (true, false) => a - b,
+        (true, true) => b - a,
+        (false, false) => a / b - 1.0,
+        (false, true) => 1.0 - a / b,
+    }
+}
+
+/// The end of a range of depths that is nearest.
+fn nearest(camera: &Camera, [least, greatest]: [f64; 2]) -> f64 {
+    if camera.convention().is_reversed() { greatest } else { least }
+}
+
 fn is_orthographic(camera: &Camera) -> bool {
     camera.rows()[3][..3] == [0.0; 3]
 }
@@ -288,34 +328,32 @@ struct Worst {
     prepass: f64,
 }
 
-/// For perspective (relative) and orthographic (absolute) cameras, standard and reversed depth.
-fn measure(renderer: &Renderer, number: usize, seed: u64) -> [[Worst; 2]; 2] {
-    let mut worst = [[Worst::default(); 2]; 2];
+/// For perspective (relative) cameras, for those whose eye may lie in a face's plane, and for orthographic (absolute) ones; standard
+/// and reversed depth.
+fn measure(renderer: &Renderer, number: usize, seed: u64) -> [[Worst; 2]; 3] {
+    let mut worst = [[Worst::default(); 2]; 3];
     for (place, make) in SCENES.iter().enumerate() {
         let scene = make.0(make.2);
         let shots: Vec<_> =
             example_shots(make).into_iter().chain(random_shots(&scene, number, seed + place as u64)).collect();
         draw_each(renderer, &scene, &shots, &WAYS[..1], |seen| {
             let camera = &seen.shot.camera;
-            let (reversed, orthographic) = (camera.convention().is_reversed(), is_orthographic(camera));
-            // How much nearer `b` is than `a`.
-            let nearer = |a: f64, b: f64| match (orthographic, reversed) {
-                (true, false) => a - b,
-                (true, true) => b - a,
-                (false, false) => a / b - 1.0,
-                (false, true) => 1.0 - a / b,
+            let kind = match seen.shot.name {
+                "grazing" | "touching" | "rooms_on_a_wall" => 1,
+                _ if is_orthographic(camera) => 2,
+                _ => 0,
             };
             let ranges: Vec<_> = scene.crowd.iter().map(|body| depth_range(body, camera)).collect();
-            let worst = &mut worst[usize::from(orthographic)][usize::from(reversed)];
+            let worst = &mut worst[kind][usize::from(camera.convention().is_reversed())];
             let pixels = seen.all.ids.iter().zip(&seen.all.depth).zip(&seen.culled.prepass);
             for ((id, depth), prepass) in pixels.filter(|((id, _), _)| **id > 0) {
                 let (depth, prepass) = (f64::from(*depth), f64::from(*prepass));
                 let body = *id as usize - 1;
                 if body >= scene.crowd.len() || seen.shot.crowd_occludes {
-                    worst.prepass = worst.prepass.max(nearer(depth, prepass));
+                    worst.prepass = worst.prepass.max(nearer(camera, depth, prepass));
                 }
-                if let Some([least, greatest]) = ranges.get(body).copied().flatten() {
-                    worst.bodies = worst.bodies.max(nearer(if reversed { greatest } else { least }, depth));
+                if let Some(range) = ranges.get(body).copied().flatten() {
+                    worst.bodies = worst.bodies.max(nearer(camera, nearest(camera, range), depth));
                 }
             }
         });
@@ -330,19 +368,21 @@ fn check_slack(number: usize, seed: u64) {
     let renderer = open(&[]);
     let worst = measure(&renderer, number, seed);
     let mut enough = true;
-    for (orthographic, pair) in worst.iter().enumerate() {
+    for (kind, pair) in worst.iter().enumerate() {
         for (convention, Worst { bodies, prepass }) in CONVENTIONS.into_iter().zip(pair) {
-            let kind = ["perspective", "orthographic"][orthographic];
-            let Slack { relative, absolute } = example_slack(&renderer, orthographic == 1, convention);
-            let (given, needed) = if orthographic == 1 {
+            let Slack { relative, absolute } = example_slack(&renderer, kind == 2, convention);
+            let (given, needed) = if kind == 2 {
                 (absolute, bodies + prepass)
             } else {
                 (relative, (1.0 + bodies) * (1.0 + prepass) - 1.0)
             };
+            let name = ["perspective", "perspective, the eye in a face's plane", "orthographic"][kind];
             eprintln!(
-                "{kind}, {convention:?}: bodies {bodies:.2e} nearer than their bounds, {prepass:.2e} farther than in the prepass, slack {given:.0e}"
+                "{name}, {convention:?}: bodies {bodies:.2e} nearer than their bounds, {prepass:.2e} farther than in the \
+                 prepass, slack {given:.0e}"
             );
-            enough &= needed <= given;
+            // A face whose plane holds the eye takes any depth: that is printed, and no slack covers it.
+            enough &= kind == 1 || needed <= given;
         }
     }
     assert!(enough, "{worst:?}");

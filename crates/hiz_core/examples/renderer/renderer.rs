@@ -284,8 +284,14 @@ impl Renderer {
         targets: &Targets,
     ) -> wgpu::RenderPass<'e> {
         let [eye_hi, eye_lo] = halves(camera.origin());
+        // The rows stand about the camera's origin, the shader subtracts the two halves of it. What those leave over goes into the
+        // constants, as in the engine's prepass: where a face is seen edge-on its last bit decides what is drawn.
+        let left_over = [0, 1, 2].map(|k| f64::from(eye_hi[k]) + f64::from(eye_lo[k]) - camera.origin()[k]);
+        let about_eye = |[x, y, z, constant]: [f64; 4]| {
+            [x, y, z, x * left_over[0] + y * left_over[1] + z * left_over[2] + constant].map(|v| v as f32)
+        };
         let view = ViewUniform {
-            clip_from_eye: camera.rows().map(|row| row.map(|v| v as f32)),
+            clip_from_eye: camera.rows().map(about_eye),
             eye_hi,
             vertices_per_body: stage.vertices_per_body,
             eye_lo,

@@ -122,7 +122,7 @@ fn random_shot(scene: &Scene, name: &'static str, random: &mut Random) -> Shot {
             }
             Projection::Orthographic {
                 left: -half * aspect,
-                right: half * aspect * random.range(0.8, 1.2),
+                right: half * aspect,
                 bottom: -half,
                 top: half,
                 near,
