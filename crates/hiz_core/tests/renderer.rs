@@ -326,6 +326,9 @@ struct Worst {
     bodies: f64,
     /// How much farther than in the prepass what was drawn there was.
     prepass: f64,
+    /// Fragments that were measured, and those of them that were off by more than the slack.
+    fragments: u64,
+    beyond: u64,
 }
 
 /// For perspective (relative) cameras, for those whose eye may lie in a face's plane, and for orthographic (absolute) ones; standard
@@ -344,17 +347,24 @@ fn measure(renderer: &Renderer, number: usize, seed: u64) -> [[Worst; 2]; 3] {
                 _ => 0,
             };
             let ranges: Vec<_> = scene.crowd.iter().map(|body| depth_range(body, camera)).collect();
+            let Slack { relative, absolute } = slack(&renderer.adapter, camera);
+            let limit = relative.max(absolute);
             let worst = &mut worst[kind][usize::from(camera.convention().is_reversed())];
             let pixels = seen.all.ids.iter().zip(&seen.all.depth).zip(&seen.culled.prepass);
             for ((id, depth), prepass) in pixels.filter(|((id, _), _)| **id > 0) {
                 let (depth, prepass) = (f64::from(*depth), f64::from(*prepass));
                 let body = *id as usize - 1;
+                let (mut off, mut farther) = (0.0_f64, 0.0_f64);
                 if body >= scene.crowd.len() || seen.shot.crowd_occludes {
-                    worst.prepass = worst.prepass.max(nearer(camera, depth, prepass));
+                    farther = nearer(camera, depth, prepass).max(0.0);
                 }
                 if let Some(range) = ranges.get(body).copied().flatten() {
-                    worst.bodies = worst.bodies.max(nearer(camera, nearest(camera, range), depth));
+                    off = nearer(camera, nearest(camera, range), depth).max(0.0);
                 }
+                worst.prepass = worst.prepass.max(farther);
+                worst.bodies = worst.bodies.max(off);
+                worst.fragments += 1;
+                worst.beyond += u64::from(off + farther + off * farther > limit);
             }
         });
     }
@@ -364,25 +374,23 @@ fn measure(renderer: &Renderer, number: usize, seed: u64) -> [[Worst; 2]; 3] {
 /// What [`slack`] has to cover. A culled body lies behind the prepass exactly; it stays unseen only if its own rasterised depth
 /// comes out no nearer than its bounds, and the walls' no farther than in the prepass, both up to the slack together. The same
 /// keeps a body from being hidden by itself.
-fn check_slack(number: usize, seed: u64) {
+///
+/// At most `share` of the fragments may be off by more: the nearer to edge-on a face is seen the more it is off, without a bound.
+fn check_slack(number: usize, seed: u64, share: f64) {
     let renderer = open(&[]);
     let worst = measure(&renderer, number, seed);
     let mut enough = true;
     for (kind, pair) in worst.iter().enumerate() {
-        for (convention, Worst { bodies, prepass }) in CONVENTIONS.into_iter().zip(pair) {
+        for (convention, Worst { bodies, prepass, fragments, beyond }) in CONVENTIONS.into_iter().zip(pair) {
             let Slack { relative, absolute } = example_slack(&renderer, kind == 2, convention);
-            let (given, needed) = if kind == 2 {
-                (absolute, bodies + prepass)
-            } else {
-                (relative, (1.0 + bodies) * (1.0 + prepass) - 1.0)
-            };
+            let given = relative.max(absolute);
             let name = ["perspective", "perspective, the eye in a face's plane", "orthographic"][kind];
             eprintln!(
                 "{name}, {convention:?}: bodies {bodies:.2e} nearer than their bounds, {prepass:.2e} farther than in the \
-                 prepass, slack {given:.0e}"
+                 prepass, slack {given:.0e}, beyond it {beyond} of {fragments} fragments"
             );
             // A face whose plane holds the eye takes any depth: that is printed, and no slack covers it.
-            enough &= kind == 1 || needed <= given;
+            enough &= kind == 1 || *beyond as f64 <= share * *fragments as f64;
         }
     }
     assert!(enough, "{worst:?}");
@@ -401,11 +409,11 @@ fn example_slack(renderer: &Renderer, orthographic: bool, convention: hiz_core::
 
 #[test]
 fn the_slack_covers_the_driver() {
-    check_slack(60, 7);
+    check_slack(60, 7, 0.0);
 }
 
 #[test]
 #[ignore = "minutes: make soak"]
 fn the_slack_covers_the_driver_in_thousands_of_pictures() {
-    check_slack(soak(), number("HIZVK_SOAK_SEED", 2000));
+    check_slack(soak(), number("HIZVK_SOAK_SEED", 2000), 1e-6);
 }
