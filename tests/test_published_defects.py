@@ -73,7 +73,7 @@ class TestRakos:
 
     @staticmethod
     def taps(size: int, other: int) -> dict[tuple[int, int], set[tuple[int, int]]]:
-        """Row R1: the texels of a `size` x `other` level that each texel of the next one reads, as the shader is printed.
+        """Row R1: the texels of a `size` x `other` level that each texel of the next one reads, as it is printed.
 
         A sample at the next level's texel centre and its left, lower and lower left neighbours; three more on
         ``x == size - 3`` of an odd side, in the branches as they are nested there.
@@ -239,11 +239,13 @@ class TestDarnell:
         short = np.stack([published[:, 0] - exact[:, 0], exact[:, 1] - published[:, 1],
                           published[:, 2] - exact[:, 2], exact[:, 3] - published[:, 3]], axis=-1)  # fmt: skip
         under = (short > 1).any(axis=-1)
-        print(f"\nDarnell: the rectangle is short by more than a pixel for {100 * under.mean():.1f} % of 40,000 spheres")
-        assert under.mean() > 0.05
+        share = under.mean()
+        print(f"\nDarnell: the rectangle is short by more than a pixel for {100 * share:.1f} % of 40,000 spheres")
+        assert share > 0.05
         camera = view(self.SIZE, self.BORDERS)
         tested = 0
-        assert short[:, :2].max() < 0.5  # to the sides it is right: there the offset is at right angles to the line of sight
+        # To the sides it is right: that offset is at right angles to the line of sight.
+        assert short[:, :2].max() < 0.5
         for i in np.flatnonzero((short[:, 3] > 1.5) & (exact[:, 3] < height / 2 - 1))[:20]:
             # The rows above their upper end, the lowest of which the sphere meets.
             last = math.ceil(height / 2 - published[i, 3]) - 1
@@ -275,7 +277,7 @@ class TestTuritzin:
 
     @staticmethod
     def taps(x: int, y: int, width: int, height: int) -> set[tuple[int, int]]:
-        """Rows T1, T4: the texels of a `width` x `height` level that texel (x, y) of the next, floor-halved one reads."""
+        """Rows T1, T4: what of a `width` x `height` level texel (x, y) of the next one, floor-halved, reads."""
         columns = range(3 if width % 2 else 2)
         rows = range(3 if height % 2 else 2)
         return {(2 * x + i, 2 * y + j) for i in columns for j in rows}
@@ -378,7 +380,8 @@ class TestArm:
     @pytest.mark.parametrize("reversed_z", [False, True])
     def test_a1_off_centre_projections(self, device: hizvk.Device, reversed_z: bool) -> None:
         """The borders are -0.2 and 1.8: what the formula takes for the sphere's columns is 25 pixels beside them."""
-        size = height, width = (16, 64)
+        size = (16, 64)
+        width = size[1]
         left, right = -0.2, 1.8
         center, radius = np.array([3.0, 0.0, -20.0]), 1.0
         first, last = self.columns(center, radius, 2 / (right - left), width)
