@@ -16,7 +16,7 @@ from . import _arguments, _core
 from .bounds import Bounds, as_arrays
 from .camera import Camera
 from .depth import checked_image
-from .errors import NoAdapterError
+from .errors import LimitError, NoAdapterError
 from .resources import DepthImage, Instances, Mesh, Occluders, Pyramid, as_meshes
 from .result import CullResult, DrawTemplate
 
@@ -245,6 +245,7 @@ class Device:
             self._own("depth", depth)
             return Pyramid(self, self._engine.pyramid(depth._inner), depth.camera)
         camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")
+        self._check_side(camera)
         image, kind, scale = checked_image("depth", depth, camera, kind, scale)
         uploaded = self._engine.upload_depth(image, kind, scale, camera._inner)
         return Pyramid(self, self._engine.pyramid(uploaded), camera)
@@ -334,6 +335,12 @@ class Device:
         )  # fmt: skip
         culling = self._engine.cull(instances._inner, camera._inner, pyramid._inner, *options)
         return CullResult(culling, statistics=options[-1])
+
+    def _check_side(self, camera: Camera) -> None:
+        """An image that the device cannot hold is refused before its array is converted."""
+        side = max(camera.size)
+        if side > self.max_image_side:
+            raise LimitError("image side in pixels", side, self.max_image_side)
 
     def wait(self) -> None:
         """Waits until everything that was submitted is done."""

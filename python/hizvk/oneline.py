@@ -105,6 +105,8 @@ def visible(
             raise TypeError(f"kind: expected nothing beside a DepthImage, got {_arguments.describe(kind)}")
         pyramid = device.pyramid(depth)
     else:
+        if device is not None:
+            device._check_side(camera)
         image, kind, scale = checked_image("depth", depth, camera, kind, scale)
         device = default_device() if device is None else device
         pyramid = device.pyramid(image, camera, kind=kind, scale=scale)
