@@ -27,6 +27,8 @@ T = TypeVar("T")
 LARGEST_SIDE = 32768
 #: Whole numbers up to here are exact in float64.
 LARGEST_EXACT_INTEGER = 2**53
+#: Rows that are checked at once.
+BLOCK = 2**16
 
 
 def describe(value: object) -> str:
@@ -133,8 +135,10 @@ def floats_or_scalar(name: str, value: object, count: int) -> FloatArray:
 def finite_floats(name: str, value: object, shape: Sequence[int | str]) -> FloatArray:
     """`floats`, all of them finite."""
     array = floats(name, value, shape)
-    if not np.isfinite(array).all():
-        bad = int(np.count_nonzero(~np.isfinite(array)))
+    # Row by row in blocks: no temporary array as long as the argument.
+    blocks = (array[start : start + BLOCK] for start in range(0, len(array), BLOCK))
+    bad = sum(int(np.count_nonzero(~np.isfinite(block))) for block in blocks)
+    if bad:
         raise ValueError(f"{name}: expected finite float {_shape_text(shape)}, got {bad} NaN or infinite numbers")
     return array
 
