@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # The tests that take minutes: the campaign of adversarial cases against the exact oracle, a million for each kind of volume
-# (HIZVK_SOAK_CASES), from seed HIZVK_SOAK_SEED on; each line it prints says how to go on from there.
+# (HIZVK_SOAK_CASES), from seed HIZVK_SOAK_SEED on; each line it prints says how to go on from there. And the example's scenes, with and
+# without culling, by 1000 random cameras each (HIZVK_SOAK_CAMERAS).
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 

@@ -67,8 +67,8 @@ BOUNDS: list[tuple[str, Any, Verdict]] = [
     ("NaN corner", box((-1, -1, -6), (1, NAN, -5)), Verdict.INVALID),
     ("infinite corner", box((-1, -1, -INF), (1, 1, -5)), Verdict.INVALID),
     ("negative half size", oriented((1, -1, 1), EYE3), Verdict.INVALID),
-    ("NaN rotation", oriented((1, 1, 1), EYE3 * NAN), Verdict.INVALID),
-    ("infinite rotation", oriented((1, 1, 1), EYE3 * INF), Verdict.INVALID),
+    ("NaN rotation", oriented((1, 1, 1), np.full((3, 3), NAN)), Verdict.INVALID),
+    ("infinite rotation", oriented((1, 1, 1), np.full((3, 3), INF)), Verdict.INVALID),
     ("beyond the camera's coordinates", sphere(0, 0, -(2.0**55), 1), Verdict.INVALID),
     # No size, flat, mirrored, singular: valid.
     ("a point behind", sphere(0, 0, -8, 0), Verdict.OCCLUDED),

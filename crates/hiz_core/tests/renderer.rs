@@ -33,7 +33,7 @@ const RANDOM: usize = 104;
 
 /// Those of `make soak`.
 fn soak() -> usize {
-    number("HIZVK_SOAK_CAMERAS", 3000)
+    number("HIZVK_SOAK_CAMERAS", 1000)
 }
 
 fn number<T: std::str::FromStr>(variable: &str, default: T) -> T {
@@ -214,7 +214,7 @@ fn red(faults: &[(&str, &str)], way: Way) -> Vec<(String, usize)> {
     for make in &SCENES {
         let mut shots = make.1(make.2, ImageSize::new(SIZES[1].0, SIZES[1].1)).unwrap();
         let scene = make.0(make.2);
-        shots.extend(random_shots(&scene, 24, 5));
+        shots.extend(random_shots(&scene, 8, 5));
         draw_each(&renderer, &scene, &shots, &[way], |seen| differing.push((seen.label(), seen.differing())));
     }
     differing.retain(|(_, pixels)| *pixels > 0);

@@ -26,12 +26,13 @@ pub(crate) struct Slack {
     pub(crate) absolute: f64,
 }
 
-/// At least twice the worst that was measured: see `docs/accuracy.md`.
+/// Beyond the worst that `tests/renderer.rs` measures, and all but a few fragments of millions that its long form does. Nothing
+/// bounds how edge-on a face can be seen: `docs/accuracy.md` has the numbers.
 pub(crate) fn slack(adapter: &wgpu::AdapterInfo, camera: &Camera) -> Slack {
     // A driver that nobody has measured gets the larger numbers; the test says whether they suffice.
     let swiftshader = adapter.name.contains("SwiftShader");
     if camera.rows()[3][..3] == [0.0; 3] {
-        return Slack { relative: 0.0, absolute: if swiftshader { 1e-3 } else { 1e-4 } };
+        return Slack { relative: 0.0, absolute: 1e-4 };
     }
     let relative = match (swiftshader, camera.convention()) {
         (true, DepthConvention::Standard) => 2e-5,
