@@ -154,11 +154,12 @@ fn pictures_with_culling_equal_those_without() {
     }
 }
 
-/// Random cameras, each in some ways. Fails with all cameras whose pictures differ; `tolerant`: differ by more than the rasteriser
-/// accounts for.
-fn random_cameras(number: usize, seed: u64, tolerant: bool, ways: impl Fn(usize) -> Vec<Way>) {
+/// Random cameras, each in some ways. Fails with all cameras whose pictures differ by more than the rasteriser accounts for, and if
+/// it has to account for more than a pixel in a hundred pictures (lavapipe: none; `SwiftShader` draws a fragment of depth 0 where a
+/// face is thinner than the sixteenth of a pixel that it snaps to, now and then).
+fn random_cameras(number: usize, seed: u64, ways: impl Fn(usize) -> Vec<Way>) {
     let renderer = open(&[]);
-    let (mut differing, mut tolerated) = (Vec::new(), 0);
+    let (mut differing, mut tolerated, mut pictures) = (Vec::new(), 0, 0);
     for (place, (scene, _, origin)) in SCENES.iter().enumerate() {
         let scene = scene(*origin);
         // How many bodies were there, kept, and hidden.
@@ -170,8 +171,9 @@ fn random_cameras(number: usize, seed: u64, tolerant: bool, ways: impl Fn(usize)
                 total += seen.scene.crowd.len() as u64;
                 kept += u64::from(counts.kept);
                 occluded += u64::from(counts.occluded);
+                pictures += 1;
                 let pixels = seen.differing();
-                if pixels > 0 && tolerant && seen.unaccounted(slack(&renderer.adapter, &seen.shot.camera)) == 0 {
+                if pixels > 0 && seen.unaccounted(slack(&renderer.adapter, &seen.shot.camera)) == 0 {
                     tolerated += pixels;
                 } else if pixels > 0 {
                     let label = seen.label();
@@ -191,20 +193,21 @@ fn random_cameras(number: usize, seed: u64, tolerant: bool, ways: impl Fn(usize)
         );
         assert!(occluded > total / 50 && kept > total / 50, "{}: nothing is hidden or seen", scene.name);
     }
-    eprintln!("{tolerated} pixels of faces seen edge-on differ");
+    eprintln!("{pictures} pictures, {tolerated} pixels differ where a face was drawn out of its bounds");
     assert!(differing.is_empty(), "{differing:?}");
+    assert!(100 * tolerated <= pictures, "{tolerated} pixels in {pictures} pictures");
 }
 
 #[test]
 fn so_do_those_of_random_cameras() {
     // Every kind of camera meets every way.
-    random_cameras(RANDOM, 3, false, |i| vec![WAYS[(i + i / KINDS.len()) % WAYS.len()]]);
+    random_cameras(RANDOM, 3, |i| vec![WAYS[(i + i / KINDS.len()) % WAYS.len()]]);
 }
 
 #[test]
 #[ignore = "minutes: make soak"]
 fn so_do_those_of_thousands_of_random_cameras() {
-    random_cameras(soak(), number("HIZVK_SOAK_SEED", 1000), true, |_| WAYS.to_vec());
+    random_cameras(soak(), number("HIZVK_SOAK_SEED", 1000), |_| WAYS.to_vec());
 }
 
 /// Labels of the example's pictures that differ under a fault, in one way.
