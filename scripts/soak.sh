@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # The tests that take minutes: the campaign of adversarial cases against the exact oracle, a million for each kind of volume
 # (HIZVK_SOAK_CASES), from seed HIZVK_SOAK_SEED on, and the certificates in every arithmetic that WGSL permits. The campaign may be
-# stopped at any time: the next run with the same settings goes on where it was.
+# stopped at any time: the next run with the same settings goes on where it was. And the example's scenes, with and without culling,
+# by 1000 random cameras each (HIZVK_SOAK_CAMERAS).
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 

@@ -10,11 +10,14 @@ from __future__ import annotations
 import math
 import numbers
 import operator
+import os
 from collections.abc import Iterable, Sequence
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+
+from .errors import OutOfMemoryError
 
 FloatArray: TypeAlias = npt.NDArray[np.float32] | npt.NDArray[np.float64]
 Size: TypeAlias = tuple[int, int]
@@ -24,6 +27,8 @@ T = TypeVar("T")
 LARGEST_SIDE = 32768
 #: Whole numbers up to here are exact in float64.
 LARGEST_EXACT_INTEGER = 2**53
+#: Rows that are checked at once.
+BLOCK = 2**16
 
 
 def describe(value: object) -> str:
@@ -77,10 +82,31 @@ def _check_shape(name: str, expected: str, array: npt.NDArray[Any], shape: Seque
         raise ValueError(f"{name}: expected {expected}, got {_shape_text(array.shape)} {array.dtype}")
 
 
-def _ready(array: npt.NDArray[Any]) -> FloatArray:
-    """The array as the engine reads it: float32 or float64, native, aligned, C order; itself where it is that."""
-    wanted = np.float64 if array.dtype.itemsize == 8 else np.float32  # float16 widens exactly
-    return np.require(array, dtype=wanted, requirements=["C", "A"])
+def _host_memory() -> int:
+    """Bytes of memory that this machine has."""
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+
+
+def copied(name: str, array: npt.NDArray[Any], wanted: npt.DTypeLike) -> npt.NDArray[Any]:
+    """The array in this dtype, native, aligned and in C order; itself where it is that.
+
+    A broadcast view can claim terabytes that are nowhere: what this machine cannot hold is refused, not tried.
+    """
+    flags = array.flags
+    if not (flags.c_contiguous and flags.aligned and array.dtype == wanted):
+        needed, there = array.size * np.dtype(wanted).itemsize, _host_memory()
+        if needed > there:
+            got = describe(array)
+            raise OutOfMemoryError(f"{name}: a copy of {got} takes {needed} bytes, this machine has {there}")
+    try:
+        return np.require(array, dtype=wanted, requirements=["C", "A"])
+    except MemoryError:
+        raise OutOfMemoryError(f"{name}: no memory for a copy of {describe(array)}") from None
+
+
+def _ready(name: str, array: npt.NDArray[Any]) -> FloatArray:
+    """The array as the engine reads it: float32 or float64; itself where it is that."""
+    return copied(name, array, np.float64 if array.dtype.itemsize == 8 else np.float32)  # float16 widens exactly
 
 
 def floats(name: str, value: object, shape: Sequence[int | str], *, why: str = "") -> FloatArray:
@@ -91,7 +117,7 @@ def floats(name: str, value: object, shape: Sequence[int | str], *, why: str = "
         got = describe(array if array.ndim else value)
         raise TypeError(f"{name}: expected {expected}, got {got}")
     _check_shape(name, expected, array, shape)
-    return _ready(array)
+    return _ready(name, array)
 
 
 def floats_or_scalar(name: str, value: object, count: int) -> FloatArray:
@@ -109,8 +135,10 @@ def floats_or_scalar(name: str, value: object, count: int) -> FloatArray:
 def finite_floats(name: str, value: object, shape: Sequence[int | str]) -> FloatArray:
     """`floats`, all of them finite."""
     array = floats(name, value, shape)
-    if not np.isfinite(array).all():
-        bad = int(np.count_nonzero(~np.isfinite(array)))
+    # Row by row in blocks: no temporary array as long as the argument.
+    blocks = (array[start : start + BLOCK] for start in range(0, len(array), BLOCK))
+    bad = sum(int(np.count_nonzero(~np.isfinite(block))) for block in blocks)
+    if bad:
         raise ValueError(f"{name}: expected finite float {_shape_text(shape)}, got {bad} NaN or infinite numbers")
     return array
 
@@ -222,7 +250,7 @@ def size(name: str, value: object) -> Size:
     expected = f"(height, width), two integers in 1..{LARGEST_SIDE}"
     if isinstance(value, (str, bytes)) or not isinstance(value, (Sequence, np.ndarray)):
         raise _wrong_type(name, expected, value)
-    if len(value) != 2:
+    if (isinstance(value, np.ndarray) and value.ndim == 0) or len(value) != 2:
         raise _wrong_value(name, expected, value)
     sides = []
     for side in value:
@@ -274,7 +302,7 @@ def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
     if array.dtype.kind != "b":
         raise TypeError(f"{name}: expected {expected}, got {describe(array if array.ndim else value)}")
     _check_shape(name, expected, array, shape)
-    return np.ascontiguousarray(array, dtype=np.bool_)
+    return copied(name, array, np.bool_)
 
 
 def triangles(name: str, value: object, vertex_count: int) -> npt.NDArray[np.uint32]:
@@ -291,9 +319,10 @@ def triangles(name: str, value: object, vertex_count: int) -> npt.NDArray[np.uin
     if array.dtype.kind not in "iu":
         raise TypeError(f"{name}: expected {expected}, got {describe(array if array.ndim else value)}")
     _check_shape(name, expected, array, ("T", 3))
+    array = copied(name, array, array.dtype.newbyteorder("="))
     if array.size:
         low, high = int(array.min()), int(array.max())
         if low < 0 or high >= vertex_count:
             wrong = low if low < 0 else high
             raise ValueError(f"{name}: expected vertex indices in 0..{vertex_count - 1}, got {wrong}")
-    return np.require(array, dtype=np.uint32, requirements=["C", "A"])
+    return copied(name, array, np.uint32)

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 Vector = tuple[float, float, float]
 
+#: OpenCV's longest list of distortion coefficients.
+MOST_COEFFICIENTS = 14
+
 
 def view(eye: object, target: object, up: object) -> tuple[Vector, Vector, Vector]:
     """The three vectors of a view; the engine refuses those that leave it without a direction."""
@@ -45,6 +48,9 @@ def refuse_distortion(distortion: object) -> None:
     if distortion is None:
         return
     coefficients = np.asarray(distortion)
+    if coefficients.size > MOST_COEFFICIENTS:
+        got = _arguments.describe(coefficients)
+        raise ValueError(f"distortion: expected None or at most {MOST_COEFFICIENTS} zeros, got {got}")
     if coefficients.dtype.kind not in "fiu":
         got = _arguments.describe(coefficients if coefficients.ndim else distortion)
         raise TypeError(f"distortion: expected None or an array of zeros, got {got}")

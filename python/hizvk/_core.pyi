@@ -125,6 +125,7 @@ class Engine:
         coverage: str,
         guard_px: float | None,
         depth_slack: float,
+        depth_slack_abs: float,
         transform_slack: float,
         footprint: int,
         descent: int,

@@ -48,5 +48,8 @@ def checked_image(
                 f'{name}: expected float (height, width), or uint16 for the kinds "z" and "distance", got '
                 f'{_arguments.describe(value)} of kind "{kind_}"'
             )
-        value = value.astype(np.float32)  # exact: 16 bits
+        if value.shape != camera.size:
+            got = _arguments.describe(value)
+            raise ValueError(f"{name}: expected uint16 {camera.size} (the camera's size), got {got}")
+        value = _arguments.copied(name, value, np.float32)  # exact: 16 bits
     return _arguments.floats(name, value, camera.size, why=" (the camera's size)"), kind_, scale_

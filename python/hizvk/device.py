@@ -16,7 +16,7 @@ from . import _arguments, _core
 from .bounds import Bounds, as_arrays
 from .camera import Camera
 from .depth import checked_image
-from .errors import NoAdapterError
+from .errors import LimitError, NoAdapterError
 from .resources import DepthImage, Instances, Mesh, Occluders, Pyramid, as_meshes
 from .result import CullResult, DrawTemplate
 
@@ -246,6 +246,7 @@ class Device:
             self._own("depth", depth)
             return Pyramid(self, self._engine.pyramid(depth._inner), depth.camera)
         camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")
+        self._check_side(camera)
         image, kind, scale = checked_image("depth", depth, camera, kind, scale)
         uploaded = self._engine.upload_depth(image, kind, scale, camera._inner)
         return Pyramid(self, self._engine.pyramid(uploaded), camera)
@@ -260,6 +261,7 @@ class Device:
         coverage: Coverage = "area",
         guard_px: float | None = None,
         depth_slack: float = 2.0**-23,
+        depth_slack_abs: float = 0.0,
         transform_slack: float = 0.0,
         footprint: int = 2,
         descent: int = 0,
@@ -287,6 +289,9 @@ class Device:
             Pixels by which bounds grow in the image, a multiple of 1/256 up to 16. None: 0 for area, 1/64 for sample.
         depth_slack : float
             Relative error of the depth image, up to 0.5; by default one ulp, for depth that was rounded to float32.
+        depth_slack_abs : float
+            Absolute error of the depth image beside that, up to 0.5, in NDC depth: a rasteriser errs by the same amount
+            near and far in an orthographic view. Anything above 0 counts 2^-23 more.
         transform_slack : float
             For depth images of a renderer that transforms in float32: ulps that its matrix product may have cost (about
             4), up to 1e6.
@@ -331,11 +336,17 @@ class Device:
             )
         options = cull_options(
             order=order, coverage=coverage, guard_px=guard_px, depth_slack=depth_slack,
-            transform_slack=transform_slack, footprint=footprint, descent=descent, fit=fit, capacity=capacity, draw=draw,
-            statistics=statistics,
+            depth_slack_abs=depth_slack_abs, transform_slack=transform_slack, footprint=footprint, descent=descent,
+            fit=fit, capacity=capacity, draw=draw, statistics=statistics,
         )  # fmt: skip
         culling = self._engine.cull(instances._inner, camera._inner, pyramid._inner, *options)
         return CullResult(culling, statistics=options[-1])
+
+    def _check_side(self, camera: Camera) -> None:
+        """An image that the device cannot hold is refused before its array is converted."""
+        side = max(camera.size)
+        if side > self.max_image_side:
+            raise LimitError("image side in pixels", side, self.max_image_side)
 
     def wait(self) -> None:
         """Waits until everything that was submitted is done."""
@@ -359,6 +370,7 @@ def cull_options(
     coverage: object,
     guard_px: object,
     depth_slack: object,
+    depth_slack_abs: object,
     transform_slack: object,
     footprint: object,
     descent: object,
@@ -366,7 +378,7 @@ def cull_options(
     capacity: object,
     draw: object,
     statistics: object,
-) -> tuple[str, str, float | None, float, float, int, int, str, int | None, tuple[int, int, int, int], bool]:
+) -> tuple[str, str, float | None, float, float, float, int, int, str, int | None, tuple[int, int, int, int], bool]:
     """The checked options of a cull, in the engine's order."""
     if guard_px is not None:
         guard_px = _arguments.number("guard_px", guard_px, at_least=0.0, at_most=16.0)
@@ -387,6 +399,7 @@ def cull_options(
         _arguments.choice("coverage", coverage, ("area", "sample")),
         guard_px,
         _arguments.number("depth_slack", depth_slack, at_least=0.0, at_most=0.5),
+        _arguments.number("depth_slack_abs", depth_slack_abs, at_least=0.0, at_most=0.5),
         _arguments.number("transform_slack", transform_slack, at_least=0.0, at_most=1e6),
         footprint,
         _arguments.integer("descent", descent, low=0, high=65536),

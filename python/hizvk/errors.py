@@ -68,4 +68,4 @@ class DeviceLostError(HizError):
 
 
 class OutOfMemoryError(HizError):
-    """The device has no memory left for what was asked."""
+    """The device, or this machine for a copy of an array, has no memory for what was asked."""

@@ -46,6 +46,7 @@ def visible(
     coverage: Coverage = "area",
     guard_px: float | None = None,
     depth_slack: float = 2.0**-23,
+    depth_slack_abs: float = 0.0,
     transform_slack: float = 0.0,
     footprint: int = 2,
     descent: int = 0,
@@ -69,7 +70,7 @@ def visible(
         World units of one step of `depth`, for the kinds ``"z"`` and ``"distance"``.
     device : Device, optional
         None: one that is made at the first call and kept.
-    coverage, guard_px, depth_slack, transform_slack, footprint, descent, fit
+    coverage, guard_px, depth_slack, depth_slack_abs, transform_slack, footprint, descent, fit
         As in `Device.cull`.
 
     Returns
@@ -91,8 +92,9 @@ def visible(
     as_arrays("bounds", bounds)
     _arguments.instance("camera", camera, Camera, "a Camera")
     options = cull_options(
-        order="any", coverage=coverage, guard_px=guard_px, depth_slack=depth_slack, transform_slack=transform_slack,
-        footprint=footprint, descent=descent, fit=fit, capacity=None, draw=None, statistics=False,
+        order="any", coverage=coverage, guard_px=guard_px, depth_slack=depth_slack, depth_slack_abs=depth_slack_abs,
+        transform_slack=transform_slack, footprint=footprint, descent=descent, fit=fit, capacity=None, draw=None,
+        statistics=False,
     )  # fmt: skip
     if device is not None:
         _arguments.instance("device", device, Device, "a Device or None")
@@ -104,13 +106,15 @@ def visible(
             raise TypeError(f"kind: expected nothing beside a DepthImage, got {_arguments.describe(kind)}")
         pyramid = device.pyramid(depth)
     else:
+        if device is not None:
+            device._check_side(camera)
         image, kind, scale = checked_image("depth", depth, camera, kind, scale)
         device = default_device() if device is None else device
         pyramid = device.pyramid(image, camera, kind=kind, scale=scale)
-    _, coverage_, guard, slack, transform, side, budget, fit_, *_ = options
+    _, coverage_, guard, slack, slack_abs, transform, side, budget, fit_, *_ = options
     result = device.cull(
         device.instances(bounds), camera, pyramid, order="any", coverage=coverage_,  # type: ignore[arg-type]
-        guard_px=guard, depth_slack=slack, transform_slack=transform, footprint=side, descent=budget,
-        fit=fit_, statistics=False,  # type: ignore[arg-type]
+        guard_px=guard, depth_slack=slack, depth_slack_abs=slack_abs, transform_slack=transform, footprint=side,
+        descent=budget, fit=fit_, statistics=False,  # type: ignore[arg-type]
     )  # fmt: skip
     return result.mask.copy()

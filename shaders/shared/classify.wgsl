@@ -119,8 +119,8 @@ fn inside_block(r: Value, w: Value, lo: u32, hi: u32, level: u32, half_size: f32
 
 // The depth that a stored one stands for: with the slack, away from subnormals.
 fn occluding_depth(bits: u32) -> f32 {
-    let stored = bitcast<f32>(bits);
-    return select(max(stored, LEAST_NORMAL), min(stored, 1.0), REVERSED) * view.depth_factor;
+    let stored = select(max(bitcast<f32>(bits), LEAST_NORMAL), min(bitcast<f32>(bits), 1.0), REVERSED);
+    return bar(stored * view.depth_factor + view.depth_offset);
 }
 
 // The far plane hides nothing.

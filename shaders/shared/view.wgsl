@@ -32,9 +32,10 @@ struct View {
     reduction: u32,
     // How many texels a descent may read.
     descent_budget: u32,
+    // What is added then: the absolute slack, reversed less than 0.
+    depth_offset: f32,
     padding_0: u32,
     padding_1: u32,
-    padding_2: u32,
 }
 
 // Keeps a compiler from folding what follows into the cancelling sum x was made by, as WGSL lets it.

@@ -75,6 +75,9 @@ pub struct CullOptions {
     pub guard_px: Option<f64>,
     /// Relative slack of the stored depth, 0..=0.5: 2^-23 covers depth that was rounded to nearest.
     pub depth_slack: f64,
+    /// Absolute slack of the stored depth, 0..=0.5, in units of NDC depth and beside the relative one: the rasteriser of an
+    /// orthographic camera errs by the same amount near and far. Anything above 0 counts 2^-23 more.
+    pub depth_slack_abs: f64,
     /// kappa, 0..=1e6: how many eps of `sum |M| |p|` the transform of the depth image's renderer may have cost; 0 for depth that
     /// is exact for the camera's matrices, about 4 for a renderer that transforms world coordinates in float32.
     pub transform_slack: f64,
@@ -96,6 +99,7 @@ impl Default for CullOptions {
             coverage: Coverage::Area,
             guard_px: None,
             depth_slack: EPS,
+            depth_slack_abs: 0.0,
             transform_slack: 0.0,
             footprint: Footprint::Two,
             descent: 0,
@@ -124,9 +128,9 @@ pub(crate) struct ViewUniform {
     pub(crate) runtime_zero: u32,
     pub(crate) reduction: u32,
     pub(crate) descent_budget: u32,
+    pub(crate) depth_offset: f32,
     pub(crate) padding_0: u32,
     pub(crate) padding_1: u32,
-    pub(crate) padding_2: u32,
 }
 
 const _: () = assert!(size_of::<ViewUniform>() == 208);
@@ -145,6 +149,7 @@ impl ViewUniform {
             }
         };
         let slack = range("depth_slack", options.depth_slack, 0.5)?;
+        let slack_abs = range("depth_slack_abs", options.depth_slack_abs, 0.5)?;
         range("descent", f64::from(options.descent), 65_536.0)?;
         let kappa = range("transform_slack", options.transform_slack, 1e6)?;
         let guard = match (options.guard_px, options.coverage) {
@@ -165,6 +170,10 @@ impl ViewUniform {
         } else {
             crate::view::round_up(1.0 + slack)
         };
+        // The product and the sum in the shader lose less than 2^-24 each where the depth stays below 1: that is added here. 0
+        // adds nothing and loses nothing.
+        let depth_offset = if slack_abs > 0.0 { crate::view::round_up(slack_abs + EPS) } else { 0.0 };
+        let depth_offset = if camera.convention().is_reversed() { -depth_offset } else { depth_offset };
         let rows = ViewRows::new(camera, kappa)?;
         let size = camera.size();
         Ok(Self {
@@ -183,9 +192,9 @@ impl ViewUniform {
             runtime_zero: 0,
             reduction,
             descent_budget: options.descent,
+            depth_offset,
             padding_0: 0,
             padding_1: 0,
-            padding_2: 0,
         })
     }
 }

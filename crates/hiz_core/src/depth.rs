@@ -6,6 +6,7 @@
 use crate::bounds::Floats;
 use crate::camera::{Camera, DepthConvention, Mat3, Mat4, Vec3, cross, dot, inverse3, mul3, normalized};
 use crate::error::{Error, Result};
+use crate::host;
 
 /// What the numbers of a depth image mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -45,14 +46,14 @@ pub fn ndc_from_kind(image: Floats<'_>, kind: DepthKind, scale: f64, camera: &Ca
             if scale != 1.0 {
                 return Err(Error::invalid("scale", format!("expected 1 for NDC depth, got {scale}")));
             }
-            Ok((0..image.len()).map(|i| toward_far(image.get(i), reversed)).collect())
+            host::collected((0..image.len()).map(|i| toward_far(image.get(i), reversed)), "depth")
         }
         DepthKind::Z | DepthKind::Distance => {
             if !(scale.is_finite() && scale > 0.0) {
                 return Err(Error::invalid("scale", format!("expected a positive finite number, got {scale}")));
             }
             let lens = Lens::new(camera)?;
-            let mut out = Vec::with_capacity(image.len());
+            let mut out = host::list(image.len(), "depth")?;
             for row in 0..size.height {
                 for column in 0..size.width {
                     let value = image.get(out.len()) * scale;

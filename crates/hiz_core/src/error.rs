@@ -43,8 +43,8 @@ pub enum Error {
     /// The device was lost; everything that lives on it is gone.
     #[error("the device was lost: {0}")]
     DeviceLost(String),
-    /// The device ran out of memory.
-    #[error("out of device memory: {0}")]
+    /// The device ran out of memory, or the host did.
+    #[error("out of memory: {0}")]
     OutOfMemory(String),
     /// The driver or wgpu refused something that this crate believes to be right: a bug worth reporting.
     #[error("the device reported an error: {0}")]

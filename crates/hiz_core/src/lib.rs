@@ -26,6 +26,7 @@ mod cull;
 mod depth;
 mod error;
 mod gpu;
+mod host;
 mod instances;
 mod layout;
 mod occluders;

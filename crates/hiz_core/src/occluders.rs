@@ -4,6 +4,7 @@ use crate::bounds::Floats;
 use crate::camera::{Camera, DepthConvention, Vec3, dot, sub};
 use crate::error::{Error, Result};
 use crate::gpu::{ContextId, Gpu, OccluderKey};
+use crate::host;
 use crate::pyramid::entry;
 use crate::shader;
 use crate::view::{ClipRows, split3};
@@ -189,6 +190,8 @@ impl Baked {
         let base_vertex = i32::try_from(self.vertices.len()).map_err(|_| too_many(self.vertices.len()))?;
         let first_index = u32::try_from(self.indices.len()).map_err(|_| too_many(self.indices.len()))?;
         let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        host::reserve(&mut self.vertices, mesh.vertices.len() / 3, "vertices")?;
+        host::reserve(&mut self.indices, mesh.triangles.len(), "triangles")?;
         for v in 0..mesh.vertices.len() / 3 {
             let p = world(mesh.vertices.array(v));
             // float32 must hold it: beyond, the halves would be infinite.

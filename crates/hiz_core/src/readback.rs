@@ -1,6 +1,7 @@
 //! From the device to the host: the only place that submits a copy, maps and waits.
 
 use crate::error::{Error, Result};
+use crate::host;
 
 /// What to copy.
 pub(crate) struct BufferRange<'a> {
@@ -47,16 +48,16 @@ pub(crate) fn read_buffers(
             .iter()
             .map(|r| {
                 let end = begin + r.size as usize;
-                let part = bytes[begin..end].to_vec();
+                let part = host::collected(bytes[begin..end].iter().copied(), "readback");
                 begin = end;
                 part
             })
             .collect()
-    })
+    })?
 }
 
 fn read_in_bands(device: &wgpu::Device, queue: &wgpu::Queue, range: &BufferRange<'_>) -> Result<Vec<u8>> {
-    let mut out = Vec::with_capacity(range.size as usize);
+    let mut out = host::list(range.size as usize, "readback")?;
     let mut done = 0;
     while done < range.size {
         let size = STAGING_BYTES.min(range.size - done);
@@ -91,12 +92,12 @@ pub(crate) fn read_texture(device: &wgpu::Device, queue: &wgpu::Queue, texture: 
     );
     let submission = queue.submit([encoder.finish()]);
     with_mapped(device, &staging, submission, |bytes| {
-        let mut out = Vec::with_capacity((row * u64::from(height)) as usize);
+        let mut out = host::list((row * u64::from(height)) as usize, "readback")?;
         for line in bytes.chunks_exact(padded as usize) {
             out.extend_from_slice(&line[..row as usize]);
         }
-        out
-    })
+        Ok(out)
+    })?
 }
 
 /// Waits for a submission.

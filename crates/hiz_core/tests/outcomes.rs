@@ -11,8 +11,8 @@ use common::{CONVENTIONS, camera_along_z, engine, ndc};
 use hiz_core::headless::{Culling, Engine};
 use hiz_core::wgpu;
 use hiz_core::{
-    Bounds, Camera, Coverage, CullOptions, DepthConvention, Error, Floats, InstanceOptions, Instances, Pyramid,
-    PyramidOptions, VisibleOptions,
+    Bounds, Camera, Coverage, CullOptions, DepthConvention, Error, Floats, ImageSize, InstanceOptions, Instances,
+    Pyramid, PyramidOptions, VisibleOptions,
 };
 
 const OUTSIDE: u8 = 0;
@@ -440,6 +440,7 @@ fn options_out_of_range_are_refused_by_name() {
         message(CullOptions { guard_px: Some(-1.0), ..plain() }).starts_with("guard_px: expected a number in 0..=16")
     );
     assert!(message(CullOptions { depth_slack: f64::NAN, ..plain() }).starts_with("depth_slack:"));
+    assert!(message(CullOptions { depth_slack_abs: 0.6, ..plain() }).starts_with("depth_slack_abs:"));
     assert!(message(CullOptions { transform_slack: -1.0, ..plain() }).starts_with("transform_slack:"));
 }
 
@@ -458,6 +459,33 @@ fn depth_slack_moves_the_wall_back_in_both_conventions() {
         };
         assert_eq!(verdicts(0.0), [OCCLUDED, OCCLUDED], "{convention:?}");
         assert_eq!(verdicts(0.01), [VISIBLE, OCCLUDED], "{convention:?}");
+    }
+}
+
+#[test]
+fn absolute_slack_moves_every_wall_by_the_same_amount() {
+    // An orthographic camera: z from 1 to 9 is depth from 0 to 1 or back, one unit of z an eighth of depth. A box one unit behind a
+    // wall is hidden; with an absolute slack of 1/8 it is not, a hair farther back it is again: before walls near and far.
+    for convention in CONVENTIONS {
+        let (slope, constant) = match convention {
+            DepthConvention::Standard => (0.125, -0.125),
+            DepthConvention::Reversed => (-0.125, 1.125),
+        };
+        let m = [[0.25, 0.0, 0.0, 0.0], [0.0, 0.25, 0.0, 0.0], [0.0, 0.0, slope, constant], [0.0, 0.0, 0.0, 1.0]];
+        let camera = Camera::from_clip_from_world(m, ImageSize::new(SIDE, SIDE), convention).unwrap();
+        for wall_z in [1.5, 4.0, 7.0] {
+            let box_at = |z: f64| ([-1.0, -1.0, z], [1.0, 1.0, 9.0]);
+            let list = boxes(&[box_at(wall_z + 0.01), box_at(wall_z + 1.0), box_at(wall_z + 1.001)]);
+            let wall = [(slope * wall_z + constant) as f32; 256];
+            let verdicts = |depth_slack_abs| {
+                let options = CullOptions { depth_slack: 0.0, depth_slack_abs, ..CullOptions::default() };
+                cull_with(&list, &wall, &camera, &options).verdicts().unwrap()
+            };
+            assert_eq!(verdicts(0.0), [OCCLUDED; 3], "{convention:?} {wall_z}");
+            assert_eq!(verdicts(0.125), [VISIBLE, VISIBLE, OCCLUDED], "{convention:?} {wall_z}");
+            // The least there is: 2^-23.
+            assert_eq!(verdicts(1e-300), [OCCLUDED; 3], "{convention:?} {wall_z}");
+        }
     }
 }
 

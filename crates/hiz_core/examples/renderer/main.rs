@@ -1,22 +1,27 @@
-//! A renderer with a device of its own draws a town twice, with and without culling, and compares the pictures:
+//! A renderer with a device of its own draws three scenes twice, with and without culling, and compares the pictures:
 //!
 //! ```text
 //! cargo run --example renderer [FOLDER]
 //! ```
 //!
-//! The pictures land in FOLDER (`out/renderer`): what was drawn with culling, and which box each pixel shows. `renderer.rs`
-//! shows how the crate is embedded, `scene.rs` what is drawn. `tests/renderer.rs` runs the same code.
+//! The pictures land in FOLDER (`out/renderer`): what was drawn with culling, and which body each pixel shows. `renderer.rs`
+//! shows how the crate is embedded; `scene.rs` says what a scene is, `town.rs`, `rooms.rs` and `field.rs` are three.
+//! `tests/renderer.rs` runs the same code.
 
+mod field;
 #[allow(dead_code, reason = "its test reads more of it")]
 mod renderer;
+mod rooms;
+#[allow(dead_code, reason = "its test reads more of it")]
 mod scene;
+mod town;
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use hiz_core::ImageSize;
 use renderer::{Picture, Renderer};
-use scene::{ORIGINS, Scene, shots};
+use scene::{Scene, Shot};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args_os().nth(1).map_or_else(|| PathBuf::from("out/renderer"), PathBuf::from);
@@ -28,12 +33,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         "camera", "image", "instances", "kept", "occluded", "outside"
     );
     let mut differing_in_all = 0;
-    let towns = ORIGINS.map(|origin| renderer.build(&Scene::new(origin)));
-    for size in [ImageSize::new(640, 360), ImageSize::new(321, 203)] {
-        for shot in shots(size)? {
-            let town = towns[shot.town].as_ref().map_err(ToString::to_string)?;
-            let all = renderer.draw_all(town, &shot);
-            let culled = renderer.draw_culled(town, &shot)?;
+    for (scene, shots) in scenes_and_shots(ImageSize::new(640, 360))? {
+        let stage = renderer.build(&scene)?;
+        for shot in shots {
+            let size = shot.camera.size();
+            let all = renderer.draw_all(&stage, &shot);
+            let culled = renderer.draw_culled(&stage, &shot, &renderer.cull_options(&shot.camera))?;
             let differing = all.differing_pixels(&culled.picture);
             differing_in_all += differing;
             let (counts, image) = (culled.counts, format!("{}x{}", size.width, size.height));
@@ -54,7 +59,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     if differing_in_all == 0 { Ok(()) } else { Err(format!("{differing_in_all} pixels differ").into()) }
 }
 
-/// Box numbers as colours that neighbours do not share.
+/// The scenes at the world's origin, each with its cameras.
+fn scenes_and_shots(size: ImageSize) -> hiz_core::Result<[(Scene, Vec<Shot>); 3]> {
+    let origin = [0.0; 3];
+    Ok([
+        (town::scene(origin), town::shots(origin, size)?),
+        (rooms::scene(origin), rooms::shots(origin, size)?),
+        (field::scene(origin), field::shots(origin, size)?),
+    ])
+}
+
+/// Numbers as colours that neighbours do not share.
 fn id_colours(picture: &Picture) -> Vec<u8> {
     let colour = |id: u32| (id.wrapping_mul(0x9E37_79B1) | 0xFF).to_be_bytes();
     picture.ids.iter().flat_map(|id| colour(*id)).collect()

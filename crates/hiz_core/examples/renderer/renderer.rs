@@ -5,12 +5,11 @@ use std::error::Error;
 
 use hiz_core::wgpu::{self, util::DeviceExt};
 use hiz_core::{
-    Bounds, Camera, CullOptions, DepthConvention, DrawTemplate, Floats, HizContext, ImageSize, InstanceOptions,
-    Instances, MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders, Order, PyramidOptions, Visible,
-    VisibleOptions,
+    Camera, CullOptions, DepthConvention, DrawTemplate, Floats, HizContext, ImageSize, InstanceOptions, Instances,
+    MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders, Order, PyramidOptions, Visible, VisibleOptions,
 };
 
-use crate::scene::{BLOCK_INDICES, Block, Scene, Shot, mesh};
+use crate::scene::{Mesh, Scene, Shot};
 
 const COLOUR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const ID_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
@@ -18,37 +17,33 @@ const ID_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 /// Crowds are small here; real ones may be cut into pieces by the device's limits. So is this one, to show the loop.
 const PIECE_CAPACITY: u32 = 2048;
 
-/// How much nearer than its bounds a box may be rasterised, relative to its depth: the cull reasons about boxes, a picture
-/// is made of fragments. At least twice the worst that was measured.
-///
-/// Measured: the fragments of each box against its nearest corner in float64, as `tests/renderer.rs` does it, in this
-/// town with random perspective cameras along the world's axes, 3000 on lavapipe (Mesa 22.3) and 1000 on `SwiftShader`:
-///
-/// | worst | standard | reversed |
-/// |---|---|---|
-/// | lavapipe | 2.5e-5 | 4.3e-3 |
-/// | `SwiftShader` | 4.5e-7 | 1.6e-5 |
-///
-/// lavapipe's fragments fall up to 0.002 pixels outside their triangle and take its plane's depth there, beyond every
-/// vertex; on a face seen edge-on that plane is steep. Reversed depth is inverse to the distance, so it shows all of it:
-/// with a slack of 2e-3 one of the 3000 pictures was wrong, by one pixel. Nothing bounds how edge-on a face can be: these
-/// numbers are the ends of tails, no proof. `SwiftShader` snaps vertices to sixteenths of a pixel, which moves the depth of
-/// a fragment by far more, but between its vertices: hardly ever out of the bounds.
-///
-/// The walls are the same triangles in the prepass and in the picture. A renderer whose prepass has others, or transforms
-/// them otherwise, has to measure and add that difference. No guard: area coverage leaves at least half a pixel around
-/// each sample, and no driver strays that far.
-pub(crate) fn depth_slack(adapter: &wgpu::AdapterInfo, convention: DepthConvention) -> f64 {
-    // A driver that nobody has measured gets the larger numbers; the test says whether they suffice.
-    match (adapter.name.contains("SwiftShader"), convention) {
-        (true, DepthConvention::Standard) => 1e-6,
-        (true, DepthConvention::Reversed) => 4e-5,
-        (false, DepthConvention::Standard) => 1e-4,
-        (false, DepthConvention::Reversed) => 1e-2,
-    }
+/// How much nearer than its bounds a body may be rasterised: the cull reasons about bounds, a picture is made of fragments.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Slack {
+    /// Of its depth; for perspective cameras.
+    pub(crate) relative: f64,
+    /// For orthographic cameras, where a rasteriser errs by the same amount near and far.
+    pub(crate) absolute: f64,
 }
 
-/// A device, a queue, and what draws boxes.
+/// Beyond the worst that `tests/renderer.rs` measures, and all but a few fragments of millions that its long form does. Nothing
+/// bounds how edge-on a face can be seen: `docs/accuracy.md` has the numbers.
+pub(crate) fn slack(adapter: &wgpu::AdapterInfo, camera: &Camera) -> Slack {
+    // A driver that nobody has measured gets the larger numbers; the test says whether they suffice.
+    let swiftshader = adapter.name.contains("SwiftShader");
+    if camera.rows()[3][..3] == [0.0; 3] {
+        return Slack { relative: 0.0, absolute: 1e-4 };
+    }
+    let relative = match (swiftshader, camera.convention()) {
+        (true, DepthConvention::Standard) => 2e-5,
+        (true, DepthConvention::Reversed) => 2e-3,
+        (false, DepthConvention::Standard) => 1e-4,
+        (false, DepthConvention::Reversed) => 1e-2,
+    };
+    Slack { relative, absolute: 0.0 }
+}
+
+/// A device, a queue, and what draws bodies.
 pub(crate) struct Renderer {
     pub(crate) adapter: wgpu::AdapterInfo,
     device: wgpu::Device,
@@ -56,16 +51,19 @@ pub(crate) struct Renderer {
     hiz: HizContext,
     /// For standard and reversed depth.
     pipelines: [wgpu::RenderPipeline; 2],
-    block_indices: wgpu::Buffer,
 }
 
 /// A scene on the device.
-pub(crate) struct Town {
-    blocks: wgpu::Buffer,
-    /// 0, 1, 2, ...: the list that draws every box.
-    everything: wgpu::Buffer,
+pub(crate) struct Stage {
+    /// Of the bodies, one after another, then of the walls.
+    vertices: wgpu::Buffer,
+    vertices_per_body: u32,
+    /// Of one body.
+    body_indices: wgpu::Buffer,
+    wall_indices: wgpu::Buffer,
+    /// 0, 1, 2, ...: the list that draws everybody.
+    everybody: wgpu::Buffer,
     num_crowd: u32,
-    num_blocks: u32,
     crowd: Instances,
     visible: Visible,
     /// The walls alone, and with the crowd.
@@ -78,7 +76,7 @@ pub(crate) struct Picture {
     pub(crate) size: ImageSize,
     /// RGBA, 8 bits each.
     pub(crate) colour: Vec<u8>,
-    /// Box numbers + 1.
+    /// Numbers of bodies + 1; the walls come after the last.
     pub(crate) ids: Vec<u32>,
     pub(crate) depth: Vec<f32>,
 }
@@ -114,33 +112,36 @@ pub(crate) struct Culled {
 #[repr(C)]
 struct ViewUniform {
     clip_from_eye: [[f32; 4]; 4],
-    eye_hi: [f32; 4],
-    eye_lo: [f32; 4],
+    eye_hi: [f32; 3],
+    vertices_per_body: u32,
+    eye_lo: [f32; 3],
+    padding: u32,
 }
 
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-struct BlockRecord {
-    min_hi: [f32; 4],
-    min_lo: [f32; 4],
-    max_hi: [f32; 4],
-    max_lo: [f32; 4],
-    colour: [f32; 4],
+struct VertexRecord {
+    hi: [f32; 3],
+    colour: [u8; 4],
+    lo: [f32; 3],
+    body: u32,
 }
 
 /// A position as two float32 that add up to it (to 2^-48): the shader subtracts the eye before anything large is rounded.
-fn halves(p: [f64; 3]) -> [[f32; 4]; 2] {
+fn halves(p: [f64; 3]) -> [[f32; 3]; 2] {
     let hi = p.map(|v| v as f32);
-    let lo = [0, 1, 2].map(|k| (p[k] - f64::from(hi[k])) as f32);
-    [hi, lo].map(|v| [v[0], v[1], v[2], 0.0])
+    [hi, [0, 1, 2].map(|k| (p[k] - f64::from(hi[k])) as f32)]
 }
 
-impl BlockRecord {
-    fn new(block: &Block) -> Self {
-        let ([min_hi, min_lo], [max_hi, max_lo]) = (halves(block.min), halves(block.max));
-        let [r, g, b] = block.colour;
-        Self { min_hi, min_lo, max_hi, max_lo, colour: [r, g, b, 1.0] }
-    }
+/// The vertices of a mesh; the body numbers count up every `vertices_per_body`.
+fn records(mesh: &Mesh, first_body: u32, vertices_per_body: u32) -> Vec<VertexRecord> {
+    let vertices = mesh.vertices.iter().zip(&mesh.colours).enumerate();
+    let record = |(i, (position, colour)): (usize, (&[f64; 3], &[f32; 3]))| {
+        let [hi, lo] = halves(*position);
+        let [r, g, b] = colour.map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8);
+        VertexRecord { hi, colour: [r, g, b, 255], lo, body: first_body + i as u32 / vertices_per_body }
+    };
+    vertices.map(record).collect()
 }
 
 impl Renderer {
@@ -172,96 +173,131 @@ impl Renderer {
             hiz: HizContext::with_planted_faults(&device, faults)?,
             pipelines: [wgpu::CompareFunction::Less, wgpu::CompareFunction::Greater]
                 .map(|nearer| pipeline(&device, nearer)),
-            block_indices: buffer(&device, "renderer.block_indices", &BLOCK_INDICES, wgpu::BufferUsages::INDEX),
             device,
             queue,
         })
     }
 
     /// Uploads a scene, once for all its pictures.
-    pub(crate) fn build(&self, scene: &Scene) -> Result<Town, Box<dyn Error>> {
-        let records: Vec<_> = scene.blocks.iter().map(BlockRecord::new).collect();
-        let numbers: Vec<u32> = (0..scene.blocks.len() as u32).collect();
-        let (min, max): (Vec<_>, Vec<_>) = scene.crowd().iter().map(|b| (b.min, b.max)).unzip();
-        let crowd = self.hiz.create_instances(
-            &Bounds::Boxes { min: Floats::F64(min.as_flattened()), max: Floats::F64(max.as_flattened()) },
-            &InstanceOptions { strict: true, piece_capacity: Some(PIECE_CAPACITY) },
-        )?;
-        // What the draw arguments say beside the count: one box has 36 indices.
-        let draw = DrawTemplate { index_count: BLOCK_INDICES.len() as u32, ..DrawTemplate::default() };
+    pub(crate) fn build(&self, scene: &Scene) -> Result<Stage, Box<dyn Error>> {
+        let num_crowd = scene.crowd.len() as u32;
+        let one = scene.crowd[0].mesh();
+        let vertices_per_body = one.vertices.len() as u32;
+        let crowd_mesh = Mesh::of_bodies(&scene.crowd);
+        let first_wall = crowd_mesh.vertices.len() as u32;
+        let mut vertices = records(&crowd_mesh, 0, vertices_per_body);
+        vertices.extend(records(&scene.walls, num_crowd, u32::MAX));
+        let wall_indices: Vec<[u32; 3]> = scene.walls.triangles.iter().map(|t| t.map(|v| first_wall + v)).collect();
+        let numbers: Vec<u32> = (0..num_crowd).collect();
+
+        let options = InstanceOptions { strict: true, piece_capacity: Some(PIECE_CAPACITY) };
+        let crowd = scene.with_bounds(|bounds| self.hiz.create_instances(bounds, &options))?;
+        // What the draw arguments say beside the count: how many indices one body has.
+        let index_count = 3 * one.triangles.len() as u32;
+        let draw = DrawTemplate { index_count, ..DrawTemplate::default() };
         let visible = self.hiz.create_visible(&crowd, &VisibleOptions { capacity: None, draw })?;
-        let occluders = |blocks: &[Block]| {
-            let (vertices, triangles) = mesh(blocks);
-            let mesh = MeshData { vertices: Floats::F64(&vertices), triangles: &triangles, transforms: None };
-            self.hiz.create_occluders(&[mesh], &OccluderOptions::default())
+        let occluders = |meshes: &[&Mesh]| {
+            let parts: Vec<MeshData<'_>> = meshes
+                .iter()
+                .map(|mesh| MeshData {
+                    vertices: Floats::F64(mesh.vertices.as_flattened()),
+                    triangles: mesh.triangles.as_flattened(),
+                    transforms: None,
+                })
+                .collect();
+            self.hiz.create_occluders(&parts, &OccluderOptions::default())
         };
-        Ok(Town {
-            blocks: buffer(&self.device, "renderer.blocks", &records, wgpu::BufferUsages::STORAGE),
-            everything: buffer(&self.device, "renderer.everything", &numbers, wgpu::BufferUsages::VERTEX),
-            num_crowd: scene.crowd,
-            num_blocks: scene.blocks.len() as u32,
+        let indices = |label, triangles: &[[u32; 3]]| buffer(&self.device, label, triangles, wgpu::BufferUsages::INDEX);
+        Ok(Stage {
+            vertices: buffer(&self.device, "renderer.vertices", &vertices, wgpu::BufferUsages::STORAGE),
+            vertices_per_body,
+            body_indices: indices("renderer.body_indices", &one.triangles),
+            wall_indices: indices("renderer.wall_indices", &wall_indices),
+            everybody: buffer(&self.device, "renderer.everybody", &numbers, wgpu::BufferUsages::VERTEX),
+            num_crowd,
             crowd,
             visible,
-            occluders: [occluders(scene.walls())?, occluders(&scene.blocks)?],
+            occluders: [occluders(&[&scene.walls])?, occluders(&[&scene.walls, &crowd_mesh])?],
         })
     }
 
+    /// How this renderer culls: with the slack that its driver needs, in ascending order. Where two bodies share a face the first
+    /// drawn wins, in both pictures the same.
+    pub(crate) fn cull_options(&self, camera: &Camera) -> CullOptions {
+        let Slack { relative, absolute } = slack(&self.adapter, camera);
+        CullOptions { order: Order::Stable, depth_slack: relative, depth_slack_abs: absolute, ..CullOptions::default() }
+    }
+
     /// Draws everything.
-    pub(crate) fn draw_all(&self, town: &Town, shot: &Shot) -> Picture {
+    pub(crate) fn draw_all(&self, stage: &Stage, shot: &Shot) -> Picture {
         let mut encoder =
             self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("renderer.all") });
         let targets = Targets::new(&self.device, shot.camera.size());
-        let mut pass = self.begin_picture(&mut encoder, town, &shot.camera, &targets);
-        pass.draw_indexed(0..36, 0, 0..town.num_crowd);
+        let mut pass = self.begin_picture(&mut encoder, stage, &shot.camera, &targets);
+        pass.draw_indexed(0..index_count(&stage.body_indices), 0, 0..stage.num_crowd);
         drop(pass);
         self.queue.submit([encoder.finish()]);
         self.read_picture(&targets)
     }
 
     /// Draws what the cull keeps. From the first pass to the last it is one command buffer: the count never leaves the device.
-    pub(crate) fn draw_culled(&self, town: &Town, shot: &Shot) -> Result<Culled, Box<dyn Error>> {
+    pub(crate) fn draw_culled(
+        &self,
+        stage: &Stage,
+        shot: &Shot,
+        options: &CullOptions,
+    ) -> Result<Culled, Box<dyn Error>> {
         let (camera, size) = (&shot.camera, shot.camera.size());
         let mut encoder =
             self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("renderer.culled") });
 
         let prepass = target(&self.device, "renderer.prepass", size, OCCLUDER_DEPTH_FORMAT);
         let depth_view = prepass.create_view(&wgpu::TextureViewDescriptor::default());
-        let occluders = &town.occluders[usize::from(shot.crowd_occludes)];
+        let occluders = &stage.occluders[usize::from(shot.crowd_occludes)];
         self.hiz.record_occluders(&mut encoder, occluders, camera, &depth_view)?;
 
         let pyramid = self.hiz.create_pyramid(size, &PyramidOptions::default())?;
         self.hiz.record_reduce(&mut encoder, &depth_view, camera, &pyramid)?;
 
-        let depth_slack = depth_slack(&self.adapter, camera.convention());
-        // Ascending numbers: where two boxes share a face, the first drawn wins, in both pictures the same.
-        let options = CullOptions { order: Order::Stable, depth_slack, ..CullOptions::default() };
-        self.hiz.record_cull(&mut encoder, &town.crowd, camera, &pyramid, &town.visible, &options)?;
+        self.hiz.record_cull(&mut encoder, &stage.crowd, camera, &pyramid, &stage.visible, options)?;
 
         let targets = Targets::new(&self.device, size);
-        let mut pass = self.begin_picture(&mut encoder, town, camera, &targets);
-        for piece in 0..town.visible.num_pieces() {
-            pass.set_vertex_buffer(0, town.visible.list(piece).slice(..));
-            pass.draw_indexed_indirect(town.visible.draw_arguments(), town.visible.draw_offset(piece));
+        let mut pass = self.begin_picture(&mut encoder, stage, camera, &targets);
+        for piece in 0..stage.visible.num_pieces() {
+            pass.set_vertex_buffer(0, stage.visible.list(piece).slice(..));
+            pass.draw_indexed_indirect(stage.visible.draw_arguments(), stage.visible.draw_offset(piece));
         }
         drop(pass);
         self.queue.submit([encoder.finish()]);
         Ok(Culled {
             picture: self.read_picture(&targets),
-            counts: self.read_counts(town),
+            counts: self.read_counts(stage),
             prepass: bytemuck::pod_collect_to_vec(&self.read_texture(&prepass)),
         })
     }
 
-    /// Begins the pass that makes a picture: walls are drawn, the list of all boxes is bound.
+    /// Begins the pass that makes a picture: walls are drawn, the bodies' indices and the list of everybody are bound.
     fn begin_picture<'e>(
         &self,
         encoder: &'e mut wgpu::CommandEncoder,
-        town: &Town,
+        stage: &Stage,
         camera: &Camera,
         targets: &Targets,
     ) -> wgpu::RenderPass<'e> {
         let [eye_hi, eye_lo] = halves(camera.origin());
-        let view = ViewUniform { clip_from_eye: camera.rows().map(|row| row.map(|v| v as f32)), eye_hi, eye_lo };
+        // The rows stand about the camera's origin, the shader subtracts the two halves of it. What those leave over goes into the
+        // constants, as in the engine's prepass: where a face is seen edge-on its last bit decides what is drawn.
+        let left_over = [0, 1, 2].map(|k| f64::from(eye_hi[k]) + f64::from(eye_lo[k]) - camera.origin()[k]);
+        let about_eye = |[x, y, z, constant]: [f64; 4]| {
+            [x, y, z, x * left_over[0] + y * left_over[1] + z * left_over[2] + constant].map(|v| v as f32)
+        };
+        let view = ViewUniform {
+            clip_from_eye: camera.rows().map(about_eye),
+            eye_hi,
+            vertices_per_body: stage.vertices_per_body,
+            eye_lo,
+            padding: 0,
+        };
         let view = buffer(&self.device, "renderer.view", &[view], wgpu::BufferUsages::UNIFORM);
         let pipeline = &self.pipelines[usize::from(camera.convention() == DepthConvention::Reversed)];
         let bind_group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -269,7 +305,7 @@ impl Renderer {
             layout: &pipeline.get_bind_group_layout(0),
             entries: &[
                 wgpu::BindGroupEntry { binding: 0, resource: view.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 1, resource: town.blocks.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: stage.vertices.as_entire_binding() },
             ],
         });
         let views = [&targets.colour, &targets.ids, &targets.depth]
@@ -298,9 +334,10 @@ impl Renderer {
         });
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &bind_group, &[]);
-        pass.set_index_buffer(self.block_indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.set_vertex_buffer(0, town.everything.slice(..));
-        pass.draw_indexed(0..36, 0, town.num_crowd..town.num_blocks);
+        pass.set_vertex_buffer(0, stage.everybody.slice(..));
+        pass.set_index_buffer(stage.wall_indices.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..index_count(&stage.wall_indices), 0, 0..1);
+        pass.set_index_buffer(stage.body_indices.slice(..), wgpu::IndexFormat::Uint32);
         pass
     }
 
@@ -314,17 +351,17 @@ impl Renderer {
         }
     }
 
-    fn read_counts(&self, town: &Town) -> Counts {
+    fn read_counts(&self, stage: &Stage) -> Counts {
         let mut counts = Counts { kept: 0, occluded: 0, outside: 0, drawn: 0 };
-        for piece in 0..town.visible.num_pieces() {
+        for piece in 0..stage.visible.num_pieces() {
             // A plane of kept bits, then one that tells occluded from outside.
-            let planes: Vec<u32> = bytemuck::pod_collect_to_vec(&self.read_buffer(town.visible.planes(piece)));
+            let planes: Vec<u32> = bytemuck::pod_collect_to_vec(&self.read_buffer(stage.visible.planes(piece)));
             let (kept, low) = planes.split_at(planes.len() / 2);
             counts.kept += kept.iter().map(|w| w.count_ones()).sum::<u32>();
             counts.occluded += kept.iter().zip(low).map(|(k, l)| (!k & l).count_ones()).sum::<u32>();
         }
-        counts.outside = town.num_crowd - counts.kept - counts.occluded;
-        let draws = self.read_buffer(town.visible.draw_arguments());
+        counts.outside = stage.num_crowd - counts.kept - counts.occluded;
+        let draws = self.read_buffer(stage.visible.draw_arguments());
         let draws: Vec<hiz_core::DrawIndexedIndirect> = bytemuck::pod_collect_to_vec(&draws);
         counts.drawn = draws.iter().map(|d| d.instance_count).sum();
         counts
@@ -382,6 +419,10 @@ impl Targets {
     }
 }
 
+fn index_count(indices: &wgpu::Buffer) -> u32 {
+    (indices.size() / 4) as u32
+}
+
 fn target(device: &wgpu::Device, label: &str, size: ImageSize, format: wgpu::TextureFormat) -> wgpu::Texture {
     device.create_texture(&wgpu::TextureDescriptor {
         label: Some(label),
@@ -409,15 +450,15 @@ fn buffer<T: bytemuck::NoUninit>(
 
 fn pipeline(device: &wgpu::Device, nearer: wgpu::CompareFunction) -> wgpu::RenderPipeline {
     let label = Some("renderer.pipeline");
-    let module = device.create_shader_module(wgpu::include_wgsl!("boxes.wgsl"));
+    let module = device.create_shader_module(wgpu::include_wgsl!("bodies.wgsl"));
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label,
         layout: None,
         vertex: wgpu::VertexState {
             module: &module,
-            entry_point: Some("block_vertex"),
+            entry_point: Some("body_vertex"),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
-            // One box number an instance, out of the packed list.
+            // One body's number an instance, out of the packed list.
             buffers: &[Some(wgpu::VertexBufferLayout {
                 array_stride: 4,
                 step_mode: wgpu::VertexStepMode::Instance,
@@ -436,7 +477,7 @@ fn pipeline(device: &wgpu::Device, nearer: wgpu::CompareFunction) -> wgpu::Rende
         multisample: wgpu::MultisampleState::default(),
         fragment: Some(wgpu::FragmentState {
             module: &module,
-            entry_point: Some("block_fragment"),
+            entry_point: Some("body_fragment"),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             targets: &[Some(COLOUR_FORMAT.into()), Some(ID_FORMAT.into())],
         }),

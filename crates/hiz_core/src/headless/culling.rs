@@ -7,6 +7,7 @@ use super::{Engine, locked, milliseconds, to_u32};
 use crate::camera::Camera;
 use crate::cull::{CullInputs, CullOptions, ExplanationRecord, record_explain};
 use crate::error::Result;
+use crate::host;
 use crate::instances::Instances;
 use crate::pyramid::Pyramid;
 use crate::readback::{self, BufferRange};
@@ -131,9 +132,9 @@ impl Culling {
             .map(|(piece, output)| BufferRange::first(&output.planes, 4 * u64::from(piece.words())))
             .collect();
         let planes = self.read(&ranges)?;
-        let mut mask = Vec::with_capacity(self.instances.len() as usize);
+        let mut mask = host::list(self.instances.len() as usize, "mask")?;
         for (piece, plane) in self.instances.pieces.iter().zip(planes) {
-            let words: Vec<u32> = to_u32(&plane).collect();
+            let words = host::collected(to_u32(&plane), "bit planes")?;
             mask.extend((0..piece.count() as usize).map(|i| bit(&words, i) == 1));
         }
         Ok(mask)
@@ -152,9 +153,9 @@ impl Culling {
             .map(|(piece, output)| BufferRange::first(&output.planes, 8 * u64::from(piece.words())))
             .collect();
         let planes = self.read(&ranges)?;
-        let mut verdicts = Vec::with_capacity(self.instances.len() as usize);
+        let mut verdicts = host::list(self.instances.len() as usize, "verdicts")?;
         for (piece, plane) in self.instances.pieces.iter().zip(planes) {
-            let words: Vec<u32> = to_u32(&plane).collect();
+            let words = host::collected(to_u32(&plane), "bit planes")?;
             let (kept, low) = words.split_at(piece.words() as usize);
             verdicts.extend((0..piece.count() as usize).map(|i| 2 * bit(kept, i) + bit(low, i)));
         }
@@ -185,7 +186,9 @@ impl Culling {
             })
             .collect();
         let lists = self.read(&ranges)?;
-        Ok(lists.iter().flat_map(|bytes| to_u32(bytes)).collect())
+        let mut indices = host::list(lists.iter().map(|bytes| bytes.len() / 4).sum(), "indices")?;
+        indices.extend(lists.iter().flat_map(|bytes| to_u32(bytes)));
+        Ok(indices)
     }
 
     /// How many instances met which end.

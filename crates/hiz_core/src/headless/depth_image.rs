@@ -3,6 +3,7 @@
 use super::{Engine, to_u32};
 use crate::camera::{Camera, ImageSize};
 use crate::error::Result;
+use crate::host;
 use crate::readback;
 
 /// A depth image on the device and the camera that it was made by.
@@ -37,6 +38,6 @@ impl DepthImage {
     pub fn read(&self) -> Result<Vec<f32>> {
         let engine = &self.engine;
         let bytes = engine.scoped(|| readback::read_texture(engine.device(), engine.queue(), &self.texture))?;
-        Ok(to_u32(&bytes).map(f32::from_bits).collect())
+        host::collected(to_u32(&bytes).map(f32::from_bits), "depth")
     }
 }

@@ -18,6 +18,7 @@ use crate::camera::Camera;
 use crate::context::HizContext;
 use crate::cull::CullOptions;
 use crate::error::{Error, Result};
+use crate::host;
 use crate::instances::{InstanceOptions, Instances};
 use crate::occluders::{MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders};
 use crate::pyramid::{Pyramid, PyramidOptions};
@@ -234,7 +235,7 @@ impl Engine {
         if level == 0 {
             let bytes = self.scoped(|| readback::read_texture(self.device(), self.queue(), built.source.texture()))?;
             let convention = built.camera.convention();
-            return Ok(to_u32(&bytes).map(|bits| crate::depth::sanitized(bits, convention)).collect());
+            return host::collected(to_u32(&bytes).map(|bits| crate::depth::sanitized(bits, convention)), "level");
         }
         let (width, stride) = (layout.width as usize, layout.stride as usize);
         let (first, count) = (u64::from(layout.offset), u64::from(layout.stride) * u64::from(layout.height));
@@ -251,8 +252,11 @@ impl Engine {
             })
             .collect();
         let bytes = self.scoped(|| readback::read_buffers(self.device(), self.queue(), &ranges))?.concat();
-        let texels: Vec<f32> = to_u32(&bytes).map(f32::from_bits).collect();
-        Ok(texels.chunks(stride).flat_map(|row| row[..width].iter().copied()).collect())
+        let mut texels = host::list(width * layout.height as usize, "level")?;
+        for row in bytes.chunks_exact(4 * stride) {
+            texels.extend(to_u32(&row[..4 * width]).map(f32::from_bits));
+        }
+        Ok(texels)
     }
 
     /// Culls: records and submits; reading the answer waits.
@@ -362,6 +366,6 @@ fn milliseconds(start: Instant, end: Instant) -> f64 {
     end.duration_since(start).as_secs_f64() * 1e3
 }
 
-fn to_u32(bytes: &[u8]) -> impl Iterator<Item = u32> {
+fn to_u32(bytes: &[u8]) -> impl ExactSizeIterator<Item = u32> {
     bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
 }

@@ -1,0 +1,72 @@
+"""Runs one call in a process whose address space is limited; test_out_of_memory.py starts it.
+
+``out_of_memory.py CALL MEBIBYTES``: everything is prepared without a limit, then the call may take that much more.
+Prints the exception's class, and after it what the next device says of two spheres, one before a wall and one behind.
+"""
+
+import resource
+import sys
+from collections.abc import Callable
+
+import numpy as np
+
+import hizvk
+
+SIDE = 8192
+COUNT = 12_000_000
+
+
+def camera(side: int) -> hizvk.Camera:
+    """Looking along -z."""
+    return hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(side, side), near=0.1)
+
+
+def works(device: hizvk.Device) -> list[bool]:
+    """What is seen of two spheres."""
+    spheres = hizvk.Spheres(np.array([[0.0, 0, -5], [0, 0, -20]]), 1.0)
+    view = camera(64)
+    pyramid = device.pyramid(np.full(view.size, 10.0), view, kind="z")
+    seen: list[bool] = device.cull(device.instances(spheres), view, pyramid).mask.tolist()
+    return seen
+
+
+def prepared(device: hizvk.Device, call: str) -> Callable[[], object]:
+    """The call, with its arguments ready."""
+    view = camera(SIDE)
+    if call == "instances":
+        spheres = hizvk.Spheres(np.zeros((COUNT, 3), np.float32), np.ones(COUNT, np.float32))
+        return lambda: device.instances(spheres)
+    if call == "occluders":
+        vertices, triangles = np.zeros((COUNT, 3)), np.zeros((COUNT, 3), np.uint32)
+        return lambda: device.occluders(vertices, triangles)
+    if call == "convert":
+        image = np.full(view.size, 10.0, np.float32)
+        return lambda: device.pyramid(image, view, kind="z")
+    if call == "upload":
+        image = np.full(view.size, 0.1, np.float32)
+        return lambda: device.pyramid(image, view, kind="reversed_ndc")
+    assert call == "render"
+    occluders = device.occluders(np.zeros((3, 3)), [[0, 1, 2]])
+    return lambda: device.render_depth(occluders, view).numpy()
+
+
+def main(call: str, mebibytes: int) -> None:
+    """See the top."""
+    device = hizvk.Device()
+    works(device)
+    run = prepared(device, call)
+    with open("/proc/self/statm", encoding="ascii") as file:
+        now = int(file.read().split()[0]) * resource.getpagesize()
+    unlimited = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (now + (mebibytes << 20), unlimited[1]))
+    try:
+        run()
+        print("no error")
+    except hizvk.HizError as error:
+        print(type(error).__name__)
+    resource.setrlimit(resource.RLIMIT_AS, unlimited)
+    print("next device:", works(hizvk.Device()))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]))

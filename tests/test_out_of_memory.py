@@ -1,0 +1,27 @@
+"""Out of memory for real: a named error, no crash, and the next device works."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SCRIPT = Path(__file__).with_name("out_of_memory.py")
+
+
+@pytest.mark.parametrize(
+    ("call", "mebibytes"),
+    [("instances", 128), ("occluders", 64), ("convert", 64), ("upload", 16), ("upload", 300), ("render", 128)],
+)
+def test_out_of_memory_is_an_error_and_the_next_device_works(call: str, mebibytes: int) -> None:
+    """The host's share (a list in Rust) and the device's run out at different limits.
+
+    wgpu gives the device up when its own staging memory ends; then the loss is what is reported.
+    """
+    run = subprocess.run(
+        [sys.executable, str(SCRIPT), call, str(mebibytes)], capture_output=True, text=True, timeout=300, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    error, after = run.stdout.splitlines()[-2:]
+    assert error in ("OutOfMemoryError", "DeviceLostError")
+    assert after == "next device: [True, False]"
