@@ -158,7 +158,7 @@ mod tests {
         same_layout!(module, "View", ViewUniform {
             "x" = x, "y" = y, "z" = z, "w" = w, "eye_hi" = eye_hi, "z_slope" = z_slope, "eye_lo" = eye_lo,
             "coordinate_limit" = coordinate_limit, "half_size" = half_size, "reach" = reach, "depth_factor" = depth_factor,
-            "size" = size, "runtime_zero" = runtime_zero, "reduction" = reduction, "descent_budget" = descent_budget, "padding_0" = padding_0,
+            "size" = size, "runtime_zero" = runtime_zero, "reduction" = reduction, "descent_budget" = descent_budget, "depth_offset" = depth_offset, "padding_0" = padding_0,
             "padding_1" = padding_1
         });
         same_layout!(module, "Piece", PieceUniform { "base" = base, "count" = count, "index" = index, "words" = words });
