@@ -137,6 +137,26 @@ fn each_block_certificate_is_needed() {
     }
 }
 
+/// A descent has certificates of its own, about the rectangle, and a budget whose end decides nothing.
+#[test]
+fn a_descent_without_its_certificates_or_past_its_budget() {
+    let (x, y) = (
+        ("inside_block(x, w, first.x, last.x, 0u, view.half_size.x, view.size.x)", "true"),
+        ("inside_block(y, w, first.y, last.y, 0u, view.half_size.y, view.size.y)", "true"),
+    );
+    let unfinished =
+        ("if left == 0u {\n                    return false;", "if left == 0u {\n                    return true;");
+    for (name, faults, modes) in [
+        ("descent, columns", &[TOO_SMALL, x][..], &[(Footprint::Two, 4096)]),
+        ("descent, rows", &[TOO_SMALL, y][..], &[(Footprint::Two, 4096)]),
+        ("descent, budget", &[unfinished][..], &[(Footprint::Two, 12)]),
+    ] {
+        let classes = &[Class::PixelBorders, Class::Grazing, Class::Holes];
+        let campaign = Campaign { seed: 24, rounds: 8, classes, modes, ..Campaign::default() };
+        assert_report_red(name, &campaign.run(&faulty(faults)));
+    }
+}
+
 /// Boxes a quarter of a pixel beside a hole, left, right, above and below of it, with half a pixel of guard: are any culled?
 fn culls_within_the_guard(engine: &Engine) -> bool {
     let camera = camera_along_z(16, 16, DepthConvention::Reversed);
