@@ -32,6 +32,9 @@ impl HizContext {
 
     /// For tests: a context whose shaders have texts replaced, `(what, by what)`. A suite is trusted once a planted fault
     /// turns it red.
+    ///
+    /// # Panics
+    /// If no shader holds such a text: a fault that was never planted proves nothing.
     #[doc(hidden)]
     pub fn with_planted_faults(device: &wgpu::Device, faults: &[(&str, &str)]) -> Result<Self> {
         let (have, need) = (device.limits(), Self::required_limits());

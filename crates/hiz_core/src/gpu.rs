@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::bounds::BoundsKind;
 use crate::camera::DepthConvention;
 use crate::error::{Error, Result};
-use crate::shader::{self, SourceKind};
+use crate::shader::{self, SOURCES, SourceKind};
 
 /// Tells objects of one context from those of another. (wgpu's own handles compare equal across its instances.)
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -100,6 +100,10 @@ impl Gpu {
             address_mode_v: wgpu::AddressMode::ClampToEdge,
             ..Default::default()
         });
+        let planted = |what: &str| shader::all().iter().any(|module| module.contains(what));
+        if let Some((what, _)) = faults.iter().find(|(what, _)| !planted(what)) {
+            panic!("planted fault: no shader says {what:?}");
+        }
         Self {
             id: ContextId::next(),
             device: device.clone(),
@@ -299,8 +303,6 @@ pub(crate) struct Layouts {
     pub(crate) one_storage: wgpu::BindGroupLayout,
     pub(crate) occluder_view: wgpu::BindGroupLayout,
 }
-
-const SOURCES: [SourceKind; 3] = [SourceKind::Depth, SourceKind::Float, SourceKind::Bits];
 
 #[derive(Clone, Copy)]
 enum Binding {

@@ -94,6 +94,16 @@ pub(crate) fn occluders() -> String {
     wgsl!("occluders").to_owned()
 }
 
+/// All kinds of source, in the order of their numbers.
+pub(crate) const SOURCES: [SourceKind; 3] = [SourceKind::Depth, SourceKind::Float, SourceKind::Bits];
+const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
+
+/// Every module, for those who plant faults in them.
+pub(crate) fn all() -> Vec<String> {
+    let classifying = SOURCES.iter().flat_map(|s| KINDS.iter().flat_map(|k| [cull(*s, *k), explain(*s, *k)]));
+    SOURCES.iter().map(|s| reduce(*s)).chain(classifying).chain([compact(), occluders()]).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -107,20 +117,11 @@ mod tests {
         module
     }
 
-    const SOURCES: [SourceKind; 3] = [SourceKind::Depth, SourceKind::Float, SourceKind::Bits];
-    const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
-
     #[test]
     fn every_module_is_valid_wgsl() {
-        for source in SOURCES {
-            parse(&reduce(source));
-            for kind in KINDS {
-                parse(&cull(source, kind));
-                parse(&explain(source, kind));
-            }
+        for module in all() {
+            parse(&module);
         }
-        parse(&compact());
-        parse(&occluders());
     }
 
     /// Offsets of a WGSL struct's members, and its size.

@@ -70,8 +70,8 @@ fn a_level_too_fine_without_block_certificates() {
         "level",
         &[
             ("level += 1u;", ""),
-            ("if inside_block(x, w, t.x, t.z, level, view.half_size.x, view.size.x)", "if true"),
-            ("&& inside_block(y, w, t.y, t.w, level, view.half_size.y, view.size.y)", ""),
+            ("if hidden && inside_block(x, w, block.x, block.z, level, view.half_size.x, view.size.x)", "if hidden"),
+            ("&& inside_block(y, w, block.y, block.w, level, view.half_size.y, view.size.y)", ""),
         ],
     );
 }
@@ -86,8 +86,8 @@ fn a_depth_certificate_at_the_centre_alone() {
     assert_red(
         "depth",
         &[
-            ("surely_above(z, bar(d - view.z_slope), w)", "z.center - bar(d - view.z_slope) * w.center > 0.0"),
-            ("surely_below(z, bar(d - view.z_slope), w)", "z.center - bar(d - view.z_slope) * w.center < 0.0"),
+            ("surely_above(z, t, w)", "z.center - t * w.center > 0.0"),
+            ("surely_below(z, t, w)", "z.center - t * w.center < 0.0"),
         ],
     );
 }
@@ -102,8 +102,8 @@ fn a_rectangle_that_is_too_small_without_block_certificates() {
                 "1.25 * error_bound(r, max(abs(interval.x), abs(interval.y)), w) / w_min + 4.0 * EPS * half_size + view.reach",
                 "view.reach",
             ),
-            ("if inside_block(x, w, t.x, t.z, level, view.half_size.x, view.size.x)", "if true"),
-            ("&& inside_block(y, w, t.y, t.w, level, view.half_size.y, view.size.y)", ""),
+            ("if hidden && inside_block(x, w, block.x, block.z, level, view.half_size.x, view.size.x)", "if hidden"),
+            ("&& inside_block(y, w, block.y, block.w, level, view.half_size.y, view.size.y)", ""),
         ],
     );
 }
@@ -128,8 +128,8 @@ fn each_block_certificate_is_needed() {
     for gone in [
         ("(lo == 0u || surely_above(r, f32(begin) + view.reach - half_size, w))", "true"),
         ("(end >= size || surely_below(r, f32(end) - view.reach - half_size, w))", "true"),
-        ("inside_block(x, w, t.x, t.z, level, view.half_size.x, view.size.x)", "true"),
-        ("inside_block(y, w, t.y, t.w, level, view.half_size.y, view.size.y)", "true"),
+        ("inside_block(x, w, block.x, block.z, level, view.half_size.x, view.size.x)", "true"),
+        ("inside_block(y, w, block.y, block.w, level, view.half_size.y, view.size.y)", "true"),
     ] {
         let classes = &[Class::PixelBorders, Class::Grazing, Class::Holes];
         let campaign = Campaign { seed: 23, rounds: 8, classes, ..Campaign::default() };
@@ -137,12 +137,12 @@ fn each_block_certificate_is_needed() {
     }
 }
 
-/// A descent has certificates of its own, about the rectangle, and a budget whose end decides nothing.
+/// A descent is certified by the rectangle's own edges, and its budget's end decides nothing.
 #[test]
 fn a_descent_without_its_certificates_or_past_its_budget() {
     let (x, y) = (
-        ("inside_block(x, w, first.x, last.x, 0u, view.half_size.x, view.size.x)", "true"),
-        ("inside_block(y, w, first.y, last.y, 0u, view.half_size.y, view.size.y)", "true"),
+        ("inside_block(x, w, block.x, block.z, level, view.half_size.x, view.size.x)", "true"),
+        ("inside_block(y, w, block.y, block.w, level, view.half_size.y, view.size.y)", "true"),
     );
     let unfinished =
         ("if left == 0u {\n                    return false;", "if left == 0u {\n                    return true;");
