@@ -391,6 +391,8 @@ TABLES: dict[str, Table] = {
             "occluders": [(np.zeros((3, 3)), TypeError, "expected Occluders of Device.occluders, got (3, 3) float64")],
             "camera": CAMERA,
             "size": SIZE,
+            "conservative": FLAG,
+            "refinement": [(9, ValueError, "in 0..8"), (-1, ValueError, "in 0..8"), (2.0, TypeError, "got float 2.0")],
         },
     ),
     "Device.pyramid": Table(

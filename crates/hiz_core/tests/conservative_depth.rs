@@ -271,6 +271,16 @@ fn no_ray_gets_past_a_pixels_depth() {
     }
 }
 
+#[test]
+#[ignore = "minutes"]
+fn no_ray_gets_past_a_pixels_depth_in_many_cases() {
+    for seed in 100..140 {
+        let tallies = campaign(seed, 2500, None);
+        println!("seed {seed}: {:?}", tallies.iter().map(|t| t.rays).sum::<u32>());
+        assert!(tallies.iter().all(|t| t.past == 0), "seed {seed}: {tallies:?}");
+    }
+}
+
 /// A wall's border a rounding away from a pixel's, in cameras whose constants cancel.
 fn borders(seed: u64, cases: u32, fault: Option<PlantedFault>) -> Tally {
     let mut random = Random(seed);
