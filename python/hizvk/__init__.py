@@ -36,6 +36,7 @@ from ._core import __version__
 from .bounds import Boxes, OrientedBoxes, Spheres
 from .camera import Camera
 from .comparison import Comparison, compare
+from .containment import BoundsCheck, ProxyCheck, check_bounds, check_proxy
 from .device import Adapter, Device, adapters
 from .errors import DeviceLostError, HizError, LimitError, NoAdapterError, OutOfMemoryError
 from .oneline import visible
@@ -45,6 +46,7 @@ from .result import DRAW_DTYPE, CullResult, CullStats, DrawTemplate, Explanation
 __all__ = [
     "DRAW_DTYPE",
     "Adapter",
+    "BoundsCheck",
     "Boxes",
     "Camera",
     "Comparison",
@@ -63,11 +65,14 @@ __all__ = [
     "Occluders",
     "OrientedBoxes",
     "OutOfMemoryError",
+    "ProxyCheck",
     "Pyramid",
     "Spheres",
     "Verdict",
     "__version__",
     "adapters",
+    "check_bounds",
+    "check_proxy",
     "compare",
     "reference",
     "visible",

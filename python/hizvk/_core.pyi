@@ -18,6 +18,8 @@ __all__ = [
     "Pyramid",
     "__version__",
     "adapters",
+    "check_bounds",
+    "check_proxy",
     "frustum_matrix",
     "reference_classify",
     "reference_pyramid",
@@ -30,9 +32,18 @@ _Vector: TypeAlias = tuple[float, float, float]
 _Matrix: TypeAlias = list[list[float]]
 _Borders: TypeAlias = tuple[float, float, float, float]
 _Size: TypeAlias = tuple[int, int]
+_Mesh: TypeAlias = tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]
 _Adapter: TypeAlias = tuple[int, str, str, str, str, str]
 
 def adapters() -> list[_Adapter]: ...
+def check_proxy(proxy: _Mesh, mesh: _Mesh) -> tuple[list[int], list[list[float]], list[int], float]: ...
+def check_bounds(
+    kind: str,
+    arrays: Sequence[_Floats],
+    meshes: Sequence[_Mesh],
+    transforms: npt.NDArray[np.float64],
+    instances: Sequence[tuple[int, int | None]],
+) -> npt.NDArray[np.float64]: ...
 def frustum_matrix(borders: _Borders, near: float, far: float | None, reversed_z: bool, size: _Size) -> _Matrix: ...
 def reference_classify(
     bounds_kind: str, arrays: Sequence[_Floats], camera: Camera, image: _Floats, depth_kind: str, scale: float
