@@ -47,8 +47,7 @@ impl Ball {
     /// Contains every quotient of a number of this ball and one of `other`; anything where `other` may be 0.
     pub(crate) fn divided_by(self, other: Ball) -> Ball {
         let least = other.mid.abs() - other.err;
-        // Written so that NaN fails, too.
-        if !(least > 0.0) {
+        if least.is_nan() || least <= 0.0 {
             return Ball { mid: 0.0, err: f64::INFINITY };
         }
         let mid = self.mid / other.mid;

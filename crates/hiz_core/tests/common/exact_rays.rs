@@ -67,10 +67,9 @@ impl ExactScene {
             // The ray's line meets the corners' combination whose x W = q w.
             let u: [[BigInt; 2]; 3] =
                 std::array::from_fn(|i| [&t[i][0] * &width - &qx * &t[i][3], &t[i][1] * &height - &qy * &t[i][3]]);
-            for axis in 0..2 {
-                if (0..3).all(|i| u[i][axis].sign() == Sign::Plus) || (0..3).all(|i| u[i][axis].sign() == Sign::Minus) {
-                    return false;
-                }
+            let beside = |axis: usize, sign| u.iter().all(|corner| corner[axis].sign() == sign);
+            if [0, 1].iter().any(|axis| beside(*axis, Sign::Plus) || beside(*axis, Sign::Minus)) {
+                return false;
             }
             let cross = |a: usize, b: usize| &u[a][0] * &u[b][1] - &u[a][1] * &u[b][0];
             let weights = [cross(1, 2), cross(2, 0), cross(0, 1)];

@@ -132,7 +132,7 @@ fn distance(volume: &Volume, p: [f64; 3]) -> f64 {
                 .iter()
                 .map(|n| {
                     let support: f64 = half_axes.iter().map(|e| dot(n, e).mid.abs()).sum();
-                    (dot(n, &d).mid.abs() - support) / norm(n.clone().map(|x| x.mid))
+                    (dot(n, &d).mid.abs() - support) / norm(n.map(|x| x.mid))
                 })
                 .filter(|x| x.is_finite())
                 .fold(0.0, f64::max)
