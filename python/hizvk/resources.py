@@ -134,7 +134,7 @@ class Occluders:
         """Memory that they take on the host.
 
         The float64 mesh, 24 bytes a vertex and 12 a triangle, and what the first conservative depth image adds to it
-        for good (about 48 bytes a triangle and 24 a vertex).
+        for good (about 42 bytes a triangle and 24 a vertex).
         """
         return self._inner.host_bytes()
 

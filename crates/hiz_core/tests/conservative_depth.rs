@@ -328,11 +328,16 @@ fn borders_that_rounding_cannot_place_do_not_count() {
 #[test]
 fn planted_faults_let_rays_through() {
     let past = |tallies: &[Tally]| tallies.iter().map(|t| t.past).sum::<u32>();
-    let contours = past(&campaign(1, 150, Some(PlantedFault::ContoursIgnored)));
-    let centre = past(&campaign(1, 150, Some(PlantedFault::DepthAtCentre)));
+    let with = |fault| past(&campaign(1, 150, Some(fault)));
+    let contours = with(PlantedFault::ContoursIgnored);
+    let centre = with(PlantedFault::DepthAtCentre);
+    let folds = with(PlantedFault::FoldsIgnored);
+    let nearest = with(PlantedFault::RoundedToNearest);
     let exact = borders(2, 300, Some(PlantedFault::NoWidening)).past;
     println!(
-        "rays past a pixel's depth: contours ignored {contours}, depth at the centre {centre}, no widening {exact}"
+        "rays past a pixel's depth: contours ignored {contours}, depth at the centre {centre}, folds ignored {folds}, rounded to \
+         nearest {nearest}, no widening {exact}"
     );
     assert!(contours > 100 && centre > 100 && exact > 10, "{contours} {centre} {exact}");
+    assert!(folds > 10 && nearest > 10, "{folds} {nearest}");
 }

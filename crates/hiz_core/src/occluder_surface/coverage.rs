@@ -37,8 +37,8 @@ pub(super) struct Coverage<'a> {
     cells: &'a Cells,
     /// By cell: its place in the list of members, if `stamps` has the current number.
     places: Vec<u32>,
-    stamps: Vec<u32>,
-    stamp: u32,
+    stamps: Vec<u64>,
+    stamp: u64,
     fault: Option<PlantedFault>,
 }
 
@@ -230,7 +230,8 @@ impl<'a> Coverage<'a> {
     fn mate(&self, half: u32) -> Option<(u32, bool)> {
         let mate = self.cells.mates[half as usize];
         let other = ((mate & !FOLD) / 3) as usize;
-        (mate != NO_MATE && self.stamps[other] == self.stamp).then(|| (self.places[other], mate & FOLD != 0))
+        let fold = mate & FOLD != 0 && self.fault != Some(PlantedFault::FoldsIgnored);
+        (mate != NO_MATE && self.stamps[other] == self.stamp).then(|| (self.places[other], fold))
     }
 
     /// The pairs of members that meet in a fold which may meet the square.

@@ -80,12 +80,16 @@ pub enum PlantedFault {
     DepthAtCentre,
     /// Projected vertices count as exact.
     NoWidening,
+    /// Triangles on the same side of their edge count as neighbours on different ones.
+    FoldsIgnored,
+    /// Depths become the nearest float32.
+    RoundedToNearest,
 }
 
 /// The occluders' triangles on the host, in float64 world coordinates.
 ///
-/// 24 bytes a vertex and 12 a triangle; the first conservative depth image adds about 48 bytes a triangle and 24 a vertex for
-/// good, and while it is made about 150 a triangle in view.
+/// 24 bytes a vertex and 12 a triangle; the first conservative depth image adds about 42 bytes a triangle and 24 a vertex for
+/// good, and while it is made about 110 of either.
 #[derive(Debug)]
 pub struct OccluderSurface {
     positions: Vec<Vec3>,
@@ -124,10 +128,12 @@ impl OccluderSurface {
         // `far` of the far plane; reversed Z counts its depths negative.
         let beyond = if convention.is_reversed() { 0.0 } else { 1.0 };
         let far = Coverage::new(&cells, fault).image(camera.size(), beyond, options.refinement.min(8));
+        #[expect(clippy::cast_possible_truncation, reason = "the fault that is planted")]
+        let rounded = if fault == Some(PlantedFault::RoundedToNearest) { |far| far as f32 } else { round_up };
         let ndc = |far: f64| match (far < beyond, convention.is_reversed()) {
             (false, _) => convention.far(),
-            (true, false) => round_up(far).min(1.0),
-            (true, true) => Some(-round_up(far)).filter(|d| *d >= LEAST_DEPTH).unwrap_or(0.0),
+            (true, false) => rounded(far).min(1.0),
+            (true, true) => Some(-rounded(far)).filter(|d| *d >= LEAST_DEPTH).unwrap_or(0.0),
         };
         Ok(far.into_iter().map(ndc).collect())
     }
