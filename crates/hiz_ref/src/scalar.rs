@@ -44,6 +44,16 @@ pub(crate) struct Ball {
 impl Ball {
     const ZERO: Ball = Ball { mid: 0.0, err: 0.0 };
 
+    /// The numbers within `err` of `mid`.
+    pub(crate) fn around(mid: f64, err: f64) -> Ball {
+        Ball { mid, err }
+    }
+
+    /// Whether its error is small beside it.
+    pub(crate) fn is_tight(self) -> bool {
+        self.err <= self.mid.abs() * 1e-6
+    }
+
     /// Contains every quotient of a number of this ball and one of `other`; anything where `other` may be 0.
     pub(crate) fn divided_by(self, other: Ball) -> Ball {
         let least = other.mid.abs() - other.err;

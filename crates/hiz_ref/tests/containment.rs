@@ -205,6 +205,61 @@ fn sheared(p: Vec3, shear: [i32; 4]) -> Vec3 {
     [x, y, z + d * y]
 }
 
+/// Undoes [`sheared`].
+fn straightened([x, y, z]: Vec3, shear: [i32; 4]) -> Vec3 {
+    let [a, b, c, d] = shear.map(f64::from);
+    let z = z - d * y;
+    let y = y - c * x;
+    [x - a * y - b * z, y, z]
+}
+
+/// Spheres of many triangles: their numbers are as crooked as real ones, and some nearly cancel.
+#[test]
+fn witnesses_of_crooked_meshes_are_outside() {
+    let sphere = |rings: u32| {
+        let mut mesh = Mesh { vertices: vec![[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], ..Mesh::default() };
+        let around = 2 * rings;
+        for i in 1..rings {
+            for k in 0..around {
+                let (theta, phi) = [(i, rings), (2 * k, around)]
+                    .map(|(n, of)| f64::from(n) / f64::from(of) * std::f64::consts::PI)
+                    .into();
+                mesh.vertices.push([theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()]);
+            }
+        }
+        let at = |i: u32, k: u32| {
+            if i == 0 {
+                0
+            } else if i == rings {
+                1
+            } else {
+                2 + (i - 1) * around + k % around
+            }
+        };
+        for i in 0..rings {
+            for k in 0..around {
+                let [a, b, c, d] = [at(i, k), at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)];
+                mesh.triangles
+                    .extend([[a, b, c], [a, c, d]].into_iter().filter(|[a, b, c]| a != b && b != c && c != a));
+            }
+        }
+        mesh
+    };
+    let found = check_proxy(&sphere(8).borrowed(), &sphere(30).borrowed()).unwrap();
+    assert!(!found.triangles.is_empty());
+    // A chord of 6 degrees lies 0.0014 below its arc, and each way counts.
+    for witness in &found.witnesses {
+        let radius = witness.iter().map(|x| x * x).sum::<f64>().sqrt();
+        assert!(radius > 0.997, "{witness:?}");
+    }
+    assert!(found.distance < 0.003);
+    let smaller = |mut mesh: Mesh| {
+        mesh.vertices.iter_mut().for_each(|p| *p = p.map(|x| 0.99 * x));
+        mesh
+    };
+    assert!(is_inside(&smaller(sphere(8)), &sphere(30)));
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
 
@@ -228,7 +283,14 @@ proptest! {
         let within = |p: Vec3| -> Vec3 { std::array::from_fn(|k| low[k] + (high[k] - low[k]) * p[k].min(4.0) / 4.0) };
         for corners in proxies.iter().copied().chain(proxies.iter().map(|t| t.map(within))) {
             let proxy = triangle(corners.map(|p| sheared(p, shear)));
-            prop_assert_eq!(is_inside(&proxy, &mesh), covered(corners, &boxes), "{:?} in {:?}", corners, boxes);
+            let found = check_proxy(&proxy.borrowed(), &mesh.borrowed()).unwrap();
+            let inside = covered(corners, &boxes);
+            prop_assert_eq!(found.triangles.is_empty(), inside, "{:?} in {:?}", corners, boxes);
+            for witness in found.witnesses {
+                let p = straightened(witness, shear);
+                let deep = |(low, high): &(Vec3, Vec3)| (0..3).all(|k| low[k] + 1e-9 < p[k] && p[k] < high[k] - 1e-9);
+                prop_assert!(!boxes.iter().any(deep), "{:?} is no witness for {:?} in {:?}", p, corners, boxes);
+            }
         }
     }
 

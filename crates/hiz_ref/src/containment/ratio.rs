@@ -17,12 +17,21 @@ impl Ratio {
         Ratio { ball: Ball::exact(value), over: Dyadic::exact(value), under: Dyadic::exact(1.0) }
     }
 
+    /// `under` is positive; a ball that cancellation or a division made useless is drawn anew from the exact numbers.
+    fn new(ball: Ball, over: Dyadic, under: Dyadic) -> Ratio {
+        let ball = match (ball.is_tight(), over.quotient(&under)) {
+            (false, Some(quotient)) => Ball::around(quotient, quotient.abs() * 2.0_f64.powi(-48)),
+            _ => ball,
+        };
+        Ratio { ball, over, under }
+    }
+
     pub(super) fn plus(&self, other: &Ratio) -> Ratio {
-        Ratio {
-            ball: self.ball.plus(&other.ball),
-            over: self.over.times(&other.under).plus(&other.over.times(&self.under)),
-            under: self.under.times(&other.under),
-        }
+        Ratio::new(
+            self.ball.plus(&other.ball),
+            self.over.times(&other.under).plus(&other.over.times(&self.under)),
+            self.under.times(&other.under),
+        )
     }
 
     pub(super) fn negated(&self) -> Ratio {
@@ -34,11 +43,7 @@ impl Ratio {
     }
 
     pub(super) fn times(&self, other: &Ratio) -> Ratio {
-        Ratio {
-            ball: self.ball.times(&other.ball),
-            over: self.over.times(&other.over),
-            under: self.under.times(&other.under),
-        }
+        Ratio::new(self.ball.times(&other.ball), self.over.times(&other.over), self.under.times(&other.under))
     }
 
     /// `other` is not 0.
@@ -46,7 +51,7 @@ impl Ratio {
         let (over, under) = (self.over.times(&other.under), self.under.times(&other.over));
         let negative = other.sign() == Ordering::Less;
         let (over, under) = if negative { (over.negated(), under.negated()) } else { (over, under) };
-        Ratio { ball: self.ball.divided_by(other.ball), over, under }
+        Ratio::new(self.ball.divided_by(other.ball), over, under)
     }
 
     pub(super) fn sign(&self) -> Ordering {
