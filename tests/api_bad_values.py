@@ -35,6 +35,9 @@ def camera(size: tuple[int, int] = (6, 8), **more: Any) -> hizvk.Camera:
     return hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=size, near=0.1, **more)
 
 
+TETRAHEDRON = hizvk.Mesh(np.eye(4)[:, :3] / 4, [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]])
+
+
 # -- bad values that several functions share -----------------------------------------------------------------
 
 VECTOR: list[Bad] = [
@@ -190,6 +193,12 @@ TRIANGLES: list[Bad] = [
     ([[0, 1, -1]], ValueError, "expected vertex indices in 0..2, got -1"),
     ("abc", TypeError, "got str 'abc'"),
     ([[0, 1], [2]], ValueError, "no array"),
+]
+SINGLE_MESH: list[Bad] = [
+    (None, TypeError, "expected a Mesh or a tuple (vertices, triangles), got None"),
+    ((np.zeros((3, 2)), [[0, 1, 2]]), ValueError, "vertices: expected float (V, 3), got (3, 2) float64"),
+    ((np.zeros((3, 3)), [[0, 1, 3]]), ValueError, "triangles: expected vertex indices in 0..2, got 3"),
+    (hizvk.Mesh(np.zeros((3, 3)), [[0, 1, 2]], EYE4), ValueError, "without transforms, got Mesh(3 vertices"),
 ]
 TRANSFORMS: list[Bad] = [
     (np.eye(3), ValueError, "expected float (4, 4), got (3, 3) float64"),
@@ -395,6 +404,8 @@ TABLES: dict[str, Table] = {
             "occluders": [(np.zeros((3, 3)), TypeError, "expected Occluders of Device.occluders, got (3, 3) float64")],
             "camera": CAMERA,
             "size": SIZE,
+            "conservative": FLAG,
+            "refinement": [(9, ValueError, "in 0..8"), (-1, ValueError, "in 0..8"), (2.0, TypeError, "got float 2.0")],
         },
     ),
     "Device.pyramid": Table(
@@ -419,6 +430,33 @@ TABLES: dict[str, Table] = {
             "capacity": [(-1, ValueError, "in 0..4294967295"), (1.5, TypeError, "got float 1.5")],
             "draw": [((36,), TypeError, "expected a DrawTemplate or None, got tuple (36,)")],
             "statistics": FLAG,
+        },
+    ),
+    "check_proxy": Table(
+        lambda device: (hizvk.check_proxy, {"proxy": TETRAHEDRON, "mesh": TETRAHEDRON}),
+        {
+            "proxy": [*SINGLE_MESH],
+            "mesh": [
+                *SINGLE_MESH,
+                (
+                    (TETRAHEDRON.vertices, TETRAHEDRON.triangles[:3]),
+                    ValueError,
+                    "expected a closed mesh whose triangles run consistently around, got 3 edges",
+                ),
+            ],
+        },
+    ),
+    "check_bounds": Table(
+        lambda device: (hizvk.check_bounds, {"bounds": spheres(), "meshes": [TETRAHEDRON]}),
+        {
+            "bounds": BOUNDS,
+            "meshes": [
+                (None, TypeError, "expected a Mesh, or a list of Mesh"),
+                ([], ValueError, "expected one for each of the 1 bounds, got 0"),
+                ([TETRAHEDRON, TETRAHEDRON], ValueError, "expected one for each of the 1 bounds, got 2"),
+                ([(TETRAHEDRON.vertices,)], TypeError, "got tuple"),
+                ([(np.zeros((3, 2)), [[0, 1, 2]])], ValueError, "vertices: expected float (V, 3), got (3, 2) float64"),
+            ],
         },
     ),
     "Device.wait": Table(lambda device: (device.wait, {}), {}),
@@ -517,4 +555,4 @@ TABLES: dict[str, Table] = {
 
 #: What the package makes and callers only read; nothing to get wrong.
 MADE_BY_THE_PACKAGE = {"Adapter", "Comparison", "CullResult", "CullStats", "DepthImage", "Explanation", "Instances"}
-MADE_BY_THE_PACKAGE |= {"Occluders", "Pyramid"}
+MADE_BY_THE_PACKAGE |= {"BoundsCheck", "Occluders", "ProxyCheck", "Pyramid"}

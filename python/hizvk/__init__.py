@@ -14,7 +14,8 @@ A pyramid keeps the farthest depth of every 2^k x 2^k block of pixels on its lev
 that cover an instance's bounds; when all of the bounds are provably farther than those, it hides the instance, and the
 others are appended to the list that an indirect draw takes. The promise: for the numbers as given, whatever could
 show in one pixel of the depth image is kept. `reference` holds the slow exact oracle, and `compare` counts false culls
-(there are none) and false keeps (a cost).
+(there are none) and false keeps (a cost). A small depth image promises for larger ones if it was rendered with
+``conservative=True``; `check_proxy` and `check_bounds` say whether occluders and bounds are what they should be.
 
     >>> import hizvk
     >>> device = hizvk.Device()
@@ -36,6 +37,7 @@ from ._core import __version__
 from .bounds import Boxes, OrientedBoxes, Spheres
 from .camera import Camera
 from .comparison import Comparison, compare
+from .containment import BoundsCheck, ProxyCheck, check_bounds, check_proxy
 from .device import Adapter, Device, adapters
 from .errors import DeviceLostError, HizError, LimitError, NoAdapterError, OutOfMemoryError
 from .oneline import visible
@@ -45,6 +47,7 @@ from .result import DRAW_DTYPE, CullResult, CullStats, DrawTemplate, Explanation
 __all__ = [
     "DRAW_DTYPE",
     "Adapter",
+    "BoundsCheck",
     "Boxes",
     "Camera",
     "Comparison",
@@ -63,11 +66,14 @@ __all__ = [
     "Occluders",
     "OrientedBoxes",
     "OutOfMemoryError",
+    "ProxyCheck",
     "Pyramid",
     "Spheres",
     "Verdict",
     "__version__",
     "adapters",
+    "check_bounds",
+    "check_proxy",
     "compare",
     "reference",
     "visible",

@@ -18,6 +18,8 @@ __all__ = [
     "Pyramid",
     "__version__",
     "adapters",
+    "check_bounds",
+    "check_proxy",
     "frustum_matrix",
     "reference_classify",
     "reference_pyramid",
@@ -30,9 +32,18 @@ _Vector: TypeAlias = tuple[float, float, float]
 _Matrix: TypeAlias = list[list[float]]
 _Borders: TypeAlias = tuple[float, float, float, float]
 _Size: TypeAlias = tuple[int, int]
+_Mesh: TypeAlias = tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]
 _Adapter: TypeAlias = tuple[int, str, str, str, str, str]
 
 def adapters() -> list[_Adapter]: ...
+def check_proxy(proxy: _Mesh, mesh: _Mesh) -> tuple[list[int], list[list[float]], list[int], float]: ...
+def check_bounds(
+    kind: str,
+    arrays: Sequence[_Floats],
+    meshes: Sequence[_Mesh],
+    transforms: npt.NDArray[np.float64],
+    instances: Sequence[tuple[int, int | None]],
+) -> npt.NDArray[np.float64]: ...
 def frustum_matrix(borders: _Borders, near: float, far: float | None, reversed_z: bool, size: _Size) -> _Matrix: ...
 def reference_classify(
     bounds_kind: str,
@@ -114,6 +125,7 @@ class Engine:
         self, meshes: Sequence[tuple[_Floats, npt.NDArray[np.uint32], _Floats | None]], cull: str
     ) -> Occluders: ...
     def render_depth(self, occluders: Occluders, camera: Camera) -> DepthImage: ...
+    def render_depth_conservative(self, occluders: Occluders, camera: Camera, refinement: int) -> DepthImage: ...
     def upload_depth(self, image: _Floats, kind: str, scale: float, camera: Camera) -> DepthImage: ...
     def pyramid(self, depth: DepthImage) -> Pyramid: ...
     def cull(
@@ -146,6 +158,7 @@ class Instances:
 
 @final
 class Occluders:
+    def host_bytes(self) -> int: ...
     def num_triangles(self) -> int: ...
     def num_parts(self) -> int: ...
     def device_bytes(self) -> int: ...

@@ -3,7 +3,8 @@
 //! Data flows one way:
 //!
 //! 1. [`Camera`] says, in float64, what is seen; [`DepthKind`] what a depth image's numbers mean; [`Bounds`] where the instances are.
-//! 2. [`Occluders`] are drawn into a depth texture, or the caller brings one.
+//! 2. [`Occluders`] are drawn into a depth texture, or the caller brings one; their [`OccluderSurface`] gives a small depth image that
+//!    holds for larger ones.
 //! 3. [`HizContext::record_reduce`] builds the [`Pyramid`]: the farthest depth of every block of pixels.
 //! 4. [`HizContext::record_cull`] decides for each of the [`Instances`] and appends the kept ones to the [`Visible`] list, whose
 //!    count is the `instance_count` of a [`DrawIndexedIndirect`] record on the device.
@@ -29,6 +30,7 @@ mod gpu;
 mod host;
 mod instances;
 mod layout;
+mod occluder_surface;
 mod occluders;
 mod pyramid;
 mod readback;
@@ -48,6 +50,9 @@ pub use depth::{DepthKind, ndc_from_kind};
 pub use error::{Error, Result};
 pub use instances::{InstanceOptions, Instances};
 pub use layout::MAX_LEVELS;
+#[doc(hidden)]
+pub use occluder_surface::PlantedFault;
+pub use occluder_surface::{ConservativeDepthOptions, OccluderSurface};
 pub use occluders::{FaceCull, MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders};
 pub use pyramid::{Pyramid, PyramidOptions};
 pub use view::ERROR_ULPS;

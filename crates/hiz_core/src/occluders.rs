@@ -5,6 +5,7 @@ use crate::camera::{Camera, DepthConvention, Vec3, dot, sub};
 use crate::error::{Error, Result};
 use crate::gpu::{ContextId, Gpu, OccluderKey};
 use crate::host;
+use crate::occluder_surface::OccluderSurface;
 use crate::pyramid::entry;
 use crate::shader;
 use crate::view::{ClipRows, split3};
@@ -71,12 +72,13 @@ struct Part {
 /// Triangle meshes on the device, in world coordinates.
 #[derive(Debug)]
 pub struct Occluders {
-    context: ContextId,
+    pub(crate) context: ContextId,
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
     parts: Vec<Part>,
     cull_mode: FaceCull,
     triangles: u64,
+    surface: OccluderSurface,
 }
 
 /// The host's side of the upload.
@@ -85,14 +87,25 @@ struct Baked {
     vertices: Vec<Vertex>,
     indices: Vec<u32>,
     parts: Vec<Part>,
+    /// The same in float64, indices counted through all parts.
+    world: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl OccluderSurface {
+    /// The surface of `meshes` without a device.
+    ///
+    /// # Errors
+    /// As [`HizContext::create_occluders`](crate::HizContext::create_occluders).
+    pub fn from_meshes(meshes: &[MeshData<'_>], options: &OccluderOptions) -> Result<Self> {
+        let baked = Baked::all(meshes)?;
+        Ok(Self::new(baked.world, baked.triangles, options.cull_mode))
+    }
 }
 
 impl Occluders {
     pub(crate) fn new(gpu: &Gpu, meshes: &[MeshData<'_>], options: &OccluderOptions) -> Result<Self> {
-        let mut baked = Baked::default();
-        for mesh in meshes {
-            baked.add(mesh)?;
-        }
+        let baked = Baked::all(meshes)?;
         let device = gpu.device();
         let allowed = device.limits().max_buffer_size;
         for bytes in [size_of_val(&baked.vertices[..]), size_of_val(&baked.indices[..])] {
@@ -116,7 +129,13 @@ impl Occluders {
             triangles: (baked.indices.len() / 3) as u64,
             parts: baked.parts,
             cull_mode: options.cull_mode,
+            surface: OccluderSurface::new(baked.world, baked.triangles, options.cull_mode),
         })
+    }
+
+    /// The triangles on the host, which give conservative depth.
+    pub fn surface(&self) -> &OccluderSurface {
+        &self.surface
     }
 
     /// Triangles in all places.
@@ -136,6 +155,14 @@ impl Occluders {
 }
 
 impl Baked {
+    fn all(meshes: &[MeshData<'_>]) -> Result<Self> {
+        let mut baked = Self::default();
+        for mesh in meshes {
+            baked.add(mesh)?;
+        }
+        Ok(baked)
+    }
+
     fn add(&mut self, mesh: &MeshData<'_>) -> Result<()> {
         let (scalars, corners) = (mesh.vertices.len(), mesh.triangles.len());
         if !scalars.is_multiple_of(3) {
@@ -207,10 +234,13 @@ impl Baked {
             }
             let (hi, lo) = split3(p);
             self.vertices.push(Vertex { hi, lo });
+            self.world.push(p);
         }
         for t in mesh.triangles.chunks_exact(3) {
             // A mirror turns outside in: the order of the corners keeps it out.
-            self.indices.extend(if mirrored { [t[0], t[2], t[1]] } else { [t[0], t[1], t[2]] });
+            let corners = if mirrored { [t[0], t[2], t[1]] } else { [t[0], t[1], t[2]] };
+            self.indices.extend(corners);
+            self.triangles.push(corners.map(|v| v + base_vertex.unsigned_abs()));
         }
         let end = u32::try_from(self.indices.len()).map_err(|_| too_many(self.indices.len()))?;
         if end > first_index {
@@ -319,7 +349,7 @@ pub(crate) fn record(
     });
     let key = OccluderKey {
         reversed: camera.convention() == DepthConvention::Reversed,
-        cull_mode: culled_face(occluders.cull_mode, camera),
+        cull_mode: occluders.cull_mode.as_seen_by(camera).face(),
     };
     let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         label: Some("hiz.occluders.pass"),
@@ -346,23 +376,34 @@ pub(crate) fn record(
     Ok(())
 }
 
-/// A camera that mirrors the world (a left-handed one) turns every triangle around in the image.
-fn culled_face(mode: FaceCull, camera: &Camera) -> Option<wgpu::Face> {
-    let rows = camera.rows();
-    let lin = |r: usize| [rows[r][0], rows[r][1], rows[r][2]];
-    let (x, y) = (lin(0), lin(1));
-    // Towards the scene: w grows in front of a perspective camera; orthographic depth grows or, reversed, falls.
-    let forward = if lin(3) != [0.0; 3] {
-        lin(3)
-    } else if camera.convention().is_reversed() {
-        lin(2).map(|v| -v)
-    } else {
-        lin(2)
-    };
-    let mirrored = dot(crate::camera::cross(x, y), forward) > 0.0;
-    match (mode, mirrored) {
-        (FaceCull::None, _) => None,
-        (FaceCull::Back, false) | (FaceCull::Front, true) => Some(wgpu::Face::Back),
-        (FaceCull::Back, true) | (FaceCull::Front, false) => Some(wgpu::Face::Front),
+impl FaceCull {
+    /// The faces that do not occlude as they appear in `camera`'s image: one that mirrors the world (a left-handed one) turns
+    /// every triangle around.
+    pub(crate) fn as_seen_by(self, camera: &Camera) -> Self {
+        let rows = camera.rows();
+        let lin = |r: usize| [rows[r][0], rows[r][1], rows[r][2]];
+        let (x, y) = (lin(0), lin(1));
+        // Towards the scene: w grows in front of a perspective camera; orthographic depth grows or, reversed, falls.
+        let forward = if lin(3) != [0.0; 3] {
+            lin(3)
+        } else if camera.convention().is_reversed() {
+            lin(2).map(|v| -v)
+        } else {
+            lin(2)
+        };
+        let mirrored = dot(crate::camera::cross(x, y), forward) > 0.0;
+        match (self, mirrored) {
+            (Self::Back, true) => Self::Front,
+            (Self::Front, true) => Self::Back,
+            (as_it_is, _) => as_it_is,
+        }
+    }
+
+    fn face(self) -> Option<wgpu::Face> {
+        match self {
+            Self::None => None,
+            Self::Back => Some(wgpu::Face::Back),
+            Self::Front => Some(wgpu::Face::Front),
+        }
     }
 }

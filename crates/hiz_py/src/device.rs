@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use hiz_core::headless::{self, AdapterSummary};
-use hiz_core::{DepthConvention, DepthKind, FaceCull, Floats, InstanceOptions, MeshData, OccluderOptions};
+use hiz_core::{
+    ConservativeDepthOptions, DepthConvention, DepthKind, FaceCull, Floats, InstanceOptions, MeshData, OccluderOptions,
+};
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -85,6 +87,17 @@ impl Engine {
 
     fn render_depth(&self, py: Python<'_>, occluders: &Occluders, camera: &Camera) -> PyResult<DepthImage> {
         detached(py, || self.0.render_depth(&occluders.0, &camera.0)).map(DepthImage)
+    }
+
+    fn render_depth_conservative(
+        &self,
+        py: Python<'_>,
+        occluders: &Occluders,
+        camera: &Camera,
+        refinement: u32,
+    ) -> PyResult<DepthImage> {
+        let options = ConservativeDepthOptions { refinement };
+        detached(py, || self.0.render_depth_conservative(&occluders.0, &camera.0, &options)).map(DepthImage)
     }
 
     fn upload_depth(
@@ -193,6 +206,10 @@ pub(crate) struct Occluders(Arc<hiz_core::Occluders>);
 
 #[pymethods]
 impl Occluders {
+    fn host_bytes(&self) -> u64 {
+        self.0.surface().host_bytes()
+    }
+
     fn num_triangles(&self) -> u64 {
         self.0.num_triangles()
     }

@@ -5,6 +5,7 @@
 
 mod arguments;
 mod camera;
+mod containment;
 mod culling;
 mod device;
 mod errors;
@@ -15,6 +16,8 @@ mod reference;
 mod _core {
     #[pymodule_export]
     use crate::camera::{Camera, frustum_matrix};
+    #[pymodule_export]
+    use crate::containment::{check_bounds, check_proxy};
     #[pymodule_export]
     use crate::culling::{Counts, Culling, Explanation};
     #[pymodule_export]

@@ -97,7 +97,7 @@ fn numbers<const N: usize>(array: &Floats<'_>, first: usize) -> [f64; N] {
     std::array::from_fn(|k| array.get(first + k))
 }
 
-fn volume(bounds: &Bounds<'_>, i: usize) -> Volume {
+pub(crate) fn volume(bounds: &Bounds<'_>, i: usize) -> Volume {
     match bounds {
         Bounds::Spheres { centers, radii } => Volume::Sphere { center: numbers(centers, 3 * i), radius: radii.get(i) },
         Bounds::Boxes { min, max } => Volume::Box { min: numbers(min, 3 * i), max: numbers(max, 3 * i) },

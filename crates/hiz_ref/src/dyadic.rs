@@ -19,6 +19,23 @@ impl Dyadic {
         &self.mantissa << shift
     }
 
+    /// `mantissa * 2^exponent` in float64, 62 bits of the number cut off and rounded once: less than 2^-52 off, relative. 0 for 0.
+    fn leading(&self) -> (f64, i64) {
+        let bits = self.mantissa.bits();
+        let cut = bits.saturating_sub(62);
+        let digits = (self.mantissa.magnitude() >> cut).iter_u64_digits().next().unwrap_or(0);
+        let sign = if self.mantissa.sign() == Sign::Minus { -1.0 } else { 1.0 };
+        (sign * digits as f64, i64::from(self.exponent) + i64::try_from(cut).expect("fits memory"))
+    }
+
+    /// `self / other`, less than 2^-48 off, relative; `None` where float64 cannot hold it, and for `other` 0.
+    pub(crate) fn quotient(&self, other: &Self) -> Option<f64> {
+        let ((a, i), (b, j)) = (self.leading(), other.leading());
+        let power = i32::try_from(i - j).ok().filter(|power| power.abs() < 900)?;
+        let quotient = a / b * 2.0_f64.powi(power);
+        (b != 0.0 && (quotient == 0.0 || quotient.is_normal())).then_some(quotient)
+    }
+
     fn combine(&self, other: &Self, op: impl Fn(BigInt, BigInt) -> BigInt) -> Self {
         let exponent = self.exponent.min(other.exponent);
         Dyadic { mantissa: op(self.mantissa_at(exponent), other.mantissa_at(exponent)), exponent }
@@ -126,6 +143,16 @@ mod tests {
             prop_assert_eq!(x.magnitude().minus(&y.magnitude()).sign(), sign(&(p.abs() - q.abs())));
             prop_assert_eq!(x.minus(&y).sign(), a.partial_cmp(&b));
         }
+    }
+
+    #[test]
+    fn quotients_are_near() {
+        let third = Dyadic::exact(-1.0).quotient(&Dyadic::exact(3.0)).unwrap();
+        assert!((third + 1.0 / 3.0).abs() < 1e-15);
+        let long = Dyadic::exact(1.0 / 3.0).times(&Dyadic::exact(1e-9)).plus(&Dyadic::exact(1e9));
+        assert!((long.quotient(&long.times(&Dyadic::exact(1e9))).unwrap() - 1e-9).abs() < 1e-23);
+        assert_eq!(Dyadic::exact(0.0).quotient(&long), Some(0.0));
+        assert_eq!(long.quotient(&Dyadic::exact(0.0)), None);
     }
 
     #[test]

@@ -13,6 +13,7 @@
 //! 4. [`classify`]: if some touched pixel does not hide the volume, it is [`Verdict::Visible`], and to cull it would be a false cull.
 //!    Otherwise it is [`Verdict::Hidden`]: outside of the frustum, or occluded.
 //! 5. [`pyramid()`] is the reference of the depth pyramid, each texel computed from all of its pixels.
+//! 6. [`check_proxy`] and [`check_bounds`] say whether an occluder proxy lies inside its mesh and whether bounds contain theirs.
 //!
 //! Inside, "touched" is the question whether a convex volume meets a few half-spaces, and "hides" whether it lies on one side of a
 //! plane; both come down to signs of polynomials in the inputs. These are evaluated in float64 with a running bound of
@@ -35,6 +36,7 @@
 //! # Ok::<(), hiz_ref::Error>(())
 //! ```
 
+mod containment;
 mod dyadic;
 mod feasibility;
 mod pyramid;
@@ -43,6 +45,7 @@ mod search;
 mod view;
 mod volume;
 
+pub use containment::{MeshError, Protrusion, TriangleMesh, check_bounds, check_proxy, contains};
 pub use pyramid::{Level, pyramid, sanitized_depth};
 pub use view::{Coverage, View};
 pub use volume::Volume;

@@ -44,6 +44,31 @@ pub(crate) struct Ball {
 impl Ball {
     const ZERO: Ball = Ball { mid: 0.0, err: 0.0 };
 
+    /// The numbers within `err` of `mid`.
+    pub(crate) fn around(mid: f64, err: f64) -> Ball {
+        Ball { mid, err }
+    }
+
+    /// Whether its error is small beside it.
+    pub(crate) fn is_tight(self) -> bool {
+        self.err <= self.mid.abs() * 1e-6
+    }
+
+    /// Contains every quotient of a number of this ball and one of `other`; anything where `other` may be 0.
+    pub(crate) fn divided_by(self, other: Ball) -> Ball {
+        let least = other.mid.abs() - other.err;
+        if least.is_nan() || least <= 0.0 {
+            return Ball { mid: 0.0, err: f64::INFINITY };
+        }
+        let mid = self.mid / other.mid;
+        // a'/b' - a/b = ((a' - a) - (a/b) (b' - b)) / b', with the division's own rounding twice.
+        let err = ((self.err + mid.abs() * (other.err + 2.0 * UNIT * other.mid.abs())) / least
+            + UNIT * mid.abs()
+            + f64::MIN_POSITIVE)
+            * (GROW * GROW);
+        Ball { mid, err }
+    }
+
     fn is_exact_zero(self) -> bool {
         self.mid == 0.0 && self.err == 0.0
     }
@@ -139,6 +164,21 @@ mod tests {
     }
 
     proptest! {
+        /// A quotient is checked by multiplying it back: `|mid b - a| <= err |b|` for every a and b of the balls, here their ends.
+        #[test]
+        fn quotients_are_contained(a in -9.0f64..9.0, b in -9.0f64..9.0, fuzz in 0.0f64..1.0) {
+            let (x, y) = (Ball { mid: a, err: fuzz * 1e-3 }, Ball { mid: b, err: fuzz * fuzz });
+            let quotient = x.divided_by(y);
+            prop_assume!(quotient.err.is_finite());
+            for (a, b) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
+                let end = |ball: Ball, sign: f64| Dyadic::exact(ball.mid).plus(&Dyadic::exact(sign * ball.err));
+                let (a, b) = (end(x, a), end(y, b));
+                let off = Dyadic::exact(quotient.mid).times(&b).minus(&a).magnitude();
+                let room = Dyadic::exact(quotient.err).times(&b.magnitude());
+                prop_assert_ne!(off.minus(&room).sign(), Some(Ordering::Greater));
+            }
+        }
+
         /// Random straight-line programs, extreme exponents and subnormals included.
         #[test]
         fn a_ball_contains_the_exact_value(
@@ -171,6 +211,7 @@ mod tests {
         let huge = Ball::exact(f64::MAX).times(&Ball::exact(4.0));
         assert_eq!(huge.sign(), None, "overflow decides nothing");
         assert_eq!(huge.minus(&huge).sign(), None);
+        assert_eq!(Ball::exact(1.0).divided_by(Ball::exact(0.0)).sign(), None);
         let zero = Ball::exact(-0.0).times(&huge);
         assert_eq!(zero.sign(), Some(Ordering::Equal), "0 times anything finite is 0");
     }

@@ -20,6 +20,7 @@ use crate::cull::CullOptions;
 use crate::error::{Error, Result};
 use crate::host;
 use crate::instances::{InstanceOptions, Instances};
+use crate::occluder_surface::ConservativeDepthOptions;
 use crate::occluders::{MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders};
 use crate::pyramid::{Pyramid, PyramidOptions};
 use crate::readback::{self, BufferRange};
@@ -153,6 +154,23 @@ impl Engine {
             self.queue().submit([encoder.finish()]);
             Ok(depth)
         })
+    }
+
+    /// Occluder depth that holds for every larger image of the same view ([`OccluderSurface::conservative_depth`]), made on the
+    /// host and uploaded.
+    ///
+    /// # Errors
+    /// As [`Engine::upload_depth`] and [`OccluderSurface::conservative_depth`].
+    ///
+    /// [`OccluderSurface::conservative_depth`]: crate::OccluderSurface::conservative_depth
+    pub fn render_depth_conservative(
+        &self,
+        occluders: &Occluders,
+        camera: &Camera,
+        options: &ConservativeDepthOptions,
+    ) -> Result<DepthImage> {
+        self.context().gpu.check_context("occluders", occluders.context)?;
+        self.upload_depth(&occluders.surface().conservative_depth(camera, options)?, camera)
     }
 
     /// Uploads NDC depth (row 0 on top, the camera's size and convention). What is no depth becomes far when it is read.

@@ -1,0 +1,343 @@
+//! Conservative occluder depth against exact rays: whatever the mesh, no ray through a pixel gets past its depth; and the tests
+//! of that, tested with planted faults. No device is needed.
+
+mod common;
+#[path = "common/exact_rays.rs"]
+mod exact_rays;
+
+use common::{CONVENTIONS, Random};
+use exact_rays::{ExactScene, Facing};
+use hiz_core::{
+    Camera, ConservativeDepthOptions, FaceCull, Floats, ImageSize, MeshData, OccluderOptions, OccluderSurface,
+    PlantedFault, Pose, Projection,
+};
+
+type Vec3 = [f64; 3];
+
+/// A mesh around the origin: about 1 in size, seen from about 3 away.
+#[derive(Debug, Clone, Default)]
+struct Mesh {
+    vertices: Vec<f64>,
+    triangles: Vec<u32>,
+}
+
+impl Mesh {
+    fn vertex(&mut self, p: Vec3) -> u32 {
+        self.vertices.extend(p);
+        (self.vertices.len() / 3) as u32 - 1
+    }
+
+    fn quad(&mut self, corners: [Vec3; 4]) {
+        let [a, b, c, d] = corners.map(|p| self.vertex(p));
+        self.triangles.extend([a, b, c, a, c, d]);
+    }
+}
+
+fn anywhere(random: &mut Random, size: f64) -> Vec3 {
+    std::array::from_fn(|_| random.range(-size, size))
+}
+
+/// Triangles among few vertices: shared edges of two, three and more, folds, intersections, duplicates, zero areas.
+fn tangle(random: &mut Random) -> Mesh {
+    let mut mesh = Mesh::default();
+    let vertices = 4 + random.below(8);
+    for _ in 0..vertices {
+        let p = anywhere(random, 1.5);
+        mesh.vertex(p);
+    }
+    for _ in 0..4 + random.below(24) {
+        mesh.triangles.extend([0; 3].map(|_: u32| random.below(vertices)));
+    }
+    mesh
+}
+
+/// Separate triangles, slivers among them.
+fn soup(random: &mut Random) -> Mesh {
+    let mut mesh = Mesh::default();
+    for _ in 0..4 + random.below(16) {
+        let (a, b) = (anywhere(random, 2.0), anywhere(random, 2.0));
+        let thin = random.pick(&[1.0, 1.0, 1e-3, 1e-7, 0.0]);
+        let c = anywhere(random, 2.0);
+        let c = std::array::from_fn(|k| b[k] + thin * (c[k] - b[k]));
+        for p in [a, b, c] {
+            let v = mesh.vertex(p);
+            mesh.triangles.push(v);
+        }
+    }
+    mesh
+}
+
+/// Closed boxes that stand in each other.
+fn boxes(random: &mut Random) -> Mesh {
+    let mut mesh = Mesh::default();
+    for _ in 0..1 + random.below(4) {
+        let (center, half) = (anywhere(random, 1.0), [0; 3].map(|_| random.range(0.05, 1.0)));
+        let first = (mesh.vertices.len() / 3) as u32;
+        for corner in 0..8 {
+            let p = std::array::from_fn(|k| center[k] + if corner >> k & 1 == 0 { -half[k] } else { half[k] });
+            mesh.vertex(p);
+        }
+        for [a, b, c, d] in [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]] {
+            mesh.triangles.extend([a, b, c, a, c, d].map(|v| v + first));
+        }
+    }
+    mesh
+}
+
+/// A height field seen from the side, so that it folds over itself in the image.
+fn terrain(random: &mut Random) -> Mesh {
+    let mut mesh = Mesh::default();
+    let n = 3 + random.below(4);
+    let rough = random.pick(&[0.05, 0.3, 1.0]);
+    for row in 0..n {
+        for column in 0..n {
+            let at = |k: u32| 6.0 * (f64::from(k) / f64::from(n - 1) - 0.5);
+            let height = random.range(-rough, rough) - 0.2;
+            mesh.vertex([at(column), height, at(row)]);
+        }
+    }
+    for row in 0..n - 1 {
+        for column in 0..n - 1 {
+            let a = row * n + column;
+            mesh.triangles.extend([a, a + n, a + 1, a + 1, a + n, a + n + 1]);
+        }
+    }
+    mesh
+}
+
+/// A wall of planks with cracks between them, down to widths that float64 hardly tells from none; some planks share vertices.
+fn planks(random: &mut Random) -> Mesh {
+    let mut mesh = Mesh::default();
+    let mut x = -3.0;
+    let z = random.range(-1.0, 1.0);
+    while x < 3.0 {
+        let next = x + random.range(0.2, 1.5);
+        mesh.quad([[x, -3.0, z], [next, -3.0, z], [next, 3.0, z], [x, 3.0, z]]);
+        x = next + random.pick(&[0.0, 0.0, 1e-3, 1e-6, 1e-9, 1e-13, -1e-13, -1e-3]);
+    }
+    mesh
+}
+
+const KINDS: [fn(&mut Random) -> Mesh; 5] = [tangle, soup, boxes, terrain, planks];
+
+/// A view of the mesh, far from or near to the world's origin, and the mesh in that place.
+fn viewed(random: &mut Random, mesh: &Mesh) -> (Camera, Mesh) {
+    let offset = random.pick(&[0.0, 0.0, 1e3, 1e6, 1e7]);
+    let place = anywhere(random, offset);
+    let mut moved = mesh.clone();
+    for (i, v) in moved.vertices.iter_mut().enumerate() {
+        *v += place[i % 3];
+    }
+    let distance = random.pick(&[0.3, 1.5, 3.0, 3.0, 6.0]);
+    let toward = [random.range(-1.0, 1.0), random.range(-0.5, 0.5), random.pick(&[-1.0, 1.0])];
+    let eye = std::array::from_fn(|k| place[k] + distance * toward[k]);
+    let pose = Pose { eye, target: place, up: [0.0, 1.0, 0.1] };
+    let convention = random.pick(&CONVENTIONS);
+    let size = ImageSize::new(1 + random.below(7), 1 + random.below(6));
+    let near = random.pick(&[1e-3, 0.1, 1.0]);
+    let far = random.pick(&[None, Some(4.0), Some(100.0)]);
+    let projection = match random.below(4) {
+        0 => Projection::Orthographic {
+            left: -1.5,
+            right: 1.0,
+            bottom: -1.0,
+            top: 1.5,
+            near: random.pick(&[-1.0, 0.0, 1.0]),
+            far: far.unwrap_or(8.0),
+            convention,
+        },
+        1 => Projection::Frustum { left: -1.0, right: 0.3, bottom: -0.2, top: 0.8, near, far, convention },
+        _ => Projection::Perspective { fov_y: random.range(0.2, 2.0), near, far, convention },
+    };
+    let camera = Camera::look_at(&pose, &projection, size).unwrap();
+    // A bare matrix has its constants cancel: the errors are those of the world's size.
+    let camera = if random.below(3) == 0 {
+        Camera::from_clip_from_world(camera.clip_from_world(), size, convention).unwrap()
+    } else {
+        camera
+    };
+    (camera, moved)
+}
+
+/// Image points of the closed pixel: corners, centre, anywhere, and a hair beside what is drawn through it.
+fn points(random: &mut Random, camera: &Camera, mesh: &Mesh, column: u32, row: u32) -> Vec<[f64; 2]> {
+    let (x, y) = (f64::from(column), f64::from(row));
+    let mut points: Vec<[f64; 2]> = (0..9).map(|k| [x + f64::from(k % 3) / 2.0, y + f64::from(k / 3) / 2.0]).collect();
+    points.extend((0..4).map(|_| [x + random.unit(), y + random.unit()]));
+    let size = camera.size();
+    let image = |v: u32| {
+        let p: Vec3 = std::array::from_fn(|k| mesh.vertices[3 * v as usize + k] - camera.origin()[k]);
+        let [cx, cy, _, w] = camera.rows().map(|r| r[0] * p[0] + r[1] * p[1] + r[2] * p[2] + r[3]);
+        (w > 0.0).then(|| [(cx / w + 1.0) * f64::from(size.width) / 2.0, (1.0 - cy / w) * f64::from(size.height) / 2.0])
+    };
+    let inside = |p: &[f64; 2]| (x..=x + 1.0).contains(&p[0]) && (y..=y + 1.0).contains(&p[1]);
+    for triangle in mesh.triangles.chunks_exact(3) {
+        let k = random.below(3) as usize;
+        let (Some(a), Some(b)) = (image(triangle[k]), image(triangle[(k + 1) % 3])) else { continue };
+        for t in [0.0, random.unit(), random.unit()] {
+            let on = [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])];
+            if inside(&on) {
+                let hair = random.pick(&[1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14]);
+                let side = [random.range(-1.0, 1.0), random.range(-1.0, 1.0)];
+                points.extend([on, [on[0] + hair * side[0], on[1] + hair * side[1]]].into_iter().filter(inside));
+            }
+        }
+    }
+    // Multiples of 2^-60 pixels: what the exact integers hold.
+    let grid = 2.0_f64.powi(60);
+    points.iter().map(|p| p.map(|v| (v * grid).round() / grid)).filter(inside).collect()
+}
+
+#[derive(Debug, Default, Clone, Copy)]
+struct Tally {
+    pixels: u32,
+    /// Pixels with a depth other than far.
+    deep: u32,
+    /// Pixels where every ray that was cast is blocked before the far plane.
+    full: u32,
+    rays: u32,
+    /// Rays that get past their pixel's depth.
+    past: u32,
+}
+
+fn surface(mesh: &Mesh, cull_mode: FaceCull) -> OccluderSurface {
+    let data = MeshData { vertices: Floats::F64(&mesh.vertices), triangles: &mesh.triangles, transforms: None };
+    OccluderSurface::from_meshes(&[data], &OccluderOptions { cull_mode }).unwrap()
+}
+
+fn examine(
+    random: &mut Random,
+    camera: &Camera,
+    mesh: &Mesh,
+    cull_mode: FaceCull,
+    options: &ConservativeDepthOptions,
+    fault: Option<PlantedFault>,
+    tally: &mut Tally,
+) {
+    let depth = surface(mesh, cull_mode).conservative_depth_with_fault(camera, options, fault).unwrap();
+    let exact = ExactScene::new(camera, &mesh.vertices, &mesh.triangles);
+    let facing = match cull_mode {
+        FaceCull::None => Facing::Any,
+        FaceCull::Back => Facing::CounterClockwise,
+        FaceCull::Front => Facing::Clockwise,
+    };
+    let far = camera.convention().far();
+    for row in 0..camera.size().height {
+        for column in 0..camera.size().width {
+            let depth = depth[(row * camera.size().width + column) as usize];
+            let points = points(random, camera, mesh, column, row);
+            tally.pixels += 1;
+            if depth == far {
+                let sample = &points[..9];
+                tally.full += u32::from(sample.iter().all(|p| exact.blocked(*p, far, facing)));
+                continue;
+            }
+            tally.deep += 1;
+            tally.full += 1;
+            for point in points {
+                tally.rays += 1;
+                if !exact.blocked(point, depth, facing) {
+                    tally.past += 1;
+                    if fault.is_none() {
+                        eprintln!("pixel ({column}, {row}), depth {depth}, ray {point:?}\n{camera:?}\n{mesh:?}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn campaign(seed: u64, cases: u32, fault: Option<PlantedFault>) -> Vec<Tally> {
+    let mut random = Random(seed);
+    let mut tallies = vec![Tally::default(); KINDS.len()];
+    for case in 0..cases {
+        let kind = case as usize % KINDS.len();
+        let mesh = KINDS[kind](&mut random);
+        let (camera, mesh) = viewed(&mut random, &mesh);
+        let cull_mode = random.pick(&[FaceCull::None, FaceCull::None, FaceCull::Back, FaceCull::Front]);
+        let options = ConservativeDepthOptions { refinement: random.below(4) };
+        examine(&mut random, &camera, &mesh, cull_mode, &options, fault, &mut tallies[kind]);
+    }
+    tallies
+}
+
+#[test]
+fn no_ray_gets_past_a_pixels_depth() {
+    let tallies = campaign(1, 1500, None);
+    for (name, tally) in ["tangle", "soup", "boxes", "terrain", "planks"].iter().zip(&tallies) {
+        println!("{name}: {tally:?}");
+        assert_eq!(tally.past, 0, "{name}");
+        assert!(tally.deep > 200 && tally.rays > 4000, "a test without depths proves nothing: {name} {tally:?}");
+    }
+}
+
+#[test]
+#[ignore = "minutes"]
+fn no_ray_gets_past_a_pixels_depth_in_many_cases() {
+    for seed in 100..140 {
+        let tallies = campaign(seed, 2500, None);
+        println!("seed {seed}: {:?}", tallies.iter().map(|t| t.rays).sum::<u32>());
+        assert!(tallies.iter().all(|t| t.past == 0), "seed {seed}: {tallies:?}");
+    }
+}
+
+/// A wall's border a rounding away from a pixel's, in cameras whose constants cancel.
+fn borders(seed: u64, cases: u32, fault: Option<PlantedFault>) -> Tally {
+    let mut random = Random(seed);
+    let mut tally = Tally::default();
+    for _ in 0..cases {
+        let (width, height) = (2 + random.below(6), 2 + random.below(6));
+        let convention = random.pick(&CONVENTIONS);
+        let size = ImageSize::new(width, height);
+        let scale = random.pick(&[1.0, 1e3, 1e6]);
+        let place = anywhere(&mut random, scale);
+        let pose = Pose { eye: place, target: [place[0], place[1], place[2] - 1.0], up: [0.0, 1.0, 0.0] };
+        let fov_y = random.range(0.5, 2.0);
+        let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
+        let camera = Camera::look_at(&pose, &projection, size).unwrap();
+        let camera = if random.below(2) == 0 {
+            Camera::from_clip_from_world(camera.clip_from_world(), size, convention).unwrap()
+        } else {
+            camera
+        };
+        let z = random.range(1.0, 9.0);
+        let unit = 2.0 * (fov_y / 2.0).tan() / f64::from(height) * z;
+        // The right border of a pixel column, in world units, give or take nothing.
+        let column = f64::from(1 + random.below(width - 1)) - f64::from(width) / 2.0;
+        let right = place[0] + column * unit;
+        let mut mesh = Mesh::default();
+        let (left, low, high) = (place[0] - 99.0, place[1] - 99.0, place[1] + 99.0);
+        mesh.quad(
+            [[left, low, -z], [right, low, -z], [right, high, -z], [left, high, -z]]
+                .map(|p| [p[0], p[1], place[2] + p[2]]),
+        );
+        let options = ConservativeDepthOptions { refinement: random.below(2) };
+        examine(&mut random, &camera, &mesh, FaceCull::None, &options, fault, &mut tally);
+    }
+    tally
+}
+
+#[test]
+fn borders_that_rounding_cannot_place_do_not_count() {
+    let tally = borders(2, 300, None);
+    println!("{tally:?}");
+    assert_eq!(tally.past, 0);
+    assert!(tally.deep > 1000);
+}
+
+#[test]
+fn planted_faults_let_rays_through() {
+    let past = |tallies: &[Tally]| tallies.iter().map(|t| t.past).sum::<u32>();
+    let with = |fault| past(&campaign(1, 150, Some(fault)));
+    let contours = with(PlantedFault::ContoursIgnored);
+    let centre = with(PlantedFault::DepthAtCentre);
+    let folds = with(PlantedFault::FoldsIgnored);
+    let nearest = with(PlantedFault::RoundedToNearest);
+    let exact = borders(2, 300, Some(PlantedFault::NoWidening)).past;
+    println!(
+        "rays past a pixel's depth: contours ignored {contours}, depth at the centre {centre}, folds ignored {folds}, rounded to \
+         nearest {nearest}, no widening {exact}"
+    );
+    assert!(contours > 100 && centre > 100 && exact > 10, "{contours} {centre} {exact}");
+    assert!(folds > 10 && nearest > 10, "{folds} {nearest}");
+}

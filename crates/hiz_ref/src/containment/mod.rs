@@ -1,0 +1,85 @@
+//! Whether occluder proxies lie inside their mesh and bounds contain theirs: what a cull takes for granted, decided exactly.
+
+mod bounds;
+mod proxy;
+mod ratio;
+mod winding;
+
+pub use bounds::{check_bounds, contains};
+pub use proxy::{Protrusion, check_proxy};
+
+/// A triangle mesh, borrowed from the caller.
+#[derive(Clone, Copy, Debug)]
+pub struct TriangleMesh<'a> {
+    /// Positions.
+    pub vertices: &'a [[f64; 3]],
+    /// Indices of vertices.
+    pub triangles: &'a [[u32; 3]],
+}
+
+/// A mesh that has no inside, or is none.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum MeshError {
+    /// NaN or infinite positions.
+    #[error("expected finite vertices, got NaN or infinity at vertex {0}")]
+    NonFinite(usize),
+    /// An index past the vertices.
+    #[error("expected indices below the {vertices} vertices, got {index}")]
+    Index {
+        /// Number of vertices.
+        vertices: usize,
+        /// The index.
+        index: u32,
+    },
+    /// Borders that do not cancel.
+    #[error(
+        "expected a closed mesh whose triangles run consistently around, got {edges} edges that run more often in one direction \
+         than in the other (the first in triangle {triangle}); equal positions count as one vertex"
+    )]
+    Open {
+        /// How many.
+        edges: usize,
+        /// A triangle with such an edge.
+        triangle: usize,
+    },
+}
+
+impl TriangleMesh<'_> {
+    fn check(&self) -> Result<(), MeshError> {
+        if let Some(vertex) = self.vertices.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
+            return Err(MeshError::NonFinite(vertex));
+        }
+        let vertices = self.vertices.len();
+        match self.triangles.iter().flatten().find(|index| **index as usize >= vertices) {
+            Some(index) => Err(MeshError::Index { vertices, index: *index }),
+            None => Ok(()),
+        }
+    }
+
+    fn corners(&self, triangle: usize) -> [[f64; 3]; 3] {
+        self.triangles[triangle].map(|v| self.vertices[v as usize])
+    }
+
+    /// Refuses meshes that have no inside: every edge has to run as often one way as the other.
+    fn check_closed(&self) -> Result<(), MeshError> {
+        // Keys order as bits; adding 0 makes -0 and 0 equal.
+        let key = |v: u32| self.vertices[v as usize].map(|x| (x + 0.0).to_bits());
+        let mut edges: Vec<(_, _, bool, usize)> = Vec::with_capacity(3 * self.triangles.len());
+        for (number, t) in self.triangles.iter().enumerate() {
+            for k in 0..3 {
+                let (a, b) = (key(t[k]), key(t[(k + 1) % 3]));
+                if a != b {
+                    edges.push((a.min(b), a.max(b), a < b, number));
+                }
+            }
+        }
+        edges.sort_unstable();
+        let mut open = edges
+            .chunk_by(|x, y| (x.0, x.1) == (y.0, y.1))
+            .filter(|run| 2 * run.iter().filter(|edge| edge.2).count() != run.len());
+        match open.next() {
+            None => Ok(()),
+            Some(first) => Err(MeshError::Open { triangle: first[0].3, edges: 1 + open.count() }),
+        }
+    }
+}
