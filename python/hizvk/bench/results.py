@@ -1,0 +1,119 @@
+"""What a run of the bench found out, as plain objects; `report` writes them."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from .configurations import Configuration
+from .pareto import front
+
+if TYPE_CHECKING:
+    from .._arguments import Size
+    from ..scenes import Floats
+
+__all__ = ["STAGES", "Row", "SceneResult", "Spread", "spread"]
+
+#: The timed stages of a view, in order.
+STAGES: Final = ("render", "reduce", "cull", "read")
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A median over the repetitions, and the quartiles about it."""
+
+    median: float
+    q1: float
+    q3: float
+
+    def __str__(self) -> str:
+        return f"{self.median:.2f} ({self.q1:.2f} to {self.q3:.2f})"
+
+
+def spread(ms: Floats) -> Spread:
+    """Over the repetitions, of the mean over the views.
+
+    Parameters
+    ----------
+    ms : (repetitions, views) float64 array
+    """
+    q1, median, q3 = np.quantile(ms.mean(axis=1), (0.25, 0.5, 0.75))
+    return Spread(float(median), float(q1), float(q3))
+
+
+@dataclass
+class Row:
+    """One way to find out what is visible, over all views of a scene."""
+
+    label: str
+    configuration: Configuration | None
+    """None: not by hizvk (a yardstick)."""
+    ms: dict[str, Spread | None] = field(default_factory=dict)
+    """Milliseconds of each of `STAGES` a view; None where there is no such stage or it was not timed."""
+    total_ms: Spread | None = None
+    """Of all stages together."""
+    ns_per_instance: float | None = None
+    """The cull's median by the number of instances."""
+    first_ms: float | None = None
+    """The first cull, with what is compiled or built then."""
+    texels_per_instance: float | None = None
+    """Depth texels read, over all instances (those outside the view read none)."""
+    kept: int = 0
+    false_culls: int = 0
+    """Visible instances that were culled, over all views."""
+    hairs: int = 0
+    """Culled ones that are visible by a hair, which a rasteriser may hide rightly (`hizvk.truth`)."""
+    hidden_kept: float = 0.0
+    """Kept and visible in no pixel, as a share of all that are visible in no pixel."""
+    hidden_kept_in_view: float = 0.0
+    """The same among the instances inside the view volume."""
+    share_of_rectangle: float = 0.0
+    """Culled inside the view volume, over what the best rectangle test culls there."""
+    pareto: bool = False
+    """Whether no other configuration with the promise and without false culls is better in time or error and no worse
+    in the other."""
+
+    @property
+    def promises(self) -> bool:
+        """Whether it is a configuration whose promise reaches to the view's own pixels."""
+        return self.configuration is not None and self.configuration.depth.promises
+
+
+@dataclass
+class SceneResult:
+    """A scene and its rows."""
+
+    key: str
+    name: str
+    instances: int
+    occluder_triangles: int
+    instance_triangles: int
+    views: int
+    size: Size
+    repetitions: int
+    truth: str
+    """How it was found out what is visible."""
+    visible: int
+    """Instances that own a pixel, over all views."""
+    hidden: int
+    inside: int
+    """Instances inside the view volume, over all views."""
+    one_instance_ms: float
+    """The cull of a single instance: what a call costs before the first instance."""
+    upload_ms: float
+    warm_up_ms: float
+    """All first calls: what compiles and builds."""
+    rows: list[Row] = field(default_factory=list)
+
+    def mark_front(self) -> None:
+        """Sets `Row.pareto` by `Row.total_ms` and `Row.hidden_kept`."""
+        cost = [np.nan if row.total_ms is None else row.total_ms.median for row in self.rows]
+        allowed = [row.promises and row.false_culls == 0 for row in self.rows]
+        for row, best in zip(self.rows, front(cost, [row.hidden_kept for row in self.rows], allowed), strict=True):
+            row.pareto = bool(best)
+
+    def as_data(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return asdict(self)
