@@ -33,6 +33,7 @@ row 0 of an image is its top, and the first pixel's centre is at (0.5, 0.5). Bad
 
 from . import reference
 from ._core import __version__
+from .bench.recommend import Recommendation, recommend
 from .bounds import Boxes, OrientedBoxes, Spheres
 from .camera import Camera
 from .comparison import Comparison, compare
@@ -64,11 +65,13 @@ __all__ = [
     "OrientedBoxes",
     "OutOfMemoryError",
     "Pyramid",
+    "Recommendation",
     "Spheres",
     "Verdict",
     "__version__",
     "adapters",
     "compare",
+    "recommend",
     "reference",
     "visible",
 ]

@@ -105,9 +105,7 @@ class RayCaster:
         """View depth of the occluders alone along `rays` ``(..., 3)``, infinite where there are none."""
         return self._cast(self._occluders, view, rays.reshape(-1, 3))[1].reshape(rays.shape[:-1])
 
-    def firm(
-        self, view: View, sight: Sight, given: Floats | None, instances: npt.ArrayLike
-    ) -> npt.NDArray[np.bool_]:
+    def firm(self, view: View, sight: Sight, given: Floats | None, instances: npt.ArrayLike) -> npt.NDArray[np.bool_]:
         """Which own a pixel that no occluder takes when the ray moves by `SNAP` or the depth by `TIE`."""
         rows, columns = np.nonzero(np.isin(sight.owner, instances))
         limit = sight.depth[rows, columns] * (1.0 + TIE)

@@ -3,7 +3,7 @@
 ====================  ==========================================================================
 `scenes`, `city`      the scenes; `volumes` has the bounds of their instances
 `configurations`      what is compared
-`measure`             times and counts
+`stages`, `measure`   times and counts
 `numpy_hiz`, `rays`   what a Python user would otherwise do
 `score`, `rectangle`  false culls, hidden instances kept, the best rectangle test
 `pareto`, `results`   what nothing beats; the numbers as plain objects

@@ -132,11 +132,11 @@ def _buildings(rng: np.random.Generator) -> tuple[Floats, Floats]:
         cuts = [np.linspace(0.0, PITCH - STREET, int(rng.integers(3, 5))) for _ in range(2)]
         for i in range(len(cuts[0]) - 1):
             for k in range(len(cuts[1]) - 1):
-                near = start + (cuts[0][i], cuts[1][k])
-                far = start + (cuts[0][i + 1], cuts[1][k + 1]) - rng.choice([0.0, 0.0, 3.0], 2)
+                near = start + np.array([cuts[0][i], cuts[1][k]])
+                far = start + np.array([cuts[0][i + 1], cuts[1][k + 1]]) - rng.choice([0.0, 0.0, 3.0], 2)
                 low.append((*near, 0.0))
                 high.append((*far, rng.uniform(9.0, 30.0) + 40.0 * rng.random() ** 6))
-    return np.round(np.array(low) / GRID) * GRID, np.round(np.array(high) / GRID) * GRID
+    return np.round(np.array(low, np.float64) / GRID) * GRID, np.round(np.array(high, np.float64) / GRID) * GRID
 
 
 def _in_streets(rng: np.random.Generator, count: int, jitter: float) -> tuple[Floats, Floats]:
@@ -146,7 +146,8 @@ def _in_streets(rng: np.random.Generator, count: int, jitter: float) -> tuple[Fl
     along = rng.integers(0, BLOCKS, count) * PITCH + STREET + rng.uniform(0.0, PITCH - STREET, count)
     north = rng.random(count) < 0.5
     foot = np.stack([np.where(north, across, along), np.where(north, along, across), np.zeros(count)], axis=1)
-    return foot, np.where(north, np.pi / 2.0, 0.0) + rng.uniform(-jitter, jitter, count)
+    yaw: Floats = np.where(north, np.pi / 2.0, 0.0) + rng.uniform(-jitter, jitter, count)
+    return foot, yaw
 
 
 def _on_walls(rng: np.random.Generator, count: int, low: Floats, high: Floats) -> tuple[Floats, Floats]:
@@ -157,7 +158,8 @@ def _on_walls(rng: np.random.Generator, count: int, low: Floats, high: Floats) -
     for number, (axis, corner) in enumerate(((1, high), (0, low), (1, low), (0, high))):
         here = front == number
         place[here, axis] = corner[house[here], axis]
-    return place, front * np.pi / 2.0
+    yaw: Floats = np.float64(np.pi / 2.0) * front.astype(np.float64)
+    return place, yaw
 
 
 def _eyes(rng: np.random.Generator, count: int, corner: tuple[float, float, float]) -> tuple[View, ...]:
@@ -170,9 +172,10 @@ def _eyes(rng: np.random.Generator, count: int, corner: tuple[float, float, floa
             along = rng.integers(2, BLOCKS - 1) * PITCH + STREET / 2.0
         north = number % 2 == 0
         heading = rng.uniform(-0.5, 0.5) + rng.choice([0.0, np.pi]) + (np.pi / 2.0 if north else 0.0)
-        eye = np.array([street, along] if north else [along, street]) + rng.uniform(-1.0, 1.0, 2)
+        x, y = (street, along) if north else (along, street)
+        eye = np.array([x, y]) + rng.uniform(-1.0, 1.0, 2)
         eye = np.round(np.array([*eye, EYE]) / GRID) * GRID + corner
-        target = eye + (10.0 * np.cos(heading), 10.0 * np.sin(heading), rng.uniform(-0.5, 1.5))
+        target = eye + np.array([10.0 * np.cos(heading), 10.0 * np.sin(heading), rng.uniform(-0.5, 1.5)])
         name = f"{'crossing' if number % 4 == 3 else 'street'} {number}"
         views.append(View(name, tuple(eye.tolist()), tuple(target.tolist()), 65.0, 0.125))
     return tuple(views)

@@ -113,7 +113,9 @@ def run(
         except scenes.Missing as missing:
             found.missing.append(str(missing))
             continue
-        steps = terminal.Progress(len(bench.scene.views) + repetitions, f"hizvk bench: {key}, {len(bench.scene):,} instances")
+        steps = terminal.Progress(
+            len(bench.scene.views) + repetitions, f"hizvk bench: {key}, {len(bench.scene):,} instances"
+        )
         try:
             result = measure(bench, size, measured, repetitions, device, steps.step)
         finally:

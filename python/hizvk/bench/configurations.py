@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING, Any, Final
 from ..device import Device
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from .._arguments import Size
 
-__all__ = ["DESCENT", "Configuration", "DepthVariant", "matrix", "supported"]
+__all__ = ["DESCENT", "Configuration", "DepthVariant", "matrix", "promised", "render_options", "supported"]
 
 #: Texels that a descent may read: enough to finish at these image sizes.
 DESCENT: Final = 4096
@@ -92,7 +94,7 @@ def render_options(depth: DepthVariant, full: Size) -> dict[str, Any]:
 
 def supported(option: str) -> bool:
     """Whether this build has ``fit`` (of `Device.cull`) or ``conservative`` (of `Device.render_depth`)."""
-    function = {"fit": Device.cull, "conservative": Device.render_depth}[option]
+    function: Any = {"fit": Device.cull, "conservative": Device.render_depth}[option]
     return option in inspect.signature(function).parameters
 
 
@@ -119,6 +121,28 @@ def matrix(extent: str) -> tuple[Configuration, ...]:
     )
 
 
+def promised(volumes: Sequence[str], coverage: str, *, smaller: bool) -> tuple[Configuration, ...]:
+    """Configurations whose promise reaches to the view's own pixels, for a scene without known truth.
+
+    Parameters
+    ----------
+    volumes : sequence of str
+        The kinds of bounds that there are.
+    coverage : "area" or "sample"
+        What the caller's renderer needs.
+    smaller : bool
+        Whether conservative depth images of half and a quarter of the size can be rendered.
+    """
+    fits = ("rectangle", "volume") if supported("fit") else ("rectangle",)
+    depths = [DepthVariant()]
+    if smaller and supported("conservative"):
+        depths += [DepthVariant(2, True), DepthVariant(4, True)]
+    return tuple(
+        Configuration(volume, *read, coverage=coverage, fit=fit, depth=depth)
+        for depth, volume, fit, read in product(depths, volumes, fits, READS)
+    )
+
+
 def _default() -> list[Configuration]:
     volumes = ("spheres", "boxes", "oriented_boxes")
     ends = (READS[0], READS[-1])
@@ -140,4 +164,4 @@ def _full() -> list[Configuration]:
         )
         if coverage == "area" or depth == DepthVariant()
     ]
-    return chosen + [Configuration(order="stable")]
+    return [*chosen, Configuration(order="stable")]

@@ -1,9 +1,9 @@
 """Times and counts: every configuration and yardstick on every view of a scene, in turns.
 
-A repetition goes through the views, and in each through all configurations and yardsticks, each time beginning with
-another one, so that what disturbs the machine for a while disturbs all alike. Each stage is waited for and timed by the
-clock on the wall, with what Python adds to it. The first call of everything comes before and is reported apart. Counts
-come from culls of their own (counting costs time), and the timed culls have to keep the same.
+A repetition goes through the views, and in each through all configurations, each time beginning with another one, so
+that what disturbs the machine for a while disturbs all alike; then the same with the yardsticks. Each stage is waited
+for and timed by the clock on the wall, with what Python adds to it. The first call of everything comes before and is
+reported apart. Counts come from culls of their own (counting costs time), and the timed culls have to keep the same.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ import numpy as np
 from .. import truth as truths_
 from ..bounds import Spheres
 from . import numpy_hiz
-from .configurations import Configuration, DepthVariant, render_options
+from .configurations import Configuration, DepthVariant
 from .rays import Rays
 from .results import STAGES, Row, SceneResult, spread
 from .score import ViewTruth, look, score
+from .stages import Stopwatch, cull, rendered
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -28,52 +29,13 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from .._arguments import Size
-    from ..camera import Camera
     from ..device import Device
-    from ..resources import DepthImage, Instances, Occluders, Pyramid
+    from ..resources import DepthImage
     from .scenes import BenchScene
 
-__all__ = ["Stopwatch", "cull", "measure", "rendered"]
+__all__ = ["measure"]
 
 Mask: TypeAlias = "npt.NDArray[np.bool_]"
-
-
-class Stopwatch:
-    """Milliseconds since the last lap, after the device is done."""
-
-    def __init__(self, device: Device) -> None:
-        self._device = device
-        device.wait()
-        self._last = time.perf_counter()
-
-    def lap(self) -> float:
-        """Waits for the device; milliseconds since it was made or asked last."""
-        self._device.wait()
-        now = time.perf_counter()
-        took, self._last = 1000.0 * (now - self._last), now
-        return took
-
-
-def rendered(
-    device: Device, occluders: Occluders, camera: Camera, variant: DepthVariant
-) -> tuple[DepthImage, Pyramid, float, float]:
-    """Depth image, pyramid, and the milliseconds that each took."""
-    watch = Stopwatch(device)
-    depth = device.render_depth(occluders, camera, **render_options(variant, camera.size))
-    render = watch.lap()
-    pyramid = device.pyramid(depth)
-    return depth, pyramid, render, watch.lap()
-
-
-def cull(
-    device: Device, instances: Instances, pyramid: Pyramid, configuration: Configuration
-) -> tuple[Mask, float, float]:
-    """The mask, and the milliseconds of the cull and of reading the mask."""
-    watch = Stopwatch(device)
-    result = device.cull(instances, pyramid.camera, pyramid, statistics=False, **configuration.cull_options())
-    took = watch.lap()
-    mask = result.mask
-    return mask, took, watch.lap()
 
 
 class _Run:
@@ -172,33 +134,37 @@ class _Run:
         self.masks.append(masks)
 
     def time(self, step: Callable[[str], None]) -> None:
-        """All repetitions."""
+        """All repetitions; each goes through the configurations first and through the yardsticks then.
+
+        The two stay apart, for whatever follows on a yardstick finds cold caches and threads that sleep.
+        """
         shape = self.repetitions, len(self.cameras)
         yardsticks = list(self.yardsticks().values())
         timed = len(self.configurations) + len(yardsticks)
         stages = {variant: np.zeros((2, *shape)) for variant in self.variants}
         self.ms = [{} for _ in range(timed)]
-        for repetition, k in np.ndindex(shape):
-            if k == 0:
-                step(f"timing, repetition {repetition}")
-            made = {}
-            for variant in self.variants:
-                depth, pyramid, *took = rendered(self.device, self.occluders, self.cameras[k], variant)
-                made[variant] = depth, pyramid
-                stages[variant][:, repetition, k] = took
-            begin = (repetition * timed) // self.repetitions + k
-            for turn in range(timed):
-                number = (begin + turn) % timed
-                if number < len(self.configurations):
+        for repetition in range(self.repetitions):
+            step(f"timing, repetition {repetition}")
+            for k, camera in enumerate(self.cameras):
+                if k == 0:
+                    rendered(self.device, self.occluders, camera, DepthVariant())
+                made = {}
+                for variant in self.variants:
+                    depth, pyramid, *took = rendered(self.device, self.occluders, camera, variant)
+                    made[variant] = pyramid
+                    stages[variant][:, repetition, k] = took
+                begin = repetition * len(self.configurations) // self.repetitions + k
+                for turn in range(len(self.configurations)):
+                    number = (begin + turn) % len(self.configurations)
                     one = self.configurations[number]
-                    mask, *both = cull(self.device, self.instances[one.volume], made[one.depth][1], one)
-                    took = dict(zip(("cull", "read"), both, strict=True))
-                else:
-                    mask, took = yardsticks[number - len(self.configurations)](k, made[DepthVariant()][0])
-                if not np.array_equal(mask, self.masks[number][k]):
-                    raise RuntimeError(f"{self.rows[number].label}, view {k}: two culls of the same view differ")
-                for stage, value in took.items():
-                    self.ms[number].setdefault(stage, np.zeros(shape))[repetition, k] = value
+                    mask, *both = cull(self.device, self.instances[one.volume], made[one.depth], one)
+                    self._note(number, repetition, k, mask, dict(zip(("cull", "read"), both, strict=True)))
+            for k, camera in enumerate(self.cameras):
+                depth = self.device.render_depth(self.occluders, camera)
+                self.device.wait()
+                for number, ask in enumerate(yardsticks, len(self.configurations)):
+                    mask, milliseconds = ask(k, depth)
+                    self._note(number, repetition, k, mask, milliseconds)
         for number, row in enumerate(self.rows[:timed]):
             ms = self.ms[number]
             if row.configuration is not None:
@@ -208,6 +174,13 @@ class _Run:
             row.ms = {stage: spread(ms[stage]) if stage in ms else None for stage in STAGES}
             row.total_ms = spread(np.sum(list(ms.values()), axis=0))
             row.ns_per_instance = 1e6 * float(np.median(ms["cull"].mean(axis=1))) / len(self.scene)
+
+    def _note(self, number: int, repetition: int, k: int, mask: Mask, took: dict[str, float]) -> None:
+        """Keeps the times of one row in one view, if it kept what it kept before."""
+        if not np.array_equal(mask, self.masks[number][k]):
+            raise RuntimeError(f"{self.rows[number].label}, view {k}: two culls of the same view differ")
+        for stage, value in took.items():
+            self.ms[number].setdefault(stage, np.zeros((self.repetitions, len(self.cameras))))[repetition, k] = value
 
     def one_instance(self) -> float:
         """The median cull of one instance in the middle of the first view."""

@@ -84,7 +84,7 @@ def cull(
         ndc = clip[..., :3] / w[..., None]
     low, high = ndc.min(axis=1), ndc.max(axis=1)
     outside = behind | (~crosses & ((high[:, :2] < -1) | (low[:, :2] > 1)).any(axis=1)) | (~crosses & (high[:, 2] < 0))
-    kept = ~outside
+    kept: npt.NDArray[np.bool_] = ~outside
     test = np.flatnonzero(kept & ~crosses)
     low, high = low[test], high[test]
     x0 = np.clip(np.floor((low[:, 0] + 1) / 2 * width), 0, width - 1).astype(np.intp)

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from .results import fronts
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -16,6 +18,8 @@ __all__ = ["draw"]
 COLOURS: Final = {"spheres": "#2a78b8", "boxes": "#d9822b", "oriented_boxes": "#3a9150"}
 YARDSTICK: Final = "#666666"
 WRONG: Final = "#d62728"
+#: By the divisor of the depth image's sides.
+MARKERS: Final = {1: "o", 2: "s", 4: "D"}
 
 
 def draw(path: Path, scene: SceneResult) -> None:
@@ -35,11 +39,16 @@ def draw(path: Path, scene: SceneResult) -> None:
     rows = [(number, row) for number, row in enumerate(scene.rows, 1) if row.total_ms is not None]
     figure = Figure(figsize=(14.0, 6.4), dpi=100, layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
-    _panel(left, rows, {number: row.total_ms.median for number, row in rows if row.total_ms})
+    # The rows of hizvk decide what is shown; what keeps far less (rays) sits on the lower edge, with an arrow.
+    errors = [_error(row) for _, row in rows if row.configuration is not None]
+    margin = 0.08 * (max(errors) - min(errors)) + 0.05
+    floor = max(min(errors) - margin, 0.0)
+    left.set_ylim(floor, max(_error(row) for _, row in rows) + margin)
+    _panel(left, rows, {number: row.total_ms.median for number, row in rows if row.total_ms}, floor)
     left.set_xlabel("ms a view: render, reduce, cull and read")
     left.set_ylabel("hidden instances kept, % of the hidden in the view volume")
     own = [(number, row) for number, row in rows if row.configuration is None or row.configuration.depth.divisor == 1]
-    _panel(right, own, {number: row.ns_per_instance or np.nan for number, row in own})
+    _panel(right, own, {number: row.ns_per_instance or np.nan for number, row in own}, floor)
     right.set_xlabel("ns an instance: the cull alone, depth at full resolution")
     best = next((row for row in scene.rows if row.label.startswith("best rectangle")), None)
     for axis in (left, right):
@@ -47,54 +56,59 @@ def draw(path: Path, scene: SceneResult) -> None:
             level = 100.0 * best.hidden_kept_in_view
             axis.axhline(level, color="#999999", linewidth=0.9, linestyle=":", zorder=0)
             axis.annotate(
-                "best rectangle test", (0.995, level), xycoords=("axes fraction", "data"), fontsize=7.5, color="#777777",
-                ha="right", va="bottom",
+                "best rectangle test", (0.995, level), xycoords=("axes fraction", "data"), fontsize=7.5,
+                color="#777777", ha="right", va="bottom",
             )  # fmt: skip
     _legend(figure, rows)
     height, width = scene.size
     figure.suptitle(
         f"{scene.key}: {scene.instances:,} instances, {scene.views} views of {width}x{height} "
-        "(down and left is better; the line is the Pareto front)",
+        "(down and left is better; line: Pareto front, dashed: with sample coverage)",
         fontsize=11,
     )
     figure.savefig(path)
 
 
-def _panel(axis: Any, rows: list[tuple[int, Row]], cost: dict[int, float]) -> None:
-    from .pareto import front
-
+def _panel(axis: Any, rows: list[tuple[int, Row]], cost: dict[int, float], floor: float) -> None:
     for number, row in rows:
-        x, y = cost[number], 100.0 * row.hidden_kept_in_view
         if row.configuration is None:
-            style = {"marker": "X", "color": YARDSTICK, "s": 46}
+            style: dict[str, Any] = {"marker": "X", "color": YARDSTICK, "s": 46}
         else:
-            marker = {1: "o", 2: "s", 4: "D"}.get(row.configuration.depth.divisor, "v")
+            marker = MARKERS.get(row.configuration.depth.divisor, "v")
             style = {"marker": marker, "color": COLOURS[row.configuration.volume], "s": 42}
-        if row.false_culls:
-            style |= {"facecolors": "none", "edgecolors": WRONG, "linewidths": 1.4}
+        if row.configuration is not None and row.configuration.coverage == "sample":
+            style |= {"edgecolors": "black", "linewidths": 0.9}
+        if row.false_culls or (row.configuration is not None and not row.promises):
+            colour = WRONG if row.false_culls else style["color"]
+            style |= {"facecolors": "none", "edgecolors": colour, "linewidths": 1.4}
             style.pop("color")
-        axis.scatter([x], [y], zorder=3, **style)
+        axis.scatter([cost[number]], [max(_error(row), floor)], zorder=3, clip_on=False, **style)
     axis.set_xscale("log")
-    axis.set_ylim(bottom=min(0.0, axis.get_ylim()[0]))
-    best = front(
-        [cost[number] for number, _ in rows],
-        [row.hidden_kept for _, row in rows],
-        [row.promises and row.false_culls == 0 for _, row in rows],
-    )
-    line = sorted((cost[number], 100.0 * row.hidden_kept_in_view, number) for (number, row), on in zip(rows, best, strict=True) if on)
-    if line:
-        x, y, _ = zip(*line, strict=True)
-        axis.step(x, y, where="post", color="black", linewidth=1.2, zorder=2)
-    chosen = {number for *_, number in line}
-    _number(axis, [(cost[number], 100.0 * row.hidden_kept_in_view, number, number in chosen) for number, row in rows])
+    on = fronts([row for _, row in rows], [cost[number] for number, _ in rows])
+    chosen = [(cost[number], _error(row), row) for (number, row), best in zip(rows, on, strict=True) if best]
+    for coverage, line in (("area", "-"), ("sample", "--")):
+        points = sorted((x, y) for x, y, row in chosen if row.configuration and row.configuration.coverage == coverage)
+        if points:
+            axis.step(*zip(*points, strict=True), where="post", color="black", linestyle=line, linewidth=1.1, zorder=2)
     axis.grid(True, which="both", color="#eeeeee", zorder=-1)
     axis.xaxis.set_major_formatter("{x:g}")
     axis.xaxis.set_minor_formatter(lambda x, _: f"{x:g}" if str(f"{x:e}")[0] in "235" else "")
     axis.tick_params(which="both", labelsize=8)
+    _number(
+        axis,
+        [
+            (cost[number], max(_error(row), floor), number, best, _error(row) < floor)
+            for (number, row), best in zip(rows, on, strict=True)
+        ],
+    )
 
 
-def _number(axis: Any, points: list[tuple[float, float, int, bool]]) -> None:
-    """Each point's number at its side; points that (nearly) coincide share one label."""
+def _error(row: Row) -> float:
+    return 100.0 * row.hidden_kept_in_view
+
+
+def _number(axis: Any, points: list[tuple[float, float, int, bool, bool]]) -> None:
+    """Each point's number at its side; points that (nearly) coincide share one label. An arrow: it lies below."""
     place = axis.transData.transform([(x, y) for x, y, *_ in points])
     left = set(range(len(points)))
     while left:
@@ -102,6 +116,7 @@ def _number(axis: Any, points: list[tuple[float, float, int, bool]]) -> None:
         group = [k for k in left if np.abs(place[k] - place[first]).max() < 13.0]
         left -= set(group)
         text = ",".join(str(points[k][2]) for k in sorted(group, key=lambda k: points[k][2]))
+        text += " \N{DOWNWARDS ARROW}" if points[first][4] else ""
         on_front = any(points[k][3] for k in group)
         axis.annotate(
             text, points[first][:2], xytext=(5, 5), textcoords="offset points", fontsize=8 if on_front else 7,
@@ -117,6 +132,8 @@ def _legend(figure: Any, rows: list[tuple[int, Row]]) -> None:
 
     handles = [mark(kind.replace("_", " "), "o", colour) for kind, colour in COLOURS.items()]
     handles += [mark("depth 1/2", "s", "#bbbbbb"), mark("depth 1/4", "D", "#bbbbbb")]
+    handles += [mark("no promise for the view", "o", "#888888", markerfacecolor="none")]
+    handles += [mark("sample coverage", "o", "#dddddd", markeredgecolor="black")]
     handles += [mark("not by hizvk", "X", YARDSTICK)]
     handles += [mark("culls what can be seen", "o", WRONG, markerfacecolor="none")]
     handles += [

@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from .configurations import Configuration
 from .pareto import front
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from .._arguments import Size
     from ..scenes import Floats
+    from .configurations import Configuration
 
-__all__ = ["STAGES", "Row", "SceneResult", "Spread", "spread"]
+__all__ = ["STAGES", "Row", "SceneResult", "Spread", "fronts", "spread"]
 
 #: The timed stages of a view, in order.
 STAGES: Final = ("render", "reduce", "cull", "read")
@@ -72,8 +74,8 @@ class Row:
     share_of_rectangle: float = 0.0
     """Culled inside the view volume, over what the best rectangle test culls there."""
     pareto: bool = False
-    """Whether no other configuration with the promise and without false culls is better in time or error and no worse
-    in the other."""
+    """Whether no configuration that promises as much is better in time or error and no worse in the other. Sample
+    coverage promises less than area coverage, so it competes with both, area coverage with its like alone."""
 
     @property
     def promises(self) -> bool:
@@ -110,10 +112,18 @@ class SceneResult:
     def mark_front(self) -> None:
         """Sets `Row.pareto` by `Row.total_ms` and `Row.hidden_kept`."""
         cost = [np.nan if row.total_ms is None else row.total_ms.median for row in self.rows]
-        allowed = [row.promises and row.false_culls == 0 for row in self.rows]
-        for row, best in zip(self.rows, front(cost, [row.hidden_kept for row in self.rows], allowed), strict=True):
-            row.pareto = bool(best)
+        for row, on in zip(self.rows, fronts(self.rows, cost), strict=True):
+            row.pareto = on
 
     def as_data(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return asdict(self)
+
+
+def fronts(rows: Sequence[Row], cost: Sequence[float]) -> list[bool]:
+    """Which rows are on the front of `cost` and hidden kept, as `Row.pareto` says."""
+    error = [row.hidden_kept for row in rows]
+    sound = np.array([row.promises and row.false_culls == 0 for row in rows])
+    area = np.array([row.configuration is not None and row.configuration.coverage == "area" for row in rows])
+    found: list[bool] = (front(cost, error, sound & area) | (front(cost, error, sound) & ~area)).tolist()
+    return found

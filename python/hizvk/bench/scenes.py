@@ -126,14 +126,15 @@ def load_castle(path: Path, views: int) -> BenchScene:
             count = len(found["camera_eye"])
             chosen = np.unique(np.linspace(0, count - 1, min(views, count)).round().astype(int))
             scene = Scene(
-                name=f"{found['name']} ({found['source']}, {found['license']})",
+                name=f"{found['name']} ({str(found['source']).split()[0]}, {found['license']})",
                 origin=tuple(np.round(found["instance_aabb_min"].astype(float).mean(axis=0)).tolist()),
                 vertices=found["occluder_vertices"].astype(np.float64),
                 triangles=found["occluder_triangles"].astype(np.uint32),
                 instance_vertices=found["instance_vertices"].astype(np.float64),
                 instance_triangles=found["instance_triangles"].astype(np.uint32),
                 owner=np.repeat(
-                    np.arange(len(found["instance_aabb_min"]), dtype=np.int32), np.diff(found["instance_first_triangle"])
+                    np.arange(len(found["instance_aabb_min"]), dtype=np.int32),
+                    np.diff(found["instance_first_triangle"]),
                 ),
                 box_min=found["instance_aabb_min"].astype(np.float64),
                 box_max=found["instance_aabb_max"].astype(np.float64),

@@ -54,9 +54,7 @@ def look(scene: Scene, view: View, size: Size, depth: npt.NDArray[np.float32], c
     given = linear_depth(depth, view.near, view.far)
     sight = caster.look(view, size, given)
     projected = project(scene, view, size)
-    return ViewTruth(
-        view, sight, given, projected, sight.pixels(len(scene)) > 0, rectangle_test(projected, given)
-    )
+    return ViewTruth(view, sight, given, projected, sight.pixels(len(scene)) > 0, rectangle_test(projected, given))
 
 
 def score(rows: list[Row], masks: list[list[Mask]], truths: list[ViewTruth], caster: Caster) -> None:
