@@ -26,7 +26,7 @@ DESCENT: Final = 4096
 READS: Final = ((2, 0), (4, 0), (8, 0), (2, DESCENT))
 
 
-@dataclass(frozen=True, order=True)
+@dataclass(frozen=True)
 class DepthVariant:
     """Which depth image the occluders are rendered into."""
 
@@ -42,13 +42,17 @@ class DepthVariant:
     def __str__(self) -> str:
         return f"1/{self.divisor}{' conservative' if self.conservative else ''}"
 
+    def cost(self) -> tuple[int, bool]:
+        """For sorting: the largest image first."""
+        return self.divisor, self.conservative
+
     @property
     def promises(self) -> bool:
         """Whether the promise reaches to the view's own pixels: not for a smaller image of plain samples."""
         return self.divisor == 1 or self.conservative
 
 
-@dataclass(frozen=True, order=True)
+@dataclass(frozen=True)
 class Configuration:
     """One way to cull."""
 

@@ -13,6 +13,7 @@ import time
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from .. import truth as truths_
 from ..bounds import Spheres
@@ -26,8 +27,6 @@ from .stages import Stopwatch, cull, rendered
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    import numpy.typing as npt
-
     from .._arguments import Size
     from ..device import Device
     from ..resources import DepthImage
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["measure"]
 
-Mask: TypeAlias = "npt.NDArray[np.bool_]"
+Mask: TypeAlias = npt.NDArray[np.bool_]
 
 
 class _Run:
@@ -47,7 +46,7 @@ class _Run:
         self.device, self.size, self.repetitions = device, size, repetitions
         self.scene = bench.scene
         self.configurations = configurations
-        self.variants = sorted({DepthVariant(), *(one.depth for one in configurations)})
+        self.variants = sorted({DepthVariant(), *(one.depth for one in configurations)}, key=DepthVariant.cost)
         self.cameras = [view.camera(size) for view in self.scene.views]
         watch = Stopwatch(device)
         self.occluders = device.occluders(self.scene.vertices, self.scene.triangles)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from ..depth import DepthKind
     from ..device import Coverage
     from ..resources import Pyramid
-
-    Depths: TypeAlias = Sequence[npt.ArrayLike]
 
 __all__ = ["Candidate", "Recommendation", "choose", "recommend"]
 
@@ -122,7 +120,7 @@ def recommend(
     cameras: Camera | Sequence[Camera],
     *,
     occluders: Occluders | Mesh | Sequence[Mesh] | None = None,
-    depths: Depths | None = None,
+    depths: Sequence[npt.ArrayLike] | None = None,
     kind: DepthKind | None = None,
     scale: float = 1.0,
     device: Device | None = None,
@@ -196,7 +194,7 @@ def recommend(
     volumes = {name: _upload(one, device) for name, one in alternatives.items()}
 
     chosen = promised(tuple(volumes), coverage, smaller=walls is not None)
-    variants = sorted({one.depth for one in chosen})
+    variants = sorted({one.depth for one in chosen}, key=DepthVariant.cost)
     total = np.zeros((len(chosen), repetitions + 1, len(views)))  # the first repetition compiles, and is dropped
     culling = np.zeros_like(total)
     kept = np.zeros(len(chosen), np.int64)

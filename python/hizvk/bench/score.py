@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from ..truth import linear_depth
 from .rectangle import project, rectangle_test
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from .._arguments import Size
     from ..scenes import Floats, Scene, View
     from ..truth import Caster, Sight
     from .rectangle import Projected
     from .results import Row
 
-    Mask = npt.NDArray[np.bool_]
-
 __all__ = ["ViewTruth", "look", "score"]
+
+Mask: TypeAlias = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
