@@ -136,12 +136,14 @@ def test_the_matrix_has_no_row_twice_and_every_dimension(extent: str) -> None:
     assert {row.coverage for row in rows} == {"area", "sample"}
     assert {row.volume for row in rows} >= {"spheres", "boxes"}
     assert {row.descent > 0 for row in rows} == {True, False}
-    assert not all(row.depth.promises for row in rows), "plain low resolution is what the others are compared with"
+    assert not all(row.promises for row in rows), "plain low resolution is what the others are compared with"
     assert ({row.fit for row in rows} == {"rectangle", "volume"}) == configurations.supported("fit")
 
 
 def test_which_depth_promises_for_the_view() -> None:
-    assert [DepthVariant(*one).promises for one in ((1, False), (1, True), (2, False), (2, True))] == [1, 1, 0, 1]
+    depths = [DepthVariant(*one) for one in ((1, False), (1, True), (2, False), (2, True))]
+    assert [Configuration(depth=depth).promises for depth in depths] == [True, True, False, True]
+    assert [Configuration(depth=depth, coverage="sample").promises for depth in depths] == [True, True, False, False]
     assert DepthVariant(4).size((90, 161)) == (22, 40)
     assert DepthVariant(4).size((2, 1)) == (1, 1)
     assert configurations.render_options(DepthVariant(), (90, 160)) == {}
@@ -429,7 +431,7 @@ def test_recommend_on_a_scene(device: hizvk.Device) -> None:
     assert found.tested == 4
     assert {one.volume for one in found.candidates} == {"boxes", "spheres"}
     assert [one.ms.median for one in found.candidates] == sorted(one.ms.median for one in found.candidates)
-    assert all(one.configuration.depth.promises for one in found.candidates)
+    assert all(one.configuration.promises for one in found.candidates)
     assert all(2 <= one.kept <= 3 for one in found.candidates), "boxes 1 and 2 are visible"
     assert min(one.kept for one in found.candidates) == 2
     assert found.best.kept == 2

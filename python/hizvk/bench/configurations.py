@@ -46,11 +46,6 @@ class DepthVariant:
         """For sorting: the largest image first."""
         return self.divisor, self.conservative
 
-    @property
-    def promises(self) -> bool:
-        """Whether the promise reaches to the view's own pixels: not for a smaller image of plain samples."""
-        return self.divisor == 1 or self.conservative
-
 
 @dataclass(frozen=True)
 class Configuration:
@@ -75,6 +70,14 @@ class Configuration:
         words += [self.order] if self.order != "any" else []
         words += [f"depth {self.depth}"] if self.depth != DepthVariant() else []
         return ", ".join(words)
+
+    @property
+    def promises(self) -> bool:
+        """Whether the promise reaches to the view's own pixels.
+
+        It does not for a smaller image of plain samples, nor for one whose own pixel centres are all that counts.
+        """
+        return self.depth.divisor == 1 or (self.depth.conservative and self.coverage == "area")
 
     def cull_options(self) -> dict[str, Any]:
         """The keyword arguments of `Device.cull`."""
@@ -139,7 +142,7 @@ def promised(volumes: Sequence[str], coverage: str, *, smaller: bool) -> tuple[C
     """
     fits = ("rectangle", "volume") if supported("fit") else ("rectangle",)
     depths = [DepthVariant()]
-    if smaller and supported("conservative"):
+    if smaller and coverage == "area" and supported("conservative"):
         depths += [DepthVariant(2, True), DepthVariant(4, True)]
     return tuple(
         Configuration(volume, *read, coverage=coverage, fit=fit, depth=depth)

@@ -80,7 +80,7 @@ class Row:
     @property
     def promises(self) -> bool:
         """Whether it is a configuration whose promise reaches to the view's own pixels."""
-        return self.configuration is not None and self.configuration.depth.promises
+        return self.configuration is not None and self.configuration.promises
 
 
 @dataclass
