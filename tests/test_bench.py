@@ -167,7 +167,7 @@ def test_the_front_of_points_by_hand() -> None:
 
 def row_of(ms: float, hidden_kept: float, configuration: Configuration | None, false_culls: int = 0) -> Row:
     row = Row("", configuration, total_ms=Spread(ms, ms, ms), false_culls=false_culls)
-    row.hidden_kept = hidden_kept
+    row.hidden_kept_in_view = hidden_kept
     return row
 
 
@@ -181,14 +181,16 @@ def test_who_competes_for_the_front() -> None:
         row_of(0.4, 0.0, Configuration("spheres"), false_culls=1),  # a bug
         row_of(5.0, 0.29, Configuration(depth=DepthVariant(2, True))),
         row_of(3.5, 0.3, Configuration("oriented_boxes")),
+        row_of(6.0, 0.2896, Configuration("spheres")),  # no better than the conservative one that it can be told
     ]
     cost = [row.total_ms.median for row in rows if row.total_ms]
-    assert results.fronts(rows, cost) == [True, True, False, False, False, False, True, False]
+    assert results.fronts(rows, cost) == [True, True, False, False, False, False, True, False, False]
 
 
 def test_a_spread_is_over_repetitions_of_means_over_views() -> None:
     ms = np.array([[1.0, 3.0], [2.0, 4.0], [8.0, 12.0]])  # means 2, 3, 10
     assert results.spread(ms) == Spread(3.0, 2.5, 6.5)
+    assert results.spread(ms, plus=1.0) == Spread(4.0, 3.5, 7.5)
 
 
 def test_a_broken_promise_fails_the_report() -> None:

@@ -45,7 +45,7 @@ EXTENTS: Final = {
     ),
     "default": Extent(
         {"mountains": 20_000, "city": 20_000, "city-far": 20_000, "room": 2_000},
-        {"mountains": 12, "city": 16, "city-far": 8, "room": 12, "castle": 40},
+        {"mountains": 12, "city": 16, "city-far": 6, "room": 12, "castle": 20},
         (360, 640),
         5,
     ),

@@ -157,7 +157,7 @@ def _default() -> list[Configuration]:
     chosen = [Configuration(volume, *read) for volume, read in product(volumes, READS)]
     chosen += [Configuration(volume, *read, fit="volume") for volume, read in product(volumes, ends)]
     chosen += [Configuration("boxes", *read, coverage="sample") for read in ends]
-    chosen += [Configuration(order="stable"), Configuration(depth=DepthVariant(1, True))]
+    chosen += [Configuration(order="stable")]
     chosen += [Configuration("boxes", *read, depth=depth) for depth, read in product(smaller, ends)]
     return chosen
 

@@ -171,7 +171,9 @@ class _Run:
             elif "reduce" in ms:  # numpy reads the image that the device has rendered
                 ms["render"] = stages[DepthVariant()][0]
             row.ms = {stage: spread(ms[stage]) if stage in ms else None for stage in STAGES}
-            row.total_ms = spread(np.sum(list(ms.values()), axis=0))
+            shared = sum(part.median for part in (row.ms["render"], row.ms["reduce"]) if part)
+            own = np.sum([ms[stage] for stage in ("cull", "read") if stage in ms], axis=0)
+            row.total_ms = spread(own, plus=shared)
             row.ns_per_instance = 1e6 * float(np.median(ms["cull"].mean(axis=1))) / len(self.scene)
 
     def _note(self, number: int, repetition: int, k: int, mask: Mask, took: dict[str, float]) -> None:

@@ -44,7 +44,8 @@ class Candidate:
 
     configuration: Configuration
     ms: Spread
-    """Milliseconds a camera: depth (if there are occluders to render), pyramid, cull and mask."""
+    """Milliseconds a camera: depth (if there are occluders to render) and pyramid, cull and mask; the quartiles are
+    those of cull and mask."""
     cull_ms: Spread
     """Of the cull alone."""
     kept: int
@@ -195,12 +196,13 @@ def recommend(
 
     chosen = promised(tuple(volumes), coverage, smaller=walls is not None)
     variants = sorted({one.depth for one in chosen}, key=DepthVariant.cost)
-    total = np.zeros((len(chosen), repetitions + 1, len(views)))  # the first repetition compiles, and is dropped
-    culling = np.zeros_like(total)
+    # The first repetition compiles, and is dropped.
+    depth_ms = {variant: np.zeros((repetitions + 1, len(views))) for variant in variants}
+    culling, reading = np.zeros((2, len(chosen), repetitions + 1, len(views)))
     kept = np.zeros(len(chosen), np.int64)
     for repetition in range(repetitions + 1):
         for k, camera in enumerate(views):
-            made: dict[DepthVariant, tuple[Pyramid, float]] = {}
+            made: dict[DepthVariant, Pyramid] = {}
             for variant in variants:
                 if walls is not None:
                     _, pyramid, *took = rendered(device, walls, camera, variant)
@@ -210,18 +212,19 @@ def recommend(
                     image, kind_, scale_ = images[k]
                     pyramid = device.pyramid(image, camera, kind=kind_, scale=scale_)
                     took = [watch.lap()]
-                made[variant] = pyramid, sum(took)
+                made[variant] = pyramid
+                depth_ms[variant][repetition, k] = sum(took)
             for turn in range(len(chosen)):
                 number = (turn + repetition * len(chosen) // (repetitions + 1) + k) % len(chosen)
-                pyramid, before = made[chosen[number].depth]
-                mask, cull_ms, read_ms = cull(device, volumes[chosen[number].volume], pyramid, chosen[number])
-                total[number, repetition, k] = before + cull_ms + read_ms
-                culling[number, repetition, k] = cull_ms
+                one = chosen[number]
+                mask, *both = cull(device, volumes[one.volume], made[one.depth], one)
+                culling[number, repetition, k], reading[number, repetition, k] = both
                 kept[number] += int(mask.sum()) if repetition == 0 else 0
-    best = front([spread(ms[1:]).median for ms in total], kept)
+    shared = {variant: spread(ms[1:]).median for variant, ms in depth_ms.items()}
+    total = [spread(culling[k, 1:] + reading[k, 1:], plus=shared[one.depth]) for k, one in enumerate(chosen)]
+    best = front([ms.median for ms in total], kept)
     candidates = [
-        Candidate(one, spread(total[k, 1:]), spread(culling[k, 1:]), int(kept[k]), bool(best[k]))
-        for k, one in enumerate(chosen)
+        Candidate(one, total[k], spread(culling[k, 1:]), int(kept[k]), bool(best[k])) for k, one in enumerate(chosen)
     ]
     candidates.sort(key=lambda one: one.ms.median)
     picked, within = choose(candidates, max_ms=max_ms, kept_within=kept_within)

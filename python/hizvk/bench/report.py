@@ -219,14 +219,15 @@ def _legend() -> list[str]:
         "Rows: the volume that is tested, the footprint (N x N texels of one level; *descent*: then finer levels where "
         "that cannot decide), and what differs from area coverage, any order, the rectangle's fit and plain depth at "
         "full resolution. *Italic*: what one would otherwise do, in the same run. **Bold** and P: on the Pareto front "
-        "of sum and hidden kept, among those whose promise reaches to the view's pixels and that culled nothing "
-        "visible; sample coverage promises less, so it takes no area coverage off the front. Rows that differ by less "
+        "of sum and hidden kept (to 0.1 % of those in the view), among those whose promise reaches to the view's "
+        "pixels and that culled nothing visible; sample coverage promises less, so it takes no area coverage off the front. Rows that differ by less "
         "than their quartiles are equal in practice.",
         "",
         "- *render*, *reduce*, *cull*, *read*: milliseconds a view of the occluders into depth, of all levels of the "
         "pyramid, of the test of all instances, and of the mask to the host; by the clock on the wall, each waited "
-        "for, Python included. *sum*: all of them; median and quartiles over the repetitions, of the mean over the "
-        "views. numpy reads the depth image back and builds its levels under *reduce*.",
+        "for, Python included. All are means over the views and medians over the repetitions. *sum*: all of "
+        "them; *quartiles*: of the sum, where render and reduce, which the rows of a depth image share, stand still. "
+        "numpy reads the depth image back and builds its levels under *reduce*.",
         "- *ns/inst.*: the cull by the number of instances; *texels/inst.*: depth texels read, over all instances, of "
         "which those outside the view read none.",
         "- *false culls*: instances that own a pixel by more than a hair and were culled (visible by a hair: the ray "

@@ -20,6 +20,8 @@ __all__ = ["STAGES", "Row", "SceneResult", "Spread", "fronts", "spread"]
 
 #: The timed stages of a view, in order.
 STAGES: Final = ("render", "reduce", "cull", "read")
+#: Decimals of a share that make a difference on the front: a thousandth of the hidden in the view.
+SAME: Final = 3
 
 
 @dataclass(frozen=True)
@@ -34,14 +36,17 @@ class Spread:
         return f"{self.median:.2f} ({self.q1:.2f} to {self.q3:.2f})"
 
 
-def spread(ms: Floats) -> Spread:
+def spread(ms: Floats, *, plus: float = 0.0) -> Spread:
     """Over the repetitions, of the mean over the views.
 
     Parameters
     ----------
     ms : (repetitions, views) float64 array
+        Milliseconds.
+    plus : float
+        Is added to all three.
     """
-    q1, median, q3 = np.quantile(ms.mean(axis=1), (0.25, 0.5, 0.75))
+    q1, median, q3 = np.quantile(ms.mean(axis=1), (0.25, 0.5, 0.75)) + plus
     return Spread(float(median), float(q1), float(q3))
 
 
@@ -55,7 +60,7 @@ class Row:
     ms: dict[str, Spread | None] = field(default_factory=dict)
     """Milliseconds of each of `STAGES` a view; None where there is no such stage or it was not timed."""
     total_ms: Spread | None = None
-    """Of all stages together."""
+    """Of all stages together: the medians of render and reduce, which rows share, and the spread of cull and read."""
     ns_per_instance: float | None = None
     """The cull's median by the number of instances."""
     first_ms: float | None = None
@@ -110,7 +115,7 @@ class SceneResult:
     rows: list[Row] = field(default_factory=list)
 
     def mark_front(self) -> None:
-        """Sets `Row.pareto` by `Row.total_ms` and `Row.hidden_kept`."""
+        """Sets `Row.pareto` by `Row.total_ms` and `Row.hidden_kept_in_view`."""
         cost = [np.nan if row.total_ms is None else row.total_ms.median for row in self.rows]
         for row, on in zip(self.rows, fronts(self.rows, cost), strict=True):
             row.pareto = on
@@ -121,8 +126,8 @@ class SceneResult:
 
 
 def fronts(rows: Sequence[Row], cost: Sequence[float]) -> list[bool]:
-    """Which rows are on the front of `cost` and hidden kept, as `Row.pareto` says."""
-    error = [row.hidden_kept for row in rows]
+    """Which rows are on the front of `cost` and hidden kept in the view, as `Row.pareto` says."""
+    error = [round(row.hidden_kept_in_view, SAME) for row in rows]
     sound = np.array([row.promises and row.false_culls == 0 for row in rows])
     area = np.array([row.configuration is not None and row.configuration.coverage == "area" for row in rows])
     found: list[bool] = (front(cost, error, sound & area) | (front(cost, error, sound) & ~area)).tolist()
