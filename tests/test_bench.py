@@ -304,6 +304,12 @@ def test_the_numpy_cull_by_hand(dtype: type[Any]) -> None:
     # A hole of one pixel in the columns 5 and 6, which box 0 covers: 8 + 8 * (-6 .. -4) / (20 .. 22).
     left[8, 6] = 0.0
     assert kept(left) == [True, True, True, False]
+    # Columns 1 to 4 are three texels of level 1, and a hole in the middle one shows on level 2 alone.
+    low, high = np.array([[-6.5, 8.0, 0.1]], dtype), np.array([[-3.5, 8.0, 0.2]], dtype)
+    wall = np.full(size, at(5.0))
+    assert kept(wall) == [False]
+    wall[7, 3] = 0.0
+    assert kept(wall) == [True]
 
 
 def test_rays_see_what_the_truth_sees() -> None:

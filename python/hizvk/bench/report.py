@@ -220,8 +220,8 @@ def _legend() -> list[str]:
         "that cannot decide), and what differs from area coverage, any order, the rectangle's fit and plain depth at "
         "full resolution. *Italic*: what one would otherwise do, in the same run. **Bold** and P: on the Pareto front "
         "of sum and hidden kept (to 0.1 % of those in the view), among those whose promise reaches to the view's "
-        "pixels and that culled nothing visible; sample coverage promises less, so it takes no area coverage off the front. Rows that differ by less "
-        "than their quartiles are equal in practice.",
+        "pixels and that culled nothing visible; sample coverage promises less, so it takes no area coverage off the "
+        "front. Rows that differ by less than their quartiles are equal in practice.",
         "",
         "- *render*, *reduce*, *cull*, *read*: milliseconds a view of the occluders into depth, of all levels of the "
         "pyramid, of the test of all instances, and of the mask to the host; by the clock on the wall, each waited "
