@@ -63,7 +63,7 @@ def versions() -> dict[str, str | None]:
         "python": platform.python_version(),
         "numpy": np.__version__,
         "embreex": embreex,
-        "platform": platform.platform(),
+        "platform": f"{platform.system()} {platform.machine()}",
     }
 
 
