@@ -187,10 +187,12 @@ def test_who_competes_for_the_front() -> None:
     assert results.fronts(rows, cost) == [True, True, False, False, False, False, True, False, False]
 
 
-def test_a_spread_is_over_repetitions_of_means_over_views() -> None:
-    ms = np.array([[1.0, 3.0], [2.0, 4.0], [8.0, 12.0]])  # means 2, 3, 10
-    assert results.spread(ms) == Spread(3.0, 2.5, 6.5)
-    assert results.spread(ms, plus=1.0) == Spread(4.0, 3.5, 7.5)
+def test_a_spread_is_over_the_repetitions_of_each_view() -> None:
+    ms = np.array(
+        [[1.0, 30.0], [20.0, 4.0], [2.0, 5.0]]
+    )  # medians 2 and 5; the means of the repetitions are 15.5, 12, 3.5
+    assert results.spread(ms) == Spread(3.5, 3.0, 14.25)
+    assert results.spread(ms, plus=1.0) == Spread(4.5, 4.0, 15.25)
 
 
 def test_a_broken_promise_fails_the_report() -> None:

@@ -174,7 +174,7 @@ class _Run:
             shared = sum(part.median for part in (row.ms["render"], row.ms["reduce"]) if part)
             own = np.sum([ms[stage] for stage in ("cull", "read") if stage in ms], axis=0)
             row.total_ms = spread(own, plus=shared)
-            row.ns_per_instance = 1e6 * float(np.median(ms["cull"].mean(axis=1))) / len(self.scene)
+            row.ns_per_instance = 1e6 * spread(ms["cull"]).median / len(self.scene)
 
     def _note(self, number: int, repetition: int, k: int, mask: Mask, took: dict[str, float]) -> None:
         """Keeps the times of one row in one view, if it kept what it kept before."""

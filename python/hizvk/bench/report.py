@@ -22,7 +22,7 @@ report.json holds one object::
            ns_per_instance, first_ms, texels_per_instance (null where it was not measured), kept, false_culls, hairs,
            hidden_kept, hidden_kept_in_view, share_of_rectangle (shares, 0 to 1 and above), pareto bool
 
-    spread: {median, q1, q3} milliseconds a view: over the repetitions, of the mean over the views
+    spread: {median, q1, q3} milliseconds a view: over the repetitions of each view, then the mean over the views
 
 `results.Row` and `results.SceneResult` say what each number is.
 """
@@ -225,7 +225,7 @@ def _legend() -> list[str]:
         "",
         "- *render*, *reduce*, *cull*, *read*: milliseconds a view of the occluders into depth, of all levels of the "
         "pyramid, of the test of all instances, and of the mask to the host; by the clock on the wall, each waited "
-        "for, Python included. All are means over the views and medians over the repetitions. *sum*: all of "
+        "for, Python included. All are medians over a view's repetitions, and the mean over the views. *sum*: all of "
         "them; *quartiles*: of the sum, where render and reduce, which the rows of a depth image share, stand still. "
         "numpy reads the depth image back and builds its levels under *reduce*.",
         "- *ns/inst.*: the cull by the number of instances; *texels/inst.*: depth texels read, over all instances, of "
