@@ -1,10 +1,13 @@
-"""Renews the tables of docs/bench.md from a report of the bench: `bench_docs.py [REPORT]` (out/bench/report.md)."""
+"""Renews the tables and the plot of docs/bench.md: `bench_docs.py [REPORT]` (out/bench/report.md)."""
 
+import shutil
 import sys
 from pathlib import Path
 
 DOCUMENT = Path(__file__).parent.parent / "docs" / "bench.md"
 MARK = "<!-- From here on"
+# The scene in which configurations differ most.
+PLOT = "castle.png"
 
 
 def main(report: Path) -> None:
@@ -17,6 +20,8 @@ def main(report: Path) -> None:
     mark = next(k for k, line in enumerate(kept) if line.startswith(MARK))
     text = "\n".join([*kept[: mark + 1], "", *tables]).replace("\n\n\n", "\n\n").rstrip()
     DOCUMENT.write_text(text + "\n", encoding="utf-8")
+    if (report.parent / PLOT).exists():
+        shutil.copyfile(report.parent / PLOT, DOCUMENT.parent / "images" / "bench.png")
 
 
 if __name__ == "__main__":

@@ -62,8 +62,7 @@ def draw(path: Path, scene: SceneResult) -> None:
     _legend(figure, rows)
     height, width = scene.size
     figure.suptitle(
-        f"{scene.key}: {scene.instances:,} instances, {scene.views} views of {width}x{height} "
-        "(down and left is better; line: Pareto front, dashed: with sample coverage)",
+        f"{scene.key}: {scene.instances:,} instances, {scene.views} views of {width}x{height}; down and left is better",
         fontsize=11,
     )
     figure.savefig(path)
@@ -115,13 +114,28 @@ def _number(axis: Any, points: list[tuple[float, float, int, bool, bool]]) -> No
         first = min(left, key=lambda k: points[k][2])
         group = [k for k in left if np.abs(place[k] - place[first]).max() < 13.0]
         left -= set(group)
-        text = ",".join(str(points[k][2]) for k in sorted(group, key=lambda k: points[k][2]))
-        text += " \N{DOWNWARDS ARROW}" if points[first][4] else ""
-        on_front = any(points[k][3] for k in group)
-        axis.annotate(
-            text, points[first][:2], xytext=(5, 5), textcoords="offset points", fontsize=8 if on_front else 7,
-            fontweight="bold" if on_front else "normal", color="black" if on_front else "#555555", zorder=4,
-        )  # fmt: skip
+        on_front = sorted(points[k][2] for k in group if points[k][3])
+        others = sorted(points[k][2] for k in group if not points[k][3])
+        below = " \N{DOWNWARDS ARROW}" if points[first][4] else ""
+        if on_front:
+            _label(axis, on_front, points[first][:2], (5.0, 5.0), "black", "bold")
+        if others:
+            _label(axis, others, points[first][:2], (5.0, -9.0 if on_front else 5.0), "#555555", "normal", below)
+
+
+def _label(
+    axis: Any,
+    numbers: list[int],
+    point: tuple[float, float],
+    shift: tuple[float, float],
+    colour: str,
+    weight: str,
+    after: str = "",
+) -> None:
+    axis.annotate(
+        ",".join(map(str, numbers)) + after, point, xytext=shift, textcoords="offset points", fontsize=7.5,
+        fontweight=weight, color=colour, zorder=4,
+    )  # fmt: skip
 
 
 def _legend(figure: Any, rows: list[tuple[int, Row]]) -> None:
@@ -135,6 +149,8 @@ def _legend(figure: Any, rows: list[tuple[int, Row]]) -> None:
     handles += [mark("no promise for the view", "o", "#888888", markerfacecolor="none")]
     handles += [mark("sample coverage", "o", "#dddddd", markeredgecolor="black")]
     handles += [mark("not by hizvk", "X", YARDSTICK)]
+    handles += [Line2D([], [], color="black", label="Pareto front, area coverage")]
+    handles += [Line2D([], [], color="black", linestyle="--", label="Pareto front, sample coverage")]
     handles += [mark("culls what can be seen", "o", WRONG, markerfacecolor="none")]
     handles += [
         Line2D([], [], linestyle="none", label=f"{number}  {row.label}")
