@@ -1,10 +1,8 @@
 #!/usr/bin/env bash
-# Benchmarks. Later: milliseconds of pyramid, cull and readback over sizes and counts, with a table to compare two revisions.
+# Speed beside error, for every configuration on scenes with known truth; report and plots are in out/bench. The module is the one that the
+# tests use (dependencies optimised, this workspace's crates at opt-level 1): the device's work is the same as in a release build.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
-cat <<'END'
-bench: comes later. It will time pyramid, cull, compaction and readback over image sizes and instance counts in a release build, each
-       beside its effectiveness (kept, hidden, wrongly kept), and compare two revisions.
-       Until then `make demo` prints the milliseconds of each stage on a real scene.
-END
+scripts/setup.sh
+step "bench" "$VENV/bin/hizvk" bench "$@"

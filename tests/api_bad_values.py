@@ -503,6 +503,51 @@ TABLES: dict[str, Table] = {
             "fit": FIT,
         },
     ),
+    "recommend": Table(
+        lambda device: (
+            hizvk.recommend,
+            {
+                "bounds": spheres(),
+                "cameras": [camera()],
+                "depths": [np.ones((6, 8))],
+                "kind": "z",
+                "device": device,
+                "repetitions": 1,
+            },
+        ),
+        {
+            "bounds": [
+                (np.zeros((2, 3)), TypeError, "expected Spheres, Boxes, OrientedBoxes, Instances or a sequence"),
+                (None, TypeError, "got None"),
+                ([], ValueError, "got an empty sequence"),
+                ([spheres(), 3], TypeError, "got int 3"),
+                ([spheres(), spheres()], ValueError, "expected each kind once, got spheres twice"),
+                (
+                    [spheres(), hizvk.Boxes(np.zeros((2, 3)), np.ones((2, 3)))],
+                    ValueError,
+                    "expected the same instances in each kind, got [1, 2] of them",
+                ),
+            ],
+            "cameras": [
+                (None, TypeError, "expected a Camera or a sequence of Camera, got None"),
+                ([], ValueError, "got an empty sequence"),
+                ([EYE4], TypeError, "got (4, 4) float64"),
+            ],
+            "occluders": [("walls", TypeError, "expected exactly one of them, got both")],
+            "depths": [
+                (3, TypeError, "expected a sequence of (height, width) arrays, got int 3"),
+                ([np.ones((6, 8))] * 2, ValueError, "expected 1 images, one for each camera, got 2"),
+                ([np.ones((8, 6))], ValueError, "expected float (6, 8) (the camera's size), got (8, 6) float64"),
+            ],
+            "kind": KIND,
+            "scale": SCALE,
+            "device": [("lavapipe", TypeError, "expected a Device or None, got str 'lavapipe'")],
+            "coverage": COVERAGE,
+            "max_ms": [(0, ValueError, "above 0, got int 0"), ("2", TypeError, "got str '2'")],
+            "kept_within": [(0.9, ValueError, "at least 1, got float 0.9"), (None, TypeError, "got None")],
+            "repetitions": [(0, ValueError, "in 1..10000, got int 0"), (1.0, TypeError, "got float 1.0")],
+        },
+    ),
     "compare": Table(
         lambda _: (hizvk.compare, {"mask": [True, False], "truth": [True, True]}),
         {
@@ -555,4 +600,4 @@ TABLES: dict[str, Table] = {
 
 #: What the package makes and callers only read; nothing to get wrong.
 MADE_BY_THE_PACKAGE = {"Adapter", "Comparison", "CullResult", "CullStats", "DepthImage", "Explanation", "Instances"}
-MADE_BY_THE_PACKAGE |= {"BoundsCheck", "Occluders", "ProxyCheck", "Pyramid"}
+MADE_BY_THE_PACKAGE |= {"BoundsCheck", "Occluders", "ProxyCheck", "Pyramid", "Recommendation"}

@@ -34,6 +34,7 @@ row 0 of an image is its top, and the first pixel's centre is at (0.5, 0.5). Bad
 
 from . import reference
 from ._core import __version__
+from .bench.recommend import Recommendation, recommend
 from .bounds import Boxes, OrientedBoxes, Spheres
 from .camera import Camera
 from .comparison import Comparison, compare
@@ -68,6 +69,7 @@ __all__ = [
     "OutOfMemoryError",
     "ProxyCheck",
     "Pyramid",
+    "Recommendation",
     "Spheres",
     "Verdict",
     "__version__",
@@ -75,6 +77,7 @@ __all__ = [
     "check_bounds",
     "check_proxy",
     "compare",
+    "recommend",
     "reference",
     "visible",
 ]

@@ -13,7 +13,7 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TextIO
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -21,6 +21,7 @@ import hizvk
 
 from . import report as reports
 from . import scenes, truth
+from .terminal import Progress, count, size
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,51 +37,6 @@ DEFAULTS: Final = {"views": 12, "size": (540, 960), "trees": 20_000}
 QUICK: Final = {"views": 3, "size": (180, 320), "trees": 3_000}
 #: Colours in the palette of overview.png, which the README shows.
 PALETTE: Final = 160
-
-
-class Progress:
-    """A bar on a terminal; elsewhere one line when it begins.
-
-    Parameters
-    ----------
-    total : int
-        Steps.
-    label : str
-        What is being done.
-    stream : file, optional
-        None: stderr.
-    """
-
-    WIDTH = 30
-
-    def __init__(self, total: int, label: str, stream: TextIO | None = None) -> None:
-        self._stream = sys.stderr if stream is None else stream
-        self._total = total
-        self._done = 0
-        self._live = self._stream.isatty()
-        self._started = time.monotonic()
-        if not self._live:
-            print(label, file=self._stream, flush=True)
-
-    def step(self, doing: str) -> None:
-        """One more step is done; `doing` is the next."""
-        self._done += 1
-        self.show(doing)
-
-    def show(self, doing: str) -> None:
-        """Draws the bar."""
-        if self._live:
-            full = self.WIDTH * self._done // self._total
-            seconds = time.monotonic() - self._started
-            bar = "#" * full + "-" * (self.WIDTH - full)
-            self._stream.write(f"\r\x1b[K[{bar}] {self._done}/{self._total}  {seconds:3.0f} s  {doing}")
-            self._stream.flush()
-
-    def close(self) -> None:
-        """Removes the bar."""
-        if self._live:
-            self._stream.write("\r\x1b[K")
-            self._stream.flush()
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,19 +196,6 @@ def _draw_best(
     ]
 
 
-def _size(text: str) -> Size:
-    width, cross, height = text.partition("x")
-    if not (cross and width.isdecimal() and height.isdecimal() and int(width) > 0 and int(height) > 0):
-        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT in pixels, like 960x540, got {text!r}")
-    return int(height), int(width)
-
-
-def _count(text: str) -> int:
-    if not (text.isdecimal() and int(text) > 0):
-        raise argparse.ArgumentTypeError(f"expected a number above 0, got {text!r}")
-    return int(text)
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="hizvk demo",
@@ -260,9 +203,9 @@ def _parser() -> argparse.ArgumentParser:
         "was culled (exit code 1 otherwise).",
     )
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for pictures and report (out)")
-    parser.add_argument("--views", type=_count, help=f"stations of the flight ({DEFAULTS['views']})")
-    parser.add_argument("--size", type=_size, metavar="WIDTHxHEIGHT", help="of the images (960x540)")
-    parser.add_argument("--trees", type=_count, help=f"instances ({DEFAULTS['trees']})")
+    parser.add_argument("--views", type=count, help=f"stations of the flight ({DEFAULTS['views']})")
+    parser.add_argument("--size", type=size, metavar="WIDTHxHEIGHT", help="of the images (960x540)")
+    parser.add_argument("--trees", type=count, help=f"instances ({DEFAULTS['trees']})")
     parser.add_argument("--quick", action="store_true", help="few trees and views, small images, fewer pictures")
     parser.add_argument("--json", action="store_true", help="print the report as one JSON object")
     return parser

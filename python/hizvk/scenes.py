@@ -68,9 +68,11 @@ class View:
     fov_y_deg : float
         The full vertical angle of view.
     near : float
-        Distance of the near plane; the far plane is infinitely far.
+        Distance of the near plane.
     up : tuple of three float
         What is up in the image.
+    far : float, optional
+        Distance of the far plane; None: infinitely far.
     """
 
     name: str
@@ -79,11 +81,12 @@ class View:
     fov_y_deg: float
     near: float
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    far: float | None = None
 
     def camera(self, size: Size) -> Camera:
-        """The library's camera for this view, reversed Z with an infinite far plane."""
+        """The library's camera for this view, reversed Z."""
         return Camera.look_at(
-            self.eye, self.target, up=self.up, fov_y_deg=self.fov_y_deg, size=size, near=self.near, far=None
+            self.eye, self.target, up=self.up, fov_y_deg=self.fov_y_deg, size=size, near=self.near, far=self.far
         )
 
     def basis(self) -> Floats:
@@ -293,11 +296,18 @@ def mountains(trees: int = 20_000, views: int = 12, *, seed: int = 2010) -> Scen
     )
 
 
-def room(seed: int = 1999) -> Scene:
-    """A floor of 16 by 12 m whose two walls with a door each hide much of 240 crates; four views.
+def room(seed: int = 1999, crates: int = 240) -> Scene:
+    """A floor of 16 by 12 m whose two walls with a door each hide much of the crates on it; four views.
 
     Walls, floor and crates are axis-aligned boxes, so that boxes are the instances' real geometry. The world is the
     origin's surroundings, up is z, and all coordinates are multiples of 1/64 m.
+
+    Parameters
+    ----------
+    seed : int
+        Same seed, same crates.
+    crates : int
+        Instances; more than 240 are smaller, so that they stand no closer.
     """
     walls = np.array(
         [
@@ -315,9 +325,11 @@ def room(seed: int = 1999) -> Scene:
         ]
     )
     rng = np.random.default_rng(seed)
-    size = np.round(rng.uniform([0.1, 0.1, 0.1], [0.7, 0.7, 1.1], (240, 3)) / GRID) * GRID
-    bay = rng.choice([0.1, 5.35, 10.35], 240)
-    low = np.stack([bay + rng.uniform(0.0, 3.8, 240), rng.uniform(0.1, 11.1, 240), np.zeros(240)], axis=1)
+    scale = min(1.0, float(np.sqrt(240.0 / crates)))
+    size = np.round(scale * rng.uniform([0.1, 0.1, 0.1], [0.7, 0.7, 1.1], (crates, 3)) / GRID) * GRID
+    size = np.maximum(size, GRID)
+    bay = rng.choice([0.1, 5.35, 10.35], crates)
+    low = np.stack([bay + rng.uniform(0.0, 3.8, crates), rng.uniform(0.1, 11.1, crates), np.zeros(crates)], axis=1)
     low = np.round(low / GRID) * GRID
     vertices, triangles = box_mesh(walls[:, :3], walls[:, 3:])
     crate_vertices, crate_triangles = box_mesh(low, low + size)
@@ -334,7 +346,7 @@ def room(seed: int = 1999) -> Scene:
         triangles=triangles,
         instance_vertices=crate_vertices,
         instance_triangles=crate_triangles,
-        owner=np.repeat(np.arange(240, dtype=np.int32), 12),
+        owner=np.repeat(np.arange(crates, dtype=np.int32), 12),
         box_min=low,
         box_max=low + size,
         views=views,

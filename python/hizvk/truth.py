@@ -70,8 +70,8 @@ class Caster(Protocol):
         """What `view` shows; `given` is the view depth of the occluders as the depth image under test has it."""
         ...
 
-    def firm(self, view: View, sight: Sight, given: Floats, instance: int) -> bool:
-        """Whether one visible instance owns a pixel by more than a hair."""
+    def firm(self, view: View, sight: Sight, given: Floats, instances: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+        """Which of the visible `instances` ``(M,)`` own a pixel by more than a hair; ``(M,)``."""
         ...
 
 
@@ -105,15 +105,15 @@ class RayCaster:
         """View depth of the occluders alone along `rays` ``(..., 3)``, infinite where there are none."""
         return self._cast(self._occluders, view, rays.reshape(-1, 3))[1].reshape(rays.shape[:-1])
 
-    def firm(self, view: View, sight: Sight, given: Floats | None, instance: int) -> bool:
-        """Whether `instance` owns a pixel that no occluder takes when the ray moves by `SNAP` or the depth by `TIE`."""
-        rows, columns = np.nonzero(sight.owner == instance)
+    def firm(self, view: View, sight: Sight, given: Floats | None, instances: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+        """Which own a pixel that no occluder takes when the ray moves by `SNAP` or the depth by `TIE`."""
+        rows, columns = np.nonzero(np.isin(sight.owner, instances))
         limit = sight.depth[rows, columns] * (1.0 + TIE)
         kept = np.ones(len(rows), dtype=bool)
         for shift in ((0.0, 0.0), (-SNAP, -SNAP), (SNAP, -SNAP), (-SNAP, SNAP), (SNAP, SNAP)):
             rays = view.rays(sight.owner.shape, shift)[rows, columns]
             kept &= self.occluder_depth(view, rays) > limit
-        return bool(kept.any())
+        return np.isin(instances, sight.owner[rows, columns][kept])
 
     def in_light(self, points: Floats, sun: Floats) -> npt.NDArray[np.bool_]:
         """Whether nothing lies between `points` ``(P, 3)`` (just off a surface) and the sun. For pictures."""
@@ -126,8 +126,10 @@ class RayCaster:
         self, embree: Any, view: View, rays: Floats
     ) -> tuple[npt.NDArray[np.int32], Floats, npt.NDArray[np.float32]]:
         eye = np.array(view.eye) - self._origin
-        start = np.broadcast_to(eye.astype(np.float32), rays.shape).copy()
-        answer = embree.run(start, rays.astype(np.float32), query="INTERSECT", output=True)
+        # From the near plane to the far one: what lies outside of them is not drawn either.
+        start = (eye + view.near * rays).astype(np.float32)
+        reach = np.full(len(rays), np.inf if view.far is None else view.far - view.near, np.float32)
+        answer = embree.run(start, rays.astype(np.float32), dists=reach, query="INTERSECT", output=True)
         owner = np.full(len(rays), SKY, np.int32)
         depth = np.full(len(rays), np.inf)
         normal = np.zeros((len(rays), 3), np.float32)
@@ -139,7 +141,7 @@ class RayCaster:
             ray = rays[hit]
             with np.errstate(divide="ignore", invalid="ignore"):
                 at = np.einsum("ij,ij->i", across, a) / np.einsum("ij,ij->i", across, ray)
-            at = np.where(np.isfinite(at), at, answer["tfar"][hit])
+            at = np.where(np.isfinite(at), at, view.near + answer["tfar"][hit])
             owner[hit] = self._owner[triangle] if number else OCCLUDER
             depth[hit] = at
             across *= -np.sign(np.einsum("ij,ij->i", across, ray))[:, None]
@@ -187,10 +189,9 @@ class BoxCaster:
             )
         return Sight(owner.reshape(size), depth.reshape(size), normal.reshape(*size, 3), self.method)
 
-    def firm(self, view: View, sight: Sight, given: Floats, instance: int) -> bool:
-        """Whether `instance` owns a pixel where it is nearer than the depth image by more than `TIE`."""
-        own = sight.owner == instance
-        return bool((given[own] > sight.depth[own] * (1.0 + TIE)).any())
+    def firm(self, view: View, sight: Sight, given: Floats, instances: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+        """Which own a pixel where they are nearer than the depth image by more than `TIE`."""
+        return np.isin(instances, sight.owner[given > sight.depth * (1.0 + TIE)])
 
     def _enter(self, view: View, box: Indices, rays: Floats) -> tuple[Floats, Indices]:
         """The view depth where rays enter their boxes, infinite for a miss; and through which pair of sides."""
@@ -201,7 +202,8 @@ class BoxCaster:
         first, last = np.fmin(a, b), np.fmax(a, b)
         side = first.argmax(axis=1)
         enter, leave = np.maximum(first.max(axis=1), view.near), last.min(axis=1)
-        return np.where(enter <= leave, enter, np.inf), side
+        last = leave if view.far is None else np.minimum(leave, view.far)
+        return np.where(enter <= last, enter, np.inf), side
 
 
 def make_caster(scene: Scene) -> Caster:
@@ -253,9 +255,9 @@ def check(
         What is seen in `view`, and who found it out.
     """
     size: Size = depth.shape
-    given = linear_depth(depth, view.near)
+    given = linear_depth(depth, view.near, view.far)
     comparison = compare(mask, sight.pixels(len(scene)) > 0)
-    firm = [caster.firm(view, sight, given, int(k)) for k in comparison.false_culls]
+    firm = caster.firm(view, sight, given, comparison.false_culls)
     # The oracle is asked where float64 does not see at once that a box is outside: it is slow there.
     asked = np.flatnonzero(~_outside(scene, view, size))
     boxes = Boxes(scene.box_min[asked], scene.box_max[asked])
@@ -269,10 +271,12 @@ def check(
     )
 
 
-def linear_depth(depth: npt.NDArray[np.float32], near: float) -> Floats:
-    """View depth of reversed NDC depth with an infinite far plane; infinite where nothing is."""
+def linear_depth(depth: npt.NDArray[np.float32], near: float, far: float | None = None) -> Floats:
+    """View depth of reversed NDC depth (`far` None: an infinite far plane); infinite where nothing is."""
+    ndc = depth.astype(np.float64)
     with np.errstate(divide="ignore"):
-        linear: Floats = near / depth.astype(np.float64)
+        linear: Floats = near / ndc if far is None else near * far / (near + ndc * (far - near))
+    linear[ndc == 0.0] = np.inf
     return linear
 
 

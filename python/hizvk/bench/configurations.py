@@ -1,0 +1,174 @@
+"""What is compared: which volume, how much is read, what of a pixel counts, which depth image, which order.
+
+All combinations would be hundreds, so each dimension is varied about the same middle (boxes, 2x2 texels, area coverage,
+full resolution, any order), and in full with those that it depends on. ``--full`` takes the whole product.
+"""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import asdict, dataclass
+from itertools import product
+from typing import TYPE_CHECKING, Any, Final
+
+from ..device import Device
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .._arguments import Size
+
+__all__ = ["DESCENT", "Configuration", "DepthVariant", "matrix", "promised", "render_options", "supported"]
+
+#: Texels that a descent may read: enough to finish at these image sizes.
+DESCENT: Final = 4096
+#: ``(footprint, descent)``, from the least that is read to the most.
+READS: Final = ((2, 0), (4, 0), (8, 0), (2, DESCENT))
+
+
+@dataclass(frozen=True)
+class DepthVariant:
+    """Which depth image the occluders are rendered into."""
+
+    divisor: int = 1
+    """The image's sides are those of the view divided by this."""
+    conservative: bool = False
+    """True: what is rendered hides only what occluders cover at the view's full resolution as well."""
+
+    def size(self, full: Size) -> Size:
+        """``(height, width)`` of the image for a view of `full` pixels."""
+        return max(1, full[0] // self.divisor), max(1, full[1] // self.divisor)
+
+    def __str__(self) -> str:
+        return f"1/{self.divisor}{' conservative' if self.conservative else ''}"
+
+    def cost(self) -> tuple[int, bool]:
+        """For sorting: the largest image first."""
+        return self.divisor, self.conservative
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """One way to cull."""
+
+    volume: str = "boxes"
+    """``"spheres"``, ``"boxes"`` or ``"oriented_boxes"``."""
+    footprint: int = 2
+    descent: int = 0
+    coverage: str = "area"
+    order: str = "any"
+    fit: str = "rectangle"
+    """What is compared at a texel: ``"rectangle"``, the nearest depth of the bounds everywhere in their rectangle; or
+    ``"volume"``, their own outline and depth there."""
+    depth: DepthVariant = DepthVariant()
+
+    def __str__(self) -> str:
+        words = [self.volume.replace("oriented_boxes", "oriented"), f"{self.footprint}x{self.footprint}"]
+        words += ["descent"] if self.descent else []
+        words += ["volume fit"] if self.fit == "volume" else []
+        words += [self.coverage] if self.coverage != "area" else []
+        words += [self.order] if self.order != "any" else []
+        words += [f"depth {self.depth}"] if self.depth != DepthVariant() else []
+        return ", ".join(words)
+
+    @property
+    def promises(self) -> bool:
+        """Whether the promise reaches to the view's own pixels.
+
+        It does not for a smaller image of plain samples, nor for one whose own pixel centres are all that counts.
+        """
+        return self.depth.divisor == 1 or (self.depth.conservative and self.coverage == "area")
+
+    def cull_options(self) -> dict[str, Any]:
+        """The keyword arguments of `Device.cull`."""
+        options = {name: getattr(self, name) for name in ("footprint", "descent", "coverage", "order")}
+        return options | ({"fit": self.fit} if supported("fit") else {})
+
+    def render_options(self, full: Size) -> dict[str, Any]:
+        """The keyword arguments of `Device.render_depth` for a view of `full` pixels."""
+        return render_options(self.depth, full)
+
+    def as_data(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return asdict(self)
+
+
+def render_options(depth: DepthVariant, full: Size) -> dict[str, Any]:
+    """The keyword arguments of `Device.render_depth` for a view of `full` pixels."""
+    options: dict[str, Any] = {} if depth.divisor == 1 else {"size": depth.size(full)}
+    return options | ({"conservative": True} if depth.conservative else {})
+
+
+def supported(option: str) -> bool:
+    """Whether this build has ``fit`` (of `Device.cull`) or ``conservative`` (of `Device.render_depth`)."""
+    function: Any = {"fit": Device.cull, "conservative": Device.render_depth}[option]
+    return option in inspect.signature(function).parameters
+
+
+def matrix(extent: str) -> tuple[Configuration, ...]:
+    """The configurations to measure, in the report's order.
+
+    Parameters
+    ----------
+    extent : "quick", "default" or "full"
+        How many.
+    """
+    if extent == "full":
+        chosen = _full()
+    elif extent == "quick":
+        chosen = [Configuration(volume, *read) for volume in ("spheres", "boxes") for read in (READS[0], READS[-1])]
+        chosen += [Configuration(depth=depth) for depth in (DepthVariant(2), DepthVariant(2, True))]
+        chosen += [Configuration(fit="volume"), Configuration(coverage="sample"), Configuration(order="stable")]
+    else:
+        chosen = _default()
+    return tuple(
+        one
+        for one in dict.fromkeys(chosen)
+        if (one.fit == "rectangle" or supported("fit")) and (not one.depth.conservative or supported("conservative"))
+    )
+
+
+def promised(volumes: Sequence[str], coverage: str, *, smaller: bool) -> tuple[Configuration, ...]:
+    """Configurations whose promise reaches to the view's own pixels, for a scene without known truth.
+
+    Parameters
+    ----------
+    volumes : sequence of str
+        The kinds of bounds that there are.
+    coverage : "area" or "sample"
+        What the caller's renderer needs.
+    smaller : bool
+        Whether conservative depth images of half and a quarter of the size can be rendered.
+    """
+    fits = ("rectangle", "volume") if supported("fit") else ("rectangle",)
+    depths = [DepthVariant()]
+    if smaller and coverage == "area" and supported("conservative"):
+        depths += [DepthVariant(2, True), DepthVariant(4, True)]
+    return tuple(
+        Configuration(volume, *read, coverage=coverage, fit=fit, depth=depth)
+        for depth, volume, fit, read in product(depths, volumes, fits, READS)
+    )
+
+
+def _default() -> list[Configuration]:
+    volumes = ("spheres", "boxes", "oriented_boxes")
+    ends = (READS[0], READS[-1])
+    smaller = [DepthVariant(divisor, conservative) for divisor in (2, 4) for conservative in (False, True)]
+    chosen = [Configuration(volume, *read) for volume, read in product(volumes, READS)]
+    chosen += [Configuration(volume, *read, fit="volume") for volume, read in product(volumes, ends)]
+    chosen += [Configuration("boxes", *read, coverage="sample") for read in ends]
+    chosen += [Configuration(order="stable")]
+    chosen += [Configuration("boxes", *read, depth=depth) for depth, read in product(smaller, ends)]
+    return chosen
+
+
+def _full() -> list[Configuration]:
+    depths = [DepthVariant(), *(DepthVariant(d, c) for d in (1, 2, 4) for c in (False, True) if (d, c) != (1, False))]
+    chosen = [
+        Configuration(volume, *read, coverage=coverage, fit=fit, depth=depth)
+        for volume, read, coverage, fit, depth in product(
+            ("spheres", "boxes", "oriented_boxes"), READS, ("area", "sample"), ("rectangle", "volume"), depths
+        )
+        if coverage == "area" or depth == DepthVariant()
+    ]
+    return [*chosen, Configuration(order="stable")]
