@@ -21,8 +21,8 @@ SIZES = [(360, 640), (563, 1001)]
 CONVENTIONS = ["standard", "reversed"]
 
 # What exact arithmetic keeps with a footprint of 2x2, 4x4 and 8x8 is 1.237, 1.113 and 1.045 times what the judge's
-# rectangle test at full resolution keeps; a descent with budget to finish is such a test. The judge's exact box at pixel
-# centres keeps 0.883 of it.
+# rectangle test at full resolution keeps; a descent with budget to finish is such a test. The judge's exact box at
+# pixel centres keeps 0.883 of it.
 MOST_KEPT = [
     ({"footprint": 2}, 1.26),
     ({"footprint": 4}, 1.13),
@@ -162,7 +162,8 @@ def test_a_volume_is_kept_where_the_oracle_sees_it_or_it_crosses_the_eye_plane(
         hidden += len(lost)
         crossing += sum(seen.explain(int(i)).rectangle is None for i in lost)
         texels += seen.stats.texels_read or 0
-        texels_of_kept += cull(device, device.instances(boxes), ours, depth, "standard", **options).stats.texels_read or 0
+        again = cull(device, device.instances(boxes), ours, depth, "standard", **options)
+        texels_of_kept += again.stats.texels_read or 0
     print(
         f"{coverage}: kept {kept}, of them hidden {hidden}, {crossing} of those cross the plane of the eye; "
         f"{texels} texels read, {texels_of_kept} of them for what is kept"

@@ -338,9 +338,9 @@ class Device:
             How many texels of finer levels a test may read where the footprint cannot decide, up to 65536; 0: none.
             With enough of them the answer is that of a test at full resolution.
         fit : "rectangle" or "volume"
-            What stands for the bounds: ``"rectangle"``, the rectangle around their projection at their nearest depth; or,
-            where that cannot decide, ``"volume"``: their own outline, and in each texel their own depth there. Keeps less
-            and computes more; with a descent it comes down to single pixels.
+            What stands for the bounds: ``"rectangle"``, the rectangle around their projection at their nearest depth;
+            or, where that cannot decide, ``"volume"``: their own outline, and in each texel their own depth there.
+            Keeps less and computes more; with a descent it comes down to single pixels.
         capacity : int, optional
             Most instances in the list. None: enough for all. Too small a capacity shows as ``count < demand``; mask and
             verdicts stay complete.

@@ -78,9 +78,11 @@ def classify(
     bounds_kind, arrays = as_arrays("bounds", bounds)
     _arguments.instance("camera", camera, Camera, "a Camera")
     image, kind, scale = checked_image("depth", depth, camera, kind, scale)
-    coverage = _arguments.choice("coverage", coverage, ("area", "sample"))
-    own_depth = _arguments.choice("own_depth", own_depth, ("nearest", "pixel"))
-    return _core.reference_classify(bounds_kind, arrays, camera._inner, image, kind, scale, coverage, own_depth)
+    words = (
+        _arguments.choice("coverage", coverage, ("area", "sample")),
+        _arguments.choice("own_depth", own_depth, ("nearest", "pixel")),
+    )
+    return _core.reference_classify(bounds_kind, arrays, camera._inner, image, kind, scale, *words)
 
 
 def pyramid(depth: npt.ArrayLike, *, reversed_z: bool) -> list[npt.NDArray[np.float32]]:

@@ -141,9 +141,6 @@ def _left_out() -> list[str]:
         )
     if not importlib.util.find_spec("matplotlib"):
         found.append("plots (matplotlib is not installed: pip install 'hizvk[viz]')")
-    for option, what in (("fit", "the volume fit"), ("conservative", "conservative depth")):
-        if not configurations.supported(option):
-            found.append(f"{what}: not part of this build")
     return found
 
 

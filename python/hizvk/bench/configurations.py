@@ -6,19 +6,16 @@ full resolution, any order), and in full with those that it depends on. ``--full
 
 from __future__ import annotations
 
-import inspect
 from dataclasses import asdict, dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any, Final
-
-from ..device import Device
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from .._arguments import Size
 
-__all__ = ["DESCENT", "Configuration", "DepthVariant", "matrix", "promised", "render_options", "supported"]
+__all__ = ["DESCENT", "Configuration", "DepthVariant", "matrix", "promised", "render_options"]
 
 #: Texels that a descent may read: enough to finish at these image sizes.
 DESCENT: Final = 4096
@@ -81,8 +78,7 @@ class Configuration:
 
     def cull_options(self) -> dict[str, Any]:
         """The keyword arguments of `Device.cull`."""
-        options = {name: getattr(self, name) for name in ("footprint", "descent", "coverage", "order")}
-        return options | ({"fit": self.fit} if supported("fit") else {})
+        return {name: getattr(self, name) for name in ("footprint", "descent", "fit", "coverage", "order")}
 
     def render_options(self, full: Size) -> dict[str, Any]:
         """The keyword arguments of `Device.render_depth` for a view of `full` pixels."""
@@ -97,12 +93,6 @@ def render_options(depth: DepthVariant, full: Size) -> dict[str, Any]:
     """The keyword arguments of `Device.render_depth` for a view of `full` pixels."""
     options: dict[str, Any] = {} if depth.divisor == 1 else {"size": depth.size(full)}
     return options | ({"conservative": True} if depth.conservative else {})
-
-
-def supported(option: str) -> bool:
-    """Whether this build has ``fit`` (of `Device.cull`) or ``conservative`` (of `Device.render_depth`)."""
-    function: Any = {"fit": Device.cull, "conservative": Device.render_depth}[option]
-    return option in inspect.signature(function).parameters
 
 
 def matrix(extent: str) -> tuple[Configuration, ...]:
@@ -121,11 +111,7 @@ def matrix(extent: str) -> tuple[Configuration, ...]:
         chosen += [Configuration(fit="volume"), Configuration(coverage="sample"), Configuration(order="stable")]
     else:
         chosen = _default()
-    return tuple(
-        one
-        for one in dict.fromkeys(chosen)
-        if (one.fit == "rectangle" or supported("fit")) and (not one.depth.conservative or supported("conservative"))
-    )
+    return tuple(dict.fromkeys(chosen))
 
 
 def promised(volumes: Sequence[str], coverage: str, *, smaller: bool) -> tuple[Configuration, ...]:
@@ -140,13 +126,12 @@ def promised(volumes: Sequence[str], coverage: str, *, smaller: bool) -> tuple[C
     smaller : bool
         Whether conservative depth images of half and a quarter of the size can be rendered.
     """
-    fits = ("rectangle", "volume") if supported("fit") else ("rectangle",)
     depths = [DepthVariant()]
-    if smaller and coverage == "area" and supported("conservative"):
+    if smaller and coverage == "area":
         depths += [DepthVariant(2, True), DepthVariant(4, True)]
     return tuple(
         Configuration(volume, *read, coverage=coverage, fit=fit, depth=depth)
-        for depth, volume, fit, read in product(depths, volumes, fits, READS)
+        for depth, volume, fit, read in product(depths, volumes, ("rectangle", "volume"), READS)
     )
 
 
