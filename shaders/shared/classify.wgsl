@@ -170,15 +170,22 @@ fn descend(
                 if surely_behind(bits, p.z, p.w) {
                     continue;
                 }
+                // Its pixels, those past the image's edge left out.
+                let corner = vec2<u32>(x, y);
+                let pixels_begin = corner << vec2<u32>(child);
+                let pixels_end = min((corner + vec2<u32>(1u)) << vec2<u32>(child), vec2<u32>(view.size));
                 if FIT_VOLUME {
-                    let corner = vec2<u32>(x, y);
-                    let pixels_begin = max(corner << vec2<u32>(child), first);
-                    let pixels_end = min((corner + vec2<u32>(1u)) << vec2<u32>(child), last + vec2<u32>(1u));
-                    if surely_clear(&planes, pixels_begin, pixels_end, bits) {
+                    if surely_clear(&planes, max(pixels_begin, first), min(pixels_end, last + vec2<u32>(1u)), bits) {
                         continue;
                     }
+                    if child == 0u {
+                        return false;
+                    }
+                } else if all(pixels_begin >= first) && all(pixels_end <= last + vec2<u32>(1u)) {
+                    // One of its pixels has that depth, and the rectangle has them all: no finer level can decide otherwise.
+                    return false;
                 }
-                if child == 0u || !DESCENT {
+                if !DESCENT {
                     return false;
                 }
                 stack[height] = (child << 28u) | (y << 14u) | x;

@@ -41,7 +41,7 @@ fn tight_image(random: &mut Random, view: &View, volume: &Volume, coverage: hiz_
         .map(|pixel| hiz_ref::own_depth(view, volume, coverage, pixel).expect("a finite view"))
         .collect();
     let nearest = own.iter().flatten().copied().reduce(if view.reversed { f32::max } else { f32::min });
-    let ulps = random.pick(&[0, 1, 2, 20, 300]);
+    let ulps = random.pick(&[0, 1, 20, 1000, 30_000]);
     let share = random.pick(&[0.0, 0.0, 0.02, 0.2, 0.6]);
     // The pixels that it does not touch: far beyond it (they must be told apart), or in front of it.
     let outside = random.pick(&[0.0, 1.0]);
@@ -54,7 +54,7 @@ fn tight_image(random: &mut Random, view: &View, volume: &Volume, coverage: hiz_
         .collect();
     if random.below(2) == 0 {
         let pixel = random.below(view.width * view.height) as usize;
-        depth[pixel] = moved(own[pixel].unwrap_or(outside), random.pick(&[0, 1, 2, 20, 300, 3000]), view.reversed);
+        depth[pixel] = moved(own[pixel].unwrap_or(outside), random.pick(&[0, 1, 20, 1000, 30_000]), view.reversed);
     }
     depth
 }
@@ -158,15 +158,16 @@ fn run(
 
 #[test]
 fn no_false_cull_on_depth_that_fits() {
-    for (seed, coverage, mode) in [
-        (31, Coverage::Area, (Footprint::Two, 4096)),
-        (32, Coverage::Sample, (Footprint::Two, 4096)),
-        (33, Coverage::Area, (Footprint::Eight, 0)),
+    // Few pipelines: each takes long to compile.
+    for (seed, coverage, kinds, mode) in [
+        (31, Coverage::Area, &KINDS[..], (Footprint::Two, 4096)),
+        (32, Coverage::Sample, &KINDS[..], (Footprint::Two, 4096)),
+        (33, Coverage::Area, &[BoundsKind::OrientedBox], (Footprint::Eight, 0)),
     ] {
-        let tally = run(engine(), &KINDS, seed, 30, coverage, mode);
+        let tally = run(engine(), kinds, seed, 30, coverage, mode);
         eprintln!("{coverage:?} {mode:?}: {tally:?}");
         assert_eq!(tally.false_culls, 0);
-        assert!(tally.gained > 50, "{tally:?}");
+        assert!(tally.gained > 30, "{tally:?}");
     }
 }
 
@@ -188,8 +189,8 @@ fn planted_faults_turn_it_red() {
         ),
         ("a pixel too few", &[("last + vec2<u32>(1u))", "last)")]),
         (
-            "a depth that forgets its slope",
-            &[("let bound = plane.facing * depth;", "let bound = plane.facing * occluding_depth(bits);")],
+            "a back taken for a front",
+            &[("guess.facing != 0.0 || !on_border(guess.own, interval.y", "!on_border(guess.own, interval.y")],
         ),
     ];
     for (name, faults) in planted {

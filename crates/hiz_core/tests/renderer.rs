@@ -17,7 +17,7 @@ mod town;
 
 use cameras::{KINDS, random_shots};
 use common::CONVENTIONS;
-use hiz_core::{Camera, Coverage, CullOptions, Footprint, ImageSize, Vec3};
+use hiz_core::{Camera, Coverage, CullOptions, Fit, Footprint, ImageSize, Vec3};
 use renderer::{Culled, Picture, Renderer, Slack, slack};
 use scene::{Body, Scene, Shape, Shot};
 
@@ -44,10 +44,18 @@ fn number<T: std::str::FromStr>(variable: &str, default: T) -> T {
 /// One way to cull; a picture has to come out the same with each.
 type Way = (&'static str, fn(CullOptions) -> CullOptions);
 
-const WAYS: [Way; 4] = [
+const WAYS: [Way; 6] = [
     ("2x2 texels", |options| options),
     ("8x8 texels", |options| CullOptions { footprint: Footprint::Eight, ..options }),
     ("a descent", |options| CullOptions { descent: 4096, ..options }),
+    ("its own outline and depth", |options| CullOptions { descent: 4096, fit: Fit::Volume, ..options }),
+    ("its own outline and depth at samples", |options| CullOptions {
+        coverage: Coverage::Sample,
+        guard_px: Some(0.125),
+        descent: 4096,
+        fit: Fit::Volume,
+        ..options
+    }),
     // What a rasteriser snaps to sixteenths of a pixel moves by half of one: the guard is four times that.
     ("sample coverage", |options| CullOptions {
         coverage: Coverage::Sample,
