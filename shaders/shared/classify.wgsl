@@ -138,69 +138,72 @@ fn surely_behind(bits: u32, z: Value, w: Value) -> bool {
     return can_occlude(d) && surely_above(z, t, w);
 }
 
-// Texels that wait to be entered: at most the footprint's 64, and 3 siblings at each of 15 levels.
-const STACK: u32 = 112u;
-
-// Whether no pixel of the rectangle first..last shows anything of the volume: a walk down the pyramid that enters only the
-// texels that cannot tell, and of them only what the rectangle touches. (Greene, Kass and Miller, "Hierarchical Z-Buffer
-// Visibility", SIGGRAPH 1993, descend so.) False where a pixel may show some of it, or the budget ends.
+// Whether no pixel of the rectangle first..last shows anything of the volume: a walk down the pyramid, from the footprint t of
+// the level `top`, that enters only the texels that cannot tell, and of them only what the rectangle touches. (Greene, Kass and
+// Miller, "Hierarchical Z-Buffer Visibility", SIGGRAPH 1993, descend so.) False where a pixel may show some of it, or the
+// budget ends.
 fn descend(
-    level: u32, t: vec4<u32>, first: vec2<u32>, last: vec2<u32>, p: Projected, texels_read: ptr<function, u32>,
+    top: u32, t: vec4<u32>, first: vec2<u32>, last: vec2<u32>, p: Projected, texels_read: ptr<function, u32>,
 ) -> bool {
-    // Packed: level, row, column. Pixels never wait, so 14 bits hold a coordinate of the largest image.
-    var stack: array<u32, STACK>;
-    var height = 0u;
-    var child = level;
-    var begin = t.xy;
-    var end = t.zw;
-    var left = view.descent_budget + *texels_read;
     var planes: SupportingPlanes;
     if FIT_VOLUME {
         planes = supporting_planes(p);
     }
+    var left = view.descent_budget + *texels_read;
+    var level = top;
+    var at = t.xy;
     loop {
-        for (var y = begin.y; y <= end.y; y += 1u) {
-            for (var x = begin.x; x <= end.x; x += 1u) {
-                if left == 0u {
-                    return false;
-                }
-                left -= 1u;
-                *texels_read += 1u;
-                let bits = texel(child, x, y);
-                if surely_behind(bits, p.z, p.w) {
-                    continue;
-                }
-                // Its pixels, those past the image's edge left out.
-                let corner = vec2<u32>(x, y);
-                let pixels_begin = corner << vec2<u32>(child);
-                let pixels_end = min((corner + vec2<u32>(1u)) << vec2<u32>(child), vec2<u32>(view.size));
-                if FIT_VOLUME {
-                    if surely_clear(&planes, max(pixels_begin, first), min(pixels_end, last + vec2<u32>(1u)), bits) {
-                        continue;
-                    }
-                    if child == 0u {
-                        return false;
-                    }
-                } else if all(pixels_begin >= first) && all(pixels_end <= last + vec2<u32>(1u)) {
-                    // One of its pixels has that depth, and the rectangle has them all: no finer level can decide otherwise.
-                    return false;
-                }
-                if !DESCENT {
-                    return false;
-                }
-                stack[height] = (child << 28u) | (y << 14u) | x;
-                height += 1u;
+        if left == 0u {
+            return false;
+        }
+        left -= 1u;
+        *texels_read += 1u;
+        let bits = texel(level, at.x, at.y);
+        var clear = surely_behind(bits, p.z, p.w);
+        if !clear {
+            // Its pixels, those past the image's edge left out.
+            let begin = at << vec2<u32>(level);
+            let end = min((at + vec2<u32>(1u)) << vec2<u32>(level), vec2<u32>(view.size));
+            if FIT_VOLUME {
+                clear = surely_clear(&planes, max(begin, first), min(end, last + vec2<u32>(1u)), bits);
+            } else if all(begin >= first) && all(end <= last + vec2<u32>(1u)) {
+                // One of its pixels has that depth, and the rectangle has them all: no finer level can decide otherwise.
+                return false;
             }
         }
-        if height == 0u {
-            return true;
+        if !clear {
+            if !DESCENT || level == 0u {
+                return false;
+            }
+            level -= 1u;
+            at = max(2u * at, first >> vec2<u32>(level));
+            continue;
         }
-        height -= 1u;
-        let parent = stack[height];
-        let corner = 2u * vec2<u32>(parent & 0x3fffu, (parent >> 14u) & 0x3fffu);
-        child = (parent >> 28u) - 1u;
-        begin = max(corner, first >> vec2<u32>(child));
-        end = min(corner + vec2<u32>(1u), last >> vec2<u32>(child));
+        // On to the next sibling, or that of the first parent that has one.
+        loop {
+            let end = last >> vec2<u32>(level);
+            if level == top {
+                if at.x < t.z {
+                    at.x += 1u;
+                    break;
+                }
+                if at.y < t.w {
+                    at = vec2<u32>(t.x, at.y + 1u);
+                    break;
+                }
+                return true;
+            }
+            if at.x % 2u == 0u && at.x < end.x {
+                at.x += 1u;
+                break;
+            }
+            if at.y % 2u == 0u && at.y < end.y {
+                at = vec2<u32>(max(at.x - at.x % 2u, first.x >> level), at.y + 1u);
+                break;
+            }
+            at /= vec2<u32>(2u);
+            level += 1u;
+        }
     }
     return false;
 }

@@ -167,7 +167,7 @@ fn no_false_cull_on_depth_that_fits() {
         let tally = run(engine(), kinds, seed, 30, coverage, mode);
         eprintln!("{coverage:?} {mode:?}: {tally:?}");
         assert_eq!(tally.false_culls, 0);
-        assert!(tally.gained > 30, "{tally:?}");
+        assert!(tally.gained > tally.to_gain / 50, "{tally:?}");
     }
 }
 
@@ -187,7 +187,7 @@ fn planted_faults_turn_it_red() {
             "the texel's nearest corner",
             &[("select(left_top, right_bottom, plane.slope >", "select(right_bottom, left_top, plane.slope >")],
         ),
-        ("a pixel too few", &[("last + vec2<u32>(1u))", "last)")]),
+        ("a pixel too few", &[("min(end, last + vec2<u32>(1u)), bits)", "min(end, last), bits)")]),
         (
             "a back taken for a front",
             &[("guess.facing != 0.0 || !on_border(guess.own, interval.y", "!on_border(guess.own, interval.y")],
