@@ -114,20 +114,38 @@ impl Campaign {
                 for (volume, away) in volumes.iter().zip(ways) {
                     let volume = tilted(&mut random, &round, volume);
                     let depth = tight_image(&mut random, &round.view, &volume, coverage);
-                    let one = Round {
-                        depth,
-                        volumes: vec![(*kind, vec![volume])],
-                        away: vec![vec![*away]],
-                        camera: round.camera.clone(),
-                        view: round.view.clone(),
-                        options: round.options.clone(),
-                        ..round
-                    };
+                    let one = round.alone(*kind, volume, *away, depth);
                     fitted.push(if sharp { on_the_edge(one, &mut random) } else { one });
                 }
             }
             fitted
         })
+    }
+
+    /// Rounds of one volume each, and the depth as it was.
+    pub(crate) fn loose(self, kinds: &'static [BoundsKind]) -> impl Iterator<Item = Round> {
+        self.rounds().flat_map(move |round| {
+            let mut random = Random(self.seed ^ round.number as u64);
+            let each = round.volumes.iter().zip(&round.away).filter(|((k, _), _)| kinds.contains(k));
+            each.flat_map(|((kind, volumes), ways)| volumes.iter().zip(ways).map(move |(v, away)| (*kind, v, away)))
+                .map(|(kind, v, away)| round.alone(kind, tilted(&mut random, &round, v), *away, round.depth.clone()))
+                .collect::<Vec<_>>()
+        })
+    }
+}
+
+impl Round {
+    /// The same with one volume and a depth image of its own.
+    fn alone(&self, kind: BoundsKind, volume: Volume, away: [f64; 3], depth: Vec<f32>) -> Self {
+        Self {
+            depth,
+            volumes: vec![(kind, vec![volume])],
+            away: vec![vec![away]],
+            camera: self.camera.clone(),
+            view: self.view.clone(),
+            options: self.options.clone(),
+            ..*self
+        }
     }
 }
 

@@ -33,6 +33,8 @@ pub(crate) struct Style {
     pub(crate) wild: bool,
     /// `bar` and `bar3` stop the compiler from folding a difference that cancels into what it was made of.
     pub(crate) bars: bool,
+    /// `bar2` stops it from folding the quotient that a slope is into what it is multiplied with.
+    pub(crate) slope_bars: bool,
 }
 
 const PLAIN: Style = Style {
@@ -43,6 +45,7 @@ const PLAIN: Style = Style {
     flushed: 0,
     wild: false,
     bars: true,
+    slope_bars: true,
 };
 
 /// What reassociation may do where no bar stops it; no style that the margin covers.
@@ -198,6 +201,9 @@ pub(crate) const WILDEST: Style = Style {
     wild: true,
     ..PLAIN
 };
+
+/// The same, and slopes that are certified are not those that are compared with.
+pub(crate) const WITHOUT_SLOPE_BARS: Style = Style { name: "no bars at slopes", slope_bars: false, ..WILDEST };
 
 /// Knuth's: the float64 sum, and what it lost, exactly.
 fn two_sum(a: f64, b: f64) -> (f64, f64) {

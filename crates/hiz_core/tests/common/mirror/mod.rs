@@ -4,6 +4,7 @@
 
 mod arithmetic;
 mod guesses;
+mod loss;
 mod planes;
 mod volume;
 
@@ -11,7 +12,8 @@ use hiz_core::{BoundsKind, CullOptions, ERROR_ULPS, Fit, Footprint};
 
 use crate::campaign::{Arrays, Round};
 
-pub(crate) use arithmetic::{Arithmetic, STYLES, Style, WILDEST, WITHOUT_BARS};
+pub(crate) use arithmetic::{Arithmetic, STYLES, Style, WILDEST, WITHOUT_BARS, WITHOUT_SLOPE_BARS};
+pub(crate) use loss::{Loss, texel_loss};
 use planes::Projected;
 use volume::Volume;
 
@@ -32,11 +34,14 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
 pub(crate) struct Margins {
     pub(crate) certificate: f32,
     pub(crate) texel: f32,
+    /// `FLATTEST`.
+    pub(crate) flattest: f32,
 }
 
 impl Margins {
     /// The shader's.
-    pub(crate) const FULL: Self = Self { certificate: ERROR_ULPS as f32, texel: 8.0 };
+    pub(crate) const FULL: Self =
+        Self { certificate: ERROR_ULPS as f32, texel: 8.0, flattest: f32::from_bits((127 - 100) << 23) };
 }
 
 impl From<f32> for Margins {

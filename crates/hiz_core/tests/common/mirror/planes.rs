@@ -16,10 +16,10 @@ pub(super) struct Projected {
 
 /// `SupportingPlane`.
 #[derive(Debug, Clone, Copy)]
-struct Plane {
-    slope: [f32; 2],
-    facing: f32,
-    offset: f32,
+pub(super) struct Plane {
+    pub(super) slope: [f32; 2],
+    pub(super) facing: f32,
+    pub(super) offset: f32,
 }
 
 /// `SupportingPlanes`.
@@ -27,7 +27,7 @@ struct Plane {
 pub(super) struct Planes {
     left_top: [f32; 2],
     right_bottom: [f32; 2],
-    list: Vec<Plane>,
+    pub(super) list: Vec<Plane>,
 }
 
 const BEYOND: f32 = 65536.0;
@@ -43,6 +43,18 @@ fn wild_slope(guessed: f32, f: &mut Arithmetic) -> f32 {
         3 | 4 => guessed * (1.0 + unit * 0.1_f32.powi(1 + f.below(6) as i32)),
         _ => guessed,
     }
+}
+
+/// `surely_clear`, its comparison at a texel's corner: `offset - slope . corner > bound` with `ulps` eps of margin.
+pub(super) fn surely_beyond(plane: &Plane, corner: [f32; 2], bound: f32, ulps: f32, f: &mut Arithmetic) -> bool {
+    f.part();
+    let fall = [0, 1].map(|k| f.mul(plane.slope[k], corner[k]));
+    let mut size = f.add(plane.offset.abs(), fall[0].abs());
+    size = f.add(size, fall[1].abs());
+    size = f.add(size, bound.abs());
+    let margin = f.mul_add(ulps * EPS, size, two_to(-100));
+    f.part();
+    f.difference(plane.offset, [(plane.slope[0], corner[0]), (plane.slope[1], corner[1])], margin) > bound
 }
 
 impl Certificates<'_> {
@@ -78,10 +90,9 @@ impl Certificates<'_> {
     fn tilted(&mut self, p: &Projected, facing: f32, slope: [f32; 2]) -> Value {
         let factors = [facing, slope[0], slope[1]];
         // Without a bar the slope's own quotient may be folded into the products: another slope, by a few roundings.
-        let mut factors_of_size = factors.map(f32::abs);
         let mut on = |factors: [f32; 3], values: [f32; 3]| {
             self.arithmetic.part();
-            let factors = if self.arithmetic.style.bars {
+            let factors = if self.arithmetic.style.slope_bars {
                 factors
             } else {
                 factors.map(|v| {
@@ -92,8 +103,7 @@ impl Certificates<'_> {
         };
         let center = on(factors, [p.z.center, p.x.center, p.y.center]);
         let half = [0, 1, 2].map(|k| on(factors, [p.z.half[k], p.x.half[k], p.y.half[k]]));
-        factors_of_size[0] = facing.abs();
-        let size = on(factors_of_size, [p.z.size, p.x.size, p.y.size]);
+        let size = on(factors.map(f32::abs), [p.z.size, p.x.size, p.y.size]);
         Value { center, size, half }
     }
 
@@ -119,7 +129,7 @@ impl Certificates<'_> {
         if !guess.slope.iter().all(|s| s.abs() <= STEEPEST) {
             return None;
         }
-        let mut slope = guess.slope.map(|s| if s.abs() >= LEAST_SLOPE { s } else { 0.0 });
+        let mut slope = guess.slope.map(|s| if s.abs() >= self.margins.flattest { s } else { 0.0 });
         let mut r = self.tilted(p, guess.facing, slope);
         let interval = ratio_interval(self.kind, &r, &p.w);
         let extent = interval[1] - interval[0];
@@ -161,18 +171,8 @@ impl Certificates<'_> {
         self.arithmetic.part();
         let depth = self.arithmetic.sub(depth, view.z_slope);
         planes.list.iter().any(|plane| {
-            let f = &mut *self.arithmetic;
             let corner = [0, 1].map(|k| sides[k][usize::from(plane.slope[k] > 0.0)]);
-            f.part();
-            let fall = [0, 1].map(|k| f.mul(plane.slope[k], corner[k]));
-            let bound = plane.facing * depth;
-            let size = plane.offset.abs() + fall[0].abs() + fall[1].abs() + bound.abs();
-            let margin = texel * EPS * size + if texel > 0.0 { two_to(-100) } else { 0.0 };
-            f.part();
-            f.difference(plane.offset, [(plane.slope[0], corner[0]), (plane.slope[1], corner[1])], margin) > bound
+            surely_beyond(plane, corner, plane.facing * depth, texel, self.arithmetic)
         })
     }
 }
-
-/// Flatter is flat.
-const LEAST_SLOPE: f32 = 0.0;
