@@ -32,6 +32,8 @@ struct Projected {
 
 // The bits of 2^16: steeper planes say nothing, and could overflow a product.
 const STEEPEST_BITS: u32 = 0x47800000u;
+// Flatter is flat: a subnormal slope could be flushed in one product and not in another, and X' may be large.
+const FLATTEST: f32 = 0x1p-100;
 
 // The sign that makes farther greater.
 fn farther_sign() -> f32 {
@@ -52,8 +54,9 @@ const BEYOND: f32 = 65536.0;
 fn proved_interval(r: Value, w: Value, w_min: f32) -> vec2<f32> {
     let guess = ratio_interval(r, w);
     let widened = 3.0 * error_bound(r, max(abs(guess.x), abs(guess.y)), w) / w_min;
-    let low = clamp(guess.x - widened, -BEYOND, BEYOND);
-    let high = clamp(guess.y + widened, -BEYOND, BEYOND);
+    // Barred: what is certified is what is returned.
+    let low = bar(clamp(guess.x - widened, -BEYOND, BEYOND));
+    let high = bar(clamp(guess.y + widened, -BEYOND, BEYOND));
     return vec2<f32>(
         select(-BEYOND, low, surely_above(r, low, w)),
         select(BEYOND, high, surely_below(r, high, w)));
@@ -72,13 +75,14 @@ fn supporting_planes(p: Projected) -> SupportingPlanes {
         if any((bitcast<vec2<u32>>(guess.slope) & vec2<u32>(0x7fffffffu)) > vec2<u32>(STEEPEST_BITS)) {
             continue;
         }
+        // Barred, so that no compiler moves the slope's own quotient into the products: that would certify another slope.
+        var slope = bar2(select(guess.slope, vec2<f32>(0.0), abs(guess.slope) < vec2<f32>(FLATTEST)));
         var r = Value(
-            guess.facing * p.z.center + guess.slope.x * p.x.center + guess.slope.y * p.y.center,
-            abs(guess.facing) * p.z.size + abs(guess.slope.x) * p.x.size + abs(guess.slope.y) * p.y.size,
-            guess.facing * p.z.half + guess.slope.x * p.x.half + guess.slope.y * p.y.half);
+            guess.facing * p.z.center + slope.x * p.x.center + slope.y * p.y.center,
+            abs(guess.facing) * p.z.size + abs(slope.x) * p.x.size + abs(slope.y) * p.y.size,
+            guess.facing * p.z.half + slope.x * p.x.half + slope.y * p.y.half);
         let interval = ratio_interval(r, p.w);
         let extent = interval.y - interval.x;
-        var slope = guess.slope;
         var least = interval.x;
         if !on_border(guess.own, least, extent) {
             // The other side of an outline is its other edge's; that of a front is a back.
@@ -89,7 +93,7 @@ fn supporting_planes(p: Projected) -> SupportingPlanes {
             r = Value(-r.center, r.size, -r.half);
             least = -interval.y;
         }
-        let offset = least - 3.0 * error_bound(r, least, p.w) / p.w_min;
+        let offset = bar(least - 3.0 * error_bound(r, least, p.w) / p.w_min);
         let small = all_small(vec4<u32>(bitcast<u32>(offset), 0u, 0u, 0u)) && r.size + abs(offset) * p.w.size < 0x1p60;
         if small && surely_above(r, offset, p.w) {
             planes.list[planes.count] = SupportingPlane(slope, guess.facing, offset);

@@ -43,6 +43,10 @@ fn bar(x: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(x) ^ view.runtime_zero);
 }
 
+fn bar2(x: vec2<f32>) -> vec2<f32> {
+    return bitcast<vec2<f32>>(bitcast<vec2<u32>>(x) ^ vec2<u32>(view.runtime_zero));
+}
+
 fn bar3(x: vec3<f32>) -> vec3<f32> {
     return bitcast<vec3<f32>>(bitcast<vec3<u32>>(x) ^ vec3<u32>(view.runtime_zero));
 }

@@ -200,7 +200,7 @@ mod tests {
     fn bars_stand_where_a_compiler_could_fold_what_cancels() {
         for kind in KINDS {
             let module = parse(&cull(SourceKind::Depth, kind));
-            for bar in ["bar", "bar3"] {
+            for bar in ["bar", "bar2", "bar3"] {
                 let (_, function) = module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(bar)).expect(bar);
                 let is_xor = |e: &naga::Expression| {
                     matches!(e, naga::Expression::Binary { op: naga::BinaryOperator::ExclusiveOr, .. })
@@ -210,6 +210,10 @@ mod tests {
             assert_eq!(calls(&module, "load_volume", "bar3"), 2, "{kind:?}: d_hi and d_lo");
             assert_eq!(calls(&module, "surely_behind", "bar"), 2, "d - A in both conventions");
             assert_eq!(calls(&module, "classify", "bar"), 2, "-A and 1 - A");
+            assert_eq!(calls(&module, "surely_clear", "bar"), 1, "d - A");
+            assert_eq!(calls(&module, "proved_interval", "bar"), 2, "both ends");
+            assert_eq!(calls(&module, "supporting_planes", "bar2"), 1, "slopes");
+            assert_eq!(calls(&module, "supporting_planes", "bar"), 1, "offsets");
         }
     }
 

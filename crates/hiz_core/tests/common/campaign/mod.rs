@@ -9,6 +9,7 @@
 mod arrays;
 mod checkpoint;
 mod class;
+mod fitted;
 mod report;
 mod scene;
 mod volume;
@@ -163,13 +164,18 @@ impl Round {
 
     /// The oracle's answer.
     pub(crate) fn outcome(&self, volume: &Volume) -> Outcome {
-        let coverage = match self.options.coverage {
-            Coverage::Area => hiz_ref::Coverage::Area,
-            Coverage::Sample => hiz_ref::Coverage::Sample,
-        };
         let own_depth = match self.options.fit {
             Fit::Rectangle => OwnDepth::Nearest,
             Fit::Volume => OwnDepth::PerPixel,
+        };
+        self.outcome_as(volume, own_depth)
+    }
+
+    /// The oracle's answer, a volume's own depth taken otherwise than the options say.
+    pub(crate) fn outcome_as(&self, volume: &Volume, own_depth: OwnDepth) -> Outcome {
+        let coverage = match self.options.coverage {
+            Coverage::Area => hiz_ref::Coverage::Area,
+            Coverage::Sample => hiz_ref::Coverage::Sample,
         };
         let options = Options { coverage, own_depth, ..Options::default() };
         hiz_ref::classify_with(&self.view, volume, &self.depth, options).expect("a finite view")

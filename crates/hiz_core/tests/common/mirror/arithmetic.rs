@@ -27,12 +27,14 @@ pub(crate) struct Style {
     pub(crate) fused: u32,
     /// Take sums in any order.
     pub(crate) reassociated: bool,
-    /// Subnormals are 0.
-    pub(crate) flushed: bool,
-    /// The rectangle is anything: it only chooses what is certified.
-    pub(crate) wild_rectangle: bool,
+    /// Subnormals are 0: in 1 of `n` operations at random, 1: in all, 0: in none.
+    pub(crate) flushed: u32,
+    /// The rectangle is anything, and so are the slopes and offsets of a volume fit: they only choose what is certified.
+    pub(crate) wild: bool,
     /// `bar` and `bar3` stop the compiler from folding a difference that cancels into what it was made of.
     pub(crate) bars: bool,
+    /// `bar2` stops it from folding the quotient that a slope is into what it is multiplied with.
+    pub(crate) slope_bars: bool,
 }
 
 const PLAIN: Style = Style {
@@ -40,9 +42,10 @@ const PLAIN: Style = Style {
     rounding: Rounding::Nearest,
     fused: 0,
     reassociated: false,
-    flushed: false,
-    wild_rectangle: false,
+    flushed: 0,
+    wild: false,
     bars: true,
+    slope_bars: true,
 };
 
 /// What reassociation may do where no bar stops it; no style that the margin covers.
@@ -57,20 +60,13 @@ pub(crate) const STYLES: [Style; 14] = [
     Style { name: "up or down by part", rounding: Rounding::EitherByPart, ..PLAIN },
     Style { name: "fused", fused: 1, ..PLAIN },
     Style { name: "reassociated", reassociated: true, ..PLAIN },
-    Style { name: "flushed", flushed: true, ..PLAIN },
+    Style { name: "flushed", flushed: 1, ..PLAIN },
     Style { name: "fused, up", fused: 1, rounding: Rounding::Up, ..PLAIN },
     Style { name: "fused, down", fused: 1, rounding: Rounding::Down, ..PLAIN },
-    Style { name: "all, up or down", rounding: Rounding::Either, fused: 2, reassociated: true, flushed: true, ..PLAIN },
-    Style {
-        name: "all, by part",
-        rounding: Rounding::EitherByPart,
-        fused: 2,
-        reassociated: true,
-        flushed: true,
-        ..PLAIN
-    },
-    Style { name: "wild rectangle", wild_rectangle: true, ..PLAIN },
-    Style { name: "wild, by part", wild_rectangle: true, rounding: Rounding::EitherByPart, ..PLAIN },
+    Style { name: "all, up or down", rounding: Rounding::Either, fused: 2, reassociated: true, flushed: 1, ..PLAIN },
+    Style { name: "all, by part", rounding: Rounding::EitherByPart, fused: 2, reassociated: true, flushed: 1, ..PLAIN },
+    Style { name: "wild guesses", wild: true, ..PLAIN },
+    Style { name: "wild, by part", wild: true, rounding: Rounding::EitherByPart, ..PLAIN },
 ];
 
 /// One device's float32.
@@ -100,8 +96,10 @@ impl Arithmetic {
         self.random.below(n)
     }
 
-    fn flush(&self, v: f32) -> f32 {
-        if self.style.flushed && v.is_subnormal() { 0.0 } else { v }
+    fn flush(&mut self, v: f32) -> f32 {
+        let n = self.style.flushed;
+        let flushes = n != 0 && v.is_subnormal() && (n == 1 || self.random.below(n) == 0);
+        if flushes { 0.0 } else { v }
     }
 
     /// The float32 that the exact number `value + rest` becomes; `nearest` is what to nearest makes of it.
@@ -172,6 +170,18 @@ impl Arithmetic {
         }
     }
 
+    /// `from` less two products and `margin`, in the order that is written or any other.
+    pub(crate) fn difference(&mut self, from: f32, products: [(f32, f32); 2], margin: f32) -> f32 {
+        let [(a, b), (c, d)] = products;
+        // As products: those of 1 are exact, fused or not.
+        let mut terms = [(from, 1.0), (-a, b), (-c, d), (-margin, 1.0)];
+        if self.style.reassociated {
+            (0..3).for_each(|k| terms.swap(k, k + self.random.below(4 - k as u32) as usize));
+        }
+        let first = self.mul(terms[0].0, terms[0].1);
+        terms[1..].iter().fold(first, |sum, (a, b)| self.mul_add(*a, *b, sum))
+    }
+
     pub(crate) fn sum(&mut self, mut v: [f32; 3]) -> f32 {
         if self.style.reassociated {
             v.swap(0, self.random.below(3) as usize);
@@ -180,6 +190,20 @@ impl Arithmetic {
         self.add(sum, v[2])
     }
 }
+
+/// What a volume fit has to stand besides [`STYLES`]: subnormals flushed in one place and not in another.
+pub(crate) const WILDEST: Style = Style {
+    name: "all, wild",
+    rounding: Rounding::EitherByPart,
+    fused: 2,
+    reassociated: true,
+    flushed: 2,
+    wild: true,
+    ..PLAIN
+};
+
+/// The same, and slopes that are certified are not those that are compared with.
+pub(crate) const WITHOUT_SLOPE_BARS: Style = Style { name: "no bars at slopes", slope_bars: false, ..WILDEST };
 
 /// Knuth's: the float64 sum, and what it lost, exactly.
 fn two_sum(a: f64, b: f64) -> (f64, f64) {

@@ -1,14 +1,20 @@
 //! The cull shader once more, on the host: the same words in, the same steps, but the arithmetic is an argument. It shows what
-//! the certificates would do on devices that round, fuse, reassociate and flush otherwise than the ones at hand. (No descent: its
-//! certificates are the footprint's.)
+//! the certificates would do on devices that round, fuse, reassociate and flush otherwise than the ones at hand.
+#![allow(dead_code, unused_imports, reason = "each test binary uses its own part")]
+
 mod arithmetic;
+mod guesses;
+mod loss;
+mod planes;
 mod volume;
 
-use hiz_core::{BoundsKind, CullOptions, Footprint};
+use hiz_core::{BoundsKind, CullOptions, ERROR_ULPS, Fit, Footprint};
 
 use crate::campaign::{Arrays, Round};
 
-pub(crate) use arithmetic::{Arithmetic, STYLES, Style, WITHOUT_BARS};
+pub(crate) use arithmetic::{Arithmetic, STYLES, Style, WILDEST, WITHOUT_BARS, WITHOUT_SLOPE_BARS};
+pub(crate) use loss::{Loss, texel_loss};
+use planes::Projected;
 use volume::Volume;
 
 const EPS: f32 = 1.0 / 8_388_608.0;
@@ -17,6 +23,31 @@ const LEAST_NORMAL: f32 = f32::MIN_POSITIVE;
 /// `2^n`.
 fn two_to(n: i32) -> f32 {
     2.0_f32.powi(n)
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// How many eps a certificate, and how many a texel's comparison with a supporting plane keeps back.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Margins {
+    pub(crate) certificate: f32,
+    pub(crate) texel: f32,
+    /// `FLATTEST`.
+    pub(crate) flattest: f32,
+}
+
+impl Margins {
+    /// The shader's.
+    pub(crate) const FULL: Self =
+        Self { certificate: ERROR_ULPS as f32, texel: 8.0, flattest: f32::from_bits((127 - 100) << 23) };
+}
+
+impl From<f32> for Margins {
+    fn from(certificate: f32) -> Self {
+        Self { certificate, ..Self::FULL }
+    }
 }
 
 /// A linear function and its magnitudes (`view.wgsl`, `Row`).
@@ -41,6 +72,8 @@ struct View {
     reach: f32,
     depth_factor: f32,
     size: [i32; 2],
+    descent_budget: u32,
+    depth_offset: f32,
 }
 
 impl View {
@@ -62,6 +95,8 @@ impl View {
             reach: one(42),
             depth_factor: one(43),
             size: [words[44] as i32, words[45] as i32],
+            descent_budget: words[48],
+            depth_offset: one(49),
         }
     }
 }
@@ -81,6 +116,8 @@ pub(crate) struct Mirror {
     reversed: bool,
     sample_coverage: bool,
     footprint_log2: u32,
+    descent: bool,
+    fit_volume: bool,
     levels: Vec<hiz_ref::Level>,
     words: Vec<(BoundsKind, Vec<u32>)>,
 }
@@ -88,7 +125,7 @@ pub(crate) struct Mirror {
 impl Mirror {
     /// Nothing for a camera that is refused.
     pub(crate) fn new(round: &Round) -> Option<Self> {
-        let CullOptions { footprint, coverage, .. } = round.options;
+        let CullOptions { footprint, coverage, descent, fit, .. } = round.options;
         let view = View::new(&hiz_core::words::view(&round.camera, &round.options).ok()?);
         let words = round
             .volumes
@@ -107,6 +144,8 @@ impl Mirror {
                 Footprint::Four => 2,
                 Footprint::Eight => 3,
             },
+            descent: descent > 0,
+            fit_volume: fit == Fit::Volume,
             levels: hiz_ref::pyramid(&round.depth, round.view.width, round.view.height, round.view.reversed),
             words,
         })
@@ -121,19 +160,25 @@ impl Mirror {
         self
     }
 
-    /// What is kept, for each kind, with the margin `error_ulps`.
-    pub(crate) fn masks(&self, error_ulps: f32, arithmetic: &mut Arithmetic) -> Vec<Vec<bool>> {
+    /// What is kept, for each kind.
+    pub(crate) fn masks(&self, margins: impl Into<Margins>, arithmetic: &mut Arithmetic) -> Vec<Vec<bool>> {
+        let margins = margins.into();
         self.words
             .iter()
             .map(|(kind, words)| {
                 let stride = kind.record_bytes() as usize / 4;
-                words.chunks_exact(stride).map(|record| !self.culls(*kind, record, error_ulps, arithmetic)).collect()
+                words.chunks_exact(stride).map(|record| !self.culls(*kind, record, margins, arithmetic)).collect()
             })
             .collect()
     }
 
     /// Whether a volume is culled.
-    pub(crate) fn culls_volume(&self, volume: &hiz_ref::Volume, error_ulps: f32, arithmetic: &mut Arithmetic) -> bool {
+    pub(crate) fn culls_volume(
+        &self,
+        volume: &hiz_ref::Volume,
+        margins: impl Into<Margins>,
+        arithmetic: &mut Arithmetic,
+    ) -> bool {
         let kind = match volume {
             hiz_ref::Volume::Sphere { .. } => BoundsKind::Sphere,
             hiz_ref::Volume::Box { .. } => BoundsKind::Box,
@@ -141,14 +186,14 @@ impl Mirror {
         };
         let arrays = Arrays::new(std::slice::from_ref(volume));
         let record = hiz_core::words::instances(&arrays.bounds(kind)).expect("arrays that agree");
-        self.culls(kind, &record, error_ulps, arithmetic)
+        self.culls(kind, &record, margins.into(), arithmetic)
     }
 
     /// `classify.wgsl`, `classify`; the numbers are its steps.
-    fn culls(&self, kind: BoundsKind, record: &[u32], error_ulps: f32, arithmetic: &mut Arithmetic) -> bool {
+    fn culls(&self, kind: BoundsKind, record: &[u32], margins: Margins, arithmetic: &mut Arithmetic) -> bool {
         let view = &self.view;
         let Some(volume) = Volume::load(kind, record, view, arithmetic) else { return false };
-        let mut c = Certificates { kind, error_ulps, arithmetic };
+        let mut c = Certificates { kind, margins, arithmetic };
         let [x, y, z, w] = [&view.x, &view.y, &view.z, &view.w].map(|row| c.value_of(row, &volume));
         let a = view.z_slope;
 
@@ -179,7 +224,7 @@ impl Mirror {
             let widest = from.abs().max(to.abs());
             let widening = 1.25 * c.error_bound(r, widest, &w) / w_min + 4.0 * EPS * view.half_size[k] + view.reach;
             [first[k], last[k]] = pixel_interval([from, to], widening, view.half_size[k], view.size[k]);
-            if c.arithmetic.style.wild_rectangle && view.size[k] > 0 {
+            if c.arithmetic.style.wild && view.size[k] > 0 {
                 let wild = [0; 2].map(|_| c.arithmetic.below(view.size[k] as u32) as i32);
                 if c.arithmetic.below(4) == 0 {
                     [first[k], last[k]] = [wild[0].min(wild[1]), wild[0].max(wild[1])];
@@ -206,11 +251,80 @@ impl Mirror {
         }
         let (from, to) = (first.map(|v| v >> level), last.map(|v| v >> level));
 
-        // 5. All of it is farther than the farthest depth there, and 6. the texels were those of all pixels that matter.
+        // 5. All of it is farther than the farthest depth there, or 5a. than the depths in finer levels, each texel by itself.
         let farthest = self.farthest(level as usize, from, to);
-        self.surely_behind(farthest, &z, &w, &mut c)
-            && c.inside_block(&x, &w, from[0], to[0], level, view, 0)
-            && c.inside_block(&y, &w, from[1], to[1], level, view, 1)
+        let block = if self.surely_behind(farthest, &z, &w, &mut c) {
+            (from, to, level)
+        } else if (self.descent && level > 0) || self.fit_volume {
+            if !self.descends(level, [from, to], [first, last], &Projected { x, y, z, w, w_min }, &mut c) {
+                return false;
+            }
+            (first, last, 0)
+        } else {
+            return false;
+        };
+
+        // 6. The texels were those of all pixels that matter.
+        let (from, to, level) = block;
+        c.inside_block(&x, &w, from[0], to[0], level, view, 0) && c.inside_block(&y, &w, from[1], to[1], level, view, 1)
+    }
+
+    /// `descend`.
+    fn descends(
+        &self,
+        level: u32,
+        [from, to]: [[u32; 2]; 2],
+        [first, last]: [[u32; 2]; 2],
+        p: &Projected,
+        c: &mut Certificates<'_>,
+    ) -> bool {
+        let planes = self.fit_volume.then(|| c.supporting_planes(p, self.reversed));
+        let mut left = self.view.descent_budget + (to[0] - from[0] + 1) * (to[1] - from[1] + 1);
+        let mut waiting = vec![];
+        let mut next = (level, from, to);
+        loop {
+            let (level, from, to) = next;
+            for y in from[1]..=to[1] {
+                for x in from[0]..=to[0] {
+                    if left == 0 {
+                        return false;
+                    }
+                    left -= 1;
+                    let texels = &self.levels[level as usize];
+                    let stored = texels.texels[(y * texels.width + x) as usize];
+                    if self.surely_behind(stored, &p.z, &p.w, c) {
+                        continue;
+                    }
+                    if let Some(planes) = &planes {
+                        let begin = [0, 1].map(|k| ([x, y][k] << level).max(first[k]));
+                        let end = [0, 1].map(|k| (([x, y][k] + 1) << level).min(last[k] + 1));
+                        c.arithmetic.part();
+                        let depth = self.occluding_depth(stored, c);
+                        if c.surely_clear(planes, begin, end, depth, &self.view) {
+                            continue;
+                        }
+                    }
+                    if level == 0 || !self.descent {
+                        return false;
+                    }
+                    waiting.push((level, [x, y]));
+                }
+            }
+            let Some((level, parent)) = waiting.pop() else { return true };
+            let corner = parent.map(|v| 2 * v);
+            let level = level - 1;
+            next = (
+                level,
+                [0, 1].map(|k| corner[k].max(first[k] >> level)),
+                [0, 1].map(|k| (corner[k] + 1).min(last[k] >> level)),
+            );
+        }
+    }
+
+    /// `occluding_depth`.
+    fn occluding_depth(&self, stored: f32, c: &mut Certificates<'_>) -> f32 {
+        let stored = if self.reversed { stored.min(1.0) } else { stored.max(LEAST_NORMAL) };
+        c.arithmetic.mul_add(stored, self.view.depth_factor, self.view.depth_offset)
     }
 
     fn farthest(&self, level: usize, from: [u32; 2], to: [u32; 2]) -> f32 {
@@ -232,11 +346,10 @@ impl Mirror {
     fn surely_behind(&self, stored: f32, z: &Value, w: &Value, c: &mut Certificates<'_>) -> bool {
         let view = &self.view;
         c.arithmetic.part();
+        let d = self.occluding_depth(stored, c);
         if self.reversed {
-            let d = c.arithmetic.mul(stored.min(1.0), view.depth_factor);
             return d >= LEAST_NORMAL && c.surely_deeper(-1.0, z, d, view.z_slope, w);
         }
-        let d = c.arithmetic.mul(stored.max(LEAST_NORMAL), view.depth_factor);
         d < 1.0 && c.surely_deeper(1.0, z, d, view.z_slope, w)
     }
 }
@@ -251,7 +364,7 @@ fn pixel_interval([from, to]: [f32; 2], margin: f32, half_size: f32, size: i32) 
 /// `certificate.wgsl`, for one kind of volume in one arithmetic.
 struct Certificates<'a> {
     kind: BoundsKind,
-    error_ulps: f32,
+    margins: Margins,
     arithmetic: &'a mut Arithmetic,
 }
 
@@ -269,7 +382,7 @@ impl Certificates<'_> {
 
     fn error_bound(&mut self, r: &Value, t: f32, w: &Value) -> f32 {
         let sizes = self.arithmetic.mul_add(t.abs(), w.size, r.size);
-        self.arithmetic.mul_add(self.error_ulps * EPS, sizes, two_to(-70))
+        self.arithmetic.mul_add(self.margins.certificate * EPS, sizes, two_to(-70))
     }
 
     fn support(&mut self, half: [f32; 3]) -> f32 {

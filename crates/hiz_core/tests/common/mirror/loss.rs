@@ -1,0 +1,132 @@
+//! How many eps the arithmetic really loses: what a certificate or a texel's comparison claims, against the same in float64.
+
+use hiz_ref::Volume as Exact;
+
+use super::planes::{Plane, Projected, surely_beyond};
+use super::volume::Volume;
+use super::{Arithmetic, Certificates, EPS, Margins, Mirror, two_to};
+use crate::campaign::Round;
+
+/// The most that was lost, and of how many claims.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Loss {
+    pub(crate) eps: f64,
+    pub(crate) claims: usize,
+}
+
+impl Loss {
+    pub(crate) fn add(&mut self, other: Self) {
+        self.eps = self.eps.max(other.eps);
+        self.claims += other.claims;
+    }
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+impl Mirror {
+    /// What the certificates of the supporting planes of the round's one volume lose, their offsets moved to where they just
+    /// hold: the margin, less what is left of it in float64. In a wild arithmetic, for it alone moves offsets.
+    pub(crate) fn loss(&self, round: &Round, arithmetic: &mut Arithmetic) -> Loss {
+        let mut loss = Loss::default();
+        let (kind, words) = &self.words[0];
+        let view = &self.view;
+        let Some(volume) = Volume::load(*kind, words, view, arithmetic) else { return loss };
+        let mut c = Certificates { kind: *kind, margins: Margins::FULL, arithmetic };
+        let [x, y, z, w] = [&view.x, &view.y, &view.z, &view.w].map(|row| c.value_of(row, &volume));
+        let w_min = w.center - c.support(w.half) - c.error_bound(&w, 0.0, &w);
+        if w_min.is_nan() || w_min <= 0.0 {
+            return loss;
+        }
+        let planes = c.supporting_planes(&Projected { x, y, z, w, w_min }, self.reversed);
+        for plane in &planes.list {
+            let [sx, sy] = plane.slope.map(f32::abs);
+            let size = f64::from(plane.facing.abs() * z.size + sx * x.size + sy * y.size + plane.offset.abs() * w.size);
+            let unit = f64::from(EPS) * size;
+            let Some(left) = self.left(round, plane, 0.02 * unit) else { continue };
+            if unit > f64::from(two_to(-50)) {
+                loss.add(Loss { eps: f64::from(Margins::FULL.certificate) - left / unit, claims: 1 });
+            }
+        }
+        loss
+    }
+
+    /// The least of `facing Z' + slope . (X', Y') - offset W'` on the volume, in float64; nothing where that is off by more than
+    /// `tolerance`.
+    fn left(&self, round: &Round, plane: &Plane, tolerance: f64) -> Option<f64> {
+        let (rows, origin) = (&round.view.rows, round.view.origin);
+        // The rows that the shader reads are these times a power of two.
+        let k = (0..4).max_by(|a, b| rows[3][*a].abs().total_cmp(&rows[3][*b].abs())).expect("four");
+        let perspective = rows[3][..3].iter().any(|v| *v != 0.0);
+        let k = if perspective && k == 3 {
+            (0..3).max_by(|a, b| rows[3][*a].abs().total_cmp(&rows[3][*b].abs())).expect("three")
+        } else {
+            k
+        };
+        let scale = (f64::from(self.view.w.m[k]) / rows[3][k]).log2().round().exp2();
+        let (facing, offset) = (f64::from(plane.facing), f64::from(plane.offset));
+        let [sx, sy] = plane.slope.map(f64::from);
+        let [half_width, half_height] = self.view.half_size.map(f64::from);
+        let slope = f64::from(self.view.z_slope);
+        let factors = [sx * half_width, -sy * half_height, facing, -(facing * slope + offset)].map(|v| v * scale);
+        let row: [f64; 4] = std::array::from_fn(|k| (0..4).map(|r| factors[r] * rows[r][k]).sum());
+        let sizes: [f64; 4] = std::array::from_fn(|k| (0..4).map(|r| (factors[r] * rows[r][k]).abs()).sum());
+        let linear = [row[0], row[1], row[2]];
+        let about = |p: [f64; 3]| dot(linear, [0, 1, 2].map(|k| p[k] - origin[k])) + row[3];
+        let far =
+            |p: [f64; 3], h: f64| (0..3).map(|k| sizes[k] * (p[k].abs() + origin[k].abs() + h)).sum::<f64>() + sizes[3];
+        let (least, magnitude) = match &round.volumes[0].1[0] {
+            Exact::Sphere { center, radius } => {
+                (about(*center) - radius * dot(linear, linear).sqrt(), far(*center, *radius))
+            }
+            Exact::Box { min, max } => {
+                let center = [0, 1, 2].map(|k| 0.5 * (min[k] + max[k]));
+                let half = [0, 1, 2].map(|k| 0.5 * (max[k] - min[k]));
+                (about(center) - dot(linear.map(f64::abs), half), far(center, half[0] + half[1] + half[2]))
+            }
+            Exact::OrientedBox { center, half_sizes, axes } => {
+                let support = |k: usize| (half_sizes[k] * dot(linear, axes.map(|row| row[k]))).abs();
+                (about(*center) - (0..3).map(support).sum::<f64>(), far(*center, half_sizes.iter().sum()))
+            }
+        };
+        (16.0 * f64::EPSILON * magnitude < tolerance).then_some(least)
+    }
+}
+
+/// What a texel's comparison with a plane loses: random terms that nearly cancel, offsets moved to where it just holds with 8 eps.
+pub(crate) fn texel_loss(cases: usize, arithmetic: &mut Arithmetic) -> Loss {
+    let mut loss = Loss::default();
+    for _ in 0..cases {
+        let mut any = |most: i32| {
+            let unit = arithmetic.below(1 << 24) as f32 / (1 << 23) as f32 - 1.0;
+            unit * two_to(-(arithmetic.below(12) as i32)) * two_to(most)
+        };
+        let slope = [any(6), any(6)];
+        let corner = [any(8), any(8)].map(|v| (v * 256.0).round() / 256.0);
+        // `bound` is a depth less z_slope, both float32.
+        let (depth, z_slope) = (any(0).abs(), any(0));
+        let exact = f64::from(depth) - f64::from(z_slope);
+        let bound = arithmetic.sub(depth, z_slope);
+        let falls = [0, 1].map(|k| f64::from(slope[k]) * f64::from(corner[k]));
+        let near = falls[0] + falls[1] + exact;
+        let size = near.abs() + falls[0].abs() + falls[1].abs() + exact.abs();
+        let at = |s: f64| Plane { slope, facing: 1.0, offset: (near + s * f64::from(EPS) * size) as f32 };
+        let (mut open, mut proved) = (0.0, 20.0);
+        for _ in 0..10 {
+            let middle = 0.5 * (open + proved);
+            if surely_beyond(&at(middle), corner, bound, Margins::FULL.texel, arithmetic) {
+                proved = middle;
+            } else {
+                open = middle;
+            }
+        }
+        let plane = at(proved);
+        if surely_beyond(&plane, corner, bound, Margins::FULL.texel, arithmetic) {
+            let unit = f64::from(EPS) * (f64::from(plane.offset.abs()) + falls[0].abs() + falls[1].abs() + exact.abs());
+            let left = f64::from(plane.offset) - near;
+            loss.add(Loss { eps: f64::from(Margins::FULL.texel) - left / unit, claims: 1 });
+        }
+    }
+    loss
+}
