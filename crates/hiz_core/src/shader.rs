@@ -208,7 +208,8 @@ mod tests {
                 assert!(function.expressions.iter().any(|(_, e)| is_xor(e)), "{bar}");
             }
             assert_eq!(calls(&module, "load_volume", "bar3"), 2, "{kind:?}: d_hi and d_lo");
-            assert_eq!(calls(&module, "surely_behind", "bar"), 2, "d - A in both conventions");
+            assert_eq!(calls(&module, "surely_behind", "bar"), 1, "d - A");
+            assert_eq!(calls(&module, "occluding_depth", "bar"), 1, "the depth that slack has moved");
             assert_eq!(calls(&module, "classify", "bar"), 2, "-A and 1 - A");
             assert_eq!(calls(&module, "surely_clear", "bar"), 1, "d - A");
             assert_eq!(calls(&module, "proved_interval", "bar"), 2, "both ends");
