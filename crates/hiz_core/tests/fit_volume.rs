@@ -34,10 +34,11 @@ fn run(
     rounds: usize,
     coverage: Coverage,
     modes: &'static [(Footprint, u32)],
+    sharp: bool,
 ) -> Tally {
     let mut tally = Tally::default();
     let campaign = Campaign { seed, rounds, volumes: 4, coverage, modes, fit: Fit::Volume, ..Campaign::default() };
-    for round in campaign.fitted(kinds, false) {
+    for round in campaign.fitted(kinds, sharp) {
         // Nothing for a camera that float32 cannot hold.
         let Some(masks) = round.masks(engine) else { continue };
         let (kind, volume, culled) = (round.volumes[0].0, &round.volumes[0].1[0], !masks[0][0]);
@@ -68,10 +69,10 @@ fn no_false_cull_on_depth_that_fits() {
         (33, Coverage::Area, &[BoundsKind::OrientedBox], &[(Footprint::Eight, 0)]),
     ];
     for (seed, coverage, kinds, mode) in modes {
-        let tally = run(engine(), kinds, seed, 30, coverage, mode);
+        let tally = run(engine(), kinds, seed, 15, coverage, mode, false);
         eprintln!("{coverage:?} {mode:?}: {tally:?}");
         assert_eq!(tally.false_culls, 0);
-        assert!(tally.gained > tally.to_gain / 50, "{tally:?}");
+        assert!(tally.gained > tally.to_gain / 100, "{tally:?}");
     }
 }
 
@@ -99,7 +100,7 @@ fn planted_faults_turn_it_red() {
     ];
     for (name, faults) in planted {
         let engine = Engine::with_planted_faults(None, faults).expect("the device tests need a Vulkan driver");
-        let tally = run(&engine, &[BoundsKind::OrientedBox], 34, 60, Coverage::Area, &[(Footprint::Two, 4096)]);
+        let tally = run(&engine, &[BoundsKind::OrientedBox], 34, 20, Coverage::Area, &[(Footprint::Two, 4096)], true);
         eprintln!("{name}: {tally:?}");
         assert!(tally.false_culls > 0, "{name}: stayed green: {tally:?}");
     }
