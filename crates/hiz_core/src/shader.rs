@@ -218,6 +218,17 @@ mod tests {
         }
     }
 
+    /// A guess is mostly right, so that no verdict shows whether it was proved.
+    #[test]
+    fn every_plane_and_side_is_certified() {
+        for kind in KINDS {
+            let module = parse(&cull(SourceKind::Depth, kind));
+            assert_eq!(calls(&module, "supporting_planes", "surely_above"), 1, "{kind:?}: a plane's offset");
+            assert_eq!(calls(&module, "proved_interval", "surely_above"), 1, "{kind:?}: left and top");
+            assert_eq!(calls(&module, "proved_interval", "surely_below"), 1, "{kind:?}: right and bottom");
+        }
+    }
+
     #[test]
     fn constants_agree_with_the_shaders() {
         let margin = format!("ERROR_ULPS: f32 = {:.1};", crate::view::ERROR_ULPS);

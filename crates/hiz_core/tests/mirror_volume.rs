@@ -9,7 +9,8 @@ mod mirror;
 
 use campaign::{Campaign, KINDS, Round};
 use common::engine;
-use hiz_core::{Coverage, Fit, Footprint};
+use hiz_core::headless::Engine;
+use hiz_core::{BoundsKind, Coverage, Fit, Footprint};
 use hiz_ref::Verdict;
 use mirror::{Arithmetic, Loss, Margins, Mirror, STYLES, Style, WILDEST, WITHOUT_SLOPE_BARS, texel_loss};
 
@@ -91,7 +92,7 @@ impl std::fmt::Display for Power {
 fn to_nearest_it_agrees_with_the_device() {
     let (mut cases, mut culled, mut kept_by_mirror, mut kept_by_device, mut false_culls) = (0, 0, 0, 0, 0);
     for (seed, any_slack) in [(51, false), (59, true)] {
-        let campaign = Campaign { rounds: 12, modes: DESCENTS, any_slack, ..campaign(seed, Coverage::Area) };
+        let campaign = Campaign { rounds: 6, modes: DESCENTS, any_slack, ..campaign(seed, Coverage::Area) };
         for round in campaign.fitted(&KINDS, false) {
             let (Some(mirror), Some(device)) = (Mirror::new(&round), round.masks(engine())) else { continue };
             let ours = mirror.masks(Margins::FULL, &mut Arithmetic::new(STYLES[0], 0))[0][0];
@@ -113,54 +114,153 @@ fn to_nearest_it_agrees_with_the_device() {
     assert!(kept_by_mirror + kept_by_device <= cases / 400, "the device computes something else");
 }
 
+type Fault = (&'static str, &'static [(&'static str, &'static str)]);
+
+/// What the oracle does not see in `fit_volume.rs`, for it knows neither slack nor guard.
+const FAULTS: &[Fault] = &[
+    ("no slack", &[("bar(occluding_depth(bits) - view.z_slope)", "bar(bitcast<f32>(bits) - view.z_slope)")]),
+    ("no guard, left and top", &[("vec2<f32>(begin) - view.reach", "vec2<f32>(begin)")]),
+    ("no guard, right and bottom", &[("vec2<f32>(end) + view.reach", "vec2<f32>(end)")]),
+];
+
+/// More of them: a minute.
+const MORE_FAULTS: &[Fault] = &[
+    ("the other convention's front", &[("return select(1.0, -1.0, REVERSED);", "return 1.0;")]),
+    (
+        "sides that nothing proves",
+        &[("guess.x - widened", "guess.x + widened + 0.1"), ("select(-BEYOND, low, surely_above(r, low, w))", "low")],
+    ),
+    ("a column's fall alone", &[("plane.offset - fall.x - fall.y", "plane.offset - fall.x")]),
+    (
+        "an offset of 0 for edges",
+        &[("slope, guess.facing, offset)", "slope, guess.facing, abs(guess.facing) * offset)")],
+    ),
+    (
+        "a texel's first pixel alone",
+        &[("(corner + vec2<u32>(1u)) << vec2<u32>(child)", "(corner << vec2<u32>(child)) + vec2<u32>(1u)")],
+    ),
+    (
+        "another plane's offset",
+        &[(
+            "let plane = (*planes).list[i];",
+            "var plane = (*planes).list[i]; plane.offset = (*planes).list[0].offset;",
+        )],
+    ),
+    ("one side for both axes", &[("plane.slope > vec2<f32>(0.0)", "vec2<bool>(plane.slope.x > 0.0)")]),
+    (
+        "no certificate, no margin",
+        &[
+            ("small && surely_above(r, offset, p.w)", "small"),
+            ("bar(least - 3.0 * error_bound(r, least, p.w) / p.w_min)", "least + 1e-4 * extent"),
+        ],
+    ),
+    ("a margin without the slopes", &[("+ abs(slope.x) * p.x.size + abs(slope.y) * p.y.size", "")]),
+    (
+        "a descent that forgets a row",
+        &[(
+            "begin = max(corner, first >> vec2<u32>(child));",
+            "begin = max(corner + vec2<u32>(0u, 1u), first >> vec2<u32>(child));",
+        )],
+    ),
+];
+
+/// What the device culls beyond the mirror is more with each fault than without any. (One kind, one convention: each compiles anew.)
+fn assert_seen(kinds: &'static [BoundsKind], faults: &[Fault]) {
+    let rounds: Vec<_> = [(61, false), (62, true), (63, true), (64, true)]
+        .into_iter()
+        .flat_map(|(seed, any_slack)| {
+            let campaign =
+                Campaign { rounds: 8, volumes: 4, modes: DESCENTS, any_slack, ..campaign(seed, Coverage::Area) };
+            campaign.fitted(kinds, false).filter(|round| round.view.reversed)
+        })
+        .filter_map(|round| {
+            let kept = Mirror::new(&round)?.masks(Margins::FULL, &mut Arithmetic::new(STYLES[0], 0))[0][0];
+            Some((round, kept))
+        })
+        .collect();
+    let more = |engine: &Engine| {
+        let culled = |(round, kept): &&(Round, bool)| *kept && !round.masks(engine).expect("the mirror took it")[0][0];
+        rounds.iter().filter(culled).count()
+    };
+    let without = more(engine());
+    for (name, planted) in faults {
+        let with = more(&Engine::with_planted_faults(None, planted).expect("the device tests need a Vulkan driver"));
+        eprintln!("{name}: of {} the device culls {with} beyond the mirror, without the fault {without}", rounds.len());
+        assert!(with > without, "{name}: stayed green");
+    }
+}
+
+#[test]
+fn it_sees_what_is_planted_in_the_device() {
+    assert_seen(&[BoundsKind::Sphere], FAULTS);
+}
+
+#[test]
+#[ignore = "a minute: make soak"]
+fn it_sees_more_of_what_is_planted_in_the_device() {
+    assert_seen(&[BoundsKind::OrientedBox], MORE_FAULTS);
+}
+
+/// Every arithmetic, and the one that does everything at once.
+fn styles() -> Vec<Style> {
+    [&STYLES[..], &[WILDEST]].concat()
+}
+
 #[test]
 fn no_arithmetic_gives_a_false_cull() {
-    let styles = [&STYLES[..], &[WILDEST]].concat();
-    for (seed, coverage) in [(53, Coverage::Area), (54, Coverage::Sample)] {
-        for sharp in [false, true] {
-            let start = std::time::Instant::now();
-            let rounds = Campaign { rounds: 6, ..campaign(seed, coverage) }.fitted(&KINDS, sharp);
-            let power = Power::of(&styles, &[Margins::FULL], rounds);
-            eprintln!("{coverage:?}, sharp {sharp}: {:?}\n{power}", start.elapsed());
-            assert_eq!(power.total(), 0);
-        }
+    for (seed, coverage, sharp) in
+        [(53, Coverage::Area, false), (54, Coverage::Sample, false), (55, Coverage::Area, true)]
+    {
+        let rounds = Campaign { rounds: 8, ..campaign(seed, coverage) }.fitted(&KINDS, sharp);
+        let power = Power::of(&styles(), &[Margins::FULL], rounds);
+        eprintln!("{coverage:?}, sharp {sharp}\n{power}");
+        assert_eq!(power.total(), 0);
+        assert!(power.culled[0][0] > power.cases / 20, "few culls prove little");
     }
 }
 
+/// With a 24th of the margin, and none for texels, bent arithmetics err; with none at all each does.
 #[test]
 fn with_less_margin_some_do() {
-    let styles = [&STYLES[..], &[WILDEST, WITHOUT_SLOPE_BARS]].concat();
-    let margins = [(24.0, 8.0), (24.0, 0.0), (1.0, 8.0), (0.0, 8.0), (1.0, 0.0), (0.0, 0.0)]
-        .map(|(certificate, texel)| Margins { certificate, texel, ..Margins::FULL });
-    for sharp in [false, true] {
-        let start = std::time::Instant::now();
-        let rounds = Campaign { rounds: 10, ..campaign(55, Coverage::Area) }.fitted(&KINDS, sharp);
-        let power = Power::of(&styles, &margins, rounds);
-        eprintln!("sharp {sharp}: {:?}\n{power}", start.elapsed());
-    }
+    let margins = [(1.0, 8.0), (1.0, 0.0), (0.0, 8.0), (0.0, 0.0)].map(|(certificate, texel)| Margins {
+        certificate,
+        texel,
+        ..Margins::FULL
+    });
+    let rounds = Campaign { rounds: 8, ..campaign(55, Coverage::Area) }.fitted(&KINDS, true);
+    let power = Power::of(&styles(), &margins, rounds);
+    eprintln!("{power}");
+    let bent = |k: usize| power.false_culls.iter().map(|counts| counts[k]).sum::<usize>();
+    assert!(bent(0) > 0, "a 24th of the margin, and green");
+    assert!(bent(3) > bent(2), "no margin for texels, and the same");
+    assert!(power.false_culls.iter().all(|counts| counts[3] > 0), "no margin, and green");
 }
 
-/// What is lost of the 24 eps of a tilted row's certificate, and of the 8 of a texel's comparison.
+/// What is really lost of the 24 eps of a tilted row's certificate, and of the 8 of a texel's comparison.
 #[test]
 fn what_certificates_and_texels_lose() {
-    let styles = [&STYLES[..], &[WILDEST, WITHOUT_SLOPE_BARS]].concat();
+    let styles = [&styles()[..], &[WITHOUT_SLOPE_BARS]].concat();
     let mut losses = vec![Loss::default(); styles.len()];
-    let start = std::time::Instant::now();
-    for round in (Campaign { rounds: 8, volumes: 24, ..campaign(56, Coverage::Area) }).loose(&KINDS) {
+    for round in (Campaign { rounds: 3, volumes: 16, ..campaign(56, Coverage::Area) }).loose(&KINDS) {
         let Some(mirror) = Mirror::new(&round) else { continue };
         for (style, loss) in styles.iter().zip(&mut losses) {
             let mut arithmetic = Arithmetic::new(Style { wild: true, ..*style }, round.seed ^ round.number as u64);
             loss.add(mirror.loss(&round, &mut arithmetic));
         }
     }
-    for (style, loss) in styles.iter().zip(&losses) {
-        let texel = texel_loss(20_000, &mut Arithmetic::new(*style, 57));
+    for (style, certificates) in styles.iter().zip(&losses) {
+        let texels = texel_loss(10_000, &mut Arithmetic::new(*style, 57));
         eprintln!(
             "{:<22} certificates {:5.2} eps of {:6}, texels {:5.2} eps of {}",
-            style.name, loss.eps, loss.claims, texel.eps, texel.claims
+            style.name, certificates.eps, certificates.claims, texels.eps, texels.claims
         );
+        // Half of what is counted by hand leaves room for cases that are not tried.
+        assert!(certificates.claims > 1000 && certificates.eps < 7.75, "{}: {certificates:?}", style.name);
+        assert!(texels.claims > 1000 && texels.eps < 2.5, "{}: {texels:?}", style.name);
     }
-    eprintln!("{:?}", start.elapsed());
+    let folded = losses.last().expect("styles").eps;
+    let barred = losses[styles.len() - 2].eps;
+    assert!(folded > barred, "a folded slope costs more: {folded} {barred}");
 }
 
 /// Why a slope is never subnormal: flushed in one product of a certificate and not in another, it moves a row by more than
