@@ -69,16 +69,17 @@ fn supporting_planes(p: Projected) -> SupportingPlanes {
     planes.right_bottom = vec2<f32>(columns.y, rows.y);
     for (var i = 0u; i < CANDIDATES; i += 1u) {
         let guess = candidate(i, p);
-        if any((bitcast<vec2<u32>>(guess.slope) & vec2<u32>(0x7fffffffu)) > vec2<u32>(STEEPEST_BITS)) {
+        // What is proved and what texels are compared with have to be the same numbers, to the bit.
+        var slope = vec2<f32>(bar(guess.slope.x), bar(guess.slope.y));
+        if any((bitcast<vec2<u32>>(slope) & vec2<u32>(0x7fffffffu)) > vec2<u32>(STEEPEST_BITS)) {
             continue;
         }
         var r = Value(
-            guess.facing * p.z.center + guess.slope.x * p.x.center + guess.slope.y * p.y.center,
-            abs(guess.facing) * p.z.size + abs(guess.slope.x) * p.x.size + abs(guess.slope.y) * p.y.size,
-            guess.facing * p.z.half + guess.slope.x * p.x.half + guess.slope.y * p.y.half);
+            guess.facing * p.z.center + slope.x * p.x.center + slope.y * p.y.center,
+            abs(guess.facing) * p.z.size + abs(slope.x) * p.x.size + abs(slope.y) * p.y.size,
+            guess.facing * p.z.half + slope.x * p.x.half + slope.y * p.y.half);
         let interval = ratio_interval(r, p.w);
         let extent = interval.y - interval.x;
-        var slope = guess.slope;
         var least = interval.x;
         if !on_border(guess.own, least, extent) {
             // The other side of an outline is its other edge's; that of a front is a back.
@@ -89,7 +90,7 @@ fn supporting_planes(p: Projected) -> SupportingPlanes {
             r = Value(-r.center, r.size, -r.half);
             least = -interval.y;
         }
-        let offset = least - 3.0 * error_bound(r, least, p.w) / p.w_min;
+        let offset = bar(least - 3.0 * error_bound(r, least, p.w) / p.w_min);
         let small = all_small(vec4<u32>(bitcast<u32>(offset), 0u, 0u, 0u)) && r.size + abs(offset) * p.w.size < 0x1p60;
         if small && surely_above(r, offset, p.w) {
             planes.list[planes.count] = SupportingPlane(slope, guess.facing, offset);

@@ -208,8 +208,11 @@ mod tests {
                 assert!(function.expressions.iter().any(|(_, e)| is_xor(e)), "{bar}");
             }
             assert_eq!(calls(&module, "load_volume", "bar3"), 2, "{kind:?}: d_hi and d_lo");
-            assert_eq!(calls(&module, "surely_behind", "bar"), 2, "d - A in both conventions");
+            assert_eq!(calls(&module, "occluding_depth", "bar"), 1, "the depth with its slack");
+            assert_eq!(calls(&module, "surely_behind", "bar"), 1, "d - A");
             assert_eq!(calls(&module, "classify", "bar"), 2, "-A and 1 - A");
+            assert_eq!(calls(&module, "supporting_planes", "bar"), 3, "a plane's slope and its offset");
+            assert_eq!(calls(&module, "surely_clear", "bar"), 1, "d - A");
         }
     }
 
