@@ -31,9 +31,10 @@ impl Dyadic {
     /// `self / other`, less than 2^-48 off, relative; `None` where float64 cannot hold it, and for `other` 0.
     pub(crate) fn quotient(&self, other: &Self) -> Option<f64> {
         let ((a, i), (b, j)) = (self.leading(), other.leading());
-        let power = i32::try_from(i - j).ok().filter(|power| power.abs() < 900)?;
-        let quotient = a / b * 2.0_f64.powi(power);
-        (b != 0.0 && (quotient == 0.0 || quotient.is_normal())).then_some(quotient)
+        let power = i32::try_from(i - j).ok().filter(|power| power.abs() < 2000)?;
+        // In two steps: one power of two may lie beyond float64 where the quotient does not.
+        let quotient = a / b * 2.0_f64.powi(power / 2) * 2.0_f64.powi(power - power / 2);
+        (b != 0.0 && (a == 0.0 || quotient.is_normal())).then_some(quotient)
     }
 
     fn combine(&self, other: &Self, op: impl Fn(BigInt, BigInt) -> BigInt) -> Self {
@@ -153,6 +154,11 @@ mod tests {
         assert!((long.quotient(&long.times(&Dyadic::exact(1e9))).unwrap() - 1e-9).abs() < 1e-23);
         assert_eq!(Dyadic::exact(0.0).quotient(&long), Some(0.0));
         assert_eq!(long.quotient(&Dyadic::exact(0.0)), None);
+        for size in [1e300, 1e-300, f64::MAX, f64::MIN_POSITIVE] {
+            let x = Dyadic::exact(size);
+            assert_eq!(x.quotient(&Dyadic::exact(1.0)), Some(size));
+            assert_eq!(x.times(&x).quotient(&Dyadic::exact(1.0)), None, "beyond float64");
+        }
     }
 
     #[test]

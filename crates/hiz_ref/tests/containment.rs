@@ -341,6 +341,29 @@ fn a_triangle_across_a_corner_is_outside_with_all_its_vertices_inside() {
     assert!(!covered(corners, &boxes) && found.triangles == [0] && found.vertices.is_empty());
 }
 
+/// Verdicts are exact at any size; what is told beside them has to be near the truth there, too.
+#[test]
+fn distances_and_witnesses_hold_at_any_size() {
+    for size in [1.0, 1e100, 1e-100, 1e160, 1e-160, 1e300, 1e-300] {
+        let times = |p: Vec3| p.map(|x| x * size);
+        let mesh = box_mesh(times([-1.0, 1.0, 0.0]), times([2.0; 3]));
+        let proxy = triangle([[-1.0, 1.0, 1.0], [-0.5, 2.0, -0.5], [-1.0, 2.0, 2.0]].map(times));
+        let found = check_proxy(&proxy.borrowed(), &mesh.borrowed()).unwrap();
+        // Its lowest corner is half a unit below the box.
+        assert!((found.distance / size - 0.5).abs() < 1e-9, "{size:e}: {found:?}");
+        assert!(found.witnesses[0][2] < 0.0, "{size:e}: {found:?}");
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        for volume in [
+            Volume::Sphere { center: [0.0; 3], radius: size },
+            Volume::Box { min: [0.0; 3], max: [size; 3] },
+            Volume::OrientedBox { center: [0.0; 3], half_sizes: [size; 3], axes },
+        ] {
+            let outside = check_bounds(&volume, &[times([0.0, 0.0, 2.0])], None).unwrap();
+            assert!((outside / size - 1.0).abs() < 1e-9, "{size:e}: {outside:e} of {volume:?}");
+        }
+    }
+}
+
 #[test]
 fn bounds_at_the_last_bit() {
     let third = 1.0 / 3.0;

@@ -1,5 +1,6 @@
 //! Whether bounds contain their mesh.
 
+use super::unit_scale;
 use crate::dyadic::Dyadic;
 use crate::scalar::{Ball, Scalar};
 use crate::volume::Volume;
@@ -120,19 +121,24 @@ fn dot<S: Scalar>(u: &[S; 3], v: &[S; 3]) -> S {
 
 /// How far a point lies outside, in plain float64: the farthest of the volume's slabs.
 fn distance(volume: &Volume, p: [f64; 3]) -> f64 {
-    let norm = |v: [f64; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    let norm = |v: [f64; 3]| {
+        let scale = unit_scale(v);
+        v.iter().map(|x| (x * scale) * (x * scale)).sum::<f64>().sqrt() / scale
+    };
     match volume {
         Volume::Sphere { center, radius } => norm([0, 1, 2].map(|i| p[i] - center[i])) - radius,
         Volume::Box { min, max } => norm([0, 1, 2].map(|i| (min[i] - p[i]).max(p[i] - max[i]).max(0.0))),
         Volume::OrientedBox { center, half_sizes, axes } => {
-            let mid = |x: f64| Ball::exact(x);
-            let half_axes = [0, 1, 2].map(|k| [0, 1, 2].map(|i| mid(axes[i][k] * half_sizes[k])));
-            let d = [0, 1, 2].map(|i| mid(p[i] - center[i]));
+            let half_axes = [0, 1, 2].map(|k| [0, 1, 2].map(|i| axes[i][k] * half_sizes[k]));
+            let d = [0, 1, 2].map(|i| p[i] - center[i]);
+            let scale = unit_scale(half_axes.iter().flatten().copied().chain(d));
+            let scaled = |v: [f64; 3]| v.map(|x| Ball::exact(x * scale));
+            let (half_axes, d) = (half_axes.map(scaled), scaled(d));
             normals(&half_axes)
                 .iter()
                 .map(|n| {
                     let support: f64 = half_axes.iter().map(|e| dot(n, e).mid.abs()).sum();
-                    (dot(n, &d).mid.abs() - support) / norm(n.map(|x| x.mid))
+                    (dot(n, &d).mid.abs() - support) / norm(n.map(|x| x.mid)) / scale
                 })
                 .filter(|x| x.is_finite())
                 .fold(0.0, f64::max)

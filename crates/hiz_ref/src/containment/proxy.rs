@@ -7,7 +7,7 @@
 
 use super::ratio::Ratio;
 use super::winding::{Place, surely_beside};
-use super::{MeshError, TriangleMesh};
+use super::{MeshError, TriangleMesh, unit_scale};
 use std::cmp::Ordering;
 
 /// What of a proxy is outside of its mesh.
@@ -235,7 +235,11 @@ fn y_at(s: &[Point; 2], x: &Ratio) -> Option<Ratio> {
 
 /// The distance of a point to the nearest triangle, in plain float64 (Ericson, Real-Time Collision Detection, 5.1.5).
 fn distance_to(mesh: &TriangleMesh<'_>, p: [f64; 3]) -> f64 {
-    (0..mesh.triangles.len()).map(|t| distance_to_triangle(&mesh.corners(t), p)).fold(f64::INFINITY, f64::min)
+    let scale = unit_scale(mesh.vertices.iter().flatten().copied().chain(p));
+    let scaled = |p: [f64; 3]| p.map(|x| x * scale);
+    (0..mesh.triangles.len())
+        .map(|t| distance_to_triangle(&mesh.corners(t).map(scaled), scaled(p)) / scale)
+        .fold(f64::INFINITY, f64::min)
 }
 
 fn distance_to_triangle([a, b, c]: &[[f64; 3]; 3], p: [f64; 3]) -> f64 {
