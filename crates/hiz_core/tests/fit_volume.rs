@@ -61,7 +61,8 @@ fn run(
 
 #[test]
 fn no_false_cull_on_depth_that_fits() {
-    let modes: [(u64, Coverage, &'static [(Footprint, u32)]); 3] = [
+    type Modes = &'static [(Footprint, u32)];
+    let modes: [(u64, Coverage, Modes); 3] = [
         (31, Coverage::Area, &[(Footprint::Two, 4096)]),
         (32, Coverage::Sample, &[(Footprint::Two, 4096)]),
         (33, Coverage::Area, &[(Footprint::Eight, 0)]),
@@ -92,8 +93,8 @@ fn planted_faults_turn_it_red() {
         ),
         ("a pixel too few", &[("last + vec2<u32>(1u))", "last)")]),
         (
-            "a depth that forgets its slope",
-            &[("let bound = plane.facing * depth;", "let bound = plane.facing * occluding_depth(bits);")],
+            "a depth that loses its slope twice",
+            &[("let bound = plane.facing * depth;", "let bound = plane.facing * (depth - view.z_slope);")],
         ),
     ];
     for (name, faults) in planted {
