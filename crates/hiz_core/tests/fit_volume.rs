@@ -62,10 +62,12 @@ fn run(
 
 #[test]
 fn no_false_cull_on_depth_that_fits() {
+    type Kinds = &'static [BoundsKind];
+    type Modes = &'static [(Footprint, u32)];
     // Few pipelines: each takes long to compile.
-    let modes: [(u64, Coverage, &'static [BoundsKind], &'static [(Footprint, u32)]); 3] = [
+    let modes: [(u64, Coverage, Kinds, Modes); 3] = [
         (31, Coverage::Area, &KINDS, &[(Footprint::Two, 4096)]),
-        (32, Coverage::Sample, &KINDS, &[(Footprint::Two, 4096)]),
+        (32, Coverage::Sample, &[BoundsKind::Sphere, BoundsKind::OrientedBox], &[(Footprint::Two, 4096)]),
         (33, Coverage::Area, &[BoundsKind::OrientedBox], &[(Footprint::Eight, 0)]),
     ];
     for (seed, coverage, kinds, mode) in modes {

@@ -81,9 +81,8 @@ fn normalized(v: Vector) -> Vector {
 }
 
 fn of_sphere(i: u32, p: &Projected, facing: f32) -> Candidate {
-    const TURN: f32 = 6.283_185_3;
     if i < 16 {
-        let (sine, cosine) = (i as f32 * (TURN / 16.0)).sin_cos();
+        let (sine, cosine) = (i as f32 * (std::f32::consts::TAU / 16.0)).sin_cos();
         return Candidate { facing: 0.0, slope: [cosine, sine], own: 0.0 };
     }
     let center = [0.0; 3];
@@ -96,7 +95,7 @@ fn of_sphere(i: u32, p: &Projected, facing: f32) -> Candidate {
     let right = normalized(columns);
     let up = cross(toward_eye, right);
     let (sine, cosine) = if i >= 20 { 1.2_f32 } else { 0.7 }.sin_cos();
-    let (turned, turn) = (i as f32 * (TURN / 4.0)).sin_cos();
+    let (turned, turn) = (i as f32 * (std::f32::consts::TAU / 4.0)).sin_cos();
     let outward = each(|k| turn * right[k] + turned * up[k]);
     let point = each(|k| cosine * toward_eye[k] + sine * outward[k]);
     let down = each(|k| cosine * outward[k] - sine * toward_eye[k]);
