@@ -164,7 +164,7 @@ impl ViewUniform {
             Coverage::Area => guard,
             Coverage::Sample => guard - 0.5,
         };
-        // Rounded so that the product moves the depth at least as far as asked for.
+        // Rounded towards far; what the product itself rounds away stays (docs/accuracy.md).
         let depth_factor = if camera.convention().is_reversed() {
             -crate::view::round_up(slack - 1.0)
         } else {
