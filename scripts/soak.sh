@@ -21,5 +21,7 @@ slow_python_tests() {
   # 5: no test is marked slow
   [ "$status" = 5 ] || return "$status"
 }
+random_arrays() { HIZVK_FUZZ=random "$VENV_PYTHON" -m pytest tests/test_fuzz.py tests/test_fuzz_arrays.py; }
 step "slow Rust tests" slow_rust_tests
+step "fuzzing with new examples" random_arrays
 step "slow Python tests" slow_python_tests

@@ -263,6 +263,7 @@ TABLES: dict[str, Table] = {
                 (np.ones((2, 1)), ValueError, "got (2, 1) float64"),
                 (np.ones(2, dtype=int), TypeError, "got (2,) int64"),
                 ("1", TypeError, "got str '1'"),
+                (np.timedelta64(0, "s"), TypeError, "got timedelta64"),
                 (True, TypeError, "got bool True"),
                 (1j, TypeError, "got complex 1j"),
                 (None, TypeError, "got None"),

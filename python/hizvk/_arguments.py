@@ -120,11 +120,16 @@ def floats(name: str, value: object, shape: Sequence[int | str], *, why: str = "
     return _ready(name, array)
 
 
+def _is_real(value: object) -> bool:
+    """Whether it is one number; truth values are none, and NumPy's durations, though they say so."""
+    return isinstance(value, numbers.Real) and not isinstance(value, (bool, np.bool_, np.timedelta64))
+
+
 def floats_or_scalar(name: str, value: object, count: int) -> FloatArray:
     """A float array ``(count,)``, or one number for all of them."""
-    if not isinstance(value, np.ndarray) and isinstance(value, numbers.Real) and not isinstance(value, bool):
+    if _is_real(value):
         try:
-            return np.full(count, float(value), dtype=np.float64)
+            return np.full(count, float(value), dtype=np.float64)  # type: ignore[arg-type]
         except OverflowError:
             raise _wrong_value(name, f"float ({count},) or one number", value) from None
     if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind == "f":
@@ -217,10 +222,10 @@ def number(
     expected = parts[0] + (" " + " and ".join(parts[1:]) if len(parts) > 1 else "")
     if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "fiu":
         value = value.item()
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, numbers.Real):
+    if not _is_real(value):
         raise _wrong_type(name, expected, value)
     try:
-        result = float(value)
+        result = float(value)  # type: ignore[arg-type]
     except OverflowError:
         raise _wrong_value(name, expected, value) from None
     fits = math.isfinite(result)
