@@ -76,9 +76,10 @@ def check_proxy(proxy: Mesh | tuple[npt.ArrayLike, ...], mesh: Mesh | tuple[npt.
 
     Parameters
     ----------
-    proxy, mesh : Mesh, or tuple (vertices, triangles)
-        In the same coordinates, without transforms. The mesh is closed and consistently oriented: each of its edges
-        runs as often one way as the other, where equal positions count as one vertex.
+    proxy, mesh : Mesh or tuple
+        A tuple is ``(vertices, triangles)``. In the same coordinates, without transforms. The mesh is closed and
+        consistently oriented: each of its edges runs as often one way as the other, where equal positions count as
+        one vertex.
 
     Returns
     -------
@@ -116,8 +117,9 @@ def check_bounds(bounds: Bounds, meshes: Mesh | Sequence[Mesh | tuple[npt.ArrayL
     ----------
     bounds : Spheres, Boxes or OrientedBoxes
         The N volumes.
-    meshes : list of Mesh or of tuples (vertices, triangles[, transforms]); or one Mesh
-        One for each instance in order; a mesh with K transforms stands for K instances in a row.
+    meshes : list of Mesh or tuple; or one Mesh
+        One for each instance in order; a mesh with K transforms stands for K instances in a row. A tuple is
+        ``(vertices, triangles)`` or ``(vertices, triangles, transforms)``.
 
     Returns
     -------

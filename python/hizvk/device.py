@@ -157,7 +157,7 @@ class Device:
             World positions (or the mesh's own, with `transforms`). A list may also hold plain tuples ``(vertices,
             triangles)`` or ``(vertices, triangles, transforms)``.
         triangles : (T, 3) integer array
-            Indices of vertices; left out when `vertices` is a Mesh or a list.
+            Indices of vertices; left out when ``vertices`` is a Mesh or a list.
         transforms : (K, 4, 4) or (4, 4) float array, optional
             ``world_from_mesh`` of each copy.
         cull : "none", "back" or "front"
