@@ -147,7 +147,7 @@ fn descend(
 ) -> bool {
     var planes: SupportingPlanes;
     if FIT_VOLUME {
-        planes = supporting_planes(p);
+        supporting_planes(&planes, p);
     }
     var left = view.descent_budget + *texels_read;
     var level = top;

@@ -62,14 +62,14 @@ fn proved_interval(r: Value, w: Value, w_min: f32) -> vec2<f32> {
         select(BEYOND, high, surely_below(r, high, w)));
 }
 
-// The planes of a volume's candidates that touch it, less a margin; those alone that a certificate proves.
-fn supporting_planes(p: Projected) -> SupportingPlanes {
-    var planes: SupportingPlanes;
-    planes.count = 0u;
+// The planes of a volume's candidates that touch it, less a margin; those alone that a certificate proves. (Through a pointer: handed
+// over by value, so much takes twice as long to compile.)
+fn supporting_planes(planes: ptr<function, SupportingPlanes>, p: Projected) {
+    (*planes).count = 0u;
     let columns = proved_interval(p.x, p.w, p.w_min);
     let rows = proved_interval(p.y, p.w, p.w_min);
-    planes.left_top = vec2<f32>(columns.x, rows.x);
-    planes.right_bottom = vec2<f32>(columns.y, rows.y);
+    (*planes).left_top = vec2<f32>(columns.x, rows.x);
+    (*planes).right_bottom = vec2<f32>(columns.y, rows.y);
     for (var i = 0u; i < CANDIDATES; i += 1u) {
         let guess = candidate(i, p);
         if any((bitcast<vec2<u32>>(guess.slope) & vec2<u32>(0x7fffffffu)) > vec2<u32>(STEEPEST_BITS)) {
@@ -96,11 +96,10 @@ fn supporting_planes(p: Projected) -> SupportingPlanes {
         let offset = bar(least - 3.0 * error_bound(r, least, p.w) / p.w_min);
         let small = all_small(vec4<u32>(bitcast<u32>(offset), 0u, 0u, 0u)) && r.size + abs(offset) * p.w.size < 0x1p60;
         if small && surely_above(r, offset, p.w) {
-            planes.list[planes.count] = SupportingPlane(slope, guess.facing, offset);
-            planes.count += 1u;
+            (*planes).list[(*planes).count] = SupportingPlane(slope, guess.facing, offset);
+            (*planes).count += 1u;
         }
     }
-    return planes;
 }
 
 // True implies: pixels from `begin` to before `end` that are no farther than the stored depth show nothing of the volume.
