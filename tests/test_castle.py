@@ -6,8 +6,6 @@ what is truly visible (Embree rays against the real geometry) and what the best 
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +14,6 @@ import pytest
 
 import hizvk
 
-JUDGE = Path(__file__).resolve().parents[2] / "shared" / "judge"
 SIZES = [(360, 640), (563, 1001)]
 CONVENTIONS = ["standard", "reversed"]
 
@@ -36,23 +33,8 @@ MOST_KEPT = [
 
 
 @pytest.fixture(scope="module")
-def judge() -> Any:
-    if not (JUDGE / "castle.npz").exists():
-        pytest.skip("the castle and its judge are not beside this checkout (../shared/judge)")
-    if importlib.util.find_spec("embreex") is None:
-        pytest.skip("the judge casts rays with embreex, which is not installed")
-    spec = importlib.util.spec_from_file_location("judge", JUDGE / "judge.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["judge"] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.fixture(scope="module")
 def scene(judge: Any) -> Any:
-    return judge.load_scene(JUDGE / "castle.npz")
+    return judge.load_scene(Path(judge.__file__).with_name("castle.npz"))
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,7 @@ Here real scenes are held against large rasterised images and against rays at th
 
 from __future__ import annotations
 
-import importlib.util
 import itertools
-import sys
 import time
 from dataclasses import dataclass
 from fractions import Fraction
@@ -24,7 +22,6 @@ from hizvk import scenes, truth
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-JUDGE = Path(__file__).resolve().parents[2] / "shared" / "judge"
 SMALL = (144, 256)
 SIZES = pytest.mark.parametrize(
     "size",
@@ -39,22 +36,6 @@ TIMES = 16
 @pytest.fixture(scope="module")
 def device() -> hizvk.Device:
     return hizvk.Device()
-
-
-@pytest.fixture(scope="module")
-def judge() -> Any:
-    if not (JUDGE / "castle.npz").exists():
-        pytest.skip("the castle and its judge are not beside this checkout (../shared/judge)")
-    if importlib.util.find_spec("embreex") is None:
-        pytest.skip("the judge casts rays with embreex, which is not installed")
-    if "judge" not in sys.modules:
-        spec = importlib.util.spec_from_file_location("judge", JUDGE / "judge.py")
-        assert spec is not None
-        assert spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.modules["judge"] = module
-        spec.loader.exec_module(module)
-    return sys.modules["judge"]
 
 
 @dataclass(frozen=True)
@@ -80,7 +61,7 @@ def view_cases(scene: scenes.Scene, views: tuple[scenes.View, ...]) -> Iterator[
 
 
 def castle_cases(judge: Any, names: tuple[str, ...]) -> Iterator[Case]:
-    scene = judge.load_scene(JUDGE / "castle.npz")
+    scene = judge.load_scene(Path(judge.__file__).with_name("castle.npz"))
     for seen in scene.cameras:
         if seen.name in names:
 
@@ -179,7 +160,7 @@ def test_no_sample_of_a_large_image_of_the_castle_is_farther(device: hizvk.Devic
 def test_culls_of_castle_by_small_images_hide_nothing_of_the_large_one(
     device: hizvk.Device, judge: Any, size: tuple[int, int]
 ) -> None:
-    scene = judge.load_scene(JUDGE / "castle.npz")
+    scene = judge.load_scene(Path(judge.__file__).with_name("castle.npz"))
     boxes = device.instances(hizvk.Boxes(scene.instance_aabb_min, scene.instance_aabb_max))
     occluders = device.occluders(scene.occluder_vertices, scene.occluder_triangles)
     names = ("intel_default", "street6", "high0")
@@ -239,7 +220,7 @@ def report(name: str, size: tuple[int, int], counts: dict[bool, list[int]], *, p
 @pytest.mark.parametrize("size", [SMALL, (288, 512)], ids=["256x144", "512x288"])
 def test_refinement_keeps_no_more(device: hizvk.Device, judge: Any, size: tuple[int, int]) -> None:
     """What refinement buys and costs, over all cameras of the castle; each step may only keep less."""
-    scene = judge.load_scene(JUDGE / "castle.npz")
+    scene = judge.load_scene(Path(judge.__file__).with_name("castle.npz"))
     boxes = device.instances(hizvk.Boxes(scene.instance_aabb_min, scene.instance_aabb_max))
     occluders = device.occluders(scene.occluder_vertices, scene.occluder_triangles)
     cameras = [

@@ -272,7 +272,7 @@ fn no_ray_gets_past_a_pixels_depth() {
 }
 
 #[test]
-#[ignore = "minutes"]
+#[ignore = "minutes: make soak"]
 fn no_ray_gets_past_a_pixels_depth_in_many_cases() {
     for seed in 100..140 {
         let tallies = campaign(seed, 2500, None);
