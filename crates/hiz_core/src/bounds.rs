@@ -136,25 +136,20 @@ impl Bounds<'_> {
         Ok(self.len()? == 0)
     }
 
-    /// Writes the records of `range` into `out` (`range.len() * record_bytes()` bytes) and appends the indices of bad bounds.
-    pub(crate) fn pack(&self, range: std::ops::Range<usize>, out: &mut Vec<u8>, invalid: &mut Vec<u64>) {
-        for i in range {
-            let valid = match *self {
-                Self::Spheres { centers, radii } => push(out, &SphereRecord::new(centers.array(i), radii.get(i))),
-                Self::Boxes { min, max } => push(out, &BoxRecord::new(min.array(i), max.array(i))),
-                Self::OrientedBoxes { centers, half_sizes, rotations } => {
-                    push(out, &OrientedBoxRecord::new(centers.array(i), half_sizes.array(i), rotations.array(i)))
-                }
-            };
-            if !valid {
-                invalid.push(i as u64);
+    /// Writes the record of instance `i` (`record_bytes()` bytes); false for bad bounds.
+    pub(crate) fn write_record(&self, i: usize, out: &mut [u8]) -> bool {
+        match *self {
+            Self::Spheres { centers, radii } => write(out, &SphereRecord::new(centers.array(i), radii.get(i))),
+            Self::Boxes { min, max } => write(out, &BoxRecord::new(min.array(i), max.array(i))),
+            Self::OrientedBoxes { centers, half_sizes, rotations } => {
+                write(out, &OrientedBoxRecord::new(centers.array(i), half_sizes.array(i), rotations.array(i)))
             }
         }
     }
 }
 
-fn push<R: Record>(out: &mut Vec<u8>, record: &R) -> bool {
-    out.extend_from_slice(bytemuck::bytes_of(record));
+fn write<R: Record>(out: &mut [u8], record: &R) -> bool {
+    out.copy_from_slice(bytemuck::bytes_of(record));
     record.is_valid()
 }
 
@@ -249,7 +244,7 @@ impl Record for SphereRecord {
 }
 
 impl BoxRecord {
-    fn new(min: [f64; 3], max: [f64; 3]) -> Self {
+    pub(crate) fn new(min: [f64; 3], max: [f64; 3]) -> Self {
         // Halved first: min + max may overflow.
         let center: [f64; 3] = std::array::from_fn(|k| 0.5 * min[k] + 0.5 * max[k]);
         let p = Position::new(center);
@@ -367,23 +362,23 @@ mod tests {
         }
     }
 
+    fn invalid(bounds: &Bounds<'_>) -> Vec<usize> {
+        let mut record = vec![0; bounds.kind().record_bytes() as usize];
+        (0..bounds.len().unwrap()).filter(|i| !bounds.write_record(*i, &mut record)).collect()
+    }
+
     #[test]
     fn bad_bounds_are_counted_and_named() {
         let bounds = Bounds::Boxes {
             min: Floats::F64(&[0.0, 0.0, 0.0, 2.0, 0.0, 0.0, f64::NAN, 0.0, 0.0, 0.0, 0.0, f64::NEG_INFINITY]),
             max: Floats::F64(&[1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]),
         };
-        let (mut bytes, mut invalid) = (Vec::new(), Vec::new());
-        bounds.pack(0..4, &mut bytes, &mut invalid);
-        assert_eq!(bytes.len(), 4 * 48);
-        assert_eq!(invalid, [1, 2, 3]);
+        assert_eq!(invalid(&bounds), [1, 2, 3]);
         let spheres = Bounds::Spheres {
             centers: Floats::F32(&[0.0, 0.0, 0.0, f32::INFINITY, 0.0, 0.0, 1e30, 0.0, 0.0, 0.0, 0.0, 0.0]),
             radii: Floats::F32(&[-0.0, 1.0, 1.0, -1e-30]),
         };
-        invalid.clear();
-        spheres.pack(0..4, &mut bytes, &mut invalid);
-        assert_eq!(invalid, [1, 2, 3]);
+        assert_eq!(invalid(&spheres), [1, 2, 3]);
         let oriented = Bounds::OrientedBoxes {
             centers: Floats::F32(&[0.0; 9]),
             half_sizes: Floats::F32(&[0.0, 0.0, 0.0, 1.0, -1.0, 1.0, 0.0, 1.0, 1.0]),
@@ -396,9 +391,7 @@ mod tests {
                 .concat(),
             ),
         };
-        invalid.clear();
-        oriented.pack(0..3, &mut bytes, &mut invalid);
-        assert_eq!(invalid, [1, 2], "a singular matrix and zero sizes are valid");
+        assert_eq!(invalid(&oriented), [1, 2], "a singular matrix and zero sizes are valid");
     }
 
     #[test]

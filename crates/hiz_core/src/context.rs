@@ -11,6 +11,7 @@ use crate::instances::{InstanceOptions, Instances};
 use crate::layout::CULL_WORKGROUP;
 use crate::occluders::{self, MeshData, OccluderOptions, Occluders};
 use crate::pyramid::{self, Pyramid, PyramidOptions};
+use crate::update;
 use crate::visible::{Visible, VisibleOptions};
 
 /// Everything that is made once a device. Cheap to clone.
@@ -88,7 +89,29 @@ impl HizContext {
     /// # Errors
     /// [`Error::Invalid`] for arrays that do not agree and, with `strict`, for bad bounds.
     pub fn create_instances(&self, bounds: &Bounds<'_>, options: &InstanceOptions) -> Result<Instances> {
-        Instances::new(&self.gpu, bounds, options)
+        Instances::new(&self.gpu, bounds, options, || Ok(()))
+    }
+
+    /// Records the replacement of instances `first..first + n` by the `n` new bounds, of the same kind. They keep their places in the
+    /// stored order, and the boxes of their groups of 64 follow: where instances have moved far, groups have grown, and
+    /// new [`Instances`] are faster to cull. `strict` refuses bad bounds, and then nothing has changed.
+    ///
+    /// What was submitted before sees the old bounds, what is submitted later the new ones. Submit updates of the same instances in
+    /// the order in which they were recorded, each one: after one that was left out or overtaken, groups that are touched are never
+    /// culled as a whole any more. (Nothing visible is culled for it.) The new records wait in memory of the device until then.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] for another kind of bounds or context, [`Error::Invalid`] for instances that there are not and, with
+    /// `strict`, for bad bounds, [`Error::OutOfMemory`].
+    pub fn record_update(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &Instances,
+        first: u32,
+        bounds: &Bounds<'_>,
+        strict: bool,
+    ) -> Result<()> {
+        update::record(&self.gpu, encoder, instances, first, bounds, strict)
     }
 
     /// Buffers for what a cull of `instances` finds.

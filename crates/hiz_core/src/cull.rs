@@ -7,6 +7,7 @@ use crate::gpu::{CullKey, Gpu};
 use crate::instances::{Instances, Piece};
 use crate::layout::CULL_WORKGROUP;
 use crate::pyramid::{Built, Pyramid, entry};
+use crate::renumber;
 use crate::view::{EPS, Row, ViewRows};
 use crate::visible::Visible;
 
@@ -269,6 +270,9 @@ pub(crate) fn record(
     let bound = bind(gpu, inputs)?;
     encoder.copy_buffer_to_buffer(&visible.draws_template, 0, &visible.draws, 0, visible.draws.size());
     encoder.clear_buffer(&visible.counters, 0, None);
+    for output in visible.pieces.iter().filter(|output| output.stored_planes.is_some()) {
+        encoder.clear_buffer(&output.planes, 0, None);
+    }
     let mut pass = encoder
         .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.cull.pass"), timestamp_writes: None });
     pass.set_pipeline(&gpu.cull_pipeline(bound.key));
@@ -278,7 +282,7 @@ pub(crate) fn record(
             label: Some("hiz.cull.visible"),
             layout: &gpu.layouts().visible,
             entries: &[
-                entry(0, output.planes.as_entire_binding()),
+                entry(0, output.stored_planes.as_ref().unwrap_or(&output.planes).as_entire_binding()),
                 entry(1, output.list.as_entire_binding()),
                 entry(2, visible.draws.as_entire_binding()),
                 entry(3, visible.counters.as_entire_binding()),
@@ -289,6 +293,7 @@ pub(crate) fn record(
         pass.set_bind_group(2, &outputs, &[]);
         pass.dispatch_workgroups(piece.count().div_ceil(CULL_WORKGROUP), 1, 1);
     }
+    renumber::record(gpu, &mut pass, instances, visible, options.order);
     if options.order == Order::Stable {
         compact::record(gpu, &mut pass, instances, visible);
     }
@@ -323,7 +328,8 @@ pub(crate) fn record_explain(
         Error::invalid("index", format!("expected an instance below {}, got {index}", instances.len()))
     })?;
     let Bound { view, key } = bind(gpu, inputs)?;
-    let which = gpu.uniform("hiz.explain.which", &[index - piece.range.start, 0, 0, 0])?;
+    let place = piece.order.place((index - piece.range.start) as usize) as u32;
+    let which = gpu.uniform("hiz.explain.which", &[place, 0, 0, 0])?;
     let output = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("hiz.explain.target"),
         layout: &gpu.layouts().one_storage,

@@ -35,6 +35,8 @@ pub(crate) struct Gpu {
     cull: Cache<CullKey, wgpu::ComputePipeline>,
     explain: Cache<CullKey, wgpu::ComputePipeline>,
     compact: Cache<&'static str, wgpu::ComputePipeline>,
+    renumber: Cache<&'static str, wgpu::ComputePipeline>,
+    update: Cache<&'static str, wgpu::ComputePipeline>,
     occluders: Cache<OccluderKey, wgpu::RenderPipeline>,
 }
 
@@ -115,6 +117,8 @@ impl Gpu {
             cull: Cache::new(),
             explain: Cache::new(),
             compact: Cache::new(),
+            renumber: Cache::new(),
+            update: Cache::new(),
             occluders: Cache::new(),
         }
     }
@@ -154,6 +158,26 @@ impl Gpu {
         write_mapped(label, &buffer, 0, contents)?;
         buffer.unmap();
         Ok(buffer)
+    }
+
+    /// A buffer of `size` bytes (a multiple of 4) that `fill` writes part by part, by a function of an offset and the bytes that
+    /// belong there.
+    pub(crate) fn written<T>(
+        &self,
+        label: &str,
+        size: u64,
+        usage: wgpu::BufferUsages,
+        fill: impl FnOnce(&(dyn Fn(u64, &[u8]) -> Result<()> + Sync)) -> Result<T>,
+    ) -> Result<(wgpu::Buffer, T)> {
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size,
+            usage,
+            mapped_at_creation: true,
+        });
+        let filled = fill(&|offset, bytes| write_mapped(label, &buffer, offset, bytes))?;
+        buffer.unmap();
+        Ok((buffer, filled))
     }
 
     pub(crate) fn id(&self) -> ContextId {
@@ -219,6 +243,18 @@ impl Gpu {
     pub(crate) fn compact_pipeline(&self, entry_point: &'static str) -> wgpu::ComputePipeline {
         self.compact.get(entry_point, || {
             self.pipeline("hiz.compact.pipeline", &shader::compact(), entry_point, &[&self.layouts().compact], &[])
+        })
+    }
+
+    pub(crate) fn renumber_pipeline(&self, entry_point: &'static str) -> wgpu::ComputePipeline {
+        self.renumber.get(entry_point, || {
+            self.pipeline("hiz.renumber.pipeline", &shader::renumber(), entry_point, &[&self.layouts().renumber], &[])
+        })
+    }
+
+    pub(crate) fn update_pipeline(&self, entry_point: &'static str) -> wgpu::ComputePipeline {
+        self.update.get(entry_point, || {
+            self.pipeline("hiz.update.pipeline", &shader::update(), entry_point, &[&self.layouts().update], &[])
         })
     }
 
@@ -299,6 +335,8 @@ pub(crate) struct Layouts {
     /// What a cull writes.
     pub(crate) visible: wgpu::BindGroupLayout,
     pub(crate) compact: wgpu::BindGroupLayout,
+    pub(crate) renumber: wgpu::BindGroupLayout,
+    pub(crate) update: wgpu::BindGroupLayout,
     pub(crate) one_uniform: wgpu::BindGroupLayout,
     pub(crate) one_storage: wgpu::BindGroupLayout,
     pub(crate) occluder_view: wgpu::BindGroupLayout,
@@ -339,6 +377,11 @@ impl Layouts {
                 "hiz.compact.layout",
                 &[(0, Uniform), (1, Read), (2, Write), (3, Write), (4, Write), (5, Uniform)],
             ),
+            renumber: layout(
+                "hiz.renumber.layout",
+                &[(0, Uniform), (1, Read), (2, Read), (3, Write), (4, Write), (5, Read)],
+            ),
+            update: layout("hiz.update.layout", &[(0, Uniform), (1, Read), (2, Read), (3, Write), (4, Write)]),
             one_uniform: layout("hiz.uniform_layout", &[(0, Uniform)]),
             one_storage: layout("hiz.storage_layout", &[(0, Write)]),
             occluder_view: device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {

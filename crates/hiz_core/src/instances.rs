@@ -1,15 +1,36 @@
-//! Instances on the device: the bounding volumes of one call, cut into pieces that fit a binding and a dispatch.
+//! Instances on the device: the bounding volumes of one call, cut into pieces that fit a binding and a dispatch, each stored along
+//! a curve through space (`morton`) and in groups (`groups`).
+//!
+//! A *place* is where an instance is stored in its piece; its *index* is the caller's number, which everything public speaks of.
 
-use crate::bounds::{Bounds, BoundsKind};
+use std::ops::Range;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use crate::bounds::{Bounds, BoundsKind, BoxRecord};
 use crate::error::{Error, Result};
-use crate::gpu::{ContextId, Gpu, write_mapped};
+use crate::gpu::{ContextId, Gpu};
+use crate::groups::Groups;
+use crate::host;
 use crate::layout::{CULL_WORKGROUP, piece_capacity};
+use crate::morton;
+
+/// In which order instances are stored. The indices that come out are the caller's in either.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum StoredOrder {
+    /// Neighbours in space together (Morton order), sorted once when they are uploaded.
+    #[default]
+    Morton,
+    /// As they came: no sort, and 8 bytes an instance less on the host. For what is in such an order already.
+    Given,
+}
 
 /// How instances are uploaded.
 #[derive(Debug, Clone, Default)]
 pub struct InstanceOptions {
     /// Refuse bad bounds (NaN, infinite, negative radius, min > max) instead of keeping them visible.
     pub strict: bool,
+    /// The order in which they are stored, piece by piece.
+    pub order: StoredOrder,
     /// Instances of one piece, at most; `None`: what the device allows. Tests make it small.
     pub piece_capacity: Option<u32>,
 }
@@ -24,11 +45,74 @@ pub(crate) struct PieceUniform {
     pub(crate) words: u32,
 }
 
+/// Which instance of a piece is stored where; nothing of it where the order is the caller's.
+#[derive(Debug, Default)]
+pub(crate) struct PieceOrder {
+    indices: Vec<u32>,
+    places: Vec<u32>,
+}
+
+impl PieceOrder {
+    fn new(bounds: &Bounds<'_>, range: Range<usize>, order: StoredOrder) -> Result<Self> {
+        if order == StoredOrder::Given {
+            return Ok(Self::default());
+        }
+        let indices = morton::order(bounds, range)?;
+        let mut places = host::list(indices.len(), "order")?;
+        places.resize(indices.len(), 0);
+        for (place, index) in indices.iter().enumerate() {
+            places[*index as usize] = place as u32;
+        }
+        Ok(Self { indices, places })
+    }
+
+    pub(crate) fn is_given(&self) -> bool {
+        self.indices.is_empty()
+    }
+
+    /// Which instance is stored at `place`, relative to the piece's first.
+    pub(crate) fn index(&self, place: usize) -> usize {
+        self.indices.get(place).map_or(place, |index| *index as usize)
+    }
+
+    /// Where the instance `index`, relative to the piece's first, is stored.
+    pub(crate) fn place(&self, index: usize) -> usize {
+        self.places.get(index).map_or(index, |place| *place as usize)
+    }
+
+    /// Where the instances `range` are stored, ascending.
+    pub(crate) fn places(&self, range: Range<usize>) -> Result<Vec<u32>> {
+        if self.is_given() {
+            return host::collected(range.start as u32..range.end as u32, "update");
+        }
+        let mut places = host::list(range.len(), "update")?;
+        if range.len() > self.indices.len() / 16 {
+            // A look at every place is cheaper than a sort.
+            let here = |(place, index): (usize, &u32)| range.contains(&(*index as usize)).then_some(place as u32);
+            places.extend(self.indices.iter().enumerate().filter_map(here));
+        } else {
+            places.extend_from_slice(&self.places[range]);
+            places.sort_unstable();
+        }
+        Ok(places)
+    }
+
+    fn host_bytes(&self) -> u64 {
+        4 * (self.indices.capacity() + self.places.capacity()) as u64
+    }
+}
+
 #[derive(Debug)]
 pub(crate) struct Piece {
-    pub(crate) range: std::ops::Range<u32>,
+    pub(crate) range: Range<u32>,
+    /// In stored order.
     pub(crate) records: wgpu::Buffer,
+    /// u32: the index of each stored instance, relative to the piece's first; up to whole workgroups, with 0xFFFFFFFF behind the last.
+    pub(crate) indices: wgpu::Buffer,
+    /// One `BoxRecord` a group.
+    pub(crate) group_records: wgpu::Buffer,
     pub(crate) uniform: wgpu::Buffer,
+    pub(crate) order: PieceOrder,
 }
 
 impl Piece {
@@ -42,6 +126,15 @@ impl Piece {
     }
 }
 
+/// What updates change on the host.
+#[derive(Debug)]
+pub(crate) struct Changing {
+    /// Of each piece.
+    pub(crate) groups: Vec<Groups>,
+    /// The number of the next update; `update` tells what for.
+    pub(crate) next_update: u32,
+}
+
 /// Bounding volumes on the device.
 #[derive(Debug)]
 pub struct Instances {
@@ -49,14 +142,21 @@ pub struct Instances {
     pub(crate) kind: BoundsKind,
     /// At least one, so that there is always a draw to consume; an empty one for no instances.
     pub(crate) pieces: Vec<Piece>,
-    invalid: Vec<u64>,
+    /// `shaders/update.wgsl`, `Sequence`.
+    pub(crate) sequence: wgpu::Buffer,
+    changing: Mutex<Changing>,
+    /// Held by whoever records *and* submits an update, so that both happen in one order.
+    pub(crate) submitting: Mutex<()>,
 }
 
-/// How many records are packed on the host before they are copied.
-const PACKED_AT_ONCE: usize = 1 << 14;
-
 impl Instances {
-    pub(crate) fn new(gpu: &Gpu, bounds: &Bounds<'_>, options: &InstanceOptions) -> Result<Self> {
+    /// `between` runs after each piece is copied; who owns the queue lets go of its staging there.
+    pub(crate) fn new(
+        gpu: &Gpu,
+        bounds: &Bounds<'_>,
+        options: &InstanceOptions,
+        mut between: impl FnMut() -> Result<()>,
+    ) -> Result<Self> {
         let n = bounds.len()?;
         let total = u32::try_from(n).map_err(|_| Error::limit("instances", n as u64, u64::from(u32::MAX)))?;
         let device = gpu.device();
@@ -72,26 +172,23 @@ impl Instances {
                 ));
             }
         };
-        let mut invalid = Vec::new();
-        let pieces = (0..total.div_ceil(capacity).max(1))
-            .map(|index| {
-                let start = index * capacity;
-                let range = start..total.min(start.saturating_add(capacity));
-                upload(gpu, bounds, index, range, &mut invalid)
-            })
-            .collect::<Result<_>>()?;
-        if options.strict
-            && let Some(first) = invalid.first()
-        {
-            return Err(Error::invalid(
-                "bounds",
-                format!(
-                    "expected finite numbers below 2^60, lengths >= 0 and min <= max, got {} bad of {n}, the first at index {first}",
-                    invalid.len()
-                ),
-            ));
+        let (mut pieces, mut groups) = (Vec::new(), Vec::new());
+        for index in 0..total.div_ceil(capacity).max(1) {
+            let start = index * capacity;
+            let range = start..total.min(start.saturating_add(capacity));
+            let (piece, its_groups) = upload(gpu, bounds, index, range, options.order)?;
+            pieces.push(piece);
+            groups.push(its_groups);
+            between()?;
         }
-        Ok(Self { context: gpu.id(), kind, pieces, invalid })
+        let sequence = gpu.filled("hiz.instances.sequence", &[0; 16], wgpu::BufferUsages::STORAGE)?;
+        let changing = Mutex::new(Changing { groups, next_update: 0 });
+        let this = Self { context: gpu.id(), kind, pieces, sequence, changing, submitting: Mutex::new(()) };
+        if options.strict {
+            let invalid = this.invalid()?;
+            refuse_bad(n, invalid.len(), invalid.first().copied())?;
+        }
+        Ok(this)
     }
 
     /// The number of instances.
@@ -114,14 +211,48 @@ impl Instances {
         self.pieces.len()
     }
 
-    /// The indices of bad bounds, ascending; they are always kept.
-    pub fn invalid(&self) -> &[u64] {
-        &self.invalid
+    /// The indices of bad bounds, ascending, as of the last update; they are always kept.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`] without memory for the list.
+    pub fn invalid(&self) -> Result<Vec<u64>> {
+        let changing = self.changing();
+        let mut invalid = host::list(changing.groups.iter().map(|g| g.invalid().count()).sum(), "invalid")?;
+        for (piece, groups) in self.pieces.iter().zip(&changing.groups) {
+            let places = groups.invalid();
+            invalid.extend(places.map(|p| u64::from(piece.range.start) + piece.order.index(p) as u64));
+        }
+        invalid.sort_unstable();
+        Ok(invalid)
     }
 
-    /// Bytes on the device.
+    /// Bytes on the device: records, 4 bytes an instance for its index, and a box for each 64 of them.
     pub fn device_bytes(&self) -> u64 {
-        self.pieces.iter().map(|p| p.records.size()).sum()
+        self.pieces.iter().map(|p| p.records.size() + p.indices.size() + p.group_records.size()).sum()
+    }
+
+    /// Bytes on the host: 8 an instance for its place and its index (none with [`StoredOrder::Given`]), 56 for each 64 of them, and
+    /// 48 an instance in such groups of 64 of which a part was updated.
+    pub fn host_bytes(&self) -> u64 {
+        let groups = self.changing().groups.iter().map(Groups::host_bytes).sum::<u64>();
+        self.pieces.iter().map(|p| p.order.host_bytes()).sum::<u64>() + groups
+    }
+
+    pub(crate) fn changing(&self) -> MutexGuard<'_, Changing> {
+        self.changing.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The error of `strict` for `bad` bad bounds of `n`.
+pub(crate) fn refuse_bad(n: usize, bad: usize, first: Option<u64>) -> Result<()> {
+    match first {
+        None => Ok(()),
+        Some(first) => Err(Error::invalid(
+            "bounds",
+            format!(
+                "expected finite numbers below 2^60, lengths >= 0 and min <= max, got {bad} bad of {n}, the first at index {first}"
+            ),
+        )),
     }
 }
 
@@ -129,27 +260,37 @@ fn upload(
     gpu: &Gpu,
     bounds: &Bounds<'_>,
     index: u32,
-    range: std::ops::Range<u32>,
-    invalid: &mut Vec<u64>,
-) -> Result<Piece> {
+    range: Range<u32>,
+    order: StoredOrder,
+) -> Result<(Piece, Groups)> {
+    let storage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
+    let (first, count) = (range.start as usize, range.len());
     let record_bytes = bounds.kind().record_bytes();
+    let order = PieceOrder::new(bounds, first..range.end as usize, order)?;
+    // A binding of no bytes is none.
+    let at_least_1 = |n: usize| n.max(1) as u64;
+    let bytes = at_least_1(count) * record_bytes;
+    let (records, groups) = gpu.written("hiz.instances.records", bytes, storage, |write| {
+        Groups::packed(bounds, count, |place| first + order.index(place), write)
+    })?;
+    let padded = at_least_1(count).next_multiple_of(u64::from(CULL_WORKGROUP));
+    let (indices, ()) = gpu.written("hiz.instances.indices", 4 * padded, storage, |write| {
+        let mut workgroup = [0; CULL_WORKGROUP as usize];
+        for begin in (0..padded as usize).step_by(workgroup.len()) {
+            for (place, index) in (begin..).zip(&mut workgroup) {
+                *index = if place < count { order.index(place) as u32 } else { u32::MAX };
+            }
+            write(4 * begin as u64, bytemuck::cast_slice(&workgroup))?;
+        }
+        Ok(())
+    })?;
+    let bytes = at_least_1(groups.len()) * size_of::<BoxRecord>() as u64;
+    let (group_records, ()) = gpu.written("hiz.instances.groups", bytes, storage, |write| {
+        (0..groups.len())
+            .try_for_each(|g| write((g * size_of::<BoxRecord>()) as u64, bytemuck::bytes_of(&groups.record(g))))
+    })?;
     let count = range.end - range.start;
-    let records = gpu.device().create_buffer(&wgpu::BufferDescriptor {
-        label: Some("hiz.instances.records"),
-        size: u64::from(count.max(1)) * record_bytes,
-        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
-        mapped_at_creation: true,
-    });
-    let (first, end) = (range.start as usize, range.end as usize);
-    let mut packed = Vec::with_capacity(PACKED_AT_ONCE.min(count as usize) * record_bytes as usize);
-    for begin in (first..end).step_by(PACKED_AT_ONCE) {
-        packed.clear();
-        bounds.pack(begin..end.min(begin + PACKED_AT_ONCE), &mut packed, invalid);
-        let offset = (begin - first) as u64 * record_bytes;
-        write_mapped("hiz.instances.records", &records, offset, &packed)?;
-    }
-    records.unmap();
     let uniform = gpu
         .uniform("hiz.instances.piece", &PieceUniform { base: range.start, count, index, words: count.div_ceil(32) })?;
-    Ok(Piece { range, records, uniform })
+    Ok((Piece { range, records, indices, group_records, uniform, order }, groups))
 }

@@ -89,6 +89,16 @@ pub(crate) fn compact() -> String {
     [wgsl!("shared/piece"), wgsl!("compact")].join("\n")
 }
 
+/// From places to the caller's indices.
+pub(crate) fn renumber() -> String {
+    [wgsl!("shared/piece"), wgsl!("renumber")].join("\n")
+}
+
+/// The update of records and groups.
+pub(crate) fn update() -> String {
+    wgsl!("update").to_owned()
+}
+
 /// The occluder pass.
 pub(crate) fn occluders() -> String {
     wgsl!("occluders").to_owned()
@@ -101,7 +111,12 @@ const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind:
 /// Every module, for those who plant faults in them.
 pub(crate) fn all() -> Vec<String> {
     let classifying = SOURCES.iter().flat_map(|s| KINDS.iter().flat_map(|k| [cull(*s, *k), explain(*s, *k)]));
-    SOURCES.iter().map(|s| reduce(*s)).chain(classifying).chain([compact(), occluders()]).collect()
+    SOURCES
+        .iter()
+        .map(|s| reduce(*s))
+        .chain(classifying)
+        .chain([compact(), renumber(), update(), occluders()])
+        .collect()
 }
 
 #[cfg(test)]
@@ -147,6 +162,7 @@ mod tests {
         use crate::instances::PieceUniform;
         use crate::layout::Level;
         use crate::pyramid::PyramidUniform;
+        use crate::update::UpdateUniform;
         use crate::view::Row;
         use crate::visible::{CounterRecord, DrawIndexedIndirect};
 
@@ -170,6 +186,10 @@ mod tests {
         same_layout!(module, "Counters", CounterRecord {
             "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid, "levels" = levels,
             "texels_low" = texels_low, "texels_high" = texels_high
+        });
+        let update = parse(&update());
+        same_layout!(update, "Update", UpdateUniform {
+            "count" = count, "vectors" = vectors, "number" = number, "padding" = padding
         });
         assert_eq!(layout(&module, "SphereRecord").1 as usize, size_of::<SphereRecord>());
         let boxes = parse(&cull(SourceKind::Depth, BoundsKind::Box));
@@ -235,6 +255,8 @@ mod tests {
         assert!(wgsl!("shared/certificate").contains(&margin));
         let workgroup = crate::layout::CULL_WORKGROUP;
         assert!(wgsl!("cull").contains(&format!("WORKGROUP: u32 = {workgroup}u;")));
-        assert!(wgsl!("cull").contains(&format!("@workgroup_size({workgroup})")));
+        for shader in [wgsl!("cull"), wgsl!("renumber"), wgsl!("update")] {
+            assert!(shader.contains(&format!("@workgroup_size({workgroup})")));
+        }
     }
 }

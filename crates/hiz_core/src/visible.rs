@@ -65,6 +65,8 @@ pub const CANARY_WORDS: u64 = 16;
 pub(crate) struct PieceOutput {
     /// The plane of kept bits, then that of the verdicts' low bits.
     pub(crate) planes: wgpu::Buffer,
+    /// Where the cull writes the planes about places, if the instances are not stored in the caller's order.
+    pub(crate) stored_planes: Option<wgpu::Buffer>,
     pub(crate) list: wgpu::Buffer,
     /// Indices that fit the list, the canary not counted.
     pub(crate) list_capacity: u32,
@@ -102,6 +104,8 @@ impl Visible {
                 let words = u64::from(piece.words().max(1));
                 Ok(PieceOutput {
                     planes: buffer("hiz.visible.planes", 2 * 4 * words, storage),
+                    stored_planes: (!piece.order.is_given())
+                        .then(|| buffer("hiz.visible.stored_planes", 2 * 4 * words, wgpu::BufferUsages::STORAGE)),
                     list: filled_list(device, u64::from(list_capacity) + CANARY_WORDS)?,
                     list_capacity,
                     before: buffer("hiz.compact.before", 4 * words, wgpu::BufferUsages::STORAGE),
@@ -167,7 +171,10 @@ impl Visible {
 
     /// Bytes on the device.
     pub fn device_bytes(&self) -> u64 {
-        let pieces = self.pieces.iter().map(|p| p.planes.size() + p.list.size() + p.before.size());
+        let pieces = self.pieces.iter().map(|p| {
+            let stored_planes = p.stored_planes.as_ref().map_or(0, wgpu::Buffer::size);
+            p.planes.size() + stored_planes + p.list.size() + p.before.size()
+        });
         pieces.sum::<u64>() + self.draws.size() + self.counters.size()
     }
 

@@ -1,9 +1,13 @@
 //! For tests: the words that the cull shader reads, so that its arithmetic can be done again on the host.
 
-use crate::bounds::Bounds;
+use crate::bounds::{Bounds, BoundsKind};
 use crate::camera::Camera;
 use crate::cull::{CullOptions, ViewUniform};
 use crate::error::Result;
+use crate::groups::{GROUP, Groups};
+use crate::headless::Engine;
+use crate::instances::{Instances, Piece};
+use crate::readback::{self, BufferRange};
 
 /// The view's uniform (`shaders/shared/view.wgsl`, `View`) as 32-bit words. The number of the reduction is 0.
 ///
@@ -18,7 +22,46 @@ pub fn view(camera: &Camera, options: &CullOptions) -> Result<Vec<u32>> {
 /// # Errors
 /// As [`Bounds::len`].
 pub fn instances(bounds: &Bounds<'_>) -> Result<Vec<u32>> {
-    let mut bytes = Vec::new();
-    bounds.pack(0..bounds.len()?, &mut bytes, &mut Vec::new());
+    let record_bytes = bounds.kind().record_bytes() as usize;
+    let mut bytes = vec![0; bounds.len()? * record_bytes];
+    for (i, record) in bytes.chunks_exact_mut(record_bytes).enumerate() {
+        bounds.write_record(i, record);
+    }
     Ok(bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
+}
+
+/// What is known of a group of 64 instances that are stored one after the other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupWords {
+    /// The caller's indices of its members.
+    pub members: Vec<u32>,
+    /// The least and the greatest corner of the box that the host keeps; none if a member is no volume.
+    pub corners: Option<[[f64; 3]; 2]>,
+    /// The box's record on the device.
+    pub record: Vec<u32>,
+}
+
+/// All groups, in stored order; after all updates that were submitted.
+///
+/// # Errors
+/// [`Error::DeviceLost`](crate::Error::DeviceLost).
+pub fn groups(engine: &Engine, instances: &Instances) -> Result<Vec<GroupWords>> {
+    let ranges: Vec<_> =
+        instances.pieces.iter().map(|p| BufferRange::first(&p.group_records, p.group_records.size())).collect();
+    let bytes = readback::read_buffers(engine.device(), engine.queue(), &ranges)?;
+    let changing = instances.changing();
+    let pieces = instances.pieces.iter().zip(&changing.groups).zip(bytes);
+    let of_piece = |((piece, groups), bytes): ((&Piece, &Groups), Vec<u8>)| -> Vec<GroupWords> {
+        let record_words = BoundsKind::Box.record_bytes() as usize / 4;
+        let words: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
+        let groups = (0..groups.len()).zip(words.chunks_exact(record_words)).map(|(g, record)| GroupWords {
+            members: (g * GROUP..(piece.count() as usize).min((g + 1) * GROUP))
+                .map(|place| piece.range.start + piece.order.index(place) as u32)
+                .collect(),
+            corners: groups.extent(g).map(|e| [e.min, e.max]),
+            record: record.to_vec(),
+        });
+        groups.collect()
+    };
+    Ok(pieces.flat_map(of_piece).collect())
 }

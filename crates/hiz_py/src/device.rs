@@ -5,6 +5,7 @@ use std::sync::Arc;
 use hiz_core::headless::{self, AdapterSummary};
 use hiz_core::{
     ConservativeDepthOptions, DepthConvention, DepthKind, FaceCull, Floats, InstanceOptions, MeshData, OccluderOptions,
+    StoredOrder,
 };
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -54,11 +55,30 @@ impl Engine {
         kind: &str,
         arrays: Vec<FloatArray<'_>>,
         strict: bool,
+        order: &str,
         piece_capacity: Option<u32>,
     ) -> PyResult<Instances> {
         let bounds = bounds(kind, &arrays)?;
-        let options = InstanceOptions { strict, piece_capacity };
+        let order = match order {
+            "morton" => StoredOrder::Morton,
+            "given" => StoredOrder::Given,
+            other => return Err(PyValueError::new_err(format!("order: no order {other:?}"))),
+        };
+        let options = InstanceOptions { strict, order, piece_capacity };
         detached(py, || self.0.instances(&bounds, &options)).map(Instances)
+    }
+
+    fn update(
+        &self,
+        py: Python<'_>,
+        instances: &Instances,
+        first: u32,
+        kind: &str,
+        arrays: Vec<FloatArray<'_>>,
+        strict: bool,
+    ) -> PyResult<()> {
+        let bounds = bounds(kind, &arrays)?;
+        detached(py, || self.0.update(&instances.0, first, &bounds, strict))
     }
 
     fn occluders(
@@ -191,8 +211,12 @@ impl Instances {
         self.0.num_pieces()
     }
 
-    fn invalid<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u64>> {
-        PyArray1::from_slice(py, self.0.invalid())
+    fn invalid<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u64>>> {
+        detached(py, || self.0.invalid()).map(|invalid| PyArray1::from_vec(py, invalid))
+    }
+
+    fn host_bytes(&self) -> u64 {
+        self.0.host_bytes()
     }
 
     fn device_bytes(&self) -> u64 {

@@ -190,7 +190,7 @@ impl Renderer {
         let wall_indices: Vec<[u32; 3]> = scene.walls.triangles.iter().map(|t| t.map(|v| first_wall + v)).collect();
         let numbers: Vec<u32> = (0..num_crowd).collect();
 
-        let options = InstanceOptions { strict: true, piece_capacity: Some(PIECE_CAPACITY) };
+        let options = InstanceOptions { strict: true, piece_capacity: Some(PIECE_CAPACITY), ..InstanceOptions::default() };
         let crowd = scene.with_bounds(|bounds| self.hiz.create_instances(bounds, &options))?;
         // What the draw arguments say beside the count: how many indices one body has.
         let index_count = 3 * one.triangles.len() as u32;

@@ -128,7 +128,27 @@ impl Engine {
     /// # Errors
     /// As [`HizContext::create_instances`], and [`Error::OutOfMemory`].
     pub fn instances(&self, bounds: &Bounds<'_>, options: &InstanceOptions) -> Result<Arc<Instances>> {
-        self.scoped(|| self.context().create_instances(bounds, options)).map(Arc::new)
+        // One piece at a time, so that only one has its copy in a staging area.
+        let between = || {
+            let submission = self.queue().submit([]);
+            readback::wait(self.device(), Some(submission))
+        };
+        self.scoped(|| Instances::new(&self.context().gpu, bounds, options, between)).map(Arc::new)
+    }
+
+    /// Replaces instances `first..first + n`: records and submits. A cull that was submitted before sees the old bounds. May be
+    /// called from any thread; updates of the same instances run in the order in which they come here.
+    ///
+    /// # Errors
+    /// As [`HizContext::record_update`].
+    pub fn update(&self, instances: &Instances, first: u32, bounds: &Bounds<'_>, strict: bool) -> Result<()> {
+        self.scoped(|| {
+            let _in_order = locked(&instances.submitting);
+            let mut encoder = self.encoder("hiz.update.encoder");
+            self.context().record_update(&mut encoder, instances, first, bounds, strict)?;
+            self.queue().submit([encoder.finish()]);
+            Ok(())
+        })
     }
 
     /// Uploads triangle meshes.

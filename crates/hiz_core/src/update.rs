@@ -1,0 +1,140 @@
+//! New bounds for some of the instances, which keep their places: records are replaced, the boxes of their groups follow.
+//!
+//! Recording is not running: an update that is dropped, or that runs in another order than it was recorded in, would leave the
+//! device with other volumes than the host formed the next boxes for, and a box must contain its members. So updates are numbered:
+//! the device counts those that ran, and where the numbers part the boxes of all groups that are touched from then on become no
+//! volume (their members are always tested one by one).
+
+use crate::bounds::{Bounds, BoxRecord};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::instances::{Instances, refuse_bad};
+use crate::pyramid::entry;
+
+/// Invocations of one workgroup; `shaders/update.wgsl`. As many as those of the cull, whose pieces fit one dispatch.
+const WORKGROUP: u32 = crate::layout::CULL_WORKGROUP;
+
+/// The shader copies records as vectors.
+const VECTOR_BYTES: u64 = 16;
+
+const _: () = assert!((size_of::<BoxRecord>() as u64).is_multiple_of(VECTOR_BYTES));
+
+/// `shaders/update.wgsl`, `Update`.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct UpdateUniform {
+    pub(crate) count: u32,
+    pub(crate) vectors: u32,
+    pub(crate) number: u32,
+    pub(crate) padding: u32,
+}
+
+/// Records that go to places of one buffer.
+struct Replacement<'a> {
+    places: &'a [u32],
+    fresh: wgpu::Buffer,
+    target: &'a wgpu::Buffer,
+    record_bytes: u64,
+}
+
+pub(crate) fn record(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    instances: &Instances,
+    first: u32,
+    bounds: &Bounds<'_>,
+    strict: bool,
+) -> Result<()> {
+    gpu.check_context("instances", instances.context)?;
+    let n = bounds.len()?;
+    if bounds.kind() != instances.kind {
+        return Err(Error::mismatch(
+            "bounds",
+            format!("expected the instances' kind, {:?}, got {:?}", instances.kind, bounds.kind()),
+        ));
+    }
+    let room = instances
+        .len()
+        .checked_sub(first)
+        .ok_or_else(|| Error::invalid("first", format!("expected a number in 0..={}, got {first}", instances.len())))?;
+    if n > room as usize {
+        return Err(Error::invalid("bounds", format!("expected at most {room} from instance {first} on, got {n}")));
+    }
+    if strict {
+        let mut record = vec![0; instances.kind.record_bytes() as usize];
+        let mut bad = (0..n).filter(|i| !bounds.write_record(*i, &mut record));
+        let first_bad = bad.next();
+        refuse_bad(n, usize::from(first_bad.is_some()) + bad.count(), first_bad.map(|i| i as u64))?;
+    }
+    if n == 0 {
+        return Ok(());
+    }
+
+    let mut changing = instances.changing();
+    let number = changing.next_update;
+    changing.next_update = number.wrapping_add(1);
+    let mut pass = encoder
+        .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.update.pass"), timestamp_writes: None });
+    let mut begun = false;
+    let mut dispatch = |replacement: &Replacement<'_>, entry_point| -> Result<()> {
+        let bind_group = bind(gpu, instances, replacement, number)?;
+        pass.set_bind_group(0, &bind_group, &[]);
+        if !std::mem::replace(&mut begun, true) {
+            pass.set_pipeline(&gpu.update_pipeline("begin"));
+            pass.dispatch_workgroups(1, 1, 1);
+        }
+        pass.set_pipeline(&gpu.update_pipeline(entry_point));
+        pass.dispatch_workgroups((replacement.places.len() as u32).div_ceil(WORKGROUP), 1, 1);
+        Ok(())
+    };
+    let range = first..first + n as u32;
+    let result = instances.pieces.iter().enumerate().try_for_each(|(p, piece)| {
+        let here = range.start.max(piece.range.start)..range.end.min(piece.range.end);
+        if here.is_empty() {
+            return Ok(());
+        }
+        let base = piece.range.start;
+        let places = piece.order.places((here.start - base) as usize..(here.end - base) as usize)?;
+        let offset = base as usize;
+        let of_bounds = |place: usize| offset + piece.order.index(place) - first as usize;
+        let record_bytes = instances.kind.record_bytes();
+        let groups = &mut changing.groups[p];
+        let staging = wgpu::BufferUsages::STORAGE;
+        let (fresh, touched) =
+            gpu.written("hiz.update.records", places.len() as u64 * record_bytes, staging, |write| {
+                groups.replace(bounds, &places, of_bounds, write)
+            })?;
+        dispatch(&Replacement { places: &places, fresh, target: &piece.records, record_bytes }, "replace_records")?;
+        let record_bytes = size_of::<BoxRecord>() as u64;
+        let (fresh, ()) = gpu.written("hiz.update.groups", touched.len() as u64 * record_bytes, staging, |write| {
+            (0..)
+                .zip(&touched)
+                .try_for_each(|(k, group)| write(k * record_bytes, bytemuck::bytes_of(&groups.record(*group as usize))))
+        })?;
+        dispatch(&Replacement { places: &touched, fresh, target: &piece.group_records, record_bytes }, "replace_groups")
+    });
+    if result.is_err() {
+        // The host may have taken a part. No number of the device will agree with it any more.
+        changing.next_update = changing.next_update.wrapping_add(1);
+    }
+    result
+}
+
+fn bind(gpu: &Gpu, instances: &Instances, replacement: &Replacement<'_>, number: u32) -> Result<wgpu::BindGroup> {
+    let Replacement { places, fresh, target, record_bytes } = replacement;
+    let vectors = (record_bytes / VECTOR_BYTES) as u32;
+    let uniform = UpdateUniform { count: places.len() as u32, vectors, number, padding: 0 };
+    let uniform = gpu.uniform("hiz.update.uniform", &uniform)?;
+    let places = gpu.filled("hiz.update.places", bytemuck::cast_slice(places), wgpu::BufferUsages::STORAGE)?;
+    Ok(gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("hiz.update.piece"),
+        layout: &gpu.layouts().update,
+        entries: &[
+            entry(0, uniform.as_entire_binding()),
+            entry(1, places.as_entire_binding()),
+            entry(2, fresh.as_entire_binding()),
+            entry(3, target.as_entire_binding()),
+            entry(4, instances.sequence.as_entire_binding()),
+        ],
+    }))
+}
