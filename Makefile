@@ -1,6 +1,6 @@
 # Every recipe is one script: what it does and why stands there, in scripts/.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-swiftshader soak lint bench docs wheel
+.PHONY: help setup demo test test-swiftshader soak lint bench bench-speed docs wheel
 
 help: ## This list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -25,6 +25,9 @@ lint: ## Format, clippy, ruff, mypy --strict, stubtest, shellcheck
 
 bench: ## Measure speed and error of every configuration on scenes with known truth; report and plots land in out/bench
 	@scripts/bench.sh
+
+bench-speed: ## Measure times against yardsticks and targets; report and plot land in out/speed
+	@scripts/bench.sh --speed
 
 docs: ## The HTML documentation, in docs/_build/html
 	@scripts/docs.sh

@@ -1,4 +1,4 @@
-// Compaction: from the plane of kept bits to the ascending list of the caller's indices and the draw's instance count.
+// Compaction: from the mask to the ascending list of the caller's indices and the draw's instance count.
 // `scan` (one workgroup) counts the bits before each word, `scatter` (an invocation a word) writes them.
 
 const LANES: u32 = 256u;
@@ -12,7 +12,7 @@ struct DrawIndexedIndirect {
 }
 
 @group(0) @binding(0) var<uniform> piece: Piece;
-@group(0) @binding(1) var<storage, read> planes: array<u32>;
+@group(0) @binding(1) var<storage, read> mask: array<u32>;
 @group(0) @binding(2) var<storage, read_write> list: array<u32>;
 @group(0) @binding(3) var<storage, read_write> draws: array<DrawIndexedIndirect>;
 // Kept bits before each word.
@@ -38,7 +38,7 @@ fn scan(@builtin(local_invocation_index) lane: u32) {
     let end = min(begin + share, piece.words);
     var sum = 0u;
     for (var w = begin; w < end; w += 1u) {
-        sum += countOneBits(planes[w]);
+        sum += countOneBits(mask[w]);
     }
     sums[lane] = sum;
     workgroupBarrier();
@@ -53,7 +53,7 @@ fn scan(@builtin(local_invocation_index) lane: u32) {
     var count = sums[lane] - sum;
     for (var w = begin; w < end; w += 1u) {
         before[w] = count;
-        count += countOneBits(planes[w]);
+        count += countOneBits(mask[w]);
     }
     if lane == LANES - 1u {
         draws[piece.index].instance_count = min(sums[lane], room());
@@ -68,7 +68,7 @@ fn scatter(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let written = draws[piece.index].instance_count;
     var slot = before[word];
-    var bits = planes[word];
+    var bits = mask[word];
     while bits != 0u && slot < written {
         list[slot] = piece.base + 32u * word + countTrailingZeros(bits);
         bits &= bits - 1u;

@@ -19,6 +19,7 @@ struct Explanation {
 
 @compute @workgroup_size(1)
 fn explain() {
+    begin();
     let outcome = classify(which.x);
     explanation.verdict = outcome.verdict;
     explanation.stage = outcome.stage;
@@ -27,9 +28,12 @@ fn explain() {
     explanation.pixels = outcome.pixels;
     explanation.texels = outcome.texels;
     if outcome.stage >= AT_DEPTH {
-        explanation.texel_bits = corners(outcome.level, outcome.texels);
+        let t = outcome.texels;
+        explanation.texel_bits = vec4<u32>(
+            texel(outcome.level, t.x, t.y), texel(outcome.level, t.z, t.y),
+            texel(outcome.level, t.x, t.w), texel(outcome.level, t.z, t.w));
     }
     let volume = load_volume(which.x);
-    let w = value_of(view.w, volume);
-    explanation.depths = ratio_interval(value_of(view.z, volume), w) + vec2<f32>(view.z_slope);
+    let w = value_of(view.w, 0.0, volume);
+    explanation.depths = ratio_interval(value_of(view.z, 0.0, volume), w) + vec2<f32>(view.z_slope);
 }

@@ -3,8 +3,8 @@
 struct Update {
     // How many records.
     count: u32,
-    // Vectors of 16 bytes in a record.
-    vectors: u32,
+    // Texels of a record.
+    texels: u32,
     // Which update of these instances this is, in the order of recording.
     number: u32,
     padding: u32,
@@ -21,11 +21,15 @@ struct Sequence {
 @group(0) @binding(0) var<uniform> update: Update;
 @group(0) @binding(1) var<storage, read> places: array<u32>;
 @group(0) @binding(2) var<storage, read> fresh: array<vec4<u32>>;
-@group(0) @binding(3) var<storage, read_write> records: array<vec4<u32>>;
+@group(0) @binding(3) var records: texture_storage_2d<rgba32uint, write>;
 @group(0) @binding(4) var<storage, read_write> sequence: Sequence;
 
-// A record of NaNs is no volume, whatever its kind.
-const NO_VOLUME: vec4<u32> = vec4<u32>(0xFFFFFFFFu);
+// The bits of 2^62: a record of such numbers is no volume, whatever its kind.
+const NO_VOLUME: vec4<u32> = vec4<u32>(0x5e800000u);
+
+fn replace(id: u32, k: u32, texel: vec4<u32>) {
+    textureStore(records, record_position(places[id], k, update.texels), texel);
+}
 
 @compute @workgroup_size(1)
 fn begin() {
@@ -38,8 +42,8 @@ fn replace_records(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= update.count {
         return;
     }
-    for (var v = 0u; v < update.vectors; v += 1u) {
-        records[places[id.x] * update.vectors + v] = fresh[id.x * update.vectors + v];
+    for (var k = 0u; k < update.texels; k += 1u) {
+        replace(id.x, k, fresh[id.x * update.texels + k]);
     }
 }
 
@@ -48,9 +52,9 @@ fn replace_groups(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= update.count {
         return;
     }
-    for (var v = 0u; v < update.vectors; v += 1u) {
-        var vector = fresh[id.x * update.vectors + v];
-        if sequence.broken != 0u { vector = NO_VOLUME; }
-        records[places[id.x] * update.vectors + v] = vector;
+    for (var k = 0u; k < update.texels; k += 1u) {
+        var texel = fresh[id.x * update.texels + k];
+        if sequence.broken != 0u { texel = NO_VOLUME; }
+        replace(id.x, k, texel);
     }
 }

@@ -40,6 +40,18 @@ TETRAHEDRON = hizvk.Mesh(np.eye(4)[:, :3] / 4, [[0, 1, 2], [0, 3, 1], [1, 3, 2],
 
 # -- bad values that several functions share -----------------------------------------------------------------
 
+LEVELS: list[Bad] = [
+    (0, ValueError, "expected an integer in 1..15, got int 0"),
+    (16, ValueError, "expected an integer in 1..15, got int 16"),
+    (2.0, TypeError, "got float 2.0"),
+    (True, TypeError, "got bool True"),
+    ("all", TypeError, "got str 'all'"),
+    ((1, 2, 3), ValueError, "expected None, a level or a pair (first, last), got tuple (1, 2, 3)"),
+    ((3, 2), ValueError, "expected first <= last, got (3, 2)"),
+    ((1, 16), ValueError, "in 1..15"),
+    ((1, None), TypeError, "got None"),
+]
+
 VECTOR: list[Bad] = [
     ("abc", TypeError, "expected (3,) finite numbers, got str 'abc'"),
     (None, TypeError, "got None"),
@@ -382,6 +394,34 @@ TABLES: dict[str, Table] = {
         {
             "bounds": BOUNDS,
             "strict": FLAG,
+            "order": [
+                ("sorted", ValueError, 'expected one of "morton", "given", got str \'sorted\''),
+                (None, TypeError, "got None"),
+            ],
+        },
+    ),
+    "Instances.update": Table(
+        lambda device: (device.instances(spheres()).update, {"first": 0, "bounds": spheres()}),
+        {
+            "first": [
+                (2, ValueError, "in 0..1, got int 2"),
+                (-1, ValueError, "in 0..1, got int -1"),
+                (0.0, TypeError, "got float 0.0"),
+            ],
+            "bounds": [
+                *BOUNDS,
+                (
+                    hizvk.Boxes(np.zeros((1, 3)), np.ones((1, 3))),
+                    TypeError,
+                    "expected spheres as the instances are, got Boxes Boxes(1 of float64)",
+                ),
+                (
+                    hizvk.Spheres(np.zeros((2, 3)), 1.0),
+                    ValueError,
+                    "expected at most 1 from instance 0 of 1 on, got 2",
+                ),
+            ],
+            "strict": FLAG,
         },
     ),
     "Device.occluders": Table(
@@ -411,7 +451,13 @@ TABLES: dict[str, Table] = {
     ),
     "Device.pyramid": Table(
         lambda device: (device.pyramid, {"depth": np.ones((6, 8)), "camera": camera(), "kind": "z"}),
-        {"depth": [*IMAGE, (None, TypeError, "got None")], "camera": CAMERA, "kind": KIND, "scale": SCALE},
+        {
+            "depth": [*IMAGE, (None, TypeError, "got None")],
+            "camera": CAMERA,
+            "kind": KIND,
+            "scale": SCALE,
+            "levels": LEVELS,
+        },
     ),
     "Device.cull": Table(
         lambda device: (device.cull, cull_arguments(device)),
@@ -428,6 +474,12 @@ TABLES: dict[str, Table] = {
             "footprint": FOOTPRINT,
             "descent": DESCENT,
             "fit": FIT,
+            "hierarchy": [(1, TypeError, "expected True or False, got int 1"), ("auto", TypeError, "got str")],
+            "outputs": [
+                ("mask", TypeError, "expected None or a collection of"),
+                (["masks"], ValueError, 'expected one of "mask", "verdicts", "indices", "draws"'),
+                ([1], TypeError, "got int 1"),
+            ],
             "capacity": [(-1, ValueError, "in 0..4294967295"), (1.5, TypeError, "got float 1.5")],
             "draw": [((36,), TypeError, "expected a DrawTemplate or None, got tuple (36,)")],
             "statistics": FLAG,

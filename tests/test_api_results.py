@@ -90,7 +90,7 @@ def test_boxes_and_oriented_boxes(device: hizvk.Device, camera: hizvk.Camera) ->
 
 
 def test_stats_add_up(device: hizvk.Device, camera: hizvk.Camera) -> None:
-    stats = culled(device, camera).stats
+    stats = culled(device, camera, statistics=True).stats
     assert stats.tested == len(SCENE)
     assert stats.outside == VERDICTS.count(Verdict.OUTSIDE)
     assert stats.occluded == VERDICTS.count(Verdict.OCCLUDED)
@@ -102,10 +102,46 @@ def test_stats_add_up(device: hizvk.Device, camera: hizvk.Camera) -> None:
     for milliseconds in (stats.record_ms, stats.gpu_ms, stats.readback_ms):
         assert milliseconds >= 0
     assert "15 tested: 10 kept (4 invalid), 5 culled (3 outside, 2 occluded)" in str(stats)
-    without = culled(device, camera, statistics=False).stats
+    assert (stats.tested_groups, stats.tested_instances, stats.comparisons) == (0, len(SCENE), len(SCENE))
+    without = culled(device, camera).stats
     assert without.levels is None
     assert without.texels_read is None
     assert without.kept == stats.kept
+
+
+def test_groups_are_tested_first(device: hizvk.Device, camera: hizvk.Camera) -> None:
+    stats = culled(device, camera, hierarchy=True).stats
+    # One group of 15, whose invalid members keep it.
+    assert (stats.tested_groups, stats.tested_instances, stats.comparisons) == (1, len(SCENE), 1 + len(SCENE))
+    assert [stats.outside, stats.occluded] == [VERDICTS.count(Verdict.OUTSIDE), VERDICTS.count(Verdict.OCCLUDED)]
+
+
+@pytest.mark.parametrize("order", ["stable", "any"])
+@pytest.mark.parametrize("hierarchy", [False, True])
+def test_what_was_not_asked_for_is_not_there(
+    device: hizvk.Device, camera: hizvk.Camera, order: hizvk.device.Order, hierarchy: bool
+) -> None:
+    parts = {
+        "mask": lambda seen: np.flatnonzero(seen.mask).tolist(),
+        "verdicts": lambda seen: [i for i, code in enumerate(seen.verdicts) if code >= Verdict.VISIBLE],
+        "indices": lambda seen: sorted(seen.indices.tolist()),
+        "draws": lambda seen: list(range(int(seen.draws["instance_count"].sum()))),
+    }
+    # Lists and draws can be made from a mask later, and a list has a draw.
+    also = {"mask": {"indices", "draws"}, "indices": {"draws"}}
+    for asked in parts:
+        seen = culled(device, camera, order=order, hierarchy=hierarchy, outputs=[asked])
+        assert seen.count == seen.demand == len(KEPT)
+        for name, read in parts.items():
+            if name == asked or name in also.get(asked, ()):
+                assert read(seen) == (list(range(len(KEPT))) if name == "draws" else KEPT), (asked, name)
+            else:
+                with pytest.raises(
+                    ValueError, match=rf"outputs: expected a cull that was asked for \w+, got .* {asked}"
+                ):
+                    read(seen)
+    with pytest.raises(ValueError, match="got one with nothing"):
+        _ = culled(device, camera, order=order, outputs=()).mask
 
 
 def test_draw_arguments(device: hizvk.Device, camera: hizvk.Camera) -> None:
@@ -251,6 +287,52 @@ def test_pyramid_levels_by_hand(device: hizvk.Device) -> None:
                 assert level.tolist() == np.asarray(values).tolist()
 
 
+def test_chosen_levels_by_hand(device: hizvk.Device) -> None:
+    """What is stored is what all levels have there; what is not says so, and what it decided is decided coarser."""
+    depth = np.full((40, 40), 0.5, np.float32)
+    depth[3, 3] = 0.0
+    view = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(40, 40), near=1)
+    everything = device.pyramid(depth, view, kind="reversed_ndc")
+    assert everything.levels == range(1, 7)
+    for levels, stored in (
+        (1, range(1, 7)),
+        (2, range(2, 7)),
+        (9, range(6, 7)),
+        ((2, 2), range(2, 3)),
+        ([4, 5], range(4, 6)),
+        ((5, 15), range(5, 7)),
+    ):
+        pyramid = device.pyramid(depth, view, kind="reversed_ndc", levels=levels)  # type: ignore[arg-type]
+        assert pyramid.levels == stored
+        assert pyramid.num_levels == 7
+        assert (pyramid.device_bytes < everything.device_bytes) == (stored != range(1, 7))
+        for k in range(7):
+            if k in (0, *stored):
+                np.testing.assert_array_equal(pyramid.level(k), everything.level(k))
+            else:
+                text = f"{stored[0]}..{stored[-1]}" if len(stored) > 1 else str(stored[0])
+                with pytest.raises(IndexError, match=rf"^k: expected 0 or a level that is stored, {text}, got {k}$"):
+                    pyramid.level(k)
+    # Behind the wall at depth 2: in one pixel, in pixels 4 to 6 (the hole is in the first blocks of 4 and 8), in 20.
+    spheres = hizvk.Spheres([[1.1, 1.1, -4], [-2.9, 2.9, -4], [1.5, -1.5, -4]], [0.02, 0.1, 1.8])
+    instances = device.instances(spheres)
+    for given, expected in (
+        (None, [False, False, False]),
+        (2, [False, False, False]),
+        (3, [False, True, False]),
+        ((1, 1), [False, False, True]),  # the large one spans more than 2 x 2 texels of level 1
+    ):
+        pyramid = device.pyramid(depth, view, kind="reversed_ndc", levels=given)  # type: ignore[arg-type]
+        result = device.cull(instances, view, pyramid)
+        assert result.mask.tolist() == expected, given
+        assert device.cull(instances, view, pyramid, descent=4096).mask.tolist() == [False] * 3
+        if given == (1, 1):
+            explained = result.explain(2)
+            assert "coarsest stored level" in explained.reason
+            assert explained.level == 1
+            assert len(explained.texels) == 0
+
+
 def test_rendered_depth_by_hand(device: hizvk.Device, camera: hizvk.Camera) -> None:
     # The square x in -10..0, y in -10..10 at depth 10 covers the left half of the image.
     corners = np.array([[-10.0, -10, -10], [0, -10, -10], [0, 10, -10], [-10, 10, -10]])
@@ -311,6 +393,8 @@ def test_instances_and_repr(device: hizvk.Device, camera: hizvk.Camera) -> None:
     assert repr(instances) == "<Instances: 15 spheres>"
     pyramid = device.pyramid(left_wall(), camera, kind="z")
     assert repr(pyramid) == "<Pyramid 8x8, 4 levels>"
+    partial = device.pyramid(left_wall(), camera, kind="z", levels=2)
+    assert repr(partial) == "<Pyramid 8x8, 4 levels, stored 2..3>"
     assert repr(device.cull(instances, camera, pyramid)) == "<CullResult of 15 instances>"
     corners = np.zeros((3, 3))
     assert repr(hizvk.Mesh(corners, [[0, 1, 2]], [np.eye(4)] * 2)) == "Mesh(3 vertices, 1 triangles, 2 copies)"

@@ -110,7 +110,7 @@ def test_an_absent_castle_is_told_of(
 
 
 def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
-    for arguments in (["--scene", "moon"], ["--quick", "--full"], ["--speed"], ["--views", "0"], ["--size", "4"]):
+    for arguments in (["--scene", "moon"], ["--quick", "--full"], ["--views", "0"], ["--size", "4"]):
         with pytest.raises(SystemExit) as caught:
             command.main(arguments)
         assert caught.value.code == 2

@@ -72,7 +72,7 @@ def cull(
     device: hizvk.Device, instances: Any, camera: hizvk.Camera, depth: np.ndarray, convention: str, **options: Any
 ) -> Any:
     kind = "reversed_ndc" if convention == "reversed" else "ndc"
-    return device.cull(instances, camera, device.pyramid(depth, camera, kind=kind), **options)
+    return device.cull(instances, camera, device.pyramid(depth, camera, kind=kind), statistics=True, **options)
 
 
 @pytest.mark.parametrize("size", SIZES, ids=["640x360", "1001x563"])

@@ -65,7 +65,7 @@ def cull_view(device: hizvk.Device, terrain: hizvk.Occluders, trees: hizvk.Insta
     mark()
     pyramid = device.pyramid(depth)
     mark()
-    seen = device.cull(trees, camera, pyramid)
+    seen = device.cull(trees, camera, pyramid, statistics=True)
     mark()
     verdicts, mask, drawn = seen.verdicts, seen.mask, int(seen.draws["instance_count"].sum())
     mark()

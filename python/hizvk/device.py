@@ -7,6 +7,7 @@ used from any thread, also at the same time.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
 
@@ -34,7 +35,10 @@ __all__ = ["Adapter", "Device", "adapters"]
 Order: TypeAlias = Literal["stable"] | Literal["any"]
 Coverage: TypeAlias = Literal["area"] | Literal["sample"]
 Fit: TypeAlias = Literal["rectangle"] | Literal["volume"]
+StoredOrder: TypeAlias = Literal["morton"] | Literal["given"]
+Output: TypeAlias = Literal["mask"] | Literal["verdicts"] | Literal["indices"] | Literal["draws"]
 FaceCull: TypeAlias = Literal["none"] | Literal["back"] | Literal["front"]
+Levels: TypeAlias = int | tuple[int, int] | None
 
 
 @dataclass(frozen=True)
@@ -105,8 +109,13 @@ class Device:
         """The largest height or width of a depth image on this device."""
         return self._engine.max_image_side()
 
-    def instances(self, bounds: Bounds, *, strict: bool = False) -> Instances:
+    def instances(self, bounds: Bounds, *, strict: bool = False, order: StoredOrder = "morton") -> Instances:
         """Uploads bounds, once for any number of culls.
+
+        They are stored so that neighbours in space lie together, in groups of 64 with a box around each: neighbours
+        meet the same pixels, and what hides the box hides the group. Masks, indices and `explain` speak of instances by
+        the order in which they came, whatever the stored one. On the device an instance takes its record, 4 bytes for
+        its index and its share of a group's box (`Instances.device_bytes`).
 
         Parameters
         ----------
@@ -115,17 +124,22 @@ class Device:
         strict : bool
             True refuses bounds that are no volume (NaN, infinite, a negative size, min > max). False keeps them
             visible, and `Instances.invalid` and `CullStats.invalid` tell of them.
+        order : "morton" or "given"
+            How they are stored. ``"morton"``: sorted along a curve through space (Morton 1966), once, here.
+            ``"given"``: as they come, for arrays that are in such an order already; no sort, and 8 bytes an instance
+            less on the host.
 
         Raises
         ------
         TypeError, ValueError
-            For other bounds, or bad ones with ``strict=True``.
+            For other bounds, or bad ones with ``strict=True``. They name the parameter, what it expects and what came.
         LimitError, OutOfMemoryError
             If the device cannot hold them.
         """
         kind, arrays = as_arrays("bounds", bounds)
         strict = _arguments.flag("strict", strict)
-        return Instances(self, self._engine.instances(kind, arrays, strict, None))
+        stored_order = _arguments.choice("order", order, ("morton", "given"))
+        return Instances(self, self._engine.instances(kind, arrays, strict, stored_order, None))
 
     @overload
     def occluders(
@@ -240,13 +254,35 @@ class Device:
         return DepthImage(self, self._engine.render_depth(occluders._inner, camera._inner), camera)
 
     @overload
-    def pyramid(self, depth: DepthImage, camera: None = None, *, kind: None = None, scale: float = 1.0) -> Pyramid: ...
+    def pyramid(
+        self,
+        depth: DepthImage,
+        camera: None = None,
+        *,
+        kind: None = None,
+        scale: float = 1.0,
+        levels: Levels = None,
+    ) -> Pyramid: ...
 
     @overload
-    def pyramid(self, depth: npt.ArrayLike, camera: Camera, *, kind: DepthKind, scale: float = 1.0) -> Pyramid: ...
+    def pyramid(
+        self,
+        depth: npt.ArrayLike,
+        camera: Camera,
+        *,
+        kind: DepthKind,
+        scale: float = 1.0,
+        levels: Levels = None,
+    ) -> Pyramid: ...
 
     def pyramid(
-        self, depth: Any, camera: Camera | None = None, *, kind: DepthKind | None = None, scale: float = 1.0
+        self,
+        depth: Any,
+        camera: Camera | None = None,
+        *,
+        kind: DepthKind | None = None,
+        scale: float = 1.0,
+        levels: Levels = None,
     ) -> Pyramid:
         """Builds the depth pyramid of a depth image.
 
@@ -267,6 +303,15 @@ class Device:
             NaN, and for z and distance also zero, negative and infinite numbers, are "no data": as far as can be.
         scale : float
             World units of one step, for the kinds ``"z"`` and ``"distance"`` (0.001 for millimetres).
+        levels : int or pair of int, optional
+            Which levels are built, of 1 to 15; level 0, the image itself, is always there. None: all. ``2``: level 2
+            and all coarser ones. ``(2, 5)``: levels 2 to 5; ``(4, 4)``: level 4 alone, made in one pass. Numbers past
+            the coarsest level, which is one texel, mean that one.
+
+            Fewer levels are built faster and take less memory, and nothing is hidden wrongly, but more is kept: a test
+            reads the next coarser level that there is, and bounds that span more texels of the coarsest one than the
+            footprint has are kept, unless a descent may read that many. Level 1 is the dearest to build; bounds of one
+            or two pixels read the image itself. ``hizvk bench`` measures both sides of the price.
 
         Raises
         ------
@@ -275,18 +320,19 @@ class Device:
         LimitError, OutOfMemoryError
             If the image is larger than the device allows.
         """
+        stored = stored_levels(levels)
         if isinstance(depth, DepthImage):
             for name, value in (("camera", camera), ("kind", kind)):
                 if value is not None:
                     got = _arguments.describe(value)
                     raise TypeError(f"{name}: expected nothing beside a DepthImage, which has its own, got {got}")
             self._own("depth", depth)
-            return Pyramid(self, self._engine.pyramid(depth._inner), depth.camera)
+            return Pyramid(self, self._engine.pyramid(depth._inner, stored), depth.camera)
         camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")
         self._check_side(camera)
         image, kind, scale = checked_image("depth", depth, camera, kind, scale)
         uploaded = self._engine.upload_depth(image, kind, scale, camera._inner)
-        return Pyramid(self, self._engine.pyramid(uploaded), camera)
+        return Pyramid(self, self._engine.pyramid(uploaded, stored), camera)
 
     def cull(
         self,
@@ -303,9 +349,11 @@ class Device:
         footprint: int = 2,
         descent: int = 0,
         fit: Fit = "rectangle",
+        hierarchy: bool | None = None,
+        outputs: Collection[Output] | None = None,
         capacity: int | None = None,
         draw: DrawTemplate | None = None,
-        statistics: bool = True,
+        statistics: bool = False,
     ) -> CullResult:
         """Tests instances against a pyramid. What could be seen in the depth image is never culled.
 
@@ -341,13 +389,21 @@ class Device:
             What stands for the bounds: ``"rectangle"``, the rectangle around their projection at their nearest depth;
             or, where that cannot decide, ``"volume"``: their own outline, and in each texel their own depth there.
             Keeps less and computes more; with a descent it comes down to single pixels.
+        hierarchy : bool, optional
+            Whether whole groups of 64 instances that lie together are tested first, and one by one only the instances of
+            the groups that are left. None: where there are enough of them for it to pay. What is kept differs by next
+            to nothing (a group's test may read other texels); ``stats`` says how many tests were spent.
+        outputs : collection of "mask", "verdicts", "indices", "draws"; optional
+            What is computed: ask for less, pay less. None: all of it, where an ordered list is made when it is first
+            asked for. Asking a result for what it was not asked to compute is a `ValueError`, but for indices and
+            draws, which can be made from a mask.
         capacity : int, optional
             Most instances in the list. None: enough for all. Too small a capacity shows as ``count < demand``; mask and
             verdicts stay complete.
         draw : DrawTemplate, optional
             The other numbers of the draw arguments; None leaves them 0.
         statistics : bool
-            Whether to count the tests by level and the texels that they read.
+            Whether to count the tests by level and the texels that they read (slower).
 
         Returns
         -------
@@ -374,7 +430,7 @@ class Device:
         options = cull_options(
             order=order, coverage=coverage, guard_px=guard_px, depth_slack=depth_slack,
             depth_slack_abs=depth_slack_abs, transform_slack=transform_slack, footprint=footprint, descent=descent,
-            fit=fit, capacity=capacity, draw=draw, statistics=statistics,
+            fit=fit, hierarchy=hierarchy, outputs=outputs, capacity=capacity, draw=draw, statistics=statistics,
         )  # fmt: skip
         culling = self._engine.cull(instances._inner, camera._inner, pyramid._inner, *options)
         return CullResult(culling, statistics=options[-1])
@@ -397,6 +453,59 @@ class Device:
         return f"<Device {self.adapter}>"
 
 
+CullOptions: TypeAlias = tuple[
+    str,
+    str,
+    float | None,
+    float,
+    float,
+    float,
+    int,
+    int,
+    str,
+    bool | None,
+    tuple[bool, bool, bool, bool],
+    int | None,
+    tuple[int, int, int, int],
+    bool,
+]
+
+#: What a cull can compute, in the engine's order.
+OUTPUTS = ("mask", "verdicts", "indices", "draws")
+
+
+def _outputs(value: object, default: tuple[bool, bool, bool, bool]) -> tuple[bool, bool, bool, bool]:
+    """Which of `OUTPUTS` are asked for."""
+    if value is None:
+        return default
+    if isinstance(value, str) or not isinstance(value, Collection):
+        got = _arguments.describe(value)
+        raise TypeError(f"outputs: expected None or a collection of {', '.join(map(repr, OUTPUTS))}, got {got}")
+    asked = {_arguments.choice("outputs", name, OUTPUTS) for name in value}
+    mask, verdicts, indices, draws = (name in asked for name in OUTPUTS)
+    return mask, verdicts, indices, draws
+
+
+#: The coarsest level that the largest image has.
+COARSEST = 15
+
+
+def stored_levels(levels: object) -> tuple[int, int]:
+    """The first and last level of ``levels=``."""
+    if levels is None:
+        return 1, COARSEST
+    if isinstance(levels, (tuple, list)):
+        if len(levels) != 2:
+            raise ValueError(
+                f"levels: expected None, a level or a pair (first, last), got {_arguments.describe(levels)}"
+            )
+        first, last = (_arguments.integer("levels", k, low=1, high=COARSEST) for k in levels)
+        if first > last:
+            raise ValueError(f"levels: expected first <= last, got ({first}, {last})")
+        return first, last
+    return _arguments.integer("levels", levels, low=1, high=COARSEST), COARSEST
+
+
 #: Texels a side that a test may read of one level.
 FOOTPRINTS = (2, 4, 8)
 
@@ -412,11 +521,18 @@ def cull_options(
     footprint: object,
     descent: object,
     fit: object,
-    capacity: object,
-    draw: object,
-    statistics: object,
-) -> tuple[str, str, float | None, float, float, float, int, int, str, int | None, tuple[int, int, int, int], bool]:
+    hierarchy: object = None,
+    outputs: object = None,
+    capacity: object = None,
+    draw: object = None,
+    statistics: object = False,
+) -> CullOptions:
     """The checked options of a cull, in the engine's order."""
+    order = _arguments.choice("order", order, ("stable", "any"))
+    if hierarchy is not None:
+        hierarchy = _arguments.flag("hierarchy", hierarchy)
+    # An ordered list can be made later, one in the order of the device cannot.
+    computed = _outputs(outputs, (True, True, order == "any", order == "any"))
     if guard_px is not None:
         guard_px = _arguments.number("guard_px", guard_px, at_least=0.0, at_most=16.0)
         if guard_px * 256.0 != round(guard_px * 256.0):
@@ -432,7 +548,7 @@ def cull_options(
         draw = _arguments.instance("draw", draw, DrawTemplate, "a DrawTemplate or None")
         template = (draw.index_count, draw.first_index, draw.base_vertex, draw.first_instance)
     return (
-        _arguments.choice("order", order, ("stable", "any")),
+        order,
         _arguments.choice("coverage", coverage, ("area", "sample")),
         guard_px,
         _arguments.number("depth_slack", depth_slack, at_least=0.0, at_most=0.5),
@@ -441,6 +557,8 @@ def cull_options(
         footprint,
         _arguments.integer("descent", descent, low=0, high=65536),
         _arguments.choice("fit", fit, ("rectangle", "volume")),
+        hierarchy,
+        computed,
         capacity,
         template,
         _arguments.flag("statistics", statistics),

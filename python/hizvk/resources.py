@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _arguments
+from .bounds import Bounds, as_arrays
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -87,13 +88,69 @@ class Instances:
 
     @property
     def invalid(self) -> npt.NDArray[np.uint64]:
-        """``(B,)`` uint64: the instances whose bounds are no volume, as far as the upload could see it."""
+        """``(B,)`` uint64, ascending: the instances whose bounds are no volume, as far as the upload could see it."""
         return self._inner.invalid()
 
     @property
     def device_bytes(self) -> int:
         """Memory that they take on the device."""
         return self._inner.device_bytes()
+
+    @property
+    def host_bytes(self) -> int:
+        """Memory that they take on the host.
+
+        8 bytes an instance for where it is stored (none with ``order="given"``), 88 for each group of 64, and 48
+        an instance in groups of which a part was updated.
+        """
+        return self._inner.host_bytes()
+
+    def update(self, first: int, bounds: Bounds, *, strict: bool = False) -> None:
+        """Replaces instances ``first``, ``first + 1``, ... by new bounds of the same kind, as many as there are.
+
+        A cull that was submitted earlier sees the old bounds, also where its result is read later; one that is
+        submitted later sees the new ones. (`CullResult.explain` runs again, so it explains the bounds of now.) From
+        several threads, updates take effect one after the other.
+
+        Instances keep the place in storage that the upload gave them; the boxes of their groups follow exactly. So an
+        update costs about as much as the upload of as many instances without the sort, and results are always right.
+        But groups whose members part are large, and large boxes are hidden less often: once most instances have moved
+        farther than neighbours lie apart, a new `Device.instances` (a re-sort) makes culls as fast as at first. It
+        pays when it costs less than what the culls until the next one save by it.
+
+        Parameters
+        ----------
+        first : int
+            The first instance that is replaced, ``0 <= first <= len(self)``.
+        bounds : Spheres, Boxes or OrientedBoxes
+            What replaces them: n volumes of the kind that they have, ``first + n <= len(self)``; none is allowed.
+        strict : bool
+            True refuses bounds that are no volume, and then nothing has changed. False keeps them visible, as
+            `Device.instances` does; `invalid` follows.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+        OutOfMemoryError
+            If the device or the host has no room for a copy of the new bounds.
+
+        Examples
+        --------
+        >>> import numpy as np, hizvk
+        >>> device = hizvk.Device()
+        >>> crowd = device.instances(hizvk.Spheres(np.zeros((1000, 3)), 0.5))
+        >>> crowd.update(990, hizvk.Spheres(np.ones((10, 3)), 0.5))
+        """
+        first = _arguments.integer("first", first, low=0, high=len(self))
+        kind, arrays = as_arrays("bounds", bounds)
+        if kind != self.kind:
+            raise TypeError(f"bounds: expected {self.kind} as the instances are, got {_arguments.describe(bounds)}")
+        if len(bounds) > len(self) - first:
+            expected = f"at most {len(self) - first} from instance {first} of {len(self)} on"
+            raise ValueError(f"bounds: expected {expected}, got {len(bounds)}")
+        strict = _arguments.flag("strict", strict)
+        self._device._engine.update(self._inner, first, kind, arrays, strict)
 
     def __len__(self) -> int:
         return self._inner.num_instances()
@@ -210,6 +267,12 @@ class Pyramid:
         return self._inner.num_levels()
 
     @property
+    def levels(self) -> range:
+        """The levels that can be read, but for 0, the image itself: those that ``levels=`` asked for."""
+        stored = self._inner.stored_levels()
+        return range(0) if stored is None else range(stored[0], stored[1] + 1)
+
+    @property
     def device_bytes(self) -> int:
         """Memory that it takes on the device."""
         return self._inner.device_bytes()
@@ -227,18 +290,26 @@ class Pyramid:
         TypeError
             If it is no integer.
         IndexError
-            If there is no such level.
+            If there is no such level, or it is not stored (see `levels`).
         """
         last = self.num_levels - 1
         try:
             k = _arguments.integer("k", k, low=0, high=last)
         except ValueError:
             raise IndexError(f"k: expected a level in 0..{last}, got {k}") from None
+        if k > 0 and k not in self.levels:
+            raise IndexError(f"k: expected 0 or a level that is stored, {self._stored()}, got {k}")
         size, texels = self._inner.read_level(k)
         return texels.reshape(size)
 
+    def _stored(self) -> str:
+        first, last = self.levels[0], self.levels[-1]
+        return f"{first}..{last}" if first < last else str(first)
+
     def __repr__(self) -> str:
-        return f"<Pyramid {self.size[0]}x{self.size[1]}, {self.num_levels} levels>"
+        missing = len(self.levels) < self.num_levels - 1
+        stored = f", stored {self._stored()}" if missing else ""
+        return f"<Pyramid {self.size[0]}x{self.size[1]}, {self.num_levels} levels{stored}>"
 
 
 def as_meshes(vertices: Any, triangles: Any, transforms: Any) -> list[Mesh]:

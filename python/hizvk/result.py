@@ -93,6 +93,10 @@ class CullStats:
     """Not culled, `invalid` ones included (also those for which `capacity` left no place)."""
     invalid: int
     """Kept because their bounds are no volume."""
+    tested_groups: int
+    """Groups of 64 that were tested as a whole."""
+    tested_instances: int
+    """Instances that were tested by themselves: all, or those of the groups that were left."""
     levels: tuple[int, ...] | None
     """How many instances were compared with the pyramid on each level; None without ``statistics=True``."""
     texels_read: int | None
@@ -103,6 +107,11 @@ class CullStats:
     """Milliseconds from the submission until the device was done, by the clock on the wall."""
     readback_ms: float
     """Milliseconds spent so far on copying results to the host."""
+
+    @property
+    def comparisons(self) -> int:
+        """Tests spent, of groups and of instances; a flat cull spends `tested`."""
+        return self.tested_groups + self.tested_instances
 
     def __str__(self) -> str:
         culled = self.outside + self.occluded
@@ -196,15 +205,19 @@ class CullResult:
     def _counts(self) -> _core.Counts:
         return self._culling.counts()
 
+    @cached_property
+    def _demand_and_written(self) -> tuple[int, int]:
+        return self._culling.demand_and_written()
+
     @property
     def count(self) -> int:
         """Instances in the draw's list: `demand`, or less where the capacity was too small."""
-        return self._counts.written
+        return self._demand_and_written[1]
 
     @property
     def demand(self) -> int:
         """Instances that were kept and belong into the list; more than `count` if the capacity was too small."""
-        return self._counts.demand
+        return self._demand_and_written[0]
 
     @property
     def stats(self) -> CullStats:
@@ -217,6 +230,8 @@ class CullResult:
             occluded=counts.occluded,
             kept=counts.visible + counts.invalid,
             invalid=counts.invalid,
+            tested_groups=counts.tested_groups,
+            tested_instances=counts.tested_instances,
             levels=tuple(counts.levels) if self._statistics else None,
             texels_read=counts.texels_read if self._statistics else None,
             record_ms=record_ms,

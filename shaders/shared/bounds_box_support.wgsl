@@ -3,12 +3,11 @@
 struct Volume {
     // About the reference point.
     center: vec3<f32>,
-    // Bounds the size of everything that a row is multiplied with.
-    reach: vec3<f32>,
+    // Bounds everything that a row is multiplied with, all axes added.
+    size: f32,
     half_axis_0: vec3<f32>,
     half_axis_1: vec3<f32>,
     half_axis_2: vec3<f32>,
-    valid: bool,
 }
 
 fn support(half: vec3<f32>) -> f32 {
@@ -17,6 +16,43 @@ fn support(half: vec3<f32>) -> f32 {
 
 fn exceeds_support(center: f32, half: vec3<f32>) -> bool {
     return center > support(half);
+}
+
+// The least and greatest r / w, and what is proved of them.
+struct Extent {
+    low: f32,
+    high: f32,
+    // On all of the volume r - low w > -below, and r - high w < above; both are above 0.
+    below: f32,
+    above: f32,
+}
+
+// Seen from the centre's ratio, r / w is greatest at the corner that lies farthest along r - ratio w, and least at the opposite one
+// (a step of Dinkelbach, "On Nonlinear Fractional Programming", 1967). Where that is another corner, for the ratio there is another
+// one, `above` and `below` say by how much the volume reaches beyond.
+fn extent_of(r: Value, w: Value, w_min: f32) -> Extent {
+    let ratio = r.center / w.center;
+    let toward = select(vec3<f32>(-1.0), vec3<f32>(1.0), r.half - ratio * w.half >= vec3<f32>(0.0));
+    let r_half = dot(toward, r.half);
+    let w_half = dot(toward, w.half);
+    // Barred: what is proved is proved of these numbers, not of the quotients.
+    let low = bar((r.center - r_half) / (w.center - w_half));
+    let high = bar((r.center + r_half) / (w.center + w_half));
+    return Extent(
+        low, high,
+        max(support(r.half - low * w.half) - (r.center - low * w.center) + error_bound(r, low, w), 0.0),
+        max(support(r.half - high * w.half) + (r.center - high * w.center) + error_bound(r, high, w), 0.0));
+}
+
+// True implies: r / w > edge on all of the volume, where w >= w_min > 0. For r - edge w = (r - low w) + (low - edge) w. (Barred: the
+// edge is an exact sum of larger numbers. Taken one by one from `low` they would leave roundings of their size behind.)
+fn surely_after(r: Value, w: Value, extent: Extent, edge: f32, w_min: f32) -> bool {
+    return (extent.low - bar(edge)) * w_min > extent.below;
+}
+
+// True implies: r / w < edge on all of the volume, where w >= w_min > 0.
+fn surely_before(r: Value, w: Value, extent: Extent, edge: f32, w_min: f32) -> bool {
+    return (bar(edge) - extent.high) * w_min > extent.above;
 }
 
 // An estimate of the least and greatest r / w: those of the eight corners.

@@ -1,27 +1,24 @@
-// Oriented boxes (twin: `crates/hiz_core/src/bounds.rs`, OrientedBoxRecord). Read as bits: validity is decided on integers.
+// Oriented boxes (twin: `crates/hiz_core/src/bounds.rs`, OrientedBoxRecord).
 
-struct OrientedBoxRecord {
-    // xyz: the centre's high half, its low half, two half axes; the four w: the third half axis and nothing.
-    center_hi: vec4<u32>,
-    center_lo: vec4<u32>,
-    half_axis_0: vec4<u32>,
-    half_axis_1: vec4<u32>,
+// xyz: the centre's high half, its low half, two half axes; the first three w: the third half axis; the last w: the caller's index.
+const RECORD_TEXELS: u32 = 4u;
+
+fn caller_index(i: u32) -> u32 {
+    return record_texel(i, 3u).w;
 }
 
-@group(1) @binding(1) var<storage, read> instances: array<OrientedBoxRecord>;
-
 fn load_volume(i: u32) -> Volume {
-    let record = instances[i];
-    let hi = bitcast<vec3<f32>>(record.center_hi.xyz);
-    let e0 = bitcast<vec3<f32>>(record.half_axis_0.xyz);
-    let e1 = bitcast<vec3<f32>>(record.half_axis_1.xyz);
-    let e2 = bitcast<vec3<f32>>(vec3<u32>(record.center_hi.w, record.center_lo.w, record.half_axis_0.w));
+    let texel_0 = record_texel(i, 0u);
+    let texel_1 = record_texel(i, 1u);
+    let texel_2 = record_texel(i, 2u);
+    let hi = bitcast<vec3<f32>>(texel_0.xyz);
+    let lo = bitcast<vec3<f32>>(texel_1.xyz);
+    let e0 = bitcast<vec3<f32>>(texel_2.xyz);
+    let e1 = bitcast<vec3<f32>>(record_texel(i, 3u).xyz);
+    let e2 = bitcast<vec3<f32>>(vec3<u32>(texel_0.w, texel_1.w, texel_2.w));
     let d_hi = bar3(hi - view.eye_hi);
-    let d_lo = bar3(bitcast<vec3<f32>>(record.center_lo.xyz) - view.eye_lo);
-    let reach = abs(d_hi) + abs(d_lo) + (abs(e0) + abs(e1) + abs(e2)) + HALF_EPS * abs(hi);
-    let valid = all_small(record.center_hi) && all_small(record.center_lo) && all_small(record.half_axis_0)
-        && all_small(vec4<u32>(record.half_axis_1.xyz, 0u)) && in_reach(reach);
-    return Volume(d_hi + d_lo, reach, e0, e1, e2, valid);
+    let d_lo = bar3(lo - view.eye_lo);
+    return Volume(d_hi + d_lo, size_of(d_hi, sum_abs(e0) + sum_abs(e1) + sum_abs(e2)), e0, e1, e2);
 }
 
 fn on_half_axes(m: vec3<f32>, volume: Volume) -> vec3<f32> {

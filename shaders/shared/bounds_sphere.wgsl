@@ -1,33 +1,28 @@
-// Spheres (twin: `crates/hiz_core/src/bounds.rs`, SphereRecord). Read as bits: validity is decided on integers.
+// Spheres (twin: `crates/hiz_core/src/bounds.rs`, SphereRecord).
 
-struct SphereRecord {
-    // xyz: the centre's high half; w: the radius.
-    center_hi_radius: vec4<u32>,
-    // xyz: the centre's low half.
-    center_lo: vec4<u32>,
-}
-
-@group(1) @binding(1) var<storage, read> instances: array<SphereRecord>;
+// xyz: the centre's high half, and its low half; the first w: the radius; the second w: the caller's index.
+const RECORD_TEXELS: u32 = 2u;
 
 struct Volume {
     // About the reference point.
     center: vec3<f32>,
-    // Bounds the size of everything that a row is multiplied with.
-    reach: vec3<f32>,
+    // Bounds everything that a row is multiplied with, all axes added.
+    size: f32,
     radius: f32,
-    valid: bool,
+}
+
+fn caller_index(i: u32) -> u32 {
+    return record_texel(i, 1u).w;
 }
 
 fn load_volume(i: u32) -> Volume {
-    let record = instances[i];
-    let hi = bitcast<vec3<f32>>(record.center_hi_radius.xyz);
-    let radius = bitcast<f32>(record.center_hi_radius.w);
+    let texel_0 = record_texel(i, 0u);
+    let hi = bitcast<vec3<f32>>(texel_0.xyz);
+    let lo = bitcast<vec3<f32>>(record_texel(i, 1u).xyz);
+    let radius = bitcast<f32>(texel_0.w);
     let d_hi = bar3(hi - view.eye_hi);
-    let d_lo = bar3(bitcast<vec3<f32>>(record.center_lo.xyz) - view.eye_lo);
-    let reach = abs(d_hi) + abs(d_lo) + vec3<f32>(radius) + HALF_EPS * abs(hi);
-    let valid = all_small(record.center_hi_radius) && all_small(vec4<u32>(record.center_lo.xyz, 0u))
-        && radius >= 0.0 && in_reach(reach);
-    return Volume(d_hi + d_lo, reach, radius, valid);
+    let d_lo = bar3(lo - view.eye_lo);
+    return Volume(d_hi + d_lo, size_of(d_hi, 3.0 * radius), radius);
 }
 
 fn on_half_axes(m: vec3<f32>, volume: Volume) -> vec3<f32> {
@@ -60,6 +55,30 @@ fn ratio_interval(r: Value, w: Value) -> vec2<f32> {
     return vec2<f32>(
         t - select(small_root, large_root, p > 0.0),
         t + select(large_root, small_root, p > 0.0));
+}
+
+// The least and greatest r / w, and how far they can be off, times w.
+struct Extent {
+    low: f32,
+    high: f32,
+    below: f32,
+    above: f32,
+}
+
+fn extent_of(r: Value, w: Value, w_min: f32) -> Extent {
+    let interval = ratio_interval(r, w);
+    return Extent(
+        interval.x, interval.y, error_bound(r, interval.x, w), error_bound(r, interval.y, w));
+}
+
+// True implies: r / w > edge on all of the volume.
+fn surely_after(r: Value, w: Value, extent: Extent, edge: f32, w_min: f32) -> bool {
+    return surely_above(r, edge, w);
+}
+
+// True implies: r / w < edge on all of the volume.
+fn surely_before(r: Value, w: Value, extent: Extent, edge: f32, w_min: f32) -> bool {
+    return surely_below(r, edge, w);
 }
 
 // 16 directions of the outline (four are the rectangle's), and two rings of 4 points about the one that is nearest to the eye.

@@ -8,24 +8,26 @@ const ERROR_ULPS: f32 = 24.0;
 // Covers what flushed subnormals lose.
 const ERROR_FLOOR: f32 = 0x1p-70;
 
-// A row on a volume: its value at the centre, a bound of the magnitudes that went into it, and its values on the half axes
-// (on a sphere: times the radius).
+// A row on a volume: its value at the centre, the most that it can be off by, and its values on the half axes (on a sphere: times
+// the radius).
 struct Value {
     center: f32,
-    size: f32,
+    error: f32,
     half: vec3<f32>,
 }
 
-fn value_of(row: Row, volume: Volume) -> Value {
-    return Value(
-        dot(row.m.xyz, volume.center) + row.m.w,
-        dot(row.a.xyz, volume.reach) + row.a.w,
-        on_half_axes(row.m.xyz, volume));
+fn value_of(row: vec4<f32>, error: f32, volume: Volume) -> Value {
+    return Value(dot(row.xyz, volume.center) + row.w, error, on_half_axes(row.xyz, volume));
+}
+
+// The margins of the four rows on a volume.
+fn errors_of(volume: Volume) -> vec4<f32> {
+    return ERROR_ULPS * EPS * (volume.size * view.magnitudes + view.constant_magnitudes) + vec4<f32>(ERROR_FLOOR);
 }
 
 // The most that `r - t w` can be off by.
 fn error_bound(r: Value, t: f32, w: Value) -> f32 {
-    return ERROR_ULPS * EPS * (r.size + abs(t) * w.size) + ERROR_FLOOR;
+    return r.error + abs(t) * w.error;
 }
 
 // True implies: r - t w > 0 on all of the volume.
@@ -36,4 +38,11 @@ fn surely_above(r: Value, t: f32, w: Value) -> bool {
 // True implies: r - t w < 0 on all of the volume.
 fn surely_below(r: Value, t: f32, w: Value) -> bool {
     return exceeds_support(-(r.center - t * w.center) - error_bound(r, t, w), r.half - t * w.half);
+}
+
+// True implies: r - t w > 0 on all of the volume, or -r - t w > 0 is. The side is that of the centre; on the other one it could only
+// succeed for what lies behind the eye, which the near plane finds.
+fn surely_beyond(r: Value, t: f32, w: Value) -> bool {
+    let side = select(1.0, -1.0, r.center < 0.0);
+    return surely_above(Value(side * r.center, r.error, side * r.half), t, w);
 }

@@ -6,6 +6,11 @@ struct Piece {
     count: u32,
     // Which piece, that is which draw.
     index: u32,
-    // Words of one bit plane.
+    // Words of the mask.
     words: u32,
+}
+
+// Where the verdicts begin behind the mask.
+fn verdicts_begin(words: u32) -> u32 {
+    return (words + 3u) / 4u * 4u;
 }

@@ -1,4 +1,5 @@
-// A header, whose first word numbers the reduction that filled the pyramid, and the levels 1 and up: one list of texels, rows padded to 4, cut into chunks that each fit one storage binding.
+// A header, whose first word numbers the reduction that filled the pyramid, and the stored levels: one list of texels, rows padded to 4
+// and more, cut into chunks that each fit one storage binding.
 
 struct Level {
     offset: u32,
@@ -9,10 +10,12 @@ struct Level {
 
 struct Pyramid {
     levels: array<Level, 16>,
-    num_levels: u32,
     // A chunk holds 1 << chunk_shift texels.
     chunk_shift: u32,
-    padding: vec2<u32>,
+    // Which levels are stored. Level 0, the depth image, is always there.
+    first_stored: u32,
+    last_stored: u32,
+    padding: u32,
 }
 
 // 1: everything lies in chunk_0, and the compiler drops the others.

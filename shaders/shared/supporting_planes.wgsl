@@ -30,6 +30,13 @@ struct Projected {
     w_min: f32,
 }
 
+// The bits of 2^60, from which on squares of products could overflow. Decided on bits: a compiler may assume that no float is NaN or infinite.
+const LARGEST_BITS: u32 = 0x5d800000u;
+
+fn is_small(bits: u32) -> bool {
+    return (bits & 0x7fffffffu) < LARGEST_BITS;
+}
+
 // The bits of 2^16: steeper planes say nothing, and could overflow a product.
 const STEEPEST_BITS: u32 = 0x47800000u;
 // Flatter is flat: a subnormal slope could be flushed in one product and not in another, and X' may be large.
@@ -79,7 +86,7 @@ fn supporting_planes(planes: ptr<function, SupportingPlanes>, p: Projected) {
         var slope = bar2(select(guess.slope, vec2<f32>(0.0), abs(guess.slope) < vec2<f32>(FLATTEST)));
         var r = Value(
             guess.facing * p.z.center + slope.x * p.x.center + slope.y * p.y.center,
-            abs(guess.facing) * p.z.size + abs(slope.x) * p.x.size + abs(slope.y) * p.y.size,
+            abs(guess.facing) * p.z.error + abs(slope.x) * p.x.error + abs(slope.y) * p.y.error + ERROR_FLOOR,
             guess.facing * p.z.half + slope.x * p.x.half + slope.y * p.y.half);
         let interval = ratio_interval(r, p.w);
         let extent = interval.y - interval.x;
@@ -90,11 +97,11 @@ fn supporting_planes(planes: ptr<function, SupportingPlanes>, p: Projected) {
                 continue;
             }
             slope = -slope;
-            r = Value(-r.center, r.size, -r.half);
+            r = Value(-r.center, r.error, -r.half);
             least = -interval.y;
         }
         let offset = bar(least - 3.0 * error_bound(r, least, p.w) / p.w_min);
-        let small = all_small(vec4<u32>(bitcast<u32>(offset), 0u, 0u, 0u)) && r.size + abs(offset) * p.w.size < 0x1p60;
+        let small = is_small(bitcast<u32>(offset)) && error_bound(r, offset, p.w) < 0x1p38;
         if small && surely_above(r, offset, p.w) {
             (*planes).list[(*planes).count] = SupportingPlane(slope, guess.facing, offset);
             (*planes).count += 1u;

@@ -40,7 +40,17 @@ impl Floats<'_> {
     }
 
     pub(crate) fn array<const N: usize>(&self, i: usize) -> [f64; N] {
-        std::array::from_fn(|k| self.get(N * i + k))
+        // One look at which they are: this is the inner loop of every upload.
+        match self {
+            Self::F32(v) => {
+                let v = &v[N * i..N * (i + 1)];
+                std::array::from_fn(|k| f64::from(v[k]))
+            }
+            Self::F64(v) => {
+                let v = &v[N * i..N * (i + 1)];
+                std::array::from_fn(|k| v[k])
+            }
+        }
     }
 }
 
@@ -136,29 +146,41 @@ impl Bounds<'_> {
         Ok(self.len()? == 0)
     }
 
-    /// Writes the record of instance `i` (`record_bytes()` bytes); false for bad bounds.
-    pub(crate) fn write_record(&self, i: usize, out: &mut [u8]) -> bool {
+    /// Writes the record of instance `i` (`record_bytes()` bytes), which says that the caller's number is `index`; false for bad bounds.
+    pub(crate) fn write_record(&self, i: usize, index: u32, out: &mut [u8]) -> bool {
         match *self {
-            Self::Spheres { centers, radii } => write(out, &SphereRecord::new(centers.array(i), radii.get(i))),
-            Self::Boxes { min, max } => write(out, &BoxRecord::new(min.array(i), max.array(i))),
+            Self::Spheres { centers, radii } => write(out, index, SphereRecord::new(centers.array(i), radii.get(i))),
+            Self::Boxes { min, max } => write(out, index, BoxRecord::new(min.array(i), max.array(i))),
             Self::OrientedBoxes { centers, half_sizes, rotations } => {
-                write(out, &OrientedBoxRecord::new(centers.array(i), half_sizes.array(i), rotations.array(i)))
+                write(out, index, OrientedBoxRecord::new(centers.array(i), half_sizes.array(i), rotations.array(i)))
             }
         }
     }
 }
 
-fn write<R: Record>(out: &mut [u8], record: &R) -> bool {
-    out.copy_from_slice(bytemuck::bytes_of(record));
-    record.is_valid()
+fn write<R: Record>(out: &mut [u8], index: u32, record: R) -> bool {
+    let is_valid = record.is_valid();
+    let record = if is_valid { record } else { R::NO_VOLUME };
+    out.copy_from_slice(bytemuck::bytes_of(&record.numbered(index)));
+    is_valid
 }
 
-/// The largest value that the shader takes, 2^60: squares of products stay far inside float32.
+/// Sizes and coordinates from here on are no volume: with those below, no product of the shader overflows.
 const LARGEST: f32 = 1_152_921_504_606_846_976.0;
 
+/// What bad bounds become: beyond every camera's coordinate limit, so that the shader keeps the instance and says that it is invalid. It
+/// need not know NaN or infinity, which a compiler may take for absent.
+const BEYOND_LIMITS: f32 = 4.0 * LARGEST;
+
 trait Record: bytemuck::Pod {
-    /// The shader's rule, bit for bit: everything below 2^60 in size, lengths not negative.
+    /// What stands for bad bounds.
+    const NO_VOLUME: Self;
+
+    /// Everything below 2^60 in size, lengths not negative.
     fn is_valid(&self) -> bool;
+
+    /// The same with the caller's index.
+    fn numbered(self, index: u32) -> Self;
 }
 
 fn all_small<const N: usize>(values: [f32; N]) -> bool {
@@ -172,7 +194,7 @@ pub(crate) struct SphereRecord {
     center_hi: [f32; 3],
     radius: f32,
     center_lo: [f32; 3],
-    padding: f32,
+    index: u32,
 }
 
 /// `shaders/shared/bounds_box.wgsl`, `BoxRecord`.
@@ -182,7 +204,7 @@ pub(crate) struct BoxRecord {
     center_hi: [f32; 3],
     padding_0: f32,
     center_lo: [f32; 3],
-    padding_1: f32,
+    index: u32,
     half_size: [f32; 3],
     padding_2: f32,
 }
@@ -198,7 +220,7 @@ pub(crate) struct OrientedBoxRecord {
     half_axis_0: [f32; 3],
     half_axis_2_z: f32,
     half_axis_1: [f32; 3],
-    padding: f32,
+    index: u32,
 }
 
 const _: () =
@@ -233,18 +255,30 @@ impl SphereRecord {
         let moved = p.rest.iter().fold(0.0, |sum, r| sum_up(sum, *r));
         // A negative radius stays negative, however small.
         let radius = if radius < 0.0 { -1.0 } else { round_up(sum_up(radius, moved)) };
-        Self { center_hi: p.hi, radius, center_lo: p.lo, padding: 0.0 }
+        Self { center_hi: p.hi, radius, center_lo: p.lo, index: 0 }
     }
 }
 
 impl Record for SphereRecord {
+    const NO_VOLUME: Self = Self { center_hi: [0.0; 3], radius: BEYOND_LIMITS, center_lo: [0.0; 3], index: 0 };
+
+    fn numbered(self, index: u32) -> Self {
+        Self { index, ..self }
+    }
+
     fn is_valid(&self) -> bool {
         all_small(self.center_hi) && all_small(self.center_lo) && all_small([self.radius]) && self.radius >= 0.0
     }
 }
 
 impl BoxRecord {
-    pub(crate) fn new(min: [f64; 3], max: [f64; 3]) -> Self {
+    /// The record of a box, or of no volume where it is none.
+    pub(crate) fn valid_or_none(corners: Option<[[f64; 3]; 2]>) -> Self {
+        let record = corners.map(|[min, max]| Self::new(min, max));
+        record.filter(Self::is_valid).unwrap_or(Self::NO_VOLUME)
+    }
+
+    fn new(min: [f64; 3], max: [f64; 3]) -> Self {
         // Halved first: min + max may overflow.
         let center: [f64; 3] = std::array::from_fn(|k| 0.5 * min[k] + 0.5 * max[k]);
         let p = Position::new(center);
@@ -256,7 +290,7 @@ impl BoxRecord {
             round_up(sum_up(half, p.rest[k]))
         });
         // A NaN corner makes a NaN centre, so that it cannot hide in the maximum above.
-        Self { center_hi: p.hi, padding_0: 0.0, center_lo: p.lo, padding_1: 0.0, half_size, padding_2: 0.0 }
+        Self { center_hi: p.hi, padding_0: 0.0, center_lo: p.lo, index: 0, half_size, padding_2: 0.0 }
     }
 }
 
@@ -269,6 +303,19 @@ fn sum_up_difference(a: f64, b: f64) -> f64 {
 }
 
 impl Record for BoxRecord {
+    const NO_VOLUME: Self = Self {
+        center_hi: [0.0; 3],
+        padding_0: 0.0,
+        center_lo: [0.0; 3],
+        index: 0,
+        half_size: [BEYOND_LIMITS; 3],
+        padding_2: 0.0,
+    };
+
+    fn numbered(self, index: u32) -> Self {
+        Self { index, ..self }
+    }
+
     fn is_valid(&self) -> bool {
         all_small(self.center_hi)
             && all_small(self.center_lo)
@@ -300,12 +347,27 @@ impl OrientedBoxRecord {
             half_axis_0: if negative { [f32::NAN; 3] } else { half_axis(0) },
             half_axis_2_z: last[2],
             half_axis_1: half_axis(1),
-            padding: 0.0,
+            index: 0,
         }
     }
 }
 
 impl Record for OrientedBoxRecord {
+    const NO_VOLUME: Self = Self {
+        center_hi: [0.0; 3],
+        half_axis_2_x: 0.0,
+        center_lo: [0.0; 3],
+        half_axis_2_y: 0.0,
+        half_axis_0: [BEYOND_LIMITS; 3],
+        half_axis_2_z: 0.0,
+        half_axis_1: [0.0; 3],
+        index: 0,
+    };
+
+    fn numbered(self, index: u32) -> Self {
+        Self { index, ..self }
+    }
+
     fn is_valid(&self) -> bool {
         all_small(self.center_hi)
             && all_small(self.center_lo)
@@ -364,7 +426,7 @@ mod tests {
 
     fn invalid(bounds: &Bounds<'_>) -> Vec<usize> {
         let mut record = vec![0; bounds.kind().record_bytes() as usize];
-        (0..bounds.len().unwrap()).filter(|i| !bounds.write_record(*i, &mut record)).collect()
+        (0..bounds.len().unwrap()).filter(|i| !bounds.write_record(*i, 0, &mut record)).collect()
     }
 
     #[test]

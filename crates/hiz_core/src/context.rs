@@ -28,7 +28,17 @@ impl HizContext {
     /// # Errors
     /// [`Error::Limit`] where the device offers less than [`HizContext::required_limits`].
     pub fn new(device: &wgpu::Device) -> Result<Self> {
-        Self::with_planted_faults(device, &[])
+        Self::with_pipeline_cache(device, None)
+    }
+
+    /// The same, with a cache that pipelines are compiled into and taken from: of a device with the feature `PIPELINE_CACHE`, whose
+    /// data the caller keeps from run to run. Pipelines are made when they are first used, each once; drivers that have a shader
+    /// cache of their own on the disk, as Mesa's have, need nothing more.
+    ///
+    /// # Errors
+    /// As [`HizContext::new`].
+    pub fn with_pipeline_cache(device: &wgpu::Device, cache: Option<wgpu::PipelineCache>) -> Result<Self> {
+        Self::make(device, cache, &[])
     }
 
     /// For tests: a context whose shaders have texts replaced, `(what, by what)`. A suite is trusted once a planted fault
@@ -38,6 +48,10 @@ impl HizContext {
     /// If no shader holds such a text: a fault that was never planted proves nothing.
     #[doc(hidden)]
     pub fn with_planted_faults(device: &wgpu::Device, faults: &[(&str, &str)]) -> Result<Self> {
+        Self::make(device, None, faults)
+    }
+
+    fn make(device: &wgpu::Device, cache: Option<wgpu::PipelineCache>, faults: &[(&str, &str)]) -> Result<Self> {
         let (have, need) = (device.limits(), Self::required_limits());
         for (name, need, have) in [
             (
@@ -57,7 +71,7 @@ impl HizContext {
                 return Err(Error::limit(name, u64::from(need), u64::from(have)));
             }
         }
-        Ok(Self { gpu: Arc::new(Gpu::new(device, faults)) })
+        Ok(Self { gpu: Arc::new(Gpu::new(device, cache, faults)) })
     }
 
     /// The limits that a device needs: WebGPU's defaults are enough.
@@ -84,12 +98,20 @@ impl HizContext {
         Pyramid::new(&self.gpu, size, options)
     }
 
-    /// Uploads bounding volumes.
+    /// Uploads bounding volumes; records their copies, which run before what is recorded later.
     ///
     /// # Errors
     /// [`Error::Invalid`] for arrays that do not agree and, with `strict`, for bad bounds.
-    pub fn create_instances(&self, bounds: &Bounds<'_>, options: &InstanceOptions) -> Result<Instances> {
-        Instances::new(&self.gpu, bounds, options, || Ok(()))
+    pub fn record_instances(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        bounds: &Bounds<'_>,
+        options: &InstanceOptions,
+    ) -> Result<Instances> {
+        Instances::new(&self.gpu, bounds, options, |copies, _| {
+            copies(encoder);
+            Ok(())
+        })
     }
 
     /// Records the replacement of instances `first..first + n` by the `n` new bounds, of the same kind. They keep their places in the
@@ -146,7 +168,7 @@ impl HizContext {
 
     /// Records the reduction of a depth image of `camera` into `pyramid`.
     ///
-    /// `depth` is a view of a whole 2D texture of one mip level, sample and layer, with the usage `TEXTURE_BINDING` and a depth
+    /// `depth` is a view of a whole 2D texture of one mip level, sample and layer, with the usage `TEXTURE_BINDING` (`R32Uint`: `STORAGE_BINDING`) and a depth
     /// format (with stencil: the view's aspect is `DepthOnly`), `R32Float`, or `R32Uint` holding float bits. The reduction has
     /// to be submitted before a cull that uses it, or with it: a cull that runs before it keeps everything.
     ///
@@ -175,7 +197,7 @@ impl HizContext {
         visible: &Visible,
         options: &CullOptions,
     ) -> Result<()> {
-        cull::record(&self.gpu, encoder, &CullInputs { instances, camera, pyramid, options }, visible)
+        cull::record(&self.gpu, encoder, &CullInputs { instances, camera, pyramid, options, certified: true }, visible)
     }
 }
 

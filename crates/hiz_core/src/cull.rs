@@ -1,15 +1,17 @@
 //! The cull pass: one camera, one pyramid, one set of instances; and the explanation of a single verdict.
 
+use crate::bounds::BoundsKind;
 use crate::camera::Camera;
 use crate::compact;
 use crate::error::{Error, Result};
-use crate::gpu::{CullKey, Gpu};
+use crate::gpu::{CullKey, Gpu, ReportKey, StandIn};
 use crate::instances::{Instances, Piece};
 use crate::layout::CULL_WORKGROUP;
 use crate::pyramid::{Built, Pyramid, entry};
-use crate::renumber;
-use crate::view::{EPS, Row, ViewRows};
-use crate::visible::Visible;
+use crate::records::Records;
+use crate::shader::TexelStore;
+use crate::view::{EPS, ViewRows};
+use crate::visible::{PieceOutput, Visible};
 
 /// In which order the indices of the kept instances are listed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -64,6 +66,18 @@ pub enum Fit {
     Volume,
 }
 
+/// Whether whole groups of 64 instances are tested before their members.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum Hierarchy {
+    /// Where there are enough instances for it to pay.
+    #[default]
+    Auto,
+    /// Whatever their number.
+    Always,
+    /// Each instance by itself.
+    Never,
+}
+
 /// How instances are culled.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CullOptions {
@@ -89,6 +103,9 @@ pub struct CullOptions {
     pub descent: u32,
     /// What stands for a volume.
     pub fit: Fit,
+    /// Whether groups are tested first. What a group's test hides, its members' own tests would have hidden but for the level that they
+    /// read: what is kept differs by next to nothing.
+    pub hierarchy: Hierarchy,
     /// Count the depth tests of each level and the texels read.
     pub statistics: bool,
 }
@@ -105,7 +122,8 @@ impl Default for CullOptions {
             footprint: Footprint::Two,
             descent: 0,
             fit: Fit::Rectangle,
-            statistics: true,
+            hierarchy: Hierarchy::Auto,
+            statistics: false,
         }
     }
 }
@@ -114,14 +132,16 @@ impl Default for CullOptions {
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct ViewUniform {
-    pub(crate) x: Row,
-    pub(crate) y: Row,
-    pub(crate) z: Row,
-    pub(crate) w: Row,
+    pub(crate) x: [f32; 4],
+    pub(crate) y: [f32; 4],
+    pub(crate) z: [f32; 4],
+    pub(crate) w: [f32; 4],
+    pub(crate) magnitudes: [f32; 4],
+    pub(crate) constant_magnitudes: [f32; 4],
     pub(crate) eye_hi: [f32; 3],
     pub(crate) z_slope: f32,
     pub(crate) eye_lo: [f32; 3],
-    pub(crate) coordinate_limit: f32,
+    pub(crate) halves_size: f32,
     pub(crate) half_size: [f32; 2],
     pub(crate) reach: f32,
     pub(crate) depth_factor: f32,
@@ -130,11 +150,11 @@ pub(crate) struct ViewUniform {
     pub(crate) reduction: u32,
     pub(crate) descent_budget: u32,
     pub(crate) depth_offset: f32,
-    pub(crate) padding_0: u32,
-    pub(crate) padding_1: u32,
+    pub(crate) coordinate_limit: f32,
+    pub(crate) padding: u32,
 }
 
-const _: () = assert!(size_of::<ViewUniform>() == 208);
+const _: () = assert!(size_of::<ViewUniform>() == 176);
 
 impl ViewUniform {
     #[expect(
@@ -177,15 +197,18 @@ impl ViewUniform {
         let depth_offset = if camera.convention().is_reversed() { -depth_offset } else { depth_offset };
         let rows = ViewRows::new(camera, kappa)?;
         let size = camera.size();
+        let all = [rows.x, rows.y, rows.z, rows.w];
         Ok(Self {
-            x: rows.x,
-            y: rows.y,
-            z: rows.z,
-            w: rows.w,
+            x: rows.x.m,
+            y: rows.y.m,
+            z: rows.z.m,
+            w: rows.w.m,
+            magnitudes: all.map(|row| row.a[..3].iter().copied().fold(0.0, f32::max)),
+            constant_magnitudes: all.map(|row| row.a[3]),
             eye_hi: rows.eye_hi,
             z_slope: rows.z_slope,
             eye_lo: rows.eye_lo,
-            coordinate_limit: rows.coordinate_limit,
+            halves_size: crate::view::round_up(halves_size(&rows)),
             half_size: [size.width as f32 / 2.0, size.height as f32 / 2.0],
             reach: reach as f32,
             depth_factor,
@@ -194,16 +217,17 @@ impl ViewUniform {
             reduction,
             descent_budget: options.descent,
             depth_offset,
-            padding_0: 0,
-            padding_1: 0,
+            coordinate_limit: rows.coordinate_limit,
+            padding: 0,
         })
     }
 }
 
-/// Everything that the shader knows of one cull, bound.
-struct Bound {
-    view: wgpu::BindGroup,
-    key: CullKey,
+/// What low halves of positions near the eye come to, all axes added: those of the eye, and twice 2^-24 of the high halves, for theirs
+/// and for what both cannot hold; and a little, for the roundings of this sum.
+fn halves_size(rows: &ViewRows) -> f64 {
+    let sum = |v: [f32; 3]| v.iter().map(|v| f64::from(v.abs())).sum::<f64>();
+    sum(rows.eye_lo) * (1.0 + EPS) + EPS * (1.0 + 1.0 / 256.0) * sum(rows.eye_hi)
 }
 
 /// What a cull reads.
@@ -213,46 +237,88 @@ pub(crate) struct CullInputs<'a> {
     pub(crate) camera: &'a Camera,
     pub(crate) pyramid: &'a Pyramid,
     pub(crate) options: &'a CullOptions,
+    /// False: the yardstick, for boxes and the flat cull alone.
+    pub(crate) certified: bool,
 }
 
-fn bind(gpu: &Gpu, inputs: &CullInputs<'_>) -> Result<Bound> {
-    let CullInputs { instances, camera, pyramid, options } = *inputs;
-    gpu.check_context("instances", instances.context)?;
-    gpu.check_context("pyramid", pyramid.context)?;
-    let Built { reduction, source, source_kind, .. } = pyramid.built_for(camera)?;
-    let view = gpu.uniform("hiz.cull.view", &ViewUniform::new(camera, reduction, options)?)?;
-    let view = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("hiz.cull.view"),
-        layout: gpu.layouts().cull(source_kind),
-        entries: &[
-            entry(0, wgpu::BindingResource::TextureView(&source)),
+/// What the shader knows of camera and pyramid, and the pipeline that asks for it.
+struct Seen {
+    built: Built,
+    /// The stored levels in a texture, where that pays.
+    texels: Option<wgpu::TextureView>,
+    key: CullKey,
+}
+
+impl Seen {
+    /// For `encoder`, which takes the copy of the levels where one is needed; without it there is none.
+    fn new(gpu: &Gpu, inputs: &CullInputs<'_>, encoder: Option<&mut wgpu::CommandEncoder>) -> Result<Self> {
+        let CullInputs { instances, camera, pyramid, options, .. } = *inputs;
+        gpu.check_context("instances", instances.context)?;
+        gpu.check_context("pyramid", pyramid.context)?;
+        let built = pyramid.built_for(camera)?;
+        let texels = encoder
+            .filter(|_| pyramid.texture_pays(gpu, instances.len()))
+            .map(|encoder| pyramid.record_texture(gpu, encoder, built.reduction));
+        let key = CullKey {
+            source: built.source_kind,
+            texels: if texels.is_some() { TexelStore::Texture } else { TexelStore::Buffer },
+            kind: instances.kind,
+            reversed: camera.convention().is_reversed(),
+            chunks: if texels.is_some() { 1 } else { pyramid.chunks.len() },
+            sample_coverage: options.coverage == Coverage::Sample,
+            footprint_log2: options.footprint.log2(),
+            descent: options.descent > 0,
+            fit_volume: options.fit == Fit::Volume,
+        };
+        Ok(Self { built, texels, key })
+    }
+
+    /// The bindings for these options.
+    fn bind(&self, gpu: &Gpu, camera: &Camera, pyramid: &Pyramid, options: &CullOptions) -> Result<wgpu::BindGroup> {
+        let view = gpu.uniform("hiz.cull.view", &ViewUniform::new(camera, self.built.reduction, options)?)?;
+        let mut entries = vec![
+            entry(0, wgpu::BindingResource::TextureView(&self.built.source)),
+            entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
             entry(2, pyramid.uniform.as_entire_binding()),
-            entry(3, pyramid.chunk(gpu, 0).as_entire_binding()),
-            entry(4, pyramid.chunk(gpu, 1).as_entire_binding()),
-            entry(5, pyramid.chunk(gpu, 2).as_entire_binding()),
             entry(6, view.as_entire_binding()),
-        ],
-    });
-    let key = CullKey {
-        source: source_kind,
-        kind: instances.kind,
-        reversed: camera.convention().is_reversed(),
-        chunks: pyramid.chunks.len(),
-        sample_coverage: options.coverage == Coverage::Sample,
-        footprint_log2: options.footprint.log2(),
-        descent: options.descent > 0,
-        fit_volume: options.fit == Fit::Volume,
-        append: options.order == Order::Any,
-        statistics: options.statistics,
-    };
-    Ok(Bound { view, key })
+        ];
+        match &self.texels {
+            Some(texels) => entries.push(entry(3, wgpu::BindingResource::TextureView(texels))),
+            None => entries.extend((0..3).map(|c| entry(3 + c, pyramid.chunk(gpu, c as usize).as_entire_binding()))),
+        }
+        Ok(gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("hiz.cull.view"),
+            layout: gpu.layouts().cull(self.key.source, self.key.texels),
+            entries: &entries,
+        }))
+    }
 }
 
-fn bind_piece(gpu: &Gpu, uniform: &wgpu::Buffer, piece: &Piece) -> wgpu::BindGroup {
+fn bind_piece(gpu: &Gpu, uniform: &wgpu::Buffer, records: &Records) -> wgpu::BindGroup {
     gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("hiz.cull.instances"),
         layout: &gpu.layouts().instances,
-        entries: &[entry(0, uniform.as_entire_binding()), entry(1, piece.records.as_entire_binding())],
+        entries: &[entry(0, uniform.as_entire_binding()), entry(1, wgpu::BindingResource::TextureView(&records.view))],
+    })
+}
+
+fn bind_output(gpu: &Gpu, piece: &Piece, visible: &Visible, p: usize, statistics: bool) -> wgpu::BindGroup {
+    let lists = visible.lists.as_ref();
+    let list = lists.map_or(gpu.stand_in(StandIn::List), |lists| lists.pieces[p].bound());
+    let draws = lists.map_or(gpu.stand_in(StandIn::Draws), |lists| &lists.draws);
+    // Any uniform will do where nothing is listed.
+    let capacity = lists.map_or(&piece.uniform, |lists| &lists.capacity_uniform);
+    let statistics = if statistics { visible.statistics_or_new(gpu) } else { gpu.stand_in(StandIn::Statistics) };
+    gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("hiz.cull.visible"),
+        layout: &gpu.layouts().visible,
+        entries: &[
+            entry(0, visible.pieces[p].mask.as_entire_binding()),
+            entry(1, list.as_entire_binding()),
+            entry(2, draws.as_entire_binding()),
+            entry(3, statistics.as_entire_binding()),
+            entry(4, capacity.as_entire_binding()),
+        ],
     })
 }
 
@@ -262,42 +328,119 @@ pub(crate) fn record(
     inputs: &CullInputs<'_>,
     visible: &Visible,
 ) -> Result<()> {
-    let CullInputs { instances, options, .. } = *inputs;
+    let CullInputs { instances, camera, pyramid, options, .. } = *inputs;
     gpu.check_context("visible", visible.context)?;
     if !visible.counts().iter().copied().eq(instances.pieces.iter().map(Piece::count)) {
         return Err(Error::mismatch("visible", "expected buffers that were created for these instances, got others"));
     }
-    let bound = bind(gpu, inputs)?;
-    encoder.copy_buffer_to_buffer(&visible.draws_template, 0, &visible.draws, 0, visible.draws.size());
-    encoder.clear_buffer(&visible.counters, 0, None);
-    for output in visible.pieces.iter().filter(|output| output.stored_planes.is_some()) {
-        encoder.clear_buffer(&output.planes, 0, None);
+    let seen = Seen::new(gpu, inputs, Some(encoder))?;
+    let key = seen.key;
+    let view = seen.bind(gpu, camera, pyramid, options)?;
+    let group_view = if instances.pieces.iter().any(|piece| is_grouped(piece, options)) {
+        let options = CullOptions { descent: options.descent.max(GROUP_DESCENT), ..options.clone() };
+        Some(seen.bind(gpu, camera, pyramid, &options)?)
+    } else {
+        None
+    };
+    let outputs = visible.outputs();
+    let listed = outputs.indices || outputs.draws;
+    let ordered = listed && options.order == Order::Stable;
+    let report = ReportKey {
+        mask: outputs.mask || ordered,
+        verdicts: outputs.verdicts,
+        append: listed && !ordered,
+        list: outputs.indices && !ordered,
+        capped: visible.is_capped(),
+        statistics: options.statistics,
+    };
+    if let Some(lists) = &visible.lists {
+        lists.record_clear(encoder);
+    }
+    if report.statistics {
+        encoder.clear_buffer(visible.statistics_or_new(gpu), 0, None);
+    }
+    for (piece, output) in instances.pieces.iter().zip(&visible.pieces) {
+        if report.mask {
+            encoder.clear_buffer(&output.mask, 0, Some(4 * u64::from(piece.words().max(1))));
+        }
+        if is_grouped(piece, options) {
+            let (from, to) = (gpu.no_survivors()?, &output.groups_or_new(gpu, piece).survivors);
+            encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
+        }
     }
     let mut pass = encoder
         .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.cull.pass"), timestamp_writes: None });
-    pass.set_pipeline(&gpu.cull_pipeline(bound.key));
-    pass.set_bind_group(0, &bound.view, &[]);
-    for (piece, output) in instances.pieces.iter().zip(&visible.pieces) {
-        let outputs = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("hiz.cull.visible"),
-            layout: &gpu.layouts().visible,
-            entries: &[
-                entry(0, output.stored_planes.as_ref().unwrap_or(&output.planes).as_entire_binding()),
-                entry(1, output.list.as_entire_binding()),
-                entry(2, visible.draws.as_entire_binding()),
-                entry(3, visible.counters.as_entire_binding()),
-                entry(4, visible.capacity_uniform.as_entire_binding()),
-            ],
-        });
-        pass.set_bind_group(1, &bind_piece(gpu, &piece.uniform, piece), &[]);
-        pass.set_bind_group(2, &outputs, &[]);
-        pass.dispatch_workgroups(piece.count().div_ceil(CULL_WORKGROUP), 1, 1);
+    pass.set_bind_group(0, &view, &[]);
+    for (p, (piece, output)) in instances.pieces.iter().zip(&visible.pieces).enumerate() {
+        let groups = group_view.as_ref().filter(|_| is_grouped(piece, options));
+        if let Some(group_view) = groups {
+            pass.set_bind_group(0, group_view, &[]);
+            record_groups(gpu, &mut pass, key, piece, output);
+            pass.set_bind_group(0, &view, &[]);
+        }
+        pass.set_bind_group(1, &bind_piece(gpu, &piece.uniform, &piece.records), &[]);
+        pass.set_bind_group(2, &bind_output(gpu, piece, visible, p, report.statistics), &[]);
+        if groups.is_some() {
+            let groups = output.groups_or_new(gpu, piece);
+            let survivors = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("hiz.cull.survivors"),
+                layout: &gpu.layouts().members,
+                entries: &[
+                    entry(0, groups.survivors.as_entire_binding()),
+                    entry(1, wgpu::BindingResource::TextureView(&groups.survivor_list)),
+                ],
+            });
+            pass.set_bind_group(3, &survivors, &[]);
+            pass.set_pipeline(&gpu.cull_members_pipeline(key, report));
+            pass.dispatch_workgroups_indirect(&groups.survivors, 0);
+        } else {
+            let pipeline = if inputs.certified { Gpu::cull_pipeline } else { Gpu::yardstick_cull_pipeline };
+            pass.set_pipeline(&pipeline(gpu, key, report));
+            pass.dispatch_workgroups(piece.groups().div_ceil(GROUPS_OF_RUN), 1, 1);
+        }
     }
-    renumber::record(gpu, &mut pass, instances, visible, options.order);
-    if options.order == Order::Stable {
-        compact::record(gpu, &mut pass, instances, visible);
+    if let Some(lists) = visible.lists.as_ref().filter(|_| ordered) {
+        compact::record(gpu, &mut pass, instances, visible, lists);
     }
     Ok(())
+}
+
+/// Groups whose members one workgroup tests; `shaders/shared/survivors.wgsl`, `RUN`.
+pub(crate) const GROUPS_OF_RUN: u32 = 8;
+
+/// Texels of finer levels that a group's test may read: a box around 64 instances is large, so its footprint is coarse
+/// (`docs/performance.md`).
+const GROUP_DESCENT: u32 = 32;
+
+/// From how many instances on groups are culled first: fewer are tested one by one before the groups' own dispatches have begun
+/// (`docs/performance.md`).
+const GROUPS_PAY_FROM: u32 = 16_384;
+
+/// Whether the groups of a piece are culled before its instances.
+pub(crate) fn is_grouped(piece: &Piece, options: &CullOptions) -> bool {
+    match options.hierarchy {
+        Hierarchy::Never => false,
+        Hierarchy::Always => piece.count() > 0,
+        Hierarchy::Auto => piece.count() >= GROUPS_PAY_FROM,
+    }
+}
+
+/// The boxes of a piece's groups, and what is left of them.
+fn record_groups(gpu: &Gpu, pass: &mut wgpu::ComputePass<'_>, key: CullKey, piece: &Piece, output: &PieceOutput) {
+    let groups = output.groups_or_new(gpu, piece);
+    let survivors = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("hiz.cull.groups"),
+        layout: &gpu.layouts().survivors,
+        entries: &[
+            entry(0, groups.survivors.as_entire_binding()),
+            entry(1, groups.verdicts.as_entire_binding()),
+            entry(2, wgpu::BindingResource::TextureView(&groups.survivor_list)),
+        ],
+    });
+    pass.set_pipeline(&gpu.cull_groups_pipeline(CullKey { kind: BoundsKind::Box, descent: true, ..key }));
+    pass.set_bind_group(1, &bind_piece(gpu, &piece.groups_uniform, &piece.group_records), &[]);
+    pass.set_bind_group(2, &survivors, &[]);
+    pass.dispatch_workgroups(piece.groups().div_ceil(CULL_WORKGROUP), 1, 1);
 }
 
 /// `shaders/explain.wgsl`, `Explanation`.
@@ -327,7 +470,8 @@ pub(crate) fn record_explain(
     let piece = instances.pieces.iter().find(|p| p.range.contains(&index)).ok_or_else(|| {
         Error::invalid("index", format!("expected an instance below {}, got {index}", instances.len()))
     })?;
-    let Bound { view, key } = bind(gpu, inputs)?;
+    let seen = Seen::new(gpu, inputs, None)?;
+    let view = seen.bind(gpu, inputs.camera, inputs.pyramid, inputs.options)?;
     let place = piece.order.place((index - piece.range.start) as usize) as u32;
     let which = gpu.uniform("hiz.explain.which", &[place, 0, 0, 0])?;
     let output = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
@@ -337,9 +481,9 @@ pub(crate) fn record_explain(
     });
     let mut pass = encoder
         .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.explain.pass"), timestamp_writes: None });
-    pass.set_pipeline(&gpu.explain_pipeline(CullKey { append: false, statistics: false, ..key }));
+    pass.set_pipeline(&gpu.explain_pipeline(seen.key));
     pass.set_bind_group(0, &view, &[]);
-    pass.set_bind_group(1, &bind_piece(gpu, &which, piece), &[]);
+    pass.set_bind_group(1, &bind_piece(gpu, &which, &piece.records), &[]);
     pass.set_bind_group(2, &output, &[]);
     pass.dispatch_workgroups(1, 1, 1);
     Ok(())

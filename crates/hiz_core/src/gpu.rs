@@ -2,13 +2,13 @@
 
 use std::collections::HashMap;
 use std::hash::Hash;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, OnceLock};
 
 use crate::bounds::BoundsKind;
-use crate::camera::DepthConvention;
 use crate::error::{Error, Result};
-use crate::shader::{self, SOURCES, SourceKind};
+use crate::shader::{self, SOURCES, SourceKind, TexelStore};
+use crate::visible::NO_SURVIVORS;
 
 /// Tells objects of one context from those of another. (wgpu's own handles compare equal across its instances.)
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,32 +26,74 @@ impl ContextId {
 pub(crate) struct Gpu {
     id: ContextId,
     device: wgpu::Device,
+    pipeline_cache: Option<wgpu::PipelineCache>,
     edits: Vec<(String, String)>,
     layouts: Layouts,
     sampler: wgpu::Sampler,
-    /// Stand in for the chunks that a small pyramid does not have.
-    no_chunk: [wgpu::Buffer; 2],
+    /// What is bound where a pipeline asks for a buffer that a call does without.
+    stand_in: [wgpu::Buffer; STAND_INS.len()],
+    /// How the survivors of a cull of groups begin.
+    no_survivors: OnceLock<wgpu::Buffer>,
     reduce: Cache<ReduceKey, wgpu::ComputePipeline>,
-    cull: Cache<CullKey, wgpu::ComputePipeline>,
+    cull: Cache<(CullKey, ReportKey), wgpu::ComputePipeline>,
+    cull_groups: Cache<CullKey, wgpu::ComputePipeline>,
+    yardstick_cull: Cache<(CullKey, ReportKey), wgpu::ComputePipeline>,
+    cull_members: Cache<(CullKey, ReportKey), wgpu::ComputePipeline>,
     explain: Cache<CullKey, wgpu::ComputePipeline>,
     compact: Cache<&'static str, wgpu::ComputePipeline>,
-    renumber: Cache<&'static str, wgpu::ComputePipeline>,
+    count: Cache<bool, wgpu::ComputePipeline>,
     update: Cache<&'static str, wgpu::ComputePipeline>,
     occluders: Cache<OccluderKey, wgpu::RenderPipeline>,
 }
 
+/// What makes one pipeline of the reduction differ from another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-struct ReduceKey {
-    source: SourceKind,
-    reversed: bool,
-    chunks: usize,
-    from_source: bool,
+pub(crate) struct ReduceKey {
+    pub(crate) source: SourceKind,
+    pub(crate) reversed: bool,
+    pub(crate) chunks: usize,
+    pub(crate) shape: ReduceShape,
 }
+
+/// The shaders of the reduction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum ReduceShape {
+    /// `shaders/reduce.wgsl`; `first`: the first level that is stored, above the one that is read.
+    Blocks { from_source: bool, first: u32 },
+    /// Its entry point for all levels that are left.
+    Tail,
+    /// `shaders/reduce_coarse.wgsl`; `shared`: a texel takes a workgroup.
+    Coarse { shared: bool },
+}
+
+/// Buffers that a pipeline may ask for and a call do without. Each has its own: one may not be bound twice to be written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum StandIn {
+    /// The second chunk of a pyramid.
+    Chunk1,
+    /// The third.
+    Chunk2,
+    /// A list of indices.
+    List,
+    /// Draw arguments.
+    Draws,
+    /// Counts of levels.
+    Statistics,
+    /// Verdicts of groups.
+    GroupVerdicts,
+}
+
+const STAND_INS: [&str; 6] =
+    ["hiz.no_chunk_1", "hiz.no_chunk_2", "hiz.no_list", "hiz.no_draws", "hiz.no_statistics", "hiz.no_group_verdicts"];
+
+/// As large as the largest structure that is bound so.
+const STAND_IN_BYTES: u64 = 256;
 
 /// What makes one cull pipeline differ from another; each is compiled without the branches that it does not take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct CullKey {
     pub(crate) source: SourceKind,
+    pub(crate) texels: TexelStore,
     pub(crate) kind: BoundsKind,
     pub(crate) reversed: bool,
     pub(crate) chunks: usize,
@@ -59,7 +101,16 @@ pub(crate) struct CullKey {
     pub(crate) footprint_log2: u32,
     pub(crate) descent: bool,
     pub(crate) fit_volume: bool,
+}
+
+/// What a cull leaves behind; `shaders/shared/report.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct ReportKey {
+    pub(crate) mask: bool,
+    pub(crate) verdicts: bool,
     pub(crate) append: bool,
+    pub(crate) list: bool,
+    pub(crate) capped: bool,
     pub(crate) statistics: bool,
 }
 
@@ -87,11 +138,11 @@ impl<K: Hash + Eq, P: Clone> Cache<K, P> {
 
 impl Gpu {
     /// See `HizContext::with_planted_faults`.
-    pub(crate) fn new(device: &wgpu::Device, faults: &[(&str, &str)]) -> Self {
-        let no_chunk = ["hiz.pyramid.no_chunk_1", "hiz.pyramid.no_chunk_2"].map(|label| {
+    pub(crate) fn new(device: &wgpu::Device, cache: Option<wgpu::PipelineCache>, faults: &[(&str, &str)]) -> Self {
+        let stand_in = STAND_INS.map(|label| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
-                size: 16,
+                size: STAND_IN_BYTES,
                 usage: wgpu::BufferUsages::STORAGE,
                 mapped_at_creation: false,
             })
@@ -109,15 +160,20 @@ impl Gpu {
         Self {
             id: ContextId::next(),
             device: device.clone(),
+            pipeline_cache: cache,
             edits: faults.iter().map(|(what, by)| ((*what).to_owned(), (*by).to_owned())).collect(),
             layouts: Layouts::new(device),
             sampler,
-            no_chunk,
+            stand_in,
+            no_survivors: OnceLock::new(),
             reduce: Cache::new(),
             cull: Cache::new(),
             explain: Cache::new(),
             compact: Cache::new(),
-            renumber: Cache::new(),
+            count: Cache::new(),
+            cull_groups: Cache::new(),
+            yardstick_cull: Cache::new(),
+            cull_members: Cache::new(),
             update: Cache::new(),
             occluders: Cache::new(),
         }
@@ -128,6 +184,11 @@ impl Gpu {
         &self.device
     }
 
+    /// The caller's cache of compiled pipelines.
+    pub(crate) fn pipeline_cache(&self) -> Option<&wgpu::PipelineCache> {
+        self.pipeline_cache.as_ref()
+    }
+
     pub(crate) fn layouts(&self) -> &Layouts {
         &self.layouts
     }
@@ -136,9 +197,19 @@ impl Gpu {
         &self.sampler
     }
 
-    /// What stands in for chunk `i`, 1 or 2, of a pyramid that does not have it.
-    pub(crate) fn no_chunk(&self, i: usize) -> &wgpu::Buffer {
-        &self.no_chunk[i - 1]
+    /// What stands in for a buffer that there is none of.
+    pub(crate) fn stand_in(&self, what: StandIn) -> &wgpu::Buffer {
+        &self.stand_in[what as usize]
+    }
+
+    /// A buffer that holds [`NO_SURVIVORS`].
+    pub(crate) fn no_survivors(&self) -> Result<&wgpu::Buffer> {
+        if let Some(buffer) = self.no_survivors.get() {
+            return Ok(buffer);
+        }
+        let contents = bytemuck::bytes_of(&NO_SURVIVORS);
+        let buffer = self.filled("hiz.cull.no_survivors", contents, wgpu::BufferUsages::COPY_SRC)?;
+        Ok(self.no_survivors.get_or_init(|| buffer))
     }
 
     /// A uniform buffer that holds `value` from the start: no queue is needed, and every recording has its own.
@@ -160,14 +231,19 @@ impl Gpu {
         Ok(buffer)
     }
 
-    /// A buffer of `size` bytes (a multiple of 4) that `fill` writes part by part, by a function of an offset and the bytes that
-    /// belong there.
+    /// A buffer of `size` bytes, all 0.
+    pub(crate) fn empty(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        let label = Some(label);
+        self.device.create_buffer(&wgpu::BufferDescriptor { label, size, usage, mapped_at_creation: false })
+    }
+
+    /// A buffer of `size` bytes (a multiple of 4) whose contents `fill` writes where they are mapped, without a copy on the host.
     pub(crate) fn written<T>(
         &self,
         label: &str,
         size: u64,
         usage: wgpu::BufferUsages,
-        fill: impl FnOnce(&(dyn Fn(u64, &[u8]) -> Result<()> + Sync)) -> Result<T>,
+        fill: impl FnOnce(&Mapped<'_>) -> Result<T>,
     ) -> Result<(wgpu::Buffer, T)> {
         let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
@@ -175,7 +251,7 @@ impl Gpu {
             usage,
             mapped_at_creation: true,
         });
-        let filled = fill(&|offset, bytes| write_mapped(label, &buffer, offset, bytes))?;
+        let filled = fill(&Mapped { label, buffer: &buffer })?;
         buffer.unmap();
         Ok((buffer, filled))
     }
@@ -192,38 +268,91 @@ impl Gpu {
         }
     }
 
-    pub(crate) fn reduce_pipeline(
-        &self,
-        source: SourceKind,
-        convention: DepthConvention,
-        chunks: usize,
-        from_source: bool,
-    ) -> wgpu::ComputePipeline {
-        let key = ReduceKey { source, reversed: convention.is_reversed(), chunks, from_source };
+    pub(crate) fn reduce_pipeline(&self, key: ReduceKey) -> wgpu::ComputePipeline {
         let layouts = self.layouts();
         self.reduce.get(key, || {
+            let mut constants = vec![("REVERSED", flag(key.reversed)), ("CHUNKS", key.chunks as f64)];
+            let (source, entry_point) = match key.shape {
+                ReduceShape::Blocks { from_source, first } => {
+                    constants.extend([("FROM_SOURCE", flag(from_source)), ("FIRST", f64::from(first))]);
+                    (shader::reduce(key.source), "reduce")
+                }
+                ReduceShape::Tail => {
+                    constants.extend([("FROM_SOURCE", flag(false)), ("FIRST", 1.0)]);
+                    (shader::reduce(key.source), "reduce_tail")
+                }
+                ReduceShape::Coarse { shared } => {
+                    constants.push(("SHARED", flag(shared)));
+                    (shader::reduce_coarse(key.source), "reduce_coarse")
+                }
+            };
             self.pipeline(
                 "hiz.reduce.pipeline",
-                &shader::reduce(source),
-                "reduce",
-                &[layouts.reduce(source), &layouts.one_uniform],
-                &[("REVERSED", flag(key.reversed)), ("CHUNKS", chunks as f64), ("FROM_SOURCE", flag(from_source))],
+                &source,
+                entry_point,
+                &[layouts.reduce(key.source), &layouts.one_uniform],
+                &constants,
             )
         })
     }
 
-    pub(crate) fn cull_pipeline(&self, key: CullKey) -> wgpu::ComputePipeline {
+    pub(crate) fn cull_pipeline(&self, key: CullKey, report: ReportKey) -> wgpu::ComputePipeline {
         let layouts = self.layouts();
-        self.cull.get(key, || {
-            let mut constants = classify_constants(&key).to_vec();
-            constants.extend([("APPEND", flag(key.append)), ("STATISTICS", flag(key.statistics))]);
+        self.cull.get((key, report), || {
             self.pipeline(
                 "hiz.cull.pipeline",
-                &shader::cull(key.source, key.kind),
+                &shader::cull(key.source, key.texels, key.kind),
                 "cull",
-                &[layouts.cull(key.source), &layouts.instances, &layouts.visible],
-                &constants,
+                &[layouts.cull(key.source, key.texels), &layouts.instances, &layouts.visible],
+                &[&classify_constants(&key)[..], &report_constants(&report)].concat(),
             )
+        })
+    }
+
+    /// See `yardstick`.
+    pub(crate) fn yardstick_cull_pipeline(&self, key: CullKey, report: ReportKey) -> wgpu::ComputePipeline {
+        let layouts = self.layouts();
+        self.yardstick_cull.get((key, report), || {
+            self.pipeline(
+                "hiz.yardstick.cull",
+                &shader::yardstick_cull(key.source, key.texels),
+                "cull",
+                &[layouts.cull(key.source, key.texels), &layouts.instances, &layouts.visible],
+                &[&classify_constants(&key)[..], &report_constants(&report)].concat(),
+            )
+        })
+    }
+
+    pub(crate) fn cull_groups_pipeline(&self, key: CullKey) -> wgpu::ComputePipeline {
+        let layouts = self.layouts();
+        self.cull_groups.get(key, || {
+            self.pipeline(
+                "hiz.cull_groups.pipeline",
+                &shader::cull_groups(key.source, key.texels),
+                "cull_groups",
+                &[layouts.cull(key.source, key.texels), &layouts.instances, &layouts.survivors],
+                &classify_constants(&key),
+            )
+        })
+    }
+
+    pub(crate) fn cull_members_pipeline(&self, key: CullKey, report: ReportKey) -> wgpu::ComputePipeline {
+        let layouts = self.layouts();
+        self.cull_members.get((key, report), || {
+            self.pipeline(
+                "hiz.cull_members.pipeline",
+                &shader::cull_members(key.source, key.texels, key.kind),
+                "cull_members",
+                &[layouts.cull(key.source, key.texels), &layouts.instances, &layouts.visible, &layouts.members],
+                &[&classify_constants(&key)[..], &report_constants(&report)].concat(),
+            )
+        })
+    }
+
+    pub(crate) fn count_pipeline(&self, grouped: bool) -> wgpu::ComputePipeline {
+        self.count.get(grouped, || {
+            let constants = [("GROUPED", flag(grouped))];
+            self.pipeline("hiz.count.pipeline", &shader::count(), "count", &[&self.layouts().count], &constants)
         })
     }
 
@@ -234,7 +363,7 @@ impl Gpu {
                 "hiz.explain.pipeline",
                 &shader::explain(key.source, key.kind),
                 "explain",
-                &[layouts.cull(key.source), &layouts.instances, &layouts.one_storage],
+                &[layouts.cull(key.source, key.texels), &layouts.instances, &layouts.one_storage],
                 &classify_constants(&key),
             )
         })
@@ -243,12 +372,6 @@ impl Gpu {
     pub(crate) fn compact_pipeline(&self, entry_point: &'static str) -> wgpu::ComputePipeline {
         self.compact.get(entry_point, || {
             self.pipeline("hiz.compact.pipeline", &shader::compact(), entry_point, &[&self.layouts().compact], &[])
-        })
-    }
-
-    pub(crate) fn renumber_pipeline(&self, entry_point: &'static str) -> wgpu::ComputePipeline {
-        self.renumber.get(entry_point, || {
-            self.pipeline("hiz.renumber.pipeline", &shader::renumber(), entry_point, &[&self.layouts().renumber], &[])
         })
     }
 
@@ -266,7 +389,7 @@ impl Gpu {
         self.occluders.get(key, make)
     }
 
-    fn pipeline(
+    pub(crate) fn pipeline(
         &self,
         label: &str,
         source: &str,
@@ -296,17 +419,29 @@ impl Gpu {
                 constants,
                 zero_initialize_workgroup_memory: false,
             },
-            cache: None,
+            cache: self.pipeline_cache(),
         })
+    }
+}
+
+/// A buffer that is mapped at its creation. Threads open ranges of their own.
+pub(crate) struct Mapped<'a> {
+    label: &'a str,
+    buffer: &'a wgpu::Buffer,
+}
+
+impl Mapped<'_> {
+    /// Bytes of `range`, not empty, which begins at a multiple of 8. Opening costs more than writing a record.
+    pub(crate) fn range(&self, range: std::ops::Range<u64>) -> Result<wgpu::BufferViewMut> {
+        let Self { label, buffer } = self;
+        buffer.get_mapped_range_mut(range).map_err(|e| Error::Device(format!("{label} could not be mapped: {e}")))
     }
 }
 
 /// Writes into a buffer that was mapped at its creation.
 pub(crate) fn write_mapped(label: &str, buffer: &wgpu::Buffer, offset: u64, contents: &[u8]) -> Result<()> {
     let range = offset..offset + contents.len() as u64;
-    let mut view =
-        buffer.get_mapped_range_mut(range).map_err(|e| Error::Device(format!("{label} could not be mapped: {e}")))?;
-    view.copy_from_slice(contents);
+    Mapped { label, buffer }.range(range)?.copy_from_slice(contents);
     Ok(())
 }
 
@@ -325,35 +460,54 @@ fn classify_constants(key: &CullKey) -> [(&'static str, f64); 6] {
     ]
 }
 
+fn report_constants(key: &ReportKey) -> [(&'static str, f64); 6] {
+    [
+        ("MASK", flag(key.mask)),
+        ("VERDICTS", flag(key.verdicts)),
+        ("APPEND", flag(key.append)),
+        ("LIST", flag(key.list)),
+        ("CAPPED", flag(key.capped)),
+        ("STATISTICS", flag(key.statistics)),
+    ]
+}
+
 /// The bind group layouts, one place for all passes.
 #[derive(Debug)]
 pub(crate) struct Layouts {
     reduce: [wgpu::BindGroupLayout; 3],
-    cull: [wgpu::BindGroupLayout; 3],
+    cull: [[wgpu::BindGroupLayout; 2]; 3],
     /// A piece and its records.
     pub(crate) instances: wgpu::BindGroupLayout,
     /// What a cull writes.
     pub(crate) visible: wgpu::BindGroupLayout,
     pub(crate) compact: wgpu::BindGroupLayout,
-    pub(crate) renumber: wgpu::BindGroupLayout,
+    /// What a cull of groups writes.
+    pub(crate) survivors: wgpu::BindGroupLayout,
+    pub(crate) count: wgpu::BindGroupLayout,
+    /// What a cull of members reads of it.
+    pub(crate) members: wgpu::BindGroupLayout,
     pub(crate) update: wgpu::BindGroupLayout,
     pub(crate) one_uniform: wgpu::BindGroupLayout,
     pub(crate) one_storage: wgpu::BindGroupLayout,
     pub(crate) occluder_view: wgpu::BindGroupLayout,
 }
 
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 enum Binding {
     Texture(SourceKind),
     Sampler,
     Uniform,
     Read,
     Write,
+    ReadRecords,
+    WriteRecords,
+    ReadTexels,
+    WriteTexels,
 }
 
 impl Layouts {
     fn new(device: &wgpu::Device) -> Self {
-        use Binding::{Read, Sampler, Texture, Uniform, Write};
+        use Binding::{Read, ReadRecords, ReadTexels, Sampler, Texture, Uniform, Write, WriteRecords, WriteTexels};
         let layout = |label: &str, entries: &[(u32, Binding)]| {
             let entries: Vec<_> = entries.iter().map(|(binding, kind)| layout_entry(*binding, *kind)).collect();
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
@@ -366,22 +520,22 @@ impl Layouts {
                 )
             }),
             cull: SOURCES.map(|s| {
-                layout(
-                    "hiz.cull.view_layout",
-                    &[(0, Texture(s)), (2, Uniform), (3, Read), (4, Read), (5, Read), (6, Uniform)],
-                )
+                let with = |texels: &[(u32, Binding)]| {
+                    let others = [(0, Texture(s)), (1, Sampler), (2, Uniform), (6, Uniform)];
+                    layout("hiz.cull.view_layout", &[&others, texels].concat())
+                };
+                [with(&[(3, Read), (4, Read), (5, Read)]), with(&[(3, ReadTexels)])]
             }),
-            instances: layout("hiz.cull.instances_layout", &[(0, Uniform), (1, Read)]),
+            instances: layout("hiz.cull.instances_layout", &[(0, Uniform), (1, ReadRecords)]),
             visible: layout("hiz.cull.visible_layout", &[(0, Write), (1, Write), (2, Write), (3, Write), (4, Uniform)]),
             compact: layout(
                 "hiz.compact.layout",
                 &[(0, Uniform), (1, Read), (2, Write), (3, Write), (4, Write), (5, Uniform)],
             ),
-            renumber: layout(
-                "hiz.renumber.layout",
-                &[(0, Uniform), (1, Read), (2, Read), (3, Write), (4, Write), (5, Read)],
-            ),
-            update: layout("hiz.update.layout", &[(0, Uniform), (1, Read), (2, Read), (3, Write), (4, Write)]),
+            survivors: layout("hiz.cull_groups.layout", &[(0, Write), (1, Write), (2, WriteTexels)]),
+            members: layout("hiz.cull_members.layout", &[(0, Read), (1, ReadTexels)]),
+            count: layout("hiz.count.layout", &[(0, Uniform), (1, Read), (2, Read), (3, Write)]),
+            update: layout("hiz.update.layout", &[(0, Uniform), (1, Read), (2, Read), (3, WriteRecords), (4, Write)]),
             one_uniform: layout("hiz.uniform_layout", &[(0, Uniform)]),
             one_storage: layout("hiz.storage_layout", &[(0, Write)]),
             occluder_view: device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
@@ -398,26 +552,33 @@ impl Layouts {
         &self.reduce[source as usize]
     }
 
-    pub(crate) fn cull(&self, source: SourceKind) -> &wgpu::BindGroupLayout {
-        &self.cull[source as usize]
+    pub(crate) fn cull(&self, source: SourceKind, texels: TexelStore) -> &wgpu::BindGroupLayout {
+        &self.cull[source as usize][texels as usize]
     }
 }
 
 fn layout_entry(binding: u32, kind: Binding) -> wgpu::BindGroupLayoutEntry {
     let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let storage_texture = |format, access| wgpu::BindingType::StorageTexture {
+        access,
+        format,
+        view_dimension: wgpu::TextureViewDimension::D2,
+    };
+    let records = |access| storage_texture(crate::records::FORMAT, access);
+    let texels = |access| storage_texture(wgpu::TextureFormat::R32Uint, access);
     wgpu::BindGroupLayoutEntry {
         binding,
         visibility: wgpu::ShaderStages::COMPUTE,
         ty: match kind {
-            Binding::Texture(source) => wgpu::BindingType::Texture {
-                sample_type: source.sample_type(),
-                view_dimension: wgpu::TextureViewDimension::D2,
-                multisampled: false,
-            },
+            Binding::Texture(source) => source.binding(),
             Binding::Sampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering),
             Binding::Uniform => buffer(wgpu::BufferBindingType::Uniform),
             Binding::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
             Binding::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
+            Binding::ReadRecords => records(wgpu::StorageTextureAccess::ReadOnly),
+            Binding::WriteRecords => records(wgpu::StorageTextureAccess::WriteOnly),
+            Binding::ReadTexels => texels(wgpu::StorageTextureAccess::ReadOnly),
+            Binding::WriteTexels => texels(wgpu::StorageTextureAccess::WriteOnly),
         },
         count: None,
     }

@@ -8,11 +8,12 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::bounds::{Bounds, BoundsKind, BoxRecord};
 use crate::error::{Error, Result};
-use crate::gpu::{ContextId, Gpu};
-use crate::groups::Groups;
+use crate::gpu::{ContextId, Gpu, Mapped};
+use crate::groups::{GROUP, Groups, Source};
 use crate::host;
 use crate::layout::{CULL_WORKGROUP, piece_capacity};
 use crate::morton;
+use crate::records::{Records, Upload};
 
 /// In which order instances are stored. The indices that come out are the caller's in either.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -105,13 +106,13 @@ impl PieceOrder {
 #[derive(Debug)]
 pub(crate) struct Piece {
     pub(crate) range: Range<u32>,
-    /// In stored order.
-    pub(crate) records: wgpu::Buffer,
-    /// u32: the index of each stored instance, relative to the piece's first; up to whole workgroups, with 0xFFFFFFFF behind the last.
-    pub(crate) indices: wgpu::Buffer,
+    /// In stored order; each knows its index, relative to the piece's first.
+    pub(crate) records: Records,
     /// One `BoxRecord` a group.
-    pub(crate) group_records: wgpu::Buffer,
+    pub(crate) group_records: Records,
     pub(crate) uniform: wgpu::Buffer,
+    /// The groups as a piece.
+    pub(crate) groups_uniform: wgpu::Buffer,
     pub(crate) order: PieceOrder,
 }
 
@@ -120,7 +121,12 @@ impl Piece {
         self.range.end - self.range.start
     }
 
-    /// Words of a bit plane of this piece.
+    /// The number of groups.
+    pub(crate) fn groups(&self) -> u32 {
+        self.count().div_ceil(GROUP as u32)
+    }
+
+    /// Words of the mask of this piece.
     pub(crate) fn words(&self) -> u32 {
         self.count().div_ceil(32)
     }
@@ -150,12 +156,13 @@ pub struct Instances {
 }
 
 impl Instances {
-    /// `between` runs after each piece is copied; who owns the queue lets go of its staging there.
+    /// `copy` records the copies of one piece, into an encoder that it is given or has; it is told whether more pieces follow, so that
+    /// who owns the queue may let go of this one's staging area.
     pub(crate) fn new(
         gpu: &Gpu,
         bounds: &Bounds<'_>,
         options: &InstanceOptions,
-        mut between: impl FnMut() -> Result<()>,
+        mut copy: impl FnMut(&dyn Fn(&mut wgpu::CommandEncoder), bool) -> Result<()>,
     ) -> Result<Self> {
         let n = bounds.len()?;
         let total = u32::try_from(n).map_err(|_| Error::limit("instances", n as u64, u64::from(u32::MAX)))?;
@@ -173,13 +180,14 @@ impl Instances {
             }
         };
         let (mut pieces, mut groups) = (Vec::new(), Vec::new());
-        for index in 0..total.div_ceil(capacity).max(1) {
+        let num_pieces = total.div_ceil(capacity).max(1);
+        for index in 0..num_pieces {
             let start = index * capacity;
             let range = start..total.min(start.saturating_add(capacity));
-            let (piece, its_groups) = upload(gpu, bounds, index, range, options.order)?;
+            let (piece, its_groups, uploads) = packed(gpu, bounds, index, range, options.order)?;
+            copy(&|encoder| uploads.iter().for_each(|upload| upload.record(encoder)), index + 1 < num_pieces)?;
             pieces.push(piece);
             groups.push(its_groups);
-            between()?;
         }
         let sequence = gpu.filled("hiz.instances.sequence", &[0; 16], wgpu::BufferUsages::STORAGE)?;
         let changing = Mutex::new(Changing { groups, next_update: 0 });
@@ -226,12 +234,12 @@ impl Instances {
         Ok(invalid)
     }
 
-    /// Bytes on the device: records, 4 bytes an instance for its index, and a box for each 64 of them.
+    /// Bytes on the device: a record for each instance, and a box for each 64 of them.
     pub fn device_bytes(&self) -> u64 {
-        self.pieces.iter().map(|p| p.records.size() + p.indices.size() + p.group_records.size()).sum()
+        self.pieces.iter().map(|p| p.records.size() + p.group_records.size()).sum()
     }
 
-    /// Bytes on the host: 8 an instance for its place and its index (none with [`StoredOrder::Given`]), 56 for each 64 of them, and
+    /// Bytes on the host: 8 an instance for its place and its index (none with [`StoredOrder::Given`]), 88 for each 64 of them, and
     /// 48 an instance in such groups of 64 of which a part was updated.
     pub fn host_bytes(&self) -> u64 {
         let groups = self.changing().groups.iter().map(Groups::host_bytes).sum::<u64>();
@@ -256,41 +264,39 @@ pub(crate) fn refuse_bad(n: usize, bad: usize, first: Option<u64>) -> Result<()>
     }
 }
 
-fn upload(
+/// A piece, its groups, and the copies that bring both to the device.
+fn packed(
     gpu: &Gpu,
     bounds: &Bounds<'_>,
     index: u32,
     range: Range<u32>,
     order: StoredOrder,
-) -> Result<(Piece, Groups)> {
-    let storage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
-    let (first, count) = (range.start as usize, range.len());
+) -> Result<(Piece, Groups, [Upload; 2])> {
+    let (first, count) = (range.start as usize, range.end - range.start);
     let record_bytes = bounds.kind().record_bytes();
     let order = PieceOrder::new(bounds, first..range.end as usize, order)?;
-    // A binding of no bytes is none.
-    let at_least_1 = |n: usize| n.max(1) as u64;
-    let bytes = at_least_1(count) * record_bytes;
-    let (records, groups) = gpu.written("hiz.instances.records", bytes, storage, |write| {
-        Groups::packed(bounds, count, |place| first + order.index(place), write)
+    let source = |place: usize| Source { bounds: first + order.index(place), index: order.index(place) as u32 };
+    let (records, upload, groups) = Records::new(gpu, "hiz.instances.records", count, record_bytes, |records| {
+        Groups::packed(bounds, count as usize, source, records)
     })?;
-    let padded = at_least_1(count).next_multiple_of(u64::from(CULL_WORKGROUP));
-    let (indices, ()) = gpu.written("hiz.instances.indices", 4 * padded, storage, |write| {
-        let mut workgroup = [0; CULL_WORKGROUP as usize];
-        for begin in (0..padded as usize).step_by(workgroup.len()) {
-            for (place, index) in (begin..).zip(&mut workgroup) {
-                *index = if place < count { order.index(place) as u32 } else { u32::MAX };
-            }
-            write(4 * begin as u64, bytemuck::cast_slice(&workgroup))?;
-        }
-        Ok(())
-    })?;
-    let bytes = at_least_1(groups.len()) * size_of::<BoxRecord>() as u64;
-    let (group_records, ()) = gpu.written("hiz.instances.groups", bytes, storage, |write| {
-        (0..groups.len())
-            .try_for_each(|g| write((g * size_of::<BoxRecord>()) as u64, bytemuck::bytes_of(&groups.record(g))))
-    })?;
-    let count = range.end - range.start;
-    let uniform = gpu
-        .uniform("hiz.instances.piece", &PieceUniform { base: range.start, count, index, words: count.div_ceil(32) })?;
-    Ok((Piece { range, records, indices, group_records, uniform, order }, groups))
+    let num_groups = groups.len() as u32;
+    let box_bytes = size_of::<BoxRecord>() as u64;
+    let (group_records, groups_upload, ()) =
+        Records::new(gpu, "hiz.instances.groups", num_groups, box_bytes, |boxes| {
+            write_boxes(boxes, (0..groups.len()).map(|g| groups.record(g)))
+        })?;
+    let uniform = |count: u32| {
+        let words = count.div_ceil(32);
+        gpu.uniform("hiz.instances.piece", &PieceUniform { base: range.start, count, index, words })
+    };
+    let (uniform, groups_uniform) = (uniform(count)?, uniform(num_groups)?);
+    Ok((Piece { range, records, group_records, uniform, groups_uniform, order }, groups, [upload, groups_upload]))
+}
+
+/// Writes box records, one after the other.
+pub(crate) fn write_boxes(target: &Mapped<'_>, records: impl ExactSizeIterator<Item = BoxRecord>) -> Result<()> {
+    let mut view = target.range(0..(records.len() * size_of::<BoxRecord>()) as u64)?;
+    let chunks = view.slice(..).into_chunks::<{ size_of::<BoxRecord>() }>().0;
+    chunks.into_iter().zip(records).for_each(|(chunk, record)| chunk.write(bytemuck::cast(record)));
+    Ok(())
 }

@@ -6,8 +6,8 @@
 //! 2. [`Occluders`] are drawn into a depth texture, or the caller brings one; their [`OccluderSurface`] gives a small depth image that
 //!    holds for larger ones.
 //! 3. [`HizContext::record_reduce`] builds the [`Pyramid`]: the farthest depth of every block of pixels.
-//! 4. [`HizContext::record_cull`] decides for each of the [`Instances`] and appends the kept ones to the [`Visible`] list, whose
-//!    count is the `instance_count` of a [`DrawIndexedIndirect`] record on the device.
+//! 4. [`HizContext::record_cull`] decides for each of the [`Instances`], whole groups first where they are many, and lists the kept
+//!    ones in [`Visible`]; the list's length is the `instance_count` of a [`DrawIndexedIndirect`] record on the device.
 //! 5. The caller draws with [`Visible::draw_arguments`]; nothing visits the CPU.
 //!
 //! The promise: an instance is culled only if, for the exact real numbers that the inputs denote, every pixel that its
@@ -23,6 +23,7 @@ mod bounds;
 mod camera;
 mod compact;
 mod context;
+mod count;
 mod cull;
 mod depth;
 mod error;
@@ -32,33 +33,38 @@ mod groups;
 mod host;
 mod instances;
 mod layout;
+mod lists;
 mod morton;
 mod occluder_surface;
 mod occluders;
 mod pyramid;
 mod readback;
-mod renumber;
+mod records;
 mod shader;
+mod threads;
 mod update;
 mod view;
 mod visible;
 #[doc(hidden)]
 pub mod words;
+#[doc(hidden)]
+pub mod yardstick;
 
 pub use wgpu;
 
 pub use bounds::{Bounds, BoundsKind, Floats};
 pub use camera::{Camera, DepthConvention, ImageSize, MAX_IMAGE_SIDE, Mat3, Mat4, Pose, Projection, Vec3};
 pub use context::HizContext;
-pub use cull::{Coverage, CullOptions, Fit, Footprint, Order};
+pub use cull::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
 pub use depth::{DepthKind, ndc_from_kind};
 pub use error::{Error, Result};
 pub use instances::{InstanceOptions, Instances, StoredOrder};
-pub use layout::MAX_LEVELS;
+pub use layout::{MAX_LEVELS, StoredLevels};
+pub use lists::{CANARY_WORDS, DrawIndexedIndirect, DrawTemplate};
 #[doc(hidden)]
 pub use occluder_surface::PlantedFault;
 pub use occluder_surface::{ConservativeDepthOptions, OccluderSurface};
 pub use occluders::{FaceCull, MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders};
 pub use pyramid::{Pyramid, PyramidOptions};
 pub use view::ERROR_ULPS;
-pub use visible::{CANARY_WORDS, DrawIndexedIndirect, DrawTemplate, Visible, VisibleOptions};
+pub use visible::{Outputs, Visible, VisibleOptions};

@@ -10,6 +10,7 @@ use std::ops::Range;
 use crate::bounds::Bounds;
 use crate::error::Result;
 use crate::host;
+use crate::threads::on_two_threads;
 
 /// Bits of a cell's number along each axis.
 const AXIS_BITS: u32 = 19;
@@ -26,7 +27,7 @@ const NO_VOLUME: u64 = u64::MAX;
 /// How many centres tell where the innermost cube lies.
 const SAMPLES: usize = 4096;
 
-/// From how many instances on a second thread pays; `examples/upload.rs` prints both.
+/// From how many instances on a second thread sorts: it takes tens of microseconds to start, they take milliseconds.
 const PARALLEL_FROM: usize = 1 << 15;
 
 /// A cell's key, and whose it is.
@@ -109,27 +110,21 @@ pub(crate) fn order(bounds: &Bounds<'_>, range: Range<usize>) -> Result<Vec<u32>
     let mut keyed = host::list(range.len(), "order")?;
     keyed.resize(range.len(), Keyed::default());
     let mut spare = host::collected(keyed.iter().copied(), "order")?;
-    let halves = if range.len() < PARALLEL_FROM { 0 } else { range.len() / 2 };
-    {
-        let (first, second) = keyed.split_at_mut(halves);
-        let (first_spare, second_spare) = spare.split_at_mut(halves);
-        let sort = |part: &mut [Keyed], spare: &mut [Keyed], begin: usize| {
-            for (k, keyed) in part.iter_mut().enumerate() {
-                let key = bounds.extent(range.start + begin + k).map_or(NO_VOLUME, |e| cube.key(e.center()));
-                *keyed = Keyed { key, index: (begin + k) as u32 };
-            }
-            radix_sort(part, spare);
-        };
-        std::thread::scope(|scope| {
-            if halves > 0 {
-                scope.spawn(|| sort(first, first_spare, 0));
-            }
-            sort(second, second_spare, halves);
-        });
-    }
+    let half = if range.len() < PARALLEL_FROM { 0 } else { range.len() / 2 };
+    let sort = |(begin, part, spare): (usize, &mut [Keyed], &mut [Keyed])| {
+        for (k, keyed) in part.iter_mut().enumerate() {
+            let key = bounds.extent(range.start + begin + k).map_or(NO_VOLUME, |e| cube.key(e.center()));
+            *keyed = Keyed { key, index: (begin + k) as u32 };
+        }
+        radix_sort(part, spare);
+        Ok(())
+    };
+    let (first, second) = keyed.split_at_mut(half);
+    let (first_spare, second_spare) = spare.split_at_mut(half);
+    on_two_threads((half > 0).then_some((0, first, first_spare)), (half, second, second_spare), sort)?;
     drop(spare);
     let mut order = host::list(range.len(), "order")?;
-    merge(&keyed[..halves], &keyed[halves..], &mut order);
+    merge(&keyed[..half], &keyed[half..], &mut order);
     Ok(order)
 }
 

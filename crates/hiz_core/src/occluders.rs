@@ -314,7 +314,7 @@ fn pipeline(gpu: &Gpu, key: OccluderKey) -> wgpu::RenderPipeline {
         multisample: wgpu::MultisampleState::default(),
         fragment: None,
         multiview_mask: None,
-        cache: None,
+        cache: gpu.pipeline_cache(),
     })
 }
 

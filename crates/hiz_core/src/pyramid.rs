@@ -5,32 +5,50 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::camera::{Camera, ImageSize};
 use crate::error::{Error, Result};
-use crate::gpu::{ContextId, Gpu};
-use crate::layout::{Level, MAX_LEVELS, PYRAMID_CHUNKS, PyramidLayout};
+use crate::gpu::{ContextId, Gpu, ReduceKey, ReduceShape, StandIn};
+use crate::layout::{Level, MAX_LEVELS, PYRAMID_CHUNKS, PyramidLayout, Step, StoredLevels};
 use crate::shader::SourceKind;
 
-/// Texels that one invocation of the reduction reads along a side; `shaders/reduce.wgsl`.
-const BLOCK: u32 = 8;
-/// Levels that one dispatch of the reduction writes.
-const LEVELS_PER_STEP: u32 = 3;
 /// Invocations of a workgroup of the reduction, all in a row.
 const REDUCE_WORKGROUP: u32 = 64;
+/// From this level on a workgroup shares one texel, if it is made alone: 8x8 pixels an invocation.
+const SHARED_LEVEL: u32 = 6;
+
+/// Texels of a row of the copy in a texture; `shaders/shared/texels_texture.wgsl`.
+pub(crate) const COPY_ROW: u32 = 4096;
 
 /// `shaders/shared/pyramid.wgsl`, `Pyramid`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct PyramidUniform {
     pub(crate) levels: [Level; MAX_LEVELS],
-    pub(crate) num_levels: u32,
     pub(crate) chunk_shift: u32,
-    pub(crate) padding: [u32; 2],
+    pub(crate) first_stored: u32,
+    pub(crate) last_stored: u32,
+    pub(crate) padding: u32,
 }
 
 const _: () = assert!(size_of::<PyramidUniform>() == 272);
 
+/// `shaders/reduce.wgsl`, `Step`.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct StepUniform {
+    pub(crate) source: u32,
+    pub(crate) last: u32,
+    pub(crate) reduction: u32,
+    pub(crate) padding: u32,
+    pub(crate) blocks: [u32; 2],
+    pub(crate) padding_1: [u32; 2],
+}
+
+const _: () = assert!(size_of::<StepUniform>() == 32);
+
 /// How a pyramid is stored.
 #[derive(Debug, Clone, Default)]
 pub struct PyramidOptions {
+    /// Which levels are stored: all, if nothing else is asked for.
+    pub levels: StoredLevels,
     /// Texels of one chunk as a power of two; `None`: what one storage binding of the device holds. Tests make it small.
     pub chunk_shift: Option<u32>,
 }
@@ -45,9 +63,16 @@ pub struct Pyramid {
     pub(crate) layout: PyramidLayout,
     pub(crate) chunks: Vec<wgpu::Buffer>,
     pub(crate) uniform: wgpu::Buffer,
-    /// Levels that the dispatches read.
-    steps: Vec<u32>,
     built: Mutex<Option<Built>>,
+    copy: Mutex<Option<TextureCopy>>,
+}
+
+/// The stored levels in a texture as well, for culls of many instances (`shaders/shared/texels_texture.wgsl`).
+#[derive(Debug)]
+struct TextureCopy {
+    texture: wgpu::Texture,
+    /// The reduction of which a copy was recorded. The header goes with it: a cull that runs before the copy keeps everything.
+    reduction: u32,
 }
 
 /// What a pyramid was last built from.
@@ -76,7 +101,7 @@ impl Pyramid {
         if !(2..=most).contains(&chunk_shift) {
             return Err(Error::invalid("chunk_shift", format!("expected 2 to {most}, got {chunk_shift}")));
         }
-        let layout = PyramidLayout::new(size, chunk_shift)?;
+        let layout = PyramidLayout::new(size, options.levels, chunk_shift)?;
         let chunks = layout
             .chunk_sizes()
             .iter()
@@ -91,13 +116,12 @@ impl Pyramid {
             .collect();
         let mut levels = [Level { offset: 0, stride: 0, width: 0, height: 0 }; MAX_LEVELS];
         levels[..layout.levels.len()].copy_from_slice(&layout.levels);
+        let StoredLevels { first, last } = layout.stored;
         let uniform = gpu.uniform(
             "hiz.pyramid.layout",
-            &PyramidUniform { levels, num_levels: layout.num_levels(), chunk_shift, padding: [0; 2] },
+            &PyramidUniform { levels, chunk_shift, first_stored: first, last_stored: last, padding: 0 },
         )?;
-        // One at least: it also writes the header.
-        let steps = (0..layout.num_levels().max(2) - 1).step_by(LEVELS_PER_STEP as usize).collect();
-        Ok(Self { context: gpu.id(), layout, chunks, uniform, steps, built: Mutex::new(None) })
+        Ok(Self { context: gpu.id(), layout, chunks, uniform, built: Mutex::new(None), copy: Mutex::new(None) })
     }
 
     /// The depth image's size.
@@ -110,6 +134,12 @@ impl Pyramid {
         self.layout.num_levels()
     }
 
+    /// Which levels above 0 are stored, cut to those that there are; nothing for an image of one pixel.
+    pub fn stored_levels(&self) -> Option<StoredLevels> {
+        let stored = self.layout.stored;
+        (stored.first <= stored.last).then_some(stored)
+    }
+
     /// The size of a level, or nothing past the last.
     pub fn level_size(&self, level: u32) -> Option<ImageSize> {
         self.layout.levels.get(level as usize).map(|l| ImageSize::new(l.width, l.height))
@@ -117,7 +147,72 @@ impl Pyramid {
 
     /// Bytes on the device, the depth texture not counted.
     pub fn device_bytes(&self) -> u64 {
-        self.chunks.iter().map(wgpu::Buffer::size).sum()
+        let copy = self.copy.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let copy = copy.as_ref().map_or(0, |c| 4 * u64::from(c.texture.width()) * u64::from(c.texture.height()));
+        self.chunks.iter().map(wgpu::Buffer::size).sum::<u64>() + copy
+    }
+
+    /// Whether a copy in a texture pays for a cull of `instances`: it costs about as much a texel as it saves an instance
+    /// (`docs/performance.md`). Also whether one is possible.
+    pub(crate) fn texture_pays(&self, gpu: &Gpu, instances: u32) -> bool {
+        let rows = self.layout.texels.div_ceil(COPY_ROW.into());
+        u64::from(instances) >= self.layout.texels
+            && rows <= u64::from(gpu.device().limits().max_texture_dimension_2d)
+            && 1 << self.layout.chunk_shift >= COPY_ROW
+    }
+
+    /// The copy of reduction `reduction`, which is recorded if it was not before.
+    pub(crate) fn record_texture(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        reduction: u32,
+    ) -> wgpu::TextureView {
+        let mut copy = self.copy.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let copy = copy.get_or_insert_with(|| TextureCopy { texture: self.copy_texture(gpu), reduction: 0 });
+        if copy.reduction != reduction {
+            copy.reduction = reduction;
+            let rows_of_chunk = (1 << self.layout.chunk_shift) / COPY_ROW;
+            for (c, (chunk, texels)) in (0..).zip(self.chunks.iter().zip(self.layout.chunk_sizes())) {
+                // A chunk is less than 2^31 texels. Whole rows, and what is left.
+                let (rows, rest) = (texels as u32 / COPY_ROW, texels as u32 % COPY_ROW);
+                for (first, width, height) in [(0, COPY_ROW, rows), (rows, rest, u32::from(rest > 0))] {
+                    encoder.copy_buffer_to_texture(
+                        wgpu::TexelCopyBufferInfo {
+                            buffer: chunk,
+                            layout: wgpu::TexelCopyBufferLayout {
+                                offset: 4 * u64::from(first) * u64::from(COPY_ROW),
+                                bytes_per_row: Some(4 * COPY_ROW),
+                                rows_per_image: None,
+                            },
+                        },
+                        wgpu::TexelCopyTextureInfo {
+                            origin: wgpu::Origin3d { x: 0, y: c * rows_of_chunk + first, z: 0 },
+                            ..copy.texture.as_image_copy()
+                        },
+                        wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+                    );
+                }
+            }
+        }
+        copy.texture.create_view(&wgpu::TextureViewDescriptor::default())
+    }
+
+    fn copy_texture(&self, gpu: &Gpu) -> wgpu::Texture {
+        gpu.device().create_texture(&wgpu::TextureDescriptor {
+            label: Some("hiz.pyramid.texture"),
+            size: wgpu::Extent3d {
+                width: COPY_ROW,
+                height: self.layout.texels.div_ceil(COPY_ROW.into()) as u32,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::R32Uint,
+            usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        })
     }
 
     /// The camera of the depth image that the pyramid was last built from.
@@ -127,7 +222,7 @@ impl Pyramid {
 
     /// Chunk `i`, or what stands in for it.
     pub(crate) fn chunk<'a>(&'a self, gpu: &'a Gpu, i: usize) -> &'a wgpu::Buffer {
-        self.chunks.get(i).unwrap_or_else(|| gpu.no_chunk(i))
+        self.chunks.get(i).unwrap_or_else(|| gpu.stand_in(if i == 1 { StandIn::Chunk1 } else { StandIn::Chunk2 }))
     }
 
     pub(crate) fn built(&self) -> Option<Built> {
@@ -194,13 +289,13 @@ pub(crate) fn record_reduce(
             ),
         ));
     }
-    if !texture.usage().contains(wgpu::TextureUsages::TEXTURE_BINDING) {
-        return Err(Error::invalid("depth", format!("expected the usage TEXTURE_BINDING, got {:?}", texture.usage())));
+    let needed = source_kind.usage();
+    if !texture.usage().contains(needed) {
+        let name = if source_kind == SourceKind::Bits { "STORAGE_BINDING" } else { "TEXTURE_BINDING" };
+        return Err(Error::invalid("depth", format!("expected the usage {name}, got {:?}", texture.usage())));
     }
     let reduction = next_reduction();
     let layouts = gpu.layouts();
-    let pipeline =
-        |from_source| gpu.reduce_pipeline(source_kind, camera.convention(), pyramid.chunks.len(), from_source);
     let source = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("hiz.reduce.pyramid"),
         layout: layouts.reduce(source_kind),
@@ -214,28 +309,51 @@ pub(crate) fn record_reduce(
         ],
     });
     let uniforms = pyramid
+        .layout
         .steps
         .iter()
-        .map(|from| gpu.uniform("hiz.reduce.step", &[*from, reduction, 0, 0]))
+        .map(|step| gpu.uniform("hiz.reduce.step", &step_uniform(step, reduction)))
         .collect::<Result<Vec<_>>>()?;
     let mut pass = encoder
         .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.reduce.pass"), timestamp_writes: None });
     pass.set_bind_group(0, &source, &[]);
-    for (from, uniform) in pyramid.steps.iter().zip(&uniforms) {
-        let size = pyramid.layout.levels[*from as usize];
+    for (step, uniform) in pyramid.layout.steps.iter().zip(&uniforms) {
         let bind_group = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("hiz.reduce.step"),
             layout: &layouts.one_uniform,
             entries: &[entry(0, uniform.as_entire_binding())],
         });
-        pass.set_pipeline(&pipeline(*from == 0));
+        let [columns, rows] = step.blocks;
+        let by_rows = [columns.div_ceil(REDUCE_WORKGROUP), rows];
+        let (shape, workgroups) = if step.is_tail() {
+            (ReduceShape::Tail, [1, 1])
+        } else if !step.is_coarse() {
+            (ReduceShape::Blocks { from_source: step.source == 0, first: step.first - step.source }, by_rows)
+        } else if step.last < SHARED_LEVEL {
+            (ReduceShape::Coarse { shared: false }, by_rows)
+        } else {
+            (ReduceShape::Coarse { shared: true }, [columns, rows])
+        };
+        let key = ReduceKey {
+            source: source_kind,
+            reversed: camera.convention().is_reversed(),
+            chunks: pyramid.chunks.len(),
+            shape,
+        };
+        pass.set_pipeline(&gpu.reduce_pipeline(key));
         pass.set_bind_group(1, &bind_group, &[]);
-        pass.dispatch_workgroups(size.width.div_ceil(BLOCK).div_ceil(REDUCE_WORKGROUP), size.height.div_ceil(BLOCK), 1);
+        // One at least, for the header, where nothing is stored.
+        pass.dispatch_workgroups(workgroups[0].max(1), workgroups[1].max(1), 1);
     }
     drop(pass);
     *pyramid.built.lock().unwrap_or_else(std::sync::PoisonError::into_inner) =
         Some(Built { reduction, source: depth.clone(), source_kind, camera: camera.clone() });
     Ok(())
+}
+
+fn step_uniform(step: &Step, reduction: u32) -> StepUniform {
+    let reduction = if step.source == 0 { reduction } else { 0 };
+    StepUniform { source: step.source, last: step.last, reduction, padding: 0, blocks: step.blocks, padding_1: [0; 2] }
 }
 
 /// Numbers reductions, never 0.

@@ -68,10 +68,15 @@ fn read_in_bands(device: &wgpu::Device, queue: &wgpu::Queue, range: &BufferRange
     Ok(out)
 }
 
-/// Reads a texture of 4 bytes a texel, row by row without padding.
-pub(crate) fn read_texture(device: &wgpu::Device, queue: &wgpu::Queue, texture: &wgpu::Texture) -> Result<Vec<u8>> {
+/// Reads a texture of `texel_bytes` a texel, row by row without padding.
+pub(crate) fn read_texture(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    texture: &wgpu::Texture,
+    texel_bytes: u64,
+) -> Result<Vec<u8>> {
     let (width, height) = (texture.width(), texture.height());
-    let row = u64::from(width) * 4;
+    let row = u64::from(width) * texel_bytes;
     let padded = row.next_multiple_of(u64::from(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT));
     let staging = staging(device, padded * u64::from(height));
     let mut encoder =

@@ -19,6 +19,24 @@ pub(crate) enum SourceKind {
     Bits,
 }
 
+/// Where a cull reads the stored levels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum TexelStore {
+    /// The buffers that the reduction fills.
+    Buffer,
+    /// A copy of them in a texture.
+    Texture,
+}
+
+impl TexelStore {
+    fn wgsl(self) -> &'static str {
+        match self {
+            Self::Buffer => wgsl!("shared/texels_buffer"),
+            Self::Texture => wgsl!("shared/texels_texture"),
+        }
+    }
+}
+
 impl SourceKind {
     fn wgsl(self) -> &'static str {
         match self {
@@ -28,11 +46,26 @@ impl SourceKind {
         }
     }
 
-    pub(crate) fn sample_type(self) -> wgpu::TextureSampleType {
+    /// How it is bound.
+    pub(crate) fn binding(self) -> wgpu::BindingType {
+        let view_dimension = wgpu::TextureViewDimension::D2;
+        let sampled = |sample_type| wgpu::BindingType::Texture { sample_type, view_dimension, multisampled: false };
         match self {
-            Self::Depth => wgpu::TextureSampleType::Depth,
-            Self::Float => wgpu::TextureSampleType::Float { filterable: false },
-            Self::Bits => wgpu::TextureSampleType::Uint,
+            Self::Depth => sampled(wgpu::TextureSampleType::Depth),
+            Self::Float => sampled(wgpu::TextureSampleType::Float { filterable: false }),
+            Self::Bits => wgpu::BindingType::StorageTexture {
+                access: wgpu::StorageTextureAccess::ReadOnly,
+                format: wgpu::TextureFormat::R32Uint,
+                view_dimension,
+            },
+        }
+    }
+
+    /// The usage that its texture needs for that.
+    pub(crate) fn usage(self) -> wgpu::TextureUsages {
+        match self {
+            Self::Depth | Self::Float => wgpu::TextureUsages::TEXTURE_BINDING,
+            Self::Bits => wgpu::TextureUsages::STORAGE_BINDING,
         }
     }
 
@@ -47,13 +80,38 @@ impl SourceKind {
     }
 }
 
-/// The depth reduction.
+/// The depth reduction, three levels a pass.
 pub(crate) fn reduce(source: SourceKind) -> String {
-    [wgsl!("shared/depth_bits"), source.wgsl(), wgsl!("shared/pyramid"), wgsl!("reduce")].join("\n")
+    reducing(source, wgsl!("reduce"))
+}
+
+/// The depth reduction to one coarse level.
+pub(crate) fn reduce_coarse(source: SourceKind) -> String {
+    reducing(source, wgsl!("reduce_coarse"))
+}
+
+fn reducing(source: SourceKind, entry: &str) -> String {
+    [wgsl!("shared/depth_bits"), source.wgsl(), wgsl!("shared/pyramid"), wgsl!("shared/pyramid_write"), entry]
+        .join("\n")
+}
+
+/// A yardstick: one dispatch a level on a flat buffer.
+pub(crate) fn yardstick_reduce_buffer(source: SourceKind) -> String {
+    [wgsl!("shared/depth_bits"), source.wgsl(), wgsl!("yardstick/reduce_buffer")].join("\n")
+}
+
+/// A yardstick: one dispatch a level on a texture's mip levels.
+pub(crate) fn yardstick_reduce_texture(source: SourceKind) -> String {
+    [wgsl!("shared/depth_bits"), source.wgsl(), wgsl!("yardstick/reduce_texture")].join("\n")
 }
 
 /// The cull (`entry` = its own file) or the explanation, which share everything up to the verdict.
-fn classifying(source: SourceKind, kind: BoundsKind, entry: &str) -> String {
+fn classifying(source: SourceKind, texels: TexelStore, kind: BoundsKind, entry: &str) -> String {
+    module(source, texels, kind, &[wgsl!("shared/supporting_planes"), wgsl!("shared/classify")].join("\n"), entry)
+}
+
+/// The same frame for the given decision about one instance.
+fn module(source: SourceKind, texels: TexelStore, kind: BoundsKind, classify: &str, entry: &str) -> String {
     let bounds = match kind {
         BoundsKind::Sphere => wgsl!("shared/bounds_sphere").to_owned(),
         BoundsKind::Box => [wgsl!("shared/bounds_box_support"), wgsl!("shared/bounds_box")].join("\n"),
@@ -64,24 +122,56 @@ fn classifying(source: SourceKind, kind: BoundsKind, entry: &str) -> String {
         source.wgsl(),
         wgsl!("shared/pyramid"),
         wgsl!("shared/view"),
-        wgsl!("shared/validity"),
+        wgsl!("shared/record_layout"),
+        wgsl!("shared/records"),
         bounds.as_str(),
         wgsl!("shared/certificate"),
-        wgsl!("shared/supporting_planes"),
-        wgsl!("shared/classify"),
+        wgsl!("shared/verdict"),
+        wgsl!("shared/outcome"),
+        wgsl!("shared/levels"),
+        texels.wgsl(),
+        wgsl!("shared/texels"),
+        classify,
         entry,
     ]
     .join("\n")
 }
 
 /// The cull of instances of one kind.
-pub(crate) fn cull(source: SourceKind, kind: BoundsKind) -> String {
-    classifying(source, kind, &[wgsl!("shared/piece"), wgsl!("cull")].join("\n"))
+pub(crate) fn cull(source: SourceKind, texels: TexelStore, kind: BoundsKind) -> String {
+    classifying(source, texels, kind, &flat_frame())
+}
+
+/// A yardstick: the same of boxes without certificates.
+pub(crate) fn yardstick_cull(source: SourceKind, texels: TexelStore) -> String {
+    let bounds = BoundsKind::Box;
+    module(source, texels, bounds, &uncertified(), &flat_frame())
+}
+
+fn uncertified() -> String {
+    // The kinds of bounds speak of supporting planes, which nobody asks for here.
+    [wgsl!("shared/supporting_planes"), wgsl!("yardstick/classify_uncertified")].join("\n")
+}
+
+fn flat_frame() -> String {
+    [wgsl!("shared/piece"), wgsl!("shared/survivors"), wgsl!("shared/report"), wgsl!("cull")].join("\n")
+}
+
+/// The cull of groups.
+pub(crate) fn cull_groups(source: SourceKind, texels: TexelStore) -> String {
+    let entry = [wgsl!("shared/piece"), wgsl!("shared/survivors"), wgsl!("cull_groups")].join("\n");
+    classifying(source, texels, BoundsKind::Box, &entry)
+}
+
+/// The cull of the members of the groups that are left.
+pub(crate) fn cull_members(source: SourceKind, texels: TexelStore, kind: BoundsKind) -> String {
+    let entry = [wgsl!("shared/piece"), wgsl!("shared/report"), wgsl!("shared/survivors"), wgsl!("cull_members")];
+    classifying(source, texels, kind, &entry.join("\n"))
 }
 
 /// The explanation of one instance's verdict.
 pub(crate) fn explain(source: SourceKind, kind: BoundsKind) -> String {
-    classifying(source, kind, wgsl!("explain"))
+    classifying(source, TexelStore::Buffer, kind, wgsl!("explain"))
 }
 
 /// The ordered compaction.
@@ -89,14 +179,14 @@ pub(crate) fn compact() -> String {
     [wgsl!("shared/piece"), wgsl!("compact")].join("\n")
 }
 
-/// From places to the caller's indices.
-pub(crate) fn renumber() -> String {
-    [wgsl!("shared/piece"), wgsl!("renumber")].join("\n")
+/// The count of verdicts.
+pub(crate) fn count() -> String {
+    [wgsl!("shared/verdict"), wgsl!("shared/piece"), wgsl!("shared/survivors"), wgsl!("count")].join("\n")
 }
 
 /// The update of records and groups.
 pub(crate) fn update() -> String {
-    wgsl!("update").to_owned()
+    [wgsl!("shared/record_layout"), wgsl!("update")].join("\n")
 }
 
 /// The occluder pass.
@@ -110,12 +200,18 @@ const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind:
 
 /// Every module, for those who plant faults in them.
 pub(crate) fn all() -> Vec<String> {
-    let classifying = SOURCES.iter().flat_map(|s| KINDS.iter().flat_map(|k| [cull(*s, *k), explain(*s, *k)]));
+    const STORES: [TexelStore; 2] = [TexelStore::Buffer, TexelStore::Texture];
+    let of_kind = |s: SourceKind, k: BoundsKind| {
+        STORES.iter().flat_map(move |t| [cull(s, *t, k), cull_members(s, *t, k)]).chain([explain(s, k)])
+    };
+    let classifying = SOURCES.iter().flat_map(|s| KINDS.iter().flat_map(move |k| of_kind(*s, *k)));
+    let groups = SOURCES.iter().flat_map(|s| STORES.iter().map(|t| cull_groups(*s, *t)));
     SOURCES
         .iter()
-        .map(|s| reduce(*s))
+        .flat_map(|s| [reduce(*s), reduce_coarse(*s)])
+        .chain(groups)
         .chain(classifying)
-        .chain([compact(), renumber(), update(), occluders()])
+        .chain([compact(), count(), update(), occluders(), yardstick_cull(SourceKind::Bits, TexelStore::Buffer)])
         .collect()
 }
 
@@ -137,6 +233,10 @@ mod tests {
         for module in all() {
             parse(&module);
         }
+        for source in SOURCES {
+            parse(&yardstick_reduce_buffer(source));
+            parse(&yardstick_reduce_texture(source));
+        }
     }
 
     /// Offsets of a WGSL struct's members, and its size.
@@ -157,45 +257,48 @@ mod tests {
 
     #[test]
     fn rust_twins_have_the_offsets_of_wgsl() {
-        use crate::bounds::{BoxRecord, OrientedBoxRecord, SphereRecord};
         use crate::cull::{ExplanationRecord, ViewUniform};
         use crate::instances::PieceUniform;
         use crate::layout::Level;
-        use crate::pyramid::PyramidUniform;
+        use crate::lists::DrawIndexedIndirect;
+        use crate::pyramid::{PyramidUniform, StepUniform};
         use crate::update::UpdateUniform;
-        use crate::view::Row;
-        use crate::visible::{CounterRecord, DrawIndexedIndirect};
+        use crate::visible::{CounterRecord, StatisticsRecord};
 
-        let module = parse(&cull(SourceKind::Depth, BoundsKind::Sphere));
-        same_layout!(module, "Row", Row { "m" = m, "a" = a });
+        let module = parse(&cull(SourceKind::Depth, TexelStore::Buffer, BoundsKind::Sphere));
         same_layout!(module, "Level", Level { "offset" = offset, "stride" = stride, "width" = width, "height" = height });
         same_layout!(module, "Pyramid", PyramidUniform {
-            "levels" = levels, "num_levels" = num_levels, "chunk_shift" = chunk_shift, "padding" = padding
+            "levels" = levels, "chunk_shift" = chunk_shift, "first_stored" = first_stored, "last_stored" = last_stored,
+            "padding" = padding
+        });
+        same_layout!(parse(&reduce(SourceKind::Depth)), "Step", StepUniform {
+            "source" = source, "last" = last, "reduction" = reduction, "padding" = padding, "blocks" = blocks,
+            "padding_1" = padding_1
         });
         same_layout!(module, "View", ViewUniform {
-            "x" = x, "y" = y, "z" = z, "w" = w, "eye_hi" = eye_hi, "z_slope" = z_slope, "eye_lo" = eye_lo,
-            "coordinate_limit" = coordinate_limit, "half_size" = half_size, "reach" = reach, "depth_factor" = depth_factor,
-            "size" = size, "runtime_zero" = runtime_zero, "reduction" = reduction, "descent_budget" = descent_budget, "depth_offset" = depth_offset, "padding_0" = padding_0,
-            "padding_1" = padding_1
+            "x" = x, "y" = y, "z" = z, "w" = w, "magnitudes" = magnitudes, "constant_magnitudes" = constant_magnitudes,
+            "eye_hi" = eye_hi, "z_slope" = z_slope, "eye_lo" = eye_lo, "halves_size" = halves_size, "half_size" = half_size,
+            "reach" = reach, "depth_factor" = depth_factor, "size" = size, "runtime_zero" = runtime_zero,
+            "reduction" = reduction, "descent_budget" = descent_budget, "depth_offset" = depth_offset,
+            "coordinate_limit" = coordinate_limit, "padding" = padding
         });
         same_layout!(module, "Piece", PieceUniform { "base" = base, "count" = count, "index" = index, "words" = words });
         same_layout!(module, "DrawIndexedIndirect", DrawIndexedIndirect {
             "index_count" = index_count, "instance_count" = instance_count, "first_index" = first_index,
             "base_vertex" = base_vertex, "first_instance" = first_instance
         });
+        same_layout!(module, "Statistics", StatisticsRecord {
+            "levels" = levels, "texels_low" = texels_low, "texels_high" = texels_high
+        });
+        let module = parse(&count());
         same_layout!(module, "Counters", CounterRecord {
-            "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid, "levels" = levels,
-            "texels_low" = texels_low, "texels_high" = texels_high
+            "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid
         });
         let update = parse(&update());
         same_layout!(update, "Update", UpdateUniform {
-            "count" = count, "vectors" = vectors, "number" = number, "padding" = padding
+            "count" = count, "texels" = texels, "number" = number, "padding" = padding
         });
-        assert_eq!(layout(&module, "SphereRecord").1 as usize, size_of::<SphereRecord>());
-        let boxes = parse(&cull(SourceKind::Depth, BoundsKind::Box));
-        assert_eq!(layout(&boxes, "BoxRecord").1 as usize, size_of::<BoxRecord>());
         let oriented = parse(&explain(SourceKind::Depth, BoundsKind::OrientedBox));
-        assert_eq!(layout(&oriented, "OrientedBoxRecord").1 as usize, size_of::<OrientedBoxRecord>());
         same_layout!(oriented, "Explanation", ExplanationRecord {
             "verdict" = verdict, "stage" = stage, "level" = level, "farthest_bits" = farthest_bits, "pixels" = pixels,
             "texels" = texels, "texel_bits" = texel_bits, "depths" = depths, "padding" = padding
@@ -219,7 +322,7 @@ mod tests {
     #[test]
     fn bars_stand_where_a_compiler_could_fold_what_cancels() {
         for kind in KINDS {
-            let module = parse(&cull(SourceKind::Depth, kind));
+            let module = parse(&cull(SourceKind::Depth, TexelStore::Buffer, kind));
             for bar in ["bar", "bar2", "bar3"] {
                 let (_, function) = module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(bar)).expect(bar);
                 let is_xor = |e: &naga::Expression| {
@@ -231,6 +334,11 @@ mod tests {
             assert_eq!(calls(&module, "surely_behind", "bar"), 1, "d - A");
             assert_eq!(calls(&module, "occluding_depth", "bar"), 1, "the depth that slack has moved");
             assert_eq!(calls(&module, "classify", "bar"), 2, "-A and 1 - A");
+            if kind != BoundsKind::Sphere {
+                assert_eq!(calls(&module, "extent_of", "bar"), 2, "low and high");
+                assert_eq!(calls(&module, "surely_after", "bar"), 1, "the edge");
+                assert_eq!(calls(&module, "surely_before", "bar"), 1, "the edge");
+            }
             assert_eq!(calls(&module, "surely_clear", "bar"), 1, "d - A");
             assert_eq!(calls(&module, "proved_interval", "bar"), 2, "both ends");
             assert_eq!(calls(&module, "supporting_planes", "bar2"), 1, "slopes");
@@ -242,7 +350,7 @@ mod tests {
     #[test]
     fn every_plane_and_side_is_certified() {
         for kind in KINDS {
-            let module = parse(&cull(SourceKind::Depth, kind));
+            let module = parse(&cull(SourceKind::Depth, TexelStore::Buffer, kind));
             assert_eq!(calls(&module, "supporting_planes", "surely_above"), 1, "{kind:?}: a plane's offset");
             assert_eq!(calls(&module, "proved_interval", "surely_above"), 1, "{kind:?}: left and top");
             assert_eq!(calls(&module, "proved_interval", "surely_below"), 1, "{kind:?}: right and bottom");
@@ -254,9 +362,17 @@ mod tests {
         let margin = format!("ERROR_ULPS: f32 = {:.1};", crate::view::ERROR_ULPS);
         assert!(wgsl!("shared/certificate").contains(&margin));
         let workgroup = crate::layout::CULL_WORKGROUP;
-        assert!(wgsl!("cull").contains(&format!("WORKGROUP: u32 = {workgroup}u;")));
-        for shader in [wgsl!("cull"), wgsl!("renumber"), wgsl!("update")] {
-            assert!(shader.contains(&format!("@workgroup_size({workgroup})")));
-        }
+        assert!(wgsl!("cull_groups").contains(&format!("WORKGROUP: u32 = {workgroup}u;")));
+        assert!(wgsl!("update").contains(&format!("@workgroup_size({workgroup})")));
+        let group = format!("GROUP: u32 = {}u;", crate::groups::GROUP);
+        assert!(wgsl!("shared/survivors").contains(&group));
+        let run = format!("RUN: u32 = {}u;", crate::cull::GROUPS_OF_RUN);
+        assert!(wgsl!("shared/survivors").contains(&run));
+        let survivors = format!("SURVIVORS_PER_ROW_LOG2: u32 = {}u;", crate::visible::SURVIVORS_PER_ROW.ilog2());
+        assert!(wgsl!("shared/survivors").contains(&survivors));
+        let copy = format!("COPY_ROW_LOG2: u32 = {}u;", crate::pyramid::COPY_ROW.ilog2());
+        assert!(wgsl!("shared/texels_texture").contains(&copy));
+        let per_row = format!("RECORDS_PER_ROW_LOG2: u32 = {}u;", crate::records::RECORDS_PER_ROW.ilog2());
+        assert!(wgsl!("shared/record_layout").contains(&per_row));
     }
 }

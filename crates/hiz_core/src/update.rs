@@ -8,23 +8,20 @@
 use crate::bounds::{Bounds, BoxRecord};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::instances::{Instances, refuse_bad};
+use crate::groups::Source;
+use crate::instances::{Instances, refuse_bad, write_boxes};
 use crate::pyramid::entry;
+use crate::records::Records;
 
 /// Invocations of one workgroup; `shaders/update.wgsl`. As many as those of the cull, whose pieces fit one dispatch.
 const WORKGROUP: u32 = crate::layout::CULL_WORKGROUP;
-
-/// The shader copies records as vectors.
-const VECTOR_BYTES: u64 = 16;
-
-const _: () = assert!((size_of::<BoxRecord>() as u64).is_multiple_of(VECTOR_BYTES));
 
 /// `shaders/update.wgsl`, `Update`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct UpdateUniform {
     pub(crate) count: u32,
-    pub(crate) vectors: u32,
+    pub(crate) texels: u32,
     pub(crate) number: u32,
     pub(crate) padding: u32,
 }
@@ -33,8 +30,7 @@ pub(crate) struct UpdateUniform {
 struct Replacement<'a> {
     places: &'a [u32],
     fresh: wgpu::Buffer,
-    target: &'a wgpu::Buffer,
-    record_bytes: u64,
+    target: &'a Records,
 }
 
 pub(crate) fn record(
@@ -62,7 +58,7 @@ pub(crate) fn record(
     }
     if strict {
         let mut record = vec![0; instances.kind.record_bytes() as usize];
-        let mut bad = (0..n).filter(|i| !bounds.write_record(*i, &mut record));
+        let mut bad = (0..n).filter(|i| !bounds.write_record(*i, 0, &mut record));
         let first_bad = bad.next();
         refuse_bad(n, usize::from(first_bad.is_some()) + bad.count(), first_bad.map(|i| i as u64))?;
     }
@@ -96,22 +92,23 @@ pub(crate) fn record(
         let base = piece.range.start;
         let places = piece.order.places((here.start - base) as usize..(here.end - base) as usize)?;
         let offset = base as usize;
-        let of_bounds = |place: usize| offset + piece.order.index(place) - first as usize;
+        let source = |place: usize| {
+            let index = piece.order.index(place);
+            Source { bounds: offset + index - first as usize, index: index as u32 }
+        };
         let record_bytes = instances.kind.record_bytes();
         let groups = &mut changing.groups[p];
         let staging = wgpu::BufferUsages::STORAGE;
         let (fresh, touched) =
-            gpu.written("hiz.update.records", places.len() as u64 * record_bytes, staging, |write| {
-                groups.replace(bounds, &places, of_bounds, write)
+            gpu.written("hiz.update.records", places.len() as u64 * record_bytes, staging, |records| {
+                groups.replace(bounds, &places, source, records)
             })?;
-        dispatch(&Replacement { places: &places, fresh, target: &piece.records, record_bytes }, "replace_records")?;
-        let record_bytes = size_of::<BoxRecord>() as u64;
-        let (fresh, ()) = gpu.written("hiz.update.groups", touched.len() as u64 * record_bytes, staging, |write| {
-            (0..)
-                .zip(&touched)
-                .try_for_each(|(k, group)| write(k * record_bytes, bytemuck::bytes_of(&groups.record(*group as usize))))
+        dispatch(&Replacement { places: &places, fresh, target: &piece.records }, "replace_records")?;
+        let bytes = (touched.len() * size_of::<BoxRecord>()) as u64;
+        let (fresh, ()) = gpu.written("hiz.update.groups", bytes, staging, |boxes| {
+            write_boxes(boxes, touched.iter().map(|group| groups.record(*group as usize)))
         })?;
-        dispatch(&Replacement { places: &touched, fresh, target: &piece.group_records, record_bytes }, "replace_groups")
+        dispatch(&Replacement { places: &touched, fresh, target: &piece.group_records }, "replace_groups")
     });
     if result.is_err() {
         // The host may have taken a part. No number of the device will agree with it any more.
@@ -121,9 +118,8 @@ pub(crate) fn record(
 }
 
 fn bind(gpu: &Gpu, instances: &Instances, replacement: &Replacement<'_>, number: u32) -> Result<wgpu::BindGroup> {
-    let Replacement { places, fresh, target, record_bytes } = replacement;
-    let vectors = (record_bytes / VECTOR_BYTES) as u32;
-    let uniform = UpdateUniform { count: places.len() as u32, vectors, number, padding: 0 };
+    let Replacement { places, fresh, target } = replacement;
+    let uniform = UpdateUniform { count: places.len() as u32, texels: target.texels(), number, padding: 0 };
     let uniform = gpu.uniform("hiz.update.uniform", &uniform)?;
     let places = gpu.filled("hiz.update.places", bytemuck::cast_slice(places), wgpu::BufferUsages::STORAGE)?;
     Ok(gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
@@ -133,7 +129,7 @@ fn bind(gpu: &Gpu, instances: &Instances, replacement: &Replacement<'_>, number:
             entry(0, uniform.as_entire_binding()),
             entry(1, places.as_entire_binding()),
             entry(2, fresh.as_entire_binding()),
-            entry(3, target.as_entire_binding()),
+            entry(3, wgpu::BindingResource::TextureView(&target.view)),
             entry(4, instances.sequence.as_entire_binding()),
         ],
     }))

@@ -19,8 +19,7 @@ const ROUNDING: f64 = f64::EPSILON / 2.0;
 pub const ERROR_ULPS: f64 = 24.0;
 
 /// A linear function of the position about the reference point: `m . d + m3`, and the magnitudes that bound its error.
-#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Row {
     /// Three linear coefficients and the constant.
     pub(crate) m: [f32; 4],

@@ -1,50 +1,58 @@
-//! What a cull finds, on the device: verdict planes, the packed list, draw arguments and counters.
+//! What a cull finds, on the device: the mask, verdicts, and the packed list with its draw arguments.
+
+use std::sync::OnceLock;
 
 use crate::error::Result;
-use crate::gpu::{ContextId, Gpu, write_mapped};
-use crate::instances::Instances;
+use crate::gpu::{ContextId, Gpu};
+use crate::instances::{Instances, Piece};
+use crate::lists::{DrawIndexedIndirect, DrawTemplate, Lists};
 
-/// The arguments of `draw_indexed_indirect`, as the device reads them.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub struct DrawIndexedIndirect {
-    /// Indices of the mesh.
-    pub index_count: u32,
-    /// Instances to draw: what the cull wrote.
-    pub instance_count: u32,
-    /// First index in the index buffer.
-    pub first_index: u32,
-    /// Added to each index.
-    pub base_vertex: i32,
-    /// First instance; other than 0 needs the feature `INDIRECT_FIRST_INSTANCE`.
-    pub first_instance: u32,
+/// What a cull is to leave behind. What is not asked for is neither computed nor stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Outputs {
+    /// A bit for each instance, kept or not.
+    pub mask: bool,
+    /// Why, for each instance: [`Counts`](crate::headless::Counts) and verdicts come from it.
+    pub verdicts: bool,
+    /// The packed list of the kept instances.
+    pub indices: bool,
+    /// The draw arguments, whose instance count is the list's length, with or without a list.
+    pub draws: bool,
 }
 
-const _: () = assert!(size_of::<DrawIndexedIndirect>() == 20);
-
-/// What the draw arguments say beside the instance count.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct DrawTemplate {
-    /// See [`DrawIndexedIndirect::index_count`].
-    pub index_count: u32,
-    /// See [`DrawIndexedIndirect::first_index`].
-    pub first_index: u32,
-    /// See [`DrawIndexedIndirect::base_vertex`].
-    pub base_vertex: i32,
-    /// See [`DrawIndexedIndirect::first_instance`].
-    pub first_instance: u32,
+impl Outputs {
+    /// Everything.
+    pub const ALL: Self = Self { mask: true, verdicts: true, indices: true, draws: true };
+    /// Nothing.
+    pub const NONE: Self = Self { mask: false, verdicts: false, indices: false, draws: false };
 }
 
-/// How much room there is, and what is drawn.
+impl std::fmt::Display for Outputs {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let all = [(self.mask, "mask"), (self.verdicts, "verdicts"), (self.indices, "indices"), (self.draws, "draws")];
+        let names: Vec<_> = all.into_iter().filter_map(|(asked, name)| asked.then_some(name)).collect();
+        if names.is_empty() { f.write_str("nothing") } else { f.write_str(&names.join(", ")) }
+    }
+}
+
+impl Default for Outputs {
+    fn default() -> Self {
+        Self::ALL
+    }
+}
+
+/// What is asked for, how much room there is, and what is drawn.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct VisibleOptions {
+    /// What culls are to leave behind.
+    pub outputs: Outputs,
     /// How many indices are written at most, all pieces together; `None`: all instances.
     pub capacity: Option<u32>,
     /// The constant part of the draw arguments.
     pub draw: DrawTemplate,
 }
 
-/// `shaders/cull.wgsl`, `Counters`.
+/// `shaders/count.wgsl`, `Counters`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct CounterRecord {
@@ -52,89 +60,93 @@ pub(crate) struct CounterRecord {
     pub(crate) occluded: u32,
     pub(crate) visible: u32,
     pub(crate) invalid: u32,
+}
+
+/// `shaders/shared/report.wgsl`, `Statistics`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct StatisticsRecord {
     pub(crate) levels: [u32; 16],
     pub(crate) texels_low: u32,
     pub(crate) texels_high: u32,
 }
 
-/// Words behind each list that stay 0xFFFFFFFF: whoever writes past the capacity shows.
-pub const CANARY_WORDS: u64 = 16;
+/// `shaders/cull_groups.wgsl`, `Survivors`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct SurvivorsRecord {
+    pub(crate) workgroups: [u32; 3],
+    pub(crate) count: u32,
+}
+
+/// Before the groups are tested.
+pub(crate) const NO_SURVIVORS: SurvivorsRecord = SurvivorsRecord { workgroups: [0, 1, 1], count: 0 };
+
+/// Groups in a row of the survivors' list; `shaders/shared/survivors.wgsl`.
+pub(crate) const SURVIVORS_PER_ROW: u32 = 4096;
+
+/// Places that `shaders/count.wgsl` reads at once.
+const VERDICT_MULTIPLE: u32 = 4;
 
 /// The buffers of one piece.
 #[derive(Debug)]
 pub(crate) struct PieceOutput {
-    /// The plane of kept bits, then that of the verdicts' low bits.
-    pub(crate) planes: wgpu::Buffer,
-    /// Where the cull writes the planes about places, if the instances are not stored in the caller's order.
-    pub(crate) stored_planes: Option<wgpu::Buffer>,
-    pub(crate) list: wgpu::Buffer,
-    /// Indices that fit the list, the canary not counted.
-    pub(crate) list_capacity: u32,
-    /// Scratch of the compaction: kept bits before each word.
-    pub(crate) before: wgpu::Buffer,
+    /// A bit for each of the caller's instances; behind them, at `verdicts_offset`, a word for each place.
+    pub(crate) mask: wgpu::Buffer,
+    /// Made by the first cull that tests groups.
+    groups: OnceLock<GroupOutput>,
+}
+
+/// What the cull of a piece's groups leaves.
+#[derive(Debug)]
+pub(crate) struct GroupOutput {
+    /// A word for each group.
+    pub(crate) verdicts: wgpu::Buffer,
+    /// How many groups are left, as the arguments of a dispatch; and which.
+    pub(crate) survivors: wgpu::Buffer,
+    pub(crate) survivor_list: wgpu::TextureView,
 }
 
 /// What a cull finds: per piece a bit mask of the kept instances, a packed list of their indices and a record of draw
-/// arguments. The lists hold the caller's indices and begin as 0xFFFFFFFF.
+/// arguments; of these what the [`Outputs`] say. The lists hold the caller's indices and begin as 0xFFFFFFFF.
 #[derive(Debug)]
 pub struct Visible {
     pub(crate) context: ContextId,
     pub(crate) pieces: Vec<PieceOutput>,
-    pub(crate) draws: wgpu::Buffer,
-    pub(crate) draws_template: wgpu::Buffer,
-    pub(crate) counters: wgpu::Buffer,
-    pub(crate) capacity_uniform: wgpu::Buffer,
+    /// `None` where neither indices nor draws are asked for.
+    pub(crate) lists: Option<Lists>,
+    /// Made by the first cull that counts levels.
+    statistics: OnceLock<wgpu::Buffer>,
     capacity: u32,
+    outputs: Outputs,
     counts: Vec<u32>,
 }
 
 impl Visible {
     pub(crate) fn new(gpu: &Gpu, instances: &Instances, options: &VisibleOptions) -> Result<Self> {
-        let device = gpu.device();
-        let capacity = options.capacity.unwrap_or(instances.len());
-        let storage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
-        let buffer = |label, size, usage| {
-            device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
-        };
-        let pieces = instances
-            .pieces
-            .iter()
-            .map(|piece| {
-                let list_capacity = piece.count().min(capacity);
-                let words = u64::from(piece.words().max(1));
-                Ok(PieceOutput {
-                    planes: buffer("hiz.visible.planes", 2 * 4 * words, storage),
-                    stored_planes: (!piece.order.is_given())
-                        .then(|| buffer("hiz.visible.stored_planes", 2 * 4 * words, wgpu::BufferUsages::STORAGE)),
-                    list: filled_list(device, u64::from(list_capacity) + CANARY_WORDS)?,
-                    list_capacity,
-                    before: buffer("hiz.compact.before", 4 * words, wgpu::BufferUsages::STORAGE),
-                })
-            })
-            .collect::<Result<_>>()?;
-        let DrawTemplate { index_count, first_index, base_vertex, first_instance } = options.draw;
-        let draw = DrawIndexedIndirect { index_count, instance_count: 0, first_index, base_vertex, first_instance };
-        let template = vec![draw; instances.num_pieces()];
-        let draws_bytes = (template.len() * size_of::<DrawIndexedIndirect>()) as u64;
+        let VisibleOptions { outputs, capacity, draw } = *options;
+        let pieces = instances.pieces.iter().map(|piece| PieceOutput::new(gpu, piece, outputs)).collect();
+        let listed = outputs.indices || outputs.draws;
         Ok(Self {
             context: gpu.id(),
             pieces,
-            draws: buffer("hiz.visible.draws", draws_bytes, storage | wgpu::BufferUsages::INDIRECT),
-            draws_template: gpu.filled(
-                "hiz.visible.draws_template",
-                bytemuck::cast_slice(&template),
-                wgpu::BufferUsages::COPY_SRC,
-            )?,
-            counters: buffer("hiz.visible.counters", size_of::<CounterRecord>() as u64, storage),
-            capacity_uniform: gpu.uniform("hiz.visible.capacity", &[capacity, 0, 0, 0])?,
-            capacity,
-            counts: instances.pieces.iter().map(crate::instances::Piece::count).collect(),
+            lists: listed.then(|| Lists::new(gpu, instances, outputs.indices, capacity, draw)).transpose()?,
+            statistics: OnceLock::new(),
+            capacity: capacity.unwrap_or(instances.len()),
+            outputs,
+            counts: instances.pieces.iter().map(Piece::count).collect(),
         })
     }
 
-    /// The draw arguments, one [`DrawIndexedIndirect`] a piece, for `draw_indexed_indirect` at [`Visible::draw_offset`].
-    pub fn draw_arguments(&self) -> &wgpu::Buffer {
-        &self.draws
+    /// What culls leave here.
+    pub fn outputs(&self) -> Outputs {
+        self.outputs
+    }
+
+    /// The draw arguments, one [`DrawIndexedIndirect`] a piece, for `draw_indexed_indirect` at [`Visible::draw_offset`]. `None` without
+    /// [`Outputs::draws`] and [`Outputs::indices`].
+    pub fn draw_arguments(&self) -> Option<&wgpu::Buffer> {
+        self.lists.as_ref().map(|lists| &lists.draws)
     }
 
     /// The offset in bytes of a piece's draw arguments.
@@ -147,21 +159,22 @@ impl Visible {
         self.pieces.len()
     }
 
-    /// A piece's packed list of indices (u32, the caller's numbering); usable as storage and as an instance vertex buffer.
+    /// A piece's packed list of indices (u32, the caller's numbering); usable as storage and as an instance vertex buffer. `None`
+    /// without [`Outputs::indices`].
     ///
     /// # Panics
     /// For a piece that is not below [`Visible::num_pieces`].
-    pub fn list(&self, piece: usize) -> &wgpu::Buffer {
-        &self.pieces[piece].list
+    pub fn list(&self, piece: usize) -> Option<&wgpu::Buffer> {
+        self.lists.as_ref()?.pieces[piece].indices.as_ref()
     }
 
-    /// A piece's bit planes: one bit an instance, kept or not, 32 a word, lowest first; behind them as many words that tell
-    /// occluded (not kept, 1) from outside (0) and invalid (kept, 1) from visible (0).
+    /// A piece's mask: one bit an instance, kept or not, 32 a word, lowest first, in the caller's numbering; what lies behind is not
+    /// for the caller. `None` without [`Outputs::mask`].
     ///
     /// # Panics
     /// For a piece that is not below [`Visible::num_pieces`].
-    pub fn planes(&self, piece: usize) -> &wgpu::Buffer {
-        &self.pieces[piece].planes
+    pub fn mask(&self, piece: usize) -> Option<&wgpu::Buffer> {
+        self.outputs.mask.then_some(&self.pieces[piece].mask)
     }
 
     /// How many indices are written at most, all pieces together.
@@ -171,36 +184,88 @@ impl Visible {
 
     /// Bytes on the device.
     pub fn device_bytes(&self) -> u64 {
-        let pieces = self.pieces.iter().map(|p| {
-            let stored_planes = p.stored_planes.as_ref().map_or(0, wgpu::Buffer::size);
-            p.planes.size() + stored_planes + p.list.size() + p.before.size()
-        });
-        pieces.sum::<u64>() + self.draws.size() + self.counters.size()
+        self.pieces.iter().map(PieceOutput::size).sum::<u64>()
+            + self.lists.as_ref().map_or(0, Lists::size)
+            + self.statistics.get().map_or(0, wgpu::Buffer::size)
     }
 
     /// Instances of each piece.
     pub(crate) fn counts(&self) -> &[u32] {
         &self.counts
     }
+
+    /// Where levels are counted.
+    pub(crate) fn statistics_or_new(&self, gpu: &Gpu) -> &wgpu::Buffer {
+        let size = size_of::<StatisticsRecord>() as u64;
+        self.statistics.get_or_init(|| gpu.empty("hiz.visible.statistics", size, STORAGE))
+    }
+
+    /// Where levels were counted, if they were.
+    pub(crate) fn statistics(&self) -> Option<&wgpu::Buffer> {
+        self.statistics.get()
+    }
+
+    /// Whether more instances may be kept than the lists hold.
+    pub(crate) fn is_capped(&self) -> bool {
+        self.counts.iter().map(|n| u64::from(*n)).sum::<u64>() > u64::from(self.capacity)
+    }
 }
 
-fn filled_list(device: &wgpu::Device, words: u64) -> Result<wgpu::Buffer> {
-    const LABEL: &str = "hiz.visible.list";
-    let size = 4 * words;
-    let list = device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(LABEL),
-        size,
-        usage: wgpu::BufferUsages::STORAGE
-            | wgpu::BufferUsages::COPY_SRC
-            | wgpu::BufferUsages::COPY_DST
-            | wgpu::BufferUsages::VERTEX,
-        mapped_at_creation: true,
-    });
-    let ones = vec![0xFF_u8; size.min(1 << 16) as usize];
-    for begin in (0..size).step_by(ones.len()) {
-        let part = ones.len().min((size - begin) as usize);
-        write_mapped(LABEL, &list, begin, &ones[..part])?;
+pub(crate) const STORAGE: wgpu::BufferUsages =
+    wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_SRC).union(wgpu::BufferUsages::COPY_DST);
+
+impl PieceOutput {
+    fn new(gpu: &Gpu, piece: &Piece, outputs: Outputs) -> Self {
+        let verdicts = if outputs.verdicts { piece.count().max(1).next_multiple_of(VERDICT_MULTIPLE) } else { 0 };
+        let size = verdicts_offset(piece).max(16) + 4 * u64::from(verdicts);
+        Self { mask: gpu.empty("hiz.visible.mask", size, STORAGE), groups: OnceLock::new() }
     }
-    list.unmap();
-    Ok(list)
+
+    /// For a cull that tests groups.
+    pub(crate) fn groups_or_new(&self, gpu: &Gpu, piece: &Piece) -> &GroupOutput {
+        self.groups.get_or_init(|| GroupOutput {
+            verdicts: gpu.empty("hiz.visible.group_verdicts", 4 * u64::from(piece.groups().max(1)), STORAGE),
+            survivors: gpu.empty(
+                "hiz.visible.survivors",
+                size_of::<SurvivorsRecord>() as u64,
+                STORAGE | wgpu::BufferUsages::INDIRECT,
+            ),
+            survivor_list: survivor_list(gpu, piece),
+        })
+    }
+
+    /// What the last cull that tested groups left, if there was one.
+    pub(crate) fn groups(&self) -> Option<&GroupOutput> {
+        self.groups.get()
+    }
+
+    fn size(&self) -> u64 {
+        let of_groups = self.groups.get().map_or(0, |groups| {
+            let list = groups.survivor_list.texture();
+            let list = 4 * u64::from(list.width()) * u64::from(list.height());
+            groups.verdicts.size() + groups.survivors.size() + list
+        });
+        self.mask.size() + of_groups
+    }
+}
+
+fn survivor_list(gpu: &Gpu, piece: &Piece) -> wgpu::TextureView {
+    let groups = piece.groups().max(1);
+    let (width, height) = (groups.min(SURVIVORS_PER_ROW), groups.div_ceil(SURVIVORS_PER_ROW));
+    let texture = gpu.device().create_texture(&wgpu::TextureDescriptor {
+        label: Some("hiz.visible.survivor_list"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::R32Uint,
+        usage: wgpu::TextureUsages::STORAGE_BINDING,
+        view_formats: &[],
+    });
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+/// Where the verdicts begin behind a piece's mask; `shaders/shared/piece.wgsl`, `verdicts_begin`.
+pub(crate) fn verdicts_offset(piece: &Piece) -> u64 {
+    4 * u64::from(piece.words().next_multiple_of(VERDICT_MULTIPLE))
 }

@@ -7,7 +7,8 @@ use crate::error::Result;
 use crate::groups::{GROUP, Groups};
 use crate::headless::Engine;
 use crate::instances::{Instances, Piece};
-use crate::readback::{self, BufferRange};
+use crate::readback;
+use crate::records::TEXEL_BYTES;
 
 /// The view's uniform (`shaders/shared/view.wgsl`, `View`) as 32-bit words. The number of the reduction is 0.
 ///
@@ -25,7 +26,7 @@ pub fn instances(bounds: &Bounds<'_>) -> Result<Vec<u32>> {
     let record_bytes = bounds.kind().record_bytes() as usize;
     let mut bytes = vec![0; bounds.len()? * record_bytes];
     for (i, record) in bytes.chunks_exact_mut(record_bytes).enumerate() {
-        bounds.write_record(i, record);
+        bounds.write_record(i, i as u32, record);
     }
     Ok(bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
 }
@@ -46,9 +47,9 @@ pub struct GroupWords {
 /// # Errors
 /// [`Error::DeviceLost`](crate::Error::DeviceLost).
 pub fn groups(engine: &Engine, instances: &Instances) -> Result<Vec<GroupWords>> {
-    let ranges: Vec<_> =
-        instances.pieces.iter().map(|p| BufferRange::first(&p.group_records, p.group_records.size())).collect();
-    let bytes = readback::read_buffers(engine.device(), engine.queue(), &ranges)?;
+    let read =
+        |p: &Piece| readback::read_texture(engine.device(), engine.queue(), p.group_records.texture(), TEXEL_BYTES);
+    let bytes = instances.pieces.iter().map(read).collect::<Result<Vec<_>>>()?;
     let changing = instances.changing();
     let pieces = instances.pieces.iter().zip(&changing.groups).zip(bytes);
     let of_piece = |((piece, groups), bytes): ((&Piece, &Groups), Vec<u8>)| -> Vec<GroupWords> {

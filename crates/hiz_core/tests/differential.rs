@@ -5,9 +5,9 @@ mod common;
 #[path = "common/campaign/mod.rs"]
 mod campaign;
 
-use campaign::{Campaign, Checkpoint, HEADER, Report};
+use campaign::{Campaign, Checkpoint, HEADER, MISSING_LEVELS, Report};
 use common::engine;
-use hiz_core::{Coverage, Fit, Footprint};
+use hiz_core::{Coverage, Fit, Footprint, StoredLevels};
 
 /// Every footprint, and descents with and without budget to finish.
 const ALL: &[(Footprint, u32)] = &[
@@ -25,7 +25,7 @@ const FITTED: &[(Footprint, u32)] = &[(Footprint::Two, 4096)];
 /// Green, and no class without culls: one that hides nothing proves nothing.
 fn assert_green(name: &str, report: &Report) {
     eprintln!("{name}\n{HEADER}\n{report}");
-    assert_eq!(report.total().false_culls, 0);
+    assert_eq!((report.total().false_culls, report.tested.contradictions), (0, 0));
     for (class, tally) in &report.classes {
         assert!(tally.culled > tally.cases / 20, "{class:?}: expected culls, got {tally:?}");
     }
@@ -52,6 +52,37 @@ fn no_false_cull_with_a_volume_fit() {
     }
 }
 
+/// Level 0 and the stored levels are all that is read, whatever the rectangle asks for.
+#[test]
+fn no_false_cull_with_missing_levels() {
+    for (seed, fit, rounds, modes) in [(16, Fit::Rectangle, 60, ALL), (17, Fit::Volume, 12, FITTED)] {
+        let campaign = Campaign { seed, rounds, modes, fit, levels: MISSING_LEVELS, ..Campaign::default() };
+        assert_green(&format!("missing levels, {fit:?}"), &campaign.run(engine()));
+    }
+}
+
+/// Groups first, in both stored orders: nothing more is kept than without, and nothing visible is lost.
+#[test]
+fn no_false_cull_in_groups() {
+    for (seed, coverage) in [(16, Coverage::Area), (17, Coverage::Sample)] {
+        let campaign = Campaign { seed, rounds: 12, coverage, modes: ALL, groups: true, ..Campaign::default() };
+        assert_grouped(&format!("groups, {coverage:?}"), &campaign.run(engine()));
+    }
+    let fitted = Campaign { seed: 18, rounds: 4, modes: FITTED, fit: Fit::Volume, groups: true, ..Campaign::default() };
+    assert_grouped("groups, volume fit", &fitted.run(engine()));
+}
+
+/// Green, and groups were hidden as a whole.
+fn assert_grouped(name: &str, report: &Report) {
+    eprintln!("{name}\n{HEADER}\n{report}");
+    assert_eq!((report.total().false_culls, report.tested.contradictions), (0, 0));
+    assert!(
+        report.tested.one_by_one < report.tested.instances * 9 / 10,
+        "groups hid next to nothing: {:?}",
+        report.tested
+    );
+}
+
 #[test]
 fn little_that_is_hidden_is_kept() {
     let report = Campaign { seed: 13, rounds: 15, count_keeps: true, ..Campaign::default() }.run(engine());
@@ -72,7 +103,7 @@ fn soak() {
     };
     let (seed, wanted) = (setting("HIZVK_SOAK_SEED", 1000), setting("HIZVK_SOAK_CASES", 1_000_000));
     let adapter = engine().adapter().to_string();
-    let checkpoint = Checkpoint::new("soak", format!("seed {seed} cases {wanted} on {adapter}"));
+    let checkpoint = Checkpoint::new("soak", format!("seed {seed} cases {wanted}, flat and in groups, on {adapter}"));
     let (mut done, mut report) = checkpoint.load(true);
     if done > 0 {
         eprintln!("soak: goes on after {done} chunks, {} cases", report.total().cases);
@@ -89,6 +120,8 @@ fn soak() {
             coverage,
             modes: if fit == Fit::Volume { FITTED } else { ALL },
             fit,
+            levels: if done % 2 == 1 { MISSING_LEVELS } else { &[StoredLevels::ALL] },
+            groups: done % 2 == 1,
             count_keeps: true,
             ..Campaign::default()
         };

@@ -39,8 +39,8 @@ fn specks(n: usize, share: f64, piece: Option<u32>, seed: u64) -> (Arc<Instances
 
 fn cull(instances: &Arc<Instances>, order: Order, capacity: Option<u32>) -> Culling {
     let (camera, pyramid) = scene();
-    let options = CullOptions { order, ..CullOptions::default() };
-    let output = VisibleOptions { capacity, draw: DRAW };
+    let options = CullOptions { order, statistics: true, ..CullOptions::default() };
+    let output = VisibleOptions { capacity, draw: DRAW, ..VisibleOptions::default() };
     engine().cull(instances, &camera, &pyramid, &options, &output).unwrap()
 }
 
@@ -52,7 +52,7 @@ fn raw_lists(culling: &Culling) -> Vec<Vec<u32>> {
     let (device, queue) = (engine().device(), engine().queue());
     (0..culling.visible().num_pieces())
         .map(|piece| {
-            let list = culling.visible().list(piece);
+            let list = culling.visible().list(piece).expect("indices were asked for");
             let staging = device.create_buffer(&hiz_core::wgpu::BufferDescriptor {
                 label: Some("test.staging"),
                 size: list.size(),

@@ -12,7 +12,7 @@ use common::engine;
 use hiz_core::headless::Engine;
 use hiz_core::{BoundsKind, Coverage, Fit, Footprint};
 use hiz_ref::Verdict;
-use mirror::{Arithmetic, Loss, Margins, Mirror, STYLES, Style, WILDEST, WITHOUT_SLOPE_BARS, texel_loss};
+use mirror::{Arithmetic, Losses, Margins, Mirror, STYLES, Style, WILDEST, WITHOUT_SLOPE_BARS, texel_loss};
 
 const DESCENTS: &[(Footprint, u32)] = &[(Footprint::Two, 4096)];
 const MODES: &[(Footprint, u32)] =
@@ -137,7 +137,10 @@ const MORE_FAULTS: &[Fault] = &[
     ),
     (
         "a texel's first pixel alone",
-        &[("(corner + vec2<u32>(1u)) << vec2<u32>(child)", "(corner << vec2<u32>(child)) + vec2<u32>(1u)")],
+        &[(
+            "let end = min((at + vec2<u32>(1u)) << vec2<u32>(level), vec2<u32>(view.size));",
+            "let end = begin + vec2<u32>(1u);",
+        )],
     ),
     (
         "another plane's offset",
@@ -154,14 +157,8 @@ const MORE_FAULTS: &[Fault] = &[
             ("bar(least - 3.0 * error_bound(r, least, p.w) / p.w_min)", "least + 1e-4 * extent"),
         ],
     ),
-    ("a margin without the slopes", &[("+ abs(slope.x) * p.x.size + abs(slope.y) * p.y.size", "")]),
-    (
-        "a descent that forgets a row",
-        &[(
-            "begin = max(corner, first >> vec2<u32>(child));",
-            "begin = max(corner + vec2<u32>(0u, 1u), first >> vec2<u32>(child));",
-        )],
-    ),
+    ("a margin without the slopes", &[("+ abs(slope.x) * p.x.error + abs(slope.y) * p.y.error", "")]),
+    ("a descent that forgets a row", &[("if at.y % 2u == 0u && at.y < end.y {", "if false {")]),
 ];
 
 /// What the device culls beyond the mirror is more with each fault than without any. (One kind, one convention: each compiles anew.)
@@ -240,26 +237,35 @@ fn with_less_margin_some_do() {
 #[test]
 fn what_certificates_and_texels_lose() {
     let styles = [&styles()[..], &[WITHOUT_SLOPE_BARS]].concat();
-    let mut losses = vec![Loss::default(); styles.len()];
+    let mut losses = vec![Losses::default(); styles.len()];
     for round in (Campaign { rounds: 3, volumes: 16, ..campaign(56, Coverage::Area) }).loose(&KINDS) {
         let Some(mirror) = Mirror::new(&round) else { continue };
-        for (style, loss) in styles.iter().zip(&mut losses) {
+        for (style, sum) in styles.iter().zip(&mut losses) {
             let mut arithmetic = Arithmetic::new(Style { wild: true, ..*style }, round.seed ^ round.number as u64);
-            loss.add(mirror.loss(&round, &mut arithmetic));
+            sum.add(mirror.losses(&round, &mut arithmetic));
         }
     }
-    for (style, certificates) in styles.iter().zip(&losses) {
+    for (style, Losses { planes, extents, least_w }) in styles.iter().zip(&losses) {
         let texels = texel_loss(10_000, &mut Arithmetic::new(*style, 57));
         eprintln!(
-            "{:<22} certificates {:5.2} eps of {:6}, texels {:5.2} eps of {}",
-            style.name, certificates.eps, certificates.claims, texels.eps, texels.claims
+            "{:<22} planes {:5.2} eps of {:6}, extents {:5.2} of {:6}, least w {:5.2} of {:6}, texels {:5.2} of {}",
+            style.name,
+            planes.eps,
+            planes.claims,
+            extents.eps,
+            extents.claims,
+            least_w.eps,
+            least_w.claims,
+            texels.eps,
+            texels.claims
         );
         // Half of what is counted by hand leaves room for cases that are not tried.
-        assert!(certificates.claims > 1000 && certificates.eps < 7.75, "{}: {certificates:?}", style.name);
-        assert!(texels.claims > 1000 && texels.eps < 2.5, "{}: {texels:?}", style.name);
+        for (loss, most) in [(planes, 10.25), (extents, 9.25), (least_w, 6.75), (&texels, 2.5)] {
+            assert!(loss.claims > 1000 && loss.eps < most, "{}: {loss:?}", style.name);
+        }
     }
-    let folded = losses.last().expect("styles").eps;
-    let barred = losses[styles.len() - 2].eps;
+    let folded = losses.last().expect("styles").planes.eps;
+    let barred = losses[styles.len() - 2].planes.eps;
     assert!(folded > barred, "a folded slope costs more: {folded} {barred}");
 }
 
@@ -279,9 +285,9 @@ fn subnormal_slopes_would_be_two_slopes() {
         hiz_core::Camera::from_clip_from_world(m, size, hiz_core::DepthConvention::Reversed).expect("a camera");
     (round.view.width, round.view.height, round.view.reversed) = (1, 1, true);
     round.depth = vec![0.0];
-    // Just within the camera's coordinate limit, 2^42.
-    let across = 0.95 * 2.0_f64.powi(42);
-    let slab = hiz_ref::Volume::Box { min: [-1.0, -1.0, 2.0], max: [across, 1.0, 3.0] };
+    // Just within the camera's coordinate limit, 2^42, and so far away that it is not taken for one that crosses the eye's plane.
+    let (across, away) = (0.95 * 2.0_f64.powi(42), 2.0_f64.powi(25));
+    let slab = hiz_ref::Volume::Box { min: [-0.5 * away, -0.5 * away, away], max: [across, 0.5 * away, 1.5 * away] };
     round.volumes = vec![(hiz_core::BoundsKind::Box, vec![slab])];
     let mirror = Mirror::new(&round).expect("rows that float32 holds");
     let culls = |flattest: f32| {

@@ -5,7 +5,8 @@ mod common;
 use common::{CONVENTIONS, Random, camera_along_z, engine, ndc};
 use hiz_core::wgpu;
 use hiz_core::{
-    Camera, DepthConvention, FaceCull, Floats, ImageSize, MeshData, OccluderOptions, Pose, Projection, PyramidOptions,
+    Camera, DepthConvention, FaceCull, Floats, ImageSize, MeshData, OccluderOptions, Pose, Projection, Pyramid,
+    PyramidOptions, StoredLevels,
 };
 
 /// A square at depth `z` from (-r, -r) to (r, r), seen counter-clockwise by a camera with x right, y up that looks along +z... which
@@ -203,21 +204,55 @@ fn pyramids_of_float_textures_are_bit_exact() {
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         for convention in CONVENTIONS {
             let camera = camera_along_z(width, height, convention);
-            let pyramid = engine().context().create_pyramid(camera.size(), &PyramidOptions::default()).unwrap();
-            let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            engine().context().record_reduce(&mut encoder, &view, &camera, &pyramid).unwrap();
-            queue.submit([encoder.finish()]);
-            for (k, level) in hiz_ref::pyramid(&depth, width, height, convention.is_reversed()).iter().enumerate() {
-                assert_eq!(
-                    engine().read_level(&pyramid, k as u32).unwrap(),
-                    level.texels,
-                    "{width}x{height} level {k}"
-                );
+            for levels in LEVELS {
+                let options = PyramidOptions { levels, ..PyramidOptions::default() };
+                let pyramid = engine().context().create_pyramid(camera.size(), &options).unwrap();
+                let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                engine().context().record_reduce(&mut encoder, &view, &camera, &pyramid).unwrap();
+                queue.submit([encoder.finish()]);
+                assert_levels(&pyramid, &depth, convention);
             }
+            let pyramid = engine().context().create_pyramid(camera.size(), &PyramidOptions::default()).unwrap();
             let other = camera_along_z(width + 1, height, convention);
             let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             let error = engine().context().record_reduce(&mut encoder, &view, &other, &pyramid).unwrap_err();
             assert!(error.to_string().starts_with("camera: expected the depth image's size"), "{error}");
+        }
+    }
+}
+
+/// One of each kind of dispatch: all, without fine ones, one by an invocation, one by a workgroup a texel.
+const LEVELS: [StoredLevels; 5] =
+    [StoredLevels::ALL, StoredLevels::from(2), StoredLevels::only(3), StoredLevels::from(4), StoredLevels::only(6)];
+
+/// The stored levels are those of the oracle.
+fn assert_levels(pyramid: &Pyramid, depth: &[f32], convention: DepthConvention) {
+    let ImageSize { width, height } = pyramid.size();
+    for (k, level) in hiz_ref::pyramid(depth, width, height, convention.is_reversed()).iter().enumerate() {
+        if k == 0 || pyramid.stored_levels().is_some_and(|s| (s.first..=s.last).contains(&(k as u32))) {
+            let texels = engine().read_level(pyramid, k as u32).unwrap();
+            assert_eq!(texels, level.texels, "{width}x{height} level {k} of {:?}", pyramid.stored_levels());
+        }
+    }
+}
+
+/// A depth texture, rendered, in sizes that leave blocks over on both sides.
+#[test]
+fn depth_textures_are_reduced_to_the_chosen_levels() {
+    let mut random = common::Random(9);
+    let vertices: Vec<f64> =
+        (0..900).map(|i| if i % 3 == 2 { random.range(1.5, 30.0) } else { random.range(-9.0, 9.0) }).collect();
+    let triangles: Vec<u32> = (0..300).collect();
+    let mesh = MeshData { vertices: Floats::F64(&vertices), triangles: &triangles, transforms: None };
+    let occluders = engine().occluders(&[mesh], &OccluderOptions::default()).unwrap();
+    for (width, height) in [(1, 1), (1, 83), (89, 1), (64, 65), (127, 129), (401, 233)] {
+        for convention in CONVENTIONS {
+            let image = engine().render_depth(&occluders, &camera_along_z(width, height, convention)).unwrap();
+            let depth = image.read().unwrap();
+            for levels in LEVELS {
+                let options = PyramidOptions { levels, ..PyramidOptions::default() };
+                assert_levels(&engine().pyramid_with(&image, &options).unwrap(), &depth, convention);
+            }
         }
     }
 }

@@ -377,10 +377,12 @@ fn textures_that_a_view_cannot_tell_apart_are_refused() {
     assert!(message(&|d| d.mip_level_count = 2).contains("2 mip levels, 1 samples, 1 layers"));
     assert!(message(&|d| d.size.depth_or_array_layers = 3).contains("3 layers"));
     assert!(message(&|d| d.usage = wgpu::TextureUsages::COPY_SRC).contains("expected the usage TEXTURE_BINDING"));
+    let bits = message(&|d| d.format = wgpu::TextureFormat::R32Uint);
+    assert!(bits.contains("expected the usage STORAGE_BINDING"), "{bits}");
     assert!(message(&|d| d.format = wgpu::TextureFormat::R16Float).contains("got R16Float"));
     assert!(message(&|d| d.size.width = 4).starts_with("depth: expected the pyramid's size"));
     for chunk_shift in [0, 1, 31, 64] {
-        let options = PyramidOptions { chunk_shift: Some(chunk_shift) };
+        let options = PyramidOptions { chunk_shift: Some(chunk_shift), ..PyramidOptions::default() };
         let error = engine().context().create_pyramid(camera.size(), &options).unwrap_err();
         assert!(error.to_string().starts_with("chunk_shift: expected 2 to"), "{error}");
     }

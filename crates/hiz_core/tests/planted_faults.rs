@@ -6,10 +6,12 @@ mod common;
 #[path = "common/campaign/mod.rs"]
 mod campaign;
 
-use campaign::{Campaign, Class, HEADER, PLAIN, Report};
+use campaign::{Campaign, Class, HEADER, MISSING_LEVELS, PLAIN, Report};
 use common::{CONVENTIONS, Random, camera_along_z};
 use hiz_core::headless::Engine;
-use hiz_core::{Bounds, Coverage, CullOptions, DepthConvention, Floats, Footprint, InstanceOptions, VisibleOptions};
+use hiz_core::{
+    Bounds, BoundsKind, Coverage, CullOptions, DepthConvention, Floats, Footprint, InstanceOptions, VisibleOptions,
+};
 
 fn faulty(faults: &[(&str, &str)]) -> Engine {
     Engine::with_planted_faults(None, faults).expect("the device tests need a Vulkan driver")
@@ -64,16 +66,14 @@ fn cuts_of_the_margin() {
     }
 }
 
+/// The block's certificates along one axis, as the cull calls them.
+const INSIDE_X: &str = "inside_block(x, w, extent_x, w_min, block.x, block.z, level, view.half_size.x, view.size.x)";
+const INSIDE_Y: &str = "inside_block(y, w, extent_y, w_min, block.y, block.w, level, view.half_size.y, view.size.y)";
+
 #[test]
 fn a_level_too_fine_without_block_certificates() {
-    assert_red(
-        "level",
-        &[
-            ("level += 1u;", ""),
-            ("if hidden && inside_block(x, w, block.x, block.z, level, view.half_size.x, view.size.x)", "if hidden"),
-            ("&& inside_block(y, w, block.y, block.w, level, view.half_size.y, view.size.y)", ""),
-        ],
-    );
+    let finer = ("return level + select(0u, 1u, (texels.x | texels.y) >= (1u << FOOTPRINT_LOG2));", "return level;");
+    assert_red("level", &[finer, (INSIDE_X, "true"), (INSIDE_Y, "true")]);
 }
 
 #[test]
@@ -95,22 +95,15 @@ fn a_depth_certificate_at_the_centre_alone() {
 #[test]
 fn a_rectangle_that_is_too_small_without_block_certificates() {
     // The rectangle alone, unwidened: the edges are what certificates are for.
-    assert_red(
-        "rectangle",
-        &[
-            (
-                "1.25 * error_bound(r, max(abs(interval.x), abs(interval.y)), w) / w_min + 4.0 * EPS * half_size + view.reach",
-                "view.reach",
-            ),
-            ("if hidden && inside_block(x, w, block.x, block.z, level, view.half_size.x, view.size.x)", "if hidden"),
-            ("&& inside_block(y, w, block.y, block.w, level, view.half_size.y, view.size.y)", ""),
-        ],
-    );
+    let unwidened = ["below", "above"].map(|end| (format!("(extent.{end} * per_w + rounding)"), "view.reach"));
+    let [low, high] = unwidened.each_ref().map(|(what, by)| (what.as_str(), *by));
+    assert_red("rectangle", &[low, high, (INSIDE_X, "true"), (INSIDE_Y, "true")]);
 }
 
+/// What the rectangle is widened by besides its own error.
+const WIDENING: &str = "let rounding = 4.0 * EPS * half_size + view.reach;";
 /// A rectangle 0.7 pixels too small on each side.
-const TOO_SMALL: (&str, &str) =
-    ("+ 4.0 * EPS * half_size + view.reach;", "+ 4.0 * EPS * half_size + view.reach - 0.7;");
+const TOO_SMALL: (&str, &str) = (WIDENING, "let rounding = 4.0 * EPS * half_size + view.reach - 0.7;");
 
 /// The rectangle only chooses what is certified: where it is wrong, less is culled and nothing wrongly. (The level that follows
 /// from it is integer arithmetic, and no heuristic: four corners are all texels of a 2 x 2 footprint only.)
@@ -126,10 +119,10 @@ fn a_rectangle_that_is_too_small_is_harmless() {
 #[test]
 fn each_block_certificate_is_needed() {
     for gone in [
-        ("(lo == 0u || surely_above(r, f32(begin) + view.reach - half_size, w))", "true"),
-        ("(end >= size || surely_below(r, f32(end) - view.reach - half_size, w))", "true"),
-        ("inside_block(x, w, block.x, block.z, level, view.half_size.x, view.size.x)", "true"),
-        ("inside_block(y, w, block.y, block.w, level, view.half_size.y, view.size.y)", "true"),
+        ("(lo == 0u | surely_after(r, w, extent, f32(begin) + view.reach - half_size, w_min))", "true"),
+        ("(end >= size | surely_before(r, w, extent, f32(end) - view.reach - half_size, w_min))", "true"),
+        (INSIDE_X, "true"),
+        (INSIDE_Y, "true"),
     ] {
         let classes = &[Class::PixelBorders, Class::Grazing, Class::Holes];
         let campaign = Campaign { seed: 23, rounds: 8, classes, ..Campaign::default() };
@@ -140,10 +133,7 @@ fn each_block_certificate_is_needed() {
 /// A descent is certified by the rectangle's own edges, and its budget's end decides nothing.
 #[test]
 fn a_descent_without_its_certificates_or_past_its_budget() {
-    let (x, y) = (
-        ("inside_block(x, w, block.x, block.z, level, view.half_size.x, view.size.x)", "true"),
-        ("inside_block(y, w, block.y, block.w, level, view.half_size.y, view.size.y)", "true"),
-    );
+    let (x, y) = ((INSIDE_X, "true"), (INSIDE_Y, "true"));
     let unfinished = ("if left == 0u {\n            return false;", "if left == 0u {\n            return true;");
     for (name, faults, modes) in [
         ("descent, columns", &[TOO_SMALL, x][..], &[(Footprint::Two, 4096)]),
@@ -181,7 +171,7 @@ fn culls_within_the_guard(engine: &Engine) -> bool {
 /// what is *culled*: `outcomes.rs`.)
 #[test]
 fn the_guard_stands_in_the_block_certificates_too() {
-    let forgetful = ("+ 4.0 * EPS * half_size + view.reach;", "+ 4.0 * EPS * half_size;");
+    let forgetful = (WIDENING, "let rounding = 4.0 * EPS * half_size;");
     assert!(!culls_within_the_guard(&faulty(&[])));
     assert!(!culls_within_the_guard(&faulty(&[forgetful])));
     for sign in [
@@ -194,38 +184,163 @@ fn the_guard_stands_in_the_block_certificates_too() {
 
 #[test]
 fn a_descent_that_forgets_a_column() {
-    let fault = ("if at.x % 2u == 0u && at.x < end.x {", "if false {");
+    let fault = ("if (at.x & last_child) < last_child && at.x < end.x {", "if false {");
     assert_red_with("descent", &[fault], &[(Footprint::Two, 4096)]);
+}
+
+/// A level that is too fine for a rectangle, or not there at all; a descent past missing levels that forgets children.
+#[test]
+fn wrong_levels_where_some_are_missing() {
+    let chosen = "select(clamp(level, first_stored, last_stored), 0u, level == 0u)";
+    for (what, by, modes) in [
+        ("let fits = finest <= last_stored;", "let fits = true;", PLAIN),
+        (chosen, "select(first_stored, 0u, level == 0u)", PLAIN),
+        (chosen, "select(clamp(level - 1u, first_stored, last_stored), 0u, level <= 1u)", PLAIN),
+        (chosen, "level", PLAIN),
+        ("let last_child = (1u << up) - 1u;", "let last_child = 1u;", &[(Footprint::Two, 4096)]),
+        ("select(1u, level, level <= first_stored)", "1u", &[(Footprint::Two, 4096)]),
+    ] {
+        let campaign = Campaign { seed: 25, rounds: 8, modes, levels: MISSING_LEVELS, ..Campaign::default() };
+        assert_report_red(&format!("{what} -> {by}"), &campaign.run(&faulty(&[(what, by)])));
+    }
 }
 
 #[test]
 fn texels_clamped_one_off() {
     assert_red(
         "clamp",
-        &[("clamp(last, -1, size - 1)", "clamp(last, -1, size - 2)"), ("end >= size ||", "end >= size - 1 ||")],
+        &[
+            ("clamp(floor(high), -1.0, edge - 1.0)", "clamp(floor(high), -1.0, edge - 2.0)"),
+            ("end >= size |", "end >= size - 1 |"),
+        ],
     );
+}
+
+/// What the cheaper certificates rest on: each claim taken away.
+#[test]
+fn claims_of_the_extent_and_the_sizes() {
+    let support = "support(r.half - low * w.half) - (r.center - low * w.center)";
+    let other_support = "support(r.half - high * w.half) + (r.center - high * w.center)";
+    let beyond = "surely_above(Value(side * r.center, r.error, side * r.half), t, w)";
+    let least_w = "w.center - support(w.half) - error_bound(w, 0.0, w)";
+    let faults: [(&str, &[(&str, &str)]); 5] = [
+        // Where the farthest corner for the centre's ratio is not the extreme one.
+        (
+            "extent, no support",
+            &[(support, "-(r.center - low * w.center)"), (other_support, "(r.center - high * w.center)")],
+        ),
+        (
+            "extent, no margin",
+            &[("+ error_bound(r, low, w), 0.0)", ", 0.0)"), ("+ error_bound(r, high, w), 0.0)", ", 0.0)")],
+        ),
+        ("least w, no support", &[(least_w, "w.center - error_bound(w, 0.0, w)")]),
+        ("frustum, half mirrored", &[(beyond, "surely_above(Value(side * r.center, r.error, r.half), t, w)")]),
+        ("another row's margin", &[("value_of(view.x, errors.x, volume)", "value_of(view.x, errors.z, volume)")]),
+    ];
+    for (name, faults) in faults {
+        let campaign = Campaign { seed: 25, rounds: 12, ..Campaign::default() };
+        assert_report_red(name, &campaign.run(&faulty(faults)));
+    }
+}
+
+/// The constants' share of a margin covers what float64 lost in them: large where they cancel at a distant eye.
+#[test]
+fn margins_count_the_constants() {
+    let fault = ("(volume.size * view.magnitudes + view.constant_magnitudes)", "(volume.size * view.magnitudes)");
+    let campaign = Campaign { seed: 38, rounds: 60, classes: &[Class::BareMatrix], ..Campaign::default() };
+    assert_report_red("no constants", &campaign.run(&faulty(&[fault])));
+}
+
+/// Pixels of level 0 come four at a time. Those beside a rectangle that is narrower are replaced; left in they only cost culls, and
+/// taken in another order they let something through.
+#[test]
+fn gathered_pixels_beside_the_rectangle() {
+    let run = |faults: &[(&str, &str)]| campaign(faults, Coverage::Area, PLAIN);
+    let left_in =
+        [("select(quad.xxzz, quad, t.x < t.z)", "quad"), ("select(columns.xyxy, columns, t.y < t.w)", "columns")];
+    let (without, with) = (run(&[]).total(), run(&left_in).total());
+    eprintln!("gathered: {} culled, with their neighbours {}", without.culled, with.culled);
+    assert!(with.false_culls == 0 && with.culled < without.culled, "{with:?}");
+    assert_red("gather", &[(".wzxy;", ";")]);
+}
+
+/// Groups: what is planted in them alone. (Boxes themselves are left out where a fault would reach them, too.)
+#[test]
+fn groups_that_forget_members_or_shrink() {
+    const ALL: &[BoundsKind] = &campaign::KINDS;
+    const OTHERS: &[BoundsKind] = &[BoundsKind::Sphere, BoundsKind::OrientedBox];
+    let half = "let half = bitcast<vec3<f32>>(record_texel(i, 2u).xyz);";
+    for (name, fault, kinds) in [
+        (
+            "a box a little too small",
+            (half, "let half = 0.9999 * bitcast<vec3<f32>>(record_texel(i, 2u).xyz);"),
+            OTHERS,
+        ),
+        (
+            "the next group's members",
+            ("survivor_position(slot)).x, lane", "survivor_position(slot)).x + 1u, lane"),
+            ALL,
+        ),
+        (
+            "a survivor's slot one off",
+            (
+                "textureStore(survivor_list, survivor_position(slot)",
+                "textureStore(survivor_list, survivor_position(slot + 1u)",
+            ),
+            ALL,
+        ),
+        ("a workgroup too few", ("slot % RUN == 0u", "slot % RUN == 1u"), ALL),
+        ("groups of 32, which", ("group * GROUP + share", "group * 32u + share"), ALL),
+        ("half of the shares", ("lane % SHARE", "lane % 4u"), ALL),
+    ] {
+        let campaign = Campaign { seed: 26, rounds: 3, volumes: 12, kinds, groups: true, ..Campaign::default() };
+        assert_report_red(name, &campaign.run(&faulty(&[fault])));
+    }
+}
+
+/// The count takes a group's verdict for its 64 members: with 32 it counts what nobody culled.
+#[test]
+fn groups_of_32_in_the_count() {
+    let run = |faults: &[(&str, &str)]| {
+        Campaign { seed: 26, rounds: 3, volumes: 12, groups: true, ..Campaign::default() }.run(&faulty(faults)).tested
+    };
+    let (without, with) = (run(&[]), run(&[("group_verdicts[place / GROUP]", "group_verdicts[place / 32u]")]));
+    eprintln!("contradictions: {}, with groups of 32 {}", without.contradictions, with.contradictions);
+    assert!(without.contradictions == 0 && with.contradictions > 0);
 }
 
 /// Reduction faults, seen by the pyramid itself.
 #[test]
 fn dropped_rows_and_columns() {
     for (what, by) in [
-        // The last column or row of an odd level: the neighbour before it is read twice.
-        ("min(2u * x + 1u, level.width - 1u)", "min(2u * x, level.width - 1u)"),
+        // The last row of an odd level; the last columns, where a block reaches past the row's padding.
         ("min(2u * y + 1u, level.height - 1u)", "min(2u * y, level.height - 1u)"),
+        ("let right = min(8u * x + 4u, last);", "let right = left;"),
+        ("vec2<u32>(2u * x + 1u, 2u * y + 1u)", "vec2<u32>(2u * x, 2u * y + 1u)"),
         ("f32(2u * x + 1u)", "f32(min(2u * x + 1u, textureDimensions(source).x - 2u))"),
         ("f32(2u * y + 1u)", "f32(min(2u * y + 1u, textureDimensions(source).y - 2u))"),
+        // Depth whose bits are no depth.
+        ("most > ONE_BITS - LEAST_NORMAL_BITS", "most > ONE_BITS"),
+        ("greatest == NEGATIVE_ZERO_BITS", "false"),
+        ("bits < LEAST_NORMAL_BITS);\n}\n", "false);\n}\n"),
     ] {
         let engine = faulty(&[(what, by)]);
         let mut random = Random(5);
         let (width, height) = (37, 29);
-        let depth: Vec<f32> = (0..width * height).map(|_| random.unit() as f32).collect();
+        // Blocks of one kind here and there, for what is farther than a block's other depths does not show in it.
+        let odd = [-0.0, 1e-40, f32::MIN_POSITIVE];
+        let depth: Vec<f32> = (0..width * height)
+            .map(|i| if i / 4 % 5 == 0 { odd[(i / 4 % 3) as usize] } else { random.unit() as f32 })
+            .collect();
         let mut red = false;
         for convention in CONVENTIONS {
-            let image = engine.upload_depth(&depth, &camera_along_z(width, height, convention)).unwrap();
-            let pyramid = engine.pyramid(&image).unwrap();
-            for (k, level) in hiz_ref::pyramid(&depth, width, height, convention.is_reversed()).iter().enumerate() {
-                red |= engine.read_level(&pyramid, k as u32).unwrap() != level.texels;
+            let camera = camera_along_z(width, height, convention);
+            let expected = hiz_ref::pyramid(&depth, width, height, convention.is_reversed());
+            for image in [engine.upload_depth(&depth, &camera), engine.upload_depth_sampled(&depth, &camera)] {
+                let pyramid = engine.pyramid(&image.unwrap()).unwrap();
+                for (k, level) in (0..).zip(&expected) {
+                    red |= engine.read_level(&pyramid, k).unwrap() != level.texels;
+                }
             }
         }
         assert!(red, "{what} -> {by}: the pyramid stayed the same");

@@ -2,8 +2,15 @@
 
 mod common;
 
-use common::{CONVENTIONS, Random, camera_along_z, engine};
-use hiz_core::{DepthConvention, ImageSize, PyramidOptions};
+use std::sync::Arc;
+
+use common::{CONVENTIONS, Random, camera_along_z, engine, ndc};
+use hiz_core::headless::DepthImage;
+use hiz_core::yardstick::{PerLevelReduction, ReductionShape, submitted_ms};
+use hiz_core::{
+    Bounds, CullOptions, DepthConvention, Floats, ImageSize, InstanceOptions, PyramidOptions, StoredLevels,
+    VisibleOptions, wgpu,
+};
 
 /// Every size class that has broken somebody's reduction: single pixels, rows, columns, odd in one or both sides, powers of two
 /// and their neighbours, primes, common screens.
@@ -70,18 +77,31 @@ fn image(width: u32, height: u32, random: &mut Random) -> Vec<f32> {
 
 fn check(width: u32, height: u32, depth: &[f32], convention: DepthConvention, options: &PyramidOptions) {
     let camera = camera_along_z(width, height, convention);
-    let uploaded = engine().upload_depth(depth, &camera).unwrap();
-    let pyramid = engine().pyramid_with(&uploaded, options).unwrap();
+    for uploaded in [engine().upload_depth(depth, &camera), engine().upload_depth_sampled(depth, &camera)] {
+        check_image(&uploaded.unwrap(), depth, convention, options);
+    }
+}
+
+fn check_image(image: &DepthImage, depth: &[f32], convention: DepthConvention, options: &PyramidOptions) {
+    let ImageSize { width, height } = image.size();
+    let pyramid = engine().pyramid_with(image, options).unwrap();
     let expected = hiz_ref::pyramid(depth, width, height, convention.is_reversed());
     assert_eq!(pyramid.num_levels() as usize, expected.len(), "{width}x{height}");
+    let top = expected.len() as u32 - 1;
+    let asked = options.levels;
     for (k, level) in expected.iter().enumerate() {
         assert_eq!(pyramid.level_size(k as u32), Some(ImageSize::new(level.width, level.height)));
+        if k > 0 && !(asked.first.min(top)..=asked.last.min(top)).contains(&(k as u32)) {
+            let error = engine().read_level(&pyramid, k as u32).unwrap_err().to_string();
+            assert!(error.contains("expected 0 or a stored level") && error.ends_with(&format!("got {k}")), "{error}");
+            continue;
+        }
         let texels = engine().read_level(&pyramid, k as u32).unwrap();
         let differing = texels.iter().zip(&level.texels).position(|(a, b)| a.to_bits() != b.to_bits());
         assert_eq!(texels.len(), level.texels.len());
         if let Some(i) = differing {
             panic!(
-                "{width}x{height} {convention:?} level {k} texel ({}, {}): device {}, oracle {}",
+                "{width}x{height} {convention:?} {asked:?} level {k} texel ({}, {}): device {}, oracle {}",
                 i as u32 % level.width,
                 i as u32 / level.width,
                 texels[i],
@@ -102,6 +122,40 @@ fn every_size_is_bit_exact_in_both_conventions() {
     }
 }
 
+/// All fours of numbers that are special to the bits of a depth: what lies on either side of each border, and depths between.
+#[test]
+fn four_of_any_kind_have_the_farthest_of_their_depths() {
+    let special = [
+        0,           // 0
+        0x0000_0001, // the least subnormal
+        0x007f_ffff, // the greatest
+        0x0080_0000, // the least depth above 0
+        0x3e80_0000, // 0.25
+        0x3f00_0000, // 0.5
+        0x3f80_0000, // 1
+        0x3f80_0001, // past it
+        0x7f80_0000, // infinity
+        0x7fff_ffff, // NaN, the greatest without a sign
+        0x8000_0000, // -0
+        0x8000_0001, // the least with a sign that counts
+        0xffff_ffff, // NaN, the greatest
+    ]
+    .map(f32::from_bits);
+    let n = special.len() as u32;
+    let side = 2 * n * n;
+    let depth: Vec<f32> = (0..side * side)
+        .map(|i| {
+            let (x, y) = (i % side, i / side);
+            // The pair of a column of quads, and that of a row of them.
+            let pair = if y % 2 == 0 { x / 2 } else { y / 2 };
+            special[(if x % 2 == 0 { pair % n } else { pair / n }) as usize]
+        })
+        .collect();
+    for convention in CONVENTIONS {
+        check(side, side, &depth, convention, &PyramidOptions::default());
+    }
+}
+
 #[test]
 fn random_small_sizes_are_bit_exact() {
     let mut random = Random(2);
@@ -112,17 +166,78 @@ fn random_small_sizes_are_bit_exact() {
     }
 }
 
+/// Every choice of levels, by both shaders and their seams: up to three levels a pass, one coarse level by an invocation or a
+/// workgroup a texel, and what goes on from there.
+#[test]
+fn chosen_levels_are_bit_exact() {
+    let mut random = Random(4);
+    let sizes = [(1, 1), (2, 2), (1, 37), (41, 1), (17, 16), (31, 33), (127, 129), (251, 241), (1, 3001), (1023, 517)];
+    for (number, (width, height)) in sizes.into_iter().enumerate() {
+        let depth = image(width, height, &mut random);
+        for first in 1..=11 {
+            let convention = CONVENTIONS[(number + first as usize) % 2];
+            for last in [first, first + 1, first + 4, 15] {
+                let levels = StoredLevels { first, last };
+                check(width, height, &depth, convention, &PyramidOptions { levels, ..PyramidOptions::default() });
+            }
+        }
+    }
+}
+
+#[test]
+fn levels_that_make_no_sense_are_refused() {
+    let camera = camera_along_z(8, 8, DepthConvention::Standard);
+    for (first, last) in [(0, 3), (3, 2), (16, 16), (1, 16), (u32::MAX, u32::MAX)] {
+        let options = PyramidOptions { levels: StoredLevels { first, last }, ..PyramidOptions::default() };
+        let error = engine().context().create_pyramid(camera.size(), &options).unwrap_err().to_string();
+        assert!(error.starts_with("levels: expected 1 <= first <= last <= 15"), "{error}");
+    }
+}
+
+/// What the reduction is timed against does the same work: all its levels are ours.
+#[test]
+fn the_yardsticks_have_the_same_levels() {
+    let mut random = Random(6);
+    for (width, height) in [(64, 64), (77, 41), (1, 19), (130, 3)] {
+        let depth = image(width, height, &mut random);
+        for convention in CONVENTIONS {
+            let uploaded = engine().upload_depth(&depth, &camera_along_z(width, height, convention)).unwrap();
+            let pyramid = engine().pyramid(&uploaded).unwrap();
+            for shape in [ReductionShape::Buffer, ReductionShape::Textures] {
+                let reduction = PerLevelReduction::new(engine(), &uploaded, shape).unwrap();
+                submitted_ms(engine(), |encoder| {
+                    reduction.record(encoder);
+                    Ok(())
+                })
+                .unwrap();
+                for k in 1..pyramid.num_levels() {
+                    let ours = engine().read_level(&pyramid, k).unwrap();
+                    assert_eq!(reduction.read(engine(), k as usize).unwrap(), ours, "{shape:?} level {k}");
+                }
+            }
+        }
+    }
+}
+
 /// A level larger than one binding is split: small chunks stand in for large images.
 #[test]
 fn split_pyramids_are_bit_exact() {
     let mut random = Random(3);
-    for (width, height) in [(64, 64), (77, 41), (130, 129)] {
+    for (width, height) in [(64, 64), (64, 72), (77, 41), (130, 129)] {
         let depth = image(width, height, &mut random);
         for convention in CONVENTIONS {
-            let texels = u64::from(width * height) / 3;
-            // Two chunks and three.
-            for chunk_shift in [texels.ilog2(), texels.ilog2() - 1] {
-                check(width, height, &depth, convention, &PyramidOptions { chunk_shift: Some(chunk_shift) });
+            let pyramid = engine().context().create_pyramid(ImageSize::new(width, height), &PyramidOptions::default());
+            let texels = pyramid.unwrap().device_bytes() / 4;
+            // Two chunks and, where they are enough, three.
+            let two = (texels - 1).ilog2();
+            for chunk_shift in [two, two - 1].into_iter().filter(|s| texels <= 3 << s) {
+                check(
+                    width,
+                    height,
+                    &depth,
+                    convention,
+                    &PyramidOptions { chunk_shift: Some(chunk_shift), ..PyramidOptions::default() },
+                );
             }
         }
     }
@@ -156,6 +271,53 @@ fn limits_are_named() {
         assert!(error.to_string().contains("max_texture_dimension_2d: requested"), "{error}");
     }
     let depth = engine().upload_depth(&[0.0; 4096], &camera_along_z(64, 64, DepthConvention::Standard)).unwrap();
-    let error = engine().pyramid_with(&depth, &PyramidOptions { chunk_shift: Some(4) }).unwrap_err();
+    let error = engine()
+        .pyramid_with(&depth, &PyramidOptions { chunk_shift: Some(4), ..PyramidOptions::default() })
+        .unwrap_err();
     assert!(error.to_string().contains("pyramid texels: requested"), "{error}");
+}
+
+/// Large culls read the levels from a copy in a texture; chunks too small to be copied keep them in their buffers.
+#[test]
+fn a_copy_in_a_texture_culls_alike_and_follows_the_next_reduction() {
+    let mut random = Random(9);
+    let (width, height) = (128, 115);
+    let centers: Vec<f32> = (0..60_000)
+        .flat_map(|_| {
+            let z = 1.0 + 30.0 * random.unit() as f32;
+            [z * (2.0 * random.unit() as f32 - 1.0), z * (2.0 * random.unit() as f32 - 1.0), z]
+        })
+        .collect();
+    let radii: Vec<f32> = (0..60_000).map(|_| 0.5 * random.unit() as f32).collect();
+    let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
+    let instances = engine().instances(&bounds, &InstanceOptions::default()).unwrap();
+    for convention in CONVENTIONS {
+        let camera = camera_along_z(width, height, convention);
+        let image = |random: &mut Random| {
+            let wall = |_: u32| if random.below(40) == 0 { 1e6 } else { 4.0 + 8.0 * random.unit() as f32 };
+            let depth: Vec<f32> = (0..width * height).map(wall).map(|z| ndc(z, convention)).collect();
+            engine().upload_depth(&depth, &camera).unwrap()
+        };
+        let (first, second) = (image(&mut random), image(&mut random));
+        let pyramids = [None, Some(11)].map(|chunk_shift| {
+            let options = PyramidOptions { chunk_shift, ..PyramidOptions::default() };
+            Arc::new(engine().context().create_pyramid(camera.size(), &options).unwrap())
+        });
+        assert!(pyramids[0].device_bytes() < 4 * 60_000, "as many instances as texels");
+        let mut seen = Vec::new();
+        for depth in [&first, &second, &first] {
+            let view = depth.texture().create_view(&wgpu::TextureViewDescriptor::default());
+            let verdicts = pyramids.each_ref().map(|pyramid| {
+                let mut encoder = engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                engine().context().record_reduce(&mut encoder, &view, &camera, pyramid).unwrap();
+                engine().queue().submit([encoder.finish()]);
+                let (options, output) = (CullOptions::default(), VisibleOptions::default());
+                engine().cull(&instances, &camera, pyramid, &options, &output).unwrap().verdicts().unwrap()
+            });
+            assert!(verdicts[0] == verdicts[1], "{convention:?}");
+            seen.push(verdicts[0].clone());
+        }
+        assert!(pyramids[0].device_bytes() > pyramids[1].device_bytes(), "nothing was copied");
+        assert!(seen[0] == seen[2] && seen[0] != seen[1], "each image hides others");
+    }
 }

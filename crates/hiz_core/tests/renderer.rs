@@ -261,7 +261,7 @@ fn a_shifted_footprint_is_seen() {
             "let t = vec4<u32>(first >> vec2<u32>(level), last >> vec2<u32>(level));",
             "let t = vec4<u32>(min((first >> vec2<u32>(level)) + vec2<u32>(1u, 0u), last >> vec2<u32>(level)), last >> vec2<u32>(level));",
         ),
-        ("return (lo == 0u || surely_above", "return (true || surely_above"),
+        ("return (lo == 0u | surely_after", "return (true | surely_after"),
     ];
     assert!(red(&faults, WAYS[0]).len() >= 12);
 }

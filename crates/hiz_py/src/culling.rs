@@ -1,6 +1,8 @@
 //! The answer of a cull, read on request.
 
-use hiz_core::{Coverage, CullOptions, DrawTemplate, Fit, Footprint, Order, VisibleOptions, headless};
+use hiz_core::{
+    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, Order, Outputs, VisibleOptions, headless,
+};
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -19,6 +21,9 @@ pub(crate) struct CullArguments<'a> {
     pub(crate) footprint: u32,
     pub(crate) descent: u32,
     pub(crate) fit: &'a str,
+    pub(crate) hierarchy: Option<bool>,
+    /// Mask, verdicts, indices, draws.
+    pub(crate) outputs: (bool, bool, bool, bool),
     pub(crate) capacity: Option<u32>,
     /// Index count, first index, base vertex, first instance.
     pub(crate) draw: (u32, u32, i32, u32),
@@ -59,6 +64,11 @@ impl CullArguments<'_> {
             footprint,
             descent: self.descent,
             fit,
+            hierarchy: match self.hierarchy {
+                None => Hierarchy::Auto,
+                Some(true) => Hierarchy::Always,
+                Some(false) => Hierarchy::Never,
+            },
             statistics: self.statistics,
         })
     }
@@ -67,7 +77,9 @@ impl CullArguments<'_> {
     pub(crate) fn output(&self) -> VisibleOptions {
         let (index_count, first_index, base_vertex, first_instance) = self.draw;
         let draw = DrawTemplate { index_count, first_index, base_vertex, first_instance };
-        VisibleOptions { capacity: self.capacity, draw }
+        let (mask, verdicts, indices, draws) = self.outputs;
+        let outputs = Outputs { mask, verdicts, indices, draws };
+        VisibleOptions { outputs, capacity: self.capacity, draw }
     }
 }
 
@@ -108,9 +120,16 @@ impl Culling {
             invalid: counts.invalid,
             demand: counts.demand,
             written: counts.written,
+            tested_groups: counts.tested_groups,
+            tested_instances: counts.tested_instances,
             levels: counts.levels,
             texels_read: counts.texels_read,
         })
+    }
+
+    /// How many instances are kept, and how many of them are listed.
+    fn demand_and_written(&self, py: Python<'_>) -> PyResult<(u64, u64)> {
+        detached(py, || self.0.demand_and_written())
     }
 
     /// Milliseconds to record, of the device, and to read back.
@@ -144,6 +163,8 @@ pub(crate) struct Counts {
     invalid: u64,
     demand: u64,
     written: u64,
+    tested_groups: u64,
+    tested_instances: u64,
     levels: [u64; 16],
     texels_read: u64,
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use hiz_core::headless::{self, AdapterSummary};
 use hiz_core::{
     ConservativeDepthOptions, DepthConvention, DepthKind, FaceCull, Floats, InstanceOptions, MeshData, OccluderOptions,
-    StoredOrder,
+    PyramidOptions, StoredLevels, StoredOrder,
 };
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -32,7 +32,7 @@ pub(crate) fn adapters(py: Python<'_>) -> Vec<Summary> {
 
 /// A device with its queue and pipelines.
 #[pyclass(frozen, module = "hizvk._core")]
-pub(crate) struct Engine(headless::Engine);
+pub(crate) struct Engine(pub(crate) headless::Engine);
 
 #[pymethods]
 impl Engine {
@@ -141,8 +141,10 @@ impl Engine {
         .map(DepthImage)
     }
 
-    fn pyramid(&self, py: Python<'_>, depth: &DepthImage) -> PyResult<Pyramid> {
-        let pyramid = detached(py, || self.0.pyramid(&depth.0))?;
+    fn pyramid(&self, py: Python<'_>, depth: &DepthImage, levels: (u32, u32)) -> PyResult<Pyramid> {
+        let levels = StoredLevels { first: levels.0, last: levels.1 };
+        let options = PyramidOptions { levels, ..PyramidOptions::default() };
+        let pyramid = detached(py, || self.0.pyramid_with(&depth.0, &options))?;
         Ok(Pyramid { engine: self.0.clone(), pyramid })
     }
 
@@ -162,6 +164,8 @@ impl Engine {
         footprint: u32,
         descent: u32,
         fit: &str,
+        hierarchy: Option<bool>,
+        outputs: (bool, bool, bool, bool),
         capacity: Option<u32>,
         draw: (u32, u32, i32, u32),
         statistics: bool,
@@ -176,6 +180,8 @@ impl Engine {
             footprint,
             descent,
             fit,
+            hierarchy,
+            outputs,
             capacity,
             draw,
             statistics,
@@ -191,7 +197,7 @@ impl Engine {
 
 /// Bounds on the device.
 #[pyclass(frozen, module = "hizvk._core")]
-pub(crate) struct Instances(Arc<hiz_core::Instances>);
+pub(crate) struct Instances(pub(crate) Arc<hiz_core::Instances>);
 
 #[pymethods]
 impl Instances {
@@ -249,7 +255,7 @@ impl Occluders {
 
 /// A depth image on the device.
 #[pyclass(frozen, module = "hizvk._core")]
-pub(crate) struct DepthImage(headless::DepthImage);
+pub(crate) struct DepthImage(pub(crate) headless::DepthImage);
 
 #[pymethods]
 impl DepthImage {
@@ -262,13 +268,18 @@ impl DepthImage {
 #[pyclass(frozen, module = "hizvk._core")]
 pub(crate) struct Pyramid {
     engine: headless::Engine,
-    pyramid: Arc<hiz_core::Pyramid>,
+    pub(crate) pyramid: Arc<hiz_core::Pyramid>,
 }
 
 #[pymethods]
 impl Pyramid {
     fn num_levels(&self) -> u32 {
         self.pyramid.num_levels()
+    }
+
+    /// The first and the last stored level above 0; nothing for an image of one pixel.
+    fn stored_levels(&self) -> Option<(u32, u32)> {
+        self.pyramid.stored_levels().map(|levels| (levels.first, levels.last))
     }
 
     /// `((height, width), texels)` of a level.

@@ -10,6 +10,7 @@ mod culling;
 mod device;
 mod errors;
 mod reference;
+mod yardstick;
 
 /// The compiled engine of `hizvk`. Not public: use the modules around it.
 #[pyo3::pymodule]
@@ -24,6 +25,8 @@ mod _core {
     use crate::device::{DepthImage, Engine, Instances, Occluders, Pyramid, adapters};
     #[pymodule_export]
     use crate::reference::{reference_classify, reference_pyramid};
+    #[pymodule_export]
+    use crate::yardstick::{Yardstick, YardstickCull, YardstickReduction};
 
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "the name is Python's")]

@@ -150,6 +150,10 @@ def _parser() -> argparse.ArgumentParser:
         description="Measures speed and error of every configuration on scenes with known truth, beside a numpy Hi-Z "
         "and ray casting (exit code 1 if a configuration with the promise culled what can be seen).",
     )
+    # Told here, taken by `main`.
+    parser.add_argument(
+        "--speed", action="store_true", help="measure times against yardsticks instead: see --speed --help"
+    )
     parser.add_argument("--out", type=Path, default=Path("out/bench"), help="folder for report and plots (out/bench)")
     parser.add_argument(
         "--scene", action="append", choices=scenes.NAMES, metavar="NAME",
@@ -172,6 +176,10 @@ def _parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command and returns its exit code: 0 good, 1 a promise was broken or it cannot run."""
     arguments = list(sys.argv[1:] if arguments is None else arguments)
+    if "--speed" in arguments:
+        from . import speed
+
+        return speed.main([argument for argument in arguments if argument != "--speed"])
     parsed = _parser().parse_args(arguments)
     try:
         found = run(

@@ -1,7 +1,7 @@
 """What is compared: which volume, how much is read, what of a pixel counts, which depth image, which order.
 
 All combinations would be hundreds, so each dimension is varied about the same middle (boxes, 2x2 texels, area coverage,
-full resolution, any order), and in full with those that it depends on. ``--full`` takes the whole product.
+full resolution, all levels, any order), and in full with those that it depends on. ``--full`` takes the whole product.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from .._arguments import Size
+    from ..device import Levels
 
 __all__ = ["DESCENT", "Configuration", "DepthVariant", "matrix", "promised", "render_options"]
 
@@ -21,27 +22,45 @@ __all__ = ["DESCENT", "Configuration", "DepthVariant", "matrix", "promised", "re
 DESCENT: Final = 4096
 #: ``(footprint, descent)``, from the least that is read to the most.
 READS: Final = ((2, 0), (4, 0), (8, 0), (2, DESCENT))
+#: Pyramids that lack levels: the finest, the two finest, all but one.
+SOME_LEVELS: Final[tuple[Levels, ...]] = (2, 3, (4, 4))
 
 
 @dataclass(frozen=True)
 class DepthVariant:
-    """Which depth image the occluders are rendered into."""
+    """Which depth image the occluders are rendered into, and what of its pyramid is built."""
 
     divisor: int = 1
     """The image's sides are those of the view divided by this."""
     conservative: bool = False
     """True: what is rendered hides only what occluders cover at the view's full resolution as well."""
 
+    levels: Levels = None
+    """Which levels of the pyramid are built, as in `Device.pyramid`."""
+
     def size(self, full: Size) -> Size:
         """``(height, width)`` of the image for a view of `full` pixels."""
         return max(1, full[0] // self.divisor), max(1, full[1] // self.divisor)
 
     def __str__(self) -> str:
-        return f"1/{self.divisor}{' conservative' if self.conservative else ''}"
+        return ", ".join(word for word in (self._image(), self._levels()) if word)
 
-    def cost(self) -> tuple[int, bool]:
-        """For sorting: the largest image first."""
-        return self.divisor, self.conservative
+    def _image(self) -> str:
+        if (self.divisor, self.conservative) == (1, False):
+            return ""
+        return f"depth 1/{self.divisor}{' conservative' if self.conservative else ''}"
+
+    def _levels(self) -> str:
+        if self.levels is None:
+            return ""
+        first, last = (self.levels, None) if isinstance(self.levels, int) else self.levels
+        if last is None:
+            return f"levels >= {first}"
+        return f"level {first} alone" if first == last else f"levels {first} to {last}"
+
+    def cost(self) -> tuple[int, bool, str]:
+        """For sorting: the largest image first, and of its pyramids that of all levels."""
+        return self.divisor, self.conservative, self._levels()
 
 
 @dataclass(frozen=True)
@@ -65,7 +84,7 @@ class Configuration:
         words += ["volume fit"] if self.fit == "volume" else []
         words += [self.coverage] if self.coverage != "area" else []
         words += [self.order] if self.order != "any" else []
-        words += [f"depth {self.depth}"] if self.depth != DepthVariant() else []
+        words += [str(self.depth)] if self.depth != DepthVariant() else []
         return ", ".join(words)
 
     @property
@@ -144,6 +163,9 @@ def _default() -> list[Configuration]:
     chosen += [Configuration("boxes", *read, coverage="sample") for read in ends]
     chosen += [Configuration(order="stable")]
     chosen += [Configuration("boxes", *read, depth=depth) for depth, read in product(smaller, ends)]
+    chosen += [
+        Configuration("boxes", *read, depth=DepthVariant(levels=some)) for some, read in product(SOME_LEVELS, ends)
+    ]
     return chosen
 
 
@@ -155,5 +177,8 @@ def _full() -> list[Configuration]:
             ("spheres", "boxes", "oriented_boxes"), READS, ("area", "sample"), ("rectangle", "volume"), depths
         )
         if coverage == "area" or depth == DepthVariant()
+    ]
+    chosen += [
+        Configuration("boxes", *read, depth=DepthVariant(levels=some)) for some, read in product(SOME_LEVELS, READS)
     ]
     return [*chosen, Configuration(order="stable")]

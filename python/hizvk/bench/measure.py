@@ -114,7 +114,9 @@ class _Run:
                 if k == 0:
                     self.rows[number].first_ms = cull(self.device, self.instances[one.volume], pyramid, one)[1]
                     self.warm_up_ms += self.rows[number].first_ms or 0.0
-                seen = self.device.cull(self.instances[one.volume], pyramid.camera, pyramid, **one.cull_options())
+                seen = self.device.cull(
+                    self.instances[one.volume], pyramid.camera, pyramid, statistics=True, **one.cull_options()
+                )
                 self.masks[number].append(seen.mask)
                 texels[number] += seen.stats.texels_read or 0
             for number, (label, ask) in enumerate(self.yardsticks().items(), len(self.configurations)):

@@ -17,8 +17,9 @@ report.json holds one object::
            pixel, that own none, and that are inside the view volume), one_instance_ms (a cull of one instance),
            upload_ms, warm_up_ms (first calls: they compile and build), rows [row]
 
-    row:   label, configuration {volume, footprint, descent, coverage, order, fit, depth {divisor, conservative}} or
-           null for a yardstick, ms {render, reduce, cull, read: spread or null}, total_ms spread or null,
+    row:   label, configuration {volume, footprint, descent, coverage, order, fit,
+           depth {divisor, conservative, levels}} or null for a yardstick,
+           ms {render, reduce, cull, read: spread or null}, total_ms spread or null,
            ns_per_instance, first_ms, texels_per_instance (null where it was not measured), kept, false_culls, hairs,
            hidden_kept, hidden_kept_in_view, share_of_rectangle (shares, 0 to 1 and above), pareto bool
 

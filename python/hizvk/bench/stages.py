@@ -42,7 +42,7 @@ def rendered(
     watch = Stopwatch(device)
     depth = device.render_depth(occluders, camera, **render_options(variant, camera.size))
     render = watch.lap()
-    pyramid = device.pyramid(depth)
+    pyramid = device.pyramid(depth, levels=variant.levels)
     return depth, pyramid, render, watch.lap()
 
 
@@ -51,7 +51,7 @@ def cull(
 ) -> tuple[npt.NDArray[np.bool_], float, float]:
     """The mask, and the milliseconds of the cull and of reading the mask."""
     watch = Stopwatch(device)
-    result = device.cull(instances, pyramid.camera, pyramid, statistics=False, **configuration.cull_options())
+    result = device.cull(instances, pyramid.camera, pyramid, **configuration.cull_options())
     took = watch.lap()
     mask = result.mask
     return mask, took, watch.lap()

@@ -6,7 +6,8 @@ use std::error::Error;
 use hiz_core::wgpu::{self, util::DeviceExt};
 use hiz_core::{
     Camera, CullOptions, DepthConvention, DrawTemplate, Floats, HizContext, ImageSize, InstanceOptions, Instances,
-    MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders, Order, PyramidOptions, Visible, VisibleOptions,
+    MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders, Order, Outputs, PyramidOptions, Visible,
+    VisibleOptions,
 };
 
 use crate::scene::{Mesh, Scene, Shot};
@@ -66,8 +67,11 @@ pub(crate) struct Stage {
     num_crowd: u32,
     crowd: Instances,
     visible: Visible,
+    /// Who is inside the frustum: to tell what is hidden from what is outside.
+    in_view: Visible,
     /// The walls alone, and with the crowd.
     occluders: [Occluders; 2],
+    nothing: Occluders,
 }
 
 /// What was drawn, row 0 on top.
@@ -190,12 +194,20 @@ impl Renderer {
         let wall_indices: Vec<[u32; 3]> = scene.walls.triangles.iter().map(|t| t.map(|v| first_wall + v)).collect();
         let numbers: Vec<u32> = (0..num_crowd).collect();
 
-        let options = InstanceOptions { strict: true, piece_capacity: Some(PIECE_CAPACITY), ..InstanceOptions::default() };
-        let crowd = scene.with_bounds(|bounds| self.hiz.create_instances(bounds, &options))?;
+        let options =
+            InstanceOptions { strict: true, piece_capacity: Some(PIECE_CAPACITY), ..InstanceOptions::default() };
+        let mut encoder =
+            self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("renderer.upload") });
+        let crowd = scene.with_bounds(|bounds| self.hiz.record_instances(&mut encoder, bounds, &options))?;
+        self.queue.submit([encoder.finish()]);
         // What the draw arguments say beside the count: how many indices one body has.
         let index_count = 3 * one.triangles.len() as u32;
         let draw = DrawTemplate { index_count, ..DrawTemplate::default() };
-        let visible = self.hiz.create_visible(&crowd, &VisibleOptions { capacity: None, draw })?;
+        let visible = |outputs| self.hiz.create_visible(&crowd, &VisibleOptions { outputs, capacity: None, draw });
+        let (visible, in_view) = (
+            visible(Outputs { mask: true, verdicts: false, indices: true, draws: true })?,
+            visible(Outputs { mask: true, ..Outputs::NONE })?,
+        );
         let occluders = |meshes: &[&Mesh]| {
             let parts: Vec<MeshData<'_>> = meshes
                 .iter()
@@ -217,7 +229,9 @@ impl Renderer {
             num_crowd,
             crowd,
             visible,
+            in_view,
             occluders: [occluders(&[&scene.walls])?, occluders(&[&scene.walls, &crowd_mesh])?],
+            nothing: occluders(&[])?,
         })
     }
 
@@ -264,14 +278,18 @@ impl Renderer {
         let targets = Targets::new(&self.device, size);
         let mut pass = self.begin_picture(&mut encoder, stage, camera, &targets);
         for piece in 0..stage.visible.num_pieces() {
-            pass.set_vertex_buffer(0, stage.visible.list(piece).slice(..));
-            pass.draw_indexed_indirect(stage.visible.draw_arguments(), stage.visible.draw_offset(piece));
+            let list = stage.visible.list(piece).expect("indices were asked for");
+            pass.set_vertex_buffer(0, list.slice(..));
+            pass.draw_indexed_indirect(
+                stage.visible.draw_arguments().expect("draws are among the outputs"),
+                stage.visible.draw_offset(piece),
+            );
         }
         drop(pass);
         self.queue.submit([encoder.finish()]);
         Ok(Culled {
             picture: self.read_picture(&targets),
-            counts: self.read_counts(stage),
+            counts: self.counts(stage, camera, options)?,
             prepass: bytemuck::pod_collect_to_vec(&self.read_texture(&prepass)),
         })
     }
@@ -351,20 +369,35 @@ impl Renderer {
         }
     }
 
-    fn read_counts(&self, stage: &Stage) -> Counts {
-        let mut counts = Counts { kept: 0, occluded: 0, outside: 0, drawn: 0 };
-        for piece in 0..stage.visible.num_pieces() {
-            // A plane of kept bits, then one that tells occluded from outside.
-            let planes: Vec<u32> = bytemuck::pod_collect_to_vec(&self.read_buffer(stage.visible.planes(piece)));
-            let (kept, low) = planes.split_at(planes.len() / 2);
-            counts.kept += kept.iter().map(|w| w.count_ones()).sum::<u32>();
-            counts.occluded += kept.iter().zip(low).map(|(k, l)| (!k & l).count_ones()).sum::<u32>();
-        }
-        counts.outside = stage.num_crowd - counts.kept - counts.occluded;
-        let draws = self.read_buffer(stage.visible.draw_arguments());
+    /// How many are kept, and how many of the others are inside the frustum: a cull against nothing keeps those.
+    fn counts(&self, stage: &Stage, camera: &Camera, options: &CullOptions) -> Result<Counts, Box<dyn Error>> {
+        let mut encoder =
+            self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("renderer.in_view") });
+        let depth = target(&self.device, "renderer.nothing", camera.size(), OCCLUDER_DEPTH_FORMAT);
+        let depth = depth.create_view(&wgpu::TextureViewDescriptor::default());
+        let pyramid = self.hiz.create_pyramid(camera.size(), &PyramidOptions::default())?;
+        self.hiz.record_occluders(&mut encoder, &stage.nothing, camera, &depth)?;
+        self.hiz.record_reduce(&mut encoder, &depth, camera, &pyramid)?;
+        self.hiz.record_cull(&mut encoder, &stage.crowd, camera, &pyramid, &stage.in_view, options)?;
+        self.queue.submit([encoder.finish()]);
+
+        let (kept, in_view) = (self.count_kept(&stage.visible), self.count_kept(&stage.in_view));
+        let draws = self.read_buffer(stage.visible.draw_arguments().expect("draws are among the outputs"));
         let draws: Vec<hiz_core::DrawIndexedIndirect> = bytemuck::pod_collect_to_vec(&draws);
-        counts.drawn = draws.iter().map(|d| d.instance_count).sum();
-        counts
+        Ok(Counts {
+            kept,
+            occluded: in_view - kept,
+            outside: stage.num_crowd - in_view,
+            drawn: draws.iter().map(|d| d.instance_count).sum(),
+        })
+    }
+
+    fn count_kept(&self, visible: &Visible) -> u32 {
+        let words = |piece: usize| -> Vec<u32> {
+            let mask = self.read_buffer(visible.mask(piece).expect("a mask was asked for"));
+            bytemuck::pod_collect_to_vec(&mask)
+        };
+        (0..visible.num_pieces()).flat_map(words).map(u32::count_ones).sum()
     }
 
     /// The bytes of a texture of 4 bytes a texel.

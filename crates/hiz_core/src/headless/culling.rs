@@ -1,17 +1,28 @@
 //! A cull that was submitted, and what can be read of it.
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Instant;
 
 use super::{Engine, locked, milliseconds, to_u32};
 use crate::camera::Camera;
-use crate::cull::{CullInputs, CullOptions, ExplanationRecord, record_explain};
-use crate::error::Result;
+use crate::compact;
+use crate::count;
+use crate::cull::{CullInputs, CullOptions, ExplanationRecord, is_grouped, record_explain};
+use crate::error::{Error, Result};
+use crate::groups::GROUP;
 use crate::host;
-use crate::instances::Instances;
+use crate::instances::{Instances, Piece};
+use crate::lists::{DrawIndexedIndirect, Lists};
 use crate::pyramid::Pyramid;
 use crate::readback::{self, BufferRange};
-use crate::visible::{CounterRecord, DrawIndexedIndirect, Visible};
+use crate::visible::{
+    CounterRecord, GroupOutput, PieceOutput, STORAGE, StatisticsRecord, SurvivorsRecord, Visible, VisibleOptions,
+    verdicts_offset,
+};
+
+/// The verdicts of `shaders/shared/verdict.wgsl` that are told from others here.
+const VISIBLE: u8 = 2;
+const INVALID: u8 = 3;
 
 /// How many instances met which end.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -30,6 +41,10 @@ pub struct Counts {
     pub demand: u64,
     /// What they hold.
     pub written: u64,
+    /// Groups that were tested as a whole.
+    pub tested_groups: u64,
+    /// Instances that were tested by themselves: all, or those of the groups that were left.
+    pub tested_instances: u64,
     /// Depth tests at each level (with [`CullOptions::statistics`]).
     pub levels: [u64; 16],
     /// Texels read (with [`CullOptions::statistics`]).
@@ -76,7 +91,9 @@ pub struct Culling {
     pub(super) pyramid: Arc<Pyramid>,
     pub(super) camera: Camera,
     pub(super) options: CullOptions,
+    pub(super) output: VisibleOptions,
     pub(super) visible: Visible,
+    pub(super) later: OnceLock<Lists>,
     pub(super) submission: wgpu::SubmissionIndex,
     pub(super) submitted: Instant,
     pub(super) timings: Mutex<Timings>,
@@ -122,20 +139,15 @@ impl Culling {
     /// Whether each instance is kept.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// [`Error::Mismatch`] for a cull without [`Outputs::mask`], [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn mask(&self) -> Result<Vec<bool>> {
-        let ranges: Vec<_> = self
-            .instances
-            .pieces
-            .iter()
-            .zip(&self.visible.pieces)
-            .map(|(piece, output)| BufferRange::first(&output.planes, 4 * u64::from(piece.words())))
-            .collect();
-        let planes = self.read(&ranges)?;
+        self.require("mask", self.visible.outputs().mask)?;
+        let planes =
+            self.read(&self.ranges(|piece, output| BufferRange::first(&output.mask, 4 * u64::from(piece.words()))))?;
         let mut mask = host::list(self.instances.len() as usize, "mask")?;
         for (piece, plane) in self.instances.pieces.iter().zip(planes) {
-            let words = host::collected(to_u32(&plane), "bit planes")?;
-            mask.extend((0..piece.count() as usize).map(|i| bit(&words, i) == 1));
+            let words = host::collected(to_u32(&plane), "mask")?;
+            mask.extend((0..piece.count() as usize).map(|i| words[i / 32] >> (i % 32) & 1 == 1));
         }
         Ok(mask)
     }
@@ -143,75 +155,184 @@ impl Culling {
     /// Each instance's verdict: 0 outside, 1 occluded, 2 visible, 3 invalid (kept).
     ///
     /// # Errors
-    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// [`Error::Mismatch`] for a cull without [`Outputs::verdicts`], [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn verdicts(&self) -> Result<Vec<u8>> {
-        let ranges: Vec<_> = self
-            .instances
-            .pieces
-            .iter()
-            .zip(&self.visible.pieces)
-            .map(|(piece, output)| BufferRange::first(&output.planes, 8 * u64::from(piece.words())))
-            .collect();
-        let planes = self.read(&ranges)?;
+        self.require("verdicts", self.visible.outputs().verdicts)?;
+        let of_members = self.read(&self.ranges(|piece, output| BufferRange {
+            buffer: &output.mask,
+            offset: verdicts_offset(piece),
+            size: 4 * u64::from(piece.count()),
+        }))?;
+        let of_groups = self.read(&self.ranges(|piece, output| match self.groups(piece, output) {
+            Some(groups) => BufferRange::first(&groups.verdicts, 4 * u64::from(piece.groups())),
+            None => BufferRange::first(&output.mask, 0),
+        }))?;
         let mut verdicts = host::list(self.instances.len() as usize, "verdicts")?;
-        for (piece, plane) in self.instances.pieces.iter().zip(planes) {
-            let words = host::collected(to_u32(&plane), "bit planes")?;
-            let (kept, low) = words.split_at(piece.words() as usize);
-            verdicts.extend((0..piece.count() as usize).map(|i| 2 * bit(kept, i) + bit(low, i)));
+        verdicts.resize(self.instances.len() as usize, 0);
+        for ((piece, members), groups) in self.instances.pieces.iter().zip(of_members).zip(of_groups) {
+            let first = piece.range.start as usize;
+            let word = |bytes: &[u8], i: usize| bytes.get(4 * i).copied();
+            for place in 0..piece.count() as usize {
+                // A group that was not culled leaves the verdict to its members.
+                let of_group = word(&groups, place / GROUP).filter(|verdict| *verdict < VISIBLE);
+                verdicts[first + piece.order.index(place)] = of_group.or(word(&members, place)).unwrap_or(INVALID);
+            }
         }
         Ok(verdicts)
     }
 
-    /// The draw arguments, one record a piece.
+    /// The draw arguments, one record a piece. Where the cull left none they are made from its mask.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// [`Error::Mismatch`] for a cull without draws, indices and mask, [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn draws(&self) -> Result<Vec<DrawIndexedIndirect>> {
-        let draws = &self.visible.draws;
+        let draws = match &self.visible.lists {
+            Some(lists) => &lists.draws,
+            None => &self.later_lists()?.draws,
+        };
         let bytes = self.read(&[BufferRange::first(draws, draws.size())])?;
         Ok(bytemuck::pod_collect_to_vec(&bytes[0]))
     }
 
-    /// The packed list, the pieces joined.
+    /// The packed list, the pieces joined. Where the cull left none it is made from its mask, ascending.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// [`Error::Mismatch`] for a cull without indices and mask, [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn indices(&self) -> Result<Vec<u32>> {
-        let draws = self.draws()?;
+        let lists = match &self.visible.lists {
+            Some(lists) if self.visible.outputs().indices => lists,
+            _ => self.later_lists()?,
+        };
+        let bytes = self.read(&[BufferRange::first(&lists.draws, lists.draws.size())])?;
+        let draws: Vec<DrawIndexedIndirect> = bytemuck::pod_collect_to_vec(&bytes[0]);
         let ranges: Vec<_> = draws
             .iter()
-            .zip(&self.visible.pieces)
-            .map(|(draw, output)| {
-                BufferRange::first(&output.list, 4 * u64::from(draw.instance_count.min(output.list_capacity)))
-            })
+            .zip(&lists.pieces)
+            .map(|(draw, list)| BufferRange::first(list.bound(), 4 * u64::from(draw.instance_count.min(list.capacity))))
             .collect();
-        let lists = self.read(&ranges)?;
-        let mut indices = host::list(lists.iter().map(|bytes| bytes.len() / 4).sum(), "indices")?;
-        indices.extend(lists.iter().flat_map(|bytes| to_u32(bytes)));
+        let parts = self.read(&ranges)?;
+        let mut indices = host::list(parts.iter().map(|bytes| bytes.len() / 4).sum(), "indices")?;
+        indices.extend(parts.iter().flat_map(|bytes| to_u32(bytes)));
         Ok(indices)
     }
 
     /// How many instances met which end.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// [`Error::Mismatch`] for a cull without [`Outputs::verdicts`], [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn counts(&self) -> Result<Counts> {
-        let (counters, draws) = (&self.visible.counters, &self.visible.draws);
-        let bytes =
-            self.read(&[BufferRange::first(counters, counters.size()), BufferRange::first(draws, draws.size())])?;
+        self.require("verdicts", self.visible.outputs().verdicts)?;
+        let engine = &self.engine;
+        let gpu = &engine.context().gpu;
+        let size = size_of::<CounterRecord>() as u64;
+        let counters = engine.scoped(|| {
+            let counters = gpu.empty("hiz.count.counters", size, STORAGE);
+            let mut encoder = engine.encoder("hiz.count.encoder");
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            count::record(gpu, &mut pass, &self.instances, &self.visible, &self.options, &counters);
+            drop(pass);
+            engine.queue().submit([encoder.finish()]);
+            Ok(counters)
+        })?;
+        let mut ranges = vec![BufferRange::first(&counters, size)];
+        ranges.extend(self.ranges(|piece, output| match self.groups(piece, output) {
+            Some(groups) => BufferRange::first(&groups.survivors, groups.survivors.size()),
+            None => BufferRange::first(&output.mask, 0),
+        }));
+        let statistics = self.visible.statistics().filter(|_| self.options.statistics);
+        ranges.extend(statistics.map(|buffer| BufferRange::first(buffer, buffer.size())));
+        let bytes = self.read(&ranges)?;
         let record: CounterRecord = bytemuck::pod_read_unaligned(&bytes[0]);
-        let draws: Vec<DrawIndexedIndirect> = bytemuck::pod_collect_to_vec(&bytes[1]);
+        let (survivors, statistics) = bytes[1..].split_at(self.instances.num_pieces());
+        let statistics: StatisticsRecord =
+            statistics.first().map_or_else(StatisticsRecord::default, |bytes| bytemuck::pod_read_unaligned(bytes));
+        let (mut tested_groups, mut tested_instances) = (0, 0);
+        for (piece, survivors) in self.instances.pieces.iter().zip(survivors) {
+            let count = u64::from(piece.count());
+            if survivors.is_empty() {
+                tested_instances += count;
+            } else {
+                let survivors: SurvivorsRecord = bytemuck::pod_read_unaligned(survivors);
+                tested_groups += u64::from(piece.groups());
+                tested_instances += (u64::from(survivors.count) * GROUP as u64).min(count);
+            }
+        }
+        let demand = u64::from(record.visible) + u64::from(record.invalid);
         Ok(Counts {
             tested: u64::from(self.instances.len()),
             outside: record.outside.into(),
             occluded: record.occluded.into(),
             visible: record.visible.into(),
             invalid: record.invalid.into(),
-            demand: u64::from(record.visible) + u64::from(record.invalid),
-            written: draws.iter().map(|d| u64::from(d.instance_count)).sum(),
-            levels: record.levels.map(u64::from),
-            texels_read: u64::from(record.texels_high) << 32 | u64::from(record.texels_low),
+            demand,
+            written: demand.min(u64::from(self.visible.capacity())),
+            tested_groups,
+            tested_instances,
+            levels: statistics.levels.map(u64::from),
+            texels_read: u64::from(statistics.texels_high) << 32 | u64::from(statistics.texels_low),
         })
+    }
+
+    /// How many instances are kept, and how many of them the lists hold.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] for a cull that left nothing that tells, [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn demand_and_written(&self) -> Result<(u64, u64)> {
+        let capacity = u64::from(self.visible.capacity());
+        let outputs = self.visible.outputs();
+        if outputs.mask {
+            let words = self
+                .read(&self.ranges(|piece, output| BufferRange::first(&output.mask, 4 * u64::from(piece.words()))))?;
+            let demand = words.iter().flat_map(|bytes| to_u32(bytes)).map(|word| u64::from(word.count_ones())).sum();
+            return Ok((demand, capacity.min(demand)));
+        }
+        if outputs.verdicts {
+            let counts = self.counts()?;
+            return Ok((counts.demand, counts.written));
+        }
+        // Where there was room for all, the lists' lengths tell.
+        self.require("mask", !self.visible.is_capped())?;
+        let written = self.draws()?.iter().map(|draw| u64::from(draw.instance_count)).sum();
+        Ok((written, written))
+    }
+
+    /// Lists that the cull did not leave, made from its mask when they are first asked for.
+    fn later_lists(&self) -> Result<&Lists> {
+        self.require("indices", self.visible.outputs().mask)?;
+        if let Some(lists) = self.later.get() {
+            return Ok(lists);
+        }
+        let engine = &self.engine;
+        let gpu = &engine.context().gpu;
+        let lists = engine.scoped(|| {
+            let VisibleOptions { capacity, draw, .. } = self.output;
+            let lists = Lists::new(gpu, &self.instances, true, capacity, draw)?;
+            let mut encoder = engine.encoder("hiz.compact.encoder");
+            lists.record_clear(&mut encoder);
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            compact::record(gpu, &mut pass, &self.instances, &self.visible, &lists);
+            drop(pass);
+            engine.queue().submit([encoder.finish()]);
+            Ok(lists)
+        })?;
+        Ok(self.later.get_or_init(|| lists))
+    }
+
+    fn require(&self, output: &str, is_there: bool) -> Result<()> {
+        if is_there {
+            return Ok(());
+        }
+        let got = self.visible.outputs();
+        Err(Error::mismatch("outputs", format!("expected a cull that was asked for {output}, got one with {got}")))
+    }
+
+    /// What this cull left of a piece's groups, if it tested them.
+    fn groups<'a>(&self, piece: &Piece, output: &'a PieceOutput) -> Option<&'a GroupOutput> {
+        output.groups().filter(|_| is_grouped(piece, &self.options))
+    }
+
+    fn ranges<'a>(&'a self, of: impl Fn(&Piece, &'a PieceOutput) -> BufferRange<'a>) -> Vec<BufferRange<'a>> {
+        self.instances.pieces.iter().zip(&self.visible.pieces).map(|(piece, output)| of(piece, output)).collect()
     }
 
     /// Why instance `index` got its verdict: the cull's own steps, run for it once more.
@@ -234,6 +355,7 @@ impl Culling {
                 camera: &self.camera,
                 pyramid: &self.pyramid,
                 options: &self.options,
+                certified: true,
             };
             record_explain(&engine.context().gpu, &mut encoder, &inputs, index, &target)?;
             engine.queue().submit([encoder.finish()]);
@@ -241,10 +363,6 @@ impl Culling {
         })?;
         Ok(explanation(&bytemuck::pod_read_unaligned(&bytes[0]), &self.camera))
     }
-}
-
-fn bit(words: &[u32], i: usize) -> u8 {
-    (words[i / 32] >> (i % 32) & 1) as u8
 }
 
 /// The stages of `shaders/shared/classify.wgsl`.
@@ -258,6 +376,7 @@ fn explanation(record: &ExplanationRecord, camera: &Camera) -> Explanation {
         (3, _) => "touches no pixel for sure, but no plane of the frustum separates it: kept",
         (4, _) => "not surely behind the farthest depth of the texels: kept",
         (6, 1) => "behind the farthest depth of every pixel that it can touch",
+        (7, _) => "spans more texels of the coarsest stored level than the footprint has: kept",
         (6, _) => "not surely behind every pixel that it can touch, or the budget ended: kept",
         (_, 1) => "behind the farthest depth of all texels that it can touch",
         _ => "behind the texels, but not surely inside their block: kept",
@@ -265,7 +384,8 @@ fn explanation(record: &ExplanationRecord, camera: &Camera) -> Explanation {
     let [x0, y0, x1, y1] = record.texels;
     let corners = [[x0, y0], [x1, y0], [x0, y1], [x1, y1]];
     let (mut texels, mut texel_depths) = (Vec::new(), Vec::new());
-    if reached_depth {
+    let read_any = reached_depth && record.stage != 7;
+    if read_any {
         for (texel, bits) in corners.iter().zip(record.texel_bits) {
             if !texels.contains(texel) {
                 texels.push(*texel);
@@ -281,7 +401,7 @@ fn explanation(record: &ExplanationRecord, camera: &Camera) -> Explanation {
         level: reached_depth.then_some(record.level),
         texels,
         texel_depths,
-        farthest: reached_depth.then(|| f32::from_bits(record.farthest_bits)),
+        farthest: read_any.then(|| f32::from_bits(record.farthest_bits)),
         nearest: (record.stage >= 3).then_some(nearest),
         reason,
     }

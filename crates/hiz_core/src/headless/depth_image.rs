@@ -37,7 +37,7 @@ impl DepthImage {
     /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn read(&self) -> Result<Vec<f32>> {
         let engine = &self.engine;
-        let bytes = engine.scoped(|| readback::read_texture(engine.device(), engine.queue(), &self.texture))?;
+        let bytes = engine.scoped(|| readback::read_texture(engine.device(), engine.queue(), &self.texture, 4))?;
         host::collected(to_u32(&bytes).map(f32::from_bits), "depth")
     }
 }

@@ -6,7 +6,7 @@ mod adapter;
 mod culling;
 mod depth_image;
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
 pub use adapter::{ADAPTER_VARIABLE, AdapterSummary, INSTALL_HINT, adapters};
@@ -20,10 +20,12 @@ use crate::cull::CullOptions;
 use crate::error::{Error, Result};
 use crate::host;
 use crate::instances::{InstanceOptions, Instances};
+use crate::layout::StoredLevels;
 use crate::occluder_surface::ConservativeDepthOptions;
 use crate::occluders::{MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders};
 use crate::pyramid::{Pyramid, PyramidOptions};
 use crate::readback::{self, BufferRange};
+use crate::shader::SourceKind;
 use crate::visible::VisibleOptions;
 
 /// Bytes of a depth image that one staging area takes.
@@ -126,14 +128,16 @@ impl Engine {
     /// Uploads bounding volumes.
     ///
     /// # Errors
-    /// As [`HizContext::create_instances`], and [`Error::OutOfMemory`].
+    /// As [`HizContext::record_instances`], and [`Error::OutOfMemory`].
     pub fn instances(&self, bounds: &Bounds<'_>, options: &InstanceOptions) -> Result<Arc<Instances>> {
         // One piece at a time, so that only one has its copy in a staging area.
-        let between = || {
-            let submission = self.queue().submit([]);
-            readback::wait(self.device(), Some(submission))
+        let copy = |copies: &dyn Fn(&mut wgpu::CommandEncoder), more: bool| {
+            let mut encoder = self.encoder("hiz.instances.encoder");
+            copies(&mut encoder);
+            let submission = self.queue().submit([encoder.finish()]);
+            if more { readback::wait(self.device(), Some(submission)) } else { Ok(()) }
         };
-        self.scoped(|| Instances::new(&self.context().gpu, bounds, options, between)).map(Arc::new)
+        self.scoped(|| Instances::new(&self.context().gpu, bounds, options, copy)).map(Arc::new)
     }
 
     /// Replaces instances `first..first + n`: records and submits. A cull that was submitted before sees the old bounds. May be
@@ -198,6 +202,22 @@ impl Engine {
     /// # Errors
     /// [`Error::Invalid`] for another number of pixels, [`Error::Limit`] for an image larger than the device's textures.
     pub fn upload_depth(&self, ndc: &[f32], camera: &Camera) -> Result<DepthImage> {
+        self.upload_depth_to(SourceKind::Bits, wgpu::TextureFormat::R32Uint, ndc, camera)
+    }
+
+    /// For tests: the same into a float texture, which is sampled like a depth texture.
+    #[doc(hidden)]
+    pub fn upload_depth_sampled(&self, ndc: &[f32], camera: &Camera) -> Result<DepthImage> {
+        self.upload_depth_to(SourceKind::Float, wgpu::TextureFormat::R32Float, ndc, camera)
+    }
+
+    fn upload_depth_to(
+        &self,
+        kind: SourceKind,
+        format: wgpu::TextureFormat,
+        ndc: &[f32],
+        camera: &Camera,
+    ) -> Result<DepthImage> {
         let size = camera.size();
         if ndc.len() as u64 != size.pixels() {
             return Err(Error::invalid(
@@ -206,9 +226,8 @@ impl Engine {
             ));
         }
         self.scoped(|| {
-            let usage =
-                wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC;
-            let depth = self.depth_image(camera, wgpu::TextureFormat::R32Uint, usage)?;
+            let usage = kind.usage() | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC;
+            let depth = self.depth_image(camera, format, usage)?;
             // In bands, so that one staging area serves the largest image.
             let rows_at_once = (UPLOAD_BYTES / (4 * size.width)).max(1);
             for (band, rows) in ndc.chunks((rows_at_once * size.width) as usize).enumerate() {
@@ -261,17 +280,25 @@ impl Engine {
     /// Reads a level of a pyramid: sanitised depth, row 0 on top.
     ///
     /// # Errors
-    /// [`Error::Invalid`] past the last level, [`Error::Mismatch`] for a pyramid that was never built.
+    /// [`Error::Invalid`] past the last level and for one that is not stored, [`Error::Mismatch`] for a pyramid that was never built.
     pub fn read_level(&self, pyramid: &Pyramid, level: u32) -> Result<Vec<f32>> {
         self.context().gpu.check_context("pyramid", pyramid.context)?;
         let layout = pyramid.layout.levels.get(level as usize).ok_or_else(|| {
             Error::invalid("level", format!("expected a level below {}, got {level}", pyramid.num_levels()))
         })?;
+        if !pyramid.layout.is_there(level) {
+            let StoredLevels { first, last } = pyramid.layout.stored;
+            return Err(Error::invalid(
+                "level",
+                format!("expected 0 or a stored level, {first}..={last}, got {level}"),
+            ));
+        }
         let built = pyramid.built().ok_or_else(|| {
             Error::mismatch("pyramid", "expected one that was built from a depth image, got one that never was")
         })?;
         if level == 0 {
-            let bytes = self.scoped(|| readback::read_texture(self.device(), self.queue(), built.source.texture()))?;
+            let bytes =
+                self.scoped(|| readback::read_texture(self.device(), self.queue(), built.source.texture(), 4))?;
             let convention = built.camera.convention();
             return host::collected(to_u32(&bytes).map(|bits| crate::depth::sanitized(bits, convention)), "level");
         }
@@ -322,7 +349,9 @@ impl Engine {
                 pyramid: Arc::clone(pyramid),
                 camera: camera.clone(),
                 options: options.clone(),
+                output: *output,
                 visible,
+                later: OnceLock::new(),
                 submission,
                 submitted: Instant::now(),
                 timings: Mutex::new(Timings { record_ms: milliseconds(start, recorded), ..Timings::default() }),

@@ -10,12 +10,16 @@ mod arrays;
 mod checkpoint;
 mod class;
 mod fitted;
+mod grouped;
 mod report;
 mod scene;
 mod volume;
 
-use hiz_core::headless::Engine;
-use hiz_core::{BoundsKind, Camera, Coverage, CullOptions, Fit, Footprint, InstanceOptions, VisibleOptions};
+use hiz_core::headless::{DepthImage, Engine};
+use hiz_core::{
+    BoundsKind, Camera, Coverage, CullOptions, Fit, Footprint, Hierarchy, InstanceOptions, PyramidOptions,
+    StoredLevels, VisibleOptions,
+};
 use hiz_ref::{Options, Outcome, OwnDepth, Verdict, View, Volume};
 
 use crate::common::Random;
@@ -24,6 +28,7 @@ use scene::Scene;
 pub(crate) use arrays::Arrays;
 pub(crate) use checkpoint::Checkpoint;
 pub(crate) use class::Class;
+pub(crate) use grouped::Tested;
 pub(crate) use report::{HEADER, Report, Tally};
 pub(crate) use volume::moved;
 
@@ -32,6 +37,17 @@ pub(crate) const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, 
 
 /// What a cull reads by default.
 pub(crate) const PLAIN: &[(Footprint, u32)] = &[(Footprint::Two, 0)];
+
+/// Pyramids that lack levels: fine ones, coarse ones, all but one.
+pub(crate) const MISSING_LEVELS: &[StoredLevels] = &[
+    StoredLevels::from(2),
+    StoredLevels::from(3),
+    StoredLevels::from(5),
+    StoredLevels::only(1),
+    StoredLevels::only(2),
+    StoredLevels::only(4),
+    StoredLevels { first: 2, last: 3 },
+];
 
 /// How to run one.
 #[derive(Debug, Clone, Copy)]
@@ -43,10 +59,15 @@ pub(crate) struct Campaign {
     pub(crate) rounds: usize,
     /// Volumes of each kind in a round.
     pub(crate) volumes: usize,
+    pub(crate) kinds: &'static [BoundsKind],
     pub(crate) coverage: Coverage,
     /// Footprints and descent budgets to choose from. (Each costs pipelines, and those cost time.)
     pub(crate) modes: &'static [(Footprint, u32)],
     pub(crate) fit: Fit,
+    /// Which levels are stored, to choose from.
+    pub(crate) levels: &'static [StoredLevels],
+    /// Cull whole groups first, in any stored order, and compare with the flat cull.
+    pub(crate) groups: bool,
     /// Guards and slacks at random.
     pub(crate) any_slack: bool,
     /// Whether false keeps are counted, too (asks the oracle about everything).
@@ -60,9 +81,12 @@ impl Default for Campaign {
             classes: &Class::ALL,
             rounds: 10,
             volumes: 32,
+            kinds: &KINDS,
             coverage: Coverage::Area,
             modes: PLAIN,
             fit: Fit::Rectangle,
+            levels: &[StoredLevels::ALL],
+            groups: false,
             any_slack: false,
             count_keeps: false,
         }
@@ -79,6 +103,7 @@ pub(crate) struct Round {
     pub(crate) view: View,
     pub(crate) depth: Vec<f32>,
     pub(crate) options: CullOptions,
+    pub(crate) levels: StoredLevels,
     pub(crate) volumes: Vec<(BoundsKind, Vec<Volume>)>,
     /// For each volume the way, as long as its distance, on which it becomes hidden.
     pub(crate) away: Vec<Vec<[f64; 3]>>,
@@ -104,6 +129,7 @@ impl Campaign {
             footprint,
             descent,
             fit: self.fit,
+            hierarchy: Hierarchy::Never,
             statistics: false,
             ..CullOptions::default()
         };
@@ -114,13 +140,15 @@ impl Campaign {
         }
         let mut volumes = Vec::new();
         let mut away = Vec::new();
-        for kind in KINDS {
+        for kind in self.kinds.iter().copied() {
             let (these, ways) = (0..self.volumes).map(|_| scene.volume(class, kind, random)).unzip();
             volumes.push((kind, these));
             away.push(ways);
         }
         let Scene { camera, view, depth, .. } = scene;
-        Some(Round { seed: self.seed, number, class, camera, view, depth, options, volumes, away })
+        // Last, so that a round is the same whatever is stored.
+        let levels = random.pick(self.levels);
+        Some(Round { seed: self.seed, number, class, camera, view, depth, options, levels, volumes, away })
     }
 
     /// Culls every round on the device and asks the oracle.
@@ -128,7 +156,15 @@ impl Campaign {
         let mut report = Report::new(self.classes, self.count_keeps);
         let mut told = false;
         for round in self.rounds() {
-            let Some(masks) = round.masks(engine) else { continue };
+            let masks = if self.groups {
+                round.grouped_masks(engine).map(|(masks, tested)| {
+                    report.tested.add(tested);
+                    masks
+                })
+            } else {
+                round.masks(engine)
+            };
+            let Some(masks) = masks else { continue };
             for ((kind, volumes), mask) in round.volumes.iter().zip(&masks) {
                 for (volume, kept) in volumes.iter().zip(mask) {
                     let tally = round.tally(volume, *kept, self.count_keeps);
@@ -145,10 +181,17 @@ impl Campaign {
 }
 
 impl Round {
+    /// The depth image; every other one in a texture that is gathered from, like a depth texture.
+    pub(crate) fn upload(&self, engine: &Engine) -> DepthImage {
+        let upload = if self.number % 2 == 1 { Engine::upload_depth_sampled } else { Engine::upload_depth };
+        upload(engine, &self.depth, &self.camera).expect("upload")
+    }
+
     /// What the device keeps, for each kind. Nothing for a camera that is refused: float32 cannot hold its rows.
     pub(crate) fn masks(&self, engine: &Engine) -> Option<Vec<Vec<bool>>> {
-        let image = engine.upload_depth(&self.depth, &self.camera).expect("upload");
-        let pyramid = engine.pyramid(&image).expect("pyramid");
+        let image = self.upload(engine);
+        let stored = PyramidOptions { levels: self.levels, ..PyramidOptions::default() };
+        let pyramid = engine.pyramid_with(&image, &stored).expect("pyramid");
         let mut masks = Vec::new();
         for (kind, volumes) in &self.volumes {
             let arrays = Arrays::new(volumes);
@@ -196,6 +239,10 @@ impl Round {
     pub(crate) fn describe(&self, kind: BoundsKind, volume: &Volume) -> String {
         let (seed, number, class) = (self.seed, self.number, self.class);
         let outcome = self.outcome(volume);
-        format!("seed {seed} round {number} {class:?} {kind:?}: {volume:?}\n{:?}\noracle {outcome:?}", self.view)
+        let levels = self.levels;
+        format!(
+            "seed {seed} round {number} {class:?} {kind:?} {levels:?}: {volume:?}\n{:?}\noracle {outcome:?}",
+            self.view
+        )
     }
 }

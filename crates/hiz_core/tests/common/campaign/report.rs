@@ -1,6 +1,7 @@
 //! What a campaign found, class by class.
 
 use super::class::Class;
+use super::grouped::Tested;
 
 /// Counts of one class, or of all.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
@@ -28,11 +29,13 @@ pub(crate) struct Report {
     pub(crate) classes: Vec<(Class, Tally)>,
     /// Whether false keeps were counted.
     pub(crate) keeps: bool,
+    /// What groups spared; all 0 without groups.
+    pub(crate) tested: Tested,
 }
 
 impl Report {
     pub(crate) fn new(classes: &[Class], keeps: bool) -> Self {
-        Self { classes: classes.iter().map(|c| (*c, Tally::default())).collect(), keeps }
+        Self { classes: classes.iter().map(|c| (*c, Tally::default())).collect(), keeps, tested: Tested::default() }
     }
 
     pub(crate) fn add(&mut self, class: Class, tally: Tally) {
@@ -47,6 +50,7 @@ impl Report {
         for (class, tally) in &other.classes {
             self.add(*class, *tally);
         }
+        self.tested.add(other.tested);
     }
 
     pub(crate) fn total(&self) -> Tally {
@@ -68,6 +72,13 @@ impl std::fmt::Display for Report {
             line(&format!("{class:?}"), tally)?;
         }
         line("all", &self.total())?;
+        if self.tested.instances > 0 {
+            let Tested { instances, one_by_one, contradictions } = self.tested;
+            writeln!(
+                f,
+                "groups: {one_by_one} of {instances} instances tested one by one, {contradictions} contradictions"
+            )?;
+        }
         Ok(())
     }
 }

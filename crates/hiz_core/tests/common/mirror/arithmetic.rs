@@ -35,6 +35,8 @@ pub(crate) struct Style {
     pub(crate) bars: bool,
     /// `bar2` stops it from folding the quotient that a slope is into what it is multiplied with.
     pub(crate) slope_bars: bool,
+    /// At the frustum's planes the margin is taken off before the second product.
+    pub(crate) margin_first: bool,
 }
 
 const PLAIN: Style = Style {
@@ -46,7 +48,11 @@ const PLAIN: Style = Style {
     wild: false,
     bars: true,
     slope_bars: true,
+    margin_first: false,
 };
+
+/// What lavapipe's compiler makes of the plain one.
+pub(crate) const MARGIN_FIRST: Style = Style { name: "nearest, margin first", margin_first: true, ..PLAIN };
 
 /// What reassociation may do where no bar stops it; no style that the margin covers.
 pub(crate) const WITHOUT_BARS: Style = Style { name: "no bars", bars: false, ..PLAIN };
@@ -178,6 +184,19 @@ impl Arithmetic {
         if self.style.reassociated {
             (0..3).for_each(|k| terms.swap(k, k + self.random.below(4 - k as u32) as usize));
         }
+        let first = self.mul(terms[0].0, terms[0].1);
+        terms[1..].iter().fold(first, |sum, (a, b)| self.mul_add(*a, *b, sum))
+    }
+
+    /// Whether the sums of one expression are taken as one, in any order: half of the time where that is permitted.
+    pub(crate) fn takes_any_order(&mut self) -> bool {
+        self.style.reassociated && self.random.below(2) == 0
+    }
+
+    /// The sum of products, in any order.
+    pub(crate) fn sum_in_any_order<const N: usize>(&mut self, mut terms: [(f32, f32); N]) -> f32 {
+        (0..N - 1).for_each(|k| terms.swap(k, k + self.random.below((N - k) as u32) as usize));
+        // As products: those of 1 are exact, fused or not.
         let first = self.mul(terms[0].0, terms[0].1);
         terms[1..].iter().fold(first, |sum, (a, b)| self.mul_add(*a, *b, sum))
     }

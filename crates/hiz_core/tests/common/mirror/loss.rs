@@ -1,10 +1,12 @@
 //! How many eps the arithmetic really loses: what a certificate or a texel's comparison claims, against the same in float64.
 
+use hiz_core::BoundsKind;
 use hiz_ref::Volume as Exact;
 
+use super::extent::Extent;
 use super::planes::{Plane, Projected, surely_beyond};
 use super::volume::Volume;
-use super::{Arithmetic, Certificates, EPS, Margins, Mirror, two_to};
+use super::{Arithmetic, Certificates, EPS, LEAST_W, Margins, Mirror, two_to};
 use crate::campaign::Round;
 
 /// The most that was lost, and of how many claims.
@@ -21,35 +23,71 @@ impl Loss {
     }
 }
 
+/// What was lost, claim by claim.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Losses {
+    /// Of supporting planes.
+    pub(crate) planes: Loss,
+    /// Of a box's extent: `below` and `above`.
+    pub(crate) extents: Loss,
+    /// Of a box's least w.
+    pub(crate) least_w: Loss,
+}
+
+impl Losses {
+    pub(crate) fn add(&mut self, other: Self) {
+        self.planes.add(other.planes);
+        self.extents.add(other.extents);
+        self.least_w.add(other.least_w);
+    }
+}
+
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 impl Mirror {
-    /// What the certificates of the supporting planes of the round's one volume lose, their offsets moved to where they just
-    /// hold: the margin, less what is left of it in float64. In a wild arithmetic, for it alone moves offsets.
-    pub(crate) fn loss(&self, round: &Round, arithmetic: &mut Arithmetic) -> Loss {
-        let mut loss = Loss::default();
+    /// What certificates on the round's one volume lose: the margin, less what is left of it in float64. In a wild arithmetic, for
+    /// it alone moves the supporting planes' offsets to where they just hold.
+    pub(crate) fn losses(&self, round: &Round, arithmetic: &mut Arithmetic) -> Losses {
+        let mut losses = Losses::default();
         let (kind, words) = &self.words[0];
         let view = &self.view;
-        let Some(volume) = Volume::load(*kind, words, view, arithmetic) else { return loss };
+        let Some(volume) = Volume::load(*kind, words, view, &Margins::FULL, arithmetic) else { return losses };
         let mut c = Certificates { kind: *kind, margins: Margins::FULL, arithmetic };
         let [x, y, z, w] = [&view.x, &view.y, &view.z, &view.w].map(|row| c.value_of(row, &volume));
-        let w_min = w.center - c.support(w.half) - c.error_bound(&w, 0.0, &w);
-        if w_min.is_nan() || w_min <= 0.0 {
-            return loss;
+        let w_min = c.least_w(&w);
+        if w_min.is_nan() || w_min <= LEAST_W {
+            return losses;
         }
+        let extents = [(x, 0), (y, 1)].map(|(r, k)| c.extent_of(&r, &w, view.half_size[k]));
         let planes = c.supporting_planes(&Projected { x, y, z, w, w_min }, self.reversed);
-        for plane in &planes.list {
+        let ulps = f64::from(Margins::FULL.certificate);
+        let add = |loss: &mut Loss, plane: &Plane, spare: f32| {
             let [sx, sy] = plane.slope.map(f32::abs);
-            let size = f64::from(plane.facing.abs() * z.size + sx * x.size + sy * y.size + plane.offset.abs() * w.size);
-            let unit = f64::from(EPS) * size;
-            let Some(left) = self.left(round, plane, 0.02 * unit) else { continue };
-            if unit > f64::from(two_to(-50)) {
-                loss.add(Loss { eps: f64::from(Margins::FULL.certificate) - left / unit, claims: 1 });
+            let error = plane.facing.abs() * z.error + sx * x.error + sy * y.error + plane.offset.abs() * w.error;
+            let unit = f64::from(error) / ulps;
+            if let Some(left) = self.left(round, plane, 0.02 * unit).filter(|_| unit > f64::from(two_to(-50))) {
+                loss.add(Loss { eps: ulps - (left + f64::from(spare)) / unit, claims: 1 });
             }
+        };
+        for plane in &planes.list {
+            add(&mut losses.planes, plane, 0.0);
         }
-        loss
+        if *kind != BoundsKind::Sphere {
+            for (k, Extent { low, high, below, above }) in extents.into_iter().enumerate() {
+                for (sign, end, beyond) in [(1.0, low, below), (-1.0, high, above)] {
+                    let mut slope = [0.0; 2];
+                    slope[k] = sign;
+                    // Where it ends at 0 it claims less than it has proved.
+                    if beyond > 0.0 && end.is_finite() {
+                        add(&mut losses.extents, &Plane { slope, facing: 0.0, offset: sign * end }, beyond);
+                    }
+                }
+            }
+            add(&mut losses.least_w, &Plane { slope: [0.0; 2], facing: 0.0, offset: -1.0 }, -w_min);
+        }
+        losses
     }
 
     /// The least of `facing Z' + slope . (X', Y') - offset W'` on the volume, in float64; nothing where that is off by more than

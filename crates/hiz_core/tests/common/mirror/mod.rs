@@ -3,6 +3,7 @@
 #![allow(dead_code, unused_imports, reason = "each test binary uses its own part")]
 
 mod arithmetic;
+mod extent;
 mod guesses;
 mod loss;
 mod planes;
@@ -12,13 +13,16 @@ use hiz_core::{BoundsKind, CullOptions, ERROR_ULPS, Fit, Footprint};
 
 use crate::campaign::{Arrays, Round};
 
-pub(crate) use arithmetic::{Arithmetic, STYLES, Style, WILDEST, WITHOUT_BARS, WITHOUT_SLOPE_BARS};
-pub(crate) use loss::{Loss, texel_loss};
+pub(crate) use arithmetic::{Arithmetic, MARGIN_FIRST, STYLES, Style, WILDEST, WITHOUT_BARS, WITHOUT_SLOPE_BARS};
+use extent::Extent;
+pub(crate) use loss::{Losses, texel_loss};
 use planes::Projected;
 use volume::Volume;
 
 const EPS: f32 = 1.0 / 8_388_608.0;
 const LEAST_NORMAL: f32 = f32::MIN_POSITIVE;
+/// `LEAST_W`: 2^-66.
+const LEAST_W: f32 = f32::from_bits((127 - 66) << 23);
 
 /// `2^n`.
 fn two_to(n: i32) -> f32 {
@@ -36,12 +40,21 @@ pub(crate) struct Margins {
     pub(crate) texel: f32,
     /// `FLATTEST`.
     pub(crate) flattest: f32,
+    /// Whether `below` and `above` of an extent end at 0.
+    pub(crate) clamped: bool,
+    /// How much of a volume's own size counts in its margins.
+    pub(crate) own: f32,
 }
 
 impl Margins {
     /// The shader's.
-    pub(crate) const FULL: Self =
-        Self { certificate: ERROR_ULPS as f32, texel: 8.0, flattest: f32::from_bits((127 - 100) << 23) };
+    pub(crate) const FULL: Self = Self {
+        certificate: ERROR_ULPS as f32,
+        texel: 8.0,
+        flattest: f32::from_bits((127 - 100) << 23),
+        clamped: true,
+        own: 1.0,
+    };
 }
 
 impl From<f32> for Margins {
@@ -50,11 +63,12 @@ impl From<f32> for Margins {
     }
 }
 
-/// A linear function and its magnitudes (`view.wgsl`, `Row`).
+/// A linear function, and what its margin is made from (`view.wgsl`, `magnitudes` and `constant_magnitudes`).
 #[derive(Debug, Clone, Copy)]
 struct Row {
     m: [f32; 4],
-    a: [f32; 4],
+    magnitude: f32,
+    constant_magnitude: f32,
 }
 
 /// `view.wgsl`, `View`; read from the words that the shader reads.
@@ -67,36 +81,41 @@ struct View {
     eye_hi: [f32; 3],
     z_slope: f32,
     eye_lo: [f32; 3],
-    coordinate_limit: f32,
+    halves_size: f32,
     half_size: [f32; 2],
     reach: f32,
     depth_factor: f32,
     size: [i32; 2],
     descent_budget: u32,
     depth_offset: f32,
+    coordinate_limit: f32,
 }
 
 impl View {
     fn new(words: &[u32]) -> Self {
-        let four = |i: usize| [0, 1, 2, 3].map(|k| f32::from_bits(words[i + k]));
-        let row = |i: usize| Row { m: four(8 * i), a: four(8 * i + 4) };
-        let three = |i: usize| [0, 1, 2].map(|k| f32::from_bits(words[i + k]));
         let one = |i: usize| f32::from_bits(words[i]);
+        let three = |i: usize| [0, 1, 2].map(|k| one(i + k));
+        let row = |k: usize| Row {
+            m: [0, 1, 2, 3].map(|j| one(4 * k + j)),
+            magnitude: one(16 + k),
+            constant_magnitude: one(20 + k),
+        };
         Self {
             x: row(0),
             y: row(1),
             z: row(2),
             w: row(3),
-            eye_hi: three(32),
-            z_slope: one(35),
-            eye_lo: three(36),
-            coordinate_limit: one(39),
-            half_size: [one(40), one(41)],
-            reach: one(42),
-            depth_factor: one(43),
-            size: [words[44] as i32, words[45] as i32],
-            descent_budget: words[48],
-            depth_offset: one(49),
+            eye_hi: three(24),
+            z_slope: one(27),
+            eye_lo: three(28),
+            halves_size: one(31),
+            half_size: [one(32), one(33)],
+            reach: one(34),
+            depth_factor: one(35),
+            size: [words[36] as i32, words[37] as i32],
+            descent_budget: words[40],
+            depth_offset: one(41),
+            coordinate_limit: one(42),
         }
     }
 }
@@ -105,8 +124,15 @@ impl View {
 #[derive(Debug, Clone, Copy)]
 struct Value {
     center: f32,
-    size: f32,
+    error: f32,
     half: [f32; 3],
+}
+
+impl Value {
+    /// `sign` times it, which is exact.
+    fn signed(&self, sign: f32) -> Self {
+        Self { center: sign * self.center, error: self.error, half: self.half.map(|h| sign * h) }
+    }
 }
 
 /// A round's camera and depth image, made ready.
@@ -155,7 +181,8 @@ impl Mirror {
     pub(crate) fn without_error_share(mut self) -> Self {
         let view = &mut self.view;
         for row in [&mut view.x, &mut view.y, &mut view.z, &mut view.w] {
-            row.a = row.m.map(f32::abs);
+            let [x, y, z, constant] = row.m.map(f32::abs);
+            (row.magnitude, row.constant_magnitude) = (x.max(y).max(z), constant);
         }
         self
     }
@@ -192,7 +219,7 @@ impl Mirror {
     /// `classify.wgsl`, `classify`; the numbers are its steps.
     fn culls(&self, kind: BoundsKind, record: &[u32], margins: Margins, arithmetic: &mut Arithmetic) -> bool {
         let view = &self.view;
-        let Some(volume) = Volume::load(kind, record, view, arithmetic) else { return false };
+        let Some(volume) = Volume::load(kind, record, view, &margins, arithmetic) else { return false };
         let mut c = Certificates { kind, margins, arithmetic };
         let [x, y, z, w] = [&view.x, &view.y, &view.z, &view.w].map(|row| c.value_of(row, &volume));
         let a = view.z_slope;
@@ -200,30 +227,26 @@ impl Mirror {
         // 1. Outside one of the six planes of the frustum.
         let border = view.half_size.map(|h| h + view.reach);
         let far_plane = c.arithmetic.sub(1.0, a);
-        if c.surely_below(&x, -border[0], &w)
-            || c.surely_above(&x, border[0], &w)
-            || c.surely_below(&y, -border[1], &w)
-            || c.surely_above(&y, border[1], &w)
+        if c.surely_beyond(&x, border[0], &w)
+            || c.surely_beyond(&y, border[1], &w)
             || c.surely_below(&z, -a, &w)
             || c.surely_above(&z, far_plane, &w)
         {
             return true;
         }
 
-        // 2. Crossing w = 0. From here to the level nothing needs trust, so it is computed in any way.
-        let w_min = w.center - c.support(w.half) - c.error_bound(&w, 0.0, &w);
-        if w_min.is_nan() || w_min <= 0.0 {
+        // 2. Crossing w = 0.
+        let w_min = c.least_w(&w);
+        if w_min.is_nan() || w_min <= LEAST_W {
             return false;
         }
 
         // 3. The pixels that the projection may touch.
+        let extents = [0, 1].map(|k| c.extent_of([&x, &y][k], &w, view.half_size[k]));
         let mut first = [0; 2];
         let mut last = [0; 2];
-        for (k, r) in [&x, &y].into_iter().enumerate() {
-            let [from, to] = volume::ratio_interval(kind, r, &w);
-            let widest = from.abs().max(to.abs());
-            let widening = 1.25 * c.error_bound(r, widest, &w) / w_min + 4.0 * EPS * view.half_size[k] + view.reach;
-            [first[k], last[k]] = pixel_interval([from, to], widening, view.half_size[k], view.size[k]);
+        for k in 0..2 {
+            [first[k], last[k]] = pixel_interval(&extents[k], 1.25 / w_min, view, k);
             if c.arithmetic.style.wild && view.size[k] > 0 {
                 let wild = [0; 2].map(|_| c.arithmetic.below(view.size[k] as u32) as i32);
                 if c.arithmetic.below(4) == 0 {
@@ -266,7 +289,14 @@ impl Mirror {
 
         // 6. The texels were those of all pixels that matter.
         let (from, to, level) = block;
-        c.inside_block(&x, &w, from[0], to[0], level, view, 0) && c.inside_block(&y, &w, from[1], to[1], level, view, 1)
+        let mut inside = |r: &Value, axis: usize| {
+            let begin = (from[axis] << level) as f32 + view.reach - view.half_size[axis];
+            let end = ((to[axis] + 1) << level) as f32 - view.reach - view.half_size[axis];
+            let reaches_end = (to[axis] + 1) << level >= view.size[axis] as u32;
+            (from[axis] == 0 || c.surely_after(r, &w, &extents[axis], begin, w_min))
+                && (reaches_end || c.surely_before(r, &w, &extents[axis], end, w_min))
+        };
+        inside(&x, 0) && inside(&y, 1)
     }
 
     /// `descend`.
@@ -355,10 +385,12 @@ impl Mirror {
 }
 
 /// `pixel_interval`.
-fn pixel_interval([from, to]: [f32; 2], margin: f32, half_size: f32, size: i32) -> [i32; 2] {
-    let edge = (size + 1) as f32;
-    let pixel = |v: f32| (v + half_size).clamp(-2.0, edge).floor() as i32;
-    [pixel(from - margin).clamp(0, size), pixel(to + margin).clamp(-1, size - 1)]
+fn pixel_interval(extent: &Extent, per_w: f32, view: &View, axis: usize) -> [i32; 2] {
+    let (half_size, edge) = (view.half_size[axis], view.size[axis] as f32);
+    let rounding = 4.0 * EPS * half_size + view.reach;
+    let low = extent.low - (extent.below * per_w + rounding) + half_size;
+    let high = extent.high + (extent.above * per_w + rounding) + half_size;
+    [low.floor().clamp(0.0, edge) as i32, high.floor().clamp(-1.0, edge - 1.0) as i32]
 }
 
 /// `certificate.wgsl`, for one kind of volume in one arithmetic.
@@ -376,13 +408,13 @@ impl Certificates<'_> {
         self.arithmetic.part();
         let half = volume.on_half_axes(three(row.m), self.arithmetic);
         self.arithmetic.part();
-        let size = self.arithmetic.sum_of_products(three(row.a), volume.reach, Some(row.a[3]));
-        Value { center, size, half }
+        let sizes = self.arithmetic.mul_add(volume.size, row.magnitude, row.constant_magnitude);
+        let error = self.arithmetic.mul_add(self.margins.certificate * EPS, sizes, two_to(-70));
+        Value { center, error, half }
     }
 
     fn error_bound(&mut self, r: &Value, t: f32, w: &Value) -> f32 {
-        let sizes = self.arithmetic.mul_add(t.abs(), w.size, r.size);
-        self.arithmetic.mul_add(self.margins.certificate * EPS, sizes, two_to(-70))
+        self.arithmetic.mul_add(t.abs(), w.error, r.error)
     }
 
     fn support(&mut self, half: [f32; 3]) -> f32 {
@@ -408,11 +440,28 @@ impl Certificates<'_> {
     /// `sign (r - t w) > 0` on all of the volume.
     fn surely(&mut self, sign: f32, r: &Value, t: f32, w: &Value) -> bool {
         self.arithmetic.part();
-        let difference = self.arithmetic.mul_add(-t, w.center, r.center);
+        let center = if self.arithmetic.takes_any_order() {
+            let terms = [(sign * r.center, 1.0), (-sign * t, w.center), (-r.error, 1.0), (-t.abs(), w.error)];
+            self.arithmetic.sum_in_any_order(terms)
+        } else {
+            let difference = self.arithmetic.mul_add(-t, w.center, r.center);
+            self.arithmetic.part();
+            let error = self.error_bound(r, t, w);
+            self.arithmetic.sub(sign * difference, error)
+        };
         self.arithmetic.part();
-        let error = self.error_bound(r, t, w);
-        let center = self.arithmetic.sub(sign * difference, error);
-        self.arithmetic.part();
+        let half = [0, 1, 2].map(|k| self.arithmetic.mul_add(-t, w.half[k], r.half[k]));
+        self.exceeds_support(center, half)
+    }
+
+    fn surely_beyond(&mut self, r: &Value, t: f32, w: &Value) -> bool {
+        let r = r.signed(if r.center < 0.0 { -1.0 } else { 1.0 });
+        if !self.arithmetic.style.margin_first {
+            return self.surely_above(&r, t, w);
+        }
+        let error = self.error_bound(&r, t, w);
+        let less = self.arithmetic.sub(r.center, error);
+        let center = self.arithmetic.mul_add(-t, w.center, less);
         let half = [0, 1, 2].map(|k| self.arithmetic.mul_add(-t, w.half[k], r.half[k]));
         self.exceeds_support(center, half)
     }
@@ -440,17 +489,9 @@ impl Certificates<'_> {
         self.exceeds_support(center, half)
     }
 
+    /// Pixel edges are multiples of 2^-8 below 2^16, so sums of them are exact in any arithmetic.
     fn between_samples(&mut self, r: &Value, w: &Value, first: i32, view: &View, axis: usize) -> bool {
         let left = first as f32 - view.half_size[axis];
         self.surely_above(r, left + view.reach, w) && self.surely_below(r, left - view.reach, w)
-    }
-
-    /// Pixel edges are multiples of 2^-8 below 2^16, so sums of them are exact in any arithmetic.
-    #[allow(clippy::too_many_arguments, reason = "those of the shader's function")]
-    fn inside_block(&mut self, r: &Value, w: &Value, lo: u32, hi: u32, level: u32, view: &View, axis: usize) -> bool {
-        let (begin, end) = ((lo << level) as f32, ((hi + 1) << level) as f32);
-        let (half_size, size) = (view.half_size[axis], view.size[axis] as f32);
-        (lo == 0 || self.surely_above(r, begin + view.reach - half_size, w))
-            && (end >= size || self.surely_below(r, end - view.reach - half_size, w))
     }
 }

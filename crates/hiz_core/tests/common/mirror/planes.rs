@@ -62,7 +62,9 @@ impl Certificates<'_> {
     /// more than a slope is, so a wild one lies where the certificate is tightest. `sign` -1: the least.
     fn wild_offset(&mut self, sign: f32, r: &Value, w: &Value, guess: f32, width: f32) -> f32 {
         let (mut proved, mut open) = (guess, guess + sign * width);
-        for _ in 0..14 {
+        // Some to where nothing but the margin's floor is left.
+        let steps = if self.arithmetic.below(4) == 0 { 40 } else { 14 };
+        for _ in 0..steps {
             let middle = 0.5 * (proved + open);
             if self.surely(sign, r, middle, w) { proved = middle } else { open = middle }
         }
@@ -103,8 +105,10 @@ impl Certificates<'_> {
         };
         let center = on(factors, [p.z.center, p.x.center, p.y.center]);
         let half = [0, 1, 2].map(|k| on(factors, [p.z.half[k], p.x.half[k], p.y.half[k]]));
-        let size = on(factors.map(f32::abs), [p.z.size, p.x.size, p.y.size]);
-        Value { center, size, half }
+        self.arithmetic.part();
+        let errors = [p.z.error, p.x.error, p.y.error];
+        let error = self.arithmetic.sum_of_products(factors.map(f32::abs), errors, Some(two_to(-70)));
+        Value { center, error, half }
     }
 
     /// `supporting_planes`.
@@ -140,7 +144,7 @@ impl Certificates<'_> {
                 return None;
             }
             slope = slope.map(|s| -s);
-            r = Value { center: -r.center, size: r.size, half: r.half.map(|h| -h) };
+            r = r.signed(-1.0);
             least = -interval[1];
         }
         let error = self.error_bound(&r, least, &p.w);
@@ -148,7 +152,7 @@ impl Certificates<'_> {
         if wild && offset.is_finite() && self.arithmetic.below(4) != 0 {
             offset = self.wild_offset(1.0, &r, &p.w, offset, 6.0 * error / p.w_min);
         }
-        let small = offset.abs() < two_to(60) && r.size + offset.abs() * p.w.size < two_to(60);
+        let small = offset.abs() < two_to(60) && self.error_bound(&r, offset, &p.w) < two_to(38);
         (small && self.surely_above(&r, offset, &p.w)).then_some(Plane { slope, facing: guess.facing, offset })
     }
 

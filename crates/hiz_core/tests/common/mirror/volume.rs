@@ -2,13 +2,13 @@
 
 use hiz_core::BoundsKind;
 
-use super::{Arithmetic, Value, View, two_to};
+use super::{Arithmetic, Margins, Value, View};
 
 /// A volume about the reference point.
 #[derive(Debug)]
 pub(super) struct Volume {
     pub(super) center: [f32; 3],
-    pub(super) reach: [f32; 3],
+    pub(super) size: f32,
     /// Spheres: the radius on each axis.
     half_axes: [[f32; 3]; 3],
     kind: BoundsKind,
@@ -16,7 +16,13 @@ pub(super) struct Volume {
 
 impl Volume {
     /// `load_volume`; nothing where it is not valid.
-    pub(super) fn load(kind: BoundsKind, record: &[u32], view: &View, f: &mut Arithmetic) -> Option<Self> {
+    pub(super) fn load(
+        kind: BoundsKind,
+        record: &[u32],
+        view: &View,
+        margins: &Margins,
+        f: &mut Arithmetic,
+    ) -> Option<Self> {
         let three = |i: usize| [0, 1, 2].map(|k| f32::from_bits(record[i + k]));
         let one = |i: usize| f32::from_bits(record[i]);
         let diagonal = |h: [f32; 3]| [[h[0], 0.0, 0.0], [0.0, h[1], 0.0], [0.0, 0.0, h[2]]];
@@ -26,34 +32,33 @@ impl Volume {
             BoundsKind::Box => diagonal(three(8)),
             BoundsKind::OrientedBox => [three(8), three(12), [one(3), one(7), one(11)]],
         };
-        let numbers = [hi, lo].into_iter().chain(half_axes).flatten();
-        let sizes_valid = kind == BoundsKind::OrientedBox || (0..3).all(|k| half_axes[k][k] >= 0.0);
-        if !sizes_valid || numbers.into_iter().any(|v| v.is_nan() || v.abs() >= two_to(60)) {
-            return None;
-        }
         let mut d_hi = [0.0; 3];
-        let mut d_lo = [0.0; 3];
         let mut center = [0.0; 3];
-        let mut reach = [0.0; 3];
         for k in 0..3 {
             f.part();
             d_hi[k] = f.sub(hi[k], view.eye_hi[k]);
-            d_lo[k] = f.sub(lo[k], view.eye_lo[k]);
+            let d_lo = f.sub(lo[k], view.eye_lo[k]);
             center[k] = if f.style.bars {
-                f.add(d_hi[k], d_lo[k])
+                f.add(d_hi[k], d_lo)
             } else {
                 let (p, eye) = (f.add(hi[k], lo[k]), f.add(view.eye_hi[k], view.eye_lo[k]));
                 f.sub(p, eye)
             };
-            let half = match kind {
-                BoundsKind::OrientedBox => f.sum([0, 1, 2].map(|e| half_axes[e][k].abs())),
-                BoundsKind::Sphere | BoundsKind::Box => half_axes[k][k],
-            };
-            f.part();
-            let sum = f.sum([d_hi[k].abs(), d_lo[k].abs(), half]);
-            reach[k] = f.mul_add(two_to(-24), hi[k].abs(), sum);
         }
-        reach.iter().all(|r| *r < view.coordinate_limit).then_some(Self { center, reach, half_axes, kind })
+        f.part();
+        let own = match kind {
+            BoundsKind::Sphere => f.mul(3.0, one(3)),
+            BoundsKind::Box => f.sum(three(8)),
+            BoundsKind::OrientedBox => {
+                let sums = half_axes.map(|e| f.sum(e.map(f32::abs)));
+                f.sum(sums)
+            }
+        };
+        f.part();
+        let distance = f.sum(d_hi.map(f32::abs));
+        let rest = f.add(margins.own * own, view.halves_size);
+        let size = f.add(distance, rest);
+        (size < view.coordinate_limit).then_some(Self { center, size, half_axes, kind })
     }
 
     /// `on_half_axes`.

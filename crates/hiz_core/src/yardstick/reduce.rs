@@ -1,0 +1,287 @@
+//! The reduction as one dispatch a level, on a flat buffer or on a texture's mip levels.
+
+use crate::camera::ImageSize;
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::headless::{DepthImage, Engine};
+use crate::pyramid::{Pyramid, entry};
+use crate::readback::{self, BufferRange};
+use crate::shader::{self, SourceKind};
+
+/// What one dispatch a level writes into.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReductionShape {
+    /// A storage buffer, by vectors of four texels.
+    Buffer,
+    /// The mip levels of an `R32Float` texture, texel by texel.
+    Textures,
+}
+
+/// `shaders/yardstick/reduce_buffer.wgsl`, `YardstickLevel`: offset and stride in vectors of four texels.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Level {
+    offset: u32,
+    stride: u32,
+    width: u32,
+    height: u32,
+}
+
+#[derive(Debug)]
+struct Step {
+    pipeline: wgpu::ComputePipeline,
+    bindings: wgpu::BindGroup,
+    workgroups: [u32; 2],
+}
+
+#[derive(Debug)]
+enum Storage {
+    Buffer(wgpu::Buffer),
+    Textures(wgpu::Texture),
+}
+
+/// All levels of a depth image's pyramid, reduced by one dispatch each; everything that can be made beforehand is.
+#[derive(Debug)]
+pub struct PerLevelReduction {
+    levels: Vec<Level>,
+    storage: Storage,
+    steps: Vec<Step>,
+}
+
+impl PerLevelReduction {
+    /// For an image of `depth`, which has more than one pixel.
+    ///
+    /// # Errors
+    /// [`Error::Device`](crate::Error::Device) where the device has no memory for it.
+    pub fn new(engine: &Engine, depth: &DepthImage, shape: ReductionShape) -> Result<Self> {
+        let gpu = &*engine.context().gpu;
+        let levels = levels(depth.size());
+        let storage = match shape {
+            ReductionShape::Buffer => {
+                let last = levels[levels.len() - 1];
+                Storage::Buffer(gpu.device().create_buffer(&wgpu::BufferDescriptor {
+                    label: Some("hiz.yardstick.levels"),
+                    size: 16 * u64::from(last.offset + last.stride * last.height),
+                    usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
+                    mapped_at_creation: false,
+                }))
+            }
+            ReductionShape::Textures => Storage::Textures(mip_levels(gpu, &levels)),
+        };
+        let steps = (1..levels.len()).map(|k| step(gpu, depth, &levels, &storage, k)).collect::<Result<_>>()?;
+        Ok(Self { levels, storage, steps })
+    }
+
+    /// Records all dispatches.
+    pub fn record(&self, encoder: &mut wgpu::CommandEncoder) {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some("hiz.yardstick.pass"),
+            timestamp_writes: None,
+        });
+        for Step { pipeline, bindings, workgroups: [x, y] } in &self.steps {
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, bindings, &[]);
+            pass.dispatch_workgroups(*x, *y, 1);
+        }
+    }
+
+    /// Level `k`, 1 or more, row by row.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost).
+    pub fn read(&self, engine: &Engine, k: usize) -> Result<Vec<f32>> {
+        let Level { offset, stride, width, height } = self.levels[k];
+        let device = engine.device();
+        let bytes = match &self.storage {
+            Storage::Buffer(buffer) => {
+                let range =
+                    BufferRange { buffer, offset: 16 * u64::from(offset), size: 16 * u64::from(stride * height) };
+                readback::read_buffers(device, engine.queue(), &[range])?.swap_remove(0)
+            }
+            Storage::Textures(texture) => {
+                let row = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+                let copied = device.create_buffer(&wgpu::BufferDescriptor {
+                    label: Some("hiz.yardstick.copied"),
+                    size: u64::from(row * height),
+                    usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+                    mapped_at_creation: false,
+                });
+                let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                encoder.copy_texture_to_buffer(
+                    wgpu::TexelCopyTextureInfo { mip_level: k as u32 - 1, ..texture.as_image_copy() },
+                    wgpu::TexelCopyBufferInfo {
+                        buffer: &copied,
+                        layout: wgpu::TexelCopyBufferLayout {
+                            offset: 0,
+                            bytes_per_row: Some(row),
+                            rows_per_image: None,
+                        },
+                    },
+                    wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+                );
+                engine.queue().submit([encoder.finish()]);
+                readback::read_buffers(device, engine.queue(), &[BufferRange::first(&copied, copied.size())])?
+                    .swap_remove(0)
+            }
+        };
+        Ok(bytes
+            .chunks_exact(bytes.len() / height as usize)
+            .flat_map(|row| bytemuck::pod_collect_to_vec::<u8, f32>(&row[..4 * width as usize]))
+            .collect())
+    }
+}
+
+/// Records the library's own reduction of `depth` into `pyramid`.
+///
+/// # Errors
+/// As [`HizContext::record_reduce`](crate::HizContext::record_reduce).
+pub fn reduce(
+    engine: &Engine,
+    encoder: &mut wgpu::CommandEncoder,
+    depth: &DepthImage,
+    pyramid: &Pyramid,
+) -> Result<()> {
+    let view = depth.texture().create_view(&wgpu::TextureViewDescriptor::default());
+    engine.context().record_reduce(encoder, &view, depth.camera(), pyramid)
+}
+
+fn levels(size: ImageSize) -> Vec<Level> {
+    let mut levels = vec![Level { offset: 0, stride: 0, width: size.width, height: size.height }];
+    let mut offset = 0;
+    while let Some(Level { width, height, .. }) = levels.last().filter(|l| l.width > 1 || l.height > 1) {
+        let (width, height) = (width.div_ceil(2), height.div_ceil(2));
+        let stride = width.div_ceil(4);
+        levels.push(Level { offset, stride, width, height });
+        offset += stride * height;
+    }
+    levels
+}
+
+/// A texture halves its mip levels downwards, a pyramid upwards: sides that are powers of two hold both.
+fn mip_levels(gpu: &Gpu, levels: &[Level]) -> wgpu::Texture {
+    gpu.device().create_texture(&wgpu::TextureDescriptor {
+        label: Some("hiz.yardstick.mips"),
+        size: wgpu::Extent3d {
+            width: levels[1].width.next_power_of_two(),
+            height: levels[1].height.next_power_of_two(),
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: levels.len() as u32 - 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::R32Float,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::STORAGE_BINDING
+            | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    })
+}
+
+/// The dispatch that makes level `k` out of the one before.
+fn step(gpu: &Gpu, depth: &DepthImage, levels: &[Level], storage: &Storage, k: usize) -> Result<Step> {
+    let kind = SourceKind::of(depth.texture().format()).expect("a depth image's own format");
+    let (read, written) = (levels[k - 1], levels[k]);
+    let source = depth.texture().create_view(&wgpu::TextureViewDescriptor::default());
+    let mip = |texture: &wgpu::Texture, k: usize| {
+        texture.create_view(&wgpu::TextureViewDescriptor {
+            base_mip_level: k as u32 - 1,
+            mip_level_count: Some(1),
+            ..Default::default()
+        })
+    };
+    let from_source = [("FROM_SOURCE", f64::from(u8::from(k == 1)))];
+    let reversed = ("REVERSED", f64::from(u8::from(depth.camera().convention().is_reversed())));
+    let constants = [reversed, from_source[0]];
+    let texture = |binding| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::COMPUTE,
+        ty: wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Float { filterable: false },
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        },
+        count: None,
+    };
+    let mut entries = vec![
+        wgpu::BindGroupLayoutEntry { ty: kind.binding(), ..texture(0) },
+        wgpu::BindGroupLayoutEntry {
+            ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering),
+            ..texture(1)
+        },
+        wgpu::BindGroupLayoutEntry { ty: buffer(wgpu::BufferBindingType::Uniform), ..texture(2) },
+    ];
+    let (module, name, uniform, workgroups) = match storage {
+        Storage::Buffer(_) => {
+            let storage = buffer(wgpu::BufferBindingType::Storage { read_only: false });
+            entries.push(wgpu::BindGroupLayoutEntry { ty: storage, ..texture(3) });
+            (
+                shader::yardstick_reduce_buffer(kind),
+                "reduce_buffer",
+                gpu.uniform("hiz.yardstick.step", &[read, written])?,
+                [written.stride.div_ceil(64), written.height],
+            )
+        }
+        Storage::Textures(_) => {
+            entries.push(texture(3));
+            entries.push(wgpu::BindGroupLayoutEntry {
+                ty: wgpu::BindingType::StorageTexture {
+                    access: wgpu::StorageTextureAccess::WriteOnly,
+                    format: wgpu::TextureFormat::R32Float,
+                    view_dimension: wgpu::TextureViewDimension::D2,
+                },
+                ..texture(4)
+            });
+            (
+                shader::yardstick_reduce_texture(kind),
+                "reduce_texture",
+                gpu.uniform("hiz.yardstick.step", &[written.width, written.height, read.width, read.height])?,
+                [written.width.div_ceil(8), written.height.div_ceil(8)],
+            )
+        }
+    };
+    let layout = gpu.device().create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("hiz.yardstick.layout"),
+        entries: &entries,
+    });
+    let pipeline = gpu.pipeline("hiz.yardstick.pipeline", &module, name, &[&layout], &constants);
+    let mut bound = vec![
+        entry(0, wgpu::BindingResource::TextureView(&source)),
+        entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
+        entry(2, uniform.as_entire_binding()),
+    ];
+    let views;
+    match storage {
+        Storage::Buffer(buffer) => bound.push(entry(3, buffer.as_entire_binding())),
+        Storage::Textures(mips) => {
+            // The first dispatch reads the source and binds any other level as the one before.
+            let finer = if k == 1 { idle_texture(gpu) } else { mips.clone() };
+            views = [mip(&finer, if k == 1 { 1 } else { k - 1 }), mip(mips, k)];
+            bound.push(entry(3, wgpu::BindingResource::TextureView(&views[0])));
+            bound.push(entry(4, wgpu::BindingResource::TextureView(&views[1])));
+        }
+    }
+    let bindings = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("hiz.yardstick.bindings"),
+        layout: &layout,
+        entries: &bound,
+    });
+    Ok(Step { pipeline, bindings, workgroups })
+}
+
+fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
+    wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None }
+}
+
+/// Something to bind where nothing is read.
+fn idle_texture(gpu: &Gpu) -> wgpu::Texture {
+    gpu.device().create_texture(&wgpu::TextureDescriptor {
+        label: Some("hiz.yardstick.idle"),
+        size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::R32Float,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    })
+}

@@ -1,0 +1,68 @@
+//! A round culled in groups: each volume many times over, so that some groups hold nothing else and their boxes are as nearly decided
+//! as it is.
+
+use hiz_core::headless::Engine;
+use hiz_core::{CullOptions, Hierarchy, InstanceOptions, StoredOrder, VisibleOptions};
+
+use super::{Arrays, Round};
+use crate::common::Random;
+
+/// What a cull in groups spared, and what contradicts the flat one.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Tested {
+    /// All instances.
+    pub(crate) instances: u64,
+    /// Those that were tested by themselves.
+    pub(crate) one_by_one: u64,
+    /// Instances that are kept with groups alone, and verdicts that are counted and not there, or the reverse: must be 0.
+    pub(crate) contradictions: u64,
+}
+
+impl Tested {
+    pub(crate) fn add(&mut self, other: Self) {
+        self.instances += other.instances;
+        self.one_by_one += other.one_by_one;
+        self.contradictions += other.contradictions;
+    }
+}
+
+impl Round {
+    /// What the device keeps with groups, for each kind, in any stored order. A volume is kept if all of its copies are. Nothing for a
+    /// camera that is refused.
+    pub(crate) fn grouped_masks(&self, engine: &Engine) -> Option<(Vec<Vec<bool>>, Tested)> {
+        let random = &mut Random(self.seed ^ (self.number as u64) << 32);
+        // Whole groups of one volume, groups of a few, and one of all.
+        let copies = random.pick(&[64, 64, 21, 1]);
+        let order = random.pick(&[StoredOrder::Morton, StoredOrder::Given]);
+        let image = self.upload(engine);
+        let pyramid = engine.pyramid(&image).expect("pyramid");
+        let mut masks = Vec::new();
+        let mut tested = Tested::default();
+        for (kind, volumes) in &self.volumes {
+            let many: Vec<_> = volumes.iter().flat_map(|volume| vec![*volume; copies]).collect();
+            let arrays = Arrays::new(&many);
+            let options = InstanceOptions { order, ..InstanceOptions::default() };
+            let instances = engine.instances(&arrays.bounds(*kind), &options).expect("instances");
+            let cull = |hierarchy| {
+                let options = CullOptions { hierarchy, ..self.options.clone() };
+                engine.cull(&instances, &self.camera, &pyramid, &options, &VisibleOptions::default())
+            };
+            let (flat, grouped) = match (cull(Hierarchy::Never), cull(Hierarchy::Always)) {
+                (Ok(flat), Ok(grouped)) => (flat, grouped),
+                (Err(hiz_core::Error::Invalid { .. }), _) => return None,
+                (Err(error), _) | (_, Err(error)) => panic!("{error}"),
+            };
+            let (flat, mask) = (flat.mask().expect("mask"), grouped.mask().expect("mask"));
+            let counts = grouped.counts().expect("counts");
+            let kept = mask.iter().filter(|kept| **kept).count() as u64;
+            let kept_alone = flat.iter().zip(&mask).filter(|(flat, grouped)| **grouped && !**flat).count() as u64;
+            tested.add(Tested {
+                instances: many.len() as u64,
+                one_by_one: counts.tested_instances,
+                contradictions: kept_alone + counts.demand.abs_diff(kept),
+            });
+            masks.push(mask.chunks_exact(copies).map(|copies| copies.iter().all(|kept| *kept)).collect());
+        }
+        Some((masks, tested))
+    }
+}

@@ -1,0 +1,106 @@
+"""What the parts of a run share: the device, the yardsticks, how much is measured, and what was found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from ... import _core
+from . import town as towns
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..._arguments import Size
+    from ...camera import Camera
+    from ...device import Device
+    from ...resources import DepthImage, Instances, Pyramid
+    from .figures import Found
+
+__all__ = ["ALL_LEVELS", "EXTENTS", "MASK", "Extent", "Run"]
+
+#: Levels as `_core` takes them.
+ALL_LEVELS: Final = (1, 15)
+#: Outputs as `_core` takes them: the mask alone.
+MASK: Final = (True, False, False, False)
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How much is measured."""
+
+    images: tuple[tuple[str, Size], ...]
+    """Names and sizes of the depth images of the reduction."""
+    crowd: int
+    """Instances of the culls."""
+    calls: int
+    """Instances of the calls from Python."""
+    rounds: int
+    sample: int
+    """Instances that the oracle judges."""
+    processes: int
+    """Fresh processes, for each state of the cache."""
+    counts: tuple[int, ...]
+    """Numbers of instances."""
+    sides: tuple[int, ...]
+    """Of square depth images."""
+    large: int | None
+    """How many instances are held against `crowd`."""
+
+
+HD: Final = ("1080p", (1080, 1920))
+UHD: Final = ("4K", (2160, 3840))
+
+EXTENTS: Final = {
+    "quick": Extent((HD,), 100_000, 100_000, 3, 200, 1, (1_000, 10_000, 100_000), (256, 512), None),
+    "default": Extent(
+        (HD, UHD), 1_000_000, 100_000, 15, 2_000, 3, (1_000, 10_000, 100_000, 1_000_000, 4_000_000),
+        (256, 512, 1024, 2048, 4096), 16_000_000,
+    ),
+    "full": Extent(
+        (HD, UHD), 1_000_000, 100_000, 25, 5_000, 5,
+        (1_000, 10_000, 100_000, 1_000_000, 4_000_000, 8_000_000, 10_000_000, 16_000_000, 32_000_000, 50_000_000),
+        (256, 512, 1024, 2048, 4096, 8192), 16_000_000,
+    ),
+}  # fmt: skip
+
+
+@dataclass
+class Run:
+    """One run."""
+
+    device: Device
+    extent: Extent
+    seed: int
+    found: Found
+    step: Callable[[str], None]
+    """Tells what is done next."""
+
+    def __post_init__(self) -> None:
+        self.yardstick = _core.Yardstick(self.device._engine)
+
+    def town(self, count: int, hidden: float) -> towns.Town:
+        """A town of this run's seed."""
+        return towns.make(count, hidden, self.seed)
+
+    def depth(self, scene: towns.Town, size: Size) -> DepthImage:
+        """The walls as they are rendered."""
+        return self.device.render_depth(self.device.occluders(scene.vertices, scene.triangles), scene.view.camera(size))
+
+    def cull(
+        self,
+        instances: Instances,
+        camera: Camera,
+        pyramid: Pyramid,
+        *,
+        certified: bool = True,
+        groups: bool | None = False,
+        order: str = "stable",
+        outputs: tuple[bool, bool, bool, bool] = MASK,
+        depth: DepthImage | None = None,
+    ) -> _core.YardstickCull:
+        """A cull that was recorded into buffers of its own; ``.ms()`` submits it, and waits."""
+        return self.yardstick.cull(
+            instances._inner, camera._inner, pyramid._inner, certified, groups, order, outputs,
+            None if depth is None else depth._inner,
+        )  # fmt: skip

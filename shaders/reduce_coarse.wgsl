@@ -1,0 +1,58 @@
+// One coarse level alone, straight from the depth image, in one dispatch: a texel takes 16x16 pixels and more.
+//
+// Up to 32x32 pixels an invocation reads them all; larger texels are shared by the 64 invocations of a workgroup. Bits are
+// sanitized before they are compared, so -0 and NaN cannot break the integer order, and nothing begins with a depth of 1
+// that would cap larger ones (both faults of the usual atomicMin on float bits).
+
+// A texel is shared by a workgroup.
+override SHARED: bool;
+
+const WORKGROUP: u32 = 64u;
+// The workgroup's invocations along a side of its texel.
+const SIDE_LOG2: u32 = 3u;
+
+var<workgroup> parts: array<u32, WORKGROUP>;
+
+// The farthest depth of `side` x `side` quads.
+fn block(begin: vec2<u32>, side: u32) -> u32 {
+    var bits = source_quad(begin.x, begin.y);
+    // What lies past the edge repeats it.
+    let end = min(begin + vec2<u32>(side), (textureDimensions(source) + vec2<u32>(1u)) / 2u);
+    for (var y = begin.y; y < end.y; y += 4u) {
+        for (var x = begin.x; x < end.x; x += 1u) {
+            bits = farthest(bits, farthest4(source_column(x, y)));
+        }
+    }
+    return bits;
+}
+
+@compute @workgroup_size(64, 1)
+fn reduce_coarse(
+    @builtin(global_invocation_id) id: vec3<u32>,
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    if id.x == 0u && id.y == 0u {
+        chunk_0[0] = vec4<u32>(step.reduction, 0u, 0u, 0u);
+    }
+    let level = pyramid.levels[step.last];
+    // Quads along a side of a texel.
+    let side = 1u << (step.last - 1u);
+    if !SHARED {
+        if id.x < step.blocks.x && id.y < step.blocks.y {
+            store(level.offset + id.y * level.stride + id.x, block(id.xy * side, side));
+        }
+        return;
+    }
+    let part = side >> SIDE_LOG2;
+    let at = vec2<u32>(lane & ((1u << SIDE_LOG2) - 1u), lane >> SIDE_LOG2);
+    parts[lane] = block(group.xy * side + at * part, part);
+    workgroupBarrier();
+    if lane == 0u {
+        var bits = parts[0];
+        for (var i = 1u; i < WORKGROUP; i += 1u) {
+            bits = farthest(bits, parts[i]);
+        }
+        store(level.offset + group.y * level.stride + group.x, bits);
+    }
+}
