@@ -390,7 +390,7 @@ class Device:
             or, where that cannot decide, ``"volume"``: their own outline, and in each texel their own depth there.
             Keeps less and computes more; with a descent it comes down to single pixels.
         hierarchy : bool, optional
-            Whether whole groups of 64 instances that lie together are tested first, and one by one only the instances of
+            Whether whole groups of 64 instances that lie together are tested first, and one by one only instances of
             the groups that are left. None: where there are enough of them for it to pay. What is kept differs by next
             to nothing (a group's test may read other texels); ``stats`` says how many tests were spent.
         outputs : collection of "mask", "verdicts", "indices", "draws"; optional
