@@ -5,10 +5,9 @@ use crate::camera::Camera;
 use crate::compact;
 use crate::error::{Error, Result};
 use crate::gpu::{CullKey, Gpu, ReportKey, StandIn};
-use crate::instances::{Instances, Piece};
+use crate::instances::{Instances, Piece, bind_records};
 use crate::layout::CULL_WORKGROUP;
 use crate::pyramid::{Built, Pyramid, entry};
-use crate::records::Records;
 use crate::shader::TexelStore;
 use crate::view::{EPS, ViewRows};
 use crate::visible::{PieceOutput, Visible};
@@ -273,9 +272,15 @@ impl Seen {
         Ok(Self { built, texels, key })
     }
 
-    /// The bindings for these options.
+    /// The bindings for these options; those of the last cull, if it asked for the same.
     fn bind(&self, gpu: &Gpu, camera: &Camera, pyramid: &Pyramid, options: &CullOptions) -> Result<wgpu::BindGroup> {
-        let view = gpu.uniform("hiz.cull.view", &ViewUniform::new(camera, self.built.reduction, options)?)?;
+        let uniform = ViewUniform::new(camera, self.built.reduction, options)?;
+        let key = (self.key.texels, bytemuck::cast(uniform));
+        pyramid.bindings(key, || self.create(gpu, pyramid, &uniform))
+    }
+
+    fn create(&self, gpu: &Gpu, pyramid: &Pyramid, uniform: &ViewUniform) -> Result<wgpu::BindGroup> {
+        let view = gpu.uniform("hiz.cull.view", uniform)?;
         let mut entries = vec![
             entry(0, wgpu::BindingResource::TextureView(&self.built.source)),
             entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
@@ -292,14 +297,6 @@ impl Seen {
             entries: &entries,
         }))
     }
-}
-
-fn bind_piece(gpu: &Gpu, uniform: &wgpu::Buffer, records: &Records) -> wgpu::BindGroup {
-    gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("hiz.cull.instances"),
-        layout: &gpu.layouts().instances,
-        entries: &[entry(0, uniform.as_entire_binding()), entry(1, wgpu::BindingResource::TextureView(&records.view))],
-    })
 }
 
 fn bind_output(gpu: &Gpu, piece: &Piece, visible: &Visible, p: usize, statistics: bool) -> wgpu::BindGroup {
@@ -378,7 +375,7 @@ pub(crate) fn record(
             record_groups(gpu, &mut pass, key, piece, output);
             pass.set_bind_group(0, &view, &[]);
         }
-        pass.set_bind_group(1, &bind_piece(gpu, &piece.uniform, &piece.records), &[]);
+        pass.set_bind_group(1, &piece.bindings, &[]);
         pass.set_bind_group(2, &bind_output(gpu, piece, visible, p, report.statistics), &[]);
         if groups.is_some() {
             let groups = output.groups_or_new(gpu, piece);
@@ -438,7 +435,7 @@ fn record_groups(gpu: &Gpu, pass: &mut wgpu::ComputePass<'_>, key: CullKey, piec
         ],
     });
     pass.set_pipeline(&gpu.cull_groups_pipeline(CullKey { kind: BoundsKind::Box, descent: true, ..key }));
-    pass.set_bind_group(1, &bind_piece(gpu, &piece.groups_uniform, &piece.group_records), &[]);
+    pass.set_bind_group(1, &piece.group_bindings, &[]);
     pass.set_bind_group(2, &survivors, &[]);
     pass.dispatch_workgroups(piece.groups().div_ceil(CULL_WORKGROUP), 1, 1);
 }
@@ -483,7 +480,7 @@ pub(crate) fn record_explain(
         .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.explain.pass"), timestamp_writes: None });
     pass.set_pipeline(&gpu.explain_pipeline(seen.key));
     pass.set_bind_group(0, &view, &[]);
-    pass.set_bind_group(1, &bind_piece(gpu, &which, &piece.records), &[]);
+    pass.set_bind_group(1, &bind_records(gpu, &which, &piece.records), &[]);
     pass.set_bind_group(2, &output, &[]);
     pass.dispatch_workgroups(1, 1, 1);
     Ok(())

@@ -13,6 +13,7 @@ use crate::groups::{GROUP, Groups, Source};
 use crate::host;
 use crate::layout::{CULL_WORKGROUP, piece_capacity};
 use crate::morton;
+use crate::pyramid::entry;
 use crate::records::{Records, Upload};
 
 /// In which order instances are stored. The indices that come out are the caller's in either.
@@ -111,8 +112,10 @@ pub(crate) struct Piece {
     /// One `BoxRecord` a group.
     pub(crate) group_records: Records,
     pub(crate) uniform: wgpu::Buffer,
-    /// The groups as a piece.
-    pub(crate) groups_uniform: wgpu::Buffer,
+    /// What a cull of the instances reads.
+    pub(crate) bindings: wgpu::BindGroup,
+    /// What a cull of the groups reads: a piece of boxes.
+    pub(crate) group_bindings: wgpu::BindGroup,
     pub(crate) order: PieceOrder,
 }
 
@@ -289,8 +292,21 @@ fn packed(
         let words = count.div_ceil(32);
         gpu.uniform("hiz.instances.piece", &PieceUniform { base: range.start, count, index, words })
     };
-    let (uniform, groups_uniform) = (uniform(count)?, uniform(num_groups)?);
-    Ok((Piece { range, records, group_records, uniform, groups_uniform, order }, groups, [upload, groups_upload]))
+    let uniform_of_groups = uniform(num_groups)?;
+    let uniform = uniform(count)?;
+    let bindings = bind_records(gpu, &uniform, &records);
+    let group_bindings = bind_records(gpu, &uniform_of_groups, &group_records);
+    let piece = Piece { range, records, group_records, uniform, bindings, group_bindings, order };
+    Ok((piece, groups, [upload, groups_upload]))
+}
+
+/// A piece's uniform and records as a cull reads them.
+pub(crate) fn bind_records(gpu: &Gpu, uniform: &wgpu::Buffer, records: &Records) -> wgpu::BindGroup {
+    gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("hiz.cull.instances"),
+        layout: &gpu.layouts().instances,
+        entries: &[entry(0, uniform.as_entire_binding()), entry(1, wgpu::BindingResource::TextureView(&records.view))],
+    })
 }
 
 /// Writes box records, one after the other.

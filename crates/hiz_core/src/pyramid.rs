@@ -4,10 +4,11 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::camera::{Camera, ImageSize};
+use crate::cull::ViewUniform;
 use crate::error::{Error, Result};
 use crate::gpu::{ContextId, Gpu, ReduceKey, ReduceShape, StandIn};
 use crate::layout::{Level, MAX_LEVELS, PYRAMID_CHUNKS, PyramidLayout, Step, StoredLevels};
-use crate::shader::SourceKind;
+use crate::shader::{SourceKind, TexelStore};
 
 /// Invocations of a workgroup of the reduction, all in a row.
 const REDUCE_WORKGROUP: u32 = 64;
@@ -65,7 +66,15 @@ pub struct Pyramid {
     pub(crate) uniform: wgpu::Buffer,
     built: Mutex<Option<Built>>,
     copy: Mutex<Option<TextureCopy>>,
+    /// The last bindings of culls, of instances and of groups: many culls see the same view.
+    bindings: Mutex<Vec<(BindingsKey, wgpu::BindGroup)>>,
 }
+
+/// Where a cull reads the levels, and the words of its view (`ViewUniform`), which name the reduction.
+pub(crate) type BindingsKey = (TexelStore, [u32; size_of::<ViewUniform>() / 4]);
+
+/// How many bindings are kept.
+const KEPT_BINDINGS: usize = 4;
 
 /// The stored levels in a texture as well, for culls of many instances (`shaders/shared/texels_texture.wgsl`).
 #[derive(Debug)]
@@ -121,7 +130,15 @@ impl Pyramid {
             "hiz.pyramid.layout",
             &PyramidUniform { levels, chunk_shift, first_stored: first, last_stored: last, padding: 0 },
         )?;
-        Ok(Self { context: gpu.id(), layout, chunks, uniform, built: Mutex::new(None), copy: Mutex::new(None) })
+        Ok(Self {
+            context: gpu.id(),
+            layout,
+            chunks,
+            uniform,
+            built: Mutex::new(None),
+            copy: Mutex::new(None),
+            bindings: Mutex::new(Vec::new()),
+        })
     }
 
     /// The depth image's size.
@@ -150,6 +167,24 @@ impl Pyramid {
         let copy = self.copy.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let copy = copy.as_ref().map_or(0, |c| 4 * u64::from(c.texture.width()) * u64::from(c.texture.height()));
         self.chunks.iter().map(wgpu::Buffer::size).sum::<u64>() + copy
+    }
+
+    /// The bindings of this key, made where they are not among the last ones.
+    pub(crate) fn bindings(
+        &self,
+        key: BindingsKey,
+        make: impl FnOnce() -> Result<wgpu::BindGroup>,
+    ) -> Result<wgpu::BindGroup> {
+        let mut kept = self.bindings.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some((_, bindings)) = kept.iter().find(|(k, _)| *k == key) {
+            return Ok(bindings.clone());
+        }
+        let bindings = make()?;
+        if kept.len() == KEPT_BINDINGS {
+            kept.remove(0);
+        }
+        kept.push((key, bindings.clone()));
+        Ok(bindings)
     }
 
     /// Whether a copy in a texture pays for a cull of `instances`: it costs about as much a texel as it saves an instance
@@ -346,6 +381,8 @@ pub(crate) fn record_reduce(
         pass.dispatch_workgroups(workgroups[0].max(1), workgroups[1].max(1), 1);
     }
     drop(pass);
+    // They hold the last depth image.
+    pyramid.bindings.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clear();
     *pyramid.built.lock().unwrap_or_else(std::sync::PoisonError::into_inner) =
         Some(Built { reduction, source: depth.clone(), source_kind, camera: camera.clone() });
     Ok(())

@@ -33,27 +33,49 @@ pub(crate) fn read_buffers(
     if total == 0 {
         return Ok(vec![Vec::new(); ranges.len()]);
     }
-    let staging = staging(device, total);
     let mut encoder =
         device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("hiz.readback.encoder") });
-    let mut offset = 0;
-    for range in ranges.iter().filter(|r| r.size > 0) {
-        encoder.copy_buffer_to_buffer(range.buffer, range.offset, &staging, offset, range.size);
-        offset += range.size;
-    }
+    let staged = Staged::record(device, &mut encoder, ranges);
     let submission = queue.submit([encoder.finish()]);
-    with_mapped(device, &staging, submission, |bytes| {
-        let mut begin = 0;
-        ranges
-            .iter()
-            .map(|r| {
-                let end = begin + r.size as usize;
-                let part = host::collected(bytes[begin..end].iter().copied(), "readback");
-                begin = end;
-                part
-            })
-            .collect()
-    })?
+    staged.read(device, submission)
+}
+
+/// Ranges of buffers that wait in a staging area: recorded with what fills them, they take no submit of their own.
+#[derive(Debug)]
+pub(crate) struct Staged {
+    staging: wgpu::Buffer,
+    sizes: Vec<u64>,
+}
+
+impl Staged {
+    /// Records the copies of ranges that are not empty in all.
+    pub(crate) fn record(
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        ranges: &[BufferRange<'_>],
+    ) -> Self {
+        let sizes: Vec<_> = ranges.iter().map(|range| range.size).collect();
+        let staging = staging(device, sizes.iter().sum());
+        let mut offset = 0;
+        for range in ranges.iter().filter(|range| range.size > 0) {
+            encoder.copy_buffer_to_buffer(range.buffer, range.offset, &staging, offset, range.size);
+            offset += range.size;
+        }
+        Self { staging, sizes }
+    }
+
+    /// Waits for the submission of the copies; the ranges, in their order.
+    pub(crate) fn read(&self, device: &wgpu::Device, submission: wgpu::SubmissionIndex) -> Result<Vec<Vec<u8>>> {
+        with_mapped(device, &self.staging, submission, |bytes| {
+            let mut rest = bytes;
+            let parts = self.sizes.iter().map(|size| {
+                let (part, behind) = rest.split_at(*size as usize);
+                rest = behind;
+                host::collected(part.iter().copied(), "readback")
+            });
+            parts.collect()
+        })?
+    }
 }
 
 fn read_in_bands(device: &wgpu::Device, queue: &wgpu::Queue, range: &BufferRange<'_>) -> Result<Vec<u8>> {

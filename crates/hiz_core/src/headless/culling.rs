@@ -14,11 +14,14 @@ use crate::host;
 use crate::instances::{Instances, Piece};
 use crate::lists::{DrawIndexedIndirect, Lists};
 use crate::pyramid::Pyramid;
-use crate::readback::{self, BufferRange};
+use crate::readback::{self, BufferRange, Staged};
 use crate::visible::{
     CounterRecord, GroupOutput, PieceOutput, STORAGE, StatisticsRecord, SurvivorsRecord, Visible, VisibleOptions,
     verdicts_offset,
 };
+
+/// Up to this size, of 131,072 instances, a mask is copied to where it can be read by the submit of its cull.
+const STAGED_MASK_BYTES: u64 = 1 << 14;
 
 /// The verdicts of `shaders/shared/verdict.wgsl` that are told from others here.
 const VISIBLE: u8 = 2;
@@ -93,6 +96,8 @@ pub struct Culling {
     pub(super) options: CullOptions,
     pub(super) output: VisibleOptions,
     pub(super) visible: Visible,
+    /// A small mask, copied by the cull's own submit.
+    pub(super) staged_mask: Mutex<Option<Staged>>,
     pub(super) later: OnceLock<Lists>,
     pub(super) submission: wgpu::SubmissionIndex,
     pub(super) submitted: Instant,
@@ -128,6 +133,31 @@ impl Culling {
         *locked(&self.timings)
     }
 
+    /// Records the copy of a mask that is asked for and so small that a submit of its own would cost more.
+    pub(super) fn stage_mask(
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &Instances,
+        visible: &Visible,
+    ) -> Option<Staged> {
+        let bytes: u64 = instances.pieces.iter().map(|piece| 4 * u64::from(piece.words())).sum();
+        let is_small = visible.outputs().mask && (1..=STAGED_MASK_BYTES).contains(&bytes);
+        is_small.then(|| Staged::record(device, encoder, &mask_ranges(instances, visible)))
+    }
+
+    /// The words of the masks of all pieces.
+    fn mask_words(&self) -> Result<Vec<Vec<u8>>> {
+        // Whoever comes first takes it; a second reader copies again.
+        let Some(staged) = locked(&self.staged_mask).take() else {
+            return self.read(&mask_ranges(&self.instances, &self.visible));
+        };
+        self.wait()?;
+        let start = Instant::now();
+        let bytes = self.engine.scoped(|| staged.read(self.engine.device(), self.submission.clone()))?;
+        locked(&self.timings).readback_ms += milliseconds(start, Instant::now());
+        Ok(bytes)
+    }
+
     fn read(&self, ranges: &[BufferRange<'_>]) -> Result<Vec<Vec<u8>>> {
         self.wait()?;
         let start = Instant::now();
@@ -142,8 +172,7 @@ impl Culling {
     /// [`Error::Mismatch`] for a cull without [`Outputs::mask`], [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn mask(&self) -> Result<Vec<bool>> {
         self.require("mask", self.visible.outputs().mask)?;
-        let planes =
-            self.read(&self.ranges(|piece, output| BufferRange::first(&output.mask, 4 * u64::from(piece.words()))))?;
+        let planes = self.mask_words()?;
         let mut mask = host::list(self.instances.len() as usize, "mask")?;
         for (piece, plane) in self.instances.pieces.iter().zip(planes) {
             let words = host::collected(to_u32(&plane), "mask")?;
@@ -281,8 +310,7 @@ impl Culling {
         let capacity = u64::from(self.visible.capacity());
         let outputs = self.visible.outputs();
         if outputs.mask {
-            let words = self
-                .read(&self.ranges(|piece, output| BufferRange::first(&output.mask, 4 * u64::from(piece.words()))))?;
+            let words = self.mask_words()?;
             let demand = words.iter().flat_map(|bytes| to_u32(bytes)).map(|word| u64::from(word.count_ones())).sum();
             return Ok((demand, capacity.min(demand)));
         }
@@ -363,6 +391,17 @@ impl Culling {
         })?;
         Ok(explanation(&bytemuck::pod_read_unaligned(&bytes[0]), &self.camera))
     }
+}
+
+/// The masks of all pieces.
+fn mask_ranges<'a>(instances: &Instances, visible: &'a Visible) -> Vec<BufferRange<'a>> {
+    let words = instances.pieces.iter().map(Piece::words);
+    visible
+        .pieces
+        .iter()
+        .zip(words)
+        .map(|(output, words)| BufferRange::first(&output.mask, 4 * u64::from(words)))
+        .collect()
 }
 
 /// The stages of `shaders/shared/classify.wgsl`.

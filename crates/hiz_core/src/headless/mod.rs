@@ -341,6 +341,7 @@ impl Engine {
             let visible = self.context().create_visible(instances, output)?;
             let mut encoder = self.encoder("hiz.cull.encoder");
             self.context().record_cull(&mut encoder, instances, camera, pyramid, &visible, options)?;
+            let staged_mask = Culling::stage_mask(self.device(), &mut encoder, instances, &visible);
             let recorded = Instant::now();
             let submission = self.queue().submit([encoder.finish()]);
             Ok(Culling {
@@ -351,6 +352,7 @@ impl Engine {
                 options: options.clone(),
                 output: *output,
                 visible,
+                staged_mask: Mutex::new(staged_mask),
                 later: OnceLock::new(),
                 submission,
                 submitted: Instant::now(),
