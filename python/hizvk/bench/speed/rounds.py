@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,15 +13,13 @@ if TYPE_CHECKING:
 
     from ...scenes import Floats
 
-    Way: TypeAlias = Callable[[], float]
-
 __all__ = ["WARM", "in_turns", "quartiles"]
 
 #: Rounds before those that count: compilations and page faults.
 WARM = 2
 
 
-def in_turns(ways: Mapping[str, Way], rounds: int) -> dict[str, Floats]:
+def in_turns(ways: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, Floats]:
     """Milliseconds of each way in each round; every round begins with another way.
 
     Parameters
