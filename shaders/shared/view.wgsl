@@ -1,4 +1,4 @@
-// What one cull knows of its camera (twin: `crates/hiz_core/src/cull.rs`, ViewUniform).
+// What one cull knows of its camera (twin: `crates/hiz_core/src/cull/view_uniform.rs`, ViewUniform).
 
 struct View {
     // Rows, linear functions m . (d, 1) of the position d about the reference point. Times w: pixel column right of the image's

@@ -169,7 +169,7 @@ impl Culling {
     /// Whether each instance is kept.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without [`Outputs::mask`], [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::Mismatch`] for a cull without [`Outputs::mask`](crate::Outputs::mask), [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn mask(&self) -> Result<Vec<bool>> {
         self.require("mask", self.visible.outputs().mask)?;
         let planes = self.mask_words()?;
@@ -184,7 +184,7 @@ impl Culling {
     /// Each instance's verdict: 0 outside, 1 occluded, 2 visible, 3 invalid (kept).
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without [`Outputs::verdicts`], [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::Mismatch`] for a cull without [`Outputs::verdicts`](crate::Outputs::verdicts), [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn verdicts(&self) -> Result<Vec<u8>> {
         self.require("verdicts", self.visible.outputs().verdicts)?;
         let of_members = self.read(&self.ranges(|piece, output| BufferRange {
@@ -248,7 +248,7 @@ impl Culling {
     /// How many instances met which end.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without [`Outputs::verdicts`], [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::Mismatch`] for a cull without [`Outputs::verdicts`](crate::Outputs::verdicts), [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn counts(&self) -> Result<Counts> {
         self.require("verdicts", self.visible.outputs().verdicts)?;
         let engine = &self.engine;

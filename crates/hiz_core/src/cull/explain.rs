@@ -1,0 +1,53 @@
+//! The explanation of a single verdict: the cull's own steps for one instance.
+
+use super::{CullInputs, Seen};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::instances::bind_records;
+use crate::pyramid::entry;
+
+/// `shaders/explain.wgsl`, `Explanation`.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct ExplanationRecord {
+    pub(crate) verdict: u32,
+    pub(crate) stage: u32,
+    pub(crate) level: u32,
+    pub(crate) farthest_bits: u32,
+    pub(crate) pixels: [i32; 4],
+    pub(crate) texels: [u32; 4],
+    pub(crate) texel_bits: [u32; 4],
+    pub(crate) depths: [f32; 2],
+    pub(crate) padding: [f32; 2],
+}
+
+/// Records the explanation of instance `index` into `target`, `size_of::<ExplanationRecord>()` bytes of storage.
+pub(crate) fn record_explain(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    inputs: &CullInputs<'_>,
+    index: u32,
+    target: &wgpu::Buffer,
+) -> Result<()> {
+    let instances = inputs.instances;
+    let piece = instances.pieces.iter().find(|p| p.range.contains(&index)).ok_or_else(|| {
+        Error::invalid("index", format!("expected an instance below {}, got {index}", instances.len()))
+    })?;
+    let seen = Seen::new(gpu, inputs, None)?;
+    let view = seen.bind(gpu, inputs.camera, inputs.pyramid, inputs.options)?;
+    let place = piece.order.place((index - piece.range.start) as usize) as u32;
+    let which = gpu.uniform("hiz.explain.which", &[place, 0, 0, 0])?;
+    let output = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("hiz.explain.target"),
+        layout: &gpu.layouts().one_storage,
+        entries: &[entry(0, target.as_entire_binding())],
+    });
+    let mut pass = encoder
+        .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.explain.pass"), timestamp_writes: None });
+    pass.set_pipeline(&gpu.explain_pipeline(seen.key));
+    pass.set_bind_group(0, &view, &[]);
+    pass.set_bind_group(1, &bind_records(gpu, &which, &piece.records), &[]);
+    pass.set_bind_group(2, &output, &[]);
+    pass.dispatch_workgroups(1, 1, 1);
+    Ok(())
+}

@@ -1,0 +1,259 @@
+//! The cull pass: one camera, one pyramid, one set of instances.
+
+mod explain;
+mod options;
+mod view_uniform;
+
+pub(crate) use explain::{ExplanationRecord, record_explain};
+pub use options::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
+pub(crate) use view_uniform::ViewUniform;
+
+use crate::bounds::BoundsKind;
+use crate::camera::Camera;
+use crate::compact;
+use crate::error::{Error, Result};
+use crate::gpu::{CullKey, Gpu, ReportKey, StandIn};
+use crate::instances::{Instances, Piece};
+use crate::layout::CULL_WORKGROUP;
+use crate::pyramid::{Built, Pyramid, entry};
+use crate::shader::TexelStore;
+use crate::visible::{PieceOutput, Visible};
+
+/// What a cull reads.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct CullInputs<'a> {
+    pub(crate) instances: &'a Instances,
+    pub(crate) camera: &'a Camera,
+    pub(crate) pyramid: &'a Pyramid,
+    pub(crate) options: &'a CullOptions,
+    /// False: the yardstick, for boxes and the flat cull alone.
+    pub(crate) certified: bool,
+}
+
+/// What the shader knows of camera and pyramid, and the pipeline that asks for it.
+struct Seen {
+    built: Built,
+    /// The stored levels in a texture, where that pays.
+    texels: Option<wgpu::TextureView>,
+    key: CullKey,
+}
+
+impl Seen {
+    /// For `encoder`, which takes the copy of the levels where one is needed; without it there is none.
+    fn new(gpu: &Gpu, inputs: &CullInputs<'_>, encoder: Option<&mut wgpu::CommandEncoder>) -> Result<Self> {
+        let CullInputs { instances, camera, pyramid, options, .. } = *inputs;
+        gpu.check_context("instances", instances.context)?;
+        gpu.check_context("pyramid", pyramid.context)?;
+        let built = pyramid.built_for(camera)?;
+        let texels = encoder
+            .filter(|_| pyramid.texture_pays(gpu, instances.len()))
+            .map(|encoder| pyramid.record_texture(gpu, encoder, built.reduction));
+        let key = CullKey {
+            source: built.source_kind,
+            texels: if texels.is_some() { TexelStore::Texture } else { TexelStore::Buffer },
+            kind: instances.kind,
+            reversed: camera.convention().is_reversed(),
+            chunks: if texels.is_some() { 1 } else { pyramid.chunks.len() },
+            sample_coverage: options.coverage == Coverage::Sample,
+            footprint_log2: options.footprint.log2(),
+            descent: options.descent > 0,
+            fit_volume: options.fit == Fit::Volume,
+        };
+        Ok(Self { built, texels, key })
+    }
+
+    /// The bindings for these options; those of the last cull, if it asked for the same.
+    fn bind(&self, gpu: &Gpu, camera: &Camera, pyramid: &Pyramid, options: &CullOptions) -> Result<wgpu::BindGroup> {
+        let uniform = ViewUniform::new(camera, self.built.reduction, options)?;
+        let key = (self.key.texels, bytemuck::cast(uniform));
+        pyramid.bindings(key, || self.create(gpu, pyramid, &uniform))
+    }
+
+    fn create(&self, gpu: &Gpu, pyramid: &Pyramid, uniform: &ViewUniform) -> Result<wgpu::BindGroup> {
+        let view = gpu.uniform("hiz.cull.view", uniform)?;
+        let mut entries = vec![
+            entry(0, wgpu::BindingResource::TextureView(&self.built.source)),
+            entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
+            entry(2, pyramid.uniform.as_entire_binding()),
+            entry(6, view.as_entire_binding()),
+        ];
+        match &self.texels {
+            Some(texels) => entries.push(entry(3, wgpu::BindingResource::TextureView(texels))),
+            None => entries.extend((0..3).map(|c| entry(3 + c, pyramid.chunk(gpu, c as usize).as_entire_binding()))),
+        }
+        Ok(gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("hiz.cull.view"),
+            layout: gpu.layouts().cull(self.key.source, self.key.texels),
+            entries: &entries,
+        }))
+    }
+}
+
+fn bind_output(gpu: &Gpu, piece: &Piece, visible: &Visible, p: usize, statistics: bool) -> wgpu::BindGroup {
+    let lists = visible.lists.as_ref();
+    let list = lists.map_or(gpu.stand_in(StandIn::List), |lists| lists.pieces[p].bound());
+    let draws = lists.map_or(gpu.stand_in(StandIn::Draws), |lists| &lists.draws);
+    // Any uniform will do where nothing is listed.
+    let capacity = lists.map_or(&piece.uniform, |lists| &lists.capacity_uniform);
+    let statistics = if statistics { visible.statistics_or_new(gpu) } else { gpu.stand_in(StandIn::Statistics) };
+    gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("hiz.cull.visible"),
+        layout: &gpu.layouts().visible,
+        entries: &[
+            entry(0, visible.pieces[p].mask.as_entire_binding()),
+            entry(1, list.as_entire_binding()),
+            entry(2, draws.as_entire_binding()),
+            entry(3, statistics.as_entire_binding()),
+            entry(4, capacity.as_entire_binding()),
+        ],
+    })
+}
+
+pub(crate) fn record(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    inputs: &CullInputs<'_>,
+    visible: &Visible,
+) -> Result<()> {
+    let CullInputs { instances, camera, pyramid, options, .. } = *inputs;
+    gpu.check_context("visible", visible.context)?;
+    if !visible.counts().iter().copied().eq(instances.pieces.iter().map(Piece::count)) {
+        return Err(Error::mismatch("visible", "expected buffers that were created for these instances, got others"));
+    }
+    let seen = Seen::new(gpu, inputs, Some(encoder))?;
+    let key = seen.key;
+    let view = seen.bind(gpu, camera, pyramid, options)?;
+    let group_view = if instances.pieces.iter().any(|piece| is_grouped(piece, options)) {
+        let options = CullOptions { descent: options.descent.max(GROUP_DESCENT), ..options.clone() };
+        Some(seen.bind(gpu, camera, pyramid, &options)?)
+    } else {
+        None
+    };
+    let report = report_key(visible, options);
+    record_clears(gpu, encoder, inputs, visible, report)?;
+    let mut pass = encoder
+        .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.cull.pass"), timestamp_writes: None });
+    pass.set_bind_group(0, &view, &[]);
+    for (p, (piece, output)) in instances.pieces.iter().zip(&visible.pieces).enumerate() {
+        let groups = group_view.as_ref().filter(|_| is_grouped(piece, options));
+        if let Some(group_view) = groups {
+            pass.set_bind_group(0, group_view, &[]);
+            record_groups(gpu, &mut pass, key, piece, output);
+            pass.set_bind_group(0, &view, &[]);
+        }
+        pass.set_bind_group(1, &piece.bindings, &[]);
+        pass.set_bind_group(2, &bind_output(gpu, piece, visible, p, report.statistics), &[]);
+        if groups.is_some() {
+            record_members(gpu, &mut pass, (key, report), piece, output);
+        } else {
+            let pipeline = if inputs.certified { Gpu::cull_pipeline } else { Gpu::yardstick_cull_pipeline };
+            pass.set_pipeline(&pipeline(gpu, key, report));
+            pass.dispatch_workgroups(piece.groups().div_ceil(GROUPS_OF_RUN), 1, 1);
+        }
+    }
+    if let Some(lists) = visible.lists.as_ref().filter(|_| options.order == Order::Stable) {
+        compact::record(gpu, &mut pass, instances, visible, lists);
+    }
+    Ok(())
+}
+
+/// What the cull itself writes; an ordered list is made from the mask.
+fn report_key(visible: &Visible, options: &CullOptions) -> ReportKey {
+    let outputs = visible.outputs();
+    let listed = outputs.indices || outputs.draws;
+    let ordered = listed && options.order == Order::Stable;
+    ReportKey {
+        mask: outputs.mask || ordered,
+        verdicts: outputs.verdicts,
+        append: listed && !ordered,
+        list: outputs.indices && !ordered,
+        capped: visible.is_capped(),
+        statistics: options.statistics,
+    }
+}
+
+/// Whatever is counted, appended to or set bit by bit begins at nothing.
+fn record_clears(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    inputs: &CullInputs<'_>,
+    visible: &Visible,
+    report: ReportKey,
+) -> Result<()> {
+    if let Some(lists) = &visible.lists {
+        lists.record_clear(encoder);
+    }
+    if report.statistics {
+        encoder.clear_buffer(visible.statistics_or_new(gpu), 0, None);
+    }
+    for (piece, output) in inputs.instances.pieces.iter().zip(&visible.pieces) {
+        if report.mask {
+            encoder.clear_buffer(&output.mask, 0, Some(4 * u64::from(piece.words().max(1))));
+        }
+        if is_grouped(piece, inputs.options) {
+            let (from, to) = (gpu.no_survivors()?, &output.groups_or_new(gpu, piece).survivors);
+            encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
+        }
+    }
+    Ok(())
+}
+
+/// Groups whose members one workgroup tests; `shaders/shared/survivors.wgsl`, `RUN`.
+pub(crate) const GROUPS_OF_RUN: u32 = 8;
+
+/// Texels of finer levels that a group's test may read: a box around 64 instances is large, so its footprint is coarse
+/// (`docs/performance.md`).
+const GROUP_DESCENT: u32 = 32;
+
+/// From how many instances on groups are culled first: fewer are tested one by one before the groups' own dispatches have begun
+/// (`docs/performance.md`).
+const GROUPS_PAY_FROM: u32 = 16_384;
+
+/// Whether the groups of a piece are culled before its instances.
+pub(crate) fn is_grouped(piece: &Piece, options: &CullOptions) -> bool {
+    match options.hierarchy {
+        Hierarchy::Never => false,
+        Hierarchy::Always => piece.count() > 0,
+        Hierarchy::Auto => piece.count() >= GROUPS_PAY_FROM,
+    }
+}
+
+/// The boxes of a piece's groups, and what is left of them.
+fn record_groups(gpu: &Gpu, pass: &mut wgpu::ComputePass<'_>, key: CullKey, piece: &Piece, output: &PieceOutput) {
+    let groups = output.groups_or_new(gpu, piece);
+    let survivors = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("hiz.cull.groups"),
+        layout: &gpu.layouts().survivors,
+        entries: &[
+            entry(0, groups.survivors.as_entire_binding()),
+            entry(1, groups.verdicts.as_entire_binding()),
+            entry(2, wgpu::BindingResource::TextureView(&groups.survivor_list)),
+        ],
+    });
+    pass.set_pipeline(&gpu.cull_groups_pipeline(CullKey { kind: BoundsKind::Box, descent: true, ..key }));
+    pass.set_bind_group(1, &piece.group_bindings, &[]);
+    pass.set_bind_group(2, &survivors, &[]);
+    pass.dispatch_workgroups(piece.groups().div_ceil(CULL_WORKGROUP), 1, 1);
+}
+
+/// The members of the groups that are left.
+fn record_members(
+    gpu: &Gpu,
+    pass: &mut wgpu::ComputePass<'_>,
+    (key, report): (CullKey, ReportKey),
+    piece: &Piece,
+    output: &PieceOutput,
+) {
+    let groups = output.groups_or_new(gpu, piece);
+    let survivors = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("hiz.cull.survivors"),
+        layout: &gpu.layouts().members,
+        entries: &[
+            entry(0, groups.survivors.as_entire_binding()),
+            entry(1, wgpu::BindingResource::TextureView(&groups.survivor_list)),
+        ],
+    });
+    pass.set_bind_group(3, &survivors, &[]);
+    pass.set_pipeline(&gpu.cull_members_pipeline(key, report));
+    pass.dispatch_workgroups_indirect(&groups.survivors, 0);
+}

@@ -1,0 +1,132 @@
+//! What the shader knows of a camera and of the options.
+
+use super::options::{Coverage, CullOptions};
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::view::{EPS, ViewRows};
+
+/// `shaders/shared/view.wgsl`, `View`.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct ViewUniform {
+    pub(crate) x: [f32; 4],
+    pub(crate) y: [f32; 4],
+    pub(crate) z: [f32; 4],
+    pub(crate) w: [f32; 4],
+    pub(crate) magnitudes: [f32; 4],
+    pub(crate) constant_magnitudes: [f32; 4],
+    pub(crate) eye_hi: [f32; 3],
+    pub(crate) z_slope: f32,
+    pub(crate) eye_lo: [f32; 3],
+    pub(crate) halves_size: f32,
+    pub(crate) half_size: [f32; 2],
+    pub(crate) reach: f32,
+    pub(crate) depth_factor: f32,
+    pub(crate) size: [i32; 2],
+    pub(crate) runtime_zero: u32,
+    pub(crate) reduction: u32,
+    pub(crate) descent_budget: u32,
+    pub(crate) depth_offset: f32,
+    pub(crate) coordinate_limit: f32,
+    pub(crate) padding: u32,
+}
+
+const _: () = assert!(size_of::<ViewUniform>() == 176);
+
+impl ViewUniform {
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "multiples of 2^-8 and sizes below 2^15 are exact, the factor is rounded towards far"
+    )]
+    pub(crate) fn new(camera: &Camera, reduction: u32, options: &CullOptions) -> Result<Self> {
+        let range = |name: &str, value: f64, most: f64| {
+            if (0.0..=most).contains(&value) {
+                Ok(value)
+            } else {
+                Err(Error::invalid(name, format!("expected a number in 0..={most}, got {value}")))
+            }
+        };
+        let slack = range("depth_slack", options.depth_slack, 0.5)?;
+        let slack_abs = range("depth_slack_abs", options.depth_slack_abs, 0.5)?;
+        range("descent", f64::from(options.descent), 65_536.0)?;
+        let kappa = range("transform_slack", options.transform_slack, 1e6)?;
+        let guard = match (options.guard_px, options.coverage) {
+            (Some(g), _) => range("guard_px", g, 16.0)?,
+            (None, Coverage::Area) => 0.0,
+            (None, Coverage::Sample) => 1.0 / 64.0,
+        };
+        if (guard * 256.0).fract() != 0.0 {
+            return Err(Error::invalid("guard_px", format!("expected a multiple of 1/256, got {guard}")));
+        }
+        let reach = match options.coverage {
+            Coverage::Area => guard,
+            Coverage::Sample => guard - 0.5,
+        };
+        // Rounded towards far; what the product itself rounds away stays (docs/accuracy.md).
+        let depth_factor = if camera.convention().is_reversed() {
+            -crate::view::round_up(slack - 1.0)
+        } else {
+            crate::view::round_up(1.0 + slack)
+        };
+        // The product and the sum in the shader lose less than 2^-24 each where the depth stays below 1: that is added here. 0
+        // adds nothing and loses nothing.
+        let depth_offset = if slack_abs > 0.0 { crate::view::round_up(slack_abs + EPS) } else { 0.0 };
+        let depth_offset = if camera.convention().is_reversed() { -depth_offset } else { depth_offset };
+        let rows = ViewRows::new(camera, kappa)?;
+        let size = camera.size();
+        let all = [rows.x, rows.y, rows.z, rows.w];
+        Ok(Self {
+            x: rows.x.m,
+            y: rows.y.m,
+            z: rows.z.m,
+            w: rows.w.m,
+            magnitudes: all.map(|row| row.a[..3].iter().copied().fold(0.0, f32::max)),
+            constant_magnitudes: all.map(|row| row.a[3]),
+            eye_hi: rows.eye_hi,
+            z_slope: rows.z_slope,
+            eye_lo: rows.eye_lo,
+            halves_size: crate::view::round_up(halves_size(&rows)),
+            half_size: [size.width as f32 / 2.0, size.height as f32 / 2.0],
+            reach: reach as f32,
+            depth_factor,
+            size: [size.width as i32, size.height as i32],
+            runtime_zero: 0,
+            reduction,
+            descent_budget: options.descent,
+            depth_offset,
+            coordinate_limit: rows.coordinate_limit,
+            padding: 0,
+        })
+    }
+}
+
+/// What low halves of positions near the eye come to, all axes added: those of the eye, and twice 2^-24 of the high halves, for theirs
+/// and for what both cannot hold; and a little, for the roundings of this sum.
+fn halves_size(rows: &ViewRows) -> f64 {
+    let sum = |v: [f32; 3]| v.iter().map(|v| f64::from(v.abs())).sum::<f64>();
+    sum(rows.eye_lo) * (1.0 + EPS) + EPS * (1.0 + 1.0 / 256.0) * sum(rows.eye_hi)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{DepthConvention, ImageSize};
+
+    /// Slack is never less than what was asked for: a factor rounded to nearest would be, half of the time.
+    #[test]
+    fn the_depth_factor_is_rounded_towards_far() {
+        for (convention, z) in
+            [(DepthConvention::Standard, [0.0, 0.0, 1.0, -1.0]), (DepthConvention::Reversed, [0.0, 0.0, 0.0, 1.0])]
+        {
+            let rows = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], z, [0.0, 0.0, 1.0, 0.0]];
+            let camera = Camera::from_clip_from_world(rows, ImageSize::new(8, 8), convention).unwrap();
+            for k in 0..100 {
+                let depth_slack = 0.5 * 10.0_f64.powf(-f64::from(k) / 8.0);
+                let options = CullOptions { depth_slack, ..CullOptions::default() };
+                let factor = f64::from(ViewUniform::new(&camera, 0, &options).unwrap().depth_factor);
+                let moved = if convention.is_reversed() { 1.0 - factor } else { factor - 1.0 };
+                assert!(moved >= depth_slack && moved <= depth_slack + EPS, "{convention:?} {depth_slack}: {factor}");
+            }
+        }
+    }
+}

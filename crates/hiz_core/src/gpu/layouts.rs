@@ -1,0 +1,116 @@
+//! The bind group layouts, one place for all passes.
+
+use crate::shader::{SOURCES, SourceKind, TexelStore};
+
+/// The bind group layouts.
+#[derive(Debug)]
+pub(crate) struct Layouts {
+    reduce: [wgpu::BindGroupLayout; 3],
+    cull: [[wgpu::BindGroupLayout; 2]; 3],
+    /// A piece and its records.
+    pub(crate) instances: wgpu::BindGroupLayout,
+    /// What a cull writes.
+    pub(crate) visible: wgpu::BindGroupLayout,
+    pub(crate) compact: wgpu::BindGroupLayout,
+    /// What a cull of groups writes.
+    pub(crate) survivors: wgpu::BindGroupLayout,
+    pub(crate) count: wgpu::BindGroupLayout,
+    /// What a cull of members reads of it.
+    pub(crate) members: wgpu::BindGroupLayout,
+    pub(crate) update: wgpu::BindGroupLayout,
+    pub(crate) one_uniform: wgpu::BindGroupLayout,
+    pub(crate) one_storage: wgpu::BindGroupLayout,
+    pub(crate) occluder_view: wgpu::BindGroupLayout,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Binding {
+    Texture(SourceKind),
+    Sampler,
+    Uniform,
+    Read,
+    Write,
+    ReadRecords,
+    WriteRecords,
+    ReadTexels,
+    WriteTexels,
+}
+
+impl Layouts {
+    pub(super) fn new(device: &wgpu::Device) -> Self {
+        use Binding::{Read, ReadRecords, ReadTexels, Sampler, Texture, Uniform, Write, WriteRecords, WriteTexels};
+        let layout = |label: &str, entries: &[(u32, Binding)]| {
+            let entries: Vec<_> = entries.iter().map(|(binding, kind)| layout_entry(*binding, *kind)).collect();
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+        };
+        Self {
+            reduce: SOURCES.map(|s| {
+                layout(
+                    "hiz.reduce.layout",
+                    &[(0, Texture(s)), (1, Sampler), (2, Uniform), (3, Write), (4, Write), (5, Write)],
+                )
+            }),
+            cull: SOURCES.map(|s| {
+                let with = |texels: &[(u32, Binding)]| {
+                    let others = [(0, Texture(s)), (1, Sampler), (2, Uniform), (6, Uniform)];
+                    layout("hiz.cull.view_layout", &[&others, texels].concat())
+                };
+                [with(&[(3, Read), (4, Read), (5, Read)]), with(&[(3, ReadTexels)])]
+            }),
+            instances: layout("hiz.cull.instances_layout", &[(0, Uniform), (1, ReadRecords)]),
+            visible: layout("hiz.cull.visible_layout", &[(0, Write), (1, Write), (2, Write), (3, Write), (4, Uniform)]),
+            compact: layout(
+                "hiz.compact.layout",
+                &[(0, Uniform), (1, Read), (2, Write), (3, Write), (4, Write), (5, Uniform)],
+            ),
+            survivors: layout("hiz.cull_groups.layout", &[(0, Write), (1, Write), (2, WriteTexels)]),
+            members: layout("hiz.cull_members.layout", &[(0, Read), (1, ReadTexels)]),
+            count: layout("hiz.count.layout", &[(0, Uniform), (1, Read), (2, Read), (3, Write)]),
+            update: layout("hiz.update.layout", &[(0, Uniform), (1, Read), (2, Read), (3, WriteRecords), (4, Write)]),
+            one_uniform: layout("hiz.uniform_layout", &[(0, Uniform)]),
+            one_storage: layout("hiz.storage_layout", &[(0, Write)]),
+            occluder_view: device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some("hiz.occluders.layout"),
+                entries: &[wgpu::BindGroupLayoutEntry {
+                    visibility: wgpu::ShaderStages::VERTEX,
+                    ..layout_entry(0, Uniform)
+                }],
+            }),
+        }
+    }
+
+    pub(crate) fn reduce(&self, source: SourceKind) -> &wgpu::BindGroupLayout {
+        &self.reduce[source as usize]
+    }
+
+    pub(crate) fn cull(&self, source: SourceKind, texels: TexelStore) -> &wgpu::BindGroupLayout {
+        &self.cull[source as usize][texels as usize]
+    }
+}
+
+fn layout_entry(binding: u32, kind: Binding) -> wgpu::BindGroupLayoutEntry {
+    let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let storage_texture = |format, access| wgpu::BindingType::StorageTexture {
+        access,
+        format,
+        view_dimension: wgpu::TextureViewDimension::D2,
+    };
+    let records = |access| storage_texture(crate::records::FORMAT, access);
+    let texels = |access| storage_texture(wgpu::TextureFormat::R32Uint, access);
+    wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::COMPUTE,
+        ty: match kind {
+            Binding::Texture(source) => source.binding(),
+            Binding::Sampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering),
+            Binding::Uniform => buffer(wgpu::BufferBindingType::Uniform),
+            Binding::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
+            Binding::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
+            Binding::ReadRecords => records(wgpu::StorageTextureAccess::ReadOnly),
+            Binding::WriteRecords => records(wgpu::StorageTextureAccess::WriteOnly),
+            Binding::ReadTexels => texels(wgpu::StorageTextureAccess::ReadOnly),
+            Binding::WriteTexels => texels(wgpu::StorageTextureAccess::WriteOnly),
+        },
+        count: None,
+    }
+}
