@@ -116,3 +116,18 @@ def test_the_interpreter_runs_while_the_device_works(device: hizvk.Device) -> No
     assert end - start > 0.01, "too fast to tell"
     inside = sum(start < tick < end for tick in ticks)
     assert inside >= 3, f"{inside} ticks of this thread in a call of {1000 * (end - start):.0f} ms"
+
+
+def test_many_threads_cull_a_crowd_that_copies_the_levels(device: hizvk.Device) -> None:
+    """The first of them copies the pyramid's levels into a texture; nobody may look before."""
+    rng = np.random.default_rng(8)
+    centers = rng.uniform((-20, -20, -30), (20, 20, -2), (40_000, 3)).astype(np.float32)
+    crowd = device.instances(hizvk.Spheres(centers, np.full(len(centers), 0.1, np.float32)))
+    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=70, size=(64, 96), near=0.125)
+    for _ in range(6):
+        pyramid = device.pyramid(np.full(camera.size, 8.0), camera, kind="z")
+        with ThreadPoolExecutor(8) as pool:
+            seen = [pool.submit(device.cull, crowd, camera, pyramid) for _ in range(8)]
+            counts = [int(result.result().mask.sum()) for result in seen]
+        assert len(set(counts)) == 1
+        assert counts[0] < len(centers) // 2

@@ -46,6 +46,8 @@ struct Shared {
     /// Why the device was lost, once it is; and errors that no scope caught.
     lost: Arc<Mutex<Option<String>>>,
     uncaught: Arc<Mutex<Option<String>>>,
+    /// Held by a cull that may copy a pyramid's levels, from recording to submit.
+    copying: Mutex<()>,
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
@@ -97,7 +99,17 @@ impl Engine {
             locked(&uncaught_to).get_or_insert(error.to_string());
         }));
         let context = HizContext::with_planted_faults(&device, faults)?;
-        Ok(Self { shared: Arc::new(Shared { context, device, queue, adapter: summary, lost, uncaught }) })
+        Ok(Self {
+            shared: Arc::new(Shared {
+                context,
+                device,
+                queue,
+                adapter: summary,
+                lost,
+                uncaught,
+                copying: Mutex::new(()),
+            }),
+        })
     }
 
     /// The adapter.
@@ -340,10 +352,14 @@ impl Engine {
         self.scoped(|| {
             let visible = self.context().create_visible(instances, output)?;
             let mut encoder = self.encoder("hiz.cull.encoder");
+            // Of several threads one records the copy of the levels: it must also be the first to submit.
+            let copies = pyramid.texture_pays(&self.context().gpu, instances.len());
+            let turn = copies.then(|| locked(&self.shared.copying));
             self.context().record_cull(&mut encoder, instances, camera, pyramid, &visible, options)?;
             let staged_mask = Culling::stage_mask(self.device(), &mut encoder, instances, &visible);
             let recorded = Instant::now();
             let submission = self.queue().submit([encoder.finish()]);
+            drop(turn);
             Ok(Culling {
                 engine: self.clone(),
                 instances: Arc::clone(instances),
