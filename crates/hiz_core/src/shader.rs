@@ -154,18 +154,18 @@ fn uncertified() -> String {
 }
 
 fn flat_frame() -> String {
-    [wgsl!("shared/piece"), wgsl!("shared/survivors"), wgsl!("shared/report"), wgsl!("cull")].join("\n")
+    [wgsl!("shared/piece"), wgsl!("shared/groups"), wgsl!("shared/report"), wgsl!("cull")].join("\n")
 }
 
 /// The cull of groups.
 pub(crate) fn cull_groups(source: SourceKind, texels: TexelStore) -> String {
-    let entry = [wgsl!("shared/piece"), wgsl!("shared/survivors"), wgsl!("cull_groups")].join("\n");
+    let entry = [wgsl!("shared/piece"), wgsl!("shared/groups"), wgsl!("cull_groups")].join("\n");
     classifying(source, texels, BoundsKind::Box, &entry)
 }
 
 /// The cull of the members of the groups that are left.
 pub(crate) fn cull_members(source: SourceKind, texels: TexelStore, kind: BoundsKind) -> String {
-    let entry = [wgsl!("shared/piece"), wgsl!("shared/report"), wgsl!("shared/survivors"), wgsl!("cull_members")];
+    let entry = [wgsl!("shared/piece"), wgsl!("shared/report"), wgsl!("shared/groups"), wgsl!("cull_members")];
     classifying(source, texels, kind, &entry.join("\n"))
 }
 
@@ -181,7 +181,7 @@ pub(crate) fn compact() -> String {
 
 /// The count of verdicts.
 pub(crate) fn count() -> String {
-    [wgsl!("shared/verdict"), wgsl!("shared/piece"), wgsl!("shared/survivors"), wgsl!("count")].join("\n")
+    [wgsl!("shared/verdict"), wgsl!("shared/piece"), wgsl!("shared/groups"), wgsl!("count")].join("\n")
 }
 
 /// The update of records and groups.
@@ -365,11 +365,11 @@ mod tests {
         assert!(wgsl!("cull_groups").contains(&format!("WORKGROUP: u32 = {workgroup}u;")));
         assert!(wgsl!("update").contains(&format!("@workgroup_size({workgroup})")));
         let group = format!("GROUP: u32 = {}u;", crate::groups::GROUP);
-        assert!(wgsl!("shared/survivors").contains(&group));
+        assert!(wgsl!("shared/groups").contains(&group));
         let run = format!("RUN: u32 = {}u;", crate::cull::GROUPS_OF_RUN);
-        assert!(wgsl!("shared/survivors").contains(&run));
+        assert!(wgsl!("shared/groups").contains(&run));
         let survivors = format!("SURVIVORS_PER_ROW_LOG2: u32 = {}u;", crate::visible::SURVIVORS_PER_ROW.ilog2());
-        assert!(wgsl!("shared/survivors").contains(&survivors));
+        assert!(wgsl!("shared/groups").contains(&survivors));
         let copy = format!("COPY_ROW_LOG2: u32 = {}u;", crate::pyramid::COPY_ROW.ilog2());
         assert!(wgsl!("shared/texels_texture").contains(&copy));
         let per_row = format!("RECORDS_PER_ROW_LOG2: u32 = {}u;", crate::records::RECORDS_PER_ROW.ilog2());

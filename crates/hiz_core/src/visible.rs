@@ -82,7 +82,7 @@ pub(crate) struct SurvivorsRecord {
 /// Before the groups are tested.
 pub(crate) const NO_SURVIVORS: SurvivorsRecord = SurvivorsRecord { workgroups: [0, 1, 1], count: 0 };
 
-/// Groups in a row of the survivors' list; `shaders/shared/survivors.wgsl`.
+/// Groups in a row of the survivors' list; `shaders/shared/groups.wgsl`.
 pub(crate) const SURVIVORS_PER_ROW: u32 = 4096;
 
 /// Places that `shaders/count.wgsl` reads at once.

@@ -198,7 +198,7 @@ fn record_clears(
     Ok(())
 }
 
-/// Groups whose members one workgroup tests; `shaders/shared/survivors.wgsl`, `RUN`.
+/// Groups whose members one workgroup tests; `shaders/shared/groups.wgsl`, `RUN`.
 pub(crate) const GROUPS_OF_RUN: u32 = 8;
 
 /// Texels of finer levels that a group's test may read: a box around 64 instances is large, so its footprint is coarse
