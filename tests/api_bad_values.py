@@ -474,7 +474,7 @@ TABLES: dict[str, Table] = {
             "footprint": FOOTPRINT,
             "descent": DESCENT,
             "fit": FIT,
-            "hierarchy": [(1, TypeError, "expected True or False, got int 1"), ("auto", TypeError, "got str")],
+            "hierarchy": [(1, TypeError, "expected True, False or None, got int 1"), ("auto", TypeError, "got str")],
             "outputs": [
                 ("mask", TypeError, "expected None or a collection of"),
                 (["masks"], ValueError, 'expected one of "mask", "verdicts", "indices", "draws"'),

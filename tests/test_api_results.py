@@ -144,6 +144,24 @@ def test_what_was_not_asked_for_is_not_there(
         _ = culled(device, camera, order=order, outputs=()).mask
 
 
+def test_a_hidden_group_is_explained_and_counted(device: hizvk.Device, camera: hizvk.Camera) -> None:
+    # 64 together behind the wall, and one in view: two groups, the second of one member.
+    centers = np.array([[0.01 * i, 0, -20] for i in range(64)] + [[0, 0, -2]])
+    crowd = device.instances(hizvk.Spheres(centers, np.full(65, 0.05)), order="given")
+    pyramid = device.pyramid(np.full(camera.size, 8.0), camera, kind="z")
+    seen = device.cull(crowd, camera, pyramid, hierarchy=True)
+    assert seen.verdicts.tolist() == [Verdict.OCCLUDED] * 64 + [Verdict.VISIBLE]
+    assert (seen.stats.tested_groups, seen.stats.tested_instances) == (2, 1)
+    told = seen.explain(7)
+    assert told.verdict == Verdict.OCCLUDED
+    assert "group" in told.reason
+    assert seen.explain(64).verdict == Verdict.VISIBLE
+    full = device.cull(crowd, camera, pyramid, outputs=["indices"], order="any", capacity=1, hierarchy=False)
+    assert full.count == 1
+    with pytest.raises(ValueError, match="a list that is full"):
+        _ = full.demand
+
+
 def test_draw_arguments(device: hizvk.Device, camera: hizvk.Camera) -> None:
     template = hizvk.DrawTemplate(36, first_index=6, base_vertex=-2, first_instance=0)
     draws = culled(device, camera, draw=template).draws

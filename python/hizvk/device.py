@@ -529,8 +529,9 @@ def cull_options(
 ) -> CullOptions:
     """The checked options of a cull, in the engine's order."""
     order = _arguments.choice("order", order, ("stable", "any"))
-    if hierarchy is not None:
-        hierarchy = _arguments.flag("hierarchy", hierarchy)
+    if hierarchy is not None and not isinstance(hierarchy, (bool, np.bool_)):
+        raise TypeError(f"hierarchy: expected True, False or None, got {_arguments.describe(hierarchy)}")
+    hierarchy = None if hierarchy is None else bool(hierarchy)
     # An ordered list can be made later, one in the order of the device cannot.
     computed = _outputs(outputs, (True, True, order == "any", order == "any"))
     if guard_px is not None:

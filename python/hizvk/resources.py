@@ -116,7 +116,9 @@ class Instances:
         update costs about as much as the upload of as many instances without the sort, and results are always right.
         But groups whose members part are large, and large boxes are hidden less often: once most instances have moved
         farther than neighbours lie apart, a new `Device.instances` (a re-sort) makes culls as fast as at first. It
-        pays when it costs less than what the culls until the next one save by it.
+        pays when it costs less than what the culls until the next one save by it. After an update that failed (for lack
+        of memory), groups that are touched are no longer tested as a whole: results stay right, and new instances are
+        fast again.
 
         Parameters
         ----------

@@ -206,7 +206,7 @@ class CullResult:
         return self._culling.counts()
 
     @cached_property
-    def _demand_and_written(self) -> tuple[int, int]:
+    def _demand_and_written(self) -> tuple[int | None, int]:
         return self._culling.demand_and_written()
 
     @property
@@ -216,8 +216,17 @@ class CullResult:
 
     @property
     def demand(self) -> int:
-        """Instances that were kept and belong into the list; more than `count` if the capacity was too small."""
-        return self._demand_and_written[0]
+        """Instances that were kept and belong into the list; more than `count` if the capacity was too small.
+
+        Raises
+        ------
+        ValueError
+            For a full list of a cull that was asked for nothing else: ask for ``"mask"`` or ``"verdicts"`` as well.
+        """
+        demand = self._demand_and_written[0]
+        if demand is None:
+            raise ValueError('outputs: expected "mask" or "verdicts" beside a list that is full, got neither')
+        return demand
 
     @property
     def stats(self) -> CullStats:
@@ -258,7 +267,8 @@ class CullResult:
         try:
             index = _arguments.integer("index", index, low=0, high=count - 1)
         except ValueError:
-            raise IndexError(f"index: expected an integer in 0..{count - 1}, got {index}") from None
+            expected = f"an integer in 0..{count - 1}" if count else "nothing, for there are no instances"
+            raise IndexError(f"index: expected {expected}, got {index}") from None
         told = self._culling.explain(index)
         rectangle = None if told.rectangle is None else tuple(told.rectangle)
         return Explanation(

@@ -186,9 +186,7 @@ impl HizContext {
 
     /// Records the cull of `instances` against `pyramid`, whose depth image must be `camera`'s; `visible` takes what is found.
     ///
-    /// The first cull after a reduction that has as many instances as the pyramid has texels copies the levels into a texture, for
-    /// itself and later ones: submit it before those. One that runs before the copy, or after an encoder with the copy was dropped,
-    /// keeps everything; the next reduction mends that.
+    /// A cull of as many instances as the pyramid has texels copies the levels into a texture first, which costs less than it saves.
     ///
     /// # Errors
     /// [`Error::Mismatch`] for objects that do not belong together, [`Error::Invalid`] for unusable options or cameras.

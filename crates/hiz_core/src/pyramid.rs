@@ -66,6 +66,8 @@ pub struct Pyramid {
     pub(crate) uniform: wgpu::Buffer,
     built: Mutex<Option<Built>>,
     copy: Mutex<Option<TextureCopy>>,
+    /// The reduction that is known to have been submitted: what was only recorded may never run.
+    submitted: AtomicU32,
     /// The last bindings of culls, of instances and of groups: many culls see the same view.
     bindings: Mutex<Vec<(BindingsKey, wgpu::BindGroup)>>,
 }
@@ -80,7 +82,7 @@ const KEPT_BINDINGS: usize = 4;
 #[derive(Debug)]
 struct TextureCopy {
     texture: wgpu::Texture,
-    /// The reduction of which a copy was recorded. The header goes with it: a cull that runs before the copy keeps everything.
+    /// The reduction of which a copy is known to have been submitted; 0: none.
     reduction: u32,
 }
 
@@ -137,6 +139,7 @@ impl Pyramid {
             uniform,
             built: Mutex::new(None),
             copy: Mutex::new(None),
+            submitted: AtomicU32::new(0),
             bindings: Mutex::new(Vec::new()),
         })
     }
@@ -196,7 +199,29 @@ impl Pyramid {
             && 1 << self.layout.chunk_shift >= COPY_ROW
     }
 
-    /// The copy of reduction `reduction`, which is recorded if it was not before.
+    /// What was recorded of this pyramid's reduction has been submitted.
+    pub(crate) fn confirm_submitted(&self) {
+        self.submitted.store(self.built().map_or(0, |built| built.reduction), Ordering::Release);
+    }
+
+    /// A cull that recorded a copy has been submitted, behind the reduction if that was.
+    pub(crate) fn confirm_copied(&self) {
+        let reduction = self.built().map_or(0, |built| built.reduction);
+        let mut copy = self.copy.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        // Nothing there: somebody else's call failed, and forgot it.
+        if let Some(copy) = copy.as_mut().filter(|_| self.submitted.load(Ordering::Acquire) == reduction) {
+            copy.reduction = reduction;
+        }
+    }
+
+    /// Something failed on the device: nothing that was made for culls is kept.
+    pub(crate) fn forget(&self) {
+        *self.copy.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = None;
+        self.bindings.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clear();
+    }
+
+    /// The copy of reduction `reduction`, which is recorded if it is not known to be there. (The header goes with it: a cull that
+    /// runs before the reduction keeps everything.)
     pub(crate) fn record_texture(
         &self,
         gpu: &Gpu,
@@ -206,7 +231,6 @@ impl Pyramid {
         let mut copy = self.copy.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let copy = copy.get_or_insert_with(|| TextureCopy { texture: self.copy_texture(gpu), reduction: 0 });
         if copy.reduction != reduction {
-            copy.reduction = reduction;
             let rows_of_chunk = (1 << self.layout.chunk_shift) / COPY_ROW;
             for (c, (chunk, texels)) in (0..).zip(self.chunks.iter().zip(self.layout.chunk_sizes())) {
                 // A chunk is less than 2^31 texels. Whole rows, and what is left.

@@ -128,7 +128,7 @@ impl Culling {
     }
 
     /// How many instances are kept, and how many of them are listed.
-    fn demand_and_written(&self, py: Python<'_>) -> PyResult<(u64, u64)> {
+    fn demand_and_written(&self, py: Python<'_>) -> PyResult<(Option<u64>, u64)> {
         detached(py, || self.0.demand_and_written())
     }
 

@@ -1,8 +1,9 @@
 //! The explanation of a single verdict: the cull's own steps for one instance.
 
-use super::{CullInputs, Seen};
+use super::{CullInputs, Seen, group_key, group_options};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::groups::GROUP;
 use crate::instances::bind_records;
 use crate::pyramid::entry;
 
@@ -21,22 +22,28 @@ pub(crate) struct ExplanationRecord {
     pub(crate) padding: [f32; 2],
 }
 
-/// Records the explanation of instance `index` into `target`, `size_of::<ExplanationRecord>()` bytes of storage.
+/// Records the explanation of instance `index`, or of the box around its group, into `target`, `size_of::<ExplanationRecord>()` bytes of storage.
 pub(crate) fn record_explain(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
     inputs: &CullInputs<'_>,
-    index: u32,
+    (index, whole_group): (u32, bool),
     target: &wgpu::Buffer,
 ) -> Result<()> {
     let instances = inputs.instances;
     let piece = instances.pieces.iter().find(|p| p.range.contains(&index)).ok_or_else(|| {
         Error::invalid("index", format!("expected an instance below {}, got {index}", instances.len()))
     })?;
-    let seen = Seen::new(gpu, inputs, None)?;
-    let view = seen.bind(gpu, inputs.camera, inputs.pyramid, inputs.options)?;
-    let place = piece.order.place((index - piece.range.start) as usize) as u32;
-    let which = gpu.uniform("hiz.explain.which", &[place, 0, 0, 0])?;
+    let mut seen = Seen::new(gpu, inputs, None)?;
+    let place = piece.order.place((index - piece.range.start) as usize);
+    let (which, records, view) = if whole_group {
+        seen.key = group_key(seen.key);
+        let view = seen.bind(gpu, inputs.camera, inputs.pyramid, &group_options(inputs.options))?;
+        (place / GROUP, &piece.group_records, view)
+    } else {
+        (place, &piece.records, seen.bind(gpu, inputs.camera, inputs.pyramid, inputs.options)?)
+    };
+    let which = gpu.uniform("hiz.explain.which", &[which as u32, 0, 0, 0])?;
     let output = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("hiz.explain.target"),
         layout: &gpu.layouts().one_storage,
@@ -46,7 +53,7 @@ pub(crate) fn record_explain(
         .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.explain.pass"), timestamp_writes: None });
     pass.set_pipeline(&gpu.explain_pipeline(seen.key));
     pass.set_bind_group(0, &view, &[]);
-    pass.set_bind_group(1, &bind_records(gpu, &which, &piece.records), &[]);
+    pass.set_bind_group(1, &bind_records(gpu, &which, records), &[]);
     pass.set_bind_group(2, &output, &[]);
     pass.dispatch_workgroups(1, 1, 1);
     Ok(())

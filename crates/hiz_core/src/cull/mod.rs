@@ -124,8 +124,7 @@ pub(crate) fn record(
     let key = seen.key;
     let view = seen.bind(gpu, camera, pyramid, options)?;
     let group_view = if instances.pieces.iter().any(|piece| is_grouped(piece, options)) {
-        let options = CullOptions { descent: options.descent.max(GROUP_DESCENT), ..options.clone() };
-        Some(seen.bind(gpu, camera, pyramid, &options)?)
+        Some(seen.bind(gpu, camera, pyramid, &group_options(options))?)
     } else {
         None
     };
@@ -209,6 +208,16 @@ const GROUP_DESCENT: u32 = 32;
 /// (`docs/performance.md`).
 const GROUPS_PAY_FROM: u32 = 16_384;
 
+/// The options of a group's test.
+fn group_options(options: &CullOptions) -> CullOptions {
+    CullOptions { descent: options.descent.max(GROUP_DESCENT), ..options.clone() }
+}
+
+/// The pipeline of a group's test.
+fn group_key(key: CullKey) -> CullKey {
+    CullKey { kind: BoundsKind::Box, descent: true, ..key }
+}
+
 /// Whether the groups of a piece are culled before its instances.
 pub(crate) fn is_grouped(piece: &Piece, options: &CullOptions) -> bool {
     match options.hierarchy {
@@ -230,7 +239,7 @@ fn record_groups(gpu: &Gpu, pass: &mut wgpu::ComputePass<'_>, key: CullKey, piec
             entry(2, wgpu::BindingResource::TextureView(&groups.survivor_list)),
         ],
     });
-    pass.set_pipeline(&gpu.cull_groups_pipeline(CullKey { kind: BoundsKind::Box, descent: true, ..key }));
+    pass.set_pipeline(&gpu.cull_groups_pipeline(group_key(key)));
     pass.set_bind_group(1, &piece.group_bindings, &[]);
     pass.set_bind_group(2, &survivors, &[]);
     pass.dispatch_workgroups(piece.groups().div_ceil(CULL_WORKGROUP), 1, 1);

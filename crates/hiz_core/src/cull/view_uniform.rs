@@ -72,7 +72,13 @@ impl ViewUniform {
         // adds nothing and loses nothing.
         let depth_offset = if slack_abs > 0.0 { crate::view::round_up(slack_abs + EPS) } else { 0.0 };
         let depth_offset = if camera.convention().is_reversed() { -depth_offset } else { depth_offset };
-        let rows = ViewRows::new(camera, kappa)?;
+        let rows = ViewRows::new(camera, kappa).map_err(|error| match ViewRows::new(camera, 0.0) {
+            Ok(_) if kappa > 0.0 => Error::invalid(
+                "transform_slack",
+                format!("expected a number that leaves room for this camera in float32, got {kappa}"),
+            ),
+            _ => error,
+        })?;
         let size = camera.size();
         let all = [rows.x, rows.y, rows.z, rows.w];
         Ok(Self {

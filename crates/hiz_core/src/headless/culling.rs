@@ -217,7 +217,7 @@ impl Culling {
     pub fn draws(&self) -> Result<Vec<DrawIndexedIndirect>> {
         let draws = match &self.visible.lists {
             Some(lists) => &lists.draws,
-            None => &self.later_lists()?.draws,
+            None => &self.later_lists("draws")?.draws,
         };
         let bytes = self.read(&[BufferRange::first(draws, draws.size())])?;
         Ok(bytemuck::pod_collect_to_vec(&bytes[0]))
@@ -230,7 +230,7 @@ impl Culling {
     pub fn indices(&self) -> Result<Vec<u32>> {
         let lists = match &self.visible.lists {
             Some(lists) if self.visible.outputs().indices => lists,
-            _ => self.later_lists()?,
+            _ => self.later_lists("indices")?,
         };
         let bytes = self.read(&[BufferRange::first(&lists.draws, lists.draws.size())])?;
         let draws: Vec<DrawIndexedIndirect> = bytemuck::pod_collect_to_vec(&bytes[0]);
@@ -268,22 +268,31 @@ impl Culling {
             Some(groups) => BufferRange::first(&groups.survivors, groups.survivors.size()),
             None => BufferRange::first(&output.mask, 0),
         }));
+        // The last group may have fewer members.
+        ranges.extend(self.ranges(|piece, output| match self.groups(piece, output) {
+            Some(groups) => BufferRange { buffer: &groups.verdicts, offset: groups.verdicts.size() - 4, size: 4 },
+            None => BufferRange::first(&output.mask, 0),
+        }));
         let statistics = self.visible.statistics().filter(|_| self.options.statistics);
         ranges.extend(statistics.map(|buffer| BufferRange::first(buffer, buffer.size())));
         let bytes = self.read(&ranges)?;
         let record: CounterRecord = bytemuck::pod_read_unaligned(&bytes[0]);
-        let (survivors, statistics) = bytes[1..].split_at(self.instances.num_pieces());
+        let (survivors, rest) = bytes[1..].split_at(self.instances.num_pieces());
+        let (last_verdicts, statistics) = rest.split_at(self.instances.num_pieces());
         let statistics: StatisticsRecord =
             statistics.first().map_or_else(StatisticsRecord::default, |bytes| bytemuck::pod_read_unaligned(bytes));
         let (mut tested_groups, mut tested_instances) = (0, 0);
-        for (piece, survivors) in self.instances.pieces.iter().zip(survivors) {
+        for ((piece, survivors), last) in self.instances.pieces.iter().zip(survivors).zip(last_verdicts) {
             let count = u64::from(piece.count());
             if survivors.is_empty() {
                 tested_instances += count;
-            } else {
-                let survivors: SurvivorsRecord = bytemuck::pod_read_unaligned(survivors);
-                tested_groups += u64::from(piece.groups());
-                tested_instances += (u64::from(survivors.count) * GROUP as u64).min(count);
+                continue;
+            }
+            let survivors: SurvivorsRecord = bytemuck::pod_read_unaligned(survivors);
+            tested_groups += u64::from(piece.groups());
+            tested_instances += u64::from(survivors.count) * GROUP as u64;
+            if last.first().is_some_and(|verdict| *verdict >= VISIBLE) {
+                tested_instances -= u64::from(piece.groups()) * GROUP as u64 - count;
             }
         }
         let demand = u64::from(record.visible) + u64::from(record.invalid);
@@ -302,31 +311,31 @@ impl Culling {
         })
     }
 
-    /// How many instances are kept, and how many of them the lists hold.
+    /// How many instances are kept, and how many of them the lists hold. The first is unknown to a cull that was asked for full lists
+    /// alone.
     ///
     /// # Errors
     /// [`Error::Mismatch`] for a cull that left nothing that tells, [`Error::DeviceLost`], [`Error::OutOfMemory`].
-    pub fn demand_and_written(&self) -> Result<(u64, u64)> {
+    pub fn demand_and_written(&self) -> Result<(Option<u64>, u64)> {
         let capacity = u64::from(self.visible.capacity());
         let outputs = self.visible.outputs();
         if outputs.mask {
             let words = self.mask_words()?;
             let demand = words.iter().flat_map(|bytes| to_u32(bytes)).map(|word| u64::from(word.count_ones())).sum();
-            return Ok((demand, capacity.min(demand)));
+            return Ok((Some(demand), capacity.min(demand)));
         }
         if outputs.verdicts {
             let counts = self.counts()?;
-            return Ok((counts.demand, counts.written));
+            return Ok((Some(counts.demand), counts.written));
         }
-        // Where there was room for all, the lists' lengths tell.
-        self.require("mask", !self.visible.is_capped())?;
         let written = self.draws()?.iter().map(|draw| u64::from(draw.instance_count)).sum();
-        Ok((written, written))
+        // Where there was room for all, the lists' lengths tell.
+        Ok(((written < capacity || !self.visible.is_capped()).then_some(written), written))
     }
 
     /// Lists that the cull did not leave, made from its mask when they are first asked for.
-    fn later_lists(&self) -> Result<&Lists> {
-        self.require("indices", self.visible.outputs().mask)?;
+    fn later_lists(&self, what: &str) -> Result<&Lists> {
+        self.require(what, self.visible.outputs().mask)?;
         if let Some(lists) = self.later.get() {
             return Ok(lists);
         }
@@ -370,6 +379,7 @@ impl Culling {
     pub fn explain(&self, index: u64) -> Result<Explanation> {
         let engine = &self.engine;
         let index = u32::try_from(index).unwrap_or(u32::MAX);
+        let whole_group = self.is_hidden_with_its_group(index)?;
         let bytes = engine.scoped(|| {
             let target = engine.device().create_buffer(&wgpu::BufferDescriptor {
                 label: Some("hiz.explain.target"),
@@ -385,11 +395,27 @@ impl Culling {
                 options: &self.options,
                 certified: true,
             };
-            record_explain(&engine.context().gpu, &mut encoder, &inputs, index, &target)?;
+            record_explain(&engine.context().gpu, &mut encoder, &inputs, (index, whole_group), &target)?;
             engine.queue().submit([encoder.finish()]);
             readback::read_buffers(engine.device(), engine.queue(), &[BufferRange::first(&target, target.size())])
         })?;
-        Ok(explanation(&bytemuck::pod_read_unaligned(&bytes[0]), &self.camera))
+        let mut told = explanation(&bytemuck::pod_read_unaligned(&bytes[0]), &self.camera);
+        if whole_group {
+            told.reason = "its group of 64 is hidden as a whole: the box around it is told of here";
+        }
+        Ok(told)
+    }
+
+    /// Whether this cull tested groups, and hid that of an instance.
+    fn is_hidden_with_its_group(&self, index: u32) -> Result<bool> {
+        let pieces = self.instances.pieces.iter().zip(&self.visible.pieces);
+        let Some((piece, output)) = pieces.into_iter().find(|(piece, _)| piece.range.contains(&index)) else {
+            return Ok(false);
+        };
+        let Some(groups) = self.groups(piece, output) else { return Ok(false) };
+        let group = piece.order.place((index - piece.range.start) as usize) / GROUP;
+        let verdict = self.read(&[BufferRange { buffer: &groups.verdicts, offset: 4 * group as u64, size: 4 }])?;
+        Ok(verdict[0].first().is_some_and(|verdict| *verdict < VISIBLE))
     }
 }
 

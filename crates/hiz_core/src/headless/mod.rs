@@ -285,6 +285,7 @@ impl Engine {
             let mut encoder = self.encoder("hiz.reduce.encoder");
             self.context().record_reduce(&mut encoder, &depth.view, &depth.camera, &pyramid)?;
             self.queue().submit([encoder.finish()]);
+            pyramid.confirm_submitted();
             Ok(Arc::new(pyramid))
         })
     }
@@ -349,17 +350,16 @@ impl Engine {
         output: &VisibleOptions,
     ) -> Result<Culling> {
         let start = Instant::now();
-        self.scoped(|| {
+        // Of several threads one records the copy of the levels: it must also be the first to submit.
+        let copies = pyramid.texture_pays(&self.context().gpu, instances.len());
+        let _turn = copies.then(|| locked(&self.shared.copying));
+        let culling = self.scoped(|| {
             let visible = self.context().create_visible(instances, output)?;
             let mut encoder = self.encoder("hiz.cull.encoder");
-            // Of several threads one records the copy of the levels: it must also be the first to submit.
-            let copies = pyramid.texture_pays(&self.context().gpu, instances.len());
-            let turn = copies.then(|| locked(&self.shared.copying));
             self.context().record_cull(&mut encoder, instances, camera, pyramid, &visible, options)?;
             let staged_mask = Culling::stage_mask(self.device(), &mut encoder, instances, &visible);
             let recorded = Instant::now();
             let submission = self.queue().submit([encoder.finish()]);
-            drop(turn);
             Ok(Culling {
                 engine: self.clone(),
                 instances: Arc::clone(instances),
@@ -374,7 +374,13 @@ impl Engine {
                 submitted: Instant::now(),
                 timings: Mutex::new(Timings { record_ms: milliseconds(start, recorded), ..Timings::default() }),
             })
-        })
+        });
+        if culling.is_err() {
+            pyramid.forget();
+        } else if copies {
+            pyramid.confirm_copied();
+        }
+        culling
     }
 
     /// Waits for everything that was submitted.
