@@ -222,7 +222,7 @@ pub(crate) fn chunk_shift(limits: &wgpu::Limits) -> u32 {
     (bytes / 4).ilog2().min(30)
 }
 
-/// Invocations of one workgroup of the cull; `shaders/cull.wgsl`, `WORKGROUP`.
+/// Invocations of one workgroup of the cull of groups and of updates; `shaders/cull_groups.wgsl`, `WORKGROUP`, and `update.wgsl`.
 pub(crate) const CULL_WORKGROUP: u32 = 128;
 
 /// How many instances one piece may hold: its records in one texture and one staging buffer, its verdicts in one binding, its
