@@ -13,14 +13,18 @@ const SIDE_LOG2: u32 = 3u;
 
 var<workgroup> parts: array<u32, WORKGROUP>;
 
-// The farthest depth of `side` x `side` quads.
-fn block(begin: vec2<u32>, side: u32) -> u32 {
-    var bits = source_quad(begin.x, begin.y);
-    // What lies past the edge repeats it.
-    let end = min(begin + vec2<u32>(side), (textureDimensions(source) + vec2<u32>(1u)) / 2u);
-    for (var y = begin.y; y < end.y; y += 4u) {
+// The farthest depth of `side` x `side` blocks of 8x8 pixels.
+fn farthest_of(begin: vec2<u32>, side: u32) -> u32 {
+    let image = pyramid.levels[0];
+    // What lies past the edge repeats it: a part that begins there takes its own first block.
+    let blocks = (vec2<u32>(image.width, image.height) + vec2<u32>(7u)) / 8u;
+    let end = max(min(begin + vec2<u32>(side), blocks), begin + vec2<u32>(1u));
+    var bits = near_bits();
+    for (var y = begin.y; y < end.y; y += 1u) {
         for (var x = begin.x; x < end.x; x += 1u) {
-            bits = farthest(bits, farthest4(source_column(x, y)));
+            let rows = source_quads(vec2<u32>(x, y));
+            let by_row = vec4<u32>(farthest4(rows[0]), farthest4(rows[1]), farthest4(rows[2]), farthest4(rows[3]));
+            bits = farthest(bits, farthest4(by_row));
         }
     }
     return bits;
@@ -36,17 +40,17 @@ fn reduce_coarse(
         chunk_0[0] = vec4<u32>(step.reduction, 0u, 0u, 0u);
     }
     let level = pyramid.levels[step.last];
-    // Quads along a side of a texel.
-    let side = 1u << (step.last - 1u);
+    // Blocks along a side of a texel.
+    let side = 1u << (step.last - 3u);
     if !SHARED {
         if id.x < step.blocks.x && id.y < step.blocks.y {
-            store(level.offset + id.y * level.stride + id.x, block(id.xy * side, side));
+            store(level.offset + id.y * level.stride + id.x, farthest_of(id.xy * side, side));
         }
         return;
     }
     let part = side >> SIDE_LOG2;
     let at = vec2<u32>(lane & ((1u << SIDE_LOG2) - 1u), lane >> SIDE_LOG2);
-    parts[lane] = block(group.xy * side + at * part, part);
+    parts[lane] = farthest_of(group.xy * side + at * part, part);
     workgroupBarrier();
     if lane == 0u {
         var bits = parts[0];

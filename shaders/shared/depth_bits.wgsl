@@ -12,6 +12,10 @@ fn far_bits() -> u32 {
     return select(ONE_BITS, 0u, REVERSED);
 }
 
+fn near_bits() -> u32 {
+    return select(0u, ONE_BITS, REVERSED);
+}
+
 // A depth as given: NaN and what lies outside 0..1 is far, subnormals and -0 are 0.
 // (Bits above 1's are numbers above 1, infinity, NaN, or anything with a sign.)
 fn sanitized(bits: u32) -> u32 {

@@ -1,30 +1,44 @@
-// Level 0 is a texture of float32 bits (r32uint): uploads travel so, for a driver may alter NaN and subnormals of a float texture. It is
-// read as a storage texture, texel by texel: faster than a gather on a software driver (docs/performance.md).
+// Level 0 is a texture of float32 bits, four pixels of a row a texel (rgba32uint): uploads travel so, for a driver may alter NaN and
+// subnormals of a float texture, and a software driver reads four pixels at once in less time than one (docs/performance.md).
+// Pixels of a row's last texel that lie past the image's width count as depth of its last ones.
 
-@group(0) @binding(0) var source: texture_storage_2d<r32uint, read>;
-
-fn raw_bits(x: u32, y: u32) -> u32 {
-    return textureLoad(source, vec2<u32>(x, y)).x;
-}
+@group(0) @binding(0) var source: texture_storage_2d<rgba32uint, read>;
 
 fn source_bits(x: u32, y: u32) -> u32 {
-    return sanitized(raw_bits(x, y));
+    return sanitized(textureLoad(source, vec2<u32>(x >> 2u, y))[x & 3u]);
 }
 
-// The farthest depth of the pixels (2x, 2y) to (2x + 1, 2y + 1), those past the edge replaced by the edge's.
-fn source_quad(x: u32, y: u32) -> u32 {
+// Quads of 2x2 pixels, the farthest depth of each: columns 4x to 4x + 3 of quads in their row y. Pixels past the edge are replaced by
+// ones at the edge.
+fn source_quad_row(x: u32, y: u32) -> vec4<u32> {
     let edge = textureDimensions(source) - vec2<u32>(1u);
     let first = min(vec2<u32>(2u * x, 2u * y), edge);
     let last = min(vec2<u32>(2u * x + 1u, 2u * y + 1u), edge);
-    return farthest_sanitized4(source_corners(vec4<u32>(first, last)));
+    let top_left = textureLoad(source, first);
+    let bottom_left = textureLoad(source, vec2<u32>(first.x, last.y));
+    let top_right = textureLoad(source, vec2<u32>(last.x, first.y));
+    let bottom_right = textureLoad(source, last);
+    return vec4<u32>(
+        farthest_sanitized4(vec4<u32>(top_left.xy, bottom_left.xy)),
+        farthest_sanitized4(vec4<u32>(top_left.zw, bottom_left.zw)),
+        farthest_sanitized4(vec4<u32>(top_right.xy, bottom_right.xy)),
+        farthest_sanitized4(vec4<u32>(top_right.zw, bottom_right.zw)));
 }
 
-// The same of four below each other, y to y + 3.
-fn source_column(x: u32, y: u32) -> vec4<u32> {
-    return vec4<u32>(source_quad(x, y), source_quad(x, y + 1u), source_quad(x, y + 2u), source_quad(x, y + 3u));
+// The same of the four rows of a block of 8x8 pixels.
+fn source_quads(block: vec2<u32>) -> array<vec4<u32>, 4> {
+    let y = 4u * block.y;
+    return array<vec4<u32>, 4>(
+        source_quad_row(block.x, y), source_quad_row(block.x, y + 1u),
+        source_quad_row(block.x, y + 2u), source_quad_row(block.x, y + 3u));
 }
 
 // The pixels at columns t.x and t.z and rows t.y and t.w, as given.
 fn source_corners(t: vec4<u32>) -> vec4<u32> {
-    return vec4<u32>(raw_bits(t.x, t.y), raw_bits(t.z, t.y), raw_bits(t.x, t.w), raw_bits(t.z, t.w));
+    let texel = t >> vec4<u32>(2u, 0u, 2u, 0u);
+    let left = t.x & 3u;
+    let right = t.z & 3u;
+    return vec4<u32>(
+        textureLoad(source, texel.xy)[left], textureLoad(source, texel.zy)[right],
+        textureLoad(source, texel.xw)[left], textureLoad(source, texel.zw)[right]);
 }

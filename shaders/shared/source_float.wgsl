@@ -14,13 +14,31 @@ fn quad_corner(x: u32, y: u32) -> vec2<f32> {
 }
 
 // Their farthest depth, those past the edge replaced by the edge's.
-fn source_quad(x: u32, y: u32) -> u32 {
+fn quad(x: u32, y: u32) -> u32 {
     return farthest_sanitized4(bitcast<vec4<u32>>(textureGather(0, source, source_sampler, quad_corner(x, y))));
 }
 
-// The same of four below each other, y to y + 3.
-fn source_column(x: u32, y: u32) -> vec4<u32> {
-    return vec4<u32>(source_quad(x, y), source_quad(x, y + 1u), source_quad(x, y + 2u), source_quad(x, y + 3u));
+// Such quads: columns 4x to 4x + 3 of them in their row y.
+fn source_quad_row(x: u32, y: u32) -> vec4<u32> {
+    return vec4<u32>(quad(4u * x, y), quad(4u * x + 1u, y), quad(4u * x + 2u, y), quad(4u * x + 3u, y));
+}
+
+fn quad_column(x: u32, y: u32) -> vec4<u32> {
+    return vec4<u32>(quad(x, y), quad(x, y + 1u), quad(x, y + 2u), quad(x, y + 3u));
+}
+
+// The four rows of a block of 8x8 pixels. They are read column by column: the first touches all cache lines of the block, so that
+// the waits for them overlap (0.92 of the time row by row, on lavapipe).
+fn source_quads(block: vec2<u32>) -> array<vec4<u32>, 4> {
+    let x = 4u * block.x;
+    let y = 4u * block.y;
+    let c0 = quad_column(x, y);
+    let c1 = quad_column(x + 1u, y);
+    let c2 = quad_column(x + 2u, y);
+    let c3 = quad_column(x + 3u, y);
+    return array<vec4<u32>, 4>(
+        vec4<u32>(c0.x, c1.x, c2.x, c3.x), vec4<u32>(c0.y, c1.y, c2.y, c3.y),
+        vec4<u32>(c0.z, c1.z, c2.z, c3.z), vec4<u32>(c0.w, c1.w, c2.w, c3.w));
 }
 
 // The pixels at columns t.x and t.z and rows t.y and t.w, as given; at most one apart. One gather about their common corner, and

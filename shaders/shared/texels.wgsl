@@ -42,7 +42,7 @@ fn footprint(level: u32, t: vec4<u32>) -> u32 {
         return select(
             farthest4(stored_corners(level, t)), farthest_sanitized4(source_corners(t)), level == 0u);
     }
-    var bits = select(0u, ONE_BITS, REVERSED);
+    var bits = near_bits();
     for (var y = t.y; y <= t.w; y += 1u) {
         for (var x = t.x; x <= t.z; x += 1u) {
             bits = farthest(bits, texel(level, x, y));

@@ -32,10 +32,7 @@ fn reduce_buffer(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     var out: vec4<u32>;
     if FROM_SOURCE {
-        let x = 4u * id.x;
-        out = vec4<u32>(
-            source_quad(x, id.y), source_quad(x + 1u, id.y),
-            source_quad(x + 2u, id.y), source_quad(x + 3u, id.y));
+        out = source_quad_row(id.x, id.y);
     } else {
         let top = step.read.offset + (2u * id.y) * step.read.stride;
         let bottom = step.read.offset + min(2u * id.y + 1u, step.read.height - 1u) * step.read.stride;

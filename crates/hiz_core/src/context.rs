@@ -168,9 +168,11 @@ impl HizContext {
 
     /// Records the reduction of a depth image of `camera` into `pyramid`.
     ///
-    /// `depth` is a view of a whole 2D texture of one mip level, sample and layer, with the usage `TEXTURE_BINDING` (`R32Uint`: `STORAGE_BINDING`) and a depth
-    /// format (with stencil: the view's aspect is `DepthOnly`), `R32Float`, or `R32Uint` holding float bits. The reduction has
-    /// to be submitted before a cull that uses it, or with it: a cull that runs before it keeps everything.
+    /// `depth` is a view of a whole 2D texture of one mip level, sample and layer, with the usage `TEXTURE_BINDING`
+    /// (`Rgba32Uint`: `STORAGE_BINDING`) and a depth format (with stencil: the view's aspect is `DepthOnly`), `R32Float`, or
+    /// `Rgba32Uint` of the float bits of four pixels of a row a texel, which is `width.div_ceil(4)` texels wide (pixels past the
+    /// width count as depth of the row's last ones: repeat the last). The reduction has to be submitted before a cull
+    /// that uses it, or with it: a cull that runs before it keeps everything.
     ///
     /// # Errors
     /// [`Error::Mismatch`] for sizes or devices that do not agree, [`Error::Invalid`] for other formats.

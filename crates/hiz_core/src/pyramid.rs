@@ -318,9 +318,20 @@ pub(crate) fn record_reduce(
 ) -> Result<()> {
     gpu.check_context("pyramid", pyramid.context)?;
     let texture = depth.texture();
-    let size = ImageSize::new(texture.width(), texture.height());
-    if size != pyramid.size() {
-        return Err(Error::mismatch("depth", format!("expected the pyramid's size {}, got {size}", pyramid.size())));
+    let source_kind = SourceKind::of(texture.format()).ok_or_else(|| {
+        Error::invalid(
+            "depth",
+            format!(
+                "expected a depth format, R32Float or Rgba32Uint (the bits of four pixels), got {:?}",
+                texture.format()
+            ),
+        )
+    })?;
+    let (size, texels) = (pyramid.size(), ImageSize::new(texture.width(), texture.height()));
+    let expected = source_kind.texture_size(size);
+    if texels != expected {
+        let packed = if expected == size { String::new() } else { format!(" as {expected} texels of four pixels") };
+        return Err(Error::mismatch("depth", format!("expected the pyramid's size {size}{packed}, got {texels}")));
     }
     if size != camera.size() {
         return Err(Error::mismatch(
@@ -328,12 +339,6 @@ pub(crate) fn record_reduce(
             format!("expected the depth image's size {size}, got {}", camera.size()),
         ));
     }
-    let source_kind = SourceKind::of(texture.format()).ok_or_else(|| {
-        Error::invalid(
-            "depth",
-            format!("expected a depth format, R32Float or R32Uint (float bits), got {:?}", texture.format()),
-        )
-    })?;
     // A view does not say which part of its texture it shows, so there must be one part only.
     let parts = (texture.mip_level_count(), texture.sample_count(), texture.depth_or_array_layers());
     if parts != (1, 1, 1) || texture.dimension() != wgpu::TextureDimension::D2 {

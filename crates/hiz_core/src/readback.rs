@@ -90,15 +90,14 @@ fn read_in_bands(device: &wgpu::Device, queue: &wgpu::Queue, range: &BufferRange
     Ok(out)
 }
 
-/// Reads a texture of `texel_bytes` a texel, row by row without padding.
+/// Reads the first `row` bytes of each row of a texture: all of a row, but for what pads it to a whole texel of up to 16 bytes.
 pub(crate) fn read_texture(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
     texture: &wgpu::Texture,
-    texel_bytes: u64,
+    row: u64,
 ) -> Result<Vec<u8>> {
-    let (width, height) = (texture.width(), texture.height());
-    let row = u64::from(width) * texel_bytes;
+    let height = texture.height();
     let padded = row.next_multiple_of(u64::from(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT));
     let staging = staging(device, padded * u64::from(height));
     let mut encoder =

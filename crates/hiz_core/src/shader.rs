@@ -1,6 +1,7 @@
 //! WGSL: which files make which module. Composition is ordered concatenation; there is no preprocessor.
 
 use crate::bounds::BoundsKind;
+use crate::camera::ImageSize;
 
 macro_rules! wgsl {
     ($name:literal) => {
@@ -15,7 +16,7 @@ pub(crate) enum SourceKind {
     Depth,
     /// A float color texture.
     Float,
-    /// A texture of float32 bits.
+    /// A texture of float32 bits, four pixels a texel.
     Bits,
 }
 
@@ -55,7 +56,7 @@ impl SourceKind {
             Self::Float => sampled(wgpu::TextureSampleType::Float { filterable: false }),
             Self::Bits => wgpu::BindingType::StorageTexture {
                 access: wgpu::StorageTextureAccess::ReadOnly,
-                format: wgpu::TextureFormat::R32Uint,
+                format: wgpu::TextureFormat::Rgba32Uint,
                 view_dimension,
             },
         }
@@ -69,11 +70,21 @@ impl SourceKind {
         }
     }
 
+    /// Pixels of a row that one texel holds.
+    pub(crate) fn pixels_of_texel(self) -> u32 {
+        if self == Self::Bits { 4 } else { 1 }
+    }
+
+    /// The size of the texture of an image.
+    pub(crate) fn texture_size(self, image: ImageSize) -> ImageSize {
+        ImageSize::new(image.width.div_ceil(self.pixels_of_texel()), image.height)
+    }
+
     /// The kind that fits a texture's format.
     pub(crate) fn of(format: wgpu::TextureFormat) -> Option<Self> {
         match format {
             wgpu::TextureFormat::R32Float => Some(Self::Float),
-            wgpu::TextureFormat::R32Uint => Some(Self::Bits),
+            wgpu::TextureFormat::Rgba32Uint => Some(Self::Bits),
             f if f.has_depth_aspect() => Some(Self::Depth),
             _ => None,
         }

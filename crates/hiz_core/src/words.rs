@@ -47,8 +47,10 @@ pub struct GroupWords {
 /// # Errors
 /// [`Error::DeviceLost`](crate::Error::DeviceLost).
 pub fn groups(engine: &Engine, instances: &Instances) -> Result<Vec<GroupWords>> {
-    let read =
-        |p: &Piece| readback::read_texture(engine.device(), engine.queue(), p.group_records.texture(), TEXEL_BYTES);
+    let read = |p: &Piece| {
+        let texture = p.group_records.texture();
+        readback::read_texture(engine.device(), engine.queue(), texture, u64::from(texture.width()) * TEXEL_BYTES)
+    };
     let bytes = instances.pieces.iter().map(read).collect::<Result<Vec<_>>>()?;
     let changing = instances.changing();
     let pieces = instances.pieces.iter().zip(&changing.groups).zip(bytes);

@@ -377,8 +377,17 @@ fn textures_that_a_view_cannot_tell_apart_are_refused() {
     assert!(message(&|d| d.mip_level_count = 2).contains("2 mip levels, 1 samples, 1 layers"));
     assert!(message(&|d| d.size.depth_or_array_layers = 3).contains("3 layers"));
     assert!(message(&|d| d.usage = wgpu::TextureUsages::COPY_SRC).contains("expected the usage TEXTURE_BINDING"));
-    let bits = message(&|d| d.format = wgpu::TextureFormat::R32Uint);
+    let bits = message(&|d| {
+        d.format = wgpu::TextureFormat::Rgba32Uint;
+        d.size.width = 2;
+    });
     assert!(bits.contains("expected the usage STORAGE_BINDING"), "{bits}");
+    let unpacked = message(&|d| d.format = wgpu::TextureFormat::Rgba32Uint);
+    let whole = "(height 8, width 8)";
+    assert_eq!(
+        unpacked,
+        format!("depth: expected the pyramid's size {whole} as (height 8, width 2) texels of four pixels, got {whole}")
+    );
     assert!(message(&|d| d.format = wgpu::TextureFormat::R16Float).contains("got R16Float"));
     assert!(message(&|d| d.size.width = 4).starts_with("depth: expected the pyramid's size"));
     for chunk_shift in [0, 1, 31, 64] {

@@ -1,10 +1,14 @@
-//! Depth images on the device.
+//! Depth images on the device: made, filled from the host, read back.
 
 use super::{Engine, to_u32};
 use crate::camera::{Camera, ImageSize};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::host;
 use crate::readback;
+use crate::shader::SourceKind;
+
+/// Bytes of an upload's staging area at most: larger images go in bands of rows.
+const STAGING_BYTES: u32 = 1 << 26;
 
 /// A depth image on the device and the camera that it was made by.
 #[derive(Debug, Clone)]
@@ -37,7 +41,89 @@ impl DepthImage {
     /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn read(&self) -> Result<Vec<f32>> {
         let engine = &self.engine;
-        let bytes = engine.scoped(|| readback::read_texture(engine.device(), engine.queue(), &self.texture, 4))?;
+        let row = 4 * u64::from(self.size().width);
+        let bytes = engine.scoped(|| readback::read_texture(engine.device(), engine.queue(), &self.texture, row))?;
         host::collected(to_u32(&bytes).map(f32::from_bits), "depth")
+    }
+
+    /// An image that holds nothing yet.
+    pub(super) fn new(
+        engine: &Engine,
+        camera: &Camera,
+        format: wgpu::TextureFormat,
+        usage: wgpu::TextureUsages,
+    ) -> Result<Self> {
+        let size = camera.size();
+        let side = size.width.max(size.height);
+        let allowed = engine.device().limits().max_texture_dimension_2d;
+        if side > allowed {
+            return Err(Error::limit("max_texture_dimension_2d", u64::from(side), u64::from(allowed)));
+        }
+        let texels = SourceKind::of(format).map_or(size, |kind| kind.texture_size(size));
+        let texture = engine.device().create_texture(&wgpu::TextureDescriptor {
+            label: Some("hiz.depth.image"),
+            size: wgpu::Extent3d { width: texels.width, height: texels.height, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage,
+            view_formats: &[],
+        });
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        Ok(Self { engine: engine.clone(), texture, view, camera: camera.clone() })
+    }
+
+    /// An image of the numbers given, for shaders that read it as `kind`, which is none of a depth texture.
+    pub(super) fn uploaded(engine: &Engine, kind: SourceKind, ndc: &[f32], camera: &Camera) -> Result<Self> {
+        let size = camera.size();
+        if ndc.len() as u64 != size.pixels() {
+            return Err(Error::invalid(
+                "depth",
+                format!("expected the camera's size {size} = {} numbers, got {}", size.pixels(), ndc.len()),
+            ));
+        }
+        let format =
+            if kind == SourceKind::Bits { wgpu::TextureFormat::Rgba32Uint } else { wgpu::TextureFormat::R32Float };
+        engine.scoped(|| {
+            let usage = kind.usage() | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC;
+            let image = Self::new(engine, camera, format, usage)?;
+            let rows_at_once = (STAGING_BYTES / (4 * size.width)).max(1);
+            for (band, rows) in (0..).zip(ndc.chunks((rows_at_once * size.width) as usize)) {
+                image.write_rows(band * rows_at_once, rows, kind.pixels_of_texel());
+                if band > 0 {
+                    // Lets go of the previous band's staging.
+                    engine.queue().submit([]);
+                }
+            }
+            Ok(image)
+        })
+    }
+
+    /// Writes whole rows from row `first` on.
+    fn write_rows(&self, first: u32, rows: &[f32], pixels_of_texel: u32) {
+        let width = self.size().width;
+        let height = (rows.len() / width as usize) as u32;
+        let whole = width / pixels_of_texel;
+        let write = |column, texels, bytes: &[u8], bytes_per_row| {
+            self.engine.queue().write_texture(
+                wgpu::TexelCopyTextureInfo {
+                    origin: wgpu::Origin3d { x: column, y: first, z: 0 },
+                    ..self.texture.as_image_copy()
+                },
+                bytes,
+                wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(bytes_per_row), rows_per_image: None },
+                wgpu::Extent3d { width: texels, height, depth_or_array_layers: 1 },
+            );
+        };
+        if whole > 0 {
+            write(0, whole, bytemuck::cast_slice(rows), 4 * width);
+        }
+        if whole < self.texture.width() {
+            // What fills a row's last texel repeats its last pixel.
+            let (begin, end) = ((whole * pixels_of_texel) as usize, width as usize);
+            let last = rows.chunks_exact(end).flat_map(|row| (0..4).map(move |i| row[(begin + i).min(end - 1)]));
+            write(whole, 1, bytemuck::cast_slice(&last.collect::<Vec<_>>()), 16);
+        }
     }
 }

@@ -28,9 +28,6 @@ use crate::readback::{self, BufferRange};
 use crate::shader::SourceKind;
 use crate::visible::VisibleOptions;
 
-/// Bytes of a depth image that one staging area takes.
-const UPLOAD_BYTES: u32 = 1 << 26;
-
 /// A device, its queue and the pipelines on it.
 #[derive(Debug, Clone)]
 pub struct Engine {
@@ -184,7 +181,7 @@ impl Engine {
             let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
                 | wgpu::TextureUsages::TEXTURE_BINDING
                 | wgpu::TextureUsages::COPY_SRC;
-            let depth = self.depth_image(camera, OCCLUDER_DEPTH_FORMAT, usage)?;
+            let depth = DepthImage::new(self, camera, OCCLUDER_DEPTH_FORMAT, usage)?;
             let mut encoder = self.encoder("hiz.occluders.encoder");
             self.context().record_occluders(&mut encoder, occluders, camera, &depth.view)?;
             self.queue().submit([encoder.finish()]);
@@ -214,56 +211,13 @@ impl Engine {
     /// # Errors
     /// [`Error::Invalid`] for another number of pixels, [`Error::Limit`] for an image larger than the device's textures.
     pub fn upload_depth(&self, ndc: &[f32], camera: &Camera) -> Result<DepthImage> {
-        self.upload_depth_to(SourceKind::Bits, wgpu::TextureFormat::R32Uint, ndc, camera)
+        DepthImage::uploaded(self, SourceKind::Bits, ndc, camera)
     }
 
     /// For tests: the same into a float texture, which is sampled like a depth texture.
     #[doc(hidden)]
     pub fn upload_depth_sampled(&self, ndc: &[f32], camera: &Camera) -> Result<DepthImage> {
-        self.upload_depth_to(SourceKind::Float, wgpu::TextureFormat::R32Float, ndc, camera)
-    }
-
-    fn upload_depth_to(
-        &self,
-        kind: SourceKind,
-        format: wgpu::TextureFormat,
-        ndc: &[f32],
-        camera: &Camera,
-    ) -> Result<DepthImage> {
-        let size = camera.size();
-        if ndc.len() as u64 != size.pixels() {
-            return Err(Error::invalid(
-                "depth",
-                format!("expected the camera's size {size} = {} numbers, got {}", size.pixels(), ndc.len()),
-            ));
-        }
-        self.scoped(|| {
-            let usage = kind.usage() | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC;
-            let depth = self.depth_image(camera, format, usage)?;
-            // In bands, so that one staging area serves the largest image.
-            let rows_at_once = (UPLOAD_BYTES / (4 * size.width)).max(1);
-            for (band, rows) in ndc.chunks((rows_at_once * size.width) as usize).enumerate() {
-                let height = rows.len() as u32 / size.width;
-                self.queue().write_texture(
-                    wgpu::TexelCopyTextureInfo {
-                        origin: wgpu::Origin3d { x: 0, y: band as u32 * rows_at_once, z: 0 },
-                        ..depth.texture.as_image_copy()
-                    },
-                    bytemuck::cast_slice(rows),
-                    wgpu::TexelCopyBufferLayout {
-                        offset: 0,
-                        bytes_per_row: Some(4 * size.width),
-                        rows_per_image: None,
-                    },
-                    wgpu::Extent3d { width: size.width, height, depth_or_array_layers: 1 },
-                );
-                if band > 0 {
-                    // Lets go of the previous band's staging.
-                    self.queue().submit([]);
-                }
-            }
-            Ok(depth)
-        })
+        DepthImage::uploaded(self, SourceKind::Float, ndc, camera)
     }
 
     /// Builds the depth pyramid of an image.
@@ -310,8 +264,9 @@ impl Engine {
             Error::mismatch("pyramid", "expected one that was built from a depth image, got one that never was")
         })?;
         if level == 0 {
+            let row = 4 * u64::from(layout.width);
             let bytes =
-                self.scoped(|| readback::read_texture(self.device(), self.queue(), built.source.texture(), 4))?;
+                self.scoped(|| readback::read_texture(self.device(), self.queue(), built.source.texture(), row))?;
             let convention = built.camera.convention();
             return host::collected(to_u32(&bytes).map(|bits| crate::depth::sanitized(bits, convention)), "level");
         }
@@ -393,32 +348,6 @@ impl Engine {
 
     fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
         self.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) })
-    }
-
-    fn depth_image(
-        &self,
-        camera: &Camera,
-        format: wgpu::TextureFormat,
-        usage: wgpu::TextureUsages,
-    ) -> Result<DepthImage> {
-        let size = camera.size();
-        let side = size.width.max(size.height);
-        let allowed = self.device().limits().max_texture_dimension_2d;
-        if side > allowed {
-            return Err(Error::limit("max_texture_dimension_2d", u64::from(side), u64::from(allowed)));
-        }
-        let texture = self.device().create_texture(&wgpu::TextureDescriptor {
-            label: Some("hiz.depth.image"),
-            size: wgpu::Extent3d { width: size.width, height: size.height, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage,
-            view_formats: &[],
-        });
-        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        Ok(DepthImage { engine: self.clone(), texture, view, camera: camera.clone() })
     }
 
     /// Runs `work` so that what the device finds wrong comes back as an error and nothing panics.
