@@ -20,7 +20,7 @@ fn halved(a: vec4<u32>, b: vec4<u32>) -> vec2<u32> {
 
 // Rows 2y and 2y + 1 of the stored level, eight texels from column 8x on, made four of one row.
 fn stored_quads(level: Level, x: u32, y: u32) -> vec4<u32> {
-    let last = level.stride - 4u;
+    let last = ((level.width + 3u) & ~3u) - 4u;
     let left = min(8u * x, last);
     let right = min(8u * x + 4u, last);
     let top = level.offset + min(2u * y, level.height - 1u) * level.stride;

@@ -1,5 +1,5 @@
-// A header, whose first word numbers the reduction that filled the pyramid, and the stored levels: one list of texels, rows padded to 4
-// and more, cut into chunks that each fit one storage binding.
+// A header, whose first word numbers the reduction that filled the pyramid, and the stored levels: one list of texels, rows padded,
+// cut into chunks that each fit one storage binding.
 
 struct Level {
     offset: u32,
@@ -10,6 +10,8 @@ struct Level {
 
 struct Pyramid {
     levels: array<Level, 16>,
+    // .xy: where they lie in an atlas.
+    origins: array<vec4<u32>, 16>,
     // A chunk holds 1 << chunk_shift texels.
     chunk_shift: u32,
     // Which levels are stored. Level 0, the depth image, is always there.

@@ -1,4 +1,4 @@
-// The pyramid as a cull reads it.
+// The pyramid as a cull reads it, wherever its levels lie (`texels_apart.wgsl`, `texels_atlas.wgsl`).
 
 // The footprint is at most 2^n x 2^n texels.
 override FOOTPRINT_LOG2: u32;
@@ -12,35 +12,15 @@ var<private> is_reduced: bool;
 // The first thing that an entry point calls: what it holds in registers a software driver does not fetch again for every instance.
 fn begin() {
     view = view_uniform;
-    is_reduced = texel_bits(0u) == view.reduction;
+    is_reduced = reduction_number() == view.reduction;
     first_stored = pyramid.first_stored;
     last_stored = pyramid.last_stored;
-}
-
-// The depth of one texel of a level.
-fn texel(level: u32, x: u32, y: u32) -> u32 {
-    if level == 0u {
-        return source_bits(x, y);
-    }
-    let l = pyramid.levels[level];
-    return texel_bits(l.offset + y * l.stride + x);
-}
-
-// The stored texels at columns t.x and t.z and rows t.y and t.w of a level.
-fn stored_corners(level: u32, t: vec4<u32>) -> vec4<u32> {
-    let l = pyramid.levels[level];
-    let top = l.offset + t.y * l.stride;
-    let bottom = l.offset + t.w * l.stride;
-    return vec4<u32>(
-        texel_bits(top + t.x), texel_bits(top + t.z), texel_bits(bottom + t.x), texel_bits(bottom + t.z));
 }
 
 // The farthest depth of the texels from columns t.x to t.z and rows t.y to t.w of a level.
 fn footprint(level: u32, t: vec4<u32>) -> u32 {
     if FOOTPRINT_LOG2 == 1u {
-        // Both are read, whatever the level: a software driver goes both ways of a branch.
-        return select(
-            farthest4(stored_corners(level, t)), farthest_sanitized4(source_corners(t)), level == 0u);
+        return farthest_sanitized4(corners(level, t));
     }
     var bits = near_bits();
     for (var y = t.y; y <= t.w; y += 1u) {

@@ -4,6 +4,7 @@
 //! pixel block `[x << k, (x + 1) << k)`; those that are stored lie one after the other in one list of texels, padded to the whole
 //! blocks of the reduction (which stores vectors and asks for no edge), cut into chunks that each fit one storage binding.
 
+use crate::atlas::AtlasLayout;
 use crate::camera::ImageSize;
 use crate::error::{Error, Result};
 use crate::records::RECORDS_PER_ROW;
@@ -14,8 +15,11 @@ pub const MAX_LEVELS: usize = 16;
 /// How many storage bindings hold a pyramid: with level 0 in a texture, 16384 x 16384 pixels need three of 128 MiB.
 pub(crate) const PYRAMID_CHUNKS: usize = 3;
 
-/// Rows of every level start at multiples of this many texels.
-const ROW_ALIGNMENT: u32 = 4;
+/// Blocks of a row come in multiples of this many, so that the reduction stores and loads vectors.
+const BLOCK_ALIGNMENT: u32 = 4;
+
+/// Rows of every level start at multiples of this many texels, as copies into a texture ask for.
+const ROW_ALIGNMENT: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT / 4;
 
 /// Texels before level 1. The first holds the number of the reduction that filled the pyramid: a cull that expects another one
 /// (recorded, but not submitted before it) keeps everything. 0, as buffers begin, is never a number.
@@ -123,12 +127,14 @@ pub(crate) struct PyramidLayout {
     pub(crate) texels: u64,
     /// A chunk holds `1 << chunk_shift` texels.
     pub(crate) chunk_shift: u32,
+    /// Where the levels lie in an atlas.
+    pub(crate) atlas: AtlasLayout,
 }
 
 impl PyramidLayout {
     /// The layout for an image of `size`, with chunks of `1 << chunk_shift` texels.
     pub(crate) fn new(size: ImageSize, stored: StoredLevels, chunk_shift: u32) -> Result<Self> {
-        debug_assert!(1 << chunk_shift >= ROW_ALIGNMENT, "a vector store must not straddle chunks");
+        debug_assert!(1 << chunk_shift >= BLOCK_ALIGNMENT, "a vector store must not straddle chunks");
         let stored = stored.checked()?;
         let mut levels = vec![Level { offset: 0, stride: 0, width: size.width, height: size.height }];
         let (mut width, mut height) = (size.width, size.height);
@@ -145,14 +151,15 @@ impl PyramidLayout {
             for k in step.first..=step.last {
                 let level = &mut levels[k as usize];
                 let [stride, rows] = step.blocks.map(|n| n * step.texels_a_block(k));
-                level.stride = stride;
+                level.stride = stride.next_multiple_of(ROW_ALIGNMENT);
                 level.offset =
                     u32::try_from(texels).map_err(|_| Error::limit("pyramid texels", texels, u64::from(u32::MAX)))?;
-                texels += u64::from(stride) * u64::from(rows);
+                texels += u64::from(level.stride) * u64::from(rows);
             }
         }
         let steps = with_tail(&levels, steps);
-        let layout = Self { size, levels, stored, steps, texels, chunk_shift };
+        let atlas = AtlasLayout::new(&levels, stored);
+        let layout = Self { size, levels, stored, steps, texels, chunk_shift, atlas };
         if layout.chunk_sizes().len() > PYRAMID_CHUNKS {
             return Err(Error::limit("pyramid texels", texels, (PYRAMID_CHUNKS as u64) << chunk_shift));
         }
@@ -162,6 +169,11 @@ impl PyramidLayout {
     /// Whether a level, 0 among them, can be read.
     pub(crate) fn is_there(&self, level: u32) -> bool {
         level == 0 || (self.stored.first..=self.stored.last).contains(&level)
+    }
+
+    /// The stored levels and their numbers.
+    pub(crate) fn stored_levels(&self) -> impl Iterator<Item = (usize, &Level)> {
+        stored_levels(&self.levels, self.stored)
     }
 
     /// Texels of each chunk.
@@ -175,6 +187,12 @@ impl PyramidLayout {
     pub(crate) fn num_levels(&self) -> u32 {
         self.levels.len() as u32
     }
+}
+
+/// Those of `levels` that are stored, and their numbers.
+pub(crate) fn stored_levels(levels: &[Level], stored: StoredLevels) -> impl Iterator<Item = (usize, &Level)> {
+    let is_stored = move |k: usize| (stored.first..=stored.last).contains(&(k as u32));
+    levels.iter().enumerate().filter(move |(k, _)| is_stored(*k))
 }
 
 /// One workgroup reads so many texels faster than a dispatch starts (docs/performance.md).
@@ -195,7 +213,7 @@ fn with_tail(levels: &[Level], mut passes: Vec<Step>) -> Vec<Step> {
 fn passes(levels: &[Level], stored: StoredLevels) -> Vec<Step> {
     let StoredLevels { first, last } = stored;
     let mut steps = Vec::new();
-    let columns = |texels: u32| texels.next_multiple_of(ROW_ALIGNMENT);
+    let columns = |texels: u32| texels.next_multiple_of(BLOCK_ALIGNMENT);
     let (mut source, mut first) = (0, first);
     if first > last {
         return vec![Step { source, first, last, blocks: [0, 0] }];
@@ -262,7 +280,7 @@ mod tests {
             let layout = PyramidLayout::new(ImageSize::new(w, h), StoredLevels::ALL, 25).unwrap();
             let mut end = 4;
             for level in &layout.levels[1..] {
-                assert!(level.offset >= end && level.offset.is_multiple_of(4) && level.stride.is_multiple_of(4));
+                assert!(level.offset >= end && level.offset.is_multiple_of(4) && level.stride.is_multiple_of(64));
                 assert!(level.stride >= level.width);
                 end = level.offset + level.stride * level.height;
             }

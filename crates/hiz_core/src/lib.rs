@@ -19,6 +19,7 @@
 
 pub mod headless;
 
+mod atlas;
 mod bounds;
 mod camera;
 mod compact;
@@ -52,6 +53,7 @@ pub mod yardstick;
 
 pub use wgpu;
 
+pub use atlas::AtlasUse;
 pub use bounds::{Bounds, BoundsKind, Floats};
 pub use camera::{Camera, DepthConvention, ImageSize, MAX_IMAGE_SIDE, Mat3, Mat4, Pose, Projection, Vec3};
 pub use context::HizContext;

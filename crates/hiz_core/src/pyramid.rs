@@ -3,33 +3,32 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use crate::atlas::{self, Atlas, AtlasUse};
 use crate::camera::{Camera, ImageSize};
 use crate::cull::ViewUniform;
 use crate::error::{Error, Result};
 use crate::gpu::{ContextId, Gpu, ReduceKey, ReduceShape, StandIn};
 use crate::layout::{Level, MAX_LEVELS, PYRAMID_CHUNKS, PyramidLayout, Step, StoredLevels};
-use crate::shader::{SourceKind, TexelStore};
+use crate::shader::{DepthStore, SourceKind};
 
 /// Invocations of a workgroup of the reduction, all in a row.
 const REDUCE_WORKGROUP: u32 = 64;
 /// From this level on a workgroup shares one texel, if it is made alone: 8x8 pixels an invocation.
 const SHARED_LEVEL: u32 = 6;
 
-/// Texels of a row of the copy in a texture; `shaders/shared/texels_texture.wgsl`.
-pub(crate) const COPY_ROW: u32 = 4096;
-
 /// `shaders/shared/pyramid.wgsl`, `Pyramid`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct PyramidUniform {
     pub(crate) levels: [Level; MAX_LEVELS],
+    pub(crate) origins: [[u32; 4]; MAX_LEVELS],
     pub(crate) chunk_shift: u32,
     pub(crate) first_stored: u32,
     pub(crate) last_stored: u32,
     pub(crate) padding: u32,
 }
 
-const _: () = assert!(size_of::<PyramidUniform>() == 272);
+const _: () = assert!(size_of::<PyramidUniform>() == 528);
 
 /// `shaders/reduce.wgsl`, `Step`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -52,6 +51,8 @@ pub struct PyramidOptions {
     pub levels: StoredLevels,
     /// Texels of one chunk as a power of two; `None`: what one storage binding of the device holds. Tests make it small.
     pub chunk_shift: Option<u32>,
+    /// Whether culls read all levels from one texture.
+    pub atlas: AtlasUse,
 }
 
 /// A depth pyramid on the device: for every level, the farthest depth of each block of pixels.
@@ -65,26 +66,19 @@ pub struct Pyramid {
     pub(crate) chunks: Vec<wgpu::Buffer>,
     pub(crate) uniform: wgpu::Buffer,
     built: Mutex<Option<Built>>,
-    copy: Mutex<Option<TextureCopy>>,
+    atlas_use: AtlasUse,
+    atlas: Mutex<Option<Atlas>>,
     /// The reduction that is known to have been submitted: what was only recorded may never run.
     submitted: AtomicU32,
     /// The last bindings of culls, of instances and of groups: many culls see the same view.
     bindings: Mutex<Vec<(BindingsKey, wgpu::BindGroup)>>,
 }
 
-/// Where a cull reads the levels, and the words of its view (`ViewUniform`), which name the reduction.
-pub(crate) type BindingsKey = (TexelStore, [u32; size_of::<ViewUniform>() / 4]);
+/// Where a cull reads depth, and the words of its view (`ViewUniform`), which name the reduction.
+pub(crate) type BindingsKey = (DepthStore, [u32; size_of::<ViewUniform>() / 4]);
 
 /// How many bindings are kept.
 const KEPT_BINDINGS: usize = 4;
-
-/// The stored levels in a texture as well, for culls of many instances (`shaders/shared/texels_texture.wgsl`).
-#[derive(Debug)]
-struct TextureCopy {
-    texture: wgpu::Texture,
-    /// The reduction of which a copy is known to have been submitted; 0: none.
-    reduction: u32,
-}
 
 /// What a pyramid was last built from.
 #[derive(Debug, Clone)]
@@ -127,10 +121,10 @@ impl Pyramid {
             .collect();
         let mut levels = [Level { offset: 0, stride: 0, width: 0, height: 0 }; MAX_LEVELS];
         levels[..layout.levels.len()].copy_from_slice(&layout.levels);
-        let StoredLevels { first, last } = layout.stored;
+        let (StoredLevels { first, last }, origins) = (layout.stored, layout.atlas.origins);
         let uniform = gpu.uniform(
             "hiz.pyramid.layout",
-            &PyramidUniform { levels, chunk_shift, first_stored: first, last_stored: last, padding: 0 },
+            &PyramidUniform { levels, origins, chunk_shift, first_stored: first, last_stored: last, padding: 0 },
         )?;
         Ok(Self {
             context: gpu.id(),
@@ -138,7 +132,8 @@ impl Pyramid {
             chunks,
             uniform,
             built: Mutex::new(None),
-            copy: Mutex::new(None),
+            atlas_use: options.atlas,
+            atlas: Mutex::new(None),
             submitted: AtomicU32::new(0),
             bindings: Mutex::new(Vec::new()),
         })
@@ -167,9 +162,9 @@ impl Pyramid {
 
     /// Bytes on the device, the depth texture not counted.
     pub fn device_bytes(&self) -> u64 {
-        let copy = self.copy.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let copy = copy.as_ref().map_or(0, |c| 4 * u64::from(c.texture.width()) * u64::from(c.texture.height()));
-        self.chunks.iter().map(wgpu::Buffer::size).sum::<u64>() + copy
+        let atlas = self.atlas.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let atlas = atlas.as_ref().map_or(0, Atlas::bytes);
+        self.chunks.iter().map(wgpu::Buffer::size).sum::<u64>() + atlas
     }
 
     /// The bindings of this key, made where they are not among the last ones.
@@ -190,13 +185,10 @@ impl Pyramid {
         Ok(bindings)
     }
 
-    /// Whether a copy in a texture pays for a cull of `instances`: it costs about as much a texel as it saves an instance
-    /// (`docs/performance.md`). Also whether one is possible.
-    pub(crate) fn texture_pays(&self, gpu: &Gpu, instances: u32) -> bool {
-        let rows = self.layout.texels.div_ceil(COPY_ROW.into());
-        u64::from(instances) >= self.layout.texels
-            && rows <= u64::from(gpu.device().limits().max_texture_dimension_2d)
-            && 1 << self.layout.chunk_shift >= COPY_ROW
+    /// Whether culls of so many instances read an atlas: where it can be, and pays.
+    pub(crate) fn wants_atlas(&self, gpu: &Gpu, instances: u32) -> bool {
+        let possible = |built: Built| atlas::is_possible(&self.layout, built.source.texture(), &gpu.device().limits());
+        self.atlas_use.pays(&self.layout, instances) && self.built().is_some_and(possible)
     }
 
     /// What was recorded of this pyramid's reduction has been submitted.
@@ -204,74 +196,35 @@ impl Pyramid {
         self.submitted.store(self.built().map_or(0, |built| built.reduction), Ordering::Release);
     }
 
-    /// A cull that recorded a copy has been submitted, behind the reduction if that was.
-    pub(crate) fn confirm_copied(&self) {
+    /// A cull that recorded the atlas has been submitted, behind the reduction if that was.
+    pub(crate) fn confirm_atlas(&self) {
         let reduction = self.built().map_or(0, |built| built.reduction);
-        let mut copy = self.copy.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut atlas = self.atlas.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         // Nothing there: somebody else's call failed, and forgot it.
-        if let Some(copy) = copy.as_mut().filter(|_| self.submitted.load(Ordering::Acquire) == reduction) {
-            copy.reduction = reduction;
+        if let Some(atlas) = atlas.as_mut().filter(|_| self.submitted.load(Ordering::Acquire) == reduction) {
+            atlas.reduction = reduction;
         }
     }
 
     /// Something failed on the device: nothing that was made for culls is kept.
     pub(crate) fn forget(&self) {
-        *self.copy.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = None;
+        *self.atlas.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = None;
         self.bindings.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clear();
     }
 
-    /// The copy of reduction `reduction`, which is recorded if it is not known to be there. (The header goes with it: a cull that
-    /// runs before the reduction keeps everything.)
-    pub(crate) fn record_texture(
+    /// The atlas of what the pyramid was built from; its copies are recorded if they are not known to have been submitted.
+    pub(crate) fn record_atlas(
         &self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
-        reduction: u32,
+        built: &Built,
     ) -> wgpu::TextureView {
-        let mut copy = self.copy.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let copy = copy.get_or_insert_with(|| TextureCopy { texture: self.copy_texture(gpu), reduction: 0 });
-        if copy.reduction != reduction {
-            let rows_of_chunk = (1 << self.layout.chunk_shift) / COPY_ROW;
-            for (c, (chunk, texels)) in (0..).zip(self.chunks.iter().zip(self.layout.chunk_sizes())) {
-                // A chunk is less than 2^31 texels. Whole rows, and what is left.
-                let (rows, rest) = (texels as u32 / COPY_ROW, texels as u32 % COPY_ROW);
-                for (first, width, height) in [(0, COPY_ROW, rows), (rows, rest, u32::from(rest > 0))] {
-                    encoder.copy_buffer_to_texture(
-                        wgpu::TexelCopyBufferInfo {
-                            buffer: chunk,
-                            layout: wgpu::TexelCopyBufferLayout {
-                                offset: 4 * u64::from(first) * u64::from(COPY_ROW),
-                                bytes_per_row: Some(4 * COPY_ROW),
-                                rows_per_image: None,
-                            },
-                        },
-                        wgpu::TexelCopyTextureInfo {
-                            origin: wgpu::Origin3d { x: 0, y: c * rows_of_chunk + first, z: 0 },
-                            ..copy.texture.as_image_copy()
-                        },
-                        wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-                    );
-                }
-            }
+        let mut atlas = self.atlas.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let atlas = atlas.get_or_insert_with(|| Atlas::new(gpu.device(), &self.layout));
+        if atlas.reduction != built.reduction {
+            atlas.record(gpu.device(), encoder, &self.layout, &self.chunks[0], built.source.texture());
         }
-        copy.texture.create_view(&wgpu::TextureViewDescriptor::default())
-    }
-
-    fn copy_texture(&self, gpu: &Gpu) -> wgpu::Texture {
-        gpu.device().create_texture(&wgpu::TextureDescriptor {
-            label: Some("hiz.pyramid.texture"),
-            size: wgpu::Extent3d {
-                width: COPY_ROW,
-                height: self.layout.texels.div_ceil(COPY_ROW.into()) as u32,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::R32Uint,
-            usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        })
+        atlas.view()
     }
 
     /// The camera of the depth image that the pyramid was last built from.

@@ -20,20 +20,20 @@ pub(crate) enum SourceKind {
     Bits,
 }
 
-/// Where a cull reads the stored levels.
+/// Where a cull reads depth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum TexelStore {
-    /// The buffers that the reduction fills.
-    Buffer,
-    /// A copy of them in a texture.
-    Texture,
+pub(crate) enum DepthStore {
+    /// Level 0 in the depth image, the others in the buffers that the reduction fills.
+    Apart(SourceKind),
+    /// All of them in one texture.
+    Atlas,
 }
 
-impl TexelStore {
-    fn wgsl(self) -> &'static str {
+impl DepthStore {
+    fn wgsl(self) -> String {
         match self {
-            Self::Buffer => wgsl!("shared/texels_buffer"),
-            Self::Texture => wgsl!("shared/texels_texture"),
+            Self::Apart(source) => [source.wgsl(), wgsl!("shared/texels_apart")].join("\n"),
+            Self::Atlas => wgsl!("shared/texels_atlas").to_owned(),
         }
     }
 }
@@ -117,12 +117,13 @@ pub(crate) fn yardstick_reduce_texture(source: SourceKind) -> String {
 }
 
 /// The cull (`entry` = its own file) or the explanation, which share everything up to the verdict.
-fn classifying(source: SourceKind, texels: TexelStore, kind: BoundsKind, entry: &str) -> String {
-    module(source, texels, kind, &[wgsl!("shared/supporting_planes"), wgsl!("shared/classify")].join("\n"), entry)
+fn classifying(store: DepthStore, kind: BoundsKind, entry: &str) -> String {
+    module(store, kind, &[wgsl!("shared/supporting_planes"), wgsl!("shared/classify")].join("\n"), entry)
 }
 
 /// The same frame for the given decision about one instance.
-fn module(source: SourceKind, texels: TexelStore, kind: BoundsKind, classify: &str, entry: &str) -> String {
+fn module(store: DepthStore, kind: BoundsKind, classify: &str, entry: &str) -> String {
+    let store = store.wgsl();
     let bounds = match kind {
         BoundsKind::Sphere => wgsl!("shared/bounds_sphere").to_owned(),
         BoundsKind::Box => [wgsl!("shared/bounds_box_support"), wgsl!("shared/bounds_box")].join("\n"),
@@ -130,7 +131,6 @@ fn module(source: SourceKind, texels: TexelStore, kind: BoundsKind, classify: &s
     };
     [
         wgsl!("shared/depth_bits"),
-        source.wgsl(),
         wgsl!("shared/pyramid"),
         wgsl!("shared/view"),
         wgsl!("shared/record_layout"),
@@ -140,7 +140,7 @@ fn module(source: SourceKind, texels: TexelStore, kind: BoundsKind, classify: &s
         wgsl!("shared/verdict"),
         wgsl!("shared/outcome"),
         wgsl!("shared/levels"),
-        texels.wgsl(),
+        store.as_str(),
         wgsl!("shared/texels"),
         classify,
         entry,
@@ -149,14 +149,14 @@ fn module(source: SourceKind, texels: TexelStore, kind: BoundsKind, classify: &s
 }
 
 /// The cull of instances of one kind.
-pub(crate) fn cull(source: SourceKind, texels: TexelStore, kind: BoundsKind) -> String {
-    classifying(source, texels, kind, &flat_frame())
+pub(crate) fn cull(store: DepthStore, kind: BoundsKind) -> String {
+    classifying(store, kind, &flat_frame())
 }
 
 /// A yardstick: the same of boxes without certificates.
-pub(crate) fn yardstick_cull(source: SourceKind, texels: TexelStore) -> String {
+pub(crate) fn yardstick_cull(store: DepthStore) -> String {
     let bounds = BoundsKind::Box;
-    module(source, texels, bounds, &uncertified(), &flat_frame())
+    module(store, bounds, &uncertified(), &flat_frame())
 }
 
 fn uncertified() -> String {
@@ -169,20 +169,20 @@ fn flat_frame() -> String {
 }
 
 /// The cull of groups.
-pub(crate) fn cull_groups(source: SourceKind, texels: TexelStore) -> String {
+pub(crate) fn cull_groups(store: DepthStore) -> String {
     let entry = [wgsl!("shared/piece"), wgsl!("shared/groups"), wgsl!("cull_groups")].join("\n");
-    classifying(source, texels, BoundsKind::Box, &entry)
+    classifying(store, BoundsKind::Box, &entry)
 }
 
 /// The cull of the members of the groups that are left.
-pub(crate) fn cull_members(source: SourceKind, texels: TexelStore, kind: BoundsKind) -> String {
+pub(crate) fn cull_members(store: DepthStore, kind: BoundsKind) -> String {
     let entry = [wgsl!("shared/piece"), wgsl!("shared/report"), wgsl!("shared/groups"), wgsl!("cull_members")];
-    classifying(source, texels, kind, &entry.join("\n"))
+    classifying(store, kind, &entry.join("\n"))
 }
 
 /// The explanation of one instance's verdict.
-pub(crate) fn explain(source: SourceKind, kind: BoundsKind) -> String {
-    classifying(source, TexelStore::Buffer, kind, wgsl!("explain"))
+pub(crate) fn explain(store: DepthStore, kind: BoundsKind) -> String {
+    classifying(store, kind, wgsl!("explain"))
 }
 
 /// The ordered compaction.
@@ -211,18 +211,16 @@ const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind:
 
 /// Every module, for those who plant faults in them.
 pub(crate) fn all() -> Vec<String> {
-    const STORES: [TexelStore; 2] = [TexelStore::Buffer, TexelStore::Texture];
-    let of_kind = |s: SourceKind, k: BoundsKind| {
-        STORES.iter().flat_map(move |t| [cull(s, *t, k), cull_members(s, *t, k)]).chain([explain(s, k)])
+    let culls = |store: DepthStore| {
+        let of_kind = move |kind| [cull(store, kind), cull_members(store, kind), explain(store, kind)];
+        KINDS.into_iter().flat_map(of_kind).chain([cull_groups(store), yardstick_cull(store)])
     };
-    let classifying = SOURCES.iter().flat_map(|s| KINDS.iter().flat_map(move |k| of_kind(*s, *k)));
-    let groups = SOURCES.iter().flat_map(|s| STORES.iter().map(|t| cull_groups(*s, *t)));
+    let of_source = |source| culls(DepthStore::Apart(source)).chain([reduce(source), reduce_coarse(source)]);
     SOURCES
-        .iter()
-        .flat_map(|s| [reduce(*s), reduce_coarse(*s)])
-        .chain(groups)
-        .chain(classifying)
-        .chain([compact(), count(), update(), occluders(), yardstick_cull(SourceKind::Bits, TexelStore::Buffer)])
+        .into_iter()
+        .flat_map(of_source)
+        .chain(culls(DepthStore::Atlas))
+        .chain([compact(), count(), update(), occluders()])
         .collect()
 }
 
@@ -276,10 +274,10 @@ mod tests {
         use crate::update::UpdateUniform;
         use crate::visible::{CounterRecord, StatisticsRecord};
 
-        let module = parse(&cull(SourceKind::Depth, TexelStore::Buffer, BoundsKind::Sphere));
+        let module = parse(&cull(DepthStore::Apart(SourceKind::Depth), BoundsKind::Sphere));
         same_layout!(module, "Level", Level { "offset" = offset, "stride" = stride, "width" = width, "height" = height });
         same_layout!(module, "Pyramid", PyramidUniform {
-            "levels" = levels, "chunk_shift" = chunk_shift, "first_stored" = first_stored, "last_stored" = last_stored,
+            "levels" = levels, "origins" = origins, "chunk_shift" = chunk_shift, "first_stored" = first_stored, "last_stored" = last_stored,
             "padding" = padding
         });
         same_layout!(parse(&reduce(SourceKind::Depth)), "Step", StepUniform {
@@ -309,7 +307,7 @@ mod tests {
         same_layout!(update, "Update", UpdateUniform {
             "count" = count, "texels" = texels, "number" = number, "padding" = padding
         });
-        let oriented = parse(&explain(SourceKind::Depth, BoundsKind::OrientedBox));
+        let oriented = parse(&explain(DepthStore::Apart(SourceKind::Depth), BoundsKind::OrientedBox));
         same_layout!(oriented, "Explanation", ExplanationRecord {
             "verdict" = verdict, "stage" = stage, "level" = level, "farthest_bits" = farthest_bits, "pixels" = pixels,
             "texels" = texels, "texel_bits" = texel_bits, "depths" = depths, "padding" = padding
@@ -333,7 +331,7 @@ mod tests {
     #[test]
     fn bars_stand_where_a_compiler_could_fold_what_cancels() {
         for kind in KINDS {
-            let module = parse(&cull(SourceKind::Depth, TexelStore::Buffer, kind));
+            let module = parse(&cull(DepthStore::Apart(SourceKind::Depth), kind));
             for bar in ["bar", "bar2", "bar3"] {
                 let (_, function) = module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(bar)).expect(bar);
                 let is_xor = |e: &naga::Expression| {
@@ -361,7 +359,7 @@ mod tests {
     #[test]
     fn every_plane_and_side_is_certified() {
         for kind in KINDS {
-            let module = parse(&cull(SourceKind::Depth, TexelStore::Buffer, kind));
+            let module = parse(&cull(DepthStore::Apart(SourceKind::Depth), kind));
             assert_eq!(calls(&module, "supporting_planes", "surely_above"), 1, "{kind:?}: a plane's offset");
             assert_eq!(calls(&module, "proved_interval", "surely_above"), 1, "{kind:?}: left and top");
             assert_eq!(calls(&module, "proved_interval", "surely_below"), 1, "{kind:?}: right and bottom");
@@ -381,8 +379,6 @@ mod tests {
         assert!(wgsl!("shared/groups").contains(&run));
         let survivors = format!("SURVIVORS_PER_ROW_LOG2: u32 = {}u;", crate::visible::SURVIVORS_PER_ROW.ilog2());
         assert!(wgsl!("shared/groups").contains(&survivors));
-        let copy = format!("COPY_ROW_LOG2: u32 = {}u;", crate::pyramid::COPY_ROW.ilog2());
-        assert!(wgsl!("shared/texels_texture").contains(&copy));
         let per_row = format!("RECORDS_PER_ROW_LOG2: u32 = {}u;", crate::records::RECORDS_PER_ROW.ilog2());
         assert!(wgsl!("shared/record_layout").contains(&per_row));
     }

@@ -264,6 +264,18 @@ fn gathered_pixels_beside_the_rectangle() {
     assert_red("gather", &[(".wzxy;", ";")]);
 }
 
+/// Where all levels lie in one texture, four texels of a row come at a time.
+#[test]
+fn atlas_texels_beside_the_right_ones() {
+    for (what, by) in [
+        ("textureLoad(atlas, at.zy)[right]", "textureLoad(atlas, at.zy)[left]"),
+        ("textureLoad(atlas, at.xw)[left]", "textureLoad(atlas, at.xy)[left]"),
+        ("let at = pyramid.origins[level].xyxy", "let at = pyramid.origins[0].xyxy"),
+    ] {
+        assert_red("atlas", &[(what, by)]);
+    }
+}
+
 /// Groups: what is planted in them alone. (Boxes themselves are left out where a fault would reach them, too.)
 #[test]
 fn groups_that_forget_members_or_shrink() {

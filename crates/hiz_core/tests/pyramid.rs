@@ -8,8 +8,8 @@ use common::{CONVENTIONS, Random, camera_along_z, engine, ndc};
 use hiz_core::headless::DepthImage;
 use hiz_core::yardstick::{PerLevelReduction, ReductionShape, submitted_ms};
 use hiz_core::{
-    Bounds, CullOptions, DepthConvention, Floats, ImageSize, InstanceOptions, Pyramid, PyramidOptions, StoredLevels,
-    VisibleOptions, wgpu,
+    AtlasUse, Bounds, CullOptions, DepthConvention, Floats, Footprint, ImageSize, InstanceOptions, MeshData,
+    OccluderOptions, Pyramid, PyramidOptions, StoredLevels, VisibleOptions, wgpu,
 };
 
 /// Every size class that has broken somebody's reduction: single pixels, rows, columns, odd in one or both sides, powers of two
@@ -289,51 +289,113 @@ fn limits_are_named() {
     assert!(error.to_string().contains("pyramid texels: requested"), "{error}");
 }
 
-/// Large culls read the levels from a copy in a texture; chunks too small to be copied keep them in their buffers.
+/// Triangles anywhere before a camera along z.
+fn triangles(random: &mut Random) -> MeshData<'static> {
+    let vertices: Vec<f32> = (0..40)
+        .flat_map(|_| {
+            let z = 3.0 + 9.0 * random.unit();
+            let (x, y) = (z * (2.0 * random.unit() - 1.0), z * (2.0 * random.unit() - 1.0));
+            (0..3).flat_map(|_| [x + 3.0 * random.unit(), y + 3.0 * random.unit(), z]).collect::<Vec<_>>()
+        })
+        .map(|v| v as f32)
+        .collect();
+    let indices: Vec<u32> = (0..120).collect();
+    MeshData { vertices: Floats::F32(vertices.leak()), triangles: indices.leak(), transforms: None }
+}
+
+/// Culls that read all levels from one texture answer as those that read them where they are, for each kind of depth image,
+/// and follow the next reduction.
 #[test]
-fn a_copy_in_a_texture_culls_alike_and_follows_the_next_reduction() {
-    if only_one_chunk() {
-        return;
-    }
+fn an_atlas_culls_alike_and_follows_the_next_reduction() {
     let mut random = Random(9);
-    let (width, height) = (128, 115);
-    let centers: Vec<f32> = (0..60_000)
+    let centers: Vec<f32> = (0..4000)
         .flat_map(|_| {
             let z = 1.0 + 30.0 * random.unit() as f32;
             [z * (2.0 * random.unit() as f32 - 1.0), z * (2.0 * random.unit() as f32 - 1.0), z]
         })
         .collect();
-    let radii: Vec<f32> = (0..60_000).map(|_| 0.5 * random.unit() as f32).collect();
+    let radii: Vec<f32> = (0..4000).map(|_| 0.5 * random.unit() as f32).collect();
     let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
     let instances = engine().instances(&bounds, &InstanceOptions::default()).unwrap();
-    for convention in CONVENTIONS {
-        let camera = camera_along_z(width, height, convention);
-        let image = |random: &mut Random| {
-            let wall = |_: u32| if random.below(40) == 0 { 1e6 } else { 4.0 + 8.0 * random.unit() as f32 };
-            let depth: Vec<f32> = (0..width * height).map(wall).map(|z| ndc(z, convention)).collect();
-            engine().upload_depth(&depth, &camera).unwrap()
-        };
-        let (first, second) = (image(&mut random), image(&mut random));
-        let pyramids = [None, Some(11)].map(|chunk_shift| {
-            let options = PyramidOptions { chunk_shift, ..PyramidOptions::default() };
-            Arc::new(engine().context().create_pyramid(camera.size(), &options).unwrap())
-        });
-        assert!(pyramids[0].device_bytes() < 4 * 60_000, "as many instances as texels");
-        let mut seen = Vec::new();
-        for depth in [&first, &second, &first] {
-            let view = depth.texture().create_view(&wgpu::TextureViewDescriptor::default());
-            let verdicts = pyramids.each_ref().map(|pyramid| {
-                let mut encoder = engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-                engine().context().record_reduce(&mut encoder, &view, &camera, pyramid).unwrap();
-                engine().queue().submit([encoder.finish()]);
-                let (options, output) = (CullOptions::default(), VisibleOptions::default());
-                engine().cull(&instances, &camera, pyramid, &options, &output).unwrap().verdicts().unwrap()
+    for ((width, height), levels) in [
+        ((131, 115), StoredLevels::ALL),
+        ((64, 7), StoredLevels::ALL),
+        ((3, 90), StoredLevels::ALL),
+        ((130, 63), StoredLevels { first: 2, last: 4 }),
+        ((129, 61), StoredLevels::only(3)),
+    ] {
+        for convention in CONVENTIONS {
+            let camera = camera_along_z(width, height, convention);
+            let mut wall = || if random.below(40) == 0 { 1e6 } else { 4.0 + 8.0 * random.unit() as f32 };
+            let depth: Vec<f32> = (0..width * height).map(|_| ndc(wall(), convention)).collect();
+            let occluders = engine().occluders(&[triangles(&mut random)], &OccluderOptions::default()).unwrap();
+            let images = [
+                engine().upload_depth(&depth, &camera).unwrap(),
+                engine().upload_depth_sampled(&depth, &camera).unwrap(),
+                engine().render_depth(&occluders, &camera).unwrap(),
+            ];
+            let pyramids = [AtlasUse::Never, AtlasUse::Always].map(|atlas| {
+                let options = PyramidOptions { atlas, levels, ..PyramidOptions::default() };
+                Arc::new(engine().context().create_pyramid(camera.size(), &options).unwrap())
             });
-            assert!(verdicts[0] == verdicts[1], "{convention:?}");
-            seen.push(verdicts[0].clone());
+            let mut seen = Vec::new();
+            for depth in [&images[0], &images[1], &images[2], &images[0]] {
+                let view = depth.texture().create_view(&wgpu::TextureViewDescriptor::default());
+                let verdicts = pyramids.each_ref().map(|pyramid| {
+                    let mut encoder =
+                        engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                    engine().context().record_reduce(&mut encoder, &view, &camera, pyramid).unwrap();
+                    engine().queue().submit([encoder.finish()]);
+                    let cull = |options: &CullOptions| {
+                        let output = VisibleOptions::default();
+                        engine().cull(&instances, &camera, pyramid, options, &output).unwrap().verdicts().unwrap()
+                    };
+                    let wide = CullOptions { footprint: Footprint::Four, descent: 16, ..CullOptions::default() };
+                    [cull(&CullOptions::default()), cull(&wide)]
+                });
+                assert!(verdicts[0] == verdicts[1], "{width}x{height} {convention:?}");
+                seen.push(verdicts[0].clone());
+            }
+            assert!(pyramids[1].device_bytes() > pyramids[0].device_bytes(), "nothing was copied");
+            assert!(seen[0] == seen[1] && seen[0] == seen[3], "the same depths");
+            assert!(seen[0] != seen[2], "each image hides others");
         }
-        assert!(pyramids[0].device_bytes() > pyramids[1].device_bytes(), "nothing was copied");
-        assert!(seen[0] == seen[2] && seen[0] != seen[1], "each image hides others");
+    }
+}
+
+/// A depth image that cannot be copied from is read where it is, and so are chunks.
+#[test]
+fn without_an_atlas_culls_go_on() {
+    let camera = camera_along_z(64, 64, DepthConvention::Standard);
+    let descriptor = wgpu::TextureDescriptor {
+        label: Some("test.depth"),
+        size: wgpu::Extent3d { width: 64, height: 64, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::R32Float,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    };
+    let uncopied = engine().device().create_texture(&descriptor);
+    let near = engine().upload_depth_sampled(&[0.0; 64 * 64], &camera).unwrap();
+    let bounds = Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0]), radii: Floats::F32(&[0.1]) };
+    let instances = engine().instances(&bounds, &InstanceOptions::default()).unwrap();
+    let one_chunk_only = only_one_chunk();
+    for (texture, chunk_shift) in [(&uncopied, None), (near.texture(), Some(11))] {
+        if one_chunk_only && chunk_shift.is_some() {
+            continue;
+        }
+        let options = PyramidOptions { atlas: AtlasUse::Always, chunk_shift, ..PyramidOptions::default() };
+        let pyramid = Arc::new(engine().context().create_pyramid(camera.size(), &options).unwrap());
+        let bytes = pyramid.device_bytes();
+        let mut encoder = engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        engine().context().record_reduce(&mut encoder, &view, &camera, &pyramid).unwrap();
+        engine().queue().submit([encoder.finish()]);
+        let (options, output) = (CullOptions::default(), VisibleOptions::default());
+        let mask = engine().cull(&instances, &camera, &pyramid, &options, &output).unwrap().mask().unwrap();
+        assert_eq!((mask, pyramid.device_bytes()), (vec![false], bytes), "all depths are 0, the nearest");
     }
 }
 

@@ -16,7 +16,7 @@ use crate::gpu::{CullKey, Gpu, ReportKey, StandIn};
 use crate::instances::{Instances, Piece};
 use crate::layout::CULL_WORKGROUP;
 use crate::pyramid::{Built, Pyramid, entry};
-use crate::shader::TexelStore;
+use crate::shader::DepthStore;
 use crate::visible::{PieceOutput, Visible};
 
 /// What a cull reads.
@@ -33,57 +33,54 @@ pub(crate) struct CullInputs<'a> {
 /// What the shader knows of camera and pyramid, and the pipeline that asks for it.
 struct Seen {
     built: Built,
-    /// The stored levels in a texture, where that pays.
-    texels: Option<wgpu::TextureView>,
+    /// All levels in one texture, where that pays.
+    atlas: Option<wgpu::TextureView>,
     key: CullKey,
 }
 
 impl Seen {
-    /// For `encoder`, which takes the copy of the levels where one is needed; without it there is none.
+    /// For `encoder`, which takes the copies into an atlas where one is needed; without it there is none.
     fn new(gpu: &Gpu, inputs: &CullInputs<'_>, encoder: Option<&mut wgpu::CommandEncoder>) -> Result<Self> {
         let CullInputs { instances, camera, pyramid, options, .. } = *inputs;
         gpu.check_context("instances", instances.context)?;
         gpu.check_context("pyramid", pyramid.context)?;
         let built = pyramid.built_for(camera)?;
-        let texels = encoder
-            .filter(|_| pyramid.texture_pays(gpu, instances.len()))
-            .map(|encoder| pyramid.record_texture(gpu, encoder, built.reduction));
+        let atlas = encoder
+            .filter(|_| pyramid.wants_atlas(gpu, instances.len()))
+            .map(|encoder| pyramid.record_atlas(gpu, encoder, &built));
         let key = CullKey {
-            source: built.source_kind,
-            texels: if texels.is_some() { TexelStore::Texture } else { TexelStore::Buffer },
+            store: if atlas.is_some() { DepthStore::Atlas } else { DepthStore::Apart(built.source_kind) },
             kind: instances.kind,
             reversed: camera.convention().is_reversed(),
-            chunks: if texels.is_some() { 1 } else { pyramid.chunks.len() },
+            chunks: if atlas.is_some() { 1 } else { pyramid.chunks.len() },
             sample_coverage: options.coverage == Coverage::Sample,
             footprint_log2: options.footprint.log2(),
             descent: options.descent > 0,
             fit_volume: options.fit == Fit::Volume,
         };
-        Ok(Self { built, texels, key })
+        Ok(Self { built, atlas, key })
     }
 
     /// The bindings for these options; those of the last cull, if it asked for the same.
     fn bind(&self, gpu: &Gpu, camera: &Camera, pyramid: &Pyramid, options: &CullOptions) -> Result<wgpu::BindGroup> {
         let uniform = ViewUniform::new(camera, self.built.reduction, options)?;
-        let key = (self.key.texels, bytemuck::cast(uniform));
+        let key = (self.key.store, bytemuck::cast(uniform));
         pyramid.bindings(key, || self.create(gpu, pyramid, &uniform))
     }
 
     fn create(&self, gpu: &Gpu, pyramid: &Pyramid, uniform: &ViewUniform) -> Result<wgpu::BindGroup> {
         let view = gpu.uniform("hiz.cull.view", uniform)?;
-        let mut entries = vec![
-            entry(0, wgpu::BindingResource::TextureView(&self.built.source)),
-            entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
-            entry(2, pyramid.uniform.as_entire_binding()),
-            entry(6, view.as_entire_binding()),
-        ];
-        match &self.texels {
-            Some(texels) => entries.push(entry(3, wgpu::BindingResource::TextureView(texels))),
-            None => entries.extend((0..3).map(|c| entry(3 + c, pyramid.chunk(gpu, c as usize).as_entire_binding()))),
+        let mut entries = vec![entry(2, pyramid.uniform.as_entire_binding()), entry(6, view.as_entire_binding())];
+        if let Some(atlas) = &self.atlas {
+            entries.push(entry(3, wgpu::BindingResource::TextureView(atlas)));
+        } else {
+            entries.push(entry(0, wgpu::BindingResource::TextureView(&self.built.source)));
+            entries.push(entry(1, wgpu::BindingResource::Sampler(gpu.sampler())));
+            entries.extend((0..3).map(|c| entry(3 + c, pyramid.chunk(gpu, c as usize).as_entire_binding())));
         }
         Ok(gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("hiz.cull.view"),
-            layout: gpu.layouts().cull(self.key.source, self.key.texels),
+            layout: gpu.layouts().cull(self.key.store),
             entries: &entries,
         }))
     }

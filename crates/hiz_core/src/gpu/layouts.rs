@@ -1,12 +1,13 @@
 //! The bind group layouts, one place for all passes.
 
-use crate::shader::{SOURCES, SourceKind, TexelStore};
+use crate::shader::{DepthStore, SOURCES, SourceKind};
 
 /// The bind group layouts.
 #[derive(Debug)]
 pub(crate) struct Layouts {
     reduce: [wgpu::BindGroupLayout; 3],
-    cull: [[wgpu::BindGroupLayout; 2]; 3],
+    cull_apart: [wgpu::BindGroupLayout; 3],
+    cull_atlas: wgpu::BindGroupLayout,
     /// A piece and its records.
     pub(crate) instances: wgpu::BindGroupLayout,
     /// What a cull writes.
@@ -30,15 +31,15 @@ enum Binding {
     Uniform,
     Read,
     Write,
-    ReadRecords,
-    WriteRecords,
+    ReadQuads,
+    WriteQuads,
     ReadTexels,
     WriteTexels,
 }
 
 impl Layouts {
     pub(super) fn new(device: &wgpu::Device) -> Self {
-        use Binding::{Read, ReadRecords, ReadTexels, Sampler, Texture, Uniform, Write, WriteRecords, WriteTexels};
+        use Binding::{Read, ReadQuads, ReadTexels, Sampler, Texture, Uniform, Write, WriteQuads, WriteTexels};
         let layout = |label: &str, entries: &[(u32, Binding)]| {
             let entries: Vec<_> = entries.iter().map(|(binding, kind)| layout_entry(*binding, *kind)).collect();
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
@@ -50,14 +51,12 @@ impl Layouts {
                     &[(0, Texture(s)), (1, Sampler), (2, Uniform), (3, Write), (4, Write), (5, Write)],
                 )
             }),
-            cull: SOURCES.map(|s| {
-                let with = |texels: &[(u32, Binding)]| {
-                    let others = [(0, Texture(s)), (1, Sampler), (2, Uniform), (6, Uniform)];
-                    layout("hiz.cull.view_layout", &[&others, texels].concat())
-                };
-                [with(&[(3, Read), (4, Read), (5, Read)]), with(&[(3, ReadTexels)])]
+            cull_apart: SOURCES.map(|s| {
+                let apart = [(0, Texture(s)), (1, Sampler), (3, Read), (4, Read), (5, Read)];
+                layout("hiz.cull.view_layout", &[&apart[..], &[(2, Uniform), (6, Uniform)]].concat())
             }),
-            instances: layout("hiz.cull.instances_layout", &[(0, Uniform), (1, ReadRecords)]),
+            cull_atlas: layout("hiz.cull.atlas_layout", &[(2, Uniform), (3, ReadQuads), (6, Uniform)]),
+            instances: layout("hiz.cull.instances_layout", &[(0, Uniform), (1, ReadQuads)]),
             visible: layout("hiz.cull.visible_layout", &[(0, Write), (1, Write), (2, Write), (3, Write), (4, Uniform)]),
             compact: layout(
                 "hiz.compact.layout",
@@ -66,7 +65,7 @@ impl Layouts {
             survivors: layout("hiz.cull_groups.layout", &[(0, Write), (1, Write), (2, WriteTexels)]),
             members: layout("hiz.cull_members.layout", &[(0, Read), (1, ReadTexels)]),
             count: layout("hiz.count.layout", &[(0, Uniform), (1, Read), (2, Read), (3, Write)]),
-            update: layout("hiz.update.layout", &[(0, Uniform), (1, Read), (2, Read), (3, WriteRecords), (4, Write)]),
+            update: layout("hiz.update.layout", &[(0, Uniform), (1, Read), (2, Read), (3, WriteQuads), (4, Write)]),
             one_uniform: layout("hiz.uniform_layout", &[(0, Uniform)]),
             one_storage: layout("hiz.storage_layout", &[(0, Write)]),
             occluder_view: device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
@@ -83,8 +82,11 @@ impl Layouts {
         &self.reduce[source as usize]
     }
 
-    pub(crate) fn cull(&self, source: SourceKind, texels: TexelStore) -> &wgpu::BindGroupLayout {
-        &self.cull[source as usize][texels as usize]
+    pub(crate) fn cull(&self, store: DepthStore) -> &wgpu::BindGroupLayout {
+        match store {
+            DepthStore::Apart(source) => &self.cull_apart[source as usize],
+            DepthStore::Atlas => &self.cull_atlas,
+        }
     }
 }
 
@@ -95,7 +97,7 @@ fn layout_entry(binding: u32, kind: Binding) -> wgpu::BindGroupLayoutEntry {
         format,
         view_dimension: wgpu::TextureViewDimension::D2,
     };
-    let records = |access| storage_texture(crate::records::FORMAT, access);
+    let quads = |access| storage_texture(wgpu::TextureFormat::Rgba32Uint, access);
     let texels = |access| storage_texture(wgpu::TextureFormat::R32Uint, access);
     wgpu::BindGroupLayoutEntry {
         binding,
@@ -106,8 +108,8 @@ fn layout_entry(binding: u32, kind: Binding) -> wgpu::BindGroupLayoutEntry {
             Binding::Uniform => buffer(wgpu::BufferBindingType::Uniform),
             Binding::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
             Binding::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
-            Binding::ReadRecords => records(wgpu::StorageTextureAccess::ReadOnly),
-            Binding::WriteRecords => records(wgpu::StorageTextureAccess::WriteOnly),
+            Binding::ReadQuads => quads(wgpu::StorageTextureAccess::ReadOnly),
+            Binding::WriteQuads => quads(wgpu::StorageTextureAccess::WriteOnly),
             Binding::ReadTexels => texels(wgpu::StorageTextureAccess::ReadOnly),
             Binding::WriteTexels => texels(wgpu::StorageTextureAccess::WriteOnly),
         },

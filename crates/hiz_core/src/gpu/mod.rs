@@ -11,7 +11,7 @@ use layouts::Layouts;
 
 use crate::bounds::BoundsKind;
 use crate::error::{Error, Result};
-use crate::shader::{self, SourceKind, TexelStore};
+use crate::shader::{self, DepthStore, SourceKind};
 use crate::visible::NO_SURVIVORS;
 
 /// Tells objects of one context from those of another. (wgpu's own handles compare equal across its instances.)
@@ -96,8 +96,7 @@ const STAND_IN_BYTES: u64 = 256;
 /// What makes one cull pipeline differ from another; each is compiled without the branches that it does not take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct CullKey {
-    pub(crate) source: SourceKind,
-    pub(crate) texels: TexelStore,
+    pub(crate) store: DepthStore,
     pub(crate) kind: BoundsKind,
     pub(crate) reversed: bool,
     pub(crate) chunks: usize,
@@ -305,9 +304,9 @@ impl Gpu {
         self.cull.get((key, report), || {
             self.pipeline(
                 "hiz.cull.pipeline",
-                &shader::cull(key.source, key.texels, key.kind),
+                &shader::cull(key.store, key.kind),
                 "cull",
-                &[layouts.cull(key.source, key.texels), &layouts.instances, &layouts.visible],
+                &[layouts.cull(key.store), &layouts.instances, &layouts.visible],
                 &[&classify_constants(&key)[..], &report_constants(&report)].concat(),
             )
         })
@@ -319,9 +318,9 @@ impl Gpu {
         self.yardstick_cull.get((key, report), || {
             self.pipeline(
                 "hiz.yardstick.cull",
-                &shader::yardstick_cull(key.source, key.texels),
+                &shader::yardstick_cull(key.store),
                 "cull",
-                &[layouts.cull(key.source, key.texels), &layouts.instances, &layouts.visible],
+                &[layouts.cull(key.store), &layouts.instances, &layouts.visible],
                 &[&classify_constants(&key)[..], &report_constants(&report)].concat(),
             )
         })
@@ -332,9 +331,9 @@ impl Gpu {
         self.cull_groups.get(key, || {
             self.pipeline(
                 "hiz.cull_groups.pipeline",
-                &shader::cull_groups(key.source, key.texels),
+                &shader::cull_groups(key.store),
                 "cull_groups",
-                &[layouts.cull(key.source, key.texels), &layouts.instances, &layouts.survivors],
+                &[layouts.cull(key.store), &layouts.instances, &layouts.survivors],
                 &classify_constants(&key),
             )
         })
@@ -345,9 +344,9 @@ impl Gpu {
         self.cull_members.get((key, report), || {
             self.pipeline(
                 "hiz.cull_members.pipeline",
-                &shader::cull_members(key.source, key.texels, key.kind),
+                &shader::cull_members(key.store, key.kind),
                 "cull_members",
-                &[layouts.cull(key.source, key.texels), &layouts.instances, &layouts.visible, &layouts.members],
+                &[layouts.cull(key.store), &layouts.instances, &layouts.visible, &layouts.members],
                 &[&classify_constants(&key)[..], &report_constants(&report)].concat(),
             )
         })
@@ -365,9 +364,9 @@ impl Gpu {
         self.explain.get(key, || {
             self.pipeline(
                 "hiz.explain.pipeline",
-                &shader::explain(key.source, key.kind),
+                &shader::explain(key.store, key.kind),
                 "explain",
-                &[layouts.cull(key.source, key.texels), &layouts.instances, &layouts.one_storage],
+                &[layouts.cull(key.store), &layouts.instances, &layouts.one_storage],
                 &classify_constants(&key),
             )
         })

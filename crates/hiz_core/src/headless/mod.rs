@@ -305,8 +305,8 @@ impl Engine {
         output: &VisibleOptions,
     ) -> Result<Culling> {
         let start = Instant::now();
-        // Of several threads one records the copy of the levels: it must also be the first to submit.
-        let copies = pyramid.texture_pays(&self.context().gpu, instances.len());
+        // Of several threads one records the copies into the atlas: it must also be the first to submit.
+        let copies = pyramid.wants_atlas(&self.context().gpu, instances.len());
         let _turn = copies.then(|| locked(&self.shared.copying));
         let culling = self.scoped(|| {
             let visible = self.context().create_visible(instances, output)?;
@@ -333,7 +333,7 @@ impl Engine {
         if culling.is_err() {
             pyramid.forget();
         } else if copies {
-            pyramid.confirm_copied();
+            pyramid.confirm_atlas();
         }
         culling
     }

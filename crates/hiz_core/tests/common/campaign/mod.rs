@@ -17,7 +17,7 @@ mod volume;
 
 use hiz_core::headless::{DepthImage, Engine};
 use hiz_core::{
-    BoundsKind, Camera, Coverage, CullOptions, Fit, Footprint, Hierarchy, InstanceOptions, PyramidOptions,
+    AtlasUse, BoundsKind, Camera, Coverage, CullOptions, Fit, Footprint, Hierarchy, InstanceOptions, PyramidOptions,
     StoredLevels, VisibleOptions,
 };
 use hiz_ref::{Options, Outcome, OwnDepth, Verdict, View, Volume};
@@ -181,17 +181,27 @@ impl Campaign {
 }
 
 impl Round {
-    /// The depth image; every other one in a texture that is gathered from, like a depth texture.
+    /// One of four ways to hold depth, whatever the class.
+    fn way(&self) -> u64 {
+        (self.number as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 62
+    }
+
+    /// The depth image; in two of four ways in a texture that is gathered from, like a depth texture.
     pub(crate) fn upload(&self, engine: &Engine) -> DepthImage {
-        let upload = if self.number % 2 == 1 { Engine::upload_depth_sampled } else { Engine::upload_depth };
+        let upload = if self.way() % 2 == 1 { Engine::upload_depth_sampled } else { Engine::upload_depth };
         upload(engine, &self.depth, &self.camera).expect("upload")
+    }
+
+    /// The levels of this round; in two of four ways, one of each kind of image, culls read all of them from one texture.
+    pub(crate) fn pyramid_options(&self) -> PyramidOptions {
+        let atlas = if self.way() < 2 { AtlasUse::Always } else { AtlasUse::Never };
+        PyramidOptions { levels: self.levels, atlas, ..PyramidOptions::default() }
     }
 
     /// What the device keeps, for each kind. Nothing for a camera that is refused: float32 cannot hold its rows.
     pub(crate) fn masks(&self, engine: &Engine) -> Option<Vec<Vec<bool>>> {
         let image = self.upload(engine);
-        let stored = PyramidOptions { levels: self.levels, ..PyramidOptions::default() };
-        let pyramid = engine.pyramid_with(&image, &stored).expect("pyramid");
+        let pyramid = engine.pyramid_with(&image, &self.pyramid_options()).expect("pyramid");
         let mut masks = Vec::new();
         for (kind, volumes) in &self.volumes {
             let arrays = Arrays::new(volumes);

@@ -1,0 +1,217 @@
+//! All levels of a pyramid, the depth image among them, in one texture, for culls of many instances: a software driver goes both ways of
+//! a branch, so with level 0 and the others apart it fetches from both, and a word of a buffer costs it four times a texel
+//! (`docs/performance.md`). Twin: `shaders/shared/texels_atlas.wgsl`.
+
+use crate::layout::{Level, MAX_LEVELS, PyramidLayout, StoredLevels, stored_levels};
+use crate::shader::SourceKind;
+
+/// Pixels of a row that a texel holds.
+const PIXELS: u32 = 4;
+
+/// Where the levels lie, in texels: level 0 on the left, beside it the stored ones below each other, and in a column of its own
+/// the pyramid's header.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct AtlasLayout {
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    /// Column and row where each level begins; `shaders/shared/pyramid.wgsl` pads them.
+    pub(crate) origins: [[u32; 4]; MAX_LEVELS],
+}
+
+impl AtlasLayout {
+    pub(crate) fn new(levels: &[Level], stored: StoredLevels) -> Self {
+        let texels = |level: &Level| level.width.div_ceil(PIXELS);
+        let mut origins = [[0; 4]; MAX_LEVELS];
+        let column = texels(&levels[0]);
+        let (mut width, mut rows) = (0, 0);
+        for (k, level) in stored_levels(levels, stored) {
+            origins[k] = [column, rows, 0, 0];
+            width = width.max(texels(level));
+            rows += level.height;
+        }
+        Self { width: column + width + 1, height: levels[0].height.max(rows), origins }
+    }
+
+    /// Whether the device has such textures.
+    fn fits(&self, limits: &wgpu::Limits) -> bool {
+        self.width.max(self.height) <= limits.max_texture_dimension_2d
+    }
+}
+
+/// Whether culls read the depth image and the stored levels from one texture, into which both are copied once a reduction. The answers
+/// are the same.
+///
+/// It can be where the depth image is [`Depth32Float`](wgpu::TextureFormat::Depth32Float) or of a color format, has the usage
+/// [`COPY_SRC`](wgpu::TextureUsages::COPY_SRC), and is no larger than a texture may be; otherwise culls read them where they are.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum AtlasUse {
+    /// Where a cull has enough instances for the copy to pay.
+    #[default]
+    Auto,
+    /// Whatever their number.
+    Always,
+    /// Not at all: no copy, and no memory for it.
+    Never,
+}
+
+/// The texture, and what is known to be in it.
+#[derive(Debug)]
+pub(crate) struct Atlas {
+    texture: wgpu::Texture,
+    /// Where the depth image passes on its way from a texture of another format.
+    staging: Option<wgpu::Buffer>,
+    /// The reduction of which the levels are known to have been submitted; 0: none.
+    pub(crate) reduction: u32,
+}
+
+/// Whether an atlas can be made of these levels and the depth image `source`.
+pub(crate) fn is_possible(layout: &PyramidLayout, source: &wgpu::Texture, limits: &wgpu::Limits) -> bool {
+    // Of depth formats this one alone travels as float32.
+    let travels = SourceKind::of(source.format()) != Some(SourceKind::Depth)
+        || source.format() == wgpu::TextureFormat::Depth32Float;
+    travels
+        && source.usage().contains(wgpu::TextureUsages::COPY_SRC)
+        && layout.chunk_sizes().len() == 1
+        && layout.atlas.fits(limits)
+}
+
+impl AtlasUse {
+    /// Whether culls of so many instances ask for one. A copied pixel costs about a quarter of what it saves an instance
+    /// (`docs/performance.md`).
+    pub(crate) fn pays(self, layout: &PyramidLayout, instances: u32) -> bool {
+        match self {
+            Self::Auto => 4 * u64::from(instances) >= layout.size.pixels() + layout.texels,
+            Self::Always => true,
+            Self::Never => false,
+        }
+    }
+}
+
+impl Atlas {
+    pub(crate) fn new(device: &wgpu::Device, layout: &PyramidLayout) -> Self {
+        let AtlasLayout { width, height, .. } = layout.atlas;
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("hiz.pyramid.atlas"),
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba32Uint,
+            usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        });
+        Self { texture, staging: None, reduction: 0 }
+    }
+
+    pub(crate) fn view(&self) -> wgpu::TextureView {
+        self.texture.create_view(&wgpu::TextureViewDescriptor::default())
+    }
+
+    /// Bytes on the device.
+    pub(crate) fn bytes(&self) -> u64 {
+        let texture = 16 * u64::from(self.texture.width()) * u64::from(self.texture.height());
+        texture + self.staging.as_ref().map_or(0, wgpu::Buffer::size)
+    }
+
+    /// Records the copies of all levels. (The header goes with them: a cull that runs before the reduction keeps everything.)
+    pub(crate) fn record(
+        &mut self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        layout: &PyramidLayout,
+        stored: &wgpu::Buffer,
+        source: &wgpu::Texture,
+    ) {
+        let header = [layout.atlas.width - 1, 0, 0, 0];
+        self.record_rows(encoder, stored, header, Rows { offset: 0, pitch: 0, width: PIXELS, height: 1 });
+        for (k, level) in layout.stored_levels() {
+            let Level { offset, stride, width, height } = *level;
+            let rows = Rows { offset: 4 * u64::from(offset), pitch: 4 * stride, width, height };
+            self.record_rows(encoder, stored, layout.atlas.origins[k], rows);
+        }
+        if source.format() == self.texture.format() {
+            encoder.copy_texture_to_texture(source.as_image_copy(), self.texture.as_image_copy(), source.size());
+            return;
+        }
+        let (width, height) = (layout.size.width, layout.size.height);
+        // Four bytes a pixel of an image that the device can hold.
+        let pitch = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let staging = self.staging.get_or_insert_with(|| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("hiz.pyramid.atlas_staging"),
+                size: u64::from(pitch) * u64::from(height),
+                usage: wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        });
+        // In one piece: a depth texture cannot be copied in parts.
+        encoder.copy_texture_to_buffer(
+            source.as_image_copy(),
+            wgpu::TexelCopyBufferInfo { buffer: staging, layout: copy_layout(0, pitch) },
+            source.size(),
+        );
+        let staging = staging.clone();
+        self.record_rows(encoder, &staging, [0; 4], Rows { offset: 0, pitch, width, height });
+    }
+
+    /// Records the copy of a level to where it begins.
+    fn record_rows(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        buffer: &wgpu::Buffer,
+        [x, y, ..]: [u32; 4],
+        Rows { offset, pitch, width, height }: Rows,
+    ) {
+        encoder.copy_buffer_to_texture(
+            wgpu::TexelCopyBufferInfo { buffer, layout: copy_layout(offset, pitch) },
+            wgpu::TexelCopyTextureInfo { origin: wgpu::Origin3d { x, y, z: 0 }, ..self.texture.as_image_copy() },
+            wgpu::Extent3d { width: width.div_ceil(PIXELS), height, depth_or_array_layers: 1 },
+        );
+    }
+}
+
+/// Rows in a buffer: bytes, but for `width` in pixels.
+struct Rows {
+    offset: u64,
+    pitch: u32,
+    width: u32,
+    height: u32,
+}
+
+fn copy_layout(offset: u64, pitch: u32) -> wgpu::TexelCopyBufferLayout {
+    wgpu::TexelCopyBufferLayout { offset, bytes_per_row: (pitch > 0).then_some(pitch), rows_per_image: None }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::camera::ImageSize;
+    use crate::layout::{PyramidLayout, StoredLevels};
+
+    #[test]
+    fn levels_lie_beside_each_other() {
+        for (w, h) in [(1, 1), (5, 3), (1, 9000), (9000, 1), (1920, 1080), (640, 481), (8191, 8001)] {
+            for levels in [StoredLevels::ALL, StoredLevels::only(3), StoredLevels { first: 2, last: 4 }] {
+                let layout = PyramidLayout::new(ImageSize::new(w, h), levels, 25).unwrap();
+                let atlas = &layout.atlas;
+                // Column, row, width, height; the header last.
+                let mut areas = vec![[0, 0, w.div_ceil(4), h], [atlas.width - 1, 0, 1, 1]];
+                for (k, level) in layout.stored_levels() {
+                    let [x, y, ..] = atlas.origins[k];
+                    areas.push([x, y, level.width.div_ceil(4), level.height]);
+                }
+                for (i, [x, y, width, height]) in areas.iter().enumerate() {
+                    assert!(x + width <= atlas.width && y + height <= atlas.height, "{w}x{h} {levels:?}");
+                    for [u, v, across, down] in &areas[..i] {
+                        assert!(x + width <= *u || u + across <= *x || y + height <= *v || v + down <= *y, "{w}x{h}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_largest_image_of_any_device_fits() {
+        let layout = PyramidLayout::new(ImageSize::new(8192, 8192), StoredLevels::ALL, 25).unwrap();
+        assert!(layout.atlas.fits(&wgpu::Limits::default()));
+    }
+}
