@@ -2,6 +2,9 @@
 //! a branch, so with level 0 and the others apart it fetches from both, and a word of a buffer costs it four times a texel
 //! (`docs/performance.md`). Twin: `shaders/shared/texels_atlas.wgsl`.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use crate::layout::{Level, MAX_LEVELS, PyramidLayout, StoredLevels, stored_levels};
 use crate::shader::SourceKind;
 
@@ -60,8 +63,8 @@ pub(crate) struct Atlas {
     texture: wgpu::Texture,
     /// Where the depth image passes on its way from a texture of another format.
     staging: Option<wgpu::Buffer>,
-    /// The reduction of which the levels are known to have been submitted; 0: none.
-    pub(crate) reduction: u32,
+    /// The reduction whose levels it is known to hold; 0: none.
+    contents: Arc<AtomicU32>,
 }
 
 /// Whether an atlas can be made of these levels and the depth image `source`.
@@ -100,11 +103,21 @@ impl Atlas {
             usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         });
-        Self { texture, staging: None, reduction: 0 }
+        Self { texture, staging: None, contents: Arc::default() }
     }
 
     pub(crate) fn view(&self) -> wgpu::TextureView {
         self.texture.create_view(&wgpu::TextureViewDescriptor::default())
+    }
+
+    /// Whether the levels of a reduction are known to be there.
+    pub(crate) fn holds(&self, reduction: u32) -> bool {
+        self.contents.load(Ordering::Acquire) == reduction
+    }
+
+    /// The number of the reduction whose levels are there, for who learns that.
+    pub(crate) fn contents(&self) -> Arc<AtomicU32> {
+        Arc::clone(&self.contents)
     }
 
     /// Bytes on the device.

@@ -1,7 +1,7 @@
 //! The depth pyramid: its storage, and the pass that fills it.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex};
 
 use crate::atlas::{self, Atlas, AtlasUse};
 use crate::camera::{Camera, ImageSize};
@@ -68,8 +68,8 @@ pub struct Pyramid {
     built: Mutex<Option<Built>>,
     atlas_use: AtlasUse,
     atlas: Mutex<Option<Atlas>>,
-    /// The reduction that is known to have been submitted: what was only recorded may never run.
-    submitted: AtomicU32,
+    /// The last reduction that is known to have run: what was only recorded may never do so.
+    reduced: Arc<AtomicU32>,
     /// The last bindings of culls, of instances and of groups: many culls see the same view.
     bindings: Mutex<Vec<(BindingsKey, wgpu::BindGroup)>>,
 }
@@ -134,7 +134,7 @@ impl Pyramid {
             built: Mutex::new(None),
             atlas_use: options.atlas,
             atlas: Mutex::new(None),
-            submitted: AtomicU32::new(0),
+            reduced: Arc::default(),
             bindings: Mutex::new(Vec::new()),
         })
     }
@@ -191,28 +191,13 @@ impl Pyramid {
         self.atlas_use.pays(&self.layout, instances) && self.built().is_some_and(possible)
     }
 
-    /// What was recorded of this pyramid's reduction has been submitted.
-    pub(crate) fn confirm_submitted(&self) {
-        self.submitted.store(self.built().map_or(0, |built| built.reduction), Ordering::Release);
-    }
-
-    /// A cull that recorded the atlas has been submitted, behind the reduction if that was.
-    pub(crate) fn confirm_atlas(&self) {
-        let reduction = self.built().map_or(0, |built| built.reduction);
-        let mut atlas = self.atlas.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        // Nothing there: somebody else's call failed, and forgot it.
-        if let Some(atlas) = atlas.as_mut().filter(|_| self.submitted.load(Ordering::Acquire) == reduction) {
-            atlas.reduction = reduction;
-        }
-    }
-
     /// Something failed on the device: nothing that was made for culls is kept.
     pub(crate) fn forget(&self) {
         *self.atlas.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = None;
         self.bindings.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clear();
     }
 
-    /// The atlas of what the pyramid was built from; its copies are recorded if they are not known to have been submitted.
+    /// The atlas of what the pyramid was built from; its copies are recorded if they are not known to have run, behind that reduction.
     pub(crate) fn record_atlas(
         &self,
         gpu: &Gpu,
@@ -221,8 +206,15 @@ impl Pyramid {
     ) -> wgpu::TextureView {
         let mut atlas = self.atlas.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let atlas = atlas.get_or_insert_with(|| Atlas::new(gpu.device(), &self.layout));
-        if atlas.reduction != built.reduction {
-            atlas.record(gpu.device(), encoder, &self.layout, &self.chunks[0], built.source.texture());
+        let Built { reduction, source, .. } = built;
+        if !atlas.holds(*reduction) {
+            atlas.record(gpu.device(), encoder, &self.layout, &self.chunks[0], source.texture());
+            let (holds, reduced, reduction) = (atlas.contents(), Arc::clone(&self.reduced), *reduction);
+            encoder.on_submitted_work_done(move || {
+                if reduced.load(Ordering::Acquire) == reduction {
+                    holds.store(reduction, Ordering::Release);
+                }
+            });
         }
         atlas.view()
     }
@@ -363,6 +355,8 @@ pub(crate) fn record_reduce(
         pass.dispatch_workgroups(workgroups[0].max(1), workgroups[1].max(1), 1);
     }
     drop(pass);
+    let reduced = Arc::clone(&pyramid.reduced);
+    encoder.on_submitted_work_done(move || reduced.store(reduction, Ordering::Release));
     // They hold the last depth image.
     pyramid.bindings.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clear();
     *pyramid.built.lock().unwrap_or_else(std::sync::PoisonError::into_inner) =

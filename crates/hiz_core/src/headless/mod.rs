@@ -43,8 +43,6 @@ struct Shared {
     /// Why the device was lost, once it is; and errors that no scope caught.
     lost: Arc<Mutex<Option<String>>>,
     uncaught: Arc<Mutex<Option<String>>>,
-    /// Held by a cull that may copy a pyramid's levels, from recording to submit.
-    copying: Mutex<()>,
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
@@ -96,17 +94,7 @@ impl Engine {
             locked(&uncaught_to).get_or_insert(error.to_string());
         }));
         let context = HizContext::with_planted_faults(&device, faults)?;
-        Ok(Self {
-            shared: Arc::new(Shared {
-                context,
-                device,
-                queue,
-                adapter: summary,
-                lost,
-                uncaught,
-                copying: Mutex::new(()),
-            }),
-        })
+        Ok(Self { shared: Arc::new(Shared { context, device, queue, adapter: summary, lost, uncaught }) })
     }
 
     /// The adapter.
@@ -239,7 +227,6 @@ impl Engine {
             let mut encoder = self.encoder("hiz.reduce.encoder");
             self.context().record_reduce(&mut encoder, &depth.view, &depth.camera, &pyramid)?;
             self.queue().submit([encoder.finish()]);
-            pyramid.confirm_submitted();
             Ok(Arc::new(pyramid))
         })
     }
@@ -305,9 +292,6 @@ impl Engine {
         output: &VisibleOptions,
     ) -> Result<Culling> {
         let start = Instant::now();
-        // Of several threads one records the copies into the atlas: it must also be the first to submit.
-        let copies = pyramid.wants_atlas(&self.context().gpu, instances.len());
-        let _turn = copies.then(|| locked(&self.shared.copying));
         let culling = self.scoped(|| {
             let visible = self.context().create_visible(instances, output)?;
             let mut encoder = self.encoder("hiz.cull.encoder");
@@ -332,8 +316,6 @@ impl Engine {
         });
         if culling.is_err() {
             pyramid.forget();
-        } else if copies {
-            pyramid.confirm_atlas();
         }
         culling
     }
