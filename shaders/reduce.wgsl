@@ -76,12 +76,13 @@ fn reduce_block(source_number: u32, last: u32, block: vec2<u32>) {
 }
 
 @compute @workgroup_size(64, 1)
-fn reduce(@builtin(global_invocation_id) id: vec3<u32>) {
-    if step.reduction != 0u && id.x == 0u && id.y == 0u {
+fn reduce(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let block = place_of(workgroup.xy, lane);
+    if step.reduction != 0u && block.x == 0u && block.y == 0u {
         chunk_0[0] = vec4<u32>(step.reduction, 0u, 0u, 0u);
     }
-    if id.x < step.blocks.x && id.y < step.blocks.y {
-        reduce_block(step.source, step.last, id.xy);
+    if block.x < step.blocks.x && block.y < step.blocks.y {
+        reduce_block(step.source, step.last, block);
     }
 }
 

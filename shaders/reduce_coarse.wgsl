@@ -8,7 +8,7 @@
 override SHARED: bool;
 
 const WORKGROUP: u32 = 64u;
-// The workgroup's invocations along a side of its texel.
+// The workgroup's invocations along a side of its texel (`place_in_square`).
 const SIDE_LOG2: u32 = 3u;
 
 var<workgroup> parts: array<u32, WORKGROUP>;
@@ -31,26 +31,22 @@ fn farthest_of(begin: vec2<u32>, side: u32) -> u32 {
 }
 
 @compute @workgroup_size(64, 1)
-fn reduce_coarse(
-    @builtin(global_invocation_id) id: vec3<u32>,
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(local_invocation_index) lane: u32,
-) {
-    if id.x == 0u && id.y == 0u {
+fn reduce_coarse(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    if lane == 0u && group.x == 0u && group.y == 0u {
         chunk_0[0] = vec4<u32>(step.reduction, 0u, 0u, 0u);
     }
     let level = pyramid.levels[step.last];
     // Blocks along a side of a texel.
     let side = 1u << (step.last - 3u);
     if !SHARED {
-        if id.x < step.blocks.x && id.y < step.blocks.y {
-            store(level.offset + id.y * level.stride + id.x, farthest_of(id.xy * side, side));
+        let at = place_of(group.xy, lane);
+        if at.x < step.blocks.x && at.y < step.blocks.y {
+            store(level.offset + at.y * level.stride + at.x, farthest_of(at * side, side));
         }
         return;
     }
     let part = side >> SIDE_LOG2;
-    let at = vec2<u32>(lane & ((1u << SIDE_LOG2) - 1u), lane >> SIDE_LOG2);
-    parts[lane] = farthest_of(group.xy * side + at * part, part);
+    parts[lane] = farthest_of(group.xy * side + place_in_square(lane) * part, part);
     workgroupBarrier();
     if lane == 0u {
         var bits = parts[0];

@@ -18,6 +18,25 @@ struct Step {
     padding_1: vec2<u32>,
 }
 
+// True: neighbouring invocations read below each other.
+override TALL: bool;
+
+// What an invocation of a workgroup of 64 reads: of 64 places in a row, or, TALL, of eight columns of eight. (A software driver reads for
+// eight invocations at once. Eight below each other walk along their rows in small steps, which the processor foresees, eight in a
+// row in large ones: docs/performance.md.)
+fn place_of(workgroup: vec2<u32>, lane: u32) -> vec2<u32> {
+    if TALL {
+        return 8u * workgroup + place_in_square(lane);
+    }
+    return vec2<u32>(64u * workgroup.x + lane, workgroup.y);
+}
+
+// Its place where the workgroup takes a square anyway.
+fn place_in_square(lane: u32) -> vec2<u32> {
+    let down = vec2<u32>(lane >> 3u, lane & 7u);
+    return select(down.yx, down, TALL);
+}
+
 // `index` is a multiple of 4, and so is the size of a chunk.
 fn load4(index: u32) -> vec4<u32> {
     if CHUNKS == 1u {

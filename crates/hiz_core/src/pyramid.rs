@@ -11,8 +11,12 @@ use crate::gpu::{ContextId, Gpu, ReduceKey, ReduceShape, StandIn};
 use crate::layout::{Level, MAX_LEVELS, PYRAMID_CHUNKS, PyramidLayout, Step, StoredLevels};
 use crate::shader::{DepthStore, SourceKind};
 
-/// Invocations of a workgroup of the reduction, all in a row.
+/// Invocations of a workgroup of the reduction, all in a row; `shaders/shared/pyramid_write.wgsl`, `place_of`.
 const REDUCE_WORKGROUP: u32 = 64;
+/// Or the side of a square of them, `TALL`.
+const TALL_SIDE: u32 = 8;
+/// Pixels of 4 KiB.
+const PAGE_PIXELS: u32 = 1024;
 /// From this level on a workgroup shares one texel, if it is made alone: 8x8 pixels an invocation.
 const SHARED_LEVEL: u32 = 6;
 
@@ -332,14 +336,17 @@ pub(crate) fn record_reduce(
             layout: &layouts.one_uniform,
             entries: &[entry(0, uniform.as_entire_binding())],
         });
+        let tall = step.source == 0 && reads_tall(source_kind, size);
         let [columns, rows] = step.blocks;
-        let by_rows = [columns.div_ceil(REDUCE_WORKGROUP), rows];
+        let of_places =
+            if tall { step.blocks.map(|n| n.div_ceil(TALL_SIDE)) } else { [columns.div_ceil(REDUCE_WORKGROUP), rows] };
         let (shape, workgroups) = if step.is_tail() {
             (ReduceShape::Tail, [1, 1])
         } else if !step.is_coarse() {
-            (ReduceShape::Blocks { from_source: step.source == 0, first: step.first - step.source }, by_rows)
+            let (from_source, first) = (step.source == 0, step.first - step.source);
+            (ReduceShape::Blocks { from_source, first }, of_places)
         } else if step.last < SHARED_LEVEL {
-            (ReduceShape::Coarse { shared: false }, by_rows)
+            (ReduceShape::Coarse { shared: false }, of_places)
         } else {
             (ReduceShape::Coarse { shared: true }, [columns, rows])
         };
@@ -347,6 +354,7 @@ pub(crate) fn record_reduce(
             source: source_kind,
             reversed: camera.convention().is_reversed(),
             chunks: pyramid.chunks.len(),
+            tall,
             shape,
         };
         pass.set_pipeline(&gpu.reduce_pipeline(key));
@@ -362,6 +370,12 @@ pub(crate) fn record_reduce(
     *pyramid.built.lock().unwrap_or_else(std::sync::PoisonError::into_inner) =
         Some(Built { reduction, source: depth.clone(), source_kind, camera: camera.clone() });
     Ok(())
+}
+
+/// Whether neighbouring invocations read blocks below each other. Texels that hold four pixels are loaded in a way that gains nothing; and
+/// rows that begin at multiples of a page would all fall into the same lines of a cache (`docs/performance.md`).
+fn reads_tall(source: SourceKind, size: ImageSize) -> bool {
+    source != SourceKind::Bits && !size.width.is_multiple_of(PAGE_PIXELS)
 }
 
 fn step_uniform(step: &Step, reduction: u32) -> StepUniform {

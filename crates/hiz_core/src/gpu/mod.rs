@@ -56,6 +56,8 @@ pub(crate) struct ReduceKey {
     pub(crate) source: SourceKind,
     pub(crate) reversed: bool,
     pub(crate) chunks: usize,
+    /// Neighbouring invocations read below each other.
+    pub(crate) tall: bool,
     pub(crate) shape: ReduceShape,
 }
 
@@ -274,7 +276,8 @@ impl Gpu {
     pub(crate) fn reduce_pipeline(&self, key: ReduceKey) -> wgpu::ComputePipeline {
         let layouts = self.layouts();
         self.reduce.get(key, || {
-            let mut constants = vec![("REVERSED", flag(key.reversed)), ("CHUNKS", key.chunks as f64)];
+            let mut constants =
+                vec![("REVERSED", flag(key.reversed)), ("CHUNKS", key.chunks as f64), ("TALL", flag(key.tall))];
             let (source, entry_point) = match key.shape {
                 ReduceShape::Blocks { from_source, first } => {
                     constants.extend([("FROM_SOURCE", flag(from_source)), ("FIRST", f64::from(first))]);
