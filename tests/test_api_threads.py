@@ -119,7 +119,7 @@ def test_the_interpreter_runs_while_the_device_works(device: hizvk.Device) -> No
 
 
 def test_many_threads_cull_a_crowd_that_copies_the_levels(device: hizvk.Device) -> None:
-    """The first of them copies the pyramid's levels into a texture; nobody may look before."""
+    """Several copy the depth image and its levels into one texture; none may look before a copy has run."""
     rng = np.random.default_rng(8)
     centers = rng.uniform((-20, -20, -30), (20, 20, -2), (40_000, 3)).astype(np.float32)
     crowd = device.instances(hizvk.Spheres(centers, np.full(len(centers), 0.1, np.float32)))

@@ -171,7 +171,8 @@ impl HizContext {
     /// `depth` is a view of a whole 2D texture of one mip level, sample and layer, with the usage `TEXTURE_BINDING`
     /// (`Rgba32Uint`: `STORAGE_BINDING`) and a depth format (with stencil: the view's aspect is `DepthOnly`), `R32Float`, or
     /// `Rgba32Uint` of the float bits of four pixels of a row a texel, which is `width.div_ceil(4)` texels wide (pixels past the
-    /// width count as depth of the row's last ones: repeat the last). The reduction has to be submitted before a cull
+    /// width count as depth of the row's last ones: repeat the last). Give it `COPY_SRC` as well, and large culls read
+    /// faster ([`AtlasUse`](crate::AtlasUse)). The reduction has to be submitted before a cull
     /// that uses it, or with it: a cull that runs before it keeps everything.
     ///
     /// # Errors
