@@ -199,7 +199,7 @@ pub(crate) const GROUPS_OF_RUN: u32 = 8;
 
 /// Texels of finer levels that a group's test may read: a box around 64 instances is large, so its footprint is coarse
 /// (`docs/performance.md`).
-const GROUP_DESCENT: u32 = 32;
+const GROUP_DESCENT: u32 = 16;
 
 /// From how many instances on groups are culled first: fewer are tested one by one before the groups' own dispatches have begun
 /// (`docs/performance.md`).
