@@ -1,52 +1,12 @@
 // Level 0 is a color texture of one float channel (r32float).
 
 @group(0) @binding(0) var source: texture_2d<f32>;
-@group(0) @binding(1) var source_sampler: sampler;
 
 fn source_bits(x: u32, y: u32) -> u32 {
     return sanitized(bitcast<u32>(textureLoad(source, vec2<u32>(x, y), 0).x));
 }
 
-// The common corner of the pixels (2x, 2y) to (2x + 1, 2y + 1), in units of the image: half a pixel from where a gather would take
-// others, so that rounding is harmless.
-fn quad_corner(x: u32, y: u32) -> vec2<f32> {
-    return vec2<f32>(f32(2u * x + 1u), f32(2u * y + 1u)) / vec2<f32>(textureDimensions(source));
-}
-
-// Their farthest depth, those past the edge replaced by the edge's.
-fn quad(x: u32, y: u32) -> u32 {
-    return farthest_sanitized4(bitcast<vec4<u32>>(textureGather(0, source, source_sampler, quad_corner(x, y))));
-}
-
-// Such quads: columns 4x to 4x + 3 of them in their row y.
-fn source_quad_row(x: u32, y: u32) -> vec4<u32> {
-    return vec4<u32>(quad(4u * x, y), quad(4u * x + 1u, y), quad(4u * x + 2u, y), quad(4u * x + 3u, y));
-}
-
-fn quad_column(x: u32, y: u32) -> vec4<u32> {
-    return vec4<u32>(quad(x, y), quad(x, y + 1u), quad(x, y + 2u), quad(x, y + 3u));
-}
-
-// The four rows of a block of 8x8 pixels. They are read column by column: the first touches all cache lines of the block, so that
-// the waits for them overlap (0.92 of the time row by row, on lavapipe).
-fn source_quads(block: vec2<u32>) -> array<vec4<u32>, 4> {
-    let x = 4u * block.x;
-    let y = 4u * block.y;
-    let c0 = quad_column(x, y);
-    let c1 = quad_column(x + 1u, y);
-    let c2 = quad_column(x + 2u, y);
-    let c3 = quad_column(x + 3u, y);
-    return array<vec4<u32>, 4>(
-        vec4<u32>(c0.x, c1.x, c2.x, c3.x), vec4<u32>(c0.y, c1.y, c2.y, c3.y),
-        vec4<u32>(c0.z, c1.z, c2.z, c3.z), vec4<u32>(c0.w, c1.w, c2.w, c3.w));
-}
-
-// The pixels at columns t.x and t.z and rows t.y and t.w, as given; at most one apart. One gather about their common corner, and
-// where two are the same what it brought of others is replaced.
-fn source_corners(t: vec4<u32>) -> vec4<u32> {
-    let corner = vec2<f32>(f32(t.x + 1u), f32(t.y + 1u)) / vec2<f32>(textureDimensions(source));
-    // In the sampler's order: bottom left, bottom right, top right, top left.
-    let quad = bitcast<vec4<u32>>(textureGather(0, source, source_sampler, corner)).wzxy;
-    let columns = select(quad.xxzz, quad, t.x < t.z);
-    return select(columns.xyxy, columns, t.y < t.w);
+// The four pixels about a point, in the sampler's order: bottom left, bottom right, top right, top left.
+fn gathered(corner: vec2<f32>) -> vec4<u32> {
+    return bitcast<vec4<u32>>(textureGather(0, source, source_sampler, corner));
 }

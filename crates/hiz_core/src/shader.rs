@@ -32,18 +32,19 @@ pub(crate) enum DepthStore {
 impl DepthStore {
     fn wgsl(self) -> String {
         match self {
-            Self::Apart(source) => [source.wgsl(), wgsl!("shared/texels_apart")].join("\n"),
+            Self::Apart(source) => [&source.wgsl(), wgsl!("shared/texels_apart")].join("\n"),
             Self::Atlas => wgsl!("shared/texels_atlas").to_owned(),
         }
     }
 }
 
 impl SourceKind {
-    fn wgsl(self) -> &'static str {
+    fn wgsl(self) -> String {
+        let sampled = wgsl!("shared/source_sampled");
         match self {
-            Self::Depth => wgsl!("shared/source_depth"),
-            Self::Float => wgsl!("shared/source_float"),
-            Self::Bits => wgsl!("shared/source_bits"),
+            Self::Depth => [wgsl!("shared/source_depth"), sampled].join("\n"),
+            Self::Float => [wgsl!("shared/source_float"), sampled].join("\n"),
+            Self::Bits => wgsl!("shared/source_bits").to_owned(),
         }
     }
 
@@ -102,18 +103,18 @@ pub(crate) fn reduce_coarse(source: SourceKind) -> String {
 }
 
 fn reducing(source: SourceKind, entry: &str) -> String {
-    [wgsl!("shared/depth_bits"), source.wgsl(), wgsl!("shared/pyramid"), wgsl!("shared/pyramid_write"), entry]
+    [wgsl!("shared/depth_bits"), &source.wgsl(), wgsl!("shared/pyramid"), wgsl!("shared/pyramid_write"), entry]
         .join("\n")
 }
 
 /// A yardstick: one dispatch a level on a flat buffer.
 pub(crate) fn yardstick_reduce_buffer(source: SourceKind) -> String {
-    [wgsl!("shared/depth_bits"), source.wgsl(), wgsl!("yardstick/reduce_buffer")].join("\n")
+    [wgsl!("shared/depth_bits"), &source.wgsl(), wgsl!("yardstick/reduce_buffer")].join("\n")
 }
 
 /// A yardstick: one dispatch a level on a texture's mip levels.
 pub(crate) fn yardstick_reduce_texture(source: SourceKind) -> String {
-    [wgsl!("shared/depth_bits"), source.wgsl(), wgsl!("yardstick/reduce_texture")].join("\n")
+    [wgsl!("shared/depth_bits"), &source.wgsl(), wgsl!("yardstick/reduce_texture")].join("\n")
 }
 
 /// The cull (`entry` = its own file) or the explanation, which share everything up to the verdict.

@@ -257,7 +257,7 @@ fn margins_count_the_constants() {
 fn gathered_pixels_beside_the_rectangle() {
     let run = |faults: &[(&str, &str)]| campaign(faults, Coverage::Area, PLAIN);
     let left_in =
-        [("select(quad.xxzz, quad, t.x < t.z)", "quad"), ("select(columns.xyxy, columns, t.y < t.w)", "columns")];
+        [("select(pixels.xxzz, pixels, t.x < t.z)", "pixels"), ("select(columns.xyxy, columns, t.y < t.w)", "columns")];
     let (without, with) = (run(&[]).total(), run(&left_in).total());
     eprintln!("gathered: {} culled, with their neighbours {}", without.culled, with.culled);
     assert!(with.false_culls == 0 && with.culled < without.culled, "{with:?}");
