@@ -3,9 +3,13 @@
 
 @group(0) @binding(3) var atlas: texture_storage_2d<rgba32uint, read>;
 
-// The number of the reduction that filled the pyramid.
+// The number of the reduction whose depth image and stored levels these are; 0, which none has, where they are of two reductions: the
+// copies ran after the next one.
 fn reduction_number() -> u32 {
-    return textureLoad(atlas, vec2<u32>(textureDimensions(atlas).x - 1u, 0u)).x;
+    let column = textureDimensions(atlas).x - 2u;
+    let of_image = textureLoad(atlas, vec2<u32>(column, 0u)).x;
+    let of_levels = textureLoad(atlas, vec2<u32>(column + 1u, 0u)).x;
+    return select(0u, of_levels, of_levels == of_image);
 }
 
 // The texels at columns t.x and t.z and rows t.y and t.w of a level; level 0's as given.

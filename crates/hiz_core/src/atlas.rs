@@ -5,14 +5,21 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use crate::camera::ImageSize;
+use crate::error::Result;
+use crate::gpu::Gpu;
 use crate::layout::{Level, MAX_LEVELS, PyramidLayout, StoredLevels, stored_levels};
+use crate::pyramid::Built;
 use crate::shader::SourceKind;
 
 /// Pixels of a row that a texel holds.
 const PIXELS: u32 = 4;
 
-/// Where the levels lie, in texels: level 0 on the left, beside it the stored ones below each other, and in a column of its own
-/// the pyramid's header.
+/// Columns of headers; `shaders/shared/texels_atlas.wgsl`, `reduction_number`.
+const HEADERS: u32 = 2;
+
+/// Where the levels lie, in texels: level 0 on the left, beside it the stored ones below each other, and in columns of their own
+/// two headers: the number of the reduction whose depth image level 0 is, and that of the reduction that left the stored levels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct AtlasLayout {
     pub(crate) width: u32,
@@ -32,7 +39,7 @@ impl AtlasLayout {
             width = width.max(texels(level));
             rows += level.height;
         }
-        Self { width: column + width + 1, height: levels[0].height.max(rows), origins }
+        Self { width: column + width + HEADERS, height: levels[0].height.max(rows), origins }
     }
 
     /// Whether the device has such textures.
@@ -76,6 +83,7 @@ pub(crate) fn is_possible(layout: &PyramidLayout, source: &wgpu::Texture, limits
         && source.usage().contains(wgpu::TextureUsages::COPY_SRC)
         && layout.chunk_sizes().len() == 1
         && layout.atlas.fits(limits)
+        && staging_bytes(layout.size) <= limits.max_buffer_size
 }
 
 impl AtlasUse {
@@ -126,17 +134,32 @@ impl Atlas {
         texture + self.staging.as_ref().map_or(0, wgpu::Buffer::size)
     }
 
-    /// Records the copies of all levels. (The header goes with them: a cull that runs before the reduction keeps everything.)
+    /// Records the copies of all levels.
+    ///
+    /// Two headers go with them, for what is copied is settled at different times: the depth image now, the stored levels when the copies
+    /// run, perhaps after the next reduction. Where they are not both of the reduction that a cull asks for, it keeps everything.
     pub(crate) fn record(
         &mut self,
-        device: &wgpu::Device,
+        gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         layout: &PyramidLayout,
         stored: &wgpu::Buffer,
-        source: &wgpu::Texture,
-    ) {
-        let header = [layout.atlas.width - 1, 0, 0, 0];
-        self.record_rows(encoder, stored, header, Rows { offset: 0, pitch: 0, width: PIXELS, height: 1 });
+        built: &Built,
+    ) -> Result<()> {
+        let source = built.source.texture();
+        let of_image = gpu.filled(
+            "hiz.pyramid.atlas_header",
+            bytemuck::cast_slice(&[built.reduction, 0, 0, 0]),
+            wgpu::BufferUsages::COPY_SRC,
+        )?;
+        for (column, buffer) in (layout.atlas.width - HEADERS..).zip([&of_image, stored]) {
+            self.record_rows(
+                encoder,
+                buffer,
+                [column, 0, 0, 0],
+                Rows { offset: 0, pitch: 0, width: PIXELS, height: 1 },
+            );
+        }
         for (k, level) in layout.stored_levels() {
             let Level { offset, stride, width, height } = *level;
             let rows = Rows { offset: 4 * u64::from(offset), pitch: 4 * stride, width, height };
@@ -144,18 +167,13 @@ impl Atlas {
         }
         if source.format() == self.texture.format() {
             encoder.copy_texture_to_texture(source.as_image_copy(), self.texture.as_image_copy(), source.size());
-            return;
+            return Ok(());
         }
         let (width, height) = (layout.size.width, layout.size.height);
-        // Four bytes a pixel of an image that the device can hold.
-        let pitch = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let pitch = staging_pitch(layout.size);
         let staging = self.staging.get_or_insert_with(|| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("hiz.pyramid.atlas_staging"),
-                size: u64::from(pitch) * u64::from(height),
-                usage: wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
+            let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+            gpu.empty("hiz.pyramid.atlas_staging", staging_bytes(layout.size), usage)
         });
         // In one piece: a depth texture cannot be copied in parts.
         encoder.copy_texture_to_buffer(
@@ -165,6 +183,7 @@ impl Atlas {
         );
         let staging = staging.clone();
         self.record_rows(encoder, &staging, [0; 4], Rows { offset: 0, pitch, width, height });
+        Ok(())
     }
 
     /// Records the copy of a level to where it begins.
@@ -181,6 +200,15 @@ impl Atlas {
             wgpu::Extent3d { width: width.div_ceil(PIXELS), height, depth_or_array_layers: 1 },
         );
     }
+}
+
+/// Bytes of a row of an image on its way, at four a pixel of an image that the device can hold.
+fn staging_pitch(size: ImageSize) -> u32 {
+    (4 * size.width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
+}
+
+fn staging_bytes(size: ImageSize) -> u64 {
+    u64::from(staging_pitch(size)) * u64::from(size.height)
 }
 
 /// Rows in a buffer: bytes, but for `width` in pixels.
@@ -206,8 +234,8 @@ mod tests {
             for levels in [StoredLevels::ALL, StoredLevels::only(3), StoredLevels { first: 2, last: 4 }] {
                 let layout = PyramidLayout::new(ImageSize::new(w, h), levels, 25).unwrap();
                 let atlas = &layout.atlas;
-                // Column, row, width, height; the header last.
-                let mut areas = vec![[0, 0, w.div_ceil(4), h], [atlas.width - 1, 0, 1, 1]];
+                // Column, row, width, height; the headers last.
+                let mut areas = vec![[0, 0, w.div_ceil(4), h], [atlas.width - 1, 0, 1, 1], [atlas.width - 2, 0, 1, 1]];
                 for (k, level) in layout.stored_levels() {
                     let [x, y, ..] = atlas.origins[k];
                     areas.push([x, y, level.width.div_ceil(4), level.height]);

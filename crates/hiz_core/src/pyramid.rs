@@ -189,10 +189,11 @@ impl Pyramid {
         Ok(bindings)
     }
 
-    /// Whether culls of so many instances read an atlas: where it can be, and pays.
-    pub(crate) fn wants_atlas(&self, gpu: &Gpu, instances: u32) -> bool {
-        let possible = |built: Built| atlas::is_possible(&self.layout, built.source.texture(), &gpu.device().limits());
-        self.atlas_use.pays(&self.layout, instances) && self.built().is_some_and(possible)
+    /// Whether culls of so many instances against `built` (no later reduction, of what may be another kind of image) read an atlas:
+    /// where it can be, and pays.
+    pub(crate) fn wants_atlas(&self, gpu: &Gpu, built: &Built, instances: u32) -> bool {
+        self.atlas_use.pays(&self.layout, instances)
+            && atlas::is_possible(&self.layout, built.source.texture(), &gpu.device().limits())
     }
 
     /// Something failed on the device: nothing that was made for culls is kept.
@@ -207,20 +208,20 @@ impl Pyramid {
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         built: &Built,
-    ) -> wgpu::TextureView {
+    ) -> Result<wgpu::TextureView> {
         let mut atlas = self.atlas.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let atlas = atlas.get_or_insert_with(|| Atlas::new(gpu.device(), &self.layout));
-        let Built { reduction, source, .. } = built;
-        if !atlas.holds(*reduction) {
-            atlas.record(gpu.device(), encoder, &self.layout, &self.chunks[0], source.texture());
-            let (holds, reduced, reduction) = (atlas.contents(), Arc::clone(&self.reduced), *reduction);
+        let reduction = built.reduction;
+        if !atlas.holds(reduction) {
+            atlas.record(gpu, encoder, &self.layout, &self.chunks[0], built)?;
+            let (contents, reduced) = (atlas.contents(), Arc::clone(&self.reduced));
             encoder.on_submitted_work_done(move || {
-                if reduced.load(Ordering::Acquire) == reduction {
-                    holds.store(reduction, Ordering::Release);
-                }
+                // Copies that ran before their reduction, or after the next one, have spoiled what was there.
+                let ran_behind_it = reduced.load(Ordering::Acquire) == reduction;
+                contents.store(if ran_behind_it { reduction } else { 0 }, Ordering::Release);
             });
         }
-        atlas.view()
+        Ok(atlas.view())
     }
 
     /// The camera of the depth image that the pyramid was last built from.

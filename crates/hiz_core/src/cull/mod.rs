@@ -46,8 +46,9 @@ impl Seen {
         gpu.check_context("pyramid", pyramid.context)?;
         let built = pyramid.built_for(camera)?;
         let atlas = encoder
-            .filter(|_| pyramid.wants_atlas(gpu, instances.len()))
-            .map(|encoder| pyramid.record_atlas(gpu, encoder, &built));
+            .filter(|_| pyramid.wants_atlas(gpu, &built, instances.len()))
+            .map(|encoder| pyramid.record_atlas(gpu, encoder, &built))
+            .transpose()?;
         let key = CullKey {
             store: if atlas.is_some() { DepthStore::Atlas } else { DepthStore::Apart(built.source_kind) },
             kind: instances.kind,
