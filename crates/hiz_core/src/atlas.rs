@@ -12,6 +12,8 @@ use crate::layout::{Level, MAX_LEVELS, PyramidLayout, StoredLevels, stored_level
 use crate::pyramid::Built;
 use crate::shader::SourceKind;
 
+const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
+
 /// Pixels of a row that a texel holds.
 const PIXELS: u32 = 4;
 
@@ -52,7 +54,8 @@ impl AtlasLayout {
 /// are the same.
 ///
 /// It can be where the depth image is [`Depth32Float`](wgpu::TextureFormat::Depth32Float) or of a color format, has the usage
-/// [`COPY_SRC`](wgpu::TextureUsages::COPY_SRC), and is no larger than a texture may be; otherwise culls read them where they are.
+/// [`COPY_SRC`](wgpu::TextureUsages::COPY_SRC), and is no larger than a texture, and a buffer that it passes through, may be; otherwise
+/// culls read them where they are.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum AtlasUse {
     /// Where a cull has enough instances for the copy to pay.
@@ -83,7 +86,7 @@ pub(crate) fn is_possible(layout: &PyramidLayout, source: &wgpu::Texture, limits
         && source.usage().contains(wgpu::TextureUsages::COPY_SRC)
         && layout.chunk_sizes().len() == 1
         && layout.atlas.fits(limits)
-        && staging_bytes(layout.size) <= limits.max_buffer_size
+        && (source.format() == FORMAT || staging_bytes(layout.size) <= limits.max_buffer_size)
 }
 
 impl AtlasUse {
@@ -107,7 +110,7 @@ impl Atlas {
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba32Uint,
+            format: FORMAT,
             usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         });
@@ -165,7 +168,7 @@ impl Atlas {
             let rows = Rows { offset: 4 * u64::from(offset), pitch: 4 * stride, width, height };
             self.record_rows(encoder, stored, layout.atlas.origins[k], rows);
         }
-        if source.format() == self.texture.format() {
+        if source.format() == FORMAT {
             encoder.copy_texture_to_texture(source.as_image_copy(), self.texture.as_image_copy(), source.size());
             return Ok(());
         }

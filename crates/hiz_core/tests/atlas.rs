@@ -9,7 +9,7 @@ use std::sync::Arc;
 use common::{CONVENTIONS, Random, camera_along_z, engine, ndc};
 use hiz_core::headless::DepthImage;
 use hiz_core::{
-    AtlasUse, Bounds, Camera, CullOptions, DepthConvention, Floats, InstanceOptions, Instances, Pyramid,
+    AtlasUse, Bounds, Camera, CullOptions, DepthConvention, Floats, HizContext, InstanceOptions, Instances, Pyramid,
     PyramidOptions, StoredLevels, Visible, VisibleOptions, wgpu,
 };
 
@@ -198,4 +198,47 @@ fn culls_in_any_order_answer_for_their_image_or_keep_everything() {
         }
     }
     assert!(hidden > rounds as u32, "too little was hidden to tell: {hidden}");
+}
+
+/// The depth image passes through a buffer, which may be larger than those that the device has: such an image is read where it is.
+#[test]
+fn an_image_that_no_buffer_holds_is_read_where_it_is() {
+    let camera = camera_along_z(640, 512, DepthConvention::Standard);
+    let least = 1 << 20;
+    let limits = wgpu::Limits {
+        max_buffer_size: least,
+        max_storage_buffer_binding_size: least,
+        ..HizContext::required_limits()
+    };
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = wgpu::Backends::VULKAN;
+    let instance = wgpu::Instance::new(descriptor);
+    let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default())).unwrap();
+    let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
+    let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).unwrap();
+    let context = HizContext::new(&device).unwrap();
+    let depth = device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("test.depth"),
+        size: wgpu::Extent3d { width: 640, height: 512, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::R32Float,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    });
+    let options =
+        PyramidOptions { atlas: AtlasUse::Always, levels: StoredLevels::from(2), ..PyramidOptions::default() };
+    let pyramid = context.create_pyramid(camera.size(), &options).unwrap();
+    let bytes = pyramid.device_bytes();
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let view = depth.create_view(&wgpu::TextureViewDescriptor::default());
+    context.record_reduce(&mut encoder, &view, &camera, &pyramid).unwrap();
+    let bounds = Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0]), radii: Floats::F32(&[0.1]) };
+    let instances = context.record_instances(&mut encoder, &bounds, &InstanceOptions::default()).unwrap();
+    let visible = context.create_visible(&instances, &VisibleOptions::default()).unwrap();
+    context.record_cull(&mut encoder, &instances, &camera, &pyramid, &visible, &CullOptions::default()).unwrap();
+    queue.submit([encoder.finish()]);
+    device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+    assert_eq!(pyramid.device_bytes(), bytes, "nothing was copied");
 }
