@@ -189,7 +189,8 @@ impl HizContext {
 
     /// Records the cull of `instances` against `pyramid`, whose depth image must be `camera`'s; `visible` takes what is found.
     ///
-    /// A cull of as many instances as the pyramid has texels copies the levels into a texture first, which costs less than it saves.
+    /// A cull of a quarter as many instances as depth image and stored levels have texels copies them into one texture first, which costs less
+    /// than it saves ([`AtlasUse`](crate::AtlasUse)).
     ///
     /// # Errors
     /// [`Error::Mismatch`] for objects that do not belong together, [`Error::Invalid`] for unusable options or cameras.
