@@ -45,6 +45,22 @@ def prepared(device: hizvk.Device, call: str) -> Callable[[], object]:
     if call == "upload":
         image = np.full(view.size, 0.1, np.float32)
         return lambda: device.pyramid(image, view, kind="reversed_ndc")
+    if call == "cull":
+        # So many that all levels would be copied into one texture of 100 MB.
+        view = camera(4096)
+        pyramid = device.pyramid(np.full(view.size, 10.0), view, kind="z")
+        centers = np.zeros((6_000_000, 3), np.float32)
+        centers[:, 2] = -20.0
+        crowd = device.instances(hizvk.Spheres(centers, np.ones(len(centers), np.float32)), order="given")
+        few = device.instances(hizvk.Spheres(centers[:100], np.ones(100, np.float32)))
+
+        def cull(instances: hizvk.Instances) -> int:
+            result = device.cull(instances, view, pyramid, hierarchy=False, outputs=["mask"])
+            return int(np.count_nonzero(result.mask))
+
+        # Compilers take memory of their own.
+        assert cull(few) == 0
+        return lambda: cull(crowd)
     assert call == "render"
     occluders = device.occluders(np.zeros((3, 3)), [[0, 1, 2]])
     return lambda: device.render_depth(occluders, view).numpy()
@@ -60,8 +76,7 @@ def main(call: str, mebibytes: int) -> None:
     unlimited = resource.getrlimit(resource.RLIMIT_AS)
     resource.setrlimit(resource.RLIMIT_AS, (now + (mebibytes << 20), unlimited[1]))
     try:
-        run()
-        print("no error")
+        print("no error:", run())
     except hizvk.HizError as error:
         print(type(error).__name__)
     resource.setrlimit(resource.RLIMIT_AS, unlimited)

@@ -25,3 +25,12 @@ def test_out_of_memory_is_an_error_and_the_next_device_works(call: str, mebibyte
     error, after = run.stdout.splitlines()[-2:]
     assert error in ("OutOfMemoryError", "DeviceLostError")
     assert after == "next device: [True, False]"
+
+
+def test_a_cull_without_memory_for_all_levels_in_one_texture_goes_on() -> None:
+    """It reads the depth image and the levels where they are."""
+    run = subprocess.run(
+        [sys.executable, str(SCRIPT), "cull", "70"], capture_output=True, text=True, timeout=300, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.splitlines()[-2:] == ["no error: 0", "next device: [True, False]"]

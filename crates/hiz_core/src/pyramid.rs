@@ -1,6 +1,6 @@
 //! The depth pyramid: its storage, and the pass that fills it.
 
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 
 use crate::atlas::{self, Atlas, AtlasUse};
@@ -71,6 +71,8 @@ pub struct Pyramid {
     pub(crate) uniform: wgpu::Buffer,
     built: Mutex<Option<Built>>,
     atlas_use: AtlasUse,
+    /// There was no memory for one.
+    no_atlas: AtomicBool,
     atlas: Mutex<Option<Atlas>>,
     /// The last reduction that is known to have run: what was only recorded may never do so.
     reduced: Arc<AtomicU32>,
@@ -137,6 +139,7 @@ impl Pyramid {
             uniform,
             built: Mutex::new(None),
             atlas_use: options.atlas,
+            no_atlas: AtomicBool::new(false),
             atlas: Mutex::new(None),
             reduced: Arc::default(),
             bindings: Mutex::new(Vec::new()),
@@ -193,13 +196,19 @@ impl Pyramid {
     /// where it can be, and pays.
     pub(crate) fn wants_atlas(&self, gpu: &Gpu, built: &Built, instances: u32) -> bool {
         self.atlas_use.pays(&self.layout, instances)
+            && !self.no_atlas.load(Ordering::Relaxed)
             && atlas::is_possible(&self.layout, built.source.texture(), &gpu.device().limits())
     }
 
-    /// Something failed on the device: nothing that was made for culls is kept.
-    pub(crate) fn forget(&self) {
-        *self.atlas.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = None;
+    /// Something failed on the device: nothing that was made for culls is kept. Whether an atlas was among it.
+    pub(crate) fn forget(&self) -> bool {
         self.bindings.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clear();
+        self.atlas.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take().is_some()
+    }
+
+    /// There is no memory for an atlas: culls read the depth image and the levels where they are from now on.
+    pub(crate) fn do_without_atlas(&self) {
+        self.no_atlas.store(true, Ordering::Relaxed);
     }
 
     /// The atlas of what the pyramid was built from; its copies are recorded if they are not known to have run, behind that reduction.

@@ -292,7 +292,7 @@ impl Engine {
         output: &VisibleOptions,
     ) -> Result<Culling> {
         let start = Instant::now();
-        let culling = self.scoped(|| {
+        let attempt = || {
             let visible = self.context().create_visible(instances, output)?;
             let mut encoder = self.encoder("hiz.cull.encoder");
             self.context().record_cull(&mut encoder, instances, camera, pyramid, &visible, options)?;
@@ -313,9 +313,14 @@ impl Engine {
                 submitted: Instant::now(),
                 timings: Mutex::new(Timings { record_ms: milliseconds(start, recorded), ..Timings::default() }),
             })
-        });
-        if culling.is_err() {
-            pyramid.forget();
+        };
+        let culling = self.scoped(attempt);
+        let Err(error) = &culling else { return culling };
+        let had_atlas = pyramid.forget();
+        if had_atlas && matches!(error, Error::OutOfMemory(_)) {
+            // The depth image and the levels can be read where they are.
+            pyramid.do_without_atlas();
+            return self.scoped(attempt);
         }
         culling
     }
