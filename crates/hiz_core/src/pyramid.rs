@@ -346,7 +346,7 @@ pub(crate) fn record_reduce(
             layout: &layouts.one_uniform,
             entries: &[entry(0, uniform.as_entire_binding())],
         });
-        let tall = step.source == 0 && reads_tall(source_kind, size);
+        let tall = step.source == 0 && reads_tall(step, source_kind, size);
         let [columns, rows] = step.blocks;
         let of_places =
             if tall { step.blocks.map(|n| n.div_ceil(TALL_SIDE)) } else { [columns.div_ceil(REDUCE_WORKGROUP), rows] };
@@ -382,10 +382,11 @@ pub(crate) fn record_reduce(
     Ok(())
 }
 
-/// Whether neighbouring invocations read blocks below each other. Texels that hold four pixels are loaded in a way that gains nothing; and
-/// rows that begin at multiples of a page would all fall into the same lines of a cache (`docs/performance.md`).
-fn reads_tall(source: SourceKind, size: ImageSize) -> bool {
-    source != SourceKind::Bits && !size.width.is_multiple_of(PAGE_PIXELS)
+/// Whether neighbouring invocations of a step that reads the image read below each other. Blocks next to each other, four pixels a texel,
+/// are loaded in a way that gains nothing; and rows that begin at multiples of a page would all fall into the same lines of a cache
+/// (`docs/performance.md`).
+fn reads_tall(step: &Step, source: SourceKind, size: ImageSize) -> bool {
+    (source != SourceKind::Bits || step.is_coarse()) && !size.width.is_multiple_of(PAGE_PIXELS)
 }
 
 fn step_uniform(step: &Step, reduction: u32) -> StepUniform {
