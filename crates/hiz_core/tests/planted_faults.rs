@@ -276,6 +276,17 @@ fn atlas_texels_beside_the_right_ones() {
     }
 }
 
+/// Uploads hold four pixels of a row a texel, of which a rectangle's corner is one.
+#[test]
+fn uploaded_pixels_beside_the_right_ones() {
+    for (what, by) in [
+        ("textureLoad(source, texel.zy)[right]", "textureLoad(source, texel.zy)[left]"),
+        ("textureLoad(source, texel.xw)[left]", "textureLoad(source, texel.xy)[left]"),
+    ] {
+        assert_red("uploads", &[(what, by)]);
+    }
+}
+
 /// Groups: what is planted in them alone. (Boxes themselves are left out where a fault would reach them, too.)
 #[test]
 fn groups_that_forget_members_or_shrink() {
