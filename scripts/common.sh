@@ -14,7 +14,7 @@ STAMPS="$VENV/.hizvk"
 export PATH
 # On a developer's machine a changed Cargo.toml may change Cargo.lock; where nobody commits it, that is an error.
 LOCKED=(${CI:+--locked})
-# Mesa's device-select layer complains about XDG_RUNTIME_DIR otherwise.
+# For Rust's tests: Mesa's device-select layer complains about XDG_RUNTIME_DIR otherwise. (Python asks for its absence itself.)
 export NODEVICE_SELECT=1
 export PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_QUIET=1
 

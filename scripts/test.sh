@@ -36,5 +36,6 @@ if [ "$driver" = swiftshader ] && [ -n "$(lavapipe_icd)" ]; then
     cargo test --workspace "${LOCKED[@]}" --test drivers -- --nocapture
 fi
 check "Python tests" "$VENV_PYTHON" -m pytest -m "not slow"
+check "processes that end" "$VENV_PYTHON" scripts/exits.py --rust 60 --python 15
 printf -- '-- all tests on %s: %d s\n' "$driver" $((SECONDS - started))
 checked

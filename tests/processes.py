@@ -139,6 +139,13 @@ def refused() -> list[str]:
             expected = f"made by process {os.getppid()}, and process {os.getpid()} is a fork of it"
             if expected not in str(error) or "spawn" not in str(error):
                 wrong.append(f"{name}: {error}")
+    try:
+        device._engine.wait_without_guard()
+        wrong.append("the engine in Rust: no error")
+    except hizvk.HizError as error:
+        expected = f"this device was made by process {os.getppid()}, and process {os.getpid()} is a fork of it: no device"
+        if not str(error).startswith(expected):
+            wrong.append(f"the engine in Rust: {error}")
     # What needs no device.
     texts = [repr(thing) for thing in (device, pyramid, instances, result)]
     assert len(texts[0]) > 0

@@ -25,7 +25,7 @@ class NoAdapterError(HizError):
     seen : tuple of str
         The adapters that were found, one line each; empty when there is no Vulkan driver.
     hint : str
-        What to do about it, the line that installs a software driver among it.
+        What to do about it: how to choose one of those seen; where there is none, the line that installs a software driver.
     request : str
         What was asked for, in words.
     """

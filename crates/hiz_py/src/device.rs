@@ -208,6 +208,12 @@ impl Engine {
     fn wait(&self, py: Python<'_>) -> PyResult<()> {
         self.0.run(py, headless::Engine::wait)
     }
+
+    /// For tests: what the engine itself says in a fork, where [`Held::get`] speaks first; and a clone of it is dropped.
+    fn wait_without_guard(&self, py: Python<'_>) -> PyResult<()> {
+        let engine = headless::Engine::clone(&*self.0.look(py)?);
+        detached(py, move || engine.wait())
+    }
 }
 
 /// Bounds on the device.
