@@ -70,3 +70,8 @@ pub use occluders::{FaceCull, MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, 
 pub use pyramid::{Pyramid, PyramidOptions};
 pub use view::ERROR_ULPS;
 pub use visible::{Outputs, Visible, VisibleOptions};
+
+/// The README's program is compiled and run with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+mod readme {}
