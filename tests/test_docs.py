@@ -80,7 +80,8 @@ def test_commands_that_are_shown_exist() -> None:
         for name in set(re.findall(rf"--{kind} ([a-z_]+)", text)):
             found = [*ROOT.glob(f"crates/*/{folder}/{name}.rs"), *ROOT.glob(f"crates/*/{folder}/{name}/main.rs")]
             assert found, f"--{kind} {name}"
-    tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False).stdout.split()
+    files = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
+    tracked = subprocess.run(files, cwd=ROOT, capture_output=True, text=True, check=False).stdout.split()
     if not tracked:
         pytest.skip("not a git checkout: which files are part of it is unknown")
     for path in set(re.findall(r"(?:tests|scripts|docs|shaders|crates|python)/[\w/.-]+\.(?:py|sh|rs|wgsl|md)", text)):

@@ -29,6 +29,7 @@ __all__ = [
 ]
 
 __version__: str
+__build__: str
 
 _Floats: TypeAlias = npt.NDArray[np.float32] | npt.NDArray[np.float64]
 _Vector: TypeAlias = tuple[float, float, float]

@@ -31,4 +31,9 @@ mod _core {
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "the name is Python's")]
     const __version__: &str = env!("CARGO_PKG_VERSION");
+
+    /// How this module was compiled: what runs on the host is slower in a development build.
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "the name is Python's")]
+    const __build__: &str = if cfg!(debug_assertions) { "development" } else { "release" };
 }
