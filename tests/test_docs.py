@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import doctest
+import importlib
 import io
 import re
 import subprocess
@@ -56,6 +58,28 @@ def test_rustdoc_runs_the_readme() -> None:
 def test_python_runs(place: str, text: str) -> None:
     with contextlib.redirect_stdout(io.StringIO()):
         exec(compile(text, place, "exec"), {"__name__": "__main__"})
+
+
+def modules() -> list[str]:
+    """Modules of the package whose docstrings hold examples."""
+    found = []
+    for path in sorted((ROOT / "python").rglob("*.py")):
+        if ">>> " in path.read_text(encoding="utf-8"):
+            found.append(".".join(path.relative_to(ROOT / "python").with_suffix("").parts).removesuffix(".__init__"))
+    return found
+
+
+@pytest.mark.parametrize("name", modules())
+def test_examples_in_docstrings_run(name: str) -> None:
+    told = doctest.testmod(importlib.import_module(name), report=True)
+    assert told.attempted > 0
+    assert told.failed == 0
+
+
+def test_no_example_is_skipped() -> None:
+    """What is not run falls behind."""
+    skipped = [path for path in (ROOT / "python").rglob("*.py") if "doctest: +SKIP" in path.read_text(encoding="utf-8")]
+    assert not skipped
 
 
 def shown() -> str:

@@ -92,6 +92,7 @@ def check_proxy(proxy: Mesh | tuple[npt.ArrayLike, ...], mesh: Mesh | tuple[npt.
 
     Examples
     --------
+    >>> import hizvk
     >>> from hizvk.scenes import box_mesh
     >>> hizvk.check_proxy(box_mesh([[0.1, 0.1, 0.1]], [[0.9, 0.9, 1.0]]), box_mesh([[0, 0, 0]], [[1, 1, 1]])).inside
     True

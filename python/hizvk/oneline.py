@@ -87,7 +87,12 @@ def visible(
 
     Examples
     --------
-    >>> mask = hizvk.visible(hizvk.Boxes(lo, hi), camera, depth=image, kind="z")  # doctest: +SKIP
+    >>> import numpy as np, hizvk
+    >>> camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(90, 160), near=0.1)
+    >>> image = np.full(camera.size, 12.0)  # a wall
+    >>> centers = np.array([[0.0, 0.0, -5.0], [0.0, 0.0, -20.0]])
+    >>> hizvk.visible(hizvk.Boxes(centers - 0.5, centers + 0.5), camera, depth=image, kind="z").tolist()
+    [True, False]
     """
     as_arrays("bounds", bounds)
     _arguments.instance("camera", camera, Camera, "a Camera")

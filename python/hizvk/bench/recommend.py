@@ -172,8 +172,14 @@ def recommend(
 
     Examples
     --------
-    >>> found = hizvk.recommend([boxes, spheres], cameras, occluders=walls, max_ms=2.0)  # doctest: +SKIP
-    >>> seen = device.cull(crowd, camera, hiz, **found.best.cull_options)  # doctest: +SKIP
+    >>> import numpy as np, hizvk
+    >>> centers = np.array([[0.0, 0.0, -5.0], [0.0, 0.0, -20.0]])
+    >>> boxes = hizvk.Boxes(centers - 0.5, centers + 0.5)
+    >>> wall = hizvk.Mesh([[-8.0, -8, -12], [8.0, -8, -12], [0.0, 8, -12]], [[0, 1, 2]])
+    >>> camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(90, 160), near=0.1)
+    >>> found = hizvk.recommend(boxes, camera, occluders=wall, repetitions=1)
+    >>> found.best.kept, found.tested
+    (1, 2)
     """
     alternatives = _alternatives(bounds)
     views = _cameras(cameras)
