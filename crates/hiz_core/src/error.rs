@@ -40,6 +40,18 @@ pub enum Error {
         /// What was expected and what came.
         message: String,
     },
+    /// The device belongs to another process, of which this one is a fork. What a driver keeps beside it, threads above all, stays
+    /// behind in a fork: a call would wait for ever.
+    #[error(
+        "this device was made by process {made_by}, and process {here} is a fork of it: no device works after a fork. Make one in \
+         this process, or start processes without a fork"
+    )]
+    OtherProcess {
+        /// The process that made the device.
+        made_by: u32,
+        /// This process.
+        here: u32,
+    },
     /// The device was lost; everything that lives on it is gone.
     #[error("the device was lost: {0}")]
     DeviceLost(String),

@@ -120,7 +120,7 @@ fn lost_to_a_late_copy(engine: &Engine) -> usize {
 
 #[test]
 fn a_late_copy_of_an_earlier_image_hides_nothing() {
-    assert_eq!(lost_to_a_late_copy(engine()), 0);
+    assert_eq!(lost_to_a_late_copy(&engine()), 0);
     let one_header = Engine::with_planted_faults(None, &[("of_levels == of_image", "true")]).unwrap();
     assert!(lost_to_a_late_copy(&one_header) > 0, "a header of the levels alone is enough to hide nothing");
 }
@@ -129,7 +129,7 @@ fn a_late_copy_of_an_earlier_image_hides_nothing() {
 /// is recorded and run after all of it answers for the last image.
 #[test]
 fn culls_in_any_order_answer_for_their_image_or_keep_everything() {
-    let engine = engine();
+    let engine = &*engine();
     let instances = spheres(engine);
     let count = instances.len() as usize;
     let mut hidden = 0;

@@ -33,7 +33,7 @@ fn assert_green(name: &str, report: &Report) {
 
 #[test]
 fn no_false_cull_in_area_coverage() {
-    let report = Campaign { seed: 11, rounds: 100, modes: ALL, ..Campaign::default() }.run(engine());
+    let report = Campaign { seed: 11, rounds: 100, modes: ALL, ..Campaign::default() }.run(&engine());
     assert_green("area coverage", &report);
     assert!(report.total().cases > 3 * 50_000, "50,000 of each kind of volume are promised: {:?}", report.total());
 }
@@ -41,14 +41,14 @@ fn no_false_cull_in_area_coverage() {
 #[test]
 fn no_false_cull_in_sample_coverage() {
     let campaign = Campaign { seed: 12, rounds: 34, coverage: Coverage::Sample, modes: ALL, ..Campaign::default() };
-    assert_green("sample coverage", &campaign.run(engine()));
+    assert_green("sample coverage", &campaign.run(&engine()));
 }
 
 #[test]
 fn no_false_cull_with_a_volume_fit() {
     for (seed, coverage) in [(14, Coverage::Area), (15, Coverage::Sample)] {
         let campaign = Campaign { seed, rounds: 20, coverage, modes: FITTED, fit: Fit::Volume, ..Campaign::default() };
-        assert_green(&format!("volume fit, {coverage:?}"), &campaign.run(engine()));
+        assert_green(&format!("volume fit, {coverage:?}"), &campaign.run(&engine()));
     }
 }
 
@@ -57,7 +57,7 @@ fn no_false_cull_with_a_volume_fit() {
 fn no_false_cull_with_missing_levels() {
     for (seed, fit, rounds, modes) in [(16, Fit::Rectangle, 60, ALL), (17, Fit::Volume, 12, FITTED)] {
         let campaign = Campaign { seed, rounds, modes, fit, levels: MISSING_LEVELS, ..Campaign::default() };
-        assert_green(&format!("missing levels, {fit:?}"), &campaign.run(engine()));
+        assert_green(&format!("missing levels, {fit:?}"), &campaign.run(&engine()));
     }
 }
 
@@ -66,10 +66,10 @@ fn no_false_cull_with_missing_levels() {
 fn no_false_cull_in_groups() {
     for (seed, coverage) in [(16, Coverage::Area), (17, Coverage::Sample)] {
         let campaign = Campaign { seed, rounds: 12, coverage, modes: ALL, groups: true, ..Campaign::default() };
-        assert_grouped(&format!("groups, {coverage:?}"), &campaign.run(engine()));
+        assert_grouped(&format!("groups, {coverage:?}"), &campaign.run(&engine()));
     }
     let fitted = Campaign { seed: 18, rounds: 4, modes: FITTED, fit: Fit::Volume, groups: true, ..Campaign::default() };
-    assert_grouped("groups, volume fit", &fitted.run(engine()));
+    assert_grouped("groups, volume fit", &fitted.run(&engine()));
 }
 
 /// Green, and groups were hidden as a whole.
@@ -85,7 +85,7 @@ fn assert_grouped(name: &str, report: &Report) {
 
 #[test]
 fn little_that_is_hidden_is_kept() {
-    let report = Campaign { seed: 13, rounds: 15, count_keeps: true, ..Campaign::default() }.run(engine());
+    let report = Campaign { seed: 13, rounds: 15, count_keeps: true, ..Campaign::default() }.run(&engine());
     assert_green("false keeps", &report);
     // Adversarial cases, made to be undecided; what plain scenes keep is measured on scenes.
     let total = report.total();
@@ -125,7 +125,7 @@ fn soak() {
             count_keeps: true,
             ..Campaign::default()
         };
-        report.merge(&chunk.run(engine()));
+        report.merge(&chunk.run(&engine()));
         done += 1;
         checkpoint.save(done, &report);
         let total = report.total();

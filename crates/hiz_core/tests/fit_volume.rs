@@ -71,7 +71,7 @@ fn no_false_cull_on_depth_that_fits() {
         (33, Coverage::Area, &[BoundsKind::OrientedBox], &[(Footprint::Eight, 0)]),
     ];
     for (seed, coverage, kinds, mode) in modes {
-        let tally = run(engine(), kinds, seed, 15, coverage, mode, false);
+        let tally = run(&engine(), kinds, seed, 15, coverage, mode, false);
         eprintln!("{coverage:?} {mode:?}: {tally:?}");
         assert_eq!(tally.false_culls, 0);
         assert!(tally.gained > tally.to_gain / 100, "{tally:?}");

@@ -49,7 +49,8 @@ const DRAW: DrawTemplate = DrawTemplate { index_count: 36, first_index: 7, base_
 /// The words of every list, canary included.
 fn raw_lists(culling: &Culling) -> Vec<Vec<u32>> {
     culling.wait().unwrap();
-    let (device, queue) = (engine().device(), engine().queue());
+    let engine = engine();
+    let (device, queue) = (engine.device(), engine.queue());
     (0..culling.visible().num_pieces())
         .map(|piece| {
             let list = culling.visible().list(piece).expect("indices were asked for");

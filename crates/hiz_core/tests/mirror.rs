@@ -120,7 +120,7 @@ fn to_nearest_it_agrees_with_the_device() {
         for round in campaign.rounds() {
             let Some(mirror) = Mirror::new(&round) else { continue };
             for round in [at_the_margin(campaign.round(round.number).expect("the same again"), &mirror), round] {
-                let (Some(mirror), Some(device)) = (Mirror::new(&round), round.masks(engine())) else { continue };
+                let (Some(mirror), Some(device)) = (Mirror::new(&round), round.masks(&engine())) else { continue };
                 cases += device.iter().map(Vec::len).sum::<usize>();
                 culled += device.iter().flatten().filter(|kept| !**kept).count();
                 for (style, [by_mirror, by_device]) in [STYLES[0], MARGIN_FIRST].iter().zip(&mut differences) {

@@ -94,7 +94,7 @@ fn to_nearest_it_agrees_with_the_device() {
     for (seed, any_slack) in [(51, false), (59, true)] {
         let campaign = Campaign { rounds: 6, modes: DESCENTS, any_slack, ..campaign(seed, Coverage::Area) };
         for round in campaign.fitted(&KINDS, false) {
-            let (Some(mirror), Some(device)) = (Mirror::new(&round), round.masks(engine())) else { continue };
+            let (Some(mirror), Some(device)) = (Mirror::new(&round), round.masks(&engine())) else { continue };
             let ours = mirror.masks(Margins::FULL, &mut Arithmetic::new(STYLES[0], 0))[0][0];
             let theirs = device[0][0];
             cases += 1;
@@ -179,7 +179,7 @@ fn assert_seen(kinds: &'static [BoundsKind], faults: &[Fault]) {
         let culled = |(round, kept): &&(Round, bool)| *kept && !round.masks(engine).expect("the mirror took it")[0][0];
         rounds.iter().filter(culled).count()
     };
-    let without = more(engine());
+    let without = more(&engine());
     for (name, planted) in faults {
         let with = more(&Engine::with_planted_faults(None, planted).expect("the device tests need a Vulkan driver"));
         eprintln!("{name}: of {} the device culls {with} beyond the mirror, without the fault {without}", rounds.len());

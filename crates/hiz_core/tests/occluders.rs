@@ -183,7 +183,8 @@ fn pyramids_of_rendered_depth_are_bit_exact() {
 /// A caller's own `R32Float` texture.
 #[test]
 fn pyramids_of_float_textures_are_bit_exact() {
-    let (device, queue) = (engine().device(), engine().queue());
+    let engine = engine();
+    let (device, queue) = (engine.device(), engine.queue());
     let mut random = Random(9);
     for (width, height) in [(5, 7), (65, 33)] {
         let depth: Vec<f32> = (0..width * height).map(|_| random.unit() as f32).collect();
@@ -206,16 +207,16 @@ fn pyramids_of_float_textures_are_bit_exact() {
             let camera = camera_along_z(width, height, convention);
             for levels in LEVELS {
                 let options = PyramidOptions { levels, ..PyramidOptions::default() };
-                let pyramid = engine().context().create_pyramid(camera.size(), &options).unwrap();
+                let pyramid = engine.context().create_pyramid(camera.size(), &options).unwrap();
                 let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-                engine().context().record_reduce(&mut encoder, &view, &camera, &pyramid).unwrap();
+                engine.context().record_reduce(&mut encoder, &view, &camera, &pyramid).unwrap();
                 queue.submit([encoder.finish()]);
                 assert_levels(&pyramid, &depth, convention);
             }
-            let pyramid = engine().context().create_pyramid(camera.size(), &PyramidOptions::default()).unwrap();
+            let pyramid = engine.context().create_pyramid(camera.size(), &PyramidOptions::default()).unwrap();
             let other = camera_along_z(width + 1, height, convention);
             let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            let error = engine().context().record_reduce(&mut encoder, &view, &other, &pyramid).unwrap_err();
+            let error = engine.context().record_reduce(&mut encoder, &view, &other, &pyramid).unwrap_err();
             assert!(error.to_string().starts_with("camera: expected the depth image's size"), "{error}");
         }
     }

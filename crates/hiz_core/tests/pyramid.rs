@@ -213,15 +213,15 @@ fn the_yardsticks_have_the_same_levels() {
             let uploaded = engine().upload_depth(&depth, &camera_along_z(width, height, convention)).unwrap();
             let pyramid = engine().pyramid(&uploaded).unwrap();
             for shape in [ReductionShape::Buffer, ReductionShape::Textures] {
-                let reduction = PerLevelReduction::new(engine(), &uploaded, shape).unwrap();
-                submitted_ms(engine(), |encoder| {
+                let reduction = PerLevelReduction::new(&engine(), &uploaded, shape).unwrap();
+                submitted_ms(&engine(), |encoder| {
                     reduction.record(encoder);
                     Ok(())
                 })
                 .unwrap();
                 for k in 1..pyramid.num_levels() {
                     let ours = engine().read_level(&pyramid, k).unwrap();
-                    assert_eq!(reduction.read(engine(), k as usize).unwrap(), ours, "{shape:?} level {k}");
+                    assert_eq!(reduction.read(&engine(), k as usize).unwrap(), ours, "{shape:?} level {k}");
                 }
             }
         }
@@ -407,7 +407,7 @@ fn a_copy_that_never_ran_is_made_again() {
     let bounds =
         Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0].repeat(5000)), radii: Floats::F32(&[0.1; 5000]) };
     let instances = engine().instances(&bounds, &InstanceOptions::default()).unwrap();
-    let context = engine().context();
+    let context = engine().context().clone();
     let view = wall.texture().create_view(&wgpu::TextureViewDescriptor::default());
     let encoder = || engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     let kept = |pyramid: &Arc<Pyramid>| {

@@ -185,7 +185,7 @@ fn assert_same_as_fresh(instances: &Arc<Instances>, crowd: &Crowd, kind: BoundsK
     let invalid: Vec<_> = (0..crowd.radii.len()).filter(|i| crowd.centers[3 * i].is_nan()).collect();
     let found: Vec<_> = instances.invalid().unwrap().iter().map(|i| *i as usize).collect();
     assert_eq!(found, invalid, "{what}");
-    let groups = words::groups(engine(), instances).unwrap();
+    let groups = words::groups(&engine(), instances).unwrap();
     assert_eq!(wrong_groups(&groups, crowd, kind, &invalid), None, "{what}");
     // One piece, in the caller's order.
     let options = InstanceOptions { order: StoredOrder::Given, ..InstanceOptions::default() };
@@ -282,7 +282,7 @@ fn boxes_of_groups_contain_their_members_exactly() {
     for kind in KINDS {
         for order in ORDERS {
             let list = instances(&crowd, kind, order);
-            let groups = words::groups(engine(), &list).unwrap();
+            let groups = words::groups(&engine(), &list).unwrap();
             assert_eq!(wrong_groups(&groups, &crowd, kind, &[]), None, "{kind:?} {order:?}");
             // The check can fail: a box that is a few units in the last place smaller, a sphere without its radius.
             for k in 0..3 {
@@ -294,7 +294,7 @@ fn boxes_of_groups_contain_their_members_exactly() {
         }
     }
     let points = Crowd { radii: vec![0.0; 2000], ..crowd.clone() };
-    let groups = words::groups(engine(), &instances(&points, BoundsKind::Sphere, StoredOrder::Given)).unwrap();
+    let groups = words::groups(&engine(), &instances(&points, BoundsKind::Sphere, StoredOrder::Given)).unwrap();
     assert!(wrong_groups(&groups, &crowd, BoundsKind::Sphere, &[]).is_some(), "boxes of centres alone are found out");
 }
 
@@ -304,7 +304,7 @@ fn boxes_from_before_an_update_are_found_out() {
     let mut random = Random(14);
     let mut crowd = Crowd::new(1000, &mut random);
     let list = instances(&crowd, BoundsKind::Box, StoredOrder::Morton);
-    let before = words::groups(engine(), &list).unwrap();
+    let before = words::groups(&engine(), &list).unwrap();
     let moved = Crowd::new(5, &mut random);
     engine().update(&list, 400, &moved.bounds(BoundsKind::Box), false).unwrap();
     crowd.replace(400, &moved);
@@ -322,7 +322,7 @@ fn boxes_forget_where_members_were() {
     let mut crowd = Crowd::default();
     (0..64).for_each(|i| crowd.replace_or_push(i, &place(i as f64)));
     let list = instances(&crowd, BoundsKind::Box, StoredOrder::Morton);
-    let corners = || words::groups(engine(), &list).unwrap()[0].corners.unwrap().map(|c| c[0]);
+    let corners = || words::groups(&engine(), &list).unwrap()[0].corners.unwrap().map(|c| c[0]);
     assert_eq!(corners(), [0.0, 63.0]);
     let kind = BoundsKind::Box;
     for x in [1000.0, -5000.0, 64.0] {
@@ -377,7 +377,7 @@ fn after_an_update_that_never_ran_touched_groups_are_never_culled_as_a_whole() {
         let third = Crowd::new(1, &mut random);
         engine().update(&list, 70, &third.bounds(kind), false).unwrap();
         crowd.replace(70, &third);
-        let groups = words::groups(engine(), &list).unwrap();
+        let groups = words::groups(&engine(), &list).unwrap();
         assert!(is_no_volume(&groups[0]) && is_no_volume(&groups[1]), "touched");
         assert!(!groups[2..].iter().any(is_no_volume), "not touched");
         let fresh = instances(&crowd, kind, StoredOrder::Given);

@@ -1,9 +1,11 @@
 //! Which Vulkan adapters there are.
 
+use crate::error::Error;
+
 /// The environment variable that chooses an adapter.
 pub const ADAPTER_VARIABLE: &str = "HIZVK_ADAPTER";
 
-/// How to install a software driver.
+/// How to install a software driver: the advice where there is no adapter at all.
 pub const INSTALL_HINT: &str = "A software Vulkan driver: apt install libvulkan1 mesa-vulkan-drivers";
 
 /// A Vulkan adapter, as text.
@@ -62,6 +64,20 @@ impl std::fmt::Display for AdapterSummary {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} ({}, {} {})", self.name, self.device_type, self.driver, self.driver_info)
     }
+}
+
+/// The error of a request that no adapter answers to: with how to choose one of those that are there, or how to get one.
+pub(super) fn no_adapter(request: String, seen: &[AdapterSummary]) -> Error {
+    let hint = if seen.is_empty() {
+        INSTALL_HINT.to_owned()
+    } else {
+        format!(
+            "Choose one of these by its number, or by a part of its name or driver, as an argument or in {ADAPTER_VARIABLE}; \
+             without both the best one is taken. One that is missing has no Vulkan driver here that the loader finds"
+        )
+    };
+    let seen = seen.iter().map(|summary| format!("{}: {summary}", summary.index)).collect();
+    Error::NoAdapter { request, seen, hint }
 }
 
 fn instance() -> wgpu::Instance {

@@ -147,6 +147,7 @@ impl Culling {
 
     /// The words of the masks of all pieces.
     fn mask_words(&self) -> Result<Vec<Vec<u8>>> {
+        self.engine.check_process()?;
         // Whoever comes first takes it; a second reader copies again.
         let Some(staged) = locked(&self.staged_mask).take() else {
             return self.read(&mask_ranges(&self.instances, &self.visible));

@@ -1,10 +1,24 @@
 //! A device of its own: for scripts and tests that have no renderer. This is what the Python package drives.
 //!
 //! Everything here is `Send + Sync`; an [`Engine`] is cheap to clone and may be used from any thread.
+//!
+//! # The end of a process
+//! A driver may still be at work when the last wait for it has returned: Mesa's lavapipe frees pipelines on a thread of its own, which
+//! only the destruction of the device joins. A process that ends meanwhile may crash in the driver. So **let go of every device before
+//! the process ends**: the last clone of an [`Engine`] waits until its device is idle, and the device is destroyed with the last object
+//! on it (instances, pyramids, results, and whatever was made on [`Engine::device`]). Keep none of them in a `static`, which is never
+//! dropped; a local of `main` and a `thread_local!` are. The same goes for a device of your own under a
+//! [`HizContext`]. `std::process::exit` drops nothing: return from `main` instead.
+//!
+//! # Forks
+//! No device works in a fork of the process that made it. There every call of an [`Engine`], [`DepthImage`] or [`Culling`] is
+//! [`Error::OtherProcess`], before it takes any lock; dropping an [`Engine`] there lets go of nothing. Other objects on the device
+//! (instances, pyramids) are better forgotten in the fork than dropped.
 
 mod adapter;
 mod culling;
 mod depth_image;
+mod process;
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Instant;
@@ -12,6 +26,7 @@ use std::time::Instant;
 pub use adapter::{ADAPTER_VARIABLE, AdapterSummary, INSTALL_HINT, adapters};
 pub use culling::{Counts, Culling, Explanation, Timings};
 pub use depth_image::DepthImage;
+use process::Process;
 
 use crate::bounds::Bounds;
 use crate::camera::Camera;
@@ -28,14 +43,24 @@ use crate::readback::{self, BufferRange};
 use crate::shader::SourceKind;
 use crate::visible::VisibleOptions;
 
-/// A device, its queue and the pipelines on it.
+/// A device, its queue and the pipelines on it. The last clone waits until the device is idle, and lets go of it.
 #[derive(Debug, Clone)]
 pub struct Engine {
     shared: Arc<Shared>,
 }
 
+impl Drop for Engine {
+    fn drop(&mut self) {
+        if self.shared.process.check().is_err() {
+            // Destroying the device would join threads that a fork does not have. One more owner keeps it for good.
+            std::mem::forget(Arc::clone(&self.shared));
+        }
+    }
+}
+
 #[derive(Debug)]
 struct Shared {
+    process: Process,
     context: HizContext,
     device: wgpu::Device,
     queue: wgpu::Queue,
@@ -43,6 +68,13 @@ struct Shared {
     /// Why the device was lost, once it is; and errors that no scope caught.
     lost: Arc<Mutex<Option<String>>>,
     uncaught: Arc<Mutex<Option<String>>>,
+}
+
+impl Drop for Shared {
+    fn drop(&mut self) {
+        // A lost device has nothing to wait for.
+        drop(self.device.poll(wgpu::PollType::wait_indefinitely()));
+    }
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
@@ -54,7 +86,8 @@ impl Engine {
     /// environment variable [`ADAPTER_VARIABLE`] says; without that the best one, real GPUs first.
     ///
     /// # Errors
-    /// [`Error::NoAdapter`] where none fits, with the adapters that were seen and the line that installs a software driver.
+    /// [`Error::NoAdapter`] where none fits, with the adapters that were seen and how to choose one of them; where there are none,
+    /// with the line that installs a software driver.
     pub fn new(adapter: Option<&str>) -> Result<Self> {
         Self::with_planted_faults(adapter, &[])
     }
@@ -65,15 +98,14 @@ impl Engine {
         let from_environment = std::env::var(ADAPTER_VARIABLE).ok().filter(|s| !s.is_empty());
         let request = adapter.map(str::to_owned).or(from_environment);
         let mut found = adapter::enumerate();
-        let no_adapter = |request: String, seen| Error::NoAdapter { request, seen, hint: INSTALL_HINT.to_owned() };
-        let seen: Vec<String> = found.iter().map(|(summary, _)| summary.to_string()).collect();
+        let seen: Vec<AdapterSummary> = found.iter().map(|(summary, _)| summary.clone()).collect();
         if let Some(request) = &request {
             found.retain(|(summary, _)| summary.matches(request));
         }
         let Some((summary, adapter)) = found.into_iter().min_by_key(|(summary, _)| (summary.rank(), summary.index))
         else {
             let request = request.map_or_else(|| "was found".to_owned(), |r| format!("matches {r:?}"));
-            return Err(no_adapter(request, seen));
+            return Err(adapter::no_adapter(request, &seen));
         };
         let features = adapter.features() & wgpu::Features::INDIRECT_FIRST_INSTANCE;
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
@@ -82,7 +114,7 @@ impl Engine {
             required_limits: adapter.limits(),
             ..Default::default()
         }))
-        .map_err(|e| no_adapter(format!("would open: {summary}: {e}"), seen))?;
+        .map_err(|e| adapter::no_adapter(format!("would open: {summary}: {e}"), &seen))?;
         let lost = Arc::new(Mutex::new(None));
         let uncaught = Arc::new(Mutex::new(None));
         let (lost_to, uncaught_to) = (Arc::clone(&lost), Arc::clone(&uncaught));
@@ -94,7 +126,14 @@ impl Engine {
             locked(&uncaught_to).get_or_insert(error.to_string());
         }));
         let context = HizContext::with_planted_faults(&device, faults)?;
-        Ok(Self { shared: Arc::new(Shared { context, device, queue, adapter: summary, lost, uncaught }) })
+        let process = Process::this();
+        Ok(Self { shared: Arc::new(Shared { process, context, device, queue, adapter: summary, lost, uncaught }) })
+    }
+
+    /// Refuses to go on in a fork of the process that made the device. To be asked before any lock is taken: one that another thread
+    /// held at the fork is never released there.
+    fn check_process(&self) -> Result<()> {
+        self.shared.process.check()
     }
 
     /// The adapter.
@@ -190,6 +229,7 @@ impl Engine {
         camera: &Camera,
         options: &ConservativeDepthOptions,
     ) -> Result<DepthImage> {
+        self.check_process()?;
         self.context().gpu.check_context("occluders", occluders.context)?;
         self.upload_depth(&occluders.surface().conservative_depth(camera, options)?, camera)
     }
@@ -236,6 +276,7 @@ impl Engine {
     /// # Errors
     /// [`Error::Invalid`] past the last level and for one that is not stored, [`Error::Mismatch`] for a pyramid that was never built.
     pub fn read_level(&self, pyramid: &Pyramid, level: u32) -> Result<Vec<f32>> {
+        self.check_process()?;
         self.context().gpu.check_context("pyramid", pyramid.context)?;
         let layout = pyramid.layout.levels.get(level as usize).ok_or_else(|| {
             Error::invalid("level", format!("expected a level below {}, got {level}", pyramid.num_levels()))
@@ -291,6 +332,7 @@ impl Engine {
         options: &CullOptions,
         output: &VisibleOptions,
     ) -> Result<Culling> {
+        self.check_process()?;
         let start = Instant::now();
         let attempt = || {
             let visible = self.context().create_visible(instances, output)?;
@@ -339,6 +381,7 @@ impl Engine {
 
     /// Runs `work` so that what the device finds wrong comes back as an error and nothing panics.
     fn scoped<T>(&self, work: impl FnOnce() -> Result<T>) -> Result<T> {
+        self.check_process()?;
         let device = self.device();
         if let Some(reason) = locked(&self.shared.lost).clone() {
             return Err(Error::DeviceLost(reason));

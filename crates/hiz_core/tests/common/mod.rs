@@ -1,30 +1,60 @@
 //! What the device tests share: one engine a process, its adapter printed and checked, and a small seeded generator.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
-use std::sync::OnceLock;
+use std::cell::OnceCell;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use hiz_core::headless::Engine;
 use hiz_core::{Camera, DepthConvention, ImageSize, Mat4};
 
-/// The engine of this process. `HIZVK_EXPECT_ADAPTER` (a part of the adapter's name or driver) refuses any other.
+/// The engine that the tests of this process share. It lives as long as one of their threads: each that has asked for it holds it until
+/// the thread ends, and then the device is waited for and destroyed. (A static would keep it until the process ends, and lavapipe may
+/// then still be freeing memory on a thread of its own: `free(): invalid size`.)
+///
+/// `HIZVK_EXPECT_ADAPTER` (a part of the adapter's name or driver) refuses any other.
 /// `HIZVK_PLANTED_FAULT` (`what => by what`, one a line) replaces texts in the shaders: does any test turn red?
-pub(crate) fn engine() -> &'static Engine {
-    static ENGINE: OnceLock<Engine> = OnceLock::new();
-    ENGINE.get_or_init(|| {
-        let planted = std::env::var("HIZVK_PLANTED_FAULT").unwrap_or_default();
-        let planted = planted.lines().map(|line| line.replace("\\n", "\n")).collect::<Vec<_>>();
-        let faults: Vec<(&str, &str)> = planted.iter().filter_map(|line| line.split_once(" => ")).collect();
-        let engine = Engine::with_planted_faults(None, &faults).expect("the device tests need a Vulkan driver");
-        let adapter = engine.adapter().to_string();
-        eprintln!("adapter: {adapter}");
-        if let Ok(expected) = std::env::var("HIZVK_EXPECT_ADAPTER") {
-            assert!(
-                adapter.to_lowercase().contains(&expected.to_lowercase()),
-                "expected the adapter {expected}, got {adapter}"
-            );
+pub(crate) fn engine() -> Arc<Engine> {
+    // A weak reference holds no device.
+    static SHARED: Mutex<Weak<Engine>> = Mutex::new(Weak::new());
+    thread_local!(static HELD: OnceCell<Held> = const { OnceCell::new() });
+    let held = |cell: &OnceCell<Held>| {
+        let held = cell.get_or_init(|| {
+            let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+            let engine = shared.upgrade().unwrap_or_else(|| Arc::new(open()));
+            *shared = Arc::downgrade(&engine);
+            Held(Some(engine))
+        });
+        held.0.clone().expect("taken by the drop alone")
+    };
+    HELD.with(held)
+}
+
+/// A thread's share of the engine.
+struct Held(Option<Arc<Engine>>);
+
+impl Drop for Held {
+    fn drop(&mut self) {
+        if let Some(last) = self.0.take().and_then(Arc::into_inner) {
+            // On a thread of its own: those of this thread's locals that wgpu uses may be gone already.
+            std::thread::spawn(move || drop(last)).join().expect("the device is let go of");
         }
-        engine
-    })
+    }
+}
+
+fn open() -> Engine {
+    let planted = std::env::var("HIZVK_PLANTED_FAULT").unwrap_or_default();
+    let planted = planted.lines().map(|line| line.replace("\\n", "\n")).collect::<Vec<_>>();
+    let faults: Vec<(&str, &str)> = planted.iter().filter_map(|line| line.split_once(" => ")).collect();
+    let engine = Engine::with_planted_faults(None, &faults).expect("the device tests need a Vulkan driver");
+    let adapter = engine.adapter().to_string();
+    eprintln!("adapter: {adapter}");
+    if let Ok(expected) = std::env::var("HIZVK_EXPECT_ADAPTER") {
+        assert!(
+            adapter.to_lowercase().contains(&expected.to_lowercase()),
+            "expected the adapter {expected}, got {adapter}"
+        );
+    }
+    engine
 }
 
 /// A camera at the origin whose clip coordinates are written down: view depth is z, x and y span -1..1 at depth 1.
