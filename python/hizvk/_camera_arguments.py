@@ -40,11 +40,10 @@ _POSE_WORDS = (
     "expected no such parameter: pass camera_from_world=(R, t) where camera = R @ world + t (OpenCV, COLMAP), or "
     "world_from_camera=(R, t) where world = R @ camera + t; (3, 4) and (4, 4) matrices will do too"
 )
-#: What `_arguments.explained` says about keywords of a camera's constructors.
-KEYWORDS: Final = {
-    "pixel_center": f"expected {_CENTERS}, got nothing; {_NO_DEFAULT}",
-    **dict.fromkeys(_POSES, _POSE_WORDS),
-}
+#: What `_arguments.explained` says about other words for a pose.
+POSE_KEYWORDS: Final = dict.fromkeys(_POSES, _POSE_WORDS)
+#: And about a camera matrix of which nobody says where its pixels' centres are.
+KEYWORDS: Final = {"pixel_center": f"expected {_CENTERS}, got nothing; {_NO_DEFAULT}", **POSE_KEYWORDS}
 
 #: COLMAP's models that are a pinhole where what follows cx and cy is 0, and the order of their
 #: parameters in cameras.txt and pycolmap (colmap/src/colmap/sensor/models/).

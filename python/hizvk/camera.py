@@ -286,7 +286,7 @@ class Camera:
         )  # fmt: skip
 
     @classmethod
-    @_arguments.explained(_camera_arguments.KEYWORDS)
+    @_arguments.explained(_camera_arguments.POSE_KEYWORDS)
     def from_colmap(
         cls,
         model: str,
@@ -355,7 +355,7 @@ class Camera:
         )  # fmt: skip
 
     @classmethod
-    @_arguments.explained(_camera_arguments.KEYWORDS)
+    @_arguments.explained(_camera_arguments.POSE_KEYWORDS)
     def from_opengl(
         cls,
         projection: npt.ArrayLike | None = None,
@@ -458,7 +458,7 @@ class Camera:
         )
 
     @classmethod
-    @_arguments.explained(_camera_arguments.KEYWORDS)
+    @_arguments.explained(_camera_arguments.POSE_KEYWORDS)
     def from_matrices(
         cls,
         clip_from_world: npt.ArrayLike | None = None,
