@@ -297,6 +297,11 @@ INTRINSICS: list[Bad] = [
     (K * NAN, ValueError, "nan"),
     ("k", TypeError, "got str 'k'"),
 ]
+DISTORTION: list[Bad] = [
+    ([0.1, 0, 0, 0], ValueError, "undistort the depth image first, by cv2.initUndistortRectifyMap"),
+    ("none", TypeError, "expected None or an array of zeros, got str 'none'"),
+    ([NAN], ValueError, "undistort"),
+]
 VECTOR_OR_NONE: list[Bad] = [
     (None, ValueError, "expected the other half of the pose") if bad[0] is None else bad for bad in VECTOR
 ]
@@ -435,11 +440,7 @@ TABLES: dict[str, Table] = {
             "size": SIZE,
             "near": NEAR,
             "far": FAR,
-            "distortion": [
-                ([0.1, 0, 0, 0], ValueError, "undistort the depth image first, by cv2.initUndistortRectifyMap"),
-                ("none", TypeError, "expected None or an array of zeros, got str 'none'"),
-                ([NAN], ValueError, "undistort"),
-            ],
+            "distortion": DISTORTION,
             "reversed_z": FLAG,
         },
     ),
@@ -503,6 +504,7 @@ TABLES: dict[str, Table] = {
             "size": SIZE,
             "near": NEAR,
             "far": FAR,
+            "distortion": DISTORTION,
             "reversed_z": FLAG[::2],
         },
     ),

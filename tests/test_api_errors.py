@@ -40,8 +40,8 @@ def test_bad_argument(device: hizvk.Device, function: str, parameter: str, bad: 
     if function == "Camera.from_colmap" and parameter in ("camera_from_world", "world_from_camera"):
         del arguments["qvec"], arguments["tvec"]
     if function == "Camera.from_opengl" and parameter not in ("projection", "size") and "world" not in parameter:
-        arguments |= {"near": 0.1, **({"k": K} if parameter in ("k", "pixel_center") else {"fov_x_deg": 60})}
-        arguments |= {"pixel_center": "half"} if parameter == "k" else {}
+        by_k = parameter in ("k", "pixel_center", "distortion")
+        arguments |= {"near": 0.1, **({"k": K, "pixel_center": "half"} if by_k else {"fov_x_deg": 60})}
         del arguments["projection"]
         if parameter == "fov_y_deg":
             del arguments["fov_x_deg"]

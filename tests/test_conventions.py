@@ -321,11 +321,28 @@ def test_one_way_to_say_what_an_opengl_camera_sees() -> None:
     with pytest.raises(ValueError, match=r"^projection, k, fov_x_deg, fov_y_deg: .*got fov_x_deg and fov_y_deg"):
         hizvk.Camera.from_opengl(fov_x_deg=60, fov_y_deg=60, **pose, near=0.1)
     gl = np.diag([1.0, 1, -1, 1])
-    for name, value in {"near": 0.1, "far": 9.0, "reversed_z": False, "pixel_center": "half"}.items():
+    for name, value in {"near": 0.1, "far": 9.0, "reversed_z": False}.items():
         with pytest.raises(TypeError, match=rf"^{name}: expected nothing beside a projection, which has its own"):
             hizvk.Camera.from_opengl(gl, **pose, **{name: value})
-    with pytest.raises(TypeError, match=r"^pixel_center: expected nothing beside an angle of view"):
-        hizvk.Camera.from_opengl(fov_x_deg=60, pixel_center="half", **pose, near=0.1)
+    for more in ({"pixel_center": "half"}, {"distortion": np.zeros(4)}):
+        with pytest.raises(TypeError, match=rf"^{next(iter(more))}: expected beside k alone, got .* beside fov_x_deg"):
+            hizvk.Camera.from_opengl(fov_x_deg=60, **more, **pose, near=0.1)
+        with pytest.raises(TypeError, match=rf"^{next(iter(more))}: expected beside k alone, got .* beside projection"):
+            hizvk.Camera.from_opengl(gl, **more, **pose)
+
+
+def test_what_pyrenders_depth_costs() -> None:
+    """What docs/conventions.md calls less than 2^-20: a buffer of 24 bits, and pyrender's way back in float32."""
+    rng = np.random.default_rng(5)
+    exact = rng.random(200_000)
+    for near, far in ((1.0, 2.0), (0.05, 100.0), (1e-3, 1e4), (0.01, 1e5), (3.0, 7.0)):
+        for neighbour in (0, 1):  # a buffer may take either
+            stored = ((np.floor(exact * (2**24 - 1)) + neighbour) / (2**24 - 1)).astype(np.float32)
+            signed = 2.0 * stored - 1.0
+            z = (2.0 * near * far / (far + near - signed * (far - near)))[stored < 1.0]
+            assert z.dtype == np.float32
+            again = far / (far - near) * (1.0 - near / z.astype(np.float64))
+            assert np.abs(again - exact[stored < 1.0]).max() < 2.0**-20
 
 
 # -- boxes ---------------------------------------------------------------------------------------------------
@@ -502,3 +519,27 @@ def test_what_is_advised_to_install_can_be_installed() -> None:
         for line in re.findall(r"pip install ([\w ]+)", text):
             advised |= set(line.split())
     assert advised == extras
+
+
+# -- the page ------------------------------------------------------------------------------------------------
+
+
+def blocks() -> list[str]:
+    page = (ROOT / "docs" / "conventions.md").read_text(encoding="utf-8")
+    return re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+
+
+@pytest.mark.parametrize("block", blocks(), ids=range(len(blocks())))
+def test_the_pages_blocks_run(block: str) -> None:
+    """Each stands for itself, and asserts what it shows."""
+    assert "assert " in block
+    exec(compile(block, "docs/conventions.md", "exec"), {})
+
+
+def test_the_page_has_every_tool() -> None:
+    page = (ROOT / "docs" / "conventions.md").read_text(encoding="utf-8")
+    tools = re.findall(r"^\| \[.*?\]\(#([a-z0-9]+)\)", page, re.MULTILINE)
+    headings = [title.lower() for title in re.findall(r"^## (\w+)$", page, re.MULTILINE)]
+    assert set(tools) == set(headings) - {"boxes", "up"}
+    assert page.count("```python") == len(set(tools)) + 1
+    assert page.count("<!-- Source:") > len(set(tools))

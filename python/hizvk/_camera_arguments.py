@@ -200,6 +200,13 @@ def nothing_beside(what: str, values: Mapping[str, object]) -> None:
             raise TypeError(f"{name}: expected nothing beside {what}, got {_arguments.describe(value)}")
 
 
+def only_beside(what: str, values: Mapping[str, object], came: str) -> None:
+    """Refuse parameters that mean something beside another one alone."""
+    for name, value in values.items():
+        if value is not None:
+            raise TypeError(f"{name}: expected beside {what} alone, got {_arguments.describe(value)} beside {came}")
+
+
 def opengl_projection(projection: object) -> npt.NDArray[np.float64]:
     """A projection of OpenGL's for column vectors."""
     clip = _arguments.matrix("projection", projection)

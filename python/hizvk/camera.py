@@ -369,6 +369,7 @@ class Camera:
         size: Size,
         near: float | None = None,
         far: float | None = None,
+        distortion: npt.ArrayLike | None = None,
         reversed_z: bool | None = None,
     ) -> Self:
         """A camera with OpenGL's axes (and Blender's, nerfstudio's, pyrender's, trimesh's).
@@ -404,6 +405,8 @@ class Camera:
             camera.
         near, far : float
             As in `look_at`, along -z; `near` is needed without a `projection`, which has its own.
+        distortion : array, optional
+            Lens distortion that belongs to `k`, as in `from_opencv`: None or all zero.
         reversed_z : bool, optional
             As in `look_at`; None is True, as in all constructors that take `near`. Metric depth does
             not care; for a depth buffer of OpenGL's pass False, or the projection. Not beside a
@@ -418,10 +421,10 @@ class Camera:
             ("projection", "k", "fov_x_deg", "fov_y_deg"), (projection, k, fov_x_deg, fov_y_deg)
         )
         if way == "projection":
-            beside = {"pixel_center": pixel_center, "near": near, "far": far, "reversed_z": reversed_z}
+            beside = {"near": near, "far": far, "reversed_z": reversed_z}
             _camera_arguments.nothing_beside("a projection, which has its own", beside)
-        elif way != "k":
-            _camera_arguments.nothing_beside("an angle of view", {"pixel_center": pixel_center})
+        if way != "k":
+            _camera_arguments.only_beside("k", {"pixel_center": pixel_center, "distortion": distortion}, way)
         if way == "projection":
             clip = _camera_arguments.opengl_projection(projection)
             zero_to_one = clip.copy()
@@ -434,6 +437,7 @@ class Camera:
         if way == "k":
             k = _camera_arguments.intrinsics(k)
             pixel_center = _camera_arguments.pixel_center(pixel_center)
+            _camera_arguments.refuse_distortion(distortion)
             seen = {"k": k, "pixel_center": pixel_center}
         else:
             angle = _arguments.number(way, fov_x_deg if way == "fov_x_deg" else fov_y_deg, above=0.0, below=180.0)
