@@ -420,12 +420,11 @@ class Camera:
         way = _camera_arguments.only_one(
             ("projection", "k", "fov_x_deg", "fov_y_deg"), (projection, k, fov_x_deg, fov_y_deg)
         )
-        if way == "projection":
-            beside = {"near": near, "far": far, "reversed_z": reversed_z}
-            _camera_arguments.nothing_beside("a projection, which has its own", beside)
         if way != "k":
             _camera_arguments.only_beside("k", {"pixel_center": pixel_center, "distortion": distortion}, way)
         if way == "projection":
+            beside = {"near": near, "far": far, "reversed_z": reversed_z}
+            _camera_arguments.nothing_beside("a projection, which has its own", beside)
             clip = _camera_arguments.opengl_projection(projection)
             zero_to_one = clip.copy()
             zero_to_one[2] = 0.5 * clip[2] + 0.5 * clip[3]
@@ -433,29 +432,25 @@ class Camera:
             size = _arguments.size("size", size)
             core = _posed(zero_to_one, name, pose, False, size)
             return cls._made(core, "from_opengl", projection=clip, **{name: pose}, size=size)
+        name, pose = _camera_arguments.one_pose(camera_from_world, world_from_camera)
+        size = _arguments.size("size", size)
+        near, far = _camera_arguments.near_far(near, far)
+        reversed_z = True if reversed_z is None else _arguments.flag("reversed_z", reversed_z)
         seen: dict[str, Any]
         if way == "k":
             k = _camera_arguments.intrinsics(k)
             pixel_center = _camera_arguments.pixel_center(pixel_center)
             _camera_arguments.refuse_distortion(distortion)
             seen = {"k": k, "pixel_center": pixel_center}
+            projected = _pinhole(k, pixel_center, near, far, reversed_z, size) @ _TURNED
         else:
             angle = _arguments.number(way, fov_x_deg if way == "fov_x_deg" else fov_y_deg, above=0.0, below=180.0)
             seen = {way: angle}
-        name, pose = _camera_arguments.one_pose(camera_from_world, world_from_camera)
-        size = _arguments.size("size", size)
-        near, far = _camera_arguments.near_far(near, far)
-        reversed_z = True if reversed_z is None else _arguments.flag("reversed_z", reversed_z)
-        if way == "k":
-            projected = _pinhole(seen["k"], seen["pixel_center"], near, far, reversed_z, size) @ _TURNED
-        else:
-            height, width = size
-            tangent = math.tan(math.radians(angle) / 2.0)
-            right, top = (
-                (tangent, tangent * height / width) if way == "fov_x_deg" else (tangent * width / height, tangent)
+            tangent, side = math.tan(math.radians(angle) / 2.0), size[1] if way == "fov_x_deg" else size[0]
+            right, top = tangent * size[1] / side, tangent * size[0] / side
+            projected = (
+                np.array(_core.frustum_matrix((-right, right, -top, top), near, far, reversed_z, size)) @ _BACKWARDS
             )
-            borders = (-right, right, -top, top)
-            projected = np.array(_core.frustum_matrix(borders, near, far, reversed_z, size)) @ _BACKWARDS
         core = _posed(projected, name, pose, reversed_z, size)
         return cls._made(
             core, "from_opengl", **seen, **{name: pose}, size=size, near=near, far=far, reversed_z=reversed_z
