@@ -109,7 +109,7 @@ def _fits(shape: Sequence[int | str], sides: Sequence[int]) -> bool:
     )
 
 
-def _shape_hint(shape: Sequence[int | str], sides: Sequence[int]) -> str:
+def shape_hint(shape: Sequence[int | str], sides: Sequence[int]) -> str:
     """The index that makes the shape right, if there is one."""
     if sides and sides[-1] == 1 and _fits(shape, sides[:-1]):
         return "; drop the last axis with [..., 0]"
@@ -123,7 +123,7 @@ def _shape_hint(shape: Sequence[int | str], sides: Sequence[int]) -> str:
 
 def _check_shape(name: str, expected: str, array: npt.NDArray[Any], shape: Sequence[int | str], hint: str = "") -> None:
     if not _fits(shape, array.shape):
-        hint = _shape_hint(shape, array.shape) or hint
+        hint = shape_hint(shape, array.shape) or hint
         raise ValueError(f"{name}: expected {expected}, got {_shape_text(array.shape)} {array.dtype}{hint}")
 
 
