@@ -122,10 +122,10 @@ class Boxes:
 class OrientedBoxes:
     """Boxes with axes of their own.
 
-    `from_yaw`, `from_quaternions` and `from_transforms` make them from what data sets hold instead of
-    `rotations`. The matrices that they form in float64 *are* the boxes' rotations from then on: what
-    a cull promises, it promises about the boxes with those matrices. They are off an exact turn by
-    some 1e-16, as far as a half size of 1 km by 1e-13 m.
+    `from_yaw`, `from_quaternions` and `from_transforms` make them from what data sets hold instead
+    of `rotations`. The matrices that they form in float64 *are* the boxes' rotations from then on:
+    what a cull promises, it promises about the boxes with those matrices. They are off an exact
+    turn by some 1e-16, as far as a half size of 1 km by 1e-13 m.
 
     Parameters
     ----------
@@ -167,7 +167,8 @@ class OrientedBoxes:
         Parameters
         ----------
         centers : (N, 3) float array
-            World positions of the boxes' centres. (KITTI's labels hold the middle of the lower face.)
+            World positions of the boxes' centres. (KITTI's labels hold the middle of the lower
+            face.)
         half_sizes : (N, 3) or (3,) float array, or one number
             Half the side along each of the box's own axes, which are the world's at an angle of 0.
         yaw_deg : (N,) float array or one number
@@ -215,9 +216,9 @@ class OrientedBoxes:
         half_sizes : (N, 3) or (3,) float array, or one number
             Half the side along each of the box's own axes.
         quaternions : (N, 4) float array
-            The turn from the box's axes to the world's; of any length but 0, for they are normalised.
-            One of length 0, or not finite, makes a box that is no volume: a cull keeps it and counts
-            it as invalid.
+            The turn from the box's axes to the world's; of any length but 0, for they are
+            normalised. One of length 0, or not finite, makes a box that is no volume: a cull keeps
+            it and counts it as invalid.
         order : {"wxyz", "xyzw"}
             Where the scalar part is. There is no default.
 
@@ -247,8 +248,8 @@ class OrientedBoxes:
             the last row of a ``(4, 4)`` is 0, 0, 0, 1. A matrix that is not finite makes a box that
             is no volume: a cull keeps it and counts it as invalid.
         half_sizes : (N, 3) or (3,) float array, or one number
-            Half the side along each of the box's own axes, before the matrix. The default is the cube
-            from -0.5 to 0.5.
+            Half the side along each of the box's own axes, before the matrix. The default is the
+            cube from -0.5 to 0.5.
 
         Raises
         ------

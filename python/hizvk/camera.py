@@ -245,18 +245,20 @@ class Camera:
             ``"half"``: at (0.5, 0.5), as in COLMAP, nerfstudio, gsplat, and wherever ``cx`` is half
             of the width (CARLA). `cx` and `cy` are used as they are.
         camera_from_world, world_from_camera : (4, 4), (3, 4) or a pair (R, t)
-            The pose; pass exactly one. ``camera_from_world`` is OpenCV's ``[R | t]``: of ``solvePnP``
-            pass ``(cv2.Rodrigues(rvec)[0], tvec)``. ``world_from_camera`` is its inverse.
+            The pose; pass exactly one. ``camera_from_world`` is OpenCV's ``[R | t]``: of
+            ``solvePnP`` pass ``(cv2.Rodrigues(rvec)[0], tvec)``. ``world_from_camera`` is its
+            inverse.
         size : (height, width)
             Pixels of the image that `k` belongs to. For a depth image of another resolution, take
             `resized` of the camera; the view stays.
         near, far, reversed_z
             As in `look_at`; view depth is the camera's z.
         distortion : array, optional
-            Lens distortion coefficients; None or all zero. Others are refused: remap the depth image
-            first (``cv2.initUndistortRectifyMap`` and ``cv2.remap`` with ``cv2.INTER_NEAREST``;
-            ``cv2.undistort`` interpolates, and makes depth that nothing has) and pass the new camera
-            matrix. A fisheye is no pinhole, even with coefficients of 0 (``cv2.fisheye``).
+            Lens distortion coefficients; None or all zero. Others are refused: remap the depth
+            image first (``cv2.initUndistortRectifyMap`` and ``cv2.remap`` with
+            ``cv2.INTER_NEAREST``; ``cv2.undistort`` interpolates, and makes depth that nothing has)
+            and pass the new camera matrix. A fisheye is no pinhole, even with coefficients of 0
+            (``cv2.fisheye``).
 
         Raises
         ------
@@ -310,15 +312,15 @@ class Camera:
         ----------
         model : str
             The camera's model, ``"PINHOLE"`` or ``"SIMPLE_PINHOLE"``. Models with distortion
-            (``"SIMPLE_RADIAL"``, ``"OPENCV"``, ...) are taken if all of it is 0; a fisheye never is.
-            The way out is COLMAP's ``image_undistorter``, whose cameras are ``PINHOLE``. pycolmap's
-            ``camera.model`` will do.
+            (``"SIMPLE_RADIAL"``, ``"OPENCV"``, ...) are taken if all of it is 0; a fisheye never
+            is. The way out is COLMAP's ``image_undistorter``, whose cameras are ``PINHOLE``.
+            pycolmap's ``camera.model`` will do.
         params : (P,) numbers
             The model's parameters in COLMAP's order, ``fx, fy, cx, cy`` of ``PINHOLE``.
         qvec : (4,) numbers, optional
-            The image's rotation from world to camera in the order of images.txt: **w, x, y, z**. (In
-            pycolmap, ``rotation.quat`` is x, y, z, w: pass ``camera_from_world`` there.) The camera
-            denotes the float64 matrix that is formed of it.
+            The image's rotation from world to camera in the order of images.txt: **w, x, y, z**.
+            (In pycolmap, ``rotation.quat`` is x, y, z, w: pass ``camera_from_world`` there.) The
+            camera denotes the float64 matrix that is formed of it.
         tvec : (3,) numbers, optional
             The translation that belongs to it. It is not the camera's position.
         camera_from_world, world_from_camera : (4, 4), (3, 4) or a pair (R, t), optional
@@ -374,12 +376,12 @@ class Camera:
     ) -> Self:
         """A camera with OpenGL's axes (and Blender's, nerfstudio's, pyrender's, trimesh's).
 
-        It has x right, y up, and looks along -z. What it sees is one of four: OpenGL's `projection`;
-        or `k`, `fov_x_deg` or `fov_y_deg`, each with `near` and `far`.
+        It has x right, y up, and looks along -z. What it sees is one of four: OpenGL's
+        `projection`; or `k`, `fov_x_deg` or `fov_y_deg`, each with `near` and `far`.
 
-        With a `projection` (clip z in -w..w, mapped to 0..w here) the camera has standard depth, and
-        a depth buffer that was read back in 0..1 is of kind ``"ndc"``. Its rows start at the bottom
-        in OpenGL: turn them, ``depth[::-1]``. A projection that was made for
+        With a `projection` (clip z in -w..w, mapped to 0..w here) the camera has standard depth,
+        and a depth buffer that was read back in 0..1 is of kind ``"ndc"``. Its rows start at the
+        bottom in OpenGL: turn them, ``depth[::-1]``. A projection that was made for
         ``glClipControl(..., GL_ZERO_TO_ONE)`` belongs into `from_matrices`.
 
         Parameters
@@ -394,8 +396,8 @@ class Camera:
             Needed with `k`, and with nothing else, as in `from_opencv`. nerfstudio, pyrender and
             trimesh: ``"half"``.
         fov_x_deg, fov_y_deg : float
-            The full horizontal or vertical angle of view in degrees, above 0 and below 180, of square
-            pixels with the axis in the middle. Blender, NeRF and pyrender have radians: pass
+            The full horizontal or vertical angle of view in degrees, above 0 and below 180, of
+            square pixels with the axis in the middle. Blender, NeRF and pyrender have radians: pass
             ``np.degrees(angle)``.
         camera_from_world, world_from_camera : (4, 4), (3, 4) or a pair (R, t)
             The pose; pass exactly one. ``camera_from_world`` is what OpenGL calls the view matrix;
@@ -408,9 +410,9 @@ class Camera:
         distortion : array, optional
             Lens distortion that belongs to `k`, as in `from_opencv`: None or all zero.
         reversed_z : bool, optional
-            As in `look_at`; None is True, as in all constructors that take `near`. Metric depth does
-            not care; for a depth buffer of OpenGL's pass False, or the projection. Not beside a
-            `projection`.
+            As in `look_at`; None is True, as in all constructors that take `near`. Metric depth
+            does not care; for a depth buffer of OpenGL's pass False, or the projection. Not beside
+            a `projection`.
 
         Raises
         ------
@@ -532,9 +534,9 @@ class Camera:
     def resized(self, size: Size) -> Camera:
         """The same view in an image of another size ``(height, width)``.
 
-        The borders of the view stay where they are: another aspect ratio makes the pixels oblong. So
-        a camera of a 1080 x 1920 image becomes that of its 270 x 480 depth image; a camera matrix K
-        needs no scaling for it.
+        The borders of the view stay where they are: another aspect ratio makes the pixels oblong.
+        So a camera of a 1080 x 1920 image becomes that of its 270 x 480 depth image; a camera
+        matrix K needs no scaling for it.
         """
         size = _arguments.size("size", size)
         return self._made(self._inner.with_size(size), "resized", camera=self, size=size)

@@ -172,7 +172,8 @@ class Device:
         vertices : (V, 3) float array; or a Mesh, a mesh of trimesh or Open3D, or a list of them
             World positions (or the mesh's own, with `transforms`). Objects of other libraries are
             told by their ``vertices`` and ``faces`` (trimesh) or ``triangles`` (Open3D). A list may
-            also hold plain tuples ``(vertices, triangles)`` or ``(vertices, triangles, transforms)``.
+            also hold plain tuples ``(vertices, triangles)`` or ``(vertices, triangles,
+            transforms)``.
         triangles : (T, 3) integer array
             Indices of vertices; left out when ``vertices`` is a mesh or a list.
         transforms : (K, 4, 4) or (4, 4) float array, optional
