@@ -479,7 +479,7 @@ def test_recommend_refuses_what_does_not_fit(device: hizvk.Device) -> None:
 
     refused(TypeError, "occluders, depths: expected exactly one of them, got neither", spheres, view)
     refused(TypeError, "kind: expected nothing beside occluders, got str 'z'", spheres, view, occluders=wall, kind="z")
-    refused(TypeError, "occluders: expected Occluders, a Mesh or a sequence of Mesh", spheres, view, occluders="wall")
+    refused(TypeError, "occluders: expected Occluders, a Mesh, a mesh of trimesh", spheres, view, occluders="wall")
     refused(ValueError, "bounds: expected Instances of this device", foreign, view, occluders=wall)
     refused(
         ValueError, "occluders: expected Occluders of this device", spheres, view,

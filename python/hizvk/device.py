@@ -18,7 +18,7 @@ from .bounds import Bounds, as_arrays
 from .camera import Camera
 from .depth import checked_image
 from .errors import LimitError, NoAdapterError
-from .resources import DepthImage, Instances, Mesh, Occluders, Pyramid, as_meshes
+from .resources import DepthImage, Instances, Occluders, Pyramid, as_meshes
 from .result import CullResult, DrawTemplate
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from ._arguments import Size
     from .depth import DepthKind
+    from .resources import MeshLike
 
 __all__ = ["Adapter", "Device", "adapters"]
 
@@ -154,9 +155,10 @@ class Device:
     @overload
     def occluders(
         self,
-        vertices: Mesh | Sequence[Mesh | tuple[npt.ArrayLike, ...]],
+        vertices: MeshLike | Sequence[MeshLike | tuple[npt.ArrayLike, ...]],
         triangles: None = None,
         *,
+        transforms: npt.ArrayLike | None = None,
         cull: FaceCull = "none",
     ) -> Occluders: ...
 
@@ -167,13 +169,15 @@ class Device:
 
         Parameters
         ----------
-        vertices : (V, 3) float array; or a Mesh, or a list of Mesh
-            World positions (or the mesh's own, with `transforms`). A list may also hold plain tuples ``(vertices,
-            triangles)`` or ``(vertices, triangles, transforms)``.
+        vertices : (V, 3) float array; or a Mesh, a mesh of trimesh or Open3D, or a list of them
+            World positions (or the mesh's own, with `transforms`). Objects of other libraries are
+            told by their ``vertices`` and ``faces`` (trimesh) or ``triangles`` (Open3D). A list may
+            also hold plain tuples ``(vertices, triangles)`` or ``(vertices, triangles,
+            transforms)``.
         triangles : (T, 3) integer array
-            Indices of vertices; left out when ``vertices`` is a Mesh or a list.
+            Indices of vertices; left out when ``vertices`` is a mesh or a list.
         transforms : (K, 4, 4) or (4, 4) float array, optional
-            ``world_from_mesh`` of each copy.
+            ``world_from_mesh`` of each copy; not beside a Mesh or a list, which have their own.
         cull : "none", "back" or "front"
             Faces that are left out; the front is where the triangle runs counter-clockwise.
 
@@ -419,14 +423,16 @@ class Device:
         """
         _arguments.instance("instances", instances, Instances, "Instances of Device.instances")
         self._own("instances", instances)
-        _arguments.instance("camera", camera, Camera, "a Camera")
+        of_one = "a Camera (one a call: each camera culls with the pyramid of its own depth, Device.pyramid)"
+        _arguments.instance("camera", camera, Camera, of_one)
         _arguments.instance("pyramid", pyramid, Pyramid, "a Pyramid of Device.pyramid")
         self._own("pyramid", pyramid)
         if camera != pyramid.camera:
-            raise ValueError(
-                f"camera: expected the camera of the pyramid, {pyramid.camera!r}, got {camera!r}; depth of one camera "
-                "says nothing about another one"
-            )
+            same_view = camera.resized(pyramid.size) == pyramid.camera
+            way = "depth of one camera says nothing about another one"
+            if same_view:
+                way = f"pass camera.resized({pyramid.size}), the same view; the promise is about an image of that size"
+            raise ValueError(f"camera: expected the camera of the pyramid, {pyramid.camera!r}, got {camera!r}; {way}")
         options = cull_options(
             order=order, coverage=coverage, guard_px=guard_px, depth_slack=depth_slack,
             depth_slack_abs=depth_slack_abs, transform_slack=transform_slack, footprint=footprint, descent=descent,

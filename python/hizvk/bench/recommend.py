@@ -18,7 +18,7 @@ from ..camera import Camera
 from ..depth import checked_image
 from ..device import Device
 from ..oneline import default_device
-from ..resources import Instances, Mesh, Occluders
+from ..resources import A_MESH, Instances, Occluders, meshes_of
 from .configurations import Configuration, DepthVariant, promised, render_options
 from .pareto import front
 from .results import Spread, spread
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from ..bounds import Bounds
     from ..depth import DepthKind
     from ..device import Coverage
-    from ..resources import Pyramid
+    from ..resources import MeshLike, Pyramid
 
 __all__ = ["Candidate", "Recommendation", "choose", "recommend"]
 
@@ -120,7 +120,7 @@ def recommend(
     bounds: Bounds | Instances | Sequence[Bounds | Instances],
     cameras: Camera | Sequence[Camera],
     *,
-    occluders: Occluders | Mesh | Sequence[Mesh] | None = None,
+    occluders: Occluders | MeshLike | Sequence[MeshLike] | None = None,
     depths: Sequence[npt.ArrayLike] | None = None,
     kind: DepthKind | None = None,
     scale: float = 1.0,
@@ -141,7 +141,7 @@ def recommend(
         The N instances; several kinds of bounds of the same instances are compared with one another.
     cameras : Camera or sequence of Camera
         Typical views.
-    occluders : Occluders, Mesh or sequence of Mesh
+    occluders : Occluders, Mesh, a mesh of trimesh or Open3D, or a sequence of meshes
         What hides; rendering is part of the time then, and smaller conservative depth images are among the candidates.
     depths : sequence of (height, width) arrays
         Instead of `occluders`: the depth image of each camera.
@@ -295,11 +295,7 @@ def _occluders(occluders: Any, device: Device) -> Occluders:
         if occluders.device is not device:
             raise ValueError("occluders: expected Occluders of this device, got one of another Device")
         return occluders
-    meshes = [occluders] if isinstance(occluders, Mesh) else occluders
-    if not isinstance(meshes, Sequence) or not all(isinstance(mesh, Mesh) for mesh in meshes):
-        got = _arguments.describe(occluders)
-        raise TypeError(f"occluders: expected Occluders, a Mesh or a sequence of Mesh, got {got}")
-    return device.occluders(list(meshes))
+    return device.occluders(meshes_of("occluders", occluders, f"Occluders, {A_MESH}, or a sequence of them"))
 
 
 def _upload(bounds: Bounds | Instances, device: Device) -> Instances:
