@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
 import numpy as np
 
 from . import _arguments, _core
-from .bounds import Bounds, as_arrays
+from .bounds import Bounds, are_points, as_arrays
 from .camera import Camera
 from .depth import checked_image
 from .errors import LimitError, NoAdapterError
+from .hints import Question
 from .resources import DepthImage, Instances, Mesh, Occluders, Pyramid, as_meshes
 from .result import CullResult, DrawTemplate
 
@@ -139,7 +140,8 @@ class Device:
         kind, arrays = as_arrays("bounds", bounds)
         strict = _arguments.flag("strict", strict)
         stored_order = _arguments.choice("order", order, ("morton", "given"))
-        return Instances(self, self._engine.instances(kind, arrays, strict, stored_order, None))
+        uploaded = self._engine.instances(kind, arrays, strict, stored_order, None)
+        return Instances(self, uploaded, points=are_points(bounds))
 
     @overload
     def occluders(
@@ -433,7 +435,8 @@ class Device:
             fit=fit, hierarchy=hierarchy, outputs=outputs, capacity=capacity, draw=draw, statistics=statistics,
         )  # fmt: skip
         culling = self._engine.cull(instances._inner, camera._inner, pyramid._inner, *options)
-        return CullResult(culling, statistics=options[-1])
+        question = Question(camera, pyramid, options[1], instances._points)
+        return CullResult(culling, statistics=options[-1], question=question)
 
     def _check_side(self, camera: Camera) -> None:
         """An image that the device cannot hold is refused before its array is converted."""

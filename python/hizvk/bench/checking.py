@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import reference
-from ..bounds import Boxes, OrientedBoxes, Spheres
+from ..bounds import Boxes, OrientedBoxes, Spheres, are_points
 from ..resources import Instances
 from .clear import POINTS, Blockers, points_of
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ..resources import Occluders
     from .configurations import Configuration
 
-__all__ = ["Check", "are_points", "by_oracle", "by_rays", "hold"]
+__all__ = ["Check", "by_oracle", "by_rays", "hold"]
 
 Mask: TypeAlias = npt.NDArray[np.bool_]
 Indices: TypeAlias = npt.NDArray[np.intp]
@@ -59,18 +59,6 @@ class Check:
     """How many of them were looked at."""
     visible: int = 0
     """How many of those are visible."""
-
-
-def are_points(bounds: Bounds | Instances) -> bool:
-    """Whether all of the bounds have size zero, as far as the host knows them."""
-    match bounds:
-        case Spheres():
-            return len(bounds) > 0 and not np.any(bounds.radii)
-        case Boxes():
-            return len(bounds) > 0 and bool(np.array_equal(bounds.min, bounds.max))
-        case OrientedBoxes():
-            return len(bounds) > 0 and not np.any(bounds.half_sizes)
-    return False
 
 
 def by_rays(occluders: Occluders, cameras: Sequence[Camera]) -> tuple[str, int, Judge]:
@@ -139,7 +127,7 @@ def hold(
     for volume, bounds in alternatives.items():
         members = [number for number, one in enumerate(chosen) if one.volume == volume]
         proven = [number for number in members if chosen[number].promises_rays] if every_ray else []
-        points = are_points(bounds)
+        points = not isinstance(bounds, Instances) and are_points(bounds)
         for k in range(len(masks[members[0]])):
             culled = {number: ~masks[number][k] for number in members}
             by_some = np.logical_or.reduce(list(culled.values()))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 import numpy as np
 
 from .. import _arguments
-from ..bounds import Boxes, OrientedBoxes, Spheres
+from ..bounds import Boxes, OrientedBoxes, Spheres, are_points
 from ..camera import Camera
 from ..depth import checked_image
 from ..device import Device
@@ -309,7 +309,7 @@ def recommend(
     device = device or _device_of(occluders, alternatives) or default_device()
     walls = None if occluders is None else _occluders(occluders, device)
     volumes = {name: _upload(one, device) for name, one in alternatives.items()}
-    points = any(checking.are_points(one) for one in alternatives.values())
+    points = any(one._points if isinstance(one, Instances) else are_points(one) for one in alternatives.values())
 
     chosen = promised(tuple(volumes), coverage, rendered=walls is not None, points=points)
     variants = sorted({one.depth for one in chosen}, key=DepthVariant.cost)
