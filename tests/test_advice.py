@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import hizvk
+from hizvk import scenes, truth
 from hizvk.bench import recommend as advice
 from hizvk.bench.clear import Blockers, points_of
 from hizvk.bench.configurations import Configuration, DepthVariant, promised
@@ -185,7 +186,7 @@ def test_points_of_bounds_lie_in_them() -> None:
 # -- what is recommended ---------------------------------------------------------------------------------------------
 
 
-def test_best_for_a_mesh_s_own_vertices_is_conservative_and_loses_none(device: hizvk.Device) -> None:
+def test_best_for_points_on_their_own_mesh_is_conservative_and_loses_none(device: hizvk.Device) -> None:
     vertices, triangles = torus(64, 40)
     camera = looking_at((360, 480))
     visible = in_view(camera, vertices) & seen_from(EYE, vertices, vertices, triangles)
@@ -382,6 +383,72 @@ def test_candidate_makes_the_whole_call(device: hizvk.Device) -> None:
     refused(TypeError, "got both", lambda: plain.cull(balls, CAMERA, walls, depth=image))
     refused(TypeError, "expected occluders instead", lambda: candidate.cull(balls, CAMERA, depth=image))
     assert plain.cull(balls, CAMERA, depth=image).mask.tolist() == [False, False, True]
+
+
+def test_a_rasteriser_knows_the_centres_up_to_the_grid_that_it_snaps_to(device: hizvk.Device) -> None:
+    """Prints how far beside a pixel's centre a wall may end and still be drawn there (docs/guide.md)."""
+    steps = np.arange(1, 513) / 4096.0  # pixels; one is one world unit at depth 4
+
+    def drawn(gap: float, **options: Any) -> bool:
+        depth = device.render_depth(device.occluders([wall(0.5 + gap, 9.0)]), CAMERA, **options).numpy()
+        return bool((depth[:, 4] > 0.0).any())
+
+    last = max((step for step in steps if drawn(step)), default=0.0)
+    print(f"drawn at a centre that the wall misses by up to {last:g} of a pixel (1/{1 / last if last else 0:g})")
+    # Vulkan: at least 4 bits below the pixel, so that a corner moves by half a sixteenth; or all of it, cut off.
+    assert last < 1.0 / 16.0
+    assert drawn(0.0)
+    assert not drawn(0.0, conservative=True), "its left part is open"
+    assert not drawn(steps[0], conservative=True)
+
+
+# -- sparse depth ----------------------------------------------------------------------------------------------------
+
+
+def farthest_of_neighbours(depth: np.ndarray, reach: int) -> np.ndarray:
+    """That of docs/guide.md."""
+    known = np.pad(np.where(depth > 0.0, depth, 0.0), reach)
+    return np.lib.stride_tricks.sliding_window_view(known, (2 * reach + 1,) * 2).max(axis=(2, 3))
+
+
+def test_sparse_depth_hides_once_it_is_filled(device: hizvk.Device) -> None:
+    """Prints the figures of docs/guide.md, "Sparse depth"."""
+    room, rng = scenes.room(), np.random.default_rng(0)
+    walls, boxes = device.occluders(room.vertices, room.triangles), hizvk.Boxes(room.box_min, room.box_max)
+    crowd = device.instances(boxes)
+    hidden, kept, lost = np.zeros(3, int), 0, 0
+    for view in room.views:
+        camera = view.camera((270, 480))
+        full = truth.linear_depth(device.render_depth(walls, camera).numpy(), view.near, view.far)
+        full[~np.isfinite(full)] = 0.0
+        sparse = np.where(rng.random(full.shape) < 0.04, full, 0.0)
+        images = full, sparse, farthest_of_neighbours(sparse, 7)
+        found = [device.cull(crowd, camera, device.pyramid(image, camera, kind="z"), descent=4096) for image in images]
+        hidden += [result.stats.occluded for result in found]
+        kept += int(found[0].mask.sum())
+        lost += int((found[0].mask & ~found[2].mask).sum())
+    print(
+        f"the full image hides {hidden[0]}, 4 % of its pixels {hidden[1]}, filled {hidden[2]}; of the {kept} that the "
+        f"full image keeps, the filled one culls {lost}"
+    )
+    assert hidden[1] < 0.01 * hidden[0] < 0.9 * hidden[0] < hidden[2]
+
+
+def test_filled_depth_closes_a_gap_that_no_pixel_shows(device: hizvk.Device) -> None:
+    """What filling costs: a wall at 4 with a gap three pixels wide, and known pixels beside it only."""
+    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(32, 32), near=1.0)
+    full = np.full((32, 32), 4.0)
+    full[:, 15:18] = 50.0
+    ball = hizvk.Spheres([[0.2, 0.0, -6.0]], 0.3)  # columns 15.7 to 17.4
+    sparse = np.zeros((32, 32))
+    sparse[::4, 1::4] = full[::4, 1::4]  # columns 13 and 17: the gap is seen
+    blind = np.zeros((32, 32))
+    blind[::4, 2::4] = full[::4, 2::4]  # columns 14 and 18: it is not
+    seen = [
+        hizvk.visible(ball, camera, depth=image, kind="z", device=device).all()
+        for image in (full, farthest_of_neighbours(sparse, 4), farthest_of_neighbours(blind, 4))
+    ]
+    assert seen == [True, True, False]
 
 
 # -- hints -----------------------------------------------------------------------------------------------------------

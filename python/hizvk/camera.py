@@ -235,8 +235,9 @@ class Camera:
         near, far, reversed_z
             As in `look_at`; view depth is the camera's z.
         distortion : array, optional
-            Lens distortion coefficients; None or all zero. Others are refused: undistort the image first
-            (``cv2.undistort``) and pass the new camera matrix.
+            Lens distortion coefficients; None or all zero. Others are refused: undistort the image first and pass the
+            new camera matrix. Depth must not be interpolated, as ``cv2.undistort`` does: use
+            ``cv2.initUndistortRectifyMap`` and ``cv2.remap`` with ``INTER_NEAREST``.
 
         Raises
         ------
