@@ -689,6 +689,7 @@ TABLES: dict[str, Table] = {
             ]
         },
     ),
+    "CullResult.hints": Table(lambda device: (device.cull(**cull_arguments(device)).hints, {}), {}),
     "CullResult.explain": Table(
         lambda device: (device.cull(**cull_arguments(device)).explain, {"index": 0}),
         {

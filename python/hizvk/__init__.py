@@ -45,7 +45,7 @@ from .camera import Camera
 from .comparison import Comparison, compare
 from .containment import BoundsCheck, ProxyCheck, check_bounds, check_proxy
 from .device import Adapter, Device, adapters
-from .errors import DeviceLostError, HizError, LimitError, NoAdapterError, OutOfMemoryError
+from .errors import DeviceLostError, HizError, HizWarning, LimitError, NoAdapterError, OutOfMemoryError
 from .oneline import visible
 from .resources import DepthImage, Instances, Mesh, Occluders, Pyramid
 from .result import DRAW_DTYPE, CullResult, CullStats, DrawTemplate, Explanation, Verdict
@@ -65,6 +65,7 @@ __all__ = [
     "DrawTemplate",
     "Explanation",
     "HizError",
+    "HizWarning",
     "Instances",
     "LimitError",
     "Mesh",

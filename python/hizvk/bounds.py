@@ -312,3 +312,13 @@ def as_arrays(name: str, bounds: object) -> tuple[str, tuple[FloatArray, ...]]:
             return "oriented_boxes", (bounds.centers, bounds.half_sizes, bounds.rotations)
     got = _arguments.describe(bounds)
     raise TypeError(f"{name}: expected Spheres, Boxes or OrientedBoxes, got {got}")
+
+
+def are_points(bounds: Bounds) -> bool:
+    """Whether there are bounds, and all of them have size zero."""
+    match bounds:
+        case Spheres():
+            return len(bounds) > 0 and not np.any(bounds.radii)
+        case Boxes():
+            return len(bounds) > 0 and bool(np.array_equal(bounds.min, bounds.max))
+    return len(bounds) > 0 and not np.any(bounds.half_sizes)

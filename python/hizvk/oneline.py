@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import os
 import threading
+import warnings
 from typing import TYPE_CHECKING
 
 from . import _arguments
-from .bounds import Bounds, as_arrays
+from .bounds import Bounds, are_points, as_arrays
 from .camera import Camera
 from .depth import checked_image
 from .device import Device, cull_options
+from .errors import HizWarning
+from .hints import Question
 from .resources import DepthImage
 
 if TYPE_CHECKING:
@@ -85,6 +88,12 @@ def visible(
     NoAdapterError
         Without a Vulkan driver.
 
+    Warns
+    -----
+    HizWarning
+        Of what is right as it was asked and looks like a mistake: all bounds outside of the view, points of size zero
+        with ``coverage="sample"``, depth that is far everywhere or sparse (see `CullResult.hints`).
+
     Examples
     --------
     >>> import numpy as np, hizvk
@@ -122,4 +131,6 @@ def visible(
         guard_px=guard, depth_slack=slack, depth_slack_abs=slack_abs, transform_slack=transform, footprint=side,
         descent=budget, fit=fit_, statistics=False,  # type: ignore[arg-type]
     )  # fmt: skip
+    for hint in Question(camera, pyramid, coverage_, are_points(bounds)).hints(result.stats, bounds):
+        warnings.warn(hint, HizWarning, stacklevel=2)
     return result.mask.copy()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, TypeAlias
 import numpy as np
 
 from . import _arguments
-from .bounds import Bounds, as_arrays
+from .bounds import Bounds, are_points, as_arrays
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -89,9 +89,10 @@ MeshLike: TypeAlias = _HasFaces | _HasTriangles
 class Instances:
     """Bounds on the device, ready to be tested; made by `Device.instances`."""
 
-    def __init__(self, device: Device, core: _core.Instances) -> None:
+    def __init__(self, device: Device, core: _core.Instances, points: bool = False) -> None:
         self._device = device
         self._inner = core
+        self._points = points
 
     @property
     def device(self) -> Device:
@@ -175,6 +176,7 @@ class Instances:
             raise ValueError(f"bounds: expected {expected}, got {len(bounds)}")
         strict = _arguments.flag("strict", strict)
         self._device._engine.update(self._inner, first, kind, arrays, strict)
+        self._points = self._points and (len(bounds) == 0 or are_points(bounds))
 
     def __len__(self) -> int:
         return self._inner.num_instances()

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from . import _core
+    from .hints import Question
 
 __all__ = ["DRAW_DTYPE", "CullResult", "CullStats", "DrawTemplate", "Explanation", "Verdict"]
 
@@ -173,9 +174,10 @@ class CullResult:
     Not made by hand. May be read from any thread.
     """
 
-    def __init__(self, culling: _core.Culling, statistics: bool) -> None:
+    def __init__(self, culling: _core.Culling, statistics: bool, question: Question | None = None) -> None:
         self._culling = culling
         self._statistics = statistics
+        self._question = question
 
     def __len__(self) -> int:
         """The number of instances that were tested."""
@@ -247,6 +249,14 @@ class CullResult:
             gpu_ms=gpu_ms,
             readback_ms=readback_ms,
         )
+
+    def hints(self) -> tuple[str, ...]:
+        """What looks like a mistake, in sentences; empty where nothing does.
+
+        Everything outside of the view, points of size zero with ``coverage="sample"``, depth that is far everywhere or
+        sparse. It is cheap beside a cull, but for an image that hides nothing, which may be read back.
+        """
+        return () if self._question is None else self._question.hints(self.stats)
 
     def explain(self, index: int) -> Explanation:
         """Pixel rectangle, level, texels, depths and verdict of one instance.

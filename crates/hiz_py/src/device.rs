@@ -230,6 +230,9 @@ impl Instances {
     }
 }
 
+/// Positions and triangles, flat, and a word about the faces.
+type SurfaceArrays<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u32>>, &'static str);
+
 /// Triangle meshes on the device.
 #[pyclass(frozen, module = "hizvk._core")]
 pub(crate) struct Occluders(Arc<hiz_core::Occluders>);
@@ -238,6 +241,18 @@ pub(crate) struct Occluders(Arc<hiz_core::Occluders>);
 impl Occluders {
     fn host_bytes(&self) -> u64 {
         self.0.surface().host_bytes()
+    }
+
+    /// World positions, 3 a vertex; vertices, 3 a triangle; and the faces that do not occlude. Copies.
+    fn surface<'py>(&self, py: Python<'py>) -> SurfaceArrays<'py> {
+        let surface = self.0.surface();
+        let faces = match surface.cull_mode() {
+            FaceCull::None => "none",
+            FaceCull::Back => "back",
+            FaceCull::Front => "front",
+        };
+        let positions = PyArray1::from_slice(py, surface.positions().as_flattened());
+        (positions, PyArray1::from_slice(py, surface.triangles().as_flattened()), faces)
     }
 
     fn num_triangles(&self) -> u64 {

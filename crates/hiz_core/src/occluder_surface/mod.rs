@@ -138,6 +138,21 @@ impl OccluderSurface {
         Ok(far.into_iter().map(ndc).collect())
     }
 
+    /// World positions of the vertices, in the meshes' order, once for each place.
+    pub fn positions(&self) -> &[[f64; 3]] {
+        &self.positions
+    }
+
+    /// Triangles as indices of [`positions`](Self::positions). A mirrored copy's corners are turned round.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// Which faces do not occlude.
+    pub fn cull_mode(&self) -> FaceCull {
+        self.cull_mode
+    }
+
     /// Bytes on the host, with the topology if it was made.
     pub fn host_bytes(&self) -> u64 {
         let made = self.topology.get().and_then(|topology| topology.as_ref().ok());
