@@ -26,9 +26,11 @@ __all__ = [
     "frustum_matrix",
     "reference_classify",
     "reference_pyramid",
+    "takes_planted_faults",
 ]
 
 __version__: str
+takes_planted_faults: bool
 
 _Floats: TypeAlias = npt.NDArray[np.float32] | npt.NDArray[np.float64]
 _Vector: TypeAlias = tuple[float, float, float]
