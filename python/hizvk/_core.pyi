@@ -26,10 +26,12 @@ __all__ = [
     "frustum_matrix",
     "reference_classify",
     "reference_pyramid",
+    "takes_planted_faults",
 ]
 
 __version__: str
 __build__: str
+takes_planted_faults: bool
 
 _Floats: TypeAlias = npt.NDArray[np.float32] | npt.NDArray[np.float64]
 _Vector: TypeAlias = tuple[float, float, float]

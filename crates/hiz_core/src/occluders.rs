@@ -272,11 +272,9 @@ fn outside_frustum(camera: &Camera, min: Vec3, max: Vec3) -> bool {
 
 fn pipeline(gpu: &Gpu, key: OccluderKey) -> wgpu::RenderPipeline {
     let device = gpu.device();
-    let label = Some("hiz.occluders.pipeline");
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label,
-        source: wgpu::ShaderSource::Wgsl(shader::occluders().into()),
-    });
+    let name = "hiz.occluders.pipeline";
+    let label = Some(name);
+    let module = gpu.shader_module(name, &shader::occluders());
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label,
         bind_group_layouts: &[Some(&gpu.layouts().occluder_view)],

@@ -356,6 +356,17 @@ mod tests {
         }
     }
 
+    /// Drivers clamp what is drawn to 0..=1, and nothing else may be copied into a depth texture: no verdict of theirs shows whether its
+    /// single pixels are sanitized. (`tests/no_depth.rs` has what other textures hold.)
+    #[test]
+    fn single_pixels_of_every_source_are_sanitized() {
+        for source in SOURCES {
+            let module = parse(&cull(DepthStore::Apart(source), BoundsKind::Box));
+            assert_eq!(calls(&module, "source_bits", "sanitized"), 1, "{source:?}");
+        }
+        assert_eq!(calls(&parse(&cull(DepthStore::Atlas, BoundsKind::Box)), "texel", "sanitized"), 1);
+    }
+
     /// A guess is mostly right, so that no verdict shows whether it was proved.
     #[test]
     fn every_plane_and_side_is_certified() {

@@ -30,6 +30,24 @@ pub(crate) fn adapters(py: Python<'_>) -> Vec<Summary> {
     py.detach(headless::adapters).iter().map(summary).collect()
 }
 
+/// Whether faults can be planted into the shaders of this build by an environment variable: development builds alone take it.
+pub(crate) const TAKES_PLANTED_FAULTS: bool = cfg!(debug_assertions);
+
+#[cfg(not(debug_assertions))]
+fn open(adapter: Option<&str>) -> hiz_core::Result<headless::Engine> {
+    headless::Engine::new(adapter)
+}
+
+/// `HIZVK_PLANTED_FAULT` (`what => by what`, one a line) replaces texts in the shaders, as for the Rust tests: does a Python test
+/// turn red? A release has no word of it.
+#[cfg(debug_assertions)]
+fn open(adapter: Option<&str>) -> hiz_core::Result<headless::Engine> {
+    let planted = std::env::var("HIZVK_PLANTED_FAULT").unwrap_or_default();
+    let planted: Vec<String> = planted.lines().map(|line| line.replace("\\n", "\n")).collect();
+    let faults: Vec<(&str, &str)> = planted.iter().filter_map(|line| line.split_once(" => ")).collect();
+    headless::Engine::with_planted_faults(adapter, &faults)
+}
+
 /// A device with its queue and pipelines.
 #[pyclass(frozen, module = "hizvk._core")]
 pub(crate) struct Engine(pub(crate) headless::Engine);
@@ -38,7 +56,7 @@ pub(crate) struct Engine(pub(crate) headless::Engine);
 impl Engine {
     #[new]
     fn new(py: Python<'_>, adapter: Option<&str>) -> PyResult<Self> {
-        detached(py, || headless::Engine::new(adapter)).map(Self)
+        detached(py, || open(adapter)).map(Self)
     }
 
     fn adapter(&self) -> Summary {

@@ -36,4 +36,8 @@ mod _core {
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "the name is Python's")]
     const __build__: &str = if cfg!(debug_assertions) { "development" } else { "release" };
+
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "the name is Python's")]
+    const takes_planted_faults: bool = crate::device::TAKES_PLANTED_FAULTS;
 }

@@ -395,6 +395,15 @@ impl Gpu {
         self.occluders.get(key, make)
     }
 
+    /// A shader with the planted faults in it: whoever makes a pipeline takes its module from here.
+    pub(crate) fn shader_module(&self, label: &str, source: &str) -> wgpu::ShaderModule {
+        let source = self.edits.iter().fold(source.to_owned(), |text, (what, by)| text.replace(what, by));
+        self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(label),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        })
+    }
+
     pub(crate) fn pipeline(
         &self,
         label: &str,
@@ -404,11 +413,7 @@ impl Gpu {
         constants: &[(&str, f64)],
     ) -> wgpu::ComputePipeline {
         let device = &self.device;
-        let source = self.edits.iter().fold(source.to_owned(), |text, (what, by)| text.replace(what, by));
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(label),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
-        });
+        let module = self.shader_module(label, source);
         let groups: Vec<_> = groups.iter().map(|g| Some(*g)).collect();
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(label),

@@ -35,7 +35,7 @@ impl Round {
         let copies = random.pick(&[64, 64, 21, 1]);
         let order = random.pick(&[StoredOrder::Morton, StoredOrder::Given]);
         let image = self.upload(engine);
-        let pyramid = engine.pyramid_with(&image, &self.pyramid_options()).expect("pyramid");
+        let pyramid = engine.pyramid_with(&image, &self.pyramid_options(engine)).expect("pyramid");
         let mut masks = Vec::new();
         let mut tested = Tested::default();
         for (kind, volumes) in &self.volumes {
