@@ -9,6 +9,8 @@ import numpy as np
 from . import _arguments
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
+
     from ._arguments import FloatArray
     from .camera import Camera
 
@@ -22,11 +24,17 @@ DEPTH_KINDS: tuple[DepthKind, ...] = ("ndc", "reversed_ndc", "z", "distance")
 
 _METRIC = ("z", "distance")
 
+if TYPE_CHECKING:
+    DepthArray: TypeAlias = FloatArray | npt.NDArray[np.float16]
+
 
 def checked_image(
     name: str, value: object, camera: Camera, kind: object, scale: object
-) -> tuple[FloatArray, DepthKind, float]:
-    """The image as float32 or float64 in the camera's shape, its kind and scale, or an error that says why not."""
+) -> tuple[DepthArray, DepthKind, float]:
+    """The image in the camera's shape, its kind and scale, or an error that says why not.
+
+    The image is float32 or float64; half floats stay half floats, for whoever uploads them counts what they round.
+    """
     if kind is None:
         words = ", ".join(f'"{word}"' for word in DEPTH_KINDS)
         raise TypeError(f"kind: expected one of {words}, got None; there is no default, a wrong guess hides things")
@@ -52,4 +60,13 @@ def checked_image(
             got = _arguments.describe(value)
             raise ValueError(f"{name}: expected uint16 {camera.size} (the camera's size), got {got}")
         value = _arguments.copied(name, value, np.float32)  # exact: 16 bits
-    return _arguments.floats(name, value, camera.size, why=" (the camera's size)"), kind_, scale_
+    image = _arguments.floats(name, value, camera.size, why=" (the camera's size)")
+    is_half = np.asarray(value).dtype == np.float16
+    return (image.astype(np.float16) if is_half else image), kind_, scale_
+
+
+def widened(image: DepthArray) -> tuple[FloatArray, bool]:
+    """A checked image as float32 or float64, and whether it came in half floats."""
+    if image.dtype == np.float16:
+        return image.astype(np.float32), True  # exact
+    return image, False  # type: ignore[return-value]

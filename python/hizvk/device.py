@@ -16,7 +16,7 @@ import numpy as np
 from . import _arguments, _core
 from .bounds import Bounds, are_points, as_arrays
 from .camera import Camera
-from .depth import checked_image
+from .depth import checked_image, widened
 from .errors import LimitError, NoAdapterError
 from .hints import Question
 from .resources import DepthImage, Instances, Occluders, Pyramid, as_meshes
@@ -300,7 +300,8 @@ class Device:
         ----------
         depth : DepthImage or (height, width) array
             A rendered image of this device, alone; or an array, with `camera` and `kind`. Arrays are float, or uint16
-            for the kinds ``"z"`` and ``"distance"``; row 0 is the top of the image.
+            for the kinds ``"z"`` and ``"distance"``; row 0 is the top of the image. What rounding to float16 may have
+            cost (2^-10 of each number, and 2^-24) is counted; what rounding to float32 cost is `cull`'s `depth_slack`.
         camera : Camera
             The camera that saw the array; its size is the array's shape.
         kind : {"ndc", "reversed_ndc", "z", "distance"}
@@ -341,7 +342,8 @@ class Device:
         camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")
         self._check_side(camera)
         image, kind, scale = checked_image("depth", depth, camera, kind, scale)
-        uploaded = self._engine.upload_depth(image, kind, scale, camera._inner)
+        numbers, is_half = widened(image)
+        uploaded = self._engine.upload_depth(numbers, kind, scale, camera._inner, is_half)
         return Pyramid(self, self._engine.pyramid(uploaded, stored), camera)
 
     def cull(

@@ -13,7 +13,7 @@ import numpy as np
 from . import _arguments, _core
 from .bounds import Bounds, as_arrays
 from .camera import Camera
-from .depth import checked_image
+from .depth import checked_image, widened
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -82,7 +82,8 @@ def classify(
         _arguments.choice("coverage", coverage, ("area", "sample")),
         _arguments.choice("own_depth", own_depth, ("nearest", "pixel")),
     )
-    return _core.reference_classify(bounds_kind, arrays, camera._inner, image, kind, scale, *words)
+    numbers, _ = widened(image)
+    return _core.reference_classify(bounds_kind, arrays, camera._inner, numbers, kind, scale, *words)
 
 
 def pyramid(depth: npt.ArrayLike, *, reversed_z: bool) -> list[npt.NDArray[np.float32]]:

@@ -10,7 +10,6 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::layout::{Level, MAX_LEVELS, PyramidLayout, StoredLevels, stored_levels};
 use crate::pyramid::Built;
-use crate::shader::SourceKind;
 
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 
@@ -53,7 +52,8 @@ impl AtlasLayout {
 /// Whether culls read the depth image and the stored levels from one texture, into which both are copied once a reduction. The answers
 /// are the same.
 ///
-/// It can be where the depth image is [`Depth32Float`](wgpu::TextureFormat::Depth32Float) or of a color format, has the usage
+/// It can be where the depth image is [`Depth32Float`](wgpu::TextureFormat::Depth32Float),
+/// [`R32Float`](wgpu::TextureFormat::R32Float) or [`Rgba32Uint`](wgpu::TextureFormat::Rgba32Uint), has the usage
 /// [`COPY_SRC`](wgpu::TextureUsages::COPY_SRC), and is no larger than a texture, and a buffer that it passes through, may be; otherwise
 /// culls read them where they are.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -79,14 +79,17 @@ pub(crate) struct Atlas {
 
 /// Whether an atlas can be made of these levels and the depth image `source`.
 pub(crate) fn is_possible(layout: &PyramidLayout, source: &wgpu::Texture, limits: &wgpu::Limits) -> bool {
-    // Of depth formats this one alone travels as float32.
-    let travels = SourceKind::of(source.format()) != Some(SourceKind::Depth)
-        || source.format() == wgpu::TextureFormat::Depth32Float;
-    travels
+    travels(source.format())
         && source.usage().contains(wgpu::TextureUsages::COPY_SRC)
         && layout.chunk_sizes().len() == 1
         && layout.atlas.fits(limits)
         && (source.format() == FORMAT || staging_bytes(layout.size) <= limits.max_buffer_size)
+}
+
+/// Whether images of a format can be copied as the bits of float32. (Those of `Depth24Plus` cannot be copied, those of other formats hold
+/// other bits.)
+pub(crate) fn travels(format: wgpu::TextureFormat) -> bool {
+    matches!(format, wgpu::TextureFormat::Depth32Float | wgpu::TextureFormat::R32Float | FORMAT)
 }
 
 impl AtlasUse {

@@ -11,6 +11,7 @@ use crate::instances::{InstanceOptions, Instances};
 use crate::layout::CULL_WORKGROUP;
 use crate::occluders::{self, MeshData, OccluderOptions, Occluders};
 use crate::pyramid::{self, Pyramid, PyramidOptions};
+use crate::tolerance::DepthTolerance;
 use crate::update;
 use crate::visible::{Visible, VisibleOptions};
 
@@ -171,7 +172,10 @@ impl HizContext {
     /// `depth` is a view of a whole 2D texture of one mip level, sample and layer, with the usage `TEXTURE_BINDING`
     /// (`Rgba32Uint`: `STORAGE_BINDING`) and a depth format (with stencil: the view's aspect is `DepthOnly`), `R32Float`, or
     /// `Rgba32Uint` of the float bits of four pixels of a row a texel, which is `width.div_ceil(4)` texels wide (pixels past the
-    /// width count as depth of the row's last ones: repeat the last). Give it `COPY_SRC` as well, and large culls read
+    /// width count as depth of the row's last ones: repeat the last). `R16Float` is taken as well.
+    ///
+    /// What the format rounds is slack that the pyramid keeps ([`Pyramid::tolerance`]) and every cull counts, beside that of
+    /// its [`CullOptions`]: a step of `Depth16Unorm`, `Depth24Plus` and `R16Float`, none of float32. Give the texture `COPY_SRC` as well, and large culls read
     /// faster ([`AtlasUse`](crate::AtlasUse)). The reduction has to be submitted before a cull
     /// that uses it, or with it: a cull that runs before it keeps everything.
     ///
@@ -184,7 +188,7 @@ impl HizContext {
         camera: &Camera,
         pyramid: &Pyramid,
     ) -> Result<()> {
-        pyramid::record_reduce(&self.gpu, encoder, depth, camera, pyramid)
+        pyramid::record_reduce(&self.gpu, encoder, depth, camera, pyramid, DepthTolerance::NONE)
     }
 
     /// Records the cull of `instances` against `pyramid`, whose depth image must be `camera`'s; `visible` takes what is found.

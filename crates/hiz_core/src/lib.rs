@@ -43,6 +43,7 @@ mod readback;
 mod records;
 mod shader;
 mod threads;
+mod tolerance;
 mod update;
 mod view;
 mod visible;
@@ -68,6 +69,7 @@ pub use occluder_surface::PlantedFault;
 pub use occluder_surface::{ConservativeDepthOptions, OccluderSurface};
 pub use occluders::{FaceCull, MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders};
 pub use pyramid::{Pyramid, PyramidOptions};
+pub use tolerance::{DepthTolerance, ndc_from_kind_within};
 pub use view::ERROR_ULPS;
 pub use visible::{Outputs, Visible, VisibleOptions};
 

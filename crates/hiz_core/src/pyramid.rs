@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{ContextId, Gpu, ReduceKey, ReduceShape, StandIn};
 use crate::layout::{Level, MAX_LEVELS, PYRAMID_CHUNKS, PyramidLayout, Step, StoredLevels};
 use crate::shader::{DepthStore, SourceKind};
+use crate::tolerance::DepthTolerance;
 
 /// Invocations of a workgroup of the reduction, all in a row; `shaders/shared/pyramid_write.wgsl`, `place_of`.
 const REDUCE_WORKGROUP: u32 = 64;
@@ -94,6 +95,8 @@ pub(crate) struct Built {
     pub(crate) source: wgpu::TextureView,
     pub(crate) source_kind: SourceKind,
     pub(crate) camera: Camera,
+    /// What the image's depths have been rounded by, for every cull to count.
+    pub(crate) tolerance: DepthTolerance,
 }
 
 impl Pyramid {
@@ -238,6 +241,12 @@ impl Pyramid {
         self.built().map(|b| b.camera)
     }
 
+    /// How far the depths that the pyramid was last built from may lie from those that were stored, by the format of the image
+    /// ([`DepthTolerance::of`]) or by what was uploaded into it. Every cull counts it, beside the slack of its options.
+    pub fn tolerance(&self) -> Option<DepthTolerance> {
+        self.built().map(|b| b.tolerance)
+    }
+
     /// Chunk `i`, or what stands in for it.
     pub(crate) fn chunk<'a>(&'a self, gpu: &'a Gpu, i: usize) -> &'a wgpu::Buffer {
         self.chunks.get(i).unwrap_or_else(|| gpu.stand_in(if i == 1 { StandIn::Chunk1 } else { StandIn::Chunk2 }))
@@ -267,25 +276,27 @@ impl Pyramid {
     }
 }
 
-/// Records the reduction of `depth` (all of its texture's first mip level) into `pyramid`.
+/// Records the reduction of `depth` (all of its texture's first mip level) into `pyramid`. `uploaded` is what its depths were rounded by
+/// before they came into the texture.
 pub(crate) fn record_reduce(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
     depth: &wgpu::TextureView,
     camera: &Camera,
     pyramid: &Pyramid,
+    uploaded: DepthTolerance,
 ) -> Result<()> {
     gpu.check_context("pyramid", pyramid.context)?;
     let texture = depth.texture();
-    let source_kind = SourceKind::of(texture.format()).ok_or_else(|| {
-        Error::invalid(
+    let format = texture.format();
+    let (Some(source_kind), Some(of_format)) = (SourceKind::of(format), DepthTolerance::of(format)) else {
+        return Err(Error::invalid(
             "depth",
             format!(
-                "expected a depth format, R32Float or Rgba32Uint (the bits of four pixels), got {:?}",
-                texture.format()
+                "expected a depth format, R32Float, R16Float or Rgba32Uint (the bits of four pixels), got {format:?}"
             ),
-        )
-    })?;
+        ));
+    };
     let (size, texels) = (pyramid.size(), ImageSize::new(texture.width(), texture.height()));
     let expected = source_kind.texture_size(size);
     if texels != expected {
@@ -377,8 +388,13 @@ pub(crate) fn record_reduce(
     encoder.on_submitted_work_done(move || reduced.store(reduction, Ordering::Release));
     // They hold the last depth image.
     pyramid.bindings.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clear();
-    *pyramid.built.lock().unwrap_or_else(std::sync::PoisonError::into_inner) =
-        Some(Built { reduction, source: depth.clone(), source_kind, camera: camera.clone() });
+    *pyramid.built.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(Built {
+        reduction,
+        source: depth.clone(),
+        source_kind,
+        camera: camera.clone(),
+        tolerance: of_format.after(uploaded),
+    });
     Ok(())
 }
 

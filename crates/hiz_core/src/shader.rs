@@ -84,7 +84,7 @@ impl SourceKind {
     /// The kind that fits a texture's format.
     pub(crate) fn of(format: wgpu::TextureFormat) -> Option<Self> {
         match format {
-            wgpu::TextureFormat::R32Float => Some(Self::Float),
+            wgpu::TextureFormat::R32Float | wgpu::TextureFormat::R16Float => Some(Self::Float),
             wgpu::TextureFormat::Rgba32Uint => Some(Self::Bits),
             f if f.has_depth_aspect() => Some(Self::Depth),
             _ => None,

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use hiz_core::headless::{self, AdapterSummary};
 use hiz_core::{
-    ConservativeDepthOptions, DepthConvention, DepthKind, FaceCull, Floats, InstanceOptions, MeshData, OccluderOptions,
-    PyramidOptions, StoredLevels, StoredOrder,
+    ConservativeDepthOptions, DepthConvention, DepthKind, DepthTolerance, FaceCull, Floats, InstanceOptions, MeshData,
+    OccluderOptions, PyramidOptions, StoredLevels, StoredOrder,
 };
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -138,6 +138,8 @@ impl Engine {
         detached(py, || self.0.render_depth_conservative(&occluders.0, &camera.0, &options)).map(DepthImage)
     }
 
+    /// `half`: the numbers were half floats.
+    #[pyo3(signature = (image, kind, scale, camera, half=false))]
     fn upload_depth(
         &self,
         py: Python<'_>,
@@ -145,16 +147,21 @@ impl Engine {
         kind: &str,
         scale: f64,
         camera: &Camera,
+        half: bool,
     ) -> PyResult<DepthImage> {
         let (image, kind) = (image.floats()?, depth_kind(kind)?);
         let own_kind = match camera.0.convention() {
             DepthConvention::Standard => DepthKind::Ndc,
             DepthConvention::Reversed => DepthKind::ReversedNdc,
         };
+        let (tolerance, camera) = (if half { DepthTolerance::HALF } else { DepthTolerance::NONE }, &camera.0);
         detached(py, || match image {
             // Already what is uploaded: no copy in between.
-            Floats::F32(ndc) if kind == own_kind && scale == 1.0 => self.0.upload_depth(ndc, &camera.0),
-            _ => self.0.upload_depth(&hiz_core::ndc_from_kind(image, kind, scale, &camera.0)?, &camera.0),
+            Floats::F32(ndc) if kind == own_kind && scale == 1.0 => self.0.upload_depth_within(ndc, camera, tolerance),
+            _ => {
+                let (ndc, left) = hiz_core::ndc_from_kind_within(image, kind, scale, camera, tolerance)?;
+                self.0.upload_depth_within(&ndc, camera, left)
+            }
         })
         .map(DepthImage)
     }

@@ -64,7 +64,7 @@ impl Seen {
 
     /// The bindings for these options; those of the last cull, if it asked for the same.
     fn bind(&self, gpu: &Gpu, camera: &Camera, pyramid: &Pyramid, options: &CullOptions) -> Result<wgpu::BindGroup> {
-        let uniform = ViewUniform::new(camera, self.built.reduction, options)?;
+        let uniform = ViewUniform::new(camera, self.built.reduction, options, self.built.tolerance)?;
         let key = (self.key.store, bytemuck::cast(uniform));
         pyramid.bindings(key, || self.create(gpu, pyramid, &uniform))
     }

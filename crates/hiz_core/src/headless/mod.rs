@@ -28,6 +28,7 @@ pub use culling::{Counts, Culling, Explanation, Timings};
 pub use depth_image::DepthImage;
 use process::Process;
 
+use crate::atlas;
 use crate::bounds::Bounds;
 use crate::camera::Camera;
 use crate::context::HizContext;
@@ -38,9 +39,10 @@ use crate::instances::{InstanceOptions, Instances};
 use crate::layout::StoredLevels;
 use crate::occluder_surface::ConservativeDepthOptions;
 use crate::occluders::{MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders};
-use crate::pyramid::{Pyramid, PyramidOptions};
+use crate::pyramid::{self, Pyramid, PyramidOptions};
 use crate::readback::{self, BufferRange};
 use crate::shader::SourceKind;
+use crate::tolerance::DepthTolerance;
 use crate::visible::VisibleOptions;
 
 /// A device, its queue and the pipelines on it. The last clone waits until the device is idle, and lets go of it.
@@ -242,6 +244,15 @@ impl Engine {
         DepthImage::uploaded(self, SourceKind::Bits, ndc, camera)
     }
 
+    /// The same of depth that was rounded within `tolerance` before it came here: of half floats [`DepthTolerance::HALF`].
+    ///
+    /// # Errors
+    /// As [`Engine::upload_depth`], and [`Error::Invalid`] for a tolerance outside 0..=0.5.
+    pub fn upload_depth_within(&self, ndc: &[f32], camera: &Camera, tolerance: DepthTolerance) -> Result<DepthImage> {
+        let tolerance = tolerance.checked()?;
+        Ok(DepthImage { tolerance, ..self.upload_depth(ndc, camera)? })
+    }
+
     /// For tests: the same into a float texture, which is sampled like a depth texture.
     #[doc(hidden)]
     pub fn upload_depth_sampled(&self, ndc: &[f32], camera: &Camera) -> Result<DepthImage> {
@@ -265,7 +276,8 @@ impl Engine {
         self.scoped(|| {
             let pyramid = self.context().create_pyramid(depth.size(), options)?;
             let mut encoder = self.encoder("hiz.reduce.encoder");
-            self.context().record_reduce(&mut encoder, &depth.view, &depth.camera, &pyramid)?;
+            let DepthImage { view, camera, tolerance, .. } = depth;
+            pyramid::record_reduce(&self.context().gpu, &mut encoder, view, camera, &pyramid, *tolerance)?;
             self.queue().submit([encoder.finish()]);
             Ok(Arc::new(pyramid))
         })
@@ -292,6 +304,13 @@ impl Engine {
             Error::mismatch("pyramid", "expected one that was built from a depth image, got one that never was")
         })?;
         if level == 0 {
+            let format = built.source.texture().format();
+            if !atlas::travels(format) {
+                return Err(Error::invalid(
+                    "level",
+                    format!("expected a level above 0 of a pyramid of {format:?}, which is not read as float32, got 0"),
+                ));
+            }
             let row = 4 * u64::from(layout.width);
             let bytes =
                 self.scoped(|| readback::read_texture(self.device(), self.queue(), built.source.texture(), row))?;
