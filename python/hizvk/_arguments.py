@@ -60,7 +60,9 @@ def _wrong_value(name: str, expected: str, value: object) -> ValueError:
 def _as_array(name: str, expected: str, value: object) -> npt.NDArray[Any]:
     """`value` as an array of numbers, without a copy where it is one; lists of Python ints become float64."""
     if isinstance(value, np.ma.MaskedArray):
-        raise TypeError(f"{name}: expected {expected}, got a masked array; fill it first, e.g. with .filled(np.nan)")
+        raise TypeError(
+            f"{name}: expected {expected}, got a masked array; fill it first, e.g. with .astype(float).filled(np.nan)"
+        )
     if isinstance(value, (str, bytes)) or value is None:
         raise _wrong_type(name, expected, value)
     try:

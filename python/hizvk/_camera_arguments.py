@@ -56,9 +56,9 @@ def refuse_distortion(distortion: object) -> None:
         raise TypeError(f"distortion: expected None or an array of zeros, got {got}")
     if coefficients.any():
         raise ValueError(
-            "distortion: expected None or zeros, got coefficients other than 0; undistort the depth image first "
-            "(cv2.undistort, or cv2.initUndistortRectifyMap with nearest-neighbour remap) and pass the new camera "
-            "matrix as k"
+            "distortion: expected None or zeros, got coefficients other than 0; undistort the depth image first by "
+            "cv2.initUndistortRectifyMap and cv2.remap(..., interpolation=cv2.INTER_NEAREST), and pass the new camera "
+            "matrix as k (what interpolates, as undistorting a photograph does, invents depth between near and far)"
         )
 
 

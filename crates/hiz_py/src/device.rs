@@ -126,6 +126,7 @@ impl Engine {
         image: FloatArray<'_>,
         kind: &str,
         scale: f64,
+        invalid: Vec<f64>,
         camera: &Camera,
     ) -> PyResult<DepthImage> {
         let (image, kind) = (image.floats()?, depth_kind(kind)?);
@@ -135,8 +136,10 @@ impl Engine {
         };
         detached(py, || match image {
             // Already what is uploaded: no copy in between.
-            Floats::F32(ndc) if kind == own_kind && scale == 1.0 => self.0.upload_depth(ndc, &camera.0),
-            _ => self.0.upload_depth(&hiz_core::ndc_from_kind(image, kind, scale, &camera.0)?, &camera.0),
+            Floats::F32(ndc) if kind == own_kind && scale == 1.0 && invalid.is_empty() => {
+                self.0.upload_depth(ndc, &camera.0)
+            }
+            _ => self.0.upload_depth(&hiz_core::ndc_from_kind(image, kind, scale, &invalid, &camera.0)?, &camera.0),
         })
         .map(DepthImage)
     }

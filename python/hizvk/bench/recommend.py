@@ -6,7 +6,7 @@ often.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from .._arguments import Size
     from ..bounds import Bounds
-    from ..depth import DepthKind
+    from ..depth import DepthArray, DepthKind
     from ..device import Coverage
     from ..resources import Pyramid
 
@@ -124,6 +124,7 @@ def recommend(
     depths: Sequence[npt.ArrayLike] | None = None,
     kind: DepthKind | None = None,
     scale: float = 1.0,
+    invalid: Collection[float] | None = None,
     device: Device | None = None,
     coverage: Coverage = "area",
     max_ms: float | None = None,
@@ -145,7 +146,7 @@ def recommend(
         What hides; rendering is part of the time then, and smaller conservative depth images are among the candidates.
     depths : sequence of (height, width) arrays
         Instead of `occluders`: the depth image of each camera.
-    kind, scale
+    kind, scale, invalid
         What the numbers of `depths` are, as in `Device.pyramid`.
     device : Device, optional
         None: that of the occluders or instances, else one that is made at the first call and kept.
@@ -187,9 +188,10 @@ def recommend(
     repetitions = _arguments.integer("repetitions", repetitions, low=1, high=10_000)
     if device is not None:
         _arguments.instance("device", device, Device, "a Device or None")
-    images = None if depths is None else _images(depths, views, kind, scale)
-    if depths is None and kind is not None:
-        raise TypeError(f"kind: expected nothing beside occluders, got {_arguments.describe(kind)}")
+    images = None if depths is None else _images(depths, views, kind, scale, invalid)
+    for name, value in (("kind", kind), ("invalid", invalid)):
+        if depths is None and value is not None:
+            raise TypeError(f"{name}: expected nothing beside occluders, got {_arguments.describe(value)}")
     device = device or _device_of(occluders, alternatives) or default_device()
     walls = None if occluders is None else _occluders(occluders, device)
     volumes = {name: _upload(one, device) for name, one in alternatives.items()}
@@ -209,8 +211,8 @@ def recommend(
                 else:
                     assert images is not None
                     watch = Stopwatch(device)
-                    image, kind_, scale_ = images[k]
-                    pyramid = device.pyramid(image, camera, kind=kind_, scale=scale_)
+                    image, kind_, scale_, invalid_ = images[k]
+                    pyramid = device.pyramid(image, camera, kind=kind_, scale=scale_, invalid=invalid_)
                     took = [watch.lap()]
                 made[variant] = pyramid
                 depth_ms[variant][repetition, k] = sum(took)
@@ -268,12 +270,15 @@ def _cameras(cameras: Any) -> list[Camera]:
     return list(found)
 
 
-def _images(depths: Any, cameras: list[Camera], kind: Any, scale: Any) -> list[tuple[Any, DepthKind, float]]:
+def _images(depths: Any, cameras: list[Camera], kind: Any, scale: Any, invalid: Any) -> list[DepthArray]:
     if not isinstance(depths, (Sequence, np.ndarray)) or isinstance(depths, str):
         raise TypeError(f"depths: expected a sequence of (height, width) arrays, got {_arguments.describe(depths)}")
     if len(depths) != len(cameras):
         raise ValueError(f"depths: expected {len(cameras)} images, one for each camera, got {len(depths)}")
-    return [checked_image("depths", image, camera, kind, scale) for image, camera in zip(depths, cameras, strict=True)]
+    return [
+        checked_image("depths", image, camera, kind, scale, invalid)
+        for image, camera in zip(depths, cameras, strict=True)
+    ]
 
 
 def _device_of(occluders: object, alternatives: dict[str, Any]) -> Device | None:
