@@ -178,14 +178,18 @@ CAMERA: list[Bad] = [
     (EYE4, TypeError, "got (4, 4) float64"),
 ]
 IMAGE: list[Bad] = [
-    (np.zeros((6, 8, 1)), ValueError, "got (6, 8, 1) float64; drop the last axis with [..., 0]"),
-    (np.zeros((1, 6, 8)), ValueError, "got (1, 6, 8) float64; drop the first axis with [0]"),
+    (np.zeros((6, 8, 1)), ValueError, "[..., 0] is the image without its axis of channels"),
+    (np.zeros((1, 6, 8)), ValueError, "[0] is the image without its leading axis"),
     (np.zeros((8, 6)), ValueError, "expected float (6, 8) (the camera's size), got (8, 6) float64"),
     (np.zeros(48), ValueError, "got (48,) float64"),
-    (np.zeros((6, 8), dtype=np.int32), TypeError, "got (6, 8) int32; convert it with .astype(np.float64)"),
+    (np.zeros((6, 8), dtype=np.int32), TypeError, "got (6, 8) int32"),
+    (np.zeros((6, 8, 3)), ValueError, "got (6, 8, 3) float64"),
+    (np.zeros((3, 4)), ValueError, "goes with camera.resized("),
     (np.zeros((6, 8), dtype=np.uint8), TypeError, "got (6, 8) uint8"),
     (np.zeros((6, 8), dtype=bool), TypeError, "got (6, 8) bool"),
-    (np.ma.zeros((6, 8)), TypeError, "masked array"),
+    (np.ma.zeros((6, 8), dtype=np.int32), TypeError, "got (6, 8) int32"),
+    (np.ma.zeros((8, 6)), ValueError, "got (8, 6) float64"),
+    (memoryview(np.zeros((6, 8), dtype=np.int32)), TypeError, "got (6, 8) int32"),
     ("image", TypeError, "got str 'image'"),
 ]
 KIND: list[Bad] = [
@@ -199,6 +203,13 @@ SCALE: list[Bad] = [
     (-0.001, ValueError, "got float -0.001"),
     (NAN, ValueError, "got float nan"),
     ("mm", TypeError, "got str 'mm'"),
+]
+INVALID: list[Bad] = [
+    (0, TypeError, "expected None or a collection of the numbers that mean no data, in the array's own units"),
+    ("0", TypeError, "got str '0'"),
+    (("0",), TypeError, "got str '0' in it"),
+    ((True,), TypeError, "got bool True in it"),
+    (np.zeros((2, 2)), TypeError, "(2, 2) float64"),
 ]
 GUARD: list[Bad] = [
     (0.3, ValueError, "expected a multiple of 1/256, got 0.3"),
@@ -611,6 +622,7 @@ TABLES: dict[str, Table] = {
             "camera": CAMERA,
             "kind": KIND,
             "scale": SCALE,
+            "invalid": INVALID,
             "levels": LEVELS,
         },
     ),
@@ -711,6 +723,7 @@ TABLES: dict[str, Table] = {
             "depth": [*IMAGE, (None, TypeError, "got None")],
             "kind": KIND,
             "scale": SCALE,
+            "invalid": INVALID,
             "device": [("lavapipe", TypeError, "expected a Device or None, got str 'lavapipe'")],
             "coverage": COVERAGE,
             "guard_px": GUARD,
@@ -760,6 +773,7 @@ TABLES: dict[str, Table] = {
             ],
             "kind": KIND,
             "scale": SCALE,
+            "invalid": INVALID,
             "device": [("lavapipe", TypeError, "expected a Device or None, got str 'lavapipe'")],
             "coverage": COVERAGE,
             "max_ms": [(0, ValueError, "above 0, got int 0"), ("2", TypeError, "got str '2'")],
@@ -797,6 +811,7 @@ TABLES: dict[str, Table] = {
             "depth": [*IMAGE, (None, TypeError, "got None")],
             "kind": KIND,
             "scale": SCALE,
+            "invalid": INVALID,
             "coverage": COVERAGE,
             "own_depth": [
                 ("volume", ValueError, 'expected one of "nearest", "pixel"'),

@@ -58,6 +58,7 @@ def reference_classify(
     image: _Floats,
     depth_kind: str,
     scale: float,
+    invalid: Sequence[float],
     coverage: str,
     own_depth: str,
 ) -> npt.NDArray[np.uint8]: ...
@@ -134,7 +135,7 @@ class Engine:
     def render_depth(self, occluders: Occluders, camera: Camera) -> DepthImage: ...
     def render_depth_conservative(self, occluders: Occluders, camera: Camera, refinement: int) -> DepthImage: ...
     def upload_depth(
-        self, image: _Floats, kind: str, scale: float, camera: Camera, half: bool = False
+        self, image: _Floats, kind: str, scale: float, invalid: Sequence[float], half: bool, camera: Camera
     ) -> DepthImage: ...
     def pyramid(self, depth: DepthImage, levels: tuple[int, int]) -> Pyramid: ...
     def cull(

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from ._arguments import Size
     from ._camera_arguments import PixelCenter
+    from .depth import DepthKind
 
 __all__ = ["Camera"]
 
@@ -522,7 +523,7 @@ class Camera:
         return self._inner.reversed_z()
 
     @property
-    def depth_kind(self) -> str:
+    def depth_kind(self) -> DepthKind:
         """The kind of this camera's depth images: ``"reversed_ndc"`` or ``"ndc"``."""
         return "reversed_ndc" if self.reversed_z else "ndc"
 

@@ -16,7 +16,7 @@ import numpy as np
 from . import _arguments, _core
 from .bounds import Bounds, are_points, as_arrays
 from .camera import Camera
-from .depth import checked_image, widened
+from .depth import checked_image
 from .errors import LimitError, NoAdapterError
 from .hints import Question
 from .resources import DepthImage, Instances, Occluders, Pyramid, as_meshes
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from ._arguments import Size
-    from .depth import DepthKind
+    from .depth import DepthArray, DepthKind
     from .resources import MeshLike
 
 __all__ = ["Adapter", "Device", "adapters"]
@@ -271,6 +271,7 @@ class Device:
         *,
         kind: None = None,
         scale: float = 1.0,
+        invalid: None = None,
         levels: Levels = None,
     ) -> Pyramid: ...
 
@@ -282,6 +283,7 @@ class Device:
         *,
         kind: DepthKind,
         scale: float = 1.0,
+        invalid: Collection[float] | None = None,
         levels: Levels = None,
     ) -> Pyramid: ...
 
@@ -292,6 +294,7 @@ class Device:
         *,
         kind: DepthKind | None = None,
         scale: float = 1.0,
+        invalid: Collection[float] | None = None,
         levels: Levels = None,
     ) -> Pyramid:
         """Builds the depth pyramid of a depth image.
@@ -302,6 +305,7 @@ class Device:
             A rendered image of this device, alone; or an array, with `camera` and `kind`. Arrays are float, or uint16
             for the kinds ``"z"`` and ``"distance"``; row 0 is the top of the image. What rounding to float16 may have
             cost (2^-10 of each number, and 2^-24) is counted; what rounding to float32 cost is `cull`'s `depth_slack`.
+            What is masked in a masked array is "no data".
         camera : Camera
             The camera that saw the array; its size is the array's shape.
         kind : {"ndc", "reversed_ndc", "z", "distance"}
@@ -311,9 +315,16 @@ class Device:
             ``"reversed_ndc"``: 1 near and 0 far (``reversed_z=True``);
             ``"z"``: depth along the view direction in world units;
             ``"distance"``: distance to the eye along the pixel's ray in world units.
-            NaN, and for z and distance also zero, negative and infinite numbers, are "no data": as far as can be.
+
+            "No data" is as far as can be: NaN, infinity, `invalid`, and what lies outside the camera's planes. For z
+            and distance zero and negative numbers are "no data", too, but for an orthographic camera with ``near < 0``:
+            it sees behind its eye, so depth of either sign is depth, and so is a float zero.
         scale : float
             World units of one step, for the kinds ``"z"`` and ``"distance"`` (0.001 for millimetres).
+        invalid : collection of float, optional
+            Which numbers of the array mean "no data", in its own units (before `scale`). None: what its dtype is
+            written with, 0 and 65535 for uint16, 65504 (the greatest) for float16, no number for float32 and float64.
+            ``()``: no number but those that never are depth.
         levels : int or pair of int, optional
             Which levels are built, of 1 to 15; level 0, the image itself, is always there. None: all. ``2``: level 2
             and all coarser ones. ``(2, 5)``: levels 2 to 5; ``(4, 4)``: level 4 alone, made in one pass. Numbers past
@@ -333,7 +344,7 @@ class Device:
         """
         stored = stored_levels(levels)
         if isinstance(depth, DepthImage):
-            for name, value in (("camera", camera), ("kind", kind)):
+            for name, value in (("camera", camera), ("kind", kind), ("invalid", invalid)):
                 if value is not None:
                     got = _arguments.describe(value)
                     raise TypeError(f"{name}: expected nothing beside a DepthImage, which has its own, got {got}")
@@ -341,9 +352,11 @@ class Device:
             return Pyramid(self, self._engine.pyramid(depth._inner, stored), depth.camera)
         camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")
         self._check_side(camera)
-        image, kind, scale = checked_image("depth", depth, camera, kind, scale)
-        numbers, is_half = widened(image)
-        uploaded = self._engine.upload_depth(numbers, kind, scale, camera._inner, is_half)
+        return self._pyramid_of(checked_image("depth", depth, camera, kind, scale, invalid), camera, stored)
+
+    def _pyramid_of(self, image: DepthArray, camera: Camera, stored: tuple[int, int]) -> Pyramid:
+        """The pyramid of an image that was checked before."""
+        uploaded = self._engine.upload_depth(*image, camera._inner)
         return Pyramid(self, self._engine.pyramid(uploaded, stored), camera)
 
     def cull(

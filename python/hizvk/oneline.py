@@ -11,12 +11,14 @@ from . import _arguments
 from .bounds import Bounds, are_points, as_arrays
 from .camera import Camera
 from .depth import checked_image
-from .device import Device, cull_options
+from .device import Device, cull_options, stored_levels
 from .errors import HizWarning
 from .hints import Question
 from .resources import DepthImage
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     import numpy as np
     import numpy.typing as npt
 
@@ -45,6 +47,7 @@ def visible(
     depth: npt.ArrayLike | DepthImage,
     kind: DepthKind | None = None,
     scale: float = 1.0,
+    invalid: Collection[float] | None = None,
     device: Device | None = None,
     coverage: Coverage = "area",
     guard_px: float | None = None,
@@ -71,6 +74,9 @@ def visible(
         What an array's numbers are (see `Device.pyramid`); left out for a `DepthImage`.
     scale : float
         World units of one step of `depth`, for the kinds ``"z"`` and ``"distance"``.
+    invalid : collection of float, optional
+        Which numbers of an array mean "no data", in its own units (before `scale`); None: what its dtype is written
+        with, 0 and 65535 for uint16, 65504 for float16 (see `Device.pyramid`).
     device : Device, optional
         None: one that is made at the first call and kept.
     coverage, guard_px, depth_slack, depth_slack_abs, transform_slack, footprint, descent, fit
@@ -116,15 +122,16 @@ def visible(
         device = depth.device if device is None else device
         if camera != depth.camera:
             raise ValueError(f"camera: expected the camera of depth, {depth.camera!r}, got {camera!r}")
-        if kind is not None:
-            raise TypeError(f"kind: expected nothing beside a DepthImage, got {_arguments.describe(kind)}")
+        for name, value in (("kind", kind), ("invalid", invalid)):
+            if value is not None:
+                raise TypeError(f"{name}: expected nothing beside a DepthImage, got {_arguments.describe(value)}")
         pyramid = device.pyramid(depth)
     else:
         if device is not None:
             device._check_side(camera)
-        image, kind, scale = checked_image("depth", depth, camera, kind, scale)
+        image = checked_image("depth", depth, camera, kind, scale, invalid)
         device = default_device() if device is None else device
-        pyramid = device.pyramid(image, camera, kind=kind, scale=scale)
+        pyramid = device._pyramid_of(image, camera, stored_levels(None))
     _, coverage_, guard, slack, slack_abs, transform, side, budget, fit_, *_ = options
     result = device.cull(
         device.instances(bounds), camera, pyramid, order="any", coverage=coverage_,  # type: ignore[arg-type]

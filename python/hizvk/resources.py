@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from . import _core
     from ._arguments import FloatArray, Size
     from .camera import Camera
+    from .depth import DepthKind
     from .device import Device
 
 __all__ = ["DepthImage", "Instances", "Mesh", "Occluders", "Pyramid"]
@@ -249,7 +250,7 @@ class DepthImage:
         return self._camera.size
 
     @property
-    def kind(self) -> str:
+    def kind(self) -> DepthKind:
         """``"reversed_ndc"`` or ``"ndc"``, as the camera has it."""
         return self._camera.depth_kind
 

@@ -33,6 +33,7 @@ mod gpu;
 mod groups;
 mod host;
 mod instances;
+mod inverse;
 mod layout;
 mod lists;
 mod morton;

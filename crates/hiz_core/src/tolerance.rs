@@ -88,17 +88,18 @@ pub fn ndc_from_kind_within(
     image: Floats<'_>,
     kind: DepthKind,
     scale: f64,
+    invalid: &[f64],
     camera: &Camera,
     tolerance: DepthTolerance,
 ) -> Result<(Vec<f32>, DepthTolerance)> {
     let tolerance = tolerance.checked()?;
-    let mut ndc = ndc_from_kind(image, kind, scale, camera)?;
+    let mut ndc = ndc_from_kind(image, kind, scale, invalid, camera)?;
     if tolerance == DepthTolerance::NONE || matches!(kind, DepthKind::Ndc | DepthKind::ReversedNdc) {
         return Ok((ndc, tolerance));
     }
     let moved = |v: f64| (v + (v.abs() * tolerance.relative + tolerance.absolute).next_up()).next_up();
     let moved = host::collected((0..image.len()).map(|i| moved(image.get(i))), "depth")?;
-    let moved = ndc_from_kind(Floats::F64(&moved), kind, scale, camera)?;
+    let moved = ndc_from_kind(Floats::F64(&moved), kind, scale, &[], camera)?;
     // What was no depth before it was moved is none behind it.
     let reversed = camera.convention().is_reversed();
     for (d, moved) in ndc.iter_mut().zip(moved) {
@@ -159,7 +160,7 @@ mod tests {
             let image = [3.0, 0.9999, 8.999, f64::NAN];
             for kind in [DepthKind::Z, DepthKind::Distance] {
                 let within = |image: &[f64], scale, tolerance| {
-                    ndc_from_kind_within(Floats::F64(image), kind, scale, &camera, tolerance).unwrap()
+                    ndc_from_kind_within(Floats::F64(image), kind, scale, &[], &camera, tolerance).unwrap()
                 };
                 let moved = 3.0 * (1.0 + 1.0 / 1024.0) + 1.0 / 16_777_216.0;
                 let (truth, _) = within(&[moved; 4], 1.0, DepthTolerance::NONE);

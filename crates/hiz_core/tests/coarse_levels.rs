@@ -59,12 +59,12 @@ fn every_coarse_level_alone_has_the_farthest_of_its_pixels() {
     for (number, size) in SIZES.into_iter().enumerate() {
         let choices = if size == (1920, 1080) { &alone[3..] } else { &alone[..] };
         let convention = CONVENTIONS[number % 2];
-        assert_eq!(difference(engine(), size, convention, 5, choices), None);
+        assert_eq!(difference(&engine(), size, convention, 5, choices), None);
     }
     // Both conventions where a workgroup shares a texel, and where it does not.
-    assert_eq!(difference(engine(), (257, 255), CONVENTIONS[1], 3, &alone), None);
+    assert_eq!(difference(&engine(), (257, 255), CONVENTIONS[1], 3, &alone), None);
     assert_eq!(
-        difference(engine(), (1920, 1080), CONVENTIONS[0], 5, &[StoredLevels::only(4), StoredLevels::only(7)]),
+        difference(&engine(), (1920, 1080), CONVENTIONS[0], 5, &[StoredLevels::only(4), StoredLevels::only(7)]),
         None
     );
 }
@@ -74,7 +74,7 @@ fn all_levels_down_to_the_last_have_the_farthest_of_their_pixels() {
     for size in SIZES {
         for (convention, far) in [(CONVENTIONS[0], 0), (CONVENTIONS[1], 0), (CONVENTIONS[0], 4), (CONVENTIONS[1], 4)] {
             let choices = [StoredLevels::ALL, StoredLevels::from(5)];
-            assert_eq!(difference(engine(), size, convention, far, &choices[..if far == 0 { 1 } else { 2 }]), None);
+            assert_eq!(difference(&engine(), size, convention, far, &choices[..if far == 0 { 1 } else { 2 }]), None);
         }
     }
 }

@@ -216,7 +216,7 @@ fn behind(stored: f64, steps: f64, step: f64, convention: DepthConvention) -> f6
 /// behind cannot, whatever the way to ask. A half step of slack, or none, or none for groups, hides the first.
 #[test]
 fn a_step_of_the_format_decides() {
-    let engine = engine();
+    let engine = &engine();
     for convention in CONVENTIONS {
         let camera = camera_along_z(SIDE, SIDE, convention);
         // The bits, the number that they stand for, the step about it.
@@ -256,7 +256,7 @@ fn a_step_of_the_format_decides() {
 /// The wall is drawn; reversed Z, far away, where a step is large beside float32's.
 #[test]
 fn depth_of_24_bits_brings_its_step_and_float32_none() {
-    let engine = engine();
+    let engine = &engine();
     let step = 1.0 / 16_777_215.0;
     let camera = camera_along_z(SIDE, SIDE, DepthConvention::Reversed);
     for format in [Format::Depth24Plus, Format::Depth24PlusStencil8, Format::Depth32Float] {
@@ -279,7 +279,7 @@ fn depth_of_24_bits_brings_its_step_and_float32_none() {
 /// 10,000 describes. Near planes are chosen so that a step of the format is 6 cm at 20 m. Twenty steps behind the wall spheres are hidden: of 24 bits the slack of float32 alone, relative to a depth near 1, is eight.
 #[test]
 fn nothing_that_stands_before_a_wall_is_hidden() {
-    let engine = engine();
+    let engine = &engine();
     let formats = [(Format::Depth16Unorm, 0.1), (Format::Depth24Plus, 4e-4), (Format::Depth24PlusStencil8, 4e-4)];
     for (format, near) in formats {
         let walls = Walls::new(engine, format);
@@ -328,7 +328,7 @@ fn nothing_that_stands_before_a_wall_is_hidden() {
 /// Half floats that were uploaded as float32: the image knows, the pyramid and every cull of it do, by the atlas too.
 #[test]
 fn uploaded_halves_bring_their_step() {
-    let engine = engine();
+    let engine = &engine();
     for convention in CONVENTIONS {
         let camera = camera_along_z(SIDE, SIDE, convention);
         let stored = if convention.is_reversed() { 1.0 / 32.0 } else { 0.875 };
@@ -358,7 +358,7 @@ fn uploaded_halves_bring_their_step() {
 /// Level 0 of such an image is not float32; the levels above are read.
 #[test]
 fn level_0_of_other_bits_is_not_read() {
-    let engine = engine();
+    let engine = &engine();
     let camera = camera_along_z(SIDE, SIDE, DepthConvention::Standard);
     let pyramid = reduced(engine, &filled(engine, Format::Depth16Unorm, 32_768), &camera, AtlasUse::Never);
     let error = engine.read_level(&pyramid, 0).unwrap_err().to_string();

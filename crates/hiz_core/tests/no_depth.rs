@@ -119,7 +119,7 @@ fn check(source: Source, atlas: AtlasUse, convention: DepthConvention, ways: &[W
     let camera = camera_along_z(SIDE, SIDE, convention);
     let options = PyramidOptions { atlas, ..PyramidOptions::default() };
     let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
-    let whole = pyramid_from(engine(), source, &wall, &camera, &options);
+    let whole = pyramid_from(&engine(), source, &wall, &camera, &options);
     for way in ways {
         let things = things(way.pixels, 1);
         let what = format!("{source:?}, atlas {atlas:?}, {convention:?}, {way:?}");
@@ -127,7 +127,7 @@ fn check(source: Source, atlas: AtlasUse, convention: DepthConvention, ways: &[W
         assert!(hidden.iter().all(|kept| !kept), "a whole wall hides all: {what}");
         for shift in [0, 5] {
             let depth = wall_with_bad_pixels(convention, way.pixels, shift);
-            let pyramid = pyramid_from(engine(), source, &depth, &camera, &options);
+            let pyramid = pyramid_from(&engine(), source, &depth, &camera, &options);
             let open = open_cells(&camera, way.pixels, shift, &pyramid);
             if source != Source::Depth {
                 assert!(open.iter().all(|open| *open), "none of these numbers is a depth");
@@ -178,13 +178,13 @@ fn what_is_no_depth_hides_no_group() {
             let camera = camera_along_z(SIDE, SIDE, convention);
             let options = PyramidOptions { atlas, ..PyramidOptions::default() };
             let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
-            let whole = pyramid_from(engine(), source, &wall, &camera, &options);
+            let whole = pyramid_from(&engine(), source, &wall, &camera, &options);
             for way in [WAYS[1], WAYS[2], WAYS[5]] {
                 let crowd = things(way.pixels, 64);
                 let (hidden, tested) = kept(&crowd, &camera, &whole, way, Hierarchy::Always);
                 assert!(hidden.iter().all(|kept| !kept) && tested == 0, "whole groups are hidden: {way:?}");
                 let depth = wall_with_bad_pixels(convention, way.pixels, 0);
-                let pyramid = pyramid_from(engine(), source, &depth, &camera, &options);
+                let pyramid = pyramid_from(&engine(), source, &depth, &camera, &options);
                 let (seen, _) = kept(&crowd, &camera, &pyramid, way, Hierarchy::Always);
                 assert!(seen.iter().all(|kept| *kept), "{source:?} {atlas:?} {convention:?} {way:?}");
             }

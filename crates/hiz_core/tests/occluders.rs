@@ -145,7 +145,7 @@ fn distance_from_the_origin_costs_nothing() {
 /// that leave a half out move what is drawn by up to half a unit.
 #[test]
 fn eyes_that_float32_does_not_hold_see_what_float64_says() {
-    assert_eq!(wrong_pixels(engine()), 0);
+    assert_eq!(wrong_pixels(&engine()), 0);
     for (what, by) in [
         ("(lo - view.eye_lo.xyz)", "lo"),
         ("(lo - view.eye_lo.xyz)", "(vec3<f32>(0.0) - view.eye_lo.xyz)"),

@@ -35,7 +35,7 @@ fn wide_images_give_no_false_cull() {
         sizes: WIDE,
         ..Campaign::default()
     };
-    let total = campaign.run(engine()).total();
+    let total = campaign.run(&engine()).total();
     eprintln!("wide: {total:?}");
     assert!(total.false_culls == 0 && total.culled > total.cases / 10, "{total:?}");
 }
@@ -51,9 +51,9 @@ fn culls_of_split_pyramids_give_no_false_cull() {
     if !has_chunks() {
         return;
     }
-    let whole = split(engine(), 1, 3);
+    let whole = split(&engine(), 1, 3);
     for chunks in [2, 3] {
-        let total = split(engine(), chunks, 3);
+        let total = split(&engine(), chunks, 3);
         eprintln!("{chunks} chunks: {total:?}");
         // The same rounds: whatever chunk a level lies in, its texels are the same.
         assert!(total == whole && total.false_culls == 0 && total.culled > total.cases / 10, "{total:?} {whole:?}");
@@ -107,7 +107,7 @@ fn three_hundred_thousand_instances() {
         (None, Hierarchy::Always, Order::Any),
         (Some(1 << 17), Hierarchy::Auto, Order::Stable),
     ] {
-        assert!(crowd(engine(), piece, hierarchy, order), "{piece:?} {hierarchy:?} {order:?}");
+        assert!(crowd(&engine(), piece, hierarchy, order), "{piece:?} {hierarchy:?} {order:?}");
     }
 }
 

@@ -139,15 +139,15 @@ impl Engine {
     }
 
     /// `half`: the numbers were half floats.
-    #[pyo3(signature = (image, kind, scale, camera, half=false))]
     fn upload_depth(
         &self,
         py: Python<'_>,
         image: FloatArray<'_>,
         kind: &str,
         scale: f64,
-        camera: &Camera,
+        invalid: Vec<f64>,
         half: bool,
+        camera: &Camera,
     ) -> PyResult<DepthImage> {
         let (image, kind) = (image.floats()?, depth_kind(kind)?);
         let own_kind = match camera.0.convention() {
@@ -157,9 +157,11 @@ impl Engine {
         let (tolerance, camera) = (if half { DepthTolerance::HALF } else { DepthTolerance::NONE }, &camera.0);
         detached(py, || match image {
             // Already what is uploaded: no copy in between.
-            Floats::F32(ndc) if kind == own_kind && scale == 1.0 => self.0.upload_depth_within(ndc, camera, tolerance),
+            Floats::F32(ndc) if kind == own_kind && scale == 1.0 && invalid.is_empty() => {
+                self.0.upload_depth_within(ndc, camera, tolerance)
+            }
             _ => {
-                let (ndc, left) = hiz_core::ndc_from_kind_within(image, kind, scale, camera, tolerance)?;
+                let (ndc, left) = hiz_core::ndc_from_kind_within(image, kind, scale, &invalid, camera, tolerance)?;
                 self.0.upload_depth_within(&ndc, camera, left)
             }
         })

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from ..bounds import Bounds
     from ..camera import Camera
+    from ..depth import DepthArray
     from ..resources import Occluders
     from .configurations import Configuration
 
@@ -79,16 +80,16 @@ def by_rays(occluders: Occluders, cameras: Sequence[Camera]) -> tuple[str, int, 
 
 
 def by_oracle(
-    image_of: Callable[[int], tuple[Any, Any, float]], cameras: Sequence[Camera], coverage: Any
+    image_of: Callable[[int], DepthArray], cameras: Sequence[Camera], coverage: Any
 ) -> tuple[str, int, Judge]:
     """The method, how many points it can look at, and the judge."""
 
     def judge(bounds: Bounds, which: Indices, k: int) -> Mask:
-        image, kind, scale = image_of(k)
-        part = _part(bounds, which)
+        depth, part = image_of(k), _part(bounds, which)
         codes = reference.classify(
-            part, cameras[k], image, kind=kind, scale=scale, coverage=coverage, own_depth="pixel"
-        )
+            part, cameras[k], depth.image, kind=depth.kind, scale=depth.scale, invalid=depth.invalid,
+            coverage=coverage, own_depth="pixel",
+        )  # fmt: skip
         visible: Mask = codes == reference.VISIBLE
         return visible
 

@@ -7,7 +7,7 @@ more often.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -16,8 +16,8 @@ import numpy as np
 from .. import _arguments
 from ..bounds import Boxes, OrientedBoxes, Spheres, are_points
 from ..camera import Camera
-from ..depth import checked_image
-from ..device import Device
+from ..depth import DepthArray, checked_image
+from ..device import Device, stored_levels
 from ..oneline import default_device
 from ..resources import A_MESH, DepthImage, Instances, Occluders, meshes_of
 from . import checking
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 __all__ = ["Candidate", "Recommendation", "choose", "recommend"]
 
 #: By view: a depth image, what its numbers are, and their scale.
-Images: TypeAlias = "list[tuple[Any, DepthKind, float]]"
+Images: TypeAlias = "list[DepthArray]"
 KINDS: Final = {"spheres": Spheres, "boxes": Boxes, "oriented_boxes": OrientedBoxes}
 #: A depth image that takes longer than this is not rendered again.
 DEAR_MS: Final = 200.0
@@ -216,6 +216,7 @@ def recommend(
     depths: Sequence[npt.ArrayLike] | None = None,
     kind: DepthKind | None = None,
     scale: float = 1.0,
+    invalid: Collection[float] | None = None,
     device: Device | None = None,
     coverage: Coverage = "area",
     max_ms: float | None = None,
@@ -256,7 +257,7 @@ def recommend(
         candidates.
     depths : sequence of (height, width) arrays
         Instead of `occluders`: the depth image of each camera.
-    kind, scale
+    kind, scale, invalid
         What the numbers of `depths` are, as in `Device.pyramid`.
     device : Device, optional
         None: that of the occluders or instances, else one that is made at the first call and kept.
@@ -308,9 +309,10 @@ def recommend(
     repetitions = _arguments.integer("repetitions", repetitions, low=1, high=10_000)
     if device is not None:
         _arguments.instance("device", device, Device, "a Device or None")
-    images = None if depths is None else _images(depths, views, kind, scale)
-    if depths is None and kind is not None:
-        raise TypeError(f"kind: expected nothing beside occluders, got {_arguments.describe(kind)}")
+    images = None if depths is None else _images(depths, views, kind, scale, invalid)
+    for name, value in (("kind", kind), ("invalid", invalid)):
+        if depths is None and value is not None:
+            raise TypeError(f"{name}: expected nothing beside occluders, got {_arguments.describe(value)}")
     device = device or _device_of(occluders, alternatives) or default_device()
     walls = None if occluders is None else _occluders(occluders, device)
     volumes = {name: _upload(one, device) for name, one in alternatives.items()}
@@ -377,19 +379,18 @@ class _Source:
         self._turn.clear()
         return {variant: self._pyramid(variant, k) for variant in variants}
 
-    def full_image(self, k: int) -> tuple[Any, Any, float]:
+    def full_image(self, k: int) -> DepthArray:
         """The image of view k in full size with what its numbers are: the one given, or the plain one."""
         if self._images is not None:
             return self._images[k]
         assert self._walls is not None
         depth = self._device.render_depth(self._walls, self._views[k])
-        return depth.numpy(), depth.kind, 1.0
+        return DepthArray(depth.numpy(), depth.kind, 1.0, (), half=False)
 
     def _pyramid(self, variant: DepthVariant, k: int) -> tuple[Pyramid, float]:
         if self._images is not None:
-            image, kind, scale = self._images[k]
             watch = Stopwatch(self._device)
-            pyramid = self._device.pyramid(image, self._views[k], kind=kind, scale=scale, levels=variant.levels)
+            pyramid = self._device._pyramid_of(self._images[k], self._views[k], stored_levels(variant.levels))
             return pyramid, watch.lap()
         depth, took = self._depth(variant, k)
         watch = Stopwatch(self._device)
@@ -481,12 +482,15 @@ def _cameras(cameras: Any) -> list[Camera]:
     return list(found)
 
 
-def _images(depths: Any, cameras: list[Camera], kind: Any, scale: Any) -> list[tuple[Any, DepthKind, float]]:
+def _images(depths: Any, cameras: list[Camera], kind: Any, scale: Any, invalid: Any) -> list[DepthArray]:
     if not isinstance(depths, (Sequence, np.ndarray)) or isinstance(depths, str):
         raise TypeError(f"depths: expected a sequence of (height, width) arrays, got {_arguments.describe(depths)}")
     if len(depths) != len(cameras):
         raise ValueError(f"depths: expected {len(cameras)} images, one for each camera, got {len(depths)}")
-    return [checked_image("depths", image, camera, kind, scale) for image, camera in zip(depths, cameras, strict=True)]
+    return [
+        checked_image("depths", image, camera, kind, scale, invalid)
+        for image, camera in zip(depths, cameras, strict=True)
+    ]
 
 
 def _device_of(occluders: object, alternatives: dict[str, Any]) -> Device | None:
