@@ -6,6 +6,7 @@ What is visible is found by hand, or by rays at every triangle (Moller and Trumb
 from __future__ import annotations
 
 import warnings
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     Mask = npt.NDArray[np.bool_]
 
 EYE = np.array([4.0, -5.0, 3.0])
+GUIDE = Path(__file__).parents[1] / "docs" / "guide.md"
 
 
 @pytest.fixture(scope="module")
@@ -118,6 +120,10 @@ def test_plain_depth_hides_a_mesh_s_own_vertices_and_conservative_depth_none(dev
         f"({100 * plain / visible.sum():.0f} %), with guard_px=0.5 {guarded}, by conservative depth {proven[0]}"
     )
     assert proven == [0, 0, 0]
+    row = f"| {name} | {len(vertices):,} | {visible.sum()} | "
+    (written,) = (line for line in GUIDE.read_text().splitlines() if line.startswith(row))
+    # Another driver's depth differs in the last bits.
+    assert int(written.removeprefix(row).split()[0]) == pytest.approx(plain, rel=0.05)
     assert plain > 0.2 * visible.sum()
 
 
@@ -164,6 +170,20 @@ def test_clear_rays_know_triangles_that_cross_the_eye_s_plane() -> None:
     assert clear.tolist() == [False, True, True, True, False]
 
 
+@pytest.mark.parametrize("faces", ["none", "back", "front"])
+def test_the_triangles_on_the_host_are_those_that_were_given(device: hizvk.Device, faces: str) -> None:
+    """By hand: a mesh in two places, one of them mirrored, and another mesh."""
+    vertices = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    moved, mirrored = np.eye(4), np.diag([-1.0, 1.0, 1.0, 1.0])
+    moved[:3, 3] = (1e6, 0.5, 0.0)
+    meshes = [hizvk.Mesh(vertices, [[0, 1, 2]], np.stack([moved, mirrored])), hizvk.Mesh(2.0 * vertices, [[2, 1, 0]])]
+    positions, triangles, told = device.occluders(meshes, cull=faces)._inner.surface()
+    expected = [vertices + moved[:3, 3], vertices * (-1.0, 1.0, 1.0), 2.0 * vertices]
+    assert positions.reshape(-1, 3).tolist() == np.concatenate(expected).tolist()
+    assert triangles.reshape(-1, 3).tolist() == [[0, 1, 2], [3, 5, 4], [8, 7, 6]]
+    assert told == faces
+
+
 def test_points_of_bounds_lie_in_them() -> None:
     rng = np.random.default_rng(1)
     centers, which, camera = rng.normal(size=(50, 3)), np.arange(7, 40), looking_at((60, 80))
@@ -194,6 +214,7 @@ def test_best_for_points_on_their_own_mesh_is_conservative_and_loses_none(device
     found = hizvk.recommend(points, camera, occluders=hizvk.Mesh(vertices, triangles), device=device, repetitions=1)
     print(found)
     assert found.best.configuration.promises_rays
+    assert found.best.bounds is points
     assert found.best.hides == found.best.unclear == 0
     tried = [one.configuration for one in found.candidates]
     assert Configuration("spheres", depth=DepthVariant(1, True)) in tried
@@ -345,6 +366,11 @@ def test_points_before_a_depth_image_get_a_guard(device: hizvk.Device) -> None:
     found = hizvk.recommend(points, camera, depths=[image], kind="reversed_ndc", device=device, repetitions=1)
     assert found.best.configuration.guard_px == 0.5
     assert found.best.cull_options["guard_px"] == 0.5
+    assert "good guess for points before an image, and no proof" in str(found)
+    uploaded = hizvk.recommend(
+        device.instances(points), camera, depths=[image], kind="reversed_ndc", device=device, repetitions=1
+    )
+    assert uploaded.best.configuration.guard_px == 0.5
     bare = [one for one in found.candidates if one.configuration.guard_px is None]
     assert all(one.hides > 0.2 * visible.sum() for one in bare)
     seen = found.best.cull(device.instances(points), camera, depth=image, kind="reversed_ndc")

@@ -255,6 +255,11 @@ class CullResult:
 
         Everything outside of the view, points of size zero with ``coverage="sample"``, depth that is far everywhere or
         sparse. It is cheap beside a cull, but for an image that hides nothing, which may be read back.
+
+        Raises
+        ------
+        ValueError
+            As `stats`, where the cull was not asked for verdicts.
         """
         return () if self._question is None else self._question.hints(self.stats)
 

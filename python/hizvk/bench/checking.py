@@ -8,6 +8,7 @@ or unclear; of a bare point rays decide either. Depth images, or pixel centres a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -15,14 +16,13 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import reference
-from ..bounds import Boxes, OrientedBoxes, Spheres, are_points
+from ..bounds import Bounds, Boxes, OrientedBoxes, Spheres, are_points
 from ..resources import Instances
 from .clear import POINTS, Blockers, points_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
-    from ..bounds import Bounds
     from ..camera import Camera
     from ..depth import DepthArray
     from ..resources import Occluders
@@ -33,7 +33,7 @@ __all__ = ["Check", "by_oracle", "by_rays", "hold"]
 Mask: TypeAlias = npt.NDArray[np.bool_]
 Indices: TypeAlias = npt.NDArray[np.intp]
 #: Says which of some instances (second) of these bounds (first) are certainly visible in view k (third).
-Judge: TypeAlias = "Callable[[Bounds, Indices, int], Mask]"
+Judge: TypeAlias = Callable[[Bounds, Indices, int], Mask]
 
 #: Rays that are cast, and instances times `POINTS` that the oracle is asked about, for each view and kind of bounds.
 MOST_RAYS: Final = 60_000
@@ -128,7 +128,7 @@ def hold(
     for volume, bounds in alternatives.items():
         members = [number for number, one in enumerate(chosen) if one.volume == volume]
         proven = [number for number in members if chosen[number].promises_rays] if every_ray else []
-        points = not isinstance(bounds, Instances) and are_points(bounds)
+        points = bounds._points if isinstance(bounds, Instances) else are_points(bounds)
         for k in range(len(masks[members[0]])):
             culled = {number: ~masks[number][k] for number in members}
             by_some = np.logical_or.reduce(list(culled.values()))

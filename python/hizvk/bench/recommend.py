@@ -8,7 +8,7 @@ more often.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
@@ -49,7 +49,7 @@ DEAR_MS: Final = 200.0
 class Candidate:
     """One configuration, measured on the caller's scene.
 
-    It holds all that the call needs: `volume`, `render_options`, `pyramid_options`, `cull_options`; or `cull` does it.
+    It holds all that the call needs: `bounds`, `render_options`, `pyramid_options`, `cull_options`; or `cull` does it.
     """
 
     configuration: Configuration
@@ -72,6 +72,8 @@ class Candidate:
     or for the pixels of an image as given."""
     asked: bool = True
     """False for what is shown for comparison alone: sample coverage, where every ray counts."""
+    bounds: Bounds | Instances | None = field(default=None, repr=False, compare=False)
+    """What `recommend` was given of this kind: pass it to `Device.instances`, if it is not uploaded already."""
 
     @property
     def safe(self) -> bool:
@@ -296,6 +298,10 @@ def recommend(
     >>> found = hizvk.recommend(boxes, camera, occluders=wall, repetitions=1)
     >>> found.best.kept, found.tested
     (1, 2)
+    >>> device = hizvk.Device()
+    >>> crowd, walls = device.instances(found.best.bounds), device.occluders(wall)
+    >>> found.best.cull(crowd, camera, walls).mask.tolist()
+    [True, False]
     """
     alternatives = _alternatives(bounds)
     views = _cameras(cameras)
@@ -351,6 +357,7 @@ def recommend(
         Candidate(
             one, total[k], spread(culling[k, 1:]), kept[k], False, check.hides[k], check.unclear[k],
             proven=one.promises_rays or not every_ray, asked=coverage == "sample" or one.coverage == "area",
+            bounds=alternatives[one.volume],
         )
         for k, one in enumerate(chosen)
     ]  # fmt: skip
@@ -369,7 +376,13 @@ def recommend(
 class _Source:
     """Where depth comes from: occluders that are rendered, or the images that were given."""
 
-    def __init__(self, device: Device, walls: Occluders | None, views: list[Camera], images: Images | None) -> None:
+    def __init__(
+        self,
+        device: Device,
+        walls: Occluders | None,
+        views: list[Camera],
+        images: Images | None,
+    ) -> None:
         self._device, self._walls, self._views, self._images = device, walls, views, images
         self._turn: dict[tuple[int, bool], tuple[DepthImage, float]] = {}
         self._dear: dict[tuple[int, bool, int], tuple[DepthImage, float]] = {}
@@ -440,6 +453,11 @@ def _notes(
         notes.append(
             'If your image has one sample a pixel, at its centre and without jitter, ask with coverage="sample": plain '
             "depth of the full size is proven for that."
+        )
+    if not rendered and coverage == "area":
+        notes.append(
+            "It is right for the images as they are. With multisampling or jitter, a pixel has to hold the farthest "
+            "depth of all its samples."
         )
     if points and coverage == "sample":
         notes.append('Points cover no pixel centre, so all are culled: ask with coverage="area".')
