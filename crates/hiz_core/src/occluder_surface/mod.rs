@@ -84,6 +84,20 @@ pub enum PlantedFault {
     FoldsIgnored,
     /// Depths become the nearest float32.
     RoundedToNearest,
+    /// What lies a little before the near plane counts, too.
+    BeforeNear,
+    /// A point is behind the near plane if float64 says so.
+    NearPointsUnproved,
+    /// Projected depths count as exact.
+    DepthsExact,
+    /// A triangle's corners have no error of their depth; its plane has.
+    CornerDepthsExact,
+    /// Points where edges are cut at the near plane count as exact.
+    CutPointsExact,
+    /// The side along the near plane counts as the edge that it was cut from.
+    CutSidesJoined,
+    /// A triangle faces as float64 says.
+    FacingUnproved,
 }
 
 /// The occluders' triangles on the host, in float64 world coordinates.
