@@ -642,6 +642,31 @@ fn nothing_at_all_is_drawn_reduced_and_culled() {
     assert_eq!(world.mask(encoder, &world.visible), 0);
 }
 
+/// A device that is lost: nothing panics, whatever comes back.
+#[test]
+fn a_lost_device_ends_nothing() {
+    let (world, wall) = culled(World::new(), AtlasUse::Never);
+    let (view, mut encoder) = (plain(&wall), world.encoder());
+    world.device.destroy();
+    let World { context, instances, occluders, camera, .. } = &world;
+    let outcomes = [
+        world.reduce(&mut encoder, &view),
+        world.cull(&mut encoder, &CullOptions::default()),
+        context.record_occluders(&mut encoder, occluders, camera, &view),
+        context.record_update(&mut encoder, instances, 0, &TWO_BOXES, true),
+        context.record_instances(&mut encoder, &TWO_BOXES, &InstanceOptions::default()).map(drop),
+        context.create_occluders(&[WALL], &OccluderOptions::default()).map(drop),
+        context.create_pyramid(camera.size(), &PyramidOptions::default()).map(drop),
+        context.create_visible(instances, &VisibleOptions::default()).map(drop),
+        HizContext::new(&world.device).map(drop),
+    ];
+    for (i, outcome) in outcomes.into_iter().enumerate() {
+        // Some cannot tell; what needs memory that is mapped does.
+        assert!(outcome.is_ok() || matches!(outcome, Err(Error::Device(_))), "{i}: {outcome:?}");
+    }
+    drop(encoder.finish());
+}
+
 /// wgpu tells of an encoder of another device where that is finished. Here nothing panics, and both devices can be used on.
 #[test]
 fn an_encoder_of_another_device_is_told_of_where_it_is_finished() {

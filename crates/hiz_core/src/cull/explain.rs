@@ -1,6 +1,6 @@
 //! The explanation of a single verdict: the cull's own steps for one instance.
 
-use super::{CullInputs, Seen, group_key, group_options};
+use super::{CullInputs, Seen, group_key};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::groups::GROUP;
@@ -38,10 +38,10 @@ pub(crate) fn record_explain(
     let place = piece.order.place((index - piece.range.start) as usize);
     let (which, records, view) = if whole_group {
         seen.key = group_key(seen.key);
-        let view = seen.bind(gpu, inputs.camera, inputs.pyramid, &group_options(inputs.options))?;
+        let view = seen.bind_for_groups(gpu, inputs.pyramid)?;
         (place / GROUP, &piece.group_records, view)
     } else {
-        (place, &piece.records, seen.bind(gpu, inputs.camera, inputs.pyramid, inputs.options)?)
+        (place, &piece.records, seen.bind(gpu, inputs.pyramid)?)
     };
     let which = gpu.uniform("hiz.explain.which", &[which as u32, 0, 0, 0])?;
     let output =

@@ -40,6 +40,7 @@ struct Seen {
     built: Built,
     /// All levels in one texture, where that pays.
     atlas: Option<wgpu::TextureView>,
+    view: ViewUniform,
     key: CullKey,
 }
 
@@ -50,7 +51,7 @@ impl Seen {
         check_contexts(gpu, inputs)?;
         let built = pyramid.built_for(camera)?;
         // Refused before anything is recorded.
-        ViewUniform::new(camera, built.reduction, options, built.tolerance)?;
+        let view = ViewUniform::new(camera, built.reduction, options, built.tolerance)?;
         Pyramid::check_source(gpu, &built)?;
         let atlas = encoder
             .filter(|_| pyramid.wants_atlas(gpu, &built, instances.len()))
@@ -66,14 +67,22 @@ impl Seen {
             descent: options.descent > 0,
             fit_volume: options.fit == Fit::Volume,
         };
-        Ok(Self { built, atlas, key })
+        Ok(Self { built, atlas, view, key })
     }
 
-    /// The bindings for these options; those of the last cull, if it asked for the same.
-    fn bind(&self, gpu: &Gpu, camera: &Camera, pyramid: &Pyramid, options: &CullOptions) -> Result<wgpu::BindGroup> {
-        let uniform = ViewUniform::new(camera, self.built.reduction, options, self.built.tolerance)?;
-        let key = (self.key.store, bytemuck::cast(uniform));
-        pyramid.bindings(key, || self.create(gpu, pyramid, &uniform))
+    /// The bindings for a test of instances; those of the last cull, if it asked for the same.
+    fn bind(&self, gpu: &Gpu, pyramid: &Pyramid) -> Result<wgpu::BindGroup> {
+        self.bind_view(gpu, pyramid, self.view)
+    }
+
+    /// Those for a test of groups.
+    fn bind_for_groups(&self, gpu: &Gpu, pyramid: &Pyramid) -> Result<wgpu::BindGroup> {
+        let descent_budget = self.view.descent_budget.max(GROUP_DESCENT);
+        self.bind_view(gpu, pyramid, ViewUniform { descent_budget, ..self.view })
+    }
+
+    fn bind_view(&self, gpu: &Gpu, pyramid: &Pyramid, view: ViewUniform) -> Result<wgpu::BindGroup> {
+        pyramid.bindings((self.key.store, bytemuck::cast(view)), || self.create(gpu, pyramid, &view))
     }
 
     fn create(&self, gpu: &Gpu, pyramid: &Pyramid, uniform: &ViewUniform) -> Result<wgpu::BindGroup> {
@@ -122,7 +131,7 @@ pub(crate) fn record(
     inputs: &CullInputs<'_>,
     visible: &Visible,
 ) -> Result<()> {
-    let CullInputs { instances, camera, pyramid, options, .. } = *inputs;
+    let CullInputs { instances, pyramid, options, .. } = *inputs;
     check_contexts(gpu, inputs)?;
     gpu.check_context("visible", visible.context)?;
     if !visible.counts().iter().copied().eq(instances.pieces.iter().map(Piece::count)) {
@@ -141,9 +150,9 @@ pub(crate) fn record(
     };
     let seen = Seen::new(gpu, inputs, Some(encoder))?;
     let key = seen.key;
-    let view = seen.bind(gpu, camera, pyramid, options)?;
+    let view = seen.bind(gpu, pyramid)?;
     let grouped = instances.pieces.iter().any(|piece| is_grouped(piece, options));
-    let group_view = if grouped { Some(seen.bind(gpu, camera, pyramid, &group_options(options))?) } else { None };
+    let group_view = if grouped { Some(seen.bind_for_groups(gpu, pyramid)?) } else { None };
     let grouped = pieces()
         .map(|(piece, output)| {
             let groups = is_grouped(piece, options).then(|| GroupCull::new(gpu, (key, report), piece, output));
@@ -232,11 +241,6 @@ const GROUP_DESCENT: u32 = 16;
 /// From how many instances on groups are culled first: fewer are tested one by one before the groups' own dispatches have begun
 /// (`docs/performance.md`).
 const GROUPS_PAY_FROM: u32 = 16_384;
-
-/// The options of a group's test.
-fn group_options(options: &CullOptions) -> CullOptions {
-    CullOptions { descent: options.descent.max(GROUP_DESCENT), ..options.clone() }
-}
 
 /// The pipeline of a group's test.
 fn group_key(key: CullKey) -> CullKey {
