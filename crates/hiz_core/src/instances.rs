@@ -169,9 +169,8 @@ impl Instances {
     ) -> Result<Self> {
         let n = bounds.len()?;
         let total = u32::try_from(n).map_err(|_| Error::limit("instances", n as u64, u64::from(u32::MAX)))?;
-        let device = gpu.device();
         let kind = bounds.kind();
-        let most = piece_capacity(kind.record_bytes(), &device.limits());
+        let most = piece_capacity(kind.record_bytes(), gpu.limits());
         let capacity = match options.piece_capacity {
             None => most,
             Some(c) if c > 0 && c <= most && c.is_multiple_of(CULL_WORKGROUP) => c,
@@ -294,19 +293,19 @@ fn packed(
     };
     let uniform_of_groups = uniform(num_groups)?;
     let uniform = uniform(count)?;
-    let bindings = bind_records(gpu, &uniform, &records);
-    let group_bindings = bind_records(gpu, &uniform_of_groups, &group_records);
+    let bindings = bind_records(gpu, &uniform, &records)?;
+    let group_bindings = bind_records(gpu, &uniform_of_groups, &group_records)?;
     let piece = Piece { range, records, group_records, uniform, bindings, group_bindings, order };
     Ok((piece, groups, [upload, groups_upload]))
 }
 
 /// A piece's uniform and records as a cull reads them.
-pub(crate) fn bind_records(gpu: &Gpu, uniform: &wgpu::Buffer, records: &Records) -> wgpu::BindGroup {
-    gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("hiz.cull.instances"),
-        layout: &gpu.layouts().instances,
-        entries: &[entry(0, uniform.as_entire_binding()), entry(1, wgpu::BindingResource::TextureView(&records.view))],
-    })
+pub(crate) fn bind_records(gpu: &Gpu, uniform: &wgpu::Buffer, records: &Records) -> Result<wgpu::BindGroup> {
+    gpu.bind_group(
+        "hiz.cull.instances",
+        &gpu.layouts().instances,
+        &[entry(0, uniform.as_entire_binding()), entry(1, wgpu::BindingResource::TextureView(&records.view))],
+    )
 }
 
 /// Writes box records, one after the other.

@@ -1,6 +1,6 @@
 //! The explanation of a single verdict: the cull's own steps for one instance.
 
-use super::{CullInputs, Seen, group_key, group_options};
+use super::{CullInputs, Seen, group_key};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::groups::GROUP;
@@ -38,22 +38,20 @@ pub(crate) fn record_explain(
     let place = piece.order.place((index - piece.range.start) as usize);
     let (which, records, view) = if whole_group {
         seen.key = group_key(seen.key);
-        let view = seen.bind(gpu, inputs.camera, inputs.pyramid, &group_options(inputs.options))?;
+        let view = seen.bind_for_groups(gpu, inputs.pyramid)?;
         (place / GROUP, &piece.group_records, view)
     } else {
-        (place, &piece.records, seen.bind(gpu, inputs.camera, inputs.pyramid, inputs.options)?)
+        (place, &piece.records, seen.bind(gpu, inputs.pyramid)?)
     };
     let which = gpu.uniform("hiz.explain.which", &[which as u32, 0, 0, 0])?;
-    let output = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("hiz.explain.target"),
-        layout: &gpu.layouts().one_storage,
-        entries: &[entry(0, target.as_entire_binding())],
-    });
+    let output =
+        gpu.bind_group("hiz.explain.target", &gpu.layouts().one_storage, &[entry(0, target.as_entire_binding())])?;
+    let (pipeline, records) = (gpu.explain_pipeline(seen.key)?, bind_records(gpu, &which, records)?);
     let mut pass = encoder
         .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.explain.pass"), timestamp_writes: None });
-    pass.set_pipeline(&gpu.explain_pipeline(seen.key));
+    pass.set_pipeline(&pipeline);
     pass.set_bind_group(0, &view, &[]);
-    pass.set_bind_group(1, &bind_records(gpu, &which, records), &[]);
+    pass.set_bind_group(1, &records, &[]);
     pass.set_bind_group(2, &output, &[]);
     pass.dispatch_workgroups(1, 1, 1);
     Ok(())

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::{Engine, locked, milliseconds, to_u32};
 use crate::camera::Camera;
-use crate::compact;
+use crate::compact::Compaction;
 use crate::count;
 use crate::cull::{CullInputs, CullOptions, ExplanationRecord, is_grouped, record_explain};
 use crate::error::{Error, Result};
@@ -256,10 +256,10 @@ impl Culling {
         let gpu = &engine.context().gpu;
         let size = size_of::<CounterRecord>() as u64;
         let counters = engine.scoped(|| {
-            let counters = gpu.empty("hiz.count.counters", size, STORAGE);
+            let counters = gpu.empty("hiz.count.counters", size, STORAGE)?;
             let mut encoder = engine.encoder("hiz.count.encoder");
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            count::record(gpu, &mut pass, &self.instances, &self.visible, &self.options, &counters);
+            count::record(gpu, &mut pass, &self.instances, &self.visible, &self.options, &counters)?;
             drop(pass);
             engine.queue().submit([encoder.finish()]);
             Ok(counters)
@@ -345,10 +345,11 @@ impl Culling {
         let lists = engine.scoped(|| {
             let VisibleOptions { capacity, draw, .. } = self.output;
             let lists = Lists::new(gpu, &self.instances, true, capacity, draw)?;
+            let compaction = Compaction::new(gpu, &self.instances, &self.visible, &lists)?;
             let mut encoder = engine.encoder("hiz.compact.encoder");
             lists.record_clear(&mut encoder);
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            compact::record(gpu, &mut pass, &self.instances, &self.visible, &lists);
+            compaction.record(&mut pass);
             drop(pass);
             engine.queue().submit([encoder.finish()]);
             Ok(lists)
