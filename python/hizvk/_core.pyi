@@ -21,9 +21,12 @@ __all__ = [
     "YardstickReduction",
     "__version__",
     "adapters",
+    "after_fork",
+    "before_fork",
     "check_bounds",
     "check_proxy",
     "frustum_matrix",
+    "let_go",
     "reference_classify",
     "reference_pyramid",
     "takes_planted_faults",
@@ -42,6 +45,9 @@ _Mesh: TypeAlias = tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]
 _Adapter: TypeAlias = tuple[int, str, str, str, str, str]
 
 def adapters() -> list[_Adapter]: ...
+def let_go() -> None: ...
+def before_fork() -> None: ...
+def after_fork() -> None: ...
 def check_proxy(proxy: _Mesh, mesh: _Mesh) -> tuple[list[int], list[list[float]], list[int], float]: ...
 def check_bounds(
     kind: str,

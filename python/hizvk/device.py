@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
 import numpy as np
 
 from . import _arguments, _core
+from ._processes import driver_is_asked
 from .bounds import Bounds, are_points, as_arrays
 from .camera import Camera
 from .depth import checked_image
-from .errors import LimitError, NoAdapterError
+from .errors import LimitError
 from .hints import Question
 from .resources import DepthImage, Instances, Occluders, Pyramid, as_meshes
 from .result import CullResult, DrawTemplate
@@ -67,7 +68,8 @@ class Adapter:
 
 def adapters() -> list[Adapter]:
     """The Vulkan adapters of this machine; an empty list without a Vulkan driver."""
-    return [Adapter(*summary) for summary in _core.adapters()]
+    with driver_is_asked():
+        return [Adapter(*summary) for summary in _core.adapters()]
 
 
 class Device:
@@ -82,9 +84,24 @@ class Device:
     Raises
     ------
     NoAdapterError
-        Without such an adapter; the error lists those there are and the line that installs a software driver.
+        Without such an adapter; the error lists those there are and how to choose one, or where there is none the line
+        that installs a software driver.
     TypeError
         If `adapter` is neither.
+
+    Notes
+    -----
+    Processes: when the interpreter ends, every device is waited for and destroyed, also where modules still name
+    results or where daemon threads cull. What asks a device after that (a function of `atexit` that was registered
+    before this package was imported) gets a `HizError`.
+
+    Forks: no device works in a forked child. There every object of the parent's devices raises a `HizError` when the
+    device is needed; lengths, ``repr`` and arrays that were read before still work. Make a `Device` in the child (a call
+    of `visible` without ``device=`` does), or use ``multiprocessing.get_context("spawn")``. A fork waits until the calls
+    of other threads are done, so that the child finds no lock of the driver held. A forked child ends without the C exit
+    handlers of its parent, because the driver's would wait for threads that the child does not have.
+
+    Threads: any number may use one device, or devices of their own.
     """
 
     def __init__(self, adapter: str | int | None = None) -> None:
@@ -93,13 +110,10 @@ class Device:
             raise TypeError(f"adapter: expected {expected}, got {_arguments.describe(adapter)}")
         if isinstance(adapter, str) and not adapter.strip():
             raise ValueError(f"adapter: expected {expected}, got an empty string")
-        if isinstance(adapter, str):
+        if not isinstance(adapter, (str, type(None))):
+            adapter = str(_arguments.integer("adapter", adapter, low=0, high=2**31 - 1))
+        with driver_is_asked():
             self._engine = _core.Engine(adapter)
-            return
-        index = None if adapter is None else _arguments.integer("adapter", adapter, low=0, high=2**31 - 1)
-        self._engine = _core.Engine(None if index is None else str(index))
-        if index is not None and self.adapter.index != index:  # the text of a number can also be part of a name
-            raise NoAdapterError([str(seen) for seen in adapters()], "", f"has the index {index}")
 
     @property
     def adapter(self) -> Adapter:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import threading
 import warnings
 from typing import TYPE_CHECKING
 
 from . import _arguments
+from ._processes import per_process
 from .bounds import Bounds, are_points, as_arrays
 from .camera import Camera
 from .depth import checked_image
@@ -27,17 +27,27 @@ if TYPE_CHECKING:
 
 __all__ = ["visible"]
 
-_lock = threading.Lock()
-_default: tuple[int, Device] | None = None
+
+class _Default:
+    """A device that is made at its first use, once."""
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()
+        self.device: Device | None = None
+
+    def get(self) -> Device:
+        with self.lock:
+            if self.device is None:
+                self.device = Device()
+            return self.device
+
+
+_defaults: dict[int, _Default] = {}
 
 
 def default_device() -> Device:
-    """The device of callers who bring none; made at the first use, once a process."""
-    global _default
-    with _lock:
-        if _default is None or _default[0] != os.getpid():  # a forked child cannot use its parent's
-            _default = (os.getpid(), Device())
-        return _default[1]
+    """The device of callers who bring none; made at the first use, once a process: a forked child has its own."""
+    return per_process(_defaults, _Default).get()
 
 
 def visible(

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from . import _arguments
+from ._processes import cached_property
 
 if TYPE_CHECKING:
     import numpy.typing as npt

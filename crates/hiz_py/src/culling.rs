@@ -8,7 +8,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::errors::detached;
+use crate::held::{Held, OnDevice};
 
 /// The options of a cull as Python words them.
 pub(crate) struct CullArguments<'a> {
@@ -85,33 +85,35 @@ impl CullArguments<'_> {
 
 /// A submitted cull.
 #[pyclass(frozen, module = "hizvk._core")]
-pub(crate) struct Culling(pub(crate) headless::Culling);
+pub(crate) struct Culling(pub(crate) Held<headless::Culling>);
+
+impl OnDevice for headless::Culling {}
 
 #[pymethods]
 impl Culling {
-    fn num_instances(&self) -> u32 {
-        self.0.instances().len()
+    fn num_instances(&self, py: Python<'_>) -> PyResult<u32> {
+        Ok(self.0.look(py)?.instances().len())
     }
 
     fn mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        detached(py, || self.0.mask()).map(|mask| PyArray1::from_vec(py, mask))
+        self.0.run(py, headless::Culling::mask).map(|mask| PyArray1::from_vec(py, mask))
     }
 
     fn verdicts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
-        detached(py, || self.0.verdicts()).map(|verdicts| PyArray1::from_vec(py, verdicts))
+        self.0.run(py, headless::Culling::verdicts).map(|verdicts| PyArray1::from_vec(py, verdicts))
     }
 
     fn indices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
-        detached(py, || self.0.indices()).map(|indices| PyArray1::from_vec(py, indices))
+        self.0.run(py, headless::Culling::indices).map(|indices| PyArray1::from_vec(py, indices))
     }
 
     /// The records one after the other, 20 bytes each.
     fn draws<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        detached(py, || self.0.draws()).map(|draws| PyBytes::new(py, bytemuck::cast_slice(&draws)))
+        self.0.run(py, headless::Culling::draws).map(|draws| PyBytes::new(py, bytemuck::cast_slice(&draws)))
     }
 
     fn counts(&self, py: Python<'_>) -> PyResult<Counts> {
-        let counts = detached(py, || self.0.counts())?;
+        let counts = self.0.run(py, headless::Culling::counts)?;
         Ok(Counts {
             tested: counts.tested,
             outside: counts.outside,
@@ -129,17 +131,17 @@ impl Culling {
 
     /// How many instances are kept, and how many of them are listed.
     fn demand_and_written(&self, py: Python<'_>) -> PyResult<(Option<u64>, u64)> {
-        detached(py, || self.0.demand_and_written())
+        self.0.run(py, headless::Culling::demand_and_written)
     }
 
     /// Milliseconds to record, of the device, and to read back.
-    fn timings(&self) -> (f64, f64, f64) {
-        let timings = self.0.timings();
-        (timings.record_ms, timings.gpu_ms, timings.readback_ms)
+    fn timings(&self, py: Python<'_>) -> PyResult<(f64, f64, f64)> {
+        let timings = self.0.get(py)?.timings();
+        Ok((timings.record_ms, timings.gpu_ms, timings.readback_ms))
     }
 
     fn explain(&self, py: Python<'_>, index: u64) -> PyResult<Explanation> {
-        let told = detached(py, || self.0.explain(index))?;
+        let told = self.0.run(py, |culling| culling.explain(index))?;
         Ok(Explanation {
             verdict: told.verdict,
             reason: told.reason,

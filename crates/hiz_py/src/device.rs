@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 use crate::arguments::{FloatArray, LevelArray, bounds, depth_kind, in_c_order};
 use crate::camera::Camera;
 use crate::culling::{CullArguments, Culling};
-use crate::errors::detached;
+use crate::held::{Held, OnDevice, detached};
 
 /// Index, name, driver, its version, backend, type.
 type Summary = (usize, String, String, String, String, String);
@@ -26,8 +26,8 @@ fn summary(adapter: &AdapterSummary) -> Summary {
 
 /// The Vulkan adapters of this machine.
 #[pyfunction]
-pub(crate) fn adapters(py: Python<'_>) -> Vec<Summary> {
-    py.detach(headless::adapters).iter().map(summary).collect()
+pub(crate) fn adapters(py: Python<'_>) -> PyResult<Vec<Summary>> {
+    Ok(detached(py, || Ok(headless::adapters()))?.iter().map(summary).collect())
 }
 
 /// Whether faults can be planted into the shaders of this build by an environment variable: development builds alone take it.
@@ -50,21 +50,21 @@ fn open(adapter: Option<&str>) -> hiz_core::Result<headless::Engine> {
 
 /// A device with its queue and pipelines.
 #[pyclass(frozen, module = "hizvk._core")]
-pub(crate) struct Engine(pub(crate) headless::Engine);
+pub(crate) struct Engine(pub(crate) Held<headless::Engine>);
 
 #[pymethods]
 impl Engine {
     #[new]
     fn new(py: Python<'_>, adapter: Option<&str>) -> PyResult<Self> {
-        detached(py, || open(adapter)).map(Self)
+        detached(py, || open(adapter)).map(|engine| Self(Held::new(py, engine)))
     }
 
-    fn adapter(&self) -> Summary {
-        summary(self.0.adapter())
+    fn adapter(&self, py: Python<'_>) -> PyResult<Summary> {
+        Ok(summary(self.0.look(py)?.adapter()))
     }
 
-    fn max_image_side(&self) -> u32 {
-        self.0.max_image_side()
+    fn max_image_side(&self, py: Python<'_>) -> PyResult<u32> {
+        Ok(self.0.get(py)?.max_image_side())
     }
 
     fn instances(
@@ -83,7 +83,9 @@ impl Engine {
             other => return Err(PyValueError::new_err(format!("order: no order {other:?}"))),
         };
         let options = InstanceOptions { strict, order, piece_capacity };
-        detached(py, || self.0.instances(&bounds, &options)).map(Instances)
+        self.0
+            .run(py, |engine| engine.instances(&bounds, &options))
+            .map(|instances| Instances(Held::new(py, instances)))
     }
 
     fn update(
@@ -96,7 +98,8 @@ impl Engine {
         strict: bool,
     ) -> PyResult<()> {
         let bounds = bounds(kind, &arrays)?;
-        detached(py, || self.0.update(&instances.0, first, &bounds, strict))
+        let instances = instances.0.get(py)?;
+        self.0.run(py, |engine| engine.update(&instances, first, &bounds, strict))
     }
 
     fn occluders(
@@ -120,11 +123,16 @@ impl Engine {
                 transforms: transforms.as_ref().map(FloatArray::floats).transpose()?,
             });
         }
-        detached(py, || self.0.occluders(&data, &OccluderOptions { cull_mode })).map(Occluders)
+        self.0
+            .run(py, |engine| engine.occluders(&data, &OccluderOptions { cull_mode }))
+            .map(|occluders| Occluders(Held::new(py, occluders)))
     }
 
     fn render_depth(&self, py: Python<'_>, occluders: &Occluders, camera: &Camera) -> PyResult<DepthImage> {
-        detached(py, || self.0.render_depth(&occluders.0, &camera.0)).map(DepthImage)
+        let occluders = occluders.0.get(py)?;
+        self.0
+            .run(py, |engine| engine.render_depth(&occluders, &camera.0))
+            .map(|depth| DepthImage(Held::new(py, depth)))
     }
 
     fn render_depth_conservative(
@@ -135,7 +143,10 @@ impl Engine {
         refinement: u32,
     ) -> PyResult<DepthImage> {
         let options = ConservativeDepthOptions { refinement };
-        detached(py, || self.0.render_depth_conservative(&occluders.0, &camera.0, &options)).map(DepthImage)
+        let occluders = occluders.0.get(py)?;
+        self.0
+            .run(py, |engine| engine.render_depth_conservative(&occluders, &camera.0, &options))
+            .map(|depth| DepthImage(Held::new(py, depth)))
     }
 
     /// `half`: the numbers were half floats.
@@ -155,24 +166,25 @@ impl Engine {
             DepthConvention::Reversed => DepthKind::ReversedNdc,
         };
         let (tolerance, camera) = (if half { DepthTolerance::HALF } else { DepthTolerance::NONE }, &camera.0);
-        detached(py, || match image {
+        let upload = |engine: &headless::Engine| match image {
             // Already what is uploaded: no copy in between.
             Floats::F32(ndc) if kind == own_kind && scale == 1.0 && invalid.is_empty() => {
-                self.0.upload_depth_within(ndc, camera, tolerance)
+                engine.upload_depth_within(ndc, camera, tolerance)
             }
             _ => {
                 let (ndc, left) = hiz_core::ndc_from_kind_within(image, kind, scale, &invalid, camera, tolerance)?;
-                self.0.upload_depth_within(&ndc, camera, left)
+                engine.upload_depth_within(&ndc, camera, left)
             }
-        })
-        .map(DepthImage)
+        };
+        self.0.run(py, upload).map(|depth| DepthImage(Held::new(py, depth)))
     }
 
     fn pyramid(&self, py: Python<'_>, depth: &DepthImage, levels: (u32, u32)) -> PyResult<Pyramid> {
         let levels = StoredLevels { first: levels.0, last: levels.1 };
         let options = PyramidOptions { levels, ..PyramidOptions::default() };
-        let pyramid = detached(py, || self.0.pyramid_with(&depth.0, &options))?;
-        Ok(Pyramid { engine: self.0.clone(), pyramid })
+        let depth = depth.0.get(py)?;
+        let reduce = |engine: &headless::Engine| Ok((engine.clone(), engine.pyramid_with(&depth, &options)?));
+        self.0.run(py, reduce).map(|built| Pyramid(Held::new(py, built)))
     }
 
     #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
@@ -214,46 +226,49 @@ impl Engine {
             statistics,
         };
         let (options, output) = (arguments.options()?, arguments.output());
-        detached(py, || self.0.cull(&instances.0, &camera.0, &pyramid.pyramid, &options, &output)).map(Culling)
+        let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
+        self.0
+            .run(py, |engine| engine.cull(&instances, &camera.0, &pyramid.1, &options, &output))
+            .map(|culling| Culling(Held::new(py, culling)))
     }
 
     fn wait(&self, py: Python<'_>) -> PyResult<()> {
-        detached(py, || self.0.wait())
+        self.0.run(py, headless::Engine::wait)
     }
 }
 
 /// Bounds on the device.
 #[pyclass(frozen, module = "hizvk._core")]
-pub(crate) struct Instances(pub(crate) Arc<hiz_core::Instances>);
+pub(crate) struct Instances(pub(crate) Held<Arc<hiz_core::Instances>>);
 
 #[pymethods]
 impl Instances {
-    fn num_instances(&self) -> u32 {
-        self.0.len()
+    fn num_instances(&self, py: Python<'_>) -> PyResult<u32> {
+        Ok(self.0.look(py)?.len())
     }
 
-    fn kind(&self) -> &'static str {
-        match self.0.kind() {
+    fn kind(&self, py: Python<'_>) -> PyResult<&'static str> {
+        Ok(match self.0.look(py)?.kind() {
             hiz_core::BoundsKind::Sphere => "spheres",
             hiz_core::BoundsKind::Box => "boxes",
             hiz_core::BoundsKind::OrientedBox => "oriented_boxes",
-        }
+        })
     }
 
-    fn num_pieces(&self) -> usize {
-        self.0.num_pieces()
+    fn num_pieces(&self, py: Python<'_>) -> PyResult<usize> {
+        Ok(self.0.look(py)?.num_pieces())
     }
 
     fn invalid<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u64>>> {
-        detached(py, || self.0.invalid()).map(|invalid| PyArray1::from_vec(py, invalid))
+        self.0.run(py, |instances| instances.invalid()).map(|invalid| PyArray1::from_vec(py, invalid))
     }
 
-    fn host_bytes(&self) -> u64 {
-        self.0.host_bytes()
+    fn host_bytes(&self, py: Python<'_>) -> PyResult<u64> {
+        Ok(self.0.get(py)?.host_bytes())
     }
 
-    fn device_bytes(&self) -> u64 {
-        self.0.device_bytes()
+    fn device_bytes(&self, py: Python<'_>) -> PyResult<u64> {
+        Ok(self.0.look(py)?.device_bytes())
     }
 }
 
@@ -262,76 +277,87 @@ type SurfaceArrays<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u32>>,
 
 /// Triangle meshes on the device.
 #[pyclass(frozen, module = "hizvk._core")]
-pub(crate) struct Occluders(Arc<hiz_core::Occluders>);
+pub(crate) struct Occluders(Held<Arc<hiz_core::Occluders>>);
 
 #[pymethods]
 impl Occluders {
-    fn host_bytes(&self) -> u64 {
-        self.0.surface().host_bytes()
+    fn host_bytes(&self, py: Python<'_>) -> PyResult<u64> {
+        Ok(self.0.look(py)?.surface().host_bytes())
     }
 
     /// World positions, 3 a vertex; vertices, 3 a triangle; and the faces that do not occlude. Copies.
-    fn surface<'py>(&self, py: Python<'py>) -> SurfaceArrays<'py> {
-        let surface = self.0.surface();
+    fn surface<'py>(&self, py: Python<'py>) -> PyResult<SurfaceArrays<'py>> {
+        let occluders = self.0.look(py)?;
+        let surface = occluders.surface();
         let faces = match surface.cull_mode() {
             FaceCull::None => "none",
             FaceCull::Back => "back",
             FaceCull::Front => "front",
         };
         let positions = PyArray1::from_slice(py, surface.positions().as_flattened());
-        (positions, PyArray1::from_slice(py, surface.triangles().as_flattened()), faces)
+        Ok((positions, PyArray1::from_slice(py, surface.triangles().as_flattened()), faces))
     }
 
-    fn num_triangles(&self) -> u64 {
-        self.0.num_triangles()
+    fn num_triangles(&self, py: Python<'_>) -> PyResult<u64> {
+        Ok(self.0.look(py)?.num_triangles())
     }
 
-    fn num_parts(&self) -> usize {
-        self.0.num_parts()
+    fn num_parts(&self, py: Python<'_>) -> PyResult<usize> {
+        Ok(self.0.look(py)?.num_parts())
     }
 
-    fn device_bytes(&self) -> u64 {
-        self.0.device_bytes()
+    fn device_bytes(&self, py: Python<'_>) -> PyResult<u64> {
+        Ok(self.0.look(py)?.device_bytes())
     }
 }
 
 /// A depth image on the device.
 #[pyclass(frozen, module = "hizvk._core")]
-pub(crate) struct DepthImage(pub(crate) headless::DepthImage);
+pub(crate) struct DepthImage(pub(crate) Held<headless::DepthImage>);
 
 #[pymethods]
 impl DepthImage {
     fn read<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f32>>> {
-        detached(py, || self.0.read()).map(|depth| PyArray1::from_vec(py, depth))
+        self.0.run(py, headless::DepthImage::read).map(|depth| PyArray1::from_vec(py, depth))
     }
 }
 
+impl OnDevice for headless::DepthImage {}
+
 /// A depth pyramid on the device.
 #[pyclass(frozen, module = "hizvk._core")]
-pub(crate) struct Pyramid {
-    engine: headless::Engine,
-    pub(crate) pyramid: Arc<hiz_core::Pyramid>,
+pub(crate) struct Pyramid(pub(crate) Held<WithEngine>);
+
+/// The pyramid, and the engine that reads it.
+pub(crate) type WithEngine = (headless::Engine, Arc<hiz_core::Pyramid>);
+
+impl OnDevice for WithEngine {
+    fn engine(&self) -> Option<&headless::Engine> {
+        Some(&self.0)
+    }
 }
 
 #[pymethods]
 impl Pyramid {
-    fn num_levels(&self) -> u32 {
-        self.pyramid.num_levels()
+    fn num_levels(&self, py: Python<'_>) -> PyResult<u32> {
+        Ok(self.0.look(py)?.1.num_levels())
     }
 
     /// The first and the last stored level above 0; nothing for an image of one pixel.
-    fn stored_levels(&self) -> Option<(u32, u32)> {
-        self.pyramid.stored_levels().map(|levels| (levels.first, levels.last))
+    fn stored_levels(&self, py: Python<'_>) -> PyResult<Option<(u32, u32)>> {
+        Ok(self.0.look(py)?.1.stored_levels().map(|levels| (levels.first, levels.last)))
     }
 
     /// `((height, width), texels)` of a level.
     fn read_level<'py>(&self, py: Python<'py>, k: u32) -> PyResult<LevelArray<'py>> {
-        let texels = detached(py, || self.engine.read_level(&self.pyramid, k))?;
-        let size = self.pyramid.level_size(k).map_or((0, 0), |size| (size.height, size.width));
+        let (size, texels) = self.0.run(py, |(engine, pyramid)| {
+            let size = pyramid.level_size(k).map_or((0, 0), |size| (size.height, size.width));
+            Ok((size, engine.read_level(pyramid, k)?))
+        })?;
         Ok((size, PyArray1::from_vec(py, texels)))
     }
 
-    fn device_bytes(&self) -> u64 {
-        self.pyramid.device_bytes()
+    fn device_bytes(&self, py: Python<'_>) -> PyResult<u64> {
+        Ok(self.0.get(py)?.1.device_bytes())
     }
 }

@@ -44,15 +44,11 @@ pub(crate) fn raised(py: Python<'_>, error: Error) -> PyErr {
         Error::DeviceLost(_) => DEVICE_LOST.raise(py, (text,)),
         Error::OutOfMemory(_) => OUT_OF_MEMORY.raise(py, (text,)),
         Error::Invalid { .. } | Error::Mismatch { .. } => PyValueError::new_err(text),
-        _ => HIZ_ERROR.raise(py, (text,)),
+        _ => hiz_error(py, text),
     }
 }
 
-/// Runs `work` without the interpreter lock and turns its error into an exception.
-pub(crate) fn detached<T, F>(py: Python<'_>, work: F) -> PyResult<T>
-where
-    T: Send,
-    F: Send + FnOnce() -> Result<T, Error>,
-{
-    py.detach(work).map_err(|error| raised(py, error))
+/// A `HizError` of no other class.
+pub(crate) fn hiz_error(py: Python<'_>, text: String) -> PyErr {
+    HIZ_ERROR.raise(py, (text,))
 }

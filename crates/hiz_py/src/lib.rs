@@ -9,6 +9,7 @@ mod containment;
 mod culling;
 mod device;
 mod errors;
+mod held;
 mod reference;
 mod yardstick;
 
@@ -23,6 +24,8 @@ mod _core {
     use crate::culling::{Counts, Culling, Explanation};
     #[pymodule_export]
     use crate::device::{DepthImage, Engine, Instances, Occluders, Pyramid, adapters};
+    #[pymodule_export]
+    use crate::held::{after_fork, before_fork, let_go};
     #[pymodule_export]
     use crate::reference::{reference_classify, reference_pyramid};
     #[pymodule_export]
@@ -40,4 +43,18 @@ mod _core {
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "the name is Python's")]
     const takes_planted_faults: bool = crate::device::TAKES_PLANTED_FAULTS;
+
+    #[pymodule_init]
+    fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+        use pyo3::types::{PyAnyMethods, PyDictMethods};
+        let (atexit, os) = (module.py().import("atexit")?, module.py().import("os")?);
+        atexit.call_method1("register", (module.getattr("let_go")?,))?;
+        if let Ok(register) = os.getattr("register_at_fork") {
+            let hooks = pyo3::types::PyDict::new(module.py());
+            hooks.set_item("before", module.getattr("before_fork")?)?;
+            hooks.set_item("after_in_parent", module.getattr("after_fork")?)?;
+            register.call((), Some(&hooks))?;
+        }
+        Ok(())
+    }
 }

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 use crate::arguments::{FloatArray, LevelArray, bounds, depth_kind, in_c_order};
 use crate::camera::Camera;
-use crate::errors::detached;
+use crate::held::detached;
 
 /// Instances between two looks at whether the user wants to stop.
 const BATCH: usize = 256;

@@ -12,17 +12,18 @@ use crate::arguments::in_c_order;
 use crate::camera::Camera;
 use crate::culling::CullArguments;
 use crate::device::{DepthImage, Engine};
-use crate::errors::detached;
+use crate::held::{Held, OnDevice, detached};
 
 /// Milliseconds on the wall of single submits on one device.
 #[pyclass(frozen, module = "hizvk._core")]
-pub(crate) struct Yardstick(headless::Engine);
+pub(crate) struct Yardstick(Held<headless::Engine>);
 
 #[pymethods]
 impl Yardstick {
     #[new]
-    fn new(engine: &Engine) -> Self {
-        Self(engine.0.clone())
+    fn new(py: Python<'_>, engine: &Engine) -> PyResult<Self> {
+        let engine = headless::Engine::clone(&*engine.0.get(py)?);
+        Ok(Self(Held::new(py, engine)))
     }
 
     /// How this module was compiled: what runs on the host is slower in a `dev` build.
@@ -32,7 +33,7 @@ impl Yardstick {
     }
 
     fn empty_submit_ms(&self, py: Python<'_>) -> PyResult<f64> {
-        detached(py, || yardstick::empty_submit_ms(&self.0))
+        self.0.run(py, yardstick::empty_submit_ms)
     }
 
     /// Of a copy on one thread of the host.
@@ -48,7 +49,7 @@ impl Yardstick {
         if from.len() != to.len() {
             return Err(PyValueError::new_err(format!("target: expected {} numbers, got {}", from.len(), to.len())));
         }
-        Ok(py.detach(|| yardstick::memcpy_ms(from, to)))
+        detached(py, || Ok(yardstick::memcpy_ms(from, to)))
     }
 
     /// The reduction of `depth`: the library's own with these levels, or one dispatch a level, which makes all of them.
@@ -59,7 +60,8 @@ impl Yardstick {
         shape: &str,
         levels: (u32, u32),
     ) -> PyResult<YardstickReduction> {
-        let (engine, depth) = (self.0.clone(), depth.0.clone());
+        let (engine, depth) = (self.0.get(py)?, depth.0.get(py)?);
+        let (engine, depth) = (headless::Engine::clone(&engine), headless::DepthImage::clone(&depth));
         let per_level = |shape| detached(py, || PerLevelReduction::new(&engine, &depth, shape)).map(Reducer::PerLevel);
         let reducer = match shape {
             "own" => {
@@ -71,7 +73,7 @@ impl Yardstick {
             "textures" => per_level(ReductionShape::Textures)?,
             other => return Err(PyValueError::new_err(format!("shape: no shape {other:?}"))),
         };
-        Ok(YardstickReduction { engine, depth, reducer })
+        Ok(YardstickReduction(Held::new(py, Reduction { engine, depth, reducer })))
     }
 
     /// The cull of `instances`, into buffers of its own; with `depth` its reduction into `pyramid` goes before it.
@@ -106,17 +108,21 @@ impl Yardstick {
             statistics: false,
         };
         let (options, output) = (arguments.options()?, arguments.output());
-        let visible = detached(py, || self.0.context().create_visible(&instances.0, &output))?;
-        Ok(YardstickCull {
-            engine: self.0.clone(),
-            instances: Arc::clone(&instances.0),
-            camera: camera.0.clone(),
-            pyramid: Arc::clone(&pyramid.pyramid),
-            depth: depth.map(|depth| depth.0.clone()),
-            visible,
-            options,
-            certified,
-        })
+        let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
+        let depth = depth.map(|depth| depth.0.get(py)).transpose()?;
+        let prepare = |engine: &headless::Engine| {
+            Ok(Cull {
+                visible: engine.context().create_visible(&instances, &output)?,
+                engine: engine.clone(),
+                instances: Arc::clone(&instances),
+                camera: camera.0.clone(),
+                pyramid: Arc::clone(&pyramid.1),
+                depth: depth.map(|depth| headless::DepthImage::clone(&depth)),
+                options,
+                certified,
+            })
+        };
+        self.0.run(py, prepare).map(|cull| YardstickCull(Held::new(py, cull)))
     }
 }
 
@@ -127,7 +133,9 @@ enum Reducer {
 
 /// A reduction that can be submitted again and again.
 #[pyclass(frozen, module = "hizvk._core")]
-pub(crate) struct YardstickReduction {
+pub(crate) struct YardstickReduction(Held<Reduction>);
+
+struct Reduction {
     engine: headless::Engine,
     depth: headless::DepthImage,
     reducer: Reducer,
@@ -136,9 +144,9 @@ pub(crate) struct YardstickReduction {
 #[pymethods]
 impl YardstickReduction {
     fn ms(&self, py: Python<'_>) -> PyResult<f64> {
-        detached(py, || {
-            yardstick::submitted_ms(&self.engine, |encoder| match &self.reducer {
-                Reducer::Own(pyramid) => yardstick::reduce(&self.engine, encoder, &self.depth, pyramid),
+        self.0.run(py, |Reduction { engine, depth, reducer }| {
+            yardstick::submitted_ms(engine, |encoder| match reducer {
+                Reducer::Own(pyramid) => yardstick::reduce(engine, encoder, depth, pyramid),
                 Reducer::PerLevel(reduction) => {
                     reduction.record(encoder);
                     Ok(())
@@ -150,7 +158,9 @@ impl YardstickReduction {
 
 /// A cull that can be submitted again and again.
 #[pyclass(frozen, module = "hizvk._core")]
-pub(crate) struct YardstickCull {
+pub(crate) struct YardstickCull(Held<Cull>);
+
+struct Cull {
     engine: headless::Engine,
     instances: Arc<Instances>,
     camera: hiz_core::Camera,
@@ -164,21 +174,27 @@ pub(crate) struct YardstickCull {
 #[pymethods]
 impl YardstickCull {
     fn ms(&self, py: Python<'_>) -> PyResult<f64> {
-        detached(py, || yardstick::submitted_ms(&self.engine, |encoder| self.record(encoder)))
+        self.0.run(py, |cull| yardstick::submitted_ms(&cull.engine, |encoder| cull.record(encoder)))
     }
 
     /// What the last submit kept.
     fn mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        detached(py, || yardstick::read_mask(&self.engine, &self.visible)).map(|mask| PyArray1::from_vec(py, mask))
+        self.0
+            .run(py, |cull| yardstick::read_mask(&cull.engine, &cull.visible))
+            .map(|mask| PyArray1::from_vec(py, mask))
     }
 
     /// Of the buffers that take what is found.
-    fn device_bytes(&self) -> u64 {
-        self.visible.device_bytes()
+    fn device_bytes(&self, py: Python<'_>) -> PyResult<u64> {
+        Ok(self.0.look(py)?.visible.device_bytes())
     }
 }
 
-impl YardstickCull {
+impl OnDevice for Reduction {}
+
+impl OnDevice for Cull {}
+
+impl Cull {
     fn record(&self, encoder: &mut hiz_core::wgpu::CommandEncoder) -> Result<(), Error> {
         let Self { engine, instances, camera, pyramid, visible, options, .. } = self;
         if let Some(depth) = &self.depth {

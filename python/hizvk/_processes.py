@@ -1,0 +1,129 @@
+"""What ending processes, forks and the driver's environment ask of this package.
+
+A lock that another thread holds at a fork is never released in the child. So nothing here or elsewhere in the package
+waits for a lock of another process: what has one belongs to a process (`per_process`), and `cached_property` has none.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import threading
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from typing import Self
+
+__all__ = ["cached_property", "driver_is_asked", "per_process"]
+
+_T = TypeVar("_T")
+
+#: Mesa's layer of this name prints "error: XDG_RUNTIME_DIR is invalid" where there is no desktop; the variable, when the
+#: Vulkan loader reads it, leaves the layer out.
+_NO_DEVICE_SELECT = "NODEVICE_SELECT"
+
+
+class cached_property(Generic[_T]):
+    """`functools.cached_property` without its lock: Python 3.11 has one for all objects of a class.
+
+    Two threads may both compute; whoever comes first decides what all see.
+    """
+
+    def __init__(self, compute: Callable[[Any], _T]) -> None:
+        self._compute = compute
+        self.__doc__ = compute.__doc__
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> Self: ...
+
+    @overload
+    def __get__(self, instance: object, owner: type) -> _T: ...
+
+    def __get__(self, instance: object | None, owner: type) -> Self | _T:
+        if instance is None:
+            return self
+        value: _T = instance.__dict__.setdefault(self._name, self._compute(instance))
+        return value
+
+
+def per_process(of: dict[int, _T], make: Callable[[], _T]) -> _T:
+    """This process's value of `of`; a forked child gets its own, and its parent's is kept as it is."""
+    try:
+        return of[os.getpid()]
+    except KeyError:
+        return of.setdefault(os.getpid(), make())
+
+
+class _Environment:
+    """How many calls of a process ask the driver now, and whether they have set the variable."""
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()
+        self.calls = 0
+        self.is_ours = False
+
+    def enter(self) -> None:
+        with self.lock:
+            if self.calls == 0 and _NO_DEVICE_SELECT not in os.environ:
+                os.environ[_NO_DEVICE_SELECT] = "1"
+                self.is_ours = True
+            self.calls += 1
+
+    def leave(self) -> None:
+        with self.lock:
+            self.calls -= 1
+            if self.calls == 0:
+                self.restore()
+
+    def restore(self) -> None:
+        if self.is_ours:
+            os.environ.pop(_NO_DEVICE_SELECT, None)
+            self.is_ours = False
+
+
+_environments: dict[int, _Environment] = {}
+
+
+@contextmanager
+def driver_is_asked() -> Iterator[None]:
+    """For calls that make a Vulkan instance: the driver's layers say nothing on stderr, and the environment is as before."""
+    environment = per_process(_environments, _Environment)
+    environment.enter()
+    try:
+        yield
+    finally:
+        environment.leave()
+
+
+# Bound here: a child of a fork has little that it can rely on.
+_libc = ctypes.CDLL(None)
+_exit = ctypes.cast(getattr(_libc, "_exit", None), ctypes.c_void_p)
+_fflush = ctypes.cast(getattr(_libc, "fflush", None), ctypes.c_void_p)
+_on_exit = getattr(_libc, "on_exit", None)
+_cxa_atexit = getattr(_libc, "__cxa_atexit", None)
+
+
+def _after_fork_in_child() -> None:
+    """Without any lock: the environment as it was, and an end without the parent's drivers.
+
+    Mesa joins threads at a C program's exit. In a fork they do not exist, and it crashes or waits for ever. So the child
+    of a process that has asked a driver ends, once Python has ended, without the C exit handlers of its parent.
+    (`multiprocessing` ends its children so in any case.)
+    """
+    if not _environments:
+        return
+    for environment in _environments.values():
+        environment.restore()
+    if _on_exit is not None and _cxa_atexit is not None:
+        # The last one runs first: C's streams are written out, then the process ends with its status.
+        _on_exit(_exit, None)
+        _cxa_atexit(_fflush, None, None)
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork_in_child)
