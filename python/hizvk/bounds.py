@@ -316,9 +316,10 @@ def as_arrays(name: str, bounds: object) -> tuple[str, tuple[FloatArray, ...]]:
 
 def are_points(bounds: Bounds) -> bool:
     """Whether there are bounds, and all of them have size zero."""
-    match bounds:
-        case Spheres():
-            return len(bounds) > 0 and not np.any(bounds.radii)
-        case Boxes():
-            return len(bounds) > 0 and bool(np.array_equal(bounds.min, bounds.max))
-    return len(bounds) > 0 and not np.any(bounds.half_sizes)
+    with np.errstate(invalid="ignore"):  # signalling NaN
+        match bounds:
+            case Spheres():
+                return len(bounds) > 0 and not np.any(bounds.radii)
+            case Boxes():
+                return len(bounds) > 0 and bool(np.array_equal(bounds.min, bounds.max))
+        return len(bounds) > 0 and not np.any(bounds.half_sizes)
