@@ -210,28 +210,46 @@ impl Pyramid {
     }
 
     /// The atlas of what the pyramid was built from; its copies are recorded if they are not known to have run, behind that reduction.
+    /// `None` where there is no memory for it, now and from now on.
     pub(crate) fn record_atlas(
         &self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         built: &Built,
-    ) -> Result<wgpu::TextureView> {
-        let mut atlas = self.atlas.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let atlas = match &mut *atlas {
-            Some(there) => there,
-            none => none.insert(Atlas::new(gpu, &self.layout)?),
+    ) -> Result<Option<wgpu::TextureView>> {
+        let mut kept = self.atlas.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let made = match kept.take() {
+            Some(there) => Ok(there),
+            None => Atlas::new(gpu, &self.layout),
         };
-        let reduction = built.reduction;
-        if !atlas.holds(reduction) {
-            atlas.record(gpu, encoder, &self.layout, &self.chunks[0], built)?;
-            let (contents, reduced) = (atlas.contents(), Arc::clone(&self.reduced));
-            encoder.on_submitted_work_done(move || {
-                // Copies that ran before their reduction, or after the next one, have spoiled what was there.
-                let ran_behind_it = reduced.load(Ordering::Acquire) == reduction;
-                contents.store(if ran_behind_it { reduction } else { 0 }, Ordering::Release);
-            });
+        let recorded = made.and_then(|mut atlas| {
+            if !atlas.holds(built.reduction) {
+                atlas.record(gpu, encoder, &self.layout, &self.chunks[0], built)?;
+                self.note_copies(encoder, &atlas, built.reduction);
+            }
+            Ok(atlas)
+        });
+        let error = match recorded {
+            Ok(atlas) => return Ok(Some(kept.insert(atlas).view())),
+            Err(error) => error,
+        };
+        // They may hold the one that is gone.
+        self.bindings.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clear();
+        if matches!(error, Error::OutOfMemory(_)) {
+            self.do_without_atlas();
+            return Ok(None);
         }
-        Ok(atlas.view())
+        Err(error)
+    }
+
+    /// Once the copies into an atlas have run it is known what it holds.
+    fn note_copies(&self, encoder: &wgpu::CommandEncoder, atlas: &Atlas, reduction: u32) {
+        let (contents, reduced) = (atlas.contents(), Arc::clone(&self.reduced));
+        encoder.on_submitted_work_done(move || {
+            // Copies that ran before their reduction, or after the next one, have spoiled what was there.
+            let ran_behind_it = reduced.load(Ordering::Acquire) == reduction;
+            contents.store(if ran_behind_it { reduction } else { 0 }, Ordering::Release);
+        });
     }
 
     /// The camera of the depth image that the pyramid was last built from.

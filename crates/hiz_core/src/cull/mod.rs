@@ -53,10 +53,10 @@ impl Seen {
         // Refused before anything is recorded.
         let view = ViewUniform::new(camera, built.reduction, options, built.tolerance)?;
         Pyramid::check_source(gpu, &built)?;
-        let atlas = encoder
-            .filter(|_| pyramid.wants_atlas(gpu, &built, instances.len()))
-            .map(|encoder| pyramid.record_atlas(gpu, encoder, &built))
-            .transpose()?;
+        let atlas = match encoder.filter(|_| pyramid.wants_atlas(gpu, &built, instances.len())) {
+            Some(encoder) => pyramid.record_atlas(gpu, encoder, &built)?,
+            None => None,
+        };
         let key = CullKey {
             store: if atlas.is_some() { DepthStore::Atlas } else { DepthStore::Apart(built.source_kind) },
             kind: instances.kind,
