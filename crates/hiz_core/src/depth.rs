@@ -256,8 +256,8 @@ fn parallel(camera: &Camera, rows: &Mat4) -> Result<Rays> {
     };
     let across = cross(x, y);
     let sine = normalized(across).map_or(f64::NAN, |ray| dot(cross(ray, z), cross(ray, z)).sqrt());
-    // Written so that NaN fails, too.
-    if !(sine < 1e-12) {
+    // NaN is tilted, too.
+    if sine.is_nan() || sine >= 1e-12 {
         return Err(Error::invalid(
             "kind",
             "expected ndc or reversed_ndc for an orthographic camera whose depth does not grow along its rays (a sheared or oblique matrix)",

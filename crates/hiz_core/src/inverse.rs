@@ -97,9 +97,10 @@ pub(crate) fn inverse(rows: &Mat3) -> Option<[[Bounded; 3]; 3]> {
     // M A = I - E gives M^-1 - A = A (E + E^2 + ...). No row of |E| sums to more than 1/2, so the series is at most twice the
     // greatest |E| of each column.
     let e = residual(&m, &a).map(|row| row.map(|x| x.value.hi.abs() + x.value.lo.abs() + x.error));
-    let row_sum = e.iter().map(|row| row.iter().sum::<f64>()).fold(0.0, f64::max);
-    // Written so that NaN fails, too.
-    if !(row_sum < 0.5) {
+    // A NaN is kept: `max` would drop it.
+    let row_sum =
+        e.iter().map(|row| row.iter().sum::<f64>()).fold(0.0, |m: f64, x| if x > m || x.is_nan() { x } else { m });
+    if row_sum.is_nan() || row_sum >= 0.5 {
         return None;
     }
     let greatest: Vec3 = std::array::from_fn(|j| e.iter().map(|row| row[j]).fold(0.0, f64::max));

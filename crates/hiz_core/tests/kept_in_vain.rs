@@ -205,7 +205,7 @@ fn counts(
 
 #[test]
 fn hardly_more_than_exact_arithmetic_keeps() {
-    println!("| camera | depth | boxes of a cell | far/near or far/wall: 1e2 | 1e4 | 1e6 | 1e9 | 1e12 | infinite |");
+    println!("\n| camera | depth | boxes of a cell | far/near or far/wall: 1e2 | 1e4 | 1e6 | 1e9 | 1e12 | infinite |");
     println!("|---|---|---|---|---|---|---|---|---|");
     let mut random = Random(8);
     let mut worse = Vec::new();
