@@ -114,9 +114,10 @@ fn plain() -> CullOptions {
 }
 
 /// Behind a wall at depth 4, what is r away: Z' is 1 (its constant), W' is r and t is 1/4 up to signs, so that the value is r / 4 - 1.
-/// `size`: of the volume, without r.
-fn behind_the_wall(size: f64) -> [f64; 2] {
-    [0.88, 1.12].map(|share| threshold(3.9, 40.0, |r| r / 4.0 - 1.0 - share * 24.0 * EPS * (1.0 + 0.25 * (r + size))))
+/// `constant`: the magnitude of that of Z'; `size`: of the volume without r, and the magnitude of the constant of W'.
+fn behind_the_wall(constant: f64, size: f64) -> [f64; 2] {
+    [0.88, 1.12]
+        .map(|share| threshold(3.9, 40.0, |r| r / 4.0 - 1.0 - share * 24.0 * EPS * (constant + 0.25 * (r + size))))
 }
 
 /// The margin of a depth's certificate: what of it belongs to the constant, to the distance, to the volume's own size, and to what the
@@ -127,11 +128,19 @@ fn the_margin_of_depth_is_as_large_as_it_is_derived() {
     // eps (1 + 2^-8) of the eye, and its low half: a float32 near 2^27 is a multiple of 8 or 16.
     let halves = 16.0 * (1.0 + 1.0 / 256.0);
     for convention in CONVENTIONS {
-        for (eye, size) in [([0.0; 3], 0.0), ([far_away, 0.0, 0.0], halves), ([0.0, far_away + 6.0, 0.0], halves + 6.0)]
-        {
+        // Where the eye is far along the view the constants are what float64 made of it: 8 roundings of 2^-53 of twice the eye, which is
+        // 2 eps, and as much again where W' was taken from z.
+        let lost = if convention == DepthConvention::Standard { 4.0 } else { 1.0 };
+        for (eye, constant, size) in [
+            ([0.0; 3], 1.0, 0.0),
+            ([far_away, 0.0, 0.0], 1.0, halves),
+            ([0.0, far_away + 6.0, 0.0], 1.0, halves + 6.0),
+            // (There the distance of 4 is in low halves, which the eye's share covers.)
+            ([0.0, 0.0, far_away], lost, halves + 2.0 - 4.0),
+        ] {
             let camera = camera_at(eye, convention);
             let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
-            let [kept, culled] = behind_the_wall(size).map(|r| [point(at(eye, [0.0, 0.0, r]))]);
+            let [kept, culled] = behind_the_wall(constant, size).map(|r| [point(at(eye, [0.0, 0.0, r]))]);
             assert_between(
                 &format!("a point behind a wall, seen from {eye:?}"),
                 (&camera, &wall),
@@ -144,7 +153,8 @@ fn the_margin_of_depth_is_as_large_as_it_is_derived() {
         // is compared by have a millionth, half of it for the support 3/4.
         let camera = camera_along_z(SIDE, SIDE, convention);
         let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
-        let [kept, culled] = behind_the_wall(6.0).map(|r| [Thing { center: [0.0, 0.0, r], half: [3.0, 3.0, 0.0] }]);
+        let [kept, culled] =
+            behind_the_wall(1.0, 6.0).map(|r| [Thing { center: [0.0, 0.0, r], half: [3.0, 3.0, 0.0] }]);
         let boxes = &KINDS[1..];
         assert_between("a wide box behind a wall", (&camera, &wall), &plain(), boxes, (&kept, &culled));
         let [kept, culled] = [0.88, 1.12].map(|share| {
