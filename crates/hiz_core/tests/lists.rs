@@ -71,8 +71,9 @@ fn words_of(buffer: &wgpu::Buffer) -> Vec<u32> {
     view.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect()
 }
 
-/// Buffers that a renderer uses frame after frame hold the last answer and nothing of those before; and so does what a pyramid keeps for the
-/// next cull: the same pyramid, asked with other options, answers for those.
+/// Buffers that a renderer uses frame after frame hold the last answer and nothing of those before;
+/// and so does what a pyramid keeps for the next cull: the same pyramid, asked with other options,
+/// answers for those.
 #[test]
 fn buffers_and_bindings_that_are_used_again_answer_for_the_last_cull() {
     let (instances, kept) = specks(3000, 0.3, Some(1024), 5);
@@ -119,7 +120,8 @@ fn buffers_and_bindings_that_are_used_again_answer_for_the_last_cull() {
             assert!(cull(pyramid, options) == *expected, "{order:?} {hierarchy:?}");
         }
     }
-    // A box a quarter of a pixel beside an open column, and a speck between the centres of pixels: each option makes a binding of its own.
+    // A box a quarter of a pixel beside an open column, and a speck between the centres of pixels:
+    // each option makes a binding of its own.
     let camera = camera_along_z(16, 16, CONVENTION);
     let mut depth = [ndc(4.0, CONVENTION); 256];
     (0..16).for_each(|row| depth[16 * row + 8] = 0.0);
