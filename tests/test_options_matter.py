@@ -49,7 +49,8 @@ CULLS: dict[str, tuple[Any, Any, dict[str, Any], dict[str, Any]]] = {
     # A quarter of a pixel beside the open column.
     "guard_px": (box((-1.5, -0.5, -8), (-0.25, 0.5, -8)), HOLE_COLUMN, {"guard_px": 0.125}, {"guard_px": 0.5}),
     "guard_px, default": (box((-1.5, -0.5, -8), (-0.25, 0.5, -8)), HOLE_COLUMN, {}, {"guard_px": 0.5}),
-    # In sample coverage the default is 1/64: a box that ends 1/100 before the centres of the column.
+    # In sample coverage the default is 1/64: a box that ends 1/100 before the centres of the
+    # column.
     "guard_px, sample": (
         box((-1.5, -0.5, -8), (0.49, 0.5, -8)),
         HOLE_COLUMN,
@@ -59,14 +60,17 @@ CULLS: dict[str, tuple[Any, Any, dict[str, Any], dict[str, Any]]] = {
     # 1/4 less a hundredth of it is 1 / 4.0404; less 1/100 it is 1 / 4.1667.
     "depth_slack": (box((-1, -1, -5), (1, 1, -4.03)), wall(), {"depth_slack": 0.005}, {"depth_slack": 0.01}),
     "depth_slack_abs": (box((-1, -1, -5), (1, 1, -4.1)), wall(), {"depth_slack_abs": 0.005}, {"depth_slack_abs": 0.01}),
-    # kappa eps (1 + 4.1 / 4) and more: 0.0024 at 10,000, where 4.1 / 4 - 1 is 0.025; 0.24 at a million.
+    # kappa eps (1 + 4.1 / 4) and more: 0.0024 at 10,000, where 4.1 / 4 - 1 is 0.025; 0.24 at a
+    # million.
     "transform_slack": (box((-1, -1, -5), (1, 1, -4.1)), wall(), {"transform_slack": 1e4}, {"transform_slack": 1e6}),
-    # Three pixels, columns 9 to 11, beside the open column 8: 2x2 texels that span them are of level 1 and have it.
+    # Three pixels, columns 9 to 11, beside the open column 8: 2x2 texels that span them are of
+    # level 1 and have it.
     "footprint": (box((1.1, 0.1, -8), (3.9, 0.9, -8)), HOLE_COLUMN, {"footprint": 4}, {"footprint": 2}),
     "footprint 8": (box((1.1, -1.9, -8), (6.9, 0.9, -8)), HOLE_COLUMN, {"footprint": 8}, {"footprint": 4}),
     "descent": (box((1.1, -1.9, -8), (6.9, 0.9, -8)), HOLE_COLUMN, {"descent": 4096}, {"descent": 0}),
     "descent, budget": (box((1.1, -1.9, -8), (6.9, 0.9, -8)), HOLE_COLUMN, {"descent": 4096}, {"descent": 3}),
-    # A ball of 3.24 pixels about the middle: its rectangle has the open pixel in its corner, its outline has not.
+    # A ball of 3.24 pixels about the middle: its rectangle has the open pixel in its corner, its
+    # outline has not.
     "fit": (
         sphere((0, 0, -8), 3.0),
         wall((4, 11)),
@@ -239,7 +243,8 @@ def test_faces_and_transforms_of_occluders(device: hizvk.Device, conservative: b
             seen = drawn(device, occluders, conservative=conservative)
             assert seen[8, 8] == (0.0 if cull == left_out else about(4)), (cull, left_out)
             assert seen[0, 0] == 0.0
-    # At depth 4 a pixel is half a unit: columns 4 to 11. Moved by 4 to either side: columns 12 to 15, and 0 to 3.
+    # At depth 4 a pixel is half a unit: columns 4 to 11. Moved by 4 to either side: columns 12 to
+    # 15, and 0 to 3.
     still = drawn(device, device.occluders(SQUARE, FRONT), conservative=conservative)
     moved = np.stack([np.eye(4), np.eye(4)])
     moved[0][0, 3], moved[1][0, 3] = 4.0, -4.0
@@ -258,8 +263,8 @@ def test_size_conservative_and_refinement(device: hizvk.Device) -> None:
     assert [plain[8, 8], whole[8, 8], plain[8, 7], whole[8, 7]] == [0.25, 0.0, 0.25, about(4)]
     assert drawn(device, occluders, size=(4, 8)).shape == (4, 8)
     assert drawn(device, occluders, size=(4, 8), conservative=True)[2, 3] == about(4)
-    # Two walls that end within column 8, the farther one where the nearer one still is: none covers the
-    # pixel, but each of its quarters is covered.
+    # Two walls that end within column 8, the farther one where the nearer one still is: none covers
+    # the pixel, but each of its quarters is covered.
     left, lap = wide.copy(), wide.copy()
     left[1:3, 0] = 0.26  # ends at 8.52, at depth 4
     lap[[0, 3], 0], lap[[1, 2], 0] = 0.2, 9.0  # begins at 8.32, at depth 5

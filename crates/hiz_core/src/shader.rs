@@ -356,8 +356,9 @@ mod tests {
         }
     }
 
-    /// Drivers clamp what is drawn to 0..=1, and nothing else may be copied into a depth texture: no verdict of theirs shows whether its
-    /// single pixels are sanitized. (`tests/no_depth.rs` has what other textures hold.)
+    /// Drivers clamp what is drawn to 0..=1, and nothing else may be copied into a depth texture:
+    /// no verdict of theirs shows whether its single pixels are sanitized. (`tests/no_depth.rs` has
+    /// what other textures hold.)
     #[test]
     fn single_pixels_of_every_source_are_sanitized() {
         for source in SOURCES {

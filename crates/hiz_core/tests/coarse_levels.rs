@@ -1,5 +1,6 @@
-//! Coarse levels, where the farthest of thousands of pixels hangs on one of them: images with a handful of far pixels, and images without
-//! any bad number, in which every texel of every level differs. (Where one pixel in fifty is far, all texels from level 4 on are.)
+//! Coarse levels, where the farthest of thousands of pixels hangs on one of them: images with a
+//! handful of far pixels, and images without any bad number, in which every texel of every level
+//! differs. (Where one pixel in fifty is far, all texels from level 4 on are.)
 
 mod common;
 
@@ -10,7 +11,8 @@ use hiz_core::{DepthConvention, PyramidOptions, StoredLevels};
 const SIZES: [(u32, u32); 10] =
     [(1, 1), (1, 37), (37, 1), (131, 127), (257, 255), (64, 65), (1, 3001), (3001, 2), (1023, 517), (1920, 1080)];
 
-/// Depths from 1/4 to 3/4 without a number that is none, all different; then some pixels anywhere that are farther, each by itself.
+/// Depths from 1/4 to 3/4 without a number that is none, all different; then some pixels anywhere
+/// that are farther, each by itself.
 fn image(width: u32, height: u32, convention: DepthConvention, far: u32, random: &mut Random) -> Vec<f32> {
     let mut depth: Vec<f32> = (0..width * height).map(|_| random.range(0.25, 0.75) as f32).collect();
     for _ in 0..far {
@@ -21,7 +23,8 @@ fn image(width: u32, height: u32, convention: DepthConvention, far: u32, random:
     depth
 }
 
-/// The first texel that differs from the oracle's, with any of these choices of levels and both kinds of upload.
+/// The first texel that differs from the oracle's, with any of these choices of levels and both
+/// kinds of upload.
 fn difference(
     engine: &Engine,
     (width, height): (u32, u32),
@@ -79,7 +82,8 @@ fn all_levels_down_to_the_last_have_the_farthest_of_their_pixels() {
     }
 }
 
-/// The mean of two depths in the place of the farthest, wherever one is taken; and parts that are left out of a coarse level.
+/// The mean of two depths in the place of the farthest, wherever one is taken; and parts that are
+/// left out of a coarse level.
 #[test]
 fn faults_of_coarse_levels_are_seen() {
     let all = [StoredLevels::ALL];

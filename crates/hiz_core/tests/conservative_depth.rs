@@ -325,7 +325,8 @@ fn borders_that_rounding_cannot_place_do_not_count() {
     assert!(tally.deep > 1000);
 }
 
-/// A view that loses what float64 holds so far from the origin: its matrix is a bare one, and its axes are nobody's.
+/// A view that loses what float64 holds so far from the origin: its matrix is a bare one, and its
+/// axes are nobody's.
 struct Lossy {
     camera: Camera,
     place: Vec3,
@@ -348,7 +349,8 @@ impl Lossy {
         let size = ImageSize::new(2 + random.below(4), 2 + random.below(4));
         let fov_y = random.range(0.5, 2.0);
         let projection = Projection::Perspective { fov_y, near, far: None, convention };
-        // About the origin the axes are as good as float64 has them; then to its place, in one matrix.
+        // About the origin the axes are as good as float64 has them; then to its place, in one
+        // matrix.
         let pose = Pose { eye: [0.0; 3], target: forward, up: axes[1] };
         let mut m = Camera::look_at(&pose, &projection, size).unwrap().clip_from_world();
         for row in &mut m {
@@ -396,8 +398,9 @@ fn walls_at_the_near_plane(seed: u64, fault: Option<PlantedFault>) -> Tally {
     tally
 }
 
-/// Walls whose right border is that of a column, give or take nothing, and is cut at the near plane in the middle of the image: the cut's place
-/// in it is far less certain than that of the border's other end, a thousand times as far away.
+/// Walls whose right border is that of a column, give or take nothing, and is cut at the near plane
+/// in the middle of the image: the cut's place in it is far less certain than that of the border's
+/// other end, a thousand times as far away.
 fn cut_borders(seed: u64, fault: Option<PlantedFault>) -> Tally {
     let (mut random, mut tally) = (Random(seed), Tally::default());
     for _ in 0..150 {
@@ -419,8 +422,8 @@ fn cut_borders(seed: u64, fault: Option<PlantedFault>) -> Tally {
     tally
 }
 
-/// A wall with a crack that is closed by a triangle that faces away, so narrow that float64 cannot tell how it faces. It does not occlude:
-/// what is seen through the crack?
+/// A wall with a crack that is closed by a triangle that faces away, so narrow that float64 cannot
+/// tell how it faces. It does not occlude: what is seen through the crack?
 fn closed_from_behind(seed: u64, fault: Option<PlantedFault>) -> Tally {
     let (mut random, mut tally) = (Random(seed), Tally::default());
     for _ in 0..600 {
@@ -455,13 +458,15 @@ fn closed_from_behind(seed: u64, fault: Option<PlantedFault>) -> Tally {
     tally
 }
 
-/// What float64 is not sure of: depths, cuts at the near plane, which side of it a point is on, how a triangle faces.
+/// What float64 is not sure of: depths, cuts at the near plane, which side of it a point is on, how
+/// a triangle faces.
 #[test]
 fn what_float64_is_not_sure_of_does_not_count() {
     for (name, tally, deep) in [
         ("walls", facing_walls(3, None), 300),
         ("walls at the near plane", walls_at_the_near_plane(9, None), 5),
-        // Where a cut's place matters it is not sure to lie behind the near plane: such triangles are dropped.
+        // Where a cut's place matters it is not sure to lie behind the near plane: such triangles
+        // are dropped.
         ("cut borders", cut_borders(4, None), 0),
         ("cracks", closed_from_behind(5, None), 0),
     ] {

@@ -1,8 +1,10 @@
-//! How large margins, slacks and guards are, and not only that they are there: what lies a little within one is kept, what lies a little
-//! outside is culled. By single instances and by groups, whose boxes are tested with the same slack.
+//! How large margins, slacks and guards are, and not only that they are there: what lies a little
+//! within one is kept, what lies a little outside is culled. By single instances and by groups,
+//! whose boxes are tested with the same slack.
 //!
-//! Every threshold is worked out here, in float64, from docs/accuracy.md: a claim `R - t W' > 0` holds where its value exceeds
-//! `E = 24 eps (a size + a_3) + |t| (the same of W')`, with the magnitudes a of rows that are written down beside it.
+//! Every threshold is worked out here, in float64, from docs/accuracy.md: a claim `R - t W' > 0`
+//! holds where its value exceeds `E = 24 eps (a size + a_3) + |t| (the same of W')`, with the
+//! magnitudes a of rows that are written down beside it.
 
 mod common;
 
@@ -52,7 +54,8 @@ fn instances(things: &[Thing], kind: BoundsKind) -> Arc<Instances> {
     engine().instances(&bounds, &options).unwrap()
 }
 
-/// Things that have to be kept and things that have to be culled, alone and as groups of 64 of the same, which are culled as a whole.
+/// Things that have to be kept and things that have to be culled, alone and as groups of 64 of the
+/// same, which are culled as a whole.
 fn assert_between(
     what: &str,
     (camera, depth): (&Camera, &[f32]),
@@ -113,25 +116,36 @@ fn plain() -> CullOptions {
     CullOptions { depth_slack: NO_SLACK, ..CullOptions::default() }
 }
 
-/// Behind a wall at depth 4, what is r away: Z' is 1 (its constant), W' is r and t is 1/4 up to signs, so that the value is r / 4 - 1.
-/// `size`: of the volume, without r.
-fn behind_the_wall(size: f64) -> [f64; 2] {
-    [0.88, 1.12].map(|share| threshold(3.9, 40.0, |r| r / 4.0 - 1.0 - share * 24.0 * EPS * (1.0 + 0.25 * (r + size))))
+/// Behind a wall at depth 4, what is r away: Z' is 1 (its constant), W' is r and t is 1/4 up to
+/// signs, so that the value is r / 4 - 1. `constant`: the magnitude of that of Z'; `size`: of the
+/// volume without r, and the magnitude of the constant of W'.
+fn behind_the_wall(constant: f64, size: f64) -> [f64; 2] {
+    [0.88, 1.12]
+        .map(|share| threshold(3.9, 40.0, |r| r / 4.0 - 1.0 - share * 24.0 * EPS * (constant + 0.25 * (r + size))))
 }
 
-/// The margin of a depth's certificate: what of it belongs to the constant, to the distance, to the volume's own size, and to what the
-/// halves of a distant eye cannot hold.
+/// The margin of a depth's certificate: what of it belongs to the constant, to the distance, to the
+/// volume's own size, and to what the halves of a distant eye cannot hold.
 #[test]
 fn the_margin_of_depth_is_as_large_as_it_is_derived() {
     let far_away = 2.0_f64.powi(27);
     // eps (1 + 2^-8) of the eye, and its low half: a float32 near 2^27 is a multiple of 8 or 16.
     let halves = 16.0 * (1.0 + 1.0 / 256.0);
     for convention in CONVENTIONS {
-        for (eye, size) in [([0.0; 3], 0.0), ([far_away, 0.0, 0.0], halves), ([0.0, far_away + 6.0, 0.0], halves + 6.0)]
-        {
+        // Where the eye is far along the view the constants are what float64 made of it: 8
+        // roundings of 2^-53 of twice the eye, which is 2 eps, and as much again where W' was taken
+        // from z.
+        let lost = if convention == DepthConvention::Standard { 4.0 } else { 1.0 };
+        for (eye, constant, size) in [
+            ([0.0; 3], 1.0, 0.0),
+            ([far_away, 0.0, 0.0], 1.0, halves),
+            ([0.0, far_away + 6.0, 0.0], 1.0, halves + 6.0),
+            // (There the distance of 4 is in low halves, which the eye's share covers.)
+            ([0.0, 0.0, far_away], lost, halves + 2.0 - 4.0),
+        ] {
             let camera = camera_at(eye, convention);
             let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
-            let [kept, culled] = behind_the_wall(size).map(|r| [point(at(eye, [0.0, 0.0, r]))]);
+            let [kept, culled] = behind_the_wall(constant, size).map(|r| [point(at(eye, [0.0, 0.0, r]))]);
             assert_between(
                 &format!("a point behind a wall, seen from {eye:?}"),
                 (&camera, &wall),
@@ -140,11 +154,13 @@ fn the_margin_of_depth_is_as_large_as_it_is_derived() {
                 (&kept, &culled),
             );
         }
-        // A flat box of half sizes 3: they count as 6. A sphere of radius 3: as 9, and its nearest point is 3 nearer; the squares that it
-        // is compared by have a millionth, half of it for the support 3/4.
+        // A flat box of half sizes 3: they count as 6. A sphere of radius 3: as 9, and its nearest
+        // point is 3 nearer; the squares that it is compared by have a millionth, half of it for
+        // the support 3/4.
         let camera = camera_along_z(SIDE, SIDE, convention);
         let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
-        let [kept, culled] = behind_the_wall(6.0).map(|r| [Thing { center: [0.0, 0.0, r], half: [3.0, 3.0, 0.0] }]);
+        let [kept, culled] =
+            behind_the_wall(1.0, 6.0).map(|r| [Thing { center: [0.0, 0.0, r], half: [3.0, 3.0, 0.0] }]);
         let boxes = &KINDS[1..];
         assert_between("a wide box behind a wall", (&camera, &wall), &plain(), boxes, (&kept, &culled));
         let [kept, culled] = [0.88, 1.12].map(|share| {
@@ -163,7 +179,8 @@ fn the_margin_of_depth_is_as_large_as_it_is_derived() {
     }
 }
 
-/// The margin at the planes of the frustum. Right of the image: X' = 8 x, W' = r and t = 8; before the near plane.
+/// The margin at the planes of the frustum. Right of the image: X' = 8 x, W' = r and t = 8; before
+/// the near plane.
 #[test]
 fn the_margin_of_the_frustums_planes_is_as_large_as_it_is_derived() {
     for convention in CONVENTIONS {
@@ -173,7 +190,8 @@ fn the_margin_of_the_frustums_planes_is_as_large_as_it_is_derived() {
         let beside = |share: f64| {
             threshold(r - 1.0, r + 1.0, |x| 8.0 * (x - r) - share * 24.0 * EPS * (8.0 * (x + r) + 8.0 * (x + r)))
         };
-        // Before the near plane: Z' + W' = r - 1 < 0 (standard), with a constant of 1; reversed the same with other signs.
+        // Before the near plane: Z' + W' = r - 1 < 0 (standard), with a constant of 1; reversed the
+        // same with other signs.
         let before = |share: f64| -threshold(-1.5, -0.5, |z| 1.0 + z - share * 24.0 * EPS * (1.0 - z));
         let [kept, culled] = [0.85, 1.15].map(|share| {
             let (x, z) = (beside(share), before(share));
@@ -183,7 +201,8 @@ fn the_margin_of_the_frustums_planes_is_as_large_as_it_is_derived() {
     }
 }
 
-/// kappa eps of `sum |M| |p|`: on the linear part by the distance and on the constant by the eye's own coordinates, of both rows.
+/// kappa eps of `sum |M| |p|`: on the linear part by the distance and on the constant by the eye's
+/// own coordinates, of both rows.
 #[test]
 fn transform_slack_is_as_large_as_it_says() {
     let kappa = 65_536.0;
@@ -193,8 +212,8 @@ fn transform_slack_is_as_large_as_it_says() {
         for eye in [[0.0; 3], [0.0, 0.0, 100.0], [30.0, -50.0, 100.0]] {
             let camera = camera_at(eye, convention);
             let z = eye[2];
-            // Of Z' = z - A w and W', with A = 1: 2 for a position, |z| + |z + 1| and twice |z| for the constants; with A = 0: nothing
-            // and 1. Of W': 1, and twice |z|.
+            // Of Z' = z - A w and W', with A = 1: 2 for a position, |z| + |z + 1| and twice |z| for
+            // the constants; with A = 0: nothing and 1. Of W': 1, and twice |z|.
             let (linear, constant) = match convention {
                 DepthConvention::Standard => (2.0, 4.0 * z + 1.0),
                 DepthConvention::Reversed => (0.0, 1.0),
@@ -212,7 +231,8 @@ fn transform_slack_is_as_large_as_it_says() {
                 &KINDS,
                 (&kept, &culled),
             );
-            // Beside the image: of X' = 8 x' and t W', t = 8; the constant of a row is its coefficients on the eye, twice.
+            // Beside the image: of X' = 8 x' and t W', t = 8; the constant of a row is its
+            // coefficients on the eye, twice.
             let open = vec![convention.far(); (SIDE * SIDE) as usize];
             let r = 40.0;
             let beside = |axis: usize, share: f64| {
@@ -238,7 +258,8 @@ fn depth_slack_is_as_large_as_it_says() {
         let camera = camera_along_z(SIDE, SIDE, convention);
         let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
         for slack in [1e-3, 0.02, 0.2] {
-            // The depth that has so much of the slack: 1 - 1 / r = 0.75 (1 + slack), 1 / r = 0.25 (1 - slack).
+            // The depth that has so much of the slack: 1 - 1 / r = 0.75 (1 + slack), 1 / r = 0.25
+            // (1 - slack).
             let [kept, culled] = [0.97, 1.03].map(|share| {
                 let r = match convention {
                     DepthConvention::Standard => 1.0 / (1.0 - 0.75 * (1.0 + share * slack)),
@@ -267,13 +288,15 @@ fn orthographic(convention: DepthConvention) -> (Camera, f64, f64) {
     (Camera::from_clip_from_world(m, ImageSize::new(SIDE, SIDE), convention).unwrap(), slope, constant)
 }
 
-/// `depth_slack_abs` in units of NDC depth, and 2^-23 more, which what the shader rounds is taken from.
+/// `depth_slack_abs` in units of NDC depth, and 2^-23 more, which what the shader rounds is taken
+/// from.
 #[test]
 fn absolute_slack_is_as_large_as_it_says() {
     for convention in CONVENTIONS {
         let (camera, slope, constant) = orthographic(convention);
         let far_sign = slope.signum();
-        // Near depth 0 a float32 is fine enough to tell, and the margin is small: it is proportional to the distance from where z is 0.
+        // Near depth 0 a float32 is fine enough to tell, and the margin is small: it is
+        // proportional to the distance from where z is 0.
         let small = 2.0_f64.powi(-13);
         for (wall, slack, shares) in [
             (0.25, 1e-3, [0.97, 1.03]),
@@ -294,8 +317,8 @@ fn absolute_slack_is_as_large_as_it_says() {
     }
 }
 
-/// A pixel that is open in a wall: what stays `guard_px` away from it, from all four sides, is hidden, and what does not is kept; in sample
-/// coverage away from the pixel's centre.
+/// A pixel that is open in a wall: what stays `guard_px` away from it, from all four sides, is
+/// hidden, and what does not is kept; in sample coverage away from the pixel's centre.
 #[test]
 fn guards_of_pixels_are_as_large_as_they_say() {
     for convention in CONVENTIONS {
@@ -312,7 +335,8 @@ fn guards_of_pixels_are_as_large_as_they_say() {
                     for i in 0..SIDE as usize {
                         depth[if axis == 0 { 16 * i + 8 } else { 16 * 8 + i }] = convention.far();
                     }
-                    // At depth 8 a pixel is a unit: column 8 is x in 0..1, row 8 is y in -1..0. A box of 1.1 pixels on each side of it.
+                    // At depth 8 a pixel is a unit: column 8 is x in 0..1, row 8 is y in -1..0. A
+                    // box of 1.1 pixels on each side of it.
                     let middle = if axis == 0 { 0.5 } else { -0.5 };
                     let [kept, culled] = [0.97 * size - 2e-3, 1.03 * size + 2e-3].map(|distance| {
                         [-1.0, 1.0].map(|side| {
@@ -347,7 +371,8 @@ fn guards_of_the_image_are_as_large_as_they_say() {
         let [kept, culled] = [0.99 * guard, 1.01 * guard].map(|beyond| {
             // At depth 8 a pixel is a unit.
             let x = rim + beyond;
-            // In sample coverage a point has to be at the height of a centre, or it is between two rows of them.
+            // In sample coverage a point has to be at the height of a centre, or it is between two
+            // rows of them.
             [[x, 0.5, 8.0], [-x, 0.5, 8.0], [0.5, x, 8.0], [0.5, -x, 8.0]].map(point)
         });
         let what = format!("guard {guard} {coverage:?} beside the image");

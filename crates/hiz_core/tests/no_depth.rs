@@ -1,5 +1,5 @@
-//! Pixels that are no depth (NaN, infinite, above 1, negative) within a wall, in every way in which a cull reads single texels: what lies
-//! behind such a pixel is kept.
+//! Pixels that are no depth (NaN, infinite, above 1, negative) within a wall, in every way in which
+//! a cull reads single texels: what lies behind such a pixel is kept.
 
 mod common;
 
@@ -15,7 +15,8 @@ use hiz_core::{
 };
 use sources::{SOURCES, Source, pyramid_from};
 
-/// The image: cells of 11 x 11 pixels (so that they begin at every remainder by 2, 4 and 8), one thing and one bad pixel in each.
+/// The image: cells of 11 x 11 pixels (so that they begin at every remainder by 2, 4 and 8), one
+/// thing and one bad pixel in each.
 const CELL: u32 = 11;
 const CELLS: u32 = 8;
 const SIDE: u32 = CELL * CELLS;
@@ -36,7 +37,8 @@ const fn way(footprint: Footprint, descent: u32, fit: Fit, pixels: u32) -> Way {
     Way { footprint, descent, fit, pixels }
 }
 
-/// A footprint of level 0, one of a stored level, a descent from there to level 0; and the same texel by texel for a volume's own fit.
+/// A footprint of level 0, one of a stored level, a descent from there to level 0; and the same
+/// texel by texel for a volume's own fit.
 const WAYS: [Way; 12] = [
     way(Footprint::Two, 0, Fit::Rectangle, 1),
     way(Footprint::Two, 0, Fit::Rectangle, 2),
@@ -52,7 +54,8 @@ const WAYS: [Way; 12] = [
     way(Footprint::Eight, 0, Fit::Volume, 10),
 ];
 
-/// Flat boxes at depth 8 that take `pixels` x `pixels` of each cell, from its second pixel on, each `copies` times.
+/// Flat boxes at depth 8 that take `pixels` x `pixels` of each cell, from its second pixel on, each
+/// `copies` times.
 fn things(pixels: u32, copies: usize) -> Arc<Instances> {
     let (mut min, mut max) = (Vec::new(), Vec::new());
     for cell in 0..CELLS * CELLS {
@@ -71,7 +74,8 @@ fn things(pixels: u32, copies: usize) -> Arc<Instances> {
     engine().instances(&bounds, &options).unwrap()
 }
 
-/// A wall at depth 4 with one bad pixel in what each thing covers: every place of it, every value, as far as the cells reach.
+/// A wall at depth 4 with one bad pixel in what each thing covers: every place of it, every value,
+/// as far as the cells reach.
 fn wall_with_bad_pixels(convention: DepthConvention, pixels: u32, shift: u32) -> Vec<f32> {
     let mut depth = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
     for cell in 0..CELLS * CELLS {
@@ -96,8 +100,8 @@ fn kept(
     (culling.mask().unwrap(), culling.counts().unwrap().tested_instances)
 }
 
-/// Which cells have an open pixel. What a depth texture holds in place of a number that is no depth is the driver's choice: where it is one
-/// that hides depth 8, nothing is asked of its cell.
+/// Which cells have an open pixel. What a depth texture holds in place of a number that is no depth
+/// is the driver's choice: where it is one that hides depth 8, nothing is asked of its cell.
 fn open_cells(camera: &Camera, pixels: u32, shift: u32, pyramid: &Pyramid) -> Vec<bool> {
     let convention = camera.convention();
     let image = engine().read_level(pyramid, 0).unwrap();

@@ -81,7 +81,8 @@ fn nearest_instead_of_farthest() {
     assert_red("swap", &[("select(max(a, b), min(a, b), REVERSED)", "select(min(a, b), max(a, b), REVERSED)")]);
 }
 
-/// The mean of two depths in the place of the farthest: where a footprint is read, and where four pixels are.
+/// The mean of two depths in the place of the farthest: where a footprint is read, and where four
+/// pixels are.
 #[test]
 fn a_mean_instead_of_the_farthest() {
     const FOUR: &[(Footprint, u32)] = &[(Footprint::Four, 0)];
@@ -103,17 +104,20 @@ fn a_mean_instead_of_the_farthest() {
     );
 }
 
-/// Slanted plates, each nearest at one end, which is half a pixel inside the pixel where it begins: left,
-/// right, top and bottom. Of that end a tenth of a pixel is nearer than the wall. Which are culled by their own fit?
+/// Slanted plates, each nearest at one end, which is half a pixel inside the pixel where it begins:
+/// left, right, top and bottom. Of that end a tenth of a pixel is nearer than the wall. Which are
+/// culled by their own fit?
 fn culled_slanted_plates(faults: &[(&str, &str)]) -> [bool; 4] {
     let engine = faulty(faults);
-    // At depth 8 a pixel is a unit. A tenth of a pixel from such an end a plate is at depth 8.1, two tenths at 8.2.
+    // At depth 8 a pixel is a unit. A tenth of a pixel from such an end a plate is at depth 8.1,
+    // two tenths at 8.2.
     let camera = camera_along_z(16, 16, DepthConvention::Reversed);
     let image = engine.upload_depth(&[1.0 / 8.1; 256], &camera).unwrap();
     let pyramid = engine.pyramid(&image).unwrap();
     let options = CullOptions { fit: Fit::Volume, descent: 4096, ..CullOptions::default() };
     let c = 0.5_f64.sqrt();
-    // Rows run downwards: the top's end is at y = -1/2, half a pixel below a border, and goes on downwards.
+    // Rows run downwards: the top's end is at y = -1/2, half a pixel below a border, and goes on
+    // downwards.
     [(0, 1.0), (0, -1.0), (1, -1.0), (1, 1.0)].map(|(axis, sign)| {
         let (mut along, mut across, mut end) = ([0.0, 0.0, c], [0.0, 0.0, -sign * c], [0.0, 0.0, 8.0]);
         (along[axis], across[axis], end[axis]) = (sign * c, c, 0.5 * sign);
@@ -132,8 +136,9 @@ fn culled_slanted_plates(faults: &[(&str, &str)]) -> [bool; 4] {
     })
 }
 
-/// The sides of a volume fit's rectangle: guesses that are a fifth of a pixel too far inside are harmless, for certificates refuse them;
-/// without those they cut off what is seen. (`shaders/shared/supporting_planes.wgsl`, `proved_interval`.)
+/// The sides of a volume fit's rectangle: guesses that are a fifth of a pixel too far inside are
+/// harmless, for certificates refuse them; without those they cut off what is seen.
+/// (`shaders/shared/supporting_planes.wgsl`, `proved_interval`.)
 #[test]
 fn sides_of_a_volumes_rectangle_are_proved() {
     let low = ("guess.x - widened", "guess.x - widened + 0.2");

@@ -1,5 +1,6 @@
-//! Every text that a test plants a fault at stands in a shader: in tests that are ignored, in Python's and in what is written about it, too.
-//! (`Engine::with_planted_faults` panics at a text that is gone, but an ignored test says so only when somebody runs it.)
+//! Every text that a test plants a fault at stands in a shader: in tests that are ignored, in
+//! Python's and in what is written about it, too. (`Engine::with_planted_faults` panics at a text
+//! that is gone, but an ignored test says so only when somebody runs it.)
 
 use std::collections::HashMap;
 use std::fs;
@@ -67,8 +68,8 @@ fn tokens(source: &str) -> Vec<Token> {
     tokens
 }
 
-/// The texts that faults are planted at: the first of two texts, `(what, by)` or `(what, by, ...)`, that are no call's arguments; `what` may
-/// be a name that the same file gives to a text.
+/// The texts that faults are planted at: the first of two texts, `(what, by)` or `(what, by, ...)`,
+/// that are no call's arguments; `what` may be a name that the same file gives to a text.
 fn planted(source: &str) -> Vec<String> {
     use Token::{Sign, Text, Word};
     let tokens = tokens(source);

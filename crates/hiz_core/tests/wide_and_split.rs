@@ -1,5 +1,6 @@
-//! The campaign against the exact oracle where images are wide (columns past 512, up to the sizes of screens) and where the stored levels are
-//! cut into two and three chunks; and cheap twins of what only twenty million instances showed.
+//! The campaign against the exact oracle where images are wide (columns past 512, up to the sizes
+//! of screens) and where the stored levels are cut into two and three chunks; and cheap twins of
+//! what only twenty million instances showed.
 
 mod common;
 
@@ -70,8 +71,9 @@ fn culls_of_split_pyramids_give_no_false_cull() {
     }
 }
 
-/// More instances than a row of the survivors' list has groups (4096 of 64), than the scan's invocations have words (256 of 32), and than a
-/// row of records has places; pieces that begin past 2^16. What is kept is known one by one, and nothing is kept beside it.
+/// More instances than a row of the survivors' list has groups (4096 of 64), than the scan's
+/// invocations have words (256 of 32), and than a row of records has places; pieces that begin past
+/// 2^16. What is kept is known one by one, and nothing is kept beside it.
 fn crowd(engine: &Engine, piece: Option<u32>, hierarchy: Hierarchy, order: Order) -> bool {
     let count: usize = 300_000;
     let mut random = Random(6);
@@ -115,7 +117,8 @@ fn three_hundred_thousand_instances() {
 #[test]
 fn faults_of_many_instances_are_seen() {
     for (what, by) in [
-        // Rows of records; of the survivors' list; shares of the scan; places in the mask; groups of a workgroup.
+        // Rows of records; of the survivors' list; shares of the scan; places in the mask; groups
+        // of a workgroup.
         ("i >> RECORDS_PER_ROW_LOG2)", "(i >> RECORDS_PER_ROW_LOG2) % 256u)"),
         ("slot >> SURVIVORS_PER_ROW_LOG2)", "0u)"),
         ("(piece.words + LANES - 1u) / LANES", "piece.words / LANES"),

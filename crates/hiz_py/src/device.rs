@@ -30,7 +30,8 @@ pub(crate) fn adapters(py: Python<'_>) -> PyResult<Vec<Summary>> {
     Ok(detached(py, || Ok(headless::adapters()))?.iter().map(summary).collect())
 }
 
-/// Whether faults can be planted into the shaders of this build by an environment variable: development builds alone take it.
+/// Whether faults can be planted into the shaders of this build by an environment variable:
+/// development builds alone take it.
 pub(crate) const TAKES_PLANTED_FAULTS: bool = cfg!(debug_assertions);
 
 #[cfg(not(debug_assertions))]
@@ -38,8 +39,8 @@ fn open(adapter: Option<&str>) -> hiz_core::Result<headless::Engine> {
     headless::Engine::new(adapter)
 }
 
-/// `HIZVK_PLANTED_FAULT` (`what => by what`, one a line) replaces texts in the shaders, as for the Rust tests: does a Python test
-/// turn red? A release has no word of it.
+/// `HIZVK_PLANTED_FAULT` (`what => by what`, one a line) replaces texts in the shaders, as for the
+/// Rust tests: does a Python test turn red? A release has no word of it.
 #[cfg(debug_assertions)]
 fn open(adapter: Option<&str>) -> hiz_core::Result<headless::Engine> {
     let planted = std::env::var("HIZVK_PLANTED_FAULT").unwrap_or_default();

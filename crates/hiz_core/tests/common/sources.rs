@@ -1,4 +1,5 @@
-//! Every kind of texture that a pyramid takes a depth image from, filled with any bits that its kind can hold.
+//! Every kind of texture that a pyramid takes a depth image from, filled with any bits that its
+//! kind can hold.
 
 use std::sync::Arc;
 
@@ -61,7 +62,8 @@ fn descriptor(
     }
 }
 
-/// A depth texture whose pixels are what fragments say. (What a driver makes of NaN is its own affair.)
+/// A depth texture whose pixels are what fragments say. (What a driver makes of NaN is its own
+/// affair.)
 fn drawn(engine: &Engine, (width, height): (u32, u32), depth: &[f32]) -> wgpu::Texture {
     let device = engine.device();
     let bits = texture_of(engine, (width, height), wgpu::TextureFormat::R32Uint, bytemuck::cast_slice(depth));

@@ -200,8 +200,8 @@ impl Round {
         upload(engine, &self.depth, &self.camera).expect("upload")
     }
 
-    /// The levels of this round; in two of four ways, one of each kind of image, culls read all of them from one texture. Of more than one
-    /// chunk there is none.
+    /// The levels of this round; in two of four ways, one of each kind of image, culls read all of
+    /// them from one texture. Of more than one chunk there is none.
     pub(crate) fn pyramid_options(&self, engine: &Engine) -> PyramidOptions {
         let atlas = if self.way() < 2 { AtlasUse::Always } else { AtlasUse::Never };
         let options = PyramidOptions { levels: self.levels, atlas, ..PyramidOptions::default() };
