@@ -20,8 +20,8 @@ __all__ = ["cached_property", "driver_is_asked", "per_process"]
 
 _T = TypeVar("_T")
 
-#: Mesa's layer of this name prints "error: XDG_RUNTIME_DIR is invalid" where there is no desktop; the variable, when the
-#: Vulkan loader reads it, leaves the layer out.
+#: Mesa's layer of this name prints "error: XDG_RUNTIME_DIR is invalid" where there is no desktop. Where the variable is
+#: set, the Vulkan loader leaves the layer out.
 _NO_DEVICE_SELECT = "NODEVICE_SELECT"
 
 
@@ -52,7 +52,7 @@ class cached_property(Generic[_T]):
 
 
 def per_process(of: dict[int, _T], make: Callable[[], _T]) -> _T:
-    """This process's value of `of`; a forked child gets its own, and its parent's is kept as it is."""
+    """The value of `of` for this process; a forked child gets its own, and its parent's is kept as it is."""
     try:
         return of[os.getpid()]
     except KeyError:
@@ -91,7 +91,7 @@ _environments: dict[int, _Environment] = {}
 
 @contextmanager
 def driver_is_asked() -> Iterator[None]:
-    """For calls that make a Vulkan instance: the driver's layers say nothing on stderr, and the environment is as before."""
+    """For calls that make a Vulkan instance: its layers say nothing on stderr, and the environment is as before."""
     environment = per_process(_environments, _Environment)
     environment.enter()
     try:
@@ -100,29 +100,38 @@ def driver_is_asked() -> Iterator[None]:
         environment.leave()
 
 
-# Bound here: a child of a fork has little that it can rely on.
-_libc = ctypes.CDLL(None)
-_exit = ctypes.cast(getattr(_libc, "_exit", None), ctypes.c_void_p)
-_fflush = ctypes.cast(getattr(_libc, "fflush", None), ctypes.c_void_p)
-_on_exit = getattr(_libc, "on_exit", None)
-_cxa_atexit = getattr(_libc, "__cxa_atexit", None)
+def _c_functions() -> tuple[Any, Any] | None:
+    """The C library's `on_exit` and `__cxa_atexit`, bound before any fork; None where there are none."""
+    if not hasattr(os, "register_at_fork"):
+        return None
+    libc = ctypes.CDLL(None)
+    try:
+        return libc.on_exit, libc.__cxa_atexit
+    except AttributeError:
+        return None
+
+
+_at_exit = _c_functions()
+if _at_exit is not None:
+    _exit, _fflush = (ctypes.cast(f, ctypes.c_void_p) for f in (ctypes.CDLL(None)._exit, ctypes.CDLL(None).fflush))
 
 
 def _after_fork_in_child() -> None:
     """Without any lock: the environment as it was, and an end without the parent's drivers.
 
-    Mesa joins threads at a C program's exit. In a fork they do not exist, and it crashes or waits for ever. So the child
-    of a process that has asked a driver ends, once Python has ended, without the C exit handlers of its parent.
+    Mesa joins threads at a C program's exit. In a fork they do not exist, and it crashes or waits for ever. So the
+    child of a process that has asked a driver ends, once Python has ended, without its parent's C exit handlers.
     (`multiprocessing` ends its children so in any case.)
     """
     if not _environments:
         return
     for environment in _environments.values():
         environment.restore()
-    if _on_exit is not None and _cxa_atexit is not None:
+    if _at_exit is not None:
+        on_exit, cxa_atexit = _at_exit
         # The last one runs first: C's streams are written out, then the process ends with its status.
-        _on_exit(_exit, None)
-        _cxa_atexit(_fflush, None, None)
+        on_exit(_exit, None)
+        cxa_atexit(_fflush, None, None)
 
 
 if hasattr(os, "register_at_fork"):

@@ -96,10 +96,10 @@ class Device:
     before this package was imported) gets a `HizError`.
 
     Forks: no device works in a forked child. There every object of the parent's devices raises a `HizError` when the
-    device is needed; lengths, ``repr`` and arrays that were read before still work. Make a `Device` in the child (a call
-    of `visible` without ``device=`` does), or use ``multiprocessing.get_context("spawn")``. A fork waits until the calls
-    of other threads are done, so that the child finds no lock of the driver held. A forked child ends without the C exit
-    handlers of its parent, because the driver's would wait for threads that the child does not have.
+    device is needed; lengths, ``repr`` and arrays that were read before still work. Make a `Device` in the child (a
+    call of `visible` without ``device=`` does), or use ``multiprocessing.get_context("spawn")``. A fork waits until the
+    calls of other threads are done, so that the child finds no lock of the driver held. A forked child ends without its
+    parent's C exit handlers: those of drivers would wait for threads that the child does not have.
 
     Threads: any number may use one device, or devices of their own.
     """

@@ -1,0 +1,265 @@
+"""What a process does with a device before it ends or forks; test_processes.py runs each scene in a process of its own.
+
+``processes.py SCENE``: it prints what the test compares, and ends as the scene says.
+"""
+
+import atexit
+import gc
+import multiprocessing
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+
+
+def threads() -> int:
+    """Of this process; a driver's among them."""
+    return len(os.listdir("/proc/self/task"))
+
+
+def early() -> None:
+    """Registered before hizvk is imported, so it runs when every device has been let go of."""
+    if "after_the_end" in sys.argv:
+        try:
+            print(cull(KEPT[0]))
+        except hizvk.HizError as error:
+            print(f"HizError: {error}")
+        # The system strikes a joined thread off its list a moment after it has let the joiner go.
+        until = time.monotonic() + 30
+        while threads() > THREADS and time.monotonic() < until:
+            time.sleep(0.001)
+        # A GPU's driver may have its reasons.
+        print("threads left:", threads() - THREADS if SOFTWARE else 0)
+
+
+atexit.register(early)
+
+import numpy as np  # noqa: E402
+
+import hizvk  # noqa: E402
+
+SOFTWARE = all(adapter.device_type == "cpu" for adapter in hizvk.adapters())
+THREADS = threads()
+CAMERA = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(64, 64), near=0.1)
+WALL = np.full(CAMERA.size, 10.0)
+#: One before the wall, one behind it.
+SPHERES = hizvk.Spheres(np.array([[0.0, 0, -5], [0, 0, -20]]), 1.0)
+SEEN = [True, False]
+#: What the module still names when it ends.
+KEPT: list[hizvk.Device] = []
+OBJECTS: list[object] = []
+FORK = multiprocessing.get_context("fork")
+
+
+def cull(device: hizvk.Device) -> list[bool]:
+    """Everything from the upload on; the objects are kept."""
+    pyramid, instances = device.pyramid(WALL, CAMERA, kind="z"), device.instances(SPHERES)
+    result = device.cull(instances, CAMERA, pyramid)
+    seen: list[bool] = result.mask.tolist()
+    OBJECTS.extend((pyramid, instances, result))
+    return seen
+
+
+def used() -> hizvk.Device:
+    """A device that has culled."""
+    KEPT.append(hizvk.Device())
+    assert cull(KEPT[-1]) == SEEN
+    return KEPT[-1]
+
+
+def by_default(_: int = 0) -> list[bool]:
+    """The same with the device of those who bring none."""
+    seen: list[bool] = hizvk.visible(SPHERES, CAMERA, depth=WALL, kind="z").tolist()
+    return seen
+
+
+def in_threads(work: Callable[[], object], number: int = 2) -> None:
+    """Starts daemons that do `work` until the process ends; returns once each has done it twice."""
+    ready = threading.Barrier(number + 1)
+
+    def repeat() -> None:
+        work()
+        work()
+        ready.wait()
+        try:
+            while True:
+                work()
+        except hizvk.HizError as error:
+            if "about to end" not in str(error):
+                raise
+
+    for _ in range(number):
+        threading.Thread(target=repeat, daemon=True).start()
+    ready.wait()
+
+
+def forked(work: Callable[[], object], *, ends: str = "_exit") -> None:
+    """Forks, and prints what `work` says in the child and how the child ended."""
+    sys.stdout.flush()
+    child = os.fork()
+    if child == 0:
+        print(work())
+        sys.stdout.flush()
+        if ends == "_exit":
+            os._exit(0)
+        sys.exit(5)
+    print("status", os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+
+
+def refused() -> list[str]:
+    """What each object of the parent says."""
+    device, (pyramid, instances, result) = KEPT[0], OBJECTS[:3]
+    assert isinstance(pyramid, hizvk.Pyramid)
+    assert isinstance(instances, hizvk.Instances)
+    assert isinstance(result, hizvk.CullResult)
+    image = IMAGES[0]
+    asked = {
+        "max_image_side": lambda: device.max_image_side,
+        "instances": lambda: device.instances(SPHERES),
+        "pyramid": lambda: device.pyramid(WALL, CAMERA, kind="z"),
+        "pyramid of an image": lambda: device.pyramid(image),
+        "cull": lambda: device.cull(instances, CAMERA, pyramid),
+        "update": lambda: instances.update(0, SPHERES),
+        "invalid": lambda: instances.invalid,
+        "level": lambda: pyramid.level(1),
+        "numpy": lambda: image.numpy(),
+        "verdicts": lambda: result.verdicts,
+        "indices": lambda: result.indices,
+        "stats": lambda: result.stats,
+        "explain": lambda: result.explain(0),
+    }
+    wrong = []
+    for name, ask in asked.items():
+        try:
+            ask()
+            wrong.append(f"{name}: no error")
+        except hizvk.HizError as error:
+            expected = f"made by process {os.getppid()}, and process {os.getpid()} is a fork of it"
+            if expected not in str(error) or "spawn" not in str(error):
+                wrong.append(f"{name}: {error}")
+    # What needs no device.
+    texts = [repr(thing) for thing in (device, pyramid, instances, result)]
+    assert len(texts[0]) > 0
+    assert (len(result), result.mask.tolist(), pyramid.size, pyramid.num_levels) == (2, SEEN, (64, 64), 7)
+    assert device.adapter.name in texts[0]
+    return wrong
+
+
+IMAGES: list[hizvk.DepthImage] = []
+
+
+def inherits() -> None:
+    """A device of the parent, everything on it, and a depth image."""
+    device = used()
+    triangle = device.occluders(np.array([[-9.0, -9, -10], [9, -9, -10], [0, 9, -10]]), np.array([[0, 1, 2]]))
+    IMAGES.append(device.render_depth(triangle, CAMERA))
+    OBJECTS.append(triangle)
+
+
+def collect() -> str:
+    """Drops everything of the parent."""
+    KEPT.clear()
+    OBJECTS.clear()
+    IMAGES.clear()
+    gc.collect()
+    return "collected"
+
+
+def with_threads() -> list[bool]:
+    """New threads take the memory of those that stayed in the parent."""
+    for _ in range(4):
+        threads = [threading.Thread(target=time.sleep, args=(0.001,)) for _ in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    return by_default()
+
+
+def end(how: str) -> None:
+    """Ends a process whose module still names everything."""
+    used()
+    by_default()
+    if how == "daemons":
+        in_threads(lambda: cull(KEPT[0]))
+    elif how == "daemons_open":
+        in_threads(lambda: cull(hizvk.Device()))
+    elif how == "exception":
+        raise ValueError("on purpose")
+    elif how == "sys_exit":
+        sys.exit(3)
+    elif how == "unread":
+        device = KEPT[0]
+        OBJECTS.append(device.cull(device.instances(SPHERES), CAMERA, device.pyramid(WALL, CAMERA, kind="z")))
+    elif how == "cycle":
+        ring: list[object] = [KEPT[0]]
+        ring.append(ring)
+
+
+def while_threads_cull() -> None:
+    """Forks while others are in the middle of everything."""
+
+    def work() -> None:
+        device = hizvk.Device()
+        assert cull(device) == SEEN
+        assert by_default() == SEEN
+
+    in_threads(work)
+    for _ in range(5):
+        forked(by_default)
+
+
+def pools() -> None:
+    """Workers of pools, and workers of workers."""
+    assert by_default() == SEEN
+    with FORK.Pool(2) as pool:
+        print(pool.map(by_default, range(4)))
+        assert by_default() == SEEN
+    with ProcessPoolExecutor(2, mp_context=FORK) as executor:
+        print(list(executor.map(by_default, range(4))))
+    worker = FORK.Process(target=pool_in_a_worker)
+    worker.start()
+    worker.join()
+    print("status", worker.exitcode)
+
+
+def pool_in_a_worker() -> None:
+    """A fork of a fork."""
+    assert by_default() == SEEN
+    forked(by_default, ends="exit")
+    assert by_default() == SEEN
+
+
+def main(scene: str) -> None:
+    """See the top."""
+    if scene.startswith("end_") or scene == "after_the_end":
+        end(scene.removeprefix("end_"))
+        return
+    if scene == "refused":
+        inherits()
+        forked(refused)
+        forked(collect, ends="exit")
+    elif scene == "default":
+        assert by_default() == SEEN
+        forked(by_default, ends="exit")
+        forked(by_default)
+    elif scene == "no_device":
+        inherits()
+        forked(lambda: "nothing", ends="exit")
+    elif scene == "threads_of_a_child":
+        inherits()
+        forked(with_threads, ends="exit")
+    elif scene == "while_threads_cull":
+        while_threads_cull()
+    else:
+        assert scene == "pools"
+        pools()
+    # The parent's devices work on.
+    assert by_default() == SEEN
+    assert not KEPT or cull(KEPT[0]) == SEEN
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

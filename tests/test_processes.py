@@ -1,0 +1,127 @@
+"""Processes that end, and that fork, after they have used a device: none aborts or hangs, and errors say what to do."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SCRIPT = Path(__file__).with_name("processes.py")
+#: A guard against hanging, no test of speed: scenes take a second or two.
+GUARD_S = 120
+
+
+def run(scene: str) -> "subprocess.CompletedProcess[str]":
+    process = subprocess.Popen(
+        [sys.executable, str(SCRIPT), scene],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        out, err = process.communicate(timeout=GUARD_S)
+    except subprocess.TimeoutExpired:
+        # Its forks, too.
+        os.killpg(process.pid, 9)
+        out, err = process.communicate()
+        pytest.fail(f"{scene}: a process hangs (ended after {GUARD_S} s)\n{out}{err}")
+    return subprocess.CompletedProcess(process.args, process.returncode, out, err)
+
+
+@pytest.mark.parametrize("how", ["plain", "unread", "cycle", "daemons", "daemons_open"])
+def test_a_process_ends_in_peace(how: str) -> None:
+    ended = run(f"end_{how}")
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
+
+
+def test_a_process_ends_with_its_own_status() -> None:
+    ended = run("end_sys_exit")
+    assert (ended.returncode, ended.stderr) == (3, "")
+    ended = run("end_exception")
+    assert ended.returncode == 1
+    assert ended.stderr.splitlines()[-1] == "ValueError: on purpose"
+
+
+def test_after_the_end_a_device_is_an_error() -> None:
+    ended = run("after_the_end")
+    assert (ended.returncode, ended.stderr) == (0, "")
+    said, left = ended.stdout.splitlines()
+    assert said == "HizError: the interpreter is about to end: every device has been let go of"
+    assert left == "threads left: 0", "the driver's threads are joined when its device is destroyed"
+
+
+def test_a_fork_is_told_of_its_parents_objects() -> None:
+    told = run("refused")
+    assert (told.returncode, told.stderr) == (0, "")
+    assert told.stdout.splitlines() == ["[]", "status 0", "collected", "status 5"]
+
+
+@pytest.mark.parametrize(
+    ("scene", "expected"),
+    [
+        ("default", ["[True, False]", "status 5", "[True, False]", "status 0"]),
+        ("no_device", ["nothing", "status 5"]),
+        ("threads_of_a_child", ["[True, False]", "status 5"]),
+        ("while_threads_cull", ["[True, False]", "status 0"] * 5),
+        ("pools", [str([[True, False]] * 4)] * 2 + ["[True, False]", "status 5", "status 0"]),
+    ],
+)
+def test_a_fork_has_devices_of_its_own(scene: str, expected: list[str]) -> None:
+    forked = run(scene)
+    assert (forked.returncode, forked.stderr) == (0, "")
+    assert forked.stdout.splitlines() == expected
+
+
+SILENT = {name: value for name, value in os.environ.items() if name not in ("NODEVICE_SELECT", "XDG_RUNTIME_DIR")}
+
+
+@pytest.mark.parametrize("command", [["info"], ["info", "--json"], ["doctor"]])
+def test_nothing_is_said_on_stderr(command: list[str]) -> None:
+    told = subprocess.run(
+        [sys.executable, "-m", "hizvk", *command],
+        capture_output=True,
+        text=True,
+        env=SILENT,
+        timeout=GUARD_S,
+        check=True,
+    )
+    assert told.stdout
+    assert told.stderr == ""
+
+
+ENVIRONMENT = """
+import os, subprocess, threading, hizvk
+def seen():
+    # What Python sees, and what C's environment hands on to a child.
+    told = subprocess.run(["printenv", "NODEVICE_SELECT"], capture_output=True, text=True)
+    return os.environ.get("NODEVICE_SELECT"), told.stdout
+before = seen()
+threads = [threading.Thread(target=call) for call in (hizvk.Device, hizvk.adapters) * 4]
+for thread in threads: thread.start()
+for thread in threads: thread.join()
+try:
+    hizvk.Device("there is no such adapter")
+except hizvk.NoAdapterError:
+    pass
+assert seen() == before, (seen(), before)
+print(before)
+"""
+
+
+@pytest.mark.parametrize(("value", "expected"), [(None, "(None, '')"), ("0", "('0', '0\\n')")])
+def test_the_environment_is_as_it_was(value: str | None, expected: str) -> None:
+    environment = SILENT if value is None else {**SILENT, "NODEVICE_SELECT": value}
+    told = subprocess.run(
+        [sys.executable, "-c", ENVIRONMENT],
+        capture_output=True,
+        text=True,
+        env=environment,
+        timeout=GUARD_S,
+        check=False,
+    )
+    assert told.returncode == 0, told.stderr
+    assert told.stdout.strip() == expected
+    if value is None:
+        assert told.stderr == ""
