@@ -16,7 +16,10 @@ pub(crate) fn record(
     instances: &Instances,
     visible: &Visible,
     lists: &Lists,
+    idle: bool,
 ) {
+    // As `CullInputs::idle`.
+    let workgroups = |count: u32| if idle { 0 } else { count };
     let (scan, scatter) = (gpu.compact_pipeline("scan"), gpu.compact_pipeline("scatter"));
     for ((piece, output), list) in instances.pieces.iter().zip(&visible.pieces).zip(&lists.pieces) {
         if piece.count() == 0 {
@@ -36,10 +39,10 @@ pub(crate) fn record(
         });
         pass.set_bind_group(0, &bind_group, &[]);
         pass.set_pipeline(&scan);
-        pass.dispatch_workgroups(1, 1, 1);
+        pass.dispatch_workgroups(workgroups(1), 1, 1);
         if list.indices.is_some() {
             pass.set_pipeline(&scatter);
-            pass.dispatch_workgroups(piece.words().div_ceil(SCATTER_WORKGROUP), 1, 1);
+            pass.dispatch_workgroups(workgroups(piece.words().div_ceil(SCATTER_WORKGROUP)), 1, 1);
         }
     }
 }

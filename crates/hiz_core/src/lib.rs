@@ -46,6 +46,7 @@ mod threads;
 mod update;
 mod view;
 mod visible;
+mod watch;
 #[doc(hidden)]
 pub mod words;
 #[doc(hidden)]

@@ -2,10 +2,12 @@
 
 mod explain;
 mod options;
+mod refine;
 mod view_uniform;
 
-pub(crate) use explain::{ExplanationRecord, record_explain};
+pub(crate) use explain::{BEHIND, CLEAR, ExplanationRecord, LEVEL_MASK, Reading, TEXELS_TOLD, record_explain};
 pub use options::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
+pub(crate) use refine::{Refinement, VERDICT_MASK};
 pub(crate) use view_uniform::ViewUniform;
 
 use crate::bounds::BoundsKind;
@@ -28,9 +30,12 @@ pub(crate) struct CullInputs<'a> {
     pub(crate) options: &'a CullOptions,
     /// False: the yardstick, for boxes and the flat cull alone.
     pub(crate) certified: bool,
+    /// All dispatches are of no workgroups: nothing is culled, but a driver that compiles at the first dispatch does it.
+    pub(crate) idle: bool,
 }
 
 /// What the shader knows of camera and pyramid, and the pipeline that asks for it.
+#[derive(Debug)]
 struct Seen {
     built: Built,
     /// All levels in one texture, where that pays.
@@ -127,6 +132,7 @@ pub(crate) fn record(
         None
     };
     let report = report_key(visible, options);
+    let workgroups = |count: u32| if inputs.idle { 0 } else { count };
     record_clears(gpu, encoder, inputs, visible, report)?;
     let mut pass = encoder
         .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.cull.pass"), timestamp_writes: None });
@@ -135,7 +141,9 @@ pub(crate) fn record(
         let groups = group_view.as_ref().filter(|_| is_grouped(piece, options));
         if let Some(group_view) = groups {
             pass.set_bind_group(0, group_view, &[]);
-            record_groups(gpu, &mut pass, key, piece, output);
+            let statistics = report.statistics.then(|| visible.statistics_or_new(gpu));
+            bind_groups(gpu, &mut pass, key, piece, output, statistics);
+            pass.dispatch_workgroups(workgroups(piece.groups().div_ceil(CULL_WORKGROUP)), 1, 1);
             pass.set_bind_group(0, &view, &[]);
         }
         pass.set_bind_group(1, &piece.bindings, &[]);
@@ -145,11 +153,11 @@ pub(crate) fn record(
         } else {
             let pipeline = if inputs.certified { Gpu::cull_pipeline } else { Gpu::yardstick_cull_pipeline };
             pass.set_pipeline(&pipeline(gpu, key, report));
-            pass.dispatch_workgroups(piece.groups().div_ceil(GROUPS_OF_RUN), 1, 1);
+            pass.dispatch_workgroups(workgroups(piece.groups().div_ceil(GROUPS_OF_RUN)), 1, 1);
         }
     }
     if let Some(lists) = visible.lists.as_ref().filter(|_| options.order == Order::Stable) {
-        compact::record(gpu, &mut pass, instances, visible, lists);
+        compact::record(gpu, &mut pass, instances, visible, lists, inputs.idle);
     }
     Ok(())
 }
@@ -207,7 +215,7 @@ const GROUP_DESCENT: u32 = 16;
 const GROUPS_PAY_FROM: u32 = 16_384;
 
 /// The options of a group's test.
-fn group_options(options: &CullOptions) -> CullOptions {
+pub(crate) fn group_options(options: &CullOptions) -> CullOptions {
     CullOptions { descent: options.descent.max(GROUP_DESCENT), ..options.clone() }
 }
 
@@ -225,9 +233,17 @@ pub(crate) fn is_grouped(piece: &Piece, options: &CullOptions) -> bool {
     }
 }
 
-/// The boxes of a piece's groups, and what is left of them.
-fn record_groups(gpu: &Gpu, pass: &mut wgpu::ComputePass<'_>, key: CullKey, piece: &Piece, output: &PieceOutput) {
+/// Binds the boxes of a piece's groups, and what takes what is left of them.
+fn bind_groups(
+    gpu: &Gpu,
+    pass: &mut wgpu::ComputePass<'_>,
+    key: CullKey,
+    piece: &Piece,
+    output: &PieceOutput,
+    statistics: Option<&wgpu::Buffer>,
+) {
     let groups = output.groups_or_new(gpu, piece);
+    let counted = statistics.unwrap_or_else(|| gpu.stand_in(StandIn::Statistics));
     let survivors = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("hiz.cull.groups"),
         layout: &gpu.layouts().survivors,
@@ -235,15 +251,15 @@ fn record_groups(gpu: &Gpu, pass: &mut wgpu::ComputePass<'_>, key: CullKey, piec
             entry(0, groups.survivors.as_entire_binding()),
             entry(1, groups.verdicts.as_entire_binding()),
             entry(2, wgpu::BindingResource::TextureView(&groups.survivor_list)),
+            entry(3, counted.as_entire_binding()),
         ],
     });
-    pass.set_pipeline(&gpu.cull_groups_pipeline(group_key(key)));
+    pass.set_pipeline(&gpu.cull_groups_pipeline(group_key(key), statistics.is_some()));
     pass.set_bind_group(1, &piece.group_bindings, &[]);
     pass.set_bind_group(2, &survivors, &[]);
-    pass.dispatch_workgroups(piece.groups().div_ceil(CULL_WORKGROUP), 1, 1);
 }
 
-/// The members of the groups that are left.
+/// The members of the groups that are left; none where no group was tested.
 fn record_members(
     gpu: &Gpu,
     pass: &mut wgpu::ComputePass<'_>,
