@@ -44,14 +44,16 @@ impl Compaction {
     }
 
     /// Records the compaction of every piece, in order: a later one needs to know what earlier ones left of the capacity.
-    pub(crate) fn record(&self, pass: &mut wgpu::ComputePass<'_>) {
+    /// `idle`: as `CullInputs::idle`.
+    pub(crate) fn record(&self, pass: &mut wgpu::ComputePass<'_>, idle: bool) {
+        let workgroups = |count: u32| if idle { 0 } else { count };
         for (bind_group, scattering) in &self.pieces {
             pass.set_bind_group(0, bind_group, &[]);
             pass.set_pipeline(&self.scan);
-            pass.dispatch_workgroups(1, 1, 1);
-            if let Some(workgroups) = scattering {
+            pass.dispatch_workgroups(workgroups(1), 1, 1);
+            if let Some(count) = scattering {
                 pass.set_pipeline(&self.scatter);
-                pass.dispatch_workgroups(*workgroups, 1, 1);
+                pass.dispatch_workgroups(workgroups(*count), 1, 1);
             }
         }
     }

@@ -136,7 +136,13 @@ impl HizContext {
         bounds: &Bounds<'_>,
         strict: bool,
     ) -> Result<()> {
-        update::record(&self.gpu, encoder, instances, first, bounds, strict)
+        update::record(&self.gpu, encoder, instances, first, bounds, strict, |encoder, range| {
+            // Recording is not running: the verdicts stay to be refined, which a second time changes nothing.
+            let watches = instances.watches();
+            watches.record_refinements(&self.gpu, encoder, instances)?;
+            watches.note(&range);
+            Ok(())
+        })
     }
 
     /// Buffers for what a cull of `instances` finds.
@@ -220,7 +226,8 @@ impl HizContext {
         visible: &Visible,
         options: &CullOptions,
     ) -> Result<()> {
-        cull::record(&self.gpu, encoder, &CullInputs { instances, camera, pyramid, options, certified: true }, visible)
+        let inputs = CullInputs { instances, camera, pyramid, options, certified: true, idle: false };
+        cull::record(&self.gpu, encoder, &inputs, visible)
     }
 }
 

@@ -15,6 +15,7 @@ use crate::layout::{CULL_WORKGROUP, piece_capacity};
 use crate::morton;
 use crate::pyramid::entry;
 use crate::records::{Records, Upload};
+use crate::watch::Watches;
 
 /// In which order instances are stored. The indices that come out are the caller's in either.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -156,6 +157,7 @@ pub struct Instances {
     changing: Mutex<Changing>,
     /// Held by whoever records *and* submits an update, so that both happen in one order.
     pub(crate) submitting: Mutex<()>,
+    watches: Mutex<Watches>,
 }
 
 impl Instances {
@@ -193,7 +195,15 @@ impl Instances {
         }
         let sequence = gpu.filled("hiz.instances.sequence", &[0; 16], wgpu::BufferUsages::STORAGE)?;
         let changing = Mutex::new(Changing { groups, next_update: 0 });
-        let this = Self { context: gpu.id(), kind, pieces, sequence, changing, submitting: Mutex::new(()) };
+        let this = Self {
+            context: gpu.id(),
+            kind,
+            pieces,
+            sequence,
+            changing,
+            submitting: Mutex::default(),
+            watches: Mutex::default(),
+        };
         if options.strict {
             let invalid = this.invalid()?;
             refuse_bad(n, invalid.len(), invalid.first().copied())?;
@@ -246,6 +256,11 @@ impl Instances {
     pub fn host_bytes(&self) -> u64 {
         let groups = self.changing().groups.iter().map(Groups::host_bytes).sum::<u64>();
         self.pieces.iter().map(|p| p.order.host_bytes()).sum::<u64>() + groups
+    }
+
+    /// The culls that were submitted. Held while one is submitted and added, and while an update is submitted and noted.
+    pub(crate) fn watches(&self) -> MutexGuard<'_, Watches> {
+        self.watches.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub(crate) fn changing(&self) -> MutexGuard<'_, Changing> {

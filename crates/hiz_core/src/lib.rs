@@ -48,6 +48,7 @@ mod tolerance;
 mod update;
 mod view;
 mod visible;
+mod watch;
 #[doc(hidden)]
 pub mod words;
 #[doc(hidden)]

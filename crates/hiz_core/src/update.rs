@@ -5,6 +5,8 @@
 //! the device counts those that ran, and where the numbers part the boxes of all groups that are touched from then on become no
 //! volume (their members are always tested one by one).
 
+use std::ops::Range;
+
 use crate::bounds::{Bounds, BoxRecord};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -33,6 +35,7 @@ struct Replacement<'a> {
     target: &'a Records,
 }
 
+/// `before` records what has to read the old bounds; it is told which instances will have new ones, and asked if there are any.
 pub(crate) fn record(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
@@ -40,6 +43,7 @@ pub(crate) fn record(
     first: u32,
     bounds: &Bounds<'_>,
     strict: bool,
+    before: impl FnOnce(&mut wgpu::CommandEncoder, Range<u32>) -> Result<()>,
 ) -> Result<()> {
     gpu.check_context("instances", instances.context)?;
     let n = bounds.len()?;
@@ -65,6 +69,8 @@ pub(crate) fn record(
     if n == 0 {
         return Ok(());
     }
+    let range = first..first + n as u32;
+    before(encoder, range.clone())?;
 
     let begin = gpu.update_pipeline("begin")?;
     let mut changing = instances.changing();
@@ -84,7 +90,6 @@ pub(crate) fn record(
         pass.dispatch_workgroups((replacement.places.len() as u32).div_ceil(WORKGROUP), 1, 1);
         Ok(())
     };
-    let range = first..first + n as u32;
     let result = instances.pieces.iter().enumerate().try_for_each(|(p, piece)| {
         let here = range.start.max(piece.range.start)..range.end.min(piece.range.end);
         if here.is_empty() {

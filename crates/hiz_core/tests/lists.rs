@@ -55,7 +55,8 @@ fn raw_lists(culling: &Culling) -> Vec<Vec<u32>> {
 }
 
 fn words_of(buffer: &wgpu::Buffer) -> Vec<u32> {
-    let (device, queue) = (engine().device(), engine().queue());
+    let engine = engine();
+    let (device, queue) = (engine.device(), engine.queue());
     let staging = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("test.staging"),
         size: buffer.size(),

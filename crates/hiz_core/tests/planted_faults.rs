@@ -391,15 +391,24 @@ fn groups_that_forget_members_or_shrink() {
     }
 }
 
-/// The count takes a group's verdict for its 64 members: with 32 it counts what nobody culled.
+/// Verdicts of the members of hidden groups, told when they are read.
 #[test]
-fn groups_of_32_in_the_count() {
+fn refined_verdicts() {
     let run = |faults: &[(&str, &str)]| {
-        Campaign { seed: 26, rounds: 3, volumes: 12, groups: true, ..Campaign::default() }.run(&faulty(faults)).tested
+        let campaign = Campaign { seed: 26, rounds: 3, volumes: 12, groups: true, ..Campaign::default() };
+        campaign.run(&faulty(faults)).tested.contradictions
     };
-    let (without, with) = (run(&[]), run(&[("group_verdicts[place / GROUP]", "group_verdicts[place / 32u]")]));
-    eprintln!("contradictions: {}, with groups of 32 {}", without.contradictions, with.contradictions);
-    assert!(without.contradictions == 0 && with.contradictions > 0);
+    assert_eq!(run(&[]), 0);
+    for (name, what, by) in [
+        ("groups of 32", "let place = group * GROUP", "let place = group * 32u"),
+        ("half of the members", "place = group * GROUP + k * SHARE", "place = group * GROUP + k / 2u * SHARE"),
+        ("the group's verdict for all", "classify(place).verdict == OUTSIDE", "false"),
+        ("nobody is occluded", "of_group == OCCLUDED && classify(place).verdict == OUTSIDE", "of_group == OCCLUDED"),
+    ] {
+        let contradictions = run(&[(what, by)]);
+        eprintln!("{name}: {contradictions} contradictions");
+        assert!(contradictions > 0, "{name}: {what} -> {by}");
+    }
 }
 
 /// Reduction faults, seen by the pyramid itself.

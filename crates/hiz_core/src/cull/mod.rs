@@ -2,10 +2,12 @@
 
 mod explain;
 mod options;
+mod refine;
 mod view_uniform;
 
-pub(crate) use explain::{ExplanationRecord, record_explain};
+pub(crate) use explain::{BEHIND, CLEAR, ExplanationRecord, LEVEL_MASK, Reading, TEXELS_TOLD, record_explain};
 pub use options::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
+pub(crate) use refine::{Refinement, VERDICT_MASK};
 pub(crate) use view_uniform::ViewUniform;
 
 use crate::bounds::BoundsKind;
@@ -28,6 +30,8 @@ pub(crate) struct CullInputs<'a> {
     pub(crate) options: &'a CullOptions,
     /// False: the yardstick, for boxes and the flat cull alone.
     pub(crate) certified: bool,
+    /// All dispatches are of no workgroups: nothing is culled, but a driver that compiles at the first dispatch does it.
+    pub(crate) idle: bool,
 }
 
 fn check_contexts(gpu: &Gpu, inputs: &CullInputs<'_>) -> Result<()> {
@@ -36,6 +40,7 @@ fn check_contexts(gpu: &Gpu, inputs: &CullInputs<'_>) -> Result<()> {
 }
 
 /// What the shader knows of camera and pyramid, and the pipeline that asks for it.
+#[derive(Debug)]
 struct Seen {
     built: Built,
     /// All levels in one texture, where that pays.
@@ -153,10 +158,11 @@ pub(crate) fn record(
     let view = seen.bind(gpu, pyramid)?;
     let grouped = instances.pieces.iter().any(|piece| is_grouped(piece, options));
     let group_view = if grouped { Some(seen.bind_for_groups(gpu, pyramid)?) } else { None };
+    let statistics = if report.statistics { Some(visible.statistics_or_new(gpu)?) } else { None };
     let grouped = pieces()
         .map(|(piece, output)| {
-            let groups = is_grouped(piece, options).then(|| GroupCull::new(gpu, (key, report), piece, output));
-            groups.transpose()
+            let make = || GroupCull::new(gpu, (key, report), piece, output, statistics);
+            is_grouped(piece, options).then(make).transpose()
         })
         .collect::<Result<Vec<_>>>()?;
     let flat = if grouped.iter().all(Option::is_some) {
@@ -165,6 +171,7 @@ pub(crate) fn record(
         let pipeline = if inputs.certified { Gpu::cull_pipeline } else { Gpu::yardstick_cull_pipeline };
         Some(pipeline(gpu, key, report)?)
     };
+    let workgroups = |count: u32| if inputs.idle { 0 } else { count };
     record_clears(gpu, encoder, inputs, visible, report)?;
     let mut pass = encoder
         .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.cull.pass"), timestamp_writes: None });
@@ -172,7 +179,7 @@ pub(crate) fn record(
     for ((piece, output), groups) in instances.pieces.iter().zip(&outputs).zip(&grouped) {
         if let (Some(groups), Some(group_view)) = (groups, &group_view) {
             pass.set_bind_group(0, group_view, &[]);
-            groups.record(&mut pass, piece);
+            groups.record(&mut pass, piece, workgroups(piece.groups().div_ceil(CULL_WORKGROUP)));
             pass.set_bind_group(0, &view, &[]);
         }
         pass.set_bind_group(1, &piece.bindings, &[]);
@@ -181,11 +188,11 @@ pub(crate) fn record(
             groups.record_members(&mut pass);
         } else if let Some(flat) = &flat {
             pass.set_pipeline(flat);
-            pass.dispatch_workgroups(piece.groups().div_ceil(GROUPS_OF_RUN), 1, 1);
+            pass.dispatch_workgroups(workgroups(piece.groups().div_ceil(GROUPS_OF_RUN)), 1, 1);
         }
     }
     if let Some(compaction) = compaction {
-        compaction.record(&mut pass);
+        compaction.record(&mut pass, inputs.idle);
     }
     Ok(())
 }
@@ -242,6 +249,11 @@ const GROUP_DESCENT: u32 = 16;
 /// (`docs/performance.md`).
 const GROUPS_PAY_FROM: u32 = 16_384;
 
+/// The options of a group's test.
+pub(crate) fn group_options(options: &CullOptions) -> CullOptions {
+    CullOptions { descent: options.descent.max(GROUP_DESCENT), ..options.clone() }
+}
+
 /// The pipeline of a group's test.
 fn group_key(key: CullKey) -> CullKey {
     CullKey { kind: BoundsKind::Box, descent: true, ..key }
@@ -266,8 +278,16 @@ struct GroupCull<'a> {
 }
 
 impl<'a> GroupCull<'a> {
-    fn new(gpu: &Gpu, (key, report): (CullKey, ReportKey), piece: &Piece, output: &'a PieceOutput) -> Result<Self> {
+    /// `statistics`: where levels are counted, if they are.
+    fn new(
+        gpu: &Gpu,
+        (key, report): (CullKey, ReportKey),
+        piece: &Piece,
+        output: &'a PieceOutput,
+        statistics: Option<&wgpu::Buffer>,
+    ) -> Result<Self> {
         let output = output.groups_or_new(gpu, piece)?;
+        let counted = statistics.unwrap_or_else(|| gpu.stand_in(StandIn::Statistics));
         let left = gpu.bind_group(
             "hiz.cull.groups",
             &gpu.layouts().survivors,
@@ -275,6 +295,7 @@ impl<'a> GroupCull<'a> {
                 entry(0, output.survivors.as_entire_binding()),
                 entry(1, output.verdicts.as_entire_binding()),
                 entry(2, wgpu::BindingResource::TextureView(&output.survivor_list)),
+                entry(3, counted.as_entire_binding()),
             ],
         )?;
         let members = gpu.bind_group(
@@ -287,16 +308,17 @@ impl<'a> GroupCull<'a> {
         )?;
         Ok(Self {
             output,
-            boxes: (gpu.cull_groups_pipeline(group_key(key))?, left),
+            boxes: (gpu.cull_groups_pipeline(group_key(key), statistics.is_some())?, left),
             members: (gpu.cull_members_pipeline(key, report)?, members),
         })
     }
 
-    fn record(&self, pass: &mut wgpu::ComputePass<'_>, piece: &Piece) {
+    /// `workgroups`: of the tests of boxes.
+    fn record(&self, pass: &mut wgpu::ComputePass<'_>, piece: &Piece, workgroups: u32) {
         pass.set_pipeline(&self.boxes.0);
         pass.set_bind_group(1, &piece.group_bindings, &[]);
         pass.set_bind_group(2, &self.boxes.1, &[]);
-        pass.dispatch_workgroups(piece.groups().div_ceil(CULL_WORKGROUP), 1, 1);
+        pass.dispatch_workgroups(workgroups, 1, 1);
     }
 
     fn record_members(&self, pass: &mut wgpu::ComputePass<'_>) {

@@ -3,11 +3,13 @@
 mod checked;
 mod layouts;
 
+use std::cell::Cell;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::hash::Hash;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock};
+use std::time::{Duration, Instant};
 
 pub(crate) use checked::checked;
 use layouts::Layouts;
@@ -44,12 +46,13 @@ pub(crate) struct Gpu {
     no_survivors: OnceLock<wgpu::Buffer>,
     reduce: Cache<ReduceKey, wgpu::ComputePipeline>,
     cull: Cache<(CullKey, ReportKey), wgpu::ComputePipeline>,
-    cull_groups: Cache<CullKey, wgpu::ComputePipeline>,
+    cull_groups: Cache<(CullKey, bool), wgpu::ComputePipeline>,
     yardstick_cull: Cache<(CullKey, ReportKey), wgpu::ComputePipeline>,
     cull_members: Cache<(CullKey, ReportKey), wgpu::ComputePipeline>,
+    refine: Cache<CullKey, wgpu::ComputePipeline>,
     explain: Cache<CullKey, wgpu::ComputePipeline>,
     compact: Cache<&'static str, wgpu::ComputePipeline>,
-    count: Cache<bool, wgpu::ComputePipeline>,
+    count: Cache<(), wgpu::ComputePipeline>,
     update: Cache<&'static str, wgpu::ComputePipeline>,
     occluders: Cache<OccluderKey, wgpu::RenderPipeline>,
 }
@@ -89,12 +92,9 @@ pub(crate) enum StandIn {
     Draws,
     /// Counts of levels.
     Statistics,
-    /// Verdicts of groups.
-    GroupVerdicts,
 }
 
-const STAND_INS: [&str; 6] =
-    ["hiz.no_chunk_1", "hiz.no_chunk_2", "hiz.no_list", "hiz.no_draws", "hiz.no_statistics", "hiz.no_group_verdicts"];
+const STAND_INS: [&str; 5] = ["hiz.no_chunk_1", "hiz.no_chunk_2", "hiz.no_list", "hiz.no_draws", "hiz.no_statistics"];
 
 /// As large as the largest structure that is bound so.
 const STAND_IN_BYTES: u64 = 256;
@@ -141,11 +141,44 @@ impl<K: Hash + Eq, P: Clone> Cache<K, P> {
 
     /// The lock is held while a pipeline is made: two threads that want the same one compile it once.
     fn get(&self, key: K, make: impl FnOnce() -> Result<P>) -> Result<P> {
+        let start = Instant::now();
         let mut made = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        Ok(match made.entry(key) {
-            Entry::Occupied(there) => there.get().clone(),
-            Entry::Vacant(free) => free.insert(make()?).clone(),
-        })
+        let (pipeline, count) = match made.entry(key) {
+            Entry::Occupied(there) => (there.get().clone(), 0),
+            Entry::Vacant(free) => (free.insert(make()?).clone(), 1),
+        };
+        drop(made);
+        MADE.with(|all| all.set(all.get().and(count, start.elapsed())));
+        Ok(pipeline)
+    }
+}
+
+/// What a thread has spent on getting pipelines.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct PipelinesMade {
+    /// How many it made.
+    pub(crate) count: u32,
+    /// How long it took to get them, also those that were there.
+    pub(crate) time: Duration,
+}
+
+thread_local! {
+    static MADE: Cell<PipelinesMade> = const { Cell::new(PipelinesMade { count: 0, time: Duration::ZERO }) };
+}
+
+impl PipelinesMade {
+    /// All that this thread has.
+    pub(crate) fn so_far() -> Self {
+        MADE.get()
+    }
+
+    /// Since `earlier`, on the same thread.
+    pub(crate) fn since(self, earlier: Self) -> Self {
+        Self { count: self.count - earlier.count, time: self.time - earlier.time }
+    }
+
+    fn and(self, count: u32, time: Duration) -> Self {
+        Self { count: self.count.wrapping_add(count), time: self.time + time }
     }
 }
 
@@ -187,6 +220,7 @@ impl Gpu {
                 no_survivors: OnceLock::new(),
                 reduce: Cache::new(),
                 cull: Cache::new(),
+                refine: Cache::new(),
                 explain: Cache::new(),
                 compact: Cache::new(),
                 count: Cache::new(),
@@ -304,14 +338,27 @@ impl Gpu {
         })
     }
 
-    pub(crate) fn cull_groups_pipeline(&self, key: CullKey) -> Result<wgpu::ComputePipeline> {
+    pub(crate) fn cull_groups_pipeline(&self, key: CullKey, statistics: bool) -> Result<wgpu::ComputePipeline> {
         let layouts = self.layouts();
-        self.cull_groups.get(key, || {
+        self.cull_groups.get((key, statistics), || {
             self.pipeline(
                 "hiz.cull_groups.pipeline",
                 &shader::cull_groups(key.store),
                 "cull_groups",
                 &[layouts.cull(key.store), &layouts.instances, &layouts.survivors],
+                &[&classify_constants(&key)[..], &[("STATISTICS", flag(statistics))]].concat(),
+            )
+        })
+    }
+
+    pub(crate) fn refine_pipeline(&self, key: CullKey) -> Result<wgpu::ComputePipeline> {
+        let layouts = self.layouts();
+        self.refine.get(key, || {
+            self.pipeline(
+                "hiz.refine.pipeline",
+                &shader::refine(key.store, key.kind),
+                "refine",
+                &[layouts.cull(key.store), &layouts.instances, &layouts.two_storages],
                 &classify_constants(&key),
             )
         })
@@ -330,11 +377,9 @@ impl Gpu {
         })
     }
 
-    pub(crate) fn count_pipeline(&self, grouped: bool) -> Result<wgpu::ComputePipeline> {
-        self.count.get(grouped, || {
-            let constants = [("GROUPED", flag(grouped))];
-            self.pipeline("hiz.count.pipeline", &shader::count(), "count", &[&self.layouts().count], &constants)
-        })
+    pub(crate) fn count_pipeline(&self) -> Result<wgpu::ComputePipeline> {
+        self.count
+            .get((), || self.pipeline("hiz.count.pipeline", &shader::count(), "count", &[&self.layouts().count], &[]))
     }
 
     pub(crate) fn explain_pipeline(&self, key: CullKey) -> Result<wgpu::ComputePipeline> {
@@ -344,7 +389,7 @@ impl Gpu {
                 "hiz.explain.pipeline",
                 &shader::explain(key.store, key.kind),
                 "explain",
-                &[layouts.cull(key.store), &layouts.instances, &layouts.one_storage],
+                &[layouts.cull(key.store), &layouts.instances, &layouts.two_storages],
                 &classify_constants(&key),
             )
         })
