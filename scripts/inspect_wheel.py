@@ -48,7 +48,8 @@ def main(path: str) -> None:
         tags = HeaderParser().parsestr(wheel.read(f"{info}/WHEEL").decode()).get_all("Tag", [])
         metadata = HeaderParser().parsestr(wheel.read(f"{info}/METADATA").decode())
         [module] = [name for name in names if name.endswith(".so")]
-        needed = needed_libraries(wheel.read(module))
+        binary = wheel.read(module)
+        needed = needed_libraries(binary)
 
     for tag in tags:
         python, abi, platform = tag.split("-")
@@ -65,6 +66,8 @@ def main(path: str) -> None:
     assert licences == {"LICENSE-MIT", "LICENSE-APACHE"}, f"licences: got {licences}"
     strangers = {name for name in names if not name.startswith(("hizvk/", info))}
     assert not strangers, f"files outside of the package: {strangers}"
+    # What tests plant faults with, in development builds.
+    assert b"HIZVK_PLANTED_FAULT" not in binary, "the module takes planted faults: expected a release build"
     linked = {name for name in needed if not name.startswith("ld-linux")}
     assert linked <= SYSTEM_LIBRARIES, f"linked libraries: {linked - SYSTEM_LIBRARIES} are not on every system"
     print(f"wheel: {', '.join(tags)}, {len(names)} files")

@@ -1,10 +1,8 @@
-// How many instances met which end: verdicts of members and of whole groups, added up.
+// How many instances met which end: their verdicts, added up.
 
 const LANES: u32 = 64u;
 // Places of one invocation: a vector of four at a time.
 const VECTORS: u32 = 4u;
-
-override GROUPED: bool;
 
 struct Counters {
     outside: atomic<u32>,
@@ -16,8 +14,7 @@ struct Counters {
 @group(0) @binding(0) var<uniform> piece: Piece;
 // The mask, and behind it the verdicts.
 @group(0) @binding(1) var<storage, read> mask: array<vec4<u32>>;
-@group(0) @binding(2) var<storage, read> group_verdicts: array<u32>;
-@group(0) @binding(3) var<storage, read_write> counters: Counters;
+@group(0) @binding(2) var<storage, read_write> counters: Counters;
 
 var<workgroup> sums: array<vec4<u32>, LANES>;
 
@@ -28,11 +25,7 @@ fn count(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation
         let vector = id.x * VECTORS + v;
         let place = 4u * vector;
         if place < piece.count {
-            var four = mask[verdicts_begin(piece.words) / 4u + vector];
-            if GROUPED {
-                let of_group = group_verdicts[place / GROUP];
-                four = select(four, vec4<u32>(of_group), of_group < VISIBLE);
-            }
+            let four = mask[verdicts_begin(piece.words) / 4u + vector];
             let here = vec4<u32>(place) + vec4<u32>(0u, 1u, 2u, 3u) < vec4<u32>(piece.count);
             for (var verdict = 0u; verdict < 4u; verdict += 1u) {
                 let ones = select(vec4<u32>(0u), vec4<u32>(1u), here & (four == vec4<u32>(verdict)));

@@ -26,7 +26,11 @@ fn cull_groups(@builtin(global_invocation_id) id: vec3<u32>) {
     if group >= groups.count {
         return;
     }
-    let verdict = classify(group).verdict;
+    let outcome = classify(group);
+    let verdict = outcome.verdict;
+    if STATISTICS {
+        count_texels(outcome.level, outcome.texels_read);
+    }
     group_verdicts[group] = verdict;
     if verdict >= VISIBLE {
         let slot = atomicAdd(&survivors.count, 1u);

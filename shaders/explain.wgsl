@@ -6,16 +6,64 @@ struct Explanation {
     level: u32,
     farthest_bits: u32,
     pixels: vec4<i32>,
-    texels: vec4<u32>,
-    texel_bits: vec4<u32>,
-    // An estimate of the bounds' least and greatest NDC depth; meaningless where they cross w = 0.
-    depths: vec2<f32>,
-    padding: vec2<f32>,
+    // An estimate of the bounds' least and greatest NDC depth, meaningless where they cross w = 0; then of w.
+    depths: vec4<f32>,
+    // The last one that was read, told or not.
+    last: vec4<u32>,
+    // How many texels were read, and how many of them by the footprint.
+    texels_read: u32,
+    of_footprint: u32,
+    // The farthest depth of those that all of the volume is behind of, and whether there is one.
+    farthest_before: u32,
+    any_before: u32,
 }
 
 // .x: the instance within its piece.
 @group(1) @binding(0) var<uniform> which: vec4<u32>;
 @group(2) @binding(0) var<storage, read_write> explanation: Explanation;
+// What was read, in order: level and flags, x, y, the depth's bits. What has no room is only counted.
+@group(2) @binding(1) var<storage, read_write> readings: array<vec4<u32>>;
+
+// Flags: all of the volume is behind the texel's depth; or its own outline and front there tell that nothing shows.
+const BEHIND: u32 = 0x100u;
+const CLEAR: u32 = 0x200u;
+
+var<private> texels_read: u32 = 0u;
+var<private> last: vec4<u32>;
+var<private> farthest_before: u32;
+var<private> any_before: u32 = 0u;
+
+fn write_down(reading: vec4<u32>) {
+    last = reading;
+    if texels_read < arrayLength(&readings) {
+        readings[texels_read] = reading;
+    }
+    texels_read += 1u;
+}
+
+fn tell_corners(level: u32, t: vec4<u32>, bits: vec4<u32>) {
+    tell_texel(level, t.x, t.y, bits.x, false);
+    if t.z != t.x { tell_texel(level, t.z, t.y, bits.y, false); }
+    if t.w != t.y { tell_texel(level, t.x, t.w, bits.z, false); }
+    if t.z != t.x && t.w != t.y { tell_texel(level, t.z, t.w, bits.w, false); }
+}
+
+fn tell_texel(level: u32, x: u32, y: u32, bits: u32, is_behind: bool) {
+    let depth = sanitized(bits);
+    write_down(vec4<u32>(level | select(0u, BEHIND, is_behind), x, y, depth));
+    if is_behind {
+        farthest_before = select(depth, farthest(depth, farthest_before), any_before != 0u);
+        any_before = 1u;
+    }
+}
+
+// Of the texel that was told last.
+fn tell_clear(is_clear: bool) {
+    if is_clear {
+        texels_read -= 1u;
+        write_down(last | vec4<u32>(CLEAR, 0u, 0u, 0u));
+    }
+}
 
 @compute @workgroup_size(1)
 fn explain() {
@@ -26,14 +74,18 @@ fn explain() {
     explanation.level = outcome.level;
     explanation.farthest_bits = outcome.farthest_bits;
     explanation.pixels = outcome.pixels;
-    explanation.texels = outcome.texels;
-    if outcome.stage >= AT_DEPTH {
+    explanation.last = last;
+    explanation.texels_read = texels_read;
+    explanation.farthest_before = farthest_before;
+    explanation.any_before = any_before;
+    if outcome.stage >= AT_DEPTH && is_reduced {
         let t = outcome.texels;
-        explanation.texel_bits = vec4<u32>(
-            texel(outcome.level, t.x, t.y), texel(outcome.level, t.z, t.y),
-            texel(outcome.level, t.x, t.w), texel(outcome.level, t.z, t.w));
+        let sides = t.zw - t.xy + vec2<u32>(1u);
+        explanation.of_footprint = select(0u, sides.x * sides.y, max(sides.x, sides.y) <= (1u << FOOTPRINT_LOG2));
     }
     let volume = load_volume(which.x);
     let w = value_of(view.w, 0.0, volume);
-    explanation.depths = ratio_interval(value_of(view.z, 0.0, volume), w) + vec2<f32>(view.z_slope);
+    let z = ratio_interval(value_of(view.z, 0.0, volume), w) + vec2<f32>(view.z_slope);
+    let w_reach = support(w.half);
+    explanation.depths = vec4<f32>(z, w.center - w_reach, w.center + w_reach);
 }

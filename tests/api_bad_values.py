@@ -56,6 +56,7 @@ VECTOR: list[Bad] = [
     ("abc", TypeError, "expected (3,) finite numbers, got str 'abc'"),
     (None, TypeError, "got None"),
     ((1, 2), ValueError, "expected (3,) finite numbers, got (2,) float64"),
+    (np.ones((3, 1)), ValueError, "got (3, 1) float64; drop the last axis with [..., 0]"),
     ((1, 2, NAN), ValueError, "nan"),
     ((1, 2, INF), ValueError, "inf"),
     ((1, 2, 3j), TypeError, "got (3,) complex128"),
@@ -97,7 +98,18 @@ NUMBER: list[Bad] = [
     (1j, TypeError, "1j"),
 ]
 POSE: list[Bad] = [
-    (np.eye(3), ValueError, "expected (4, 4) finite numbers, got (3, 3) float64"),
+    (
+        np.eye(3),
+        ValueError,
+        "expected (3, 4) or (4, 4) finite numbers, got (3, 3) float64; pass a rotation and a translation as a pair",
+    ),
+    (np.eye(4)[:, :3], ValueError, "got (4, 3) float64"),
+    ((np.ones(3), np.zeros(3)), ValueError, "expected R of a pair (R, t) to be (3, 3) finite numbers, got (3,)"),
+    ((np.ones((3, 1)), np.zeros((3, 1))), ValueError, "a rotation vector becomes a matrix by cv2.Rodrigues(rvec)[0]"),
+    ((np.eye(3), np.zeros(4)), ValueError, "expected t of a pair (R, t) to be (3, 1) or (1, 3) or (3,) finite"),
+    ((np.eye(3), None), TypeError, "got None"),
+    ((np.zeros((3, 3)), np.zeros(3)), ValueError, "singular"),
+    (SINGULAR[:3], ValueError, "singular"),
     ("pose", TypeError, "got str 'pose'"),
     (np.full((4, 4), NAN), ValueError, "nan"),
     (SINGULAR, ValueError, "singular"),
@@ -119,12 +131,23 @@ MATRIX: list[Bad] = [
 ]
 
 
+PIXEL_CENTER: list[Bad] = [
+    (
+        None,
+        TypeError,
+        '"integer" (the first pixel\'s centre is (0, 0): OpenCV, KITTI, ROS) or "half" (it is (0.5, 0.5)',
+    ),
+    ("center", ValueError, "COLMAP, nerfstudio, gsplat, pyrender, CARLA), got str 'center'"),
+    (0.5, TypeError, "got float 0.5; there is no default"),
+]
+
+
 def array_of(shape: str, *, wrong: tuple[int, ...]) -> list[Bad]:
     """Bad values for a float array of positions."""
     expected = f"expected float {shape}, got"
     return [
         (np.zeros(wrong), ValueError, f"{expected} {wrong} float64"),
-        (np.zeros(wrong, dtype=np.int64), TypeError, f"{expected} {wrong} int64"),
+        (np.zeros(wrong, dtype=np.int64), TypeError, f"{expected} {wrong} int64; convert it with .astype(np.float64)"),
         (np.zeros(wrong, dtype=bool), TypeError, "bool"),
         (np.zeros(wrong, dtype=complex), TypeError, "complex128"),
         (np.zeros(wrong, dtype=object), TypeError, "object"),
@@ -137,18 +160,36 @@ def array_of(shape: str, *, wrong: tuple[int, ...]) -> list[Bad]:
     ]
 
 
+HALF_SIZES: list[Bad] = [
+    (np.ones((3, 3)), ValueError, "expected float (2, 3), got (3, 3) float64"),
+    (np.ones((2, 3), dtype=int), TypeError, "got (2, 3) int64; convert it with .astype(np.float64)"),
+    ((1.0, 2.0), ValueError, "expected float (3,) or one number, got (2,) float64"),
+    ([[1.0, 2.0], [3.0]], ValueError, "no array"),
+    ("large", TypeError, "got str 'large'"),
+    (None, TypeError, "got None"),
+]
 BOUNDS: list[Bad] = [
     (np.zeros((2, 3)), TypeError, "expected Spheres, Boxes or OrientedBoxes, got (2, 3) float64"),
     (None, TypeError, "got None"),
 ]
-CAMERA: list[Bad] = [(None, TypeError, "expected a Camera"), (EYE4, TypeError, "got (4, 4) float64")]
+CAMERA: list[Bad] = [
+    ([camera(), camera()], TypeError, "got a list of 2; pass one a call, in a loop"),
+    (None, TypeError, "expected a Camera"),
+    (EYE4, TypeError, "got (4, 4) float64"),
+]
 IMAGE: list[Bad] = [
+    (np.zeros((6, 8, 1)), ValueError, "[..., 0] is the image without its axis of channels"),
+    (np.zeros((1, 6, 8)), ValueError, "[0] is the image without its leading axis"),
     (np.zeros((8, 6)), ValueError, "expected float (6, 8) (the camera's size), got (8, 6) float64"),
     (np.zeros(48), ValueError, "got (48,) float64"),
     (np.zeros((6, 8), dtype=np.int32), TypeError, "got (6, 8) int32"),
+    (np.zeros((6, 8, 3)), ValueError, "got (6, 8, 3) float64"),
+    (np.zeros((3, 4)), ValueError, "goes with camera.resized("),
     (np.zeros((6, 8), dtype=np.uint8), TypeError, "got (6, 8) uint8"),
     (np.zeros((6, 8), dtype=bool), TypeError, "got (6, 8) bool"),
-    (np.ma.zeros((6, 8)), TypeError, "masked array"),
+    (np.ma.zeros((6, 8), dtype=np.int32), TypeError, "got (6, 8) int32"),
+    (np.ma.zeros((8, 6)), ValueError, "got (8, 6) float64"),
+    (memoryview(np.zeros((6, 8), dtype=np.int32)), TypeError, "got (6, 8) int32"),
     ("image", TypeError, "got str 'image'"),
 ]
 KIND: list[Bad] = [
@@ -162,6 +203,13 @@ SCALE: list[Bad] = [
     (-0.001, ValueError, "got float -0.001"),
     (NAN, ValueError, "got float nan"),
     ("mm", TypeError, "got str 'mm'"),
+]
+INVALID: list[Bad] = [
+    (0, TypeError, "expected None or a collection of the numbers that mean no data, in the array's own units"),
+    ("0", TypeError, "got str '0'"),
+    (("0",), TypeError, "got str '0' in it"),
+    ((True,), TypeError, "got bool True in it"),
+    (np.zeros((2, 2)), TypeError, "(2, 2) float64"),
 ]
 GUARD: list[Bad] = [
     (0.3, ValueError, "expected a multiple of 1/256, got 0.3"),
@@ -207,7 +255,7 @@ TRIANGLES: list[Bad] = [
     ([[0, 1], [2]], ValueError, "no array"),
 ]
 SINGLE_MESH: list[Bad] = [
-    (None, TypeError, "expected a Mesh or a tuple (vertices, triangles), got None"),
+    (None, TypeError, "expected a Mesh, a mesh of trimesh or Open3D or a tuple (vertices, triangles), got None"),
     ((np.zeros((3, 2)), [[0, 1, 2]]), ValueError, "vertices: expected float (V, 3), got (3, 2) float64"),
     ((np.zeros((3, 3)), [[0, 1, 3]]), ValueError, "triangles: expected vertex indices in 0..2, got 3"),
     (hizvk.Mesh(np.zeros((3, 3)), [[0, 1, 2]], EYE4), ValueError, "without transforms, got Mesh(3 vertices"),
@@ -238,7 +286,7 @@ def unsigned(name: str) -> list[Bad]:
 VIEW: BadValues = {
     "eye": VECTOR,
     "target": [*VECTOR, ((0, 0, 0), ValueError, "eye")],
-    "up": [*VECTOR, ((0, 0, 0), ValueError, "expected a direction"), ((0, 0, 5), ValueError, "not parallel")],
+    "up": [*VECTOR, ((0, 0, 0), ValueError, "expected a direction"), ((0, 0, 5), ValueError, "such as (0, 1, 0)")],
     "size": SIZE,
     "near": NEAR,
     "far": FAR,
@@ -250,6 +298,23 @@ FOV: list[Bad] = [
     (0, ValueError, "expected a finite number above 0 and below 180, got int 0"),
     (180, ValueError, "below 180, got int 180"),
     (None, TypeError, "got None"),
+]
+INTRINSICS: list[Bad] = [
+    (EYE4, ValueError, "expected (3, 3) finite numbers, got (4, 4) float64"),
+    (EYE4[:3], ValueError, "got (3, 4) float64; of a projection P = K [I | t] pass P[:, :3]"),
+    (K.T, ValueError, "it looks transposed"),
+    (K * 2, ValueError, "expected [[fx, skew, cx], [0, fy, cy], [0, 0, 1]]"),
+    (-K, ValueError, "got fx=-100 and fy=-100"),
+    (K * NAN, ValueError, "nan"),
+    ("k", TypeError, "got str 'k'"),
+]
+DISTORTION: list[Bad] = [
+    ([0.1, 0, 0, 0], ValueError, "undistort the depth image first, by cv2.initUndistortRectifyMap"),
+    ("none", TypeError, "expected None or an array of zeros, got str 'none'"),
+    ([NAN], ValueError, "undistort"),
+]
+VECTOR_OR_NONE: list[Bad] = [
+    (None, ValueError, "expected the other half of the pose") if bad[0] is None else bad for bad in VECTOR
 ]
 ORTHO_NEAR: list[Bad] = [("near", TypeError, "expected a finite number, got str"), (NAN, ValueError, "got float nan")]
 CLIP: list[Bad] = [*MATRIX, (None, ValueError, "got neither")]
@@ -295,7 +360,60 @@ TABLES: dict[str, Table] = {
         {
             "centers": array_of("(N, 3)", wrong=(3, 100)),
             "half_sizes": array_of("(2, 3)", wrong=(3, 3)),
-            "rotations": array_of("(2, 3, 3)", wrong=(2, 9)),
+            "rotations": [
+                *array_of("(2, 3, 3)", wrong=(2, 9)),
+                (np.zeros(2), ValueError, "got (2,) float64; angles, quaternions and matrices with a translation are"),
+                (np.zeros((2, 4)), ValueError, "OrientedBoxes.from_yaw, .from_quaternions and .from_transforms"),
+            ],
+        },
+    ),
+    "OrientedBoxes.from_yaw": Table(
+        lambda _: (
+            hizvk.OrientedBoxes.from_yaw,
+            {"centers": np.zeros((2, 3)), "half_sizes": np.ones((2, 3)), "yaw_deg": np.zeros(2), "up": (0, 0, 1)},
+        ),
+        {
+            "centers": array_of("(N, 3)", wrong=(3, 100)),
+            "half_sizes": HALF_SIZES,
+            "yaw_deg": [
+                (np.zeros(3), ValueError, "expected float (2,) or one number, got (3,) float64"),
+                ("north", TypeError, "got str 'north'"),
+            ],
+            "up": [*VECTOR, ((0, 0, 0), ValueError, "expected a direction, got (0.0, 0.0, 0.0)")],
+        },
+    ),
+    "OrientedBoxes.from_quaternions": Table(
+        lambda _: (
+            hizvk.OrientedBoxes.from_quaternions,
+            {
+                "centers": np.zeros((2, 3)),
+                "half_sizes": 0.5,
+                "quaternions": [[1, 0, 0, 0], [0.5, 0.5, 0.5, 0.5]],
+                "order": "wxyz",
+            },
+        ),
+        {
+            "centers": array_of("(N, 3)", wrong=(3, 100)),
+            "half_sizes": HALF_SIZES,
+            "quaternions": array_of("(2, 4)", wrong=(4, 4)),
+            "order": [
+                ("zyxw", ValueError, 'expected "wxyz" (nuScenes, COLMAP, Blender, trimesh, MuJoCo) or "xyzw" (SciPy'),
+                (None, TypeError, "got None; there is no default"),
+            ],
+        },
+    ),
+    "OrientedBoxes.from_transforms": Table(
+        lambda _: (
+            hizvk.OrientedBoxes.from_transforms,
+            {"world_from_box": np.stack([EYE4, EYE4]), "half_sizes": [1.0, 2.0, 3.0]},
+        ),
+        {
+            "world_from_box": [
+                *array_of("(N, 4, 4)", wrong=(2, 3, 3)),
+                (np.eye(3), ValueError, "expected float (4, 4), got (3, 3) float64"),
+                (TRANSPOSED_POSE, ValueError, "it looks transposed"),
+            ],
+            "half_sizes": HALF_SIZES,
         },
     ),
     "Camera": Table(lambda _: (hizvk.Camera, {}), {}),
@@ -321,36 +439,84 @@ TABLES: dict[str, Table] = {
         },
     ),
     "Camera.from_opencv": Table(
-        lambda _: (hizvk.Camera.from_opencv, {"k": K, "camera_from_world": EYE4, "size": (48, 64), "near": 0.1}),
+        lambda _: (
+            hizvk.Camera.from_opencv,
+            {"k": K, "pixel_center": "half", "camera_from_world": EYE4, "size": (48, 64), "near": 0.1},
+        ),
         {
-            "k": [
-                (EYE4, ValueError, "expected (3, 3) finite numbers, got (4, 4) float64"),
-                (K.T, ValueError, "it looks transposed"),
-                (K * 2, ValueError, "expected [[fx, skew, cx], [0, fy, cy], [0, 0, 1]]"),
-                (-K, ValueError, "got fx=-100 and fy=-100"),
-                (K * NAN, ValueError, "nan"),
-                ("k", TypeError, "got str 'k'"),
-            ],
-            "camera_from_world": [*POSE, (None, ValueError, "expected exactly one (4, 4) matrix, got neither")],
+            "k": INTRINSICS,
+            "pixel_center": PIXEL_CENTER,
+            "camera_from_world": [*POSE, (None, ValueError, "expected exactly one of them: (4, 4), (3, 4) or a pair")],
             "world_from_camera": POSE,
             "size": SIZE,
             "near": NEAR,
             "far": FAR,
-            "distortion": [
-                ([0.1, 0, 0, 0], ValueError, "undistort the depth image first (cv2.undistort"),
-                ("none", TypeError, "expected None or an array of zeros, got str 'none'"),
-                ([NAN], ValueError, "undistort"),
+            "distortion": DISTORTION,
+            "reversed_z": FLAG,
+        },
+    ),
+    "Camera.from_colmap": Table(
+        lambda _: (
+            hizvk.Camera.from_colmap,
+            {
+                "model": "PINHOLE",
+                "params": [100, 110, 32, 24],
+                "qvec": [1, 0, 0, 0],
+                "tvec": [0, 0, 4],
+                "size": (48, 64),
+                "near": 0.1,
+            },
+        ),
+        {
+            "model": [
+                ("pinhole", ValueError, "expected one of COLMAP's models SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL"),
+                ("OPENCV_FISHEYE", ValueError, "no pinhole with any numbers; run COLMAP's image_undistorter, and pass"),
+                ("THIN_PRISM_FISHEYE", ValueError, "image_undistorter"),
+                (1, TypeError, "got int 1"),
+                (None, TypeError, "got None"),
             ],
+            "params": [
+                ([100, 32, 24], ValueError, "expected fx, fy, cx, cy of PINHOLE, (4,) finite numbers, got (3,)"),
+                ([100, 0, 32, 24], ValueError, "with focal lengths above 0"),
+                ([100, -1, 32, 24], ValueError, "with focal lengths above 0"),
+                ([100, NAN, 32, 24], ValueError, "nan"),
+                ("100", TypeError, "got str '100'"),
+            ],
+            "qvec": [
+                ([0, 0, 0, 0], ValueError, "expected a quaternion (w, x, y, z) of length 1, got [0.0, 0.0, 0.0, 0.0]"),
+                ([1, 1, 0, 0], ValueError, "of length 1.41421"),
+                ([1, 0, 0], ValueError, "expected (4,) finite numbers, got (3,) float64"),
+                ([NAN, 0, 0, 1], ValueError, "nan"),
+                (None, ValueError, "expected the other half of the pose, as images.txt has it; got None"),
+            ],
+            "tvec": VECTOR_OR_NONE,
+            "camera_from_world": POSE,
+            "world_from_camera": POSE,
+            "size": SIZE,
+            "near": NEAR,
+            "far": FAR,
             "reversed_z": FLAG,
         },
     ),
     "Camera.from_opengl": Table(
         lambda _: (hizvk.Camera.from_opengl, {"projection": GL, "camera_from_world": EYE4, "size": (48, 64)}),
         {
-            "projection": [*MATRIX, (GL.T, ValueError, "looks transposed; pass projection.T")],
+            "projection": [
+                *MATRIX,
+                (GL.T, ValueError, "looks transposed; pass projection.T"),
+                (None, ValueError, "projection, k, fov_x_deg, fov_y_deg: expected exactly one of them, got none"),
+            ],
+            "k": INTRINSICS,
+            "pixel_center": PIXEL_CENTER,
+            "fov_x_deg": FOV[:2],
+            "fov_y_deg": FOV[:2],
             "camera_from_world": POSE,
             "world_from_camera": POSE,
             "size": SIZE,
+            "near": NEAR,
+            "far": FAR,
+            "distortion": DISTORTION,
+            "reversed_z": FLAG[::2],
         },
     ),
     "Camera.from_matrices": Table(
@@ -456,6 +622,7 @@ TABLES: dict[str, Table] = {
             "camera": CAMERA,
             "kind": KIND,
             "scale": SCALE,
+            "invalid": INVALID,
             "levels": LEVELS,
         },
     ),
@@ -463,7 +630,17 @@ TABLES: dict[str, Table] = {
         lambda device: (device.cull, cull_arguments(device)),
         {
             "instances": [(spheres(), TypeError, "expected Instances of Device.instances, got Spheres Spheres(1")],
-            "camera": [*CAMERA, (camera((6, 9)), ValueError, "expected the camera of the pyramid")],
+            "camera": [
+                *CAMERA,
+                (
+                    [camera()] * 2,
+                    TypeError,
+                    "each camera culls with the pyramid of its own depth, Device.pyramid), got",
+                ),
+                (camera((6, 9)), ValueError, "expected the camera of the pyramid"),
+                (camera().resized((3, 4)), ValueError, "pass camera.resized((6, 8)), the same view; the promise is"),
+                (camera((6, 9)), ValueError, "depth of one camera says nothing about another one"),
+            ],
             "pyramid": [(np.zeros((6, 8)), TypeError, "expected a Pyramid of Device.pyramid, got (6, 8) float64")],
             "order": [("fast", ValueError, 'expected one of "stable", "any"'), (None, TypeError, "got None")],
             "coverage": COVERAGE,
@@ -504,7 +681,7 @@ TABLES: dict[str, Table] = {
         {
             "bounds": BOUNDS,
             "meshes": [
-                (None, TypeError, "expected a Mesh, or a list of Mesh"),
+                (None, TypeError, "expected a Mesh, a mesh of trimesh or Open3D, or a list of them"),
                 ([], ValueError, "expected one for each of the 1 bounds, got 0"),
                 ([TETRAHEDRON, TETRAHEDRON], ValueError, "expected one for each of the 1 bounds, got 2"),
                 ([(TETRAHEDRON.vertices,)], TypeError, "got tuple"),
@@ -524,6 +701,7 @@ TABLES: dict[str, Table] = {
             ]
         },
     ),
+    "CullResult.hints": Table(lambda device: (device.cull(**cull_arguments(device)).hints, {}), {}),
     "CullResult.explain": Table(
         lambda device: (device.cull(**cull_arguments(device)).explain, {"index": 0}),
         {
@@ -545,6 +723,7 @@ TABLES: dict[str, Table] = {
             "depth": [*IMAGE, (None, TypeError, "got None")],
             "kind": KIND,
             "scale": SCALE,
+            "invalid": INVALID,
             "device": [("lavapipe", TypeError, "expected a Device or None, got str 'lavapipe'")],
             "coverage": COVERAGE,
             "guard_px": GUARD,
@@ -594,6 +773,7 @@ TABLES: dict[str, Table] = {
             ],
             "kind": KIND,
             "scale": SCALE,
+            "invalid": INVALID,
             "device": [("lavapipe", TypeError, "expected a Device or None, got str 'lavapipe'")],
             "coverage": COVERAGE,
             "max_ms": [(0, ValueError, "above 0, got int 0"), ("2", TypeError, "got str '2'")],
@@ -631,6 +811,7 @@ TABLES: dict[str, Table] = {
             "depth": [*IMAGE, (None, TypeError, "got None")],
             "kind": KIND,
             "scale": SCALE,
+            "invalid": INVALID,
             "coverage": COVERAGE,
             "own_depth": [
                 ("volume", ValueError, 'expected one of "nearest", "pixel"'),

@@ -67,16 +67,17 @@ OPENCV_POSE = np.array([[0.0, -1, 0, 0.5], [1, 0, 0, 0.25], [0, 0, 1, 4], [0, 0,
 @pytest.mark.parametrize("skew", [0.0, 3.0])
 @pytest.mark.parametrize("far", [None, 100.0])
 @pytest.mark.parametrize("reversed_z", [True, False])
-def test_opencv_pixels(skew: float, far: float | None, reversed_z: bool) -> None:
+@pytest.mark.parametrize(("pixel_center", "shift"), [("integer", 0.5), ("half", 0.0)])
+def test_opencv_pixels(skew: float, far: float | None, reversed_z: bool, pixel_center: str, shift: float) -> None:
     k = np.array([[120.0, skew, 33.5], [0, 110, 21.25], [0, 0, 1]])
-    given = {"size": (48, 64), "near": 0.5, "far": far, "reversed_z": reversed_z}
+    given = {"size": (48, 64), "near": 0.5, "far": far, "reversed_z": reversed_z, "pixel_center": pixel_center}
     forth = hizvk.Camera.from_opencv(k, camera_from_world=OPENCV_POSE, distortion=np.zeros(5), **given)
     back = hizvk.Camera.from_opencv(k, world_from_camera=np.linalg.inv(OPENCV_POSE), **given)
     for world in ((0.0, 0.0, 0.0), (0.3, -0.4, 1.0), (-1.0, 0.7, 20.0)):
         u, v, z = k @ (OPENCV_POSE @ np.array([*world, 1.0]))[:3]
         n, f = 0.5, far
         standard = 1 - n / z if f is None else f / (f - n) * (1 - n / z)
-        expected = (u / z + 0.5, v / z + 0.5, 1 - standard if reversed_z else standard)
+        expected = (u / z + shift, v / z + shift, 1 - standard if reversed_z else standard)
         assert project(forth, world) == pytest.approx(expected)
         assert project(back, world) == pytest.approx(expected)
 
@@ -152,8 +153,15 @@ def all_kinds() -> list[hizvk.Camera]:
         hizvk.Camera.look_at(**look, fov_y_deg=50, reversed_z=False),
         hizvk.Camera.frustum(**look, left=-1, right=0.5, bottom=-1, top=1),
         hizvk.Camera.orthographic(**look, height=10),
-        hizvk.Camera.from_opencv(k, world_from_camera=OPENCV_POSE, size=(30, 40), near=0.1),
-        hizvk.Camera.from_opencv(k, camera_from_world=OPENCV_POSE, size=(30, 40), near=0.1),
+        hizvk.Camera.from_opencv(k, pixel_center="half", world_from_camera=OPENCV_POSE, size=(30, 40), near=0.1),
+        hizvk.Camera.from_opencv(k, pixel_center="half", camera_from_world=OPENCV_POSE, size=(30, 40), near=0.1),
+        hizvk.Camera.from_opencv(k, pixel_center="integer", camera_from_world=OPENCV_POSE, size=(30, 40), near=0.1),
+        hizvk.Camera.from_colmap(
+            "RADIAL", [90, 33, 21, 0, 0], qvec=[0.5, 0.5, 0.5, -0.5], tvec=[1, 2, 3], size=(30, 40), near=0.1, far=9
+        ),
+        hizvk.Camera.from_opengl(k=k, pixel_center="integer", camera_from_world=shifted(1), size=(30, 40), near=0.1),
+        hizvk.Camera.from_opengl(fov_x_deg=70, world_from_camera=shifted(1), size=(30, 40), near=0.1),
+        hizvk.Camera.from_opengl(fov_y_deg=70, world_from_camera=shifted(1), size=(30, 40), near=0.1, reversed_z=False),
         hizvk.Camera.from_opengl(gl, camera_from_world=shifted(1), size=(30, 40)),
         hizvk.Camera.from_matrices(gl, size=(30, 40), reversed_z=False),
         hizvk.Camera.from_matrices(clip_from_camera=gl, camera_from_world=shifted(2), size=(30, 40), reversed_z=False),
@@ -184,6 +192,11 @@ def test_repr_says_how_to_make_it() -> None:
     assert repr(camera.resized((2, 3))) == repr(camera) + ".resized((2, 3))"
     pose = hizvk.Camera.from_opengl(opengl_projection(1, 3, 1, 2), camera_from_world=np.eye(4), size=(4, 6))
     assert repr(pose) == "Camera.from_opengl(projection=<4x4>, camera_from_world=<4x4>, size=(4, 6))"
+    colmap = hizvk.Camera.from_colmap("PINHOLE", [9, 9, 3, 2], qvec=[1, 0, 0, 0], tvec=[0, 0, 1], size=(4, 6), near=0.5)
+    assert repr(colmap) == (
+        "Camera.from_colmap(model='PINHOLE', params=<4>, camera_from_world=<4x4>, size=(4, 6), near=0.5, far=None, "
+        "reversed_z=True)"
+    )
 
 
 def test_resized_keeps_the_view() -> None:

@@ -25,6 +25,7 @@ def test_info(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["info", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["hizvk"] == hizvk.__version__
+    assert told["build"] in ("development", "release")
     assert [hizvk.Adapter(**adapter) for adapter in told["adapters"]] == hizvk.adapters()
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import hizvk
-from api_bad_values import EYE4, GL, MADE_BY_THE_PACKAGE, NAN, TABLES, Bad, camera, spheres
+from api_bad_values import EYE4, GL, MADE_BY_THE_PACKAGE, NAN, TABLES, Bad, K, camera, spheres
 
 
 def cases() -> Iterator[Any]:
@@ -37,6 +37,14 @@ def test_bad_argument(device: hizvk.Device, function: str, parameter: str, bad: 
     # The alternatives of one another: only the bad one comes.
     if parameter == "world_from_camera":
         arguments.pop("camera_from_world", None)
+    if function == "Camera.from_colmap" and parameter in ("camera_from_world", "world_from_camera"):
+        del arguments["qvec"], arguments["tvec"]
+    if function == "Camera.from_opengl" and parameter not in ("projection", "size") and "world" not in parameter:
+        by_k = parameter in ("k", "pixel_center", "distortion")
+        arguments |= {"near": 0.1, **({"k": K, "pixel_center": "half"} if by_k else {"fov_x_deg": 60})}
+        del arguments["projection"]
+        if parameter == "fov_y_deg":
+            del arguments["fov_x_deg"]
     if (
         function == "Camera.from_matrices"
         and parameter != "clip_from_world"
@@ -52,7 +60,8 @@ def test_bad_argument(device: hizvk.Device, function: str, parameter: str, bad: 
         call(**{**arguments, parameter: value})
     assert type(caught.value) is exception
     text = str(caught.value)
-    assert text.startswith((f"{parameter}:", f"{parameter}, ")), text
+    # A pose or a way to see may be missing altogether, and a list's item is told by its number.
+    assert text.startswith((f"{parameter}:", f"{parameter}, ", f"{parameter}[")), text
     assert fragment in text
 
 
@@ -138,7 +147,11 @@ def test_a_rendered_image_has_its_camera_and_kind(device: hizvk.Device) -> None:
 @pytest.mark.parametrize(
     ("meshes", "exception", "fragment"),
     [
-        ([np.zeros((3, 3))], TypeError, "vertices: expected a Mesh or a list of Mesh when triangles is left out"),
+        (
+            [np.zeros((3, 3))],
+            TypeError,
+            "vertices[0]: expected a Mesh, a mesh of trimesh or Open3D, or a list of them when triangles is left out",
+        ),
         ([(np.zeros((3, 2)), [[0, 1, 2]])], ValueError, "vertices[0]: vertices: expected float (V, 3), got (3, 2)"),
         (
             [(np.zeros((3, 3)), [[0, 1, 9]])],

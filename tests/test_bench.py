@@ -463,7 +463,9 @@ def test_recommend_on_a_scene(device: hizvk.Device) -> None:
     assert "over the budget" in str(by_image)
     assert by_image.best is by_image.candidates[0]
     assert {one.configuration.coverage for one in by_image.candidates} == {"sample"}
-    assert {one.configuration.depth for one in by_image.candidates} == {DepthVariant()}
+    assert {dataclasses.replace(one.configuration.depth, levels=None) for one in by_image.candidates} == {
+        DepthVariant()
+    }
 
 
 def test_recommend_refuses_what_does_not_fit(device: hizvk.Device) -> None:
@@ -479,7 +481,7 @@ def test_recommend_refuses_what_does_not_fit(device: hizvk.Device) -> None:
 
     refused(TypeError, "occluders, depths: expected exactly one of them, got neither", spheres, view)
     refused(TypeError, "kind: expected nothing beside occluders, got str 'z'", spheres, view, occluders=wall, kind="z")
-    refused(TypeError, "occluders: expected Occluders, a Mesh or a sequence of Mesh", spheres, view, occluders="wall")
+    refused(TypeError, "occluders: expected Occluders, a Mesh, a mesh of trimesh", spheres, view, occluders="wall")
     refused(ValueError, "bounds: expected Instances of this device", foreign, view, occluders=wall)
     refused(
         ValueError, "occluders: expected Occluders of this device", spheres, view,

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+import documented
 import hizvk
 from hizvk import scenes, truth
 
@@ -214,6 +215,14 @@ def report(name: str, size: tuple[int, int], counts: dict[bool, list[int]], *, p
     assert counts[True][0] == 0
     # Otherwise this test would prove nothing.
     assert counts[False][0] > 0 or not plain_has_to_fail
+    text = documented.page("occluders.md")
+    if not documented.is_of_this_driver(text):
+        return
+    rows = documented.table(text, "scene", "image", "visible")
+    [row] = [row for row in rows if (row["scene"], row["image"]) == (name, f"{size[1]}x{size[0]}")]
+    said = [int(cell) for cell in list(row.values())[2:]]
+    (plain, plain_idle, visible), (wrong, idle, _) = counts[False], counts[True]
+    assert said == [visible, plain, wrong, plain_idle, idle]
 
 
 @pytest.mark.slow
@@ -241,6 +250,10 @@ def test_refinement_keeps_no_more(device: hizvk.Device, judge: Any, size: tuple[
         milliseconds = f", {1000 * seconds / len(cameras):.0f} ms of one core an image" if options else ""
         print(f"{size[1]}x{size[0]} {options or 'plain'}: {count} kept{milliseconds}")
     assert all(finer <= coarser for coarser, finer in itertools.pairwise(kept[1:]))
+    text = documented.page("occluders.md")
+    if documented.is_of_this_driver(text):
+        [row] = [row for row in documented.table(text, "image", "plain") if row["image"] == f"{size[1]}x{size[0]}"]
+        assert [int(cell.split(",")[0]) for cell in list(row.values())[1:]] == kept, row
 
 
 # -- by hand ---------------------------------------------------------------------------------------------------------

@@ -153,7 +153,7 @@ def test_without_the_elevation_model(
         monkeypatch.setattr(cbook, "get_sample_data", missing)
     assert demo.main(["--out", str(tmp_path)]) == 1
     text = capsys.readouterr().err
-    assert "pip install 'hizvk[viz,scene]'" in text
+    assert "pip install matplotlib embreex" in text
     assert ("sample data" in text) == (reason == "no sample data")
 
 

@@ -18,14 +18,19 @@ show in one pixel of the depth image is kept. `reference` holds the slow exact o
 ``conservative=True``; `check_proxy` and `check_bounds` say whether occluders and bounds are what they should be.
 
     >>> import hizvk
+    >>> import numpy as np
+    >>> centers = np.array([[0.0, 2.0, -6.0], [0.0, 2.0, -30.0], [0.0, 2.0, 30.0]])
+    >>> vertices = [[-8.0, 0.0, -12.0], [8.0, 0.0, -12.0], [8.0, 6.0, -12.0], [-8.0, 6.0, -12.0]]
+    >>> triangles = [[0, 1, 2], [0, 2, 3]]
+    >>> camera = hizvk.Camera.look_at((0, 2, 0), (0, 2, -1), fov_y_deg=60, size=(540, 960), near=0.1)
     >>> device = hizvk.Device()
-    >>> camera = hizvk.Camera.look_at(eye, target, fov_y_deg=60, size=(1080, 1920), near=0.1)
-    >>> crowd = device.instances(hizvk.Spheres(centers, radii))
+    >>> crowd = device.instances(hizvk.Spheres(centers, 0.5))
     >>> hiz = device.pyramid(device.render_depth(device.occluders(vertices, triangles), camera))
     >>> seen = device.cull(crowd, camera, hiz)
-    >>> seen.mask, seen.indices, seen.draws
+    >>> seen.mask.tolist(), seen.indices.tolist(), [hizvk.Verdict(code).name for code in seen.verdicts]
+    ([True, False, False], [0], ['VISIBLE', 'OCCLUDED', 'OUTSIDE'])
 
-or in one call ``hizvk.visible(hizvk.Boxes(lo, hi), camera, depth=image, kind="z")``.
+or in one call, with a depth image of one's own, `visible`.
 
 Conventions: matrices are C-order (4, 4) for column vectors, NDC is x right, y up, z in 0..1, sizes are (height, width),
 row 0 of an image is its top, and the first pixel's centre is at (0.5, 0.5). Bad arguments raise `TypeError` or
@@ -40,7 +45,7 @@ from .camera import Camera
 from .comparison import Comparison, compare
 from .containment import BoundsCheck, ProxyCheck, check_bounds, check_proxy
 from .device import Adapter, Device, adapters
-from .errors import DeviceLostError, HizError, LimitError, NoAdapterError, OutOfMemoryError
+from .errors import DeviceLostError, HizError, HizWarning, LimitError, NoAdapterError, OutOfMemoryError
 from .oneline import visible
 from .resources import DepthImage, Instances, Mesh, Occluders, Pyramid
 from .result import DRAW_DTYPE, CullResult, CullStats, DrawTemplate, Explanation, Verdict
@@ -60,6 +65,7 @@ __all__ = [
     "DrawTemplate",
     "Explanation",
     "HizError",
+    "HizWarning",
     "Instances",
     "LimitError",
     "Mesh",

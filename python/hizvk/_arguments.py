@@ -7,12 +7,14 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import math
 import numbers
 import operator
 import os
-from collections.abc import Iterable, Sequence
-from typing import Any, TypeAlias, TypeVar
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +24,7 @@ from .errors import OutOfMemoryError
 FloatArray: TypeAlias = npt.NDArray[np.float32] | npt.NDArray[np.float64]
 Size: TypeAlias = tuple[int, int]
 T = TypeVar("T")
+P = ParamSpec("P")
 
 #: The largest image side of a camera; a device may allow less (`Device.max_image_side`).
 LARGEST_SIDE = 32768
@@ -49,6 +52,29 @@ def _shape_text(shape: Sequence[int | str]) -> str:
     return f"({inner},)" if len(shape) == 1 else f"({inner})"
 
 
+def explained(texts: Mapping[str, str]) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """A decorator that says more than Python does about keywords that are missing or unknown.
+
+    `texts` has what follows ``<name>: `` in the `TypeError`, by name: of a parameter without a
+    default that is left out, or of a word that is no parameter and is passed all the same.
+    """
+
+    def decorate(maker: Callable[P, T]) -> Callable[P, T]:
+        parameters = inspect.signature(maker).parameters
+        needed = [name for name in texts if name in parameters and parameters[name].default is inspect.Parameter.empty]
+        strange = texts.keys() - parameters.keys()
+
+        @functools.wraps(maker)
+        def checked(*args: P.args, **kwargs: P.kwargs) -> T:
+            for name in [name for name in needed if name not in kwargs] + sorted(strange & kwargs.keys()):
+                raise TypeError(f"{name}: {texts[name]}")
+            return maker(*args, **kwargs)
+
+        return checked
+
+    return decorate
+
+
 def _wrong_type(name: str, expected: str, value: object) -> TypeError:
     return TypeError(f"{name}: expected {expected}, got {describe(value)}")
 
@@ -60,7 +86,9 @@ def _wrong_value(name: str, expected: str, value: object) -> ValueError:
 def _as_array(name: str, expected: str, value: object) -> npt.NDArray[Any]:
     """`value` as an array of numbers, without a copy where it is one; lists of Python ints become float64."""
     if isinstance(value, np.ma.MaskedArray):
-        raise TypeError(f"{name}: expected {expected}, got a masked array; fill it first, e.g. with .filled(np.nan)")
+        # Only floats have a NaN to fill with.
+        way = ".filled(np.nan)" if value.dtype.kind == "f" else ".astype(np.float64).filled(np.nan)"
+        raise TypeError(f"{name}: expected {expected}, got a masked array; fill it first, e.g. with {way}")
     if isinstance(value, (str, bytes)) or value is None:
         raise _wrong_type(name, expected, value)
     try:
@@ -74,12 +102,29 @@ def _as_array(name: str, expected: str, value: object) -> npt.NDArray[Any]:
     return array
 
 
-def _check_shape(name: str, expected: str, array: npt.NDArray[Any], shape: Sequence[int | str]) -> None:
-    fits = array.ndim == len(shape) and all(
-        isinstance(wanted, str) or wanted == side for wanted, side in zip(shape, array.shape, strict=True)
+def _fits(shape: Sequence[int | str], sides: Sequence[int]) -> bool:
+    """Whether an array of these sides has this shape (letters are free sides)."""
+    return len(sides) == len(shape) and all(
+        isinstance(wanted, str) or wanted == side for wanted, side in zip(shape, sides, strict=True)
     )
-    if not fits:
-        raise ValueError(f"{name}: expected {expected}, got {_shape_text(array.shape)} {array.dtype}")
+
+
+def shape_hint(shape: Sequence[int | str], sides: Sequence[int]) -> str:
+    """The index that makes the shape right, if there is one."""
+    if sides and sides[-1] == 1 and _fits(shape, sides[:-1]):
+        return "; drop the last axis with [..., 0]"
+    if sides and sides[0] == 1 and _fits(shape, sides[1:]):
+        return "; drop the first axis with [0]"
+    # Two free or two fixed sides (an image) may be in the wrong order elsewhere.
+    if len(sides) == 2 and len({type(side) for side in shape}) == 2 and _fits(shape, sides[::-1]):
+        return "; it looks transposed, pass .T"
+    return ""
+
+
+def _check_shape(name: str, expected: str, array: npt.NDArray[Any], shape: Sequence[int | str], hint: str = "") -> None:
+    if not _fits(shape, array.shape):
+        hint = shape_hint(shape, array.shape) or hint
+        raise ValueError(f"{name}: expected {expected}, got {_shape_text(array.shape)} {array.dtype}{hint}")
 
 
 def _host_memory() -> int:
@@ -109,14 +154,18 @@ def _ready(name: str, array: npt.NDArray[Any]) -> FloatArray:
     return copied(name, array, np.float64 if array.dtype.itemsize == 8 else np.float32)  # float16 widens exactly
 
 
-def floats(name: str, value: object, shape: Sequence[int | str], *, why: str = "") -> FloatArray:
-    """A float array of this shape (letters are free sides), converted only where it has to be."""
+def floats(name: str, value: object, shape: Sequence[int | str], *, why: str = "", hint: str = "") -> FloatArray:
+    """A float array of this shape (letters are free sides), converted only where it has to be.
+
+    `why` follows the expected shape, and `hint` an error of the shape that has no plainer way out.
+    """
     expected = f"float {_shape_text(shape)}{why}"
     array = _as_array(name, expected, value)
     if array.dtype.kind != "f" or array.dtype.itemsize not in (2, 4, 8):
         got = describe(array if array.ndim else value)
-        raise TypeError(f"{name}: expected {expected}, got {got}")
-    _check_shape(name, expected, array, shape)
+        way = "; convert it with .astype(np.float64)" if array.dtype.kind in "iu" and array.ndim else ""
+        raise TypeError(f"{name}: expected {expected}, got {got}{way}")
+    _check_shape(name, expected, array, shape, hint)
     return _ready(name, array)
 
 
@@ -148,13 +197,19 @@ def finite_floats(name: str, value: object, shape: Sequence[int | str]) -> Float
     return array
 
 
-def numbers_of_shape(name: str, value: object, shape: Sequence[int]) -> npt.NDArray[np.float64]:
-    """A small float64 array of finite numbers (a vector or matrix of a camera); integers are welcome here."""
-    expected = f"{_shape_text(shape)} finite numbers"
+def numbers_of_shape(
+    name: str, value: object, *shapes: Sequence[int], of: str = "", hint: str = ""
+) -> npt.NDArray[np.float64]:
+    """A small float64 array of finite numbers (a vector or matrix of a camera); integers are welcome here.
+
+    Any of `shapes` will do. `of` comes before them in an error, and `hint` after what came.
+    """
+    expected = f"{of}{' or '.join(map(_shape_text, shapes))} finite numbers"
     array = _as_array(name, expected, value)
     if array.dtype.kind not in "fiu" or array.dtype.itemsize > 8:
         raise TypeError(f"{name}: expected {expected}, got {describe(array if array.ndim else value)}")
-    _check_shape(name, expected, array, shape)
+    if array.shape not in shapes:
+        _check_shape(name, expected, array, shapes[-1], hint)
     result: npt.NDArray[np.float64] = np.array(array, dtype=np.float64, order="C")
     if not np.isfinite(result).all():
         raise ValueError(f"{name}: expected {expected}, got {' '.join(str(result.tolist()).split())}")
@@ -175,10 +230,30 @@ def matrix(name: str, value: object) -> npt.NDArray[np.float64]:
 
 
 def pose(name: str, value: object) -> npt.NDArray[np.float64]:
-    """An invertible ``(4, 4)`` matrix that maps points to points: its last row is 0, 0, 0, 1."""
-    result = matrix(name, value)
+    """An invertible ``(4, 4)`` matrix that maps points to points: its last row is 0, 0, 0, 1.
+
+    It comes as such, as ``(3, 4)`` without that row, or as a pair ``(R, t)``.
+    """
+    result = np.eye(4)
+    if isinstance(value, (tuple, list)) and len(value) == 2:
+        result[:3, :3], result[:3, 3] = _rotation_and_translation(name, *value)
+    else:
+        hint = "; pass a rotation and a translation as a pair, (R, t)"
+        given = numbers_of_shape(name, value, (3, 4), (4, 4), hint=hint)
+        result[: len(given)] = given
+    _refuse_singular(name, "an invertible matrix", result)
     check_affine(name, result)
     return result
+
+
+def _rotation_and_translation(
+    name: str, rotation: object, translation: object
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    hint = "; a rotation vector becomes a matrix by cv2.Rodrigues(rvec)[0]"
+    linear = numbers_of_shape(name, rotation, (3, 3), of="R of a pair (R, t) to be ", hint=hint)
+    # OpenCV's translations are columns.
+    moved = numbers_of_shape(name, translation, (3, 1), (1, 3), (3,), of="t of a pair (R, t) to be ")
+    return linear, moved.reshape(3)
 
 
 def check_affine(name: str, matrices: npt.NDArray[Any]) -> None:
@@ -290,6 +365,9 @@ def choice(name: str, value: object, choices: Iterable[str]) -> str:
 
 def instance(name: str, value: object, wanted: type[T], expected: str) -> T:
     """An object of this class."""
+    if isinstance(value, (list, tuple)) and value and all(isinstance(one, wanted) for one in value):
+        got = f"{type(value).__name__} of {len(value)}"
+        raise TypeError(f"{name}: expected {expected}, got a {got}; pass one a call, in a loop")
     if not isinstance(value, wanted):
         raise _wrong_type(name, expected, value)
     return value

@@ -9,16 +9,41 @@ or `Device.instances(..., strict=True)` refuses them.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
-from . import _arguments
+import numpy as np
+
+from . import _arguments, _rotations
 
 if TYPE_CHECKING:
+    from typing import Self
+
     import numpy.typing as npt
 
     from ._arguments import FloatArray
 
 __all__ = ["Boxes", "OrientedBoxes", "Spheres"]
+
+
+# A union of words: stubtest takes Literal["a", "b"] for something else at run time.
+QuaternionOrder: TypeAlias = Literal["wxyz"] | Literal["xyzw"]
+
+_ORDERS = (
+    '"wxyz" (nuScenes, COLMAP, Blender, trimesh, MuJoCo) or "xyzw" (SciPy, ROS, glTF, PyBullet, '
+    "pycolmap's rotation.quat)"
+)
+_NO_DEFAULT = "there is no default, for a wrong guess hides things"
+#: What `_arguments.explained` says about keywords of the constructors of boxes.
+_KEYWORDS: Final = {
+    "order": f"expected {_ORDERS}, got nothing; {_NO_DEFAULT}",
+    "up": "expected the axis of the turn, (0, 0, 1) where z is up (nuScenes, CARLA, Waymo) or (0, 1, 0) (KITTI's "
+    f"rotation_y in camera coordinates, worlds whose y is up), got nothing; {_NO_DEFAULT}",
+    "yaw": "expected yaw_deg, in degrees: np.degrees(yaw)",
+}
+_OTHER_ROTATIONS = (
+    "; angles, quaternions and matrices with a translation are taken by OrientedBoxes.from_yaw, .from_quaternions and "
+    ".from_transforms"
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -97,6 +122,11 @@ class Boxes:
 class OrientedBoxes:
     """Boxes with axes of their own.
 
+    `from_yaw`, `from_quaternions` and `from_transforms` make them from what data sets hold instead
+    of `rotations`. The matrices that they form in float64 *are* the boxes' rotations from then on:
+    what a cull promises, it promises about the boxes with those matrices. They are off an exact
+    turn by some 1e-16, as far as a half size of 1 km by 1e-13 m.
+
     Parameters
     ----------
     centers : (N, 3) float array
@@ -124,13 +154,148 @@ class OrientedBoxes:
         count = len(centers)
         object.__setattr__(self, "centers", centers)
         object.__setattr__(self, "half_sizes", _arguments.floats("half_sizes", half_sizes, (count, 3)))
-        object.__setattr__(self, "rotations", _arguments.floats("rotations", rotations, (count, 3, 3)))
+        checked = _arguments.floats("rotations", rotations, (count, 3, 3), hint=_OTHER_ROTATIONS)
+        object.__setattr__(self, "rotations", checked)
+
+    @classmethod
+    @_arguments.explained(_KEYWORDS)
+    def from_yaw(
+        cls, centers: npt.ArrayLike, half_sizes: npt.ArrayLike, yaw_deg: npt.ArrayLike, *, up: npt.ArrayLike
+    ) -> Self:
+        """Boxes that are turned about one axis, as in most driving data.
+
+        Parameters
+        ----------
+        centers : (N, 3) float array
+            World positions of the boxes' centres. (KITTI's labels hold the middle of the lower
+            face.)
+        half_sizes : (N, 3) or (3,) float array, or one number
+            Half the side along each of the box's own axes, which are the world's at an angle of 0.
+        yaw_deg : (N,) float array or one number
+            Degrees (``np.degrees`` of a data set's radians) by which the boxes turn about `up`, by
+            the right-hand rule: for ``up=(0, 0, 1)`` from x towards y, as CARLA has it in its
+            left-handed coordinates, too. Whole quarter turns are exact.
+        up : three numbers
+            The axis, of any length: ``(0, 0, 1)`` where z is up. There is no default.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+
+        Examples
+        --------
+        >>> import numpy as np, hizvk
+        >>> hizvk.OrientedBoxes.from_yaw(np.zeros((2, 3)), [2.0, 1.0, 0.8], [0.0, 30.0], up=(0, 0, 1))
+        OrientedBoxes(2 of float64)
+        """
+        centers = _arguments.floats("centers", centers, ("N", 3))
+        half_sizes = _for_each("half_sizes", half_sizes, len(centers))
+        angles = _arguments.floats_or_scalar("yaw_deg", yaw_deg, len(centers))
+        axis = _arguments.vector("up", up)
+        if not any(axis):
+            raise ValueError(f"up: expected a direction, got {axis}")
+        return cls(centers, half_sizes, _rotations.about(axis, angles))
+
+    @classmethod
+    @_arguments.explained(_KEYWORDS)
+    def from_quaternions(
+        cls,
+        centers: npt.ArrayLike,
+        half_sizes: npt.ArrayLike,
+        quaternions: npt.ArrayLike,
+        *,
+        order: QuaternionOrder,
+    ) -> Self:
+        """Boxes that are turned by quaternions (Hamilton's: ``i j = k``).
+
+        Parameters
+        ----------
+        centers : (N, 3) float array
+            World positions.
+        half_sizes : (N, 3) or (3,) float array, or one number
+            Half the side along each of the box's own axes.
+        quaternions : (N, 4) float array
+            The turn from the box's axes to the world's; of any length but 0, for they are
+            normalised. One of length 0, or not finite, makes a box that is no volume: a cull keeps
+            it and counts it as invalid.
+        order : {"wxyz", "xyzw"}
+            Where the scalar part is. There is no default.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+        """
+        if not isinstance(order, str):
+            raise TypeError(f"order: expected {_ORDERS}, got {_arguments.describe(order)}; {_NO_DEFAULT}")
+        if order not in ("wxyz", "xyzw"):
+            raise ValueError(f"order: expected {_ORDERS}, got {_arguments.describe(order)}")
+        centers = _arguments.floats("centers", centers, ("N", 3))
+        half_sizes = _for_each("half_sizes", half_sizes, len(centers))
+        columns = _arguments.floats("quaternions", quaternions, (len(centers), 4)).T
+        w, x, y, z = columns if order == "wxyz" else (columns[3], columns[0], columns[1], columns[2])
+        return cls(centers, half_sizes, _rotations.from_quaternions(w, x, y, z))
+
+    @classmethod
+    def from_transforms(cls, world_from_box: npt.ArrayLike, half_sizes: npt.ArrayLike = 0.5) -> Self:
+        """Boxes that are placed by matrices: cubes of a scene graph, poses of a tracker.
+
+        Parameters
+        ----------
+        world_from_box : (N, 4, 4) or (N, 3, 4) float array; or one matrix without the N
+            ``world = M @ [x, y, z, 1]`` for column vectors, with any turn, scale, shear or mirroring;
+            the last row of a ``(4, 4)`` is 0, 0, 0, 1. A matrix that is not finite makes a box that
+            is no volume: a cull keeps it and counts it as invalid.
+        half_sizes : (N, 3) or (3,) float array, or one number
+            Half the side along each of the box's own axes, before the matrix. The default is the
+            cube from -0.5 to 0.5.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+
+        Examples
+        --------
+        >>> import numpy as np, hizvk
+        >>> hizvk.OrientedBoxes.from_transforms(np.eye(4))
+        OrientedBoxes(1 of float64)
+        """
+        name = "world_from_box"
+        sides = _sides(world_from_box) or ()
+        rows = 3 if sides[-2:] == (3, 4) else 4
+        free: tuple[int | str, ...] = () if len(sides) == 2 else ("N",)
+        matrices = _arguments.floats(name, world_from_box, (*free, rows, 4)).reshape(-1, rows, 4)
+        centers = matrices[:, :3, 3]
+        if rows == 4:
+            known = np.asarray(np.isfinite(matrices[:, 3]).all(axis=1))
+            _arguments.check_affine(name, matrices[known])
+            centers = np.where(known[:, None], centers, np.nan)
+        return cls(centers, _for_each("half_sizes", half_sizes, len(matrices)), matrices[:, :3, :3])
 
     def __len__(self) -> int:
         return len(self.centers)
 
     def __repr__(self) -> str:
         return f"OrientedBoxes({len(self)} of {self.centers.dtype})"
+
+
+def _sides(value: Any) -> tuple[int, ...] | None:
+    """The shape of anything that has one; None for a ragged list, which `_arguments` refuses by name."""
+    try:
+        return tuple(np.shape(value))
+    except ValueError:
+        return None
+
+
+def _for_each(name: str, value: npt.ArrayLike, count: int) -> FloatArray:
+    """``(count, 3)``, also from one row or one number for all."""
+    sides = _sides(value)
+    if sides is None or len(sides) > 1:
+        return _arguments.floats(name, value, (count, 3))
+    row = np.asarray(_arguments.floats_or_scalar(name, value, 3), np.float64)
+    return np.broadcast_to(row, (count, 3))
 
 
 Bounds: TypeAlias = Spheres | Boxes | OrientedBoxes
@@ -147,3 +312,14 @@ def as_arrays(name: str, bounds: object) -> tuple[str, tuple[FloatArray, ...]]:
             return "oriented_boxes", (bounds.centers, bounds.half_sizes, bounds.rotations)
     got = _arguments.describe(bounds)
     raise TypeError(f"{name}: expected Spheres, Boxes or OrientedBoxes, got {got}")
+
+
+def are_points(bounds: Bounds) -> bool:
+    """Whether there are bounds, and all of them have size zero."""
+    with np.errstate(invalid="ignore"):  # signalling NaN
+        match bounds:
+            case Spheres():
+                return len(bounds) > 0 and not np.any(bounds.radii)
+            case Boxes():
+                return len(bounds) > 0 and bool(np.array_equal(bounds.min, bounds.max))
+        return len(bounds) > 0 and not np.any(bounds.half_sizes)

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from ._arguments import Size
+    from ._camera_arguments import PixelCenter
+    from .depth import DepthKind
 
 __all__ = ["Camera"]
 
@@ -34,9 +36,13 @@ class Camera:
     `Camera.frustum`        perspective, off-centre
     `Camera.orthographic`   parallel projection
     `Camera.from_opencv`    an intrinsic matrix K; the camera looks along +z, y down
-    `Camera.from_opengl`    a projection of OpenGL (clip z in -w..w); the camera looks along -z, y up
+    `Camera.from_colmap`    a model of COLMAP's with its parameters, and an image's pose
+    `Camera.from_opengl`    the camera looks along -z, y up; a projection of OpenGL, K or an angle of view
     `Camera.from_matrices`  matrices that already are in this library's conventions
     ======================  ==========================================================================
+
+    ``docs/conventions.md`` has the call for each of a dozen tools. Poses are ``(4, 4)``, ``(3, 4)``
+    or a pair ``(R, t)`` of ``(3, 3)`` and ``(3,)``, for column vectors.
 
     Cameras compare by what they project, can be hashed, copied and pickled, and may be used from any thread.
     """
@@ -48,8 +54,8 @@ class Camera:
 
     def __init__(self) -> None:
         raise TypeError(
-            "Camera() takes no arguments: use Camera.look_at, .frustum, .orthographic, .from_opencv, .from_opengl "
-            "or .from_matrices"
+            "Camera() takes no arguments: use Camera.look_at, .frustum, .orthographic, .from_opencv, .from_colmap, "
+            ".from_opengl or .from_matrices"
         )
 
     @classmethod
@@ -82,7 +88,10 @@ class Camera:
         eye, target : three numbers
             World positions.
         up : three numbers
-            What is up in the image; not parallel to the view direction.
+            The direction that points to the top of the image. The default is +y: in a world whose z
+            is up (Blender, CARLA, ROS, maps) pass ``(0, 0, 1)``, or the image comes out rolled. It
+            must not be parallel to the view direction: to look straight down, pass what shall be
+            at the top, such as the heading, or north.
         fov_y_deg : float
             The full vertical angle of view in degrees, above 0 and below 180.
         size : (height, width)
@@ -208,10 +217,12 @@ class Camera:
         )  # fmt: skip
 
     @classmethod
+    @_arguments.explained(_camera_arguments.KEYWORDS)
     def from_opencv(
         cls,
         k: npt.ArrayLike,
         *,
+        pixel_center: PixelCenter,
         camera_from_world: npt.ArrayLike | None = None,
         world_from_camera: npt.ArrayLike | None = None,
         size: Size,
@@ -220,92 +231,236 @@ class Camera:
         distortion: npt.ArrayLike | None = None,
         reversed_z: bool = True,
     ) -> Self:
-        """A camera as OpenCV, COLMAP and most calibration tools write it: x right, y down, z forward.
+        """A camera with OpenCV's axes: x right, y down, z forward.
 
         Parameters
         ----------
         k : (3, 3)
-            ``[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]`` in pixels. OpenCV counts from the centre of the first pixel;
-            here that centre is at (0.5, 0.5), so ``cx + 0.5`` and ``cy + 0.5`` are used.
-        camera_from_world, world_from_camera : (4, 4)
-            The pose; pass exactly one. ``camera_from_world`` is OpenCV's ``[R | t]`` (of ``solvePnP``) with a last row
-            0, 0, 0, 1; ``world_from_camera`` is its inverse.
+            ``[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]`` in pixels.
+        pixel_center : {"integer", "half"}
+            Where `k` has the centre of the first pixel. There is no default: half a pixel too far
+            hides what can be seen.
+
+            ``"integer"``: at (0, 0), as in OpenCV, ROS, KITTI and Open3D's cameras. Here it is at
+            (0.5, 0.5), so ``cx + 0.5`` and ``cy + 0.5`` are used.
+            ``"half"``: at (0.5, 0.5), as in COLMAP, nerfstudio, gsplat, and wherever ``cx`` is half
+            of the width (CARLA). `cx` and `cy` are used as they are.
+        camera_from_world, world_from_camera : (4, 4), (3, 4) or a pair (R, t)
+            The pose; pass exactly one. ``camera_from_world`` is OpenCV's ``[R | t]``: of
+            ``solvePnP`` pass ``(cv2.Rodrigues(rvec)[0], tvec)``. ``world_from_camera`` is its
+            inverse.
         size : (height, width)
-            Pixels of the image that `k` belongs to.
+            Pixels of the image that `k` belongs to. For a depth image of another resolution, take
+            `resized` of the camera; the view stays.
         near, far, reversed_z
             As in `look_at`; view depth is the camera's z.
         distortion : array, optional
-            Lens distortion coefficients; None or all zero. Others are refused: undistort the image first
-            (``cv2.undistort``) and pass the new camera matrix.
+            Lens distortion coefficients; None or all zero. Others are refused: remap the depth
+            image first (``cv2.initUndistortRectifyMap`` and ``cv2.remap`` with
+            ``cv2.INTER_NEAREST``; ``cv2.undistort`` interpolates, and makes depth that nothing has)
+            and pass the new camera matrix. A fisheye is no pinhole, even with coefficients of 0
+            (``cv2.fisheye``).
 
         Raises
         ------
         TypeError, ValueError
             They name the parameter, what it expects and what came.
+
+        Examples
+        --------
+        >>> import numpy as np, hizvk
+        >>> k = [[500, 0, 320], [0, 500, 240], [0, 0, 1]]
+        >>> hizvk.Camera.from_opencv(
+        ...     k, pixel_center="half", camera_from_world=np.eye(4), size=(480, 640), near=0.1
+        ... ).size
+        (480, 640)
         """
         k = _camera_arguments.intrinsics(k)
+        pixel_center = _camera_arguments.pixel_center(pixel_center)
         name, pose = _camera_arguments.one_pose(camera_from_world, world_from_camera)
         size = _arguments.size("size", size)
         near, far = _camera_arguments.near_far(near, far)
         _camera_arguments.refuse_distortion(distortion)
         reversed_z = _arguments.flag("reversed_z", reversed_z)
-
-        (fx, skew, cx), (_, fy, cy), _ = k.tolist()
-        height, width = size
-        cx, cy = cx + 0.5, cy + 0.5
-        borders = (-cx / fx, (width - cx) / fx, (cy - height) / fy, cy / fy)
-        projection = np.array(_core.frustum_matrix(borders, near, far, reversed_z, size))
-        # From OpenCV's camera (y down) to one with y up, and the skew as a shear: fx (X + skew / fx Y) + cx Z.
-        upright_from_opencv = np.diag([1.0, -1.0, 1.0, 1.0])
-        upright_from_opencv[0, 1] = skew / fx
-        core = _posed(projection @ upright_from_opencv, name, pose, reversed_z, size)
-        return cls._made(core, "from_opencv", k=k, **{name: pose}, size=size, near=near, far=far, reversed_z=reversed_z)
+        core = _posed(_pinhole(k, pixel_center, near, far, reversed_z, size), name, pose, reversed_z, size)
+        return cls._made(
+            core, "from_opencv", k=k, pixel_center=pixel_center, **{name: pose}, size=size, near=near, far=far,
+            reversed_z=reversed_z,
+        )  # fmt: skip
 
     @classmethod
-    def from_opengl(
+    @_arguments.explained(_camera_arguments.POSE_KEYWORDS)
+    def from_colmap(
         cls,
-        projection: npt.ArrayLike,
+        model: str,
+        params: npt.ArrayLike,
         *,
+        qvec: npt.ArrayLike | None = None,
+        tvec: npt.ArrayLike | None = None,
         camera_from_world: npt.ArrayLike | None = None,
         world_from_camera: npt.ArrayLike | None = None,
         size: Size,
+        near: float,
+        far: float | None = None,
+        reversed_z: bool = True,
     ) -> Self:
-        """A camera as OpenGL has it: x right, y up, looking along -z, clip z in -w..w (mapped to 0..w here).
+        """A camera of a COLMAP model (cameras.txt and images.txt, or pycolmap).
 
-        The result has standard depth (``reversed_z=False``), and a depth buffer that was read back in 0..1 is of kind
-        ``"ndc"`` (its rows start at the bottom in OpenGL: turn them, ``depth[::-1]``). A projection that was made for
+        Its axes are OpenCV's (x right, y down, z forward), and the first pixel's centre is at
+        (0.5, 0.5), as it is here.
+
+        Parameters
+        ----------
+        model : str
+            The camera's model, ``"PINHOLE"`` or ``"SIMPLE_PINHOLE"``. Models with distortion
+            (``"SIMPLE_RADIAL"``, ``"OPENCV"``, ...) are taken if all of it is 0; a fisheye never
+            is. The way out is COLMAP's ``image_undistorter``, whose cameras are ``PINHOLE``.
+            pycolmap's ``camera.model`` will do.
+        params : (P,) numbers
+            The model's parameters in COLMAP's order, ``fx, fy, cx, cy`` of ``PINHOLE``.
+        qvec : (4,) numbers, optional
+            The image's rotation from world to camera in the order of images.txt: **w, x, y, z**.
+            (In pycolmap, ``rotation.quat`` is x, y, z, w: pass ``camera_from_world`` there.) The
+            camera denotes the float64 matrix that is formed of it.
+        tvec : (3,) numbers, optional
+            The translation that belongs to it. It is not the camera's position.
+        camera_from_world, world_from_camera : (4, 4), (3, 4) or a pair (R, t), optional
+            The pose instead of `qvec` and `tvec`; pycolmap's is
+            ``camera_from_world=image.cam_from_world().matrix()``.
+        size : (height, width)
+            Pixels of the camera; COLMAP writes the width first. For a depth image of another
+            resolution, take `resized` of the camera.
+        near, far, reversed_z
+            As in `look_at`; view depth is the camera's z.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+
+        Examples
+        --------
+        >>> import hizvk
+        >>> camera = hizvk.Camera.from_colmap(
+        ...     "SIMPLE_PINHOLE", [2559.81, 1536, 1152], qvec=[1, 0, 0, 0], tvec=[0, 0, 4],
+        ...     size=(2304, 3072), near=0.1,
+        ... )
+        """
+        model, params, k = _camera_arguments.colmap_intrinsics(model, params)
+        name, pose = _camera_arguments.colmap_pose(qvec, tvec, camera_from_world, world_from_camera)
+        size = _arguments.size("size", size)
+        near, far = _camera_arguments.near_far(near, far)
+        reversed_z = _arguments.flag("reversed_z", reversed_z)
+        core = _posed(_pinhole(k, "half", near, far, reversed_z, size), name, pose, reversed_z, size)
+        return cls._made(
+            core, "from_colmap", model=model, params=params, **{name: pose}, size=size, near=near, far=far,
+            reversed_z=reversed_z,
+        )  # fmt: skip
+
+    @classmethod
+    @_arguments.explained(_camera_arguments.POSE_KEYWORDS)
+    def from_opengl(
+        cls,
+        projection: npt.ArrayLike | None = None,
+        *,
+        k: npt.ArrayLike | None = None,
+        pixel_center: PixelCenter | None = None,
+        fov_x_deg: float | None = None,
+        fov_y_deg: float | None = None,
+        camera_from_world: npt.ArrayLike | None = None,
+        world_from_camera: npt.ArrayLike | None = None,
+        size: Size,
+        near: float | None = None,
+        far: float | None = None,
+        distortion: npt.ArrayLike | None = None,
+        reversed_z: bool | None = None,
+    ) -> Self:
+        """A camera with OpenGL's axes (and Blender's, nerfstudio's, pyrender's, trimesh's).
+
+        It has x right, y up, and looks along -z. What it sees is one of four: OpenGL's
+        `projection`; or `k`, `fov_x_deg` or `fov_y_deg`, each with `near` and `far`.
+
+        With a `projection` (clip z in -w..w, mapped to 0..w here) the camera has standard depth,
+        and a depth buffer that was read back in 0..1 is of kind ``"ndc"``. Its rows start at the
+        bottom in OpenGL: turn them, ``depth[::-1]``. A projection that was made for
         ``glClipControl(..., GL_ZERO_TO_ONE)`` belongs into `from_matrices`.
 
         Parameters
         ----------
         projection : (4, 4)
-            ``clip_from_camera`` for column vectors. OpenGL's and glm's memory is column by column: transpose it.
-        camera_from_world, world_from_camera : (4, 4)
-            The pose; pass exactly one. ``camera_from_world`` is what OpenGL calls the view matrix.
+            ``clip_from_camera`` for column vectors. OpenGL's and glm's memory is column by column:
+            transpose it.
+        k : (3, 3)
+            ``[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]`` in pixels from the top-left corner, as
+            nerfstudio writes it beside poses of this kind.
+        pixel_center : {"integer", "half"}
+            Needed with `k`, and with nothing else, as in `from_opencv`. nerfstudio, pyrender and
+            trimesh: ``"half"``.
+        fov_x_deg, fov_y_deg : float
+            The full horizontal or vertical angle of view in degrees, above 0 and below 180, of
+            square pixels with the axis in the middle. Blender, NeRF and pyrender have radians: pass
+            ``np.degrees(angle)``.
+        camera_from_world, world_from_camera : (4, 4), (3, 4) or a pair (R, t)
+            The pose; pass exactly one. ``camera_from_world`` is what OpenGL calls the view matrix;
+            ``world_from_camera`` is Blender's ``matrix_world``, nerfstudio's ``transform_matrix``.
         size : (height, width)
-            Pixels of the viewport.
+            Pixels of the viewport. For a depth image of another resolution, take `resized` of the
+            camera.
+        near, far : float
+            As in `look_at`, along -z; `near` is needed without a `projection`, which has its own.
+        distortion : array, optional
+            Lens distortion that belongs to `k`, as in `from_opencv`: None or all zero.
+        reversed_z : bool, optional
+            As in `look_at`; None is True, as in all constructors that take `near`. Metric depth
+            does not care; for a depth buffer of OpenGL's pass False, or the projection. Not beside
+            a `projection`.
 
         Raises
         ------
         TypeError, ValueError
             They name the parameter, what it expects and what came.
         """
-        clip = _arguments.matrix("projection", projection)
-        perspective_memory = clip[2, 3] == -1.0 and clip[3, 2] not in (-1.0, 0.0) and clip[3, 3] == 0.0
-        orthographic_memory = (clip[:, 3] == (0.0, 0.0, 0.0, 1.0)).all() and clip[3, :3].any()
-        if perspective_memory or orthographic_memory:
-            raise ValueError(
-                "projection: expected a matrix for column vectors (clip = M @ [x, y, z, 1]), got one that looks "
-                "transposed; pass projection.T"
-            )
+        way = _camera_arguments.only_one(
+            ("projection", "k", "fov_x_deg", "fov_y_deg"), (projection, k, fov_x_deg, fov_y_deg)
+        )
+        if way != "k":
+            _camera_arguments.only_beside("k", {"pixel_center": pixel_center, "distortion": distortion}, way)
+        if way == "projection":
+            beside = {"near": near, "far": far, "reversed_z": reversed_z}
+            _camera_arguments.nothing_beside("a projection, which has its own", beside)
+            clip = _camera_arguments.opengl_projection(projection)
+            zero_to_one = clip.copy()
+            zero_to_one[2] = 0.5 * clip[2] + 0.5 * clip[3]
+            name, pose = _camera_arguments.one_pose(camera_from_world, world_from_camera)
+            size = _arguments.size("size", size)
+            core = _posed(zero_to_one, name, pose, False, size)
+            return cls._made(core, "from_opengl", projection=clip, **{name: pose}, size=size)
         name, pose = _camera_arguments.one_pose(camera_from_world, world_from_camera)
         size = _arguments.size("size", size)
-        zero_to_one = clip.copy()
-        zero_to_one[2] = 0.5 * clip[2] + 0.5 * clip[3]
-        core = _posed(zero_to_one, name, pose, False, size)
-        return cls._made(core, "from_opengl", projection=clip, **{name: pose}, size=size)
+        near, far = _camera_arguments.near_far(near, far)
+        reversed_z = True if reversed_z is None else _arguments.flag("reversed_z", reversed_z)
+        seen: dict[str, Any]
+        if way == "k":
+            k = _camera_arguments.intrinsics(k)
+            pixel_center = _camera_arguments.pixel_center(pixel_center)
+            _camera_arguments.refuse_distortion(distortion)
+            seen = {"k": k, "pixel_center": pixel_center}
+            projected = _pinhole(k, pixel_center, near, far, reversed_z, size) @ _TURNED
+        else:
+            angle = _arguments.number(way, fov_x_deg if way == "fov_x_deg" else fov_y_deg, above=0.0, below=180.0)
+            seen = {way: angle}
+            tangent, side = math.tan(math.radians(angle) / 2.0), size[1] if way == "fov_x_deg" else size[0]
+            right, top = tangent * size[1] / side, tangent * size[0] / side
+            projected = (
+                np.array(_core.frustum_matrix((-right, right, -top, top), near, far, reversed_z, size)) @ _BACKWARDS
+            )
+        core = _posed(projected, name, pose, reversed_z, size)
+        return cls._made(
+            core, "from_opengl", **seen, **{name: pose}, size=size, near=near, far=far, reversed_z=reversed_z
+        )
 
     @classmethod
+    @_arguments.explained(_camera_arguments.POSE_KEYWORDS)
     def from_matrices(
         cls,
         clip_from_world: npt.ArrayLike | None = None,
@@ -325,8 +480,8 @@ class Camera:
         ----------
         clip_from_world, clip_from_camera : (4, 4)
             Clip space has x right, y up and ``0 <= z <= w``. The camera space between may be any.
-        camera_from_world, world_from_camera : (4, 4)
-            The pose, last row 0, 0, 0, 1.
+        camera_from_world, world_from_camera : (4, 4), (3, 4) or a pair (R, t)
+            The pose; the last row of a ``(4, 4)`` is 0, 0, 0, 1.
         size : (height, width)
             Pixels of the image.
         reversed_z : bool
@@ -368,7 +523,7 @@ class Camera:
         return self._inner.reversed_z()
 
     @property
-    def depth_kind(self) -> str:
+    def depth_kind(self) -> DepthKind:
         """The kind of this camera's depth images: ``"reversed_ndc"`` or ``"ndc"``."""
         return "reversed_ndc" if self.reversed_z else "ndc"
 
@@ -381,6 +536,8 @@ class Camera:
         """The same view in an image of another size ``(height, width)``.
 
         The borders of the view stay where they are: another aspect ratio makes the pixels oblong.
+        So a camera of a 1080 x 1920 image becomes that of its 270 x 480 depth image; a camera
+        matrix K needs no scaling for it.
         """
         size = _arguments.size("size", size)
         return self._made(self._inner.with_size(size), "resized", camera=self, size=size)
@@ -429,6 +586,26 @@ def _again(name: str, arguments: dict[str, Any]) -> Camera:
         return camera.resized(arguments["size"])
     maker: Callable[..., Camera] = getattr(Camera, name)
     return maker(**arguments)
+
+
+#: OpenCV's camera axes of OpenGL's, and axes that look forward with y up of OpenGL's.
+_TURNED = np.diag([1.0, -1.0, -1.0, 1.0])
+_BACKWARDS = np.diag([1.0, 1.0, -1.0, 1.0])
+
+
+def _pinhole(
+    k: npt.NDArray[np.float64], pixel_center: PixelCenter, near: float, far: float | None, reversed_z: bool, size: Size
+) -> npt.NDArray[np.float64]:
+    """``clip_from_camera`` of a camera matrix, for OpenCV's axes."""
+    (fx, skew, cx), (_, fy, cy), _ = k.tolist()
+    height, width = size
+    cx, cy = cx + _camera_arguments.TO_HALF[pixel_center], cy + _camera_arguments.TO_HALF[pixel_center]
+    borders = (-cx / fx, (width - cx) / fx, (cy - height) / fy, cy / fy)
+    # From OpenCV's camera (y down) to one with y up, and the skew as a shear: fx (X + skew / fx Y) + cx Z.
+    upright_from_opencv = np.diag([1.0, -1.0, 1.0, 1.0])
+    upright_from_opencv[0, 1] = skew / fx
+    projection: npt.NDArray[np.float64] = np.array(_core.frustum_matrix(borders, near, far, reversed_z, size))
+    return projection @ upright_from_opencv
 
 
 def _posed(

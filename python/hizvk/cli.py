@@ -18,6 +18,8 @@ import numpy as np
 
 import hizvk
 
+from . import _core
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -63,6 +65,7 @@ def information() -> dict[str, Any]:
     """What `info` prints, as plain data."""
     return {
         "hizvk": hizvk.__version__,
+        "build": _core.__build__,
         "python": platform.python_version(),
         "numpy": np.__version__,
         "platform": platform.platform(),
@@ -76,7 +79,7 @@ def _info(as_json: bool) -> int:
     if as_json:
         print(json.dumps(told, indent=2))
         return 0
-    for name in ("hizvk", "python", "numpy", "platform"):
+    for name in ("hizvk", "build", "python", "numpy", "platform"):
         print(f"{name:9} {told[name]}")
     for name, value in told["environment"].items():
         print(f"{name}={value}")

@@ -89,6 +89,7 @@ def compare(mask: npt.ArrayLike, truth: npt.ArrayLike) -> Comparison:
 
     Examples
     --------
+    >>> import hizvk
     >>> hizvk.compare([True, False, True], [True, True, False])
     <Comparison: 3 instances, 2 kept, 2 visible, 1 hidden, 0 undecided; 1 wrongly culled, 1 wrongly kept (100.0 % of \
 the hidden)>

@@ -7,19 +7,21 @@ is found. They need no device, and are for tools and tests, not for every frame.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from . import _arguments, _core
+from . import _core
 from .bounds import Bounds, as_arrays
-from .resources import Mesh
+from .resources import A_MESH, as_mesh, meshes_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from typing import Any
+
+    from .resources import Mesh, MeshLike
 
 __all__ = ["BoundsCheck", "ProxyCheck", "check_bounds", "check_proxy"]
 
@@ -61,7 +63,7 @@ class BoundsCheck:
         return bool(self.contained.all())
 
 
-def check_proxy(proxy: Mesh | tuple[npt.ArrayLike, ...], mesh: Mesh | tuple[npt.ArrayLike, ...]) -> ProxyCheck:
+def check_proxy(proxy: MeshLike | tuple[npt.ArrayLike, ...], mesh: MeshLike | tuple[npt.ArrayLike, ...]) -> ProxyCheck:
     """Whether an occluder proxy may be rendered in its mesh's stead.
 
     Inside means: every point of every proxy triangle lies in the closed solid of the mesh, which is its surface and all
@@ -76,7 +78,7 @@ def check_proxy(proxy: Mesh | tuple[npt.ArrayLike, ...], mesh: Mesh | tuple[npt.
 
     Parameters
     ----------
-    proxy, mesh : Mesh or tuple
+    proxy, mesh : Mesh, tuple, or a mesh of trimesh or Open3D
         A tuple is ``(vertices, triangles)``. In the same coordinates, without transforms. The mesh is closed and
         consistently oriented: each of its edges runs as often one way as the other, where equal positions count as
         one vertex.
@@ -92,6 +94,7 @@ def check_proxy(proxy: Mesh | tuple[npt.ArrayLike, ...], mesh: Mesh | tuple[npt.
 
     Examples
     --------
+    >>> import hizvk
     >>> from hizvk.scenes import box_mesh
     >>> hizvk.check_proxy(box_mesh([[0.1, 0.1, 0.1]], [[0.9, 0.9, 1.0]]), box_mesh([[0, 0, 0]], [[1, 1, 1]])).inside
     True
@@ -107,7 +110,7 @@ def check_proxy(proxy: Mesh | tuple[npt.ArrayLike, ...], mesh: Mesh | tuple[npt.
     )
 
 
-def check_bounds(bounds: Bounds, meshes: Mesh | Sequence[Mesh | tuple[npt.ArrayLike, ...]]) -> BoundsCheck:
+def check_bounds(bounds: Bounds, meshes: MeshLike | Sequence[MeshLike | tuple[npt.ArrayLike, ...]]) -> BoundsCheck:
     """Whether bounds contain what they bound.
 
     Bounds are convex, so a mesh lies in them if its vertices do. Each vertex is ``world_from_mesh @ (x, y, z, 1)`` in
@@ -117,7 +120,7 @@ def check_bounds(bounds: Bounds, meshes: Mesh | Sequence[Mesh | tuple[npt.ArrayL
     ----------
     bounds : Spheres, Boxes or OrientedBoxes
         The N volumes.
-    meshes : list of Mesh or tuple; or one Mesh
+    meshes : list of Mesh, of tuples, or of meshes of trimesh or Open3D; or one Mesh
         One for each instance in order; a mesh with K transforms stands for K instances in a row. A tuple is
         ``(vertices, triangles)`` or ``(vertices, triangles, transforms)``.
 
@@ -159,26 +162,13 @@ def _pair(mesh: Mesh) -> _Pair:
 
 
 def _unplaced(name: str, value: Any) -> _Pair:
-    expected = "a Mesh or a tuple (vertices, triangles)"
-    mesh = _as_mesh(name, value, expected)
+    expected = f"{A_MESH} or a tuple (vertices, triangles)"
+    mesh = as_mesh(name, value, expected)
     if mesh.transforms is not None:
         raise ValueError(f"{name}: expected {expected} without transforms, got {mesh!r}")
     return _pair(mesh)
 
 
-def _as_mesh(name: str, value: Any, expected: str) -> Mesh:
-    if isinstance(value, tuple) and 2 <= len(value) <= 3:
-        try:
-            return Mesh(*value)
-        except (TypeError, ValueError) as error:
-            raise type(error)(f"{name}: {error}") from None
-    return _arguments.instance(name, value, Mesh, expected)
-
-
 def _all_meshes(value: Any) -> list[Mesh]:
-    expected = "a Mesh, or a list of Mesh or of tuples (vertices, triangles[, transforms])"
-    if isinstance(value, Mesh):
-        return [value]
-    if not isinstance(value, Sequence) or isinstance(value, (str, bytes)):
-        raise TypeError(f"meshes: expected {expected}, got {_arguments.describe(value)}")
-    return [_as_mesh("meshes", one, expected) for one in value]
+    expected = f"{A_MESH}, or a list of them or of tuples (vertices, triangles[, transforms])"
+    return meshes_of("meshes", value, expected)

@@ -19,8 +19,8 @@ import numpy as np
 
 import hizvk
 
+from . import _core, scenes, truth
 from . import report as reports
-from . import scenes, truth
 from .terminal import Progress, count, size
 
 if TYPE_CHECKING:
@@ -232,6 +232,8 @@ def _tell(found: reports.Report, out: Path) -> None:
     tested, kept = found.total("tested"), found.total("kept")
     times = ", ".join(f"{stage} {took:.2f}" for stage, took in found.median_ms().items())
     print(f"adapter  {found.adapter}")
+    if _core.__build__ != "release":
+        print("build    development: what runs on the host is not optimised; `make wheel` makes a release build")
     print(
         f"culled   {tested - kept:,} of {tested:,} ({100.0 * (1.0 - kept / tested):.1f} %) in {len(found.views)} views"
     )

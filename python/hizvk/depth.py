@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, TypeAlias
+import numbers
+from collections.abc import Collection
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from . import _arguments
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
     from ._arguments import FloatArray
     from .camera import Camera
 
-__all__ = ["DEPTH_KINDS", "DepthKind"]
+__all__ = ["DEPTH_KINDS", "DepthArray", "DepthKind"]
 
 # Unions of words: stubtest takes Literal["a", "b"] for something else at run time.
 DepthKind: TypeAlias = Literal["ndc"] | Literal["reversed_ndc"] | Literal["z"] | Literal["distance"]
@@ -22,11 +28,29 @@ DEPTH_KINDS: tuple[DepthKind, ...] = ("ndc", "reversed_ndc", "z", "distance")
 
 _METRIC = ("z", "distance")
 
+#: What sensors and their files write where they saw nothing, by dtype: the ends of what it can hold.
+NO_DATA: dict[str, tuple[float, ...]] = {"uint16": (0.0, 65535.0), "float16": (65504.0,)}
+
+
+class DepthArray(NamedTuple):
+    """A checked depth image."""
+
+    image: FloatArray
+    """float32 or float64, in the camera's shape."""
+    kind: DepthKind
+    """What its numbers are."""
+    scale: float
+    """World units of one step."""
+    invalid: tuple[float, ...]
+    """The numbers that mean "no data", as the array's own dtype holds them."""
+    half: bool
+    """Whether they came as half floats: whoever uploads them counts what those round."""
+
 
 def checked_image(
-    name: str, value: object, camera: Camera, kind: object, scale: object
-) -> tuple[FloatArray, DepthKind, float]:
-    """The image as float32 or float64 in the camera's shape, its kind and scale, or an error that says why not."""
+    name: str, value: object, camera: Camera, kind: object, scale: object, invalid: object = None
+) -> DepthArray:
+    """The image as the engine takes it and what its numbers mean, or an error that says why not."""
     if kind is None:
         words = ", ".join(f'"{word}"' for word in DEPTH_KINDS)
         raise TypeError(f"kind: expected one of {words}, got None; there is no default, a wrong guess hides things")
@@ -42,14 +66,95 @@ def checked_image(
         raise ValueError(
             f'scale: expected 1 for the kind "{kind_}", got {scale_:g}; only "z" and "distance" have units'
         )
-    if isinstance(value, np.ndarray) and value.dtype.kind == "u" and not isinstance(value, np.ma.MaskedArray):
-        if value.dtype.itemsize != 2 or kind_ not in _METRIC:
-            raise TypeError(
-                f'{name}: expected float (height, width), or uint16 for the kinds "z" and "distance", got '
-                f'{_arguments.describe(value)} of kind "{kind_}"'
-            )
-        if value.shape != camera.size:
-            got = _arguments.describe(value)
-            raise ValueError(f"{name}: expected uint16 {camera.size} (the camera's size), got {got}")
-        value = _arguments.copied(name, value, np.float32)  # exact: 16 bits
-    return _arguments.floats(name, value, camera.size, why=" (the camera's size)"), kind_, scale_
+    mask: npt.NDArray[np.bool_] | None = None
+    if isinstance(value, np.ma.MaskedArray):
+        mask = None if value.mask is np.ma.nomask else np.asarray(value.mask)
+        value = value.data
+    elif not isinstance(value, (np.ndarray, list, tuple, str, bytes, type(None))):
+        # An image of another library, or a buffer: its dtype says what its numbers mean, as an array's does.
+        array = np.asarray(value)
+        value = array if array.ndim else value
+    elif isinstance(value, (list, tuple)) and _is_of_16_bits(value):
+        value = np.asarray(value)
+    if isinstance(value, np.ndarray):
+        _refuse_dtype(name, value, kind_)
+        _refuse_shape(name, value, camera)
+    dtype = value.dtype if isinstance(value, np.ndarray) else np.dtype(np.float64)
+    if dtype.kind == "u":
+        value = _arguments.copied(name, value, np.float32)  # type: ignore[arg-type]  # exact: 16 bits
+    image = _arguments.floats(name, value, camera.size, why=" (the camera's size)")
+    if mask is not None and mask.any():
+        # Masked is no data, whatever lies below the mask.
+        image = np.where(mask, image.dtype.type(np.nan), image)
+    return DepthArray(image, kind_, scale_, _no_data(invalid, dtype), dtype == np.float16)
+
+
+def _is_of_16_bits(rows: Sequence[Any]) -> bool:
+    """Whether rows or numbers of a sensor's dtype were listed: they mean what an array of it means."""
+    try:
+        return np.asarray(rows).dtype.name in NO_DATA
+    except ValueError:
+        return False  # ragged; refused elsewhere
+
+
+def _refuse_dtype(name: str, array: npt.NDArray[Any], kind: DepthKind) -> None:
+    """Whole numbers are depth where a sensor writes them: 16 bits without a sign, in steps of `scale`."""
+    metric = kind in _METRIC
+    if array.dtype.kind not in "iub" or (array.dtype.kind == "u" and array.dtype.itemsize == 2 and metric):
+        return
+    hint = ""
+    if metric and array.dtype.kind != "b" and array.dtype.itemsize > 1:
+        hint = (
+            "; whole numbers of a 16-bit image (Pillow's mode I) become what they were by .astype(np.uint16), "
+            "others by .astype(np.float32)"
+        )
+    raise TypeError(
+        f'{name}: expected float (height, width), or uint16 for the kinds "z" and "distance", got '
+        f'{_arguments.describe(array)} of kind "{kind}"{hint}'
+    )
+
+
+def _refuse_shape(name: str, array: npt.NDArray[Any], camera: Camera) -> None:
+    size = camera.size
+    if array.ndim == 0 or array.shape == size:
+        return  # a number that is no image says so elsewhere
+    expected = "uint16" if array.dtype.kind == "u" else "float"
+    hint = ""
+    if array.ndim == 3 and array.shape[2] == 1:
+        hint = f"; {name}[..., 0] is the image without its axis of channels"
+    elif array.ndim == 3 and array.shape[0] == 1:
+        hint = f"; {name}[0] is the image without its leading axis"
+    elif array.ndim == 2 and 0 not in array.shape and max(array.shape) <= _arguments.LARGEST_SIDE:
+        hint = f"; a smaller or larger image of the same view goes with camera.resized({name}.shape)"
+        if array.shape == size[::-1]:
+            hint = f"; it looks transposed, and a turned image needs a turned camera{hint}"
+    got = _arguments.describe(array)
+    raise ValueError(f"{name}: expected {expected} {size} (the camera's size), got {got}{hint}")
+
+
+def _no_data(invalid: object, dtype: np.dtype[Any]) -> tuple[float, ...]:
+    """The caller's values as `dtype` holds them, or its convention."""
+    if invalid is None:
+        return NO_DATA.get(dtype.name, ())
+    expected = "None or a collection of the numbers that mean no data, in the array's own units (before scale)"
+    if isinstance(invalid, np.ndarray) and invalid.ndim == 1 and invalid.dtype.kind in "fiu":
+        invalid = invalid.tolist()
+    if isinstance(invalid, (str, bytes, np.ndarray)) or not isinstance(invalid, Collection):
+        raise TypeError(f"invalid: expected {expected}, got {_arguments.describe(invalid)}")
+    found = []
+    for value in invalid:
+        if isinstance(value, (bool, np.bool_)) or not isinstance(value, numbers.Real):
+            raise TypeError(f"invalid: expected {expected}, got {_arguments.describe(value)} in it")
+        if not np.isfinite(float(value)):
+            continue  # never depth
+        held = float(value)
+        if dtype.kind == "u":
+            if held != int(held) or not 0 <= held <= np.iinfo(dtype).max:
+                raise ValueError(f"invalid: expected {expected}, got {value!r}, which no {dtype} is")
+        else:
+            with np.errstate(over="ignore"):
+                held = float(np.asarray(value, dtype=np.float64).astype(dtype))
+            if not np.isfinite(held):
+                raise ValueError(f"invalid: expected {expected}, got {value!r}, which no {dtype} is")
+        found.append(held)
+    return tuple(found)

@@ -15,11 +15,12 @@ import numpy as np
 
 from . import _arguments, _core
 from ._processes import driver_is_asked
-from .bounds import Bounds, as_arrays
+from .bounds import Bounds, are_points, as_arrays
 from .camera import Camera
 from .depth import checked_image
 from .errors import LimitError
-from .resources import DepthImage, Instances, Mesh, Occluders, Pyramid, as_meshes
+from .hints import Question
+from .resources import DepthImage, Instances, Occluders, Pyramid, as_meshes
 from .result import CullResult, DrawTemplate
 
 if TYPE_CHECKING:
@@ -28,7 +29,8 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from ._arguments import Size
-    from .depth import DepthKind
+    from .depth import DepthArray, DepthKind
+    from .resources import MeshLike
 
 __all__ = ["Adapter", "Device", "adapters"]
 
@@ -153,7 +155,8 @@ class Device:
         kind, arrays = as_arrays("bounds", bounds)
         strict = _arguments.flag("strict", strict)
         stored_order = _arguments.choice("order", order, ("morton", "given"))
-        return Instances(self, self._engine.instances(kind, arrays, strict, stored_order, None))
+        uploaded = self._engine.instances(kind, arrays, strict, stored_order, None)
+        return Instances(self, uploaded, points=are_points(bounds))
 
     @overload
     def occluders(
@@ -168,9 +171,10 @@ class Device:
     @overload
     def occluders(
         self,
-        vertices: Mesh | Sequence[Mesh | tuple[npt.ArrayLike, ...]],
+        vertices: MeshLike | Sequence[MeshLike | tuple[npt.ArrayLike, ...]],
         triangles: None = None,
         *,
+        transforms: npt.ArrayLike | None = None,
         cull: FaceCull = "none",
     ) -> Occluders: ...
 
@@ -181,13 +185,15 @@ class Device:
 
         Parameters
         ----------
-        vertices : (V, 3) float array; or a Mesh, or a list of Mesh
-            World positions (or the mesh's own, with `transforms`). A list may also hold plain tuples ``(vertices,
-            triangles)`` or ``(vertices, triangles, transforms)``.
+        vertices : (V, 3) float array; or a Mesh, a mesh of trimesh or Open3D, or a list of them
+            World positions (or the mesh's own, with `transforms`). Objects of other libraries are
+            told by their ``vertices`` and ``faces`` (trimesh) or ``triangles`` (Open3D). A list may
+            also hold plain tuples ``(vertices, triangles)`` or ``(vertices, triangles,
+            transforms)``.
         triangles : (T, 3) integer array
-            Indices of vertices; left out when ``vertices`` is a Mesh or a list.
+            Indices of vertices; left out when ``vertices`` is a mesh or a list.
         transforms : (K, 4, 4) or (4, 4) float array, optional
-            ``world_from_mesh`` of each copy.
+            ``world_from_mesh`` of each copy; not beside a Mesh or a list, which have their own.
         cull : "none", "back" or "front"
             Faces that are left out; the front is where the triangle runs counter-clockwise.
 
@@ -214,16 +220,20 @@ class Device:
     ) -> DepthImage:
         """Renders occluders into a depth image that stays on the device.
 
-        The plain image is rasterised: it knows the depth at the pixels' centres, and a cull by it promises for an image
-        of that size and those samples. In a larger image of the same view a gap may show that no centre hit, with
-        something behind it that was culled.
+        The plain image is rasterised: it knows the depth at the pixels' centres, up to the grid to which the driver
+        moves corners (1/256 pixel on lavapipe, 1/16 at most), and a cull by it promises for an image of that size and
+        those samples. In a larger image of the same view, or at other samples (multisampling, jitter), a gap may show
+        that no centre hit, with something behind it that was culled. And it hides points that lie on their own
+        occluder: of a mesh's own visible vertices nearly half (44 to 47 % of the meshes in ``docs/guide.md``), for
+        between two centres the surface is farther than at one of them.
 
         The conservative image promises for every image of the same view, whatever its size, sample positions and
-        jitter: **every ray through the closed square of a pixel meets an occluder at the pixel's depth or nearer**;
-        where that cannot be shown the pixel is far. So render it small, and a cull by it (``coverage="area"``, the
-        default) never hides what can be seen in a large image. It is a proof about the exact triangles, given float64
-        positions included, whatever the mesh: open, folded, intersecting itself or wrong way round. Cracks between
-        triangles that do not share their vertices' exact positions count as gaps.
+        jitter, and hides none of a mesh's own visible vertices: **every ray through the closed square of a pixel meets
+        an occluder at the pixel's depth or nearer**; where that cannot be shown the pixel is far. So render it small,
+        and a cull by it (``coverage="area"``, the default) never hides what can be seen in a large image. It is a proof
+        about the exact triangles, given float64 positions included, whatever the mesh: open, folded, intersecting
+        itself or wrong way round. Cracks between triangles that do not share their vertices' exact positions count as
+        gaps.
 
         Parameters
         ----------
@@ -275,6 +285,7 @@ class Device:
         *,
         kind: None = None,
         scale: float = 1.0,
+        invalid: None = None,
         levels: Levels = None,
     ) -> Pyramid: ...
 
@@ -286,6 +297,7 @@ class Device:
         *,
         kind: DepthKind,
         scale: float = 1.0,
+        invalid: Collection[float] | None = None,
         levels: Levels = None,
     ) -> Pyramid: ...
 
@@ -296,6 +308,7 @@ class Device:
         *,
         kind: DepthKind | None = None,
         scale: float = 1.0,
+        invalid: Collection[float] | None = None,
         levels: Levels = None,
     ) -> Pyramid:
         """Builds the depth pyramid of a depth image.
@@ -304,7 +317,9 @@ class Device:
         ----------
         depth : DepthImage or (height, width) array
             A rendered image of this device, alone; or an array, with `camera` and `kind`. Arrays are float, or uint16
-            for the kinds ``"z"`` and ``"distance"``; row 0 is the top of the image.
+            for the kinds ``"z"`` and ``"distance"``; row 0 is the top of the image. What rounding to float16 may have
+            cost (2^-10 of each number, and 2^-24) is counted; what rounding to float32 cost is `cull`'s `depth_slack`.
+            What is masked in a masked array is "no data".
         camera : Camera
             The camera that saw the array; its size is the array's shape.
         kind : {"ndc", "reversed_ndc", "z", "distance"}
@@ -314,9 +329,16 @@ class Device:
             ``"reversed_ndc"``: 1 near and 0 far (``reversed_z=True``);
             ``"z"``: depth along the view direction in world units;
             ``"distance"``: distance to the eye along the pixel's ray in world units.
-            NaN, and for z and distance also zero, negative and infinite numbers, are "no data": as far as can be.
+
+            "No data" is as far as can be: NaN, infinity, `invalid`, and what lies outside the camera's planes. For z
+            and distance zero and negative numbers are "no data", too, but for an orthographic camera with ``near < 0``:
+            it sees behind its eye, so depth of either sign is depth, and so is a float zero.
         scale : float
             World units of one step, for the kinds ``"z"`` and ``"distance"`` (0.001 for millimetres).
+        invalid : collection of float, optional
+            Which numbers of the array mean "no data", in its own units (before `scale`). None: what its dtype is
+            written with, 0 and 65535 for uint16, 65504 (the greatest) for float16, no number for float32 and float64.
+            ``()``: no number but those that never are depth.
         levels : int or pair of int, optional
             Which levels are built, of 1 to 15; level 0, the image itself, is always there. None: all. ``2``: level 2
             and all coarser ones. ``(2, 5)``: levels 2 to 5; ``(4, 4)``: level 4 alone, made in one pass. Numbers past
@@ -336,7 +358,7 @@ class Device:
         """
         stored = stored_levels(levels)
         if isinstance(depth, DepthImage):
-            for name, value in (("camera", camera), ("kind", kind)):
+            for name, value in (("camera", camera), ("kind", kind), ("invalid", invalid)):
                 if value is not None:
                     got = _arguments.describe(value)
                     raise TypeError(f"{name}: expected nothing beside a DepthImage, which has its own, got {got}")
@@ -344,8 +366,11 @@ class Device:
             return Pyramid(self, self._engine.pyramid(depth._inner, stored), depth.camera)
         camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")
         self._check_side(camera)
-        image, kind, scale = checked_image("depth", depth, camera, kind, scale)
-        uploaded = self._engine.upload_depth(image, kind, scale, camera._inner)
+        return self._pyramid_of(checked_image("depth", depth, camera, kind, scale, invalid), camera, stored)
+
+    def _pyramid_of(self, image: DepthArray, camera: Camera, stored: tuple[int, int]) -> Pyramid:
+        """The pyramid of an image that was checked before."""
+        uploaded = self._engine.upload_depth(*image, camera._inner)
         return Pyramid(self, self._engine.pyramid(uploaded, stored), camera)
 
     def cull(
@@ -383,7 +408,9 @@ class Device:
             Whether the list of the visible ascends, or comes as the device finished (faster).
         coverage : "area" or "sample"
             ``"area"``: visible is what meets any part of a pixel. ``"sample"``: what covers no pixel centre counts as
-            hidden; right for an image of one sample a pixel, the same viewport and no jitter.
+            hidden; right for an image of one sample a pixel, the same viewport and no jitter. A plain depth image
+            answers for its pixels' centres in either case: multisampling and jitter need ``"area"`` and conservative
+            depth (`render_depth`).
         guard_px : float, optional
             Pixels by which bounds grow in the image, a multiple of 1/256 up to 16. None: 0 for area, 1/64 for sample.
         depth_slack : float
@@ -433,21 +460,24 @@ class Device:
         """
         _arguments.instance("instances", instances, Instances, "Instances of Device.instances")
         self._own("instances", instances)
-        _arguments.instance("camera", camera, Camera, "a Camera")
+        of_one = "a Camera (one a call: each camera culls with the pyramid of its own depth, Device.pyramid)"
+        _arguments.instance("camera", camera, Camera, of_one)
         _arguments.instance("pyramid", pyramid, Pyramid, "a Pyramid of Device.pyramid")
         self._own("pyramid", pyramid)
         if camera != pyramid.camera:
-            raise ValueError(
-                f"camera: expected the camera of the pyramid, {pyramid.camera!r}, got {camera!r}; depth of one camera "
-                "says nothing about another one"
-            )
+            same_view = camera.resized(pyramid.size) == pyramid.camera
+            way = "depth of one camera says nothing about another one"
+            if same_view:
+                way = f"pass camera.resized({pyramid.size}), the same view; the promise is about an image of that size"
+            raise ValueError(f"camera: expected the camera of the pyramid, {pyramid.camera!r}, got {camera!r}; {way}")
         options = cull_options(
             order=order, coverage=coverage, guard_px=guard_px, depth_slack=depth_slack,
             depth_slack_abs=depth_slack_abs, transform_slack=transform_slack, footprint=footprint, descent=descent,
             fit=fit, hierarchy=hierarchy, outputs=outputs, capacity=capacity, draw=draw, statistics=statistics,
         )  # fmt: skip
         culling = self._engine.cull(instances._inner, camera._inner, pyramid._inner, *options)
-        return CullResult(culling, statistics=options[-1])
+        question = Question(camera, pyramid, options[1], instances._points)
+        return CullResult(culling, statistics=options[-1], question=question)
 
     def _check_side(self, camera: Camera) -> None:
         """An image that the device cannot hold is refused before its array is converted."""

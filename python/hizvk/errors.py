@@ -10,11 +10,15 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-__all__ = ["DeviceLostError", "HizError", "LimitError", "NoAdapterError", "OutOfMemoryError"]
+__all__ = ["DeviceLostError", "HizError", "HizWarning", "LimitError", "NoAdapterError", "OutOfMemoryError"]
 
 
 class HizError(Exception):
     """Base of what the device, its driver or its limits refuse."""
+
+
+class HizWarning(UserWarning):
+    """What is right as it was asked, and looks like a mistake: see `CullResult.hints`."""
 
 
 class NoAdapterError(HizError):

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import threading
+import warnings
 from typing import TYPE_CHECKING
 
 from . import _arguments
 from ._processes import per_process
-from .bounds import Bounds, as_arrays
+from .bounds import Bounds, are_points, as_arrays
 from .camera import Camera
 from .depth import checked_image
-from .device import Device, cull_options
+from .device import Device, cull_options, stored_levels
+from .errors import HizWarning
+from .hints import Question
 from .resources import DepthImage
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     import numpy as np
     import numpy.typing as npt
 
@@ -52,6 +57,7 @@ def visible(
     depth: npt.ArrayLike | DepthImage,
     kind: DepthKind | None = None,
     scale: float = 1.0,
+    invalid: Collection[float] | None = None,
     device: Device | None = None,
     coverage: Coverage = "area",
     guard_px: float | None = None,
@@ -78,6 +84,9 @@ def visible(
         What an array's numbers are (see `Device.pyramid`); left out for a `DepthImage`.
     scale : float
         World units of one step of `depth`, for the kinds ``"z"`` and ``"distance"``.
+    invalid : collection of float, optional
+        Which numbers of an array mean "no data", in its own units (before `scale`); None: what its dtype is written
+        with, 0 and 65535 for uint16, 65504 for float16 (see `Device.pyramid`).
     device : Device, optional
         None: one that is made at the first call and kept.
     coverage, guard_px, depth_slack, depth_slack_abs, transform_slack, footprint, descent, fit
@@ -95,9 +104,20 @@ def visible(
     NoAdapterError
         Without a Vulkan driver.
 
+    Warns
+    -----
+    HizWarning
+        Of what is right as it was asked and looks like a mistake: all bounds outside of the view, points of size zero
+        with ``coverage="sample"``, depth that is far everywhere or sparse (see `CullResult.hints`).
+
     Examples
     --------
-    >>> mask = hizvk.visible(hizvk.Boxes(lo, hi), camera, depth=image, kind="z")  # doctest: +SKIP
+    >>> import numpy as np, hizvk
+    >>> camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(90, 160), near=0.1)
+    >>> image = np.full(camera.size, 12.0)  # a wall
+    >>> centers = np.array([[0.0, 0.0, -5.0], [0.0, 0.0, -20.0]])
+    >>> hizvk.visible(hizvk.Boxes(centers - 0.5, centers + 0.5), camera, depth=image, kind="z").tolist()
+    [True, False]
     """
     as_arrays("bounds", bounds)
     _arguments.instance("camera", camera, Camera, "a Camera")
@@ -112,19 +132,22 @@ def visible(
         device = depth.device if device is None else device
         if camera != depth.camera:
             raise ValueError(f"camera: expected the camera of depth, {depth.camera!r}, got {camera!r}")
-        if kind is not None:
-            raise TypeError(f"kind: expected nothing beside a DepthImage, got {_arguments.describe(kind)}")
+        for name, value in (("kind", kind), ("invalid", invalid)):
+            if value is not None:
+                raise TypeError(f"{name}: expected nothing beside a DepthImage, got {_arguments.describe(value)}")
         pyramid = device.pyramid(depth)
     else:
         if device is not None:
             device._check_side(camera)
-        image, kind, scale = checked_image("depth", depth, camera, kind, scale)
+        image = checked_image("depth", depth, camera, kind, scale, invalid)
         device = default_device() if device is None else device
-        pyramid = device.pyramid(image, camera, kind=kind, scale=scale)
+        pyramid = device._pyramid_of(image, camera, stored_levels(None))
     _, coverage_, guard, slack, slack_abs, transform, side, budget, fit_, *_ = options
     result = device.cull(
         device.instances(bounds), camera, pyramid, order="any", coverage=coverage_,  # type: ignore[arg-type]
         guard_px=guard, depth_slack=slack, depth_slack_abs=slack_abs, transform_slack=transform, footprint=side,
         descent=budget, fit=fit_, statistics=False,  # type: ignore[arg-type]
     )  # fmt: skip
+    for hint in Question(camera, pyramid, coverage_, are_points(bounds)).hints(result.stats, bounds):
+        warnings.warn(hint, HizWarning, stacklevel=2)
     return result.mask.copy()

@@ -16,6 +16,8 @@ from .camera import Camera
 from .depth import checked_image
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     import numpy.typing as npt
 
     from .depth import DepthKind
@@ -33,7 +35,7 @@ VISIBLE: Final = 2
 INVALID: Final = 3
 """The bounds are no volume; a cull has to keep them."""
 UNDECIDED: Final = 4
-"""Too close to call: a tie within the oracle's own rounding."""
+"""Too close to call: hidden or not by which of the two float32 next to a converted depth is taken."""
 
 
 def classify(
@@ -43,6 +45,7 @@ def classify(
     *,
     kind: DepthKind,
     scale: float = 1.0,
+    invalid: Collection[float] | None = None,
     coverage: Coverage = "area",
     own_depth: OwnDepth = "nearest",
 ) -> npt.NDArray[np.uint8]:
@@ -56,9 +59,9 @@ def classify(
         The camera that saw `depth`.
     depth : (height, width) array
         The depth image, row 0 on top.
-    kind, scale
-        What its numbers are, as in `Device.pyramid`; the kinds ``"z"`` and ``"distance"`` become NDC in the same way
-        (rounded towards far), so that oracle and engine speak of the same image.
+    kind, scale, invalid
+        What its numbers are, as in `Device.pyramid`. The oracle finds the NDC depth of ``"z"`` and ``"distance"`` by
+        itself, exactly, between two neighbouring float32.
     coverage : "area" or "sample"
         What of a pixel counts: its closed square, or its centre.
     own_depth : "nearest" or "pixel"
@@ -77,12 +80,14 @@ def classify(
     """
     bounds_kind, arrays = as_arrays("bounds", bounds)
     _arguments.instance("camera", camera, Camera, "a Camera")
-    image, kind, scale = checked_image("depth", depth, camera, kind, scale)
+    checked = checked_image("depth", depth, camera, kind, scale, invalid)
     words = (
         _arguments.choice("coverage", coverage, ("area", "sample")),
         _arguments.choice("own_depth", own_depth, ("nearest", "pixel")),
     )
-    return _core.reference_classify(bounds_kind, arrays, camera._inner, image, kind, scale, *words)
+    # The image as given: what half floats have rounded is no part of it.
+    image = (checked.image, checked.kind, checked.scale, checked.invalid)
+    return _core.reference_classify(bounds_kind, arrays, camera._inner, *image, *words)
 
 
 def pyramid(depth: npt.ArrayLike, *, reversed_z: bool) -> list[npt.NDArray[np.float32]]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final, Protocol, TypeAlias
 
 import numpy as np
 
 from . import _arguments
-from .bounds import Bounds, as_arrays
+from .bounds import Bounds, are_points, as_arrays
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from . import _core
     from ._arguments import FloatArray, Size
     from .camera import Camera
+    from .depth import DepthKind
     from .device import Device
 
 __all__ = ["DepthImage", "Instances", "Mesh", "Occluders", "Pyramid"]
@@ -64,12 +65,35 @@ class Mesh:
         return f"Mesh({len(self.vertices)} vertices, {len(self.triangles)} triangles, {copies} copies)"
 
 
+class _HasFaces(Protocol):
+    """A mesh of trimesh."""
+
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def faces(self) -> Any: ...
+
+
+class _HasTriangles(Protocol):
+    """A mesh of Open3D; `Mesh` is one, too."""
+
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def triangles(self) -> Any: ...
+
+
+#: A `Mesh`, or a mesh of another library: told by what it has, so that none needs to be there.
+MeshLike: TypeAlias = _HasFaces | _HasTriangles
+
+
 class Instances:
     """Bounds on the device, ready to be tested; made by `Device.instances`."""
 
-    def __init__(self, device: Device, core: _core.Instances) -> None:
+    def __init__(self, device: Device, core: _core.Instances, points: bool = False) -> None:
         self._device = device
         self._inner = core
+        self._points = points
 
     @property
     def device(self) -> Device:
@@ -153,6 +177,7 @@ class Instances:
             raise ValueError(f"bounds: expected {expected}, got {len(bounds)}")
         strict = _arguments.flag("strict", strict)
         self._device._engine.update(self._inner, first, kind, arrays, strict)
+        self._points = self._points and (len(bounds) == 0 or are_points(bounds))
 
     def __len__(self) -> int:
         return self._inner.num_instances()
@@ -225,7 +250,7 @@ class DepthImage:
         return self._camera.size
 
     @property
-    def kind(self) -> str:
+    def kind(self) -> DepthKind:
         """``"reversed_ndc"`` or ``"ndc"``, as the camera has it."""
         return self._camera.depth_kind
 
@@ -314,27 +339,52 @@ class Pyramid:
         return f"<Pyramid {self.size[0]}x{self.size[1]}, {self.num_levels} levels{stored}>"
 
 
+def as_mesh(name: str, value: object, expected: str) -> Mesh:
+    """A Mesh, a tuple of its arguments, or an object of another library that has its parts."""
+    if isinstance(value, Mesh):
+        return value
+    parts = value if isinstance(value, tuple) and 2 <= len(value) <= 3 else _parts(value)
+    if parts is None:
+        # A scene of trimesh's holds meshes by name; it has none of its own.
+        is_scene = hasattr(value, "geometry") and hasattr(value, "dump")
+        hint = "; of a trimesh scene pass scene.to_mesh(), or scene.dump(concatenate=True)" if is_scene else ""
+        raise TypeError(f"{name}: expected {expected}, got {_arguments.describe(value)}{hint}")
+    try:
+        return Mesh(*parts)
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"{name}: {error}") from None
+
+
+def _parts(value: Any) -> tuple[Any, Any] | None:
+    """Vertices and triangles of a mesh of trimesh (`faces`) or Open3D (`triangles`), told by what it has."""
+    vertices = getattr(value, "vertices", None)
+    for name in ("faces", "triangles"):
+        triangles = getattr(value, name, None)
+        if vertices is not None and triangles is not None:
+            return vertices, triangles
+    return None
+
+
+#: What `as_mesh` takes, in words.
+A_MESH: Final = "a Mesh, a mesh of trimesh or Open3D"
+
+
+def meshes_of(name: str, value: object, expected: str) -> list[Mesh]:
+    """One mesh, or a list of them in which plain tuples are welcome, too."""
+    if isinstance(value, Mesh) or _parts(value) is not None:
+        return [as_mesh(name, value, expected)]
+    if not isinstance(value, Sequence) or isinstance(value, (str, bytes)):
+        return [as_mesh(name, value, expected)]
+    return [as_mesh(f"{name}[{number}]", item, expected) for number, item in enumerate(value)]
+
+
 def as_meshes(vertices: Any, triangles: Any, transforms: Any) -> list[Mesh]:
     """The meshes of either form of `Device.occluders`."""
     if triangles is not None:
         return [Mesh(vertices, triangles, transforms)]
+    parts = None if isinstance(vertices, Mesh) else _parts(vertices)
+    if transforms is not None and parts is not None:  # it has none of its own
+        return [Mesh(*parts, transforms)]
     if transforms is not None:
         raise TypeError("transforms: expected nothing beside a list of meshes, which have their own")
-    if isinstance(vertices, Mesh):
-        return [vertices]
-    expected = "a Mesh or a list of Mesh when triangles is left out"
-    if not isinstance(vertices, Sequence) or isinstance(vertices, (str, bytes)):
-        raise TypeError(f"vertices: expected {expected}, got {_arguments.describe(vertices)}")
-    meshes = []
-    for number, item in enumerate(vertices):
-        if isinstance(item, Mesh):
-            meshes.append(item)
-        elif isinstance(item, tuple) and 2 <= len(item) <= 3:
-            try:
-                meshes.append(Mesh(*item))
-            except (TypeError, ValueError) as error:
-                raise type(error)(f"vertices[{number}]: {error}") from None
-        else:
-            got = _arguments.describe(item)
-            raise TypeError(f"vertices: expected {expected}, got {got} at {number}")
-    return meshes
+    return meshes_of("vertices", vertices, f"{A_MESH}, or a list of them when triangles is left out")

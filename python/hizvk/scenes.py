@@ -29,8 +29,9 @@ GRID: Final = 1.0 / 64.0
 METRES_PER_DEGREE: Final = 111_200.0
 #: Where the south-west corner of the mountains stands, like an easting and northing of the map (UTM zone 16).
 MAP_CORNER: Final = (731_000.0, 4_036_000.0, 0.0)
-#: What installs the extras that the demo uses.
-INSTALL_LINE: Final = "pip install 'hizvk[viz,scene]'"
+#: What installs the packages that the demo uses (the extras `viz` and `scene` of pyproject.toml, by
+#: name: hizvk itself is on no index, so that ``hizvk[viz]`` would not be found).
+INSTALL_LINE: Final = "pip install matplotlib embreex"
 
 #: The flight around the massif: kilometres east and north of the corner, and metres above the ground.
 FLIGHT: Final = (

@@ -76,12 +76,14 @@ fn descend(
         *texels_read += 1u;
         let bits = texel(level, at.x, at.y);
         var clear = surely_behind(bits, p.z, p.w);
+        tell_texel(level, at.x, at.y, bits, clear);
         if !clear {
             // Its pixels, those past the image's edge left out.
             let begin = at << vec2<u32>(level);
             let end = min((at + vec2<u32>(1u)) << vec2<u32>(level), vec2<u32>(view.size));
             if FIT_VOLUME {
                 clear = surely_clear(&planes, max(begin, first), min(end, last + vec2<u32>(1u)), bits);
+                tell_clear(clear);
             } else if all(begin >= first) && all(end <= last + vec2<u32>(1u)) {
                 // One of its pixels has that depth, and the rectangle has them all: no finer level can decide otherwise.
                 return false;

@@ -11,8 +11,6 @@ override APPEND: bool;
 override LIST: bool;
 // More may be kept than the lists hold.
 override CAPPED: bool;
-// Count the tests of each level.
-override STATISTICS: bool;
 
 struct DrawIndexedIndirect {
     index_count: u32,
@@ -22,21 +20,12 @@ struct DrawIndexedIndirect {
     first_instance: u32,
 }
 
-struct Statistics {
-    // How many instances were compared with the depths of each level.
-    levels: array<atomic<u32>, 16>,
-    // Texels read, a 64-bit number in two halves.
-    texels_low: atomic<u32>,
-    texels_high: atomic<u32>,
-}
-
 @group(1) @binding(0) var<uniform> piece: Piece;
 // Bit i of the first words: the caller's instance i of the piece is kept. Then, from a multiple of 4 on, a word for each place: the
 // verdict of who is stored there.
 @group(2) @binding(0) var<storage, read_write> mask: array<atomic<u32>>;
 @group(2) @binding(1) var<storage, read_write> list: array<u32>;
 @group(2) @binding(2) var<storage, read_write> draws: array<DrawIndexedIndirect>;
-@group(2) @binding(3) var<storage, read_write> statistics: Statistics;
 // .x: how many indices may be written in all pieces together.
 @group(2) @binding(4) var<uniform> capacity: vec4<u32>;
 
@@ -71,11 +60,7 @@ fn test(place: u32) -> bool {
         atomicStore(&mask[verdicts_begin(piece.words) + place], outcome.verdict);
     }
     if STATISTICS {
-        if outcome.texels_read > 0u {
-            atomicAdd(&statistics.levels[outcome.level], 1u);
-            let before = atomicAdd(&statistics.texels_low, outcome.texels_read);
-            if before + outcome.texels_read < before { atomicAdd(&statistics.texels_high, 1u); }
-        }
+        count_texels(outcome.level, outcome.texels_read);
     }
     return outcome.verdict >= VISIBLE;
 }

@@ -20,12 +20,16 @@ fn begin() {
 // The farthest depth of the texels from columns t.x to t.z and rows t.y to t.w of a level.
 fn footprint(level: u32, t: vec4<u32>) -> u32 {
     if FOOTPRINT_LOG2 == 1u {
-        return farthest_sanitized4(corners(level, t));
+        let bits = corners(level, t);
+        tell_corners(level, t, bits);
+        return farthest_sanitized4(bits);
     }
     var bits = near_bits();
     for (var y = t.y; y <= t.w; y += 1u) {
         for (var x = t.x; x <= t.z; x += 1u) {
-            bits = farthest(bits, texel(level, x, y));
+            let here = texel(level, x, y);
+            tell_texel(level, x, y, here, false);
+            bits = farthest(bits, here);
         }
     }
     return bits;

@@ -11,7 +11,7 @@ struct View {
     // bound the coefficients' own errors as well.
     magnitudes: vec4<f32>,
     constant_magnitudes: vec4<f32>,
-    // The reference point is exactly eye_hi + eye_lo: the eye, or a point of an orthographic camera's near or far plane.
+    // The reference point is exactly eye_hi + eye_lo: the eye, or a point nearer to what is seen (`Reference` in view.rs).
     eye_hi: vec3<f32>,
     z_slope: f32,
     eye_lo: vec3<f32>,

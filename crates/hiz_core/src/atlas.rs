@@ -10,7 +10,6 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::layout::{Level, MAX_LEVELS, PyramidLayout, StoredLevels, stored_levels};
 use crate::pyramid::Built;
-use crate::shader::SourceKind;
 
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 
@@ -53,7 +52,8 @@ impl AtlasLayout {
 /// Whether culls read the depth image and the stored levels from one texture, into which both are copied once a reduction. The answers
 /// are the same.
 ///
-/// It can be where the depth image is [`Depth32Float`](wgpu::TextureFormat::Depth32Float) or of a color format, has the usage
+/// It can be where the depth image is [`Depth32Float`](wgpu::TextureFormat::Depth32Float),
+/// [`R32Float`](wgpu::TextureFormat::R32Float) or [`Rgba32Uint`](wgpu::TextureFormat::Rgba32Uint), has the usage
 /// [`COPY_SRC`](wgpu::TextureUsages::COPY_SRC), and is no larger than a texture, and a buffer that it passes through, may be; otherwise
 /// culls read them where they are.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -71,6 +71,7 @@ pub enum AtlasUse {
 #[derive(Debug)]
 pub(crate) struct Atlas {
     texture: wgpu::Texture,
+    view: wgpu::TextureView,
     /// Where the depth image passes on its way from a texture of another format.
     staging: Option<wgpu::Buffer>,
     /// The reduction whose levels it is known to hold; 0: none.
@@ -79,14 +80,17 @@ pub(crate) struct Atlas {
 
 /// Whether an atlas can be made of these levels and the depth image `source`.
 pub(crate) fn is_possible(layout: &PyramidLayout, source: &wgpu::Texture, limits: &wgpu::Limits) -> bool {
-    // Of depth formats this one alone travels as float32.
-    let travels = SourceKind::of(source.format()) != Some(SourceKind::Depth)
-        || source.format() == wgpu::TextureFormat::Depth32Float;
-    travels
+    travels(source.format())
         && source.usage().contains(wgpu::TextureUsages::COPY_SRC)
         && layout.chunk_sizes().len() == 1
         && layout.atlas.fits(limits)
         && (source.format() == FORMAT || staging_bytes(layout.size) <= limits.max_buffer_size)
+}
+
+/// Whether images of a format can be copied as the bits of float32. (Those of `Depth24Plus` cannot be copied, those of other formats hold
+/// other bits.)
+pub(crate) fn travels(format: wgpu::TextureFormat) -> bool {
+    matches!(format, wgpu::TextureFormat::Depth32Float | wgpu::TextureFormat::R32Float | FORMAT)
 }
 
 impl AtlasUse {
@@ -102,23 +106,15 @@ impl AtlasUse {
 }
 
 impl Atlas {
-    pub(crate) fn new(device: &wgpu::Device, layout: &PyramidLayout) -> Self {
+    pub(crate) fn new(gpu: &Gpu, layout: &PyramidLayout) -> Result<Self> {
         let AtlasLayout { width, height, .. } = layout.atlas;
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("hiz.pyramid.atlas"),
-            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: FORMAT,
-            usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        });
-        Self { texture, staging: None, contents: Arc::default() }
+        let usage = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST;
+        let texture = gpu.texture("hiz.pyramid.atlas", (width, height), FORMAT, usage)?;
+        Ok(Self { view: gpu.view(&texture)?, texture, staging: None, contents: Arc::default() })
     }
 
     pub(crate) fn view(&self) -> wgpu::TextureView {
-        self.texture.create_view(&wgpu::TextureViewDescriptor::default())
+        self.view.clone()
     }
 
     /// Whether the levels of a reduction are known to be there.
@@ -150,6 +146,8 @@ impl Atlas {
         built: &Built,
     ) -> Result<()> {
         let source = built.source.texture();
+        // Nothing is recorded before all is there.
+        let staging = if source.format() == FORMAT { None } else { Some(self.staging_or_new(gpu, layout)?) };
         let of_image = gpu.filled(
             "hiz.pyramid.atlas_header",
             bytemuck::cast_slice(&[built.reduction, 0, 0, 0]),
@@ -168,25 +166,29 @@ impl Atlas {
             let rows = Rows { offset: 4 * u64::from(offset), pitch: 4 * stride, width, height };
             self.record_rows(encoder, stored, layout.atlas.origins[k], rows);
         }
-        if source.format() == FORMAT {
+        let Some(staging) = staging else {
             encoder.copy_texture_to_texture(source.as_image_copy(), self.texture.as_image_copy(), source.size());
             return Ok(());
-        }
+        };
         let (width, height) = (layout.size.width, layout.size.height);
         let pitch = staging_pitch(layout.size);
-        let staging = self.staging.get_or_insert_with(|| {
-            let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
-            gpu.empty("hiz.pyramid.atlas_staging", staging_bytes(layout.size), usage)
-        });
         // In one piece: a depth texture cannot be copied in parts.
         encoder.copy_texture_to_buffer(
             source.as_image_copy(),
-            wgpu::TexelCopyBufferInfo { buffer: staging, layout: copy_layout(0, pitch) },
+            wgpu::TexelCopyBufferInfo { buffer: &staging, layout: copy_layout(0, pitch) },
             source.size(),
         );
-        let staging = staging.clone();
         self.record_rows(encoder, &staging, [0; 4], Rows { offset: 0, pitch, width, height });
         Ok(())
+    }
+
+    fn staging_or_new(&mut self, gpu: &Gpu, layout: &PyramidLayout) -> Result<wgpu::Buffer> {
+        if let Some(staging) = &self.staging {
+            return Ok(staging.clone());
+        }
+        let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+        let staging = gpu.empty("hiz.pyramid.atlas_staging", staging_bytes(layout.size), usage)?;
+        Ok(self.staging.insert(staging).clone())
     }
 
     /// Records the copy of a level to where it begins.

@@ -74,7 +74,8 @@ pub struct Pose {
     pub eye: Vec3,
     /// A point that appears on the optical axis.
     pub target: Vec3,
-    /// A direction that appears upwards; not parallel to the viewing direction.
+    /// A direction that appears upwards; not parallel to the viewing direction. To look straight down, take what
+    /// shall be at the top of the image, such as the heading.
     pub up: Vec3,
 }
 
@@ -99,12 +100,29 @@ impl Pose {
         if dot(right, right) < 1e-20 {
             return Err(Error::invalid(
                 "up",
-                format!("expected a direction that is not parallel to target - eye, got {:?}", self.up),
+                format!(
+                    "expected a direction that is not parallel to target - eye, got {:?}; pass what shall be at the top \
+                     of the image, such as {} or the camera's heading",
+                    self.up,
+                    across(self.up)
+                ),
             ));
         }
         let right =
             normalized(right).ok_or_else(|| Error::invalid("up", "expected a direction apart from target - eye"))?;
         Ok([right, cross(right, forward), forward])
+    }
+}
+
+/// An axis across `up`: what is at the top of the image for who looks along `up`, in the worlds that have it so.
+fn across(up: Vec3) -> &'static str {
+    let [x, y, z] = up.map(f64::abs);
+    if y >= x && y >= z {
+        "(0, 0, -1)" // y is up, and cameras look along -z at rest
+    } else if z >= x {
+        "(0, 1, 0)" // z is up, and y is north
+    } else {
+        "(0, 0, 1)"
     }
 }
 
@@ -538,6 +556,24 @@ mod tests {
             for (x, y) in clip(&a, point).iter().zip(clip(&b, point)) {
                 assert!((x - y).abs() < 1e-12);
             }
+        }
+    }
+
+    #[test]
+    fn who_looks_along_up_is_told_a_direction_that_works() {
+        let camera = |target: Vec3, up: Vec3| {
+            let good =
+                Projection::Perspective { fov_y: 1.0, near: 0.1, far: None, convention: DepthConvention::Reversed };
+            Camera::look_at(&Pose { eye: [0.0; 3], target, up }, &good, SIZE)
+        };
+        for (target, up, said, other) in [
+            ([0.0, -1.0, 0.0], [0.0, 1.0, 0.0], "(0, 0, -1)", [0.0, 0.0, -1.0]),
+            ([0.0, 0.0, -3.0], [0.0, 0.0, 2.0], "(0, 1, 0)", [0.0, 1.0, 0.0]),
+            ([5.0, 0.0, 0.0], [-1.0, 0.0, 0.0], "(0, 0, 1)", [0.0, 0.0, 1.0]),
+        ] {
+            let text = camera(target, up).unwrap_err().to_string();
+            assert!(text.contains(&format!("such as {said} or the camera's heading")), "{text}");
+            assert!(camera(target, other).is_ok(), "{said}");
         }
     }
 

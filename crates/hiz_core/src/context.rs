@@ -10,13 +10,27 @@ use crate::gpu::Gpu;
 use crate::instances::{InstanceOptions, Instances};
 use crate::layout::CULL_WORKGROUP;
 use crate::occluders::{self, MeshData, OccluderOptions, Occluders};
-use crate::pyramid::{self, Pyramid, PyramidOptions};
+use crate::pyramid::{self, Pyramid, PyramidOptions, PyramidUniform};
+use crate::tolerance::DepthTolerance;
 use crate::update;
 use crate::visible::{Visible, VisibleOptions};
 
 /// Everything that is made once a device. Cheap to clone.
 ///
 /// Nothing here submits, polls or maps: `record_*` writes into the caller's encoder, `create_*` makes buffers.
+///
+/// # Errors
+/// What wgpu finds wrong with what is made here comes back as an [`Error`], and never at the device's own error handler, which ends
+/// the process by default. After an error the caller's encoder and device can be used on: nothing that is invalid was recorded.
+/// (What was recorded before the error came up may be part of the work.)
+///
+/// Three things cannot be known here:
+///
+/// - An encoder of another device, or one with an open pass (whose lifetime was forgotten). wgpu tells of it when the encoder
+///   is finished.
+/// - What is destroyed between the recording and the submit. wgpu tells of it then.
+/// - Views, encoders and buffers of another `wgpu::Instance`. wgpu takes them for others, for its handles are numbers that each
+///   instance gives out anew.
 #[derive(Debug, Clone)]
 pub struct HizContext {
     pub(crate) gpu: Arc<Gpu>,
@@ -26,7 +40,7 @@ impl HizContext {
     /// A context on the caller's device.
     ///
     /// # Errors
-    /// [`Error::Limit`] where the device offers less than [`HizContext::required_limits`].
+    /// [`Error::Limit`] where the device offers less than the shaders need; [`HizContext::required_limits`] are enough.
     pub fn new(device: &wgpu::Device) -> Result<Self> {
         Self::with_pipeline_cache(device, None)
     }
@@ -52,35 +66,23 @@ impl HizContext {
     }
 
     fn make(device: &wgpu::Device, cache: Option<wgpu::PipelineCache>, faults: &[(&str, &str)]) -> Result<Self> {
-        let (have, need) = (device.limits(), Self::required_limits());
-        for (name, need, have) in [
-            (
-                "max_storage_buffers_per_shader_stage",
-                need.max_storage_buffers_per_shader_stage,
-                have.max_storage_buffers_per_shader_stage,
-            ),
-            (
-                "max_compute_invocations_per_workgroup",
-                need.max_compute_invocations_per_workgroup,
-                have.max_compute_invocations_per_workgroup,
-            ),
-            ("max_compute_workgroup_size_x", need.max_compute_workgroup_size_x, have.max_compute_workgroup_size_x),
-            ("max_bind_groups", need.max_bind_groups, have.max_bind_groups),
-        ] {
+        let have = device.limits();
+        for (name, need, have) in needed(&have) {
             if have < need {
-                return Err(Error::limit(name, u64::from(need), u64::from(have)));
+                return Err(Error::limit(name, need, have));
             }
         }
-        Ok(Self { gpu: Arc::new(Gpu::new(device, cache, faults)) })
+        Ok(Self { gpu: Arc::new(Gpu::new(device, cache, faults)?) })
     }
 
-    /// The limits that a device needs: WebGPU's defaults are enough.
+    /// Limits that are enough for a device: WebGPU's defaults. [`HizContext::new`] takes less where the shaders, their bindings and one row
+    /// of records fit into it, and names the first limit that is too low.
     pub fn required_limits() -> wgpu::Limits {
         wgpu::Limits::default()
     }
 
-    /// The features that a device needs: none. (`DrawTemplate::first_instance` other than 0 needs
-    /// `INDIRECT_FIRST_INSTANCE` in the caller's own draw.)
+    /// The features that a device needs: none. (A [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0
+    /// needs `INDIRECT_FIRST_INSTANCE`.)
     pub fn required_features() -> wgpu::Features {
         wgpu::Features::empty()
     }
@@ -93,7 +95,8 @@ impl HizContext {
     /// An empty pyramid for depth images of `size`.
     ///
     /// # Errors
-    /// [`Error::Limit`] past the device's textures or bindings.
+    /// [`Error::Invalid`] for a size of 0 and options out of range, [`Error::Limit`] past the device's textures or bindings,
+    /// [`Error::OutOfMemory`].
     pub fn create_pyramid(&self, size: ImageSize, options: &PyramidOptions) -> Result<Pyramid> {
         Pyramid::new(&self.gpu, size, options)
     }
@@ -133,13 +136,21 @@ impl HizContext {
         bounds: &Bounds<'_>,
         strict: bool,
     ) -> Result<()> {
-        update::record(&self.gpu, encoder, instances, first, bounds, strict)
+        update::record(&self.gpu, encoder, instances, first, bounds, strict, |encoder, range| {
+            // Recording is not running: the verdicts stay to be refined, which a second time changes nothing.
+            let watches = instances.watches();
+            watches.record_refinements(&self.gpu, encoder, instances)?;
+            watches.note(&range);
+            Ok(())
+        })
     }
 
     /// Buffers for what a cull of `instances` finds.
     ///
     /// # Errors
-    /// [`Error::Device`] where the device has no memory for them, or is lost.
+    /// [`Error::Mismatch`] for instances of another context, [`Error::Invalid`] for a
+    /// [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0 on a device without the feature
+    /// `INDIRECT_FIRST_INSTANCE`, [`Error::OutOfMemory`], [`Error::Device`] where the device is lost.
     pub fn create_visible(&self, instances: &Instances, options: &VisibleOptions) -> Result<Visible> {
         Visible::new(&self.gpu, instances, options)
     }
@@ -147,15 +158,18 @@ impl HizContext {
     /// Uploads triangle meshes.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for arrays that do not fit and indices out of range.
+    /// [`Error::Invalid`] for arrays that do not fit and indices out of range, [`Error::Limit`] past the device's buffers,
+    /// [`Error::OutOfMemory`].
     pub fn create_occluders(&self, meshes: &[MeshData<'_>], options: &OccluderOptions) -> Result<Occluders> {
         Occluders::new(&self.gpu, meshes, options)
     }
 
-    /// Records the drawing of `occluders` into `target`, a `Depth32Float` texture view of the camera's size, which is cleared first.
+    /// Records the drawing of `occluders` into `target`, which is cleared first: a view of one layer of a 2D `Depth32Float` texture
+    /// of the camera's size, with one mip level, one sample a pixel and the usage `RENDER_ATTACHMENT`.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a target of another size or format, [`Error::Invalid`] for a camera that float32 cannot hold.
+    /// [`Error::Mismatch`] for a target of another size, format or device and for a destroyed one, [`Error::Invalid`] for one of other
+    /// usages, samples or mip levels and for a camera that float32 cannot hold.
     pub fn record_occluders(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -168,15 +182,23 @@ impl HizContext {
 
     /// Records the reduction of a depth image of `camera` into `pyramid`.
     ///
-    /// `depth` is a view of a whole 2D texture of one mip level, sample and layer, with the usage `TEXTURE_BINDING`
-    /// (`Rgba32Uint`: `STORAGE_BINDING`) and a depth format (with stencil: the view's aspect is `DepthOnly`), `R32Float`, or
-    /// `Rgba32Uint` of the float bits of four pixels of a row a texel, which is `width.div_ceil(4)` texels wide (pixels past the
-    /// width count as depth of the row's last ones: repeat the last). Give it `COPY_SRC` as well, and large culls read
-    /// faster ([`AtlasUse`](crate::AtlasUse)). The reduction has to be submitted before a cull
-    /// that uses it, or with it: a cull that runs before it keeps everything.
+    /// `depth` is a view of a 2D texture of one mip level, sample and layer, whose whole depth is read, whatever part of it the view shows:
+    /// the default view of a texture with a stencil will do. Formats and usages:
+    ///
+    /// - any depth format, `R32Float` or `R16Float`, with `TEXTURE_BINDING`;
+    /// - `Rgba32Uint` with `STORAGE_BINDING`: the float bits of four pixels of a row in a texel. It is `width.div_ceil(4)` texels wide;
+    ///   pixels past the width count as depth of the row's last ones, so repeat the last.
+    ///
+    /// Give it `COPY_SRC` as well, and large culls read faster ([`AtlasUse`](crate::AtlasUse)). The texture must neither change nor be
+    /// destroyed before the culls that use it have run. Submit the reduction before them or with them: a cull that runs before
+    /// it keeps everything.
+    ///
+    /// What the format rounds is slack that the pyramid keeps ([`Pyramid::tolerance`]), and every cull counts it beside the slack of
+    /// its [`CullOptions`]: a step of `Depth16Unorm`, `Depth24Plus`, `Depth24PlusStencil8` and `R16Float`, nothing of float32.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for sizes or devices that do not agree, [`Error::Invalid`] for other formats.
+    /// [`Error::Mismatch`] for sizes or devices that do not agree and for a destroyed texture, [`Error::Invalid`] for other formats
+    /// and usages, [`Error::OutOfMemory`].
     pub fn record_reduce(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -184,7 +206,7 @@ impl HizContext {
         camera: &Camera,
         pyramid: &Pyramid,
     ) -> Result<()> {
-        pyramid::record_reduce(&self.gpu, encoder, depth, camera, pyramid)
+        pyramid::record_reduce(&self.gpu, encoder, depth, camera, pyramid, DepthTolerance::NONE)
     }
 
     /// Records the cull of `instances` against `pyramid`, whose depth image must be `camera`'s; `visible` takes what is found.
@@ -193,7 +215,8 @@ impl HizContext {
     /// than it saves ([`AtlasUse`](crate::AtlasUse)).
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for objects that do not belong together, [`Error::Invalid`] for unusable options or cameras.
+    /// [`Error::Mismatch`] for objects that do not belong together, for a depth image that was destroyed since it was reduced and for
+    /// destroyed buffers of `visible`; [`Error::Invalid`] for unusable options or cameras; [`Error::OutOfMemory`].
     pub fn record_cull(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -203,9 +226,55 @@ impl HizContext {
         visible: &Visible,
         options: &CullOptions,
     ) -> Result<()> {
-        cull::record(&self.gpu, encoder, &CullInputs { instances, camera, pyramid, options, certified: true }, visible)
+        let inputs = CullInputs { instances, camera, pyramid, options, certified: true, idle: false };
+        cull::record(&self.gpu, encoder, &inputs, visible)
     }
 }
 
-// `required_limits` promises what WebGPU's defaults give.
+/// What the shaders and their bindings need of a device, and what it has. `tests/validation.rs` runs everything on a device that has just
+/// this, and on devices with one less.
+fn needed(have: &wgpu::Limits) -> Vec<(&'static str, u64, u64)> {
+    macro_rules! limits {
+        ($($name:ident >= $need:expr,)*) => {
+            vec![$((stringify!($name), $need, u64::from(have.$name))),*]
+        };
+    }
+    limits! {
+        // A row of records of oriented boxes, 4 texels each (`records`), and a row of surviving groups.
+        max_texture_dimension_2d >= 4096,
+        // The cull of members: view, records, outputs, survivors.
+        max_bind_groups >= 4,
+        max_bind_groups_plus_vertex_buffers >= 4,
+        // The view of a cull (`gpu/layouts`).
+        max_bindings_per_bind_group >= 7,
+        // A depth image.
+        max_sampled_textures_per_shader_stage >= 1,
+        max_samplers_per_shader_stage >= 1,
+        // Of the cull of members: three chunks, mask, list, draws, statistics, survivors.
+        max_storage_buffers_per_shader_stage >= 8,
+        // An atlas, or an image of bits; records; the list of survivors.
+        max_storage_textures_per_shader_stage >= 3,
+        // Pyramid, view, piece, capacity.
+        max_uniform_buffers_per_shader_stage >= 4,
+        max_uniform_buffer_binding_size >= size_of::<PyramidUniform>() as u64,
+        // The words of the verdicts of a row of records; and the row itself on its way.
+        max_storage_buffer_binding_size >= 8192,
+        max_buffer_size >= 65_536,
+        // Occluders.
+        max_vertex_buffers >= 1,
+        max_vertex_attributes >= 2,
+        max_vertex_buffer_array_stride >= 24,
+        // None, but wgpu 30 counts down from it.
+        max_inter_stage_shader_variables >= 1,
+        // Prefix sums of 256 words (`compact`), 64 vectors of four (`count`).
+        max_compute_workgroup_storage_size >= 1024,
+        max_compute_invocations_per_workgroup >= 256,
+        max_compute_workgroup_size_x >= 256,
+        max_compute_workgroup_size_y >= 1,
+        max_compute_workgroup_size_z >= 1,
+        // What WebGPU promises everywhere: a column of blocks of the largest image, the pieces.
+        max_compute_workgroups_per_dimension >= 65_535,
+    }
+}
+
 const _: () = assert!(CULL_WORKGROUP <= 256);

@@ -15,6 +15,7 @@ use crate::layout::{CULL_WORKGROUP, piece_capacity};
 use crate::morton;
 use crate::pyramid::entry;
 use crate::records::{Records, Upload};
+use crate::watch::Watches;
 
 /// In which order instances are stored. The indices that come out are the caller's in either.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -156,6 +157,7 @@ pub struct Instances {
     changing: Mutex<Changing>,
     /// Held by whoever records *and* submits an update, so that both happen in one order.
     pub(crate) submitting: Mutex<()>,
+    watches: Mutex<Watches>,
 }
 
 impl Instances {
@@ -169,9 +171,8 @@ impl Instances {
     ) -> Result<Self> {
         let n = bounds.len()?;
         let total = u32::try_from(n).map_err(|_| Error::limit("instances", n as u64, u64::from(u32::MAX)))?;
-        let device = gpu.device();
         let kind = bounds.kind();
-        let most = piece_capacity(kind.record_bytes(), &device.limits());
+        let most = piece_capacity(kind.record_bytes(), gpu.limits());
         let capacity = match options.piece_capacity {
             None => most,
             Some(c) if c > 0 && c <= most && c.is_multiple_of(CULL_WORKGROUP) => c,
@@ -194,7 +195,15 @@ impl Instances {
         }
         let sequence = gpu.filled("hiz.instances.sequence", &[0; 16], wgpu::BufferUsages::STORAGE)?;
         let changing = Mutex::new(Changing { groups, next_update: 0 });
-        let this = Self { context: gpu.id(), kind, pieces, sequence, changing, submitting: Mutex::new(()) };
+        let this = Self {
+            context: gpu.id(),
+            kind,
+            pieces,
+            sequence,
+            changing,
+            submitting: Mutex::default(),
+            watches: Mutex::default(),
+        };
         if options.strict {
             let invalid = this.invalid()?;
             refuse_bad(n, invalid.len(), invalid.first().copied())?;
@@ -249,6 +258,11 @@ impl Instances {
         self.pieces.iter().map(|p| p.order.host_bytes()).sum::<u64>() + groups
     }
 
+    /// The culls that were submitted. Held while one is submitted and added, and while an update is submitted and noted.
+    pub(crate) fn watches(&self) -> MutexGuard<'_, Watches> {
+        self.watches.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     pub(crate) fn changing(&self) -> MutexGuard<'_, Changing> {
         self.changing.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -294,19 +308,19 @@ fn packed(
     };
     let uniform_of_groups = uniform(num_groups)?;
     let uniform = uniform(count)?;
-    let bindings = bind_records(gpu, &uniform, &records);
-    let group_bindings = bind_records(gpu, &uniform_of_groups, &group_records);
+    let bindings = bind_records(gpu, &uniform, &records)?;
+    let group_bindings = bind_records(gpu, &uniform_of_groups, &group_records)?;
     let piece = Piece { range, records, group_records, uniform, bindings, group_bindings, order };
     Ok((piece, groups, [upload, groups_upload]))
 }
 
 /// A piece's uniform and records as a cull reads them.
-pub(crate) fn bind_records(gpu: &Gpu, uniform: &wgpu::Buffer, records: &Records) -> wgpu::BindGroup {
-    gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("hiz.cull.instances"),
-        layout: &gpu.layouts().instances,
-        entries: &[entry(0, uniform.as_entire_binding()), entry(1, wgpu::BindingResource::TextureView(&records.view))],
-    })
+pub(crate) fn bind_records(gpu: &Gpu, uniform: &wgpu::Buffer, records: &Records) -> Result<wgpu::BindGroup> {
+    gpu.bind_group(
+        "hiz.cull.instances",
+        &gpu.layouts().instances,
+        &[entry(0, uniform.as_entire_binding()), entry(1, wgpu::BindingResource::TextureView(&records.view))],
+    )
 }
 
 /// Writes box records, one after the other.

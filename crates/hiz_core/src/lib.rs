@@ -33,6 +33,7 @@ mod gpu;
 mod groups;
 mod host;
 mod instances;
+mod inverse;
 mod layout;
 mod lists;
 mod morton;
@@ -43,9 +44,11 @@ mod readback;
 mod records;
 mod shader;
 mod threads;
+mod tolerance;
 mod update;
 mod view;
 mod visible;
+mod watch;
 #[doc(hidden)]
 pub mod words;
 #[doc(hidden)]
@@ -68,5 +71,11 @@ pub use occluder_surface::PlantedFault;
 pub use occluder_surface::{ConservativeDepthOptions, OccluderSurface};
 pub use occluders::{FaceCull, MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders};
 pub use pyramid::{Pyramid, PyramidOptions};
+pub use tolerance::{DepthTolerance, ndc_from_kind_within};
 pub use view::ERROR_ULPS;
 pub use visible::{Outputs, Visible, VisibleOptions};
+
+/// The README's program is compiled and run with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+mod readme {}

@@ -81,7 +81,7 @@ impl Lists {
             Ok(PieceList {
                 indices: if listed { Some(filled_list(gpu, u64::from(here) + CANARY_WORDS)?) } else { None },
                 capacity: here,
-                before: gpu.empty("hiz.compact.before", 4 * u64::from(piece.words().max(1)), STORAGE),
+                before: gpu.empty("hiz.compact.before", 4 * u64::from(piece.words().max(1)), STORAGE)?,
             })
         });
         let pieces = pieces.collect::<Result<_>>()?;
@@ -91,7 +91,7 @@ impl Lists {
         let bytes = (template.len() * size_of::<DrawIndexedIndirect>()) as u64;
         Ok(Self {
             pieces,
-            draws: gpu.empty("hiz.visible.draws", bytes, STORAGE | wgpu::BufferUsages::INDIRECT),
+            draws: gpu.empty("hiz.visible.draws", bytes, STORAGE | wgpu::BufferUsages::INDIRECT)?,
             template: gpu.filled(
                 "hiz.visible.draws_template",
                 bytemuck::cast_slice(&template),
@@ -116,12 +116,7 @@ impl Lists {
 fn filled_list(gpu: &Gpu, words: u64) -> Result<wgpu::Buffer> {
     const LABEL: &str = "hiz.visible.list";
     let size = 4 * words;
-    let list = gpu.device().create_buffer(&wgpu::BufferDescriptor {
-        label: Some(LABEL),
-        size,
-        usage: STORAGE | wgpu::BufferUsages::VERTEX,
-        mapped_at_creation: true,
-    });
+    let list = gpu.mapped(LABEL, size, STORAGE | wgpu::BufferUsages::VERTEX)?;
     let ones = vec![0xFF_u8; size.min(1 << 16) as usize];
     for begin in (0..size).step_by(ones.len()) {
         let part = ones.len().min((size - begin) as usize);

@@ -106,8 +106,7 @@ impl OccluderSurface {
 impl Occluders {
     pub(crate) fn new(gpu: &Gpu, meshes: &[MeshData<'_>], options: &OccluderOptions) -> Result<Self> {
         let baked = Baked::all(meshes)?;
-        let device = gpu.device();
-        let allowed = device.limits().max_buffer_size;
+        let allowed = gpu.limits().max_buffer_size;
         for bytes in [size_of_val(&baked.vertices[..]), size_of_val(&baked.indices[..])] {
             if bytes as u64 > allowed {
                 return Err(Error::limit("max_buffer_size", bytes as u64, allowed));
@@ -272,11 +271,9 @@ fn outside_frustum(camera: &Camera, min: Vec3, max: Vec3) -> bool {
 
 fn pipeline(gpu: &Gpu, key: OccluderKey) -> wgpu::RenderPipeline {
     let device = gpu.device();
-    let label = Some("hiz.occluders.pipeline");
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label,
-        source: wgpu::ShaderSource::Wgsl(shader::occluders().into()),
-    });
+    let name = "hiz.occluders.pipeline";
+    let label = Some(name);
+    let module = gpu.shader_module(name, &shader::occluders());
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label,
         bind_group_layouts: &[Some(&gpu.layouts().occluder_view)],
@@ -318,14 +315,8 @@ fn pipeline(gpu: &Gpu, key: OccluderKey) -> wgpu::RenderPipeline {
     })
 }
 
-pub(crate) fn record(
-    gpu: &Gpu,
-    encoder: &mut wgpu::CommandEncoder,
-    occluders: &Occluders,
-    camera: &Camera,
-    target: &wgpu::TextureView,
-) -> Result<()> {
-    gpu.check_context("occluders", occluders.context)?;
+/// What a texture tells of itself.
+fn check_target(camera: &Camera, target: &wgpu::TextureView) -> Result<()> {
     let texture = target.texture();
     let (want, have) = (camera.size(), (texture.width(), texture.height()));
     if have != (want.width, want.height) || texture.format() != OCCLUDER_DEPTH_FORMAT {
@@ -339,32 +330,64 @@ pub(crate) fn record(
             ),
         ));
     }
+    let (mips, samples) = (texture.mip_level_count(), texture.sample_count());
+    if (mips, samples) != (1, 1) || texture.dimension() != wgpu::TextureDimension::D2 {
+        return Err(Error::invalid(
+            "target",
+            format!(
+                "expected a 2D texture of one mip level and one sample a pixel, got {:?} with {mips} mip levels, {samples} samples",
+                texture.dimension()
+            ),
+        ));
+    }
+    if !texture.usage().contains(wgpu::TextureUsages::RENDER_ATTACHMENT) {
+        return Err(Error::invalid(
+            "target",
+            format!("expected the usage RENDER_ATTACHMENT, got {:?}", texture.usage()),
+        ));
+    }
+    Ok(())
+}
+
+pub(crate) fn record(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    occluders: &Occluders,
+    camera: &Camera,
+    target: &wgpu::TextureView,
+) -> Result<()> {
+    gpu.check_context("occluders", occluders.context)?;
+    check_target(camera, target)?;
     let ClipRows { rows, eye_hi, eye_lo } = ClipRows::new(camera)?;
     let wide = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
     let view = gpu.uniform("hiz.occluders.view", &OccluderView { rows, eye_hi: wide(eye_hi), eye_lo: wide(eye_lo) })?;
-    let bind_group = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("hiz.occluders.view"),
-        layout: &gpu.layouts().occluder_view,
-        entries: &[entry(0, view.as_entire_binding())],
-    });
+    let entries = [entry(0, view.as_entire_binding())];
+    let bind_group = gpu.bind_group("hiz.occluders.view", &gpu.layouts().occluder_view, &entries)?;
     let key = OccluderKey {
         reversed: camera.convention() == DepthConvention::Reversed,
         cull_mode: occluders.cull_mode.as_seen_by(camera).face(),
     };
+    let pipeline = gpu.occluder_pipeline(key, || pipeline(gpu, key))?;
+    let depth_ops =
+        wgpu::Operations { load: wgpu::LoadOp::Clear(camera.convention().far()), store: wgpu::StoreOp::Store };
+    gpu.can_draw_into(target, depth_ops).map_err(|error| match error {
+        Error::Device(why) => Error::mismatch(
+            "target",
+            format!("expected a view of one layer of a texture of this device that has not been destroyed, but {why}"),
+        ),
+        other => other,
+    })?;
     let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         label: Some("hiz.occluders.pass"),
         color_attachments: &[],
         depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
             view: target,
-            depth_ops: Some(wgpu::Operations {
-                load: wgpu::LoadOp::Clear(camera.convention().far()),
-                store: wgpu::StoreOp::Store,
-            }),
+            depth_ops: Some(depth_ops),
             stencil_ops: None,
         }),
         ..Default::default()
     });
-    pass.set_pipeline(&gpu.occluder_pipeline(key, || pipeline(gpu, key)));
+    pass.set_pipeline(&pipeline);
     pass.set_bind_group(0, &bind_group, &[]);
     pass.set_vertex_buffer(0, occluders.vertices.slice(..));
     pass.set_index_buffer(occluders.indices.slice(..), wgpu::IndexFormat::Uint32);

@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{ContextId, Gpu, ReduceKey, ReduceShape, StandIn};
 use crate::layout::{Level, MAX_LEVELS, PYRAMID_CHUNKS, PyramidLayout, Step, StoredLevels};
 use crate::shader::{DepthStore, SourceKind};
+use crate::tolerance::DepthTolerance;
 
 /// Invocations of a workgroup of the reduction, all in a row; `shaders/shared/pyramid_write.wgsl`, `place_of`.
 const REDUCE_WORKGROUP: u32 = 64;
@@ -94,20 +95,21 @@ pub(crate) struct Built {
     pub(crate) source: wgpu::TextureView,
     pub(crate) source_kind: SourceKind,
     pub(crate) camera: Camera,
+    /// What the image's depths have been rounded by, for every cull to count.
+    pub(crate) tolerance: DepthTolerance,
 }
 
 impl Pyramid {
     pub(crate) fn new(gpu: &Gpu, size: ImageSize, options: &PyramidOptions) -> Result<Self> {
-        let device = gpu.device();
         let side = size.width.max(size.height);
-        let allowed = device.limits().max_texture_dimension_2d;
+        let allowed = gpu.limits().max_texture_dimension_2d;
         if side > allowed {
             return Err(Error::limit("max_texture_dimension_2d", u64::from(side), u64::from(allowed)));
         }
         if side == 0 || size.width.min(size.height) == 0 {
             return Err(Error::invalid("size", format!("expected at least one pixel a side, got {size}")));
         }
-        let most = crate::layout::chunk_shift(&device.limits());
+        let most = crate::layout::chunk_shift(gpu.limits());
         let chunk_shift = options.chunk_shift.unwrap_or(most);
         if !(2..=most).contains(&chunk_shift) {
             return Err(Error::invalid("chunk_shift", format!("expected 2 to {most}, got {chunk_shift}")));
@@ -117,14 +119,10 @@ impl Pyramid {
             .chunk_sizes()
             .iter()
             .map(|texels| {
-                device.create_buffer(&wgpu::BufferDescriptor {
-                    label: Some("hiz.pyramid.chunk"),
-                    size: texels * 4,
-                    usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
-                    mapped_at_creation: false,
-                })
+                let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+                gpu.empty("hiz.pyramid.chunk", texels * 4, usage)
             })
-            .collect();
+            .collect::<Result<_>>()?;
         let mut levels = [Level { offset: 0, stride: 0, width: 0, height: 0 }; MAX_LEVELS];
         levels[..layout.levels.len()].copy_from_slice(&layout.levels);
         let (StoredLevels { first, last }, origins) = (layout.stored, layout.atlas.origins);
@@ -197,7 +195,7 @@ impl Pyramid {
     pub(crate) fn wants_atlas(&self, gpu: &Gpu, built: &Built, instances: u32) -> bool {
         self.atlas_use.pays(&self.layout, instances)
             && !self.no_atlas.load(Ordering::Relaxed)
-            && atlas::is_possible(&self.layout, built.source.texture(), &gpu.device().limits())
+            && atlas::is_possible(&self.layout, built.source.texture(), gpu.limits())
     }
 
     /// Something failed on the device: nothing that was made for culls is kept. Whether an atlas was among it.
@@ -212,30 +210,69 @@ impl Pyramid {
     }
 
     /// The atlas of what the pyramid was built from; its copies are recorded if they are not known to have run, behind that reduction.
+    /// `None` where there is no memory for it, now and from now on.
     pub(crate) fn record_atlas(
         &self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         built: &Built,
-    ) -> Result<wgpu::TextureView> {
-        let mut atlas = self.atlas.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let atlas = atlas.get_or_insert_with(|| Atlas::new(gpu.device(), &self.layout));
-        let reduction = built.reduction;
-        if !atlas.holds(reduction) {
-            atlas.record(gpu, encoder, &self.layout, &self.chunks[0], built)?;
-            let (contents, reduced) = (atlas.contents(), Arc::clone(&self.reduced));
-            encoder.on_submitted_work_done(move || {
-                // Copies that ran before their reduction, or after the next one, have spoiled what was there.
-                let ran_behind_it = reduced.load(Ordering::Acquire) == reduction;
-                contents.store(if ran_behind_it { reduction } else { 0 }, Ordering::Release);
-            });
+    ) -> Result<Option<wgpu::TextureView>> {
+        let mut kept = self.atlas.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let made = match kept.take() {
+            Some(there) => Ok(there),
+            None => Atlas::new(gpu, &self.layout),
+        };
+        let recorded = made.and_then(|mut atlas| {
+            if !atlas.holds(built.reduction) {
+                atlas.record(gpu, encoder, &self.layout, &self.chunks[0], built)?;
+                self.note_copies(encoder, &atlas, built.reduction);
+            }
+            Ok(atlas)
+        });
+        let error = match recorded {
+            Ok(atlas) => return Ok(Some(kept.insert(atlas).view())),
+            Err(error) => error,
+        };
+        // They may hold the one that is gone.
+        self.bindings.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clear();
+        if matches!(error, Error::OutOfMemory(_)) {
+            self.do_without_atlas();
+            return Ok(None);
         }
-        Ok(atlas.view())
+        Err(error)
+    }
+
+    /// Once the copies into an atlas have run it is known what it holds.
+    fn note_copies(&self, encoder: &wgpu::CommandEncoder, atlas: &Atlas, reduction: u32) {
+        let (contents, reduced) = (atlas.contents(), Arc::clone(&self.reduced));
+        encoder.on_submitted_work_done(move || {
+            // Copies that ran before their reduction, or after the next one, have spoiled what was there.
+            let ran_behind_it = reduced.load(Ordering::Acquire) == reduction;
+            contents.store(if ran_behind_it { reduction } else { 0 }, Ordering::Release);
+        });
     }
 
     /// The camera of the depth image that the pyramid was last built from.
     pub fn camera(&self) -> Option<Camera> {
         self.built().map(|b| b.camera)
+    }
+
+    /// How far the depths that the pyramid was last built from may lie from those that were stored, by the format of the image
+    /// ([`DepthTolerance::of`]) or by what was uploaded into it. Every cull counts it, beside the slack of its options.
+    pub fn tolerance(&self) -> Option<DepthTolerance> {
+        self.built().map(|b| b.tolerance)
+    }
+
+    /// Whether the depth image that `built` was made of is still there: a cull would bind it, and what was destroyed ends the caller's
+    /// encoder.
+    pub(crate) fn check_source(gpu: &Gpu, built: &Built) -> Result<()> {
+        gpu.view(built.source.texture()).map(drop).map_err(|error| match error {
+            Error::Device(why) => Error::mismatch(
+                "pyramid",
+                format!("expected one whose depth image has not been destroyed since it was reduced, but {why}"),
+            ),
+            other => other,
+        })
     }
 
     /// Chunk `i`, or what stands in for it.
@@ -267,25 +304,27 @@ impl Pyramid {
     }
 }
 
-/// Records the reduction of `depth` (all of its texture's first mip level) into `pyramid`.
+/// Records the reduction of `depth` (all of its texture's first mip level) into `pyramid`. `uploaded` is what its depths were rounded by
+/// before they came into the texture.
 pub(crate) fn record_reduce(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
     depth: &wgpu::TextureView,
     camera: &Camera,
     pyramid: &Pyramid,
+    uploaded: DepthTolerance,
 ) -> Result<()> {
     gpu.check_context("pyramid", pyramid.context)?;
     let texture = depth.texture();
-    let source_kind = SourceKind::of(texture.format()).ok_or_else(|| {
-        Error::invalid(
+    let format = texture.format();
+    let (Some(source_kind), Some(of_format)) = (SourceKind::of(format), DepthTolerance::of(format)) else {
+        return Err(Error::invalid(
             "depth",
             format!(
-                "expected a depth format, R32Float or Rgba32Uint (the bits of four pixels), got {:?}",
-                texture.format()
+                "expected a depth format, R32Float, R16Float or Rgba32Uint (the bits of four pixels), got {format:?}"
             ),
-        )
-    })?;
+        ));
+    };
     let (size, texels) = (pyramid.size(), ImageSize::new(texture.width(), texture.height()));
     let expected = source_kind.texture_size(size);
     if texels != expected {
@@ -317,69 +356,103 @@ pub(crate) fn record_reduce(
         let name = if source_kind == SourceKind::Bits { "STORAGE_BINDING" } else { "TEXTURE_BINDING" };
         return Err(Error::invalid("depth", format!("expected the usage {name}, got {:?}", texture.usage())));
     }
+    let (source, view) = bind_source(gpu, depth, source_kind, pyramid)?;
+    // Everything is there before anything is recorded.
     let reduction = next_reduction();
-    let layouts = gpu.layouts();
-    let source = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("hiz.reduce.pyramid"),
-        layout: layouts.reduce(source_kind),
-        entries: &[
-            entry(0, wgpu::BindingResource::TextureView(depth)),
-            entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
-            entry(2, pyramid.uniform.as_entire_binding()),
-            entry(3, pyramid.chunk(gpu, 0).as_entire_binding()),
-            entry(4, pyramid.chunk(gpu, 1).as_entire_binding()),
-            entry(5, pyramid.chunk(gpu, 2).as_entire_binding()),
-        ],
-    });
-    let uniforms = pyramid
-        .layout
-        .steps
-        .iter()
-        .map(|step| gpu.uniform("hiz.reduce.step", &step_uniform(step, reduction)))
-        .collect::<Result<Vec<_>>>()?;
-    let mut pass = encoder
-        .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.reduce.pass"), timestamp_writes: None });
-    pass.set_bind_group(0, &source, &[]);
-    for (step, uniform) in pyramid.layout.steps.iter().zip(&uniforms) {
-        let bind_group = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("hiz.reduce.step"),
-            layout: &layouts.one_uniform,
-            entries: &[entry(0, uniform.as_entire_binding())],
-        });
+    let dispatch = |step: &Step| {
         let tall = step.source == 0 && reads_tall(step, source_kind, size);
-        let [columns, rows] = step.blocks;
-        let of_places =
-            if tall { step.blocks.map(|n| n.div_ceil(TALL_SIDE)) } else { [columns.div_ceil(REDUCE_WORKGROUP), rows] };
-        let (shape, workgroups) = if step.is_tail() {
-            (ReduceShape::Tail, [1, 1])
-        } else if !step.is_coarse() {
-            let (from_source, first) = (step.source == 0, step.first - step.source);
-            (ReduceShape::Blocks { from_source, first }, of_places)
-        } else if step.last < SHARED_LEVEL {
-            (ReduceShape::Coarse { shared: false }, of_places)
-        } else {
-            (ReduceShape::Coarse { shared: true }, [columns, rows])
-        };
-        let key = ReduceKey {
+        let (shape, workgroups) = shape_of(step, tall);
+        let pipeline = gpu.reduce_pipeline(ReduceKey {
             source: source_kind,
             reversed: camera.convention().is_reversed(),
             chunks: pyramid.chunks.len(),
             tall,
             shape,
-        };
-        pass.set_pipeline(&gpu.reduce_pipeline(key));
-        pass.set_bind_group(1, &bind_group, &[]);
+        })?;
+        let uniform = gpu.uniform("hiz.reduce.step", &step_uniform(step, reduction))?;
+        let entries = [entry(0, uniform.as_entire_binding())];
+        Ok((pipeline, gpu.bind_group("hiz.reduce.step", &gpu.layouts().one_uniform, &entries)?, workgroups))
+    };
+    let dispatches = pyramid.layout.steps.iter().map(dispatch).collect::<Result<Vec<_>>>()?;
+    let mut pass = encoder
+        .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.reduce.pass"), timestamp_writes: None });
+    pass.set_bind_group(0, &source, &[]);
+    for (pipeline, bind_group, [columns, rows]) in &dispatches {
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(1, bind_group, &[]);
         // One at least, for the header, where nothing is stored.
-        pass.dispatch_workgroups(workgroups[0].max(1), workgroups[1].max(1), 1);
+        pass.dispatch_workgroups((*columns).max(1), (*rows).max(1), 1);
     }
     drop(pass);
     let reduced = Arc::clone(&pyramid.reduced);
     encoder.on_submitted_work_done(move || reduced.store(reduction, Ordering::Release));
     // They hold the last depth image.
     pyramid.bindings.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clear();
+    let tolerance = of_format.after(uploaded);
     *pyramid.built.lock().unwrap_or_else(std::sync::PoisonError::into_inner) =
-        Some(Built { reduction, source: depth.clone(), source_kind, camera: camera.clone() });
+        Some(Built { reduction, source: view, source_kind, camera: camera.clone(), tolerance });
     Ok(())
+}
+
+/// What the reduction reads and writes; and the view of the image's depth that can be bound: the caller's, or where that shows another
+/// part or use of the texture, as the default view of a texture with a stencil does, the whole depth of it.
+fn bind_source(
+    gpu: &Gpu,
+    depth: &wgpu::TextureView,
+    source_kind: SourceKind,
+    pyramid: &Pyramid,
+) -> Result<(wgpu::BindGroup, wgpu::TextureView)> {
+    let bind = |view: &wgpu::TextureView| {
+        gpu.bind_group(
+            "hiz.reduce.pyramid",
+            gpu.layouts().reduce(source_kind),
+            &[
+                entry(0, wgpu::BindingResource::TextureView(view)),
+                entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
+                entry(2, pyramid.uniform.as_entire_binding()),
+                entry(3, pyramid.chunk(gpu, 0).as_entire_binding()),
+                entry(4, pyramid.chunk(gpu, 1).as_entire_binding()),
+                entry(5, pyramid.chunk(gpu, 2).as_entire_binding()),
+            ],
+        )
+    };
+    let error = match bind(depth) {
+        Ok(bound) => return Ok((bound, depth.clone())),
+        Err(error) => error,
+    };
+    let refused = |error| match error {
+        Error::Device(why) => Error::mismatch(
+            "depth",
+            format!("expected a texture of this device and context that has not been destroyed, but {why}"),
+        ),
+        other => other,
+    };
+    // A view of another device's texture would tell that device of its errors, whose handler may end the process.
+    if error.to_string().contains(OF_ANOTHER_DEVICE) {
+        return Err(refused(error));
+    }
+    let view = gpu.view(depth.texture()).map_err(refused)?;
+    Ok((bind(&view).map_err(refused)?, view))
+}
+
+/// What wgpu says of objects of another device.
+const OF_ANOTHER_DEVICE: &str = "doesn't match";
+
+/// The shader of a step, and its workgroups.
+fn shape_of(step: &Step, tall: bool) -> (ReduceShape, [u32; 2]) {
+    let [columns, rows] = step.blocks;
+    let of_places =
+        if tall { step.blocks.map(|n| n.div_ceil(TALL_SIDE)) } else { [columns.div_ceil(REDUCE_WORKGROUP), rows] };
+    if step.is_tail() {
+        (ReduceShape::Tail, [1, 1])
+    } else if !step.is_coarse() {
+        let (from_source, first) = (step.source == 0, step.first - step.source);
+        (ReduceShape::Blocks { from_source, first }, of_places)
+    } else if step.last < SHARED_LEVEL {
+        (ReduceShape::Coarse { shared: false }, of_places)
+    } else {
+        (ReduceShape::Coarse { shared: true }, [columns, rows])
+    }
 }
 
 /// Whether neighbouring invocations of a step that reads the image read below each other. Blocks next to each other, four pixels a texel,

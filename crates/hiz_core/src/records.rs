@@ -46,21 +46,13 @@ impl Records {
         // Without MAP_WRITE wgpu maps a staging area of its own, and copies that into this one.
         let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::MAP_WRITE;
         let (staging, filled) = gpu.written(label, size, usage, fill)?;
-        let texture = gpu.device().create_texture(&wgpu::TextureDescriptor {
-            label: Some(label),
-            size: wgpu::Extent3d {
-                width: columns * (record_bytes / TEXEL_BYTES) as u32,
-                height: rows,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: FORMAT,
-            usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
-        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let texture = gpu.texture(
+            label,
+            (columns * (record_bytes / TEXEL_BYTES) as u32, rows),
+            FORMAT,
+            wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC,
+        )?;
+        let view = gpu.view(&texture)?;
         let records = Self { view, texture: texture.clone(), record_bytes };
         Ok((records, Upload { staging, texture }, filled))
     }

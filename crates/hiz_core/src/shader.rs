@@ -84,7 +84,7 @@ impl SourceKind {
     /// The kind that fits a texture's format.
     pub(crate) fn of(format: wgpu::TextureFormat) -> Option<Self> {
         match format {
-            wgpu::TextureFormat::R32Float => Some(Self::Float),
+            wgpu::TextureFormat::R32Float | wgpu::TextureFormat::R16Float => Some(Self::Float),
             wgpu::TextureFormat::Rgba32Uint => Some(Self::Bits),
             f if f.has_depth_aspect() => Some(Self::Depth),
             _ => None,
@@ -117,9 +117,13 @@ pub(crate) fn yardstick_reduce_texture(source: SourceKind) -> String {
     [wgsl!("shared/depth_bits"), &source.wgsl(), wgsl!("yardstick/reduce_texture")].join("\n")
 }
 
-/// The cull (`entry` = its own file) or the explanation, which share everything up to the verdict.
+/// The cull (`entry` = its own file), which shares everything up to the verdict with the explanation.
 fn classifying(store: DepthStore, kind: BoundsKind, entry: &str) -> String {
-    module(store, kind, &[wgsl!("shared/supporting_planes"), wgsl!("shared/classify")].join("\n"), entry)
+    module(store, kind, &certified(), &[wgsl!("shared/untold"), entry].join("\n"))
+}
+
+fn certified() -> String {
+    [wgsl!("shared/supporting_planes"), wgsl!("shared/classify")].join("\n")
 }
 
 /// The same frame for the given decision about one instance.
@@ -157,7 +161,7 @@ pub(crate) fn cull(store: DepthStore, kind: BoundsKind) -> String {
 /// A yardstick: the same of boxes without certificates.
 pub(crate) fn yardstick_cull(store: DepthStore) -> String {
     let bounds = BoundsKind::Box;
-    module(store, bounds, &uncertified(), &flat_frame())
+    module(store, bounds, &uncertified(), &[wgsl!("shared/untold"), &flat_frame()].join("\n"))
 }
 
 fn uncertified() -> String {
@@ -166,24 +170,37 @@ fn uncertified() -> String {
 }
 
 fn flat_frame() -> String {
-    [wgsl!("shared/piece"), wgsl!("shared/groups"), wgsl!("shared/report"), wgsl!("cull")].join("\n")
+    [wgsl!("shared/piece"), wgsl!("shared/groups"), wgsl!("shared/statistics"), wgsl!("shared/report"), wgsl!("cull")]
+        .join("\n")
 }
 
 /// The cull of groups.
 pub(crate) fn cull_groups(store: DepthStore) -> String {
-    let entry = [wgsl!("shared/piece"), wgsl!("shared/groups"), wgsl!("cull_groups")].join("\n");
-    classifying(store, BoundsKind::Box, &entry)
+    let entry = [wgsl!("shared/piece"), wgsl!("shared/groups"), wgsl!("shared/statistics"), wgsl!("cull_groups")];
+    classifying(store, BoundsKind::Box, &entry.join("\n"))
 }
 
 /// The cull of the members of the groups that are left.
 pub(crate) fn cull_members(store: DepthStore, kind: BoundsKind) -> String {
-    let entry = [wgsl!("shared/piece"), wgsl!("shared/report"), wgsl!("shared/groups"), wgsl!("cull_members")];
+    let entry = [
+        wgsl!("shared/piece"),
+        wgsl!("shared/statistics"),
+        wgsl!("shared/report"),
+        wgsl!("shared/groups"),
+        wgsl!("cull_members"),
+    ];
+    classifying(store, kind, &entry.join("\n"))
+}
+
+/// The verdicts of the members of groups that were hidden as a whole.
+pub(crate) fn refine(store: DepthStore, kind: BoundsKind) -> String {
+    let entry = [wgsl!("shared/piece"), wgsl!("shared/groups"), wgsl!("refine")];
     classifying(store, kind, &entry.join("\n"))
 }
 
 /// The explanation of one instance's verdict.
 pub(crate) fn explain(store: DepthStore, kind: BoundsKind) -> String {
-    classifying(store, kind, wgsl!("explain"))
+    module(store, kind, &certified(), wgsl!("explain"))
 }
 
 /// The ordered compaction.
@@ -193,7 +210,7 @@ pub(crate) fn compact() -> String {
 
 /// The count of verdicts.
 pub(crate) fn count() -> String {
-    [wgsl!("shared/verdict"), wgsl!("shared/piece"), wgsl!("shared/groups"), wgsl!("count")].join("\n")
+    [wgsl!("shared/verdict"), wgsl!("shared/piece"), wgsl!("count")].join("\n")
 }
 
 /// The update of records and groups.
@@ -213,7 +230,8 @@ const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind:
 /// Every module, for those who plant faults in them.
 pub(crate) fn all() -> Vec<String> {
     let culls = |store: DepthStore| {
-        let of_kind = move |kind| [cull(store, kind), cull_members(store, kind), explain(store, kind)];
+        let of_kind =
+            move |kind| [cull(store, kind), cull_members(store, kind), refine(store, kind), explain(store, kind)];
         KINDS.into_iter().flat_map(of_kind).chain([cull_groups(store), yardstick_cull(store)])
     };
     let of_source = |source| culls(DepthStore::Apart(source)).chain([reduce(source), reduce_coarse(source)]);
@@ -311,7 +329,8 @@ mod tests {
         let oriented = parse(&explain(DepthStore::Apart(SourceKind::Depth), BoundsKind::OrientedBox));
         same_layout!(oriented, "Explanation", ExplanationRecord {
             "verdict" = verdict, "stage" = stage, "level" = level, "farthest_bits" = farthest_bits, "pixels" = pixels,
-            "texels" = texels, "texel_bits" = texel_bits, "depths" = depths, "padding" = padding
+            "depths" = depths, "last" = last, "texels_read" = texels_read, "of_footprint" = of_footprint,
+            "farthest_before" = farthest_before, "any_before" = any_before
         });
     }
 
@@ -354,6 +373,18 @@ mod tests {
             assert_eq!(calls(&module, "supporting_planes", "bar2"), 1, "slopes");
             assert_eq!(calls(&module, "supporting_planes", "bar"), 1, "offsets");
         }
+    }
+
+    /// Drivers clamp what is drawn to 0..=1, and nothing else may be copied into a depth texture:
+    /// no verdict of theirs shows whether its single pixels are sanitized. (`tests/no_depth.rs` has
+    /// what other textures hold.)
+    #[test]
+    fn single_pixels_of_every_source_are_sanitized() {
+        for source in SOURCES {
+            let module = parse(&cull(DepthStore::Apart(source), BoundsKind::Box));
+            assert_eq!(calls(&module, "source_bits", "sanitized"), 1, "{source:?}");
+        }
+        assert_eq!(calls(&parse(&cull(DepthStore::Atlas, BoundsKind::Box)), "texel", "sanitized"), 1);
     }
 
     /// A guess is mostly right, so that no verdict shows whether it was proved.

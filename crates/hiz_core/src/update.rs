@@ -5,10 +5,12 @@
 //! the device counts those that ran, and where the numbers part the boxes of all groups that are touched from then on become no
 //! volume (their members are always tested one by one).
 
+use std::ops::Range;
+
 use crate::bounds::{Bounds, BoxRecord};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::groups::Source;
+use crate::groups::{GROUP, Source};
 use crate::instances::{Instances, refuse_bad, write_boxes};
 use crate::pyramid::entry;
 use crate::records::Records;
@@ -33,6 +35,7 @@ struct Replacement<'a> {
     target: &'a Records,
 }
 
+/// `before` records what has to read the old bounds; it is told which instances will have new ones, and asked if there are any.
 pub(crate) fn record(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
@@ -40,6 +43,7 @@ pub(crate) fn record(
     first: u32,
     bounds: &Bounds<'_>,
     strict: bool,
+    before: impl FnOnce(&mut wgpu::CommandEncoder, Range<u32>) -> Result<()>,
 ) -> Result<()> {
     gpu.check_context("instances", instances.context)?;
     let n = bounds.len()?;
@@ -65,7 +69,10 @@ pub(crate) fn record(
     if n == 0 {
         return Ok(());
     }
+    let range = first..first + n as u32;
+    before(encoder, range.clone())?;
 
+    let begin = gpu.update_pipeline("begin")?;
     let mut changing = instances.changing();
     let number = changing.next_update;
     changing.next_update = number.wrapping_add(1);
@@ -73,17 +80,16 @@ pub(crate) fn record(
         .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.update.pass"), timestamp_writes: None });
     let mut begun = false;
     let mut dispatch = |replacement: &Replacement<'_>, entry_point| -> Result<()> {
-        let bind_group = bind(gpu, instances, replacement, number)?;
+        let (bind_group, pipeline) = (bind(gpu, instances, replacement, number)?, gpu.update_pipeline(entry_point)?);
         pass.set_bind_group(0, &bind_group, &[]);
         if !std::mem::replace(&mut begun, true) {
-            pass.set_pipeline(&gpu.update_pipeline("begin"));
+            pass.set_pipeline(&begin);
             pass.dispatch_workgroups(1, 1, 1);
         }
-        pass.set_pipeline(&gpu.update_pipeline(entry_point));
+        pass.set_pipeline(&pipeline);
         pass.dispatch_workgroups((replacement.places.len() as u32).div_ceil(WORKGROUP), 1, 1);
         Ok(())
     };
-    let range = first..first + n as u32;
     let result = instances.pieces.iter().enumerate().try_for_each(|(p, piece)| {
         let here = range.start.max(piece.range.start)..range.end.min(piece.range.end);
         if here.is_empty() {
@@ -99,16 +105,19 @@ pub(crate) fn record(
         let record_bytes = instances.kind.record_bytes();
         let groups = &mut changing.groups[p];
         let staging = wgpu::BufferUsages::STORAGE;
-        let (fresh, touched) =
-            gpu.written("hiz.update.records", places.len() as u64 * record_bytes, staging, |records| {
-                groups.replace(bounds, &places, source, records)
+        for places in bands(&places, record_bytes, gpu.limits()) {
+            let (fresh, touched) =
+                gpu.written("hiz.update.records", places.len() as u64 * record_bytes, staging, |records| {
+                    groups.replace(bounds, places, source, records)
+                })?;
+            dispatch(&Replacement { places, fresh, target: &piece.records }, "replace_records")?;
+            let bytes = (touched.len() * size_of::<BoxRecord>()) as u64;
+            let (fresh, ()) = gpu.written("hiz.update.groups", bytes, staging, |boxes| {
+                write_boxes(boxes, touched.iter().map(|group| groups.record(*group as usize)))
             })?;
-        dispatch(&Replacement { places: &places, fresh, target: &piece.records }, "replace_records")?;
-        let bytes = (touched.len() * size_of::<BoxRecord>()) as u64;
-        let (fresh, ()) = gpu.written("hiz.update.groups", bytes, staging, |boxes| {
-            write_boxes(boxes, touched.iter().map(|group| groups.record(*group as usize)))
-        })?;
-        dispatch(&Replacement { places: &touched, fresh, target: &piece.group_records }, "replace_groups")
+            dispatch(&Replacement { places: &touched, fresh, target: &piece.group_records }, "replace_groups")?;
+        }
+        Ok(())
     });
     if result.is_err() {
         // The host may have taken a part. No number of the device will agree with it any more.
@@ -117,20 +126,35 @@ pub(crate) fn record(
     result
 }
 
+/// `places`, ascending, in bands whose new records one storage binding holds. (A piece may hold more: its own records lie in a texture.)
+/// No group is in two of them.
+fn bands<'a>(places: &'a [u32], record_bytes: u64, limits: &wgpu::Limits) -> impl Iterator<Item = &'a [u32]> {
+    let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    let most = u32::try_from(bytes / record_bytes).unwrap_or(u32::MAX);
+    let step = (most / GROUP as u32).max(1).saturating_mul(GROUP as u32);
+    let mut rest = places;
+    std::iter::from_fn(move || {
+        let first = rest.first()? / step;
+        let (band, behind) = rest.split_at(rest.partition_point(|place| place / step == first));
+        rest = behind;
+        Some(band)
+    })
+}
+
 fn bind(gpu: &Gpu, instances: &Instances, replacement: &Replacement<'_>, number: u32) -> Result<wgpu::BindGroup> {
     let Replacement { places, fresh, target } = replacement;
     let uniform = UpdateUniform { count: places.len() as u32, texels: target.texels(), number, padding: 0 };
     let uniform = gpu.uniform("hiz.update.uniform", &uniform)?;
     let places = gpu.filled("hiz.update.places", bytemuck::cast_slice(places), wgpu::BufferUsages::STORAGE)?;
-    Ok(gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("hiz.update.piece"),
-        layout: &gpu.layouts().update,
-        entries: &[
+    gpu.bind_group(
+        "hiz.update.piece",
+        &gpu.layouts().update,
+        &[
             entry(0, uniform.as_entire_binding()),
             entry(1, places.as_entire_binding()),
             entry(2, fresh.as_entire_binding()),
             entry(3, wgpu::BindingResource::TextureView(&target.view)),
             entry(4, instances.sequence.as_entire_binding()),
         ],
-    }))
+    )
 }

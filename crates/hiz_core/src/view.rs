@@ -3,10 +3,10 @@
 //!
 //! The certificates compare linear functions of the position. Written about the eye, with the depth row relative to w
 //! (`z = A w + Z'`), their rounding errors are proportional to the *distance* instead of the world coordinates: margins come
-//! out near 1e-5 of the distance. The magnitude rows carry the share that each coefficient can contribute to an error, in
+//! out near 1e-5 of the distance. Parallel rays have no eye: theirs is the distance from a point that is likely to be near. The magnitude rows carry the share that each coefficient can contribute to an error, in
 //! units of float32's eps; the shader multiplies them by the instance's own magnitudes.
 
-use crate::camera::{Camera, Mat3, Vec3, dot, solve3, sub};
+use crate::camera::{Camera, Mat3, Mat4, Vec3, dot, solve3, sub};
 use crate::error::{Error, Result};
 
 /// float32's spacing at 1: WGSL calls a result "correctly rounded" when it is off by less than this, up or down.
@@ -38,7 +38,7 @@ pub(crate) struct ViewRows {
     pub(crate) z: Row,
     /// w: view depth up to a power of two.
     pub(crate) w: Row,
-    /// A of promise: `z = A w + Z'`.
+    /// A: `z = A w + Z'`.
     pub(crate) z_slope: f32,
     /// The reference point is exactly `eye_hi + eye_lo`.
     pub(crate) eye_hi: [f32; 3],
@@ -56,18 +56,19 @@ impl ViewRows {
         let linear = |r: usize| [rows[r][0], rows[r][1], rows[r][2]];
         let origin = camera.origin();
         let (w_lin, z_lin) = (linear(3), linear(2));
-        let (eye_hi, eye_lo, eye) = reference_point(camera);
+        let Reference { hi: eye_hi, lo: eye_lo, point: eye, is_eye } = Reference::of(camera);
         let about_eye = |r: usize| Affine::about(eye, rows[r], origin);
         let size = camera.size();
         let x = about_eye(0).scaled(f64::from(size.width) / 2.0);
         let y = about_eye(1).scaled(-f64::from(size.height) / 2.0);
         let w = about_eye(3);
-        let slope = dot(z_lin, w_lin) / dot(w_lin, w_lin);
+        // About the eye: what of z is proportional to w. Elsewhere: the depth of that point, so that Z' and `d - A` are small near it.
+        let slope = if is_eye { dot(z_lin, w_lin) / dot(w_lin, w_lin) } else { about_eye(2).m[3] / w.m[3] };
         #[expect(
             clippy::cast_possible_truncation,
             reason = "rounding to float32 is the point; what it leaves over stays in Z'"
         )]
-        let z_slope = if slope.abs() < 32_768.0 { slope as f32 } else { 0.0 };
+        let z_slope = if slope.abs() < 32_768.0 { flushed(slope as f32) } else { 0.0 };
         let z = about_eye(2).minus(f64::from(z_slope), &w);
         let [x, y, z, w] = [x, y, z, w].map(|r| r.rounded(transform_slack));
 
@@ -115,27 +116,77 @@ impl ClipRows {
     pub(crate) fn new(camera: &Camera) -> Result<Self> {
         // The cull's own view decides what float32 can hold: what it refuses is not worth drawing either.
         ViewRows::new(camera, 0.0)?;
-        let (eye_hi, eye_lo, eye) = reference_point(camera);
+        let Reference { hi: eye_hi, lo: eye_lo, point: eye, .. } = Reference::of(camera);
         let rows = camera.rows_near_one().map(|row| Affine::about(eye, row, camera.origin()).rounded(0.0).m);
         Ok(Self { rows, eye_hi, eye_lo })
     }
 }
 
-/// The eye (perspective: where x = y = w = 0) or the middle of the near or far plane (orthographic: x = y = z = 0); the
-/// world's origin where neither can be found. Any point would be *valid*, this one makes the margins small.
-fn reference_point(camera: &Camera) -> ([f32; 3], [f32; 3], Vec3) {
-    let rows = camera.rows_near_one();
-    let third = if camera.is_orthographic() { 2 } else { 3 };
-    let m: Mat3 = [0, 1, third].map(|r| [rows[r][0], rows[r][1], rows[r][2]]);
-    let b = [0, 1, third].map(|r: usize| -rows[r][3]);
-    let relative = solve3(&m, b).unwrap_or([0.0; 3]);
-    let origin = camera.origin();
-    let eye: Vec3 = std::array::from_fn(|k| origin[k] + relative[k]);
-    // Beyond 2^60 the shader would call everything invalid; the origin is as good as any point there.
-    let eye = if eye.iter().all(|v| v.abs() < 2.0_f64.powi(60)) { eye } else { [0.0; 3] };
-    let (hi, lo) = split3(eye);
-    // The two halves add up without rounding: `lo` holds bits of a float64 below those of `hi`.
-    (hi, lo, std::array::from_fn(|k| f64::from(hi[k]) + f64::from(lo[k])))
+/// The point that a camera's float32 rows stand about. Any would be *valid*; one near what is tested makes the margins small, for
+/// they are proportional to the distance from it.
+struct Reference {
+    /// The two halves add up to the point without rounding: `lo` holds bits of a float64 below those of `hi`.
+    hi: [f32; 3],
+    lo: [f32; 3],
+    point: Vec3,
+    /// Whether it is the centre of projection.
+    is_eye: bool,
+}
+
+impl Reference {
+    /// A point of the image's middle axis (x = y = 0).
+    ///
+    /// - Perspective: the eye, where w = 0; the near plane where the far one is not twice as far away, so that all that is seen is nearer to
+    ///   it than to the eye.
+    /// - Parallel rays: [`depth_of_interest`].
+    /// - The world's origin where no such point can be found.
+    fn of(camera: &Camera) -> Self {
+        let rows = camera.rows_near_one();
+        let middle = |third: usize, value: f64| {
+            let m: Mat3 = [0, 1, third].map(|r| [rows[r][0], rows[r][1], rows[r][2]]);
+            solve3(&m, [-rows[0][3], -rows[1][3], value - rows[third][3]])
+        };
+        let (relative, is_eye) = if camera.is_orthographic() {
+            (middle(2, depth_of_interest(camera, &rows)), false)
+        } else {
+            let depth = |p: Vec3| dot([rows[2][0], rows[2][1], rows[2][2]], p) + rows[2][3];
+            let (eye, ahead) = (middle(3, 0.0), middle(3, 1.0));
+            // Along the axis z grows from the eye's by so much for each w.
+            let near = eye.zip(ahead).and_then(|(eye, ahead)| {
+                near_of_thin_range(depth(eye), depth(ahead) - depth(eye), camera.convention().is_reversed())
+            });
+            match near {
+                Some(w) => (middle(3, w), false),
+                None => (eye, true),
+            }
+        };
+        let origin = camera.origin();
+        let point: Vec3 = std::array::from_fn(|k| origin[k] + relative.unwrap_or([0.0; 3])[k]);
+        // Beyond 2^60 the shader would call everything invalid; the origin is as good as any point there.
+        let point = if point.iter().all(|v| v.abs() < 2.0_f64.powi(60)) { point } else { [0.0; 3] };
+        let (hi, lo) = split3(point);
+        Self { hi, lo, point: std::array::from_fn(|k| f64::from(hi[k]) + f64::from(lo[k])), is_eye }
+    }
+}
+
+/// w at the near plane, where at the far plane it is less than twice that. Depth is `slope + at_eye / w`.
+fn near_of_thin_range(at_eye: f64, slope: f64, reversed: bool) -> Option<f64> {
+    let (at_zero, at_one) = (-at_eye / slope, at_eye / (1.0 - slope));
+    let (near, far) = if reversed { (at_one, at_zero) } else { (at_zero, at_one) };
+    // Written so that NaN is not thin, either.
+    (near > 0.0 && near < far && far < 2.0 * near).then_some(near)
+}
+
+/// The z around which a camera with parallel rays is likely to see most: where its eye stands, or at the plane next to it where that is
+/// outside the camera's range. A bare matrix does not say where the eye is: there it is the world's origin, if that is in
+/// view, or else the near plane, in either convention.
+fn depth_of_interest(camera: &Camera, rows: &Mat4) -> f64 {
+    let [x, y, z, w] = rows.map(|row| row[3]);
+    // The rows stand about the origin, and the constants are its clip coordinates. w is not 0: no NaN.
+    let ratios = [x / w, y / w, z / w];
+    let in_view = ratios[0].abs() <= 1.0 && ratios[1].abs() <= 1.0 && (0.0..=1.0).contains(&ratios[2]);
+    let near = if camera.convention().is_reversed() { 1.0 } else { 0.0 };
+    w * if camera.is_posed() || in_view { ratios[2].clamp(0.0, 1.0) } else { near }
 }
 
 /// `v` as two float32: `hi` nearest, `lo` the rest, nearest; both flushed where subnormal.
@@ -247,6 +298,81 @@ mod tests {
         // x, y and w vanish at the eye up to what the two halves leave over.
         for row in [rows.x, rows.y, rows.w] {
             assert!(f64::from(row.m[3]).abs() < 1e-4, "{row:?}");
+        }
+    }
+
+    fn point(view: &ViewRows) -> Vec3 {
+        std::array::from_fn(|k| f64::from(view.eye_hi[k]) + f64::from(view.eye_lo[k]))
+    }
+
+    fn close(a: Vec3, b: Vec3) -> bool {
+        sub(a, b).iter().all(|v| v.abs() < 1e-9)
+    }
+
+    /// A far plane less than twice as far away as the near one: the near one's middle, and its depth. The eye is at (0, 0, 5).
+    #[test]
+    fn thin_ranges_are_measured_from_their_near_plane() {
+        let pose = Pose { eye: [0.0, 0.0, 5.0], target: [0.0; 3], up: [0.0, 1.0, 0.0] };
+        for convention in [DepthConvention::Standard, DepthConvention::Reversed] {
+            for (near, far, z) in
+                [(64.0, Some(127.0), -59.0), (64.0, Some(129.0), 5.0), (64.0, None, 5.0), (1.0, Some(1e3), 5.0)]
+            {
+                let projection = Projection::Perspective { fov_y: 1.0, near, far, convention };
+                let posed = Camera::look_at(&pose, &projection, ImageSize::new(8, 8)).unwrap();
+                let bare = Camera::from_clip_from_world(posed.clip_from_world(), ImageSize::new(8, 8), convention);
+                for camera in [posed, bare.unwrap()] {
+                    let view = ViewRows::new(&camera, 0.0).unwrap();
+                    assert!(close(point(&view), [0.0, 0.0, z]), "{near} {far:?}: {view:?}");
+                    if z < 0.0 {
+                        let depth = if convention.is_reversed() { 1.0 } else { 0.0 };
+                        assert!(
+                            (view.z_slope - depth).abs() < 1e-6
+                                && view.z.m[3].abs() < 1e-7
+                                && (view.w.m[3] - 64.0).abs() < 1e-3,
+                            "{view:?}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    /// Parallel rays: the reference point by hand. The eye is at (0, 0, 5), and looks along -z.
+    #[test]
+    fn parallel_rays_are_measured_from_where_things_are() {
+        let pose = Pose { eye: [0.0, 0.0, 5.0], target: [0.0; 3], up: [0.0, 1.0, 0.0] };
+        for convention in [DepthConvention::Standard, DepthConvention::Reversed] {
+            let camera = |near, far, beside: f64| {
+                let (left, right) = (beside - 2.0, beside + 2.0);
+                let projection =
+                    Projection::Orthographic { left, right, bottom: -2.0, top: 2.0, near, far, convention };
+                Camera::look_at(&pose, &projection, ImageSize::new(8, 8)).unwrap()
+            };
+            // View depths of the planes, the image's middle beside the eye, and the point's z: the eye's, or the next plane's.
+            for (near, far, beside, z) in [
+                (0.0, 1024.0, 0.0, 5.0),
+                (1.0, 1024.0, 0.0, 4.0),
+                (-1024.0, 1024.0, 8.0, 5.0),
+                (-1024.0, -2.0, 0.0, 7.0),
+            ] {
+                let camera = camera(near, far, beside);
+                let view = ViewRows::new(&camera, 0.0).unwrap();
+                let found = point(&view);
+                assert!(close(found, [beside, 0.0, z]), "{near} {far}: {found:?}");
+                // Its depth is A, and nothing is left of it in Z'.
+                let depth = (5.0 - z - near) / (far - near);
+                let depth = if convention.is_reversed() { 1.0 - depth } else { depth };
+                assert!((f64::from(view.z_slope) - depth).abs() < 1e-7 && view.z.m[3].abs() < 1e-7, "{view:?}");
+            }
+            // A bare matrix: the world's origin where it is in view, at view depth 5; or else the near plane.
+            for (near, far, beside, z) in
+                [(1.0, 1024.0, 0.0, 0.0), (1.0, 1024.0, 8.0, 4.0), (8.0, 1024.0, 0.0, -3.0), (1.0, 2.0, 0.0, 4.0)]
+            {
+                let m = camera(near, far, beside).clip_from_world();
+                let bare = Camera::from_clip_from_world(m, ImageSize::new(8, 8), convention).unwrap();
+                let found = point(&ViewRows::new(&bare, 0.0).unwrap());
+                assert!(close(found, [beside, 0.0, z]), "{near} {far} {beside}: {found:?}");
+            }
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{ContextId, Gpu};
 use crate::instances::{Instances, Piece};
 use crate::lists::{DrawIndexedIndirect, DrawTemplate, Lists};
@@ -125,11 +125,22 @@ pub struct Visible {
 impl Visible {
     pub(crate) fn new(gpu: &Gpu, instances: &Instances, options: &VisibleOptions) -> Result<Self> {
         let VisibleOptions { outputs, capacity, draw } = *options;
-        let pieces = instances.pieces.iter().map(|piece| PieceOutput::new(gpu, piece, outputs)).collect();
+        gpu.check_context("instances", instances.context)?;
+        if draw.first_instance != 0 && !gpu.device().features().contains(wgpu::Features::INDIRECT_FIRST_INSTANCE) {
+            return Err(Error::invalid(
+                "first_instance",
+                format!(
+                    "expected 0 on a device without the feature INDIRECT_FIRST_INSTANCE, got {}; ask for the feature where the \
+                     device is requested",
+                    draw.first_instance
+                ),
+            ));
+        }
+        let pieces = instances.pieces.iter().map(|piece| PieceOutput::new(gpu, piece, outputs));
         let listed = outputs.indices || outputs.draws;
         Ok(Self {
             context: gpu.id(),
-            pieces,
+            pieces: pieces.collect::<Result<_>>()?,
             lists: listed.then(|| Lists::new(gpu, instances, outputs.indices, capacity, draw)).transpose()?,
             statistics: OnceLock::new(),
             capacity: capacity.unwrap_or(instances.len()),
@@ -195,9 +206,9 @@ impl Visible {
     }
 
     /// Where levels are counted.
-    pub(crate) fn statistics_or_new(&self, gpu: &Gpu) -> &wgpu::Buffer {
+    pub(crate) fn statistics_or_new(&self, gpu: &Gpu) -> Result<&wgpu::Buffer> {
         let size = size_of::<StatisticsRecord>() as u64;
-        self.statistics.get_or_init(|| gpu.empty("hiz.visible.statistics", size, STORAGE))
+        made(&self.statistics, || gpu.empty("hiz.visible.statistics", size, STORAGE))
     }
 
     /// Where levels were counted, if they were.
@@ -215,22 +226,21 @@ pub(crate) const STORAGE: wgpu::BufferUsages =
     wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_SRC).union(wgpu::BufferUsages::COPY_DST);
 
 impl PieceOutput {
-    fn new(gpu: &Gpu, piece: &Piece, outputs: Outputs) -> Self {
+    fn new(gpu: &Gpu, piece: &Piece, outputs: Outputs) -> Result<Self> {
         let verdicts = if outputs.verdicts { piece.count().max(1).next_multiple_of(VERDICT_MULTIPLE) } else { 0 };
         let size = verdicts_offset(piece).max(16) + 4 * u64::from(verdicts);
-        Self { mask: gpu.empty("hiz.visible.mask", size, STORAGE), groups: OnceLock::new() }
+        Ok(Self { mask: gpu.empty("hiz.visible.mask", size, STORAGE)?, groups: OnceLock::new() })
     }
 
     /// For a cull that tests groups.
-    pub(crate) fn groups_or_new(&self, gpu: &Gpu, piece: &Piece) -> &GroupOutput {
-        self.groups.get_or_init(|| GroupOutput {
-            verdicts: gpu.empty("hiz.visible.group_verdicts", 4 * u64::from(piece.groups().max(1)), STORAGE),
-            survivors: gpu.empty(
-                "hiz.visible.survivors",
-                size_of::<SurvivorsRecord>() as u64,
-                STORAGE | wgpu::BufferUsages::INDIRECT,
-            ),
-            survivor_list: survivor_list(gpu, piece),
+    pub(crate) fn groups_or_new(&self, gpu: &Gpu, piece: &Piece) -> Result<&GroupOutput> {
+        made(&self.groups, || {
+            let (bytes, usage) = (size_of::<SurvivorsRecord>() as u64, STORAGE | wgpu::BufferUsages::INDIRECT);
+            Ok(GroupOutput {
+                verdicts: gpu.empty("hiz.visible.group_verdicts", 4 * u64::from(piece.groups().max(1)), STORAGE)?,
+                survivors: gpu.empty("hiz.visible.survivors", bytes, usage)?,
+                survivor_list: survivor_list(gpu, piece)?,
+            })
         })
     }
 
@@ -249,20 +259,20 @@ impl PieceOutput {
     }
 }
 
-fn survivor_list(gpu: &Gpu, piece: &Piece) -> wgpu::TextureView {
+fn survivor_list(gpu: &Gpu, piece: &Piece) -> Result<wgpu::TextureView> {
     let groups = piece.groups().max(1);
-    let (width, height) = (groups.min(SURVIVORS_PER_ROW), groups.div_ceil(SURVIVORS_PER_ROW));
-    let texture = gpu.device().create_texture(&wgpu::TextureDescriptor {
-        label: Some("hiz.visible.survivor_list"),
-        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::R32Uint,
-        usage: wgpu::TextureUsages::STORAGE_BINDING,
-        view_formats: &[],
-    });
-    texture.create_view(&wgpu::TextureViewDescriptor::default())
+    let size = (groups.min(SURVIVORS_PER_ROW), groups.div_ceil(SURVIVORS_PER_ROW));
+    let usage = wgpu::TextureUsages::STORAGE_BINDING;
+    gpu.view(&gpu.texture("hiz.visible.survivor_list", size, wgpu::TextureFormat::R32Uint, usage)?)
+}
+
+/// What `cell` holds, made if there is nothing.
+fn made<T>(cell: &OnceLock<T>, make: impl FnOnce() -> Result<T>) -> Result<&T> {
+    if let Some(there) = cell.get() {
+        return Ok(there);
+    }
+    let fresh = make()?;
+    Ok(cell.get_or_init(|| fresh))
 }
 
 /// Where the verdicts begin behind a piece's mask; `shaders/shared/piece.wgsl`, `verdicts_begin`.

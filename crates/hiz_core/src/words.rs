@@ -9,13 +9,14 @@ use crate::headless::Engine;
 use crate::instances::{Instances, Piece};
 use crate::readback;
 use crate::records::TEXEL_BYTES;
+use crate::tolerance::DepthTolerance;
 
 /// The view's uniform (`shaders/shared/view.wgsl`, `View`) as 32-bit words. The number of the reduction is 0.
 ///
 /// # Errors
 /// As `HizContext::record_cull`, for options and cameras that it refuses.
 pub fn view(camera: &Camera, options: &CullOptions) -> Result<Vec<u32>> {
-    Ok(bytemuck::cast_slice(&[ViewUniform::new(camera, 0, options)?]).to_vec())
+    Ok(bytemuck::cast_slice(&[ViewUniform::new(camera, 0, options, DepthTolerance::NONE)?]).to_vec())
 }
 
 /// The records of all instances (`shaders/shared/bounds_*.wgsl`) as 32-bit words.

@@ -325,6 +325,156 @@ fn borders_that_rounding_cannot_place_do_not_count() {
     assert!(tally.deep > 1000);
 }
 
+/// A view that loses what float64 holds so far from the origin: its matrix is a bare one, and its
+/// axes are nobody's.
+struct Lossy {
+    camera: Camera,
+    place: Vec3,
+    /// Right, up, forward.
+    axes: [Vec3; 3],
+    /// Half the image's width and height at depth 1.
+    half: [f64; 2],
+}
+
+impl Lossy {
+    fn new(random: &mut Random, near: f64) -> Self {
+        let place: Vec3 = [0; 3].map(|_| random.range(-1e7, 1e7));
+        let cross =
+            |a: Vec3, b: Vec3| [0, 1, 2].map(|k| a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]);
+        let unit = |v: Vec3| v.map(|x| x / v.iter().map(|x| x * x).sum::<f64>().sqrt());
+        let (forward, up) = (unit(anywhere(random, 1.0)), anywhere(random, 1.0));
+        let right = unit(cross(forward, up));
+        let axes = [right, cross(right, forward), forward];
+        let convention = random.pick(&CONVENTIONS);
+        let size = ImageSize::new(2 + random.below(4), 2 + random.below(4));
+        let fov_y = random.range(0.5, 2.0);
+        let projection = Projection::Perspective { fov_y, near, far: None, convention };
+        // About the origin the axes are as good as float64 has them; then to its place, in one
+        // matrix.
+        let pose = Pose { eye: [0.0; 3], target: forward, up: axes[1] };
+        let mut m = Camera::look_at(&pose, &projection, size).unwrap().clip_from_world();
+        for row in &mut m {
+            row[3] -= (0..3).map(|k| row[k] * place[k]).sum::<f64>();
+        }
+        let camera = Camera::from_clip_from_world(m, size, convention).unwrap();
+        let top = (fov_y / 2.0).tan();
+        let half = [top * f64::from(size.width) / f64::from(size.height), top];
+        Self { camera, place, axes, half }
+    }
+
+    /// The world position of (right, up, forward).
+    fn at(&self, v: Vec3) -> Vec3 {
+        std::array::from_fn(|k| self.place[k] + (0..3).map(|j| self.axes[j][k] * v[j]).sum::<f64>())
+    }
+}
+
+/// Walls that face such a camera, a few near planes away: at a depth that nobody is sure of.
+fn facing_walls(seed: u64, fault: Option<PlantedFault>) -> Tally {
+    let (mut random, mut tally) = (Random(seed), Tally::default());
+    for _ in 0..40 {
+        let near = 1e-4;
+        let view = Lossy::new(&mut random, near);
+        let z = near * random.range(1.5, 9.0);
+        let mut mesh = Mesh::default();
+        mesh.quad([[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]].map(|[x, y]| view.at([x * z, y * z, z])));
+        let options = ConservativeDepthOptions { refinement: random.below(2) };
+        examine(&mut random, &view.camera, &mesh, FaceCull::None, &options, fault, &mut tally);
+    }
+    tally
+}
+
+/// Walls so near to the near plane that float64 cannot tell which side of it they are on.
+fn walls_at_the_near_plane(seed: u64, fault: Option<PlantedFault>) -> Tally {
+    let (mut random, mut tally) = (Random(seed), Tally::default());
+    for _ in 0..300 {
+        let near = 1e-5;
+        let view = Lossy::new(&mut random, near);
+        let z = near + random.range(-3e-9, 3e-9);
+        let mut mesh = Mesh::default();
+        mesh.quad([[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]].map(|[x, y]| view.at([x * z, y * z, z])));
+        let options = ConservativeDepthOptions { refinement: 0 };
+        examine(&mut random, &view.camera, &mesh, FaceCull::None, &options, fault, &mut tally);
+    }
+    tally
+}
+
+/// Walls whose right border is that of a column, give or take nothing, and is cut at the near plane
+/// in the middle of the image: the cut's place in it is far less certain than that of the border's
+/// other end, a thousand times as far away.
+fn cut_borders(seed: u64, fault: Option<PlantedFault>) -> Tally {
+    let (mut random, mut tally) = (Random(seed), Tally::default());
+    for _ in 0..150 {
+        let near = 1e-3;
+        let view = Lossy::new(&mut random, near);
+        let ImageSize { width, height } = view.camera.size();
+        let column = f64::from(1 + random.below(width - 1));
+        let x = (2.0 * column / f64::from(width) - 1.0) * view.half[0];
+        // The cut is in the first row or above; the far end below the image.
+        let y = (1.0 - random.range(-1.0, 1.0) / f64::from(height)) * view.half[1];
+        let (cut, far) = ([x * near, y * near, near], [x, -2.0 * view.half[1], 1.0].map(|v| 1e3 * near * v));
+        let before: Vec3 = std::array::from_fn(|k| cut[k] - 1e-3 * (far[k] - cut[k]));
+        let left = |p: Vec3| [p[0] - 9.0, p[1], p[2]];
+        let mut mesh = Mesh::default();
+        mesh.quad([left(before), left(far), far, before].map(|v| view.at(v)));
+        let options = ConservativeDepthOptions { refinement: 0 };
+        examine(&mut random, &view.camera, &mesh, FaceCull::None, &options, fault, &mut tally);
+    }
+    tally
+}
+
+/// A wall with a crack that is closed by a triangle that faces away, so narrow that float64 cannot
+/// tell how it faces. It does not occlude: what is seen through the crack?
+fn closed_from_behind(seed: u64, fault: Option<PlantedFault>) -> Tally {
+    let (mut random, mut tally) = (Random(seed), Tally::default());
+    for _ in 0..600 {
+        let view = Lossy::new(&mut random, 1e-3);
+        let ImageSize { width, height } = view.camera.size();
+        let x = random.range(-0.9, 0.9) * view.half[0];
+        let crack = x + random.pick(&[1e-9, 2e-9, 4e-9, 8e-9]);
+        let mut mesh = Mesh::default();
+        let corner = |x: f64, y: f64| view.at([x, y, 1.0]);
+        let [a, b, c, d] = [(-9.0, -9.0), (x, -9.0), (x, 9.0), (-9.0, 9.0)].map(|(x, y)| mesh.vertex(corner(x, y)));
+        let [f, g, h] = [(9.0, -9.0), (9.0, 9.0), (crack, 9.0)].map(|(x, y)| mesh.vertex(corner(x, y)));
+        // Counter-clockwise as seen, but for the one in the crack.
+        mesh.triangles.extend([a, b, c, a, c, d, b, f, g, b, g, h, b, c, h]);
+        let depth = surface(&mesh, FaceCull::Back)
+            .conservative_depth_with_fault(&view.camera, &ConservativeDepthOptions { refinement: 0 }, fault)
+            .unwrap();
+        let exact = ExactScene::new(&view.camera, &mesh.vertices, &mesh.triangles);
+        let middle = (0.5 * (x + crack) / view.half[0] + 1.0) * f64::from(width) / 2.0;
+        let row = random.below(height);
+        let depth = depth[(row * width + middle as u32) as usize];
+        tally.pixels += 1;
+        tally.deep += u32::from(depth != view.camera.convention().far());
+        for k in -40..=40 {
+            let grid = 2.0_f64.powi(60);
+            let at = ((middle + f64::from(k) * 4e-10 * f64::from(width)) * grid).round() / grid;
+            tally.rays += 1;
+            let sees = depth == view.camera.convention().far()
+                || exact.blocked([at, f64::from(row) + 0.5], depth, Facing::CounterClockwise);
+            tally.past += u32::from(!sees);
+        }
+    }
+    tally
+}
+
+/// What float64 is not sure of: depths, cuts at the near plane, which side of it a point is on, how
+/// a triangle faces.
+#[test]
+fn what_float64_is_not_sure_of_does_not_count() {
+    for (name, tally, deep) in [
+        ("walls", facing_walls(3, None), 300),
+        ("walls at the near plane", walls_at_the_near_plane(9, None), 5),
+        // Where a cut's place matters it is not sure to lie behind the near plane: such triangles
+        // are dropped.
+        ("cut borders", cut_borders(4, None), 0),
+        ("cracks", closed_from_behind(5, None), 0),
+    ] {
+        println!("{name}: {tally:?}");
+        assert!(tally.past == 0 && tally.deep >= deep, "{name}: {tally:?}");
+    }
+}
+
 #[test]
 fn planted_faults_let_rays_through() {
     let past = |tallies: &[Tally]| tallies.iter().map(|t| t.past).sum::<u32>();
@@ -334,6 +484,18 @@ fn planted_faults_let_rays_through() {
     let folds = with(PlantedFault::FoldsIgnored);
     let nearest = with(PlantedFault::RoundedToNearest);
     let exact = borders(2, 300, Some(PlantedFault::NoWidening)).past;
+    for (name, past) in [
+        ("before the near plane", with(PlantedFault::BeforeNear)),
+        ("a cut's side joined", past(&campaign(1, 1000, Some(PlantedFault::CutSidesJoined)))),
+        ("points at the near plane unproved", walls_at_the_near_plane(9, Some(PlantedFault::NearPointsUnproved)).past),
+        ("exact depths", facing_walls(3, Some(PlantedFault::DepthsExact)).past),
+        ("exact depths of corners", facing_walls(3, Some(PlantedFault::CornerDepthsExact)).past),
+        ("exact cuts", cut_borders(4, Some(PlantedFault::CutPointsExact)).past),
+        ("facing unproved", closed_from_behind(5, Some(PlantedFault::FacingUnproved)).past),
+    ] {
+        println!("{name}: {past} rays past");
+        assert!(past > 0, "{name}: stayed green");
+    }
     println!(
         "rays past a pixel's depth: contours ignored {contours}, depth at the centre {centre}, folds ignored {folds}, rounded to \
          nearest {nearest}, no widening {exact}"

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use common::{Random, camera_along_z, engine, ndc};
 use hiz_core::headless::Culling;
 use hiz_core::{
-    Bounds, CANARY_WORDS, Camera, CullOptions, DepthConvention, DrawIndexedIndirect, DrawTemplate, Floats,
-    InstanceOptions, Instances, Order, Pyramid, VisibleOptions,
+    Bounds, CANARY_WORDS, Camera, Coverage, CullOptions, DepthConvention, DrawIndexedIndirect, DrawTemplate, Floats,
+    Hierarchy, InstanceOptions, Instances, Order, Pyramid, VisibleOptions, wgpu,
 };
 
 const CONVENTION: DepthConvention = DepthConvention::Reversed;
@@ -49,26 +49,103 @@ const DRAW: DrawTemplate = DrawTemplate { index_count: 36, first_index: 7, base_
 /// The words of every list, canary included.
 fn raw_lists(culling: &Culling) -> Vec<Vec<u32>> {
     culling.wait().unwrap();
+    (0..culling.visible().num_pieces())
+        .map(|piece| words_of(culling.visible().list(piece).expect("indices were asked for")))
+        .collect()
+}
+
+fn words_of(buffer: &wgpu::Buffer) -> Vec<u32> {
     let engine = engine();
     let (device, queue) = (engine.device(), engine.queue());
-    (0..culling.visible().num_pieces())
-        .map(|piece| {
-            let list = culling.visible().list(piece).expect("indices were asked for");
-            let staging = device.create_buffer(&hiz_core::wgpu::BufferDescriptor {
-                label: Some("test.staging"),
-                size: list.size(),
-                usage: hiz_core::wgpu::BufferUsages::COPY_DST | hiz_core::wgpu::BufferUsages::MAP_READ,
-                mapped_at_creation: false,
-            });
-            let mut encoder = device.create_command_encoder(&hiz_core::wgpu::CommandEncoderDescriptor::default());
-            encoder.copy_buffer_to_buffer(list, 0, &staging, 0, list.size());
-            queue.submit([encoder.finish()]);
-            staging.map_async(hiz_core::wgpu::MapMode::Read, .., |result| result.unwrap());
-            device.poll(hiz_core::wgpu::PollType::wait_indefinitely()).unwrap();
-            let view = staging.get_mapped_range(..).unwrap();
-            view.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect()
-        })
-        .collect()
+    let staging = device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("test.staging"),
+        size: buffer.size(),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
+    queue.submit([encoder.finish()]);
+    staging.map_async(wgpu::MapMode::Read, .., |result| result.unwrap());
+    device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+    let view = staging.get_mapped_range(..).unwrap();
+    view.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect()
+}
+
+/// Buffers that a renderer uses frame after frame hold the last answer and nothing of those before;
+/// and so does what a pyramid keeps for the next cull: the same pyramid, asked with other options,
+/// answers for those.
+#[test]
+fn buffers_and_bindings_that_are_used_again_answer_for_the_last_cull() {
+    let (instances, kept) = specks(3000, 0.3, Some(1024), 5);
+    let (camera, wall) = scene();
+    let open = engine().pyramid(&engine().upload_depth(&[0.0; 64 * 64], &camera).unwrap()).unwrap();
+    for (order, hierarchy) in [
+        (Order::Stable, Hierarchy::Never),
+        (Order::Any, Hierarchy::Never),
+        (Order::Stable, Hierarchy::Always),
+        (Order::Any, Hierarchy::Always),
+    ] {
+        let visible = engine().context().create_visible(&instances, &VisibleOptions::default()).unwrap();
+        let cull = |pyramid: &Pyramid, options: &CullOptions| {
+            let mut encoder = engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let options = CullOptions { order, hierarchy, ..options.clone() };
+            engine().context().record_cull(&mut encoder, &instances, &camera, pyramid, &visible, &options).unwrap();
+            engine().queue().submit([encoder.finish()]);
+            let draws = words_of(visible.draw_arguments().unwrap());
+            let (mut bits, mut indices) = (Vec::new(), Vec::new());
+            for piece in 0..visible.num_pieces() {
+                let first = 1024 * piece as u32;
+                let here = (3000 - first).min(1024);
+                let mask = words_of(visible.mask(piece).unwrap());
+                bits.extend((0..here).filter(|i| mask[*i as usize / 32] >> (i % 32) & 1 == 1).map(|i| first + i));
+                let count = draws[(visible.draw_offset(piece) / 4) as usize + 1] as usize;
+                indices.extend_from_slice(&words_of(visible.list(piece).unwrap())[..count]);
+            }
+            indices.sort_unstable();
+            assert_eq!(indices, bits, "{order:?} {hierarchy:?}");
+            bits
+        };
+        let all: Vec<u32> = (0..3000).collect();
+        let plain = CullOptions::default();
+        // 1/8 and the wall's 1/4: with half of it as slack nothing is hidden.
+        let slack = CullOptions { depth_slack_abs: 0.2, ..plain.clone() };
+        for (pyramid, options, expected) in [
+            (&open, &plain, &all),
+            (&wall, &plain, &kept),
+            (&wall, &slack, &all),
+            (&wall, &plain, &kept),
+            (&open, &plain, &all),
+            (&wall, &plain, &kept),
+        ] {
+            assert!(cull(pyramid, options) == *expected, "{order:?} {hierarchy:?}");
+        }
+    }
+    // A box a quarter of a pixel beside an open column, and a speck between the centres of pixels:
+    // each option makes a binding of its own.
+    let camera = camera_along_z(16, 16, CONVENTION);
+    let mut depth = [ndc(4.0, CONVENTION); 256];
+    (0..16).for_each(|row| depth[16 * row + 8] = 0.0);
+    let pyramid = engine().pyramid(&engine().upload_depth(&depth, &camera).unwrap()).unwrap();
+    let (min, max) = ([-1.5, -0.5, 8.0, 0.0, 0.0, 2.0], [-0.25, 0.5, 8.0, 0.0, 0.0, 2.0]);
+    let bounds = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };
+    let instances = engine().instances(&bounds, &InstanceOptions::default()).unwrap();
+    let plain = CullOptions::default;
+    let sample = CullOptions { coverage: Coverage::Sample, ..plain() };
+    for (options, expected) in [
+        (plain(), [false, true]),
+        (CullOptions { guard_px: Some(0.5), ..plain() }, [true, true]),
+        (plain(), [false, true]),
+        (sample.clone(), [false, false]),
+        (CullOptions { guard_px: Some(0.5), ..sample.clone() }, [false, true]),
+        (CullOptions { depth_slack: 0.5, ..plain() }, [true, true]),
+        (sample, [false, false]),
+        (CullOptions { transform_slack: 1e6, ..plain() }, [true, true]),
+        (plain(), [false, true]),
+    ] {
+        let culling = engine().cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap();
+        assert_eq!(culling.mask().unwrap(), expected, "{options:?}");
+    }
 }
 
 #[test]

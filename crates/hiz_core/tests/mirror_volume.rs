@@ -158,7 +158,7 @@ const MORE_FAULTS: &[Fault] = &[
         ],
     ),
     ("a margin without the slopes", &[("+ abs(slope.x) * p.x.error + abs(slope.y) * p.y.error", "")]),
-    ("a descent that forgets a row", &[("if at.y % 2u == 0u && at.y < end.y {", "if false {")]),
+    ("a descent that forgets a row", &[("if (at.y & last_child) < last_child && at.y < end.y {", "if false {")]),
 ];
 
 /// What the device culls beyond the mirror is more with each fault than without any. (One kind, one convention: each compiles anew.)

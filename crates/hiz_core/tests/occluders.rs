@@ -3,6 +3,7 @@
 mod common;
 
 use common::{CONVENTIONS, Random, camera_along_z, engine, ndc};
+use hiz_core::headless::Engine;
 use hiz_core::wgpu;
 use hiz_core::{
     Camera, DepthConvention, FaceCull, Floats, ImageSize, MeshData, OccluderOptions, Pose, Projection, Pyramid,
@@ -138,6 +139,63 @@ fn distance_from_the_origin_costs_nothing() {
             &depth[..4]
         );
     }
+}
+
+/// Slanted walls seen from eyes that float32 does not hold, against float64: every pixel's depth,
+/// and which pixels are covered. The faults that leave a half out move what is drawn by up to half
+/// a unit.
+#[test]
+fn eyes_that_float32_does_not_hold_see_what_float64_says() {
+    assert_eq!(wrong_pixels(&engine()), 0);
+    for (what, by) in [
+        ("(lo - view.eye_lo.xyz)", "lo"),
+        ("(lo - view.eye_lo.xyz)", "(vec3<f32>(0.0) - view.eye_lo.xyz)"),
+        ("(hi - view.eye_hi.xyz) + (lo - view.eye_lo.xyz)", "(hi + lo) - (view.eye_hi.xyz + view.eye_lo.xyz)"),
+        ("dot(view.clip_from_eye[0], d)", "dot(view.clip_from_eye[0], d) + 0.1 * d.z"),
+    ] {
+        let faulty = Engine::with_planted_faults(None, &[(what, by)]).expect("the device tests need a Vulkan driver");
+        assert!(wrong_pixels(&faulty) > 100, "{what} -> {by}: stayed green");
+    }
+}
+
+/// Pixels that are not as float64 says, of those that are surely covered or surely not.
+fn wrong_pixels(engine: &Engine) -> usize {
+    let size = ImageSize::new(40, 24);
+    let mut wrong = 0;
+    for convention in CONVENTIONS {
+        for eye in [[1e6 + 0.3, -1e6 - 0.7, 1e6 + 0.1], [0.3, 1e7 + 0.45, -1e5 - 0.01], [-3e7 - 1.3, 0.7, 2e6 + 0.6]] {
+            let camera = right_handed(eye, size, convention);
+            // A quadrangle that tilts away to the right and upwards: its depth is 4 + 0.5 x + 0.25
+            // y, and x and y end at 2 and 1.
+            let (right, top) = (2.0, 1.0);
+            let depth = |x: f64, y: f64| 4.0 + 0.5 * x + 0.25 * y;
+            let corner = |x: f64, y: f64| [eye[0] + x, eye[1] + y, eye[2] - depth(x, y)];
+            let vertices = [corner(-9.0, -9.0), corner(right, -9.0), corner(right, top), corner(-9.0, top)].concat();
+            let mesh = MeshData { vertices: Floats::F64(&vertices), triangles: &[0, 1, 2, 0, 2, 3], transforms: None };
+            let occluders = engine.occluders(&[mesh], &OccluderOptions::default()).unwrap();
+            let drawn = engine.render_depth(&occluders, &camera).unwrap().read().unwrap();
+            for (i, got) in (0..).zip(drawn) {
+                // 90 degrees high: the ray through a pixel's centre is (u, v, 1), and meets the
+                // plane at z = 4 / (1 - u / 2 - v / 4).
+                let [w, h] = [size.width, size.height].map(f64::from);
+                let u = (2.0 * (f64::from(i % size.width) + 0.5) / w - 1.0) * w / h;
+                let v = 1.0 - 2.0 * (f64::from(i / size.width) + 0.5) / h;
+                let z = 4.0 / (1.0 - 0.5 * u - 0.25 * v);
+                let (x, y) = (u * z, v * z);
+                // (The corners at the left and below are behind the plane z = 1, or beyond the
+                // image.)
+                let beyond = (x - right).max(y - top);
+                let expected = if beyond > 0.0 { f64::from(convention.far()) } else { ndc64(z, convention) };
+                let is_near = beyond.abs() < 0.02 || z < 1.1;
+                wrong += usize::from(!is_near && (f64::from(got) - expected).abs() > 2e-6);
+            }
+        }
+    }
+    wrong
+}
+
+fn ndc64(z: f64, convention: DepthConvention) -> f64 {
+    if convention.is_reversed() { 1.0 / z } else { 1.0 - 1.0 / z }
 }
 
 #[test]

@@ -10,7 +10,7 @@ use campaign::{Campaign, Class, HEADER, MISSING_LEVELS, PLAIN, Report};
 use common::{CONVENTIONS, Random, camera_along_z};
 use hiz_core::headless::Engine;
 use hiz_core::{
-    Bounds, BoundsKind, Coverage, CullOptions, DepthConvention, Floats, Footprint, InstanceOptions, VisibleOptions,
+    Bounds, BoundsKind, Coverage, CullOptions, DepthConvention, Fit, Floats, Footprint, InstanceOptions, VisibleOptions,
 };
 
 fn faulty(faults: &[(&str, &str)]) -> Engine {
@@ -79,6 +79,76 @@ fn a_level_too_fine_without_block_certificates() {
 #[test]
 fn nearest_instead_of_farthest() {
     assert_red("swap", &[("select(max(a, b), min(a, b), REVERSED)", "select(min(a, b), max(a, b), REVERSED)")]);
+}
+
+/// The mean of two depths in the place of the farthest: where a footprint is read, and where four
+/// pixels are.
+#[test]
+fn a_mean_instead_of_the_farthest() {
+    const FOUR: &[(Footprint, u32)] = &[(Footprint::Four, 0)];
+    let mean = |a: &str, b: &str| format!("bitcast<u32>(0.5 * (bitcast<f32>({a}) + bitcast<f32>({b})))");
+    let texels = format!("bits = {};", mean("bits", "texel(level, x, y)"));
+    assert_red_with("mean of a footprint", &[("bits = farthest(bits, texel(level, x, y));", &texels)], FOUR);
+    let (standard, reversed) =
+        (mean("greatest", "min(min(v.x, v.y), min(v.z, v.w))"), "(max(below_one.x, below_one.y) / 2u)");
+    assert_red(
+        "mean of four",
+        &[(
+            "select(greatest, u32(max(greatest_signed, 0))",
+            &format!("select({standard}, u32(max(greatest_signed, 0))"),
+        )],
+    );
+    assert_red(
+        "mean of four, reversed",
+        &[("max(max(below_one.x, below_one.y), max(below_one.z, below_one.w))", reversed)],
+    );
+}
+
+/// Slanted plates, each nearest at one end, which is half a pixel inside the pixel where it begins:
+/// left, right, top and bottom. Of that end a tenth of a pixel is nearer than the wall. Which are
+/// culled by their own fit?
+fn culled_slanted_plates(faults: &[(&str, &str)]) -> [bool; 4] {
+    let engine = faulty(faults);
+    // At depth 8 a pixel is a unit. A tenth of a pixel from such an end a plate is at depth 8.1,
+    // two tenths at 8.2.
+    let camera = camera_along_z(16, 16, DepthConvention::Reversed);
+    let image = engine.upload_depth(&[1.0 / 8.1; 256], &camera).unwrap();
+    let pyramid = engine.pyramid(&image).unwrap();
+    let options = CullOptions { fit: Fit::Volume, descent: 4096, ..CullOptions::default() };
+    let c = 0.5_f64.sqrt();
+    // Rows run downwards: the top's end is at y = -1/2, half a pixel below a border, and goes on
+    // downwards.
+    [(0, 1.0), (0, -1.0), (1, -1.0), (1, 1.0)].map(|(axis, sign)| {
+        let (mut along, mut across, mut end) = ([0.0, 0.0, c], [0.0, 0.0, -sign * c], [0.0, 0.0, 8.0]);
+        (along[axis], across[axis], end[axis]) = (sign * c, c, 0.5 * sign);
+        let mut beside = [1.0, 1.0, 0.0];
+        beside[axis] = 0.0;
+        let center: Vec<f64> = end.iter().zip(&along).map(|(e, a)| e + a).collect();
+        let rotation: Vec<f64> = (0..3).flat_map(|k| [along[k], beside[k], across[k]]).collect();
+        let bounds = Bounds::OrientedBoxes {
+            centers: Floats::F64(&center),
+            half_sizes: Floats::F64(&[1.0, 0.3, 0.02]),
+            rotations: Floats::F64(&rotation),
+        };
+        let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
+        let culling = engine.cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap();
+        !culling.mask().unwrap()[0]
+    })
+}
+
+/// The sides of a volume fit's rectangle: guesses that are a fifth of a pixel too far inside are
+/// harmless, for certificates refuse them; without those they cut off what is seen.
+/// (`shaders/shared/supporting_planes.wgsl`, `proved_interval`.)
+#[test]
+fn sides_of_a_volumes_rectangle_are_proved() {
+    let low = ("guess.x - widened", "guess.x - widened + 0.2");
+    let high = ("guess.y + widened", "guess.y + widened - 0.2");
+    let unproved_low = ("select(-BEYOND, low, surely_above(r, low, w))", "low");
+    let unproved_high = ("select(BEYOND, high, surely_below(r, high, w))", "high");
+    assert_eq!(culled_slanted_plates(&[]), [false; 4]);
+    assert_eq!(culled_slanted_plates(&[low, high]), [false; 4]);
+    assert_eq!(culled_slanted_plates(&[low, unproved_low]), [true, false, true, false]);
+    assert_eq!(culled_slanted_plates(&[high, unproved_high]), [false, true, false, true]);
 }
 
 #[test]
@@ -321,15 +391,24 @@ fn groups_that_forget_members_or_shrink() {
     }
 }
 
-/// The count takes a group's verdict for its 64 members: with 32 it counts what nobody culled.
+/// Verdicts of the members of hidden groups, told when they are read.
 #[test]
-fn groups_of_32_in_the_count() {
+fn refined_verdicts() {
     let run = |faults: &[(&str, &str)]| {
-        Campaign { seed: 26, rounds: 3, volumes: 12, groups: true, ..Campaign::default() }.run(&faulty(faults)).tested
+        let campaign = Campaign { seed: 26, rounds: 3, volumes: 12, groups: true, ..Campaign::default() };
+        campaign.run(&faulty(faults)).tested.contradictions
     };
-    let (without, with) = (run(&[]), run(&[("group_verdicts[place / GROUP]", "group_verdicts[place / 32u]")]));
-    eprintln!("contradictions: {}, with groups of 32 {}", without.contradictions, with.contradictions);
-    assert!(without.contradictions == 0 && with.contradictions > 0);
+    assert_eq!(run(&[]), 0);
+    for (name, what, by) in [
+        ("groups of 32", "let place = group * GROUP", "let place = group * 32u"),
+        ("half of the members", "place = group * GROUP + k * SHARE", "place = group * GROUP + k / 2u * SHARE"),
+        ("the group's verdict for all", "classify(place).verdict == OUTSIDE", "false"),
+        ("nobody is occluded", "of_group == OCCLUDED && classify(place).verdict == OUTSIDE", "of_group == OCCLUDED"),
+    ] {
+        let contradictions = run(&[(what, by)]);
+        eprintln!("{name}: {contradictions} contradictions");
+        assert!(contradictions > 0, "{name}: {what} -> {by}");
+    }
 }
 
 /// Reduction faults, seen by the pyramid itself.

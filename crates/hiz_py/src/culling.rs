@@ -134,24 +134,14 @@ impl Culling {
         self.0.run(py, headless::Culling::demand_and_written)
     }
 
-    /// Milliseconds to record, of the device, and to read back.
-    fn timings(&self, py: Python<'_>) -> PyResult<(f64, f64, f64)> {
+    /// Milliseconds to record, to compile, until the device was done, and to read back.
+    fn timings(&self, py: Python<'_>) -> PyResult<(f64, f64, f64, f64)> {
         let timings = self.0.get(py)?.timings();
-        Ok((timings.record_ms, timings.gpu_ms, timings.readback_ms))
+        Ok((timings.record_ms, timings.compile_ms, timings.wall_ms, timings.readback_ms))
     }
 
     fn explain(&self, py: Python<'_>, index: u64) -> PyResult<Explanation> {
-        let told = self.0.run(py, |culling| culling.explain(index))?;
-        Ok(Explanation {
-            verdict: told.verdict,
-            reason: told.reason,
-            rectangle: told.rectangle,
-            level: told.level,
-            texels: told.texels,
-            texel_depths: told.texel_depths,
-            farthest: told.farthest,
-            nearest: told.nearest,
-        })
+        self.0.run(py, |culling| culling.explain(index)).map(Explanation)
     }
 }
 
@@ -172,14 +162,76 @@ pub(crate) struct Counts {
 }
 
 /// How one verdict came about.
-#[pyclass(frozen, get_all, module = "hizvk._core")]
-pub(crate) struct Explanation {
-    verdict: u8,
-    reason: &'static str,
-    rectangle: Option<[i32; 4]>,
-    level: Option<u32>,
-    texels: Vec<[u32; 2]>,
-    texel_depths: Vec<f32>,
-    farthest: Option<f32>,
-    nearest: Option<f64>,
+#[pyclass(frozen, module = "hizvk._core")]
+pub(crate) struct Explanation(headless::Explanation);
+
+#[pymethods]
+impl Explanation {
+    #[getter]
+    fn verdict(&self) -> u8 {
+        self.0.verdict
+    }
+
+    #[getter]
+    fn reason(&self) -> &str {
+        &self.0.reason
+    }
+
+    #[getter]
+    fn rectangle(&self) -> Option<[i32; 4]> {
+        self.0.rectangle
+    }
+
+    #[getter]
+    fn level(&self) -> Option<u32> {
+        self.0.level
+    }
+
+    /// Level, column, row and depth of each.
+    #[getter]
+    fn texels(&self) -> Vec<(u32, u32, u32, f32)> {
+        let told = &self.0;
+        let places = told.texel_levels.iter().zip(&told.texels).zip(&told.texel_depths);
+        places.map(|((level, [x, y]), depth)| (*level, *x, *y, *depth)).collect()
+    }
+
+    #[getter]
+    fn texels_read(&self) -> u32 {
+        self.0.texels_read
+    }
+
+    #[getter]
+    fn decisive(&self) -> Option<usize> {
+        self.0.decisive
+    }
+
+    #[getter]
+    fn farthest(&self) -> Option<f32> {
+        self.0.farthest
+    }
+
+    #[getter]
+    fn nearest(&self) -> Option<f64> {
+        self.0.nearest
+    }
+
+    #[getter]
+    fn farthest_z(&self) -> Option<f64> {
+        self.0.farthest_z
+    }
+
+    #[getter]
+    fn nearest_z(&self) -> Option<f64> {
+        self.0.nearest_z
+    }
+
+    #[getter]
+    fn stale(&self) -> bool {
+        self.0.stale
+    }
+
+    #[getter]
+    fn group(&self) -> Option<Self> {
+        self.0.group.as_deref().cloned().map(Self)
+    }
 }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use hiz_core::headless::{self, AdapterSummary};
 use hiz_core::{
-    ConservativeDepthOptions, DepthConvention, DepthKind, FaceCull, Floats, InstanceOptions, MeshData, OccluderOptions,
-    PyramidOptions, StoredLevels, StoredOrder,
+    ConservativeDepthOptions, DepthConvention, DepthKind, DepthTolerance, FaceCull, Floats, InstanceOptions, MeshData,
+    OccluderOptions, PyramidOptions, StoredLevels, StoredOrder,
 };
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -30,6 +30,25 @@ pub(crate) fn adapters(py: Python<'_>) -> PyResult<Vec<Summary>> {
     Ok(detached(py, || Ok(headless::adapters()))?.iter().map(summary).collect())
 }
 
+/// Whether faults can be planted into the shaders of this build by an environment variable:
+/// development builds alone take it.
+pub(crate) const TAKES_PLANTED_FAULTS: bool = cfg!(debug_assertions);
+
+#[cfg(not(debug_assertions))]
+fn open(adapter: Option<&str>) -> hiz_core::Result<headless::Engine> {
+    headless::Engine::new(adapter)
+}
+
+/// `HIZVK_PLANTED_FAULT` (`what => by what`, one a line) replaces texts in the shaders, as for the
+/// Rust tests: does a Python test turn red? A release has no word of it.
+#[cfg(debug_assertions)]
+fn open(adapter: Option<&str>) -> hiz_core::Result<headless::Engine> {
+    let planted = std::env::var("HIZVK_PLANTED_FAULT").unwrap_or_default();
+    let planted: Vec<String> = planted.lines().map(|line| line.replace("\\n", "\n")).collect();
+    let faults: Vec<(&str, &str)> = planted.iter().filter_map(|line| line.split_once(" => ")).collect();
+    headless::Engine::with_planted_faults(adapter, &faults)
+}
+
 /// A device with its queue and pipelines.
 #[pyclass(frozen, module = "hizvk._core")]
 pub(crate) struct Engine(pub(crate) Held<headless::Engine>);
@@ -38,7 +57,7 @@ pub(crate) struct Engine(pub(crate) Held<headless::Engine>);
 impl Engine {
     #[new]
     fn new(py: Python<'_>, adapter: Option<&str>) -> PyResult<Self> {
-        detached(py, || headless::Engine::new(adapter)).map(|engine| Self(Held::new(py, engine)))
+        detached(py, || open(adapter)).map(|engine| Self(Held::new(py, engine)))
     }
 
     fn adapter(&self, py: Python<'_>) -> PyResult<Summary> {
@@ -131,12 +150,15 @@ impl Engine {
             .map(|depth| DepthImage(Held::new(py, depth)))
     }
 
+    /// `half`: the numbers were half floats.
     fn upload_depth(
         &self,
         py: Python<'_>,
         image: FloatArray<'_>,
         kind: &str,
         scale: f64,
+        invalid: Vec<f64>,
+        half: bool,
         camera: &Camera,
     ) -> PyResult<DepthImage> {
         let (image, kind) = (image.floats()?, depth_kind(kind)?);
@@ -144,10 +166,16 @@ impl Engine {
             DepthConvention::Standard => DepthKind::Ndc,
             DepthConvention::Reversed => DepthKind::ReversedNdc,
         };
+        let (tolerance, camera) = (if half { DepthTolerance::HALF } else { DepthTolerance::NONE }, &camera.0);
         let upload = |engine: &headless::Engine| match image {
             // Already what is uploaded: no copy in between.
-            Floats::F32(ndc) if kind == own_kind && scale == 1.0 => engine.upload_depth(ndc, &camera.0),
-            _ => engine.upload_depth(&hiz_core::ndc_from_kind(image, kind, scale, &camera.0)?, &camera.0),
+            Floats::F32(ndc) if kind == own_kind && scale == 1.0 && invalid.is_empty() => {
+                engine.upload_depth_within(ndc, camera, tolerance)
+            }
+            _ => {
+                let (ndc, left) = hiz_core::ndc_from_kind_within(image, kind, scale, &invalid, camera, tolerance)?;
+                engine.upload_depth_within(&ndc, camera, left)
+            }
         };
         self.0.run(py, upload).map(|depth| DepthImage(Held::new(py, depth)))
     }
@@ -251,6 +279,9 @@ impl Instances {
     }
 }
 
+/// Positions and triangles, flat, and a word about the faces.
+type SurfaceArrays<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u32>>, &'static str);
+
 /// Triangle meshes on the device.
 #[pyclass(frozen, module = "hizvk._core")]
 pub(crate) struct Occluders(Held<Arc<hiz_core::Occluders>>);
@@ -259,6 +290,19 @@ pub(crate) struct Occluders(Held<Arc<hiz_core::Occluders>>);
 impl Occluders {
     fn host_bytes(&self, py: Python<'_>) -> PyResult<u64> {
         Ok(self.0.look(py)?.surface().host_bytes())
+    }
+
+    /// World positions, 3 a vertex; vertices, 3 a triangle; and the faces that do not occlude. Copies.
+    fn surface<'py>(&self, py: Python<'py>) -> PyResult<SurfaceArrays<'py>> {
+        let occluders = self.0.look(py)?;
+        let surface = occluders.surface();
+        let faces = match surface.cull_mode() {
+            FaceCull::None => "none",
+            FaceCull::Back => "back",
+            FaceCull::Front => "front",
+        };
+        let positions = PyArray1::from_slice(py, surface.positions().as_flattened());
+        Ok((positions, PyArray1::from_slice(py, surface.triangles().as_flattened()), faces))
     }
 
     fn num_triangles(&self, py: Python<'_>) -> PyResult<u64> {

@@ -1,7 +1,7 @@
 //! The oracle of `hiz_ref`: conversions only.
 
-use hiz_core::{Bounds, Floats};
-use hiz_ref::{Coverage, Options, OwnDepth, Verdict, View, Volume};
+use hiz_core::{Bounds, DepthKind, Floats};
+use hiz_ref::{Coverage, DepthMeaning, Options, OwnDepth, Verdict, View, Volume};
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -30,14 +30,14 @@ pub(crate) fn reference_classify<'py>(
     image: FloatArray<'py>,
     depth_kind: &str,
     scale: f64,
+    invalid: Vec<f64>,
     coverage: &str,
     own_depth: &str,
 ) -> PyResult<Bound<'py, PyArray1<u8>>> {
     let volumes = bounds(bounds_kind, &arrays)?;
     let (image, depth_kind) = (image.floats()?, self::depth_kind(depth_kind)?);
     let camera = &camera.0;
-    let (count, ndc) =
-        detached(py, || Ok((volumes.len()?, hiz_core::ndc_from_kind(image, depth_kind, scale, camera)?)))?;
+    let count = detached(py, || volumes.len())?;
     let view = View {
         rows: camera.rows(),
         origin: camera.origin(),
@@ -58,12 +58,30 @@ pub(crate) fn reference_classify<'py>(
         },
         ..Options::default()
     };
-    let verdict = |i| hiz_ref::classify_with(&view, &volume(&volumes, i), &ndc, options).map(|o| code(o.verdict));
+    let meaning = DepthMeaning {
+        kind: match depth_kind {
+            DepthKind::Ndc => hiz_ref::DepthKind::Ndc,
+            DepthKind::ReversedNdc => hiz_ref::DepthKind::ReversedNdc,
+            DepthKind::Z => hiz_ref::DepthKind::Z,
+            DepthKind::Distance => hiz_ref::DepthKind::Distance,
+        },
+        scale,
+        invalid: &invalid,
+        origin_is_eye: camera.is_posed(),
+    };
+    let refused = |error: hiz_ref::Error| PyValueError::new_err(error.to_string());
+    let depth = py
+        .detach(|| {
+            let numbers: Vec<f64> = (0..image.len()).map(|i| image.get(i)).collect();
+            hiz_ref::depth_bounds(&view, &numbers, meaning)
+        })
+        .map_err(refused)?;
+    let verdict = |i| hiz_ref::classify_between(&view, &volume(&volumes, i), &depth, options).map(code);
     let mut codes = Vec::with_capacity(count);
     while codes.len() < count {
         let batch = codes.len()..count.min(codes.len() + BATCH);
         let more: Result<Vec<u8>, hiz_ref::Error> = py.detach(|| batch.map(verdict).collect());
-        codes.extend(more.map_err(|error| PyValueError::new_err(error.to_string()))?);
+        codes.extend(more.map_err(refused)?);
         py.check_signals()?;
     }
     Ok(PyArray1::from_vec(py, codes))

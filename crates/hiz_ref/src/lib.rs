@@ -12,8 +12,10 @@
 //!    the pixel can show. Depths are cleaned up first ([`sanitized_depth`]).
 //! 4. [`classify`]: if some touched pixel does not hide the volume, it is [`Verdict::Visible`], and to cull it would be a false cull.
 //!    Otherwise it is [`Verdict::Hidden`]: outside of the frustum, or occluded.
-//! 5. [`pyramid()`] is the reference of the depth pyramid, each texel computed from all of its pixels.
-//! 6. [`check_proxy`] and [`check_bounds`] say whether an occluder proxy lies inside its mesh and whether bounds contain theirs.
+//! 5. [`depth_bounds`] says what the numbers of an image that holds no NDC depth are as NDC depth, between two float32;
+//!    [`classify_between`] judges by such an image.
+//! 6. [`pyramid()`] is the reference of the depth pyramid, each texel computed from all of its pixels.
+//! 7. [`check_proxy`] and [`check_bounds`] say whether an occluder proxy lies inside its mesh and whether bounds contain theirs.
 //!
 //! Inside, "touched" is the question whether a convex volume meets a few half-spaces, and "hides" whether it lies on one side of a
 //! plane; both come down to signs of polynomials in the inputs. These are evaluated in float64 with a running bound of
@@ -37,6 +39,7 @@
 //! ```
 
 mod containment;
+mod depth;
 mod dyadic;
 mod feasibility;
 mod pyramid;
@@ -46,6 +49,7 @@ mod view;
 mod volume;
 
 pub use containment::{MeshError, Protrusion, TriangleMesh, check_bounds, check_proxy, contains};
+pub use depth::{DepthBounds, DepthKind, DepthMeaning, depth_bounds};
 pub use pyramid::{Level, pyramid, sanitized_depth};
 pub use view::{Coverage, View};
 pub use volume::Volume;
@@ -140,6 +144,9 @@ pub enum Error {
         /// Height in pixels.
         height: u32,
     },
+    /// The numbers of a depth image cannot mean what they are said to mean in this view.
+    #[error("{0}")]
+    DepthMeaning(&'static str),
 }
 
 /// Whether a cull may hide `volume`, given the NDC depth image `depth` (row order, row 0 on top, `view.width * view.height` values).
@@ -160,7 +167,7 @@ pub fn classify(view: &View, volume: &Volume, depth: &[f32]) -> Result<Verdict, 
 /// Those of [`classify`].
 pub fn classify_with(view: &View, volume: &Volume, depth: &[f32], options: Options) -> Result<Outcome, Error> {
     view.check()?;
-    view.check_depth(depth)?;
+    view.check_length(depth.len())?;
     if !volume.is_valid() {
         return Ok(Outcome { verdict: Verdict::Invalid, outside: None, witness: None, nearest_depth: None });
     }
@@ -177,6 +184,25 @@ pub fn classify_with(view: &View, volume: &Volume, depth: &[f32], options: Optio
         }
     };
     Ok(Outcome { verdict, outside, witness, nearest_depth: projected.nearest_depth() })
+}
+
+/// [`classify_with`], by an image that is known to lie between two.
+///
+/// A volume is [`Verdict::Visible`] if it is so in the nearer image, which hides most, and [`Verdict::Hidden`] if it is so in the farther one.
+/// Between them it is [`Verdict::Undecided`].
+///
+/// # Errors
+///
+/// Those of [`classify`].
+pub fn classify_between(view: &View, volume: &Volume, depth: &DepthBounds, options: Options) -> Result<Verdict, Error> {
+    let Outcome { verdict, outside, .. } = classify_with(view, volume, &depth.nearer, options)?;
+    if verdict != Verdict::Hidden || outside == Some(true) || depth.nearer == depth.farther {
+        return Ok(verdict);
+    }
+    Ok(match classify_with(view, volume, &depth.farther, options)?.verdict {
+        Verdict::Visible => Verdict::Undecided,
+        farther => farther,
+    })
 }
 
 /// Whether no point of `volume` is inside the frustum: `w > 0`, `0 <= z <= w`, pixel coordinates in the closed image.

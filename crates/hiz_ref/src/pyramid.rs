@@ -3,7 +3,7 @@
 /// The bits of 1.0f32: the greatest pattern that denotes a depth.
 pub(crate) const ONE: u32 = 0x3f80_0000;
 /// The bits of the least normal float32, 2^-126.
-const LEAST_NORMAL: u32 = 0x0080_0000;
+pub(crate) const LEAST_NORMAL: u32 = 0x0080_0000;
 /// The bits of -0.0f32.
 const MINUS_ZERO: u32 = 0x8000_0000;
 

@@ -69,6 +69,20 @@ impl Ball {
         Ball { mid, err }
     }
 
+    /// How far `mid` may be off.
+    pub(crate) fn err(self) -> f64 {
+        self.err
+    }
+
+    /// Contains the roots of this ball's numbers that are not negative.
+    pub(crate) fn square_root(self) -> Ball {
+        // Each end outwards by more than its sum's and its root's rounding.
+        let low = ((self.mid - self.err) * (1.0 - 4.0 * UNIT)).max(0.0).sqrt() * (1.0 - 2.0 * UNIT);
+        let high = ((self.mid + self.err) * (1.0 + 4.0 * UNIT)).sqrt() * (1.0 + 4.0 * UNIT);
+        let mid = low.midpoint(high);
+        Ball { mid, err: ((high - low) * 0.5 + UNIT * mid + f64::MIN_POSITIVE) * GROW }
+    }
+
     fn is_exact_zero(self) -> bool {
         self.mid == 0.0 && self.err == 0.0
     }

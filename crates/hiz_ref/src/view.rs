@@ -43,12 +43,13 @@ impl View {
         if finite { Ok(()) } else { Err(Error::NonFiniteView) }
     }
 
-    pub(crate) fn check_depth(&self, depth: &[f32]) -> Result<(), Error> {
+    /// Whether a depth image of so many numbers is this view's.
+    pub(crate) fn check_length(&self, got: usize) -> Result<(), Error> {
         let expected = self.width as usize * self.height as usize;
-        if depth.len() == expected {
+        if got == expected {
             Ok(())
         } else {
-            Err(Error::DepthLength { expected, got: depth.len(), width: self.width, height: self.height })
+            Err(Error::DepthLength { expected, got, width: self.width, height: self.height })
         }
     }
 

@@ -9,6 +9,7 @@
 `pareto`, `results`   what nothing beats; the numbers as plain objects
 `report`, `plots`     report.json (its schema stands there), report.md, a picture for each scene
 `recommend`           the same measurement on the caller's own scene
+`checking`, `clear`   what its candidates are held against: rays at the triangles, or the oracle
 `speed`               ``hizvk bench --speed``: times against yardsticks and targets
 ====================  ==========================================================================
 """

@@ -136,11 +136,11 @@ def _left_out() -> list[str]:
     found = []
     if not importlib.util.find_spec("embreex"):
         found.append(
-            "ray casting (embreex is not installed: pip install 'hizvk[scene]'); the truth is that of boxes before the "
+            "ray casting (embreex is not installed: pip install embreex); the truth is that of boxes before the "
             "rendered depth, so it says nothing about the depth image"
         )
     if not importlib.util.find_spec("matplotlib"):
-        found.append("plots (matplotlib is not installed: pip install 'hizvk[viz]')")
+        found.append("plots (matplotlib is not installed: pip install matplotlib)")
     return found
 
 

@@ -6,7 +6,7 @@ full resolution, all levels, any order), and in full with those that it depends 
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
@@ -46,8 +46,8 @@ class DepthVariant:
         return ", ".join(word for word in (self._image(), self._levels()) if word)
 
     def _image(self) -> str:
-        if (self.divisor, self.conservative) == (1, False):
-            return ""
+        if self.divisor == 1:
+            return "depth conservative" if self.conservative else ""
         return f"depth 1/{self.divisor}{' conservative' if self.conservative else ''}"
 
     def _levels(self) -> str:
@@ -77,6 +77,8 @@ class Configuration:
     """What is compared at a texel: ``"rectangle"``, the nearest depth of the bounds everywhere in their rectangle; or
     ``"volume"``, their own outline and depth there."""
     depth: DepthVariant = DepthVariant()
+    guard_px: float | None = None
+    """Pixels by which the bounds grow, as in `Device.cull`."""
 
     def __str__(self) -> str:
         words = [self.volume.replace("oriented_boxes", "oriented"), f"{self.footprint}x{self.footprint}"]
@@ -84,6 +86,7 @@ class Configuration:
         words += ["volume fit"] if self.fit == "volume" else []
         words += [self.coverage] if self.coverage != "area" else []
         words += [self.order] if self.order != "any" else []
+        words += [f"guard {self.guard_px:g} px"] if self.guard_px is not None else []
         words += [str(self.depth)] if self.depth != DepthVariant() else []
         return ", ".join(words)
 
@@ -93,11 +96,17 @@ class Configuration:
 
         It does not for a smaller image of plain samples, nor for one whose own pixel centres are all that counts.
         """
-        return self.depth.divisor == 1 or (self.depth.conservative and self.coverage == "area")
+        return self.depth.divisor == 1 or self.promises_rays
+
+    @property
+    def promises_rays(self) -> bool:
+        """Whether the promise reaches to every ray: to any size, sample positions and jitter, and to bare points."""
+        return self.depth.conservative and self.coverage == "area"
 
     def cull_options(self) -> dict[str, Any]:
         """The keyword arguments of `Device.cull`."""
-        return {name: getattr(self, name) for name in ("footprint", "descent", "fit", "coverage", "order")}
+        options = {name: getattr(self, name) for name in ("footprint", "descent", "fit", "coverage", "order")}
+        return options | ({} if self.guard_px is None else {"guard_px": self.guard_px})
 
     def render_options(self, full: Size) -> dict[str, Any]:
         """The keyword arguments of `Device.render_depth` for a view of `full` pixels."""
@@ -133,25 +142,49 @@ def matrix(extent: str) -> tuple[Configuration, ...]:
     return tuple(dict.fromkeys(chosen))
 
 
-def promised(volumes: Sequence[str], coverage: str, *, smaller: bool) -> tuple[Configuration, ...]:
-    """Configurations whose promise reaches to the view's own pixels, for a scene without known truth.
+def promised(volumes: Sequence[str], coverage: str, *, rendered: bool, points: bool = False) -> list[Configuration]:
+    """What `hizvk.recommend` tries: whatever can be right for some renderer.
 
     Parameters
     ----------
     volumes : sequence of str
         The kinds of bounds that there are.
     coverage : "area" or "sample"
-        What the caller's renderer needs.
-    smaller : bool
-        Whether conservative depth images of half and a quarter of the size can be rendered.
+        What counts: every ray of the view, or the pixels' centres alone.
+    rendered : bool
+        Whether depth is rendered from occluders, so that it can be conservative, or smaller.
+    points : bool
+        Whether the bounds are bare points, which lie on what a given image shows more often than not.
     """
-    depths = [DepthVariant()]
-    if smaller and coverage == "area":
-        depths += [DepthVariant(2, True), DepthVariant(4, True)]
-    return tuple(
-        Configuration(volume, *read, coverage=coverage, fit=fit, depth=depth)
-        for depth, volume, fit, read in product(depths, volumes, ("rectangle", "volume"), READS)
-    )
+    plain, full = DepthVariant(), DepthVariant(1, True)
+    ends = (READS[0], READS[-1])
+    fits = ("rectangle", "volume")
+    chosen = []
+    if coverage == "area" or not rendered:
+        chosen += [
+            Configuration(volume, *read, fit=fit, coverage=coverage)
+            for volume, fit, read in product(volumes, fits, READS)
+        ]
+    if rendered:
+        chosen += [
+            Configuration(volume, *read, fit=fit, depth=depth)
+            for depth, volume, fit, read in product(
+                (full, DepthVariant(2, True), DepthVariant(4, True)), volumes, fits, READS
+            )
+        ]
+        chosen += [
+            Configuration(volume, *read, fit=fit, coverage="sample")
+            for volume, fit, read in product(volumes, fits, READS if coverage == "sample" else ends)
+        ]
+    some = [replace(plain, levels=levels) for levels in SOME_LEVELS]
+    some += [replace(full, levels=levels) for levels in SOME_LEVELS] if rendered else []
+    chosen += [
+        Configuration(volume, *read, depth=depth, coverage="area" if depth.conservative else coverage)
+        for depth, volume, read in product(some, volumes, ends)
+    ]
+    if points and not rendered and coverage == "area":
+        chosen += [Configuration(volume, *read, guard_px=0.5) for volume, read in product(volumes, READS)]
+    return list(dict.fromkeys(chosen))
 
 
 def _default() -> list[Configuration]:

@@ -1,28 +1,30 @@
-"""Measures the caller's own scene, and says which configuration to use there.
+"""Measures the caller's own scene, checks what would be lost there, and says which configuration to use.
 
-No truth is needed for it: none of the candidates hides what can be seen, so the one that keeps less is right more
-often.
+Some candidates are proven for every ray, others for the pixels of one image alone. So each is held against what can be
+seen (`checking`), and one that hides something is never recommended. Of the others, the one that keeps less is right
+more often.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 
 from .. import _arguments
-from ..bounds import Boxes, OrientedBoxes, Spheres
+from ..bounds import Boxes, OrientedBoxes, Spheres, are_points
 from ..camera import Camera
-from ..depth import checked_image
-from ..device import Device
+from ..depth import DepthArray, checked_image
+from ..device import Device, stored_levels
 from ..oneline import default_device
-from ..resources import Instances, Mesh, Occluders
+from ..resources import A_MESH, DepthImage, Instances, Occluders, meshes_of
+from . import checking
 from .configurations import Configuration, DepthVariant, promised, render_options
 from .pareto import front
 from .results import Spread, spread
-from .stages import Stopwatch, cull, rendered
+from .stages import Stopwatch, cull
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -31,16 +33,24 @@ if TYPE_CHECKING:
     from ..bounds import Bounds
     from ..depth import DepthKind
     from ..device import Coverage
-    from ..resources import Pyramid
+    from ..resources import MeshLike, Pyramid
+    from ..result import CullResult
 
 __all__ = ["Candidate", "Recommendation", "choose", "recommend"]
 
+#: By view: a depth image, what its numbers are, and their scale.
+Images: TypeAlias = "list[DepthArray]"
 KINDS: Final = {"spheres": Spheres, "boxes": Boxes, "oriented_boxes": OrientedBoxes}
+#: A depth image that takes longer than this is not rendered again.
+DEAR_MS: Final = 200.0
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One configuration, measured on the caller's scene."""
+    """One configuration, measured on the caller's scene.
+
+    It holds all that the call needs: `bounds`, `render_options`, `pyramid_options`, `cull_options`; or `cull` does it.
+    """
 
     configuration: Configuration
     ms: Spread
@@ -51,7 +61,24 @@ class Candidate:
     kept: int
     """Instances that it keeps, over all cameras."""
     on_front: bool
-    """Whether no other candidate is better in time or in what is kept, and no worse in the other."""
+    """Whether no other candidate is better in time or in what is kept, and no worse in the other. Only candidates that
+    may be recommended take part."""
+    hides: int = 0
+    """Instances that it culls and that the check found visible, over all cameras."""
+    unclear: int = 0
+    """Instances that it culls and that are neither proven to be hidden nor found visible, over all cameras."""
+    proven: bool = True
+    """Whether what was asked is proven of it for other cameras, too: for every ray (conservative depth, area coverage),
+    or for the pixels of an image as given."""
+    asked: bool = True
+    """False for what is shown for comparison alone: sample coverage, where every ray counts."""
+    bounds: Bounds | Instances | None = field(default=None, repr=False, compare=False)
+    """What `recommend` was given of this kind: pass it to `Device.instances`, if it is not uploaded already."""
+
+    @property
+    def safe(self) -> bool:
+        """Whether it may be recommended: all that it culls before the cameras given is hidden, of what was asked."""
+        return self.asked and not self.hides and not self.unclear
 
     @property
     def volume(self) -> str:
@@ -63,9 +90,62 @@ class Candidate:
         """Keyword arguments for `Device.cull`."""
         return self.configuration.cull_options()
 
+    @property
+    def pyramid_options(self) -> dict[str, Any]:
+        """Keyword arguments for `Device.pyramid`, beside the image and what its numbers are."""
+        levels = self.configuration.depth.levels
+        return {} if levels is None else {"levels": levels}
+
     def render_options(self, size: Size) -> dict[str, Any]:
         """Keyword arguments for `Device.render_depth` with a camera of `size`."""
         return render_options(self.configuration.depth, size)
+
+    def cull(
+        self,
+        instances: Instances,
+        camera: Camera,
+        occluders: Occluders | None = None,
+        *,
+        depth: DepthImage | npt.ArrayLike | None = None,
+        **depth_options: Any,
+    ) -> CullResult:
+        """The whole call: depth from the occluders (or as given), pyramid, cull.
+
+        Parameters
+        ----------
+        instances : Instances
+            Of the kind `volume`.
+        camera : Camera
+            The view, in the size of the large image.
+        occluders : Occluders
+            Of the same device.
+        depth : DepthImage or (height, width) array
+            Instead of `occluders`; a candidate that renders depth of its own cannot take it.
+        **depth_options
+            ``kind`` and ``scale`` of an array, as in `Device.pyramid`.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+        """
+        _arguments.instance("instances", instances, Instances, "Instances of Device.instances")
+        if instances.kind != self.volume:
+            raise ValueError(f"instances: expected {self.volume}, got {instances.kind}")
+        if (occluders is None) == (depth is None):
+            got = "neither" if occluders is None else "both"
+            raise TypeError(f"occluders, depth: expected exactly one of them, got {got}")
+        device = instances.device
+        if occluders is not None:
+            depth = device.render_depth(occluders, camera, **self.render_options(camera.size))
+        elif render_options(self.configuration.depth, camera.size):
+            got = _arguments.describe(depth)
+            raise TypeError(f"depth: expected occluders instead, for {self.configuration.depth}, got {got}")
+        if isinstance(depth, DepthImage):
+            pyramid = device.pyramid(depth, **self.pyramid_options)
+        else:
+            pyramid = device.pyramid(depth, camera, **depth_options, **self.pyramid_options)  # type: ignore[arg-type]
+        return device.cull(instances, pyramid.camera, pyramid, **self.cull_options)
 
     def __str__(self) -> str:
         return str(self.configuration)
@@ -76,15 +156,19 @@ class Recommendation:
     """What `recommend` found; ``print`` shows it as a table."""
 
     best: Candidate
-    """What to use."""
+    """What to use. It is `Candidate.safe`."""
     within_budget: bool
-    """False if no candidate is within ``max_ms``; `best` is the fastest one then."""
+    """False if no candidate that may be recommended is within ``max_ms``; `best` is the fastest of them then."""
     candidates: tuple[Candidate, ...]
     """All of them, the fastest first."""
     tested: int
     """Instances times cameras."""
     adapter: str
     """Where it was measured; another device may have another order."""
+    check: str = ""
+    """How candidates were checked, and how much of what they cull was looked at."""
+    notes: tuple[str, ...] = ()
+    """What to know about it: why candidates were dropped, and what is proven of the best."""
 
     @property
     def front(self) -> tuple[Candidate, ...]:
@@ -92,13 +176,15 @@ class Recommendation:
         return tuple(one for one in self.candidates if one.on_front)
 
     def __str__(self) -> str:
-        lines = [f"on {self.adapter}: {self.best}" + ("" if self.within_budget else " (over the budget, as all are)")]
-        lines.append("    ms a camera        kept   (* the Pareto front)")
+        over = "" if self.within_budget else " (over the budget, as all are that may be recommended)"
+        lines = [f"on {self.adapter}: {self.best}{over}"]
+        lines.append("    ms a camera        kept     hides   unclear   (* the Pareto front; - not for what was asked)")
         for one in self.candidates:
             share = 100.0 * one.kept / max(self.tested, 1)
-            mark = "*" if one.on_front else " "
-            lines.append(f"  {mark} {one.ms.median:11.2f}  {share:8.2f} %   {one}")
-        return "\n".join(lines)
+            mark = "*" if one.on_front else " " if one.asked else "-"
+            lines.append(f"  {mark} {one.ms.median:11.2f}  {share:8.2f} %  {one.hides:8,}  {one.unclear:8,}   {one}")
+        lines += [f"checked by {self.check}"] if self.check else []
+        return "\n".join([*lines, *self.notes])
 
 
 def choose(
@@ -106,12 +192,20 @@ def choose(
 ) -> tuple[Candidate, bool]:
     """The candidate to use, and whether it is within the budget.
 
-    Of those within `max_ms`, the fastest that keeps at most `kept_within` times what the least of them keeps. If none
-    is within it, the fastest of all.
+    Only those that are `Candidate.safe` count. Of those within `max_ms`, the fastest that keeps at most `kept_within`
+    times what the least of them keeps. If none is within it, the fastest of all.
+
+    Raises
+    ------
+    ValueError
+        If no candidate is safe.
     """
-    able = [one for one in candidates if max_ms is None or one.ms.median <= max_ms]
+    safe = [one for one in candidates if one.safe]
+    if not safe:
+        raise ValueError("candidates: expected one that hides nothing that was found visible, got none")
+    able = [one for one in safe if max_ms is None or one.ms.median <= max_ms]
     if not able:
-        return min(candidates, key=lambda one: one.ms.median), False
+        return min(safe, key=lambda one: one.ms.median), False
     limit = kept_within * min(one.kept for one in able)
     return min((one for one in able if one.kept <= limit), key=lambda one: one.ms.median), True
 
@@ -120,37 +214,60 @@ def recommend(
     bounds: Bounds | Instances | Sequence[Bounds | Instances],
     cameras: Camera | Sequence[Camera],
     *,
-    occluders: Occluders | Mesh | Sequence[Mesh] | None = None,
+    occluders: Occluders | MeshLike | Sequence[MeshLike] | None = None,
     depths: Sequence[npt.ArrayLike] | None = None,
     kind: DepthKind | None = None,
     scale: float = 1.0,
+    invalid: Collection[float] | None = None,
     device: Device | None = None,
     coverage: Coverage = "area",
     max_ms: float | None = None,
     kept_within: float = 1.05,
     repetitions: int = 5,
 ) -> Recommendation:
-    """Measures configurations on a scene of one's own, and recommends one.
+    """Measures configurations on a scene of one's own, checks them there, and recommends one.
 
-    Every candidate keeps the promise for the pixels of the cameras given; they differ in speed and in how much that is
-    hidden they keep. It takes seconds: each candidate culls `repetitions` times for each camera.
+    Candidates differ in speed, in how much that is hidden they keep, and in what is proven of them. Conservative depth
+    with area coverage is proven for every ray. A plain depth image knows the depth at its pixels' centres alone: what
+    shows between them may be culled, and so may points that lie on their own occluder. So each candidate is checked on
+    the cameras given, and **one that hides what the check finds visible, or cannot show to be hidden, is never
+    recommended**.
+
+    What conservative depth hides is hidden. What a candidate culls beyond that is looked at by rays in float64 at the
+    occluders' triangles, from the camera to the bounds: to a bare point itself, else to 27 points of a volume, as many
+    as 60,000 rays for each camera and kind of bounds. What they find visible is visible (`Candidate.hides`). The rest
+    is unclear (`Candidate.unclear`), but for points, of which a ray decides either. So a plain image that is
+    recommended is right before the cameras given; before others, only conservative depth is proven.
+
+    With `depths`, or where ``coverage="sample"``, the promise is about the image as it is. The exact oracle
+    (`hizvk.reference`) takes the rays' place then, for 400 instances (10,800 bare points) each. Bare points before
+    given depth mostly lie on what it shows. Those that only a guard of half a pixel keeps count as visible, for the
+    image cannot tell; that guard is a good guess, and no proof.
+
+    It takes seconds to minutes: each candidate culls `repetitions` times for each camera, and conservative depth of
+    the full size is dear where there are many triangles.
 
     Parameters
     ----------
     bounds : Spheres, Boxes, OrientedBoxes or Instances; or a sequence of them
-        The N instances; several kinds of bounds of the same instances are compared with one another.
+        The N instances; several kinds of bounds of the same instances are compared with one another. Of `Instances`
+        the host knows no numbers, so no rays are cast: what conservative depth does not hide stays unclear.
     cameras : Camera or sequence of Camera
         Typical views.
-    occluders : Occluders, Mesh or sequence of Mesh
-        What hides; rendering is part of the time then, and smaller conservative depth images are among the candidates.
+    occluders : Occluders, Mesh, a mesh of trimesh or Open3D, or a sequence of meshes
+        What hides; rendering is part of the time then, and conservative depth images, small ones too, are among the
+        candidates.
     depths : sequence of (height, width) arrays
         Instead of `occluders`: the depth image of each camera.
-    kind, scale
+    kind, scale, invalid
         What the numbers of `depths` are, as in `Device.pyramid`.
     device : Device, optional
         None: that of the occluders or instances, else one that is made at the first call and kept.
     coverage : "area" or "sample"
-        What the caller's renderer needs, as in `Device.cull`; it is not varied, for it changes the promise.
+        What counts as seen. ``"area"``: what any ray of the view meets, as for multisampling, jitter, larger images,
+        and points. Candidates of sample coverage are shown beside the others then, and never recommended.
+        ``"sample"``: what covers a pixel's centre; right for a renderer with one sample a pixel, the same viewport and
+        no jitter. Plain depth is proven for that.
     max_ms : float, optional
         Budget for each camera in milliseconds.
     kept_within : float
@@ -161,7 +278,8 @@ def recommend(
     Returns
     -------
     Recommendation
-        `Recommendation.best` has the options; the whole front is there to choose otherwise.
+        `Recommendation.best` has the options, and the whole call (`Candidate.cull`); the whole front is there to
+        choose otherwise, `Recommendation.notes` say what to know.
 
     Raises
     ------
@@ -172,8 +290,18 @@ def recommend(
 
     Examples
     --------
-    >>> found = hizvk.recommend([boxes, spheres], cameras, occluders=walls, max_ms=2.0)  # doctest: +SKIP
-    >>> seen = device.cull(crowd, camera, hiz, **found.best.cull_options)  # doctest: +SKIP
+    >>> import numpy as np, hizvk
+    >>> centers = np.array([[0.0, 0.0, -5.0], [0.0, 0.0, -20.0]])
+    >>> boxes = hizvk.Boxes(centers - 0.5, centers + 0.5)
+    >>> wall = hizvk.Mesh([[-8.0, -8, -12], [8.0, -8, -12], [0.0, 8, -12]], [[0, 1, 2]])
+    >>> camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(90, 160), near=0.1)
+    >>> found = hizvk.recommend(boxes, camera, occluders=wall, repetitions=1)
+    >>> found.best.kept, found.tested
+    (1, 2)
+    >>> device = hizvk.Device()
+    >>> crowd, walls = device.instances(found.best.bounds), device.occluders(wall)
+    >>> found.best.cull(crowd, camera, walls).mask.tolist()
+    [True, False]
     """
     alternatives = _alternatives(bounds)
     views = _cameras(cameras)
@@ -187,49 +315,153 @@ def recommend(
     repetitions = _arguments.integer("repetitions", repetitions, low=1, high=10_000)
     if device is not None:
         _arguments.instance("device", device, Device, "a Device or None")
-    images = None if depths is None else _images(depths, views, kind, scale)
-    if depths is None and kind is not None:
-        raise TypeError(f"kind: expected nothing beside occluders, got {_arguments.describe(kind)}")
+    images = None if depths is None else _images(depths, views, kind, scale, invalid)
+    for name, value in (("kind", kind), ("invalid", invalid)):
+        if depths is None and value is not None:
+            raise TypeError(f"{name}: expected nothing beside occluders, got {_arguments.describe(value)}")
     device = device or _device_of(occluders, alternatives) or default_device()
     walls = None if occluders is None else _occluders(occluders, device)
     volumes = {name: _upload(one, device) for name, one in alternatives.items()}
+    points = any(one._points if isinstance(one, Instances) else are_points(one) for one in alternatives.values())
 
-    chosen = promised(tuple(volumes), coverage, smaller=walls is not None)
+    chosen = promised(tuple(volumes), coverage, rendered=walls is not None, points=points)
     variants = sorted({one.depth for one in chosen}, key=DepthVariant.cost)
+    source = _Source(device, walls, views, images)
     # The first repetition compiles, and is dropped.
     depth_ms = {variant: np.zeros((repetitions + 1, len(views))) for variant in variants}
     culling, reading = np.zeros((2, len(chosen), repetitions + 1, len(views)))
-    kept = np.zeros(len(chosen), np.int64)
+    masks: list[list[npt.NDArray[np.bool_]]] = [[] for _ in chosen]
     for repetition in range(repetitions + 1):
-        for k, camera in enumerate(views):
-            made: dict[DepthVariant, Pyramid] = {}
-            for variant in variants:
-                if walls is not None:
-                    _, pyramid, *took = rendered(device, walls, camera, variant)
-                else:
-                    assert images is not None
-                    watch = Stopwatch(device)
-                    image, kind_, scale_ = images[k]
-                    pyramid = device.pyramid(image, camera, kind=kind_, scale=scale_)
-                    took = [watch.lap()]
-                made[variant] = pyramid
-                depth_ms[variant][repetition, k] = sum(took)
+        for k in range(len(views)):
+            made = source.pyramids(variants, k)
+            for variant, (_, took) in made.items():
+                depth_ms[variant][repetition, k] = took
             for turn in range(len(chosen)):
                 number = (turn + repetition * len(chosen) // (repetitions + 1) + k) % len(chosen)
                 one = chosen[number]
-                mask, *both = cull(device, volumes[one.volume], made[one.depth], one)
+                mask, *both = cull(device, volumes[one.volume], made[one.depth][0], one)
                 culling[number, repetition, k], reading[number, repetition, k] = both
-                kept[number] += int(mask.sum()) if repetition == 0 else 0
+                if repetition == 0:
+                    masks[number].append(mask)
+    every_ray = walls is not None and coverage == "area"
+    tool = (
+        checking.by_rays(walls, views)
+        if walls is not None and every_ray
+        else checking.by_oracle(source.full_image, views, coverage)
+    )
+    check = checking.hold(chosen, masks, alternatives, tool, every_ray=every_ray)
     shared = {variant: spread(ms[1:]).median for variant, ms in depth_ms.items()}
     total = [spread(culling[k, 1:] + reading[k, 1:], plus=shared[one.depth]) for k, one in enumerate(chosen)]
-    best = front([ms.median for ms in total], kept)
+    kept = [sum(int(mask.sum()) for mask in of_one) for of_one in masks]
     candidates = [
-        Candidate(one, total[k], spread(culling[k, 1:]), int(kept[k]), bool(best[k])) for k, one in enumerate(chosen)
-    ]
+        Candidate(
+            one, total[k], spread(culling[k, 1:]), kept[k], False, check.hides[k], check.unclear[k],
+            proven=one.promises_rays or not every_ray, asked=coverage == "sample" or one.coverage == "area",
+            bounds=alternatives[one.volume],
+        )
+        for k, one in enumerate(chosen)
+    ]  # fmt: skip
+    best = front([one.ms.median for one in candidates], kept, [one.safe for one in candidates])
+    candidates = [replace(one, on_front=bool(on)) for one, on in zip(candidates, best, strict=True)]
     candidates.sort(key=lambda one: one.ms.median)
     picked, within = choose(candidates, max_ms=max_ms, kept_within=kept_within)
     tested = len(next(iter(volumes.values()))) * len(views)
-    return Recommendation(picked, within, tuple(candidates), tested, str(device.adapter))
+    looked = (
+        f"{check.method}: {check.looked:,} of {check.culled:,} that some candidate culls, {check.visible:,} visible"
+    )
+    notes = _notes(candidates, picked, check, coverage=coverage, points=points, rendered=walls is not None)
+    return Recommendation(picked, within, tuple(candidates), tested, str(device.adapter), looked, notes)
+
+
+class _Source:
+    """Where depth comes from: occluders that are rendered, or the images that were given."""
+
+    def __init__(
+        self,
+        device: Device,
+        walls: Occluders | None,
+        views: list[Camera],
+        images: Images | None,
+    ) -> None:
+        self._device, self._walls, self._views, self._images = device, walls, views, images
+        self._turn: dict[tuple[int, bool], tuple[DepthImage, float]] = {}
+        self._dear: dict[tuple[int, bool, int], tuple[DepthImage, float]] = {}
+
+    def pyramids(self, variants: list[DepthVariant], k: int) -> dict[DepthVariant, tuple[Pyramid, float]]:
+        """The pyramids of view k, each with the milliseconds that it and its image take."""
+        self._turn.clear()
+        return {variant: self._pyramid(variant, k) for variant in variants}
+
+    def full_image(self, k: int) -> DepthArray:
+        """The image of view k in full size with what its numbers are: the one given, or the plain one."""
+        if self._images is not None:
+            return self._images[k]
+        assert self._walls is not None
+        depth = self._device.render_depth(self._walls, self._views[k])
+        return DepthArray(depth.numpy(), depth.kind, 1.0, (), half=False)
+
+    def _pyramid(self, variant: DepthVariant, k: int) -> tuple[Pyramid, float]:
+        if self._images is not None:
+            watch = Stopwatch(self._device)
+            pyramid = self._device._pyramid_of(self._images[k], self._views[k], stored_levels(variant.levels))
+            return pyramid, watch.lap()
+        depth, took = self._depth(variant, k)
+        watch = Stopwatch(self._device)
+        return self._device.pyramid(depth, levels=variant.levels), took + watch.lap()
+
+    def _depth(self, variant: DepthVariant, k: int) -> tuple[DepthImage, float]:
+        """The image, rendered once a turn, and not again if it is dear."""
+        assert self._walls is not None
+        key = variant.divisor, variant.conservative
+        if key not in self._turn and (*key, k) in self._dear:
+            self._turn[key] = self._dear[*key, k]
+        if key not in self._turn:
+            watch = Stopwatch(self._device)
+            camera = self._views[k]
+            depth = self._device.render_depth(self._walls, camera, **render_options(variant, camera.size))
+            self._turn[key] = depth, watch.lap()
+            if self._turn[key][1] > DEAR_MS:
+                self._dear[*key, k] = self._turn[key]
+        return self._turn[key]
+
+
+def _notes(
+    candidates: list[Candidate], best: Candidate, check: checking.Check, *, coverage: str, points: bool, rendered: bool
+) -> tuple[str, ...]:
+    """What to know about a recommendation, a sentence or two each."""
+    notes = []
+    dropped = [one for one in candidates if one.asked and not one.safe]
+    if dropped:
+        asked = sum(one.asked for one in candidates)
+        lost, unclear = max(one.hides for one in dropped), max(one.unclear for one in dropped)
+        what = [f"hide up to {lost:,} of the {check.visible:,} that the check found visible"] if lost else []
+        what += [f"cull up to {unclear:,} that are not shown to be hidden"] if unclear else []
+        why = ""
+        if rendered and coverage == "area":
+            why = " Plain depth knows the depth at its pixels' centres alone."
+        elif points:
+            why = " The image knows the depth at its pixels' centres alone, and points lie on what it shows."
+        notes.append(f"{len(dropped)} of {asked} candidates were dropped: they {', and '.join(what)}.{why}")
+    if best.configuration.guard_px:
+        notes.append("A guard of half a pixel is a good guess for points before an image, and no proof.")
+    if not best.proven:
+        notes.append(
+            "The best is right before the cameras given: all that it culls there is hidden. Before other cameras, only "
+            "conservative depth is proven for what shows between the pixels' centres."
+        )
+    if rendered and coverage == "area":
+        notes.append(
+            'If your image has one sample a pixel, at its centre and without jitter, ask with coverage="sample": plain '
+            "depth of the full size is proven for that."
+        )
+    if not rendered and coverage == "area":
+        notes.append(
+            "It is right for the images as they are. With multisampling or jitter, a pixel has to hold the farthest "
+            "depth of all its samples."
+        )
+    if points and coverage == "sample":
+        notes.append('Points cover no pixel centre, so all are culled: ask with coverage="area".')
+    return tuple(notes)
 
 
 def _alternatives(bounds: Any) -> dict[str, Bounds | Instances]:
@@ -268,12 +500,15 @@ def _cameras(cameras: Any) -> list[Camera]:
     return list(found)
 
 
-def _images(depths: Any, cameras: list[Camera], kind: Any, scale: Any) -> list[tuple[Any, DepthKind, float]]:
+def _images(depths: Any, cameras: list[Camera], kind: Any, scale: Any, invalid: Any) -> list[DepthArray]:
     if not isinstance(depths, (Sequence, np.ndarray)) or isinstance(depths, str):
         raise TypeError(f"depths: expected a sequence of (height, width) arrays, got {_arguments.describe(depths)}")
     if len(depths) != len(cameras):
         raise ValueError(f"depths: expected {len(cameras)} images, one for each camera, got {len(depths)}")
-    return [checked_image("depths", image, camera, kind, scale) for image, camera in zip(depths, cameras, strict=True)]
+    return [
+        checked_image("depths", image, camera, kind, scale, invalid)
+        for image, camera in zip(depths, cameras, strict=True)
+    ]
 
 
 def _device_of(occluders: object, alternatives: dict[str, Any]) -> Device | None:
@@ -289,11 +524,7 @@ def _occluders(occluders: Any, device: Device) -> Occluders:
         if occluders.device is not device:
             raise ValueError("occluders: expected Occluders of this device, got one of another Device")
         return occluders
-    meshes = [occluders] if isinstance(occluders, Mesh) else occluders
-    if not isinstance(meshes, Sequence) or not all(isinstance(mesh, Mesh) for mesh in meshes):
-        got = _arguments.describe(occluders)
-        raise TypeError(f"occluders: expected Occluders, a Mesh or a sequence of Mesh, got {got}")
-    return device.occluders(list(meshes))
+    return device.occluders(meshes_of("occluders", occluders, f"Occluders, {A_MESH}, or a sequence of them"))
 
 
 def _upload(bounds: Bounds | Instances, device: Device) -> Instances:

@@ -3,6 +3,7 @@
 use super::options::{Coverage, CullOptions};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::tolerance::DepthTolerance;
 use crate::view::{EPS, ViewRows};
 
 /// `shaders/shared/view.wgsl`, `View`.
@@ -38,7 +39,13 @@ impl ViewUniform {
         clippy::cast_possible_truncation,
         reason = "multiples of 2^-8 and sizes below 2^15 are exact, the factor is rounded towards far"
     )]
-    pub(crate) fn new(camera: &Camera, reduction: u32, options: &CullOptions) -> Result<Self> {
+    /// `tolerance` is what the depth image's format has rounded; the options' slack comes on top.
+    pub(crate) fn new(
+        camera: &Camera,
+        reduction: u32,
+        options: &CullOptions,
+        tolerance: DepthTolerance,
+    ) -> Result<Self> {
         let range = |name: &str, value: f64, most: f64| {
             if (0.0..=most).contains(&value) {
                 Ok(value)
@@ -46,8 +53,12 @@ impl ViewUniform {
                 Err(Error::invalid(name, format!("expected a number in 0..={most}, got {value}")))
             }
         };
-        let slack = range("depth_slack", options.depth_slack, 0.5)?;
-        let slack_abs = range("depth_slack_abs", options.depth_slack_abs, 0.5)?;
+        let of_caller = DepthTolerance {
+            relative: range("depth_slack", options.depth_slack, 0.5)?,
+            absolute: range("depth_slack_abs", options.depth_slack_abs, 0.5)?,
+        };
+        // The maker erred first, then the format rounded.
+        let DepthTolerance { relative: slack, absolute: slack_abs } = tolerance.after(of_caller);
         range("descent", f64::from(options.descent), 65_536.0)?;
         let kappa = range("transform_slack", options.transform_slack, 1e6)?;
         let guard = match (options.guard_px, options.coverage) {
@@ -129,9 +140,45 @@ mod tests {
             for k in 0..100 {
                 let depth_slack = 0.5 * 10.0_f64.powf(-f64::from(k) / 8.0);
                 let options = CullOptions { depth_slack, ..CullOptions::default() };
-                let factor = f64::from(ViewUniform::new(&camera, 0, &options).unwrap().depth_factor);
+                let factor =
+                    f64::from(ViewUniform::new(&camera, 0, &options, DepthTolerance::NONE).unwrap().depth_factor);
                 let moved = if convention.is_reversed() { 1.0 - factor } else { factor - 1.0 };
                 assert!(moved >= depth_slack && moved <= depth_slack + EPS, "{convention:?} {depth_slack}: {factor}");
+            }
+        }
+    }
+
+    /// A format's step is in what the shader reads: whole, and no more than what rounding upwards adds. With the caller's slack on top,
+    /// in either convention.
+    #[test]
+    fn the_step_of_a_format_comes_before_the_callers_slack() {
+        use wgpu::TextureFormat as Format;
+        // The step, and what is relative to the depth, by hand.
+        let formats = [
+            (Format::Depth16Unorm, 1.0 / 65_535.0, 2.0_f64.powi(-22)),
+            (Format::Depth24Plus, 1.0 / 16_777_215.0, 2.0_f64.powi(-22)),
+            (Format::Depth24PlusStencil8, 1.0 / 16_777_215.0, 2.0_f64.powi(-22)),
+            (Format::R16Float, 2.0_f64.powi(-24), 2.0_f64.powi(-10)),
+        ];
+        for (convention, z) in
+            [(DepthConvention::Standard, [0.0, 0.0, 1.0, -1.0]), (DepthConvention::Reversed, [0.0, 0.0, 0.0, 1.0])]
+        {
+            let rows = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], z, [0.0, 0.0, 1.0, 0.0]];
+            let camera = Camera::from_clip_from_world(rows, ImageSize::new(8, 8), convention).unwrap();
+            for (format, step, relative) in formats {
+                for (depth_slack, depth_slack_abs) in [(0.0, 0.0), (EPS, 0.0), (0.25, 0.0), (0.0, 1e-3), (0.25, 1e-3)] {
+                    let options = CullOptions { depth_slack, depth_slack_abs, ..CullOptions::default() };
+                    let tolerance = DepthTolerance::of(format).unwrap();
+                    let view = ViewUniform::new(&camera, 0, &options, tolerance).unwrap();
+                    let (factor, offset) = (f64::from(view.depth_factor), f64::from(view.depth_offset));
+                    let (moved, offset) =
+                        if convention.is_reversed() { (1.0 - factor, -offset) } else { (factor - 1.0, offset) };
+                    let of_both = (1.0 + relative) * (1.0 + depth_slack) - 1.0;
+                    let what = format!("{convention:?} {format:?} {depth_slack} {depth_slack_abs}: {moved} {offset}");
+                    assert!(moved >= of_both && moved <= of_both + 1.01 * EPS, "{what}");
+                    let of_both = step * (1.0 + depth_slack) + depth_slack_abs + EPS;
+                    assert!(offset >= of_both && offset <= of_both * 1.000_001, "{what}");
+                }
             }
         }
     }

@@ -20,7 +20,7 @@ pub(crate) struct Layouts {
     pub(crate) members: wgpu::BindGroupLayout,
     pub(crate) update: wgpu::BindGroupLayout,
     pub(crate) one_uniform: wgpu::BindGroupLayout,
-    pub(crate) one_storage: wgpu::BindGroupLayout,
+    pub(crate) two_storages: wgpu::BindGroupLayout,
     pub(crate) occluder_view: wgpu::BindGroupLayout,
 }
 
@@ -62,12 +62,12 @@ impl Layouts {
                 "hiz.compact.layout",
                 &[(0, Uniform), (1, Read), (2, Write), (3, Write), (4, Write), (5, Uniform)],
             ),
-            survivors: layout("hiz.cull_groups.layout", &[(0, Write), (1, Write), (2, WriteTexels)]),
+            survivors: layout("hiz.cull_groups.layout", &[(0, Write), (1, Write), (2, WriteTexels), (3, Write)]),
             members: layout("hiz.cull_members.layout", &[(0, Read), (1, ReadTexels)]),
-            count: layout("hiz.count.layout", &[(0, Uniform), (1, Read), (2, Read), (3, Write)]),
+            count: layout("hiz.count.layout", &[(0, Uniform), (1, Read), (2, Write)]),
             update: layout("hiz.update.layout", &[(0, Uniform), (1, Read), (2, Read), (3, WriteQuads), (4, Write)]),
             one_uniform: layout("hiz.uniform_layout", &[(0, Uniform)]),
-            one_storage: layout("hiz.storage_layout", &[(0, Write)]),
+            two_storages: layout("hiz.storage_layout", &[(0, Write), (1, Write)]),
             occluder_view: device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
                 label: Some("hiz.occluders.layout"),
                 entries: &[wgpu::BindGroupLayoutEntry {

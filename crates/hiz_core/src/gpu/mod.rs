@@ -1,12 +1,17 @@
 //! The device and what is made once on it: pipelines (when first used), bind group layouts, buffers with contents.
 
+mod checked;
 mod layouts;
 
+use std::cell::Cell;
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::hash::Hash;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock};
+use std::time::{Duration, Instant};
 
+pub(crate) use checked::checked;
 use layouts::Layouts;
 
 use crate::bounds::BoundsKind;
@@ -30,6 +35,7 @@ impl ContextId {
 pub(crate) struct Gpu {
     id: ContextId,
     device: wgpu::Device,
+    limits: wgpu::Limits,
     pipeline_cache: Option<wgpu::PipelineCache>,
     edits: Vec<(String, String)>,
     layouts: Layouts,
@@ -40,12 +46,13 @@ pub(crate) struct Gpu {
     no_survivors: OnceLock<wgpu::Buffer>,
     reduce: Cache<ReduceKey, wgpu::ComputePipeline>,
     cull: Cache<(CullKey, ReportKey), wgpu::ComputePipeline>,
-    cull_groups: Cache<CullKey, wgpu::ComputePipeline>,
+    cull_groups: Cache<(CullKey, bool), wgpu::ComputePipeline>,
     yardstick_cull: Cache<(CullKey, ReportKey), wgpu::ComputePipeline>,
     cull_members: Cache<(CullKey, ReportKey), wgpu::ComputePipeline>,
+    refine: Cache<CullKey, wgpu::ComputePipeline>,
     explain: Cache<CullKey, wgpu::ComputePipeline>,
     compact: Cache<&'static str, wgpu::ComputePipeline>,
-    count: Cache<bool, wgpu::ComputePipeline>,
+    count: Cache<(), wgpu::ComputePipeline>,
     update: Cache<&'static str, wgpu::ComputePipeline>,
     occluders: Cache<OccluderKey, wgpu::RenderPipeline>,
 }
@@ -85,12 +92,9 @@ pub(crate) enum StandIn {
     Draws,
     /// Counts of levels.
     Statistics,
-    /// Verdicts of groups.
-    GroupVerdicts,
 }
 
-const STAND_INS: [&str; 6] =
-    ["hiz.no_chunk_1", "hiz.no_chunk_2", "hiz.no_list", "hiz.no_draws", "hiz.no_statistics", "hiz.no_group_verdicts"];
+const STAND_INS: [&str; 5] = ["hiz.no_chunk_1", "hiz.no_chunk_2", "hiz.no_list", "hiz.no_draws", "hiz.no_statistics"];
 
 /// As large as the largest structure that is bound so.
 const STAND_IN_BYTES: u64 = 256;
@@ -136,52 +140,97 @@ impl<K: Hash + Eq, P: Clone> Cache<K, P> {
     }
 
     /// The lock is held while a pipeline is made: two threads that want the same one compile it once.
-    fn get(&self, key: K, make: impl FnOnce() -> P) -> P {
-        self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner).entry(key).or_insert_with(make).clone()
+    fn get(&self, key: K, make: impl FnOnce() -> Result<P>) -> Result<P> {
+        let start = Instant::now();
+        let mut made = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let (pipeline, count) = match made.entry(key) {
+            Entry::Occupied(there) => (there.get().clone(), 0),
+            Entry::Vacant(free) => (free.insert(make()?).clone(), 1),
+        };
+        drop(made);
+        MADE.with(|all| all.set(all.get().and(count, start.elapsed())));
+        Ok(pipeline)
+    }
+}
+
+/// What a thread has spent on getting pipelines.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct PipelinesMade {
+    /// How many it made.
+    pub(crate) count: u32,
+    /// How long it took to get them, also those that were there.
+    pub(crate) time: Duration,
+}
+
+thread_local! {
+    static MADE: Cell<PipelinesMade> = const { Cell::new(PipelinesMade { count: 0, time: Duration::ZERO }) };
+}
+
+impl PipelinesMade {
+    /// All that this thread has.
+    pub(crate) fn so_far() -> Self {
+        MADE.get()
+    }
+
+    /// Since `earlier`, on the same thread.
+    pub(crate) fn since(self, earlier: Self) -> Self {
+        Self { count: self.count - earlier.count, time: self.time - earlier.time }
+    }
+
+    fn and(self, count: u32, time: Duration) -> Self {
+        Self { count: self.count.wrapping_add(count), time: self.time + time }
     }
 }
 
 impl Gpu {
     /// See `HizContext::with_planted_faults`.
-    pub(crate) fn new(device: &wgpu::Device, cache: Option<wgpu::PipelineCache>, faults: &[(&str, &str)]) -> Self {
-        let stand_in = STAND_INS.map(|label| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size: STAND_IN_BYTES,
-                usage: wgpu::BufferUsages::STORAGE,
-                mapped_at_creation: false,
-            })
-        });
-        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("hiz.reduce.sampler"),
-            address_mode_u: wgpu::AddressMode::ClampToEdge,
-            address_mode_v: wgpu::AddressMode::ClampToEdge,
-            ..Default::default()
-        });
+    pub(crate) fn new(
+        device: &wgpu::Device,
+        cache: Option<wgpu::PipelineCache>,
+        faults: &[(&str, &str)],
+    ) -> Result<Self> {
         let planted = |what: &str| shader::all().iter().any(|module| module.contains(what));
         if let Some((what, _)) = faults.iter().find(|(what, _)| !planted(what)) {
             panic!("planted fault: no shader says {what:?}");
         }
-        Self {
-            id: ContextId::next(),
-            device: device.clone(),
-            pipeline_cache: cache,
-            edits: faults.iter().map(|(what, by)| ((*what).to_owned(), (*by).to_owned())).collect(),
-            layouts: Layouts::new(device),
-            sampler,
-            stand_in,
-            no_survivors: OnceLock::new(),
-            reduce: Cache::new(),
-            cull: Cache::new(),
-            explain: Cache::new(),
-            compact: Cache::new(),
-            count: Cache::new(),
-            cull_groups: Cache::new(),
-            yardstick_cull: Cache::new(),
-            cull_members: Cache::new(),
-            update: Cache::new(),
-            occluders: Cache::new(),
-        }
+        checked(device, || {
+            let stand_in = STAND_INS.map(|label| {
+                device.create_buffer(&wgpu::BufferDescriptor {
+                    label: Some(label),
+                    size: STAND_IN_BYTES,
+                    usage: wgpu::BufferUsages::STORAGE,
+                    mapped_at_creation: false,
+                })
+            });
+            let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("hiz.reduce.sampler"),
+                address_mode_u: wgpu::AddressMode::ClampToEdge,
+                address_mode_v: wgpu::AddressMode::ClampToEdge,
+                ..Default::default()
+            });
+            Self {
+                id: ContextId::next(),
+                device: device.clone(),
+                limits: device.limits(),
+                pipeline_cache: cache,
+                edits: faults.iter().map(|(what, by)| ((*what).to_owned(), (*by).to_owned())).collect(),
+                layouts: Layouts::new(device),
+                sampler,
+                stand_in,
+                no_survivors: OnceLock::new(),
+                reduce: Cache::new(),
+                cull: Cache::new(),
+                refine: Cache::new(),
+                explain: Cache::new(),
+                compact: Cache::new(),
+                count: Cache::new(),
+                cull_groups: Cache::new(),
+                yardstick_cull: Cache::new(),
+                cull_members: Cache::new(),
+                update: Cache::new(),
+                occluders: Cache::new(),
+            }
+        })
     }
 
     /// The device.
@@ -192,6 +241,10 @@ impl Gpu {
     /// The caller's cache of compiled pipelines.
     pub(crate) fn pipeline_cache(&self) -> Option<&wgpu::PipelineCache> {
         self.pipeline_cache.as_ref()
+    }
+
+    pub(crate) fn limits(&self) -> &wgpu::Limits {
+        &self.limits
     }
 
     pub(crate) fn layouts(&self) -> &Layouts {
@@ -217,50 +270,6 @@ impl Gpu {
         Ok(self.no_survivors.get_or_init(|| buffer))
     }
 
-    /// A uniform buffer that holds `value` from the start: no queue is needed, and every recording has its own.
-    pub(crate) fn uniform<T: bytemuck::Pod>(&self, label: &str, value: &T) -> Result<wgpu::Buffer> {
-        self.filled(label, bytemuck::bytes_of(value), wgpu::BufferUsages::UNIFORM)
-    }
-
-    /// A buffer that holds `contents` (a multiple of 4 bytes) from the start. (wgpu's own helper panics where a lost device or
-    /// memory that ran out leave nothing to map.)
-    pub(crate) fn filled(&self, label: &str, contents: &[u8], usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
-        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            size: contents.len() as u64,
-            usage,
-            mapped_at_creation: true,
-        });
-        write_mapped(label, &buffer, 0, contents)?;
-        buffer.unmap();
-        Ok(buffer)
-    }
-
-    /// A buffer of `size` bytes, all 0.
-    pub(crate) fn empty(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
-        let label = Some(label);
-        self.device.create_buffer(&wgpu::BufferDescriptor { label, size, usage, mapped_at_creation: false })
-    }
-
-    /// A buffer of `size` bytes (a multiple of 4) whose contents `fill` writes where they are mapped, without a copy on the host.
-    pub(crate) fn written<T>(
-        &self,
-        label: &str,
-        size: u64,
-        usage: wgpu::BufferUsages,
-        fill: impl FnOnce(&Mapped<'_>) -> Result<T>,
-    ) -> Result<(wgpu::Buffer, T)> {
-        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            size,
-            usage,
-            mapped_at_creation: true,
-        });
-        let filled = fill(&Mapped { label, buffer: &buffer })?;
-        buffer.unmap();
-        Ok((buffer, filled))
-    }
-
     pub(crate) fn id(&self) -> ContextId {
         self.id
     }
@@ -273,7 +282,7 @@ impl Gpu {
         }
     }
 
-    pub(crate) fn reduce_pipeline(&self, key: ReduceKey) -> wgpu::ComputePipeline {
+    pub(crate) fn reduce_pipeline(&self, key: ReduceKey) -> Result<wgpu::ComputePipeline> {
         let layouts = self.layouts();
         self.reduce.get(key, || {
             let mut constants =
@@ -302,7 +311,7 @@ impl Gpu {
         })
     }
 
-    pub(crate) fn cull_pipeline(&self, key: CullKey, report: ReportKey) -> wgpu::ComputePipeline {
+    pub(crate) fn cull_pipeline(&self, key: CullKey, report: ReportKey) -> Result<wgpu::ComputePipeline> {
         let layouts = self.layouts();
         self.cull.get((key, report), || {
             self.pipeline(
@@ -316,7 +325,7 @@ impl Gpu {
     }
 
     /// See `yardstick`.
-    pub(crate) fn yardstick_cull_pipeline(&self, key: CullKey, report: ReportKey) -> wgpu::ComputePipeline {
+    pub(crate) fn yardstick_cull_pipeline(&self, key: CullKey, report: ReportKey) -> Result<wgpu::ComputePipeline> {
         let layouts = self.layouts();
         self.yardstick_cull.get((key, report), || {
             self.pipeline(
@@ -329,20 +338,33 @@ impl Gpu {
         })
     }
 
-    pub(crate) fn cull_groups_pipeline(&self, key: CullKey) -> wgpu::ComputePipeline {
+    pub(crate) fn cull_groups_pipeline(&self, key: CullKey, statistics: bool) -> Result<wgpu::ComputePipeline> {
         let layouts = self.layouts();
-        self.cull_groups.get(key, || {
+        self.cull_groups.get((key, statistics), || {
             self.pipeline(
                 "hiz.cull_groups.pipeline",
                 &shader::cull_groups(key.store),
                 "cull_groups",
                 &[layouts.cull(key.store), &layouts.instances, &layouts.survivors],
+                &[&classify_constants(&key)[..], &[("STATISTICS", flag(statistics))]].concat(),
+            )
+        })
+    }
+
+    pub(crate) fn refine_pipeline(&self, key: CullKey) -> Result<wgpu::ComputePipeline> {
+        let layouts = self.layouts();
+        self.refine.get(key, || {
+            self.pipeline(
+                "hiz.refine.pipeline",
+                &shader::refine(key.store, key.kind),
+                "refine",
+                &[layouts.cull(key.store), &layouts.instances, &layouts.two_storages],
                 &classify_constants(&key),
             )
         })
     }
 
-    pub(crate) fn cull_members_pipeline(&self, key: CullKey, report: ReportKey) -> wgpu::ComputePipeline {
+    pub(crate) fn cull_members_pipeline(&self, key: CullKey, report: ReportKey) -> Result<wgpu::ComputePipeline> {
         let layouts = self.layouts();
         self.cull_members.get((key, report), || {
             self.pipeline(
@@ -355,33 +377,31 @@ impl Gpu {
         })
     }
 
-    pub(crate) fn count_pipeline(&self, grouped: bool) -> wgpu::ComputePipeline {
-        self.count.get(grouped, || {
-            let constants = [("GROUPED", flag(grouped))];
-            self.pipeline("hiz.count.pipeline", &shader::count(), "count", &[&self.layouts().count], &constants)
-        })
+    pub(crate) fn count_pipeline(&self) -> Result<wgpu::ComputePipeline> {
+        self.count
+            .get((), || self.pipeline("hiz.count.pipeline", &shader::count(), "count", &[&self.layouts().count], &[]))
     }
 
-    pub(crate) fn explain_pipeline(&self, key: CullKey) -> wgpu::ComputePipeline {
+    pub(crate) fn explain_pipeline(&self, key: CullKey) -> Result<wgpu::ComputePipeline> {
         let layouts = self.layouts();
         self.explain.get(key, || {
             self.pipeline(
                 "hiz.explain.pipeline",
                 &shader::explain(key.store, key.kind),
                 "explain",
-                &[layouts.cull(key.store), &layouts.instances, &layouts.one_storage],
+                &[layouts.cull(key.store), &layouts.instances, &layouts.two_storages],
                 &classify_constants(&key),
             )
         })
     }
 
-    pub(crate) fn compact_pipeline(&self, entry_point: &'static str) -> wgpu::ComputePipeline {
+    pub(crate) fn compact_pipeline(&self, entry_point: &'static str) -> Result<wgpu::ComputePipeline> {
         self.compact.get(entry_point, || {
             self.pipeline("hiz.compact.pipeline", &shader::compact(), entry_point, &[&self.layouts().compact], &[])
         })
     }
 
-    pub(crate) fn update_pipeline(&self, entry_point: &'static str) -> wgpu::ComputePipeline {
+    pub(crate) fn update_pipeline(&self, entry_point: &'static str) -> Result<wgpu::ComputePipeline> {
         self.update.get(entry_point, || {
             self.pipeline("hiz.update.pipeline", &shader::update(), entry_point, &[&self.layouts().update], &[])
         })
@@ -391,42 +411,8 @@ impl Gpu {
         &self,
         key: OccluderKey,
         make: impl FnOnce() -> wgpu::RenderPipeline,
-    ) -> wgpu::RenderPipeline {
-        self.occluders.get(key, make)
-    }
-
-    pub(crate) fn pipeline(
-        &self,
-        label: &str,
-        source: &str,
-        entry_point: &str,
-        groups: &[&wgpu::BindGroupLayout],
-        constants: &[(&str, f64)],
-    ) -> wgpu::ComputePipeline {
-        let device = &self.device;
-        let source = self.edits.iter().fold(source.to_owned(), |text, (what, by)| text.replace(what, by));
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(label),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
-        });
-        let groups: Vec<_> = groups.iter().map(|g| Some(*g)).collect();
-        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some(label),
-            bind_group_layouts: &groups,
-            immediate_size: 0,
-        });
-        device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(label),
-            layout: Some(&layout),
-            module: &module,
-            entry_point: Some(entry_point),
-            // The shaders write workgroup memory before they read it.
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants,
-                zero_initialize_workgroup_memory: false,
-            },
-            cache: self.pipeline_cache(),
-        })
+    ) -> Result<wgpu::RenderPipeline> {
+        self.occluders.get(key, || self.render_pipeline(make))
     }
 }
 

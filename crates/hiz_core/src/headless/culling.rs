@@ -3,11 +3,15 @@
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Instant;
 
+use super::explanation::{Explanation, Told};
 use super::{Engine, locked, milliseconds, to_u32};
 use crate::camera::Camera;
-use crate::compact;
+use crate::compact::Compaction;
 use crate::count;
-use crate::cull::{CullInputs, CullOptions, ExplanationRecord, is_grouped, record_explain};
+use crate::cull::{
+    CullInputs, CullOptions, ExplanationRecord, Reading, TEXELS_TOLD, VERDICT_MASK, group_options, is_grouped,
+    record_explain,
+};
 use crate::error::{Error, Result};
 use crate::groups::GROUP;
 use crate::host;
@@ -19,22 +23,24 @@ use crate::visible::{
     CounterRecord, GroupOutput, PieceOutput, STORAGE, StatisticsRecord, SurvivorsRecord, Visible, VisibleOptions,
     verdicts_offset,
 };
+use crate::watch::Watch;
 
 /// Up to this size, of 131,072 instances, a mask is copied to where it can be read by the submit of its cull.
 const STAGED_MASK_BYTES: u64 = 1 << 14;
 
-/// The verdicts of `shaders/shared/verdict.wgsl` that are told from others here.
+/// The verdicts of `shaders/shared/verdict.wgsl`.
+const OUTSIDE: u8 = 0;
+pub(super) const OCCLUDED: u8 = 1;
 const VISIBLE: u8 = 2;
-const INVALID: u8 = 3;
 
-/// How many instances met which end.
+/// How many instances met which end: [`Culling::verdicts`], counted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Counts {
     /// All instances.
     pub tested: u64,
-    /// Outside the frustum.
+    /// Outside the frustum, or between all pixel centres in sample coverage.
     pub outside: u64,
-    /// Hidden by the depth image.
+    /// Hidden by the depth image, and not outside.
     pub occluded: u64,
     /// Possibly visible.
     pub visible: u64,
@@ -48,42 +54,25 @@ pub struct Counts {
     pub tested_groups: u64,
     /// Instances that were tested by themselves: all, or those of the groups that were left.
     pub tested_instances: u64,
-    /// Depth tests at each level (with [`CullOptions::statistics`]).
+    /// Depth tests at each level, of groups and of instances (with [`CullOptions::statistics`]).
     pub levels: [u64; 16],
-    /// Texels read (with [`CullOptions::statistics`]).
+    /// Texels read by them (with [`CullOptions::statistics`]).
     pub texels_read: u64,
 }
 
-/// Wall times of one cull.
+/// Times of one cull by the clock on the wall.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Timings {
     /// Making buffers and recording.
     pub record_ms: f64,
-    /// From the submit to the end of the first wait for it.
-    pub gpu_ms: f64,
+    /// Making the pipelines that were not there yet, the driver's own compiling included; next to 0 in a cull like an earlier one.
+    pub compile_ms: f64,
+    /// From the submit until the device was seen to be done with it; 0 before that. What was submitted earlier and was not done yet
+    /// comes first, so it counts. A device tells only who asks: that is each read and wait, and each submit. Who does something else
+    /// before the first of them finds more than the device took.
+    pub wall_ms: f64,
     /// Copies to the host after that, so far.
     pub readback_ms: f64,
-}
-
-/// Why an instance got its verdict.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Explanation {
-    /// 0 outside, 1 occluded, 2 visible, 3 invalid (kept).
-    pub verdict: u8,
-    /// First and last pixel column and row that the projection may touch, inclusive: x0, y0, x1, y1.
-    pub rectangle: Option<[i32; 4]>,
-    /// The level that was read.
-    pub level: Option<u32>,
-    /// The texels (x, y) of that level that were read.
-    pub texels: Vec<[u32; 2]>,
-    /// Their depths.
-    pub texel_depths: Vec<f32>,
-    /// The farthest of them.
-    pub farthest: Option<f32>,
-    /// The NDC depth of the bounds' nearest point, an estimate.
-    pub nearest: Option<f64>,
-    /// In words.
-    pub reason: &'static str,
 }
 
 /// A cull that was submitted. Reading waits for it.
@@ -95,12 +84,16 @@ pub struct Culling {
     pub(super) camera: Camera,
     pub(super) options: CullOptions,
     pub(super) output: VisibleOptions,
-    pub(super) visible: Visible,
+    pub(super) visible: Arc<Visible>,
     /// A small mask, copied by the cull's own submit.
     pub(super) staged_mask: Mutex<Option<Staged>>,
     pub(super) later: OnceLock<Lists>,
+    /// What later updates leave here, and do first.
+    pub(super) watch: Arc<Watch>,
     pub(super) submission: wgpu::SubmissionIndex,
     pub(super) submitted: Instant,
+    /// When the device was seen to be done.
+    pub(super) done: Arc<OnceLock<Instant>>,
     pub(super) timings: Mutex<Timings>,
 }
 
@@ -121,16 +114,15 @@ impl Culling {
     /// [`Error::DeviceLost`](crate::Error::DeviceLost).
     pub fn wait(&self) -> Result<()> {
         self.engine.scoped(|| readback::wait(self.engine.device(), Some(self.submission.clone())))?;
-        let mut timings = locked(&self.timings);
-        if timings.gpu_ms == 0.0 {
-            timings.gpu_ms = milliseconds(self.submitted, Instant::now());
-        }
+        // The wait itself has called back, unless another thread's is about to.
+        self.done.get_or_init(Instant::now);
         Ok(())
     }
 
-    /// Wall times so far.
+    /// Times so far.
     pub fn timings(&self) -> Timings {
-        *locked(&self.timings)
+        let wall_ms = self.done.get().map_or(0.0, |done| milliseconds(self.submitted, *done));
+        Timings { wall_ms, ..*locked(&self.timings) }
     }
 
     /// Records the copy of a mask that is asked for and so small that a submit of its own would cost more.
@@ -184,28 +176,27 @@ impl Culling {
 
     /// Each instance's verdict: 0 outside, 1 occluded, 2 visible, 3 invalid (kept).
     ///
+    /// Outside is what lies outside the frustum by a certificate of its own or of its group's box (in sample coverage also what lies
+    /// between all pixel centres). Occluded is every other instance that is hidden. So a verdict does not depend on whether groups
+    /// were tested, but for the few instances that a group's test hides and their own would keep: they are occluded. Members of hidden
+    /// groups get theirs by a pass of its own, when verdicts or counts are first read, or before the next update.
+    ///
     /// # Errors
     /// [`Error::Mismatch`] for a cull without [`Outputs::verdicts`](crate::Outputs::verdicts), [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn verdicts(&self) -> Result<Vec<u8>> {
         self.require("verdicts", self.visible.outputs().verdicts)?;
-        let of_members = self.read(&self.ranges(|piece, output| BufferRange {
+        self.refine()?;
+        let of_places = self.read(&self.ranges(|piece, output| BufferRange {
             buffer: &output.mask,
             offset: verdicts_offset(piece),
             size: 4 * u64::from(piece.count()),
         }))?;
-        let of_groups = self.read(&self.ranges(|piece, output| match self.groups(piece, output) {
-            Some(groups) => BufferRange::first(&groups.verdicts, 4 * u64::from(piece.groups())),
-            None => BufferRange::first(&output.mask, 0),
-        }))?;
         let mut verdicts = host::list(self.instances.len() as usize, "verdicts")?;
-        verdicts.resize(self.instances.len() as usize, 0);
-        for ((piece, members), groups) in self.instances.pieces.iter().zip(of_members).zip(of_groups) {
+        verdicts.resize(self.instances.len() as usize, VISIBLE);
+        for (piece, words) in self.instances.pieces.iter().zip(of_places) {
             let first = piece.range.start as usize;
-            let word = |bytes: &[u8], i: usize| bytes.get(4 * i).copied();
-            for place in 0..piece.count() as usize {
-                // A group that was not culled leaves the verdict to its members.
-                let of_group = word(&groups, place / GROUP).filter(|verdict| *verdict < VISIBLE);
-                verdicts[first + piece.order.index(place)] = of_group.or(word(&members, place)).unwrap_or(INVALID);
+            for (place, verdict) in words.iter().step_by(4).enumerate() {
+                verdicts[first + piece.order.index(place)] = *verdict;
             }
         }
         Ok(verdicts)
@@ -252,16 +243,17 @@ impl Culling {
     /// [`Error::Mismatch`] for a cull without [`Outputs::verdicts`](crate::Outputs::verdicts), [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn counts(&self) -> Result<Counts> {
         self.require("verdicts", self.visible.outputs().verdicts)?;
+        self.refine()?;
         let engine = &self.engine;
         let gpu = &engine.context().gpu;
         let size = size_of::<CounterRecord>() as u64;
         let counters = engine.scoped(|| {
-            let counters = gpu.empty("hiz.count.counters", size, STORAGE);
+            let counters = gpu.empty("hiz.count.counters", size, STORAGE)?;
             let mut encoder = engine.encoder("hiz.count.encoder");
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            count::record(gpu, &mut pass, &self.instances, &self.visible, &self.options, &counters);
+            count::record(gpu, &mut pass, &self.instances, &self.visible, &counters)?;
             drop(pass);
-            engine.queue().submit([encoder.finish()]);
+            self.finish(encoder)?;
             Ok(counters)
         })?;
         let mut ranges = vec![BufferRange::first(&counters, size)];
@@ -292,7 +284,7 @@ impl Culling {
             let survivors: SurvivorsRecord = bytemuck::pod_read_unaligned(survivors);
             tested_groups += u64::from(piece.groups());
             tested_instances += u64::from(survivors.count) * GROUP as u64;
-            if last.first().is_some_and(|verdict| *verdict >= VISIBLE) {
+            if last.first().is_some_and(|word| !is_hidden(*word)) {
                 tested_instances -= u64::from(piece.groups()) * GROUP as u64 - count;
             }
         }
@@ -345,15 +337,42 @@ impl Culling {
         let lists = engine.scoped(|| {
             let VisibleOptions { capacity, draw, .. } = self.output;
             let lists = Lists::new(gpu, &self.instances, true, capacity, draw)?;
+            let compaction = Compaction::new(gpu, &self.instances, &self.visible, &lists)?;
             let mut encoder = engine.encoder("hiz.compact.encoder");
             lists.record_clear(&mut encoder);
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            compact::record(gpu, &mut pass, &self.instances, &self.visible, &lists);
+            compaction.record(&mut pass, false);
             drop(pass);
-            engine.queue().submit([encoder.finish()]);
+            self.finish(encoder)?;
             Ok(lists)
         })?;
         Ok(self.later.get_or_init(|| lists))
+    }
+
+    /// Submits what makes an answer, and waits: only the copy that follows counts as one.
+    fn finish(&self, encoder: wgpu::CommandEncoder) -> Result<()> {
+        let submission = self.engine.queue().submit([encoder.finish()]);
+        readback::wait(self.engine.device(), Some(submission))
+    }
+
+    /// Sees to it that each place has a verdict of its own.
+    fn refine(&self) -> Result<()> {
+        let engine = &self.engine;
+        let submission = engine.scoped(|| {
+            let watches = self.instances.watches();
+            let mut encoder = engine.encoder("hiz.refine.encoder");
+            let gpu = &engine.context().gpu;
+            if !watches.record_refinement(gpu, &mut encoder, &self.instances, &self.watch)? {
+                return Ok(None);
+            }
+            let submission = engine.queue().submit([encoder.finish()]);
+            watches.refined(&self.watch);
+            Ok(Some(submission))
+        })?;
+        match submission {
+            Some(submission) => engine.scoped(|| readback::wait(engine.device(), Some(submission))),
+            None => Ok(()),
+        }
     }
 
     fn require(&self, output: &str, is_there: bool) -> Result<()> {
@@ -373,21 +392,35 @@ impl Culling {
         self.instances.pieces.iter().zip(&self.visible.pieces).map(|(piece, output)| of(piece, output)).collect()
     }
 
-    /// Why instance `index` got its verdict: the cull's own steps, run for it once more.
+    /// Why instance `index` got its verdict: the cull's own steps, run for it once more. They read the bounds as they are now: those of
+    /// an instance that was updated since make an explanation that is [`stale`](Explanation::stale).
     ///
     /// # Errors
     /// [`Error::Invalid`](crate::Error::Invalid) for an index past the end.
     pub fn explain(&self, index: u64) -> Result<Explanation> {
-        let engine = &self.engine;
         let index = u32::try_from(index).unwrap_or(u32::MAX);
-        let whole_group = self.is_hidden_with_its_group(index)?;
+        let mut told = self.test(index, false)?;
+        told.stale = self.watch.is_updated(&(index..index.saturating_add(1)));
+        if told.stale {
+            told.reason = format!("updated since the cull, so this is of its new bounds: {}", told.reason);
+            return Ok(told);
+        }
+        let Some((of_group, is_updated)) = self.hidden_group(index)? else { return Ok(told) };
+        let mut group = self.test(index, true)?;
+        group.stale = is_updated;
+        told.verdict = if told.verdict == OUTSIDE { OUTSIDE } else { of_group };
+        told.reason = format!("its group of 64 is hidden as a whole ({}); by itself: {}", group.reason, told.reason);
+        told.group = Some(Box::new(group));
+        Ok(told)
+    }
+
+    /// The test of an instance, or of the box around its group.
+    fn test(&self, index: u32, whole_group: bool) -> Result<Explanation> {
+        let engine = &self.engine;
         let bytes = engine.scoped(|| {
-            let target = engine.device().create_buffer(&wgpu::BufferDescriptor {
-                label: Some("hiz.explain.target"),
-                size: size_of::<ExplanationRecord>() as u64,
-                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
-                mapped_at_creation: false,
-            });
+            let gpu = &engine.context().gpu;
+            let target = gpu.empty("hiz.explain.target", size_of::<ExplanationRecord>() as u64, STORAGE)?;
+            let readings = gpu.empty("hiz.explain.readings", (TEXELS_TOLD * size_of::<Reading>()) as u64, STORAGE)?;
             let mut encoder = engine.encoder("hiz.explain.encoder");
             let inputs = CullInputs {
                 instances: &self.instances,
@@ -395,29 +428,43 @@ impl Culling {
                 pyramid: &self.pyramid,
                 options: &self.options,
                 certified: true,
+                idle: false,
             };
-            record_explain(&engine.context().gpu, &mut encoder, &inputs, (index, whole_group), &target)?;
+            record_explain(gpu, &mut encoder, &inputs, (index, whole_group), [&target, &readings])?;
             engine.queue().submit([encoder.finish()]);
-            readback::read_buffers(engine.device(), engine.queue(), &[BufferRange::first(&target, target.size())])
+            let ranges = [&target, &readings].map(|buffer| BufferRange::first(buffer, buffer.size()));
+            readback::read_buffers(engine.device(), engine.queue(), &ranges)
         })?;
-        let mut told = explanation(&bytemuck::pod_read_unaligned(&bytes[0]), &self.camera);
-        if whole_group {
-            told.reason = "its group of 64 is hidden as a whole: the box around it is told of here";
-        }
-        Ok(told)
+        let record: ExplanationRecord = bytemuck::pod_read_unaligned(&bytes[0]);
+        let readings: Vec<Reading> = bytemuck::pod_collect_to_vec(&bytes[1]);
+        let readings = &readings[..readings.len().min(record.texels_read as usize)];
+        let of_group = group_options(&self.options);
+        let options = if whole_group { &of_group } else { &self.options };
+        Ok(Told { record, readings, camera: &self.camera, options }.explanation())
     }
 
-    /// Whether this cull tested groups, and hid that of an instance.
-    fn is_hidden_with_its_group(&self, index: u32) -> Result<bool> {
+    /// Where this cull hid the group of an instance: the group's verdict, and whether any of its members was updated since.
+    fn hidden_group(&self, index: u32) -> Result<Option<(u8, bool)>> {
         let pieces = self.instances.pieces.iter().zip(&self.visible.pieces);
         let Some((piece, output)) = pieces.into_iter().find(|(piece, _)| piece.range.contains(&index)) else {
-            return Ok(false);
+            return Ok(None);
         };
-        let Some(groups) = self.groups(piece, output) else { return Ok(false) };
+        let Some(groups) = self.groups(piece, output) else { return Ok(None) };
         let group = piece.order.place((index - piece.range.start) as usize) / GROUP;
-        let verdict = self.read(&[BufferRange { buffer: &groups.verdicts, offset: 4 * group as u64, size: 4 }])?;
-        Ok(verdict[0].first().is_some_and(|verdict| *verdict < VISIBLE))
+        let word = self.read(&[BufferRange { buffer: &groups.verdicts, offset: 4 * group as u64, size: 4 }])?;
+        let Some(word) = word[0].first().copied().filter(|word| is_hidden(*word)) else { return Ok(None) };
+        let members = group * GROUP..((group + 1) * GROUP).min(piece.count() as usize);
+        let is_updated = |place| {
+            let index = piece.range.start + piece.order.index(place) as u32;
+            self.watch.is_updated(&(index..index + 1))
+        };
+        Ok(Some((word & VERDICT_MASK, members.into_iter().any(is_updated))))
     }
+}
+
+/// Whether the word of a group says that it was hidden as a whole.
+fn is_hidden(word: u8) -> bool {
+    word & VERDICT_MASK < VISIBLE
 }
 
 /// The masks of all pieces.
@@ -429,46 +476,4 @@ fn mask_ranges<'a>(instances: &Instances, visible: &'a Visible) -> Vec<BufferRan
         .zip(words)
         .map(|(output, words)| BufferRange::first(&output.mask, 4 * u64::from(words)))
         .collect()
-}
-
-/// The stages of `shaders/shared/classify.wgsl`.
-fn explanation(record: &ExplanationRecord, camera: &Camera) -> Explanation {
-    let reached_depth = record.stage >= 4;
-    let reason = match (record.stage, record.verdict) {
-        (0, _) => "the bounds are not finite, negative, or too large for this camera: kept",
-        (1, _) => "outside one plane of the frustum",
-        (2, _) => "crosses the plane of the eye: kept",
-        (3, 0) => "between the pixel centres",
-        (3, _) => "touches no pixel for sure, but no plane of the frustum separates it: kept",
-        (4, _) => "not surely behind the farthest depth of the texels: kept",
-        (6, 1) => "behind the farthest depth of every pixel that it can touch",
-        (7, _) => "spans more texels of the coarsest stored level than the footprint has: kept",
-        (6, _) => "not surely behind every pixel that it can touch, or the budget ended: kept",
-        (_, 1) => "behind the farthest depth of all texels that it can touch",
-        _ => "behind the texels, but not surely inside their block: kept",
-    };
-    let [x0, y0, x1, y1] = record.texels;
-    let corners = [[x0, y0], [x1, y0], [x0, y1], [x1, y1]];
-    let (mut texels, mut texel_depths) = (Vec::new(), Vec::new());
-    let read_any = reached_depth && record.stage != 7;
-    if read_any {
-        for (texel, bits) in corners.iter().zip(record.texel_bits) {
-            if !texels.contains(texel) {
-                texels.push(*texel);
-                texel_depths.push(f32::from_bits(bits));
-            }
-        }
-    }
-    let [least, greatest] = record.depths.map(f64::from);
-    let nearest = if camera.convention().is_reversed() { greatest } else { least };
-    Explanation {
-        verdict: record.verdict as u8,
-        rectangle: reached_depth.then_some(record.pixels),
-        level: reached_depth.then_some(record.level),
-        texels,
-        texel_depths,
-        farthest: read_any.then(|| f32::from_bits(record.farthest_bits)),
-        nearest: (record.stage >= 3).then_some(nearest),
-        reason,
-    }
 }

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::host;
 use crate::readback;
 use crate::shader::SourceKind;
+use crate::tolerance::DepthTolerance;
 
 /// Bytes of an upload's staging area at most: larger images go in bands of rows.
 const STAGING_BYTES: u32 = 1 << 26;
@@ -17,6 +18,7 @@ pub struct DepthImage {
     pub(super) texture: wgpu::Texture,
     pub(super) view: wgpu::TextureView,
     pub(super) camera: Camera,
+    pub(super) tolerance: DepthTolerance,
 }
 
 impl DepthImage {
@@ -28,6 +30,11 @@ impl DepthImage {
     /// The camera that it was made by.
     pub fn camera(&self) -> &Camera {
         &self.camera
+    }
+
+    /// What its depths were rounded by before they came into the texture.
+    pub fn tolerance(&self) -> DepthTolerance {
+        self.tolerance
     }
 
     /// The texture.
@@ -71,7 +78,7 @@ impl DepthImage {
             view_formats: &[],
         });
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        Ok(Self { engine: engine.clone(), texture, view, camera: camera.clone() })
+        Ok(Self { engine: engine.clone(), texture, view, camera: camera.clone(), tolerance: DepthTolerance::NONE })
     }
 
     /// An image of the numbers given, for shaders that read it as `kind`, which is none of a depth texture.

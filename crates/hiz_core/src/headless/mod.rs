@@ -18,30 +18,37 @@
 mod adapter;
 mod culling;
 mod depth_image;
+mod explanation;
 mod process;
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
 pub use adapter::{ADAPTER_VARIABLE, AdapterSummary, INSTALL_HINT, adapters};
-pub use culling::{Counts, Culling, Explanation, Timings};
+pub use culling::{Counts, Culling, Timings};
 pub use depth_image::DepthImage;
+pub use explanation::Explanation;
 use process::Process;
 
+use crate::atlas;
 use crate::bounds::Bounds;
 use crate::camera::Camera;
 use crate::context::HizContext;
-use crate::cull::CullOptions;
+use crate::cull::{self, CullInputs, CullOptions, Refinement};
 use crate::error::{Error, Result};
+use crate::gpu::PipelinesMade;
 use crate::host;
 use crate::instances::{InstanceOptions, Instances};
 use crate::layout::StoredLevels;
 use crate::occluder_surface::ConservativeDepthOptions;
 use crate::occluders::{MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders};
-use crate::pyramid::{Pyramid, PyramidOptions};
+use crate::pyramid::{self, Pyramid, PyramidOptions};
 use crate::readback::{self, BufferRange};
 use crate::shader::SourceKind;
-use crate::visible::VisibleOptions;
+use crate::tolerance::DepthTolerance;
+use crate::update;
+use crate::visible::{Visible, VisibleOptions};
+use crate::watch::Watch;
 
 /// A device, its queue and the pipelines on it. The last clone waits until the device is idle, and lets go of it.
 #[derive(Debug, Clone)]
@@ -176,17 +183,28 @@ impl Engine {
         self.scoped(|| Instances::new(&self.context().gpu, bounds, options, copy)).map(Arc::new)
     }
 
-    /// Replaces instances `first..first + n`: records and submits. A cull that was submitted before sees the old bounds. May be
-    /// called from any thread; updates of the same instances run in the order in which they come here.
+    /// Replaces instances `first..first + n`: records and submits. A cull that was submitted before sees the old bounds, whenever
+    /// its answer is read. May be called from any thread; updates of the same instances run in the order in which they come here.
     ///
     /// # Errors
     /// As [`HizContext::record_update`].
     pub fn update(&self, instances: &Instances, first: u32, bounds: &Bounds<'_>, strict: bool) -> Result<()> {
         self.scoped(|| {
             let _in_order = locked(&instances.submitting);
+            let gpu = &self.context().gpu;
             let mut encoder = self.encoder("hiz.update.encoder");
-            self.context().record_update(&mut encoder, instances, first, bounds, strict)?;
-            self.queue().submit([encoder.finish()]);
+            let mut updated = 0..0;
+            update::record(gpu, &mut encoder, instances, first, bounds, strict, |_, range| {
+                updated = range;
+                Ok(())
+            })?;
+            // Short, so that culls on other threads do not wait for the packing above.
+            let watches = instances.watches();
+            let mut before = self.encoder("hiz.refine.encoder");
+            let before = watches.record_refinements(gpu, &mut before, instances)?.then(|| before.finish());
+            self.queue().submit(before.into_iter().chain([encoder.finish()]));
+            watches.all_refined();
+            watches.note(&updated);
             Ok(())
         })
     }
@@ -242,6 +260,15 @@ impl Engine {
         DepthImage::uploaded(self, SourceKind::Bits, ndc, camera)
     }
 
+    /// The same of depth that was rounded within `tolerance` before it came here: of half floats [`DepthTolerance::HALF`].
+    ///
+    /// # Errors
+    /// As [`Engine::upload_depth`], and [`Error::Invalid`] for a tolerance outside 0..=0.5.
+    pub fn upload_depth_within(&self, ndc: &[f32], camera: &Camera, tolerance: DepthTolerance) -> Result<DepthImage> {
+        let tolerance = tolerance.checked()?;
+        Ok(DepthImage { tolerance, ..self.upload_depth(ndc, camera)? })
+    }
+
     /// For tests: the same into a float texture, which is sampled like a depth texture.
     #[doc(hidden)]
     pub fn upload_depth_sampled(&self, ndc: &[f32], camera: &Camera) -> Result<DepthImage> {
@@ -265,7 +292,8 @@ impl Engine {
         self.scoped(|| {
             let pyramid = self.context().create_pyramid(depth.size(), options)?;
             let mut encoder = self.encoder("hiz.reduce.encoder");
-            self.context().record_reduce(&mut encoder, &depth.view, &depth.camera, &pyramid)?;
+            let DepthImage { view, camera, tolerance, .. } = depth;
+            pyramid::record_reduce(&self.context().gpu, &mut encoder, view, camera, &pyramid, *tolerance)?;
             self.queue().submit([encoder.finish()]);
             Ok(Arc::new(pyramid))
         })
@@ -292,6 +320,13 @@ impl Engine {
             Error::mismatch("pyramid", "expected one that was built from a depth image, got one that never was")
         })?;
         if level == 0 {
+            let format = built.source.texture().format();
+            if !atlas::travels(format) {
+                return Err(Error::invalid(
+                    "level",
+                    format!("expected a level above 0 of a pyramid of {format:?}, which is not read as float32, got 0"),
+                ));
+            }
             let row = 4 * u64::from(layout.width);
             let bytes =
                 self.scoped(|| readback::read_texture(self.device(), self.queue(), built.source.texture(), row))?;
@@ -320,7 +355,8 @@ impl Engine {
         Ok(texels)
     }
 
-    /// Culls: records and submits; reading the answer waits.
+    /// Culls: records and submits; reading the answer waits. A cull that needs a pipeline that was not made before makes it, and waits
+    /// until the driver has compiled it ([`Timings::compile_ms`]).
     ///
     /// # Errors
     /// As [`HizContext::record_cull`], and [`Error::OutOfMemory`].
@@ -333,14 +369,33 @@ impl Engine {
         output: &VisibleOptions,
     ) -> Result<Culling> {
         self.check_process()?;
-        let start = Instant::now();
+        let gpu = &self.context().gpu;
         let attempt = || {
-            let visible = self.context().create_visible(instances, output)?;
+            let (start, made_before) = (Instant::now(), PipelinesMade::so_far());
+            let visible = Arc::new(self.context().create_visible(instances, output)?);
+            let inputs = CullInputs { instances, camera, pyramid, options, certified: true, idle: false };
             let mut encoder = self.encoder("hiz.cull.encoder");
-            self.context().record_cull(&mut encoder, instances, camera, pyramid, &visible, options)?;
+            cull::record(gpu, &mut encoder, &inputs, &visible)?;
             let staged_mask = Culling::stage_mask(self.device(), &mut encoder, instances, &visible);
-            let recorded = Instant::now();
+            let refinement = Refinement::new(gpu, instances, camera, pyramid, options, &visible)?;
+            let watch = Watch::new(refinement);
+            let done = Arc::new(OnceLock::new());
+            let when_done = Arc::clone(&done);
+            encoder.on_submitted_work_done(move || {
+                when_done.get_or_init(Instant::now);
+            });
+            let made = PipelinesMade::so_far().since(made_before);
+            let mut record_ms = milliseconds(start, Instant::now());
+            let mut compile_ms = 0.0;
+            if made.count > 0 {
+                let making_ms = 1e3 * made.time.as_secs_f64();
+                record_ms -= making_ms;
+                compile_ms = making_ms + self.compile(&CullInputs { idle: true, ..inputs }, &visible)?;
+            }
+            let watches = &mut instances.watches();
+            let submitted = Instant::now();
             let submission = self.queue().submit([encoder.finish()]);
+            watches.add(&watch);
             Ok(Culling {
                 engine: self.clone(),
                 instances: Arc::clone(instances),
@@ -351,9 +406,11 @@ impl Engine {
                 visible,
                 staged_mask: Mutex::new(staged_mask),
                 later: OnceLock::new(),
+                watch,
                 submission,
-                submitted: Instant::now(),
-                timings: Mutex::new(Timings { record_ms: milliseconds(start, recorded), ..Timings::default() }),
+                submitted,
+                done,
+                timings: Mutex::new(Timings { record_ms, compile_ms, ..Timings::default() }),
             })
         };
         let culling = self.scoped(attempt);
@@ -365,6 +422,18 @@ impl Engine {
             return self.scoped(attempt);
         }
         culling
+    }
+
+    /// Lets the driver compile what it leaves to the first dispatch of a pipeline: submits the same work of no workgroups, and waits.
+    /// How many milliseconds that took, what was submitted before not counted.
+    fn compile(&self, inputs: &CullInputs<'_>, visible: &Visible) -> Result<f64> {
+        readback::wait(self.device(), None)?;
+        let start = Instant::now();
+        let mut encoder = self.encoder("hiz.cull.compile");
+        cull::record(&self.context().gpu, &mut encoder, inputs, visible)?;
+        let submission = self.queue().submit([encoder.finish()]);
+        readback::wait(self.device(), Some(submission))?;
+        Ok(milliseconds(start, Instant::now()))
     }
 
     /// Waits for everything that was submitted.

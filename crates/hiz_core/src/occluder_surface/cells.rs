@@ -46,7 +46,7 @@ struct Lens {
     /// Values of `far`: at the near plane, and where the surface is clipped.
     near: f64,
     clipped: f64,
-    widened: bool,
+    fault: Option<PlantedFault>,
 }
 
 impl Lens {
@@ -57,6 +57,7 @@ impl Lens {
             rows[2] = rows[2].map(|v| -v);
         }
         let near = if reversed { -1.0 } else { 0.0 };
+        let near = if fault == Some(PlantedFault::BeforeNear) { near - 0.1 } else { near };
         let size = camera.size();
         Self {
             rows,
@@ -64,7 +65,7 @@ impl Lens {
             half: [f64::from(size.width) / 2.0, f64::from(size.height) / 2.0],
             near,
             clipped: near + NEAR_ROOM,
-            widened: fault != Some(PlantedFault::NoWidening),
+            fault,
         }
     }
 
@@ -103,10 +104,15 @@ impl Lens {
         let pixels = |half: f64, s: f64, e: f64| half * (e + 4.0 * ROUNDING * (s.abs() + 1.0));
         let margin = pixels(self.half[0], sx, ex).max(pixels(self.half[1], sy, ey)) * UP;
         let far_error = ef * UP;
-        if !(margin <= LARGEST_MARGIN && far - far_error >= self.near && far.is_finite()) {
+        let unproved = if self.fault == Some(PlantedFault::NearPointsUnproved) { 0.0 } else { far_error };
+        if !(margin <= LARGEST_MARGIN && far - unproved >= self.near && far.is_finite()) {
             return None;
         }
-        let (margin, far_error) = if self.widened { (margin, far_error) } else { (0.0, 0.0) };
+        let (margin, far_error) = match self.fault {
+            Some(PlantedFault::NoWidening) => (0.0, 0.0),
+            Some(PlantedFault::DepthsExact) => (margin, 0.0),
+            _ => (margin, far_error),
+        };
         Some(Point { x: (sx + 1.0) * self.half[0], y: (1.0 - sy) * self.half[1], far, margin, far_error })
     }
 }
@@ -176,7 +182,11 @@ impl<'a> Builder<'a> {
             let (a, b) = (&self.clips[a.min(b) as usize], &self.clips[a.max(b) as usize]);
             let (na, nb) = (self.lens.depth_in(a), self.lens.depth_in(b));
             let t = (na / (na - nb)).clamp(0.0, 1.0);
-            let point = self.lens.point(&between(a, b, t));
+            let mut cut = between(a, b, t);
+            if self.lens.fault == Some(PlantedFault::CutPointsExact) {
+                cut.error = [0.0; 4];
+            }
+            let point = self.lens.point(&cut);
             self.cuts[edge] = self.points.len() as u32;
             self.points.push(point);
         }
@@ -200,7 +210,8 @@ impl<'a> Builder<'a> {
             }
             if inside[k] != inside[next] {
                 // Leaving: the next side runs along the clipping plane and has no neighbour.
-                push((self.cut(half), if inside[k] { NO_MATE } else { half }));
+                let joined = self.lens.fault == Some(PlantedFault::CutSidesJoined);
+                push((self.cut(half), if inside[k] && !joined { NO_MATE } else { half }));
             }
         }
         match count {
@@ -234,6 +245,7 @@ impl<'a> Builder<'a> {
         let margin = a.margin.max(b.margin).max(c.margin);
         let area_error = 8.0 * ROUNDING * ((ux * vy).abs() + (uy * vx).abs())
             + (2.0 * margin * (ux.abs() + uy.abs() + vx.abs() + vy.abs()) + 8.0 * margin * margin) * UP;
+        let area_error = if self.lens.fault == Some(PlantedFault::FacingUnproved) { 0.0 } else { area_error };
         // Rows run downwards, so what is counter-clockwise with y up has a negative area here.
         let occludes = match culled {
             FaceCull::None => true,

@@ -146,7 +146,7 @@ impl<'a> Coverage<'a> {
 
     fn far(&self, cell: u32, square: Square) -> f64 {
         let half = if self.fault == Some(PlantedFault::DepthAtCentre) { 0.0 } else { square.half };
-        farthest(self.cells.corners_of(cell), &Square { half, ..square })
+        farthest(self.cells.corners_of(cell), &Square { half, ..square }, self.fault)
     }
 
     /// At most `bound`, which is known to hold already: the depth that every ray through `square` is blocked at or before.

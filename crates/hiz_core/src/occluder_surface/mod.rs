@@ -84,6 +84,20 @@ pub enum PlantedFault {
     FoldsIgnored,
     /// Depths become the nearest float32.
     RoundedToNearest,
+    /// What lies a little before the near plane counts, too.
+    BeforeNear,
+    /// A point is behind the near plane if float64 says so.
+    NearPointsUnproved,
+    /// Projected depths count as exact.
+    DepthsExact,
+    /// A triangle's corners have no error of their depth; its plane has.
+    CornerDepthsExact,
+    /// Points where edges are cut at the near plane count as exact.
+    CutPointsExact,
+    /// The side along the near plane counts as the edge that it was cut from.
+    CutSidesJoined,
+    /// A triangle faces as float64 says.
+    FacingUnproved,
 }
 
 /// The occluders' triangles on the host, in float64 world coordinates.
@@ -136,6 +150,21 @@ impl OccluderSurface {
             (true, true) => Some(-rounded(far)).filter(|d| *d >= LEAST_DEPTH).unwrap_or(0.0),
         };
         Ok(far.into_iter().map(ndc).collect())
+    }
+
+    /// World positions of the vertices, in the meshes' order, once for each place.
+    pub fn positions(&self) -> &[[f64; 3]] {
+        &self.positions
+    }
+
+    /// Triangles as indices of [`positions`](Self::positions). A mirrored copy's corners are turned round.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// Which faces do not occlude.
+    pub fn cull_mode(&self) -> FaceCull {
+        self.cull_mode
     }
 
     /// Bytes on the host, with the topology if it was made.

@@ -1,6 +1,8 @@
 //! The two questions about a square of the image that everything rests on: does an edge surely miss it, and how far does a
 //! triangle reach within it. Both allow for the error of the points and for every rounding here.
 
+use super::PlantedFault;
+
 /// Half a spacing of float64 at 1: the relative error of one rounding.
 pub(super) const ROUNDING: f64 = f64::EPSILON / 2.0;
 /// Covers a handful of relative roundings in the bounds themselves.
@@ -77,9 +79,10 @@ pub(super) fn side(a: &Point, b: &Point, square: &Square) -> Side {
 /// Points of the exact triangle and of the one between the points correspond by their barycentric coordinates. Corresponding
 /// points are at most the largest margin apart, and their depths the largest depth error; so it is enough to bound the plane
 /// through the points over the square grown by that margin. A triangle too thin for its plane is bounded by its corners.
-pub(super) fn farthest(corners: [&Point; 3], square: &Square) -> f64 {
+pub(super) fn farthest(corners: [&Point; 3], square: &Square, fault: Option<PlantedFault>) -> f64 {
     let [a, b, c] = corners;
-    let top = corners.iter().fold(f64::NEG_INFINITY, |m, p| m.max(p.far + p.far_error));
+    let corner_error = |p: &Point| if fault == Some(PlantedFault::CornerDepthsExact) { 0.0 } else { p.far_error };
+    let top = corners.iter().fold(f64::NEG_INFINITY, |m, p| m.max(p.far + corner_error(p)));
     let top = top + 2.0 * ROUNDING * top.abs();
     let half = (square.half + a.margin.max(b.margin).max(c.margin)) * UP;
     let (ux, uy, vx, vy) = (b.x - a.x, b.y - a.y, c.x - a.x, c.y - a.y);
@@ -144,12 +147,13 @@ mod tests {
     fn planes_are_bounded_by_their_far_corner_of_the_square() {
         // far = x / 8 + y / 16 over a large triangle: over the unit square about (2.5, 1.5) that is at most 3/8 + 2/16.
         let corners = [point(0.0, 0.0, 0.0), point(16.0, 0.0, 2.0), point(0.0, 16.0, 1.0)];
-        let bound = farthest([&corners[0], &corners[2], &corners[1]], &Square { x: 2.5, y: 1.5, half: 0.5 });
+        let bound = farthest([&corners[0], &corners[2], &corners[1]], &Square { x: 2.5, y: 1.5, half: 0.5 }, None);
         assert!((0.5..0.5 + 1e-12).contains(&bound), "{bound}");
         // Past the triangle's own reach its corners decide.
-        assert!(
-            (2.0..2.0 + 1e-12)
-                .contains(&farthest([&corners[0], &corners[1], &corners[2]], &Square { x: 40.0, y: 1.0, half: 0.5 }))
-        );
+        assert!((2.0..2.0 + 1e-12).contains(&farthest(
+            [&corners[0], &corners[1], &corners[2]],
+            &Square { x: 40.0, y: 1.0, half: 0.5 },
+            None
+        )));
     }
 }

@@ -28,7 +28,7 @@ pub fn record_uncertified_cull(
         return Err(Error::invalid("instances", format!("expected boxes, got {:?}", instances.kind())));
     }
     let options = &CullOptions { hierarchy: Hierarchy::Never, statistics: false, ..options.clone() };
-    let inputs = CullInputs { instances, camera, pyramid, options, certified: false };
+    let inputs = CullInputs { instances, camera, pyramid, options, certified: false, idle: false };
     cull::record(&engine.context().gpu, encoder, &inputs, visible)
 }
 

@@ -243,7 +243,7 @@ fn step(gpu: &Gpu, depth: &DepthImage, levels: &[Level], storage: &Storage, k: u
         label: Some("hiz.yardstick.layout"),
         entries: &entries,
     });
-    let pipeline = gpu.pipeline("hiz.yardstick.pipeline", &module, name, &[&layout], &constants);
+    let pipeline = gpu.pipeline("hiz.yardstick.pipeline", &module, name, &[&layout], &constants)?;
     let mut bound = vec![
         entry(0, wgpu::BindingResource::TextureView(&source)),
         entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),

@@ -130,7 +130,7 @@ def _others(run: Run, scene: Town, depth: DepthImage, pyramid: Pyramid) -> None:
 
         ways |= {"Embree, one ray a pixel": pixels, "Embree, rays to 9 points of a box": points}
     else:
-        run.found.notes.append("rays by Embree were left out: embreex is not installed (pip install 'hizvk[scene]')")
+        run.found.notes.append("rays by Embree were left out: embreex is not installed (pip install embreex)")
     ms = in_turns(ways, SLOW_ROUNDS)
     run.found.timed("beside others", ms)
     for label in ways:

@@ -80,7 +80,7 @@ def run(
         shown.close()
     plot = None
     if importlib.util.find_spec("matplotlib") is None:
-        found.notes.append("plots were left out: matplotlib is not installed (pip install 'hizvk[viz]')")
+        found.notes.append("plots were left out: matplotlib is not installed (pip install matplotlib)")
     elif found.instance_counts and found.image_sizes:
         from . import plots
 

@@ -2,7 +2,7 @@
 //! as it is.
 
 use hiz_core::headless::Engine;
-use hiz_core::{CullOptions, Hierarchy, InstanceOptions, StoredOrder, VisibleOptions};
+use hiz_core::{Coverage, CullOptions, Hierarchy, InstanceOptions, StoredOrder, VisibleOptions};
 
 use super::{Arrays, Round};
 use crate::common::Random;
@@ -14,7 +14,8 @@ pub(crate) struct Tested {
     pub(crate) instances: u64,
     /// Those that were tested by themselves.
     pub(crate) one_by_one: u64,
-    /// Instances that are kept with groups alone, and verdicts that are counted and not there, or the reverse: must be 0.
+    /// Instances that are kept with groups alone, verdicts that are counted and not there, or the reverse, and those that groups change
+    /// beyond hiding a few more: must be 0.
     pub(crate) contradictions: u64,
 }
 
@@ -34,8 +35,9 @@ impl Round {
         // Whole groups of one volume, groups of a few, and one of all.
         let copies = random.pick(&[64, 64, 21, 1]);
         let order = random.pick(&[StoredOrder::Morton, StoredOrder::Given]);
+        let is_area = self.options.coverage == Coverage::Area;
         let image = self.upload(engine);
-        let pyramid = engine.pyramid_with(&image, &self.pyramid_options()).expect("pyramid");
+        let pyramid = engine.pyramid_with(&image, &self.pyramid_options(engine)).expect("pyramid");
         let mut masks = Vec::new();
         let mut tested = Tested::default();
         for (kind, volumes) in &self.volumes {
@@ -47,19 +49,34 @@ impl Round {
                 let options = CullOptions { hierarchy, ..self.options.clone() };
                 engine.cull(&instances, &self.camera, &pyramid, &options, &VisibleOptions::default())
             };
-            let (flat, grouped) = match (cull(Hierarchy::Never), cull(Hierarchy::Always)) {
+            let (flat_cull, grouped) = match (cull(Hierarchy::Never), cull(Hierarchy::Always)) {
                 (Ok(flat), Ok(grouped)) => (flat, grouped),
                 (Err(hiz_core::Error::Invalid { .. }), _) => return None,
                 (Err(error), _) | (_, Err(error)) => panic!("{error}"),
             };
-            let (flat, mask) = (flat.mask().expect("mask"), grouped.mask().expect("mask"));
-            let counts = grouped.counts().expect("counts");
+            let (flat, mask) = (flat_cull.mask().expect("mask"), grouped.mask().expect("mask"));
+            let (counts, verdicts) = (grouped.counts().expect("counts"), grouped.verdicts().expect("verdicts"));
+            let alone = flat_cull.verdicts().expect("verdicts");
+            let changed =
+                alone.iter().zip(&verdicts).enumerate().filter(|(i, (alone, verdict))| match (alone, verdict) {
+                    (2, 1) => false,
+                    // The certificate of its group's box, which is another one than its own.
+                    (1 | 2, 0) => !hiz_ref::is_outside(&self.view, &many[*i]).expect("a finite view") && is_area,
+                    (alone, verdict) => alone != verdict,
+                });
+            let counted = [counts.outside, counts.occluded, counts.visible, counts.invalid];
+            let wrong_counts = (0..4_u8).map(|verdict| {
+                counted[usize::from(verdict)].abs_diff(verdicts.iter().filter(|v| **v == verdict).count() as u64)
+            });
             let kept = mask.iter().filter(|kept| **kept).count() as u64;
             let kept_alone = flat.iter().zip(&mask).filter(|(flat, grouped)| **grouped && !**flat).count() as u64;
             tested.add(Tested {
                 instances: many.len() as u64,
                 one_by_one: counts.tested_instances,
-                contradictions: kept_alone + counts.demand.abs_diff(kept),
+                contradictions: kept_alone
+                    + counts.demand.abs_diff(kept)
+                    + changed.count() as u64
+                    + wrong_counts.sum::<u64>(),
             });
             masks.push(mask.chunks_exact(copies).map(|copies| copies.iter().all(|kept| *kept)).collect());
         }

@@ -66,6 +66,10 @@ pub(crate) struct Campaign {
     pub(crate) fit: Fit,
     /// Which levels are stored, to choose from.
     pub(crate) levels: &'static [StoredLevels],
+    /// Sizes of images to choose from; none: up to 48 pixels a side, whatever the class says.
+    pub(crate) sizes: &'static [(u32, u32)],
+    /// How many chunks the stored levels are cut into, at most: 1 to 3.
+    pub(crate) chunks: u64,
     /// Cull whole groups first, in any stored order, and compare with the flat cull.
     pub(crate) groups: bool,
     /// Guards and slacks at random.
@@ -86,6 +90,8 @@ impl Default for Campaign {
             modes: PLAIN,
             fit: Fit::Rectangle,
             levels: &[StoredLevels::ALL],
+            sizes: &[],
+            chunks: 1,
             groups: false,
             any_slack: false,
             count_keeps: false,
@@ -104,6 +110,7 @@ pub(crate) struct Round {
     pub(crate) depth: Vec<f32>,
     pub(crate) options: CullOptions,
     pub(crate) levels: StoredLevels,
+    pub(crate) chunks: u64,
     pub(crate) volumes: Vec<(BoundsKind, Vec<Volume>)>,
     /// For each volume the way, as long as its distance, on which it becomes hidden.
     pub(crate) away: Vec<Vec<[f64; 3]>>,
@@ -119,7 +126,7 @@ impl Campaign {
     pub(crate) fn round(&self, number: usize) -> Option<Round> {
         let random = &mut Random(self.seed.wrapping_mul(1_000_003).wrapping_add(number as u64));
         let class = self.classes[number % self.classes.len()];
-        let scene = Scene::new(class, self.coverage, random)?;
+        let scene = Scene::new(class, self.coverage, self.sizes, random)?;
         let (footprint, descent) = random.pick(self.modes);
         let mut options = CullOptions {
             coverage: self.coverage,
@@ -148,7 +155,8 @@ impl Campaign {
         let Scene { camera, view, depth, .. } = scene;
         // Last, so that a round is the same whatever is stored.
         let levels = random.pick(self.levels);
-        Some(Round { seed: self.seed, number, class, camera, view, depth, options, levels, volumes, away })
+        let (seed, chunks) = (self.seed, self.chunks);
+        Some(Round { seed, number, class, camera, view, depth, options, levels, chunks, volumes, away })
     }
 
     /// Culls every round on the device and asks the oracle.
@@ -192,16 +200,24 @@ impl Round {
         upload(engine, &self.depth, &self.camera).expect("upload")
     }
 
-    /// The levels of this round; in two of four ways, one of each kind of image, culls read all of them from one texture.
-    pub(crate) fn pyramid_options(&self) -> PyramidOptions {
+    /// The levels of this round; in two of four ways, one of each kind of image, culls read all of
+    /// them from one texture. Of more than one chunk there is none.
+    pub(crate) fn pyramid_options(&self, engine: &Engine) -> PyramidOptions {
         let atlas = if self.way() < 2 { AtlasUse::Always } else { AtlasUse::Never };
-        PyramidOptions { levels: self.levels, atlas, ..PyramidOptions::default() }
+        let options = PyramidOptions { levels: self.levels, atlas, ..PyramidOptions::default() };
+        if self.chunks == 1 {
+            return options;
+        }
+        let whole = engine.context().create_pyramid(self.camera.size(), &options).expect("pyramid");
+        // The least chunks of a power of two of which so many are enough.
+        let shift = (2..30).find(|shift| whole.device_bytes() / 4 <= self.chunks << shift).expect("a small pyramid");
+        PyramidOptions { chunk_shift: Some(shift), ..options }
     }
 
     /// What the device keeps, for each kind. Nothing for a camera that is refused: float32 cannot hold its rows.
     pub(crate) fn masks(&self, engine: &Engine) -> Option<Vec<Vec<bool>>> {
         let image = self.upload(engine);
-        let pyramid = engine.pyramid_with(&image, &self.pyramid_options()).expect("pyramid");
+        let pyramid = engine.pyramid_with(&image, &self.pyramid_options(engine)).expect("pyramid");
         let mut masks = Vec::new();
         for (kind, volumes) in &self.volumes {
             let arrays = Arrays::new(volumes);

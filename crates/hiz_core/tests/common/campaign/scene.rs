@@ -137,9 +137,13 @@ pub(super) struct Scene {
 
 impl Scene {
     /// Nothing where float64 cannot make such a camera.
-    pub(super) fn new(class: Class, coverage: Coverage, random: &mut Random) -> Option<Self> {
+    pub(super) fn new(class: Class, coverage: Coverage, sizes: &[(u32, u32)], random: &mut Random) -> Option<Self> {
         let mut settings = Settings::new(random);
         class.insist(&mut settings, random);
+        if !sizes.is_empty() {
+            let (width, height) = random.pick(sizes);
+            settings.size = ImageSize::new(width, height);
+        }
         let camera = settings.camera(random)?;
         let rows = camera.rows();
         let reversed = settings.convention.is_reversed();

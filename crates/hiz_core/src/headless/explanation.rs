@@ -1,0 +1,177 @@
+//! The explanation of one verdict, out of what the shader wrote down.
+
+use crate::camera::Camera;
+use crate::cull::{BEHIND, CLEAR, CullOptions, ExplanationRecord, Fit, LEVEL_MASK, Reading};
+use crate::depth::ViewDepth;
+
+use super::culling::OCCLUDED;
+
+/// Why an instance got its verdict: the cull's own steps, run for it once more.
+///
+/// A member of a group that was hidden as a whole was never tested by itself. Its verdict is then the group's (told of in `group`),
+/// or outside where its own test says so; everything else here is its own test, which may have kept it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Explanation {
+    /// 0 outside, 1 occluded, 2 visible, 3 invalid (kept).
+    pub verdict: u8,
+    /// First and last pixel column and row that the projection may touch, inclusive: x0, y0, x1, y1.
+    pub rectangle: Option<[i32; 4]>,
+    /// The level of the footprint.
+    pub level: Option<u32>,
+    /// The texels (x, y) that were read, in order: those of the footprint, then those of a descent; the first 4,096.
+    pub texels: Vec<[u32; 2]>,
+    /// Their levels.
+    pub texel_levels: Vec<u32>,
+    /// Their depths.
+    pub texel_depths: Vec<f32>,
+    /// How many were read, those that are not listed included.
+    pub texels_read: u32,
+    /// Which of the listed texels decided: the farthest one that hides it, or the one that does not. `None` where no single one did
+    /// or it is not listed.
+    pub decisive: Option<usize>,
+    /// The farthest depth of those that hide it, or the depth that does not.
+    pub farthest: Option<f32>,
+    /// The NDC depth of the bounds' nearest point, an estimate.
+    pub nearest: Option<f64>,
+    /// `farthest` as view depth, in world units; infinite for far. `None` where the camera's NDC depth does not tell it alone: an
+    /// orthographic camera of a bare matrix, an oblique near plane.
+    pub farthest_z: Option<f64>,
+    /// The view depth of the bounds' nearest point in world units, an estimate. `None` for an orthographic camera of a bare matrix.
+    pub nearest_z: Option<f64>,
+    /// The instance was updated since the cull: everything here is of its new bounds, and the cull's verdict may be another.
+    pub stale: bool,
+    /// Of a member of a group that was hidden as a whole: the test of the box around the group.
+    pub group: Option<Box<Self>>,
+    /// In words.
+    pub reason: String,
+}
+
+/// What the shader wrote down of one test, and what the test was asked.
+pub(super) struct Told<'a> {
+    pub(super) record: ExplanationRecord,
+    pub(super) readings: &'a [Reading],
+    pub(super) camera: &'a Camera,
+    /// Of a group: those of its test.
+    pub(super) options: &'a CullOptions,
+}
+
+/// What a test came to.
+struct End {
+    reason: &'static str,
+    decisive: Option<usize>,
+    farthest: Option<f32>,
+}
+
+impl End {
+    fn new(reason: &'static str) -> Self {
+        Self { reason, decisive: None, farthest: None }
+    }
+}
+
+// The stages of `shaders/shared/outcome.wgsl` from which on there is a rectangle, and pixels in it.
+const AT_RECTANGLE: u32 = 3;
+const AT_DEPTH: u32 = 4;
+
+impl Told<'_> {
+    pub(super) fn explanation(&self) -> Explanation {
+        let record = &self.record;
+        let reached_depth = record.stage >= AT_DEPTH;
+        let End { reason, decisive, farthest } = self.end();
+        let [least, greatest, w_least, _] = record.depths.map(f64::from);
+        let nearest = if self.camera.convention().is_reversed() { greatest } else { least };
+        let is_before_eye = record.stage >= AT_RECTANGLE;
+        let view_depth = ViewDepth::new(self.camera);
+        let z_of = |ndc: f64| view_depth.as_ref().and_then(|view| view.of_ndc(ndc));
+        let nearest_z = match view_depth.as_ref().and_then(|view| view.of_w(w_least)) {
+            Some(z) => Some(z),
+            None => z_of(nearest),
+        };
+        Explanation {
+            verdict: record.verdict as u8,
+            rectangle: reached_depth.then_some(record.pixels),
+            level: reached_depth.then_some(record.level),
+            texels: self.readings.iter().map(|[_, x, y, _]| [*x, *y]).collect(),
+            texel_levels: self.readings.iter().map(|[word, ..]| word & LEVEL_MASK).collect(),
+            texel_depths: self.readings.iter().map(depth).collect(),
+            texels_read: record.texels_read,
+            decisive: decisive.filter(|i| *i < self.readings.len()),
+            farthest,
+            nearest: is_before_eye.then_some(nearest),
+            farthest_z: farthest.and_then(|ndc| z_of(f64::from(ndc))),
+            nearest_z: nearest_z.filter(|_| is_before_eye),
+            stale: false,
+            group: None,
+            reason: reason.to_owned(),
+        }
+    }
+
+    /// How the test ended; the stages of `shaders/shared/outcome.wgsl`.
+    fn end(&self) -> End {
+        let record = &self.record;
+        let is_hidden = record.verdict == u32::from(OCCLUDED);
+        match record.stage {
+            0 => End::new("the bounds are not finite, negative, or too large for this camera: kept"),
+            1 => End::new("outside one plane of the frustum"),
+            2 => End::new("crosses the plane of the eye: kept"),
+            AT_RECTANGLE if record.verdict == 0 => End::new("between the pixel centres"),
+            AT_RECTANGLE => End::new("touches no pixel for sure, but no plane of the frustum separates it: kept"),
+            _ if record.texels_read == 0 => End::new(match record.stage {
+                AT_DEPTH => "the pyramid's reduction has not run: kept",
+                _ => "spans more texels of the coarsest stored level than the footprint has: kept",
+            }),
+            AT_DEPTH => self.footprint("not surely behind the farthest depth of the texels: kept"),
+            5 if is_hidden => self.footprint("behind the farthest depth of all texels that it can touch"),
+            5 => End::new("behind the texels, but not surely inside their block: kept"),
+            _ if is_hidden => {
+                let farthest = (record.any_before != 0).then_some(record.farthest_before);
+                let is_it = |r: &Reading| r[0] & BEHIND != 0 && Some(r[3]) == farthest;
+                End {
+                    reason: "behind the farthest depth of every pixel that it can touch",
+                    decisive: self.readings.iter().position(is_it),
+                    farthest: farthest.map(f32::from_bits),
+                }
+            }
+            _ => self.failed_descent(),
+        }
+    }
+
+    fn footprint(&self, reason: &'static str) -> End {
+        let bits = self.record.farthest_bits;
+        let of_footprint = &self.readings[..self.readings.len().min(self.record.of_footprint as usize)];
+        End { reason, decisive: of_footprint.iter().position(|r| r[3] == bits), farthest: Some(f32::from_bits(bits)) }
+    }
+
+    /// Why a descent did not hide the volume: at a texel that shows it, at the end of its budget, or at the last certificate.
+    fn failed_descent(&self) -> End {
+        let [word, x, y, bits] = self.record.last;
+        let level = word & LEVEL_MASK;
+        let [x0, y0, x1, y1] = self.record.pixels.map(i64::from);
+        let size = self.camera.size();
+        let (begin_x, begin_y) = (i64::from(x) << level, i64::from(y) << level);
+        let end_x = ((i64::from(x) + 1) << level).min(i64::from(size.width));
+        let end_y = ((i64::from(y) + 1) << level).min(i64::from(size.height));
+        if word & (BEHIND | CLEAR) != 0 {
+            // The walk ends at the rectangle's last pixel.
+            let is_last = (begin_x..end_x).contains(&x1) && (begin_y..end_y).contains(&y1);
+            return End::new(if is_last {
+                "behind every pixel that it can touch, but those are not surely all: kept"
+            } else {
+                "hidden as far as the descent's budget reached: kept"
+            });
+        }
+        let is_within = begin_x >= x0 && begin_y >= y0 && end_x <= x1 + 1 && end_y <= y1 + 1;
+        let has_children = self.options.descent > 0 && level > 0;
+        if has_children && (self.options.fit == Fit::Volume || !is_within) {
+            return End::new("the descent's budget ended before a finer level could tell: kept");
+        }
+        End {
+            reason: "not surely behind a pixel that it can touch: kept",
+            decisive: Some(self.record.texels_read as usize - 1),
+            farthest: Some(f32::from_bits(bits)),
+        }
+    }
+}
+
+fn depth([.., bits]: &Reading) -> f32 {
+    f32::from_bits(*bits)
+}

@@ -1,0 +1,392 @@
+//! How large margins, slacks and guards are, and not only that they are there: what lies a little
+//! within one is kept, what lies a little outside is culled. By single instances and by groups,
+//! whose boxes are tested with the same slack.
+//!
+//! Every threshold is worked out here, in float64, from docs/accuracy.md: a claim `R - t W' > 0`
+//! holds where its value exceeds `E = 24 eps (a size + a_3) + |t| (the same of W')`, with the
+//! magnitudes a of rows that are written down beside it.
+
+mod common;
+
+use std::sync::Arc;
+
+use common::{CONVENTIONS, camera_along_z, engine, ndc};
+use hiz_core::{
+    Bounds, BoundsKind, Camera, Coverage, CullOptions, DepthConvention, Fit, Floats, Hierarchy, ImageSize,
+    InstanceOptions, Instances, StoredOrder, VisibleOptions,
+};
+
+const SIDE: u32 = 16;
+const VISIBLE: u8 = 2;
+const EPS: f64 = 1.0 / 8_388_608.0;
+const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
+
+/// A box by its centre and half sizes; a sphere has the first of them for its radius.
+#[derive(Debug, Clone, Copy)]
+struct Thing {
+    center: [f64; 3],
+    half: [f64; 3],
+}
+
+fn point(center: [f64; 3]) -> Thing {
+    Thing { center, half: [0.0; 3] }
+}
+
+fn instances(things: &[Thing], kind: BoundsKind) -> Arc<Instances> {
+    let all = |of: &dyn Fn(&Thing) -> [f64; 3]| things.iter().flat_map(of).collect::<Vec<f64>>();
+    let (centers, half_sizes) = (all(&|t| t.center), all(&|t| t.half));
+    let radii: Vec<f64> = things.iter().map(|t| t.half[0]).collect();
+    let (min, max) = (
+        all(&|t| std::array::from_fn(|k| t.center[k] - t.half[k])),
+        all(&|t| std::array::from_fn(|k| t.center[k] + t.half[k])),
+    );
+    let rotations = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0].repeat(things.len());
+    let bounds = match kind {
+        BoundsKind::Sphere => Bounds::Spheres { centers: Floats::F64(&centers), radii: Floats::F64(&radii) },
+        BoundsKind::Box => Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) },
+        BoundsKind::OrientedBox => Bounds::OrientedBoxes {
+            centers: Floats::F64(&centers),
+            half_sizes: Floats::F64(&half_sizes),
+            rotations: Floats::F64(&rotations),
+        },
+    };
+    let options = InstanceOptions { order: StoredOrder::Given, ..InstanceOptions::default() };
+    engine().instances(&bounds, &options).unwrap()
+}
+
+/// Things that have to be kept and things that have to be culled, alone and as groups of 64 of the
+/// same, which are culled as a whole.
+fn assert_between(
+    what: &str,
+    (camera, depth): (&Camera, &[f32]),
+    options: &CullOptions,
+    kinds: &[BoundsKind],
+    (kept, culled): (&[Thing], &[Thing]),
+) {
+    let pyramid = engine().pyramid(&engine().upload_depth(depth, camera).unwrap()).unwrap();
+    let things = [kept, culled].concat();
+    let expected: Vec<bool> = (0..things.len()).map(|i| i < kept.len()).collect();
+    for kind in kinds {
+        let culling = |hierarchy, things: &[Thing]| {
+            let options = CullOptions { hierarchy, ..options.clone() };
+            let list = instances(things, *kind);
+            engine().cull(&list, camera, &pyramid, &options, &VisibleOptions::default()).unwrap()
+        };
+        let is_kept = |verdicts: Vec<u8>| verdicts.into_iter().map(|v| v == VISIBLE).collect::<Vec<bool>>();
+        let alone = is_kept(culling(Hierarchy::Never, &things).verdicts().unwrap());
+        assert_eq!(alone, expected, "{what}, {kind:?}: {things:?}");
+        let crowd: Vec<Thing> = things.iter().flat_map(|thing| [*thing; 64]).collect();
+        let groups = culling(Hierarchy::Always, &crowd);
+        let of_groups = is_kept(groups.verdicts().unwrap());
+        assert!(of_groups.chunks(64).zip(&expected).all(|(group, kept)| group.iter().all(|k| k == kept)), "{what}");
+        // What is hidden is hidden as a whole group.
+        assert_eq!(groups.counts().unwrap().tested_instances, 64 * kept.len() as u64, "{what}, {kind:?}, groups");
+    }
+}
+
+/// The s between `low` and `high` at which `value - error` passes 0.
+fn threshold(low: f64, high: f64, excess: impl Fn(f64) -> f64) -> f64 {
+    let (mut below, mut above) = (low, high);
+    assert!(excess(below) < 0.0 && excess(above) > 0.0, "{} {}", excess(below), excess(above));
+    for _ in 0..200 {
+        let middle = 0.5 * (below + above);
+        if excess(middle) < 0.0 { below = middle } else { above = middle }
+    }
+    above
+}
+
+/// [`camera_along_z`] moved to `eye`.
+fn camera_at(eye: [f64; 3], convention: DepthConvention) -> Camera {
+    let [x, y, z] = eye;
+    let depth = match convention {
+        DepthConvention::Standard => [0.0, 0.0, 1.0, -z - 1.0],
+        DepthConvention::Reversed => [0.0, 0.0, 0.0, 1.0],
+    };
+    let m = [[1.0, 0.0, 0.0, -x], [0.0, 1.0, 0.0, -y], depth, [0.0, 0.0, 1.0, -z]];
+    Camera::from_clip_from_world(m, ImageSize::new(SIDE, SIDE), convention).unwrap()
+}
+
+fn at(eye: [f64; 3], d: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|k| eye[k] + d[k])
+}
+
+const NO_SLACK: f64 = 0.0;
+
+fn plain() -> CullOptions {
+    CullOptions { depth_slack: NO_SLACK, ..CullOptions::default() }
+}
+
+/// Behind a wall at depth 4, what is r away: Z' is 1 (its constant), W' is r and t is 1/4 up to
+/// signs, so that the value is r / 4 - 1. `constant`: the magnitude of that of Z'; `size`: of the
+/// volume without r, and the magnitude of the constant of W'.
+fn behind_the_wall(constant: f64, size: f64) -> [f64; 2] {
+    [0.88, 1.12]
+        .map(|share| threshold(3.9, 40.0, |r| r / 4.0 - 1.0 - share * 24.0 * EPS * (constant + 0.25 * (r + size))))
+}
+
+/// The margin of a depth's certificate: what of it belongs to the constant, to the distance, to the
+/// volume's own size, and to what the halves of a distant eye cannot hold.
+#[test]
+fn the_margin_of_depth_is_as_large_as_it_is_derived() {
+    let far_away = 2.0_f64.powi(27);
+    // eps (1 + 2^-8) of the eye, and its low half: a float32 near 2^27 is a multiple of 8 or 16.
+    let halves = 16.0 * (1.0 + 1.0 / 256.0);
+    for convention in CONVENTIONS {
+        // Where the eye is far along the view the constants are what float64 made of it: 8
+        // roundings of 2^-53 of twice the eye, which is 2 eps, and as much again where W' was taken
+        // from z.
+        let lost = if convention == DepthConvention::Standard { 4.0 } else { 1.0 };
+        for (eye, constant, size) in [
+            ([0.0; 3], 1.0, 0.0),
+            ([far_away, 0.0, 0.0], 1.0, halves),
+            ([0.0, far_away + 6.0, 0.0], 1.0, halves + 6.0),
+            // (There the distance of 4 is in low halves, which the eye's share covers.)
+            ([0.0, 0.0, far_away], lost, halves + 2.0 - 4.0),
+        ] {
+            let camera = camera_at(eye, convention);
+            let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
+            let [kept, culled] = behind_the_wall(constant, size).map(|r| [point(at(eye, [0.0, 0.0, r]))]);
+            assert_between(
+                &format!("a point behind a wall, seen from {eye:?}"),
+                (&camera, &wall),
+                &plain(),
+                &KINDS,
+                (&kept, &culled),
+            );
+        }
+        // A flat box of half sizes 3: they count as 6. A sphere of radius 3: as 9, and its nearest
+        // point is 3 nearer; the squares that it is compared by have a millionth, half of it for
+        // the support 3/4.
+        let camera = camera_along_z(SIDE, SIDE, convention);
+        let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
+        let [kept, culled] =
+            behind_the_wall(1.0, 6.0).map(|r| [Thing { center: [0.0, 0.0, r], half: [3.0, 3.0, 0.0] }]);
+        let boxes = &KINDS[1..];
+        assert_between("a wide box behind a wall", (&camera, &wall), &plain(), boxes, (&kept, &culled));
+        let [kept, culled] = [0.88, 1.12].map(|share| {
+            threshold(6.0, 40.0, |r| {
+                r / 4.0 - 1.0 - share * (24.0 * EPS * (1.0 + 0.25 * (r + 9.0)) + 0.75 * 5e-7) - 0.75
+            })
+        });
+        // (In a group it is a box: of half sizes 3, at the same depth, which count as 9, too.)
+        let ball = |r: f64| [Thing { center: [0.0, 0.0, r], half: [3.0; 3] }];
+        let cull = |r: f64| {
+            let pyramid = engine().pyramid(&engine().upload_depth(&wall, &camera).unwrap()).unwrap();
+            let list = instances(&ball(r), BoundsKind::Sphere);
+            engine().cull(&list, &camera, &pyramid, &plain(), &VisibleOptions::default()).unwrap().mask().unwrap()[0]
+        };
+        assert!(cull(kept) && !cull(culled), "a sphere behind a wall, {convention:?}");
+    }
+}
+
+/// The margin at the planes of the frustum. Right of the image: X' = 8 x, W' = r and t = 8; before
+/// the near plane.
+#[test]
+fn the_margin_of_the_frustums_planes_is_as_large_as_it_is_derived() {
+    for convention in CONVENTIONS {
+        let camera = camera_along_z(SIDE, SIDE, convention);
+        let open = vec![convention.far(); (SIDE * SIDE) as usize];
+        let r = 4.0;
+        let beside = |share: f64| {
+            threshold(r - 1.0, r + 1.0, |x| 8.0 * (x - r) - share * 24.0 * EPS * (8.0 * (x + r) + 8.0 * (x + r)))
+        };
+        // Before the near plane: Z' + W' = r - 1 < 0 (standard), with a constant of 1; reversed the
+        // same with other signs.
+        let before = |share: f64| -threshold(-1.5, -0.5, |z| 1.0 + z - share * 24.0 * EPS * (1.0 - z));
+        let [kept, culled] = [0.85, 1.15].map(|share| {
+            let (x, z) = (beside(share), before(share));
+            [[x, 0.0, r], [-x, 0.0, r], [0.0, x, r], [0.0, -x, r], [0.0, 0.0, z]].map(point)
+        });
+        assert_between("the frustum's planes", (&camera, &open), &plain(), &KINDS, (&kept, &culled));
+    }
+}
+
+/// kappa eps of `sum |M| |p|`: on the linear part by the distance and on the constant by the eye's
+/// own coordinates, of both rows.
+#[test]
+fn transform_slack_is_as_large_as_it_says() {
+    let kappa = 65_536.0;
+    let q = kappa * EPS;
+    let options = CullOptions { transform_slack: kappa, ..plain() };
+    for convention in CONVENTIONS {
+        for eye in [[0.0; 3], [0.0, 0.0, 100.0], [30.0, -50.0, 100.0]] {
+            let camera = camera_at(eye, convention);
+            let z = eye[2];
+            // Of Z' = z - A w and W', with A = 1: 2 for a position, |z| + |z + 1| and twice |z| for
+            // the constants; with A = 0: nothing and 1. Of W': 1, and twice |z|.
+            let (linear, constant) = match convention {
+                DepthConvention::Standard => (2.0, 4.0 * z + 1.0),
+                DepthConvention::Reversed => (0.0, 1.0),
+            };
+            // The halves of the eye count as positions, a little.
+            let size = |d: f64| d + EPS * eye.iter().map(|v: &f64| v.abs()).sum::<f64>();
+            let depth_error = |r: f64, t: f64| q * (linear * size(r) + constant + t * (size(r) + 2.0 * z));
+            let behind = |share: f64| threshold(3.0, 1e3, |r| r / 4.0 - 1.0 - share * depth_error(r, 0.25));
+            let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
+            let [kept, culled] = [0.98, 1.02].map(|share| [point(at(eye, [0.0, 0.0, behind(share)]))]);
+            assert_between(
+                &format!("behind a wall, {convention:?}, from {eye:?}"),
+                (&camera, &wall),
+                &options,
+                &KINDS,
+                (&kept, &culled),
+            );
+            // Beside the image: of X' = 8 x' and t W', t = 8; the constant of a row is its
+            // coefficients on the eye, twice.
+            let open = vec![convention.far(); (SIDE * SIDE) as usize];
+            let r = 40.0;
+            let beside = |axis: usize, share: f64| {
+                threshold(r - 1.0, 4.0 * r, |x| {
+                    let (size, own) = (size(x + r), 2.0 * eye[axis].abs());
+                    8.0 * (x - r) - share * q * 8.0 * (size + own + size + 2.0 * z)
+                })
+            };
+            let [kept, culled] = [0.98, 1.02].map(|share| {
+                let (x, y) = (beside(0, share), beside(1, share));
+                [[x, 0.0, r], [-x, 0.0, r], [0.0, y, r], [0.0, -y, r]].map(|d| point(at(eye, d)))
+            });
+            let what = format!("beside the image, {convention:?}, from {eye:?}");
+            assert_between(&what, (&camera, &open), &options, &KINDS, (&kept, &culled));
+        }
+    }
+}
+
+/// `depth_slack` moves a wall at depth 4 by that share of its stored depth.
+#[test]
+fn depth_slack_is_as_large_as_it_says() {
+    for convention in CONVENTIONS {
+        let camera = camera_along_z(SIDE, SIDE, convention);
+        let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
+        for slack in [1e-3, 0.02, 0.2] {
+            // The depth that has so much of the slack: 1 - 1 / r = 0.75 (1 + slack), 1 / r = 0.25
+            // (1 - slack).
+            let [kept, culled] = [0.97, 1.03].map(|share| {
+                let r = match convention {
+                    DepthConvention::Standard => 1.0 / (1.0 - 0.75 * (1.0 + share * slack)),
+                    DepthConvention::Reversed => 4.0 / (1.0 - share * slack),
+                };
+                [point([0.0, 0.0, r])]
+            });
+            for fit in [Fit::Rectangle, Fit::Volume] {
+                let options = CullOptions { depth_slack: slack, fit, ..CullOptions::default() };
+                let what = format!("slack {slack}, {convention:?}, {fit:?}");
+                // (Another fit takes long to compile: one kind tells.)
+                let kinds = if fit == Fit::Volume { &KINDS[1..2] } else { &KINDS[..] };
+                assert_between(&what, (&camera, &wall), &options, kinds, (&kept, &culled));
+            }
+        }
+    }
+}
+
+/// An orthographic camera: z from 1 to 9 is depth from 0 to 1 or back.
+fn orthographic(convention: DepthConvention) -> (Camera, f64, f64) {
+    let (slope, constant) = match convention {
+        DepthConvention::Standard => (0.125, -0.125),
+        DepthConvention::Reversed => (-0.125, 1.125),
+    };
+    let m = [[0.25, 0.0, 0.0, 0.0], [0.0, 0.25, 0.0, 0.0], [0.0, 0.0, slope, constant], [0.0, 0.0, 0.0, 1.0]];
+    (Camera::from_clip_from_world(m, ImageSize::new(SIDE, SIDE), convention).unwrap(), slope, constant)
+}
+
+/// `depth_slack_abs` in units of NDC depth, and 2^-23 more, which what the shader rounds is taken
+/// from.
+#[test]
+fn absolute_slack_is_as_large_as_it_says() {
+    for convention in CONVENTIONS {
+        let (camera, slope, constant) = orthographic(convention);
+        let far_sign = slope.signum();
+        // Near depth 0 a float32 is fine enough to tell, and the margin is small: it is
+        // proportional to the distance from where z is 0.
+        let small = 2.0_f64.powi(-13);
+        for (wall, slack, shares) in [
+            (0.25, 1e-3, [0.97, 1.03]),
+            (0.25, 0.125, [0.97, 1.03]),
+            (0.75, 0.125, [0.97, 1.03]),
+            (small, 0.5 * EPS, [0.95, 1.05]),
+            (small, 1e-300, [0.95, 1.05]),
+        ] {
+            let depth = vec![wall as f32; (SIDE * SIDE) as usize];
+            let [kept, culled] = shares.map(|share| {
+                let ndc = wall + far_sign * share * (slack + EPS);
+                [point([0.0, 0.0, (ndc - constant) / slope])]
+            });
+            let options = CullOptions { depth_slack_abs: slack, ..plain() };
+            let what = format!("absolute slack {slack} at {wall}, {convention:?}");
+            assert_between(&what, (&camera, &depth), &options, &KINDS, (&kept, &culled));
+        }
+    }
+}
+
+/// A pixel that is open in a wall: what stays `guard_px` away from it, from all four sides, is
+/// hidden, and what does not is kept; in sample coverage away from the pixel's centre.
+#[test]
+fn guards_of_pixels_are_as_large_as_they_say() {
+    for convention in CONVENTIONS {
+        let camera = camera_along_z(SIDE, SIDE, convention);
+        for coverage in [Coverage::Area, Coverage::Sample] {
+            for guard in [None, Some(0.25), Some(2.0)] {
+                let (rim, default) = match coverage {
+                    Coverage::Area => (0.5, 0.0),
+                    Coverage::Sample => (0.0, 1.0 / 64.0),
+                };
+                let size = guard.unwrap_or(default);
+                for axis in [0, 1] {
+                    let mut depth = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
+                    for i in 0..SIDE as usize {
+                        depth[if axis == 0 { 16 * i + 8 } else { 16 * 8 + i }] = convention.far();
+                    }
+                    // At depth 8 a pixel is a unit: column 8 is x in 0..1, row 8 is y in -1..0. A
+                    // box of 1.1 pixels on each side of it.
+                    let middle = if axis == 0 { 0.5 } else { -0.5 };
+                    let [kept, culled] = [0.97 * size - 2e-3, 1.03 * size + 2e-3].map(|distance| {
+                        [-1.0, 1.0].map(|side| {
+                            let mut thing = Thing { center: [0.3, 0.3, 8.0], half: [0.55, 0.55, 0.0] };
+                            thing.center[axis] = middle + side * (rim + distance + 0.55);
+                            thing
+                        })
+                    });
+                    // Down to single pixels, for a footprint alone reads others beside them.
+                    let options = CullOptions { coverage, guard_px: guard, descent: 4096, ..plain() };
+                    let what = format!("guard {guard:?} {coverage:?} {convention:?} axis {axis}");
+                    assert_between(&what, (&camera, &depth), &options, &KINDS[1..2], (&kept, &culled));
+                }
+            }
+        }
+    }
+}
+
+/// The guard beyond the image's border, and between the centres of pixels.
+#[test]
+fn guards_of_the_image_are_as_large_as_they_say() {
+    let convention = DepthConvention::Reversed;
+    let camera = camera_along_z(SIDE, SIDE, convention);
+    let open = vec![convention.far(); (SIDE * SIDE) as usize];
+    for (coverage, guard, rim) in [
+        (Coverage::Area, 0.25, 8.0),
+        (Coverage::Area, 3.0, 8.0),
+        (Coverage::Sample, 0.25, 7.5),
+        (Coverage::Sample, 3.0, 7.5),
+    ] {
+        let options = CullOptions { coverage, guard_px: Some(guard), ..plain() };
+        let [kept, culled] = [0.99 * guard, 1.01 * guard].map(|beyond| {
+            // At depth 8 a pixel is a unit.
+            let x = rim + beyond;
+            // In sample coverage a point has to be at the height of a centre, or it is between two
+            // rows of them.
+            [[x, 0.5, 8.0], [-x, 0.5, 8.0], [0.5, x, 8.0], [0.5, -x, 8.0]].map(point)
+        });
+        let what = format!("guard {guard} {coverage:?} beside the image");
+        assert_between(&what, (&camera, &open), &options, &KINDS, (&kept, &culled));
+    }
+    for guard in [None, Some(0.25)] {
+        let size = guard.unwrap_or(1.0 / 64.0);
+        let [kept, culled] = [0.97, 1.03].map(|share| {
+            // Beside the centre of column 8 and of row 8, to both sides.
+            let d = share * size;
+            [[0.5 + d, 0.5, 8.0], [0.5 - d, 0.5, 8.0], [0.5, -0.5 + d, 8.0], [0.5, -0.5 - d, 8.0]].map(point)
+        });
+        let options = CullOptions { coverage: Coverage::Sample, guard_px: guard, ..plain() };
+        let what = format!("guard {guard:?} between centres");
+        assert_between(&what, (&camera, &open), &options, &KINDS, (&kept, &culled));
+    }
+}

@@ -1,0 +1,197 @@
+//! Pixels that are no depth (NaN, infinite, above 1, negative) within a wall, in every way in which
+//! a cull reads single texels: what lies behind such a pixel is kept.
+
+mod common;
+
+#[path = "common/sources.rs"]
+mod sources;
+
+use std::sync::Arc;
+
+use common::{CONVENTIONS, camera_along_z, engine, ndc};
+use hiz_core::{
+    AtlasUse, Bounds, Camera, CullOptions, DepthConvention, Fit, Floats, Footprint, Hierarchy, InstanceOptions,
+    Instances, Pyramid, PyramidOptions, StoredOrder, VisibleOptions,
+};
+use sources::{SOURCES, Source, pyramid_from};
+
+/// The image: cells of 11 x 11 pixels (so that they begin at every remainder by 2, 4 and 8), one
+/// thing and one bad pixel in each.
+const CELL: u32 = 11;
+const CELLS: u32 = 8;
+const SIDE: u32 = CELL * CELLS;
+
+const BAD: [f32; 9] =
+    [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.5, -1e-40, 1.5, 3e38, f32::from_bits(0x3f80_0001)];
+
+/// A way to read texels: what is asked for, and how many pixels a thing is wide.
+#[derive(Debug, Clone, Copy)]
+struct Way {
+    footprint: Footprint,
+    descent: u32,
+    fit: Fit,
+    pixels: u32,
+}
+
+const fn way(footprint: Footprint, descent: u32, fit: Fit, pixels: u32) -> Way {
+    Way { footprint, descent, fit, pixels }
+}
+
+/// A footprint of level 0, one of a stored level, a descent from there to level 0; and the same
+/// texel by texel for a volume's own fit.
+const WAYS: [Way; 12] = [
+    way(Footprint::Two, 0, Fit::Rectangle, 1),
+    way(Footprint::Two, 0, Fit::Rectangle, 2),
+    way(Footprint::Two, 0, Fit::Rectangle, 7),
+    way(Footprint::Four, 0, Fit::Rectangle, 4),
+    way(Footprint::Four, 0, Fit::Rectangle, 7),
+    way(Footprint::Eight, 0, Fit::Rectangle, 8),
+    way(Footprint::Eight, 0, Fit::Rectangle, 10),
+    way(Footprint::Two, 4096, Fit::Rectangle, 9),
+    way(Footprint::Two, 4096, Fit::Volume, 9),
+    way(Footprint::Two, 4096, Fit::Volume, 2),
+    way(Footprint::Eight, 0, Fit::Volume, 7),
+    way(Footprint::Eight, 0, Fit::Volume, 10),
+];
+
+/// Flat boxes at depth 8 that take `pixels` x `pixels` of each cell, from its second pixel on, each
+/// `copies` times.
+fn things(pixels: u32, copies: usize) -> Arc<Instances> {
+    let (mut min, mut max) = (Vec::new(), Vec::new());
+    for cell in 0..CELLS * CELLS {
+        // A pixel is 2 / SIDE at depth 1.
+        let at = |pixel: f64| 8.0 * (2.0 * pixel / f64::from(SIDE) - 1.0);
+        let first = [cell % CELLS, cell / CELLS].map(|c| f64::from(CELL * c + 1));
+        let end = first.map(|f| f + f64::from(pixels));
+        for _ in 0..copies {
+            // Rows run downwards.
+            min.extend([at(first[0] + 0.1), -at(end[1] - 0.1), 8.0]);
+            max.extend([at(end[0] - 0.1), -at(first[1] + 0.1), 8.0]);
+        }
+    }
+    let bounds = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };
+    let options = InstanceOptions { order: StoredOrder::Given, ..InstanceOptions::default() };
+    engine().instances(&bounds, &options).unwrap()
+}
+
+/// A wall at depth 4 with one bad pixel in what each thing covers: every place of it, every value,
+/// as far as the cells reach.
+fn wall_with_bad_pixels(convention: DepthConvention, pixels: u32, shift: u32) -> Vec<f32> {
+    let mut depth = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
+    for cell in 0..CELLS * CELLS {
+        let place = (cell + shift) % (pixels * pixels);
+        let x = CELL * (cell % CELLS) + 1 + place % pixels;
+        let y = CELL * (cell / CELLS) + 1 + place / pixels;
+        depth[(y * SIDE + x) as usize] = BAD[((cell + shift) % 9) as usize];
+    }
+    depth
+}
+
+fn kept(
+    things: &Arc<Instances>,
+    camera: &Camera,
+    pyramid: &Arc<Pyramid>,
+    way: Way,
+    hierarchy: Hierarchy,
+) -> (Vec<bool>, u64) {
+    let Way { footprint, descent, fit, .. } = way;
+    let options = CullOptions { footprint, descent, fit, hierarchy, ..CullOptions::default() };
+    let culling = engine().cull(things, camera, pyramid, &options, &VisibleOptions::default()).unwrap();
+    (culling.mask().unwrap(), culling.counts().unwrap().tested_instances)
+}
+
+/// Which cells have an open pixel. What a depth texture holds in place of a number that is no depth
+/// is the driver's choice: where it is one that hides depth 8, nothing is asked of its cell.
+fn open_cells(camera: &Camera, pixels: u32, shift: u32, pyramid: &Pyramid) -> Vec<bool> {
+    let convention = camera.convention();
+    let image = engine().read_level(pyramid, 0).unwrap();
+    let mut open = vec![false; (CELLS * CELLS) as usize];
+    for (i, given) in (0..).zip(wall_with_bad_pixels(convention, pixels, shift)) {
+        if given.to_bits() != ndc(4.0, convention).to_bits() {
+            let cell = i % SIDE / CELL + CELLS * (i / SIDE / CELL);
+            // Depth 8 is 7/8 and 1/8: what is nearer hides it.
+            open[cell as usize] = match convention {
+                DepthConvention::Standard => image[i as usize] > 0.875,
+                DepthConvention::Reversed => image[i as usize] < 0.125,
+            };
+        }
+    }
+    open
+}
+
+fn check(source: Source, atlas: AtlasUse, convention: DepthConvention, ways: &[Way]) {
+    let camera = camera_along_z(SIDE, SIDE, convention);
+    let options = PyramidOptions { atlas, ..PyramidOptions::default() };
+    let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
+    let whole = pyramid_from(&engine(), source, &wall, &camera, &options);
+    for way in ways {
+        let things = things(way.pixels, 1);
+        let what = format!("{source:?}, atlas {atlas:?}, {convention:?}, {way:?}");
+        let (hidden, _) = kept(&things, &camera, &whole, *way, Hierarchy::Never);
+        assert!(hidden.iter().all(|kept| !kept), "a whole wall hides all: {what}");
+        for shift in [0, 5] {
+            let depth = wall_with_bad_pixels(convention, way.pixels, shift);
+            let pyramid = pyramid_from(&engine(), source, &depth, &camera, &options);
+            let open = open_cells(&camera, way.pixels, shift, &pyramid);
+            if source != Source::Depth {
+                assert!(open.iter().all(|open| *open), "none of these numbers is a depth");
+            }
+            assert!(open.iter().filter(|open| **open).count() > 20, "{what}: {open:?}");
+            let (seen, _) = kept(&things, &camera, &pyramid, *way, Hierarchy::Never);
+            for (cell, (seen, open)) in seen.iter().zip(&open).enumerate() {
+                let value = BAD[(cell + shift as usize) % 9];
+                assert!(*seen || !open, "{what}: cell {cell}, {value}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_no_depth_hides_nothing_in_an_upload() {
+    for convention in CONVENTIONS {
+        check(Source::Bits, AtlasUse::Never, convention, &WAYS);
+    }
+}
+
+#[test]
+fn what_is_no_depth_hides_nothing_in_sampled_textures() {
+    for source in [Source::Float, Source::Depth] {
+        for convention in CONVENTIONS {
+            check(source, AtlasUse::Never, convention, &WAYS[..8]);
+        }
+        check(source, AtlasUse::Never, DepthConvention::Standard, &WAYS[8..9]);
+    }
+}
+
+#[test]
+fn what_is_no_depth_hides_nothing_in_an_atlas() {
+    for (source, convention) in
+        SOURCES.into_iter().zip([DepthConvention::Standard, DepthConvention::Reversed, DepthConvention::Standard])
+    {
+        check(source, AtlasUse::Always, convention, &WAYS);
+    }
+}
+
+/// Groups have a footprint and a descent of their own.
+#[test]
+fn what_is_no_depth_hides_no_group() {
+    for (source, atlas) in
+        [(Source::Bits, AtlasUse::Never), (Source::Float, AtlasUse::Never), (Source::Bits, AtlasUse::Always)]
+    {
+        for convention in CONVENTIONS {
+            let camera = camera_along_z(SIDE, SIDE, convention);
+            let options = PyramidOptions { atlas, ..PyramidOptions::default() };
+            let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
+            let whole = pyramid_from(&engine(), source, &wall, &camera, &options);
+            for way in [WAYS[1], WAYS[2], WAYS[5]] {
+                let crowd = things(way.pixels, 64);
+                let (hidden, tested) = kept(&crowd, &camera, &whole, way, Hierarchy::Always);
+                assert!(hidden.iter().all(|kept| !kept) && tested == 0, "whole groups are hidden: {way:?}");
+                let depth = wall_with_bad_pixels(convention, way.pixels, 0);
+                let pyramid = pyramid_from(&engine(), source, &depth, &camera, &options);
+                let (seen, _) = kept(&crowd, &camera, &pyramid, way, Hierarchy::Always);
+                assert!(seen.iter().all(|kept| *kept), "{source:?} {atlas:?} {convention:?} {way:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,320 @@
+//! What the numbers of a depth image mean: the NDC depth of each pixel, exactly, between two neighbouring float32.
+//!
+//! Every depth here has the form `(a + b sqrt(q)) / n` with a, b, q and n polynomials in the inputs: a ray's length is the only root.
+//! Whether it lies above a float32 is the sign of a polynomial again (`a - f n` against `b sqrt(q)`, squared), so the two float32 around it are
+//! found by float64 with an error bound, and by exact arithmetic where that leaves more than two.
+
+use crate::Error;
+use crate::dyadic::Dyadic;
+use crate::pyramid::{LEAST_NORMAL, ONE};
+use crate::scalar::{Ball, Scalar};
+use crate::view::View;
+use std::cell::OnceCell;
+use std::cmp::Ordering;
+
+/// What the numbers of a depth image mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DepthKind {
+    /// NDC depth, near 0, far 1.
+    Ndc,
+    /// NDC depth, near 1, far 0.
+    ReversedNdc,
+    /// World units along the viewing direction: the normal of the planes of equal w; of a parallel projection, the rays.
+    Z,
+    /// World units along the ray through the pixel's centre.
+    Distance,
+}
+
+/// How the numbers of a depth image become depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DepthMeaning<'a> {
+    /// What they are.
+    pub kind: DepthKind,
+    /// World units of one step, above 0; 1 for NDC depth.
+    pub scale: f64,
+    /// Numbers of the image, before `scale`, that mean "no data".
+    pub invalid: &'a [f64],
+    /// Whether `view.origin` is where the camera stands. View depth of a parallel projection starts there, or nobody knows where.
+    pub origin_is_eye: bool,
+}
+
+/// An NDC depth image between two images of float32 that are equal or neighbours.
+///
+/// What the nearer one lets show can be seen, and what the farther one hides is hidden.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DepthBounds {
+    /// Nowhere farther than the depth.
+    pub nearer: Vec<f32>,
+    /// Nowhere nearer than the depth.
+    pub farther: Vec<f32>,
+}
+
+/// The NDC depth of each pixel of `image` (row order, row 0 on top).
+///
+/// "No data", which is as far as can be: NaN, infinite and `invalid` numbers; what lies outside `0..=1` of NDC depth; of kinds `Z` and `Distance`
+/// zero and negative numbers too, unless the view is a parallel projection whose near plane lies behind `view.origin` (by more than 2^-40 of
+/// the depth range and 2^-48 of what `origin` moves depth by). View depth 0 of a parallel projection is at `view.origin`.
+///
+/// # Errors
+///
+/// If the view is not finite, of another size or singular, or if kind or scale contradict it.
+pub fn depth_bounds(view: &View, image: &[f64], meaning: DepthMeaning) -> Result<DepthBounds, Error> {
+    view.check()?;
+    view.check_length(image.len())?;
+    let DepthMeaning { kind, scale, invalid, origin_is_eye } = meaning;
+    let far = if view.reversed { 0.0 } else { 1.0 };
+    let mut bounds = DepthBounds { nearer: Vec::with_capacity(image.len()), farther: Vec::with_capacity(image.len()) };
+    let metric = matches!(kind, DepthKind::Z | DepthKind::Distance);
+    if !metric && (kind == DepthKind::ReversedNdc) != view.reversed {
+        return Err(Error::DepthMeaning("kind: expected NDC depth in the view's own convention"));
+    }
+    if !(scale > 0.0 && scale.is_finite()) || (!metric && scale != 1.0) {
+        return Err(Error::DepthMeaning("scale: expected a positive finite number, 1 for NDC depth"));
+    }
+    if metric && !origin_is_eye && view.rows[3][..3] == [0.0; 3] {
+        return Err(Error::DepthMeaning(
+            "kind: expected NDC depth for a parallel projection that does not say where view depth starts",
+        ));
+    }
+    let rays = if metric { Some(Rays::new(view, kind)?) } else { None };
+    let mut pixels = image.iter();
+    for row in 0..view.height {
+        for column in 0..view.width {
+            let number = *pixels.next().expect("as many as pixels");
+            let around = match &rays {
+                _ if !number.is_finite() || invalid.contains(&number) => None,
+                None => bracket(number, number, |f| number.partial_cmp(&f64::from(f)).expect("a finite number")),
+                Some(rays) if number > 0.0 || rays.signed => rays.around([column, row], number, scale),
+                Some(_) => None,
+            };
+            let [low, high] = around.unwrap_or([far; 2]);
+            let (nearer, farther) = if view.reversed { (high, low) } else { (low, high) };
+            bounds.nearer.push(nearer);
+            bounds.farther.push(farther);
+        }
+    }
+    Ok(bounds)
+}
+
+/// How depth along the rays of a view becomes NDC depth, in float64 and exactly.
+struct Rays<'a> {
+    view: &'a View,
+    kind: DepthKind,
+    signed: bool,
+    float: Geometry<Ball>,
+    exact: Geometry<Dyadic>,
+}
+
+impl<'a> Rays<'a> {
+    fn new(view: &'a View, kind: DepthKind) -> Result<Self, Error> {
+        let exact = Geometry::<Dyadic>::new(view);
+        if exact.determinant.is_zero() {
+            return Err(Error::DepthMeaning("view: expected an invertible projection, got a singular matrix"));
+        }
+        if exact.parallel && exact.along.is_zero() {
+            return Err(Error::DepthMeaning("view: expected depth to change along the rays"));
+        }
+        let [_, _, z, w] = view.rows;
+        let moved = (0..3).map(|i| (z[i] * view.origin[i]).abs()).sum::<f64>() / w[3].abs();
+        let behind_near = if view.reversed { 1.0 - z[3] / w[3] } else { z[3] / w[3] };
+        let signed = exact.parallel && behind_near > 2.0_f64.powi(-40) + 2.0_f64.powi(-48) * moved;
+        let float = Geometry { away: exact.away, ..Geometry::new(view) };
+        Ok(Rays { view, kind, signed, float, exact })
+    }
+
+    /// The float32 next to the depth of `number * scale` in a pixel; `None` where it is outside `0..=1`.
+    fn around(&self, pixel: [u32; 2], number: f64, scale: f64) -> Option<[f32; 2]> {
+        let quick = self.float.depth(self.view, self.kind, pixel, number, scale).rounded();
+        let exact = OnceCell::new();
+        bracket(quick.mid - quick.err(), quick.mid + quick.err(), |f| {
+            exact.get_or_init(|| self.exact.depth(self.view, self.kind, pixel, number, scale)).compare(f)
+        })
+    }
+}
+
+/// The float32 next to a number of `0..=1` that lies in `low..=high` and compares to a float32 as told; both are it where it is
+/// one. `None` where the number is outside. Below the least normal float32 stand 0 and that one.
+fn bracket(low: f64, high: f64, compare: impl Fn(f32) -> Ordering) -> Option<[f32; 2]> {
+    // Outwards once more, for the rounding of the ends; NaN is no end.
+    let low = if low.is_nan() { f64::NEG_INFINITY } else { low.next_down() };
+    let high = if high.is_nan() { f64::INFINITY } else { high.next_up() };
+    if low > 1.0 || high < 0.0 {
+        return None;
+    }
+    for (end, open, outside) in [(0.0, low <= 0.0, Ordering::Less), (1.0, high >= 1.0, Ordering::Greater)] {
+        if open {
+            match compare(end) {
+                Ordering::Equal => return Some([end; 2]),
+                order if order == outside => return None,
+                _ => {}
+            }
+        }
+    }
+    // In steps of float32, which order like the numbers.
+    let (mut below, mut above) = (floor(low.max(0.0)), ceiling(high.min(1.0)));
+    while above - below > 1 {
+        let middle = below.midpoint(above);
+        match compare(f32::from_bits(middle)) {
+            Ordering::Less => above = middle,
+            Ordering::Greater => below = middle,
+            Ordering::Equal => (below, above) = (middle, middle),
+        }
+    }
+    let below = if below < LEAST_NORMAL { 0 } else { below };
+    let above = if above > 0 { above.max(LEAST_NORMAL) } else { 0 };
+    Some([f32::from_bits(below), f32::from_bits(above)])
+}
+
+/// The bits of the greatest float32 that is not above a number of `0..=1`.
+fn floor(x: f64) -> u32 {
+    let nearest = x as f32;
+    if f64::from(nearest) > x { nearest.to_bits() - 1 } else { nearest.to_bits() }
+}
+
+/// The bits of the least float32 that is not below a number of `0..=1`.
+fn ceiling(x: f64) -> u32 {
+    let nearest = x as f32;
+    if f64::from(nearest) < x { (nearest.to_bits() + 1).min(ONE) } else { nearest.to_bits() }
+}
+
+/// `(a + b sqrt(q)) / n` with `q >= 0`.
+struct Root<S> {
+    a: S,
+    b: S,
+    q: S,
+    n: S,
+}
+
+impl Root<Ball> {
+    fn rounded(&self) -> Ball {
+        self.a.plus(&self.b.times(&self.q.square_root())).divided_by(self.n)
+    }
+}
+
+impl Root<Dyadic> {
+    /// How the number compares to `f`: the sign of `a - f n + b sqrt(q)`, times that of n.
+    fn compare(&self, f: f32) -> Ordering {
+        let sign = |x: &Dyadic| x.sign().expect("exact");
+        let rest = self.a.minus(&self.n.times(&Dyadic::exact(f64::from(f))));
+        let root = if self.q.is_zero() { Ordering::Equal } else { sign(&self.b) };
+        let order = match (sign(&rest), root) {
+            (x, Ordering::Equal) => x,
+            (Ordering::Equal, y) => y,
+            (x, y) if x == y => x,
+            // Of different signs: the larger magnitude decides.
+            (x, y) => match sign(&rest.times(&rest).minus(&self.b.times(&self.b).times(&self.q))) {
+                Ordering::Greater => x,
+                Ordering::Less => y,
+                Ordering::Equal => Ordering::Equal,
+            },
+        };
+        if sign(&self.n) == Ordering::Less { order.reverse() } else { order }
+    }
+}
+
+type Vector<S> = [S; 3];
+
+fn dot<S: Scalar>(a: &Vector<S>, b: &Vector<S>) -> S {
+    a[0].times(&b[0]).plus(&a[1].times(&b[1])).plus(&a[2].times(&b[2]))
+}
+
+fn cross<S: Scalar>(a: &Vector<S>, b: &Vector<S>) -> Vector<S> {
+    let part = |i: usize, j: usize| a[i].times(&b[j]).minus(&a[j].times(&b[i]));
+    [part(1, 2), part(2, 0), part(0, 1)]
+}
+
+/// What all pixels share.
+///
+/// Through an eye: the matrix M of the linear rows x, y, w, by its adjugate. A point p whose clip coordinates are `w (x, y, 1)` is
+/// `M^-1 (w (x, y, 1) - constants)`. Parallel: M has the rows x, y and the rays' direction `x times y` instead.
+struct Geometry<S> {
+    parallel: bool,
+    /// Columns of the adjugate: `M^-1 = adjugate / determinant`.
+    adjugate: [Vector<S>; 3],
+    determinant: S,
+    /// The linear part of z.
+    z: Vector<S>,
+    /// The linear part of w, squared.
+    w_square: S,
+    /// Through an eye: determinant times z at the eye. Parallel: determinant times z where clip x and y are 0, on the plane through the
+    /// origin across the rays.
+    constant: S,
+    /// Parallel: how z grows along the direction, and the constant w.
+    along: S,
+    w: S,
+    /// Parallel: 1 or -1, whichever way is away from the viewer.
+    away: f64,
+}
+
+impl<S: Scalar> Geometry<S> {
+    fn new(view: &View) -> Self {
+        let linear = |r: usize| [0, 1, 2].map(|k| S::exact(view.rows[r][k]));
+        let constant = |r: usize| S::exact(view.rows[r][3]);
+        let [x, y, z, w_linear] = [0, 1, 2, 3].map(linear);
+        let parallel = view.rows[3][..3] == [0.0; 3];
+        let third = if parallel { cross(&x, &y) } else { w_linear.clone() };
+        let adjugate = [cross(&y, &third), cross(&third, &x), cross(&x, &y)];
+        let determinant = dot(&third, &adjugate[2]);
+        let mut start = constant(2).times(&determinant);
+        for (column, r) in [(0, 0), (1, 1), (2, 3)] {
+            if !(parallel && column == 2) {
+                start = start.minus(&dot(&z, &adjugate[column]).times(&constant(r)));
+            }
+        }
+        let along = dot(&z, &third);
+        // Depth grows away from the viewer in standard Z, and falls in reversed Z.
+        let grows = along.sign() == Some(Ordering::Greater);
+        let away = if grows == (view.reversed == (view.rows[3][3] < 0.0)) { 1.0 } else { -1.0 };
+        let w_square = dot(&w_linear, &w_linear);
+        Geometry { parallel, adjugate, determinant, w_square, constant: start, along, w: constant(3), z, away }
+    }
+
+    /// The NDC depth at which `number * scale` lies in a pixel.
+    fn depth(&self, view: &View, kind: DepthKind, [column, row]: [u32; 2], number: f64, scale: f64) -> Root<S> {
+        let (width, height) = (f64::from(view.width), f64::from(view.height));
+        // The pixel's centre in NDC, times width and height: whole numbers.
+        let area = S::exact(width * height);
+        let x = S::exact((2.0 * f64::from(column) + 1.0 - width) * height);
+        let y = S::exact((height - 1.0 - 2.0 * f64::from(row)) * width);
+        let value = S::exact(number).times(&S::exact(scale));
+        let at = |k: usize| {
+            let [a, b, c] = [0, 1, 2].map(|j| &self.adjugate[j][k]);
+            let sum = a.times(&x).plus(&b.times(&y));
+            if self.parallel { sum } else { sum.plus(&c.times(&area)) }
+        };
+        // Times determinant and area: the ray along which w grows by 1. Parallel: the pixel's place beside that of x = y = 0.
+        let ray = [at(0), at(1), at(2)];
+        if self.parallel {
+            // z = (constant + w z.ray / area) / determinant + along value / |direction|, and |direction|^2 is the determinant.
+            let place = self.constant.times(&area).plus(&dot(&self.z, &ray).times(&self.w));
+            let grown = self.along.times(&value).times(&area).times(&S::exact(self.away));
+            return Root {
+                a: place,
+                b: grown,
+                q: self.determinant.clone(),
+                n: self.determinant.times(&area).times(&self.w),
+            };
+        }
+        // z / w = (z.ray / area + constant / w) / determinant.
+        let slope = dot(&self.z, &ray);
+        if kind == DepthKind::Z {
+            // 1 / w = 1 / (value sqrt(w_square)) = sqrt(w_square) / (value w_square).
+            let w_root = value.times(&self.w_square);
+            Root {
+                a: slope.times(&w_root),
+                b: self.constant.times(&area),
+                q: self.w_square.clone(),
+                n: self.determinant.times(&area).times(&w_root),
+            }
+        } else {
+            // 1 / w = |ray| / (area |determinant| value).
+            let size = self.determinant.magnitude().times(&value);
+            Root {
+                a: slope.times(&size),
+                b: self.constant.clone(),
+                q: dot(&ray, &ray),
+                n: self.determinant.times(&area).times(&size),
+            }
+        }
+    }
+}

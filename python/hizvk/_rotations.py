@@ -1,0 +1,57 @@
+"""Rotation matrices from angles and quaternions, in float64.
+
+What they return *is* the rotation from there on: a camera or a box denotes the float64 matrix that
+was formed, so that the roundings here (some 1e-16) are no error that a cull would have to cover.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+
+def from_quaternions(w: Any, x: Any, y: Any, z: Any) -> npt.NDArray[np.float64]:
+    """``(N, 3, 3)`` from the four parts, ``(N,)`` each, of Hamilton quaternions of any length.
+
+    A quaternion of length 0, or one that is not finite, becomes a matrix of NaN.
+    """
+    parts = np.stack([np.asarray(part, np.float64) for part in (w, x, y, z)])
+    with np.errstate(all="ignore"):
+        parts = parts / np.abs(parts).max(axis=0)  # no square over- or underflows
+        w, x, y, z = parts / np.sqrt((parts * parts).sum(axis=0))
+        rows = (
+            (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+            (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+            (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+        )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def about(axis: tuple[float, float, float], degrees: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """``(N, 3, 3)``: turns about one axis by the right-hand rule (Rodrigues's formula).
+
+    Whole quarter turns are exact; an angle that is not finite becomes a matrix of NaN.
+    """
+    direction = np.asarray(axis, np.float64)
+    direction = direction / np.abs(direction).max()
+    direction = direction / np.linalg.norm(direction)
+    with np.errstate(all="ignore"):
+        angle = np.mod(np.asarray(degrees, np.float64), 360.0)
+        quarters = np.round(angle / 90.0)
+        rest = np.radians(angle - 90.0 * quarters)
+        sine, cosine = np.sin(rest), np.cos(rest)
+        turn = np.mod(quarters, 4.0)
+        sine, cosine = (
+            np.select([turn == 0, turn == 1, turn == 2, turn == 3], [sine, cosine, -sine, -cosine], np.nan),
+            np.select([turn == 0, turn == 1, turn == 2, turn == 3], [cosine, -sine, -cosine, sine], np.nan),
+        )
+    x, y, z = direction
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    along = np.outer(direction, direction)
+    sine, cosine = sine[:, None, None], cosine[:, None, None]
+    turned: npt.NDArray[np.float64] = cosine * np.eye(3) + sine * across + (1.0 - cosine) * along
+    return turned

@@ -1,0 +1,161 @@
+"""What looks like a mistake in a cull that is right as it was asked: everything outside, nothing that could hide.
+
+No hint changes a result, and each says something that holds for all instances or all pixels, so that a scene which is
+as it should be gets none. `hizvk.visible` warns (`HizWarning`), `CullResult.hints` tells when asked.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from .bounds import Boxes
+from .camera import Camera
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from .bounds import Bounds
+    from .resources import Pyramid
+    from .result import CullStats
+
+__all__ = ["Question", "posed_otherwise"]
+
+#: Instances whose middles are looked at through other poses.
+MOST_MIDDLES: Final = 4096
+#: Depth is sparse if so small a part of the pixels has any, and so small a part of those lies in full blocks of 2x2.
+SPARSE_PIXELS: Final = 0.25
+SPARSE_BLOCKS: Final = 0.1
+#: The level that is looked at first: where one of its texels is not far, depth is dense somewhere.
+COARSE: Final = 3
+#: OpenCV's camera axes from OpenGL's, and back: half a turn about x.
+TURNED: Final = np.diag([1.0, -1.0, -1.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What a cull was asked, as far as hints need it."""
+
+    camera: Camera
+    pyramid: Pyramid
+    coverage: str
+    points: bool
+    """Whether all bounds have size zero."""
+
+    def hints(self, stats: CullStats, bounds: Bounds | None = None) -> tuple[str, ...]:
+        """What looks like a mistake, in whole sentences; empty where nothing does.
+
+        Parameters
+        ----------
+        stats : CullStats
+            What came of it.
+        bounds : Spheres, Boxes or OrientedBoxes, optional
+            What was culled, to find the pose that was meant.
+        """
+        if not stats.tested:
+            return ()
+        if self.coverage == "sample" and self.points:
+            return (
+                "bounds, coverage: all sizes are zero, and a point covers no pixel's centre, so what can be seen is "
+                'culled; use coverage="area"',
+            )
+        if stats.outside == stats.tested:
+            # By sample coverage, what lies between the pixels' centres counts as outside, too.
+            if self.coverage == "sample" and (bounds is None or _in_view(self.camera, bounds)):
+                return (
+                    "bounds, coverage: nothing covers a pixel's centre: all are too small, or outside of the view; "
+                    'coverage="area" keeps small ones',
+                )
+            return (_outside(stats.tested, self.camera, bounds),)
+        if stats.occluded or stats.kept == stats.invalid:
+            return ()
+        return self._depth()
+
+    def _known(self, level: int) -> npt.NDArray[np.bool_]:
+        """Where something may be hidden: not far, as far as numbers without a meaning are."""
+        depth = self.pyramid.level(level)
+        if self.camera.reversed_z:
+            return (depth > 0.0) & (depth <= 1.0)
+        return (depth >= 0.0) & (depth < 1.0)
+
+    def _depth(self) -> tuple[str, ...]:
+        """Of an image that hid nothing of what is in view."""
+        coarse = max((k for k in self.pyramid.levels if k <= COARSE), default=0)
+        if self._known(coarse).any():
+            return ()
+        known = self._known(0)
+        if not known.any():
+            return (
+                "depth: every pixel is far, so nothing can be hidden; if something should be there, check kind and "
+                "scale: numbers that do not lie between the camera's near and far planes count as no data",
+            )
+        full = known[:-1, :-1] & known[1:, :-1] & known[:-1, 1:] & known[1:, 1:]
+        if known.mean() < SPARSE_PIXELS and full.sum() < SPARSE_BLOCKS * known.sum():
+            return (
+                f"depth: {100.0 * known.mean():.1f} % of the pixels have a depth, hardly any of them beside another, "
+                'and empty ones are far, so next to nothing can be hidden; "Sparse depth" in docs/guide.md fills them',
+            )
+        return ()
+
+
+def _outside(count: int, camera: Camera, bounds: Bounds | None) -> str:
+    all_ = f"all {count:,} lie" if count > 1 else "the only one lies"
+    said = f"bounds, camera: {all_} outside of the view"
+    for what, other in posed_otherwise(camera) if bounds is not None else ():
+        seen = _in_view(other, bounds)
+        if seen:
+            return f"{said}, and {seen:,} would be inside of it with {what}"
+    return (
+        f"{said}; if that is not meant, check the pose's direction (camera_from_world or world_from_camera), its "
+        "convention (from_opencv looks along +z, from_opengl along -z) and the units"
+    )
+
+
+def posed_otherwise(camera: Camera) -> list[tuple[str, Camera]]:
+    """The camera with its pose taken in the ways that poses are mistaken for, with words for each; often empty."""
+    name, recipe = camera._recipe
+    arguments: dict[str, Any] = dict(recipe)
+    if name == "resized":
+        inner: Camera = arguments["camera"]
+        return [(what, other.resized(arguments["size"])) for what, other in posed_otherwise(inner)]
+    ways = ("camera_from_world", "world_from_camera")
+    given = [way for way in ways if arguments.get(way) is not None]
+    if len(given) != 1:
+        return []
+    way = given[0]
+    pose = np.asarray(arguments.pop(way), np.float64)
+    if pose.shape != (4, 4):
+        return []
+    other_way = ways[1 - ways.index(way)]
+    turned = TURNED @ pose if way == ways[0] else pose @ TURNED
+    make = getattr(Camera, name)
+    axes = "the camera's y and z turned round, as between the poses of OpenCV and OpenGL"
+    return [
+        (axes, make(**{way: turned}, **arguments)),
+        (f"the pose as {other_way}", make(**{other_way: pose}, **arguments)),
+    ]
+
+
+def _in_view(camera: Camera, bounds: Bounds | None) -> int:
+    """How many middles lie in the view; of many bounds, some are looked at."""
+    middles = _middles(bounds)
+    clip = np.c_[middles, np.ones(len(middles))] @ camera.clip_from_world.T
+    x, y, z, w = clip.T
+    with np.errstate(invalid="ignore"):
+        return int(((np.abs(x) <= w) & (np.abs(y) <= w) & (z >= 0.0) & (z <= w) & (w > 0.0)).sum())
+
+
+def _middles(bounds: Bounds | None) -> npt.NDArray[np.float64]:
+    match bounds:
+        case None:
+            return np.zeros((0, 3))
+        case Boxes():
+            low, high = (np.asarray(corner[_some(bounds)], np.float64) for corner in (bounds.min, bounds.max))
+            return 0.5 * (low + high)
+    return np.asarray(bounds.centers[_some(bounds)], np.float64)
+
+
+def _some(bounds: Bounds) -> slice:
+    return slice(None, None, max(1, len(bounds) // MOST_MIDDLES))

@@ -1,0 +1,23 @@
+// The count of what was read, where it is asked for.
+
+// Count the tests of each level.
+override STATISTICS: bool;
+
+struct Statistics {
+    // How many instances and groups were compared with the depths of each level.
+    levels: array<atomic<u32>, 16>,
+    // Texels read, a 64-bit number in two halves.
+    texels_low: atomic<u32>,
+    texels_high: atomic<u32>,
+}
+
+@group(2) @binding(3) var<storage, read_write> statistics: Statistics;
+
+// A test that read so many texels, of `level` first.
+fn count_texels(level: u32, texels_read: u32) {
+    if texels_read > 0u {
+        atomicAdd(&statistics.levels[level], 1u);
+        let before = atomicAdd(&statistics.texels_low, texels_read);
+        if before + texels_read < before { atomicAdd(&statistics.texels_high, 1u); }
+    }
+}

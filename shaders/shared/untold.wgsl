@@ -1,0 +1,7 @@
+// What a test reads is told to nobody here: calls of nothing, which compilers drop. `explain.wgsl` has functions that write it down.
+
+fn tell_corners(level: u32, t: vec4<u32>, bits: vec4<u32>) {}
+
+fn tell_texel(level: u32, x: u32, y: u32, bits: u32, is_behind: bool) {}
+
+fn tell_clear(is_clear: bool) {}

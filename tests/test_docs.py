@@ -1,0 +1,114 @@
+"""What README and docs show runs as it stands: code, commands and the faults that they plant."""
+
+from __future__ import annotations
+
+import contextlib
+import doctest
+import importlib
+import io
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("crates/*/README.md")])
+FENCE = re.compile(r"^```(?P<language>[^\n]*)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
+#: Languages that are shown and not run here; `rust` is, by rustdoc (`crates/hiz_core/src/lib.rs`, `readme`).
+NOT_RUN = {"sh", "text", "rust", "wgsl", "json", "{eval-rst}", "{include}", "{toctree}"}
+
+
+def blocks() -> list[tuple[str, str, str]]:
+    """Where each fenced block stands, its language and its text."""
+    found = []
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        for fence in FENCE.finditer(text):
+            line = text.count("\n", 0, fence.start()) + 1
+            language = fence["language"].split()[0] if fence["language"] else ""
+            found.append((f"{page.relative_to(ROOT)}:{line}", language, fence["text"]))
+    return found
+
+
+BLOCKS = blocks()
+PYTHON = [pytest.param(place, text, id=place) for place, language, text in BLOCKS if language == "python"]
+
+
+def test_every_block_says_what_it_is() -> None:
+    """A block of no or another language would be run by nobody."""
+    strange = [place for place, language, _ in BLOCKS if language not in {*NOT_RUN, "python"}]
+    assert not strange
+    # rustdoc runs README's alone, and passes over what is marked so.
+    unrun = [place for place, language, _ in BLOCKS if language == "rust" and not place.startswith("README.md")]
+    assert not unrun
+    assert PYTHON
+    assert any(language == "rust" for _, language, _ in BLOCKS)
+
+
+def test_rustdoc_runs_the_readme() -> None:
+    source = (ROOT / "crates" / "hiz_core" / "src" / "lib.rs").read_text(encoding="utf-8")
+    assert '#[doc = include_str!("../../../README.md")]' in source
+    # To rustdoc, indented lines outside of a fence are Rust.
+    outside = FENCE.sub("", (ROOT / "README.md").read_text(encoding="utf-8"))
+    assert not re.search(r"^(    |\t)\S", outside, re.MULTILINE)
+
+
+@pytest.mark.parametrize(("place", "text"), PYTHON)
+def test_python_runs(place: str, text: str) -> None:
+    with contextlib.redirect_stdout(io.StringIO()):
+        exec(compile(text, place, "exec"), {"__name__": "__main__"})
+
+
+def modules() -> list[str]:
+    """Modules of the package whose docstrings hold examples."""
+    found = []
+    for path in sorted((ROOT / "python").rglob("*.py")):
+        if ">>> " in path.read_text(encoding="utf-8"):
+            found.append(".".join(path.relative_to(ROOT / "python").with_suffix("").parts).removesuffix(".__init__"))
+    return found
+
+
+@pytest.mark.parametrize("name", modules())
+def test_examples_in_docstrings_run(name: str) -> None:
+    told = doctest.testmod(importlib.import_module(name), report=True)
+    assert told.attempted > 0
+    assert told.failed == 0
+
+
+def test_no_example_is_skipped() -> None:
+    """What is not run falls behind."""
+    skipped = [path for path in (ROOT / "python").rglob("*.py") if "doctest: +SKIP" in path.read_text(encoding="utf-8")]
+    assert not skipped
+
+
+def shown() -> str:
+    """All pages as one text."""
+    text = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
+    return re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)  # sources of other projects
+
+
+def test_planted_faults_that_are_shown_can_be_planted() -> None:
+    shaders = [path.read_text(encoding="utf-8") for path in ROOT.glob("shaders/**/*.wgsl")]
+    planted = re.findall(r"HIZVK_PLANTED_FAULT='(.+?) => .+?'", shown())
+    assert planted
+    for what in planted:
+        assert any(what in shader for shader in shaders), f"no shader says {what!r}"
+
+
+def test_commands_that_are_shown_exist() -> None:
+    text = shown()
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    for target in set(re.findall(r"(?:^|`|    )make ([a-z-]+)", text, re.MULTILINE)):
+        assert target in targets, f"make {target}"
+    for kind, folder in (("test", "tests"), ("bench", "benches"), ("example", "examples")):
+        for name in set(re.findall(rf"--{kind} ([a-z_]+)", text)):
+            found = [*ROOT.glob(f"crates/*/{folder}/{name}.rs"), *ROOT.glob(f"crates/*/{folder}/{name}/main.rs")]
+            assert found, f"--{kind} {name}"
+    files = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
+    tracked = subprocess.run(files, cwd=ROOT, capture_output=True, text=True, check=False).stdout.split()
+    if not tracked:
+        pytest.skip("not a git checkout: which files are part of it is unknown")
+    for path in set(re.findall(r"(?:tests|scripts|docs|shaders|crates|python)/[\w/.-]+\.(?:py|sh|rs|wgsl|md)", text)):
+        # Modules of hiz_core are named by their file alone.
+        assert any(each.endswith(path) for each in tracked), path

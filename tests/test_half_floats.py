@@ -1,0 +1,62 @@
+"""Depth in half floats: what rounding to them may have cost is counted, in every kind.
+
+Every expectation is worked out by hand.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hizvk
+
+
+@pytest.fixture(scope="module")
+def device() -> hizvk.Device:
+    return hizvk.Device()
+
+
+# The kind, what is stored, and the view depth of a wall half a spacing behind it, which is stored as the same number.
+# A spacing is 2^-7 from 8 to 16, 2^-11 from 0.5 to 1, and 2^-14 from 2^-4 to 2^-3.
+CASES = [
+    ("z", 10.0, 10.0 + 2.0**-8),
+    ("distance", 10.0, 10.0 + 2.0**-8),
+    ("ndc", 0.875, 1.0 / (0.125 - 2.0**-12)),
+    ("reversed_ndc", 0.0625, 1.0 / (0.0625 - 2.0**-15)),
+]
+
+
+@pytest.mark.parametrize(("kind", "stored", "wall"), CASES, ids=[case[0] for case in CASES])
+@pytest.mark.parametrize("way", ["device", "visible", "list"])
+def test_what_a_half_float_rounds_is_counted(
+    device: hizvk.Device, kind: Any, stored: float, wall: float, way: str
+) -> None:
+    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(1, 1), near=1.0, reversed_z=kind != "ndc")
+    # Flat boxes a quarter of that half spacing before the wall, and far enough behind the number that is stored.
+    step = wall - stored if kind in ("z", "distance") else wall - (8.0 if kind == "ndc" else 16.0)
+    depths = np.array([wall - 0.25 * step, wall + 4.0 * step])
+    low = np.stack([-0.1 * depths, -0.1 * depths, -depths], axis=1)
+    high = np.stack([0.1 * depths, 0.1 * depths, -depths], axis=1)
+    boxes = hizvk.Boxes(low, high)
+
+    def seen(image: Any) -> list[bool]:
+        if way == "visible":
+            mask = hizvk.visible(boxes, camera, depth=image, kind=kind, device=device)
+        else:
+            pyramid = device.pyramid(image, camera, kind=kind)
+            mask = device.cull(device.instances(boxes), camera, pyramid).mask
+        return [bool(kept) for kept in mask]
+
+    half = np.full((1, 1), stored, np.float16)
+    assert seen([[half[0, 0]]] if way == "list" else half) == [True, False]
+    # Of a wall that stands where the number says, the first one is hidden.
+    assert seen(half.astype(np.float32)) == [False, False]
+
+
+def test_reference_takes_half_floats_as_they_are() -> None:
+    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(1, 1), near=1.0)
+    boxes = hizvk.Boxes(np.array([[-1.0, -1.0, -10.003]]), np.array([[1.0, 1.0, -10.003]]))
+    image = np.full((1, 1), 10.0, np.float16)
+    assert hizvk.reference.classify(boxes, camera, image, kind="z")[0] == hizvk.reference.HIDDEN
