@@ -143,7 +143,9 @@ def refused() -> list[str]:
         device._engine.wait_without_guard()
         wrong.append("the engine in Rust: no error")
     except hizvk.HizError as error:
-        expected = f"this device was made by process {os.getppid()}, and process {os.getpid()} is a fork of it: no device"
+        expected = (
+            f"this device was made by process {os.getppid()}, and process {os.getpid()} is a fork of it: no device"
+        )
         if not str(error).startswith(expected):
             wrong.append(f"the engine in Rust: {error}")
     # What needs no device.

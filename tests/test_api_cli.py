@@ -118,7 +118,13 @@ def test_an_adapter_that_is_not_there() -> None:
     with pytest.raises(hizvk.NoAdapterError) as caught:
         hizvk.Device("no such adapter")
     assert "no such adapter" in str(caught.value)
-    assert len(caught.value.seen) == len(hizvk.adapters())
+    # The advice fits: there are adapters to choose from, so there is no driver to install.
+    assert caught.value.seen == tuple(
+        f"{one.index}: {one.name} ({one.device_type}, {one.driver} {one.driver_info})" for one in hizvk.adapters()
+    )
+    assert "by its number" in caught.value.hint
+    assert "HIZVK_ADAPTER" in caught.value.hint
+    assert INSTALL_LINE not in str(caught.value)
     with pytest.raises(hizvk.NoAdapterError):
         hizvk.Device(10_000)
 

@@ -29,7 +29,7 @@ class NoAdapterError(HizError):
     seen : tuple of str
         The adapters that were found, one line each; empty when there is no Vulkan driver.
     hint : str
-        What to do about it: how to choose one of those seen; where there is none, the line that installs a software driver.
+        What to do about it: how to choose one of those seen, or the line that installs a software driver.
     request : str
         What was asked for, in words.
     """
