@@ -168,6 +168,9 @@ def test_hierarchy_and_statistics(device: hizvk.Device) -> None:
     instances = device.instances(bounds)
     groups = {h: device.cull(instances, CAMERA, pyramid, hierarchy=h).stats.tested_groups for h in (None, True, False)}
     assert groups == {None: 0, True: 47, False: 0}
+    # Where nothing is hidden each instance is tested; the last of 47 groups has 56 members.
+    nothing = device.pyramid(np.full(SIZE, np.inf), CAMERA, kind="z")
+    assert device.cull(instances, CAMERA, nothing, hierarchy=True).stats.tested_instances == 3000
     without, with_them = (device.cull(instances, CAMERA, pyramid, statistics=s).stats for s in (False, True))
     assert (without.levels, without.texels_read) == (None, None)
     assert with_them.levels is not None
