@@ -108,13 +108,15 @@ def test_each_option_of_a_cull(device: hizvk.Device, name: str, face: Any) -> No
         assert face(device, bounds, depth, keeping), "kept"
 
 
-def test_kind_and_scale(device: hizvk.Device) -> None:
+@pytest.mark.parametrize("dtype", [np.float64, np.float32, np.uint16])
+def test_kind_and_scale(device: hizvk.Device, dtype: Any) -> None:
     """A distance of 4 in the image's corner is a view depth of 2.4; steps of 2 make a wall at depth 8."""
     corner = sphere((3.0 * 14 / 16, 3.0 * 14 / 16, -3.0), 0.05)
+    depth = wall().astype(dtype)
 
     def kept(bounds: Any, **options: Any) -> tuple[bool, bool]:
-        seen = hizvk.visible(bounds, CAMERA, depth=wall(), device=device, **options)
-        pyramid = device.pyramid(wall(), CAMERA, **options)
+        seen = hizvk.visible(bounds, CAMERA, depth=depth, device=device, **options)
+        pyramid = device.pyramid(depth, CAMERA, **options)
         return bool(seen[0]), bool(device.cull(device.instances(bounds), CAMERA, pyramid).mask[0])
 
     assert kept(corner, kind="z") == (True, True)
@@ -132,6 +134,11 @@ def test_levels(device: hizvk.Device) -> None:
     for levels, kept in ((None, False), (1, False), ((1, 1), False), (3, True), ((3, 3), True)):
         pyramid = device.pyramid(depth, CAMERA, kind="z", levels=levels)
         assert bool(device.cull(device.instances(three), CAMERA, pyramid).mask[0]) == kept, levels
+    # Six pixels are more than two texels of level 1, and no more than two of level 2 (columns 8 to 15).
+    six = box((1.1, 0.1, -8), (6.9, 0.9, -8))
+    for levels, kept in ((None, False), ((1, 2), False), ((1, 1), True)):
+        pyramid = device.pyramid(wall((slice(None), 0)), CAMERA, kind="z", levels=levels)
+        assert bool(device.cull(device.instances(six), CAMERA, pyramid).mask[0]) == kept, levels
 
 
 def points(count: int) -> tuple[hizvk.Spheres, Any]:
@@ -161,6 +168,9 @@ def test_hierarchy_and_statistics(device: hizvk.Device) -> None:
     instances = device.instances(bounds)
     groups = {h: device.cull(instances, CAMERA, pyramid, hierarchy=h).stats.tested_groups for h in (None, True, False)}
     assert groups == {None: 0, True: 47, False: 0}
+    # Where nothing is hidden each instance is tested; the last of 47 groups has 56 members.
+    nothing = device.pyramid(np.full(SIZE, np.inf), CAMERA, kind="z")
+    assert device.cull(instances, CAMERA, nothing, hierarchy=True).stats.tested_instances == 3000
     without, with_them = (device.cull(instances, CAMERA, pyramid, statistics=s).stats for s in (False, True))
     assert (without.levels, without.texels_read) == (None, None)
     assert with_them.levels is not None

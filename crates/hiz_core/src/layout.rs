@@ -313,6 +313,40 @@ mod tests {
         assert!(matches!(error, Error::Limit { .. }));
     }
 
+    /// Each limit alone, worked out by hand: what only twenty million instances meet on a device.
+    #[test]
+    fn every_limit_makes_pieces_smaller() {
+        let large = wgpu::Limits {
+            max_texture_dimension_2d: 1 << 20,
+            max_buffer_size: 1 << 40,
+            max_storage_buffer_binding_size: 1 << 40,
+            max_compute_workgroups_per_dimension: 1 << 30,
+            ..wgpu::Limits::default()
+        };
+        // Indices of a piece are exact as float32.
+        assert_eq!(piece_capacity(64, &large), 1 << 24);
+        let rows = wgpu::Limits { max_texture_dimension_2d: 8, ..large.clone() };
+        assert_eq!(piece_capacity(64, &rows), 8 * 1024);
+        // 2^20 bytes are 16384 records of 64 bytes. Of 32 bytes they would be 32768.
+        let buffer = wgpu::Limits { max_buffer_size: 1 << 20, ..large.clone() };
+        assert_eq!((piece_capacity(64, &buffer), piece_capacity(32, &buffer)), (16_384, 32_768));
+        // A word of a verdict and a bit of the mask, 5 bytes with room: 209715, in whole rows.
+        let binding = wgpu::Limits { max_storage_buffer_binding_size: 1 << 20, ..large.clone() };
+        assert_eq!(piece_capacity(64, &binding), 204 * 1024);
+        // Workgroups of 128.
+        let dispatch = wgpu::Limits { max_compute_workgroups_per_dimension: 100, ..large };
+        assert_eq!(piece_capacity(64, &dispatch), 12 * 1024);
+        let chunk = |binding, buffer| {
+            chunk_shift(&wgpu::Limits {
+                max_storage_buffer_binding_size: binding,
+                max_buffer_size: buffer,
+                ..wgpu::Limits::default()
+            })
+        };
+        assert_eq!((chunk(1 << 27, 1 << 40), chunk(1 << 40, 1 << 27), chunk((1 << 27) - 1, 1 << 40)), (25, 25, 24));
+        assert_eq!(chunk(1 << 40, 1 << 40), 30);
+    }
+
     #[test]
     fn pieces_fit_the_binding_and_the_dispatch() {
         let limits = wgpu::Limits::default();

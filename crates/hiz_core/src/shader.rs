@@ -398,6 +398,35 @@ mod tests {
         }
     }
 
+    /// The f32 that a shader says after `before`.
+    fn number(shader: &str, before: &str) -> f64 {
+        let rest = shader.split_once(before).unwrap_or_else(|| panic!("{before}")).1;
+        let text: String = rest.chars().take_while(|c| c.is_alphanumeric() || ".-".contains(*c)).collect();
+        match text.split_once("p") {
+            Some(("0x1", exponent)) => 2.0_f64.powi(exponent.parse().expect("an exponent")),
+            _ => text.parse().expect("a number"),
+        }
+    }
+
+    /// What docs/accuracy.md derives of constants whose absence shows in no verdict but the mirror's: they cover what it counts.
+    #[test]
+    fn constants_cover_what_is_counted() {
+        let eps = crate::view::EPS;
+        let certificate = wgsl!("shared/certificate");
+        assert!(number(certificate, "ERROR_FLOOR: f32 = ") >= 2.0_f64.powi(-70), "flushed subnormals");
+        // Both squares, the product and the sum lose at most 6 eps, and squares below 2^-126 what they are.
+        let sphere = wgsl!("shared/bounds_sphere");
+        assert!(number(sphere, "dot(half, half) * ") >= 1.0 + 6.0 * eps, "a sphere's squares");
+        assert!(number(sphere, "1.000001 + ") >= 2.0_f64.powi(-100), "what vanishes of them");
+        // The margin is at least 2^-70; a ratio may not overflow.
+        assert!(number(wgsl!("shared/classify"), "LEAST_W: f32 = ") >= 2.0_f64.powi(-66), "the least w");
+        let planes = wgsl!("shared/supporting_planes");
+        // Six roundings of a texel's comparison.
+        assert!(number(planes, "let margin = ") >= 6.0, "a texel's margin");
+        assert!(number(planes, "abs(bound)) + ") >= 2.0_f64.powi(-100), "what is flushed there");
+        assert!(number(planes, "FLATTEST: f32 = ") >= 2.0_f64.powi(-100), "slopes that one product would flush");
+    }
+
     #[test]
     fn constants_agree_with_the_shaders() {
         let margin = format!("ERROR_ULPS: f32 = {:.1};", crate::view::ERROR_ULPS);

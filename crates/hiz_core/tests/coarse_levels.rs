@@ -89,57 +89,34 @@ fn faults_of_coarse_levels_are_seen() {
     let all = [StoredLevels::ALL];
     let alone = [StoredLevels::only(4), StoredLevels::only(5), StoredLevels::only(6), StoredLevels::only(8)];
     let mean = |a: &str, b: &str| format!("bitcast<u32>(0.5 * (bitcast<f32>({a}) + bitcast<f32>({b})))");
-    let quads = "farthest4(vec4<u32>(a.xy, b.xy))";
-    let planted: [(&str, &str, String, &[StoredLevels]); 11] = [
-        ("a mean of rows of texels", quads, mean("a.x", "b.y"), &all),
-        ("a mean in an eighth", "farthest4(vec4<u32>(q0, q1))", mean("farthest4(q0.xyxy)", "farthest4(q1.xyxy)"), &all),
-        ("a mean of two", "select(max(a, b), min(a, b), REVERSED)", mean("a", "b"), &all),
-        (
-            "a mean of blocks",
-            "bits = farthest(bits, farthest4(by_row));",
-            format!("bits = {};", mean("bits", "farthest4(by_row)")),
-            &alone,
-        ),
-        (
-            "a mean of shares",
-            "bits = farthest(bits, parts[i]);",
-            format!("bits = {};", mean("bits", "parts[i]")),
-            &alone,
-        ),
-        ("half of the shares", "i < WORKGROUP; i += 1u", "i < 32u; i += 1u".to_owned(), &alone),
-        ("shares one off", "var bits = parts[0];", "var bits = parts[1];".to_owned(), &alone),
-        (
-            "a share too short",
-            "let part = side >> SIDE_LOG2;",
-            "let part = max(side >> (SIDE_LOG2 + 1u), 1u);".to_owned(),
-            &alone,
-        ),
-        (
-            "the last column of blocks",
-            "min(begin + vec2<u32>(side), blocks)",
-            "min(begin + vec2<u32>(side), blocks - vec2<u32>(1u, 0u))".to_owned(),
-            &alone,
-        ),
-        (
-            "blocks of a tail",
-            "blocks = (blocks + vec2<u32>(7u)) / 8u;",
-            "blocks = (blocks + vec2<u32>(3u)) / 8u;".to_owned(),
-            &all,
-        ),
-        (
-            "lanes of a tail",
-            "i < blocks.x * blocks.y; i += 64u",
-            "i < min(blocks.x * blocks.y, 64u); i += 64u".to_owned(),
-            &all,
-        ),
+    let rows = mean("a.x", "b.y");
+    let eighth = mean("farthest4(q0.xyxy)", "farthest4(q1.xyxy)");
+    let two = mean("a", "b");
+    let blocks = format!("bits = {};", mean("bits", "farthest4(by_row)"));
+    let shares = format!("bits = {};", mean("bits", "parts[i]"));
+    let planted: [((&str, &str), &[StoredLevels]); 11] = [
+        (("farthest4(vec4<u32>(a.xy, b.xy))", &rows), &all),
+        (("farthest4(vec4<u32>(q0, q1))", &eighth), &all),
+        (("select(max(a, b), min(a, b), REVERSED)", &two), &all),
+        (("bits = farthest(bits, farthest4(by_row));", &blocks), &alone),
+        (("bits = farthest(bits, parts[i]);", &shares), &alone),
+        // Half of the shares; shares one off and too short.
+        (("i < WORKGROUP; i += 1u", "i < 32u; i += 1u"), &alone),
+        (("var bits = parts[0];", "var bits = parts[1];"), &alone),
+        (("let part = side >> SIDE_LOG2;", "let part = max(side >> (SIDE_LOG2 + 1u), 1u);"), &alone),
+        // The last column of blocks.
+        (("min(begin + vec2<u32>(side), blocks)", "min(begin + vec2<u32>(side), blocks - vec2<u32>(1u, 0u))"), &alone),
+        // A tail's blocks and lanes.
+        (("blocks = (blocks + vec2<u32>(7u)) / 8u;", "blocks = (blocks + vec2<u32>(3u)) / 8u;"), &all),
+        (("i < blocks.x * blocks.y; i += 64u", "i < min(blocks.x * blocks.y, 64u); i += 64u"), &all),
     ];
-    for (name, what, by, choices) in &planted {
+    for ((what, by), choices) in planted {
         let engine = Engine::with_planted_faults(None, &[(what, by)]).expect("the device tests need a Vulkan driver");
         let seen = [(1023, 517), (257, 255), (513, 511)]
             .into_iter()
             .flat_map(|size| CONVENTIONS.map(|convention| (size, convention)))
             .find_map(|(size, convention)| difference(&engine, size, convention, 3, choices));
-        eprintln!("{name}: {seen:?}");
-        assert!(seen.is_some(), "{name}: stayed green");
+        eprintln!("{what} -> {by}: {seen:?}");
+        assert!(seen.is_some(), "{what} -> {by}: stayed green");
     }
 }

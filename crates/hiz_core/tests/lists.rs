@@ -46,6 +46,33 @@ fn cull(instances: &Arc<Instances>, order: Order, capacity: Option<u32>) -> Cull
 
 const DRAW: DrawTemplate = DrawTemplate { index_count: 36, first_index: 7, base_vertex: -3, first_instance: 0 };
 
+/// Counts of levels and of texels: boxes of 2, 4 and 8 pixels that begin at texels of the level that fits them.
+#[test]
+fn statistics_say_which_level_was_read() {
+    let camera = camera_along_z(64, 64, CONVENTION);
+    let pyramid = scene().1;
+    // At depth 8 a pixel is a quarter of a unit; the middle is the border of column and row 32. (A box of no size reads one pixel.)
+    let (mut min, mut max) = (Vec::new(), Vec::new());
+    for (pixels, copies) in [(0.5, 1), (1.5, 2), (3.5, 3), (7.5, 4), (30.0, 5)] {
+        for _ in 0..copies {
+            min.extend([0.05, -0.25 * pixels - 0.05, 8.0]);
+            max.extend([0.25 * pixels + 0.05, -0.05, 8.0]);
+        }
+    }
+    let bounds = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };
+    let instances = engine().instances(&bounds, &InstanceOptions::default()).unwrap();
+    for hierarchy in [Hierarchy::Never, Hierarchy::Auto] {
+        let options = CullOptions { statistics: true, hierarchy, ..CullOptions::default() };
+        let culling = engine().cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap();
+        let counts = culling.counts().unwrap();
+        // 1 pixel and 2 x 2 of level 0, then 2 x 2 texels each.
+        let mut levels = [0; 16];
+        (levels[0], levels[1], levels[2], levels[4]) = (3, 3, 4, 5);
+        assert_eq!((counts.levels, counts.texels_read), (levels, 1 + 4 * 14));
+        assert_eq!((counts.occluded, counts.visible), (15, 0));
+    }
+}
+
 /// The words of every list, canary included.
 fn raw_lists(culling: &Culling) -> Vec<Vec<u32>> {
     culling.wait().unwrap();

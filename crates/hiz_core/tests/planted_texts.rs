@@ -87,12 +87,16 @@ fn planted(source: &str) -> Vec<String> {
     let mut found = Vec::new();
     for i in 1..tokens.len() {
         let is_call = matches!(tokens[i - 1], Word(_) | Sign('!'));
-        if let ([Sign('('), what, Sign(','), Text(_), Sign(',' | ')'), ..], false) = (&tokens[i..], is_call) {
-            match what {
-                Text(what) => found.push(what.clone()),
-                Word(name) => found.extend(names.get(name).cloned()),
-                Sign(_) => {}
-            }
+        let what = match &tokens[i..] {
+            [Sign('('), what, Sign(','), Text(_), Sign(',' | ')'), ..] => what,
+            [Sign('('), what, Sign(','), Sign('&'), Word(_), Sign(',' | ')'), ..] => what,
+            _ => continue,
+        };
+        match what {
+            _ if is_call => {}
+            Text(what) => found.push(what.clone()),
+            Word(name) => found.extend(names.get(name).cloned()),
+            Sign(_) => {}
         }
     }
     found
@@ -169,10 +173,10 @@ fn planted_texts_are_found_as_tests_write_them() {
         let near = "select(min(a, b))";
         // ("a comment", "no fault")
         let faults = [("what", "by"), (near, "far"), (WIDE, ""), ("what \"more\"\nand \
-            on", "by", MODES), ("a name", &[("inner", "by")])];
+            on", "by", MODES), ("a name", &[("inner", "by"), ("made", &by)])];
         text.replace("no", "fault"); assert!(("no fault" == "by"), "really");
     "#;
-    let expected = ["what", "select(min(a, b))", "a wide text", "what \"more\"\nand on", "inner"];
+    let expected = ["what", "select(min(a, b))", "a wide text", "what \"more\"\nand on", "inner", "made"];
     assert_eq!(planted(source), expected);
     let shell =
         "  HIZVK_PLANTED_FAULT='a - 1u => a - 2u' cargo test\n    \"max(a, b) => min(a, b)\",\nnot this => that";
