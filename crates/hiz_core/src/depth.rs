@@ -498,15 +498,22 @@ mod tests {
                 let found = ndc_from_kind(Floats::F64(&[0.0, -0.0, -2.0, -8.0]), DepthKind::Z, 1.0, &[], &camera);
                 assert_eq!(found.unwrap(), [far; 4], "near {near}");
             }
-            // Behind the eye by rounding alone: an eye that float64 cannot hold in world-to-camera form, near plane at it.
-            let t = 1.0e6 / 3.0;
-            let (c, s) = (0.6_f64, 0.8_f64);
-            let m = [[c, 0.0, s, t], [0.0, 1.0, 0.0, t], [-s, 0.0, c, t], [0.0, 0.0, 0.0, 1.0]];
-            let z = if convention.is_reversed() { [0.0, 0.0, -0.1, 1.0] } else { [0.0, 0.0, 0.1, 0.0] };
-            let p = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], z, [0.0, 0.0, 0.0, 1.0]];
-            let camera = Camera::from_clip_from_camera(p, m, ImageSize::new(2, 2), convention).unwrap();
-            assert_ne!(camera.rows()[2][3], f64::from(u8::from(convention.is_reversed())), "the residual of the eye");
-            assert_eq!(ndc_from_kind(Floats::F64(&[0.0; 4]), DepthKind::Z, 1.0, &[], &camera).unwrap(), [far; 4]);
+            // Behind the eye by rounding alone: eyes that float64 cannot hold in world-to-camera form, the near plane at them.
+            let mut behind = 0;
+            for step in 1..20 {
+                let t = 1.0e6 / 3.0 * f64::from(step);
+                let (s, c) = (0.3 * f64::from(step)).sin_cos();
+                let m = [[c, 0.0, s, t], [0.0, 1.0, 0.0, t], [-s, 0.0, c, t / 7.0], [0.0, 0.0, 0.0, 1.0]];
+                let reversed = convention.is_reversed();
+                let z = if reversed { [0.0, 0.0, -0.1, 1.0] } else { [0.0, 0.0, 0.1, 0.0] };
+                let p = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], z, [0.0, 0.0, 0.0, 1.0]];
+                let camera = Camera::from_clip_from_camera(p, m, ImageSize::new(2, 2), convention).unwrap();
+                let at_eye = camera.rows()[2][3];
+                behind += usize::from(if reversed { at_eye < 1.0 - 1e-13 } else { at_eye > 1e-13 });
+                let found = ndc_from_kind(Floats::F64(&[0.0; 4]), DepthKind::Z, 1.0, &[], &camera).unwrap();
+                assert_eq!(found, [far; 4], "{at_eye}");
+            }
+            assert!(behind > 1, "{behind} residuals of the eye put the near plane behind it");
         }
     }
 
