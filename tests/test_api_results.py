@@ -154,8 +154,15 @@ def test_a_hidden_group_is_explained_and_counted(device: hizvk.Device, camera: h
     assert (seen.stats.tested_groups, seen.stats.tested_instances) == (2, 1)
     told = seen.explain(7)
     assert told.verdict == Verdict.OCCLUDED
-    assert "group" in told.reason
-    assert seen.explain(64).verdict == Verdict.VISIBLE
+    assert told.reason.startswith("its group of 64 is hidden as a whole (behind")
+    assert told.group is not None
+    assert (told.group.verdict, told.group.group) == (Verdict.OCCLUDED, None)
+    # Its own test, x from 0.02 to 0.12 at depth 20, then the box around all 64, x from -0.05 to 0.68: both in column 4.
+    assert told.rectangle == (4, 3, 4, 4)
+    assert told.group.rectangle == (3, 3, 4, 4)
+    assert "the box around its group: occluded" in str(told)
+    last = seen.explain(64)
+    assert (last.verdict, last.group) == (Verdict.VISIBLE, None)
     full = device.cull(crowd, camera, pyramid, outputs=["indices"], order="any", capacity=1, hierarchy=False)
     assert full.count == 1
     with pytest.raises(ValueError, match="a list that is full"):
@@ -209,6 +216,132 @@ def test_explain_by_hand(device: hizvk.Device, camera: hizvk.Camera) -> None:
     text = str(told)
     assert "instance 0: occluded" in text
     assert "x 1..2, y 3..4" in text
+
+
+def wide_camera(*, reversed_z: bool = True) -> hizvk.Camera:
+    """64 pixels a side, 8 of them a unit at depth 4: column 32 begins at x = 0, row 31 ends at y = 0."""
+    return hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(64, 64), near=0.125, reversed_z=reversed_z)
+
+
+@pytest.mark.parametrize("reversed_z", [True, False])
+@pytest.mark.parametrize("side", [4, 8])
+def test_explain_lists_a_whole_footprint(device: hizvk.Device, reversed_z: bool, side: int) -> None:
+    camera = wide_camera(reversed_z=reversed_z)
+    depth = np.full(camera.size, 2.0)
+    depth[20:30, 34:44] = 3.0  # in the middle of what the box can touch, in no corner of it
+    pyramid = device.pyramid(depth, camera, kind="z")
+    # At depth 4 from x = -1.45 to 1.9 and y = -1.3 to 1.7: pixels 20 to 47 by 18 to 42.
+    box = device.instances(hizvk.Boxes([[-1.45, -1.3, -4]], [[1.9, 1.7, -4]]))
+    told = device.cull(box, camera, pyramid, footprint=side).explain(0)
+    assert told.rectangle == (20, 18, 47, 42)
+    # 28 by 25 pixels: the finest level with no more than 8 (4) texels a side is level 2 (3).
+    level = 2 if side == 8 else 3
+    assert told.level == level
+    assert told.texels == tuple(
+        (x, y) for y in range(18 >> level, (42 >> level) + 1) for x in range(20 >> level, (47 >> level) + 1)
+    )
+    assert told.texels_read == len(told.texels) == len(told.texel_depths)
+    assert set(told.texel_levels) == {level}
+    texels = pyramid.level(level)
+    assert told.texel_depths == tuple(float(texels[y, x]) for x, y in told.texels)
+    assert told.verdict is Verdict.OCCLUDED
+    assert told.decisive is not None
+    # The first one of the dent.
+    assert told.texels[told.decisive] == (34 >> level, 20 >> level)
+    assert told.farthest == told.texel_depths[told.decisive]
+    assert (told.farthest_z, told.nearest_z) == (pytest.approx(3.0, rel=1e-6), pytest.approx(4.0, rel=1e-6))
+    assert "view depth 3 (depth image)" in str(told)
+    assert f"decisive  ({34 >> level}, {20 >> level}) of level {level}" in str(told)
+
+
+def test_explain_follows_a_descent(device: hizvk.Device) -> None:
+    camera = wide_camera()
+    depth = np.full(camera.size, 2.0)
+    depth[24, 31] = 50.0
+    pyramid = device.pyramid(depth, camera, kind="z")
+    # Pixels 20 to 31 by 18 to 24 at depth 4, of level 3 the texels (2, 2) to (3, 3).
+    box = device.instances(hizvk.Boxes([[-1.45, 0.9, -4]], [[-0.1, 1.7, -4]]))
+    told = device.cull(box, camera, pyramid, descent=4096).explain(0)
+    assert (told.rectangle, told.level) == ((20, 18, 31, 24), 3)
+    # The footprint; then its texels again, down into the one with the far pixel, of whose children the
+    # rectangle meets the first row alone: columns 6 and 7 of level 2, and so on to the pixel itself.
+    walked = [
+        (3, 2, 2),
+        (3, 3, 2),
+        (3, 2, 3),
+        (3, 3, 3),
+        (2, 6, 6),
+        (2, 7, 6),
+        (1, 14, 12),
+        (1, 15, 12),
+        (0, 30, 24),
+        (0, 31, 24),
+    ]
+    expected = [(3, 2, 2), (3, 3, 2), (3, 2, 3), (3, 3, 3), *walked]
+    assert [(level, x, y) for level, (x, y) in zip(told.texel_levels, told.texels, strict=True)] == expected
+    assert told.verdict is Verdict.VISIBLE
+    assert told.decisive == len(expected) - 1
+    assert told.farthest_z == pytest.approx(50.0, rel=1e-6)
+    # The same budget, with no hole: behind everything, the farthest of which is the wall.
+    plain = device.cull(box, camera, device.pyramid(np.full(camera.size, 2.0), camera, kind="z"), descent=4096).explain(
+        0
+    )
+    assert (plain.verdict, plain.farthest_z) == (Verdict.OCCLUDED, pytest.approx(2.0, rel=1e-6))
+
+
+def test_explain_in_world_units(device: hizvk.Device) -> None:
+    box = device.instances(hizvk.Boxes([[-1.0, -1, -9]], [[1, 1, -7]]))
+    for reversed_z in (True, False):
+        camera = hizvk.Camera.orthographic(
+            (0, 0, 0), (0, 0, -1), height=16, size=(16, 16), near=0.0, far=30.0, reversed_z=reversed_z
+        )
+        told = device.cull(box, camera, device.pyramid(np.full((16, 16), 6.0), camera, kind="z")).explain(0)
+        assert (told.farthest_z, told.nearest_z) == (pytest.approx(6.0, abs=1e-4), pytest.approx(7.0, abs=1e-4))
+        # A bare orthographic matrix does not say where view depth starts.
+        bare = hizvk.Camera.from_matrices(camera.clip_from_world, size=(16, 16), reversed_z=reversed_z)
+        told = device.cull(box, bare, device.pyramid(np.full((16, 16), 0.5), bare, kind=bare.depth_kind)).explain(0)  # type: ignore[call-overload]
+        assert (told.farthest_z, told.nearest_z) == (None, None)
+        assert told.farthest == 0.5
+        assert "view depth" not in str(told)
+    open_sky = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(16, 16), near=0.125)
+    told = device.cull(box, open_sky, device.pyramid(np.full((16, 16), np.inf), open_sky, kind="z")).explain(0)
+    assert told.farthest_z == float("inf")
+
+
+def test_an_explanation_after_an_update_is_stale(device: hizvk.Device, camera: hizvk.Camera) -> None:
+    instances = device.instances(scene())
+    result = device.cull(instances, camera, device.pyramid(left_wall(), camera, kind="z"))
+    before = [result.explain(i) for i in range(3)]
+    instances.update(0, hizvk.Spheres([[10.0, 0, -20]], 1.0))
+    told = result.explain(0)
+    assert told.stale
+    assert told.verdict is Verdict.VISIBLE  # where it is now
+    assert "stale     updated since the cull" in str(told)
+    assert Verdict(result.verdicts[0]) is Verdict.OCCLUDED  # where it was
+    assert [result.explain(i) for i in (1, 2)] == before[1:]
+    assert not before[0].stale
+
+
+def test_results_export_by_dlpack(device: hizvk.Device, camera: hizvk.Camera) -> None:
+    """They are shared and read-only; whoever imports one gets a copy."""
+    result = culled(device, camera)
+    for array in (result.mask, result.verdicts, result.indices):
+        assert type(array.__dlpack__()).__name__ == "PyCapsule"
+        imported = np.from_dlpack(array)
+        assert imported.dtype == array.dtype
+        np.testing.assert_array_equal(imported, array)
+        assert not np.shares_memory(imported, array)
+        assert not array.flags.writeable
+        part = np.from_dlpack(array[2:])
+        np.testing.assert_array_equal(part, array[2:])
+        # What is made of them is NumPy's own.
+        for made in (array == array, array & array, np.flatnonzero(array), np.where(array, 1, 0)):
+            assert type(made) is np.ndarray
+        assert isinstance(array.sum(), np.integer)
+        assert repr(array) == repr(np.array(array))
+        copy = array.copy()
+        copy[0] = 1
+        assert np.from_dlpack(copy)[0] == 1
 
 
 @pytest.mark.parametrize("index", range(len(SCENE)))

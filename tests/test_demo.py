@@ -32,6 +32,29 @@ def cull(device: hizvk.Device, scene: scenes.Scene, view: scenes.View, size: tup
     return demo.cull_view(device, terrain, boxes, view.camera(size))
 
 
+def test_trees_outside_the_view_are_counted_as_such(device: hizvk.Device) -> None:
+    """With groups, of which many straddle the border of the view: by float64 planes, `truth._outside`."""
+    pytest.importorskip("matplotlib")
+    scene, size = scenes.mountains(2000, 4), (90, 160)
+    terrain = device.occluders(scene.vertices, scene.triangles)
+    boxes = device.instances(hizvk.Boxes(scene.box_min, scene.box_max))
+    changed = 0
+    for view in scene.views:
+        camera = view.camera(size)
+        pyramid = device.pyramid(device.render_depth(terrain, camera))
+        flat, grouped = (device.cull(boxes, camera, pyramid, hierarchy=hierarchy) for hierarchy in (False, True))
+        assert grouped.stats.tested_instances < len(scene)
+        differs = flat.verdicts != grouped.verdicts
+        assert (grouped.verdicts[differs] == hizvk.Verdict.OCCLUDED).all()
+        assert (flat.verdicts[differs] == hizvk.Verdict.VISIBLE).all()
+        changed += int(differs.sum())
+        outside = truth._outside(scene, view, size)
+        assert (grouped.verdicts[outside] == hizvk.Verdict.OUTSIDE).all()
+        assert grouped.stats.outside == int((grouped.verdicts == hizvk.Verdict.OUTSIDE).sum()) >= outside.sum()
+        assert grouped.stats.occluded + grouped.stats.outside == int((~grouped.mask).sum())
+    assert changed <= 8
+
+
 # -- the command -----------------------------------------------------------------------------------------------------
 
 

@@ -47,6 +47,23 @@ def pyramid(device: hizvk.Device) -> hizvk.Pyramid:
     return device.pyramid(depth, camera, kind="z")
 
 
+@pytest.mark.parametrize("make", KINDS)
+def test_a_cull_sees_the_bounds_that_were_there(
+    device: hizvk.Device, pyramid: hizvk.Pyramid, make: Callable[..., Bounds]
+) -> None:
+    """Verdicts of the members of hidden groups are told when they are read; an update in between changes nothing."""
+    (centers, sizes), (elsewhere, _) = crowd(3000, 1), crowd(3000, 2)
+    instances = device.instances(make(centers, sizes))
+    flat = verdicts(device, instances, pyramid)
+    seen, counted = (device.cull(instances, pyramid.camera, pyramid, hierarchy=True) for _ in range(2))
+    instances.update(0, make(elsewhere, sizes))
+    expected = [flat.count(code) for code in range(2)]
+    differs = sum(a != b for a, b in zip(flat, seen.verdicts.tolist(), strict=True))
+    assert differs <= 3  # a group may hide a few more
+    assert [counted.stats.outside, counted.stats.occluded] == pytest.approx(expected, abs=3)
+    assert verdicts(device, instances, pyramid) != flat
+
+
 def verdicts(device: hizvk.Device, instances: hizvk.Instances, pyramid: hizvk.Pyramid) -> list[int]:
     return device.cull(instances, pyramid.camera, pyramid, hierarchy=False).verdicts.tolist()
 

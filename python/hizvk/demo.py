@@ -185,7 +185,7 @@ def _draw_best(
         f"of the {told.visible:,} visible ones {wrong or 'none'} culled"
     )
     red = plots.with_culled(picture, scene, view, sight, one.verdicts)
-    note = f"red: the {one.stats.occluded:,} trees that the ridges hide"
+    note = f"red: the {one.stats.occluded:,} trees in the view that the ridges hide"
     plots.overview(out / "overview.png", red, scene, view, one.verdicts, title, note=note, colours=PALETTE)
     return [
         ("overview.png", "Where most is hidden: the view with the culled trees in red, and the scene from above"),

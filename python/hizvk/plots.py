@@ -83,7 +83,10 @@ def view_picture(scene: Scene, view: View, sight: Sight, caster: Caster, *, samp
 
 
 def with_culled(picture: Image, scene: Scene, view: View, sight: Sight, verdicts: npt.NDArray[np.uint8]) -> Image:
-    """`picture` with the occluded instances shining through the ground as red triangles."""
+    """`picture` with the occluded instances shining through the ground as red triangles.
+
+    Those are in the view: what is outside is not occluded (`Verdict`).
+    """
     height, width = picture.shape[:2]
     occluded = np.flatnonzero(verdicts == Verdict.OCCLUDED)
     foot = (scene.box_min[occluded] + scene.box_max[occluded]) / 2.0 - view.eye
@@ -251,7 +254,7 @@ def _top_view(axis: Any, scene: Scene, view: View, verdicts: npt.NDArray[np.uint
     east, north = (middle / 1000.0).T
     groups = (
         (verdicts == Verdict.OUTSIDE, OUTSIDE, 1.2, "culled, outside the view"),
-        (verdicts == Verdict.OCCLUDED, CULLED, 2.2, "culled, behind a ridge"),
+        (verdicts == Verdict.OCCLUDED, CULLED, 2.2, "culled, in the view behind a ridge"),
         (verdicts >= Verdict.VISIBLE, KEPT, 2.2, "kept"),
     )
     for chosen, colour, area, label in groups:

@@ -49,7 +49,7 @@ class ViewReport:
     outside: int
     """Culled: outside the view."""
     occluded: int
-    """Culled: behind the depth image."""
+    """Culled: not outside, and behind the depth image."""
     kept: int
     drawn: int
     """The instance count of the indirect draws; equals `kept`."""
@@ -212,7 +212,7 @@ def _page(report: Report, pictures: Iterable[tuple[str, str]]) -> list[str]:
         *(_row(str(number), view) for number, view in enumerate(report.views)),
         _row("all", report),
         "",
-        "- *outside*, *behind*: culled, outside the view or behind the depth image",
+        "- *outside*, *behind*: culled, outside the view or within it behind the depth image",
         "- *visible*: owns a pixel, by the truth (below)",
         "- *kept in vain*: hidden and kept all the same, and its share of the hidden",
         "- *has to be kept*: the exact oracle cannot call the tree's box hidden by the terrain, the only occluder;",

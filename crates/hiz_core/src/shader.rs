@@ -27,6 +27,8 @@ pub(crate) enum DepthStore {
     Apart(SourceKind),
     /// All of them in one texture.
     Atlas,
+    /// Nowhere: it finds what is outside.
+    Nowhere,
 }
 
 impl DepthStore {
@@ -34,6 +36,7 @@ impl DepthStore {
         match self {
             Self::Apart(source) => [&source.wgsl(), wgsl!("shared/texels_apart")].join("\n"),
             Self::Atlas => wgsl!("shared/texels_atlas").to_owned(),
+            Self::Nowhere => wgsl!("shared/texels_nowhere").to_owned(),
         }
     }
 }
@@ -193,9 +196,9 @@ pub(crate) fn cull_members(store: DepthStore, kind: BoundsKind) -> String {
 }
 
 /// The verdicts of the members of groups that were hidden as a whole.
-pub(crate) fn refine(store: DepthStore, kind: BoundsKind) -> String {
+pub(crate) fn refine(kind: BoundsKind) -> String {
     let entry = [wgsl!("shared/piece"), wgsl!("shared/groups"), wgsl!("refine")];
-    classifying(store, kind, &entry.join("\n"))
+    classifying(DepthStore::Nowhere, kind, &entry.join("\n"))
 }
 
 /// The explanation of one instance's verdict.
@@ -230,8 +233,7 @@ const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind:
 /// Every module, for those who plant faults in them.
 pub(crate) fn all() -> Vec<String> {
     let culls = |store: DepthStore| {
-        let of_kind =
-            move |kind| [cull(store, kind), cull_members(store, kind), refine(store, kind), explain(store, kind)];
+        let of_kind = move |kind| [cull(store, kind), cull_members(store, kind), explain(store, kind)];
         KINDS.into_iter().flat_map(of_kind).chain([cull_groups(store), yardstick_cull(store)])
     };
     let of_source = |source| culls(DepthStore::Apart(source)).chain([reduce(source), reduce_coarse(source)]);
@@ -239,6 +241,7 @@ pub(crate) fn all() -> Vec<String> {
         .into_iter()
         .flat_map(of_source)
         .chain(culls(DepthStore::Atlas))
+        .chain(KINDS.map(refine))
         .chain([compact(), count(), update(), occluders()])
         .collect()
 }

@@ -12,7 +12,9 @@ use crate::lists::{DrawIndexedIndirect, DrawTemplate, Lists};
 pub struct Outputs {
     /// A bit for each instance, kept or not.
     pub mask: bool,
-    /// Why, for each instance: [`Counts`](crate::headless::Counts) and verdicts come from it.
+    /// Why, for each instance: [`Counts`](crate::headless::Counts) and
+    /// [`verdicts`](crate::headless::Culling::verdicts) come from it, where it is said
+    /// what they mean.
     pub verdicts: bool,
     /// The packed list of the kept instances.
     pub indices: bool,
@@ -100,7 +102,8 @@ pub(crate) struct PieceOutput {
 /// What the cull of a piece's groups leaves.
 #[derive(Debug)]
 pub(crate) struct GroupOutput {
-    /// A word for each group.
+    /// A word for each group: its verdict, and whether its members have theirs
+    /// (`shaders/refine.wgsl`).
     pub(crate) verdicts: wgpu::Buffer,
     /// How many groups are left, as the arguments of a dispatch; and which.
     pub(crate) survivors: wgpu::Buffer,

@@ -136,20 +136,20 @@ mod tests {
     #[test]
     fn updated_ranges_are_joined_where_they_meet() {
         let watch = Watch::new(None);
-        let noted = |ranges: &[Range<u32>]| {
+        let noted = |ranges: &[(u32, u32)]| {
             let mut state = watch.state();
-            ranges.iter().for_each(|range| state.note(range));
-            state.updated.iter().map(|(first, end)| *first..*end).collect::<Vec<_>>()
+            ranges.iter().for_each(|(first, last)| state.note(&(*first..*last)));
+            state.updated.iter().map(|(first, end)| (*first, *end)).collect::<Vec<_>>()
         };
         assert!(!watch.is_updated(&(0..u32::MAX)));
-        assert_eq!(noted(&[10..20, 30..40]), [10..20, 30..40]);
+        assert_eq!(noted(&[(10, 20), (30, 40)]), [(10, 20), (30, 40)]);
         for (range, expected) in [(9..10, false), (9..11, true), (19..20, true), (20..30, false), (25..31, true)] {
             assert_eq!(watch.is_updated(&range), expected, "{range:?}");
         }
-        assert_eq!(noted(&[20..22]), [10..22, 30..40], "it touches the first");
-        assert_eq!(noted(&[12..13]), [10..22, 30..40], "it is there already");
-        assert_eq!(noted(&[50..60, 21..55]), [10..60], "it meets three");
-        assert_eq!(noted(&[0..9]), [0..9, 10..60]);
-        assert_eq!(noted(&[9..10]), [0..60]);
+        assert_eq!(noted(&[(20, 22)]), [(10, 22), (30, 40)], "it touches the first");
+        assert_eq!(noted(&[(12, 13)]), [(10, 22), (30, 40)], "it is there already");
+        assert_eq!(noted(&[(50, 60), (21, 55)]), [(10, 60)], "it meets three");
+        assert_eq!(noted(&[(0, 9)]), [(0, 9), (10, 60)]);
+        assert_eq!(noted(&[(9, 10)]), [(0, 60)]);
     }
 }

@@ -41,7 +41,7 @@ fn depth_is_never_nearer_than_the_exact_one() {
             })
             .collect();
         let camera = Camera::look_at(&pose, &projection, ImageSize::new(100, 40)).unwrap();
-        let converted = ndc_from_kind(Floats::F64(&depths), DepthKind::Z, 1.0, &camera).unwrap();
+        let converted = ndc_from_kind(Floats::F64(&depths), DepthKind::Z, 1.0, &[], &camera).unwrap();
         let mut at_the_border = 0;
         for (z, ndc) in depths.iter().zip(&converted) {
             // Both sides times 8 z: a float32 below 1 is a multiple of 2^-48 here, a depth of 2^-52.

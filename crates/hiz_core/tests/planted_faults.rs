@@ -400,8 +400,8 @@ fn refined_verdicts() {
     };
     assert_eq!(run(&[]), 0);
     for (name, what, by) in [
-        ("groups of 32", "let place = group * GROUP", "let place = group * 32u"),
-        ("half of the members", "place = group * GROUP + k * SHARE", "place = group * GROUP + k / 2u * SHARE"),
+        ("groups of 32", "let first = group * GROUP;", "let first = group * 32u;"),
+        ("half of the members", "place < min(first + GROUP,", "place < min(first + 32u,"),
         ("the group's verdict for all", "classify(place).verdict == OUTSIDE", "false"),
         ("nobody is occluded", "of_group == OCCLUDED && classify(place).verdict == OUTSIDE", "of_group == OCCLUDED"),
     ] {

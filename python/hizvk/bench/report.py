@@ -229,8 +229,8 @@ def _legend() -> list[str]:
         "for, Python included. All are medians over a view's repetitions, and the mean over the views. *sum*: all of "
         "them; *quartiles*: of the sum, where render and reduce, which the rows of a depth image share, stand still. "
         "numpy reads the depth image back and builds its levels under *reduce*.",
-        "- *ns/inst.*: the cull by the number of instances; *texels/inst.*: depth texels read, over all instances, of "
-        "which those outside the view read none.",
+        "- *ns/inst.*: the cull by the number of instances; *texels/inst.*: depth texels read, by tests of groups "
+        "and of instances, over all instances; what lies outside the view reads none.",
         "- *false culls*: instances that own a pixel by more than a hair and were culled (visible by a hair: the ray "
         "moved by 1/16 pixel, or the depth by 1e-6, hides it). A smaller image of plain samples promises nothing for "
         "the pixels of the view, so its rows may have some.",

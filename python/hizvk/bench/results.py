@@ -68,7 +68,7 @@ class Row:
     first_ms: float | None = None
     """The first cull, with what is compiled or built then."""
     texels_per_instance: float | None = None
-    """Depth texels read, over all instances (those outside the view read none)."""
+    """Depth texels read by tests of groups and of instances, over all instances."""
     kept: int = 0
     false_culls: int = 0
     """Visible instances that were culled, over all views."""

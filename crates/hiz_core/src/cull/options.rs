@@ -94,7 +94,7 @@ pub struct CullOptions {
     /// What stands for a volume.
     pub fit: Fit,
     /// Whether groups are tested first. What a group's test hides, its members' own tests would have hidden but for the level that they
-    /// read: what is kept differs by next to nothing.
+    /// read: what is kept differs by next to nothing, and verdicts but for that not at all.
     pub hierarchy: Hierarchy,
     /// Count the depth tests of each level and the texels read.
     pub statistics: bool,

@@ -2,13 +2,18 @@
 
 use std::sync::Arc;
 
-use super::{CullInputs, CullKey, CullOptions, GROUPS_OF_RUN, Seen, is_grouped};
+use super::{Coverage, CullOptions, ViewUniform, is_grouped};
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::instances::Instances;
 use crate::pyramid::{Pyramid, entry};
+use crate::shader::DepthStore;
+use crate::tolerance::DepthTolerance;
 use crate::visible::Visible;
+
+/// Groups that one workgroup tells; `shaders/refine.wgsl`.
+const WORKGROUP: u32 = 64;
 
 /// Of a group's word, what is its verdict; the next bit says that its members have theirs (`shaders/refine.wgsl`, `TOLD`).
 pub(crate) const VERDICT_MASK: u8 = 3;
@@ -16,16 +21,16 @@ pub(crate) const VERDICT_MASK: u8 = 3;
 /// What is left to be done of a cull that tested groups.
 #[derive(Debug)]
 pub(crate) struct Refinement {
-    seen: Seen,
-    pyramid: Arc<Pyramid>,
+    view: ViewUniform,
     options: CullOptions,
+    /// Its levels are asked which one would be read.
+    pyramid: Arc<Pyramid>,
     visible: Arc<Visible>,
 }
 
 impl Refinement {
     /// Of a cull that was recorded; nothing where every place has a verdict of its own, or none was asked for.
     pub(crate) fn new(
-        gpu: &Gpu,
         instances: &Instances,
         camera: &Camera,
         pyramid: &Arc<Pyramid>,
@@ -36,21 +41,21 @@ impl Refinement {
         if !is_needed {
             return Ok(None);
         }
-        let inputs = CullInputs { instances, camera, pyramid, options, certified: true, idle: false };
-        let seen = Seen::new(gpu, &inputs, None)?;
-        // What is outside is so whatever the depth image shows: a test of it need not look closely.
-        let key = CullKey { footprint_log2: 1, descent: false, fit_volume: false, ..seen.key };
-        Ok(Some(Self {
-            seen: Seen { key, ..seen },
-            pyramid: Arc::clone(pyramid),
-            options: options.clone(),
-            visible: Arc::clone(visible),
-        }))
+        // Of no reduction in particular: no depth is read.
+        let view = ViewUniform::new(camera, 1, options, DepthTolerance::NONE)?;
+        let (pyramid, visible) = (Arc::clone(pyramid), Arc::clone(visible));
+        Ok(Some(Self { view, options: options.clone(), pyramid, visible }))
     }
 
     /// Records it. It may run more than once, and the first time counts.
     pub(crate) fn record(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, instances: &Instances) -> Result<()> {
-        let (view, pipeline) = (self.seen.bind(gpu, &self.pyramid)?, gpu.refine_pipeline(self.seen.key)?);
+        let view = gpu.uniform("hiz.refine.view", &self.view)?;
+        let view = gpu.bind_group(
+            "hiz.refine.view",
+            gpu.layouts().cull(DepthStore::Nowhere),
+            &[entry(2, self.pyramid.uniform.as_entire_binding()), entry(6, view.as_entire_binding())],
+        )?;
+        let pipeline = gpu.refine_pipeline(instances.kind, self.options.coverage == Coverage::Sample)?;
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("hiz.refine.pass"),
             timestamp_writes: None,
@@ -66,7 +71,7 @@ impl Refinement {
             )?;
             pass.set_bind_group(1, &piece.bindings, &[]);
             pass.set_bind_group(2, &verdicts, &[]);
-            pass.dispatch_workgroups(piece.groups().div_ceil(GROUPS_OF_RUN), 1, 1);
+            pass.dispatch_workgroups(piece.groups().div_ceil(WORKGROUP), 1, 1);
         }
         Ok(())
     }

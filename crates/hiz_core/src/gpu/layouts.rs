@@ -8,6 +8,7 @@ pub(crate) struct Layouts {
     reduce: [wgpu::BindGroupLayout; 3],
     cull_apart: [wgpu::BindGroupLayout; 3],
     cull_atlas: wgpu::BindGroupLayout,
+    cull_nowhere: wgpu::BindGroupLayout,
     /// A piece and its records.
     pub(crate) instances: wgpu::BindGroupLayout,
     /// What a cull writes.
@@ -56,6 +57,7 @@ impl Layouts {
                 layout("hiz.cull.view_layout", &[&apart[..], &[(2, Uniform), (6, Uniform)]].concat())
             }),
             cull_atlas: layout("hiz.cull.atlas_layout", &[(2, Uniform), (3, ReadQuads), (6, Uniform)]),
+            cull_nowhere: layout("hiz.cull.no_depth_layout", &[(2, Uniform), (6, Uniform)]),
             instances: layout("hiz.cull.instances_layout", &[(0, Uniform), (1, ReadQuads)]),
             visible: layout("hiz.cull.visible_layout", &[(0, Write), (1, Write), (2, Write), (3, Write), (4, Uniform)]),
             compact: layout(
@@ -86,6 +88,7 @@ impl Layouts {
         match store {
             DepthStore::Apart(source) => &self.cull_apart[source as usize],
             DepthStore::Atlas => &self.cull_atlas,
+            DepthStore::Nowhere => &self.cull_nowhere,
         }
     }
 }

@@ -49,7 +49,7 @@ pub(crate) struct Gpu {
     cull_groups: Cache<(CullKey, bool), wgpu::ComputePipeline>,
     yardstick_cull: Cache<(CullKey, ReportKey), wgpu::ComputePipeline>,
     cull_members: Cache<(CullKey, ReportKey), wgpu::ComputePipeline>,
-    refine: Cache<CullKey, wgpu::ComputePipeline>,
+    refine: Cache<(BoundsKind, bool), wgpu::ComputePipeline>,
     explain: Cache<CullKey, wgpu::ComputePipeline>,
     compact: Cache<&'static str, wgpu::ComputePipeline>,
     count: Cache<(), wgpu::ComputePipeline>,
@@ -351,14 +351,18 @@ impl Gpu {
         })
     }
 
-    pub(crate) fn refine_pipeline(&self, key: CullKey) -> Result<wgpu::ComputePipeline> {
+    pub(crate) fn refine_pipeline(&self, kind: BoundsKind, sample_coverage: bool) -> Result<wgpu::ComputePipeline> {
         let layouts = self.layouts();
-        self.refine.get(key, || {
+        let store = DepthStore::Nowhere;
+        // What is said of depth is all the same: none is read.
+        let (reversed, descent, fit_volume) = (false, false, false);
+        let key = CullKey { store, kind, reversed, chunks: 1, sample_coverage, footprint_log2: 1, descent, fit_volume };
+        self.refine.get((kind, sample_coverage), || {
             self.pipeline(
                 "hiz.refine.pipeline",
-                &shader::refine(key.store, key.kind),
+                &shader::refine(kind),
                 "refine",
-                &[layouts.cull(key.store), &layouts.instances, &layouts.two_storages],
+                &[layouts.cull(store), &layouts.instances, &layouts.two_storages],
                 &classify_constants(&key),
             )
         })

@@ -377,7 +377,7 @@ impl Engine {
             let mut encoder = self.encoder("hiz.cull.encoder");
             cull::record(gpu, &mut encoder, &inputs, &visible)?;
             let staged_mask = Culling::stage_mask(self.device(), &mut encoder, instances, &visible);
-            let refinement = Refinement::new(gpu, instances, camera, pyramid, options, &visible)?;
+            let refinement = Refinement::new(instances, camera, pyramid, options, &visible)?;
             let watch = Watch::new(refinement);
             let done = Arc::new(OnceLock::new());
             let when_done = Arc::clone(&done);

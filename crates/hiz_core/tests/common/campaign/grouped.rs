@@ -57,13 +57,18 @@ impl Round {
             let (flat, mask) = (flat_cull.mask().expect("mask"), grouped.mask().expect("mask"));
             let (counts, verdicts) = (grouped.counts().expect("counts"), grouped.verdicts().expect("verdicts"));
             let alone = flat_cull.verdicts().expect("verdicts");
-            let changed =
-                alone.iter().zip(&verdicts).enumerate().filter(|(i, (alone, verdict))| match (alone, verdict) {
-                    (2, 1) => false,
-                    // The certificate of its group's box, which is another one than its own.
-                    (1 | 2, 0) => !hiz_ref::is_outside(&self.view, &many[*i]).expect("a finite view") && is_area,
-                    (alone, verdict) => alone != verdict,
-                });
+            let pairs = alone.chunks_exact(copies).zip(verdicts.chunks_exact(copies)).zip(volumes);
+            let changed = pairs.map(|((alone, verdicts), volume)| {
+                // By the certificate of its group's box, which is another one than its own.
+                let by_box =
+                    alone.iter().zip(verdicts).filter(|(alone, verdict)| matches!(alone, 1 | 2) && **verdict == 0);
+                let by_box = by_box.count() as u64;
+                let is_right =
+                    by_box == 0 || !is_area || hiz_ref::is_outside(&self.view, volume).expect("a finite view");
+                let others =
+                    alone.iter().zip(verdicts).filter(|pair| !matches!(pair, (1 | 2, 0) | (2, 1)) && pair.0 != pair.1);
+                others.count() as u64 + if is_right { 0 } else { by_box }
+            });
             let counted = [counts.outside, counts.occluded, counts.visible, counts.invalid];
             let wrong_counts = (0..4_u8).map(|verdict| {
                 counted[usize::from(verdict)].abs_diff(verdicts.iter().filter(|v| **v == verdict).count() as u64)
@@ -75,7 +80,7 @@ impl Round {
                 one_by_one: counts.tested_instances,
                 contradictions: kept_alone
                     + counts.demand.abs_diff(kept)
-                    + changed.count() as u64
+                    + changed.sum::<u64>()
                     + wrong_counts.sum::<u64>(),
             });
             masks.push(mask.chunks_exact(copies).map(|copies| copies.iter().all(|kept| *kept)).collect());
