@@ -25,12 +25,12 @@ DEPTH_KINDS: tuple[DepthKind, ...] = ("ndc", "reversed_ndc", "z", "distance")
 _METRIC = ("z", "distance")
 
 if TYPE_CHECKING:
-    DepthArray: TypeAlias = FloatArray | npt.NDArray[np.float16]
+    _DepthArray: TypeAlias = FloatArray | npt.NDArray[np.float16]
 
 
 def checked_image(
     name: str, value: object, camera: Camera, kind: object, scale: object
-) -> tuple[DepthArray, DepthKind, float]:
+) -> tuple[_DepthArray, DepthKind, float]:
     """The image in the camera's shape, its kind and scale, or an error that says why not.
 
     The image is float32 or float64; half floats stay half floats, for whoever uploads them counts what they round.
@@ -65,7 +65,7 @@ def checked_image(
     return (image.astype(np.float16) if is_half else image), kind_, scale_
 
 
-def widened(image: DepthArray) -> tuple[FloatArray, bool]:
+def widened(image: _DepthArray) -> tuple[FloatArray, bool]:
     """A checked image as float32 or float64, and whether it came in half floats."""
     if image.dtype == np.float16:
         return image.astype(np.float32), True  # exact
