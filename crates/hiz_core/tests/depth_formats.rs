@@ -159,19 +159,21 @@ fn reduced(engine: &Engine, texture: &wgpu::Texture, camera: &Camera, atlas: Atl
     Arc::new(pyramid)
 }
 
-/// Boxes of no thickness at these depths, in the middle of the image; 64 of each, so that groups hold one depth alone.
+/// Boxes of no thickness at these depths, in the middle of the image; 64 of each, so that groups hold one depth alone. They are as wide as
+/// five pixels; where an atlas is asked for less than one wide, so that the image itself is read.
 fn verdicts(
     engine: &Engine,
     depths: &[f64],
     camera: &Camera,
-    pyramid: &Arc<Pyramid>,
+    (pyramid, atlas): (&Arc<Pyramid>, AtlasUse),
     options: &CullOptions,
 ) -> Vec<u8> {
     let (mut min, mut max) = (Vec::new(), Vec::new());
+    let half = if atlas == AtlasUse::Always { 0.02 } else { 0.3 };
     for z in depths {
         for _ in 0..64 {
-            min.extend([-0.3 * z, -0.3 * z, *z]);
-            max.extend([0.3 * z, 0.3 * z, *z]);
+            min.extend([-half * z, -half * z, *z]);
+            max.extend([half * z, half * z, *z]);
         }
     }
     let bounds = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };
@@ -238,13 +240,13 @@ fn a_step_of_the_format_decides() {
                     // The shader's own roundings take 2^-23, which is two steps of subnormal halves.
                     let far = if stored < 1e-6 { 4.0 } else { 1.1 };
                     let depths = [0.55, 0.95, far, 8.0].map(|k| behind(stored, k, step, convention));
-                    let got = verdicts(engine, &depths, &camera, &pyramid, options);
+                    let got = verdicts(engine, &depths, &camera, (&pyramid, atlas), options);
                     let what = format!("{convention:?} {format:?} {stored} {atlas:?} {options:?}");
                     assert_eq!(got, [VISIBLE, VISIBLE, OCCLUDED, OCCLUDED], "{what}");
                     // The caller's slack comes on top: half a step of it more.
                     let options = CullOptions { depth_slack_abs: 0.5 * step, ..options.clone() };
                     let depths = [1.45, far + 0.5].map(|k| behind(stored, k, step, convention));
-                    let got = verdicts(engine, &depths, &camera, &pyramid, &options);
+                    let got = verdicts(engine, &depths, &camera, (&pyramid, atlas), &options);
                     assert_eq!(got, [VISIBLE, OCCLUDED], "{what} and half a step");
                 }
             }
@@ -269,7 +271,7 @@ fn depth_of_24_bits_brings_its_step_and_float32_none() {
         for options in ways() {
             // Beside the step the shader's own roundings take 2^-23, two steps; a tenth is float32's margin.
             let depths = [0.55, 0.95, 3.3, 10.0].map(|k| behind(stored, k, step, DepthConvention::Reversed));
-            let got = verdicts(engine, &depths, &camera, &pyramid, &options);
+            let got = verdicts(engine, &depths, &camera, (&pyramid, AtlasUse::Never), &options);
             assert_eq!(got, [expected, expected, OCCLUDED, OCCLUDED], "{format:?} {options:?}");
         }
     }
@@ -343,9 +345,9 @@ fn uploaded_halves_bring_their_step() {
             assert_eq!(pyramid.tolerance(), Some(DepthTolerance::HALF));
             let exact = engine.pyramid_with(&engine.upload_depth(&wall, &camera).unwrap(), &options).unwrap();
             for options in ways() {
-                let got = verdicts(engine, &depths, &camera, &pyramid, &options);
+                let got = verdicts(engine, &depths, &camera, (&pyramid, atlas), &options);
                 assert_eq!(got, [VISIBLE, VISIBLE, OCCLUDED, OCCLUDED], "{convention:?} {atlas:?} {options:?}");
-                let got = verdicts(engine, &depths, &camera, &exact, &options);
+                let got = verdicts(engine, &depths, &camera, (&exact, atlas), &options);
                 assert_eq!(got, [OCCLUDED; 4], "{convention:?} {atlas:?} {options:?}");
             }
         }
