@@ -26,8 +26,8 @@ use crate::visible::{Visible, VisibleOptions};
 ///
 /// Three things cannot be known here:
 ///
-/// - An encoder of another device, or one with an open pass (whose lifetime was forgotten). wgpu tells of it when the encoder
-///   is finished.
+/// - An encoder of another device, or one with an open pass (whose lifetime was forgotten). wgpu tells of it when the encoder is
+///   finished; of an open pass sometimes at once, which is an [`Error::Invalid`] that names the encoder.
 /// - What is destroyed between the recording and the submit. wgpu tells of it then.
 /// - Views, encoders and buffers of another `wgpu::Instance`. wgpu takes them for others, for its handles are numbers that each
 ///   instance gives out anew.
@@ -112,8 +112,10 @@ impl HizContext {
         options: &InstanceOptions,
     ) -> Result<Instances> {
         Instances::new(&self.gpu, bounds, options, |copies, _| {
-            copies(encoder);
-            Ok(())
+            self.gpu.recorded(|| {
+                copies(encoder);
+                Ok(())
+            })
         })
     }
 

@@ -374,16 +374,18 @@ pub(crate) fn record_reduce(
         Ok((pipeline, gpu.bind_group("hiz.reduce.step", &gpu.layouts().one_uniform, &entries)?, workgroups))
     };
     let dispatches = pyramid.layout.steps.iter().map(dispatch).collect::<Result<Vec<_>>>()?;
-    let mut pass = encoder
-        .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.reduce.pass"), timestamp_writes: None });
-    pass.set_bind_group(0, &source, &[]);
-    for (pipeline, bind_group, [columns, rows]) in &dispatches {
-        pass.set_pipeline(pipeline);
-        pass.set_bind_group(1, bind_group, &[]);
-        // One at least, for the header, where nothing is stored.
-        pass.dispatch_workgroups((*columns).max(1), (*rows).max(1), 1);
-    }
-    drop(pass);
+    gpu.recorded(|| {
+        let descriptor = wgpu::ComputePassDescriptor { label: Some("hiz.reduce.pass"), timestamp_writes: None };
+        let mut pass = encoder.begin_compute_pass(&descriptor);
+        pass.set_bind_group(0, &source, &[]);
+        for (pipeline, bind_group, [columns, rows]) in &dispatches {
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(1, bind_group, &[]);
+            // One at least, for the header, where nothing is stored.
+            pass.dispatch_workgroups((*columns).max(1), (*rows).max(1), 1);
+        }
+        Ok(())
+    })?;
     let reduced = Arc::clone(&pyramid.reduced);
     encoder.on_submitted_work_done(move || reduced.store(reduction, Ordering::Release));
     // They hold the last depth image.

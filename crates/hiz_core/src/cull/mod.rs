@@ -131,6 +131,10 @@ pub(crate) fn record(
     inputs: &CullInputs<'_>,
     visible: &Visible,
 ) -> Result<()> {
+    gpu.recorded(|| record_all(gpu, encoder, inputs, visible))
+}
+
+fn record_all(gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, inputs: &CullInputs<'_>, visible: &Visible) -> Result<()> {
     let CullInputs { instances, pyramid, options, .. } = *inputs;
     check_contexts(gpu, inputs)?;
     gpu.check_context("visible", visible.context)?;

@@ -148,6 +148,17 @@ impl Gpu {
         self.checked(|device| device.create_bind_group(&descriptor))
     }
 
+    /// Runs `record`, which writes into the caller's encoder. With a pass open there it can take nothing, and wgpu says so at once.
+    pub(crate) fn recorded<T>(&self, record: impl FnOnce() -> Result<T>) -> Result<T> {
+        match checked(&self.device, record) {
+            Ok(result) => result,
+            Err(Error::Device(why)) => {
+                Err(Error::invalid("encoder", format!("expected one of this device without an open pass, but {why}")))
+            }
+            Err(other) => Err(other),
+        }
+    }
+
     /// Whether a render pass can draw depth into `target` and clear it first: the same pass, recorded into an encoder that is thrown
     /// away. Nothing else tells what a view shows, where its texture lives, and whether it is still there.
     pub(crate) fn can_draw_into(&self, target: &wgpu::TextureView, depth_ops: wgpu::Operations<f32>) -> Result<()> {
