@@ -33,7 +33,8 @@ def checked_image(
 ) -> tuple[_DepthArray, DepthKind, float]:
     """The image in the camera's shape, its kind and scale, or an error that says why not.
 
-    The image is float32 or float64; half floats stay half floats, for whoever uploads them counts what they round.
+    The image is float32 or float64. Half floats stay half floats: whoever uploads them counts what they
+    round.
     """
     if kind is None:
         words = ", ".join(f'"{word}"' for word in DEPTH_KINDS)

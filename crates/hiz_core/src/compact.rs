@@ -43,7 +43,8 @@ impl Compaction {
         })
     }
 
-    /// Records the compaction of every piece, in order: a later one needs to know what earlier ones left of the capacity.
+    /// Records the compaction of every piece, in order: a later one needs to know what earlier ones
+    /// left of the capacity.
     pub(crate) fn record(&self, pass: &mut wgpu::ComputePass<'_>) {
         for (bind_group, scattering) in &self.pieces {
             pass.set_bind_group(0, bind_group, &[]);

@@ -246,7 +246,8 @@ impl Pyramid {
     fn note_copies(&self, encoder: &wgpu::CommandEncoder, atlas: &Atlas, reduction: u32) {
         let (contents, reduced) = (atlas.contents(), Arc::clone(&self.reduced));
         encoder.on_submitted_work_done(move || {
-            // Copies that ran before their reduction, or after the next one, have spoiled what was there.
+            // Copies that ran before their reduction, or after the next one, have spoiled what was
+            // there.
             let ran_behind_it = reduced.load(Ordering::Acquire) == reduction;
             contents.store(if ran_behind_it { reduction } else { 0 }, Ordering::Release);
         });
@@ -257,14 +258,15 @@ impl Pyramid {
         self.built().map(|b| b.camera)
     }
 
-    /// How far the depths that the pyramid was last built from may lie from those that were stored, by the format of the image
-    /// ([`DepthTolerance::of`]) or by what was uploaded into it. Every cull counts it, beside the slack of its options.
+    /// How far the depths that the pyramid was last built from may lie from those that were stored,
+    /// by the format of the image ([`DepthTolerance::of`]) or by what was uploaded into it. Every
+    /// cull counts it, beside the slack of its options.
     pub fn tolerance(&self) -> Option<DepthTolerance> {
         self.built().map(|b| b.tolerance)
     }
 
-    /// Whether the depth image that `built` was made of is still there: a cull would bind it, and what was destroyed ends the caller's
-    /// encoder.
+    /// Whether the depth image that `built` was made of is still there: a cull would bind it, and
+    /// what was destroyed ends the caller's encoder.
     pub(crate) fn check_source(gpu: &Gpu, built: &Built) -> Result<()> {
         gpu.view(built.source.texture()).map(drop).map_err(|error| match error {
             Error::Device(why) => Error::mismatch(
@@ -304,8 +306,8 @@ impl Pyramid {
     }
 }
 
-/// Records the reduction of `depth` (all of its texture's first mip level) into `pyramid`. `uploaded` is what its depths were rounded by
-/// before they came into the texture.
+/// Records the reduction of `depth` (all of its texture's first mip level) into `pyramid`.
+/// `uploaded` is what its depths were rounded by before they came into the texture.
 pub(crate) fn record_reduce(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
@@ -396,8 +398,9 @@ pub(crate) fn record_reduce(
     Ok(())
 }
 
-/// What the reduction reads and writes; and the view of the image's depth that can be bound: the caller's, or where that shows another
-/// part or use of the texture, as the default view of a texture with a stencil does, the whole depth of it.
+/// What the reduction reads and writes; and the view of the image's depth that can be bound: the
+/// caller's, or where that shows another part or use of the texture, as the default view of a
+/// texture with a stencil does, the whole depth of it.
 fn bind_source(
     gpu: &Gpu,
     depth: &wgpu::TextureView,
@@ -429,7 +432,8 @@ fn bind_source(
         ),
         other => other,
     };
-    // A view of another device's texture would tell that device of its errors, whose handler may end the process.
+    // A view of another device's texture would tell that device of its errors, whose handler may
+    // end the process.
     if error.to_string().contains(OF_ANOTHER_DEVICE) {
         return Err(refused(error));
     }

@@ -126,8 +126,8 @@ pub(crate) fn record(
     result
 }
 
-/// `places`, ascending, in bands whose new records one storage binding holds. (A piece may hold more: its own records lie in a texture.)
-/// No group is in two of them.
+/// `places`, ascending, in bands whose new records one storage binding holds. (A piece may hold
+/// more: its own records lie in a texture.) No group is in two of them.
 fn bands<'a>(places: &'a [u32], record_bytes: u64, limits: &wgpu::Limits) -> impl Iterator<Item = &'a [u32]> {
     let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
     let most = u32::try_from(bytes / record_bytes).unwrap_or(u32::MAX);

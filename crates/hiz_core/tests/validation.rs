@@ -1,6 +1,7 @@
-//! What wgpu's validation would find wrong in the library's own calls comes back as an error that names the parameter. Devices here have
-//! wgpu's own error handler, which ends a process: whatever gets there fails the test. After each error the same encoder is finished and
-//! submitted, and the same device culls as before.
+//! What wgpu's validation would find wrong in the library's own calls comes back as an error that
+//! names the parameter. Devices here have wgpu's own error handler, which ends a process: whatever
+//! gets there fails the test. After each error the same encoder is finished and submitted, and the
+//! same device culls as before.
 
 mod common;
 
@@ -667,8 +668,8 @@ fn a_lost_device_ends_nothing() {
     drop(encoder.finish());
 }
 
-/// wgpu tells of an encoder of another device where that is finished, and of one with an open pass at once or there. Nothing panics here,
-/// and the devices can be used on.
+/// wgpu tells of an encoder of another device where that is finished, and of one with an open pass
+/// at once or there. Nothing panics here, and the devices can be used on.
 #[test]
 fn encoders_that_cannot_be_used_are_told_of() {
     let [world, other] = World::two();
@@ -710,7 +711,8 @@ fn encoders_that_cannot_be_used_are_told_of() {
     other.works(other.encoder(), "the other one");
 }
 
-/// The least of each limit that the shaders need, counted by hand from `gpu/layouts.rs` and `shaders/`.
+/// The least of each limit that the shaders need, counted by hand from `gpu/layouts.rs` and
+/// `shaders/`.
 fn least() -> wgpu::Limits {
     wgpu::Limits {
         max_texture_dimension_2d: 4096,
@@ -844,7 +846,8 @@ fn the_least_limits_are_enough_for_everything() {
     assert!(error.to_string().starts_with("pyramid texels: requested"), "{error}");
 }
 
-/// An update of more records than a storage binding holds goes in bands: the device answers for all of them.
+/// An update of more records than a storage binding holds goes in bands: the device answers for all
+/// of them.
 #[test]
 fn an_update_larger_than_a_binding_reaches_every_instance() {
     // 256 spheres of 32 bytes a band.

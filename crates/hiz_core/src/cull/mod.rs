@@ -143,7 +143,8 @@ fn record_all(gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, inputs: &CullInputs
     }
     let report = report_key(visible, options);
     let pieces = || instances.pieces.iter().zip(&visible.pieces);
-    // Everything is there before anything is recorded: what could not be made would end the caller's encoder.
+    // Everything is there before anything is recorded: what could not be made would end the
+    // caller's encoder.
     let outputs = pieces()
         .enumerate()
         .map(|(p, (piece, _))| bind_output(gpu, piece, visible, p, report.statistics))
