@@ -18,7 +18,8 @@ def device() -> hizvk.Device:
     return hizvk.Device()
 
 
-# The kind, what is stored, and the view depth of a wall half a spacing behind it, which is stored as the same number.
+# The kind, what is stored, and the view depth of a wall half a spacing behind it.
+# That wall is stored as the same number.
 # A spacing is 2^-7 from 8 to 16, 2^-11 from 0.5 to 1, and 2^-14 from 2^-4 to 2^-3.
 CASES = [
     ("z", 10.0, 10.0 + 2.0**-8),
@@ -34,7 +35,7 @@ def test_what_a_half_float_rounds_is_counted(
     device: hizvk.Device, kind: Any, stored: float, wall: float, way: str
 ) -> None:
     camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(1, 1), near=1.0, reversed_z=kind != "ndc")
-    # Flat boxes a quarter of that half spacing before the wall, and far enough behind the number that is stored.
+    # Flat boxes: a quarter of that half spacing before the wall, and far enough behind the stored number.
     step = wall - stored if kind in ("z", "distance") else wall - (8.0 if kind == "ndc" else 16.0)
     depths = np.array([wall - 0.25 * step, wall + 4.0 * step])
     low = np.stack([-0.1 * depths, -0.1 * depths, -depths], axis=1)

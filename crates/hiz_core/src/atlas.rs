@@ -53,7 +53,8 @@ impl AtlasLayout {
 /// are the same.
 ///
 /// It can be where the depth image is [`Depth32Float`](wgpu::TextureFormat::Depth32Float),
-/// [`R32Float`](wgpu::TextureFormat::R32Float) or [`Rgba32Uint`](wgpu::TextureFormat::Rgba32Uint), has the usage
+/// [`R32Float`](wgpu::TextureFormat::R32Float) or [`Rgba32Uint`](wgpu::TextureFormat::Rgba32Uint),
+/// has the usage
 /// [`COPY_SRC`](wgpu::TextureUsages::COPY_SRC), and is no larger than a texture, and a buffer that it passes through, may be; otherwise
 /// culls read them where they are.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -87,8 +88,8 @@ pub(crate) fn is_possible(layout: &PyramidLayout, source: &wgpu::Texture, limits
         && (source.format() == FORMAT || staging_bytes(layout.size) <= limits.max_buffer_size)
 }
 
-/// Whether images of a format can be copied as the bits of float32. (Those of `Depth24Plus` cannot be copied, those of other formats hold
-/// other bits.)
+/// Whether images of a format can be copied as the bits of float32. (Those of `Depth24Plus` cannot
+/// be copied, those of other formats hold other bits.)
 pub(crate) fn travels(format: wgpu::TextureFormat) -> bool {
     matches!(format, wgpu::TextureFormat::Depth32Float | wgpu::TextureFormat::R32Float | FORMAT)
 }

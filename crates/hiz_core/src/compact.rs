@@ -43,7 +43,8 @@ impl Compaction {
         })
     }
 
-    /// Records the compaction of every piece, in order: a later one needs to know what earlier ones left of the capacity.
+    /// Records the compaction of every piece, in order: a later one needs to know what earlier ones
+    /// left of the capacity.
     /// `idle`: as `CullInputs::idle`.
     pub(crate) fn record(&self, pass: &mut wgpu::ComputePass<'_>, idle: bool) {
         let workgroups = |count: u32| if idle { 0 } else { count };

@@ -20,17 +20,19 @@ use crate::visible::{Visible, VisibleOptions};
 /// Nothing here submits, polls or maps: `record_*` writes into the caller's encoder, `create_*` makes buffers.
 ///
 /// # Errors
-/// What wgpu finds wrong with what is made here comes back as an [`Error`], and never at the device's own error handler, which ends
-/// the process by default. After an error the caller's encoder and device can be used on: nothing that is invalid was recorded.
-/// (What was recorded before the error came up may be part of the work.)
+/// What wgpu finds wrong with what is made here comes back as an [`Error`], and never at the
+/// device's own error handler, which ends the process by default. After an error the caller's
+/// encoder and device can be used on: nothing that is invalid was recorded. (What was recorded
+/// before the error came up may be part of the work.)
 ///
 /// Three things cannot be known here:
 ///
-/// - An encoder of another device, or one with an open pass (whose lifetime was forgotten). wgpu tells of it when the encoder
-///   is finished.
+/// - An encoder of another device, or one with an open pass (whose lifetime was forgotten). wgpu
+///   tells of it when the encoder is finished; of an open pass sometimes at once, which is an
+///   [`Error::Invalid`] that names the encoder.
 /// - What is destroyed between the recording and the submit. wgpu tells of it then.
-/// - Views, encoders and buffers of another `wgpu::Instance`. wgpu takes them for others, for its handles are numbers that each
-///   instance gives out anew.
+/// - Views, encoders and buffers of another `wgpu::Instance`. wgpu takes them for others, for its
+///   handles are numbers that each instance gives out anew.
 #[derive(Debug, Clone)]
 pub struct HizContext {
     pub(crate) gpu: Arc<Gpu>,
@@ -40,7 +42,8 @@ impl HizContext {
     /// A context on the caller's device.
     ///
     /// # Errors
-    /// [`Error::Limit`] where the device offers less than the shaders need; [`HizContext::required_limits`] are enough.
+    /// [`Error::Limit`] where the device offers less than the shaders need;
+    /// [`HizContext::required_limits`] are enough.
     pub fn new(device: &wgpu::Device) -> Result<Self> {
         Self::with_pipeline_cache(device, None)
     }
@@ -75,14 +78,16 @@ impl HizContext {
         Ok(Self { gpu: Arc::new(Gpu::new(device, cache, faults)?) })
     }
 
-    /// Limits that are enough for a device: WebGPU's defaults. [`HizContext::new`] takes less where the shaders, their bindings and one row
-    /// of records fit into it, and names the first limit that is too low.
+    /// Limits that are enough for a device: WebGPU's defaults. [`HizContext::new`] takes less where
+    /// the shaders, their bindings and one row of records fit into it, and names the first limit
+    /// that is too low.
     pub fn required_limits() -> wgpu::Limits {
         wgpu::Limits::default()
     }
 
-    /// The features that a device needs: none. (A [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0
-    /// needs `INDIRECT_FIRST_INSTANCE`.)
+    /// The features that a device needs: none. (A
+    /// [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0 needs
+    /// `INDIRECT_FIRST_INSTANCE`.)
     pub fn required_features() -> wgpu::Features {
         wgpu::Features::empty()
     }
@@ -95,8 +100,8 @@ impl HizContext {
     /// An empty pyramid for depth images of `size`.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for a size of 0 and options out of range, [`Error::Limit`] past the device's textures or bindings,
-    /// [`Error::OutOfMemory`].
+    /// [`Error::Invalid`] for a size of 0 and options out of range, [`Error::Limit`] past the
+    /// device's textures or bindings, [`Error::OutOfMemory`].
     pub fn create_pyramid(&self, size: ImageSize, options: &PyramidOptions) -> Result<Pyramid> {
         Pyramid::new(&self.gpu, size, options)
     }
@@ -112,8 +117,10 @@ impl HizContext {
         options: &InstanceOptions,
     ) -> Result<Instances> {
         Instances::new(&self.gpu, bounds, options, |copies, _| {
-            copies(encoder);
-            Ok(())
+            self.gpu.recorded(|| {
+                copies(encoder);
+                Ok(())
+            })
         })
     }
 
@@ -149,8 +156,9 @@ impl HizContext {
     ///
     /// # Errors
     /// [`Error::Mismatch`] for instances of another context, [`Error::Invalid`] for a
-    /// [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0 on a device without the feature
-    /// `INDIRECT_FIRST_INSTANCE`, [`Error::OutOfMemory`], [`Error::Device`] where the device is lost.
+    /// [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0 on a
+    /// device without the feature `INDIRECT_FIRST_INSTANCE`, [`Error::OutOfMemory`],
+    /// [`Error::Device`] where the device is lost.
     pub fn create_visible(&self, instances: &Instances, options: &VisibleOptions) -> Result<Visible> {
         Visible::new(&self.gpu, instances, options)
     }
@@ -158,18 +166,20 @@ impl HizContext {
     /// Uploads triangle meshes.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for arrays that do not fit and indices out of range, [`Error::Limit`] past the device's buffers,
-    /// [`Error::OutOfMemory`].
+    /// [`Error::Invalid`] for arrays that do not fit and indices out of range, [`Error::Limit`]
+    /// past the device's buffers, [`Error::OutOfMemory`].
     pub fn create_occluders(&self, meshes: &[MeshData<'_>], options: &OccluderOptions) -> Result<Occluders> {
         Occluders::new(&self.gpu, meshes, options)
     }
 
-    /// Records the drawing of `occluders` into `target`, which is cleared first: a view of one layer of a 2D `Depth32Float` texture
-    /// of the camera's size, with one mip level, one sample a pixel and the usage `RENDER_ATTACHMENT`.
+    /// Records the drawing of `occluders` into `target`, which is cleared first: a view of one
+    /// layer of a 2D `Depth32Float` texture of the camera's size, with one mip level, one sample a
+    /// pixel and the usage `RENDER_ATTACHMENT`.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a target of another size, format or device and for a destroyed one, [`Error::Invalid`] for one of other
-    /// usages, samples or mip levels and for a camera that float32 cannot hold.
+    /// [`Error::Mismatch`] for a target of another size, format or device and for a destroyed one,
+    /// [`Error::Invalid`] for one of other usages, samples or mip levels and for a camera that
+    /// float32 cannot hold.
     pub fn record_occluders(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -182,23 +192,26 @@ impl HizContext {
 
     /// Records the reduction of a depth image of `camera` into `pyramid`.
     ///
-    /// `depth` is a view of a 2D texture of one mip level, sample and layer, whose whole depth is read, whatever part of it the view shows:
-    /// the default view of a texture with a stencil will do. Formats and usages:
+    /// `depth` is a view of a 2D texture of one mip level, sample and layer, whose whole depth is
+    /// read, whatever part of it the view shows: the default view of a texture with a stencil will
+    /// do. Formats and usages:
     ///
     /// - any depth format, `R32Float` or `R16Float`, with `TEXTURE_BINDING`;
-    /// - `Rgba32Uint` with `STORAGE_BINDING`: the float bits of four pixels of a row in a texel. It is `width.div_ceil(4)` texels wide;
-    ///   pixels past the width count as depth of the row's last ones, so repeat the last.
+    /// - `Rgba32Uint` with `STORAGE_BINDING`: the float bits of four pixels of a row in a texel. It
+    ///   is `width.div_ceil(4)` texels wide; pixels past the width count as depth of the row's last
+    ///   ones, so repeat the last.
     ///
-    /// Give it `COPY_SRC` as well, and large culls read faster ([`AtlasUse`](crate::AtlasUse)). The texture must neither change nor be
-    /// destroyed before the culls that use it have run. Submit the reduction before them or with them: a cull that runs before
-    /// it keeps everything.
+    /// Give it `COPY_SRC` as well, and large culls read faster ([`AtlasUse`](crate::AtlasUse)). The
+    /// texture must neither change nor be destroyed before the culls that use it have run. Submit
+    /// the reduction before them or with them: a cull that runs before it keeps everything.
     ///
-    /// What the format rounds is slack that the pyramid keeps ([`Pyramid::tolerance`]), and every cull counts it beside the slack of
-    /// its [`CullOptions`]: a step of `Depth16Unorm`, `Depth24Plus`, `Depth24PlusStencil8` and `R16Float`, nothing of float32.
+    /// What the format rounds is slack that the pyramid keeps ([`Pyramid::tolerance`]), and every
+    /// cull counts it beside the slack of its [`CullOptions`]: a step of `Depth16Unorm`,
+    /// `Depth24Plus`, `Depth24PlusStencil8` and `R16Float`, nothing of float32.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for sizes or devices that do not agree and for a destroyed texture, [`Error::Invalid`] for other formats
-    /// and usages, [`Error::OutOfMemory`].
+    /// [`Error::Mismatch`] for sizes or devices that do not agree and for a destroyed texture,
+    /// [`Error::Invalid`] for other formats and usages, [`Error::OutOfMemory`].
     pub fn record_reduce(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -215,8 +228,9 @@ impl HizContext {
     /// than it saves ([`AtlasUse`](crate::AtlasUse)).
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for objects that do not belong together, for a depth image that was destroyed since it was reduced and for
-    /// destroyed buffers of `visible`; [`Error::Invalid`] for unusable options or cameras; [`Error::OutOfMemory`].
+    /// [`Error::Mismatch`] for objects that do not belong together, for a depth image that was
+    /// destroyed since it was reduced and for destroyed buffers of `visible`; [`Error::Invalid`]
+    /// for unusable options or cameras; [`Error::OutOfMemory`].
     pub fn record_cull(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -231,8 +245,8 @@ impl HizContext {
     }
 }
 
-/// What the shaders and their bindings need of a device, and what it has. `tests/validation.rs` runs everything on a device that has just
-/// this, and on devices with one less.
+/// What the shaders and their bindings need of a device, and what it has. `tests/validation.rs`
+/// runs everything on a device that has just this, and on devices with one less.
 fn needed(have: &wgpu::Limits) -> Vec<(&'static str, u64, u64)> {
     macro_rules! limits {
         ($($name:ident >= $need:expr,)*) => {
@@ -240,7 +254,8 @@ fn needed(have: &wgpu::Limits) -> Vec<(&'static str, u64, u64)> {
         };
     }
     limits! {
-        // A row of records of oriented boxes, 4 texels each (`records`), and a row of surviving groups.
+        // A row of records of oriented boxes, 4 texels each (`records`), and a row of surviving
+        // groups.
         max_texture_dimension_2d >= 4096,
         // The cull of members: view, records, outputs, survivors.
         max_bind_groups >= 4,

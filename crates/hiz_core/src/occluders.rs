@@ -377,26 +377,28 @@ pub(crate) fn record(
         ),
         other => other,
     })?;
-    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some("hiz.occluders.pass"),
-        color_attachments: &[],
-        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-            view: target,
-            depth_ops: Some(depth_ops),
-            stencil_ops: None,
-        }),
-        ..Default::default()
-    });
-    pass.set_pipeline(&pipeline);
-    pass.set_bind_group(0, &bind_group, &[]);
-    pass.set_vertex_buffer(0, occluders.vertices.slice(..));
-    pass.set_index_buffer(occluders.indices.slice(..), wgpu::IndexFormat::Uint32);
-    for part in &occluders.parts {
-        if !outside_frustum(camera, part.min, part.max) {
-            pass.draw_indexed(part.indices.clone(), part.base_vertex, 0..1);
+    gpu.recorded(|| {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("hiz.occluders.pass"),
+            color_attachments: &[],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: target,
+                depth_ops: Some(depth_ops),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &bind_group, &[]);
+        pass.set_vertex_buffer(0, occluders.vertices.slice(..));
+        pass.set_index_buffer(occluders.indices.slice(..), wgpu::IndexFormat::Uint32);
+        for part in &occluders.parts {
+            if !outside_frustum(camera, part.min, part.max) {
+                pass.draw_indexed(part.indices.clone(), part.base_vertex, 0..1);
+            }
         }
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 impl FaceCull {

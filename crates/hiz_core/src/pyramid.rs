@@ -246,7 +246,8 @@ impl Pyramid {
     fn note_copies(&self, encoder: &wgpu::CommandEncoder, atlas: &Atlas, reduction: u32) {
         let (contents, reduced) = (atlas.contents(), Arc::clone(&self.reduced));
         encoder.on_submitted_work_done(move || {
-            // Copies that ran before their reduction, or after the next one, have spoiled what was there.
+            // Copies that ran before their reduction, or after the next one, have spoiled what was
+            // there.
             let ran_behind_it = reduced.load(Ordering::Acquire) == reduction;
             contents.store(if ran_behind_it { reduction } else { 0 }, Ordering::Release);
         });
@@ -257,14 +258,15 @@ impl Pyramid {
         self.built().map(|b| b.camera)
     }
 
-    /// How far the depths that the pyramid was last built from may lie from those that were stored, by the format of the image
-    /// ([`DepthTolerance::of`]) or by what was uploaded into it. Every cull counts it, beside the slack of its options.
+    /// How far the depths that the pyramid was last built from may lie from those that were stored,
+    /// by the format of the image ([`DepthTolerance::of`]) or by what was uploaded into it. Every
+    /// cull counts it, beside the slack of its options.
     pub fn tolerance(&self) -> Option<DepthTolerance> {
         self.built().map(|b| b.tolerance)
     }
 
-    /// Whether the depth image that `built` was made of is still there: a cull would bind it, and what was destroyed ends the caller's
-    /// encoder.
+    /// Whether the depth image that `built` was made of is still there: a cull would bind it, and
+    /// what was destroyed ends the caller's encoder.
     pub(crate) fn check_source(gpu: &Gpu, built: &Built) -> Result<()> {
         gpu.view(built.source.texture()).map(drop).map_err(|error| match error {
             Error::Device(why) => Error::mismatch(
@@ -304,8 +306,8 @@ impl Pyramid {
     }
 }
 
-/// Records the reduction of `depth` (all of its texture's first mip level) into `pyramid`. `uploaded` is what its depths were rounded by
-/// before they came into the texture.
+/// Records the reduction of `depth` (all of its texture's first mip level) into `pyramid`.
+/// `uploaded` is what its depths were rounded by before they came into the texture.
 pub(crate) fn record_reduce(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
@@ -374,16 +376,18 @@ pub(crate) fn record_reduce(
         Ok((pipeline, gpu.bind_group("hiz.reduce.step", &gpu.layouts().one_uniform, &entries)?, workgroups))
     };
     let dispatches = pyramid.layout.steps.iter().map(dispatch).collect::<Result<Vec<_>>>()?;
-    let mut pass = encoder
-        .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.reduce.pass"), timestamp_writes: None });
-    pass.set_bind_group(0, &source, &[]);
-    for (pipeline, bind_group, [columns, rows]) in &dispatches {
-        pass.set_pipeline(pipeline);
-        pass.set_bind_group(1, bind_group, &[]);
-        // One at least, for the header, where nothing is stored.
-        pass.dispatch_workgroups((*columns).max(1), (*rows).max(1), 1);
-    }
-    drop(pass);
+    gpu.recorded(|| {
+        let descriptor = wgpu::ComputePassDescriptor { label: Some("hiz.reduce.pass"), timestamp_writes: None };
+        let mut pass = encoder.begin_compute_pass(&descriptor);
+        pass.set_bind_group(0, &source, &[]);
+        for (pipeline, bind_group, [columns, rows]) in &dispatches {
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(1, bind_group, &[]);
+            // One at least, for the header, where nothing is stored.
+            pass.dispatch_workgroups((*columns).max(1), (*rows).max(1), 1);
+        }
+        Ok(())
+    })?;
     let reduced = Arc::clone(&pyramid.reduced);
     encoder.on_submitted_work_done(move || reduced.store(reduction, Ordering::Release));
     // They hold the last depth image.
@@ -394,8 +398,9 @@ pub(crate) fn record_reduce(
     Ok(())
 }
 
-/// What the reduction reads and writes; and the view of the image's depth that can be bound: the caller's, or where that shows another
-/// part or use of the texture, as the default view of a texture with a stencil does, the whole depth of it.
+/// What the reduction reads and writes; and the view of the image's depth that can be bound: the
+/// caller's, or where that shows another part or use of the texture, as the default view of a
+/// texture with a stencil does, the whole depth of it.
 fn bind_source(
     gpu: &Gpu,
     depth: &wgpu::TextureView,
@@ -427,7 +432,8 @@ fn bind_source(
         ),
         other => other,
     };
-    // A view of another device's texture would tell that device of its errors, whose handler may end the process.
+    // A view of another device's texture would tell that device of its errors, whose handler may
+    // end the process.
     if error.to_string().contains(OF_ANOTHER_DEVICE) {
         return Err(refused(error));
     }

@@ -1,5 +1,5 @@
-//! What the format of a depth image rounds: slack that is due before the caller adds any (`docs/accuracy.md`, section "What a depth format
-//! rounds").
+//! What the format of a depth image rounds: slack that is due before the caller adds any
+//! (`docs/accuracy.md`, section "What a depth format rounds").
 
 use crate::bounds::Floats;
 use crate::camera::Camera;
@@ -8,11 +8,14 @@ use crate::error::{Error, Result};
 use crate::host;
 use crate::view::EPS;
 
-/// How far a stored depth may lie from the depth that was given to be stored: by `relative` times the stored one, and `absolute` more.
+/// How far a stored depth may lie from the depth that was given to be stored: by `relative` times
+/// the stored one, and `absolute` more.
 ///
-/// It says what rounding to a format may lose, in either direction, and what reading the stored number back as float32 may lose.
-/// What computed the depth errs beside that; [`CullOptions::depth_slack`](crate::CullOptions::depth_slack) and
-/// [`depth_slack_abs`](crate::CullOptions::depth_slack_abs) are for that, and every cull counts both.
+/// It says what rounding to a format may lose, in either direction, and what reading the stored
+/// number back as float32 may lose. What computed the depth errs beside that;
+/// [`CullOptions::depth_slack`](crate::CullOptions::depth_slack) and
+/// [`depth_slack_abs`](crate::CullOptions::depth_slack_abs) are for that, and every cull counts
+/// both.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DepthTolerance {
     /// Per unit of the stored number.
@@ -22,18 +25,22 @@ pub struct DepthTolerance {
 }
 
 impl DepthTolerance {
-    /// Nothing is lost: depth that is stored as it was given, or was rounded towards far. Of float32 formats, too: what rounding to
-    /// float32 loses is what `depth_slack` covers by default.
+    /// Nothing is lost: depth that is stored as it was given, or was rounded towards far. Of
+    /// float32 formats, too: what rounding to float32 loses is what `depth_slack` covers by
+    /// default.
     pub const NONE: Self = Self { relative: 0.0, absolute: 0.0 };
 
-    /// Half floats: 2^-10 relative and 2^-24 absolute, a spacing of theirs. Vulkan lets a driver take either neighbour.
+    /// Half floats: 2^-10 relative and 2^-24 absolute, a spacing of theirs. Vulkan lets a driver
+    /// take either neighbour.
     pub const HALF: Self = Self { relative: 1.0 / 1024.0, absolute: 1.0 / 16_777_216.0 };
 
     /// Of a format that a pyramid can be built from; `None` for others.
     ///
-    /// `Depth16Unorm`: 1/65535 absolute. `Depth24Plus` and `Depth24PlusStencil8`: 1/(2^24 - 1) absolute, which holds for float32 as
-    /// well, in which a driver without 24 bits keeps them. Both: 2^-22 relative for the way back to float32. `R16Float`:
-    /// [`DepthTolerance::HALF`]. `Depth32Float`, `Depth32FloatStencil8`, `R32Float` and `Rgba32Uint`: [`DepthTolerance::NONE`].
+    /// `Depth16Unorm`: 1/65535 absolute. `Depth24Plus` and `Depth24PlusStencil8`: 1/(2^24 - 1)
+    /// absolute, which holds for float32 as well, in which a driver without 24 bits keeps them.
+    /// Both: 2^-22 relative for the way back to float32. `R16Float`: [`DepthTolerance::HALF`].
+    /// `Depth32Float`, `Depth32FloatStencil8`, `R32Float` and `Rgba32Uint`:
+    /// [`DepthTolerance::NONE`].
     pub fn of(format: wgpu::TextureFormat) -> Option<Self> {
         use wgpu::TextureFormat as Format;
         match format {
@@ -47,13 +54,15 @@ impl DepthTolerance {
         }
     }
 
-    /// Normalised integers of so many bits: one step, and two spacings of float32 for the number that is read.
+    /// Normalised integers of so many bits: one step, and two spacings of float32 for the number
+    /// that is read.
     fn fixed_point(bits: u32) -> Self {
         let steps = f64::from((1_u32 << bits) - 1);
         Self { relative: 2.0 * EPS, absolute: (1.0 / steps).next_up() }
     }
 
-    /// Of a depth that was moved by `self` after it was moved by `before`: by both, one after the other, rounded up.
+    /// Of a depth that was moved by `self` after it was moved by `before`: by both, one after the
+    /// other, rounded up.
     #[must_use]
     pub fn after(self, before: Self) -> Self {
         if self == Self::NONE || before == Self::NONE {
@@ -76,11 +85,11 @@ impl DepthTolerance {
     }
 }
 
-/// [`ndc_from_kind`] of an image whose numbers were rounded within `tolerance` (in their own units, before `scale`) before they came
-/// here; and the tolerance that is left for the pyramid to keep.
+/// [`ndc_from_kind`] of an image whose numbers were rounded within `tolerance` (in their own units,
+/// before `scale`) before they came here; and the tolerance that is left for the pyramid to keep.
 ///
-/// Numbers of the kinds `Z` and `Distance` are moved away from the eye by it before they are converted, and nothing is left. NDC depth
-/// stays as it is, and so does its tolerance.
+/// Numbers of the kinds `Z` and `Distance` are moved away from the eye by it before they are
+/// converted, and nothing is left. NDC depth stays as it is, and so does its tolerance.
 ///
 /// # Errors
 /// As [`ndc_from_kind`], and [`Error::Invalid`] for a tolerance outside 0..=0.5.
@@ -132,7 +141,8 @@ mod tests {
         assert_eq!(DepthTolerance::of(Format::Stencil8), None);
     }
 
-    /// A thousandth and a quarter, one after the other: in either convention no depth comes out nearer than by both in turn.
+    /// A thousandth and a quarter, one after the other: in either convention no depth comes out
+    /// nearer than by both in turn.
     #[test]
     fn tolerances_add_up_one_after_the_other() {
         let (format, caller) =
@@ -149,7 +159,8 @@ mod tests {
         assert_eq!(DepthTolerance::NONE.after(caller), caller);
     }
 
-    /// View depth 3 as a half float may be anything up to 3.0029...: that depth is what comes out, in either convention.
+    /// View depth 3 as a half float may be anything up to 3.0029...: that depth is what comes out,
+    /// in either convention.
     #[test]
     fn metric_halves_are_moved_before_they_are_converted() {
         let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, 1.0], up: [0.0, 1.0, 0.0] };

@@ -76,48 +76,53 @@ pub(crate) fn record(
     let mut changing = instances.changing();
     let number = changing.next_update;
     changing.next_update = number.wrapping_add(1);
-    let mut pass = encoder
-        .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.update.pass"), timestamp_writes: None });
-    let mut begun = false;
-    let mut dispatch = |replacement: &Replacement<'_>, entry_point| -> Result<()> {
-        let (bind_group, pipeline) = (bind(gpu, instances, replacement, number)?, gpu.update_pipeline(entry_point)?);
-        pass.set_bind_group(0, &bind_group, &[]);
-        if !std::mem::replace(&mut begun, true) {
-            pass.set_pipeline(&begin);
-            pass.dispatch_workgroups(1, 1, 1);
-        }
-        pass.set_pipeline(&pipeline);
-        pass.dispatch_workgroups((replacement.places.len() as u32).div_ceil(WORKGROUP), 1, 1);
-        Ok(())
-    };
-    let result = instances.pieces.iter().enumerate().try_for_each(|(p, piece)| {
-        let here = range.start.max(piece.range.start)..range.end.min(piece.range.end);
-        if here.is_empty() {
-            return Ok(());
-        }
-        let base = piece.range.start;
-        let places = piece.order.places((here.start - base) as usize..(here.end - base) as usize)?;
-        let offset = base as usize;
-        let source = |place: usize| {
-            let index = piece.order.index(place);
-            Source { bounds: offset + index - first as usize, index: index as u32 }
+    let result = gpu.recorded(|| {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some("hiz.update.pass"),
+            timestamp_writes: None,
+        });
+        let mut begun = false;
+        let mut dispatch = |replacement: &Replacement<'_>, entry_point| -> Result<()> {
+            let (bind_group, pipeline) =
+                (bind(gpu, instances, replacement, number)?, gpu.update_pipeline(entry_point)?);
+            pass.set_bind_group(0, &bind_group, &[]);
+            if !std::mem::replace(&mut begun, true) {
+                pass.set_pipeline(&begin);
+                pass.dispatch_workgroups(1, 1, 1);
+            }
+            pass.set_pipeline(&pipeline);
+            pass.dispatch_workgroups((replacement.places.len() as u32).div_ceil(WORKGROUP), 1, 1);
+            Ok(())
         };
-        let record_bytes = instances.kind.record_bytes();
-        let groups = &mut changing.groups[p];
-        let staging = wgpu::BufferUsages::STORAGE;
-        for places in bands(&places, record_bytes, gpu.limits()) {
-            let (fresh, touched) =
-                gpu.written("hiz.update.records", places.len() as u64 * record_bytes, staging, |records| {
-                    groups.replace(bounds, places, source, records)
+        instances.pieces.iter().enumerate().try_for_each(|(p, piece)| {
+            let here = range.start.max(piece.range.start)..range.end.min(piece.range.end);
+            if here.is_empty() {
+                return Ok(());
+            }
+            let base = piece.range.start;
+            let places = piece.order.places((here.start - base) as usize..(here.end - base) as usize)?;
+            let offset = base as usize;
+            let source = |place: usize| {
+                let index = piece.order.index(place);
+                Source { bounds: offset + index - first as usize, index: index as u32 }
+            };
+            let record_bytes = instances.kind.record_bytes();
+            let groups = &mut changing.groups[p];
+            let staging = wgpu::BufferUsages::STORAGE;
+            for places in bands(&places, record_bytes, gpu.limits()) {
+                let (fresh, touched) =
+                    gpu.written("hiz.update.records", places.len() as u64 * record_bytes, staging, |records| {
+                        groups.replace(bounds, places, source, records)
+                    })?;
+                dispatch(&Replacement { places, fresh, target: &piece.records }, "replace_records")?;
+                let bytes = (touched.len() * size_of::<BoxRecord>()) as u64;
+                let (fresh, ()) = gpu.written("hiz.update.groups", bytes, staging, |boxes| {
+                    write_boxes(boxes, touched.iter().map(|group| groups.record(*group as usize)))
                 })?;
-            dispatch(&Replacement { places, fresh, target: &piece.records }, "replace_records")?;
-            let bytes = (touched.len() * size_of::<BoxRecord>()) as u64;
-            let (fresh, ()) = gpu.written("hiz.update.groups", bytes, staging, |boxes| {
-                write_boxes(boxes, touched.iter().map(|group| groups.record(*group as usize)))
-            })?;
-            dispatch(&Replacement { places: &touched, fresh, target: &piece.group_records }, "replace_groups")?;
-        }
-        Ok(())
+                dispatch(&Replacement { places: &touched, fresh, target: &piece.group_records }, "replace_groups")?;
+            }
+            Ok(())
+        })
     });
     if result.is_err() {
         // The host may have taken a part. No number of the device will agree with it any more.
@@ -126,8 +131,8 @@ pub(crate) fn record(
     result
 }
 
-/// `places`, ascending, in bands whose new records one storage binding holds. (A piece may hold more: its own records lie in a texture.)
-/// No group is in two of them.
+/// `places`, ascending, in bands whose new records one storage binding holds. (A piece may hold
+/// more: its own records lie in a texture.) No group is in two of them.
 fn bands<'a>(places: &'a [u32], record_bytes: u64, limits: &wgpu::Limits) -> impl Iterator<Item = &'a [u32]> {
     let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
     let most = u32::try_from(bytes / record_bytes).unwrap_or(u32::MAX);

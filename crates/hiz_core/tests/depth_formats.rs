@@ -1,6 +1,7 @@
-//! What the format of a depth image rounds is slack: what can be seen past a wall is never hidden because the wall was stored nearer
-//! than it stands. Expectations are worked out from the formats' definitions (Vulkan 1.3, "Fixed-Point Data Conversions" and
-//! "Floating-Point Format Conversions": a number between two that can be stored may become either).
+//! What the format of a depth image rounds is slack: what can be seen past a wall is never hidden
+//! because the wall was stored nearer than it stands. Expectations are worked out from the formats'
+//! definitions (Vulkan 1.3, "Fixed-Point Data Conversions" and "Floating-Point Format Conversions":
+//! a number between two that can be stored may become either).
 
 mod common;
 
@@ -159,19 +160,22 @@ fn reduced(engine: &Engine, texture: &wgpu::Texture, camera: &Camera, atlas: Atl
     Arc::new(pyramid)
 }
 
-/// Boxes of no thickness at these depths, in the middle of the image; 64 of each, so that groups hold one depth alone.
+/// Boxes of no thickness at these depths, in the middle of the image; 64 of each, so that groups
+/// hold one depth alone. They are as wide as five pixels; where an atlas is asked for less than one
+/// wide, so that the image itself is read.
 fn verdicts(
     engine: &Engine,
     depths: &[f64],
     camera: &Camera,
-    pyramid: &Arc<Pyramid>,
+    (pyramid, atlas): (&Arc<Pyramid>, AtlasUse),
     options: &CullOptions,
 ) -> Vec<u8> {
     let (mut min, mut max) = (Vec::new(), Vec::new());
+    let half = if atlas == AtlasUse::Always { 0.02 } else { 0.3 };
     for z in depths {
         for _ in 0..64 {
-            min.extend([-0.3 * z, -0.3 * z, *z]);
-            max.extend([0.3 * z, 0.3 * z, *z]);
+            min.extend([-half * z, -half * z, *z]);
+            max.extend([half * z, half * z, *z]);
         }
     }
     let bounds = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };
@@ -212,8 +216,9 @@ fn behind(stored: f64, steps: f64, step: f64, convention: DepthConvention) -> f6
     view_depth(if convention.is_reversed() { stored - steps * step } else { stored + steps * step }, convention)
 }
 
-/// A wall is anywhere up to a step behind the number that is stored: what stands 0.95 of it behind may be seen, what stands 1.1 of it
-/// behind cannot, whatever the way to ask. A half step of slack, or none, or none for groups, hides the first.
+/// A wall is anywhere up to a step behind the number that is stored: what stands 0.95 of it behind
+/// may be seen, what stands 1.1 of it behind cannot, whatever the way to ask. A half step of slack,
+/// or none, or none for groups, hides the first.
 #[test]
 fn a_step_of_the_format_decides() {
     let engine = &engine();
@@ -235,16 +240,17 @@ fn a_step_of_the_format_decides() {
                 let pyramid = reduced(engine, &texture, &camera, atlas);
                 assert_eq!(pyramid.tolerance(), DepthTolerance::of(format));
                 for options in ways {
-                    // The shader's own roundings take 2^-23, which is two steps of subnormal halves.
+                    // The shader's own roundings take 2^-23, which is two steps of subnormal
+                    // halves.
                     let far = if stored < 1e-6 { 4.0 } else { 1.1 };
                     let depths = [0.55, 0.95, far, 8.0].map(|k| behind(stored, k, step, convention));
-                    let got = verdicts(engine, &depths, &camera, &pyramid, options);
+                    let got = verdicts(engine, &depths, &camera, (&pyramid, atlas), options);
                     let what = format!("{convention:?} {format:?} {stored} {atlas:?} {options:?}");
                     assert_eq!(got, [VISIBLE, VISIBLE, OCCLUDED, OCCLUDED], "{what}");
                     // The caller's slack comes on top: half a step of it more.
                     let options = CullOptions { depth_slack_abs: 0.5 * step, ..options.clone() };
                     let depths = [1.45, far + 0.5].map(|k| behind(stored, k, step, convention));
-                    let got = verdicts(engine, &depths, &camera, &pyramid, &options);
+                    let got = verdicts(engine, &depths, &camera, (&pyramid, atlas), &options);
                     assert_eq!(got, [VISIBLE, OCCLUDED], "{what} and half a step");
                 }
             }
@@ -252,8 +258,9 @@ fn a_step_of_the_format_decides() {
     }
 }
 
-/// The same of depth in 24 bits, or in the float32 that a driver keeps instead, and of the formats of float32, which bring no slack.
-/// The wall is drawn; reversed Z, far away, where a step is large beside float32's.
+/// The same of depth in 24 bits, or in the float32 that a driver keeps instead, and of the formats
+/// of float32, which bring no slack. The wall is drawn; reversed Z, far away, where a step is large
+/// beside float32's.
 #[test]
 fn depth_of_24_bits_brings_its_step_and_float32_none() {
     let engine = &engine();
@@ -267,16 +274,19 @@ fn depth_of_24_bits_brings_its_step_and_float32_none() {
         assert_eq!(pyramid.tolerance(), DepthTolerance::of(format));
         let expected = if format == Format::Depth32Float { OCCLUDED } else { VISIBLE };
         for options in ways() {
-            // Beside the step the shader's own roundings take 2^-23, two steps; a tenth is float32's margin.
+            // Beside the step the shader's own roundings take 2^-23, two steps; a tenth is
+            // float32's margin.
             let depths = [0.55, 0.95, 3.3, 10.0].map(|k| behind(stored, k, step, DepthConvention::Reversed));
-            let got = verdicts(engine, &depths, &camera, &pyramid, &options);
+            let got = verdicts(engine, &depths, &camera, (&pyramid, AtlasUse::Never), &options);
             assert_eq!(got, [expected, expected, OCCLUDED, OCCLUDED], "{format:?} {options:?}");
         }
     }
 }
 
-/// Spheres one to three centimetres before a wall 10 to 30 metres away, the wall rasterised: what the issue of 4,200 hidden spheres of
-/// 10,000 describes. Near planes are chosen so that a step of the format is 6 cm at 20 m. Twenty steps behind the wall spheres are hidden: of 24 bits the slack of float32 alone, relative to a depth near 1, is eight.
+/// Spheres one to three centimetres before a wall 10 to 30 metres away, the wall rasterised: what
+/// the issue of 4,200 hidden spheres of 10,000 describes. Near planes are chosen so that a step of
+/// the format is 6 cm at 20 m. Twenty steps behind the wall spheres are hidden: of 24 bits the
+/// slack of float32 alone, relative to a depth near 1, is eight.
 #[test]
 fn nothing_that_stands_before_a_wall_is_hidden() {
     let engine = &engine();
@@ -295,7 +305,8 @@ fn nothing_that_stands_before_a_wall_is_hidden() {
                 let standard = far / (far - near) * (1.0 - near / z);
                 let ndc = if convention.is_reversed() { 1.0 - standard } else { standard };
                 let pyramid = reduced(engine, &walls.draw(engine, ndc as f32), &camera, AtlasUse::Never);
-                // 125 spheres with their farthest points 1 to 3 cm before the wall, and 125 beyond twenty steps behind it.
+                // 125 spheres with their farthest points 1 to 3 cm before the wall, and 125 beyond
+                // twenty steps behind it.
                 let step = z * z / near / steps;
                 let (mut centers, mut radii) = (Vec::new(), Vec::new());
                 for i in 0..125 {
@@ -325,7 +336,8 @@ fn nothing_that_stands_before_a_wall_is_hidden() {
     }
 }
 
-/// Half floats that were uploaded as float32: the image knows, the pyramid and every cull of it do, by the atlas too.
+/// Half floats that were uploaded as float32: the image knows, the pyramid and every cull of it do,
+/// by the atlas too.
 #[test]
 fn uploaded_halves_bring_their_step() {
     let engine = &engine();
@@ -343,9 +355,9 @@ fn uploaded_halves_bring_their_step() {
             assert_eq!(pyramid.tolerance(), Some(DepthTolerance::HALF));
             let exact = engine.pyramid_with(&engine.upload_depth(&wall, &camera).unwrap(), &options).unwrap();
             for options in ways() {
-                let got = verdicts(engine, &depths, &camera, &pyramid, &options);
+                let got = verdicts(engine, &depths, &camera, (&pyramid, atlas), &options);
                 assert_eq!(got, [VISIBLE, VISIBLE, OCCLUDED, OCCLUDED], "{convention:?} {atlas:?} {options:?}");
-                let got = verdicts(engine, &depths, &camera, &exact, &options);
+                let got = verdicts(engine, &depths, &camera, (&exact, atlas), &options);
                 assert_eq!(got, [OCCLUDED; 4], "{convention:?} {atlas:?} {options:?}");
             }
         }

@@ -1,6 +1,7 @@
-//! What wgpu's validation would find wrong in the library's own calls comes back as an error that names the parameter. Devices here have
-//! wgpu's own error handler, which ends a process: whatever gets there fails the test. After each error the same encoder is finished and
-//! submitted, and the same device culls as before.
+//! What wgpu's validation would find wrong in the library's own calls comes back as an error that
+//! names the parameter. Devices here have wgpu's own error handler, which ends a process: whatever
+//! gets there fails the test. After each error the same encoder is finished and submitted, and the
+//! same device culls as before.
 
 mod common;
 
@@ -667,22 +668,51 @@ fn a_lost_device_ends_nothing() {
     drop(encoder.finish());
 }
 
-/// wgpu tells of an encoder of another device where that is finished. Here nothing panics, and both devices can be used on.
+/// wgpu tells of an encoder of another device where that is finished, and of one with an open pass
+/// at once or there. Nothing panics here, and the devices can be used on.
 #[test]
-fn an_encoder_of_another_device_is_told_of_where_it_is_finished() {
+fn encoders_that_cannot_be_used_are_told_of() {
     let [world, other] = World::two();
     let (world, wall) = culled(world, AtlasUse::Never);
     let mut encoder = other.encoder();
     world.reduce(&mut encoder, &plain(&wall)).unwrap();
     world.cull(&mut encoder, &CullOptions::default()).unwrap();
-    let scope = other.device.push_error_scope(wgpu::ErrorFilter::Validation);
-    drop(encoder.finish());
-    assert!(pollster::block_on(scope.pop()).is_some());
+    let fails = |world: &World, encoder: wgpu::CommandEncoder| {
+        let scope = world.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        drop(encoder.finish());
+        pollster::block_on(scope.pop()).is_some()
+    };
+    assert!(fails(&other, encoder));
+    let World { context, instances, occluders, camera, .. } = &world;
+    let view = plain(&wall);
+    type Act<'a> = &'a dyn Fn(&mut wgpu::CommandEncoder) -> Result<()>;
+    let acts: [Act<'_>; 5] = [
+        &|encoder| world.reduce(encoder, &view),
+        &|encoder| world.cull(encoder, &CullOptions::default()),
+        &|encoder| context.record_occluders(encoder, occluders, camera, &view),
+        &|encoder| context.record_update(encoder, instances, 0, &TWO_BOXES, true),
+        &|encoder| context.record_instances(encoder, &TWO_BOXES, &InstanceOptions::default()).map(drop),
+    ];
+    for (i, act) in acts.iter().enumerate() {
+        let mut encoder = world.encoder();
+        let pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()).forget_lifetime();
+        let outcome = act(&mut encoder);
+        // Where copies come first wgpu tells later.
+        if [0, 2, 3].contains(&i) {
+            let text = outcome.unwrap_err().to_string();
+            assert!(text.starts_with("encoder: expected one of this device without an open pass, but"), "{i}: {text}");
+        }
+        let scope = world.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        drop(pass);
+        drop(pollster::block_on(scope.pop()));
+        assert!(fails(&world, encoder));
+    }
     world.works(world.encoder(), "this device");
     other.works(other.encoder(), "the other one");
 }
 
-/// The least of each limit that the shaders need, counted by hand from `gpu/layouts.rs` and `shaders/`.
+/// The least of each limit that the shaders need, counted by hand from `gpu/layouts.rs` and
+/// `shaders/`.
 fn least() -> wgpu::Limits {
     wgpu::Limits {
         max_texture_dimension_2d: 4096,
@@ -816,7 +846,8 @@ fn the_least_limits_are_enough_for_everything() {
     assert!(error.to_string().starts_with("pyramid texels: requested"), "{error}");
 }
 
-/// An update of more records than a storage binding holds goes in bands: the device answers for all of them.
+/// An update of more records than a storage binding holds goes in bands: the device answers for all
+/// of them.
 #[test]
 fn an_update_larger_than_a_binding_reaches_every_instance() {
     // 256 spheres of 32 bytes a band.

@@ -136,6 +136,10 @@ pub(crate) fn record(
     inputs: &CullInputs<'_>,
     visible: &Visible,
 ) -> Result<()> {
+    gpu.recorded(|| record_all(gpu, encoder, inputs, visible))
+}
+
+fn record_all(gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, inputs: &CullInputs<'_>, visible: &Visible) -> Result<()> {
     let CullInputs { instances, pyramid, options, .. } = *inputs;
     check_contexts(gpu, inputs)?;
     gpu.check_context("visible", visible.context)?;
@@ -144,7 +148,8 @@ pub(crate) fn record(
     }
     let report = report_key(visible, options);
     let pieces = || instances.pieces.iter().zip(&visible.pieces);
-    // Everything is there before anything is recorded: what could not be made would end the caller's encoder.
+    // Everything is there before anything is recorded: what could not be made would end the
+    // caller's encoder.
     let outputs = pieces()
         .enumerate()
         .map(|(p, (piece, _))| bind_output(gpu, piece, visible, p, report.statistics))

@@ -77,8 +77,9 @@ pub struct CullOptions {
     /// Extra distance in pixels, a multiple of 1/256 in 0..=16, that a projection must keep from what it does not touch. `None`: 0 in area
     /// coverage, 1/64 in sample coverage (what a rasteriser's snapping may move a sample).
     pub guard_px: Option<f64>,
-    /// Relative slack of the stored depth, 0..=0.5: 2^-23 covers float32 depth that was rounded to nearest. What another format
-    /// rounds comes beside it, from the pyramid ([`DepthTolerance`](crate::DepthTolerance)).
+    /// Relative slack of the stored depth, 0..=0.5: 2^-23 covers float32 depth that was rounded to
+    /// nearest. What another format rounds comes beside it, from the pyramid
+    /// ([`DepthTolerance`](crate::DepthTolerance)).
     pub depth_slack: f64,
     /// Absolute slack of the stored depth, 0..=0.5, in units of NDC depth and beside the relative one: the rasteriser of an
     /// orthographic camera errs by the same amount near and far. Anything above 0 counts 2^-23 more.

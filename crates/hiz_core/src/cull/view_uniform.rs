@@ -148,8 +148,8 @@ mod tests {
         }
     }
 
-    /// A format's step is in what the shader reads: whole, and no more than what rounding upwards adds. With the caller's slack on top,
-    /// in either convention.
+    /// A format's step is in what the shader reads: whole, and no more than what rounding upwards
+    /// adds. With the caller's slack on top, in either convention.
     #[test]
     fn the_step_of_a_format_comes_before_the_callers_slack() {
         use wgpu::TextureFormat as Format;

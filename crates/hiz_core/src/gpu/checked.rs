@@ -1,8 +1,9 @@
 //! What is made on the device, each with what wgpu finds wrong with it as an error, at once.
 //!
-//! wgpu reports errors to the device's handler, which ends the process unless the caller has set another one. Error scopes belong to
-//! a thread and are popped at once, so a scope around each call catches that call's own errors and nobody else's. It has to be
-//! each call: an object that could not be made must not get into the caller's encoder, whose `finish` would fail for it.
+//! wgpu reports errors to the device's handler, which ends the process unless the caller has set
+//! another one. Error scopes belong to a thread and are popped at once, so a scope around each call
+//! catches that call's own errors and nobody else's. It has to be each call: an object that could
+//! not be made must not get into the caller's encoder, whose `finish` would fail for it.
 
 use std::future::Future;
 use std::pin::pin;
@@ -35,7 +36,8 @@ fn in_a_line(error: &wgpu::Error) -> String {
     if texts.is_empty() { error.to_string() } else { texts.join(": ") }
 }
 
-/// What a scope has caught. Where wgpu runs natively it is there as soon as the scope is popped; elsewhere it is not waited for.
+/// What a scope has caught. Where wgpu runs natively it is there as soon as the scope is popped;
+/// elsewhere it is not waited for.
 fn found(scope: impl Future<Output = Option<wgpu::Error>>) -> Option<wgpu::Error> {
     match pin!(scope).poll(&mut Context::from_waker(Waker::noop())) {
         Poll::Ready(error) => error,
@@ -63,13 +65,14 @@ impl Gpu {
         self.checked(|device| device.create_buffer(descriptor))
     }
 
-    /// A uniform buffer that holds `value` from the start: no queue is needed, and every recording has its own.
+    /// A uniform buffer that holds `value` from the start: no queue is needed, and every recording
+    /// has its own.
     pub(crate) fn uniform<T: bytemuck::Pod>(&self, label: &str, value: &T) -> Result<wgpu::Buffer> {
         self.filled(label, bytemuck::bytes_of(value), wgpu::BufferUsages::UNIFORM)
     }
 
-    /// A buffer that holds `contents` (a multiple of 4 bytes) from the start. (wgpu's own helper panics where a lost device or
-    /// memory that ran out leave nothing to map.)
+    /// A buffer that holds `contents` (a multiple of 4 bytes) from the start. (wgpu's own helper
+    /// panics where a lost device or memory that ran out leave nothing to map.)
     pub(crate) fn filled(&self, label: &str, contents: &[u8], usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
         let buffer = self.mapped(label, contents.len() as u64, usage)?;
         write_mapped(label, &buffer, 0, contents)?;
@@ -87,7 +90,8 @@ impl Gpu {
         self.buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: true })
     }
 
-    /// A buffer of `size` bytes (a multiple of 4) whose contents `fill` writes where they are mapped, without a copy on the host.
+    /// A buffer of `size` bytes (a multiple of 4) whose contents `fill` writes where they are
+    /// mapped, without a copy on the host.
     pub(crate) fn written<T>(
         &self,
         label: &str,
@@ -148,8 +152,21 @@ impl Gpu {
         self.checked(|device| device.create_bind_group(&descriptor))
     }
 
-    /// Whether a render pass can draw depth into `target` and clear it first: the same pass, recorded into an encoder that is thrown
-    /// away. Nothing else tells what a view shows, where its texture lives, and whether it is still there.
+    /// Runs `record`, which writes into the caller's encoder. With a pass open there it can take
+    /// nothing, and wgpu says so at once.
+    pub(crate) fn recorded<T>(&self, record: impl FnOnce() -> Result<T>) -> Result<T> {
+        match checked(&self.device, record) {
+            Ok(result) => result,
+            Err(Error::Device(why)) => {
+                Err(Error::invalid("encoder", format!("expected one of this device without an open pass, but {why}")))
+            }
+            Err(other) => Err(other),
+        }
+    }
+
+    /// Whether a render pass can draw depth into `target` and clear it first: the same pass,
+    /// recorded into an encoder that is thrown away. Nothing else tells what a view shows, where
+    /// its texture lives, and whether it is still there.
     pub(crate) fn can_draw_into(&self, target: &wgpu::TextureView, depth_ops: wgpu::Operations<f32>) -> Result<()> {
         self.checked(|device| {
             let label = Some("hiz.occluders.check");

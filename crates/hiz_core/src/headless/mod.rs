@@ -260,7 +260,8 @@ impl Engine {
         DepthImage::uploaded(self, SourceKind::Bits, ndc, camera)
     }
 
-    /// The same of depth that was rounded within `tolerance` before it came here: of half floats [`DepthTolerance::HALF`].
+    /// The same of depth that was rounded within `tolerance` before it came here: of half floats
+    /// [`DepthTolerance::HALF`].
     ///
     /// # Errors
     /// As [`Engine::upload_depth`], and [`Error::Invalid`] for a tolerance outside 0..=0.5.
