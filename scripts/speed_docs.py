@@ -1,6 +1,7 @@
-"""Renews what docs/performance.md quotes of a run: `speed_docs.py [REPORT]` (out/speed/report.md).
+"""Renews what docs/performance.md and guide.md quote of a run: `speed_docs.py [REPORT]` (out/speed/report.md).
 
-Each quotation stands between two marks that name the report's sections.
+Each quotation stands between two marks that name the report's sections, and may name the rows of its tables that are
+wanted: `<!-- speed: Section; Other section | part of a label | part of another -->`.
 """
 
 import re
@@ -8,7 +9,8 @@ import shutil
 import sys
 from pathlib import Path
 
-DOCUMENT = Path(__file__).parent.parent / "docs" / "performance.md"
+DOCS = Path(__file__).parent.parent / "docs"
+DOCUMENTS = (DOCS / "performance.md", DOCS / "guide.md")
 QUOTATION = re.compile(r"(<!-- speed: (.*?) -->\n).*?(<!-- speed: end -->)", re.DOTALL)
 
 
@@ -22,16 +24,27 @@ def sections(report: str) -> dict[str, str]:
     return {title: re.sub(r"\n{3,}", "\n\n", text).strip() for title, text in found.items()}
 
 
+def quoted(found: dict[str, str], wanted: str) -> str:
+    """A section, or those rows of its tables whose label holds one of the words."""
+    name, *words = (part.strip() for part in wanted.split("|"))
+    if not words:
+        return found[name]
+    table = [line for line in found[name].splitlines() if line.startswith("|")]
+    rows = [line for line in table[2:] if any(word in line.split("|")[1] for word in words)]
+    return "\n".join([*table[:2], *rows])
+
+
 def main(report: Path) -> None:
     """Replaces every quotation, and the plot."""
     found = sections(report.read_text(encoding="utf-8"))
 
     def quote(mark: re.Match[str]) -> str:
-        return mark[1] + "\n" + "\n\n".join(found[name] for name in mark[2].split("; ")) + "\n\n" + mark[3]
+        return mark[1] + "\n" + "\n\n".join(quoted(found, each) for each in mark[2].split("; ")) + "\n\n" + mark[3]
 
-    DOCUMENT.write_text(QUOTATION.sub(quote, DOCUMENT.read_text(encoding="utf-8")), encoding="utf-8")
+    for document in DOCUMENTS:
+        document.write_text(QUOTATION.sub(quote, document.read_text(encoding="utf-8")), encoding="utf-8")
     if (report.parent / "scale.png").exists():
-        shutil.copyfile(report.parent / "scale.png", DOCUMENT.parent / "images" / "scale.png")
+        shutil.copyfile(report.parent / "scale.png", DOCS / "images" / "scale.png")
 
 
 if __name__ == "__main__":
