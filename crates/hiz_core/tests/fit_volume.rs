@@ -102,7 +102,7 @@ fn planted_faults_turn_it_red() {
     ];
     for (name, faults) in planted {
         let engine = Engine::with_planted_faults(None, faults).expect("the device tests need a Vulkan driver");
-        let tally = run(&engine, &[BoundsKind::OrientedBox], 34, 20, Coverage::Area, &[(Footprint::Two, 4096)], true);
+        let tally = run(&engine, &[BoundsKind::OrientedBox], 36, 20, Coverage::Area, &[(Footprint::Two, 4096)], true);
         eprintln!("{name}: {tally:?}");
         assert!(tally.false_culls > 0, "{name}: stayed green: {tally:?}");
     }
