@@ -125,6 +125,9 @@ def test_kind_and_scale(device: hizvk.Device, dtype: Any) -> None:
     assert kept(behind, kind="z") == (False, False)
     assert kept(behind, kind="z", scale=2.0) == (True, True)
     assert kept(behind, kind="distance", scale=2.0) == (True, True)
+    far_behind = box((-1, -1, -10), (1, 1, -9))
+    assert kept(far_behind, kind="z", scale=2.0) == (False, False)
+    assert kept(far_behind, kind="z", scale=3.0) == (True, True)
 
 
 def test_levels(device: hizvk.Device) -> None:

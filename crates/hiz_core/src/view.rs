@@ -427,6 +427,13 @@ mod tests {
         let m = [[1e30, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
         let camera = Camera::from_clip_from_world(m, ImageSize::new(8, 8), DepthConvention::Standard).unwrap();
         assert!(ViewRows::new(&camera, 0.0).unwrap_err().to_string().contains("2^34"));
+        // Half an image of 8 pixels is 4 times the coefficient.
+        for (exponent, held) in [(31, true), (33, false)] {
+            let mut m = m;
+            m[0][0] = 2.0_f64.powi(exponent);
+            let camera = Camera::from_clip_from_world(m, ImageSize::new(8, 8), DepthConvention::Standard).unwrap();
+            assert_eq!(ViewRows::new(&camera, 0.0).is_ok(), held, "2^{exponent}");
+        }
     }
 
     #[test]

@@ -59,15 +59,18 @@ fn a_wall_has_its_depth_and_nothing_is_far() {
 fn the_nearer_of_two_walls_wins() {
     for convention in CONVENTIONS {
         let camera = camera_along_z(8, 8, convention);
-        let (mut vertices, mut triangles) = square(8.0, 100.0);
-        let (near, second) = square(2.0, 1.0);
-        vertices.extend(near);
-        triangles.extend(second.iter().map(|i| i + 4));
-        let depth = draw(&vertices, &triangles, None, FaceCull::None, &camera);
-        // The near square spans half the image: pixels 2 to 5.
-        for (i, d) in depth.iter().enumerate() {
-            let inside = (2..6).contains(&(i % 8)) && (2..6).contains(&(i / 8));
-            assert_eq!(*d, ndc(if inside { 2.0 } else { 8.0 }, convention), "pixel {i}");
+        // Whichever is drawn first.
+        for [(z, r), (next_z, next_r)] in [[(8.0, 100.0), (2.0, 1.0)], [(2.0, 1.0), (8.0, 100.0)]] {
+            let (mut vertices, mut triangles) = square(z, r);
+            let (next, second) = square(next_z, next_r);
+            vertices.extend(next);
+            triangles.extend(second.iter().map(|i| i + 4));
+            let depth = draw(&vertices, &triangles, None, FaceCull::None, &camera);
+            // The near square spans half the image: pixels 2 to 5.
+            for (i, d) in depth.iter().enumerate() {
+                let inside = (2..6).contains(&(i % 8)) && (2..6).contains(&(i / 8));
+                assert_eq!(*d, ndc(if inside { 2.0 } else { 8.0 }, convention), "pixel {i}");
+            }
         }
     }
 }

@@ -166,6 +166,9 @@ fn strict_instances_refuse_bad_bounds_by_index() {
 fn too_far_for_this_camera_is_invalid_and_kept() {
     // 2^55 passes the test of the bits but not the camera's coordinate limit, 2^50 at most.
     assert_eq!(before_a_wall(&spheres(&[([0.0, 0.0, 2.0_f64.powi(55)], 1.0)])), [INVALID]);
+    // This camera's: 2^58 over 2^16 times the coefficients of w, which are 1.
+    let at = |exponent| ([0.0, 0.0, 2.0_f64.powi(exponent)], 1.0);
+    assert_eq!(before_a_wall(&spheres(&[at(41), at(43), at(49)])), [OCCLUDED, INVALID, INVALID]);
 }
 
 #[test]

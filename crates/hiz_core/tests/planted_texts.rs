@@ -75,22 +75,21 @@ fn planted(source: &str) -> Vec<String> {
     let tokens = tokens(source);
     let mut names = HashMap::new();
     for i in 0..tokens.len() {
-        if let [Word(name), rest @ ..] = &tokens[i..] {
-            let value = match rest {
-                [Sign('='), Text(text), Sign(';'), ..]
-                | [Sign(':'), Sign('&'), Word(_), Sign('='), Text(text), Sign(';'), ..] => text,
-                _ => continue,
-            };
-            names.insert(name.clone(), value.clone());
-        }
+        let [Word(name), rest @ ..] = &tokens[i..] else { continue };
+        let ([Sign('='), Text(value), Sign(';'), ..]
+        | [Sign(':'), Sign('&'), Word(_), Sign('='), Text(value), Sign(';'), ..]) = rest
+        else {
+            continue;
+        };
+        names.insert(name.clone(), value.clone());
     }
     let mut found = Vec::new();
     for i in 1..tokens.len() {
         let is_call = matches!(tokens[i - 1], Word(_) | Sign('!'));
-        let what = match &tokens[i..] {
-            [Sign('('), what, Sign(','), Text(_), Sign(',' | ')'), ..] => what,
-            [Sign('('), what, Sign(','), Sign('&'), Word(_), Sign(',' | ')'), ..] => what,
-            _ => continue,
+        let ([Sign('('), what, Sign(','), Text(_), Sign(',' | ')'), ..]
+        | [Sign('('), what, Sign(','), Sign('&'), Word(_), Sign(',' | ')'), ..]) = &tokens[i..]
+        else {
+            continue;
         };
         match what {
             _ if is_call => {}
