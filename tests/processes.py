@@ -33,7 +33,17 @@ def early() -> None:
         # A GPU's driver may have its reasons.
         print("threads left:", threads() - THREADS if SOFTWARE else 0)
 
+    if "after_the_end_for_many" in sys.argv:
+        # They meet while the first error is made.
+        sys.setswitchinterval(1e-6)
+        GO.set()
+        for thread in MANY:
+            thread.join()
+        print("joined", len(MANY))
 
+
+GO = threading.Event()
+MANY: list[threading.Thread] = []
 atexit.register(early)
 
 import numpy as np  # noqa: E402
@@ -207,6 +217,23 @@ def end(how: str) -> None:
         ring.append(ring)
 
 
+def waits_for_the_end() -> None:
+    """Daemons that ask a device once every one has been let go of."""
+    device = used()
+
+    def ask() -> None:
+        GO.wait()
+        for _ in range(200):
+            try:
+                print(device.max_image_side)
+            except hizvk.HizError:
+                pass
+
+    MANY.extend(threading.Thread(target=ask, daemon=True) for _ in range(8))
+    for thread in MANY:
+        thread.start()
+
+
 def while_threads_cull() -> None:
     """Forks while others are in the middle of everything."""
 
@@ -245,6 +272,9 @@ def main(scene: str) -> None:
     """See the top."""
     if scene.startswith("end_") or scene == "after_the_end":
         end(scene.removeprefix("end_"))
+        return
+    if scene == "after_the_end_for_many":
+        waits_for_the_end()
         return
     if scene == "refused":
         inherits()

@@ -52,6 +52,11 @@ def test_after_the_end_a_device_is_an_error() -> None:
     assert left == "threads left: 0", "the driver's threads are joined when its device is destroyed"
 
 
+def test_after_the_end_many_threads_meet_an_error_and_no_lock() -> None:
+    ended = run("after_the_end_for_many")
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "joined 8\n", "")
+
+
 def test_a_fork_is_told_of_its_parents_objects() -> None:
     told = run("refused")
     assert (told.returncode, told.stderr) == (0, "")

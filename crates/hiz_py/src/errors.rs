@@ -35,6 +35,14 @@ static LIMIT: Exception = Exception::new("LimitError");
 static DEVICE_LOST: Exception = Exception::new("DeviceLostError");
 static OUT_OF_MEMORY: Exception = Exception::new("OutOfMemoryError");
 
+/// Imports all of them: what is made once at its first use has a lock, which a forked child may find held.
+pub(crate) fn prepare(py: Python<'_>) -> PyResult<()> {
+    for exception in [&HIZ_ERROR, &NO_ADAPTER, &LIMIT, &DEVICE_LOST, &OUT_OF_MEMORY] {
+        exception.class.import(py, "hizvk.errors", exception.name)?;
+    }
+    Ok(())
+}
+
 /// The Python exception for an error of the engine.
 pub(crate) fn raised(py: Python<'_>, error: Error) -> PyErr {
     let text = error.to_string();

@@ -63,7 +63,9 @@ impl<T: OnDevice> Held<T> {
 
     /// For what the host knows and no lock guards: works in forks, too.
     pub(crate) fn look(&self, py: Python<'_>) -> PyResult<Arc<T>> {
-        self.0.lock().clone().ok_or_else(|| closed(py))
+        // The lock is let go of before the exception is made: that may hand the interpreter lock on, to a thread that wants this one.
+        let value = self.0.lock().clone();
+        value.ok_or_else(|| closed(py))
     }
 
     /// [`detached`] with what is held.

@@ -46,7 +46,11 @@ mod _core {
 
     #[pymodule_init]
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+        use numpy::PyArrayMethods;
         use pyo3::types::{PyAnyMethods, PyDictMethods};
+        crate::errors::prepare(module.py())?;
+        // The same for what stands between NumPy and Rust.
+        drop(numpy::PyArray1::<f32>::from_vec(module.py(), Vec::new()).readonly());
         let (atexit, os) = (module.py().import("atexit")?, module.py().import("os")?);
         atexit.call_method1("register", (module.getattr("let_go")?,))?;
         if let Ok(register) = os.getattr("register_at_fork") {
