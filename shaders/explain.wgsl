@@ -6,7 +6,8 @@ struct Explanation {
     level: u32,
     farthest_bits: u32,
     pixels: vec4<i32>,
-    // An estimate of the bounds' least and greatest NDC depth, meaningless where they cross w = 0; then of w.
+    // An estimate of the bounds' least and greatest NDC depth, meaningless where they cross w = 0;
+    // then of w.
     depths: vec4<f32>,
     // The last one that was read, told or not.
     last: vec4<u32>,
@@ -21,10 +22,12 @@ struct Explanation {
 // .x: the instance within its piece.
 @group(1) @binding(0) var<uniform> which: vec4<u32>;
 @group(2) @binding(0) var<storage, read_write> explanation: Explanation;
-// What was read, in order: level and flags, x, y, the depth's bits. What has no room is only counted.
+// What was read, in order: level and flags, x, y, the depth's bits. What has no room is only
+// counted.
 @group(2) @binding(1) var<storage, read_write> readings: array<vec4<u32>>;
 
-// Flags: all of the volume is behind the texel's depth; or its own outline and front there tell that nothing shows.
+// Flags: all of the volume is behind the texel's depth; or its own outline and front there tell
+// that nothing shows.
 const BEHIND: u32 = 0x100u;
 const CLEAR: u32 = 0x200u;
 

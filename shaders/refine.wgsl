@@ -1,11 +1,13 @@
-// What the members of hidden groups are themselves: an invocation tells those of one. The cull hides them with their group and asks no
-// more. Here those of a group outside the view are outside; of a group that is hidden by depth those are outside that their own
-// certificates call so, and the others occluded. After it each place has a verdict, and the group is told: it may run again, and with
-// other bounds, and changes nothing.
+// What the members of hidden groups are themselves: an invocation tells those of one. The cull
+// hides them with their group and asks no more. Here those of a group outside the view are outside;
+// of a group that is hidden by depth those are outside that their own certificates call so, and the
+// others occluded. After it each place has a verdict, and the group is told: it may run again, and
+// with other bounds, and changes nothing.
 
 const WORKGROUP: u32 = 64u;
 
-// Added to the verdict of a group whose members have theirs (twin: `crates/hiz_core/src/cull/refine.rs`).
+// Added to the verdict of a group whose members have theirs (twin:
+// `crates/hiz_core/src/cull/refine.rs`).
 const TOLD: u32 = 4u;
 
 @group(1) @binding(0) var<uniform> piece: Piece;

@@ -128,7 +128,10 @@ impl HizContext {
     /// stored order, and the boxes of their groups of 64 follow: where instances have moved far, groups have grown, and
     /// new [`Instances`] are faster to cull. `strict` refuses bad bounds, and then nothing has changed.
     ///
-    /// What was submitted before sees the old bounds, what is submitted later the new ones. Submit updates of the same instances in
+    /// What was submitted before sees the old bounds, what is submitted later the new ones. (The
+    /// verdicts of an [`Engine`](crate::headless::Engine)'s culls are refined here, from the old
+    /// bounds. Of a cull that is submitted between this recording and its submit, read them
+    /// before.) Submit updates of the same instances in
     /// the order in which they were recorded, each one: after one that was left out or overtaken, groups that are touched are never
     /// culled as a whole any more. (Nothing visible is culled for it.) The new records wait in memory of the device until then.
     ///
@@ -144,7 +147,8 @@ impl HizContext {
         strict: bool,
     ) -> Result<()> {
         update::record(&self.gpu, encoder, instances, first, bounds, strict, |encoder, range| {
-            // Recording is not running: the verdicts stay to be refined, which a second time changes nothing.
+            // Recording is not running: the verdicts stay to be refined, which a second time
+            // changes nothing.
             let watches = instances.watches();
             watches.record_refinements(&self.gpu, encoder, instances)?;
             watches.note(&range);

@@ -9,7 +9,8 @@ use crate::visible::Visible;
 /// Places that one workgroup counts; `shaders/count.wgsl`.
 const COUNT_WORKGROUP: u32 = 64 * 16;
 
-/// Adds the verdicts in `visible`, each place's own (`cull::Refinement`), to `counters`, a `CounterRecord` of zeros.
+/// Adds the verdicts in `visible`, each place's own (`cull::Refinement`), to `counters`, a
+/// `CounterRecord` of zeros.
 pub(crate) fn record(
     gpu: &Gpu,
     pass: &mut wgpu::ComputePass<'_>,

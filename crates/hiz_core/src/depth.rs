@@ -212,7 +212,8 @@ fn ray_length(inverse: &[[(f64, f64); 3]; 3], at: Vec3) -> (f64, f64) {
     (length, error * (1.0 + 1e-9) + 8.0 * ROUNDING * length)
 }
 
-/// What view depth, in world units, a camera's NDC depth and w stand for: for people, nothing is decided by it.
+/// What view depth, in world units, a camera's NDC depth and w stand for: for people, nothing is
+/// decided by it.
 pub(crate) enum ViewDepth {
     /// NDC depth is `slope + constant / w`, within the error, where it depends on w alone.
     FromEye {
@@ -226,7 +227,8 @@ pub(crate) enum ViewDepth {
 }
 
 impl ViewDepth {
-    /// Nothing for a parallel camera that does not say where its depth starts or whose depth does not grow along its rays.
+    /// Nothing for a parallel camera that does not say where its depth starts or whose depth does
+    /// not grow along its rays.
     pub(crate) fn new(camera: &Camera) -> Option<Self> {
         let rows = camera.rows_near_one();
         let rays = if camera.is_orthographic() { parallel(camera, &rows) } else { from_eye(&rows) };
@@ -413,7 +415,8 @@ mod tests {
         }
     }
 
-    /// View depth back from NDC depth, and from w: planes of the test's cameras at depths that are worked out by hand.
+    /// View depth back from NDC depth, and from w: planes of the test's cameras at depths that are
+    /// worked out by hand.
     #[test]
     fn view_depth_comes_back() {
         let near = |z: Option<f64>, expected: f64| assert!((z.unwrap() - expected).abs() < 1e-12, "{z:?} {expected}");
@@ -435,7 +438,8 @@ mod tests {
             near(view.of_ndc(at_3), 5.0);
             assert_eq!(view.of_w(1.0), None);
         }
-        // A bare orthographic matrix does not say where depth starts; with an oblique near plane NDC depth depends on the pixel.
+        // A bare orthographic matrix does not say where depth starts; with an oblique near plane
+        // NDC depth depends on the pixel.
         let size = ImageSize::new(2, 2);
         let bare = |z, w| {
             let rows = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], z, w];

@@ -258,7 +258,8 @@ impl Instances {
         self.pieces.iter().map(|p| p.order.host_bytes()).sum::<u64>() + groups
     }
 
-    /// The culls that were submitted. Held while one is submitted and added, and while an update is submitted and noted.
+    /// The culls that were submitted. Held while one is submitted and added, and while an update is
+    /// submitted and noted.
     pub(crate) fn watches(&self) -> MutexGuard<'_, Watches> {
         self.watches.lock().unwrap_or_else(PoisonError::into_inner)
     }

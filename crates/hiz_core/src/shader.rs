@@ -120,7 +120,8 @@ pub(crate) fn yardstick_reduce_texture(source: SourceKind) -> String {
     [wgsl!("shared/depth_bits"), &source.wgsl(), wgsl!("yardstick/reduce_texture")].join("\n")
 }
 
-/// The cull (`entry` = its own file), which shares everything up to the verdict with the explanation.
+/// The cull (`entry` = its own file), which shares everything up to the verdict with the
+/// explanation.
 fn classifying(store: DepthStore, kind: BoundsKind, entry: &str) -> String {
     module(store, kind, &certified(), &[wgsl!("shared/untold"), entry].join("\n"))
 }

@@ -35,7 +35,8 @@ struct Replacement<'a> {
     target: &'a Records,
 }
 
-/// `before` records what has to read the old bounds; it is told which instances will have new ones, and asked if there are any.
+/// `before` records what has to read the old bounds; it is told which instances will have new ones,
+/// and asked if there are any.
 pub(crate) fn record(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,

@@ -1,8 +1,9 @@
 //! What a submitted cull has to know of later updates of its instances, and they of it.
 //!
-//! Verdicts of the members of hidden groups are refined when they are first read (`cull::Refinement`), from the bounds that were
-//! culled. So an update refines those of all submitted culls first; and notes which instances it changed, so that an explanation,
-//! which tests the bounds as they are now, can say that they are not the ones that were culled.
+//! Verdicts of the members of hidden groups are refined when they are first read
+//! (`cull::Refinement`), from the bounds that were culled. So an update refines those of all
+//! submitted culls first; and notes which instances it changed, so that an explanation, which tests
+//! the bounds as they are now, can say that they are not the ones that were culled.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -21,9 +22,11 @@ pub(crate) struct Watch {
 
 #[derive(Debug)]
 struct State {
-    /// Until the commands that refine the verdicts were submitted, behind the cull and before any update.
+    /// Until the commands that refine the verdicts were submitted, behind the cull and before any
+    /// update.
     refinement: Option<Refinement>,
-    /// The instances that were updated since: from the first to before the last, apart and not touching.
+    /// The instances that were updated since: from the first to before the last, apart and not
+    /// touching.
     updated: BTreeMap<u32, u32>,
 }
 
@@ -46,6 +49,9 @@ impl Watch {
 
 impl State {
     fn note(&mut self, range: &Range<u32>) {
+        if range.is_empty() {
+            return;
+        }
         let Range { mut start, mut end } = *range;
         // All that overlap or touch it become one with it.
         while let Some((first, last)) = self.updated.range(..=end).next_back().map(|(first, last)| (*first, *last)) {

@@ -1,8 +1,10 @@
-//! What a verdict says: the same with groups and without, whenever it is read, and explained by what was read for it.
+//! What a verdict says: the same with groups and without, whenever it is read, and explained by
+//! what was read for it.
 
 mod common;
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use common::{CONVENTIONS, Random, camera_along_z, engine, ndc};
 use hiz_core::headless::{Culling, Engine, Explanation};
@@ -17,8 +19,8 @@ const OCCLUDED: u8 = 1;
 const VISIBLE: u8 = 2;
 const SIDE: u32 = 64;
 
-/// Volumes behind the wall at depth 4, a good part of them beside what the camera sees: |x| and |y| up to z. In arrays of any kind;
-/// the volume of each holds the sphere about its centre.
+/// Volumes behind the wall at depth 4, a good part of them beside what the camera sees: |x| and |y|
+/// up to z. In arrays of any kind; the volume of each holds the sphere about its centre.
 struct Crowd {
     centers: Vec<f64>,
     radii: Vec<f64>,
@@ -56,8 +58,9 @@ impl Crowd {
         }
     }
 
-    /// How far the sphere within volume `i` and the box around it stay from the sides of the view, x = +-z and y = +-z: negative
-    /// inside. Worked out by hand, as a distance times the square root of 2.
+    /// How far the sphere within volume `i` and the box around it stay from the sides of the view,
+    /// x = +-z and y = +-z: negative inside. Worked out by hand, as a distance times the square
+    /// root of 2.
     fn beside(&self, i: usize) -> [f64; 2] {
         let [x, y, z] = [0, 1, 2].map(|k| self.centers[3 * i + k]);
         let (side, r) = (x.abs().max(y.abs()) - z, self.radii[i]);
@@ -145,7 +148,8 @@ fn verdicts_are_the_same_with_groups_and_without() {
     assert!(refined > 20, "members outside of groups that are hidden by depth: {refined}");
 }
 
-/// An update in between does not change what a cull found, on whatever way it comes, and whatever was read before.
+/// An update in between does not change what a cull found, on whatever way it comes, and whatever
+/// was read before.
 #[test]
 fn verdicts_are_those_of_the_bounds_that_were_culled() {
     let (before, after) = (Crowd::new(2500, 7), Crowd::new(2500, 8));
@@ -164,7 +168,8 @@ fn verdicts_are_those_of_the_bounds_that_were_culled() {
             }
             let encoder = || engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             let (mut kept, mut dropped) = (encoder(), encoder());
-            // One that is recorded and submitted, after the refinement of a cull was recorded that never ran.
+            // One that is recorded and submitted, after the refinement of a cull was recorded that
+            // never ran.
             engine().context().record_update(&mut kept, instances, 0, &bounds, true).unwrap();
             drop(engine().context().record_update(&mut dropped, instances, 0, &bounds, true));
             engine().queue().submit([kept.finish()]);
@@ -209,6 +214,15 @@ fn explanations_of_updated_instances_are_stale() {
     assert!((0..640).all(|i| i == 77 || again[i].verdict == told[i].verdict));
 }
 
+/// Counts down where a thread ends, in a panic as well.
+struct Done<'a>(&'a AtomicUsize);
+
+impl Drop for Done<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
 /// Culls, reads and updates on threads: each answer is that of one state of the instances.
 #[test]
 fn verdicts_on_threads() {
@@ -222,9 +236,11 @@ fn verdicts_on_threads() {
         .each_ref()
         .map(|crowd| cull(&engine(), (&upload(&engine(), crowd, kind), &camera, &pyramid), &flat).verdicts().unwrap());
     let instances = upload(&engine(), &states[0], kind);
+    let running = AtomicUsize::new(2);
     std::thread::scope(|scope| {
         for _ in 0..2 {
             scope.spawn(|| {
+                let _done = Done(&running);
                 for k in 0..40 {
                     let culling = cull(&engine(), (&instances, &camera, &pyramid), &options);
                     let later = cull(&engine(), (&instances, &camera, &pyramid), &options);
@@ -237,7 +253,7 @@ fn verdicts_on_threads() {
             });
         }
         scope.spawn(|| {
-            for k in 1..60 {
+            for k in (1..).take_while(|_| running.load(Ordering::Relaxed) > 0) {
                 engine().update(&instances, 0, &states[k % 2].bounds(kind), true).unwrap();
             }
         });
@@ -259,7 +275,8 @@ fn texels_counted(
     (culling, counts.texels_read)
 }
 
-/// Every texel that a test reads is told, with the depth that the level has there, and `farthest` agrees with the verdict.
+/// Every texel that a test reads is told, with the depth that the level has there, and `farthest`
+/// agrees with the verdict.
 #[test]
 fn explain_tells_what_was_read() {
     let mut random = Random(31);
@@ -278,6 +295,7 @@ fn explain_tells_what_was_read() {
             (Footprint::Eight, 0, Fit::Rectangle),
             (Footprint::Two, 5, Fit::Rectangle),
             (Footprint::Two, 4096, Fit::Rectangle),
+            (Footprint::Two, 9, Fit::Volume),
             (Footprint::Two, 4096, Fit::Volume),
             (Footprint::Four, 0, Fit::Volume),
         ] {
@@ -296,12 +314,30 @@ fn explain_tells_what_was_read() {
                 if fit == Fit::Rectangle {
                     assert_farthest(&told, convention, &what);
                 }
+                let is_descent = told.texels_read as usize > footprint_of(&told).len();
+                if told.verdict == VISIBLE && is_descent && descent > 0 {
+                    // At a texel that decides no budget helps, and where a budget ended one does.
+                    let deeper = CullOptions { descent: 65_536, ..options.clone() };
+                    let (deeper, more) = texels_counted(&engine(), &camera, &pyramid, &bounds, &deeper);
+                    let same = deeper.verdicts().unwrap()[0] == VISIBLE && more == texels_read;
+                    assert!(if told.reason.contains("budget") { more > texels_read } else { same }, "{what} {more}");
+                }
                 *ends.entry(format!("{} {}", told.verdict, told.reason)).or_default() += 1;
             }
         }
     }
     eprintln!("{ends:#?}");
-    assert!(ends.len() >= 5, "{ends:?}");
+    let seen = |what: &str| ends.keys().any(|end| end.contains(what));
+    for what in ["farthest depth of the texels", "all texels", "every pixel", "a pixel", "budget"] {
+        assert!(seen(what), "{what} in {ends:?}");
+    }
+}
+
+/// All texels of the level that the rectangle meets, row by row.
+fn footprint_of(told: &Explanation) -> Vec<[u32; 2]> {
+    let (Some(level), Some(rectangle)) = (told.level, told.rectangle) else { return Vec::new() };
+    let [x0, y0, x1, y1] = rectangle.map(|p| p as u32 >> level);
+    (y0..=y1).flat_map(|y| (x0..=x1).map(move |x| [x, y])).collect()
 }
 
 fn assert_told(told: &Explanation, levels: &[Vec<f32>], what: &str) {
@@ -312,9 +348,8 @@ fn assert_told(told: &Explanation, levels: &[Vec<f32>], what: &str) {
         assert_eq!(levels[*level as usize][(y * width + x) as usize], *depth, "{what}");
     }
     let Some(level) = told.level else { return };
-    // The footprint comes first: all texels of its level that the rectangle meets, row by row.
-    let [x0, y0, x1, y1] = told.rectangle.unwrap().map(|p| p as u32 >> level);
-    let footprint: Vec<_> = (y0..=y1).flat_map(|y| (x0..=x1).map(move |x| [x, y])).collect();
+    // The footprint comes first.
+    let footprint = footprint_of(told);
     assert_eq!(told.texels[..footprint.len()], footprint, "{what}");
     assert!(told.texel_levels[..footprint.len()].iter().all(|l| *l == level), "{what}");
     if told.texels_read as usize == footprint.len() {
@@ -340,7 +375,8 @@ fn assert_farthest(told: &Explanation, convention: DepthConvention, what: &str) 
     assert!((nearest_z / z(nearest) - 1.0).abs() < 1e-4, "{what}");
 }
 
-/// A descent reads more than is listed: the rest is counted, and what is told of it agrees with the verdict.
+/// A descent reads more than is listed: the rest is counted, and what is told of it agrees with the
+/// verdict.
 #[test]
 fn what_is_not_listed_is_counted() {
     let convention = DepthConvention::Reversed;
@@ -351,7 +387,8 @@ fn what_is_not_listed_is_counted() {
     let bounds = Bounds::Boxes { min: Floats::F64(&[-7.0, -7.0, 8.0]), max: Floats::F64(&[7.0, 7.0, 9.0]) };
     let options = CullOptions { descent: 65_536, ..CullOptions::default() };
     for (far, verdict) in [(None, OCCLUDED), (Some(511 - 40), VISIBLE)] {
-        // At depth 8 the box spans pixels 32 to 479: below, a pixel of the last rows. And the dents hide a box at depth 8.
+        // At depth 8 the box spans pixels 32 to 479: below, a pixel of the last rows. And the dents
+        // hide a box at depth 8.
         if let Some(row) = far {
             depth[row * 512 + 470] = ndc(50.0, convention);
         }
@@ -379,8 +416,8 @@ fn the_reads_of_groups_are_counted() {
         let culling = cull(&engine(), (&instances, &camera, &pyramid), &options);
         let counts = culling.counts().unwrap();
         assert_eq!((counts.occluded, counts.tested_groups, counts.tested_instances), (64, 1, 0));
-        // From x = -0.1 to 0.73 at depth 7.9: pixels 31 to 34, and rows 31 and 32. Three texels of level 1 are too many, so level 2 is
-        // read: columns 7 and 8, rows 7 and 8.
+        // From x = -0.1 to 0.73 at depth 7.9: pixels 31 to 34, and rows 31 and 32. Three texels of
+        // level 1 are too many, so level 2 is read: columns 7 and 8, rows 7 and 8.
         assert_eq!((counts.texels_read, counts.levels[2], counts.levels.iter().sum::<u64>()), (4, 1, 1));
         let told = culling.explain(5).unwrap();
         assert_eq!((told.verdict, told.group.as_ref().unwrap().texels_read), (OCCLUDED, 4));
@@ -409,5 +446,11 @@ fn compiling_is_told_apart() {
         eprintln!("{hierarchy:?}: first {first:?}, second {second:?}");
         assert!(first.compile_ms > 0.0 && first.record_ms > 0.0 && first.wall_ms > 0.0, "{first:?}");
         assert!(second.compile_ms == 0.0, "{second:?}");
+        // It ends when the device is seen to be done, whoever asks and whenever the answer is read.
+        let third = cull(engine, (&instances, &camera, &pyramid), &options);
+        engine.wait().unwrap();
+        let seen = third.timings().wall_ms;
+        third.mask().unwrap();
+        assert!(seen > 0.0 && third.timings().wall_ms == seen, "{seen} {:?}", third.timings());
     }
 }

@@ -32,11 +32,12 @@ pub(crate) const LEVEL_MASK: u32 = 0xFF;
 pub(crate) const BEHIND: u32 = 0x100;
 pub(crate) const CLEAR: u32 = 0x200;
 
-/// How many readings an explanation tells at most. A descent may read 65,536 texels; what comes after these is counted.
+/// How many readings an explanation tells at most. A descent may read 65,536 texels; what comes
+/// after these is counted.
 pub(crate) const TEXELS_TOLD: usize = 4096;
 
-/// Records the explanation of instance `index`, or of the box around its group, into `target`, an `ExplanationRecord`, and `readings`,
-/// as many [`Reading`]s as there is room for: both storage.
+/// Records the explanation of instance `index`, or of the box around its group, into `target`, an
+/// `ExplanationRecord`, and `readings`, as many [`Reading`]s as there is room for: both storage.
 pub(crate) fn record_explain(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,

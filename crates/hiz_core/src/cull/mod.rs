@@ -30,7 +30,8 @@ pub(crate) struct CullInputs<'a> {
     pub(crate) options: &'a CullOptions,
     /// False: the yardstick, for boxes and the flat cull alone.
     pub(crate) certified: bool,
-    /// All dispatches are of no workgroups: nothing is culled, but a driver that compiles at the first dispatch does it.
+    /// All dispatches are of no workgroups: nothing is culled, but a driver that compiles at the
+    /// first dispatch does it.
     pub(crate) idle: bool,
 }
 

@@ -1,4 +1,5 @@
-//! The verdicts of the members of groups that were hidden as a whole, which a cull leaves to whoever reads them.
+//! The verdicts of the members of groups that were hidden as a whole, which a cull leaves to
+//! whoever reads them.
 
 use std::sync::Arc;
 
@@ -15,7 +16,8 @@ use crate::visible::Visible;
 /// Groups that one workgroup tells; `shaders/refine.wgsl`.
 const WORKGROUP: u32 = 64;
 
-/// Of a group's word, what is its verdict; the next bit says that its members have theirs (`shaders/refine.wgsl`, `TOLD`).
+/// Of a group's word, what is its verdict; the next bit says that its members have theirs
+/// (`shaders/refine.wgsl`, `TOLD`).
 pub(crate) const VERDICT_MASK: u8 = 3;
 
 /// What is left to be done of a cull that tested groups.
@@ -29,7 +31,8 @@ pub(crate) struct Refinement {
 }
 
 impl Refinement {
-    /// Of a cull that was recorded; nothing where every place has a verdict of its own, or none was asked for.
+    /// Of a cull that was recorded; nothing where every place has a verdict of its own, or none was
+    /// asked for.
     pub(crate) fn new(
         instances: &Instances,
         camera: &Camera,

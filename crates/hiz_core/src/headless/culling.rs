@@ -65,11 +65,13 @@ pub struct Counts {
 pub struct Timings {
     /// Making buffers and recording.
     pub record_ms: f64,
-    /// Making the pipelines that were not there yet, the driver's own compiling included; next to 0 in a cull like an earlier one.
+    /// Making the pipelines that were not there yet, the driver's own compiling included; next to 0
+    /// in a cull like an earlier one.
     pub compile_ms: f64,
-    /// From the submit until the device was seen to be done with it; 0 before that. What was submitted earlier and was not done yet
-    /// comes first, so it counts. A device tells only who asks: that is each read and wait, and each submit. Who does something else
-    /// before the first of them finds more than the device took.
+    /// From the submit until the device was seen to be done with it; 0 before that. What was
+    /// submitted earlier and was not done yet comes first, so it counts. A device tells only who
+    /// asks: that is each read and wait, and each submit. Who does something else before the first
+    /// of them finds more than the device took.
     pub wall_ms: f64,
     /// Copies to the host after that, so far.
     pub readback_ms: f64,
@@ -176,10 +178,12 @@ impl Culling {
 
     /// Each instance's verdict: 0 outside, 1 occluded, 2 visible, 3 invalid (kept).
     ///
-    /// Outside is what lies outside the frustum by a certificate of its own or of its group's box (in sample coverage also what lies
-    /// between all pixel centres). Occluded is every other instance that is hidden. So a verdict does not depend on whether groups
-    /// were tested, but for the few instances that a group's test hides and their own would keep: they are occluded. Members of hidden
-    /// groups get theirs by a pass of its own, when verdicts or counts are first read, or before the next update.
+    /// Outside is what lies outside the frustum by a certificate of its own or of its group's box
+    /// (in sample coverage also what lies between all pixel centres). Occluded is every other
+    /// instance that is hidden. So a verdict does not depend on whether groups were tested, but for
+    /// the few instances that a group's test hides and their own would keep: they are occluded.
+    /// Members of hidden groups get theirs by a pass of its own, when verdicts or counts are first
+    /// read, or before the next update.
     ///
     /// # Errors
     /// [`Error::Mismatch`] for a cull without [`Outputs::verdicts`](crate::Outputs::verdicts), [`Error::DeviceLost`], [`Error::OutOfMemory`].
@@ -392,8 +396,9 @@ impl Culling {
         self.instances.pieces.iter().zip(&self.visible.pieces).map(|(piece, output)| of(piece, output)).collect()
     }
 
-    /// Why instance `index` got its verdict: the cull's own steps, run for it once more. They read the bounds as they are now: those of
-    /// an instance that was updated since make an explanation that is [`stale`](Explanation::stale).
+    /// Why instance `index` got its verdict: the cull's own steps, run for it once more. They read
+    /// the bounds as they are now: those of an instance that was updated since make an explanation
+    /// that is [`stale`](Explanation::stale).
     ///
     /// # Errors
     /// [`Error::Invalid`](crate::Error::Invalid) for an index past the end.
@@ -443,7 +448,8 @@ impl Culling {
         Ok(Told { record, readings, camera: &self.camera, options }.explanation())
     }
 
-    /// Where this cull hid the group of an instance: the group's verdict, and whether any of its members was updated since.
+    /// Where this cull hid the group of an instance: the group's verdict, and whether any of its
+    /// members was updated since.
     fn hidden_group(&self, index: u32) -> Result<Option<(u8, bool)>> {
         let pieces = self.instances.pieces.iter().zip(&self.visible.pieces);
         let Some((piece, output)) = pieces.into_iter().find(|(piece, _)| piece.range.contains(&index)) else {

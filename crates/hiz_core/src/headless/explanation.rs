@@ -8,17 +8,20 @@ use super::culling::OCCLUDED;
 
 /// Why an instance got its verdict: the cull's own steps, run for it once more.
 ///
-/// A member of a group that was hidden as a whole was never tested by itself. Its verdict is then the group's (told of in `group`),
-/// or outside where its own test says so; everything else here is its own test, which may have kept it.
+/// A member of a group that was hidden as a whole was never tested by itself. Its verdict is then
+/// the group's (told of in `group`), or outside where its own test says so; everything else here is
+/// its own test, which may have kept it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explanation {
     /// 0 outside, 1 occluded, 2 visible, 3 invalid (kept).
     pub verdict: u8,
-    /// First and last pixel column and row that the projection may touch, inclusive: x0, y0, x1, y1.
+    /// First and last pixel column and row that the projection may touch, inclusive: x0, y0, x1,
+    /// y1.
     pub rectangle: Option<[i32; 4]>,
     /// The level of the footprint.
     pub level: Option<u32>,
-    /// The texels (x, y) that were read, in order: those of the footprint, then those of a descent; the first 4,096.
+    /// The texels (x, y) that were read, in order: those of the footprint, then those of a descent;
+    /// the first 4,096.
     pub texels: Vec<[u32; 2]>,
     /// Their levels.
     pub texel_levels: Vec<u32>,
@@ -26,19 +29,22 @@ pub struct Explanation {
     pub texel_depths: Vec<f32>,
     /// How many were read, those that are not listed included.
     pub texels_read: u32,
-    /// Which of the listed texels decided: the farthest one that hides it, or the one that does not. `None` where no single one did
-    /// or it is not listed.
+    /// Which of the listed texels decided: the farthest one that hides it, or the one that does
+    /// not. `None` where no single one did or it is not listed.
     pub decisive: Option<usize>,
     /// The farthest depth of those that hide it, or the depth that does not.
     pub farthest: Option<f32>,
     /// The NDC depth of the bounds' nearest point, an estimate.
     pub nearest: Option<f64>,
-    /// `farthest` as view depth, in world units; infinite for far. `None` where the camera's NDC depth does not tell it alone: an
-    /// orthographic camera of a bare matrix, an oblique near plane.
+    /// `farthest` as view depth, in world units; infinite for far. `None` where the camera's NDC
+    /// depth does not tell it alone: an orthographic camera of a bare matrix, an oblique near
+    /// plane.
     pub farthest_z: Option<f64>,
-    /// The view depth of the bounds' nearest point in world units, an estimate. `None` for an orthographic camera of a bare matrix.
+    /// The view depth of the bounds' nearest point in world units, an estimate. `None` for an
+    /// orthographic camera of a bare matrix.
     pub nearest_z: Option<f64>,
-    /// The instance was updated since the cull: everything here is of its new bounds, and the cull's verdict may be another.
+    /// The instance was updated since the cull: everything here is of its new bounds, and the
+    /// cull's verdict may be another.
     pub stale: bool,
     /// Of a member of a group that was hidden as a whole: the test of the box around the group.
     pub group: Option<Box<Self>>,
@@ -141,7 +147,8 @@ impl Told<'_> {
         End { reason, decisive: of_footprint.iter().position(|r| r[3] == bits), farthest: Some(f32::from_bits(bits)) }
     }
 
-    /// Why a descent did not hide the volume: at a texel that shows it, at the end of its budget, or at the last certificate.
+    /// Why a descent did not hide the volume: at a texel that shows it, at the end of its budget,
+    /// or at the last certificate.
     fn failed_descent(&self) -> End {
         let [word, x, y, bits] = self.record.last;
         let level = word & LEVEL_MASK;

@@ -183,8 +183,9 @@ impl Engine {
         self.scoped(|| Instances::new(&self.context().gpu, bounds, options, copy)).map(Arc::new)
     }
 
-    /// Replaces instances `first..first + n`: records and submits. A cull that was submitted before sees the old bounds, whenever
-    /// its answer is read. May be called from any thread; updates of the same instances run in the order in which they come here.
+    /// Replaces instances `first..first + n`: records and submits. A cull that was submitted before
+    /// sees the old bounds, whenever its answer is read. May be called from any thread; updates of
+    /// the same instances run in the order in which they come here.
     ///
     /// # Errors
     /// As [`HizContext::record_update`].
@@ -356,8 +357,9 @@ impl Engine {
         Ok(texels)
     }
 
-    /// Culls: records and submits; reading the answer waits. A cull that needs a pipeline that was not made before makes it, and waits
-    /// until the driver has compiled it ([`Timings::compile_ms`]).
+    /// Culls: records and submits; reading the answer waits. A cull that needs a pipeline that was
+    /// not made before makes it, and waits until the driver has compiled it
+    /// ([`Timings::compile_ms`]).
     ///
     /// # Errors
     /// As [`HizContext::record_cull`], and [`Error::OutOfMemory`].
@@ -425,8 +427,9 @@ impl Engine {
         culling
     }
 
-    /// Lets the driver compile what it leaves to the first dispatch of a pipeline: submits the same work of no workgroups, and waits.
-    /// How many milliseconds that took, what was submitted before not counted.
+    /// Lets the driver compile what it leaves to the first dispatch of a pipeline: submits the same
+    /// work of no workgroups, and waits. How many milliseconds that took, what was submitted before
+    /// not counted.
     fn compile(&self, inputs: &CullInputs<'_>, visible: &Visible) -> Result<f64> {
         readback::wait(self.device(), None)?;
         let start = Instant::now();

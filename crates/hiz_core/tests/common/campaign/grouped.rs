@@ -14,8 +14,8 @@ pub(crate) struct Tested {
     pub(crate) instances: u64,
     /// Those that were tested by themselves.
     pub(crate) one_by_one: u64,
-    /// Instances that are kept with groups alone, verdicts that are counted and not there, or the reverse, and those that groups change
-    /// beyond hiding a few more: must be 0.
+    /// Instances that are kept with groups alone, verdicts that are counted and not there, or the
+    /// reverse, and those that groups change beyond hiding a few more: must be 0.
     pub(crate) contradictions: u64,
 }
 
