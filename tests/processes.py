@@ -4,6 +4,7 @@
 """
 
 import atexit
+import contextlib
 import gc
 import multiprocessing
 import os
@@ -224,10 +225,8 @@ def waits_for_the_end() -> None:
     def ask() -> None:
         GO.wait()
         for _ in range(200):
-            try:
+            with contextlib.suppress(hizvk.HizError):
                 print(device.max_image_side)
-            except hizvk.HizError:
-                pass
 
     MANY.extend(threading.Thread(target=ask, daemon=True) for _ in range(8))
     for thread in MANY:

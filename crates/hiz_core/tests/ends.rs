@@ -1,4 +1,5 @@
-//! A process that ends in the middle of a driver's work: `scripts/exits.py` runs this one thousands of times and counts those that abort.
+//! A process that ends in the middle of a driver's work: `scripts/exits.py` runs this one thousands
+//! of times and counts those that abort.
 
 mod common;
 
@@ -6,8 +7,8 @@ use common::{camera_along_z, engine};
 use hiz_core::yardstick::{PerLevelReduction, ReductionShape, submitted_ms};
 use hiz_core::{Bounds, CullOptions, DepthConvention, Floats, InstanceOptions, VisibleOptions};
 
-/// Pipelines are dropped before the last submit. A driver in software frees them on a thread of its own, after it has told that the
-/// submit is done: then this process ends.
+/// Pipelines are dropped before the last submit. A driver in software frees them on a thread of its
+/// own, after it has told that the submit is done: then this process ends.
 #[test]
 fn a_process_ends_while_the_driver_frees() {
     let engine = engine();

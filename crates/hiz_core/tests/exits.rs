@@ -1,5 +1,6 @@
-//! The end of a device: destroyed with the last object on it, on each way out. A driver in software has threads of its own, which the
-//! destruction joins; so the threads of this process tell whether it has happened.
+//! The end of a device: destroyed with the last object on it, on each way out. A driver in software
+//! has threads of its own, which the destruction joins; so the threads of this process tell whether
+//! it has happened.
 
 mod common;
 

@@ -151,6 +151,7 @@ impl Engine {
     }
 
     /// `half`: the numbers were half floats.
+    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn upload_depth(
         &self,
         py: Python<'_>,

@@ -1,10 +1,13 @@
-//! What lives on a device, as Python's objects hold it: let go of before the process ends, and refused in a fork of it.
+//! What lives on a device, as Python's objects hold it: let go of before the process ends, and
+//! refused in a fork of it.
 //!
-//! A driver may be at work on threads of its own after the last wait for it; only the destruction of the device joins them. The
-//! interpreter drops nothing that a module still names when it ends, so [`let_go`] empties every holder at its exit.
+//! A driver may be at work on threads of its own after the last wait for it; only the destruction
+//! of the device joins them. The interpreter drops nothing that a module still names when it ends,
+//! so [`let_go`] empties every holder at its exit.
 //!
-//! A lock that another thread holds at a fork is never released in the child. So those here are only held with the interpreter lock,
-//! which whoever forks has; and [`before_fork`] waits until no call is within the driver, whose locks a child would meet.
+//! A lock that another thread holds at a fork is never released in the child. So those here are
+//! only held with the interpreter lock, which whoever forks has; and [`before_fork`] waits until no
+//! call is within the driver, whose locks a child would meet.
 
 use std::any::Any;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
@@ -46,7 +49,8 @@ impl<T: OnDevice> Held<T> {
 
     /// For calls that ask the device or take a lock.
     pub(crate) fn get(&self, py: Python<'_>) -> PyResult<Arc<T>> {
-        // Before any lock is taken: one that another thread held at the fork is never released here.
+        // Before any lock is taken: one that another thread held at the fork is never released
+        // here.
         let (made_by, here) = (self.0.process, std::process::id());
         if made_by != here {
             return Err(hiz_error(
@@ -63,7 +67,8 @@ impl<T: OnDevice> Held<T> {
 
     /// For what the host knows and no lock guards: works in forks, too.
     pub(crate) fn look(&self, py: Python<'_>) -> PyResult<Arc<T>> {
-        // The lock is let go of before the exception is made: that may hand the interpreter lock on, to a thread that wants this one.
+        // The lock is let go of before the exception is made: that may hand the interpreter lock
+        // on, to a thread that wants this one.
         let value = self.0.lock().clone();
         value.ok_or_else(|| closed(py))
     }
@@ -90,7 +95,8 @@ impl<T> Cell<T> {
 impl<T> Drop for Cell<T> {
     fn drop(&mut self) {
         if self.process != std::process::id() {
-            // In a fork the device's threads are gone, and its locks may be held for ever: nothing of it may be touched.
+            // In a fork the device's threads are gone, and its locks may be held for ever: nothing
+            // of it may be touched.
             std::mem::forget(self.contents.get_mut().unwrap_or_else(PoisonError::into_inner).take());
         }
     }
@@ -190,20 +196,22 @@ where
     T: Send,
     F: Send + FnOnce() -> Result<T, Error>,
 {
-    // Ends with the interpreter lock held: a thread that still waited for the lock when the interpreter ends would be struck down
-    // within this module.
+    // Ends with the interpreter lock held: a thread that still waited for the lock when the
+    // interpreter ends would be struck down within this module.
     let call = Call::begin(py)?;
     let result = py.detach(work);
     drop(call);
     result.map_err(|error| raised(py, error))
 }
 
-/// Lets other threads have the interpreter for a moment. (Waiting by a condition variable would hold a lock without the interpreter's.)
+/// Lets other threads have the interpreter for a moment. (Waiting by a condition variable would
+/// hold a lock without the interpreter's.)
 fn nap(py: Python<'_>) {
     py.detach(|| std::thread::sleep(Duration::from_millis(1)));
 }
 
-/// Waits until no call is within the driver and every device is idle; calls of other threads wait until [`after_fork`].
+/// Waits until no call is within the driver and every device is idle; calls of other threads wait
+/// until [`after_fork`].
 #[pyfunction]
 pub(crate) fn before_fork(py: Python<'_>) {
     house(py).forking.push(std::thread::current().id());
@@ -214,7 +222,8 @@ pub(crate) fn before_fork(py: Python<'_>) {
     let engines: Vec<_> = holders.iter().filter_map(Weak::upgrade).filter_map(|holder| holder.engine()).collect();
     py.detach(|| {
         for engine in &engines {
-            // What is freed after the end of one submit is freed before that of the next. A lost device is idle.
+            // What is freed after the end of one submit is freed before that of the next. A lost
+            // device is idle.
             engine.queue().submit([]);
             drop(engine.wait());
         }
@@ -230,8 +239,8 @@ pub(crate) fn after_fork(py: Python<'_>) {
     }
 }
 
-/// The interpreter is about to end: waits for the calls of threads that it does not wait for (daemons), and lets go of every device.
-/// What comes later is an error.
+/// The interpreter is about to end: waits for the calls of threads that it does not wait for
+/// (daemons), and lets go of every device. What comes later is an error.
 #[pyfunction]
 pub(crate) fn let_go(py: Python<'_>) {
     house(py).closed = true;

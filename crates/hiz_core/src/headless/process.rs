@@ -25,7 +25,8 @@ mod tests {
     #[test]
     fn another_process_is_named_beside_this_one() {
         assert!(Process::this().check().is_ok());
-        // No process has this id: it is the highest that the type holds, and those of Linux end at 2^22.
+        // No process has this id: it is the highest that the type holds, and those of Linux end at
+        // 2^22.
         let text = Process(u32::MAX).check().unwrap_err().to_string();
         let here = std::process::id();
         assert_eq!(
