@@ -61,7 +61,7 @@ impl Refinement {
             label: Some("hiz.refine.pass"),
             timestamp_writes: None,
         });
-        pass.set_pipeline(&gpu.refine_pipeline(instances.kind, self.options.coverage == Coverage::Sample));
+        let is_sample = self.options.coverage == Coverage::Sample;
         pass.set_bind_group(0, &view, &[]);
         for (piece, output) in instances.pieces.iter().zip(&self.visible.pieces) {
             let Some(groups) = output.groups().filter(|_| is_grouped(piece, &self.options)) else { continue };
@@ -70,8 +70,14 @@ impl Refinement {
                 layout: &gpu.layouts().two_storages,
                 entries: &[entry(0, output.mask.as_entire_binding()), entry(1, groups.verdicts.as_entire_binding())],
             });
-            pass.set_bind_group(1, &piece.bindings, &[]);
             pass.set_bind_group(2, &verdicts, &[]);
+            if !is_sample {
+                pass.set_pipeline(&gpu.refine_groups_pipeline());
+                pass.set_bind_group(1, &piece.group_bindings, &[]);
+                pass.dispatch_workgroups(piece.groups().div_ceil(WORKGROUP), 1, 1);
+            }
+            pass.set_pipeline(&gpu.refine_pipeline(instances.kind, is_sample));
+            pass.set_bind_group(1, &piece.bindings, &[]);
             pass.dispatch_workgroups(piece.groups().div_ceil(WORKGROUP), 1, 1);
         }
         Ok(())
