@@ -20,16 +20,26 @@ fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
     begin();
     let group = id.x;
     let first = group * GROUP;
-    if first >= piece.count || group_verdicts[group] >= VISIBLE {
+    if first >= piece.count {
         return;
     }
-    let of_group = group_verdicts[group];
-    for (var place = first; place < min(first + GROUP, piece.count); place += 1u) {
-        var verdict = of_group;
-        if of_group == OCCLUDED && classify(place).verdict == OUTSIDE {
-            verdict = OUTSIDE;
+    let word = group_verdicts[group];
+    let of_group = word & 3u;
+    if (word & TOLD) != 0u || of_group >= VISIBLE {
+        return;
+    }
+    let verdicts = verdicts_begin(piece.words);
+    let end = min(first + GROUP, piece.count);
+    for (var place = first; place < end; place += 1u) {
+        mask[verdicts + place] = of_group;
+    }
+    // `refine_groups.wgsl` adds more to those that lie within the view. A loop of its own: a software
+    // driver skips no branch, but it ends a loop.
+    let may_be_outside = word == OCCLUDED;
+    for (var place = select(end, first, may_be_outside); place < end; place += 1u) {
+        if classify(place).verdict == OUTSIDE {
+            mask[verdicts + place] = OUTSIDE;
         }
-        mask[verdicts_begin(piece.words) + place] = verdict;
     }
     group_verdicts[group] = of_group | TOLD;
 }

@@ -202,6 +202,12 @@ pub(crate) fn refine(kind: BoundsKind) -> String {
     classifying(DepthStore::Nowhere, kind, &entry.join("\n"))
 }
 
+/// The groups that lie within the view.
+pub(crate) fn refine_groups() -> String {
+    let entry = [wgsl!("shared/piece"), wgsl!("refine_groups")];
+    classifying(DepthStore::Nowhere, BoundsKind::Box, &entry.join("\n"))
+}
+
 /// The explanation of one instance's verdict.
 pub(crate) fn explain(store: DepthStore, kind: BoundsKind) -> String {
     module(store, kind, &certified(), wgsl!("explain"))
@@ -243,6 +249,7 @@ pub(crate) fn all() -> Vec<String> {
         .flat_map(of_source)
         .chain(culls(DepthStore::Atlas))
         .chain(KINDS.map(refine))
+        .chain([refine_groups()])
         .chain([compact(), count(), update(), occluders()])
         .collect()
 }

@@ -402,9 +402,10 @@ fn refined_verdicts() {
     assert_eq!(run(&[]), 0);
     for (name, what, by) in [
         ("groups of 32", "let first = group * GROUP;", "let first = group * 32u;"),
-        ("half of the members", "place < min(first + GROUP,", "place < min(first + 32u,"),
+        ("half of the members", "let end = min(first + GROUP,", "let end = min(first + 32u,"),
         ("the group's verdict for all", "classify(place).verdict == OUTSIDE", "false"),
-        ("nobody is occluded", "of_group == OCCLUDED && classify(place).verdict == OUTSIDE", "of_group == OCCLUDED"),
+        ("nobody is occluded", "if classify(place).verdict == OUTSIDE", "if may_be_outside"),
+        ("all are within the view", "if is_within(group) {", "if true {"),
     ] {
         let contradictions = run(&[(what, by)]);
         eprintln!("{name}: {contradictions} contradictions");

@@ -58,12 +58,12 @@ impl Refinement {
             gpu.layouts().cull(DepthStore::Nowhere),
             &[entry(2, self.pyramid.uniform.as_entire_binding()), entry(6, view.as_entire_binding())],
         )?;
-        let pipeline = gpu.refine_pipeline(instances.kind, self.options.coverage == Coverage::Sample)?;
+        let is_sample = self.options.coverage == Coverage::Sample;
+        let (of_groups, of_members) = (gpu.refine_groups_pipeline()?, gpu.refine_pipeline(instances.kind, is_sample)?);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("hiz.refine.pass"),
             timestamp_writes: None,
         });
-        pass.set_pipeline(&pipeline);
         pass.set_bind_group(0, &view, &[]);
         for (piece, output) in instances.pieces.iter().zip(&self.visible.pieces) {
             let Some(groups) = output.groups().filter(|_| is_grouped(piece, &self.options)) else { continue };
@@ -72,8 +72,14 @@ impl Refinement {
                 &gpu.layouts().two_storages,
                 &[entry(0, output.mask.as_entire_binding()), entry(1, groups.verdicts.as_entire_binding())],
             )?;
-            pass.set_bind_group(1, &piece.bindings, &[]);
             pass.set_bind_group(2, &verdicts, &[]);
+            if !is_sample {
+                pass.set_pipeline(&of_groups);
+                pass.set_bind_group(1, &piece.group_bindings, &[]);
+                pass.dispatch_workgroups(piece.groups().div_ceil(WORKGROUP), 1, 1);
+            }
+            pass.set_pipeline(&of_members);
+            pass.set_bind_group(1, &piece.bindings, &[]);
             pass.dispatch_workgroups(piece.groups().div_ceil(WORKGROUP), 1, 1);
         }
         Ok(())

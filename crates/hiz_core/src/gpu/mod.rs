@@ -50,6 +50,7 @@ pub(crate) struct Gpu {
     yardstick_cull: Cache<(CullKey, ReportKey), wgpu::ComputePipeline>,
     cull_members: Cache<(CullKey, ReportKey), wgpu::ComputePipeline>,
     refine: Cache<(BoundsKind, bool), wgpu::ComputePipeline>,
+    refine_groups: Cache<(), wgpu::ComputePipeline>,
     explain: Cache<CullKey, wgpu::ComputePipeline>,
     compact: Cache<&'static str, wgpu::ComputePipeline>,
     count: Cache<(), wgpu::ComputePipeline>,
@@ -221,6 +222,7 @@ impl Gpu {
                 reduce: Cache::new(),
                 cull: Cache::new(),
                 refine: Cache::new(),
+                refine_groups: Cache::new(),
                 explain: Cache::new(),
                 compact: Cache::new(),
                 count: Cache::new(),
@@ -352,20 +354,32 @@ impl Gpu {
     }
 
     pub(crate) fn refine_pipeline(&self, kind: BoundsKind, sample_coverage: bool) -> Result<wgpu::ComputePipeline> {
+        self.refine.get((kind, sample_coverage), || {
+            self.refining("hiz.refine.pipeline", &shader::refine(kind), "refine", (kind, sample_coverage))
+        })
+    }
+
+    pub(crate) fn refine_groups_pipeline(&self) -> Result<wgpu::ComputePipeline> {
+        let kind = BoundsKind::Box;
+        self.refine_groups.get((), || {
+            self.refining("hiz.refine_groups.pipeline", &shader::refine_groups(), "refine_groups", (kind, false))
+        })
+    }
+
+    fn refining(
+        &self,
+        label: &str,
+        source: &str,
+        entry_point: &str,
+        (kind, sample_coverage): (BoundsKind, bool),
+    ) -> Result<wgpu::ComputePipeline> {
         let layouts = self.layouts();
         let store = DepthStore::Nowhere;
         // What is said of depth is all the same: none is read.
         let (reversed, descent, fit_volume) = (false, false, false);
         let key = CullKey { store, kind, reversed, chunks: 1, sample_coverage, footprint_log2: 1, descent, fit_volume };
-        self.refine.get((kind, sample_coverage), || {
-            self.pipeline(
-                "hiz.refine.pipeline",
-                &shader::refine(kind),
-                "refine",
-                &[layouts.cull(store), &layouts.instances, &layouts.two_storages],
-                &classify_constants(&key),
-            )
-        })
+        let groups = [layouts.cull(store), &layouts.instances, &layouts.two_storages];
+        self.pipeline(label, source, entry_point, &groups, &classify_constants(&key))
     }
 
     pub(crate) fn cull_members_pipeline(&self, key: CullKey, report: ReportKey) -> Result<wgpu::ComputePipeline> {

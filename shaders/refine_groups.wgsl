@@ -1,0 +1,43 @@
+// Which groups that are hidden by depth lie within the view with all that they hold: none of their
+// members is outside, so `refine.wgsl` need not test them. For area coverage: in sample coverage
+// what lies between the pixel centres is outside, wherever it is.
+
+const WORKGROUP: u32 = 64u;
+
+// Added to the verdict of such a group.
+const WITHIN: u32 = 8u;
+
+// The boxes are instances of a piece of their own.
+@group(1) @binding(0) var<uniform> groups: Piece;
+@group(2) @binding(1) var<storage, read_write> group_verdicts: array<u32>;
+
+// True implies: all of the box lies within the planes that `classify` asks about, so that no
+// certificate of a part of it can say that it is outside.
+fn is_within(i: u32) -> bool {
+    let volume = load_volume(i);
+    if !(volume.size < view.coordinate_limit) {
+        return false;
+    }
+    let errors = errors_of(volume);
+    let x = value_of(view.x, errors.x, volume);
+    let y = value_of(view.y, errors.y, volume);
+    let z = value_of(view.z, errors.z, volume);
+    let w = value_of(view.w, errors.w, volume);
+    let border = view.half_size + view.reach;
+    let a = view.z_slope;
+    return surely_below(x, border.x, w) && surely_above(x, -border.x, w)
+        && surely_below(y, border.y, w) && surely_above(y, -border.y, w)
+        && surely_above(z, bar(-a), w) && surely_below(z, bar(1.0 - a), w);
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn refine_groups(@builtin(global_invocation_id) id: vec3<u32>) {
+    begin();
+    let group = id.x;
+    if group >= groups.count || group_verdicts[group] != OCCLUDED {
+        return;
+    }
+    if is_within(group) {
+        group_verdicts[group] = OCCLUDED | WITHIN;
+    }
+}
