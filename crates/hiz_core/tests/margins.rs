@@ -280,10 +280,14 @@ fn depth_slack_is_as_large_as_it_says() {
 
 /// An orthographic camera: z from 1 to 9 is depth from 0 to 1 or back.
 fn orthographic(convention: DepthConvention) -> (Camera, f64, f64) {
-    let (slope, constant) = match convention {
-        DepthConvention::Standard => (0.125, -0.125),
-        DepthConvention::Reversed => (-0.125, 1.125),
-    };
+    match convention {
+        DepthConvention::Standard => parallel(convention, 0.125, -0.125),
+        DepthConvention::Reversed => parallel(convention, -0.125, 1.125),
+    }
+}
+
+/// One whose depth is `slope` times z and a constant.
+fn parallel(convention: DepthConvention, slope: f64, constant: f64) -> (Camera, f64, f64) {
     let m = [[0.25, 0.0, 0.0, 0.0], [0.0, 0.25, 0.0, 0.0], [0.0, 0.0, slope, constant], [0.0, 0.0, 0.0, 1.0]];
     (Camera::from_clip_from_world(m, ImageSize::new(SIDE, SIDE), convention).unwrap(), slope, constant)
 }
@@ -293,10 +297,9 @@ fn orthographic(convention: DepthConvention) -> (Camera, f64, f64) {
 #[test]
 fn absolute_slack_is_as_large_as_it_says() {
     for convention in CONVENTIONS {
-        let (camera, slope, constant) = orthographic(convention);
-        let far_sign = slope.signum();
-        // Near depth 0 a float32 is fine enough to tell, and the margin is small: it is
-        // proportional to the distance from where z is 0.
+        let far_sign = orthographic(convention).1.signum();
+        // Near depth 0 a float32 is fine enough to tell. The margin is proportional to the distance
+        // from the reference point, which is the origin where it is in view: it lies there.
         let small = 2.0_f64.powi(-13);
         for (wall, slack, shares) in [
             (0.25, 1e-3, [0.97, 1.03]),
@@ -305,6 +308,11 @@ fn absolute_slack_is_as_large_as_it_says() {
             (small, 0.5 * EPS, [0.95, 1.05]),
             (small, 1e-300, [0.95, 1.05]),
         ] {
+            let (camera, slope, constant) = if wall == small {
+                parallel(convention, 0.125 * far_sign, 2.0 * small)
+            } else {
+                orthographic(convention)
+            };
             let depth = vec![wall as f32; (SIDE * SIDE) as usize];
             let [kept, culled] = shares.map(|share| {
                 let ndc = wall + far_sign * share * (slack + EPS);

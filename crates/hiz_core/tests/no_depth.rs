@@ -213,13 +213,13 @@ fn pixels_that_nobody_cleans_hide_something() {
             ),
         ),
         (Source::Bits, AtlasUse::Always, ("sanitized(textureLoad(atlas,", "(textureLoad(atlas,")),
-        (Source::Bits, AtlasUse::Never, ("farthest_sanitized4(corners(level, t))", "farthest4(corners(level, t))")),
+        (Source::Bits, AtlasUse::Never, ("return farthest_sanitized4(bits);", "return farthest4(bits);")),
     ] {
         let faulty = Engine::with_planted_faults(None, &[(what, by)]).expect("the device tests need a Vulkan driver");
         for convention in CONVENTIONS {
             let camera = camera_along_z(SIDE, SIDE, convention);
             let options = PyramidOptions { atlas, ..PyramidOptions::default() };
-            let way = if what.contains("corners") { WAYS[1] } else { WAYS[3] };
+            let way = if what.contains("farthest_sanitized4") { WAYS[1] } else { WAYS[3] };
             let depth = wall_with_bad_pixels(convention, way.pixels, 0);
             let pyramid = pyramid_from(&faulty, source, &depth, &camera, &options);
             let things = things(&faulty, way.pixels, 1);

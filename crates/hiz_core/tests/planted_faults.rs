@@ -87,8 +87,8 @@ fn nearest_instead_of_farthest() {
 fn a_mean_instead_of_the_farthest() {
     const FOUR: &[(Footprint, u32)] = &[(Footprint::Four, 0)];
     let mean = |a: &str, b: &str| format!("bitcast<u32>(0.5 * (bitcast<f32>({a}) + bitcast<f32>({b})))");
-    let texels = format!("bits = {};", mean("bits", "texel(level, x, y)"));
-    assert_red_with("mean of a footprint", &[("bits = farthest(bits, texel(level, x, y));", &texels)], FOUR);
+    let texels = format!("bits = {};", mean("bits", "here"));
+    assert_red_with("mean of a footprint", &[("bits = farthest(bits, here);", &texels)], FOUR);
     let (standard, reversed) =
         (mean("greatest", "min(min(v.x, v.y), min(v.z, v.w))"), "(max(below_one.x, below_one.y) / 2u)");
     assert_red(
@@ -400,12 +400,12 @@ fn refined_verdicts() {
         campaign.run(&faulty(faults)).tested.contradictions
     };
     assert_eq!(run(&[]), 0);
-    for (name, what, by) in [
-        ("groups of 32", "let first = group * GROUP;", "let first = group * 32u;"),
-        ("half of the members", "let end = min(first + GROUP,", "let end = min(first + 32u,"),
-        ("the group's verdict for all", "classify(place).verdict == OUTSIDE", "false"),
-        ("nobody is occluded", "if classify(place).verdict == OUTSIDE", "if may_be_outside"),
-        ("all are within the view", "if is_within(group) {", "if true {"),
+    for (name, (what, by)) in [
+        ("groups of 32", ("let first = group * GROUP;", "let first = group * 32u;")),
+        ("half of the members", ("let end = min(first + GROUP,", "let end = min(first + 32u,")),
+        ("the group's verdict for all", ("classify(place).verdict == OUTSIDE", "false")),
+        ("nobody is occluded", ("if classify(place).verdict == OUTSIDE", "if may_be_outside")),
+        ("all are within the view", ("if is_within(group) {", "if true {")),
     ] {
         let contradictions = run(&[(what, by)]);
         eprintln!("{name}: {contradictions} contradictions");
