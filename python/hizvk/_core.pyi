@@ -19,6 +19,7 @@ __all__ = [
     "Yardstick",
     "YardstickCull",
     "YardstickReduction",
+    "__build__",
     "__version__",
     "adapters",
     "after_fork",

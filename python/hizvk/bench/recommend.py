@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -38,8 +38,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Candidate", "Recommendation", "choose", "recommend"]
 
-#: By view: a depth image, what its numbers are, and their scale.
-Images: TypeAlias = "list[DepthArray]"
 KINDS: Final = {"spheres": Spheres, "boxes": Boxes, "oriented_boxes": OrientedBoxes}
 #: A depth image that takes longer than this is not rendered again.
 DEAR_MS: Final = 200.0
@@ -381,7 +379,7 @@ class _Source:
         device: Device,
         walls: Occluders | None,
         views: list[Camera],
-        images: Images | None,
+        images: list[DepthArray] | None,
     ) -> None:
         self._device, self._walls, self._views, self._images = device, walls, views, images
         self._turn: dict[tuple[int, bool], tuple[DepthImage, float]] = {}
