@@ -6,7 +6,11 @@
 
 mod common;
 
+#[path = "common/documented.rs"]
+mod documented;
+
 use common::{CONVENTIONS, Random, engine};
+use documented::{assert_said, is_of_this_driver};
 use hiz_core::{
     Bounds, Camera, CullOptions, DepthConvention, Floats, ImageSize, InstanceOptions, Mat4, Pose, Projection, Vec3,
     VisibleOptions,
@@ -208,7 +212,7 @@ fn hardly_more_than_exact_arithmetic_keeps() {
     println!("\n| camera | depth | boxes of a cell | far/near or far/wall: 1e2 | 1e4 | 1e6 | 1e9 | 1e12 | infinite |");
     println!("|---|---|---|---|---|---|---|---|---|");
     let mut random = Random(8);
-    let mut worse = Vec::new();
+    let (mut worse, mut lines) = (Vec::new(), Vec::new());
     for kind in PERSPECTIVES.into_iter().chain(PARALLEL) {
         let places = PLACES.iter().filter(|(_, away)| match kind {
             Kind::OrthographicMatrixAround => *away == 0.0,
@@ -236,8 +240,13 @@ fn hardly_more_than_exact_arithmetic_keeps() {
                 }
                 line += &format!(" {kept} for {seen} |");
             }
-            println!("{line}{}", " |".repeat(6 - ratios.len()));
+            line += &" |".repeat(6 - ratios.len());
+            println!("{line}");
+            lines.push(line);
         }
+    }
+    if is_of_this_driver(&engine()) {
+        lines.iter().for_each(|line| assert_said(line));
     }
     assert!(worse.is_empty(), "kept in vain:\n{}", worse.join("\n"));
 }

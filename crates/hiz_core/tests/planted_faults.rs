@@ -3,11 +3,15 @@
 
 mod common;
 
+#[path = "common/documented.rs"]
+mod documented;
+
 #[path = "common/campaign/mod.rs"]
 mod campaign;
 
 use campaign::{Campaign, Class, HEADER, MISSING_LEVELS, PLAIN, Report};
 use common::{CONVENTIONS, Random, camera_along_z};
+use documented::{assert_said, is_of_this_driver};
 use hiz_core::headless::Engine;
 use hiz_core::{
     Bounds, BoundsKind, Coverage, CullOptions, DepthConvention, Fit, Floats, Footprint, InstanceOptions, VisibleOptions,
@@ -52,16 +56,28 @@ fn without_faults_it_is_green() {
 /// The campaign's power: every class finds that there is no margin, and all together that there is a 48th of it.
 #[test]
 fn cuts_of_the_margin() {
+    let is_documented = is_of_this_driver(&faulty(&[]));
+    let mut reports = Vec::new();
     for (ulps, rounds) in [("0.0", 25), ("0.25", 10), ("0.5", 20)] {
         let margin = format!("ERROR_ULPS: f32 = {ulps}");
         let engine = faulty(&[("ERROR_ULPS: f32 = 24.0", &margin)]);
         let report = Campaign { seed: 22, rounds, ..Campaign::default() }.run(&engine);
         assert_report_red(&margin, &report);
+        reports.push(report.clone());
         if ulps == "0.0" {
             eprintln!("{HEADER}\n{report}");
             let green: Vec<Class> =
                 report.classes.iter().filter(|(_, t)| t.false_culls == 0).map(|(class, _)| *class).collect();
             assert!(green.is_empty(), "no margin, and green: {green:?}");
+        }
+    }
+    if is_documented {
+        let all: Vec<String> =
+            reports.iter().map(|r| format!("{} of {}", r.total().false_culls, r.total().cases)).collect();
+        assert_said(&format!("| **device**, of so many cases | {} |", all.join(" | ")));
+        for (k, (class, tally)) in reports[0].classes.iter().enumerate() {
+            let counts: Vec<String> = reports.iter().map(|r| r.classes[k].1.false_culls.to_string()).collect();
+            assert_said(&format!("| {class:?} | {} | {} |", tally.cases, counts.join(" | ")));
         }
     }
 }
