@@ -1,4 +1,4 @@
-"""Depth in half floats: what rounding to them may have cost is counted, in every kind.
+"""Depth in half floats and in float32: what rounding to them may have cost is counted, in every kind.
 
 Every expectation is worked out by hand.
 """
@@ -30,7 +30,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("kind", "stored", "wall"), CASES, ids=[case[0] for case in CASES])
-@pytest.mark.parametrize("way", ["device", "visible", "list"])
+@pytest.mark.parametrize("way", ["device", "visible", "list", "big-endian"])
 def test_what_a_half_float_rounds_is_counted(
     device: hizvk.Device, kind: Any, stored: float, wall: float, way: str
 ) -> None:
@@ -50,10 +50,39 @@ def test_what_a_half_float_rounds_is_counted(
             mask = device.cull(device.instances(boxes), camera, pyramid).mask
         return [bool(kept) for kept in mask]
 
-    half = np.full((1, 1), stored, np.float16)
+    half = np.full((1, 1), stored, ">f2" if way == "big-endian" else np.float16)
     assert seen([[half[0, 0]]] if way == "list" else half) == [True, False]
     # Of a wall that stands where the number says, the first one is hidden.
     assert seen(half.astype(np.float32)) == [False, False]
+
+
+@pytest.mark.parametrize("reversed_z", [False, True])
+@pytest.mark.parametrize("kind", ["z", "distance"])
+def test_what_float32_rounds_of_a_metric_depth_is_counted(device: hizvk.Device, kind: Any, reversed_z: bool) -> None:
+    """Just behind a near plane 1024 units away, where no share of the NDC depth covers a share of the metric one."""
+    camera = hizvk.Camera.orthographic(
+        (0, 0, 0), (0, 0, -1), height=2, size=(1, 1), near=1024, far=1056, reversed_z=reversed_z
+    )
+    # A spacing is 2^-13: a wall just short of half of it behind 1025 is stored as 1025.
+    wall = 1025.0 + 0.49 * 2.0**-13
+    image = np.full((1, 1), wall).astype(np.float32)
+    assert image[0, 0] == 1025.0
+    points = np.array([[0.0, 0.0, -(1025.0 + 0.45 * 2.0**-13)], [0.0, 0.0, -(1025.0 + 64.0 * 2.0**-13)]])
+    spheres = device.instances(hizvk.Spheres(points, 0.0))
+    pyramid = device.pyramid(image, camera, kind=kind)
+    assert device.cull(spheres, camera, pyramid, depth_slack=0.0).mask.tolist() == [True, False]
+
+
+def test_rows_with_masks_are_masked(device: hizvk.Device) -> None:
+    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(8, 8), near=0.1)
+    behind = hizvk.Spheres([[0.0, 0.0, -20.0]], 1.0)
+    for dtype in (np.float32, np.uint16):
+        image = np.ma.array(np.full(camera.size, 5, dtype), mask=True)
+        with pytest.warns(hizvk.errors.HizWarning, match="every pixel is far"):
+            assert hizvk.visible(behind, camera, depth=list(image), kind="z", device=device).tolist() == [True]
+        assert not hizvk.visible(behind, camera, depth=list(image.data), kind="z", device=device).any()
+    with pytest.raises(TypeError, match="centers: expected .* got a masked array"):
+        hizvk.Spheres(list(np.ma.zeros((2, 3))), 1.0)
 
 
 def test_reference_takes_half_floats_as_they_are() -> None:

@@ -83,11 +83,19 @@ def _wrong_value(name: str, expected: str, value: object) -> ValueError:
     return ValueError(f"{name}: expected {expected}, got {describe(value)}")
 
 
+def is_masked(value: object) -> bool:
+    """A masked array, or rows of which one is: NumPy makes an array of them without their masks."""
+    if isinstance(value, (list, tuple)):
+        return any(isinstance(row, np.ma.MaskedArray) for row in value)
+    return isinstance(value, np.ma.MaskedArray)
+
+
 def _as_array(name: str, expected: str, value: object) -> npt.NDArray[Any]:
     """`value` as an array of numbers, without a copy where it is one; lists of Python ints become float64."""
-    if isinstance(value, np.ma.MaskedArray):
+    if is_masked(value):
         # Only floats have a NaN to fill with.
-        way = ".filled(np.nan)" if value.dtype.kind == "f" else ".astype(np.float64).filled(np.nan)"
+        is_float = isinstance(value, np.ma.MaskedArray) and value.dtype.kind == "f"
+        way = ".filled(np.nan)" if is_float else ".astype(np.float64).filled(np.nan)"
         raise TypeError(f"{name}: expected {expected}, got a masked array; fill it first, e.g. with {way}")
     if isinstance(value, (str, bytes)) or value is None:
         raise _wrong_type(name, expected, value)
@@ -377,7 +385,7 @@ def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
     """A ``(count,)`` bool array (any length for None)."""
     shape: tuple[int | str, ...] = ("N" if count is None else count,)
     expected = f"bool {_shape_text(shape)}"
-    if isinstance(value, (str, bytes)) or value is None or isinstance(value, np.ma.MaskedArray):
+    if isinstance(value, (str, bytes)) or value is None or is_masked(value):
         raise _wrong_type(name, expected, value)
     array = np.asarray(value)
     if array.size == 0 and not hasattr(value, "dtype"):
@@ -391,7 +399,7 @@ def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
 def triangles(name: str, value: object, vertex_count: int) -> npt.NDArray[np.uint32]:
     """``(T, 3)`` indices of vertices, as uint32; any integer dtype comes in."""
     expected = "integer (T, 3)"
-    if isinstance(value, (str, bytes)) or value is None or isinstance(value, np.ma.MaskedArray):
+    if isinstance(value, (str, bytes)) or value is None or is_masked(value):
         raise _wrong_type(name, expected, value)
     try:
         array = np.asarray(value)

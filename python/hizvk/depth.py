@@ -28,6 +28,8 @@ DEPTH_KINDS: tuple[DepthKind, ...] = ("ndc", "reversed_ndc", "z", "distance")
 
 _METRIC = ("z", "distance")
 
+Rounding: TypeAlias = Literal["none"] | Literal["single"] | Literal["half"]
+
 #: What sensors and their files write where they saw nothing, by dtype: the ends of what it can hold.
 NO_DATA: dict[str, tuple[float, ...]] = {"uint16": (0.0, 65535.0), "float16": (65504.0,)}
 
@@ -43,8 +45,9 @@ class DepthArray(NamedTuple):
     """World units of one step."""
     invalid: tuple[float, ...]
     """The numbers that mean "no data", as the array's own dtype holds them."""
-    half: bool
-    """Whether they came as half floats: whoever uploads them counts what those round."""
+    rounding: Rounding
+    """What its dtype may have rounded, which whoever uploads it counts: half floats of every kind, float32 of metric
+    ones. (For NDC depth `depth_slack` covers float32.)"""
 
 
 def checked_image(
@@ -67,6 +70,8 @@ def checked_image(
             f'scale: expected 1 for the kind "{kind_}", got {scale_:g}; only "z" and "distance" have units'
         )
     mask: npt.NDArray[np.bool_] | None = None
+    if _arguments.is_masked(value):
+        value = np.ma.array(value)  # of rows, too, whose masks numpy.asarray would drop
     if isinstance(value, np.ma.MaskedArray):
         mask = None if value.mask is np.ma.nomask else np.asarray(value.mask)
         value = value.data
@@ -86,7 +91,16 @@ def checked_image(
     if mask is not None and mask.any():
         # Masked is no data, whatever lies below the mask.
         image = np.where(mask, image.dtype.type(np.nan), image)
-    return DepthArray(image, kind_, scale_, _no_data(invalid, dtype), dtype == np.float16)
+    return DepthArray(image, kind_, scale_, _no_data(invalid, dtype), _rounding(dtype, kind_))
+
+
+def _rounding(dtype: np.dtype[Any], kind: DepthKind) -> Rounding:
+    """Of any byte order. Whole numbers and float64 count as exact."""
+    if dtype.kind != "f" or dtype.itemsize > 4:
+        return "none"
+    if dtype.itemsize == 2:
+        return "half"
+    return "single" if kind in _METRIC else "none"
 
 
 def _is_of_16_bits(rows: Sequence[Any]) -> bool:

@@ -8,6 +8,7 @@ use crate::camera::{Camera, DepthConvention, Mat4, Vec3, cross, dot, normalized}
 use crate::error::{Error, Result};
 use crate::host;
 use crate::inverse::{Bounded, ROUNDING, inverse};
+use crate::tolerance::DepthTolerance;
 
 /// What the numbers of a depth image mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -39,6 +40,19 @@ pub fn ndc_from_kind(
     scale: f64,
     invalid: &[f64],
     camera: &Camera,
+) -> Result<Vec<f32>> {
+    converted(image, kind, scale, invalid, camera, DepthTolerance::NONE)
+}
+
+/// [`ndc_from_kind`] of numbers that were rounded within `tolerance`, in their own units. Those of the kinds `Z` and `Distance` are
+/// taken at the far end of it; NDC depth stays as it is.
+pub(crate) fn converted(
+    image: Floats<'_>,
+    kind: DepthKind,
+    scale: f64,
+    invalid: &[f64],
+    camera: &Camera,
+    tolerance: DepthTolerance,
 ) -> Result<Vec<f32>> {
     let size = camera.size();
     if image.len() as u64 != size.pixels() {
@@ -73,7 +87,9 @@ pub fn ndc_from_kind(
                     let number = image.get(out.len());
                     let value = number * scale;
                     let known = value.is_finite() && (value > 0.0 || lens.signed) && !invalid.contains(&number);
-                    out.push(if known { lens.ndc(column, row, value, kind) } else { convention.far() });
+                    // A hair more than all that it lost, for the roundings of this line.
+                    let off = (number.abs() * tolerance.relative + tolerance.absolute) * scale * (1.0 + 1e-15);
+                    out.push(if known { lens.ndc(column, row, (value, off), kind) } else { convention.far() });
                 }
             }
             Ok(out)
@@ -160,12 +176,14 @@ impl Lens {
         Ok(Self { reversed, signed, size, rays })
     }
 
-    fn ndc(&self, column: u32, row: u32, value: f64, kind: DepthKind) -> f32 {
+    /// Of a depth along the ray, which may be off by so much.
+    fn ndc(&self, column: u32, row: u32, (value, off): (f64, f64), kind: DepthKind) -> f32 {
         match &self.rays {
             // Rays are parallel: both kinds are the same. `value`, the slope (6), the constant, the product and the sum: less than 12.
             Rays::Parallel { slope, constant, tilt } => {
                 let terms = [slope * value, *constant];
-                let lost = 12.0 * ROUNDING * (terms[0].abs() + terms[1].abs()) + tilt;
+                let of_value = slope.abs() * off * (1.0 + 16.0 * ROUNDING);
+                let lost = 12.0 * ROUNDING * (terms[0].abs() + terms[1].abs()) + tilt + of_value;
                 toward_far_by(terms[0] + terms[1], lost, self.reversed)
             }
             Rays::FromEye { k, constant, k_error, constant_error, inverse, w_length } => {
@@ -181,6 +199,12 @@ impl Lens {
                         (length / value, error / value)
                     }
                 };
+                // A depth that is off by a share s has 1 / w off by s / (1 - s) of it.
+                let share = off / value;
+                if share >= 0.5 {
+                    return if self.reversed { 0.0 } else { 1.0 };
+                }
+                let per_w_error = per_w_error + (per_w + per_w_error) * share / (1.0 - share) * (1.0 + 16.0 * ROUNDING);
                 let terms = [k[0] * x, k[1] * y, k[2], constant * per_w];
                 // Of a term: x 1, the product 1, three sums; of the last one: w_length (5) or the length's division, `value`, the
                 // product, a sum. 16 cover each.

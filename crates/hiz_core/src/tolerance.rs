@@ -3,9 +3,8 @@
 
 use crate::bounds::Floats;
 use crate::camera::Camera;
-use crate::depth::{DepthKind, ndc_from_kind};
+use crate::depth::{DepthKind, converted};
 use crate::error::{Error, Result};
-use crate::host;
 use crate::view::EPS;
 
 /// How far a stored depth may lie from the depth that was given to be stored: by `relative` times
@@ -33,6 +32,11 @@ impl DepthTolerance {
     /// Half floats: 2^-10 relative and 2^-24 absolute, a spacing of theirs. Vulkan lets a driver
     /// take either neighbour.
     pub const HALF: Self = Self { relative: 1.0 / 1024.0, absolute: 1.0 / 16_777_216.0 };
+
+    /// float32 that was rounded to nearest: half a spacing. For NDC depth `depth_slack` covers it by
+    /// default; a metric depth is rounded before it is converted, and near the near plane a share of
+    /// the converted one would be too little.
+    pub const SINGLE: Self = Self { relative: 0.5 * EPS, absolute: f32::MIN_POSITIVE as f64 * EPS };
 
     /// Of a format that a pyramid can be built from; `None` for others.
     ///
@@ -102,19 +106,9 @@ pub fn ndc_from_kind_within(
     tolerance: DepthTolerance,
 ) -> Result<(Vec<f32>, DepthTolerance)> {
     let tolerance = tolerance.checked()?;
-    let mut ndc = ndc_from_kind(image, kind, scale, invalid, camera)?;
-    if tolerance == DepthTolerance::NONE || matches!(kind, DepthKind::Ndc | DepthKind::ReversedNdc) {
-        return Ok((ndc, tolerance));
-    }
-    let moved = |v: f64| (v + (v.abs() * tolerance.relative + tolerance.absolute).next_up()).next_up();
-    let moved = host::collected((0..image.len()).map(|i| moved(image.get(i))), "depth")?;
-    let moved = ndc_from_kind(Floats::F64(&moved), kind, scale, &[], camera)?;
-    // What was no depth before it was moved is none behind it.
-    let reversed = camera.convention().is_reversed();
-    for (d, moved) in ndc.iter_mut().zip(moved) {
-        *d = if reversed { d.min(moved) } else { d.max(moved) };
-    }
-    Ok((ndc, DepthTolerance::NONE))
+    let ndc = converted(image, kind, scale, invalid, camera, tolerance)?;
+    let is_ndc = matches!(kind, DepthKind::Ndc | DepthKind::ReversedNdc);
+    Ok((ndc, if is_ndc { tolerance } else { DepthTolerance::NONE }))
 }
 
 #[cfg(test)]

@@ -150,7 +150,7 @@ impl Engine {
             .map(|depth| DepthImage(Held::new(py, depth)))
     }
 
-    /// `half`: the numbers were half floats.
+    /// `rounding`: to which floats the numbers had been rounded before they came, "none", "single" or "half".
     #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn upload_depth(
         &self,
@@ -159,7 +159,7 @@ impl Engine {
         kind: &str,
         scale: f64,
         invalid: Vec<f64>,
-        half: bool,
+        rounding: &str,
         camera: &Camera,
     ) -> PyResult<DepthImage> {
         let (image, kind) = (image.floats()?, depth_kind(kind)?);
@@ -167,7 +167,13 @@ impl Engine {
             DepthConvention::Standard => DepthKind::Ndc,
             DepthConvention::Reversed => DepthKind::ReversedNdc,
         };
-        let (tolerance, camera) = (if half { DepthTolerance::HALF } else { DepthTolerance::NONE }, &camera.0);
+        let tolerance = match rounding {
+            "none" => DepthTolerance::NONE,
+            "single" => DepthTolerance::SINGLE,
+            "half" => DepthTolerance::HALF,
+            other => return Err(PyValueError::new_err(format!("rounding: no rounding {other:?}"))),
+        };
+        let camera = &camera.0;
         let upload = |engine: &headless::Engine| match image {
             // Already what is uploaded: no copy in between.
             Floats::F32(ndc) if kind == own_kind && scale == 1.0 && invalid.is_empty() => {

@@ -396,7 +396,7 @@ class _Source:
             return self._images[k]
         assert self._walls is not None
         depth = self._device.render_depth(self._walls, self._views[k])
-        return DepthArray(depth.numpy(), depth.kind, 1.0, (), half=False)
+        return DepthArray(depth.numpy(), depth.kind, 1.0, (), "none")
 
     def _pyramid(self, variant: DepthVariant, k: int) -> tuple[Pyramid, float]:
         if self._images is not None:

@@ -43,7 +43,7 @@ def measure(run: Run) -> None:
         rendered = run.depth(scene, size)
         numbers = rendered.numpy()
         camera = rendered.camera
-        uploaded = run.device._engine.upload_depth(numbers, camera.depth_kind, 1.0, (), False, camera._inner)
+        uploaded = run.device._engine.upload_depth(numbers, camera.depth_kind, 1.0, (), "none", camera._inner)
         for source, depth in (("rendered", rendered._inner), ("uploaded", uploaded)):
             run.step(f"reduction of a {source} image, {name}")
             _one(run, name, source, depth, numbers)
