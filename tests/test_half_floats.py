@@ -81,7 +81,7 @@ def test_rows_with_masks_are_masked(device: hizvk.Device) -> None:
         with pytest.warns(hizvk.errors.HizWarning, match="every pixel is far"):
             assert hizvk.visible(behind, camera, depth=list(image), kind="z", device=device).tolist() == [True]
         assert not hizvk.visible(behind, camera, depth=list(image.data), kind="z", device=device).any()
-    with pytest.raises(TypeError, match="centers: expected .* got a masked array"):
+    with pytest.raises(TypeError, match=r"centers: expected .* got a masked array"):
         hizvk.Spheres(list(np.ma.zeros((2, 3))), 1.0)
 
 

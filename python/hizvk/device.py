@@ -318,8 +318,9 @@ class Device:
         depth : DepthImage or (height, width) array
             A rendered image of this device, alone; or an array, with `camera` and `kind`. Arrays are float, or uint16
             for the kinds ``"z"`` and ``"distance"``; row 0 is the top of the image. What rounding to float16 may have
-            cost (2^-10 of each number, and 2^-24) is counted, and of the kinds ``"z"`` and ``"distance"`` what rounding to
-            float32 may have (2^-24 of each number); whole numbers and float64 count as exact. What is masked in a masked array is "no data".
+            cost (2^-10 of each number, and 2^-24) is counted, and of the kinds ``"z"`` and ``"distance"`` what
+            rounding to float32 may have (2^-24 of each number). Whole numbers and float64 count as exact. What is
+            masked in a masked array is "no data".
         camera : Camera
             The camera that saw the array; its size is the array's shape.
         kind : {"ndc", "reversed_ndc", "z", "distance"}
