@@ -44,9 +44,30 @@ pub fn ndc_from_kind(
     converted(image, kind, scale, invalid, camera, DepthTolerance::NONE)
 }
 
-/// [`ndc_from_kind`] of numbers that were rounded within `tolerance`, in their own units. Those of the kinds `Z` and `Distance` are
-/// taken at the far end of it; NDC depth stays as it is.
-pub(crate) fn converted(
+/// [`ndc_from_kind`] of an image whose numbers were rounded within `tolerance` (in their own units,
+/// before `scale`) before they came here; and the tolerance that is left for the pyramid to keep.
+///
+/// Numbers of the kinds `Z` and `Distance` are moved away from the eye by it before they are
+/// converted, and nothing is left. NDC depth stays as it is, and so does its tolerance.
+///
+/// # Errors
+/// As [`ndc_from_kind`], and [`Error::Invalid`] for a tolerance outside 0..=0.5.
+pub fn ndc_from_kind_within(
+    image: Floats<'_>,
+    kind: DepthKind,
+    scale: f64,
+    invalid: &[f64],
+    camera: &Camera,
+    tolerance: DepthTolerance,
+) -> Result<(Vec<f32>, DepthTolerance)> {
+    let tolerance = tolerance.checked()?;
+    let ndc = converted(image, kind, scale, invalid, camera, tolerance)?;
+    let is_ndc = matches!(kind, DepthKind::Ndc | DepthKind::ReversedNdc);
+    Ok((ndc, if is_ndc { tolerance } else { DepthTolerance::NONE }))
+}
+
+/// Numbers of the kinds `Z` and `Distance` are taken at the far end of `tolerance`; NDC depth stays as it is.
+fn converted(
     image: Floats<'_>,
     kind: DepthKind,
     scale: f64,

@@ -61,7 +61,7 @@ pub use bounds::{Bounds, BoundsKind, Floats};
 pub use camera::{Camera, DepthConvention, ImageSize, MAX_IMAGE_SIDE, Mat3, Mat4, Pose, Projection, Vec3};
 pub use context::HizContext;
 pub use cull::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
-pub use depth::{DepthKind, ndc_from_kind};
+pub use depth::{DepthKind, ndc_from_kind, ndc_from_kind_within};
 pub use error::{Error, Result};
 pub use instances::{InstanceOptions, Instances, StoredOrder};
 pub use layout::{MAX_LEVELS, StoredLevels};
@@ -71,7 +71,7 @@ pub use occluder_surface::PlantedFault;
 pub use occluder_surface::{ConservativeDepthOptions, OccluderSurface};
 pub use occluders::{FaceCull, MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders};
 pub use pyramid::{Pyramid, PyramidOptions};
-pub use tolerance::{DepthTolerance, ndc_from_kind_within};
+pub use tolerance::DepthTolerance;
 pub use view::ERROR_ULPS;
 pub use visible::{Outputs, Visible, VisibleOptions};
 

@@ -1,9 +1,6 @@
 //! What the format of a depth image rounds: slack that is due before the caller adds any
 //! (`docs/accuracy.md`, section "What a depth format rounds").
 
-use crate::bounds::Floats;
-use crate::camera::Camera;
-use crate::depth::{DepthKind, converted};
 use crate::error::{Error, Result};
 use crate::view::EPS;
 
@@ -89,32 +86,13 @@ impl DepthTolerance {
     }
 }
 
-/// [`ndc_from_kind`] of an image whose numbers were rounded within `tolerance` (in their own units,
-/// before `scale`) before they came here; and the tolerance that is left for the pyramid to keep.
-///
-/// Numbers of the kinds `Z` and `Distance` are moved away from the eye by it before they are
-/// converted, and nothing is left. NDC depth stays as it is, and so does its tolerance.
-///
-/// # Errors
-/// As [`ndc_from_kind`], and [`Error::Invalid`] for a tolerance outside 0..=0.5.
-pub fn ndc_from_kind_within(
-    image: Floats<'_>,
-    kind: DepthKind,
-    scale: f64,
-    invalid: &[f64],
-    camera: &Camera,
-    tolerance: DepthTolerance,
-) -> Result<(Vec<f32>, DepthTolerance)> {
-    let tolerance = tolerance.checked()?;
-    let ndc = converted(image, kind, scale, invalid, camera, tolerance)?;
-    let is_ndc = matches!(kind, DepthKind::Ndc | DepthKind::ReversedNdc);
-    Ok((ndc, if is_ndc { tolerance } else { DepthTolerance::NONE }))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bounds::Floats;
+    use crate::camera::Camera;
     use crate::camera::{DepthConvention, ImageSize, Pose, Projection};
+    use crate::depth::{DepthKind, ndc_from_kind_within};
 
     /// Worked out by hand: a step of the format, never less, and no more than a hair above.
     #[test]
