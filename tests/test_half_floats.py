@@ -69,8 +69,9 @@ def test_what_float32_rounds_of_a_metric_depth_is_counted(device: hizvk.Device, 
     assert image[0, 0] == 1025.0
     points = np.array([[0.0, 0.0, -(1025.0 + 0.45 * 2.0**-13)], [0.0, 0.0, -(1025.0 + 64.0 * 2.0**-13)]])
     spheres = device.instances(hizvk.Spheres(points, 0.0))
-    pyramid = device.pyramid(image, camera, kind=kind)
-    assert device.cull(spheres, camera, pyramid, depth_slack=0.0).mask.tolist() == [True, False]
+    for form in (image, image.astype(">f4"), list(image), memoryview(image)):
+        pyramid = device.pyramid(form, camera, kind=kind)
+        assert device.cull(spheres, camera, pyramid, depth_slack=0.0).mask.tolist() == [True, False], type(form)
 
 
 def test_rows_with_masks_are_masked(device: hizvk.Device) -> None:

@@ -79,7 +79,7 @@ def checked_image(
         # An image of another library, or a buffer: its dtype says what its numbers mean, as an array's does.
         array = np.asarray(value)
         value = array if array.ndim else value
-    elif isinstance(value, (list, tuple)) and _is_of_16_bits(value):
+    elif isinstance(value, (list, tuple)) and _has_a_dtype(value):
         value = np.asarray(value)
     if isinstance(value, np.ndarray):
         _refuse_dtype(name, value, kind_)
@@ -103,10 +103,10 @@ def _rounding(dtype: np.dtype[Any], kind: DepthKind) -> Rounding:
     return "single" if kind in _METRIC else "none"
 
 
-def _is_of_16_bits(rows: Sequence[Any]) -> bool:
-    """Whether rows or numbers of a sensor's dtype were listed: they mean what an array of it means."""
+def _has_a_dtype(rows: Sequence[Any]) -> bool:
+    """Whether rows or numbers of NumPy were listed: they mean what an array of their dtype means."""
     try:
-        return np.asarray(rows).dtype.name in NO_DATA
+        return np.asarray(rows).dtype not in (np.float64, np.int64, np.bool_)
     except ValueError:
         return False  # ragged; refused elsewhere
 

@@ -365,7 +365,7 @@ class Device:
                     got = _arguments.describe(value)
                     raise TypeError(f"{name}: expected nothing beside a DepthImage, which has its own, got {got}")
             self._own("depth", depth)
-            return Pyramid(self, self._engine.pyramid(depth._inner, stored), depth.camera)
+            return Pyramid(self, self._engine.pyramid(depth._inner, stored), depth.camera, is_rendered=True)
         camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")
         self._check_side(camera)
         return self._pyramid_of(checked_image("depth", depth, camera, kind, scale, invalid), camera, stored)

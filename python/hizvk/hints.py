@@ -68,7 +68,7 @@ class Question:
                     "bounds, coverage: nothing covers a pixel's centre: all are too small, or outside of the view; "
                     'coverage="area" keeps small ones',
                 )
-            return (_outside(stats.tested, self.camera, bounds),)
+            return _outside(stats.tested, self.camera, bounds)
         if stats.occluded or stats.kept == stats.invalid:
             return ()
         return self._depth()
@@ -92,24 +92,29 @@ class Question:
                 "scale: numbers that do not lie between the camera's near and far planes count as no data",
             )
         full = known[:-1, :-1] & known[1:, :-1] & known[:-1, 1:] & known[1:, 1:]
+        if self.pyramid._is_rendered:
+            return ()  # nothing is missing: what is far is sky
         if known.mean() < SPARSE_PIXELS and full.sum() < SPARSE_BLOCKS * known.sum():
             return (
                 f"depth: {100.0 * known.mean():.1f} % of the pixels have a depth, hardly any of them beside another, "
-                'and empty ones are far, so next to nothing can be hidden; "Sparse depth" in docs/guide.md fills them',
+                "and empty ones are far, so next to nothing can be hidden; if depth is missing there (a LiDAR, not the "
+                'sky), "Sparse depth" in docs/guide.md fills it, and says what that costs the promise',
             )
         return ()
 
 
-def _outside(count: int, camera: Camera, bounds: Bounds | None) -> str:
+def _outside(count: int, camera: Camera, bounds: Bounds | None) -> tuple[str, ...]:
     all_ = f"all {count:,} lie" if count > 1 else "the only one lies"
     said = f"bounds, camera: {all_} outside of the view"
     for what, other in posed_otherwise(camera) if bounds is not None else ():
         seen = _in_view(other, bounds)
         if seen:
-            return f"{said}, and {seen:,} would be inside of it with {what}"
+            return (f"{said}, and {seen:,} would be inside of it with {what}",)
+    if count == 1:
+        return ()  # a single thing is often outside, with nothing wrong
     return (
         f"{said}; if that is not meant, check the pose's direction (camera_from_world or world_from_camera), its "
-        "convention (from_opencv looks along +z, from_opengl along -z) and the units"
+        "convention (from_opencv looks along +z, from_opengl along -z) and the units",
     )
 
 

@@ -268,10 +268,11 @@ class Pyramid:
     Made by `Device.pyramid`.
     """
 
-    def __init__(self, device: Device, core: _core.Pyramid, camera: Camera) -> None:
+    def __init__(self, device: Device, core: _core.Pyramid, camera: Camera, *, is_rendered: bool = False) -> None:
         self._device = device
         self._inner = core
         self._camera = camera
+        self._is_rendered = is_rendered
 
     @property
     def device(self) -> Device:
