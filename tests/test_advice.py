@@ -605,3 +605,12 @@ def test_depth_that_cannot_hide_is_hinted_at(device: hizvk.Device, reversed_z: b
     (text,) = hinted(balls, camera, lines, device=device)
     assert text.startswith("depth: 20.3 % of the pixels have a depth")
     assert hinted(hizvk.Spheres(MIDDLES, np.nan), camera, sparse, device=device) == [], "nothing that could be hidden"
+
+
+def test_points_are_not_sent_to_sample_coverage(device: hizvk.Device) -> None:
+    """It culls every one of them."""
+    wall = hizvk.Mesh([[-1.0, -1, -5], [1, -1, -5], [0, 1, -5]], [[0, 1, 2]])
+    points = np.random.default_rng(0).uniform((-3, -3, -12), (3, 3, -3), (50, 3))
+    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(48, 64), near=0.1)
+    found = hizvk.recommend(hizvk.Spheres(points, 0.0), camera, occluders=wall, device=device, repetitions=1)
+    assert not any('coverage="sample"' in note for note in found.notes)

@@ -222,3 +222,17 @@ def test_equal_depth_is_visible_and_the_oracle_says_what_it_does_not_know(device
         truth = hizvk.reference.classify(boxes, view, image, kind="z")
         assert truth.tolist() == [hizvk.reference.VISIBLE, at_it, hizvk.reference.HIDDEN]
         assert hizvk.visible(boxes, view, depth=image, kind="z", device=device)[:2].all()
+
+
+def test_a_scale_beside_what_has_its_own_units_is_refused(device: hizvk.Device) -> None:
+    """It was passed over in silence: of a rendered image nothing is in millimetres."""
+    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(4, 4), near=0.1)
+    wall = hizvk.Mesh([[-8.0, -8, -12], [8.0, -8, -12], [0.0, 8, -12]], [[0, 1, 2]])
+    depth = device.render_depth(device.occluders([wall]), camera)
+    ball = hizvk.Spheres([[0.0, 0.0, -20.0]], 0.5)
+    with pytest.raises(ValueError, match=r"scale: expected 1 beside a DepthImage, whose depth is NDC, got 0\.001"):
+        device.pyramid(depth, scale=0.001)
+    with pytest.raises(ValueError, match="scale: expected 1 beside a DepthImage"):
+        hizvk.visible(ball, camera, depth=depth, scale=0.001)
+    with pytest.raises(ValueError, match="scale: expected 1 beside occluders"):
+        hizvk.recommend(ball, camera, occluders=wall, scale=0.001)

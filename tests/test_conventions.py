@@ -543,3 +543,11 @@ def test_the_page_has_every_tool() -> None:
     assert set(tools) == set(headings) - {"boxes", "up"}
     assert page.count("```python") == len(set(tools)) + 1
     assert page.count("<!-- Source:") > len(set(tools))
+
+
+def test_words_of_other_cameras_get_a_way_out() -> None:
+    words = {"size": (24, 32), "near": 0.1, "camera_from_world": np.eye(4)}
+    with pytest.raises(TypeError, match="pixel_center: expected no such parameter: COLMAP's centres are at halves"):
+        hizvk.Camera.from_colmap("PINHOLE", [20, 20, 16, 12], pixel_center="half", **words)  # type: ignore[call-arg]
+    with pytest.raises(ValueError, match=r"pass k\[:3, :3\]"):
+        hizvk.Camera.from_opencv(np.eye(4), pixel_center="half", **words)

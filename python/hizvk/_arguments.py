@@ -399,7 +399,9 @@ def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
 def triangles(name: str, value: object, vertex_count: int) -> npt.NDArray[np.uint32]:
     """``(T, 3)`` indices of vertices, as uint32; any integer dtype comes in."""
     expected = "integer (T, 3)"
-    if isinstance(value, (str, bytes)) or value is None or is_masked(value):
+    if is_masked(value):
+        raise TypeError(f"{name}: expected {expected}, got a masked array; leave out the triangles that are masked")
+    if isinstance(value, (str, bytes)) or value is None:
         raise _wrong_type(name, expected, value)
     try:
         array = np.asarray(value)

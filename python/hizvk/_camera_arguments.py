@@ -42,6 +42,11 @@ _POSE_WORDS = (
 )
 #: What `_arguments.explained` says about other words for a pose.
 POSE_KEYWORDS: Final = dict.fromkeys(_POSES, _POSE_WORDS)
+#: And about COLMAP's cameras.
+COLMAP_KEYWORDS: Final = {
+    "pixel_center": "expected no such parameter: COLMAP's centres are at halves, always",
+    **POSE_KEYWORDS,
+}
 #: And about a camera matrix of which nobody says where its pixels' centres are.
 KEYWORDS: Final = {"pixel_center": f"expected {_CENTERS}, got nothing; {_NO_DEFAULT}", **POSE_KEYWORDS}
 
@@ -95,7 +100,8 @@ def pixel_center(value: object) -> PixelCenter:
 def intrinsics(k: object) -> npt.NDArray[np.float64]:
     """A camera matrix, with the zeros where they have to be."""
     # KITTI's P: the translation in it belongs into the pose.
-    hint = "; of a projection P = K [I | t] pass P[:, :3]" if getattr(k, "shape", None) == (3, 4) else ""
+    hints = {(3, 4): "; of a projection P = K [I | t] pass P[:, :3]", (4, 4): "; pass k[:3, :3]"}
+    hint = hints.get(getattr(k, "shape", (3, 3)), "")
     result = _arguments.numbers_of_shape("k", k, (3, 3), hint=hint)
     expected = "k: expected [[fx, skew, cx], [0, fy, cy], [0, 0, 1]] with fx and fy above 0"
     if not (result[0, 0] > 0.0 and result[1, 1] > 0.0):

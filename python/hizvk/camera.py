@@ -289,7 +289,7 @@ class Camera:
         )  # fmt: skip
 
     @classmethod
-    @_arguments.explained(_camera_arguments.POSE_KEYWORDS)
+    @_arguments.explained(_camera_arguments.COLMAP_KEYWORDS)
     def from_colmap(
         cls,
         model: str,

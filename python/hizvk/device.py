@@ -364,6 +364,8 @@ class Device:
                 if value is not None:
                     got = _arguments.describe(value)
                     raise TypeError(f"{name}: expected nothing beside a DepthImage, which has its own, got {got}")
+            if _arguments.number("scale", scale, above=0.0) != 1.0:
+                raise ValueError(f"scale: expected 1 beside a DepthImage, whose depth is NDC, got {scale:g}")
             self._own("depth", depth)
             return Pyramid(self, self._engine.pyramid(depth._inner, stored), depth.camera, is_rendered=True)
         camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")

@@ -135,7 +135,7 @@ def visible(
         for name, value in (("kind", kind), ("invalid", invalid)):
             if value is not None:
                 raise TypeError(f"{name}: expected nothing beside a DepthImage, got {_arguments.describe(value)}")
-        pyramid = device.pyramid(depth)
+        pyramid = device.pyramid(depth, scale=scale)
     else:
         if device is not None:
             device._check_side(camera)

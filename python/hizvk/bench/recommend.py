@@ -317,6 +317,8 @@ def recommend(
     for name, value in (("kind", kind), ("invalid", invalid)):
         if depths is None and value is not None:
             raise TypeError(f"{name}: expected nothing beside occluders, got {_arguments.describe(value)}")
+    if depths is None and _arguments.number("scale", scale, above=0.0) != 1.0:
+        raise ValueError(f"scale: expected 1 beside occluders, got {scale:g}")
     device = device or _device_of(occluders, alternatives) or default_device()
     walls = None if occluders is None else _occluders(occluders, device)
     volumes = {name: _upload(one, device) for name, one in alternatives.items()}
@@ -447,7 +449,7 @@ def _notes(
             "The best is right before the cameras given: all that it culls there is hidden. Before other cameras, only "
             "conservative depth is proven for what shows between the pixels' centres."
         )
-    if rendered and coverage == "area":
+    if rendered and coverage == "area" and not points:  # points cover no pixel's centre
         notes.append(
             'If your image has one sample a pixel, at its centre and without jitter, ask with coverage="sample": plain '
             "depth of the full size is proven for that."
