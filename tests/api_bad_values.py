@@ -152,7 +152,7 @@ def array_of(shape: str, *, wrong: tuple[int, ...]) -> list[Bad]:
         (np.zeros(wrong, dtype=complex), TypeError, "complex128"),
         (np.zeros(wrong, dtype=object), TypeError, "object"),
         (np.array([["a"]]), TypeError, "<U1"),
-        (np.ma.zeros(wrong), TypeError, "masked array; fill it first"),
+        (np.ma.zeros(wrong), TypeError, "got a masked array; "),
         ("abc", TypeError, f"{expected} str 'abc'"),
         (None, TypeError, f"{expected} None"),
         ([[1.0, 2.0], [3.0]], ValueError, "no array"),

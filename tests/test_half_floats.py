@@ -86,6 +86,29 @@ def test_rows_with_masks_are_masked(device: hizvk.Device) -> None:
         hizvk.Spheres(list(np.ma.zeros((2, 3))), 1.0)
 
 
+def test_listed_rows_are_refused_where_their_array_is(device: hizvk.Device) -> None:
+    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(8, 8), near=0.1)
+    behind = hizvk.Spheres([[0.0, 0.0, -20.0]], 1.0)
+    for dtype in (np.int64, np.int32, np.uint8, np.bool_):
+        image = np.full(camera.size, 1, dtype)
+        for form in (image, list(image), [list(row) for row in image]):
+            with pytest.raises(TypeError, match=r"^depth: expected "):
+                hizvk.visible(behind, camera, depth=form, kind="z", device=device)
+    # Python's own whole numbers are metres.
+    assert not hizvk.visible(behind, camera, depth=[[5] * 8] * 8, kind="z", device=device).any()
+
+
+def test_what_masked_parameters_are_told_leads_somewhere(device: hizvk.Device) -> None:
+    """NaN is no way out where NaN is refused."""
+    vertices = np.ma.zeros((3, 3))
+    with pytest.raises(TypeError, match=r"^vertices: .*masked array; leave out what is masked"):
+        device.occluders(vertices, [[0, 1, 2]])
+    with pytest.raises(TypeError, match=r"^triangles: .*masked array; leave out the triangles that are masked"):
+        device.occluders(vertices.data, np.ma.array([[0, 1, 2]]))
+    with pytest.raises(TypeError, match=r"^eye: .*masked array; leave out what is masked"):
+        hizvk.Camera.look_at(np.ma.zeros(3), (0, 0, -1), fov_y_deg=60, size=(8, 8), near=0.1)
+
+
 def test_reference_takes_half_floats_as_they_are() -> None:
     camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(1, 1), near=1.0)
     boxes = hizvk.Boxes(np.array([[-1.0, -1.0, -10.003]]), np.array([[1.0, 1.0, -10.003]]))

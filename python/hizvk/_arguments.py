@@ -93,10 +93,12 @@ def is_masked(value: object) -> bool:
 def _as_array(name: str, expected: str, value: object) -> npt.NDArray[Any]:
     """`value` as an array of numbers, without a copy where it is one; lists of Python ints become float64."""
     if is_masked(value):
-        # Only floats have a NaN to fill with.
+        # Only floats have a NaN to fill with, and not every parameter takes a NaN.
         is_float = isinstance(value, np.ma.MaskedArray) and value.dtype.kind == "f"
-        way = ".filled(np.nan)" if is_float else ".astype(np.float64).filled(np.nan)"
-        raise TypeError(f"{name}: expected {expected}, got a masked array; fill it first, e.g. with {way}")
+        way = "fill it first, e.g. with " + (".filled(np.nan)" if is_float else ".astype(np.float64).filled(np.nan)")
+        if "finite" in expected:
+            way = "leave out what is masked"
+        raise TypeError(f"{name}: expected {expected}, got a masked array; {way}")
     if isinstance(value, (str, bytes)) or value is None:
         raise _wrong_type(name, expected, value)
     try:
@@ -171,7 +173,7 @@ def floats(name: str, value: object, shape: Sequence[int | str], *, why: str = "
     array = _as_array(name, expected, value)
     if array.dtype.kind != "f" or array.dtype.itemsize not in (2, 4, 8):
         got = describe(array if array.ndim else value)
-        way = "; convert it with .astype(np.float64)" if array.dtype.kind in "iu" and array.ndim else ""
+        way = "; convert it with .astype(np.float64)" if array.dtype.kind in "iufO" and array.ndim else ""
         raise TypeError(f"{name}: expected {expected}, got {got}{way}")
     _check_shape(name, expected, array, shape, hint)
     return _ready(name, array)
@@ -196,6 +198,9 @@ def floats_or_scalar(name: str, value: object, count: int) -> FloatArray:
 
 def finite_floats(name: str, value: object, shape: Sequence[int | str]) -> FloatArray:
     """`floats`, all of them finite."""
+    if is_masked(value):
+        expected = f"finite float {_shape_text(shape)}"
+        raise TypeError(f"{name}: expected {expected}, got a masked array; leave out what is masked")
     array = floats(name, value, shape)
     # Row by row in blocks: no temporary array as long as the argument.
     blocks = (array[start : start + BLOCK] for start in range(0, len(array), BLOCK))
@@ -385,7 +390,11 @@ def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
     """A ``(count,)`` bool array (any length for None)."""
     shape: tuple[int | str, ...] = ("N" if count is None else count,)
     expected = f"bool {_shape_text(shape)}"
-    if isinstance(value, (str, bytes)) or value is None or is_masked(value):
+    if is_masked(value):
+        raise TypeError(
+            f"{name}: expected {expected}, got a masked array; fill it first, with .filled(False) or (True)"
+        )
+    if isinstance(value, (str, bytes)) or value is None:
         raise _wrong_type(name, expected, value)
     array = np.asarray(value)
     if array.size == 0 and not hasattr(value, "dtype"):

@@ -104,7 +104,12 @@ def _rounding(dtype: np.dtype[Any], kind: DepthKind) -> Rounding:
 
 
 def _has_a_dtype(rows: Sequence[Any]) -> bool:
-    """Whether rows or numbers of NumPy were listed: they mean what an array of their dtype means."""
+    """Whether rows or numbers of NumPy were listed, at any depth: they mean what an array of their dtype means."""
+    first: Any = rows
+    while isinstance(first, (list, tuple)) and first:
+        first = first[0]
+    if hasattr(first, "dtype"):
+        return True
     try:
         return np.asarray(rows).dtype not in (np.float64, np.int64, np.bool_)
     except ValueError:
