@@ -98,6 +98,24 @@ def test_listed_rows_are_refused_where_their_array_is(device: hizvk.Device) -> N
     assert not hizvk.visible(behind, camera, depth=[[5] * 8] * 8, kind="z", device=device).any()
 
 
+@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.dtype(">f2")])
+def test_lists_of_several_dtypes_are_refused(device: hizvk.Device, dtype: Any) -> None:
+    """Promoted to float64 they would count as exact, and what the half floats had rounded would hide things."""
+    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(2, 2), near=0.1)
+    row = np.full(2, 10, dtype)
+    mixtures: list[list[object]] = [
+        [row, [10.0, 10.0]],
+        [[10.0, 10.0], row],
+        [[10.0, row[0]], row],
+        [row, row.astype("f8")],
+    ]
+    for mixed in mixtures:
+        with pytest.raises(TypeError, match=r"^depth: expected numbers of one dtype, got a list of float64 with "):
+            device.pyramid(mixed, camera, kind="z")  # type: ignore[arg-type]
+    device.pyramid([row, list(row)], camera, kind="z")
+    device.pyramid([row.astype("f8"), [10.0, 10.0]], camera, kind="z")
+
+
 def test_what_masked_parameters_are_told_leads_somewhere(device: hizvk.Device) -> None:
     """NaN is no way out where NaN is refused."""
     vertices = np.ma.zeros((3, 3))

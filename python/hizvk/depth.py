@@ -79,8 +79,8 @@ def checked_image(
         # An image of another library, or a buffer: its dtype says what its numbers mean, as an array's does.
         array = np.asarray(value)
         value = array if array.ndim else value
-    elif isinstance(value, (list, tuple)) and _has_a_dtype(value):
-        value = np.asarray(value)
+    elif isinstance(value, (list, tuple)):
+        value = _from_rows(name, value)
     if isinstance(value, np.ndarray):
         _refuse_dtype(name, value, kind_)
         _refuse_shape(name, value, camera)
@@ -103,17 +103,30 @@ def _rounding(dtype: np.dtype[Any], kind: DepthKind) -> Rounding:
     return "single" if kind in _METRIC else "none"
 
 
-def _has_a_dtype(rows: Sequence[Any]) -> bool:
-    """Whether rows or numbers of NumPy were listed, at any depth: they mean what an array of their dtype means."""
-    first: Any = rows
-    while isinstance(first, (list, tuple)) and first:
-        first = first[0]
-    if hasattr(first, "dtype"):
-        return True
+def _from_rows(name: str, rows: Sequence[Any]) -> Any:
+    """Listed rows or numbers of NumPy, at any depth, as the array of their dtype; Python's own as they are.
+
+    Of several dtypes NumPy makes a wider one, which would not say what the narrower numbers had rounded.
+    """
     try:
-        return np.asarray(rows).dtype not in (np.float64, np.int64, np.bool_)
+        array = np.asarray(rows)
     except ValueError:
-        return False  # ragged; refused elsewhere
+        return rows  # ragged; refused elsewhere
+    has_a_dtype = array.dtype not in (np.float64, np.int64, np.bool_)
+    left: list[Any] = [rows]
+    while left:
+        item = left.pop()
+        if isinstance(item, (list, tuple)):
+            left.extend(item)
+        elif hasattr(item, "dtype"):
+            has_a_dtype = True
+            of_item = np.asarray(item).dtype
+            if of_item.newbyteorder("=") != array.dtype.newbyteorder("="):
+                raise TypeError(
+                    f"{name}: expected numbers of one dtype, got a list of {array.dtype} with {of_item} in it; "
+                    "make one array of the dtype that they were rounded to"
+                )
+    return array if has_a_dtype else rows
 
 
 def _refuse_dtype(name: str, array: npt.NDArray[Any], kind: DepthKind) -> None:
