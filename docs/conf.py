@@ -21,5 +21,6 @@ autodoc_typehints = "signature"
 # Defaults are shown as they are written (`2**-23`), not as what they evaluate to.
 autodoc_preserve_defaults = True
 myst_heading_anchors = 3
-# The README links to files that are no pages here, and its Rust blocks are marked as rustdoc wants them.
+# The README links to files that are no pages here, and its Rust blocks are marked as rustdoc wants
+# them.
 suppress_warnings = ["myst.xref_missing", "misc.highlighting_failure"]

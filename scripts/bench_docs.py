@@ -15,7 +15,9 @@ def main(report: Path) -> None:
     lines = report.read_text(encoding="utf-8").splitlines()
     first = next(k for k, line in enumerate(lines) if line.startswith("- Command"))
     last = lines.index("## What the columns mean")
-    tables = [line.replace("## ", "### ", 1) for line in lines[first:last] if not line.startswith("![")]
+    tables = [
+        line.replace("## ", "### ", 1) for line in lines[first:last] if not line.startswith("![")
+    ]
     kept = DOCUMENT.read_text(encoding="utf-8").splitlines()
     mark = next(k for k, line in enumerate(kept) if line.startswith(MARK))
     text = "\n".join([*kept[: mark + 1], "", *tables]).replace("\n\n\n", "\n\n").rstrip()

@@ -1,8 +1,10 @@
 """Ends processes that use a device, four at once, and counts those that abort.
 
-A driver in software frees memory on threads of its own; where nobody joins them, a process may crash while it ends.
-Half of the processes here are a Rust test binary (`crates/hiz_core/tests/ends.rs`), half are Python scripts
-(`tests/processes.py`: modules that still name everything, results that nobody read, daemons that cull).
+A driver in software frees memory on threads of its own; where nobody joins them, a process may
+crash while it ends.
+Half of the processes here are a Rust test binary (`crates/hiz_core/tests/ends.rs`), half are Python
+scripts (`tests/processes.py`: modules that still name everything, results that nobody read, daemons
+that cull).
 
     exits.py                     # 2000 of each
     exits.py --rust 80 --python 20
@@ -29,7 +31,15 @@ GUARD_S = 300
 
 def rust_binary() -> str:
     """The path of the test binary `ends`, built where it is not."""
-    command = ["cargo", "test", "--workspace", "--test", "ends", "--no-run", "--message-format=json"]
+    command = [
+        "cargo",
+        "test",
+        "--workspace",
+        "--test",
+        "ends",
+        "--no-run",
+        "--message-format=json",
+    ]
     built = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
     for line in built.splitlines():
         message = json.loads(line)
@@ -41,7 +51,9 @@ def rust_binary() -> str:
 def ended(command: list[str]) -> tuple[str, str]:
     """How a process ended, and its last words where not in peace."""
     try:
-        run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, errors="replace", timeout=GUARD_S)
+        run = subprocess.run(
+            command, cwd=ROOT, capture_output=True, text=True, errors="replace", timeout=GUARD_S
+        )
     except subprocess.TimeoutExpired:
         return "hung", ""
     if run.returncode == 0:
@@ -57,7 +69,9 @@ def main() -> int:
     parser.add_argument("--rust", type=int, default=2000, help="runs of the Rust binary")
     parser.add_argument("--python", type=int, default=2000, help="runs of the Python script")
     parser.add_argument("--runs", type=int, default=2000, help="runs of --command")
-    parser.add_argument("--command", nargs=argparse.REMAINDER, help="another program, in place of both")
+    parser.add_argument(
+        "--command", nargs=argparse.REMAINDER, help="another program, in place of both"
+    )
     given = parser.parse_args()
     jobs: dict[str, list[list[str]]] = {}
     if given.command:
@@ -66,15 +80,22 @@ def main() -> int:
         if given.rust:
             jobs["Rust"] = [[rust_binary()]] * given.rust
         scenes = itertools.islice(itertools.cycle(SCENES), given.python)
-        jobs["Python"] = [[sys.executable, str(ROOT / "tests" / "processes.py"), scene] for scene in scenes]
+        jobs["Python"] = [
+            [sys.executable, str(ROOT / "tests" / "processes.py"), scene] for scene in scenes
+        ]
     # In turns, so that both kinds meet each other's load.
     mixed = [
-        (kind, job) for row in itertools.zip_longest(*jobs.values()) for kind, job in zip(jobs, row, strict=True) if job
+        (kind, job)
+        for row in itertools.zip_longest(*jobs.values())
+        for kind, job in zip(jobs, row, strict=True)
+        if job
     ]
     found: dict[str, Counter[str]] = {kind: Counter() for kind in jobs}
     words: list[str] = []
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        for (kind, _), (how, last) in zip(mixed, pool.map(lambda job: ended(job[1]), mixed), strict=True):
+        for (kind, _), (how, last) in zip(
+            mixed, pool.map(lambda job: ended(job[1]), mixed), strict=True
+        ):
             found[kind][how] += 1
             if how != "in peace":
                 words.append(f"  {kind}: {how}: {last}")

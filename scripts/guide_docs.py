@@ -1,7 +1,8 @@
 """Renews the tables of docs/guide.md out of those of docs/bench.md: `guide_docs.py` (after `bench_docs.py`).
 
-A table stands between two marks, the first of which names it. Everything in it is a count or a ratio of two cells of
-one of the bench's tables, so that the two pages cannot disagree; a test compares them.
+A table stands between two marks, the first of which names it.
+Everything in it is a count or a ratio of two cells of one of the bench's tables, so that the two
+pages cannot disagree; a test compares them.
 """
 
 from __future__ import annotations
@@ -41,8 +42,14 @@ IMAGES = {
 def rows(bench: str) -> Rows:
     """The cells of the bench's tables, marks of emphasis and of the Pareto front left out."""
     found: Rows = {}
-    for title, text in re.findall(r"^### ([\w-]+)\n(.*?)(?=^### |\Z)", bench, re.DOTALL | re.MULTILINE):
-        lines = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line[:1] == "|"]
+    for title, text in re.findall(
+        r"^### ([\w-]+)\n(.*?)(?=^### |\Z)", bench, re.DOTALL | re.MULTILINE
+    ):
+        lines = [
+            [cell.strip() for cell in line.strip("|").split("|")]
+            for line in text.splitlines()
+            if line[:1] == "|"
+        ]
         if not lines or lines[0][0] != "#":
             continue
         head = lines[0]
@@ -61,7 +68,9 @@ def _ratio(scene: dict[str, dict[str, str]], label: str, other: str, column: str
     return f"{_number(scene[label][column]) / _number(scene[other][column]):.2f}"
 
 
-def _table(head: list[str], found: Rows, cells: Callable[[dict[str, dict[str, str]]], Iterable[str]]) -> str:
+def _table(
+    head: list[str], found: Rows, cells: Callable[[dict[str, dict[str, str]]], Iterable[str]]
+) -> str:
     lines = [f"| {' | '.join(head)} |", "|---|" + "---:|" * (len(head) - 1)]
     lines += [f"| {' | '.join([name, *cells(scene)])} |" for name, scene in found.items()]
     return "\n".join(lines)
@@ -71,7 +80,12 @@ def tables(found: Rows) -> dict[str, str]:
     """Every table of the guide that is made of the bench's, by name."""
     kept, of_best = "of those in view", "of best rect."
     volumes = {"spheres": "spheres", "boxes": "boxes", "oriented boxes": "oriented"}
-    reads = {"2x2": "boxes, 2x2", "4x4": "boxes, 4x4", "8x8": "boxes, 8x8", "2x2 and descent": DESCENT}
+    reads = {
+        "2x2": "boxes, 2x2",
+        "4x4": "boxes, 4x4",
+        "8x8": "boxes, 8x8",
+        "2x2 and descent": DESCENT,
+    }
     fits = ("boxes, 2x2, descent", "oriented, 2x2, descent")
     others = ("numpy Hi-Z, float32", "Embree, one ray a pixel", "Embree, rays to 9 points of a box")
     return {
@@ -116,7 +130,9 @@ def tables(found: Rows) -> dict[str, str]:
         "reads in time": _table(
             ["time of the cull, over 2x2", *list(reads)[1:]],
             found,
-            lambda scene: [_ratio(scene, label, "boxes, 2x2") for label in list(reads.values())[1:]],
+            lambda scene: [
+                _ratio(scene, label, "boxes, 2x2") for label in list(reads.values())[1:]
+            ],
         ),
         "fits": _table(
             [
@@ -151,21 +167,24 @@ def tables(found: Rows) -> dict[str, str]:
             ["time of the whole way, over full", *list(IMAGES)[1:]],
             found,
             lambda scene: [
-                _ratio(scene, f"boxes, 2x2{image}", "boxes, 2x2", "sum") for image in list(IMAGES.values())[1:]
+                _ratio(scene, f"boxes, 2x2{image}", "boxes, 2x2", "sum")
+                for image in list(IMAGES.values())[1:]
             ],
         ),
         "levels": _table(
             ["boxes: kept with 2x2, with a descent", *LEVELS],
             found,
             lambda scene: [
-                f"{scene[f'boxes, 2x2{some}'][kept]}, {scene[f'{DESCENT}{some}'][kept]}" for some in LEVELS.values()
+                f"{scene[f'boxes, 2x2{some}'][kept]}, {scene[f'{DESCENT}{some}'][kept]}"
+                for some in LEVELS.values()
             ],
         ),
         "levels in time": _table(
             ["time of the reduction, over all levels", *list(LEVELS)[1:]],
             found,
             lambda scene: [
-                _ratio(scene, f"boxes, 2x2{some}", "boxes, 2x2", "reduce") for some in list(LEVELS.values())[1:]
+                _ratio(scene, f"boxes, 2x2{some}", "boxes, 2x2", "reduce")
+                for some in list(LEVELS.values())[1:]
             ],
         ),
         "coverage": _table(

@@ -12,7 +12,14 @@ NEWEST_GLIBC = (2, 28)
 ALIASES = {"manylinux1": (2, 5), "manylinux2010": (2, 12), "manylinux2014": (2, 17)}
 EXPECTED = {"hizvk/__init__.py", "hizvk/_core.pyi", "hizvk/py.typed"}
 # What every Linux system has; Vulkan's loader is opened at run time and must not be here.
-SYSTEM_LIBRARIES = {"libc.so.6", "libm.so.6", "libdl.so.2", "libpthread.so.0", "librt.so.1", "libgcc_s.so.1"}
+SYSTEM_LIBRARIES = {
+    "libc.so.6",
+    "libm.so.6",
+    "libdl.so.2",
+    "libpthread.so.0",
+    "librt.so.1",
+    "libgcc_s.so.1",
+}
 
 
 def glibc_of(platform: str) -> tuple[int, int]:
@@ -27,7 +34,9 @@ def needed_libraries(elf: bytes) -> list[str]:
     section_offset = struct.unpack_from("<Q", elf, 0x28)[0]
     entry_size, count = struct.unpack_from("<HH", elf, 0x3A)
     # A section header: name, type, flags, address, offset, size, link, ...
-    sections = [struct.unpack_from("<IIQQQQI", elf, section_offset + k * entry_size) for k in range(count)]
+    sections = [
+        struct.unpack_from("<IIQQQQI", elf, section_offset + k * entry_size) for k in range(count)
+    ]
     names = []
     for _, kind, _, _, offset, size, link in sections:
         if kind != 6:  # SHT_DYNAMIC
@@ -44,7 +53,9 @@ def main(path: str) -> None:
     """Asserts, and prints what was found."""
     with zipfile.ZipFile(path) as wheel:
         names = set(wheel.namelist())
-        info = next(name for name in names if name.endswith(".dist-info/WHEEL")).removesuffix("/WHEEL")
+        info = next(name for name in names if name.endswith(".dist-info/WHEEL")).removesuffix(
+            "/WHEEL"
+        )
         tags = HeaderParser().parsestr(wheel.read(f"{info}/WHEEL").decode()).get_all("Tag", [])
         metadata = HeaderParser().parsestr(wheel.read(f"{info}/METADATA").decode())
         [module] = [name for name in names if name.endswith(".so")]
@@ -54,7 +65,9 @@ def main(path: str) -> None:
     for tag in tags:
         python, abi, platform = tag.split("-")
         assert (python, abi) == ("cp311", "abi3"), f"tag: expected cp311-abi3, got {tag}"
-        assert glibc_of(platform) <= NEWEST_GLIBC, f"tag: expected glibc {NEWEST_GLIBC} or older, got {tag}"
+        assert glibc_of(platform) <= NEWEST_GLIBC, (
+            f"tag: expected glibc {NEWEST_GLIBC} or older, got {tag}"
+        )
     assert tags, "the wheel has no tag"
 
     required = [entry for entry in metadata.get_all("Requires-Dist", []) if "extra ==" not in entry]
@@ -67,9 +80,13 @@ def main(path: str) -> None:
     strangers = {name for name in names if not name.startswith(("hizvk/", info))}
     assert not strangers, f"files outside of the package: {strangers}"
     # What tests plant faults with, in development builds.
-    assert b"HIZVK_PLANTED_FAULT" not in binary, "the module takes planted faults: expected a release build"
+    assert b"HIZVK_PLANTED_FAULT" not in binary, (
+        "the module takes planted faults: expected a release build"
+    )
     linked = {name for name in needed if not name.startswith("ld-linux")}
-    assert linked <= SYSTEM_LIBRARIES, f"linked libraries: {linked - SYSTEM_LIBRARIES} are not on every system"
+    assert linked <= SYSTEM_LIBRARIES, (
+        f"linked libraries: {linked - SYSTEM_LIBRARIES} are not on every system"
+    )
     print(f"wheel: {', '.join(tags)}, {len(names)} files")
     print(f"wheel: requires {', '.join(required)}; links {', '.join(sorted(linked))}")
 

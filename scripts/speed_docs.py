@@ -1,7 +1,8 @@
 """Renews what docs/performance.md and guide.md quote of a run: `speed_docs.py [REPORT]` (out/speed/report.md).
 
-Each quotation stands between two marks that name the report's sections, and may name the rows of its tables that are
-wanted: `<!-- speed: Section; Other section | part of a label | part of another -->`.
+Each quotation stands between two marks that name the report's sections, and may name the rows of
+its tables that are wanted: `<!-- speed: Section; Other section | part of a label | part of another
+-->`.
 """
 
 import re
@@ -39,10 +40,18 @@ def main(report: Path) -> None:
     found = sections(report.read_text(encoding="utf-8"))
 
     def quote(mark: re.Match[str]) -> str:
-        return mark[1] + "\n" + "\n\n".join(quoted(found, each) for each in mark[2].split("; ")) + "\n\n" + mark[3]
+        return (
+            mark[1]
+            + "\n"
+            + "\n\n".join(quoted(found, each) for each in mark[2].split("; "))
+            + "\n\n"
+            + mark[3]
+        )
 
     for document in DOCUMENTS:
-        document.write_text(QUOTATION.sub(quote, document.read_text(encoding="utf-8")), encoding="utf-8")
+        document.write_text(
+            QUOTATION.sub(quote, document.read_text(encoding="utf-8")), encoding="utf-8"
+        )
     if (report.parent / "scale.png").exists():
         shutil.copyfile(report.parent / "scale.png", DOCS / "images" / "scale.png")
 

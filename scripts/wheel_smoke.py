@@ -14,7 +14,9 @@ def without_driver() -> None:
     try:
         hizvk.Device()
     except hizvk.NoAdapterError as error:
-        assert INSTALL_LINE in str(error), f"NoAdapterError: expected the line {INSTALL_LINE!r}, got {error}"
+        assert INSTALL_LINE in str(error), (
+            f"NoAdapterError: expected the line {INSTALL_LINE!r}, got {error}"
+        )
         print(f"no driver: NoAdapterError: {error}")
     else:
         raise AssertionError("Device(): expected NoAdapterError without a driver")
@@ -32,7 +34,9 @@ def with_driver() -> None:
 
 
 if __name__ == "__main__":
-    assert "site-packages" in hizvk.__file__, f"hizvk comes from {hizvk.__file__}, not from the wheel"
+    assert "site-packages" in hizvk.__file__, (
+        f"hizvk comes from {hizvk.__file__}, not from the wheel"
+    )
     if "--no-driver" in sys.argv[1:]:
         without_driver()
     else:

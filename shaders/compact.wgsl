@@ -1,5 +1,7 @@
-// Compaction: from the mask to the ascending list of the caller's indices and the draw's instance count.
-// `scan` (one workgroup) counts the bits before each word, `scatter` (an invocation a word) writes them.
+// Compaction: from the mask to the ascending list of the caller's indices and the draw's instance
+// count.
+// `scan` (one workgroup) counts the bits before each word, `scatter` (an invocation a word) writes
+// them.
 
 const LANES: u32 = 256u;
 

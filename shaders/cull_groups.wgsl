@@ -1,6 +1,7 @@
-// The cull of whole groups: one invocation tests the box around 64 instances, by the same certificates. What hides the box hides all
-// of them; the other groups are compacted, for `cull_members.wgsl`. (Moller, Haines and others, "Real-Time Rendering", section
-// "Hierarchical Z-Buffering".)
+// The cull of whole groups: one invocation tests the box around 64 instances, by the same
+// certificates.
+// What hides the box hides all of them; the other groups are compacted, for `cull_members.wgsl`.
+// (Moller, Haines and others, "Real-Time Rendering", section "Hierarchical Z-Buffering".)
 
 const WORKGROUP: u32 = 128u;
 

@@ -22,8 +22,8 @@ struct Explanation {
 // .x: the instance within its piece.
 @group(1) @binding(0) var<uniform> which: vec4<u32>;
 @group(2) @binding(0) var<storage, read_write> explanation: Explanation;
-// What was read, in order: level and flags, x, y, the depth's bits. What has no room is only
-// counted.
+// What was read, in order: level and flags, x, y, the depth's bits.
+// What has no room is only counted.
 @group(2) @binding(1) var<storage, read_write> readings: array<vec4<u32>>;
 
 // Flags: all of the volume is behind the texel's depth; or its own outline and front there tell

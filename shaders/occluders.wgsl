@@ -1,4 +1,5 @@
-// Occluders, depth only. A vertex is two float32 halves of its world position; the eye is subtracted half by half before
+// Occluders, depth only.
+// A vertex is two float32 halves of its world position; the eye is subtracted half by half before
 // anything is rounded, so that a wall a million metres from the origin does not tremble.
 
 struct OccluderView {

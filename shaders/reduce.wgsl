@@ -1,16 +1,20 @@
-// Depth reduction: each invocation reads an 8x8 block of one level and writes what it makes of the next three.
+// Depth reduction: each invocation reads an 8x8 block of one level and writes what it makes of the
+// next three.
 //
-// The shape of AMD's Single Pass Downsampler (FidelityFX SPD, 2020) cut to registers: no shared memory, no barrier, a pass
-// for every three levels. Sizes are ceil-halved, and reads past an edge repeat the edge, so a texel of level k is the
-// farthest depth of exactly the pixels [x << k, (x + 1) << k): nothing is dropped at odd sizes and nothing is read twice
-// that could matter (the defect of the shader printed in Rakos 2010).
+// The shape of AMD's Single Pass Downsampler (FidelityFX SPD, 2020) cut to registers: no shared
+// memory, no barrier, a pass for every three levels.
+// Sizes are ceil-halved, and reads past an edge repeat the edge, so a texel of level k is the
+// farthest depth of exactly the pixels [x << k, (x + 1) << k): nothing is dropped at odd sizes and
+// nothing is read twice that could matter (the defect of the shader printed in Rakos 2010).
 //
-// Levels are stored with room for whole blocks (`layout.rs`), so that no store asks where the level ends: the padding takes what
-// lies past the edge, which repeats it, and the pass that reads this level reads the padding like the rest.
+// Levels are stored with room for whole blocks (`layout.rs`), so that no store asks where the level
+// ends: the padding takes what lies past the edge, which repeats it, and the pass that reads this
+// level reads the padding like the rest.
 
 // True: level 0, the source texture, is read; otherwise a stored level.
 override FROM_SOURCE: bool;
-// The first level that is stored, 1 to 3 above the one that is read: an image's own level 1 is the dearest to write.
+// The first level that is stored, 1 to 3 above the one that is read: an image's own level 1 is the
+// dearest to write.
 override FIRST: u32;
 
 // The farthest of two rows, and of neighbours in them.

@@ -1,8 +1,11 @@
-// One coarse level alone, straight from the depth image, in one dispatch: a texel takes 16x16 pixels and more.
+// One coarse level alone, straight from the depth image, in one dispatch: a texel takes 16x16
+// pixels and more.
 //
-// Up to 32x32 pixels an invocation reads them all; larger texels are shared by the 64 invocations of a workgroup. Bits are
-// sanitized before they are compared, so -0 and NaN cannot break the integer order, and nothing begins with a depth of 1
-// that would cap larger ones (both faults of the usual atomicMin on float bits).
+// Up to 32x32 pixels an invocation reads them all; larger texels are shared by the 64 invocations
+// of a workgroup.
+// Bits are sanitized before they are compared, so -0 and NaN cannot break the integer order, and
+// nothing begins with a depth of 1 that would cap larger ones (both faults of the usual atomicMin
+// on float bits).
 
 // A texel is shared by a workgroup.
 override SHARED: bool;

@@ -1,8 +1,9 @@
-// What the members of hidden groups are themselves: an invocation tells those of one. The cull
-// hides them with their group and asks no more. Here those of a group outside the view are outside;
-// of a group that is hidden by depth those are outside that their own certificates call so, and the
-// others occluded. After it each place has a verdict, and the group is told: it may run again, and
-// with other bounds, and changes nothing.
+// What the members of hidden groups are themselves: an invocation tells those of one.
+// The cull hides them with their group and asks no more.
+// Here those of a group outside the view are outside; of a group that is hidden by depth those are
+// outside that their own certificates call so, and the others occluded.
+// After it each place has a verdict, and the group is told: it may run again, and with other
+// bounds, and changes nothing.
 
 const WORKGROUP: u32 = 64u;
 
@@ -33,8 +34,8 @@ fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var place = first; place < end; place += 1u) {
         mask[verdicts + place] = of_group;
     }
-    // `refine_groups.wgsl` adds more to those that lie within the view. A loop of its own: a software
-    // driver skips no branch, but it ends a loop.
+    // `refine_groups.wgsl` adds more to those that lie within the view.
+    // A loop of its own: a software driver skips no branch, but it ends a loop.
     let may_be_outside = word == OCCLUDED;
     for (var place = select(end, first, may_be_outside); place < end; place += 1u) {
         if classify(place).verdict == OUTSIDE {

@@ -1,6 +1,7 @@
 // Which groups that are hidden by depth lie within the view with all that they hold: none of their
-// members is outside, so `refine.wgsl` need not test them. For area coverage: in sample coverage
-// what lies between the pixel centres is outside, wherever it is.
+// members is outside, so `refine.wgsl` need not test them.
+// For area coverage: in sample coverage what lies between the pixel centres is outside, wherever it
+// is.
 
 const WORKGROUP: u32 = 64u;
 

@@ -14,7 +14,8 @@ struct Update {
 struct Sequence {
     // The number of the next one.
     next: u32,
-    // Not 0: one was left out, or overtaken. The boxes that the host forms from then on may not contain their groups.
+    // Not 0: one was left out, or overtaken.
+    // The boxes that the host forms from then on may not contain their groups.
     broken: u32,
 }
 

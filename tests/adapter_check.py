@@ -1,12 +1,14 @@
 """Which Vulkan adapter the tests run on, and whether it is the one that they expect.
 
-`python tests/adapter_check.py` prints it and fails on a wrong one; conftest.py does so when pytest starts.
+`python tests/adapter_check.py` prints it and fails on a wrong one; conftest.py does so when pytest
+starts.
 """
 
 import os
 import sys
 
-# lavapipe calls its driver so. `HIZVK_EXPECT_ADAPTER=...` names another one: any part of its name or driver.
+# lavapipe calls its driver so.
+# `HIZVK_EXPECT_ADAPTER=...` names another one: any part of its name or driver.
 DEFAULT_EXPECTATION = "llvmpipe"
 
 
@@ -21,7 +23,10 @@ def check() -> tuple[str, str | None]:
         return "adapter: none", f"no device: {error}"
     line = f"adapter: {adapter.name}; driver: {adapter.driver} {adapter.driver_info}"
     if expected.lower() not in line.lower():
-        return line, f"HIZVK_EXPECT_ADAPTER: expected an adapter or driver called {expected!r}, got {line}"
+        return (
+            line,
+            f"HIZVK_EXPECT_ADAPTER: expected an adapter or driver called {expected!r}, got {line}",
+        )
     return line, None
 
 

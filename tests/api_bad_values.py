@@ -1,6 +1,7 @@
 """Bad arguments of every public function: the tables behind test_api_errors.py.
 
-One table a function: valid arguments, and for each parameter bad values with the exception and a part of its text.
+One table a function: valid arguments, and for each parameter bad values with the exception and a
+part of its text.
 """
 
 from collections.abc import Callable
@@ -38,7 +39,8 @@ def camera(size: tuple[int, int] = (6, 8), **more: Any) -> hizvk.Camera:
 TETRAHEDRON = hizvk.Mesh(np.eye(4)[:, :3] / 4, [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]])
 
 
-# -- bad values that several functions share -----------------------------------------------------------------
+# -- bad values that several functions
+# share -----------------------------------------------------------------
 
 LEVELS: list[Bad] = [
     (0, ValueError, "expected an integer in 1..15, got int 0"),
@@ -104,9 +106,21 @@ POSE: list[Bad] = [
         "expected (3, 4) or (4, 4) finite numbers, got (3, 3) float64; pass a rotation and a translation as a pair",
     ),
     (np.eye(4)[:, :3], ValueError, "got (4, 3) float64"),
-    ((np.ones(3), np.zeros(3)), ValueError, "expected R of a pair (R, t) to be (3, 3) finite numbers, got (3,)"),
-    ((np.ones((3, 1)), np.zeros((3, 1))), ValueError, "a rotation vector becomes a matrix by cv2.Rodrigues(rvec)[0]"),
-    ((np.eye(3), np.zeros(4)), ValueError, "expected t of a pair (R, t) to be (3, 1) or (1, 3) or (3,) finite"),
+    (
+        (np.ones(3), np.zeros(3)),
+        ValueError,
+        "expected R of a pair (R, t) to be (3, 3) finite numbers, got (3,)",
+    ),
+    (
+        (np.ones((3, 1)), np.zeros((3, 1))),
+        ValueError,
+        "a rotation vector becomes a matrix by cv2.Rodrigues(rvec)[0]",
+    ),
+    (
+        (np.eye(3), np.zeros(4)),
+        ValueError,
+        "expected t of a pair (R, t) to be (3, 1) or (1, 3) or (3,) finite",
+    ),
     ((np.eye(3), None), TypeError, "got None"),
     ((np.zeros((3, 3)), np.zeros(3)), ValueError, "singular"),
     (SINGULAR[:3], ValueError, "singular"),
@@ -147,7 +161,11 @@ def array_of(shape: str, *, wrong: tuple[int, ...]) -> list[Bad]:
     expected = f"expected float {shape}, got"
     return [
         (np.zeros(wrong), ValueError, f"{expected} {wrong} float64"),
-        (np.zeros(wrong, dtype=np.int64), TypeError, f"{expected} {wrong} int64; convert it with .astype(np.float64)"),
+        (
+            np.zeros(wrong, dtype=np.int64),
+            TypeError,
+            f"{expected} {wrong} int64; convert it with .astype(np.float64)",
+        ),
         (np.zeros(wrong, dtype=bool), TypeError, "bool"),
         (np.zeros(wrong, dtype=complex), TypeError, "complex128"),
         (np.zeros(wrong, dtype=object), TypeError, "object"),
@@ -162,7 +180,11 @@ def array_of(shape: str, *, wrong: tuple[int, ...]) -> list[Bad]:
 
 HALF_SIZES: list[Bad] = [
     (np.ones((3, 3)), ValueError, "expected float (2, 3), got (3, 3) float64"),
-    (np.ones((2, 3), dtype=int), TypeError, "got (2, 3) int64; convert it with .astype(np.float64)"),
+    (
+        np.ones((2, 3), dtype=int),
+        TypeError,
+        "got (2, 3) int64; convert it with .astype(np.float64)",
+    ),
     ((1.0, 2.0), ValueError, "expected float (3,) or one number, got (2,) float64"),
     ([[1.0, 2.0], [3.0]], ValueError, "no array"),
     ("large", TypeError, "got str 'large'"),
@@ -193,10 +215,22 @@ IMAGE: list[Bad] = [
     ("image", TypeError, "got str 'image'"),
 ]
 KIND: list[Bad] = [
-    (None, TypeError, 'expected one of "ndc", "reversed_ndc", "z", "distance", got None; there is no default'),
-    ("depth", ValueError, 'expected one of "ndc", "reversed_ndc", "z", "distance", got str \'depth\''),
+    (
+        None,
+        TypeError,
+        'expected one of "ndc", "reversed_ndc", "z", "distance", got None; there is no default',
+    ),
+    (
+        "depth",
+        ValueError,
+        'expected one of "ndc", "reversed_ndc", "z", "distance", got str \'depth\'',
+    ),
     (3, TypeError, "got int 3"),
-    ("ndc", ValueError, 'expected "reversed_ndc" (1 near and 0 far) for a camera with reversed_z=True, got "ndc"'),
+    (
+        "ndc",
+        ValueError,
+        'expected "reversed_ndc" (1 near and 0 far) for a camera with reversed_z=True, got "ndc"',
+    ),
 ]
 SCALE: list[Bad] = [
     (0, ValueError, "above 0, got int 0"),
@@ -205,7 +239,11 @@ SCALE: list[Bad] = [
     ("mm", TypeError, "got str 'mm'"),
 ]
 INVALID: list[Bad] = [
-    (0, TypeError, "expected None or a collection of the numbers that mean no data, in the array's own units"),
+    (
+        0,
+        TypeError,
+        "expected None or a collection of the numbers that mean no data, in the array's own units",
+    ),
     ("0", TypeError, "got str '0'"),
     (("0",), TypeError, "got str '0' in it"),
     ((True,), TypeError, "got bool True in it"),
@@ -216,7 +254,10 @@ GUARD: list[Bad] = [
     (-1, ValueError, "expected a finite number at least 0 and at most 16, got int -1"),
     ("1", TypeError, "got str '1'"),
 ]
-COVERAGE: list[Bad] = [("pixel", ValueError, 'expected one of "area", "sample"'), (0, TypeError, "got int 0")]
+COVERAGE: list[Bad] = [
+    ("pixel", ValueError, 'expected one of "area", "sample"'),
+    (0, TypeError, "got int 0"),
+]
 DEPTH_SLACK: list[Bad] = [
     (-1e-7, ValueError, "at least 0"),
     (0.75, ValueError, "at most 0.5, got float 0.75"),
@@ -244,7 +285,11 @@ TRANSFORM_SLACK: list[Bad] = [
 VERTICES: list[Bad] = [
     (np.zeros((4, 2)), ValueError, "expected float (V, 3), got (4, 2) float64"),
     (np.zeros((4, 3), dtype=int), TypeError, "got (4, 3) int64"),
-    (np.full((4, 3), NAN), ValueError, "expected finite float (V, 3), got 12 NaN or infinite numbers"),
+    (
+        np.full((4, 3), NAN),
+        ValueError,
+        "expected finite float (V, 3), got 12 NaN or infinite numbers",
+    ),
 ]
 TRIANGLES: list[Bad] = [
     (np.zeros((1, 4), dtype=int), ValueError, "expected integer (T, 3), got (1, 4) int64"),
@@ -255,10 +300,26 @@ TRIANGLES: list[Bad] = [
     ([[0, 1], [2]], ValueError, "no array"),
 ]
 SINGLE_MESH: list[Bad] = [
-    (None, TypeError, "expected a Mesh, a mesh of trimesh or Open3D or a tuple (vertices, triangles), got None"),
-    ((np.zeros((3, 2)), [[0, 1, 2]]), ValueError, "vertices: expected float (V, 3), got (3, 2) float64"),
-    ((np.zeros((3, 3)), [[0, 1, 3]]), ValueError, "triangles: expected vertex indices in 0..2, got 3"),
-    (hizvk.Mesh(np.zeros((3, 3)), [[0, 1, 2]], EYE4), ValueError, "without transforms, got Mesh(3 vertices"),
+    (
+        None,
+        TypeError,
+        "expected a Mesh, a mesh of trimesh or Open3D or a tuple (vertices, triangles), got None",
+    ),
+    (
+        (np.zeros((3, 2)), [[0, 1, 2]]),
+        ValueError,
+        "vertices: expected float (V, 3), got (3, 2) float64",
+    ),
+    (
+        (np.zeros((3, 3)), [[0, 1, 3]]),
+        ValueError,
+        "triangles: expected vertex indices in 0..2, got 3",
+    ),
+    (
+        hizvk.Mesh(np.zeros((3, 3)), [[0, 1, 2]], EYE4),
+        ValueError,
+        "without transforms, got Mesh(3 vertices",
+    ),
 ]
 TRANSFORMS: list[Bad] = [
     (np.eye(3), ValueError, "expected float (4, 4), got (3, 3) float64"),
@@ -266,7 +327,11 @@ TRANSFORMS: list[Bad] = [
     (np.eye(4, dtype=int), TypeError, "got (4, 4) int64"),
     (np.eye(4) * NAN, ValueError, "NaN or infinite"),
     (TRANSPOSED_POSE, ValueError, "it looks transposed"),
-    (np.diag([1.0, 1, 1, 2]), ValueError, "expected the last row to be 0, 0, 0, 1, got [0.0, 0.0, 0.0, 2.0]"),
+    (
+        np.diag([1.0, 1, 1, 2]),
+        ValueError,
+        "expected the last row to be 0, 0, 0, 1, got [0.0, 0.0, 0.0, 2.0]",
+    ),
 ]
 
 
@@ -281,18 +346,30 @@ def unsigned(name: str) -> list[Bad]:
     ]
 
 
-# -- the tables ----------------------------------------------------------------------------------------------
+# -- the
+# tables ----------------------------------------------------------------------------------------------
 
 VIEW: BadValues = {
     "eye": VECTOR,
     "target": [*VECTOR, ((0, 0, 0), ValueError, "eye")],
-    "up": [*VECTOR, ((0, 0, 0), ValueError, "expected a direction"), ((0, 0, 5), ValueError, "such as (0, 1, 0)")],
+    "up": [
+        *VECTOR,
+        ((0, 0, 0), ValueError, "expected a direction"),
+        ((0, 0, 5), ValueError, "such as (0, 1, 0)"),
+    ],
     "size": SIZE,
     "near": NEAR,
     "far": FAR,
     "reversed_z": FLAG,
 }
-LOOK: dict[str, Any] = {"eye": (0, 0, 0), "target": (0, 0, -1), "up": (0, 1, 0), "size": (6, 8), "near": 0.1, "far": 10}
+LOOK: dict[str, Any] = {
+    "eye": (0, 0, 0),
+    "target": (0, 0, -1),
+    "up": (0, 1, 0),
+    "size": (6, 8),
+    "near": 0.1,
+    "far": 10,
+}
 LOOK["reversed_z"] = True
 FOV: list[Bad] = [
     (0, ValueError, "expected a finite number above 0 and below 180, got int 0"),
@@ -314,9 +391,13 @@ DISTORTION: list[Bad] = [
     ([NAN], ValueError, "undistort"),
 ]
 VECTOR_OR_NONE: list[Bad] = [
-    (None, ValueError, "expected the other half of the pose") if bad[0] is None else bad for bad in VECTOR
+    (None, ValueError, "expected the other half of the pose") if bad[0] is None else bad
+    for bad in VECTOR
 ]
-ORTHO_NEAR: list[Bad] = [("near", TypeError, "expected a finite number, got str"), (NAN, ValueError, "got float nan")]
+ORTHO_NEAR: list[Bad] = [
+    ("near", TypeError, "expected a finite number, got str"),
+    (NAN, ValueError, "got float nan"),
+]
 CLIP: list[Bad] = [*MATRIX, (None, ValueError, "got neither")]
 
 
@@ -355,22 +436,39 @@ TABLES: dict[str, Table] = {
     "OrientedBoxes": Table(
         lambda _: (
             hizvk.OrientedBoxes,
-            {"centers": np.zeros((2, 3)), "half_sizes": np.ones((2, 3)), "rotations": np.zeros((2, 3, 3))},
+            {
+                "centers": np.zeros((2, 3)),
+                "half_sizes": np.ones((2, 3)),
+                "rotations": np.zeros((2, 3, 3)),
+            },
         ),
         {
             "centers": array_of("(N, 3)", wrong=(3, 100)),
             "half_sizes": array_of("(2, 3)", wrong=(3, 3)),
             "rotations": [
                 *array_of("(2, 3, 3)", wrong=(2, 9)),
-                (np.zeros(2), ValueError, "got (2,) float64; angles, quaternions and matrices with a translation are"),
-                (np.zeros((2, 4)), ValueError, "OrientedBoxes.from_yaw, .from_quaternions and .from_transforms"),
+                (
+                    np.zeros(2),
+                    ValueError,
+                    "got (2,) float64; angles, quaternions and matrices with a translation are",
+                ),
+                (
+                    np.zeros((2, 4)),
+                    ValueError,
+                    "OrientedBoxes.from_yaw, .from_quaternions and .from_transforms",
+                ),
             ],
         },
     ),
     "OrientedBoxes.from_yaw": Table(
         lambda _: (
             hizvk.OrientedBoxes.from_yaw,
-            {"centers": np.zeros((2, 3)), "half_sizes": np.ones((2, 3)), "yaw_deg": np.zeros(2), "up": (0, 0, 1)},
+            {
+                "centers": np.zeros((2, 3)),
+                "half_sizes": np.ones((2, 3)),
+                "yaw_deg": np.zeros(2),
+                "up": (0, 0, 1),
+            },
         ),
         {
             "centers": array_of("(N, 3)", wrong=(3, 100)),
@@ -397,7 +495,11 @@ TABLES: dict[str, Table] = {
             "half_sizes": HALF_SIZES,
             "quaternions": array_of("(2, 4)", wrong=(4, 4)),
             "order": [
-                ("zyxw", ValueError, 'expected "wxyz" (nuScenes, COLMAP, Blender, trimesh, MuJoCo) or "xyzw" (SciPy'),
+                (
+                    "zyxw",
+                    ValueError,
+                    'expected "wxyz" (nuScenes, COLMAP, Blender, trimesh, MuJoCo) or "xyzw" (SciPy',
+                ),
                 (None, TypeError, "got None; there is no default"),
             ],
         },
@@ -417,7 +519,9 @@ TABLES: dict[str, Table] = {
         },
     ),
     "Camera": Table(lambda _: (hizvk.Camera, {}), {}),
-    "Camera.look_at": Table(lambda _: (hizvk.Camera.look_at, {**LOOK, "fov_y_deg": 60}), {**VIEW, "fov_y_deg": FOV}),
+    "Camera.look_at": Table(
+        lambda _: (hizvk.Camera.look_at, {**LOOK, "fov_y_deg": 60}), {**VIEW, "fov_y_deg": FOV}
+    ),
     "Camera.frustum": Table(
         lambda _: (hizvk.Camera.frustum, {**LOOK, "left": -1, "right": 2, "bottom": -1, "top": 1}),
         {
@@ -441,12 +545,21 @@ TABLES: dict[str, Table] = {
     "Camera.from_opencv": Table(
         lambda _: (
             hizvk.Camera.from_opencv,
-            {"k": K, "pixel_center": "half", "camera_from_world": EYE4, "size": (48, 64), "near": 0.1},
+            {
+                "k": K,
+                "pixel_center": "half",
+                "camera_from_world": EYE4,
+                "size": (48, 64),
+                "near": 0.1,
+            },
         ),
         {
             "k": INTRINSICS,
             "pixel_center": PIXEL_CENTER,
-            "camera_from_world": [*POSE, (None, ValueError, "expected exactly one of them: (4, 4), (3, 4) or a pair")],
+            "camera_from_world": [
+                *POSE,
+                (None, ValueError, "expected exactly one of them: (4, 4), (3, 4) or a pair"),
+            ],
             "world_from_camera": POSE,
             "size": SIZE,
             "near": NEAR,
@@ -469,25 +582,45 @@ TABLES: dict[str, Table] = {
         ),
         {
             "model": [
-                ("pinhole", ValueError, "expected one of COLMAP's models SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL"),
-                ("OPENCV_FISHEYE", ValueError, "no pinhole with any numbers; run COLMAP's image_undistorter, and pass"),
+                (
+                    "pinhole",
+                    ValueError,
+                    "expected one of COLMAP's models SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL",
+                ),
+                (
+                    "OPENCV_FISHEYE",
+                    ValueError,
+                    "no pinhole with any numbers; run COLMAP's image_undistorter, and pass",
+                ),
                 ("THIN_PRISM_FISHEYE", ValueError, "image_undistorter"),
                 (1, TypeError, "got int 1"),
                 (None, TypeError, "got None"),
             ],
             "params": [
-                ([100, 32, 24], ValueError, "expected fx, fy, cx, cy of PINHOLE, (4,) finite numbers, got (3,)"),
+                (
+                    [100, 32, 24],
+                    ValueError,
+                    "expected fx, fy, cx, cy of PINHOLE, (4,) finite numbers, got (3,)",
+                ),
                 ([100, 0, 32, 24], ValueError, "with focal lengths above 0"),
                 ([100, -1, 32, 24], ValueError, "with focal lengths above 0"),
                 ([100, NAN, 32, 24], ValueError, "nan"),
                 ("100", TypeError, "got str '100'"),
             ],
             "qvec": [
-                ([0, 0, 0, 0], ValueError, "expected a quaternion (w, x, y, z) of length 1, got [0.0, 0.0, 0.0, 0.0]"),
+                (
+                    [0, 0, 0, 0],
+                    ValueError,
+                    "expected a quaternion (w, x, y, z) of length 1, got [0.0, 0.0, 0.0, 0.0]",
+                ),
                 ([1, 1, 0, 0], ValueError, "of length 1.41421"),
                 ([1, 0, 0], ValueError, "expected (4,) finite numbers, got (3,) float64"),
                 ([NAN, 0, 0, 1], ValueError, "nan"),
-                (None, ValueError, "expected the other half of the pose, as images.txt has it; got None"),
+                (
+                    None,
+                    ValueError,
+                    "expected the other half of the pose, as images.txt has it; got None",
+                ),
             ],
             "tvec": VECTOR_OR_NONE,
             "camera_from_world": POSE,
@@ -499,12 +632,19 @@ TABLES: dict[str, Table] = {
         },
     ),
     "Camera.from_opengl": Table(
-        lambda _: (hizvk.Camera.from_opengl, {"projection": GL, "camera_from_world": EYE4, "size": (48, 64)}),
+        lambda _: (
+            hizvk.Camera.from_opengl,
+            {"projection": GL, "camera_from_world": EYE4, "size": (48, 64)},
+        ),
         {
             "projection": [
                 *MATRIX,
                 (GL.T, ValueError, "looks transposed; pass projection.T"),
-                (None, ValueError, "projection, k, fov_x_deg, fov_y_deg: expected exactly one of them, got none"),
+                (
+                    None,
+                    ValueError,
+                    "projection, k, fov_x_deg, fov_y_deg: expected exactly one of them, got none",
+                ),
             ],
             "k": INTRINSICS,
             "pixel_center": PIXEL_CENTER,
@@ -520,7 +660,10 @@ TABLES: dict[str, Table] = {
         },
     ),
     "Camera.from_matrices": Table(
-        lambda _: (hizvk.Camera.from_matrices, {"clip_from_world": GL, "size": (48, 64), "reversed_z": False}),
+        lambda _: (
+            hizvk.Camera.from_matrices,
+            {"clip_from_world": GL, "size": (48, 64), "reversed_z": False},
+        ),
         {
             "clip_from_world": CLIP,
             "clip_from_camera": MATRIX,
@@ -532,7 +675,10 @@ TABLES: dict[str, Table] = {
     ),
     "Camera.resized": Table(lambda _: (camera().resized, {"size": (3, 4)}), {"size": SIZE}),
     "Mesh": Table(
-        lambda _: (hizvk.Mesh, {"vertices": np.zeros((3, 3)), "triangles": [[0, 1, 2]], "transforms": EYE4}),
+        lambda _: (
+            hizvk.Mesh,
+            {"vertices": np.zeros((3, 3)), "triangles": [[0, 1, 2]], "transforms": EYE4},
+        ),
         {"vertices": VERTICES, "triangles": TRIANGLES, "transforms": TRANSFORMS},
     ),
     "DrawTemplate": Table(
@@ -541,14 +687,21 @@ TABLES: dict[str, Table] = {
             "index_count": unsigned("index_count"),
             "first_index": unsigned("first_index"),
             "first_instance": unsigned("first_instance"),
-            "base_vertex": [(2**31, ValueError, "in -2147483648..2147483647"), (0.5, TypeError, "got float 0.5")],
+            "base_vertex": [
+                (2**31, ValueError, "in -2147483648..2147483647"),
+                (0.5, TypeError, "got float 0.5"),
+            ],
         },
     ),
     "Device": Table(
         lambda _: (hizvk.Device, {}),
         {
             "adapter": [
-                (1.5, TypeError, "expected an adapter's index, a part of its name, or None, got float 1.5"),
+                (
+                    1.5,
+                    TypeError,
+                    "expected an adapter's index, a part of its name, or None, got float 1.5",
+                ),
                 (True, TypeError, "got bool True"),
                 (-1, ValueError, "in 0..2147483647, got int -1"),
                 (" ", ValueError, "got an empty string"),
@@ -608,15 +761,28 @@ TABLES: dict[str, Table] = {
             {"occluders": device.occluders(np.zeros((3, 3)), [[0, 1, 2]]), "camera": camera()},
         ),
         {
-            "occluders": [(np.zeros((3, 3)), TypeError, "expected Occluders of Device.occluders, got (3, 3) float64")],
+            "occluders": [
+                (
+                    np.zeros((3, 3)),
+                    TypeError,
+                    "expected Occluders of Device.occluders, got (3, 3) float64",
+                )
+            ],
             "camera": CAMERA,
             "size": SIZE,
             "conservative": FLAG,
-            "refinement": [(9, ValueError, "in 0..8"), (-1, ValueError, "in 0..8"), (2.0, TypeError, "got float 2.0")],
+            "refinement": [
+                (9, ValueError, "in 0..8"),
+                (-1, ValueError, "in 0..8"),
+                (2.0, TypeError, "got float 2.0"),
+            ],
         },
     ),
     "Device.pyramid": Table(
-        lambda device: (device.pyramid, {"depth": np.ones((6, 8)), "camera": camera(), "kind": "z"}),
+        lambda device: (
+            device.pyramid,
+            {"depth": np.ones((6, 8)), "camera": camera(), "kind": "z"},
+        ),
         {
             "depth": [*IMAGE, (None, TypeError, "got None")],
             "camera": CAMERA,
@@ -629,7 +795,13 @@ TABLES: dict[str, Table] = {
     "Device.cull": Table(
         lambda device: (device.cull, cull_arguments(device)),
         {
-            "instances": [(spheres(), TypeError, "expected Instances of Device.instances, got Spheres Spheres(1")],
+            "instances": [
+                (
+                    spheres(),
+                    TypeError,
+                    "expected Instances of Device.instances, got Spheres Spheres(1",
+                )
+            ],
             "camera": [
                 *CAMERA,
                 (
@@ -638,11 +810,24 @@ TABLES: dict[str, Table] = {
                     "each camera culls with the pyramid of its own depth, Device.pyramid), got",
                 ),
                 (camera((6, 9)), ValueError, "expected the camera of the pyramid"),
-                (camera().resized((3, 4)), ValueError, "pass camera.resized((6, 8)), the same view; the promise is"),
+                (
+                    camera().resized((3, 4)),
+                    ValueError,
+                    "pass camera.resized((6, 8)), the same view; the promise is",
+                ),
                 (camera((6, 9)), ValueError, "depth of one camera says nothing about another one"),
             ],
-            "pyramid": [(np.zeros((6, 8)), TypeError, "expected a Pyramid of Device.pyramid, got (6, 8) float64")],
-            "order": [("fast", ValueError, 'expected one of "stable", "any"'), (None, TypeError, "got None")],
+            "pyramid": [
+                (
+                    np.zeros((6, 8)),
+                    TypeError,
+                    "expected a Pyramid of Device.pyramid, got (6, 8) float64",
+                )
+            ],
+            "order": [
+                ("fast", ValueError, 'expected one of "stable", "any"'),
+                (None, TypeError, "got None"),
+            ],
             "coverage": COVERAGE,
             "guard_px": GUARD,
             "depth_slack": DEPTH_SLACK,
@@ -651,7 +836,10 @@ TABLES: dict[str, Table] = {
             "footprint": FOOTPRINT,
             "descent": DESCENT,
             "fit": FIT,
-            "hierarchy": [(1, TypeError, "expected True, False or None, got int 1"), ("auto", TypeError, "got str")],
+            "hierarchy": [
+                (1, TypeError, "expected True, False or None, got int 1"),
+                ("auto", TypeError, "got str"),
+            ],
             "outputs": [
                 ("mask", TypeError, "expected None or a collection of"),
                 (["masks"], ValueError, 'expected one of "mask", "verdicts", "indices", "draws"'),
@@ -681,11 +869,23 @@ TABLES: dict[str, Table] = {
         {
             "bounds": BOUNDS,
             "meshes": [
-                (None, TypeError, "expected a Mesh, a mesh of trimesh or Open3D, or a list of them"),
+                (
+                    None,
+                    TypeError,
+                    "expected a Mesh, a mesh of trimesh or Open3D, or a list of them",
+                ),
                 ([], ValueError, "expected one for each of the 1 bounds, got 0"),
-                ([TETRAHEDRON, TETRAHEDRON], ValueError, "expected one for each of the 1 bounds, got 2"),
+                (
+                    [TETRAHEDRON, TETRAHEDRON],
+                    ValueError,
+                    "expected one for each of the 1 bounds, got 2",
+                ),
                 ([(TETRAHEDRON.vertices,)], TypeError, "got tuple"),
-                ([(np.zeros((3, 2)), [[0, 1, 2]])], ValueError, "vertices: expected float (V, 3), got (3, 2) float64"),
+                (
+                    [(np.zeros((3, 2)), [[0, 1, 2]])],
+                    ValueError,
+                    "vertices: expected float (V, 3), got (3, 2) float64",
+                ),
             ],
         },
     ),
@@ -715,7 +915,13 @@ TABLES: dict[str, Table] = {
     "visible": Table(
         lambda device: (
             hizvk.visible,
-            {"bounds": spheres(), "camera": camera(), "depth": np.ones((6, 8)), "kind": "z", "device": device},
+            {
+                "bounds": spheres(),
+                "camera": camera(),
+                "depth": np.ones((6, 8)),
+                "kind": "z",
+                "device": device,
+            },
         ),
         {
             "bounds": BOUNDS,
@@ -749,7 +955,11 @@ TABLES: dict[str, Table] = {
         ),
         {
             "bounds": [
-                (np.zeros((2, 3)), TypeError, "expected Spheres, Boxes, OrientedBoxes, Instances or a sequence"),
+                (
+                    np.zeros((2, 3)),
+                    TypeError,
+                    "expected Spheres, Boxes, OrientedBoxes, Instances or a sequence",
+                ),
                 (None, TypeError, "got None"),
                 ([], ValueError, "got an empty sequence"),
                 ([spheres(), 3], TypeError, "got int 3"),
@@ -768,8 +978,16 @@ TABLES: dict[str, Table] = {
             "occluders": [("walls", TypeError, "expected exactly one of them, got both")],
             "depths": [
                 (3, TypeError, "expected a sequence of (height, width) arrays, got int 3"),
-                ([np.ones((6, 8))] * 2, ValueError, "expected 1 images, one for each camera, got 2"),
-                ([np.ones((8, 6))], ValueError, "expected float (6, 8) (the camera's size), got (8, 6) float64"),
+                (
+                    [np.ones((6, 8))] * 2,
+                    ValueError,
+                    "expected 1 images, one for each camera, got 2",
+                ),
+                (
+                    [np.ones((8, 6))],
+                    ValueError,
+                    "expected float (6, 8) (the camera's size), got (8, 6) float64",
+                ),
             ],
             "kind": KIND,
             "scale": SCALE,
@@ -777,8 +995,14 @@ TABLES: dict[str, Table] = {
             "device": [("lavapipe", TypeError, "expected a Device or None, got str 'lavapipe'")],
             "coverage": COVERAGE,
             "max_ms": [(0, ValueError, "above 0, got int 0"), ("2", TypeError, "got str '2'")],
-            "kept_within": [(0.9, ValueError, "at least 1, got float 0.9"), (None, TypeError, "got None")],
-            "repetitions": [(0, ValueError, "in 1..10000, got int 0"), (1.0, TypeError, "got float 1.0")],
+            "kept_within": [
+                (0.9, ValueError, "at least 1, got float 0.9"),
+                (None, TypeError, "got None"),
+            ],
+            "repetitions": [
+                (0, ValueError, "in 1..10000, got int 0"),
+                (1.0, TypeError, "got float 1.0"),
+            ],
         },
     ),
     "compare": Table(
@@ -794,7 +1018,11 @@ TABLES: dict[str, Table] = {
                 ([True], ValueError, "expected bool (2,), got (1,) bool"),
                 (np.array([1.0, 0.0]), TypeError, "got (2,) float64"),
                 (np.array([1], dtype=np.uint8), ValueError, "expected uint8 (2,), got (1,) uint8"),
-                (np.array([1, 77], dtype=np.uint8), ValueError, "codes of hizvk.reference (1, 2, 3, 4), got 77"),
+                (
+                    np.array([1, 77], dtype=np.uint8),
+                    ValueError,
+                    "codes of hizvk.reference (1, 2, 3, 4), got 77",
+                ),
                 (None, TypeError, "got None"),
             ],
         },
@@ -833,5 +1061,13 @@ TABLES: dict[str, Table] = {
 }
 
 #: What the package makes and callers only read; nothing to get wrong.
-MADE_BY_THE_PACKAGE = {"Adapter", "Comparison", "CullResult", "CullStats", "DepthImage", "Explanation", "Instances"}
+MADE_BY_THE_PACKAGE = {
+    "Adapter",
+    "Comparison",
+    "CullResult",
+    "CullStats",
+    "DepthImage",
+    "Explanation",
+    "Instances",
+}
 MADE_BY_THE_PACKAGE |= {"BoundsCheck", "Occluders", "ProxyCheck", "Pyramid", "Recommendation"}

@@ -11,8 +11,11 @@ from hypothesis import settings
 
 import adapter_check
 
-# The same examples in every run: a change is red for its own sake. `make soak` tries others (HIZVK_FUZZ=random).
-settings.register_profile("hizvk", derandomize=os.environ.get("HIZVK_FUZZ") != "random", database=None)
+# The same examples in every run: a change is red for its own sake.
+# `make soak` tries others (HIZVK_FUZZ=random).
+settings.register_profile(
+    "hizvk", derandomize=os.environ.get("HIZVK_FUZZ") != "random", database=None
+)
 settings.load_profile("hizvk")
 
 _description, _wrong = adapter_check.check()

@@ -26,7 +26,8 @@ def table(text: str, *head: str) -> list[dict[str, str]]:
     found = []
     for block in re.findall(r"(?:^ *\|.*\n)+", text, re.MULTILINE):
         lines = [
-            [cell.strip().strip("*") for cell in line.strip().strip("|").split("|")] for line in block.splitlines()
+            [cell.strip().strip("*") for cell in line.strip().strip("|").split("|")]
+            for line in block.splitlines()
         ]
         if tuple(lines[0][: len(head)]) == head:
             found.append([dict(zip(lines[0], line, strict=True)) for line in lines[2:]])

@@ -1,7 +1,9 @@
 """Runs one call in a process whose address space is limited; test_out_of_memory.py starts it.
 
-``out_of_memory.py CALL MEBIBYTES``: everything is prepared without a limit, then the call may take that much more.
-Prints the exception's class, and after it what the next device says of two spheres, one before a wall and one behind.
+``out_of_memory.py CALL MEBIBYTES``: everything is prepared without a limit, then the call may take
+that much more.
+Prints the exception's class, and after it what the next device says of two spheres, one before a
+wall and one behind.
 """
 
 import resource
@@ -51,7 +53,9 @@ def prepared(device: hizvk.Device, call: str) -> Callable[[], object]:
         pyramid = device.pyramid(np.full(view.size, 10.0), view, kind="z")
         centers = np.zeros((6_000_000, 3), np.float32)
         centers[:, 2] = -20.0
-        crowd = device.instances(hizvk.Spheres(centers, np.ones(len(centers), np.float32)), order="given")
+        crowd = device.instances(
+            hizvk.Spheres(centers, np.ones(len(centers), np.float32)), order="given"
+        )
         few = device.instances(hizvk.Spheres(centers[:100], np.ones(100, np.float32)))
 
         def cull(instances: hizvk.Instances) -> int:

@@ -154,15 +154,18 @@ def refused() -> list[str]:
         device._engine.wait_without_guard()
         wrong.append("the engine in Rust: no error")
     except hizvk.HizError as error:
-        expected = (
-            f"this device was made by process {os.getppid()}, and process {os.getpid()} is a fork of it: no device"
-        )
+        expected = f"this device was made by process {os.getppid()}, and process {os.getpid()} is a fork of it: no device"
         if not str(error).startswith(expected):
             wrong.append(f"the engine in Rust: {error}")
     # What needs no device.
     texts = [repr(thing) for thing in (device, pyramid, instances, result)]
     assert len(texts[0]) > 0
-    assert (len(result), result.mask.tolist(), pyramid.size, pyramid.num_levels) == (2, SEEN, (64, 64), 7)
+    assert (len(result), result.mask.tolist(), pyramid.size, pyramid.num_levels) == (
+        2,
+        SEEN,
+        (64, 64),
+        7,
+    )
     assert device.adapter.name in texts[0]
     return wrong
 
@@ -173,7 +176,9 @@ IMAGES: list[hizvk.DepthImage] = []
 def inherits() -> None:
     """A device of the parent, everything on it, and a depth image."""
     device = used()
-    triangle = device.occluders(np.array([[-9.0, -9, -10], [9, -9, -10], [0, 9, -10]]), np.array([[0, 1, 2]]))
+    triangle = device.occluders(
+        np.array([[-9.0, -9, -10], [9, -9, -10], [0, 9, -10]]), np.array([[0, 1, 2]])
+    )
     IMAGES.append(device.render_depth(triangle, CAMERA))
     OBJECTS.append(triangle)
 
@@ -212,7 +217,9 @@ def end(how: str) -> None:
         sys.exit(3)
     elif how == "unread":
         device = KEPT[0]
-        OBJECTS.append(device.cull(device.instances(SPHERES), CAMERA, device.pyramid(WALL, CAMERA, kind="z")))
+        OBJECTS.append(
+            device.cull(device.instances(SPHERES), CAMERA, device.pyramid(WALL, CAMERA, kind="z"))
+        )
     elif how == "cycle":
         ring: list[object] = [KEPT[0]]
         ring.append(ring)

@@ -1,6 +1,7 @@
 """What the library advises: which depth hides a mesh's own vertices, what `recommend` picks, and the hints.
 
-What is visible is found by hand, or by rays at every triangle (Moller and Trumbore 1997), written once more here.
+What is visible is found by hand, or by rays at every triangle (Moller and Trumbore 1997), written
+once more here.
 """
 
 from __future__ import annotations
@@ -48,7 +49,9 @@ def torus(rows: int = 48, columns: int = 24) -> tuple[np.ndarray, np.ndarray]:
     u, v = np.meshgrid(np.arange(rows) / rows, np.arange(columns) / columns, indexing="ij")
     u, v = 2.0 * np.pi * u, 2.0 * np.pi * v
     wide = 2.0 + 0.8 * np.cos(v)
-    vertices = np.stack([wide * np.cos(u), wide * np.sin(u), 0.8 * np.sin(v)], axis=-1).reshape(-1, 3)
+    vertices = np.stack([wide * np.cos(u), wide * np.sin(u), 0.8 * np.sin(v)], axis=-1).reshape(
+        -1, 3
+    )
     return vertices, grid(rows, columns, wraps=True)
 
 
@@ -59,9 +62,13 @@ def hills(side: int = 36) -> tuple[np.ndarray, np.ndarray]:
 
 
 def ball(rows: int = 32, columns: int = 40) -> tuple[np.ndarray, np.ndarray]:
-    polar, turn = np.meshgrid(np.linspace(0.05, np.pi - 0.05, rows), np.arange(columns) / columns, indexing="ij")
+    polar, turn = np.meshgrid(
+        np.linspace(0.05, np.pi - 0.05, rows), np.arange(columns) / columns, indexing="ij"
+    )
     turn = 2.0 * np.pi * turn
-    vertices = 2.0 * np.stack([np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)], axis=-1)
+    vertices = 2.0 * np.stack(
+        [np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)], axis=-1
+    )
     number = np.pad(np.arange(rows * columns).reshape(rows, columns), ((0, 0), (0, 1)), mode="wrap")
     a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
     return vertices.reshape(-1, 3), np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
@@ -71,14 +78,20 @@ MESHES = {"torus": torus, "ball": ball, "hills": hills}
 
 
 def looking_at(size: tuple[int, int], **more: Any) -> hizvk.Camera:
-    return hizvk.Camera.look_at(EYE, (0, 0, 0), up=(0, 0, 1), fov_y_deg=50, size=size, near=0.1, **more)
+    return hizvk.Camera.look_at(
+        EYE, (0, 0, 0), up=(0, 0, 1), fov_y_deg=50, size=size, near=0.1, **more
+    )
 
 
-def seen_from(start: np.ndarray, points: np.ndarray, vertices: np.ndarray, triangles: np.ndarray) -> Mask:
+def seen_from(
+    start: np.ndarray, points: np.ndarray, vertices: np.ndarray, triangles: np.ndarray
+) -> Mask:
     """Whether the way from `start` (one, or one a point) to each point is free, but for what touches the point."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     free = np.ones(len(points), dtype=bool)
-    for number, (point, begin) in enumerate(zip(points, np.broadcast_to(start, points.shape), strict=True)):
+    for number, (point, begin) in enumerate(
+        zip(points, np.broadcast_to(start, points.shape), strict=True)
+    ):
         ray = point - begin
         across = np.cross(ray, c - a)
         scale = ((b - a) * across).sum(axis=1)
@@ -87,26 +100,36 @@ def seen_from(start: np.ndarray, points: np.ndarray, vertices: np.ndarray, trian
             other = np.cross(begin - a, b - a)
             v = other @ ray / scale
             t = ((c - a) * other).sum(axis=1) / scale
-        free[number] = not ((u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9) & (t > 0.0) & (t < 1.0 - 1e-9)).any()
+        free[number] = not (
+            (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9) & (t > 0.0) & (t < 1.0 - 1e-9)
+        ).any()
     return free
 
 
 def in_view(camera: hizvk.Camera, points: np.ndarray) -> Mask:
     clip = np.c_[points, np.ones(len(points))] @ camera.clip_from_world.T
     ndc = clip[:, :3] / clip[:, 3:]
-    return (np.abs(ndc - np.array([0.0, 0.0, 0.5])) <= (1.0, 1.0, 0.5)).all(axis=1) & (clip[:, 3] > 0.0)
+    return (np.abs(ndc - np.array([0.0, 0.0, 0.5])) <= (1.0, 1.0, 0.5)).all(axis=1) & (
+        clip[:, 3] > 0.0
+    )
 
 
-# -- points that lie on their own occluder ---------------------------------------------------------------------------
+# -- points that lie on their own
+# occluder ---------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", MESHES)
-def test_plain_depth_hides_a_mesh_s_own_vertices_and_conservative_depth_none(device: hizvk.Device, name: str) -> None:
+def test_plain_depth_hides_a_mesh_s_own_vertices_and_conservative_depth_none(
+    device: hizvk.Device, name: str
+) -> None:
     """Prints the figures of docs/guide.md, "Points and vertices"."""
     vertices, triangles = MESHES[name]()
     camera = looking_at((360, 480))
     visible = in_view(camera, vertices) & seen_from(EYE, vertices, vertices, triangles)
-    points, mesh = device.instances(hizvk.Spheres(vertices, 0.0)), device.occluders(vertices, triangles)
+    points, mesh = (
+        device.instances(hizvk.Spheres(vertices, 0.0)),
+        device.occluders(vertices, triangles),
+    )
 
     def lost(guard_px: float, **options: Any) -> int:
         depth = device.render_depth(mesh, camera, **options)
@@ -127,16 +150,24 @@ def test_plain_depth_hides_a_mesh_s_own_vertices_and_conservative_depth_none(dev
     assert plain > 0.2 * visible.sum()
 
 
-# -- the check -------------------------------------------------------------------------------------------------------
+# -- the
+# check -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", ["perspective", "standard", "orthographic", "orthographic, standard"])
+@pytest.mark.parametrize(
+    "kind", ["perspective", "standard", "orthographic", "orthographic, standard"]
+)
 @pytest.mark.parametrize("faces", ["none", "back", "front"])
 def test_clear_rays_are_those_of_every_triangle(kind: str, faces: str) -> None:
     vertices, triangles = torus(24, 14)
     # Some beside the surface, and some out of view.
     points = np.concatenate(
-        [vertices, vertices * 1.05, vertices * (1.0, 1.0, 0.5), vertices + np.array([9.0, 0.0, 0.0])]
+        [
+            vertices,
+            vertices * 1.05,
+            vertices * (1.0, 1.0, 0.5),
+            vertices + np.array([9.0, 0.0, 0.0]),
+        ]
     )
     if kind.startswith("orthographic"):
         camera = hizvk.Camera.orthographic(
@@ -164,19 +195,26 @@ def test_clear_rays_know_triangles_that_cross_the_eye_s_plane() -> None:
     floor = np.array([[-50.0, -1.0, 50.0], [50.0, -1.0, 50.0], [0.0, -1.0, -500.0]])
     near = np.array([[-9.0, -9.0, -0.05], [9.0, -9.0, -0.05], [0.0, 9.0, -0.05]])
     camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(8, 8), near=0.1)
-    points = np.array([[0.0, -2.0, -4.0], [0.0, -0.9, -4.0], [0.0, -1.0, -4.0], [0.0, 1.0, -4.0], [0.0, 0.0, 4.0]])
+    points = np.array(
+        [[0.0, -2.0, -4.0], [0.0, -0.9, -4.0], [0.0, -1.0, -4.0], [0.0, 1.0, -4.0], [0.0, 0.0, 4.0]]
+    )
     triangles = np.array([[0, 1, 2], [3, 4, 5]], np.uint32)
     clear = Blockers(np.concatenate([floor, near]), triangles, "none", camera).clear(points)
     assert clear.tolist() == [False, True, True, True, False]
 
 
 @pytest.mark.parametrize("faces", ["none", "back", "front"])
-def test_the_triangles_on_the_host_are_those_that_were_given(device: hizvk.Device, faces: str) -> None:
+def test_the_triangles_on_the_host_are_those_that_were_given(
+    device: hizvk.Device, faces: str
+) -> None:
     """By hand: a mesh in two places, one of them mirrored, and another mesh."""
     vertices = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     moved, mirrored = np.eye(4), np.diag([-1.0, 1.0, 1.0, 1.0])
     moved[:3, 3] = (1e6, 0.5, 0.0)
-    meshes = [hizvk.Mesh(vertices, [[0, 1, 2]], np.stack([moved, mirrored])), hizvk.Mesh(2.0 * vertices, [[2, 1, 0]])]
+    meshes = [
+        hizvk.Mesh(vertices, [[0, 1, 2]], np.stack([moved, mirrored])),
+        hizvk.Mesh(2.0 * vertices, [[2, 1, 0]]),
+    ]
     positions, triangles, told = device.occluders(meshes, cull=faces)._inner.surface()
     expected = [vertices + moved[:3, 3], vertices * (-1.0, 1.0, 1.0), 2.0 * vertices]
     assert positions.reshape(-1, 3).tolist() == np.concatenate(expected).tolist()
@@ -198,20 +236,30 @@ def test_points_of_bounds_lie_in_them() -> None:
     assert (points.max(axis=1) == boxes.max[which]).all()
     turn = np.linalg.qr(rng.normal(size=(50, 3, 3)))[0]
     oriented = hizvk.OrientedBoxes(centers, np.full((50, 3), 0.3), turn)
-    local = np.einsum("nji,nkj->nki", turn[which], points_of(oriented, which, camera) - centers[which, None])
+    local = np.einsum(
+        "nji,nkj->nki", turn[which], points_of(oriented, which, camera) - centers[which, None]
+    )
     assert np.abs(local).max() == pytest.approx(0.3)
-    assert points_of(hizvk.Spheres(centers, 0.0), which, camera).tolist() == centers[which, None].tolist()
+    assert (
+        points_of(hizvk.Spheres(centers, 0.0), which, camera).tolist()
+        == centers[which, None].tolist()
+    )
 
 
-# -- what is recommended ---------------------------------------------------------------------------------------------
+# -- what is
+# recommended ---------------------------------------------------------------------------------------------
 
 
-def test_best_for_points_on_their_own_mesh_is_conservative_and_loses_none(device: hizvk.Device) -> None:
+def test_best_for_points_on_their_own_mesh_is_conservative_and_loses_none(
+    device: hizvk.Device,
+) -> None:
     vertices, triangles = torus(64, 40)
     camera = looking_at((360, 480))
     visible = in_view(camera, vertices) & seen_from(EYE, vertices, vertices, triangles)
     points = hizvk.Spheres(vertices, 0.0)
-    found = hizvk.recommend(points, camera, occluders=hizvk.Mesh(vertices, triangles), device=device, repetitions=1)
+    found = hizvk.recommend(
+        points, camera, occluders=hizvk.Mesh(vertices, triangles), device=device, repetitions=1
+    )
     print(found)
     assert found.best.configuration.promises_rays
     assert found.best.bounds is points
@@ -220,7 +268,8 @@ def test_best_for_points_on_their_own_mesh_is_conservative_and_loses_none(device
     assert Configuration("spheres", depth=DepthVariant(1, True)) in tried
     assert Configuration("spheres", depth=DepthVariant(1, True, levels=2)) in tried
     assert Configuration("spheres", coverage="sample") in tried
-    # What it says of each is what rays at every triangle say, and the whole call is the one that was checked.
+    # What it says of each is what rays at every triangle say, and the whole call is the one that
+    # was checked.
     crowd, walls = device.instances(points), device.occluders(vertices, triangles)
     for one in found.candidates:
         mask = one.cull(crowd, camera, walls).mask
@@ -233,7 +282,10 @@ def test_best_for_points_on_their_own_mesh_is_conservative_and_loses_none(device
     assert "pixels' centres alone" in str(found)
     # A budget that plain depth alone keeps does not bring it back.
     safe = [one for one in found.candidates if one.safe]
-    assert advice.choose(found.candidates, max_ms=1e-9) == (min(safe, key=lambda one: one.ms.median), False)
+    assert advice.choose(found.candidates, max_ms=1e-9) == (
+        min(safe, key=lambda one: one.ms.median),
+        False,
+    )
 
 
 #: 90 degrees, 8 pixels of one world unit at depth 4.
@@ -241,7 +293,12 @@ CAMERA = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(8, 8), 
 
 
 def wall(left: float, right: float, depth: float = 4.0) -> hizvk.Mesh:
-    corners = [[left, -9.0, -depth], [right, -9.0, -depth], [right, 9.0, -depth], [left, 9.0, -depth]]
+    corners = [
+        [left, -9.0, -depth],
+        [right, -9.0, -depth],
+        [right, 9.0, -depth],
+        [left, 9.0, -depth],
+    ]
     return hizvk.Mesh(np.array(corners), np.array([[0, 1, 2], [0, 2, 3]]))
 
 
@@ -256,7 +313,11 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fewer candidates, of every sort: each needs a pipeline of its own, and compiling is what takes the time."""
 
     def some(*arguments: Any, **more: Any) -> list[Configuration]:
-        return [one for one in promised(*arguments, **more) if one.footprint < 8 and one.fit == "rectangle"]
+        return [
+            one
+            for one in promised(*arguments, **more)
+            if one.footprint < 8 and one.fit == "rectangle"
+        ]
 
     monkeypatch.setattr(advice, "promised", some)
 
@@ -265,9 +326,12 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_shows_between_the_centres_drops_plain_depth(device: hizvk.Device) -> None:
     found = hizvk.recommend(BALLS, CAMERA, occluders=GAP, device=device, repetitions=1)
     for one in found.candidates:
-        # By hand: the plain image shows a closed wall, so ball 0 is lost. Through x = 0.97 a ray meets its middle.
+        # By hand: the plain image shows a closed wall, so ball 0 is lost.
+        # Through x = 0.97 a ray meets its middle.
         conservative = one.configuration.depth.conservative
-        assert (one.hides, one.unclear) == ((0, 0) if conservative or one.kept == 3 else (1, 0)), str(one)
+        assert (one.hides, one.unclear) == ((0, 0) if conservative or one.kept == 3 else (1, 0)), (
+            str(one)
+        )
         assert one.safe == (one.asked and not one.hides)
         assert one.proven == conservative
     assert {one.kept for one in found.candidates if one.hides} == {1}
@@ -277,7 +341,9 @@ def test_what_shows_between_the_centres_drops_plain_depth(device: hizvk.Device) 
 
 @pytest.mark.usefixtures("few")
 def test_pixel_centres_alone_are_plain_depth_s(device: hizvk.Device) -> None:
-    found = hizvk.recommend(BALLS, CAMERA, occluders=GAP, device=device, repetitions=1, coverage="sample")
+    found = hizvk.recommend(
+        BALLS, CAMERA, occluders=GAP, device=device, repetitions=1, coverage="sample"
+    )
     assert found.best.configuration.coverage == "sample"
     assert not found.best.configuration.depth.conservative
     assert found.best.kept == 1
@@ -295,7 +361,9 @@ def test_plain_depth_that_culls_what_is_proven_hidden_is_recommended(device: hiz
         assert all(one.safe or not one.asked for one in found.candidates)
         assert {one.kept for one in found.candidates} == {1}
     # Of what is on the device already no ray can be cast: what is not proven is unclear.
-    found = hizvk.recommend(device.instances(BALLS), CAMERA, occluders=GAP, device=device, repetitions=1)
+    found = hizvk.recommend(
+        device.instances(BALLS), CAMERA, occluders=GAP, device=device, repetitions=1
+    )
     plain = [one for one in found.candidates if not one.configuration.depth.conservative]
     assert {(one.hides, one.unclear, one.safe) for one in plain} == {(0, 1, False)}
     assert found.best.proven
@@ -314,7 +382,9 @@ def test_a_candidate_that_hides_what_is_visible_is_never_chosen(
     """A planted liar is the fastest, keeps least, and may even be one of those that are proven."""
     honest = advice.cull
 
-    def lying(device: hizvk.Device, instances: Any, pyramid: Any, one: Configuration) -> tuple[Mask, float, float]:
+    def lying(
+        device: hizvk.Device, instances: Any, pyramid: Any, one: Configuration
+    ) -> tuple[Mask, float, float]:
         mask, *took = honest(device, instances, pyramid, one)
         if planted(one):
             mask, took = mask.copy(), [0.0, 0.0]
@@ -323,7 +393,13 @@ def test_a_candidate_that_hides_what_is_visible_is_never_chosen(
 
     monkeypatch.setattr(advice, "cull", lying)
     found = hizvk.recommend(
-        BALLS, CAMERA, occluders=GAP, device=device, repetitions=1, coverage=coverage, kept_within=9.0
+        BALLS,
+        CAMERA,
+        occluders=GAP,
+        device=device,
+        repetitions=1,
+        coverage=coverage,
+        kept_within=9.0,
     )
     liars = [one for one in found.candidates if planted(one.configuration)]
     assert liars
@@ -332,10 +408,14 @@ def test_a_candidate_that_hides_what_is_visible_is_never_chosen(
     assert not any(one in found.front for one in liars)
 
 
-def test_a_smaller_plain_image_is_found_out(device: hizvk.Device, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_smaller_plain_image_is_found_out(
+    device: hizvk.Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
     small = Configuration("spheres", depth=DepthVariant(8))
     monkeypatch.setattr(
-        advice, "promised", lambda *_, **__: [small, Configuration("spheres", depth=DepthVariant(1, True))]
+        advice,
+        "promised",
+        lambda *_, **__: [small, Configuration("spheres", depth=DepthVariant(1, True))],
     )
     post = wall(-0.4, 0.4)
     found = hizvk.recommend(BALLS, CAMERA, occluders=post, device=device, repetitions=1)
@@ -363,22 +443,36 @@ def test_points_before_a_depth_image_get_a_guard(device: hizvk.Device) -> None:
     visible = in_view(camera, vertices) & seen_from(EYE, vertices, vertices, triangles)
     image = device.render_depth(device.occluders(vertices, triangles), camera).numpy()
     points = hizvk.Spheres(vertices, 0.0)
-    found = hizvk.recommend(points, camera, depths=[image], kind="reversed_ndc", device=device, repetitions=1)
+    found = hizvk.recommend(
+        points, camera, depths=[image], kind="reversed_ndc", device=device, repetitions=1
+    )
     assert found.best.configuration.guard_px == 0.5
     assert found.best.cull_options["guard_px"] == 0.5
     assert "good guess for points before an image, and no proof" in str(found)
     uploaded = hizvk.recommend(
-        device.instances(points), camera, depths=[image], kind="reversed_ndc", device=device, repetitions=1
+        device.instances(points),
+        camera,
+        depths=[image],
+        kind="reversed_ndc",
+        device=device,
+        repetitions=1,
     )
     assert uploaded.best.configuration.guard_px == 0.5
     bare = [one for one in found.candidates if one.configuration.guard_px is None]
     assert all(one.hides > 0.2 * visible.sum() for one in bare)
     seen = found.best.cull(device.instances(points), camera, depth=image, kind="reversed_ndc")
-    print(f"with the guard {int((visible & ~seen.mask).sum())} of {visible.sum()} visible ones are culled")
+    print(
+        f"with the guard {int((visible & ~seen.mask).sum())} of {visible.sum()} visible ones are culled"
+    )
     assert (visible & ~seen.mask).sum() < 0.05 * visible.sum()
     # Volumes promise for the image as it is, and the oracle agrees.
     found = hizvk.recommend(
-        hizvk.Spheres(vertices, 0.05), camera, depths=[image], kind="reversed_ndc", device=device, repetitions=1
+        hizvk.Spheres(vertices, 0.05),
+        camera,
+        depths=[image],
+        kind="reversed_ndc",
+        device=device,
+        repetitions=1,
     )
     assert all(one.safe for one in found.candidates)
     assert {one.configuration.guard_px for one in found.candidates} == {None}
@@ -390,11 +484,18 @@ def test_candidate_makes_the_whole_call(device: hizvk.Device) -> None:
     candidate = advice.Candidate(one, ms, ms, 2, False)
     balls, walls = device.instances(BALLS), device.occluders(GAP)
     options = candidate.render_options(CAMERA.size)
-    assert (options, candidate.pyramid_options) == ({"size": (4, 4), "conservative": True}, {"levels": (1, 2)})
+    assert (options, candidate.pyramid_options) == (
+        {"size": (4, 4), "conservative": True},
+        {"levels": (1, 2)},
+    )
     depth = device.render_depth(walls, CAMERA, **options)
     pyramid = device.pyramid(depth, **candidate.pyramid_options)
     by_hand = device.cull(balls, depth.camera, pyramid, **candidate.cull_options)
-    assert candidate.cull(balls, CAMERA, walls).mask.tolist() == by_hand.mask.tolist() == [True, False, True]
+    assert (
+        candidate.cull(balls, CAMERA, walls).mask.tolist()
+        == by_hand.mask.tolist()
+        == [True, False, True]
+    )
 
     def refused(error: type[Exception], text: str, call: Callable[[], object]) -> None:
         with pytest.raises(error) as caught:
@@ -404,31 +505,47 @@ def test_candidate_makes_the_whole_call(device: hizvk.Device) -> None:
     boxes = device.instances(hizvk.Boxes(MIDDLES, MIDDLES))
     plain = advice.Candidate(Configuration("spheres"), ms, ms, 2, False)
     image = device.render_depth(walls, CAMERA)
-    refused(ValueError, "instances: expected spheres, got boxes", lambda: candidate.cull(boxes, CAMERA, walls))
-    refused(TypeError, "expected exactly one of them, got neither", lambda: plain.cull(balls, CAMERA))
+    refused(
+        ValueError,
+        "instances: expected spheres, got boxes",
+        lambda: candidate.cull(boxes, CAMERA, walls),
+    )
+    refused(
+        TypeError, "expected exactly one of them, got neither", lambda: plain.cull(balls, CAMERA)
+    )
     refused(TypeError, "got both", lambda: plain.cull(balls, CAMERA, walls, depth=image))
-    refused(TypeError, "expected occluders instead", lambda: candidate.cull(balls, CAMERA, depth=image))
+    refused(
+        TypeError, "expected occluders instead", lambda: candidate.cull(balls, CAMERA, depth=image)
+    )
     assert plain.cull(balls, CAMERA, depth=image).mask.tolist() == [False, False, True]
 
 
-def test_a_rasteriser_knows_the_centres_up_to_the_grid_that_it_snaps_to(device: hizvk.Device) -> None:
+def test_a_rasteriser_knows_the_centres_up_to_the_grid_that_it_snaps_to(
+    device: hizvk.Device,
+) -> None:
     """Prints how far beside a pixel's centre a wall may end and still be drawn there (docs/guide.md)."""
     steps = np.arange(1, 513) / 4096.0  # pixels; one is one world unit at depth 4
 
     def drawn(gap: float, **options: Any) -> bool:
-        depth = device.render_depth(device.occluders([wall(0.5 + gap, 9.0)]), CAMERA, **options).numpy()
+        depth = device.render_depth(
+            device.occluders([wall(0.5 + gap, 9.0)]), CAMERA, **options
+        ).numpy()
         return bool((depth[:, 4] > 0.0).any())
 
     last = max((step for step in steps if drawn(step)), default=0.0)
-    print(f"drawn at a centre that the wall misses by up to {last:g} of a pixel (1/{1 / last if last else 0:g})")
-    # Vulkan: at least 4 bits below the pixel, so that a corner moves by half a sixteenth; or all of it, cut off.
+    print(
+        f"drawn at a centre that the wall misses by up to {last:g} of a pixel (1/{1 / last if last else 0:g})"
+    )
+    # Vulkan: at least 4 bits below the pixel, so that a corner moves by half a sixteenth; or all of
+    # it, cut off.
     assert last < 1.0 / 16.0
     assert drawn(0.0)
     assert not drawn(0.0, conservative=True), "its left part is open"
     assert not drawn(steps[0], conservative=True)
 
 
-# -- sparse depth ----------------------------------------------------------------------------------------------------
+# -- sparse
+# depth ----------------------------------------------------------------------------------------------------
 
 
 def farthest_of_neighbours(depth: np.ndarray, reach: int) -> np.ndarray:
@@ -440,7 +557,10 @@ def farthest_of_neighbours(depth: np.ndarray, reach: int) -> np.ndarray:
 def test_sparse_depth_hides_once_it_is_filled(device: hizvk.Device) -> None:
     """Prints the figures of docs/guide.md, "Sparse depth"."""
     room, rng = scenes.room(), np.random.default_rng(0)
-    walls, boxes = device.occluders(room.vertices, room.triangles), hizvk.Boxes(room.box_min, room.box_max)
+    walls, boxes = (
+        device.occluders(room.vertices, room.triangles),
+        hizvk.Boxes(room.box_min, room.box_max),
+    )
     crowd = device.instances(boxes)
     hidden, kept, lost = np.zeros(3, int), 0, 0
     for view in room.views:
@@ -449,7 +569,10 @@ def test_sparse_depth_hides_once_it_is_filled(device: hizvk.Device) -> None:
         full[~np.isfinite(full)] = 0.0
         sparse = np.where(rng.random(full.shape) < 0.04, full, 0.0)
         images = full, sparse, farthest_of_neighbours(sparse, 7)
-        found = [device.cull(crowd, camera, device.pyramid(image, camera, kind="z"), descent=4096) for image in images]
+        found = [
+            device.cull(crowd, camera, device.pyramid(image, camera, kind="z"), descent=4096)
+            for image in images
+        ]
         hidden += [result.stats.occluded for result in found]
         kept += int(found[0].mask.sum())
         lost += int((found[0].mask & ~found[2].mask).sum())
@@ -477,12 +600,15 @@ def test_filled_depth_closes_a_gap_that_no_pixel_shows(device: hizvk.Device) -> 
     assert seen == [True, True, False]
 
 
-# -- hints -----------------------------------------------------------------------------------------------------------
+# --
+# hints -----------------------------------------------------------------------------------------------------------
 
 IMAGE = np.full(CAMERA.size, 4.0)
 
 
-def hinted(bounds: hizvk.Spheres, camera: hizvk.Camera = CAMERA, depth: Any = IMAGE, **more: Any) -> list[str]:
+def hinted(
+    bounds: hizvk.Spheres, camera: hizvk.Camera = CAMERA, depth: Any = IMAGE, **more: Any
+) -> list[str]:
     """What `visible` warns of, all of it in this file's name, and what the result hints at when asked."""
     kind = None if isinstance(depth, hizvk.DepthImage) else "z"
     with warnings.catch_warnings(record=True) as caught:
@@ -503,7 +629,9 @@ def test_what_is_as_it_should_be_gets_no_hint(device: hizvk.Device) -> None:
     small = np.zeros((8, 8))
     small[3:5, 3:5] = 2.0
     assert hinted(hizvk.Spheres(MIDDLES, 0.5), device=device) == []
-    assert hinted(hizvk.Spheres(one_in_view, 0.5), device=device) == [], "something is in view, and nothing hidden"
+    assert hinted(hizvk.Spheres(one_in_view, 0.5), device=device) == [], (
+        "something is in view, and nothing hidden"
+    )
     assert hinted(hizvk.Spheres(one_in_view, 0.0), device=device) == []
     assert hinted(hizvk.Spheres(MIDDLES, 0.5), depth=half, device=device) == []
     beside = hizvk.Spheres(MIDDLES[1:2], 0.5)
@@ -511,7 +639,11 @@ def test_what_is_as_it_should_be_gets_no_hint(device: hizvk.Device) -> None:
     assert hinted(hizvk.Spheres(np.zeros((0, 3)), 0.5), depth=np.zeros((8, 8)), device=device) == []
     assert hinted(hizvk.Spheres(MIDDLES[1:2], 0.5), device=device) == [], "all of it hidden"
     assert (
-        hinted(hizvk.Spheres(MIDDLES, 0.5), depth=device.render_depth(device.occluders(GAP), CAMERA), device=device)
+        hinted(
+            hizvk.Spheres(MIDDLES, 0.5),
+            depth=device.render_depth(device.occluders(GAP), CAMERA),
+            device=device,
+        )
         == []
     )
     assert hinted(hizvk.Spheres(MIDDLES, 0.5), coverage="sample", device=device) == []
@@ -520,7 +652,9 @@ def test_what_is_as_it_should_be_gets_no_hint(device: hizvk.Device) -> None:
 def test_everything_outside_is_hinted_at(device: hizvk.Device) -> None:
     away = MIDDLES * (1.0, 1.0, -1.0)
     (text,) = hinted(hizvk.Spheres(away, 0.5), device=device)
-    assert text.startswith("bounds, camera: all 3 lie outside of the view; if that is not meant, check the pose's")
+    assert text.startswith(
+        "bounds, camera: all 3 lie outside of the view; if that is not meant, check the pose's"
+    )
     # One alone is often outside, with nothing wrong: callers ask in a loop.
     assert hinted(hizvk.Spheres(away[:1], 0.5), device=device) == []
 
@@ -528,7 +662,8 @@ def test_everything_outside_is_hinted_at(device: hizvk.Device) -> None:
 def test_a_rendered_image_lacks_nothing(device: hizvk.Device) -> None:
     """A rope before the sky: few pixels have a depth, and none is missing."""
     rope = device.occluders(
-        np.array([[-9.0, -4, -5], [9, 5, -5], [9, 5.02, -5], [-9, -3.98, -5]]), [[0, 1, 2], [0, 2, 3]]
+        np.array([[-9.0, -4, -5], [9, 5, -5], [9, 5.02, -5], [-9, -3.98, -5]]),
+        [[0, 1, 2], [0, 2, 3]],
     )
     camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(240, 320), near=0.1)
     depth = device.render_depth(rope, camera)
@@ -541,11 +676,15 @@ def test_a_rendered_image_lacks_nothing(device: hizvk.Device) -> None:
 @pytest.mark.parametrize("resized", [False, True])
 def test_a_pose_that_was_mistaken_is_named(device: hizvk.Device, resized: bool) -> None:
     """`CAMERA` looks along -z with y up: its pose is OpenGL's unit matrix. Given to OpenCV's rows it looks away."""
-    projection = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1], [0, 0, 1, 0]])  # z forward, reversed, infinite
+    projection = np.array(
+        [[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1], [0, 0, 1, 0]]
+    )  # z forward, reversed, infinite
 
     def made(pose: np.ndarray, way: str = "camera_from_world") -> hizvk.Camera:
         size = (16, 16) if resized else CAMERA.size
-        camera = hizvk.Camera.from_matrices(clip_from_camera=projection, **{way: pose}, size=size, reversed_z=True)
+        camera = hizvk.Camera.from_matrices(
+            clip_from_camera=projection, **{way: pose}, size=size, reversed_z=True
+        )
         return camera.resized(CAMERA.size) if resized else camera
 
     balls = hizvk.Spheres(MIDDLES, 0.5)
@@ -554,7 +693,9 @@ def test_a_pose_that_was_mistaken_is_named(device: hizvk.Device, resized: bool) 
     up = np.eye(4)
     up[1, 3] = 50.0
     for way, pose in (("world_from_camera", up), ("camera_from_world", np.linalg.inv(up))):
-        (text,) = hinted(hizvk.Spheres(MIDDLES + np.array([0.0, 50.0, 0.0]), 0.5), made(pose, way), device=device)
+        (text,) = hinted(
+            hizvk.Spheres(MIDDLES + np.array([0.0, 50.0, 0.0]), 0.5), made(pose, way), device=device
+        )
         assert "3 would be inside of it with the camera's y and z turned round" in text
     right = np.diag([1.0, -1.0, -1.0, 1.0])
     assert hinted(balls, made(right), device=device) == []
@@ -586,7 +727,13 @@ def test_points_by_sample_coverage_are_hinted_at(device: hizvk.Device) -> None:
 @pytest.mark.parametrize("reversed_z", [True, False])
 def test_depth_that_cannot_hide_is_hinted_at(device: hizvk.Device, reversed_z: bool) -> None:
     camera = hizvk.Camera.look_at(
-        (0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(64, 64), near=1.0, far=100.0, reversed_z=reversed_z
+        (0, 0, 0),
+        (0, 0, -1),
+        fov_y_deg=90,
+        size=(64, 64),
+        near=1.0,
+        far=100.0,
+        reversed_z=reversed_z,
     )
     balls = hizvk.Spheres(MIDDLES, 0.5)
     metres = np.full((64, 64), 4.0)
@@ -604,7 +751,9 @@ def test_depth_that_cannot_hide_is_hinted_at(device: hizvk.Device, reversed_z: b
     lines[::5] = 4.0
     (text,) = hinted(balls, camera, lines, device=device)
     assert text.startswith("depth: 20.3 % of the pixels have a depth")
-    assert hinted(hizvk.Spheres(MIDDLES, np.nan), camera, sparse, device=device) == [], "nothing that could be hidden"
+    assert hinted(hizvk.Spheres(MIDDLES, np.nan), camera, sparse, device=device) == [], (
+        "nothing that could be hidden"
+    )
 
 
 def test_points_are_not_sent_to_sample_coverage(device: hizvk.Device) -> None:
@@ -612,5 +761,7 @@ def test_points_are_not_sent_to_sample_coverage(device: hizvk.Device) -> None:
     wall = hizvk.Mesh([[-1.0, -1, -5], [1, -1, -5], [0, 1, -5]], [[0, 1, 2]])
     points = np.random.default_rng(0).uniform((-3, -3, -12), (3, 3, -3), (50, 3))
     camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(48, 64), near=0.1)
-    found = hizvk.recommend(hizvk.Spheres(points, 0.0), camera, occluders=wall, device=device, repetitions=1)
+    found = hizvk.recommend(
+        hizvk.Spheres(points, 0.0), camera, occluders=wall, device=device, repetitions=1
+    )
     assert not any('coverage="sample"' in note for note in found.notes)

@@ -12,7 +12,13 @@ import hizvk
 # Positions that every kind of float holds exactly, so that all must give the same answer.
 CENTERS = np.array([[0.0, 0, -5], [0, 0, -20], [0, 0, 20], [4, 0, -16], [-1, 0.5, -10]])
 RADII = np.array([1.0, 1, 1, 0.5, 2])
-EXPECTED = [True, False, False, False, True]  # before the wall, behind, behind the camera, behind, through it
+EXPECTED = [
+    True,
+    False,
+    False,
+    False,
+    True,
+]  # before the wall, behind, behind the camera, behind, through it
 
 
 def misaligned(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -65,7 +71,9 @@ def camera() -> hizvk.Camera:
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_every_layout_means_the_same(device: hizvk.Device, camera: hizvk.Camera, layout: str) -> None:
+def test_every_layout_means_the_same(
+    device: hizvk.Device, camera: hizvk.Camera, layout: str
+) -> None:
     change = LAYOUTS[layout]
     wall = change(np.full(camera.size, 10.0))
     sizes = np.repeat(RADII[:, None], 3, axis=1)
@@ -89,13 +97,18 @@ def test_ready_arrays_are_not_copied() -> None:
         assert spheres.centers is centers
         assert spheres.radii is radii
         assert hizvk.Boxes(centers, centers).max is centers
-    assert hizvk.Spheres(CENTERS.astype(np.float16), 1).centers.dtype == np.float32  # exact, and the smallest there is
+    assert (
+        hizvk.Spheres(CENTERS.astype(np.float16), 1).centers.dtype == np.float32
+    )  # exact, and the smallest there is
 
 
 def test_mixed_dtypes(device: hizvk.Device, camera: hizvk.Camera) -> None:
     spheres = hizvk.Spheres(CENTERS, RADII.astype(np.float32))
     assert (
-        hizvk.visible(spheres, camera, depth=np.full(camera.size, 10.0), kind="z", device=device).tolist() == EXPECTED
+        hizvk.visible(
+            spheres, camera, depth=np.full(camera.size, 10.0), kind="z", device=device
+        ).tolist()
+        == EXPECTED
     )
 
 
@@ -105,7 +118,9 @@ def test_one_radius_for_all() -> None:
 
 
 @pytest.mark.parametrize("dtype", [np.uint16, np.dtype(">u2")])
-def test_millimetres_of_a_sensor(device: hizvk.Device, camera: hizvk.Camera, dtype: npt.DTypeLike) -> None:
+def test_millimetres_of_a_sensor(
+    device: hizvk.Device, camera: hizvk.Camera, dtype: npt.DTypeLike
+) -> None:
     wall = np.full(camera.size, 10_000, dtype=dtype)
     spheres = hizvk.Spheres(CENTERS, RADII)
     mask = hizvk.visible(spheres, camera, depth=wall, kind="z", scale=0.001, device=device)

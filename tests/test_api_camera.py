@@ -19,7 +19,9 @@ def project(camera: hizvk.Camera, point: tuple[float, float, float]) -> tuple[fl
 
 def test_look_at_by_hand() -> None:
     # 90 degrees at depth 2: y reaches from -2 to 2; the image is twice as wide.
-    camera = hizvk.Camera.look_at((10, 20, 30), (10, 20, 0), fov_y_deg=90, size=(100, 200), near=0.5)
+    camera = hizvk.Camera.look_at(
+        (10, 20, 30), (10, 20, 0), fov_y_deg=90, size=(100, 200), near=0.5
+    )
     assert project(camera, (10, 20, 28)) == pytest.approx((100, 50, 0.25))  # the axis; near / depth
     assert project(camera, (12, 20, 28)) == pytest.approx((150, 50, 0.25))  # right
     assert project(camera, (10, 21, 28)) == pytest.approx((100, 25, 0.25))  # up is towards row 0
@@ -27,8 +29,12 @@ def test_look_at_by_hand() -> None:
 
 @pytest.mark.parametrize(("reversed_z", "at_near", "at_far"), [(True, 1.0, 0.0), (False, 0.0, 1.0)])
 def test_depth_conventions(reversed_z: bool, at_near: float, at_far: float) -> None:
-    look = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(4, 6), near=1, far=3, reversed_z=reversed_z)
-    flat = hizvk.Camera.orthographic((0, 0, 0), (0, 0, -1), height=2, size=(4, 6), near=1, far=3, reversed_z=reversed_z)
+    look = hizvk.Camera.look_at(
+        (0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(4, 6), near=1, far=3, reversed_z=reversed_z
+    )
+    flat = hizvk.Camera.orthographic(
+        (0, 0, 0), (0, 0, -1), height=2, size=(4, 6), near=1, far=3, reversed_z=reversed_z
+    )
     for camera in (look, flat):
         assert camera.reversed_z is reversed_z
         assert camera.depth_kind == ("reversed_ndc" if reversed_z else "ndc")
@@ -57,21 +63,35 @@ def test_frustum_borders_are_tangents() -> None:
 def test_orthographic_is_in_world_units_and_square_by_default() -> None:
     camera = hizvk.Camera.orthographic((0, 0, 5), (0, 0, 0), height=4, size=(8, 16), near=0, far=10)
     assert project(camera, (4, 2, 0)) == pytest.approx((16, 0, 0.5))
-    wide = hizvk.Camera.orthographic((0, 0, 5), (0, 0, 0), height=4, width=16, size=(8, 16), near=0, far=10)
+    wide = hizvk.Camera.orthographic(
+        (0, 0, 5), (0, 0, 0), height=4, width=16, size=(8, 16), near=0, far=10
+    )
     assert project(wide, (8, -2, -5)) == pytest.approx((16, 8, 0))
 
 
-OPENCV_POSE = np.array([[0.0, -1, 0, 0.5], [1, 0, 0, 0.25], [0, 0, 1, 4], [0, 0, 0, 1]])  # a turn about z, a shift
+OPENCV_POSE = np.array(
+    [[0.0, -1, 0, 0.5], [1, 0, 0, 0.25], [0, 0, 1, 4], [0, 0, 0, 1]]
+)  # a turn about z, a shift
 
 
 @pytest.mark.parametrize("skew", [0.0, 3.0])
 @pytest.mark.parametrize("far", [None, 100.0])
 @pytest.mark.parametrize("reversed_z", [True, False])
 @pytest.mark.parametrize(("pixel_center", "shift"), [("integer", 0.5), ("half", 0.0)])
-def test_opencv_pixels(skew: float, far: float | None, reversed_z: bool, pixel_center: str, shift: float) -> None:
+def test_opencv_pixels(
+    skew: float, far: float | None, reversed_z: bool, pixel_center: str, shift: float
+) -> None:
     k = np.array([[120.0, skew, 33.5], [0, 110, 21.25], [0, 0, 1]])
-    given = {"size": (48, 64), "near": 0.5, "far": far, "reversed_z": reversed_z, "pixel_center": pixel_center}
-    forth = hizvk.Camera.from_opencv(k, camera_from_world=OPENCV_POSE, distortion=np.zeros(5), **given)
+    given = {
+        "size": (48, 64),
+        "near": 0.5,
+        "far": far,
+        "reversed_z": reversed_z,
+        "pixel_center": pixel_center,
+    }
+    forth = hizvk.Camera.from_opencv(
+        k, camera_from_world=OPENCV_POSE, distortion=np.zeros(5), **given
+    )
     back = hizvk.Camera.from_opencv(k, world_from_camera=np.linalg.inv(OPENCV_POSE), **given)
     for world in ((0.0, 0.0, 0.0), (0.3, -0.4, 1.0), (-1.0, 0.7, 20.0)):
         u, v, z = k @ (OPENCV_POSE @ np.array([*world, 1.0]))[:3]
@@ -101,7 +121,9 @@ def test_opengl_clip_z_is_mapped() -> None:
     assert project(camera, (0, 0, -1)) == pytest.approx((10, 5, 0))
     assert project(camera, (0, 0, -3)) == pytest.approx((10, 5, 1))
     assert project(camera, (2, 1, -1))[:2] == pytest.approx((20, 0))
-    look = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(10, 20), near=1, far=3, reversed_z=False)
+    look = hizvk.Camera.look_at(
+        (0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(10, 20), near=1, far=3, reversed_z=False
+    )
     assert camera.clip_from_world == pytest.approx(look.clip_from_world)
     moved = np.eye(4)
     moved[:3, 3] = (1, 2, 3)
@@ -110,22 +132,32 @@ def test_opengl_clip_z_is_mapped() -> None:
 
 
 def test_matrices_in_one_or_two_parts() -> None:
-    look = hizvk.Camera.look_at((1, 2, 3), (4, 5, -6), fov_y_deg=50, size=(30, 40), near=0.2, far=50)
+    look = hizvk.Camera.look_at(
+        (1, 2, 3), (4, 5, -6), fov_y_deg=50, size=(30, 40), near=0.2, far=50
+    )
     whole = hizvk.Camera.from_matrices(look.clip_from_world, size=(30, 40), reversed_z=True)
     assert whole.clip_from_world == pytest.approx(look.clip_from_world)
     pose = np.linalg.inv(OPENCV_POSE)
     parts = hizvk.Camera.from_matrices(
-        clip_from_camera=look.clip_from_world, camera_from_world=OPENCV_POSE, size=(30, 40), reversed_z=True
+        clip_from_camera=look.clip_from_world,
+        camera_from_world=OPENCV_POSE,
+        size=(30, 40),
+        reversed_z=True,
     )
     other = hizvk.Camera.from_matrices(
-        clip_from_camera=look.clip_from_world, world_from_camera=pose, size=(30, 40), reversed_z=True
+        clip_from_camera=look.clip_from_world,
+        world_from_camera=pose,
+        size=(30, 40),
+        reversed_z=True,
     )
     assert parts.clip_from_world == pytest.approx(look.clip_from_world @ OPENCV_POSE)
     assert other.clip_from_world == pytest.approx(parts.clip_from_world)
 
 
 def test_integers_lists_and_small_floats_are_numbers_too() -> None:
-    exact = hizvk.Camera.look_at((0.0, 0.5, 2.0), (0.0, 0.5, 0.0), fov_y_deg=60.0, size=(4, 6), near=0.5)
+    exact = hizvk.Camera.look_at(
+        (0.0, 0.5, 2.0), (0.0, 0.5, 0.0), fov_y_deg=60.0, size=(4, 6), near=0.5
+    )
     for kind in (np.float16, np.float32, np.float64, np.dtype(">f8")):
         eye = np.array([0, 0.5, 2], dtype=kind)
         eye.setflags(write=False)
@@ -135,7 +167,8 @@ def test_integers_lists_and_small_floats_are_numbers_too() -> None:
         assert camera == exact
 
 
-# -- cameras as values ---------------------------------------------------------------------------------------
+# -- cameras as
+# values ---------------------------------------------------------------------------------------
 
 
 def shifted(by: float) -> np.ndarray:
@@ -153,18 +186,38 @@ def all_kinds() -> list[hizvk.Camera]:
         hizvk.Camera.look_at(**look, fov_y_deg=50, reversed_z=False),
         hizvk.Camera.frustum(**look, left=-1, right=0.5, bottom=-1, top=1),
         hizvk.Camera.orthographic(**look, height=10),
-        hizvk.Camera.from_opencv(k, pixel_center="half", world_from_camera=OPENCV_POSE, size=(30, 40), near=0.1),
-        hizvk.Camera.from_opencv(k, pixel_center="half", camera_from_world=OPENCV_POSE, size=(30, 40), near=0.1),
-        hizvk.Camera.from_opencv(k, pixel_center="integer", camera_from_world=OPENCV_POSE, size=(30, 40), near=0.1),
-        hizvk.Camera.from_colmap(
-            "RADIAL", [90, 33, 21, 0, 0], qvec=[0.5, 0.5, 0.5, -0.5], tvec=[1, 2, 3], size=(30, 40), near=0.1, far=9
+        hizvk.Camera.from_opencv(
+            k, pixel_center="half", world_from_camera=OPENCV_POSE, size=(30, 40), near=0.1
         ),
-        hizvk.Camera.from_opengl(k=k, pixel_center="integer", camera_from_world=shifted(1), size=(30, 40), near=0.1),
-        hizvk.Camera.from_opengl(fov_x_deg=70, world_from_camera=shifted(1), size=(30, 40), near=0.1),
-        hizvk.Camera.from_opengl(fov_y_deg=70, world_from_camera=shifted(1), size=(30, 40), near=0.1, reversed_z=False),
+        hizvk.Camera.from_opencv(
+            k, pixel_center="half", camera_from_world=OPENCV_POSE, size=(30, 40), near=0.1
+        ),
+        hizvk.Camera.from_opencv(
+            k, pixel_center="integer", camera_from_world=OPENCV_POSE, size=(30, 40), near=0.1
+        ),
+        hizvk.Camera.from_colmap(
+            "RADIAL",
+            [90, 33, 21, 0, 0],
+            qvec=[0.5, 0.5, 0.5, -0.5],
+            tvec=[1, 2, 3],
+            size=(30, 40),
+            near=0.1,
+            far=9,
+        ),
+        hizvk.Camera.from_opengl(
+            k=k, pixel_center="integer", camera_from_world=shifted(1), size=(30, 40), near=0.1
+        ),
+        hizvk.Camera.from_opengl(
+            fov_x_deg=70, world_from_camera=shifted(1), size=(30, 40), near=0.1
+        ),
+        hizvk.Camera.from_opengl(
+            fov_y_deg=70, world_from_camera=shifted(1), size=(30, 40), near=0.1, reversed_z=False
+        ),
         hizvk.Camera.from_opengl(gl, camera_from_world=shifted(1), size=(30, 40)),
         hizvk.Camera.from_matrices(gl, size=(30, 40), reversed_z=False),
-        hizvk.Camera.from_matrices(clip_from_camera=gl, camera_from_world=shifted(2), size=(30, 40), reversed_z=False),
+        hizvk.Camera.from_matrices(
+            clip_from_camera=gl, camera_from_world=shifted(2), size=(30, 40), reversed_z=False
+        ),
         hizvk.Camera.look_at(**look, fov_y_deg=50).resized((15, 20)).resized((3, 5)),
     ]
 
@@ -172,7 +225,12 @@ def all_kinds() -> list[hizvk.Camera]:
 def test_cameras_are_values() -> None:
     cameras = all_kinds()
     for number, (camera, again) in enumerate(zip(cameras, all_kinds(), strict=True)):
-        for same in (again, pickle.loads(pickle.dumps(camera)), copy.copy(camera), copy.deepcopy(camera)):
+        for same in (
+            again,
+            pickle.loads(pickle.dumps(camera)),
+            copy.copy(camera),
+            copy.deepcopy(camera),
+        ):
             assert same == camera
             assert hash(same) == hash(camera)
             assert repr(same) == repr(camera)
@@ -190,9 +248,15 @@ def test_repr_says_how_to_make_it() -> None:
     )
     assert eval(repr(camera), {"Camera": hizvk.Camera}) == camera
     assert repr(camera.resized((2, 3))) == repr(camera) + ".resized((2, 3))"
-    pose = hizvk.Camera.from_opengl(opengl_projection(1, 3, 1, 2), camera_from_world=np.eye(4), size=(4, 6))
-    assert repr(pose) == "Camera.from_opengl(projection=<4x4>, camera_from_world=<4x4>, size=(4, 6))"
-    colmap = hizvk.Camera.from_colmap("PINHOLE", [9, 9, 3, 2], qvec=[1, 0, 0, 0], tvec=[0, 0, 1], size=(4, 6), near=0.5)
+    pose = hizvk.Camera.from_opengl(
+        opengl_projection(1, 3, 1, 2), camera_from_world=np.eye(4), size=(4, 6)
+    )
+    assert (
+        repr(pose) == "Camera.from_opengl(projection=<4x4>, camera_from_world=<4x4>, size=(4, 6))"
+    )
+    colmap = hizvk.Camera.from_colmap(
+        "PINHOLE", [9, 9, 3, 2], qvec=[1, 0, 0, 0], tvec=[0, 0, 1], size=(4, 6), near=0.5
+    )
     assert repr(colmap) == (
         "Camera.from_colmap(model='PINHOLE', params=<4>, camera_from_world=<4x4>, size=(4, 6), near=0.5, far=None, "
         "reversed_z=True)"
@@ -211,7 +275,11 @@ def test_a_camera_far_from_the_origin_loses_nothing() -> None:
     """The eye is kept apart, so that the rows about it are those of the camera at the origin."""
     near = hizvk.Camera.look_at((0, 0, 0), (3, -1, 2), fov_y_deg=60, size=(40, 60), near=0.5)
     far = hizvk.Camera.look_at(
-        (2.0**30, -(2.0**31), 0), (2.0**30 + 3, -(2.0**31) - 1, 2), fov_y_deg=60, size=(40, 60), near=0.5
+        (2.0**30, -(2.0**31), 0),
+        (2.0**30 + 3, -(2.0**31) - 1, 2),
+        fov_y_deg=60,
+        size=(40, 60),
+        near=0.5,
     )
     assert near._inner.rows() == far._inner.rows()
     assert far._inner.origin() == [2.0**30, -(2.0**31), 0.0]

@@ -34,12 +34,18 @@ def test_doctor(capsys: pytest.CaptureFixture[str]) -> None:
     told = json.loads(capsys.readouterr().out)
     assert told["healthy"] is True
     found = {check["name"]: check["detail"] for check in told["checks"]}
-    assert found["cull (reversed depth)"] == found["cull (standard depth)"] == "visible, occluded, outside"
+    assert (
+        found["cull (reversed depth)"]
+        == found["cull (standard depth)"]
+        == "visible, occluded, outside"
+    )
     assert cli.main(["doctor"]) == 0
     assert "ok   cull (standard depth): visible, occluded, outside" in capsys.readouterr().out
 
 
-def test_doctor_tells_what_is_wrong(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_doctor_tells_what_is_wrong(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("HIZVK_ADAPTER", "no such adapter")
     assert cli.main(["doctor"]) == 1
     text = capsys.readouterr().out
@@ -97,17 +103,29 @@ except hizvk.NoAdapterError as error:
 
 
 def test_without_a_driver() -> None:
-    environment = {**os.environ, "VK_DRIVER_FILES": "/nowhere.json", "VK_ICD_FILENAMES": "/nowhere.json"}
+    environment = {
+        **os.environ,
+        "VK_DRIVER_FILES": "/nowhere.json",
+        "VK_ICD_FILENAMES": "/nowhere.json",
+    }
     environment.pop("VK_ADD_DRIVER_FILES", None)
     ran = subprocess.run(
-        [sys.executable, "-c", WITHOUT_DRIVER], env=environment, capture_output=True, text=True, check=True
+        [sys.executable, "-c", WITHOUT_DRIVER],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     text, hint = ran.stdout.strip().rsplit("\n", 1)
     assert text.startswith("no Vulkan adapter")
     assert INSTALL_LINE in text
     assert INSTALL_LINE in hint
     told = subprocess.run(
-        [sys.executable, "-m", "hizvk", "doctor"], env=environment, capture_output=True, text=True, check=False
+        [sys.executable, "-m", "hizvk", "doctor"],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert told.returncode == 1
     assert INSTALL_LINE in told.stdout
@@ -120,7 +138,8 @@ def test_an_adapter_that_is_not_there() -> None:
     assert "no such adapter" in str(caught.value)
     # The advice fits: there are adapters to choose from, so there is no driver to install.
     assert caught.value.seen == tuple(
-        f"{one.index}: {one.name} ({one.device_type}, {one.driver} {one.driver_info})" for one in hizvk.adapters()
+        f"{one.index}: {one.name} ({one.device_type}, {one.driver} {one.driver_info})"
+        for one in hizvk.adapters()
     )
     assert "by its number" in caught.value.hint
     assert "HIZVK_ADAPTER" in caught.value.hint
@@ -132,7 +151,11 @@ def test_an_adapter_that_is_not_there() -> None:
 def test_an_adapter_by_index_and_by_name() -> None:
     chosen = hizvk.Device().adapter
     assert hizvk.Device(chosen.index).adapter == chosen
-    assert hizvk.Device(chosen.name[:6].upper()).adapter.name.lower().startswith(chosen.name[:6].lower())
+    assert (
+        hizvk.Device(chosen.name[:6].upper())
+        .adapter.name.lower()
+        .startswith(chosen.name[:6].lower())
+    )
 
 
 def test_errors_are_one_family_and_can_be_pickled() -> None:

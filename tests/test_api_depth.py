@@ -18,12 +18,18 @@ SIZE = (4, 6)
 FAR, NEAR = hizvk.reference.VISIBLE, hizvk.reference.HIDDEN
 
 
-def camera(*, near: float = 1.0, far: float = 1e6, reversed_z: bool = True, orthographic: bool = False) -> hizvk.Camera:
+def camera(
+    *, near: float = 1.0, far: float = 1e6, reversed_z: bool = True, orthographic: bool = False
+) -> hizvk.Camera:
     """Looks along -z from the origin."""
     eye, target = (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)
     if orthographic:
-        return hizvk.Camera.orthographic(eye, target, height=4, near=near, far=far, size=SIZE, reversed_z=reversed_z)
-    return hizvk.Camera.look_at(eye, target, fov_y_deg=90, near=near, far=far, size=SIZE, reversed_z=reversed_z)
+        return hizvk.Camera.orthographic(
+            eye, target, height=4, near=near, far=far, size=SIZE, reversed_z=reversed_z
+        )
+    return hizvk.Camera.look_at(
+        eye, target, fov_y_deg=90, near=near, far=far, size=SIZE, reversed_z=reversed_z
+    )
 
 
 def behind(depth: float) -> hizvk.Spheres:
@@ -96,7 +102,9 @@ def test_which_numbers_are_no_data(
         for reversed_z in (False, True):
             view = camera(near=max(value * scale, 0.05) / 100.0, reversed_z=reversed_z)
             bounds = behind(max(value * scale * 3.0, 1.0))
-            assert faces.hidden(image, view, bounds, kind=kind, scale=scale, invalid=invalid) == wall, scale
+            assert (
+                faces.hidden(image, view, bounds, kind=kind, scale=scale, invalid=invalid) == wall
+            ), scale
 
 
 @pytest.mark.parametrize("reversed_z", [False, True])
@@ -141,12 +149,19 @@ def test_depth_behind_an_orthographic_eye(faces: Faces, reversed_z: bool, kind: 
         image = np.full(SIZE, value, dtype)
         low = value if np.isfinite(value) else 0.0
         bounds = hizvk.Spheres(quarters - (0.0, 0.0, low + 10.0), np.full(4, 0.1))
-        assert faces.hidden(image, view, bounds, kind=kind, invalid=invalid) == wall, (value, dtype, invalid)
+        assert faces.hidden(image, view, bounds, kind=kind, invalid=invalid) == wall, (
+            value,
+            dtype,
+            invalid,
+        )
     # From a near plane at the eye on, nothing changes.
     view = camera(near=0.0, far=100.0, reversed_z=reversed_z, orthographic=True)
     for value in (0.0, -50.0):
         assert not faces.hidden(
-            np.full(SIZE, value), view, hizvk.Spheres(quarters - (0.0, 0.0, 20.0), np.full(4, 0.1)), kind=kind
+            np.full(SIZE, value),
+            view,
+            hizvk.Spheres(quarters - (0.0, 0.0, 20.0), np.full(4, 0.1)),
+            kind=kind,
         )
 
 
@@ -162,7 +177,13 @@ def test_a_buffer_means_what_its_dtype_does(device: hizvk.Device) -> None:
     for value in (Picture(saturated), memoryview(saturated)):
         assert hizvk.visible(behind(2e5), camera(), depth=value, kind="z", device=device).all()  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="int32"):
-        hizvk.visible(behind(80.0), camera(), depth=Picture(saturated.astype(np.int32)), kind="z", device=device)  # type: ignore[arg-type]
+        hizvk.visible(
+            behind(80.0),
+            camera(),
+            depth=Picture(saturated.astype(np.int32)),
+            kind="z",
+            device=device,
+        )  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -176,7 +197,9 @@ def test_a_buffer_means_what_its_dtype_does(device: hizvk.Device) -> None:
         (np.ones(SIZE[::-1]), "looks transposed"),
     ],
 )
-def test_a_message_proposes_what_works(device: hizvk.Device, image: npt.NDArray[Any], fragment: str) -> None:
+def test_a_message_proposes_what_works(
+    device: hizvk.Device, image: npt.NDArray[Any], fragment: str
+) -> None:
     """Each way out, taken, is taken by the call."""
     ways: dict[str, Callable[[], tuple[Any, hizvk.Camera]]] = {
         ".astype(np.float32)": lambda: (image.astype(np.float32), camera()),
@@ -200,7 +223,10 @@ def test_values_that_the_dtype_cannot_hold(device: hizvk.Device) -> None:
         (np.ones(SIZE, np.float16), (1e6,)),
         (np.ones(SIZE, np.float32), (1e300,)),
     ]:
-        with pytest.raises(ValueError, match=r"invalid: expected .*own units.*, which no (uint16|float16|float32) is"):
+        with pytest.raises(
+            ValueError,
+            match=r"invalid: expected .*own units.*, which no (uint16|float16|float32) is",
+        ):
             device.pyramid(image, camera(), kind="z", invalid=bad)
     depth = device.render_depth(device.occluders(np.zeros((3, 3)), np.array([[0, 1, 2]])), camera())
     with pytest.raises(TypeError, match="invalid: expected nothing beside a DepthImage"):
@@ -209,14 +235,17 @@ def test_values_that_the_dtype_cannot_hold(device: hizvk.Device) -> None:
         hizvk.visible(behind(2.0), camera(), depth=depth, invalid=(0,))
 
 
-def test_equal_depth_is_visible_and_the_oracle_says_what_it_does_not_know(device: hizvk.Device) -> None:
+def test_equal_depth_is_visible_and_the_oracle_says_what_it_does_not_know(
+    device: hizvk.Device,
+) -> None:
     """Standard Z, near 1, no far plane: depth is 1 - 1/z, which float32 holds for z = 8 and not for z = 3."""
     eye = ((0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
     view = hizvk.Camera.look_at(*eye, fov_y_deg=90, near=1.0, size=SIZE, reversed_z=False)
     for wall, at_it in ((8.0, hizvk.reference.VISIBLE), (3.0, hizvk.reference.UNDECIDED)):
         fronts = np.array([wall * (1 - 1e-6), wall, wall * (1 + 1e-6)])
         boxes = hizvk.Boxes(
-            np.stack([[-0.1, -0.1, -f - 1.0] for f in fronts]), np.stack([[0.1, 0.1, -f] for f in fronts])
+            np.stack([[-0.1, -0.1, -f - 1.0] for f in fronts]),
+            np.stack([[0.1, 0.1, -f] for f in fronts]),
         )
         image = np.full(SIZE, wall)
         truth = hizvk.reference.classify(boxes, view, image, kind="z")
@@ -230,7 +259,9 @@ def test_a_scale_beside_what_has_its_own_units_is_refused(device: hizvk.Device) 
     wall = hizvk.Mesh([[-8.0, -8, -12], [8.0, -8, -12], [0.0, 8, -12]], [[0, 1, 2]])
     depth = device.render_depth(device.occluders([wall]), camera)
     ball = hizvk.Spheres([[0.0, 0.0, -20.0]], 0.5)
-    with pytest.raises(ValueError, match=r"scale: expected 1 beside a DepthImage, whose depth is NDC, got 0\.001"):
+    with pytest.raises(
+        ValueError, match=r"scale: expected 1 beside a DepthImage, whose depth is NDC, got 0\.001"
+    ):
         device.pyramid(depth, scale=0.001)
     with pytest.raises(ValueError, match="scale: expected 1 beside a DepthImage"):
         hizvk.visible(ball, camera, depth=depth, scale=0.001)

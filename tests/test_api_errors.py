@@ -1,8 +1,8 @@
 """Bad arguments: every parameter of every public function has a test of its error's text.
 
-The tables are in api_bad_values.py. A text has to start with the parameter's name, and
-`test_every_parameter_has_a_bad_value` compares the tables with the package, so that a new parameter without an entry
-fails.
+The tables are in api_bad_values.py.
+A text has to start with the parameter's name, and `test_every_parameter_has_a_bad_value` compares
+the tables with the package, so that a new parameter without an entry fails.
 """
 
 import dataclasses
@@ -39,9 +39,16 @@ def test_bad_argument(device: hizvk.Device, function: str, parameter: str, bad: 
         arguments.pop("camera_from_world", None)
     if function == "Camera.from_colmap" and parameter in ("camera_from_world", "world_from_camera"):
         del arguments["qvec"], arguments["tvec"]
-    if function == "Camera.from_opengl" and parameter not in ("projection", "size") and "world" not in parameter:
+    if (
+        function == "Camera.from_opengl"
+        and parameter not in ("projection", "size")
+        and "world" not in parameter
+    ):
         by_k = parameter in ("k", "pixel_center", "distortion")
-        arguments |= {"near": 0.1, **({"k": K, "pixel_center": "half"} if by_k else {"fov_x_deg": 60})}
+        arguments |= {
+            "near": 0.1,
+            **({"k": K, "pixel_center": "half"} if by_k else {"fov_x_deg": 60}),
+        }
         del arguments["projection"]
         if parameter == "fov_y_deg":
             del arguments["fov_x_deg"]
@@ -93,7 +100,9 @@ def public_callables() -> dict[str, Callable[..., Any]]:
         if name not in MADE_BY_THE_PACKAGE:
             found[name] = thing
         for method, value in vars(thing).items():
-            if not method.startswith("_") and (inspect.isfunction(value) or isinstance(value, classmethod)):
+            if not method.startswith("_") and (
+                inspect.isfunction(value) or isinstance(value, classmethod)
+            ):
                 found[f"{name}.{method}"] = getattr(thing, method)
     return found
 
@@ -121,7 +130,9 @@ def test_what_belongs_to_another_device_is_refused(device: hizvk.Device) -> None
     instances = device.instances(spheres())
     occluders = device.occluders(np.zeros((3, 3)), [[0, 1, 2]])
     image = device.render_depth(occluders, view)
-    with pytest.raises(ValueError, match="instances: expected Instances of this device, got one of another Device"):
+    with pytest.raises(
+        ValueError, match="instances: expected Instances of this device, got one of another Device"
+    ):
         other.cull(instances, view, pyramid)
     with pytest.raises(ValueError, match="pyramid: expected Pyramid of this device"):
         other.cull(other.instances(spheres()), view, pyramid)
@@ -136,7 +147,10 @@ def test_a_rendered_image_has_its_camera_and_kind(device: hizvk.Device) -> None:
     image = device.render_depth(device.occluders(np.zeros((3, 3)), [[0, 1, 2]]), view)
     with pytest.raises(TypeError, match="camera: expected nothing beside a DepthImage"):
         device.pyramid(image, view)  # type: ignore[call-overload]
-    with pytest.raises(TypeError, match="kind: expected nothing beside a DepthImage, which has its own, got str 'z'"):
+    with pytest.raises(
+        TypeError,
+        match="kind: expected nothing beside a DepthImage, which has its own, got str 'z'",
+    ):
         device.pyramid(image, kind="z")  # type: ignore[call-overload]
     with pytest.raises(ValueError, match="camera: expected the camera of depth"):
         hizvk.visible(spheres(), camera((6, 9)), depth=image)
@@ -152,7 +166,11 @@ def test_a_rendered_image_has_its_camera_and_kind(device: hizvk.Device) -> None:
             TypeError,
             "vertices[0]: expected a Mesh, a mesh of trimesh or Open3D, or a list of them when triangles is left out",
         ),
-        ([(np.zeros((3, 2)), [[0, 1, 2]])], ValueError, "vertices[0]: vertices: expected float (V, 3), got (3, 2)"),
+        (
+            [(np.zeros((3, 2)), [[0, 1, 2]])],
+            ValueError,
+            "vertices[0]: vertices: expected float (V, 3), got (3, 2)",
+        ),
         (
             [(np.zeros((3, 3)), [[0, 1, 9]])],
             ValueError,
@@ -161,7 +179,9 @@ def test_a_rendered_image_has_its_camera_and_kind(device: hizvk.Device) -> None:
         ("mesh", TypeError, "got str 'mesh'"),
     ],
 )
-def test_bad_lists_of_meshes(device: hizvk.Device, meshes: Any, exception: type[Exception], fragment: str) -> None:
+def test_bad_lists_of_meshes(
+    device: hizvk.Device, meshes: Any, exception: type[Exception], fragment: str
+) -> None:
     with pytest.raises(exception) as caught:
         device.occluders(meshes)
     assert fragment in str(caught.value)
@@ -172,14 +192,20 @@ def test_bad_lists_of_meshes(device: hizvk.Device, meshes: Any, exception: type[
 def test_ndc_has_no_units_and_no_integers(device: hizvk.Device) -> None:
     with pytest.raises(ValueError, match='scale: expected 1 for the kind "reversed_ndc"'):
         device.pyramid(np.ones((6, 8)), camera(), kind="reversed_ndc", scale=0.5)
-    with pytest.raises(TypeError, match=r"depth: expected float \(height, width\), or uint16 for the kinds"):
+    with pytest.raises(
+        TypeError, match=r"depth: expected float \(height, width\), or uint16 for the kinds"
+    ):
         device.pyramid(np.ones((6, 8), dtype=np.uint16), camera(), kind="reversed_ndc")
-    with pytest.raises(ValueError, match=r'kind: expected "ndc" \(0 near and 1 far\) .* got "reversed_ndc"'):
+    with pytest.raises(
+        ValueError, match=r'kind: expected "ndc" \(0 near and 1 far\) .* got "reversed_ndc"'
+    ):
         device.pyramid(np.ones((6, 8)), camera(reversed_z=False), kind="reversed_ndc")
 
 
 def test_only_one_way_to_say_where_the_camera_is() -> None:
-    with pytest.raises(ValueError, match=r"camera_from_world, world_from_camera: expected exactly one .*, got both"):
+    with pytest.raises(
+        ValueError, match=r"camera_from_world, world_from_camera: expected exactly one .*, got both"
+    ):
         hizvk.Camera.from_opengl(GL, camera_from_world=EYE4, world_from_camera=EYE4, size=(6, 8))
     with pytest.raises(ValueError, match=r"clip_from_world: expected alone, .* got both"):
         hizvk.Camera.from_matrices(GL, camera_from_world=EYE4, size=(6, 8), reversed_z=False)

@@ -18,7 +18,9 @@ def device() -> hizvk.Device:
 @pytest.fixture(scope="module", params=[True, False], ids=["reversed", "standard"])
 def camera(request: pytest.FixtureRequest) -> hizvk.Camera:
     """At the origin, looking along -z: at depth d the image reaches from -d to d in x and y."""
-    return hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(8, 8), near=0.125, reversed_z=request.param)
+    return hizvk.Camera.look_at(
+        (0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(8, 8), near=0.125, reversed_z=request.param
+    )
 
 
 def left_wall(size: tuple[int, int] = (8, 8)) -> np.ndarray:
@@ -52,7 +54,8 @@ KEPT = [i for i, verdict in enumerate(VERDICTS) if verdict in (Verdict.VISIBLE, 
 
 def scene() -> hizvk.Spheres:
     return hizvk.Spheres(
-        np.array([center for center, *_ in SCENE]), np.array([float(radius) for _, radius, _ in SCENE])
+        np.array([center for center, *_ in SCENE]),
+        np.array([float(radius) for _, radius, _ in SCENE]),
     )
 
 
@@ -102,7 +105,11 @@ def test_stats_add_up(device: hizvk.Device, camera: hizvk.Camera) -> None:
     for milliseconds in (stats.record_ms, stats.compile_ms, stats.wall_ms, stats.readback_ms):
         assert milliseconds >= 0
     assert "15 tested: 10 kept (4 invalid), 5 culled (3 outside, 2 occluded)" in str(stats)
-    assert (stats.tested_groups, stats.tested_instances, stats.comparisons) == (0, len(SCENE), len(SCENE))
+    assert (stats.tested_groups, stats.tested_instances, stats.comparisons) == (
+        0,
+        len(SCENE),
+        len(SCENE),
+    )
     without = culled(device, camera).stats
     assert without.levels is None
     assert without.texels_read is None
@@ -112,8 +119,15 @@ def test_stats_add_up(device: hizvk.Device, camera: hizvk.Camera) -> None:
 def test_groups_are_tested_first(device: hizvk.Device, camera: hizvk.Camera) -> None:
     stats = culled(device, camera, hierarchy=True).stats
     # One group of 15, whose invalid members keep it.
-    assert (stats.tested_groups, stats.tested_instances, stats.comparisons) == (1, len(SCENE), 1 + len(SCENE))
-    assert [stats.outside, stats.occluded] == [VERDICTS.count(Verdict.OUTSIDE), VERDICTS.count(Verdict.OCCLUDED)]
+    assert (stats.tested_groups, stats.tested_instances, stats.comparisons) == (
+        1,
+        len(SCENE),
+        1 + len(SCENE),
+    )
+    assert [stats.outside, stats.occluded] == [
+        VERDICTS.count(Verdict.OUTSIDE),
+        VERDICTS.count(Verdict.OCCLUDED),
+    ]
 
 
 @pytest.mark.parametrize("order", ["stable", "any"])
@@ -123,7 +137,9 @@ def test_what_was_not_asked_for_is_not_there(
 ) -> None:
     parts = {
         "mask": lambda seen: np.flatnonzero(seen.mask).tolist(),
-        "verdicts": lambda seen: [i for i, code in enumerate(seen.verdicts) if code >= Verdict.VISIBLE],
+        "verdicts": lambda seen: [
+            i for i, code in enumerate(seen.verdicts) if code >= Verdict.VISIBLE
+        ],
         "indices": lambda seen: sorted(seen.indices.tolist()),
         "draws": lambda seen: list(range(int(seen.draws["instance_count"].sum()))),
     }
@@ -134,17 +150,23 @@ def test_what_was_not_asked_for_is_not_there(
         assert seen.count == seen.demand == len(KEPT)
         for name, read in parts.items():
             if name == asked or name in also.get(asked, ()):
-                assert read(seen) == (list(range(len(KEPT))) if name == "draws" else KEPT), (asked, name)
+                assert read(seen) == (list(range(len(KEPT))) if name == "draws" else KEPT), (
+                    asked,
+                    name,
+                )
             else:
                 with pytest.raises(
-                    ValueError, match=rf"outputs: expected a cull that was asked for \w+, got .* {asked}"
+                    ValueError,
+                    match=rf"outputs: expected a cull that was asked for \w+, got .* {asked}",
                 ):
                     read(seen)
     with pytest.raises(ValueError, match="got one with nothing"):
         _ = culled(device, camera, order=order, outputs=()).mask
 
 
-def test_a_hidden_group_is_explained_and_counted(device: hizvk.Device, camera: hizvk.Camera) -> None:
+def test_a_hidden_group_is_explained_and_counted(
+    device: hizvk.Device, camera: hizvk.Camera
+) -> None:
     # 64 together behind the wall, and one in view: two groups, the second of one member.
     centers = np.array([[0.01 * i, 0, -20] for i in range(64)] + [[0, 0, -2]])
     crowd = device.instances(hizvk.Spheres(centers, np.full(65, 0.05)), order="given")
@@ -157,13 +179,16 @@ def test_a_hidden_group_is_explained_and_counted(device: hizvk.Device, camera: h
     assert told.reason.startswith("its group of 64 is hidden as a whole (behind")
     assert told.group is not None
     assert (told.group.verdict, told.group.group) == (Verdict.OCCLUDED, None)
-    # Its own test, x from 0.02 to 0.12 at depth 20, then the box around all 64, x from -0.05 to 0.68: both in column 4.
+    # Its own test, x from 0.02 to 0.12 at depth 20, then the box around all 64, x from -0.05 to
+    # 0.68: both in column 4.
     assert told.rectangle == (4, 3, 4, 4)
     assert told.group.rectangle == (3, 3, 4, 4)
     assert "the box around its group: occluded" in str(told)
     last = seen.explain(64)
     assert (last.verdict, last.group) == (Verdict.VISIBLE, None)
-    full = device.cull(crowd, camera, pyramid, outputs=["indices"], order="any", capacity=1, hierarchy=False)
+    full = device.cull(
+        crowd, camera, pyramid, outputs=["indices"], order="any", capacity=1, hierarchy=False
+    )
     assert full.count == 1
     with pytest.raises(ValueError, match="a list that is full"):
         _ = full.demand
@@ -174,7 +199,13 @@ def test_draw_arguments(device: hizvk.Device, camera: hizvk.Camera) -> None:
     draws = culled(device, camera, draw=template).draws
     assert draws.dtype == hizvk.DRAW_DTYPE
     assert draws.dtype.itemsize == 20
-    assert draws.dtype.names == ("index_count", "instance_count", "first_index", "base_vertex", "first_instance")
+    assert draws.dtype.names == (
+        "index_count",
+        "instance_count",
+        "first_index",
+        "base_vertex",
+        "first_instance",
+    )
     assert draws.tolist() == [(36, len(KEPT), 6, -2, 0)]
 
 
@@ -186,7 +217,9 @@ def test_any_order_has_the_same_members(device: hizvk.Device, camera: hizvk.Came
 
 @pytest.mark.parametrize("order", ["stable", "any"])
 @pytest.mark.parametrize("capacity", [0, 3, len(KEPT), 1000])
-def test_capacity_and_demand(device: hizvk.Device, camera: hizvk.Camera, order: str, capacity: int) -> None:
+def test_capacity_and_demand(
+    device: hizvk.Device, camera: hizvk.Camera, order: str, capacity: int
+) -> None:
     result = culled(device, camera, order=order, capacity=capacity)
     written = min(capacity, len(KEPT))
     assert result.demand == len(KEPT)
@@ -199,8 +232,9 @@ def test_capacity_and_demand(device: hizvk.Device, camera: hizvk.Camera, order: 
 
 
 def test_explain_by_hand(device: hizvk.Device, camera: hizvk.Camera) -> None:
-    # Centre (-10, 0, -20), radius 1: x / depth from -(200 + 499^0.5) / 399 to -(200 - 499^0.5) / 399, that is columns
-    # 1.77 to 2.22; y / depth within 1 / 399^0.5, rows 3.80 to 4.20. So pixels 1..2 by 3..4, four texels of level 0.
+    # Centre (-10, 0, -20), radius 1: x / depth from -(200 + 499^0.5) / 399 to -(200 - 499^0.5) /
+    # 399, that is columns 1.77 to 2.22; y / depth within 1 / 399^0.5, rows 3.80 to 4.20.
+    # So pixels 1..2 by 3..4, four texels of level 0.
     told = culled(device, camera).explain(0)
     assert told.index == 0
     assert told.verdict is Verdict.OCCLUDED
@@ -220,7 +254,9 @@ def test_explain_by_hand(device: hizvk.Device, camera: hizvk.Camera) -> None:
 
 def wide_camera(*, reversed_z: bool = True) -> hizvk.Camera:
     """64 pixels a side, 8 of them a unit at depth 4: column 32 begins at x = 0, row 31 ends at y = 0."""
-    return hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(64, 64), near=0.125, reversed_z=reversed_z)
+    return hizvk.Camera.look_at(
+        (0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(64, 64), near=0.125, reversed_z=reversed_z
+    )
 
 
 @pytest.mark.parametrize("reversed_z", [True, False])
@@ -238,7 +274,9 @@ def test_explain_lists_a_whole_footprint(device: hizvk.Device, reversed_z: bool,
     level = 2 if side == 8 else 3
     assert told.level == level
     assert told.texels == tuple(
-        (x, y) for y in range(18 >> level, (42 >> level) + 1) for x in range(20 >> level, (47 >> level) + 1)
+        (x, y)
+        for y in range(18 >> level, (42 >> level) + 1)
+        for x in range(20 >> level, (47 >> level) + 1)
     )
     assert told.texels_read == len(told.texels) == len(told.texel_depths)
     assert set(told.texel_levels) == {level}
@@ -249,7 +287,10 @@ def test_explain_lists_a_whole_footprint(device: hizvk.Device, reversed_z: bool,
     # The first one of the dent.
     assert told.texels[told.decisive] == (34 >> level, 20 >> level)
     assert told.farthest == told.texel_depths[told.decisive]
-    assert (told.farthest_z, told.nearest_z) == (pytest.approx(3.0, rel=1e-6), pytest.approx(4.0, rel=1e-6))
+    assert (told.farthest_z, told.nearest_z) == (
+        pytest.approx(3.0, rel=1e-6),
+        pytest.approx(4.0, rel=1e-6),
+    )
     assert "view depth 3 (depth image)" in str(told)
     assert f"decisive  ({34 >> level}, {20 >> level}) of level {level}" in str(told)
 
@@ -263,8 +304,9 @@ def test_explain_follows_a_descent(device: hizvk.Device) -> None:
     box = device.instances(hizvk.Boxes([[-1.45, 0.9, -4]], [[-0.1, 1.7, -4]]))
     told = device.cull(box, camera, pyramid, descent=4096).explain(0)
     assert (told.rectangle, told.level) == ((20, 18, 31, 24), 3)
-    # The footprint; then its texels again, down into the one with the far pixel, of whose children the
-    # rectangle meets the first row alone: columns 6 and 7 of level 2, and so on to the pixel itself.
+    # The footprint; then its texels again, down into the one with the far pixel, of whose children
+    # the rectangle meets the first row alone: columns 6 and 7 of level 2, and so on to the pixel
+    # itself.
     walked = [
         (3, 2, 2),
         (3, 3, 2),
@@ -278,14 +320,16 @@ def test_explain_follows_a_descent(device: hizvk.Device) -> None:
         (0, 31, 24),
     ]
     expected = [(3, 2, 2), (3, 3, 2), (3, 2, 3), (3, 3, 3), *walked]
-    assert [(level, x, y) for level, (x, y) in zip(told.texel_levels, told.texels, strict=True)] == expected
+    assert [
+        (level, x, y) for level, (x, y) in zip(told.texel_levels, told.texels, strict=True)
+    ] == expected
     assert told.verdict is Verdict.VISIBLE
     assert told.decisive == len(expected) - 1
     assert told.farthest_z == pytest.approx(50.0, rel=1e-6)
     # The same budget, with no hole: behind everything, the farthest of which is the wall.
-    plain = device.cull(box, camera, device.pyramid(np.full(camera.size, 2.0), camera, kind="z"), descent=4096).explain(
-        0
-    )
+    plain = device.cull(
+        box, camera, device.pyramid(np.full(camera.size, 2.0), camera, kind="z"), descent=4096
+    ).explain(0)
     assert (plain.verdict, plain.farthest_z) == (Verdict.OCCLUDED, pytest.approx(2.0, rel=1e-6))
 
 
@@ -293,22 +337,41 @@ def test_explain_in_world_units(device: hizvk.Device) -> None:
     box = device.instances(hizvk.Boxes([[-1.0, -1, -9]], [[1, 1, -7]]))
     for reversed_z in (True, False):
         camera = hizvk.Camera.orthographic(
-            (0, 0, 0), (0, 0, -1), height=16, size=(16, 16), near=0.0, far=30.0, reversed_z=reversed_z
+            (0, 0, 0),
+            (0, 0, -1),
+            height=16,
+            size=(16, 16),
+            near=0.0,
+            far=30.0,
+            reversed_z=reversed_z,
         )
-        told = device.cull(box, camera, device.pyramid(np.full((16, 16), 6.0), camera, kind="z")).explain(0)
-        assert (told.farthest_z, told.nearest_z) == (pytest.approx(6.0, abs=1e-4), pytest.approx(7.0, abs=1e-4))
+        told = device.cull(
+            box, camera, device.pyramid(np.full((16, 16), 6.0), camera, kind="z")
+        ).explain(0)
+        assert (told.farthest_z, told.nearest_z) == (
+            pytest.approx(6.0, abs=1e-4),
+            pytest.approx(7.0, abs=1e-4),
+        )
         # A bare orthographic matrix does not say where view depth starts.
-        bare = hizvk.Camera.from_matrices(camera.clip_from_world, size=(16, 16), reversed_z=reversed_z)
-        told = device.cull(box, bare, device.pyramid(np.full((16, 16), 0.5), bare, kind=bare.depth_kind)).explain(0)  # type: ignore[call-overload]
+        bare = hizvk.Camera.from_matrices(
+            camera.clip_from_world, size=(16, 16), reversed_z=reversed_z
+        )
+        told = device.cull(
+            box, bare, device.pyramid(np.full((16, 16), 0.5), bare, kind=bare.depth_kind)
+        ).explain(0)  # type: ignore[call-overload]
         assert (told.farthest_z, told.nearest_z) == (None, None)
         assert told.farthest == 0.5
         assert "view depth" not in str(told)
     open_sky = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(16, 16), near=0.125)
-    told = device.cull(box, open_sky, device.pyramid(np.full((16, 16), np.inf), open_sky, kind="z")).explain(0)
+    told = device.cull(
+        box, open_sky, device.pyramid(np.full((16, 16), np.inf), open_sky, kind="z")
+    ).explain(0)
     assert told.farthest_z == float("inf")
 
 
-def test_an_explanation_after_an_update_is_stale(device: hizvk.Device, camera: hizvk.Camera) -> None:
+def test_an_explanation_after_an_update_is_stale(
+    device: hizvk.Device, camera: hizvk.Camera
+) -> None:
     instances = device.instances(scene())
     result = device.cull(instances, camera, device.pyramid(left_wall(), camera, kind="z"))
     before = [result.explain(i) for i in range(3)]
@@ -345,7 +408,9 @@ def test_results_export_by_dlpack(device: hizvk.Device, camera: hizvk.Camera) ->
 
 
 @pytest.mark.parametrize("index", range(len(SCENE)))
-def test_explain_agrees_with_the_verdict(device: hizvk.Device, camera: hizvk.Camera, index: int) -> None:
+def test_explain_agrees_with_the_verdict(
+    device: hizvk.Device, camera: hizvk.Camera, index: int
+) -> None:
     told = culled(device, camera).explain(index)
     assert told.verdict is VERDICTS[index]
     assert told.reason
@@ -357,7 +422,9 @@ def test_explain_agrees_with_the_verdict(device: hizvk.Device, camera: hizvk.Cam
 def test_invalid_bounds_are_listed(device: hizvk.Device) -> None:
     instances = device.instances(scene())
     assert instances.invalid.dtype == np.uint64
-    assert instances.invalid.tolist() == [i for i, verdict in enumerate(VERDICTS) if verdict is Verdict.INVALID]
+    assert instances.invalid.tolist() == [
+        i for i, verdict in enumerate(VERDICTS) if verdict is Verdict.INVALID
+    ]
 
 
 def test_no_instances(device: hizvk.Device, camera: hizvk.Camera) -> None:
@@ -377,7 +444,9 @@ def test_no_instances(device: hizvk.Device, camera: hizvk.Camera) -> None:
             assert result.draws["instance_count"].sum() == 0
             with pytest.raises(IndexError):
                 result.explain(0)
-        assert hizvk.visible(bounds, camera, depth=left_wall(), kind="z", device=device).shape == (0,)
+        assert hizvk.visible(bounds, camera, depth=left_wall(), kind="z", device=device).shape == (
+            0,
+        )
 
 
 @pytest.mark.parametrize(("x", "kept"), [(-10.0, False), (10.0, True)])
@@ -395,7 +464,9 @@ def test_sample_coverage_and_guard(device: hizvk.Device, camera: hizvk.Camera) -
     instances = device.instances(corner)
     assert device.cull(instances, camera, pyramid).mask.tolist() == [True]
     assert device.cull(instances, camera, pyramid, coverage="sample").mask.tolist() == [False]
-    assert device.cull(instances, camera, pyramid, coverage="sample", guard_px=0.5).mask.tolist() == [True]
+    assert device.cull(
+        instances, camera, pyramid, coverage="sample", guard_px=0.5
+    ).mask.tolist() == [True]
 
 
 @pytest.mark.parametrize("kind", ["ndc", "z", "distance"])
@@ -421,11 +492,15 @@ def test_kinds_of_depth(device: hizvk.Device, camera: hizvk.Camera, kind: str) -
 
 
 def test_pyramid_levels_by_hand(device: hizvk.Device) -> None:
-    depth = np.array([[0.5, 0.25, 0.75, 0.5, 0.125], [0.5, 0.5, 0.5, 0.5, 0.5], [0.25, 1.0, 0.5, 0.375, 0.625]])
+    depth = np.array(
+        [[0.5, 0.25, 0.75, 0.5, 0.125], [0.5, 0.5, 0.5, 0.5, 0.5], [0.25, 1.0, 0.5, 0.375, 0.625]]
+    )
     far_is_0 = [depth, [[0.25, 0.5, 0.125], [0.25, 0.375, 0.625]], [[0.25, 0.125]], [[0.125]]]
     far_is_1 = [depth, [[0.5, 0.75, 0.5], [1.0, 0.5, 0.625]], [[1.0, 0.625]], [[1.0]]]
     for reversed_z, expected in ((True, far_is_0), (False, far_is_1)):
-        camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(3, 5), near=1, reversed_z=reversed_z)
+        camera = hizvk.Camera.look_at(
+            (0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(3, 5), near=1, reversed_z=reversed_z
+        )
         pyramid = device.pyramid(depth, camera, kind=camera.depth_kind)  # type: ignore[call-overload]
         reference = hizvk.reference.pyramid(depth, reversed_z=reversed_z)
         assert pyramid.num_levels == len(reference) == 4
@@ -462,9 +537,12 @@ def test_chosen_levels_by_hand(device: hizvk.Device) -> None:
                 np.testing.assert_array_equal(pyramid.level(k), everything.level(k))
             else:
                 text = f"{stored[0]}..{stored[-1]}" if len(stored) > 1 else str(stored[0])
-                with pytest.raises(IndexError, match=rf"^k: expected 0 or a level that is stored, {text}, got {k}$"):
+                with pytest.raises(
+                    IndexError, match=rf"^k: expected 0 or a level that is stored, {text}, got {k}$"
+                ):
                     pyramid.level(k)
-    # Behind the wall at depth 2: in one pixel, in pixels 4 to 6 (the hole is in the first blocks of 4 and 8), in 20.
+    # Behind the wall at depth 2: in one pixel, in pixels 4 to 6 (the hole is in the first blocks of
+    # 4 and 8), in 20.
     spheres = hizvk.Spheres([[1.1, 1.1, -4], [-2.9, 2.9, -4], [1.5, -1.5, -4]], [0.02, 0.1, 1.8])
     instances = device.instances(spheres)
     for given, expected in (
@@ -508,7 +586,9 @@ def test_occluders_placed_culled_and_resized(device: hizvk.Device, camera: hizvk
     placed[0, :3, 3] = (-5, 0, -10)
     placed[1, :3, 3] = (-5, 0, -30)
     far = 0.0 if camera.reversed_z else 1.0
-    expected = device.render_depth(device.occluders(corners, faces, transforms=placed), camera).numpy()
+    expected = device.render_depth(
+        device.occluders(corners, faces, transforms=placed), camera
+    ).numpy()
     assert (expected[:, :4] != far).all()
     assert (expected[:, 4:] == far).all()
     for meshes in (
@@ -530,7 +610,9 @@ def test_occluders_placed_culled_and_resized(device: hizvk.Device, camera: hizvk
 def test_the_default_device_is_made_once(camera: hizvk.Camera) -> None:
     from hizvk.oneline import default_device
 
-    assert np.flatnonzero(hizvk.visible(scene(), camera, depth=left_wall(), kind="z")).tolist() == KEPT
+    assert (
+        np.flatnonzero(hizvk.visible(scene(), camera, depth=left_wall(), kind="z")).tolist() == KEPT
+    )
     assert default_device() is default_device()
 
 
@@ -548,19 +630,31 @@ def test_instances_and_repr(device: hizvk.Device, camera: hizvk.Camera) -> None:
     assert repr(partial) == "<Pyramid 8x8, 4 levels, stored 2..3>"
     assert repr(device.cull(instances, camera, pyramid)) == "<CullResult of 15 instances>"
     corners = np.zeros((3, 3))
-    assert repr(hizvk.Mesh(corners, [[0, 1, 2]], [np.eye(4)] * 2)) == "Mesh(3 vertices, 1 triangles, 2 copies)"
+    assert (
+        repr(hizvk.Mesh(corners, [[0, 1, 2]], [np.eye(4)] * 2))
+        == "Mesh(3 vertices, 1 triangles, 2 copies)"
+    )
     occluders = device.occluders([hizvk.Mesh(corners, [[0, 1, 2]], [np.eye(4)] * 2)] * 3)
     assert repr(occluders) == "<Occluders: 6 meshes, 6 triangles>"
-    assert repr(device.render_depth(occluders, camera)) == f"<DepthImage 8x8 of kind {camera.depth_kind}>"
+    assert (
+        repr(device.render_depth(occluders, camera))
+        == f"<DepthImage 8x8 of kind {camera.depth_kind}>"
+    )
     assert repr(device) == f"<Device {device.adapter}>"
     assert device.adapter in hizvk.adapters()
     assert device.max_image_side >= 8192
     device.wait()
 
 
-# -- the oracle and the comparison ---------------------------------------------------------------------------
+# -- the oracle and the
+# comparison ---------------------------------------------------------------------------
 
-TRUTH = {Verdict.OUTSIDE: HIDDEN, Verdict.OCCLUDED: HIDDEN, Verdict.VISIBLE: VISIBLE, Verdict.INVALID: INVALID}
+TRUTH = {
+    Verdict.OUTSIDE: HIDDEN,
+    Verdict.OCCLUDED: HIDDEN,
+    Verdict.VISIBLE: VISIBLE,
+    Verdict.INVALID: INVALID,
+}
 
 
 def test_the_oracle_by_hand(camera: hizvk.Camera) -> None:
@@ -571,7 +665,9 @@ def test_the_oracle_by_hand(camera: hizvk.Camera) -> None:
     boxes = hizvk.Boxes(centers - radii, centers + radii)
     assert hizvk.reference.classify(boxes, camera, left_wall(), kind="z").tolist() == codes.tolist()
     turned = hizvk.OrientedBoxes(centers, radii, np.broadcast_to(np.eye(3), (len(centers), 3, 3)))
-    assert hizvk.reference.classify(turned, camera, left_wall(), kind="z").tolist() == codes.tolist()
+    assert (
+        hizvk.reference.classify(turned, camera, left_wall(), kind="z").tolist() == codes.tolist()
+    )
 
 
 def test_compare_by_hand() -> None:
@@ -589,7 +685,12 @@ def test_compare_by_hand() -> None:
     plain = hizvk.compare([True, False], [True, True])
     assert (plain.false_culls.tolist(), plain.false_keeps.tolist()) == ([1], [])
     none = hizvk.compare([], [])
-    assert (none.total, none.kept_share, none.false_keep_share, none.kept_over_visible) == (0, 0.0, 0.0, 1.0)
+    assert (none.total, none.kept_share, none.false_keep_share, none.kept_over_visible) == (
+        0,
+        0.0,
+        0.0,
+        1.0,
+    )
     assert hizvk.compare([True], [False]).kept_over_visible == float("inf")
 
 

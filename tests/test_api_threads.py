@@ -22,7 +22,9 @@ def crowd(count: int, seed: int) -> hizvk.Spheres:
 
 
 def view(seed: int) -> hizvk.Camera:
-    return hizvk.Camera.look_at((seed * 0.25, 0, 0), (0, 0, -10), fov_y_deg=70, size=(45 + seed, 64), near=0.125)
+    return hizvk.Camera.look_at(
+        (seed * 0.25, 0, 0), (0, 0, -10), fov_y_deg=70, size=(45 + seed, 64), near=0.125
+    )
 
 
 def wall(camera: hizvk.Camera) -> np.ndarray:
@@ -55,7 +57,9 @@ def test_two_threads_share_a_device(device: hizvk.Device) -> None:
 def test_two_threads_with_a_device_each(device: hizvk.Device) -> None:
     expected = [masks(device, seed, 1)[0] for seed in range(2)]
     with ThreadPoolExecutor(2) as pool:
-        for seed, found in enumerate(pool.map(lambda seed: masks(hizvk.Device(), seed, 4), range(2))):
+        for seed, found in enumerate(
+            pool.map(lambda seed: masks(hizvk.Device(), seed, 4), range(2))
+        ):
             assert found == [expected[seed]] * 4
 
 
@@ -67,7 +71,9 @@ def test_one_result_read_by_many_threads(device: hizvk.Device) -> None:
         result = device.cull(instances, camera, pyramid)
         barrier = threading.Barrier(4)
 
-        def read(result: hizvk.CullResult = result, barrier: threading.Barrier = barrier) -> tuple[bytes, int, str]:
+        def read(
+            result: hizvk.CullResult = result, barrier: threading.Barrier = barrier
+        ) -> tuple[bytes, int, str]:
             barrier.wait()
             return result.mask.tobytes(), result.count, str(result.explain(17))
 
@@ -101,7 +107,9 @@ def test_the_interpreter_runs_while_the_device_works(device: hizvk.Device) -> No
         for _ in range(3):
             # One call each between the two times; none of them comes back to Python on its way.
             start = time.perf_counter()
-            instances = device._engine.instances("spheres", (bounds.centers, bounds.radii), False, "morton", None)
+            instances = device._engine.instances(
+                "spheres", (bounds.centers, bounds.radii), False, "morton", None
+            )
             calls.append((start, time.perf_counter()))
             del instances
 

@@ -13,7 +13,18 @@ import pytest
 import hizvk
 from hizvk import cli, truth
 from hizvk import scenes as shared_scenes
-from hizvk.bench import command, configurations, numpy_hiz, pareto, recommend, report, results, scenes, score, volumes
+from hizvk.bench import (
+    command,
+    configurations,
+    numpy_hiz,
+    pareto,
+    recommend,
+    report,
+    results,
+    scenes,
+    score,
+    volumes,
+)
 from hizvk.bench.city import city
 from hizvk.bench.configurations import Configuration, DepthVariant
 from hizvk.bench.rectangle import project, rectangle_test
@@ -28,11 +39,14 @@ def device() -> hizvk.Device:
     return hizvk.Device()
 
 
-# -- the command -----------------------------------------------------------------------------------------------------
+# -- the
+# command -----------------------------------------------------------------------------------------------------
 
 
 def run_quick(out: Path, *more: str) -> int:
-    return cli.main(["bench", "--quick", "--views", "2", "--instances", "300", "--out", str(out), *more])
+    return cli.main(
+        ["bench", "--quick", "--views", "2", "--instances", "300", "--out", str(out), *more]
+    )
 
 
 def test_a_quick_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -69,9 +83,14 @@ def test_a_quick_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
                 assert set(row["ms"]) == {"render", "reduce", "cull", "read"}
                 for spread in (*row["ms"].values(), row["total_ms"]):
                     assert 0.0 < spread["q1"] <= spread["median"] <= spread["q3"]
-                assert row["ns_per_instance"] == pytest.approx(1e6 * row["ms"]["cull"]["median"] / 300)
+                assert row["ns_per_instance"] == pytest.approx(
+                    1e6 * row["ms"]["cull"]["median"] / 300
+                )
                 assert row["texels_per_instance"] > 0.0
-                if row["configuration"]["depth"]["divisor"] == 1 or row["configuration"]["depth"]["conservative"]:
+                if (
+                    row["configuration"]["depth"]["divisor"] == 1
+                    or row["configuration"]["depth"]["conservative"]
+                ):
                     assert row["false_culls"] == 0
         assert any(row["pareto"] for row in scene["rows"])
         by_label = {row["label"]: row for row in scene["rows"]}
@@ -105,12 +124,19 @@ def test_an_absent_castle_is_told_of(
     assert run_quick(tmp_path, "--scene", "castle") == 1  # nothing was measured
     assert "left out the castle is left out" in capsys.readouterr().out
     assert "nowhere.npz is no file" in (tmp_path / "report.md").read_text()
-    with pytest.raises(scenes.Missing, match=r"here\.npz is no file; name a castle\.npz with --castle PATH"):
+    with pytest.raises(
+        scenes.Missing, match=r"here\.npz is no file; name a castle\.npz with --castle PATH"
+    ):
         scenes.find_castle(tmp_path / "here.npz")
 
 
 def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
-    for arguments in (["--scene", "moon"], ["--quick", "--full"], ["--views", "0"], ["--size", "4"]):
+    for arguments in (
+        ["--scene", "moon"],
+        ["--quick", "--full"],
+        ["--views", "0"],
+        ["--size", "4"],
+    ):
         with pytest.raises(SystemExit) as caught:
             command.main(arguments)
         assert caught.value.code == 2
@@ -119,13 +145,16 @@ def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_importing_hizvk_loads_no_scene_and_no_plot() -> None:
     code = "import sys, hizvk; print([n for n in sys.modules if n.startswith(('hizvk.bench.', 'matplotlib'))])"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout
     for name in ("scenes", "city", "plots", "command", "matplotlib"):
         assert f".{name}'" not in loaded
         assert f"'{name}'" not in loaded
 
 
-# -- configurations --------------------------------------------------------------------------------------------------
+# --
+# configurations --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("extent", ["quick", "default", "full"])
@@ -136,7 +165,9 @@ def test_the_matrix_has_no_row_twice_and_every_dimension(extent: str) -> None:
     assert {row.coverage for row in rows} == {"area", "sample"}
     assert {row.volume for row in rows} >= {"spheres", "boxes"}
     assert {row.descent > 0 for row in rows} == {True, False}
-    assert not all(row.promises for row in rows), "plain low resolution is what the others are compared with"
+    assert not all(row.promises for row in rows), (
+        "plain low resolution is what the others are compared with"
+    )
     assert {row.fit for row in rows} == {"rectangle", "volume"}
     assert {row.depth.conservative for row in rows} == {True, False}
 
@@ -144,29 +175,49 @@ def test_the_matrix_has_no_row_twice_and_every_dimension(extent: str) -> None:
 def test_which_depth_promises_for_the_view() -> None:
     depths = [DepthVariant(*one) for one in ((1, False), (1, True), (2, False), (2, True))]
     assert [Configuration(depth=depth).promises for depth in depths] == [True, True, False, True]
-    assert [Configuration(depth=depth, coverage="sample").promises for depth in depths] == [True, True, False, False]
+    assert [Configuration(depth=depth, coverage="sample").promises for depth in depths] == [
+        True,
+        True,
+        False,
+        False,
+    ]
     assert DepthVariant(4).size((90, 161)) == (22, 40)
     assert DepthVariant(4).size((2, 1)) == (1, 1)
     assert configurations.render_options(DepthVariant(), (90, 160)) == {}
     assert configurations.render_options(DepthVariant(2), (90, 160)) == {"size": (45, 80)}
-    assert configurations.render_options(DepthVariant(2, True), (90, 160)) == {"size": (45, 80), "conservative": True}
+    assert configurations.render_options(DepthVariant(2, True), (90, 160)) == {
+        "size": (45, 80),
+        "conservative": True,
+    }
 
 
-# -- the front -------------------------------------------------------------------------------------------------------
+# -- the
+# front -------------------------------------------------------------------------------------------------------
 
 
 def test_the_front_of_points_by_hand() -> None:
     cost = [1.0, 2.0, 3.0, 2.0, 4.0, 1.0, np.nan]
     error = [9.0, 5.0, 5.0, 5.0, 1.0, 9.5, 0.0]
-    # 2 is slower than 1 at the same error; 3 equals 1; 5 has more error than 0 at the same cost; 6 was not timed.
+    # 2 is slower than 1 at the same error; 3 equals 1; 5 has more error than 0 at the same cost; 6
+    # was not timed.
     assert pareto.front(cost, error).tolist() == [True, True, False, True, True, False, False]
     # Without 1 and 3, 2 is on it; without 4 nothing changes for the others.
     allowed = [True, False, True, False, False, True, True]
-    assert pareto.front(cost, error, allowed).tolist() == [True, False, True, False, False, False, False]
+    assert pareto.front(cost, error, allowed).tolist() == [
+        True,
+        False,
+        True,
+        False,
+        False,
+        False,
+        False,
+    ]
     assert pareto.front([], []).tolist() == []
 
 
-def row_of(ms: float, hidden_kept: float, configuration: Configuration | None, false_culls: int = 0) -> Row:
+def row_of(
+    ms: float, hidden_kept: float, configuration: Configuration | None, false_culls: int = 0
+) -> Row:
     row = Row("", configuration, total_ms=Spread(ms, ms, ms), false_culls=false_culls)
     row.hidden_kept_in_view = hidden_kept
     return row
@@ -182,10 +233,22 @@ def test_who_competes_for_the_front() -> None:
         row_of(0.4, 0.0, Configuration("spheres"), false_culls=1),  # a bug
         row_of(5.0, 0.29, Configuration(depth=DepthVariant(2, True))),
         row_of(3.5, 0.3, Configuration("oriented_boxes")),
-        row_of(6.0, 0.2896, Configuration("spheres")),  # no better than the conservative one that it can be told
+        row_of(
+            6.0, 0.2896, Configuration("spheres")
+        ),  # no better than the conservative one that it can be told
     ]
     cost = [row.total_ms.median for row in rows if row.total_ms]
-    assert results.fronts(rows, cost) == [True, True, False, False, False, False, True, False, False]
+    assert results.fronts(rows, cost) == [
+        True,
+        True,
+        False,
+        False,
+        False,
+        False,
+        True,
+        False,
+        False,
+    ]
 
 
 def test_a_spread_is_over_the_repetitions_of_each_view() -> None:
@@ -212,7 +275,8 @@ def test_a_broken_promise_fails_the_report() -> None:
     assert found.broken() == ["x: : 1 visible instances culled"]
 
 
-# -- truth -----------------------------------------------------------------------------------------------------------
+# --
+# truth -----------------------------------------------------------------------------------------------------------
 
 
 def two_boxes() -> shared_scenes.Scene:
@@ -231,7 +295,9 @@ def two_boxes() -> shared_scenes.Scene:
 def test_planted_false_culls_and_false_keeps_are_counted(device: hizvk.Device) -> None:
     scene, size = two_boxes(), (64, 64)
     view, caster = scene.views[0], truth.make_caster(scene)
-    depth = device.render_depth(device.occluders(scene.vertices, scene.triangles), view.camera(size)).numpy()
+    depth = device.render_depth(
+        device.occluders(scene.vertices, scene.triangles), view.camera(size)
+    ).numpy()
     told = score.look(scene, view, size, depth, caster)
     assert told.visible.tolist() == [False, True, True, False]
     assert told.projected.inside.tolist() == [True, True, True, False]
@@ -252,7 +318,9 @@ def test_the_best_rectangle_test_by_hand() -> None:
     scene, size = two_boxes(), (8, 8)
     seen = project(scene, scene.views[0], size)
     # Box 1: x from 5 to 7, y from 20 to 22, z from -1 to 1.
-    np.testing.assert_allclose(seen.rectangle[1], [4.0 + 4 * 5 / 22, 4.0 - 4 / 20, 4.0 + 4 * 7 / 20, 4.0 + 4 / 20])
+    np.testing.assert_allclose(
+        seen.rectangle[1], [4.0 + 4 * 5 / 22, 4.0 - 4 / 20, 4.0 + 4 * 7 / 20, 4.0 + 4 / 20]
+    )
     assert seen.nearest.tolist() == [20.0, 20.0, 4.0, -9.0]
     assert seen.crosses.tolist() == [False, False, False, True]
     everywhere = np.full(size, 19.0)
@@ -268,20 +336,31 @@ def test_the_best_rectangle_test_by_hand() -> None:
 def test_far_planes_cut_what_rays_see() -> None:
     pytest.importorskip("embreex")
     scene = two_boxes()
-    near, far = (dataclasses.replace(scene.views[0], near=near, far=far) for near, far in ((0.25, 15.0), (15.0, 40.0)))
+    near, far = (
+        dataclasses.replace(scene.views[0], near=near, far=far)
+        for near, far in ((0.25, 15.0), (15.0, 40.0))
+    )
     caster = truth.RayCaster(scene)
     # The wall lies before the second view's near plane, box 1 behind the first one's far plane.
     assert (caster.look(near, (64, 64)).pixels(4) > 0).tolist() == [False, False, True, False]
     assert (caster.look(far, (64, 64)).pixels(4) > 0).tolist() == [True, True, False, False]
 
 
-# -- yardsticks ------------------------------------------------------------------------------------------------------
+# --
+# yardsticks ------------------------------------------------------------------------------------------------------
 
 
 def test_the_numpy_pyramid_by_hand() -> None:
-    depth = np.array([[0.9, 0.8, 0.7], [0.6, 0.5, 0.4], [0.3, 0.2, 0.1], [0.9, 0.9, 0.9], [0.5, 0.9, 0.9]])
+    depth = np.array(
+        [[0.9, 0.8, 0.7], [0.6, 0.5, 0.4], [0.3, 0.2, 0.1], [0.9, 0.9, 0.9], [0.5, 0.9, 0.9]]
+    )
     made = numpy_hiz.NumpyPyramid.build(depth)
-    assert list(zip(made.height.tolist(), made.width.tolist(), strict=True)) == [(5, 3), (3, 2), (2, 1), (1, 1)]
+    assert list(zip(made.height.tolist(), made.width.tolist(), strict=True)) == [
+        (5, 3),
+        (3, 2),
+        (2, 1),
+        (1, 1),
+    ]
     assert made.texels[15:].tolist() == [0.5, 0.4, 0.2, 0.1, 0.5, 0.9, 0.1, 0.5, 0.1]
 
 
@@ -293,7 +372,9 @@ def test_the_numpy_cull_by_hand(dtype: type[Any]) -> None:
     low, high = scene.box_min.astype(dtype), scene.box_max.astype(dtype)
 
     def kept(depth: np.ndarray) -> list[bool]:
-        return numpy_hiz.cull(low, high, matrix, numpy_hiz.NumpyPyramid.build(depth.astype(dtype)), view.near).tolist()
+        return numpy_hiz.cull(
+            low, high, matrix, numpy_hiz.NumpyPyramid.build(depth.astype(dtype)), view.near
+        ).tolist()
 
     def at(distance: float) -> float:
         return view.near / distance
@@ -304,10 +385,12 @@ def test_the_numpy_cull_by_hand(dtype: type[Any]) -> None:
     left = np.zeros(size)
     left[:, :8] = at(10.0)
     assert kept(left) == [False, True, True, False]
-    # A hole of one pixel in the columns 5 and 6, which box 0 covers: 8 + 8 * (-6 .. -4) / (20 .. 22).
+    # A hole of one pixel in the columns 5 and 6, which box 0 covers: 8 + 8 * (-6 .. -4) / (20 ..
+    # 22).
     left[8, 6] = 0.0
     assert kept(left) == [True, True, True, False]
-    # Columns 1 to 4 are three texels of level 1, and a hole in the middle one shows on level 2 alone.
+    # Columns 1 to 4 are three texels of level 1, and a hole in the middle one shows on level 2
+    # alone.
     low, high = np.array([[-6.5, 8.0, 0.1]], dtype), np.array([[-3.5, 8.0, 0.2]], dtype)
     wall = np.full(size, at(5.0))
     assert kept(wall) == [False]
@@ -327,7 +410,8 @@ def test_rays_see_what_the_truth_sees() -> None:
     assert rays.image(clipped, size).tolist() == [False, False, True, False]
 
 
-# -- scenes ----------------------------------------------------------------------------------------------------------
+# --
+# scenes ----------------------------------------------------------------------------------------------------------
 
 
 def test_the_city_repeats_and_can_stand_far_away() -> None:
@@ -405,15 +489,21 @@ def test_a_castle_is_read(tmp_path: Path) -> None:
     caster = truth.make_caster(bench.scene)
     given = np.full((32, 32), 10.0)
     given[:, 16:] = np.inf
-    seen = [(caster.look(view, (32, 32), given[:, ::-1]).pixels(4) > 0).sum() for view in bench.scene.views]
+    seen = [
+        (caster.look(view, (32, 32), given[:, ::-1]).pixels(4) > 0).sum()
+        for view in bench.scene.views
+    ]
     assert seen[0] < seen[1], "the near far plane cuts the boxes behind it away"
     with pytest.raises(scenes.Missing, match="camera_near"):
         scenes.load_castle(castle_file(tmp_path / "b.npz", camera_near=None), 2)
     with pytest.raises(scenes.Missing, match="occluders that are instances as well"):
-        scenes.load_castle(castle_file(tmp_path / "c.npz", occluder_instance=np.zeros(12, np.int32)), 2)
+        scenes.load_castle(
+            castle_file(tmp_path / "c.npz", occluder_instance=np.zeros(12, np.int32)), 2
+        )
 
 
-# -- recommend -------------------------------------------------------------------------------------------------------
+# --
+# recommend -------------------------------------------------------------------------------------------------------
 
 
 def candidate(ms: float, kept: int) -> recommend.Candidate:
@@ -441,7 +531,9 @@ def test_recommend_on_a_scene(device: hizvk.Device) -> None:
     assert isinstance(found, hizvk.Recommendation)
     assert found.tested == 4
     assert {one.volume for one in found.candidates} == {"boxes", "spheres"}
-    assert [one.ms.median for one in found.candidates] == sorted(one.ms.median for one in found.candidates)
+    assert [one.ms.median for one in found.candidates] == sorted(
+        one.ms.median for one in found.candidates
+    )
     assert all(one.configuration.promises for one in found.candidates)
     assert all(2 <= one.kept <= 3 for one in found.candidates), "boxes 1 and 2 are visible"
     assert min(one.kept for one in found.candidates) == 2
@@ -450,9 +542,14 @@ def test_recommend_on_a_scene(device: hizvk.Device) -> None:
     assert found.within_budget
     assert str(found).startswith(f"on {device.adapter}: {found.best}\n")
     # What it recommends can be passed on as it is.
-    depth = device.render_depth(device.occluders([wall]), cameras[0], **found.best.render_options(cameras[0].size))
+    depth = device.render_depth(
+        device.occluders([wall]), cameras[0], **found.best.render_options(cameras[0].size)
+    )
     bounds = spheres if found.best.volume == "spheres" else device.instances(boxes)
-    assert device.cull(bounds, depth.camera, device.pyramid(depth), **found.best.cull_options).count == 2
+    assert (
+        device.cull(bounds, depth.camera, device.pyramid(depth), **found.best.cull_options).count
+        == 2
+    )
 
     image = device.render_depth(device.occluders([wall]), cameras[0]).numpy()
     by_image = hizvk.recommend(
@@ -463,9 +560,9 @@ def test_recommend_on_a_scene(device: hizvk.Device) -> None:
     assert "over the budget" in str(by_image)
     assert by_image.best is by_image.candidates[0]
     assert {one.configuration.coverage for one in by_image.candidates} == {"sample"}
-    assert {dataclasses.replace(one.configuration.depth, levels=None) for one in by_image.candidates} == {
-        DepthVariant()
-    }
+    assert {
+        dataclasses.replace(one.configuration.depth, levels=None) for one in by_image.candidates
+    } == {DepthVariant()}
 
 
 def test_recommend_refuses_what_does_not_fit(device: hizvk.Device) -> None:
@@ -479,9 +576,24 @@ def test_recommend_refuses_what_does_not_fit(device: hizvk.Device) -> None:
             hizvk.recommend(*arguments, **{"device": device, **more})
         assert text in str(caught.value)
 
-    refused(TypeError, "occluders, depths: expected exactly one of them, got neither", spheres, view)
-    refused(TypeError, "kind: expected nothing beside occluders, got str 'z'", spheres, view, occluders=wall, kind="z")
-    refused(TypeError, "occluders: expected Occluders, a Mesh, a mesh of trimesh", spheres, view, occluders="wall")
+    refused(
+        TypeError, "occluders, depths: expected exactly one of them, got neither", spheres, view
+    )
+    refused(
+        TypeError,
+        "kind: expected nothing beside occluders, got str 'z'",
+        spheres,
+        view,
+        occluders=wall,
+        kind="z",
+    )
+    refused(
+        TypeError,
+        "occluders: expected Occluders, a Mesh, a mesh of trimesh",
+        spheres,
+        view,
+        occluders="wall",
+    )
     refused(ValueError, "bounds: expected Instances of this device", foreign, view, occluders=wall)
     refused(
         ValueError, "occluders: expected Occluders of this device", spheres, view,

@@ -64,7 +64,8 @@ def run() -> Run:
     return Run(device, TINY, 7, found, lambda _: None)
 
 
-# -- the command -----------------------------------------------------------------------------------------------------
+# -- the
+# command -----------------------------------------------------------------------------------------------------
 
 
 def test_a_run_has_every_target(
@@ -72,7 +73,9 @@ def test_a_run_has_every_target(
 ) -> None:
     monkeypatch.setitem(EXTENTS, "quick", TINY)
     out = tmp_path / "a" / "b"
-    assert cli.main(["bench", "--speed", "--quick", "--seed", "7", "--out", str(out), "--json"]) == 0
+    assert (
+        cli.main(["bench", "--speed", "--quick", "--seed", "7", "--out", str(out), "--json"]) == 0
+    )
     printed = capsys.readouterr()
     told = json.loads(printed.out)
     assert told == json.loads((out / "report.json").read_text())
@@ -85,30 +88,46 @@ def test_a_run_has_every_target(
     assert len(by_key) == len(told["figures"])
     for key, (target, at_least) in TARGETS.items():
         assert (by_key[key]["target"], by_key[key]["at_least"]) == (target, at_least), key
-        assert by_key[key]["met"] is (by_key[key]["value"] >= target if at_least else by_key[key]["value"] <= target)
+        assert by_key[key]["met"] is (
+            by_key[key]["value"] >= target if at_least else by_key[key]["value"] <= target
+        )
     for key in TOLD:
         assert by_key[key]["target"] is by_key[key]["met"] is None, key
     for figure in told["figures"]:
         if figure["q1"] is not None:
             assert figure["q1"] <= figure["q3"], figure["key"]
-        if figure["unit"] == "x" and not figure["key"].startswith("memory.host"):  # two peaks may be equal
+        if figure["unit"] == "x" and not figure["key"].startswith(
+            "memory.host"
+        ):  # two peaks may be equal
             assert figure["value"] > 0.0, figure["key"]
     for time in told["times"]:
         assert 0.0 < time["least"] <= time["ms"]["median"] <= time["most"], time
         assert time["ms"]["q1"] <= time["ms"]["median"] <= time["ms"]["q3"]
     labels = {(error["part"], error["label"]) for error in told["errors"]}
-    assert {("cull, 95 % hidden", "boxes, groups"), ("reduction", "levels >= 2"), ("calls", "hizvk")} <= labels
+    assert {
+        ("cull, 95 % hidden", "boxes, groups"),
+        ("reduction", "levels >= 2"),
+        ("calls", "hizvk"),
+    } <= labels
     for error in told["errors"]:
         assert error["sample"] == TINY.sample
         assert not (error["promises"] and error["false_culls"])
         assert error["promises"] == (
-            "uncertified" not in error["label"] and "numpy" not in error["label"] and "Embree" not in error["label"]
+            "uncertified" not in error["label"]
+            and "numpy" not in error["label"]
+            and "Embree" not in error["label"]
         )
     assert [row["instances"] for row in told["instance_counts"]] == [100, 1_000]
     assert [row["side"] for row in told["image_sizes"]] == [16, 32]
     assert all(row["tests"] >= 2 and row["texels"] > 0.0 for row in told["instance_counts"])
     page = (out / "report.md").read_text()
-    for part in ("## Targets", "## Told, not judged", "## What it was bought at", "## Scale", "## Times"):
+    for part in (
+        "## Targets",
+        "## Told, not judged",
+        "## What it was bought at",
+        "## Scale",
+        "## Times",
+    ):
         assert part in page
     assert by_key["calls.small"]["label"] in page
     assert told["command"] in page
@@ -148,17 +167,22 @@ def test_every_extent_has_what_the_parts_need() -> None:
     assert max(EXTENTS["quick"].counts) == 100_000
 
 
-# -- figures, by hand ------------------------------------------------------------------------------------------------
+# -- figures, by
+# hand ------------------------------------------------------------------------------------------------
 
 
 def found() -> figures.Found:
-    return figures.Found("hizvk bench --speed", 1, "quick", hizvk.Adapter(0, "a", "b", "c", "vulkan", "cpu"))
+    return figures.Found(
+        "hizvk bench --speed", 1, "quick", hizvk.Adapter(0, "a", "b", "c", "vulkan", "cpu")
+    )
 
 
 def test_a_ratio_is_that_of_medians() -> None:
     told = found()
     told.ratio("a.b", "x", np.array([1.0, 2.0, 30.0]), np.array([1.0, 1.0, 10.0]), 2.0)
-    told.ratio("a.c", "x", np.array([1.0, 2.0, 30.0]), np.array([1.0, 1.0, 10.0]), 2.5, at_least=True)
+    told.ratio(
+        "a.c", "x", np.array([1.0, 2.0, 30.0]), np.array([1.0, 1.0, 10.0]), 2.5, at_least=True
+    )
     told.number("a.d", "x", 7.0, "ms")
     assert [(one.value, one.q1, one.q3, one.met) for one in told.figures] == [
         (2.0, 1.5, 2.5, True),
@@ -211,18 +235,28 @@ def test_a_broken_promise_fails_and_a_missed_target_does_not() -> None:
 
 def test_cliffs_by_hand(run: Run) -> None:
     def count(instances: int, flat_ms: float) -> figures.InstanceCount:
-        return figures.InstanceCount(instances, 1, instances / 1e5, flat_ms, instances / 1e6, 1, 1.0, 1)
+        return figures.InstanceCount(
+            instances, 1, instances / 1e5, flat_ms, instances / 1e6, 1, 1.0, 1
+        )
 
     # 10, 10, 20 ns an instance; the first is too small to tell.
-    run.found.instance_counts = [count(1_000, 9.0), count(100_000, 1.0), count(200_000, 2.0), count(400_000, 8.0)]
-    run.found.image_sizes = [figures.ImageSize(side, 1.0, ms, 1.0, 1, 1.0) for side, ms in ((512, 1.0), (1024, 6.0))]
+    run.found.instance_counts = [
+        count(1_000, 9.0),
+        count(100_000, 1.0),
+        count(200_000, 2.0),
+        count(400_000, 8.0),
+    ]
+    run.found.image_sizes = [
+        figures.ImageSize(side, 1.0, ms, 1.0, 1, 1.0) for side, ms in ((512, 1.0), (1024, 6.0))
+    ]
     assert scale.cliffs(run) == [
         "cliff: flat, an instance of 400,000 (1 pieces) costs 2.00 times one of 200,000 (1)",
         "cliff: the reduction, a pixel of 1024x1024 costs 1.50 times one of 512x512 (a memcpy 0.25 times)",
     ]
 
 
-# -- the town and its judge ------------------------------------------------------------------------------------------
+# -- the town and its
+# judge ------------------------------------------------------------------------------------------
 
 
 def test_the_town_hides_about_what_was_asked_for(run: Run) -> None:
@@ -235,7 +269,9 @@ def test_the_town_hides_about_what_was_asked_for(run: Run) -> None:
     for hidden in (0.95, 0.5, 0.0):
         scene = town.make(500, hidden, 3)
         depth = run.depth(scene, (180, 320))
-        codes = hizvk.reference.classify(scene.boxes, depth.camera, depth.numpy(), kind="reversed_ndc")
+        codes = hizvk.reference.classify(
+            scene.boxes, depth.camera, depth.numpy(), kind="reversed_ndc"
+        )
         assert (codes == hizvk.reference.HIDDEN).mean() == pytest.approx(hidden, abs=0.06)
 
 
@@ -243,7 +279,10 @@ def test_planted_errors_are_counted(run: Run) -> None:
     scene = town.make(40, 0.5, 3)
     depth = run.depth(scene, (90, 160))
     codes = hizvk.reference.classify(scene.boxes, depth.camera, depth.numpy(), kind="reversed_ndc")
-    hidden, visible = int((codes == hizvk.reference.HIDDEN).sum()), int((codes == hizvk.reference.VISIBLE).sum())
+    hidden, visible = (
+        int((codes == hizvk.reference.HIDDEN).sum()),
+        int((codes == hizvk.reference.VISIBLE).sum()),
+    )
     assert hidden > 5
     assert visible > 5
     judge = errors.Judge(run, scene.boxes, depth)
@@ -254,7 +293,8 @@ def test_planted_errors_are_counted(run: Run) -> None:
     assert run.found.errors == [nothing, everything]
 
 
-# -- the yardsticks of the engine ------------------------------------------------------------------------------------
+# -- the yardsticks of the
+# engine ------------------------------------------------------------------------------------
 
 
 def test_a_timed_cull_is_that_of_the_device(run: Run) -> None:
@@ -292,7 +332,9 @@ def test_what_the_yardsticks_refuse(run: Run) -> None:
 def test_a_fresh_process_reaches_a_mask(tmp_path: Path) -> None:
     scene = town.make(100, 0.5, 3)
     file = tmp_path / "town.npz"
-    np.savez(file, low=scene.low, high=scene.high, vertices=scene.vertices, triangles=scene.triangles)
+    np.savez(
+        file, low=scene.low, high=scene.high, vertices=scene.vertices, triangles=scene.triangles
+    )
     # The cache of this user: cold compilations take long.
     cache = Path(os.environ.get(first_call.CACHE, Path.home() / ".cache"))
     seconds = first_call._process(file, cache)

@@ -1,7 +1,9 @@
 """Intel's castle with ray-cast ground truth: nothing visible is culled, and little that is hidden is kept.
 
-The scene and its judge are not part of the repository; where they are absent these tests are skipped. The judge knows
-what is truly visible (Embree rays against the real geometry) and what the best rectangle test at full resolution keeps.
+The scene and its judge are not part of the repository; where they are absent these tests are
+skipped.
+The judge knows what is truly visible (Embree rays against the real geometry) and what the best
+rectangle test at full resolution keeps.
 """
 
 from __future__ import annotations
@@ -17,9 +19,10 @@ import hizvk
 SIZES = [(360, 640), (563, 1001)]
 CONVENTIONS = ["standard", "reversed"]
 
-# What exact arithmetic keeps with a footprint of 2x2, 4x4 and 8x8 is 1.237, 1.113 and 1.045 times what the judge's
-# rectangle test at full resolution keeps; a descent with budget to finish is such a test. The judge's exact box at
-# pixel centres keeps 0.883 of it.
+# What exact arithmetic keeps with a footprint of 2x2, 4x4 and 8x8 is 1.237, 1.113 and 1.045 times
+# what the judge's rectangle test at full resolution keeps; a descent with budget to finish is such
+# a test.
+# The judge's exact box at pixel centres keeps 0.883 of it.
 MOST_KEPT = [
     ({"footprint": 2}, 1.26),
     ({"footprint": 4}, 1.13),
@@ -45,7 +48,9 @@ def device() -> hizvk.Device:
 @pytest.fixture(scope="module")
 def uploaded(device: hizvk.Device, scene: Any) -> dict[str, Any]:
     return {
-        "spheres": device.instances(hizvk.Spheres(scene.instance_sphere[:, :3], scene.instance_sphere[:, 3])),
+        "spheres": device.instances(
+            hizvk.Spheres(scene.instance_sphere[:, :3], scene.instance_sphere[:, 3])
+        ),
         "boxes": device.instances(hizvk.Boxes(scene.instance_aabb_min, scene.instance_aabb_max)),
     }
 
@@ -63,22 +68,37 @@ def truths(judge: Any, scene: Any) -> dict[Any, Any]:
     return Truths()
 
 
-def camera_of(judge: Any, scene: Any, k: int, size: tuple[int, int], convention: str) -> hizvk.Camera:
+def camera_of(
+    judge: Any, scene: Any, k: int, size: tuple[int, int], convention: str
+) -> hizvk.Camera:
     matrix = judge.view_projection(scene.cameras[k], size, convention)
     return hizvk.Camera.from_matrices(matrix, size=size, reversed_z=convention == "reversed")
 
 
 def cull(
-    device: hizvk.Device, instances: Any, camera: hizvk.Camera, depth: np.ndarray, convention: str, **options: Any
+    device: hizvk.Device,
+    instances: Any,
+    camera: hizvk.Camera,
+    depth: np.ndarray,
+    convention: str,
+    **options: Any,
 ) -> Any:
     kind = "reversed_ndc" if convention == "reversed" else "ndc"
-    return device.cull(instances, camera, device.pyramid(depth, camera, kind=kind), statistics=True, **options)
+    return device.cull(
+        instances, camera, device.pyramid(depth, camera, kind=kind), statistics=True, **options
+    )
 
 
 @pytest.mark.parametrize("size", SIZES, ids=["640x360", "1001x563"])
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_nothing_visible_is_culled(
-    judge: Any, scene: Any, device: hizvk.Device, uploaded: Any, truths: Any, size: tuple[int, int], convention: str
+    judge: Any,
+    scene: Any,
+    device: hizvk.Device,
+    uploaded: Any,
+    truths: Any,
+    size: tuple[int, int],
+    convention: str,
 ) -> None:
     culled = 0
     for k, camera in enumerate(scene.cameras):
@@ -135,10 +155,20 @@ def test_a_volume_is_kept_where_the_oracle_sees_it_or_it_crosses_the_eye_plane(
     for k, (camera, (linear, _)) in list(enumerate(zip(scene.cameras, best, strict=True)))[::4]:
         depth = judge.encode_depth(linear, camera, "standard").astype(np.float32)
         ours = camera_of(judge, scene, k, (360, 640), "standard")
-        options = {"coverage": coverage, "fit": "volume", "descent": 4096, "guard_px": 0.0, "depth_slack": 0.0}
+        options = {
+            "coverage": coverage,
+            "fit": "volume",
+            "descent": 4096,
+            "guard_px": 0.0,
+            "depth_slack": 0.0,
+        }
         seen = cull(device, uploaded["boxes"], ours, depth, "standard", **options)
-        boxes = hizvk.Boxes(scene.instance_aabb_min[seen.indices], scene.instance_aabb_max[seen.indices])
-        verdicts = hizvk.reference.classify(boxes, ours, depth, kind="ndc", coverage=coverage, own_depth="pixel")
+        boxes = hizvk.Boxes(
+            scene.instance_aabb_min[seen.indices], scene.instance_aabb_max[seen.indices]
+        )
+        verdicts = hizvk.reference.classify(
+            boxes, ours, depth, kind="ndc", coverage=coverage, own_depth="pixel"
+        )
         lost = seen.indices[verdicts == hizvk.reference.HIDDEN]
         kept += seen.count
         hidden += len(lost)

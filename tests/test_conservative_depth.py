@@ -1,6 +1,7 @@
 """Conservative occluder depth of a small image: it holds for large ones, and culls by it hide nothing that those show.
 
-Whether the depth is right for every single ray is decided exactly, by `crates/hiz_core/tests/conservative_depth.rs`.
+Whether the depth is right for every single ray is decided exactly, by
+`crates/hiz_core/tests/conservative_depth.rs`.
 Here real scenes are held against large rasterised images and against rays at the real geometry.
 """
 
@@ -26,7 +27,10 @@ if TYPE_CHECKING:
 SMALL = (144, 256)
 SIZES = pytest.mark.parametrize(
     "size",
-    [pytest.param(SMALL, id="256x144"), pytest.param((288, 512), id="512x288", marks=pytest.mark.slow)],
+    [
+        pytest.param(SMALL, id="256x144"),
+        pytest.param((288, 512), id="512x288", marks=pytest.mark.slow),
+    ],
 )
 #: The image whose truth culls by small images are held against.
 LARGE = (864, 1536)
@@ -52,7 +56,9 @@ class Case:
 def view_cases(scene: scenes.Scene, views: tuple[scenes.View, ...]) -> Iterator[Case]:
     for view in views:
 
-        def camera(size: tuple[int, int], reversed_z: bool, view: scenes.View = view) -> hizvk.Camera:
+        def camera(
+            size: tuple[int, int], reversed_z: bool, view: scenes.View = view
+        ) -> hizvk.Camera:
             return hizvk.Camera.look_at(
                 view.eye, view.target, up=view.up, fov_y_deg=view.fov_y_deg, size=size, near=view.near,
                 reversed_z=reversed_z,
@@ -81,7 +87,9 @@ def blocked(case: Case, camera: hizvk.Camera, at: tuple[Fraction, Fraction], dep
     # Triangles that the ray misses by far are left out in float64.
     vertices = np.asarray(case.vertices, np.float64)
     clip = np.concatenate([vertices, np.ones((len(vertices), 1))], axis=1) @ matrix.T
-    across = np.stack([clip[:, 0] - float(x) * clip[:, 3], clip[:, 1] - float(y) * clip[:, 3]], axis=1)
+    across = np.stack(
+        [clip[:, 0] - float(x) * clip[:, 3], clip[:, 1] - float(y) * clip[:, 3]], axis=1
+    )
     corners = across[case.triangles]
     room = 1e-6 * np.abs(corners).max(axis=(1, 2), keepdims=False)[:, None]
     near = ((corners.min(axis=1) <= room) & (corners.max(axis=1) >= -room)).all(axis=1)
@@ -90,38 +98,56 @@ def blocked(case: Case, camera: hizvk.Camera, at: tuple[Fraction, Fraction], dep
     for triangle in np.flatnonzero(near):
         points = []
         for vertex in case.triangles[triangle]:
-            d = [Fraction(float(p)) - o for p, o in zip(vertices[vertex], origin, strict=True)] + [Fraction(1)]
+            d = [Fraction(float(p)) - o for p, o in zip(vertices[vertex], origin, strict=True)] + [
+                Fraction(1)
+            ]
             points.append([sum(m * v for m, v in zip(row, d, strict=True)) for row in rows])
         u = [(p[0] - x * p[3], p[1] - y * p[3]) for p in points]
-        weights = [u[(k + 1) % 3][0] * u[(k + 2) % 3][1] - u[(k + 1) % 3][1] * u[(k + 2) % 3][0] for k in range(3)]
+        weights = [
+            u[(k + 1) % 3][0] * u[(k + 2) % 3][1] - u[(k + 1) % 3][1] * u[(k + 2) % 3][0]
+            for k in range(3)
+        ]
         if min(weights) < 0 < max(weights) or not any(weights):
             continue
         total = sum(weights)
         z, w = (sum(s * p[k] for s, p in zip(weights, points, strict=True)) / total for k in (2, 3))
-        if w > 0 and 0 <= z <= w and (z >= Fraction(depth) * w if camera.reversed_z else z <= Fraction(depth) * w):
+        if (
+            w > 0
+            and 0 <= z <= w
+            and (z >= Fraction(depth) * w if camera.reversed_z else z <= Fraction(depth) * w)
+        ):
             return True
     return False
 
 
-def check_against_large_image(device: hizvk.Device, cases: Iterator[Case], most_loss: float) -> None:
+def check_against_large_image(
+    device: hizvk.Device, cases: Iterator[Case], most_loss: float
+) -> None:
     """No sample of an image `TIMES` larger is farther than the small image says; and little is lost."""
     full_pixels = shown = 0
     for case in cases:
         occluders = device.occluders(case.vertices, case.triangles)
         for reversed_z in (True, False):
             small = case.camera(SMALL, reversed_z)
-            depth = device.render_depth(occluders, small, conservative=True).numpy().astype(np.float64)
+            depth = (
+                device.render_depth(occluders, small, conservative=True).numpy().astype(np.float64)
+            )
             size = (SMALL[0] * TIMES, SMALL[1] * TIMES)
             samples = device.render_depth(occluders, small, size=size).numpy()
-            blocks = samples.reshape(SMALL[0], TIMES, SMALL[1], TIMES).transpose(0, 2, 1, 3).reshape(*SMALL, -1)
+            blocks = (
+                samples.reshape(SMALL[0], TIMES, SMALL[1], TIMES)
+                .transpose(0, 2, 1, 3)
+                .reshape(*SMALL, -1)
+            )
             sign = -1.0 if reversed_z else 1.0
             at = (sign * blocks).argmax(axis=2)
             farthest = np.take_along_axis(blocks, at[..., None], 2)[..., 0].astype(np.float64)
             far = 0.0 if reversed_z else 1.0
             known, full = depth != far, farthest != far
             suspects = np.argwhere(known & (sign * farthest > sign * depth))
-            # A rasteriser moves corners and rounds depths. What it says is farther has to be its own error: the
-            # exact ray through the very sample is blocked.
+            # A rasteriser moves corners and rounds depths.
+            # What it says is farther has to be its own error: the exact ray through the very sample
+            # is blocked.
             assert len(suspects) < 200, f"{case.name}: {len(suspects)} pixels"
             for row, column in suspects:
                 sub_row, sub_column = divmod(int(at[row, column]), TIMES)
@@ -129,10 +155,14 @@ def check_against_large_image(device: hizvk.Device, cases: Iterator[Case], most_
                     Fraction(2 * (int(column) * TIMES + sub_column) + 1, 2 * TIMES),
                     Fraction(2 * (int(row) * TIMES + sub_row) + 1, 2 * TIMES),
                 )
-                assert blocked(case, small, point, float(depth[row, column])), f"{case.name}: pixel {row}, {column}"
+                assert blocked(case, small, point, float(depth[row, column])), (
+                    f"{case.name}: pixel {row}, {column}"
+                )
             full_pixels += int(full.sum())
             shown += int((known & full).sum())
-            looseness = np.abs(farthest - depth)[known & full] / np.abs(farthest - far)[known & full]
+            looseness = (
+                np.abs(farthest - depth)[known & full] / np.abs(farthest - far)[known & full]
+            )
             print(
                 f"{case.name}, reversed_z={reversed_z}: of {full.sum()} covered pixels {(known & full).sum()} have a "
                 f"depth, {np.median(looseness):.2e} farther in the median (relative to the distance to far), "
@@ -152,7 +182,9 @@ def test_no_sample_of_a_large_image_of_the_mountains_is_farther(device: hizvk.De
     check_against_large_image(device, view_cases(mountains, mountains.views[::2]), 0.002)
 
 
-def test_no_sample_of_a_large_image_of_the_castle_is_farther(device: hizvk.Device, judge: Any) -> None:
+def test_no_sample_of_a_large_image_of_the_castle_is_farther(
+    device: hizvk.Device, judge: Any
+) -> None:
     names = ("intel_default", "street6", "high0", "tight3", "nearcut2", "wide120")
     check_against_large_image(device, castle_cases(judge, names), 0.005)
 
@@ -168,9 +200,13 @@ def test_culls_of_castle_by_small_images_hide_nothing_of_the_large_one(
     counts = {False: [0, 0, 0], True: [0, 0, 0]}
     for seen in (camera for camera in scene.cameras if camera.name in names):
         sight = judge.render_truth(scene, seen, LARGE)
-        camera = hizvk.Camera.from_matrices(judge.view_projection(seen, size, "reversed"), size=size, reversed_z=True)
+        camera = hizvk.Camera.from_matrices(
+            judge.view_projection(seen, size, "reversed"), size=size, reversed_z=True
+        )
         for conservative, count in counts.items():
-            pyramid = device.pyramid(device.render_depth(occluders, camera, conservative=conservative))
+            pyramid = device.pyramid(
+                device.render_depth(occluders, camera, conservative=conservative)
+            )
             mask = device.cull(boxes, camera, pyramid, footprint=8, descent=4096).mask
             wrong = judge.score(mask, sight)["wrongly_culled"]
             count[0] += len(wrong)
@@ -196,16 +232,26 @@ def test_culls_by_small_images_hide_nothing_of_the_large_one(
         visible = sight.pixels(len(scene)) > 0
         camera = view.camera(size)
         for conservative, count in counts.items():
-            pyramid = device.pyramid(device.render_depth(occluders, camera, conservative=conservative))
+            pyramid = device.pyramid(
+                device.render_depth(occluders, camera, conservative=conservative)
+            )
             mask = device.cull(boxes, camera, pyramid, footprint=8, descent=4096).mask
-            wrong = [k for k in np.flatnonzero(visible & ~mask) if caster.firm(view, sight, None, int(k))]
+            wrong = [
+                k for k in np.flatnonzero(visible & ~mask) if caster.firm(view, sight, None, int(k))
+            ]
             count[0] += len(wrong)
             count[1] += int((mask & ~visible).sum())
             count[2] += int(visible.sum())
     report(name, size, counts, plain_has_to_fail=name == "mountains" and size == SMALL)
 
 
-def report(name: str, size: tuple[int, int], counts: dict[bool, list[int]], *, plain_has_to_fail: bool = True) -> None:
+def report(
+    name: str,
+    size: tuple[int, int],
+    counts: dict[bool, list[int]],
+    *,
+    plain_has_to_fail: bool = True,
+) -> None:
     for conservative, (wrong, idle, visible) in counts.items():
         kind = "conservative" if conservative else "plain"
         print(
@@ -233,10 +279,15 @@ def test_refinement_keeps_no_more(device: hizvk.Device, judge: Any, size: tuple[
     boxes = device.instances(hizvk.Boxes(scene.instance_aabb_min, scene.instance_aabb_max))
     occluders = device.occluders(scene.occluder_vertices, scene.occluder_triangles)
     cameras = [
-        hizvk.Camera.from_matrices(judge.view_projection(seen, size, "reversed"), size=size, reversed_z=True)
+        hizvk.Camera.from_matrices(
+            judge.view_projection(seen, size, "reversed"), size=size, reversed_z=True
+        )
         for seen in scene.cameras
     ]
-    pictures: list[dict[str, Any]] = [{}, *({"conservative": True, "refinement": k} for k in range(5))]
+    pictures: list[dict[str, Any]] = [
+        {},
+        *({"conservative": True, "refinement": k} for k in range(5)),
+    ]
     kept = []
     for options in pictures:
         device.render_depth(occluders, cameras[0], **options)
@@ -245,18 +296,27 @@ def test_refinement_keeps_no_more(device: hizvk.Device, judge: Any, size: tuple[
             start = time.thread_time()
             depth = device.render_depth(occluders, camera, **options)
             seconds += time.thread_time() - start
-            count += device.cull(boxes, camera, device.pyramid(depth), footprint=8, descent=4096).count
+            count += device.cull(
+                boxes, camera, device.pyramid(depth), footprint=8, descent=4096
+            ).count
         kept.append(count)
-        milliseconds = f", {1000 * seconds / len(cameras):.0f} ms of one core an image" if options else ""
+        milliseconds = (
+            f", {1000 * seconds / len(cameras):.0f} ms of one core an image" if options else ""
+        )
         print(f"{size[1]}x{size[0]} {options or 'plain'}: {count} kept{milliseconds}")
     assert all(finer <= coarser for coarser, finer in itertools.pairwise(kept[1:]))
     text = documented.page("occluders.md")
     if documented.is_of_this_driver(text):
-        [row] = [row for row in documented.table(text, "image", "plain") if row["image"] == f"{size[1]}x{size[0]}"]
+        [row] = [
+            row
+            for row in documented.table(text, "image", "plain")
+            if row["image"] == f"{size[1]}x{size[0]}"
+        ]
         assert [int(cell.split(",")[0]) for cell in list(row.values())[1:]] == kept, row
 
 
-# -- by hand ---------------------------------------------------------------------------------------------------------
+# -- by
+# hand ---------------------------------------------------------------------------------------------------------
 
 
 def wall(left: float, right: float) -> tuple[np.ndarray, np.ndarray]:
@@ -267,7 +327,9 @@ def wall(left: float, right: float) -> tuple[np.ndarray, np.ndarray]:
 
 def is_at_the_wall(depth: np.ndarray) -> bool:
     """Depth 1/4, or the next float32 farther: the bound lies a rounding of float64 behind the wall."""
-    return bool(((depth == 0.25) | (depth == np.nextafter(np.float32(0.25), np.float32(0.0)))).all())
+    return bool(
+        ((depth == 0.25) | (depth == np.nextafter(np.float32(0.25), np.float32(0.0)))).all()
+    )
 
 
 @pytest.fixture
@@ -276,7 +338,9 @@ def camera() -> hizvk.Camera:
     return hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(8, 8), near=1.0)
 
 
-def test_gap_between_centres_shows_in_the_conservative_image_alone(device: hizvk.Device, camera: hizvk.Camera) -> None:
+def test_gap_between_centres_shows_in_the_conservative_image_alone(
+    device: hizvk.Device, camera: hizvk.Camera
+) -> None:
     walls = device.occluders([wall(-9.0, 0.95), wall(0.99, 9.0)])
     assert (device.render_depth(walls, camera).numpy() == 0.25).all()
     depth = device.render_depth(walls, camera, conservative=True).numpy()
@@ -284,13 +348,19 @@ def test_gap_between_centres_shows_in_the_conservative_image_alone(device: hizvk
     assert is_at_the_wall(np.delete(depth, 4, axis=1))
 
 
-def test_walls_that_share_their_edge_leave_no_gap(device: hizvk.Device, camera: hizvk.Camera) -> None:
+def test_walls_that_share_their_edge_leave_no_gap(
+    device: hizvk.Device, camera: hizvk.Camera
+) -> None:
     walls = device.occluders([wall(-9.0, 0.3), wall(0.3, 9.0)])
     assert is_at_the_wall(device.render_depth(walls, camera, conservative=True).numpy())
-    assert is_at_the_wall(device.render_depth(walls, camera, size=(3, 5), conservative=True).numpy())
+    assert is_at_the_wall(
+        device.render_depth(walls, camera, size=(3, 5), conservative=True).numpy()
+    )
 
 
-def test_silhouettes_have_the_depth_of_what_is_behind(device: hizvk.Device, camera: hizvk.Camera) -> None:
+def test_silhouettes_have_the_depth_of_what_is_behind(
+    device: hizvk.Device, camera: hizvk.Camera
+) -> None:
     post = np.array([[-0.4, -9.0, -2.0], [0.2, -9.0, -2.0], [0.2, 9.0, -2.0], [-0.4, 9.0, -2.0]])
     occluders = device.occluders([(post, wall(0, 0)[1]), wall(-9.0, 9.0)])
     # In the image the post spans columns 3.2 to 4.4.
@@ -298,17 +368,27 @@ def test_silhouettes_have_the_depth_of_what_is_behind(device: hizvk.Device, came
     assert (device.render_depth(occluders, camera).numpy()[:, 3] == 0.5).all()
 
 
-def test_refinement_finds_what_two_surfaces_cover_together(device: hizvk.Device, camera: hizvk.Camera) -> None:
-    # Neither covers column 4, which they overlap in: the left one to 0.7 of it, the right one from 0.3.
+def test_refinement_finds_what_two_surfaces_cover_together(
+    device: hizvk.Device, camera: hizvk.Camera
+) -> None:
+    # Neither covers column 4, which they overlap in: the left one to 0.7 of it, the right one from
+    # 0.3.
     occluders = device.occluders([wall(-9.0, 0.7), wall(0.3, 9.0)])
-    assert (device.render_depth(occluders, camera, conservative=True, refinement=0).numpy()[:, 4] == 0.0).all()
-    assert is_at_the_wall(device.render_depth(occluders, camera, conservative=True, refinement=2).numpy())
+    assert (
+        device.render_depth(occluders, camera, conservative=True, refinement=0).numpy()[:, 4] == 0.0
+    ).all()
+    assert is_at_the_wall(
+        device.render_depth(occluders, camera, conservative=True, refinement=2).numpy()
+    )
 
 
 def test_refinement_never_loses(device: hizvk.Device) -> None:
     scene = scenes.room()
     occluders = device.occluders(scene.vertices, scene.triangles)
     view = scene.views[0].camera((45, 80))
-    depths = [device.render_depth(occluders, view, conservative=True, refinement=k).numpy() for k in range(4)]
+    depths = [
+        device.render_depth(occluders, view, conservative=True, refinement=k).numpy()
+        for k in range(4)
+    ]
     assert all((finer >= coarser).all() for coarser, finer in itertools.pairwise(depths))
     assert occluders.host_bytes > 36 * len(scene.triangles)

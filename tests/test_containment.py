@@ -15,7 +15,9 @@ def test_box_in_box_and_poking_out_by_a_nanometre() -> None:
     assert good.protrusion == 0.0
     assert good.triangles.shape == (0,)
     assert good.witnesses.shape == (0, 3)
-    bad = hizvk.check_proxy(hizvk.Mesh(*box_mesh([[0.25, 0.25, 0.0]], [[0.75, 0.75, 1.0 + 1e-9]])), mesh)
+    bad = hizvk.check_proxy(
+        hizvk.Mesh(*box_mesh([[0.25, 0.25, 0.0]], [[0.75, 0.75, 1.0 + 1e-9]])), mesh
+    )
     assert not bad.inside
     assert len(bad.triangles) == 10  # all but the bottom
     assert bad.vertices.tolist() == [4, 5, 6, 7]
@@ -27,14 +29,17 @@ def test_box_in_box_and_poking_out_by_a_nanometre() -> None:
 def test_float32_meshes_are_taken_exactly() -> None:
     vertices, triangles = box_mesh([[0, 0, 0]], [[0.1, 0.1, 0.1]])
     # 0.1 in float32 is larger than in float64.
-    assert not hizvk.check_proxy((vertices.astype(np.float32), triangles), (vertices, triangles)).inside
+    assert not hizvk.check_proxy(
+        (vertices.astype(np.float32), triangles), (vertices, triangles)
+    ).inside
     assert hizvk.check_proxy((vertices, triangles), (vertices.astype(np.float32), triangles)).inside
 
 
 def test_a_scenes_own_boxes_contain_it() -> None:
     scene = room()
     meshes = [
-        (scene.instance_vertices[8 * k : 8 * k + 8], scene.instance_triangles[:12]) for k in range(len(scene.box_min))
+        (scene.instance_vertices[8 * k : 8 * k + 8], scene.instance_triangles[:12])
+        for k in range(len(scene.box_min))
     ]
     check = hizvk.check_bounds(hizvk.Boxes(scene.box_min, scene.box_max), meshes)
     assert check.all_contained

@@ -1,7 +1,8 @@
 """Cameras as other tools hold them, against each tool's own projection, written out here.
 
-A tool says where a camera's point shows: OpenCV ``u = fx X/Z + cx`` where the first pixel's centre is
-0, COLMAP the same where it is 0.5. Nothing here uses the library's matrices for what it expects.
+A tool says where a camera's point shows: OpenCV ``u = fx X/Z + cx`` where the first pixel's centre
+is 0, COLMAP the same where it is 0.5.
+Nothing here uses the library's matrices for what it expects.
 """
 
 import inspect
@@ -108,7 +109,8 @@ def device() -> hizvk.Device:
     return hizvk.Device()
 
 
-# -- pixel centres -------------------------------------------------------------------------------------------
+# -- pixel
+# centres -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", TOOLS)
@@ -127,14 +129,18 @@ def scene(tool: Tool) -> tuple[hizvk.Spheres, Floats]:
     walls = rng.uniform(4.0, 40.0, SIZE)
     row, column = (side.ravel() for side in np.mgrid[: SIZE[0], : SIZE[1]])
     inside = rng.uniform(0.1, 0.9, (2, row.size))
-    return hizvk.Spheres(tool.world(column + inside[0], row + inside[1], 0.99 * walls.ravel()), 0.0), walls
+    return hizvk.Spheres(
+        tool.world(column + inside[0], row + inside[1], 0.99 * walls.ravel()), 0.0
+    ), walls
 
 
 @pytest.mark.parametrize("name", TOOLS)
 def test_what_a_tool_shows_is_not_culled(device: hizvk.Device, name: str) -> None:
     points, walls = scene(TOOLS[name])
     for options in ({}, {"footprint": 8}, {"descent": 64, "fit": "volume"}):
-        seen = hizvk.visible(points, TOOLS[name].camera, depth=walls, kind="z", device=device, **options)
+        seen = hizvk.visible(
+            points, TOOLS[name].camera, depth=walls, kind="z", device=device, **options
+        )
         assert seen.all()
 
 
@@ -149,32 +155,45 @@ def test_half_a_pixel_off_hides_what_shows(device: hizvk.Device, right: str, wro
 
 def test_a_missing_or_unknown_word_is_told_the_way() -> None:
     """Python itself would only name it."""
-    with pytest.raises(TypeError, match=r"^pixel_center: expected \"integer\" .*OpenCV.* or \"half\" .*COLMAP"):
+    with pytest.raises(
+        TypeError, match=r"^pixel_center: expected \"integer\" .*OpenCV.* or \"half\" .*COLMAP"
+    ):
         hizvk.Camera.from_opencv(K, camera_from_world=np.eye(4), **GIVEN)  # type: ignore[call-arg]
     with pytest.raises(TypeError, match=r"^pixel_center: expected \"integer\""):
         hizvk.Camera.from_opengl(k=K, camera_from_world=np.eye(4), **GIVEN)
-    assert inspect.signature(hizvk.Camera.from_opencv).parameters["pixel_center"].default is inspect.Parameter.empty
+    assert (
+        inspect.signature(hizvk.Camera.from_opencv).parameters["pixel_center"].default
+        is inspect.Parameter.empty
+    )
     sees = {"pixel_center": "half", **GIVEN}
     for maker, arguments in (
         (hizvk.Camera.from_opencv, sees), (hizvk.Camera.from_opengl, sees), (hizvk.Camera.from_matrices, {}),
     ):  # fmt: skip
         for word in ("R", "t", "rotation", "tvec", "viewmat", "c2w"):
             with pytest.raises(
-                TypeError, match=rf"^{word}: .*camera_from_world=\(R, t\) where camera = R @ world \+ t"
+                TypeError,
+                match=rf"^{word}: .*camera_from_world=\(R, t\) where camera = R @ world \+ t",
             ):
                 maker(K, **{word: np.eye(3)}, **arguments)
     with pytest.raises(TypeError, match="unexpected keyword argument 'colour'"):
-        hizvk.Camera.from_opencv(K, pixel_center="half", camera_from_world=np.eye(4), colour=1, **GIVEN)  # type: ignore[call-arg]
+        hizvk.Camera.from_opencv(
+            K, pixel_center="half", camera_from_world=np.eye(4), colour=1, **GIVEN
+        )  # type: ignore[call-arg]
     boxes: dict[str, Any] = {"centers": np.zeros((1, 3)), "half_sizes": 1.0}
-    with pytest.raises(TypeError, match=r"^order: expected \"wxyz\" .*nuScenes.* or \"xyzw\" .*SciPy"):
+    with pytest.raises(
+        TypeError, match=r"^order: expected \"wxyz\" .*nuScenes.* or \"xyzw\" .*SciPy"
+    ):
         hizvk.OrientedBoxes.from_quaternions(quaternions=[[1, 0, 0, 0]], **boxes)  # type: ignore[call-arg]
-    with pytest.raises(TypeError, match=r"^up: expected the axis of the turn, \(0, 0, 1\) where z is up"):
+    with pytest.raises(
+        TypeError, match=r"^up: expected the axis of the turn, \(0, 0, 1\) where z is up"
+    ):
         hizvk.OrientedBoxes.from_yaw(yaw_deg=0.0, **boxes)  # type: ignore[call-arg]
     with pytest.raises(TypeError, match=r"^yaw: expected yaw_deg, in degrees: np.degrees\(yaw\)"):
         hizvk.OrientedBoxes.from_yaw(yaw=0.0, up=(0, 0, 1), **boxes)  # type: ignore[call-arg]
 
 
-# -- poses ---------------------------------------------------------------------------------------------------
+# --
+# poses ---------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["camera_from_world", "world_from_camera"])
@@ -186,7 +205,9 @@ def test_every_form_of_a_pose(name: str) -> None:
         lambda **pose: hizvk.Camera.from_colmap("PINHOLE", [FX, FY, CX, CY], **pose, **GIVEN),
         lambda **pose: hizvk.Camera.from_opengl(fov_y_deg=50, **pose, **GIVEN),
         lambda **pose: hizvk.Camera.from_opengl(np.diag([1.0, 1, -1, 1]), **pose, size=SIZE),
-        lambda **pose: hizvk.Camera.from_matrices(clip_from_camera=np.eye(4), **pose, size=SIZE, reversed_z=False),
+        lambda **pose: hizvk.Camera.from_matrices(
+            clip_from_camera=np.eye(4), **pose, size=SIZE, reversed_z=False
+        ),
     ]
     for maker in makers:
         whole = maker(**{name: pose})
@@ -195,7 +216,8 @@ def test_every_form_of_a_pose(name: str) -> None:
             (rotation.tolist(), shift[:, None]), (rotation, shift[None]),
         ):  # fmt: skip
             assert maker(**{name: form}) == whole
-    # And what it means, by hand: the camera of solvePnP's R and t sees the world point R^T (p - t) at p.
+    # And what it means, by hand: the camera of solvePnP's R and t sees the world point R^T (p - t)
+    # at p.
     camera = hizvk.Camera.from_opencv(
         K, pixel_center="integer", camera_from_world=(ROTATION, SHIFT.reshape(3, 1)), **GIVEN
     )
@@ -222,15 +244,25 @@ def turned_by(quaternion: tuple[float, ...], point: Floats) -> Floats:
 
 def test_colmaps_own_example() -> None:
     """The image and camera of COLMAP's description of its format, with its own projection."""
-    quaternion, shift = (0.851773, 0.0165051, 0.503764, -0.142941), np.array([-0.737434, 1.02973, 3.74354])
+    quaternion, shift = (
+        (0.851773, 0.0165051, 0.503764, -0.142941),
+        np.array([-0.737434, 1.02973, 3.74354]),
+    )
     camera = hizvk.Camera.from_colmap(
-        "SIMPLE_PINHOLE", [2559.81, 1536, 1152], qvec=quaternion, tvec=shift, size=(2304, 3072), near=0.1
+        "SIMPLE_PINHOLE",
+        [2559.81, 1536, 1152],
+        qvec=quaternion,
+        tvec=shift,
+        size=(2304, 3072),
+        near=0.1,
     )
     for point in ([1.67241, 0.292931, 0.609726], [2.01848, 0.108877, -0.0260841], [0.0, 0, 0]):
         x, y, z = turned_by(quaternion, np.array(point)) + shift
         columns, rows = project(camera, np.array([point]))
         expected = (2559.81 * x / z + 1536, 2559.81 * y / z + 1152)
-        assert (columns[0], rows[0]) == pytest.approx(expected, abs=2e-2)  # its quaternion has six digits
+        assert (columns[0], rows[0]) == pytest.approx(
+            expected, abs=2e-2
+        )  # its quaternion has six digits
 
 
 COLMAP_ZEROS = {
@@ -249,7 +281,9 @@ def test_a_colmap_model_is_a_pinhole_if_nothing_is_bent(model: str) -> None:
     for place in range(bent):
         params = [*focal, CX, CY, *[0.0] * bent]
         params[focals + 2 + place] = -1e-12
-        with pytest.raises(ValueError, match=r"^params: .*no distortion.*=-1e-12 of .*COLMAP's image_undistorter"):
+        with pytest.raises(
+            ValueError, match=r"^params: .*no distortion.*=-1e-12 of .*COLMAP's image_undistorter"
+        ):
             hizvk.Camera.from_colmap(model, params, **pose)
 
     class Enumeration:  # as pycolmap's CameraModelId
@@ -259,11 +293,17 @@ def test_a_colmap_model_is_a_pinhole_if_nothing_is_bent(model: str) -> None:
     assert named == straight
 
 
-@pytest.mark.parametrize("model", ["OPENCV_FISHEYE", "SIMPLE_FISHEYE", "RADIAL_FISHEYE", "EQUIRECTANGULAR"])
+@pytest.mark.parametrize(
+    "model", ["OPENCV_FISHEYE", "SIMPLE_FISHEYE", "RADIAL_FISHEYE", "EQUIRECTANGULAR"]
+)
 def test_a_fisheye_is_no_pinhole_with_zeros_either(model: str) -> None:
     """At 45 degrees an equidistant fisheye shows a point at f pi / 4, a pinhole at f: zeros would hide what shows."""
-    with pytest.raises(ValueError, match=r"^model: .*no pinhole with any numbers; run COLMAP's image_undistorter"):
-        hizvk.Camera.from_colmap(model, [FX, FY, CX, CY, 0, 0, 0, 0], qvec=QVEC, tvec=SHIFT, **GIVEN)
+    with pytest.raises(
+        ValueError, match=r"^model: .*no pinhole with any numbers; run COLMAP's image_undistorter"
+    ):
+        hizvk.Camera.from_colmap(
+            model, [FX, FY, CX, CY, 0, 0, 0, 0], qvec=QVEC, tvec=SHIFT, **GIVEN
+        )
 
 
 def test_one_pose_of_a_colmap_image() -> None:
@@ -271,16 +311,23 @@ def test_one_pose_of_a_colmap_image() -> None:
         return hizvk.Camera.from_colmap("PINHOLE", [FX, FY, CX, CY], **pose, **GIVEN)
 
     assert make(qvec=QVEC, tvec=SHIFT) == make(camera_from_world=CAMERA_FROM_WORLD)
-    assert make(qvec=[-part for part in QVEC], tvec=SHIFT) == make(camera_from_world=CAMERA_FROM_WORLD)
-    with pytest.raises(ValueError, match=r"^qvec, tvec: expected both as images.txt has them, or camera_from_world"):
+    assert make(qvec=[-part for part in QVEC], tvec=SHIFT) == make(
+        camera_from_world=CAMERA_FROM_WORLD
+    )
+    with pytest.raises(
+        ValueError, match=r"^qvec, tvec: expected both as images.txt has them, or camera_from_world"
+    ):
         make()
-    with pytest.raises(ValueError, match=r"^qvec, tvec: expected alone, or camera_from_world instead; got both"):
+    with pytest.raises(
+        ValueError, match=r"^qvec, tvec: expected alone, or camera_from_world instead; got both"
+    ):
         make(qvec=QVEC, tvec=SHIFT, camera_from_world=np.eye(4))
     with pytest.raises(ValueError, match=r"^camera_from_world, world_from_camera: .*got both"):
         make(world_from_camera=np.eye(4), camera_from_world=np.eye(4))
 
 
-# -- OpenGL's axes -------------------------------------------------------------------------------------------
+# -- OpenGL's
+# axes -------------------------------------------------------------------------------------------
 
 
 def test_a_camera_matrix_is_pyrenders_projection() -> None:
@@ -293,16 +340,22 @@ def test_a_camera_matrix_is_pyrenders_projection() -> None:
     projection[3, 2] = -1
     projection[2, 2], projection[2, 3] = (far + near) / (near - far), 2 * far * near / (near - far)
     pose = {"world_from_camera": WORLD_FROM_CAMERA @ TURNED, "size": SIZE}
-    by_k = hizvk.Camera.from_opengl(k=K, pixel_center="half", **pose, near=near, far=far, reversed_z=False)
+    by_k = hizvk.Camera.from_opengl(
+        k=K, pixel_center="half", **pose, near=near, far=far, reversed_z=False
+    )
     by_projection = hizvk.Camera.from_opengl(projection, **pose)
-    np.testing.assert_allclose(by_k.clip_from_world, by_projection.clip_from_world, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        by_k.clip_from_world, by_projection.clip_from_world, rtol=0, atol=1e-12
+    )
     assert by_k.depth_kind == by_projection.depth_kind == "ndc"
 
 
 def test_a_skew_in_either_axes() -> None:
     skewed = K.copy()
     skewed[0, 1] = 2.5
-    down = hizvk.Camera.from_opencv(skewed, pixel_center="half", camera_from_world=CAMERA_FROM_WORLD, **GIVEN)
+    down = hizvk.Camera.from_opencv(
+        skewed, pixel_center="half", camera_from_world=CAMERA_FROM_WORLD, **GIVEN
+    )
     up = hizvk.Camera.from_opengl(k=skewed, pixel_center="half", **GL)
     point = np.array([[0.3, -0.2, 7.0]])
     u, v, z = skewed @ (ROTATION @ point[0] + SHIFT)
@@ -318,16 +371,26 @@ def test_one_way_to_say_what_an_opengl_camera_sees() -> None:
     np.testing.assert_allclose(by_angle.clip_from_world, look.clip_from_world, rtol=0, atol=1e-15)
     assert by_angle.reversed_z  # as in every constructor that takes near
     assert not hizvk.Camera.from_opengl(fov_y_deg=60, **pose, near=0.1, reversed_z=False).reversed_z
-    with pytest.raises(ValueError, match=r"^projection, k, fov_x_deg, fov_y_deg: .*got fov_x_deg and fov_y_deg"):
+    with pytest.raises(
+        ValueError, match=r"^projection, k, fov_x_deg, fov_y_deg: .*got fov_x_deg and fov_y_deg"
+    ):
         hizvk.Camera.from_opengl(fov_x_deg=60, fov_y_deg=60, **pose, near=0.1)
     gl = np.diag([1.0, 1, -1, 1])
     for name, value in {"near": 0.1, "far": 9.0, "reversed_z": False}.items():
-        with pytest.raises(TypeError, match=rf"^{name}: expected nothing beside a projection, which has its own"):
+        with pytest.raises(
+            TypeError, match=rf"^{name}: expected nothing beside a projection, which has its own"
+        ):
             hizvk.Camera.from_opengl(gl, **pose, **{name: value})
     for more in ({"pixel_center": "half"}, {"distortion": np.zeros(4)}):
-        with pytest.raises(TypeError, match=rf"^{next(iter(more))}: expected beside k alone, got .* beside fov_x_deg"):
+        with pytest.raises(
+            TypeError,
+            match=rf"^{next(iter(more))}: expected beside k alone, got .* beside fov_x_deg",
+        ):
             hizvk.Camera.from_opengl(fov_x_deg=60, **more, **pose, near=0.1)
-        with pytest.raises(TypeError, match=rf"^{next(iter(more))}: expected beside k alone, got .* beside projection"):
+        with pytest.raises(
+            TypeError,
+            match=rf"^{next(iter(more))}: expected beside k alone, got .* beside projection",
+        ):
             hizvk.Camera.from_opengl(gl, **more, **pose)
 
 
@@ -345,18 +408,26 @@ def test_what_pyrenders_depth_costs() -> None:
             assert np.abs(again - exact[stored < 1.0]).max() < 2.0**-20
 
 
-# -- boxes ---------------------------------------------------------------------------------------------------
+# --
+# boxes ---------------------------------------------------------------------------------------------------
 
 
 def test_yaw_turns_from_x_to_y_where_z_is_up() -> None:
-    boxes = hizvk.OrientedBoxes.from_yaw(np.zeros((4, 3)), [2.0, 1.0, 0.5], np.array([0.0, 90, -90, 540]), up=(0, 0, 3))
+    boxes = hizvk.OrientedBoxes.from_yaw(
+        np.zeros((4, 3)), [2.0, 1.0, 0.5], np.array([0.0, 90, -90, 540]), up=(0, 0, 3)
+    )
     quarter = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-    for rotation, expected in zip(boxes.rotations, (np.eye(3), quarter, quarter.T, quarter @ quarter), strict=True):
+    for rotation, expected in zip(
+        boxes.rotations, (np.eye(3), quarter, quarter.T, quarter @ quarter), strict=True
+    ):
         assert (rotation == expected).all()  # quarter turns are exact
     assert boxes.half_sizes.tolist() == [[2.0, 1.0, 0.5]] * 4
-    # KITTI's devkit: R = [c 0 s; 0 1 0; -s 0 c] about the camera's y; a car at ry = -pi/2 points along +z.
+    # KITTI's devkit: R = [c 0 s; 0 1 0; -s 0 c] about the camera's y; a car at ry = -pi/2 points
+    # along +z.
     ry = -1.3
-    kitti = hizvk.OrientedBoxes.from_yaw(np.zeros((1, 3)), 1.0, np.degrees(ry), up=(0, 1, 0)).rotations[0]
+    kitti = hizvk.OrientedBoxes.from_yaw(
+        np.zeros((1, 3)), 1.0, np.degrees(ry), up=(0, 1, 0)
+    ).rotations[0]
     c, s = np.cos(ry), np.sin(ry)
     np.testing.assert_allclose(kitti, [[c, 0, s], [0, 1, 0], [-s, 0, c]], rtol=0, atol=1e-15)
     # Any axis, against the quaternion of the same turn (cos, sin * axis).
@@ -365,7 +436,9 @@ def test_yaw_turns_from_x_to_y_where_z_is_up() -> None:
     quaternion = (np.cos(half), *(np.sin(half) * axis / np.linalg.norm(axis)))
     turned = hizvk.OrientedBoxes.from_yaw(np.zeros((1, 3)), 1.0, angle, up=axis).rotations[0]
     for k in range(3):
-        np.testing.assert_allclose(turned[:, k], turned_by(quaternion, np.eye(3)[k]), rtol=0, atol=1e-14)
+        np.testing.assert_allclose(
+            turned[:, k], turned_by(quaternion, np.eye(3)[k]), rtol=0, atol=1e-14
+        )
 
 
 @pytest.mark.parametrize("order", ["wxyz", "xyzw"])
@@ -381,18 +454,30 @@ def test_quaternions_in_either_order_and_of_any_length(order: Any, dtype: Any) -
     boxes = hizvk.OrientedBoxes.from_quaternions(np.zeros((50, 3)), 1.0, given, order=order)
     expected = [[turned_by(tuple(q), axis) for axis in np.eye(3)] for q in unit]
     np.testing.assert_allclose(
-        boxes.rotations.transpose(0, 2, 1), expected, rtol=0, atol=1e-14 if dtype == np.float64 else 1e-6
+        boxes.rotations.transpose(0, 2, 1),
+        expected,
+        rtol=0,
+        atol=1e-14 if dtype == np.float64 else 1e-6,
     )
 
 
 def test_transforms_in_every_shape() -> None:
     scaled = np.array([[0.0, -2, 0, 5], [3, 0, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1]])
-    for given in (scaled, scaled[None], scaled[:3], scaled[None, :3], scaled.tolist(), scaled.astype(np.float32)):
+    for given in (
+        scaled,
+        scaled[None],
+        scaled[:3],
+        scaled[None, :3],
+        scaled.tolist(),
+        scaled.astype(np.float32),
+    ):
         boxes = hizvk.OrientedBoxes.from_transforms(given)
         assert boxes.centers.tolist() == [[5.0, 6, 7]]
         assert boxes.half_sizes.tolist() == [[0.5, 0.5, 0.5]]
         assert boxes.rotations.tolist() == [scaled[:3, :3].tolist()]
-    assert hizvk.OrientedBoxes.from_transforms(scaled, [1.0, 2, 3]).half_sizes.tolist() == [[1.0, 2, 3]]
+    assert hizvk.OrientedBoxes.from_transforms(scaled, [1.0, 2, 3]).half_sizes.tolist() == [
+        [1.0, 2, 3]
+    ]
 
 
 def test_boxes_that_are_none_are_kept_and_counted(device: hizvk.Device) -> None:
@@ -405,7 +490,9 @@ def test_boxes_that_are_none_are_kept_and_counted(device: hizvk.Device) -> None:
         hizvk.OrientedBoxes.from_quaternions(
             np.zeros((3, 3)), 0.5, [[1, 0, 0, 0], [0, 0, 0, 0], [np.inf, 0, 0, 1]], order="wxyz"
         ),
-        hizvk.OrientedBoxes.from_yaw(np.zeros((3, 3)), 0.5, np.array([0, np.nan, np.inf]), up=(0, 1, 0)),
+        hizvk.OrientedBoxes.from_yaw(
+            np.zeros((3, 3)), 0.5, np.array([0, np.nan, np.inf]), up=(0, 1, 0)
+        ),
     ]
     for boxes in lists:
         uploaded = device.instances(boxes)
@@ -414,7 +501,8 @@ def test_boxes_that_are_none_are_kept_and_counted(device: hizvk.Device) -> None:
         assert device.cull(uploaded, camera, near_wall).mask.tolist() == [False, True, True]
 
 
-# -- meshes of other libraries -------------------------------------------------------------------------------
+# -- meshes of other
+# libraries -------------------------------------------------------------------------------
 
 
 class Trimesh:
@@ -471,7 +559,9 @@ def test_meshes_of_trimesh_and_open3d_hide(device: hizvk.Device) -> None:
     for form in (there, [away]):
         found = hizvk.recommend(spheres, camera, occluders=form, device=device, repetitions=1)
         assert found.best.kept == 1
-    assert hizvk.check_bounds(hizvk.Boxes(CORNERS.min(0)[None], CORNERS.max(0)[None]), there).contained.all()
+    assert hizvk.check_bounds(
+        hizvk.Boxes(CORNERS.min(0)[None], CORNERS.max(0)[None]), there
+    ).contained.all()
     assert hizvk.check_bounds(hizvk.Spheres([[0.0, 0, -10]], 71.0), [away]).contained.all()
 
 
@@ -485,17 +575,26 @@ def test_what_is_no_mesh_is_told_so(device: hizvk.Device) -> None:
         def dump(self) -> None: ...
 
     for value, text in (
-        (Points(), r"^vertices: expected a Mesh, a mesh of trimesh or Open3D, or a list of them .*got Points"),
+        (
+            Points(),
+            r"^vertices: expected a Mesh, a mesh of trimesh or Open3D, or a list of them .*got Points",
+        ),
         ([Points()], r"^vertices\[0\]: expected a Mesh"),
-        (Scene(), r"of a trimesh scene pass scene\.to_mesh\(\), or scene\.dump\(concatenate=True\)"),
+        (
+            Scene(),
+            r"of a trimesh scene pass scene\.to_mesh\(\), or scene\.dump\(concatenate=True\)",
+        ),
     ):
         with pytest.raises(TypeError, match=text):
             device.occluders(value)
-    with pytest.raises(ValueError, match=r"^vertices\[1\]: triangles: expected integer \(T, 3\), got \(1, 4\)"):
+    with pytest.raises(
+        ValueError, match=r"^vertices\[1\]: triangles: expected integer \(T, 3\), got \(1, 4\)"
+    ):
         device.occluders([Trimesh(CORNERS, FACES), Trimesh(CORNERS, [[0, 1, 2, 3]])])
 
 
-# -- hints that work -----------------------------------------------------------------------------------------
+# -- hints that
+# work -----------------------------------------------------------------------------------------
 
 
 def test_the_hint_for_a_masked_array_works() -> None:
@@ -511,7 +610,11 @@ def test_the_hint_for_a_masked_array_works() -> None:
 def test_what_is_advised_to_install_can_be_installed() -> None:
     """hizvk itself is on no index: packages are named, those of the extras."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    extras = {re.match(r"[\w-]+", one)[0] for all_of in settings["optional-dependencies"].values() for one in all_of}  # type: ignore[index]
+    extras = {
+        re.match(r"[\w-]+", one)[0]
+        for all_of in settings["optional-dependencies"].values()
+        for one in all_of
+    }  # type: ignore[index]
     advised = set()
     for path in (ROOT / "python").rglob("*.py"):
         text = path.read_text(encoding="utf-8")
@@ -521,7 +624,8 @@ def test_what_is_advised_to_install_can_be_installed() -> None:
     assert advised == extras
 
 
-# -- the page ------------------------------------------------------------------------------------------------
+# -- the
+# page ------------------------------------------------------------------------------------------------
 
 
 def blocks() -> list[str]:
@@ -547,7 +651,9 @@ def test_the_page_has_every_tool() -> None:
 
 def test_words_of_other_cameras_get_a_way_out() -> None:
     words = {"size": (24, 32), "near": 0.1, "camera_from_world": np.eye(4)}
-    with pytest.raises(TypeError, match="pixel_center: expected no such parameter: COLMAP's centres are at halves"):
+    with pytest.raises(
+        TypeError, match="pixel_center: expected no such parameter: COLMAP's centres are at halves"
+    ):
         hizvk.Camera.from_colmap("PINHOLE", [20, 20, 16, 12], pixel_center="half", **words)  # type: ignore[call-arg]
     with pytest.raises(ValueError, match=r"pass k\[:3, :3\]"):
         hizvk.Camera.from_opencv(np.eye(4), pixel_center="half", **words)

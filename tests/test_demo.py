@@ -26,7 +26,9 @@ def small_mountains() -> scenes.Scene:
     return scenes.mountains(500, 4)
 
 
-def cull(device: hizvk.Device, scene: scenes.Scene, view: scenes.View, size: tuple[int, int]) -> demo.Culled:
+def cull(
+    device: hizvk.Device, scene: scenes.Scene, view: scenes.View, size: tuple[int, int]
+) -> demo.Culled:
     terrain = device.occluders(scene.vertices, scene.triangles)
     boxes = device.instances(hizvk.Boxes(scene.box_min, scene.box_max))
     return demo.cull_view(device, terrain, boxes, view.camera(size))
@@ -42,7 +44,9 @@ def test_trees_outside_the_view_are_counted_as_such(device: hizvk.Device) -> Non
     for view in scene.views:
         camera = view.camera(size)
         pyramid = device.pyramid(device.render_depth(terrain, camera))
-        flat, grouped = (device.cull(boxes, camera, pyramid, hierarchy=hierarchy) for hierarchy in (False, True))
+        flat, grouped = (
+            device.cull(boxes, camera, pyramid, hierarchy=hierarchy) for hierarchy in (False, True)
+        )
         assert grouped.stats.tested_instances < len(scene)
         differs = flat.verdicts != grouped.verdicts
         assert (grouped.verdicts[differs] == hizvk.Verdict.OCCLUDED).all()
@@ -50,12 +54,17 @@ def test_trees_outside_the_view_are_counted_as_such(device: hizvk.Device) -> Non
         changed += int(differs.sum())
         outside = truth._outside(scene, view, size)
         assert (grouped.verdicts[outside] == hizvk.Verdict.OUTSIDE).all()
-        assert grouped.stats.outside == int((grouped.verdicts == hizvk.Verdict.OUTSIDE).sum()) >= outside.sum()
+        assert (
+            grouped.stats.outside
+            == int((grouped.verdicts == hizvk.Verdict.OUTSIDE).sum())
+            >= outside.sum()
+        )
         assert grouped.stats.occluded + grouped.stats.outside == int((~grouped.mask).sum())
     assert changed <= 8
 
 
-# -- the command -----------------------------------------------------------------------------------------------------
+# -- the
+# command -----------------------------------------------------------------------------------------------------
 
 
 def test_quick_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -68,7 +77,9 @@ def test_quick_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert told == json.loads((out / "report.json").read_text())
     for name in PICTURES:
         assert (out / name).read_bytes().startswith(b"\x89PNG\r\n"), name
-    assert sorted(path.name for path in out.iterdir()) == sorted([*PICTURES, "report.json", "report.md"])
+    assert sorted(path.name for path in out.iterdir()) == sorted(
+        [*PICTURES, "report.json", "report.md"]
+    )
 
     assert told["passed"] is True
     assert told["adapter"]["name"] == hizvk.Device().adapter.name
@@ -94,7 +105,10 @@ def test_quick_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_the_flight_is_drawn_and_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("matplotlib")
-    assert demo.main(["--out", str(tmp_path), "--views", "2", "--size", "96x64", "--trees", "300"]) == 0
+    assert (
+        demo.main(["--out", str(tmp_path), "--views", "2", "--size", "96x64", "--trees", "300"])
+        == 0
+    )
     text = capsys.readouterr().out
     assert "of 600 (" in text
     assert "check    passed: 0 of" in text
@@ -105,7 +119,10 @@ def test_the_flight_is_drawn_and_told(tmp_path: Path, capsys: pytest.CaptureFixt
 
 @pytest.mark.parametrize("caster", [truth.RayCaster, truth.BoxCaster])
 def test_a_wrong_mask_fails(
-    caster: type[truth.Caster], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    caster: type[truth.Caster],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     pytest.importorskip("matplotlib")
     if caster is truth.RayCaster:
@@ -206,7 +223,8 @@ def test_progress() -> None:
     assert drawn.endswith("\r\x1b[K")
 
 
-# -- the scenes ------------------------------------------------------------------------------------------------------
+# -- the
+# scenes ------------------------------------------------------------------------------------------------------
 
 
 def test_mountains(small_mountains: scenes.Scene) -> None:
@@ -218,7 +236,11 @@ def test_mountains(small_mountains: scenes.Scene) -> None:
     assert terrain.step == pytest.approx((74.4, 92.67), rel=0.001)
     assert len(scene) == 500
     assert len(scene.triangles) == 2 * 343 * 402
-    for positions in (scene.vertices, scene.instance_vertices, np.array([view.eye for view in scene.views])):
+    for positions in (
+        scene.vertices,
+        scene.instance_vertices,
+        np.array([view.eye for view in scene.views]),
+    ):
         relative = positions - scene.origin
         np.testing.assert_array_equal(relative, relative.astype(np.float32))
     assert (np.abs(scene.instance_vertices[:, 1]) > 4e6).all()  # where float32 has steps of 0.25 m
@@ -243,7 +265,9 @@ def test_the_ground_between_the_corners_is_the_mesh(small_mountains: scenes.Scen
     corners = vertices[triangles[np.random.default_rng(1).integers(0, len(triangles), 2000)]]
     share = np.random.default_rng(2).dirichlet([1.0, 1.0, 1.0], 2000)
     points = np.einsum("tk,tkx->tx", share, corners)
-    np.testing.assert_allclose(terrain.height_at(points[:, 0], points[:, 1]), points[:, 2], atol=1e-6)
+    np.testing.assert_allclose(
+        terrain.height_at(points[:, 0], points[:, 1]), points[:, 2], atol=1e-6
+    )
     a, b, c = (corners[:, k] for k in range(3))
     assert (np.cross(b - a, c - a)[:, 2] > 0.0).all()  # fronts are above
 
@@ -258,7 +282,9 @@ def test_scenes_repeat() -> None:
 
 
 def test_box_mesh() -> None:
-    vertices, triangles = scenes.box_mesh([[0.0, 0.0, 0.0], [5.0, 5.0, 5.0]], [[1.0, 2.0, 3.0], [6.0, 6.0, 6.0]])
+    vertices, triangles = scenes.box_mesh(
+        [[0.0, 0.0, 0.0], [5.0, 5.0, 5.0]], [[1.0, 2.0, 3.0], [6.0, 6.0, 6.0]]
+    )
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     outwards = np.cross(b - a, c - a)
     centre = np.repeat([[0.5, 1.0, 1.5], [5.5, 5.5, 5.5]], 12, axis=0)
@@ -272,16 +298,24 @@ def test_rays_go_through_the_cameras_pixel_centres() -> None:
     for view in scenes.room().views:
         points = np.array(view.eye) + view.rays(size) * 4.0
         x, y, z, w = np.moveaxis(
-            np.concatenate([points, np.ones((*size, 1))], axis=-1) @ view.camera(size).clip_from_world.T, -1, 0
+            np.concatenate([points, np.ones((*size, 1))], axis=-1)
+            @ view.camera(size).clip_from_world.T,
+            -1,
+            0,
         )
-        np.testing.assert_allclose((x / w + 1.0) / 2.0 * 12.0, np.broadcast_to(np.arange(12) + 0.5, size), atol=1e-9)
+        np.testing.assert_allclose(
+            (x / w + 1.0) / 2.0 * 12.0, np.broadcast_to(np.arange(12) + 0.5, size), atol=1e-9
+        )
         np.testing.assert_allclose(
             (1.0 - y / w) / 2.0 * 7.0, np.broadcast_to(np.arange(7)[:, None] + 0.5, size), atol=1e-9
         )
-        np.testing.assert_allclose(truth.linear_depth((z / w).astype(np.float32), view.near), 4.0, rtol=1e-6)
+        np.testing.assert_allclose(
+            truth.linear_depth((z / w).astype(np.float32), view.near), 4.0, rtol=1e-6
+        )
 
 
-# -- the check -------------------------------------------------------------------------------------------------------
+# -- the
+# check -------------------------------------------------------------------------------------------------------
 
 
 def test_the_room_by_rays_and_by_boxes(device: hizvk.Device) -> None:
@@ -325,7 +359,8 @@ def test_each_planted_fault_is_found(make: type[truth.Caster], device: hizvk.Dev
 
 def test_what_shows_by_a_hair_is_told_apart() -> None:
     pytest.importorskip("embreex")
-    # Pixel (1, 1) of 3x3 looks straight ahead; a wall covers the left up to `edge` pixels beside its centre.
+    # Pixel (1, 1) of 3x3 looks straight ahead; a wall covers the left up to `edge` pixels beside
+    # its centre.
     view = scenes.View("ahead", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 90.0, 0.25)
     size = (3, 3)
     pixel = 2.0 / 3.0  # at distance 1
@@ -341,7 +376,11 @@ def test_what_shows_by_a_hair_is_told_apart() -> None:
         sight = caster.look(view, size)
         depth = np.zeros(size, np.float32)
         found = truth.check(scene, view, np.array([False]), depth, sight, caster)
-        assert (found.false_culls, found.hairs) == {"hair": ([], [0]), "seen": ([0], []), "hidden": ([], [])}[expected]
+        assert (found.false_culls, found.hairs) == {
+            "hair": ([], [0]),
+            "seen": ([0], []),
+            "hidden": ([], []),
+        }[expected]
 
 
 def test_the_caster_follows_what_is_installed(monkeypatch: pytest.MonkeyPatch) -> None:

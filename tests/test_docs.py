@@ -32,7 +32,9 @@ def blocks() -> list[tuple[str, str, str]]:
 
 
 BLOCKS = blocks()
-PYTHON = [pytest.param(place, text, id=place) for place, language, text in BLOCKS if language == "python"]
+PYTHON = [
+    pytest.param(place, text, id=place) for place, language, text in BLOCKS if language == "python"
+]
 
 
 def test_every_block_says_what_it_is() -> None:
@@ -40,7 +42,11 @@ def test_every_block_says_what_it_is() -> None:
     strange = [place for place, language, _ in BLOCKS if language not in {*NOT_RUN, "python"}]
     assert not strange
     # rustdoc runs README's alone, and passes over what is marked so.
-    unrun = [place for place, language, _ in BLOCKS if language == "rust" and not place.startswith("README.md")]
+    unrun = [
+        place
+        for place, language, _ in BLOCKS
+        if language == "rust" and not place.startswith("README.md")
+    ]
     assert not unrun
     assert PYTHON
     assert any(language == "rust" for _, language, _ in BLOCKS)
@@ -65,7 +71,11 @@ def modules() -> list[str]:
     found = []
     for path in sorted((ROOT / "python").rglob("*.py")):
         if ">>> " in path.read_text(encoding="utf-8"):
-            found.append(".".join(path.relative_to(ROOT / "python").with_suffix("").parts).removesuffix(".__init__"))
+            found.append(
+                ".".join(path.relative_to(ROOT / "python").with_suffix("").parts).removesuffix(
+                    ".__init__"
+                )
+            )
     return found
 
 
@@ -78,7 +88,11 @@ def test_examples_in_docstrings_run(name: str) -> None:
 
 def test_no_example_is_skipped() -> None:
     """What is not run falls behind."""
-    skipped = [path for path in (ROOT / "python").rglob("*.py") if "doctest: +SKIP" in path.read_text(encoding="utf-8")]
+    skipped = [
+        path
+        for path in (ROOT / "python").rglob("*.py")
+        if "doctest: +SKIP" in path.read_text(encoding="utf-8")
+    ]
     assert not skipped
 
 
@@ -90,17 +104,28 @@ def shown() -> str:
 
 def test_commands_that_are_shown_exist() -> None:
     text = shown()
-    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    targets = set(
+        re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    )
     for target in set(re.findall(r"(?:^|`|    )make ([a-z-]+)", text, re.MULTILINE)):
         assert target in targets, f"make {target}"
     for kind, folder in (("test", "tests"), ("bench", "benches"), ("example", "examples")):
         for name in set(re.findall(rf"--{kind} ([a-z_]+)", text)):
-            found = [*ROOT.glob(f"crates/*/{folder}/{name}.rs"), *ROOT.glob(f"crates/*/{folder}/{name}/main.rs")]
+            found = [
+                *ROOT.glob(f"crates/*/{folder}/{name}.rs"),
+                *ROOT.glob(f"crates/*/{folder}/{name}/main.rs"),
+            ]
             assert found, f"--{kind} {name}"
     files = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
-    tracked = subprocess.run(files, cwd=ROOT, capture_output=True, text=True, check=False).stdout.split()
+    tracked = subprocess.run(
+        files, cwd=ROOT, capture_output=True, text=True, check=False
+    ).stdout.split()
     if not tracked:
         pytest.skip("not a git checkout: which files are part of it is unknown")
-    for path in set(re.findall(r"(?:tests|scripts|docs|shaders|crates|python)/[\w/.-]+\.(?:py|sh|rs|wgsl|md)", text)):
+    for path in set(
+        re.findall(
+            r"(?:tests|scripts|docs|shaders|crates|python)/[\w/.-]+\.(?:py|sh|rs|wgsl|md)", text
+        )
+    ):
         # Modules of hiz_core are named by their file alone.
         assert any(each.endswith(path) for each in tracked), path

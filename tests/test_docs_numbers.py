@@ -1,7 +1,8 @@
 """Tables of README and docs that are counts say what their command prints today; what is made of another table, too.
 
-Counts repeat with the seed on one driver. On another one rasterised depth differs in its last bits, and a few counts
-with it: there the comparison is skipped.
+Counts repeat with the seed on one driver.
+On another one rasterised depth differs in its last bits, and a few counts with it: there the
+comparison is skipped.
 """
 
 from __future__ import annotations
@@ -50,7 +51,9 @@ def test_a_table_that_was_edited_is_seen() -> None:
     with pytest.raises(KeyError, match="boxes, 2x2"):
         guide_docs.renewed(page("guide.md"), bench)
     cells = guide_docs.rows(page("bench.md"))["room"]["boxes, 2x2"]
-    bench = page("bench.md").replace(f"| {cells['of those in view']} | {cells['of best rect.']} |", "| 1 % | 2 % |")
+    bench = page("bench.md").replace(
+        f"| {cells['of those in view']} | {cells['of best rect.']} |", "| 1 % | 2 % |"
+    )
     assert guide_docs.renewed(page("guide.md"), bench) != page("guide.md")
 
 
@@ -58,7 +61,10 @@ def test_a_table_that_was_edited_is_seen() -> None:
     "scene",
     [
         "room",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("mountains", "city", "city-far", "castle")),
+        *(
+            pytest.param(name, marks=pytest.mark.slow)
+            for name in ("mountains", "city", "city-far", "castle")
+        ),
     ],
 )
 def test_the_bench_still_counts_so(tmp_path: Path, scene: str) -> None:
@@ -67,7 +73,10 @@ def test_the_bench_still_counts_so(tmp_path: Path, scene: str) -> None:
         pytest.skip(f"docs/bench.md was printed on another driver than {hizvk.Device().adapter}")
     if scene == "castle" and not CASTLE.exists():
         pytest.skip("the castle is not beside this checkout (../shared/judge)")
-    for module, what in (("embreex", "the truth is cast"), ("matplotlib", "the elevation model is taken from")):
+    for module, what in (
+        ("embreex", "the truth is cast"),
+        ("matplotlib", "the elevation model is taken from"),
+    ):
         if importlib.util.find_spec(module) is None:
             pytest.skip(f"{module}, by which {what}, is not installed")
     command.run(tmp_path, keys=[scene], repetitions=1, castle=CASTLE if scene == "castle" else None)

@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 import hizvk
 
 SIZE = (6, 8)
-FUZZ = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+FUZZ = settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 
 #: Dtypes that hold positions and depth, and some that do not.
 FLOATS = ["<f4", ">f4", "<f8", ">f8", "<f2"]
@@ -26,7 +28,9 @@ def device() -> hizvk.Device:
 
 @pytest.fixture(scope="module")
 def camera() -> hizvk.Camera:
-    return hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=SIZE, near=0.5, reversed_z=False)
+    return hizvk.Camera.look_at(
+        (0, 0, 0), (0, 0, -1), fov_y_deg=60, size=SIZE, near=0.5, reversed_z=False
+    )
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +92,9 @@ def test_any_bits_are_an_answer_and_never_hide_bad_bounds(
 
 @FUZZ
 @given(data=st.data())
-def test_wrong_arrays_are_named(device: hizvk.Device, camera: hizvk.Camera, data: st.DataObject) -> None:
+def test_wrong_arrays_are_named(
+    device: hizvk.Device, camera: hizvk.Camera, data: st.DataObject
+) -> None:
     shape = data.draw(st.lists(st.integers(0, 4), min_size=0, max_size=3).map(tuple))
     dtype = data.draw(st.sampled_from(FLOATS + OTHERS))
     array = np.zeros(shape, dtype)

@@ -75,9 +75,32 @@ SHAPES: list[tuple[int, ...]] = [
 ]  # fmt: skip
 
 #: Views of one number that claim far more than any machine has.
-CLAIMS: list[tuple[int, ...]] = [(2**58,), (2**40, 3), (2**40, 4, 4), (2**38, 3, 3), (2**29, 2**29), (2, 2**50)]
+CLAIMS: list[tuple[int, ...]] = [
+    (2**58,),
+    (2**40, 3),
+    (2**40, 4, 4),
+    (2**38, 3, 3),
+    (2**29, 2**29),
+    (2, 2**50),
+]
 
-NUMBERS = [0.0, -0.0, 1.0, -1.0, 0.5, 3.0, np.nan, np.inf, -np.inf, 1e-310, 1e-45, 1e300, -1e30, 2.0**61, 65504.0]
+NUMBERS = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    0.5,
+    3.0,
+    np.nan,
+    np.inf,
+    -np.inf,
+    1e-310,
+    1e-45,
+    1e300,
+    -1e30,
+    2.0**61,
+    65504.0,
+]
 
 
 @pytest.fixture(scope="module")
@@ -146,7 +169,9 @@ def attempt(device: hizvk.Device, function: str, parameter: str, value: Any) -> 
     return None
 
 
-@settings(max_examples=800, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=800, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(data=st.data())
 def test_any_array_is_an_answer_or_a_named_error(device: hizvk.Device, data: st.DataObject) -> None:
     function, parameter = data.draw(st.sampled_from(ARRAYS))
@@ -189,7 +214,9 @@ def test_views_that_claim_more_than_there_is_are_refused(
 
 
 @pytest.mark.parametrize("side", [16385, 32768])
-def test_images_beyond_the_devices_limit_are_refused_before_they_are_copied(device: hizvk.Device, side: int) -> None:
+def test_images_beyond_the_devices_limit_are_refused_before_they_are_copied(
+    device: hizvk.Device, side: int
+) -> None:
     if side <= device.max_image_side:
         pytest.skip("this device holds such an image")
     camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(side, side), near=0.1)
@@ -199,7 +226,9 @@ def test_images_beyond_the_devices_limit_are_refused_before_they_are_copied(devi
             device.pyramid(image, camera, kind="z")
         assert (caught.value.requested, caught.value.allowed) == (side, device.max_image_side)
         with pytest.raises(hizvk.LimitError):
-            hizvk.visible(hizvk.Spheres(np.zeros((1, 3)), 1), camera, depth=image, kind="z", device=device)
+            hizvk.visible(
+                hizvk.Spheres(np.zeros((1, 3)), 1), camera, depth=image, kind="z", device=device
+            )
     with pytest.raises(hizvk.LimitError):
         device.render_depth(device.occluders(np.zeros((3, 3)), [[0, 1, 2]]), camera)
     assert address_space() - before < 1 << 30
@@ -216,7 +245,10 @@ def test_every_array_parameter_is_fuzzed() -> None:
     objects = {"bounds", "camera", "instances", "pyramid", "occluders", "depth"}
     fuzzed = {parameter for _, parameter in ARRAYS}
     # Vectors and matrices of all cameras share one check each, so one of each is enough.
-    assert {parameter for _, parameter in listed} - objects <= fuzzed | {"world_from_camera", "clip_from_camera"}
+    assert {parameter for _, parameter in listed} - objects <= fuzzed | {
+        "world_from_camera",
+        "clip_from_camera",
+    }
 
 
 def test_this_process_still_has_its_device(device: hizvk.Device) -> None:

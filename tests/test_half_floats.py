@@ -34,8 +34,11 @@ CASES = [
 def test_what_a_half_float_rounds_is_counted(
     device: hizvk.Device, kind: Any, stored: float, wall: float, way: str
 ) -> None:
-    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(1, 1), near=1.0, reversed_z=kind != "ndc")
-    # Flat boxes: a quarter of that half spacing before the wall, and far enough behind the stored number.
+    camera = hizvk.Camera.look_at(
+        (0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(1, 1), near=1.0, reversed_z=kind != "ndc"
+    )
+    # Flat boxes: a quarter of that half spacing before the wall, and far enough behind the stored
+    # number.
     step = wall - stored if kind in ("z", "distance") else wall - (8.0 if kind == "ndc" else 16.0)
     depths = np.array([wall - 0.25 * step, wall + 4.0 * step])
     low = np.stack([-0.1 * depths, -0.1 * depths, -depths], axis=1)
@@ -58,7 +61,9 @@ def test_what_a_half_float_rounds_is_counted(
 
 @pytest.mark.parametrize("reversed_z", [False, True])
 @pytest.mark.parametrize("kind", ["z", "distance"])
-def test_what_float32_rounds_of_a_metric_depth_is_counted(device: hizvk.Device, kind: Any, reversed_z: bool) -> None:
+def test_what_float32_rounds_of_a_metric_depth_is_counted(
+    device: hizvk.Device, kind: Any, reversed_z: bool
+) -> None:
     """Just behind a near plane 1024 units away, where no share of the NDC depth covers a share of the metric one."""
     camera = hizvk.Camera.orthographic(
         (0, 0, 0), (0, 0, -1), height=2, size=(1, 1), near=1024, far=1056, reversed_z=reversed_z
@@ -67,11 +72,16 @@ def test_what_float32_rounds_of_a_metric_depth_is_counted(device: hizvk.Device, 
     wall = 1025.0 + 0.49 * 2.0**-13
     image = np.full((1, 1), wall).astype(np.float32)
     assert image[0, 0] == 1025.0
-    points = np.array([[0.0, 0.0, -(1025.0 + 0.45 * 2.0**-13)], [0.0, 0.0, -(1025.0 + 64.0 * 2.0**-13)]])
+    points = np.array(
+        [[0.0, 0.0, -(1025.0 + 0.45 * 2.0**-13)], [0.0, 0.0, -(1025.0 + 64.0 * 2.0**-13)]]
+    )
     spheres = device.instances(hizvk.Spheres(points, 0.0))
     for form in (image, image.astype(">f4"), list(image), memoryview(image)):
         pyramid = device.pyramid(form, camera, kind=kind)
-        assert device.cull(spheres, camera, pyramid, depth_slack=0.0).mask.tolist() == [True, False], type(form)
+        assert device.cull(spheres, camera, pyramid, depth_slack=0.0).mask.tolist() == [
+            True,
+            False,
+        ], type(form)
 
 
 def test_rows_with_masks_are_masked(device: hizvk.Device) -> None:
@@ -80,8 +90,12 @@ def test_rows_with_masks_are_masked(device: hizvk.Device) -> None:
     for dtype in (np.float32, np.uint16):
         image = np.ma.array(np.full(camera.size, 5, dtype), mask=True)
         with pytest.warns(hizvk.errors.HizWarning, match="every pixel is far"):
-            assert hizvk.visible(behind, camera, depth=list(image), kind="z", device=device).tolist() == [True]
-        assert not hizvk.visible(behind, camera, depth=list(image.data), kind="z", device=device).any()
+            assert hizvk.visible(
+                behind, camera, depth=list(image), kind="z", device=device
+            ).tolist() == [True]
+        assert not hizvk.visible(
+            behind, camera, depth=list(image.data), kind="z", device=device
+        ).any()
     with pytest.raises(TypeError, match=r"centers: expected .* got a masked array"):
         hizvk.Spheres(list(np.ma.zeros((2, 3))), 1.0)
 
@@ -110,7 +124,9 @@ def test_lists_of_several_dtypes_are_refused(device: hizvk.Device, dtype: Any) -
         [row, row.astype("f8")],
     ]
     for mixed in mixtures:
-        with pytest.raises(TypeError, match=r"^depth: expected numbers of one dtype, got a list of float64 with "):
+        with pytest.raises(
+            TypeError, match=r"^depth: expected numbers of one dtype, got a list of float64 with "
+        ):
             device.pyramid(mixed, camera, kind="z")  # type: ignore[arg-type]
     device.pyramid([row, list(row)], camera, kind="z")
     device.pyramid([row.astype("f8"), [10.0, 10.0]], camera, kind="z")
@@ -121,7 +137,9 @@ def test_what_masked_parameters_are_told_leads_somewhere(device: hizvk.Device) -
     vertices = np.ma.zeros((3, 3))
     with pytest.raises(TypeError, match=r"^vertices: .*masked array; leave out what is masked"):
         device.occluders(vertices, [[0, 1, 2]])
-    with pytest.raises(TypeError, match=r"^triangles: .*masked array; leave out the triangles that are masked"):
+    with pytest.raises(
+        TypeError, match=r"^triangles: .*masked array; leave out the triangles that are masked"
+    ):
         device.occluders(vertices.data, np.ma.array([[0, 1, 2]]))
     with pytest.raises(TypeError, match=r"^eye: .*masked array; leave out what is masked"):
         hizvk.Camera.look_at(np.ma.zeros(3), (0, 0, -1), fov_y_deg=60, size=(8, 8), near=0.1)

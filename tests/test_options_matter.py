@@ -1,7 +1,8 @@
 """Every option changes an answer: one scene an option, in which what it says is worked out by hand.
 
-The camera looks along -z from the origin, 90 degrees wide, near plane at 1, 16x16 pixels: at depth 8 a pixel is a unit
-wide, column 8 begins at x = 0 and row 8 ends there, rows running downwards. The wall stands at depth 4.
+The camera looks along -z from the origin, 90 degrees wide, near plane at 1, 16x16 pixels: at depth
+8 a pixel is a unit wide, column 8 begins at x = 0 and row 8 ends there, rows running downwards.
+The wall stands at depth 4.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ def device() -> hizvk.Device:
     return hizvk.Device()
 
 
-CAMERA = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=SIZE, near=1.0, reversed_z=True)
+CAMERA = hizvk.Camera.look_at(
+    (0, 0, 0), (0, 0, -1), fov_y_deg=90, size=SIZE, near=1.0, reversed_z=True
+)
 
 
 def box(low: Any, high: Any) -> hizvk.Boxes:
@@ -47,8 +50,18 @@ CULLS: dict[str, tuple[Any, Any, dict[str, Any], dict[str, Any]]] = {
     # Between the centres of pixels, before the wall.
     "coverage": (sphere((0, 0, -2), 0.01), wall(), {"coverage": "sample"}, {"coverage": "area"}),
     # A quarter of a pixel beside the open column.
-    "guard_px": (box((-1.5, -0.5, -8), (-0.25, 0.5, -8)), HOLE_COLUMN, {"guard_px": 0.125}, {"guard_px": 0.5}),
-    "guard_px, default": (box((-1.5, -0.5, -8), (-0.25, 0.5, -8)), HOLE_COLUMN, {}, {"guard_px": 0.5}),
+    "guard_px": (
+        box((-1.5, -0.5, -8), (-0.25, 0.5, -8)),
+        HOLE_COLUMN,
+        {"guard_px": 0.125},
+        {"guard_px": 0.5},
+    ),
+    "guard_px, default": (
+        box((-1.5, -0.5, -8), (-0.25, 0.5, -8)),
+        HOLE_COLUMN,
+        {},
+        {"guard_px": 0.5},
+    ),
     # In sample coverage the default is 1/64: a box that ends 1/100 before the centres of the
     # column.
     "guard_px, sample": (
@@ -58,17 +71,52 @@ CULLS: dict[str, tuple[Any, Any, dict[str, Any], dict[str, Any]]] = {
         {"coverage": "sample"},
     ),
     # 1/4 less a hundredth of it is 1 / 4.0404; less 1/100 it is 1 / 4.1667.
-    "depth_slack": (box((-1, -1, -5), (1, 1, -4.03)), wall(), {"depth_slack": 0.005}, {"depth_slack": 0.01}),
-    "depth_slack_abs": (box((-1, -1, -5), (1, 1, -4.1)), wall(), {"depth_slack_abs": 0.005}, {"depth_slack_abs": 0.01}),
+    "depth_slack": (
+        box((-1, -1, -5), (1, 1, -4.03)),
+        wall(),
+        {"depth_slack": 0.005},
+        {"depth_slack": 0.01},
+    ),
+    "depth_slack_abs": (
+        box((-1, -1, -5), (1, 1, -4.1)),
+        wall(),
+        {"depth_slack_abs": 0.005},
+        {"depth_slack_abs": 0.01},
+    ),
     # kappa eps (1 + 4.1 / 4) and more: 0.0024 at 10,000, where 4.1 / 4 - 1 is 0.025; 0.24 at a
     # million.
-    "transform_slack": (box((-1, -1, -5), (1, 1, -4.1)), wall(), {"transform_slack": 1e4}, {"transform_slack": 1e6}),
+    "transform_slack": (
+        box((-1, -1, -5), (1, 1, -4.1)),
+        wall(),
+        {"transform_slack": 1e4},
+        {"transform_slack": 1e6},
+    ),
     # Three pixels, columns 9 to 11, beside the open column 8: 2x2 texels that span them are of
     # level 1 and have it.
-    "footprint": (box((1.1, 0.1, -8), (3.9, 0.9, -8)), HOLE_COLUMN, {"footprint": 4}, {"footprint": 2}),
-    "footprint 8": (box((1.1, -1.9, -8), (6.9, 0.9, -8)), HOLE_COLUMN, {"footprint": 8}, {"footprint": 4}),
-    "descent": (box((1.1, -1.9, -8), (6.9, 0.9, -8)), HOLE_COLUMN, {"descent": 4096}, {"descent": 0}),
-    "descent, budget": (box((1.1, -1.9, -8), (6.9, 0.9, -8)), HOLE_COLUMN, {"descent": 4096}, {"descent": 3}),
+    "footprint": (
+        box((1.1, 0.1, -8), (3.9, 0.9, -8)),
+        HOLE_COLUMN,
+        {"footprint": 4},
+        {"footprint": 2},
+    ),
+    "footprint 8": (
+        box((1.1, -1.9, -8), (6.9, 0.9, -8)),
+        HOLE_COLUMN,
+        {"footprint": 8},
+        {"footprint": 4},
+    ),
+    "descent": (
+        box((1.1, -1.9, -8), (6.9, 0.9, -8)),
+        HOLE_COLUMN,
+        {"descent": 4096},
+        {"descent": 0},
+    ),
+    "descent, budget": (
+        box((1.1, -1.9, -8), (6.9, 0.9, -8)),
+        HOLE_COLUMN,
+        {"descent": 4096},
+        {"descent": 3},
+    ),
     # A ball of 3.24 pixels about the middle: its rectangle has the open pixel in its corner, its
     # outline has not.
     "fit": (
@@ -91,7 +139,9 @@ def by_cull(device: hizvk.Device, bounds: Any, depth: Any, options: dict[str, An
 
 def by_groups(device: hizvk.Device, bounds: Any, depth: Any, options: dict[str, Any]) -> bool:
     """A hundred times the same, in two groups: hidden as a whole, or all kept."""
-    many = type(bounds)(*(np.repeat(getattr(bounds, name), 100, axis=0) for name in bounds.__dataclass_fields__))
+    many = type(bounds)(
+        *(np.repeat(getattr(bounds, name), 100, axis=0) for name in bounds.__dataclass_fields__)
+    )
     pyramid = device.pyramid(depth, CAMERA, kind="z")
     mask = device.cull(device.instances(many), CAMERA, pyramid, hierarchy=True, **options).mask
     assert mask.all() or not mask.any()
@@ -137,7 +187,8 @@ def test_levels(device: hizvk.Device) -> None:
     for levels, kept in ((None, False), (1, False), ((1, 1), False), (3, True), ((3, 3), True)):
         pyramid = device.pyramid(depth, CAMERA, kind="z", levels=levels)
         assert bool(device.cull(device.instances(three), CAMERA, pyramid).mask[0]) == kept, levels
-    # Six pixels are more than two texels of level 1, and no more than two of level 2 (columns 8 to 15).
+    # Six pixels are more than two texels of level 1, and no more than two of level 2 (columns 8 to
+    # 15).
     six = box((1.1, 0.1, -8), (6.9, 0.9, -8))
     for levels, kept in ((None, False), ((1, 2), False), ((1, 1), True)):
         pyramid = device.pyramid(wall((slice(None), 0)), CAMERA, kind="z", levels=levels)
@@ -148,7 +199,9 @@ def points(count: int) -> tuple[hizvk.Spheres, Any]:
     """Specks in any order before and behind the wall, and which are before it."""
     random = np.random.default_rng(3)
     z = np.where(random.random(count) < 0.5, 2.0, 8.0)
-    centers = np.stack([z * random.uniform(-0.9, 0.9, count), z * random.uniform(-0.9, 0.9, count), -z], axis=1)
+    centers = np.stack(
+        [z * random.uniform(-0.9, 0.9, count), z * random.uniform(-0.9, 0.9, count), -z], axis=1
+    )
     return hizvk.Spheres(centers, np.full(count, 1e-3)), z == 2.0
 
 
@@ -157,7 +210,8 @@ def test_order_of_the_list(device: hizvk.Device) -> None:
     pyramid = device.pyramid(wall(), CAMERA, kind="z")
     expected = np.flatnonzero(before)
     stable, any_order = (
-        device.cull(device.instances(bounds), CAMERA, pyramid, order=order).indices for order in ("stable", "any")
+        device.cull(device.instances(bounds), CAMERA, pyramid, order=order).indices
+        for order in ("stable", "any")
     )
     assert stable.tolist() == expected.tolist()
     assert np.sort(any_order).tolist() == expected.tolist()
@@ -169,16 +223,25 @@ def test_hierarchy_and_statistics(device: hizvk.Device) -> None:
     bounds, before = points(3000)
     pyramid = device.pyramid(wall(), CAMERA, kind="z")
     instances = device.instances(bounds)
-    groups = {h: device.cull(instances, CAMERA, pyramid, hierarchy=h).stats.tested_groups for h in (None, True, False)}
+    groups = {
+        h: device.cull(instances, CAMERA, pyramid, hierarchy=h).stats.tested_groups
+        for h in (None, True, False)
+    }
     assert groups == {None: 0, True: 47, False: 0}
     # Where nothing is hidden each instance is tested; the last of 47 groups has 56 members.
     nothing = device.pyramid(np.full(SIZE, np.inf), CAMERA, kind="z")
     assert device.cull(instances, CAMERA, nothing, hierarchy=True).stats.tested_instances == 3000
-    without, with_them = (device.cull(instances, CAMERA, pyramid, statistics=s).stats for s in (False, True))
+    without, with_them = (
+        device.cull(instances, CAMERA, pyramid, statistics=s).stats for s in (False, True)
+    )
     assert (without.levels, without.texels_read) == (None, None)
     assert with_them.levels is not None
     assert sum(with_them.levels) == 3000
-    assert (with_them.outside, with_them.occluded, with_them.kept) == (0, 3000 - before.sum(), before.sum())
+    assert (with_them.outside, with_them.occluded, with_them.kept) == (
+        0,
+        3000 - before.sum(),
+        before.sum(),
+    )
 
 
 def test_outputs_capacity_and_draws(device: hizvk.Device) -> None:
@@ -256,12 +319,14 @@ def test_faces_and_transforms_of_occluders(device: hizvk.Device, conservative: b
             seen = drawn(device, occluders, conservative=conservative)
             assert seen[8, 8] == (0.0 if cull == left_out else about(4)), (cull, left_out)
             assert seen[0, 0] == 0.0
-    # At depth 4 a pixel is half a unit: columns 4 to 11. Moved by 4 to either side: columns 12 to
-    # 15, and 0 to 3.
+    # At depth 4 a pixel is half a unit: columns 4 to 11.
+    # Moved by 4 to either side: columns 12 to 15, and 0 to 3.
     still = drawn(device, device.occluders(SQUARE, FRONT), conservative=conservative)
     moved = np.stack([np.eye(4), np.eye(4)])
     moved[0][0, 3], moved[1][0, 3] = 4.0, -4.0
-    seen = drawn(device, device.occluders(SQUARE, FRONT, transforms=moved), conservative=conservative)
+    seen = drawn(
+        device, device.occluders(SQUARE, FRONT, transforms=moved), conservative=conservative
+    )
     assert [still[8, column] for column in (2, 8, 13)] == [0.0, about(4), 0.0]
     assert [seen[8, column] for column in (2, 8, 13)] == [about(4), 0.0, about(4)]
 
@@ -283,7 +348,9 @@ def test_size_conservative_and_refinement(device: hizvk.Device) -> None:
     lap[[0, 3], 0], lap[[1, 2], 0] = 0.2, 9.0  # begins at 8.32, at depth 5
     lap[:, 2] = -5.0
     overlapping = device.occluders([(left, FRONT), (lap, FRONT)])
-    coarse, fine = (drawn(device, overlapping, conservative=True, refinement=n)[8, 8] for n in (0, 2))
+    coarse, fine = (
+        drawn(device, overlapping, conservative=True, refinement=n)[8, 8] for n in (0, 2)
+    )
     assert [coarse, fine] == [0.0, about(5)]
 
 
@@ -294,7 +361,14 @@ def test_a_resized_orthographic_camera_and_depth_along_z(
 ) -> None:
     """8 wide, 4 high, from 1 to 9 away; what stands in the image's quarters is 3, 5, 7 and 8 away."""
     first = hizvk.Camera.orthographic(
-        (1, 2, 3), (1, 2, 2), height=4.0, width=8.0, size=(50, 60), near=1.0, far=9.0, reversed_z=reversed_z
+        (1, 2, 3),
+        (1, 2, 2),
+        height=4.0,
+        width=8.0,
+        size=(50, 60),
+        near=1.0,
+        far=9.0,
+        reversed_z=reversed_z,
     )
     camera = first.resized(size)
     quarters = np.array([[3.0, 5.0], [7.0, 8.0]])
@@ -314,6 +388,11 @@ def test_a_resized_orthographic_camera_and_depth_along_z(
             high.append((x + 0.1, y + 0.1, z))
             kept.append(offset < 0)
     for descent in (0, 4096):
-        mask = device.cull(device.instances(hizvk.Boxes(low, high)), camera, pyramid, descent=descent).mask
+        mask = device.cull(
+            device.instances(hizvk.Boxes(low, high)), camera, pyramid, descent=descent
+        ).mask
         assert mask.tolist() == kept, (size, descent)
-    assert hizvk.visible(hizvk.Boxes(low, high), camera, depth=depth, kind="z", device=device).tolist() == kept
+    assert (
+        hizvk.visible(hizvk.Boxes(low, high), camera, depth=depth, kind="z", device=device).tolist()
+        == kept
+    )

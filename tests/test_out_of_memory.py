@@ -11,7 +11,14 @@ SCRIPT = Path(__file__).with_name("out_of_memory.py")
 
 @pytest.mark.parametrize(
     ("call", "mebibytes"),
-    [("instances", 128), ("occluders", 64), ("convert", 64), ("upload", 16), ("upload", 300), ("render", 128)],
+    [
+        ("instances", 128),
+        ("occluders", 64),
+        ("convert", 64),
+        ("upload", 16),
+        ("upload", 300),
+        ("render", 128),
+    ],
 )
 def test_out_of_memory_is_an_error_and_the_next_device_works(call: str, mebibytes: int) -> None:
     """The host's share (a list in Rust) and the device's run out at different limits.
@@ -19,7 +26,11 @@ def test_out_of_memory_is_an_error_and_the_next_device_works(call: str, mebibyte
     wgpu gives the device up when its own staging memory ends; then the loss is what is reported.
     """
     run = subprocess.run(
-        [sys.executable, str(SCRIPT), call, str(mebibytes)], capture_output=True, text=True, timeout=300, check=False
+        [sys.executable, str(SCRIPT), call, str(mebibytes)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
     )
     assert run.returncode == 0, run.stderr
     error, after = run.stdout.splitlines()[-2:]
@@ -30,7 +41,11 @@ def test_out_of_memory_is_an_error_and_the_next_device_works(call: str, mebibyte
 def test_a_cull_without_memory_for_all_levels_in_one_texture_goes_on() -> None:
     """It reads the depth image and the levels where they are."""
     run = subprocess.run(
-        [sys.executable, str(SCRIPT), "cull", "70"], capture_output=True, text=True, timeout=300, check=False
+        [sys.executable, str(SCRIPT), "cull", "70"],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
     )
     assert run.returncode == 0, run.stderr
     assert run.stdout.splitlines()[-2:] == ["no error: 0", "next device: [True, False]"]

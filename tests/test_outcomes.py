@@ -1,7 +1,8 @@
 """The named outcomes of docs/accuracy.md, row by row and bit by bit, as Python sees them.
 
-The camera looks along -z from the origin, 90 degrees wide, near plane at 1; the wall stands at depth 4 unless a test
-says otherwise. Every expectation is worked out by hand.
+The camera looks along -z from the origin, 90 degrees wide, near plane at 1; the wall stands at
+depth 4 unless a test says otherwise.
+Every expectation is worked out by hand.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ def device() -> hizvk.Device:
     return hizvk.Device()
 
 
-def view(*, reversed_z: bool, far: float | None = None, size: tuple[int, int] = SIZE) -> hizvk.Camera:
+def view(
+    *, reversed_z: bool, far: float | None = None, size: tuple[int, int] = SIZE
+) -> hizvk.Camera:
     return hizvk.Camera.look_at(
         (0, 0, 0), (0, 0, -1), fov_y_deg=90, size=size, near=1.0, far=far, reversed_z=reversed_z
     )
@@ -89,7 +92,11 @@ BOUNDS: list[tuple[str, Any, Verdict]] = [
     ("an oriented box around the eye", oriented((2, 2, 2), EYE3, (0, 0, 0)), Verdict.VISIBLE),
     ("from behind the eye through the wall", box((-0.1, -0.1, -8), (0.1, 0.1, 1)), Verdict.VISIBLE),
     ("across the near plane", sphere(0, 0, -1, 0.25), Verdict.VISIBLE),
-    ("across the near plane, to beyond the wall", box((-0.1, -0.1, -8), (0.1, 0.1, -0.5)), Verdict.VISIBLE),
+    (
+        "across the near plane, to beyond the wall",
+        box((-0.1, -0.1, -8), (0.1, 0.1, -0.5)),
+        Verdict.VISIBLE,
+    ),
     # Equal depth, and a hair behind.
     ("equal depth", box((-1, -1, -5), (1, 1, -4)), Verdict.VISIBLE),
     ("touching from behind", sphere(0, 0, -5, 1), Verdict.VISIBLE),
@@ -102,7 +109,9 @@ BOUNDS: list[tuple[str, Any, Verdict]] = [
 
 
 @BOTH
-@pytest.mark.parametrize(("bounds", "verdict"), [row[1:] for row in BOUNDS], ids=[row[0] for row in BOUNDS])
+@pytest.mark.parametrize(
+    ("bounds", "verdict"), [row[1:] for row in BOUNDS], ids=[row[0] for row in BOUNDS]
+)
 def test_bounds(device: hizvk.Device, bounds: Any, verdict: Verdict, reversed_z: bool) -> None:
     camera = view(reversed_z=reversed_z)
     pyramid = device.pyramid(np.full(SIZE, 4.0), camera, kind="z")
@@ -163,26 +172,34 @@ def test_depth_bits(device: hizvk.Device, bits: int, meaning: str | None, revers
 
 
 @BOTH
-@pytest.mark.parametrize("bits", [bits for bits, _ in BITS], ids=[f"{bits:08x}" for bits, _ in BITS])
+@pytest.mark.parametrize(
+    "bits", [bits for bits, _ in BITS], ids=[f"{bits:08x}" for bits, _ in BITS]
+)
 def test_what_is_no_depth_is_a_hole(device: hizvk.Device, bits: int, reversed_z: bool) -> None:
     """One such pixel in a wall: it is seen through unless it holds a depth before the box."""
     camera = view(reversed_z=reversed_z)
     wall = np.float32(0.25 if reversed_z else 0.75)  # depth 4
     depth = np.full(SIZE, wall)
     behind = box((-2, -2, -9), (2, 2, -8))  # 1/8, 7/8
-    assert not hizvk.visible(behind, camera, depth=depth, kind=camera.depth_kind, device=device).any()
+    assert not hizvk.visible(
+        behind, camera, depth=depth, kind=camera.depth_kind, device=device
+    ).any()
     depth[8, 7] = of_bits(bits)
     with np.errstate(invalid="ignore"):
         value = float(depth[8, 7])
     hides = 0.125 < value <= 1.0 if reversed_z else 0.0 <= value < 0.875
     for options in ({}, {"footprint": 4}, {"descent": 4096}):
-        seen = hizvk.visible(behind, camera, depth=depth, kind=camera.depth_kind, device=device, **options)
+        seen = hizvk.visible(
+            behind, camera, depth=depth, kind=camera.depth_kind, device=device, **options
+        )
         assert seen.tolist() == [not hides]
 
 
 @BOTH
 @pytest.mark.parametrize("far_plane", [None, 100.0])
-@pytest.mark.parametrize("bad", [0.0, -0.0, -1.0, NAN, INF, -INF, 1e-310, 0.5, 180.0, 1e308], ids=str)
+@pytest.mark.parametrize(
+    "bad", [0.0, -0.0, -1.0, NAN, INF, -INF, 1e-310, 0.5, 180.0, 1e308], ids=str
+)
 def test_view_depth_and_distance_that_are_none_are_far(
     device: hizvk.Device, bad: float, far_plane: float | None, reversed_z: bool
 ) -> None:
@@ -197,7 +214,9 @@ def test_view_depth_and_distance_that_are_none_are_far(
         level = device.pyramid(np.full(SIZE, bad), camera, kind=kind).level(0)
         assert (level == (0.0 if reversed_z else 1.0)).all(), kind
         spheres = sphere(0, 0, -50, 1)
-        assert hizvk.visible(spheres, camera, depth=np.full(SIZE, bad), kind=kind, device=device).all()
+        assert hizvk.visible(
+            spheres, camera, depth=np.full(SIZE, bad), kind=kind, device=device
+        ).all()
 
 
 @pytest.mark.parametrize("entry", [NAN, INF, -INF])
@@ -216,7 +235,9 @@ def test_singular_cameras_and_rows_beyond_float32_are_refused(device: hizvk.Devi
     huge = np.array([[1e30, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -1], [0, 0, 1, 0]])
     camera = hizvk.Camera.from_matrices(huge, size=SIZE, reversed_z=False)
     pyramid = device.pyramid(np.full(SIZE, 0.5, np.float32), camera, kind="ndc")
-    with pytest.raises(ValueError, match=r"camera: expected rows whose coefficients stay below 2\^34"):
+    with pytest.raises(
+        ValueError, match=r"camera: expected rows whose coefficients stay below 2\^34"
+    ):
         device.cull(device.instances(sphere(0, 0, 8, 1)), camera, pyramid)
 
 
@@ -238,4 +259,6 @@ def test_pyramids_of_another_size_camera_or_device_are_errors(device: hizvk.Devi
     with pytest.raises(ValueError, match="pyramid: expected Pyramid of this device"):
         elsewhere.cull(elsewhere.instances(sphere(0, 0, -8, 1)), camera, pyramid)
     # An equal camera is the same camera.
-    assert device.cull(instances, view(reversed_z=True), pyramid).verdicts.tolist() == [Verdict.OCCLUDED]
+    assert device.cull(instances, view(reversed_z=True), pyramid).verdicts.tolist() == [
+        Verdict.OCCLUDED
+    ]

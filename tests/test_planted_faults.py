@@ -42,7 +42,9 @@ FAULTS = {
 def run(fault: str) -> str:
     """What the script prints."""
     environment = os.environ | {"HIZVK_PLANTED_FAULT": fault}
-    done = subprocess.run([sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, timeout=120
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
 

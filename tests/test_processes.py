@@ -79,7 +79,11 @@ def test_a_fork_has_devices_of_its_own(scene: str, expected: list[str]) -> None:
     assert forked.stdout.splitlines() == expected
 
 
-SILENT = {name: value for name, value in os.environ.items() if name not in ("NODEVICE_SELECT", "XDG_RUNTIME_DIR")}
+SILENT = {
+    name: value
+    for name, value in os.environ.items()
+    if name not in ("NODEVICE_SELECT", "XDG_RUNTIME_DIR")
+}
 
 
 @pytest.mark.parametrize("command", [["info"], ["info", "--json"], ["doctor"]])

@@ -1,8 +1,10 @@
 """Defects of the published methods: each formula is shown to fail on a case, and the library not to.
 
-The formulas are written down here once more, from the texts, in NumPy; nothing of the library takes part. What is true
-comes from hand-made scenes, closed forms and the exact oracle `hizvk.reference`. Cameras look along -z from the
-origin; depth images hold view depth (``kind="z"``), infinity is a hole.
+The formulas are written down here once more, from the texts, in NumPy; nothing of the library takes
+part.
+What is true comes from hand-made scenes, closed forms and the exact oracle `hizvk.reference`.
+Cameras look along -z from the origin; depth images hold view depth (``kind="z"``), infinity is a
+hole.
 """
 
 from __future__ import annotations
@@ -28,7 +30,10 @@ def device() -> hizvk.Device:
 
 
 def view(
-    size: tuple[int, int], borders: tuple[float, float, float, float] = (-1, 1, -1, 1), *, reversed_z: bool = False
+    size: tuple[int, int],
+    borders: tuple[float, float, float, float] = (-1, 1, -1, 1),
+    *,
+    reversed_z: bool = False,
 ) -> hizvk.Camera:
     """Left, right, bottom and top border at depth 1."""
     left, right, bottom, top = borders
@@ -38,20 +43,28 @@ def view(
     )  # fmt: skip
 
 
-def assert_kept(device: hizvk.Device, bounds: Any, camera: hizvk.Camera, depth: Image, kind: Any = "z") -> None:
+def assert_kept(
+    device: hizvk.Device, bounds: Any, camera: hizvk.Camera, depth: Image, kind: Any = "z"
+) -> None:
     """All bounds are visible in truth, and with every footprint and descent they are kept."""
     assert (hizvk.reference.classify(bounds, camera, depth, kind=kind) == VISIBLE).all()
     for options in ({}, {"footprint": 8}, {"descent": 65536}):
         assert hizvk.visible(bounds, camera, depth=depth, kind=kind, device=device, **options).all()
 
 
-def assert_hidden(device: hizvk.Device, bounds: Any, camera: hizvk.Camera, depth: Image, kind: Any = "z") -> None:
+def assert_hidden(
+    device: hizvk.Device, bounds: Any, camera: hizvk.Camera, depth: Image, kind: Any = "z"
+) -> None:
     """The counterpart: the case above is no library that keeps everything."""
     assert (hizvk.reference.classify(bounds, camera, depth, kind=kind) == HIDDEN).all()
-    assert not hizvk.visible(bounds, camera, depth=depth, kind=kind, device=device, descent=65536).any()
+    assert not hizvk.visible(
+        bounds, camera, depth=depth, kind=kind, device=device, descent=65536
+    ).any()
 
 
-def flat_box(camera_span: float, pixels: tuple[float, float, float, float], size: tuple[int, int]) -> hizvk.Boxes:
+def flat_box(
+    camera_span: float, pixels: tuple[float, float, float, float], size: tuple[int, int]
+) -> hizvk.Boxes:
     """A flat box at depth 20 that spans these pixels (left, top, right, bottom) of a camera with symmetric borders."""
     height, width = size
     x0, y0, x1, y1 = pixels
@@ -75,8 +88,8 @@ class TestRakos:
     def taps(size: int, other: int) -> dict[tuple[int, int], set[tuple[int, int]]]:
         """Row R1: the texels of a `size` x `other` level that each texel of the next one reads, as it is printed.
 
-        A sample at the next level's texel centre and its left, lower and lower left neighbours; three more on
-        ``x == size - 3`` of an odd side, in the branches as they are nested there.
+        A sample at the next level's texel centre and its left, lower and lower left neighbours;
+        three more on ``x == size - 3`` of an odd side, in the branches as they are nested there.
         """
 
         def base(i: int, side: int) -> int:
@@ -106,9 +119,14 @@ class TestRakos:
     def test_r1_the_corner_of_two_odd_sides_reads_7_of_9(self) -> None:
         """Row R1: the branches exclude one another, so two texels of the corner are never read."""
         assert len(self.taps(3, 3)[0, 0]) == 7
-        assert set(self.taps(3, 3)[0, 0]) == {(x, y) for x in range(3) for y in range(3)} - {(0, 2), (1, 2)}
+        assert set(self.taps(3, 3)[0, 0]) == {(x, y) for x in range(3) for y in range(3)} - {
+            (0, 2),
+            (1, 2),
+        }
 
-    @pytest.mark.parametrize(("size", "hole"), [((5, 5), (2, 4)), ((5, 5), (4, 4)), ((3, 3), (2, 0)), ((3, 7), (1, 6))])
+    @pytest.mark.parametrize(
+        ("size", "hole"), [((5, 5), (2, 4)), ((5, 5), (4, 4)), ((3, 3), (2, 0)), ((3, 7), (1, 6))]
+    )
     def test_r1_a_hole_that_it_misses_is_seen_through(
         self, device: hizvk.Device, size: tuple[int, int], hole: tuple[int, int]
     ) -> None:
@@ -153,8 +171,12 @@ class TestRakos:
         length = 2.0 ** rng.uniform(0, 10, 1_000_000)
         first = rng.uniform(0, 1, length.size) * (1024 - length)
         level = self.level(first, first + length)
-        skipped = (np.floor((first + length) / 2.0**level) - np.floor(first / 2.0**level) > 1).mean()
-        print(f"\nRakos R4: a texel column is skipped for {100 * skipped:.1f} % of 1,000,000 intervals")
+        skipped = (
+            np.floor((first + length) / 2.0**level) - np.floor(first / 2.0**level) > 1
+        ).mean()
+        print(
+            f"\nRakos R4: a texel column is skipped for {100 * skipped:.1f} % of 1,000,000 intervals"
+        )
         assert 0.38 < skipped < 0.395
 
 
@@ -180,7 +202,9 @@ class TestDarnell:
         up = np.array([0.0, 1.0, 0.0])
         right = np.cross(-centers, up)
         right /= np.linalg.norm(right, axis=-1, keepdims=True)
-        corners = np.stack([centers + i * spread * up + j * spread * right for i in (-1, 1) for j in (-1, 1)])
+        corners = np.stack(
+            [centers + i * spread * up + j * spread * right for i in (-1, 1) for j in (-1, 1)]
+        )
         x, y = (corners[..., k] / -corners[..., 2] for k in (0, 1))
         return np.stack([x.min(0), x.max(0), y.min(0), y.max(0)], axis=-1)
 
@@ -192,7 +216,10 @@ class TestDarnell:
         for k in (0, 1):
             a = centers[..., k]
             root = radii * np.sqrt(a * a + z * z - radii * radii)
-            sides += [(a * z - root) / (z * z - radii * radii), (a * z + root) / (z * z - radii * radii)]
+            sides += [
+                (a * z - root) / (z * z - radii * radii),
+                (a * z + root) / (z * z - radii * radii),
+            ]
         return np.stack(sides, axis=-1)
 
     @classmethod
@@ -201,8 +228,13 @@ class TestDarnell:
         rng = np.random.default_rng(2)
         left, right, bottom, top = cls.BORDERS
         z = rng.uniform(2, 60, number)
-        centers = np.stack([rng.uniform(left, right, number) * z, rng.uniform(bottom, top, number) * z, -z], axis=-1)
-        radii = np.minimum(rng.uniform(0.01, 0.2, number) * np.linalg.norm(centers, axis=-1), 0.9 * z)
+        centers = np.stack(
+            [rng.uniform(left, right, number) * z, rng.uniform(bottom, top, number) * z, -z],
+            axis=-1,
+        )
+        radii = np.minimum(
+            rng.uniform(0.01, 0.2, number) * np.linalg.norm(centers, axis=-1), 0.9 * z
+        )
         return centers, radii
 
     def test_a_sphere_around_the_camera_is_visible(self, device: hizvk.Device) -> None:
@@ -220,7 +252,9 @@ class TestDarnell:
         """Only a sphere straight ahead has its least depth there."""
         centers, radii = self.spheres(40_000)
         farther = self.nearest_depth(centers, radii) > -centers[:, 2] - radii
-        print(f"\nDarnell: the depth is farther than the least depth in {farther.sum():,} of 40,000 spheres")
+        print(
+            f"\nDarnell: the depth is farther than the least depth in {farther.sum():,} of 40,000 spheres"
+        )
         assert farther.sum() >= 39_960
         # One of them, before a wall between the two depths: its front is nearer than the wall.
         center, radius = np.array([[6.0, 0.0, -10.0]]), np.array([3.0])
@@ -235,12 +269,16 @@ class TestDarnell:
         """A hole above the corners' rectangle, inside the sphere's own; even all pixels of theirs would not show it."""
         centers, radii = self.spheres(40_000)
         height, width = self.SIZE
-        published, exact = (r(centers, radii) * (width / 2) for r in (self.rectangle, self.exact_rectangle))
+        published, exact = (
+            r(centers, radii) * (width / 2) for r in (self.rectangle, self.exact_rectangle)
+        )
         short = np.stack([published[:, 0] - exact[:, 0], exact[:, 1] - published[:, 1],
                           published[:, 2] - exact[:, 2], exact[:, 3] - published[:, 3]], axis=-1)  # fmt: skip
         under = (short > 1).any(axis=-1)
         share = under.mean()
-        print(f"\nDarnell: the rectangle is short by more than a pixel for {100 * share:.1f} % of 40,000 spheres")
+        print(
+            f"\nDarnell: the rectangle is short by more than a pixel for {100 * share:.1f} % of 40,000 spheres"
+        )
         assert share > 0.05
         camera = view(self.SIZE, self.BORDERS)
         tested = 0
@@ -266,7 +304,9 @@ class TestDarnell:
         depth[40:200:7, 100:400:11] = HOLE
         camera, bounds = view(self.SIZE, self.BORDERS), hizvk.Spheres(centers, radii)
         truth = hizvk.reference.classify(bounds, camera, depth, kind="z")
-        result = hizvk.compare(hizvk.visible(bounds, camera, depth=depth, kind="z", device=device), truth)
+        result = hizvk.compare(
+            hizvk.visible(bounds, camera, depth=depth, kind="z", device=device), truth
+        )
         assert result.false_culls.size == 0
         assert result.hidden > 50
         assert result.visible > 50
@@ -289,7 +329,9 @@ class TestTuritzin:
         return float(bits.min(keepdims=True).view(np.float32)[0])
 
     @pytest.mark.parametrize("bad", [np.float32(-0.0), np.float32("nan")])
-    def test_t3_minus_zero_and_nan_break_the_order_of_bits(self, device: hizvk.Device, bad: np.float32) -> None:
+    def test_t3_minus_zero_and_nan_break_the_order_of_bits(
+        self, device: hizvk.Device, bad: np.float32
+    ) -> None:
         """Reversed depth, far is 0: a pixel of -0.0 or NaN is a hole, and its bits are greater than any wall's."""
         size = (16, 16)
         near = np.float32(0.125)
@@ -311,7 +353,9 @@ class TestTuritzin:
             camera = view((4, 4), reversed_z=reversed_z)
             depth = np.full((4, 4), 0.25, np.float32)
             depth[2, 1] = np.array([bad], np.uint32).view(np.float32)[0]
-            assert device.pyramid(depth, camera, kind=camera.depth_kind).level(2) == (0.0 if reversed_z else 1.0)
+            assert device.pyramid(depth, camera, kind=camera.depth_kind).level(2) == (
+                0.0 if reversed_z else 1.0
+            )
 
     def test_t3_an_initial_one_caps_larger_depths(self, device: hizvk.Device) -> None:
         """A map of view depths beyond 1: its least depth comes out as 1."""
@@ -324,7 +368,9 @@ class TestTuritzin:
             exact = 0.125 / WALL if reversed_z else 1 - 0.125 / WALL  # no far plane
             assert top == pytest.approx(exact, rel=1e-6)
             spheres = hizvk.Spheres(np.array([[0.0, 0, -5], [0, 0, -20]]), 1.0)
-            assert hizvk.visible(spheres, camera, depth=depth, kind="z", device=device).tolist() == [True, False]
+            assert hizvk.visible(
+                spheres, camera, depth=depth, kind="z", device=device
+            ).tolist() == [True, False]
 
     def test_t4_long_images_are_read_out_of_bounds(self) -> None:
         """Row T4: once one side is 1 and the other is not, the listing reads rows that are not there."""
@@ -340,7 +386,20 @@ class TestTuritzin:
             assert outside > 0, (width, height)
 
     @pytest.mark.parametrize(
-        "size", [(1, 1), (1, 7), (7, 1), (2, 8), (4, 64), (3, 5), (5, 3), (13, 29), (31, 33), (1, 257), (129, 2)]
+        "size",
+        [
+            (1, 1),
+            (1, 7),
+            (7, 1),
+            (2, 8),
+            (4, 64),
+            (3, 5),
+            (5, 3),
+            (13, 29),
+            (31, 33),
+            (1, 257),
+            (129, 2),
+        ],
     )
     @pytest.mark.parametrize("reversed_z", [False, True])
     def test_t1_t2_t4_every_size_keeps_its_farthest_texels(

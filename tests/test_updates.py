@@ -55,7 +55,9 @@ def test_a_cull_sees_the_bounds_that_were_there(
     (centers, sizes), (elsewhere, _) = crowd(3000, 1), crowd(3000, 2)
     instances = device.instances(make(centers, sizes))
     flat = verdicts(device, instances, pyramid)
-    seen, counted = (device.cull(instances, pyramid.camera, pyramid, hierarchy=True) for _ in range(2))
+    seen, counted = (
+        device.cull(instances, pyramid.camera, pyramid, hierarchy=True) for _ in range(2)
+    )
     instances.update(0, make(elsewhere, sizes))
     expected = [flat.count(code) for code in range(2)]
     differs = sum(a != b for a, b in zip(flat, seen.verdicts.tolist(), strict=True))
@@ -71,19 +73,26 @@ def verdicts(device: hizvk.Device, instances: hizvk.Instances, pyramid: hizvk.Py
 @pytest.mark.parametrize("make", KINDS)
 @pytest.mark.parametrize("order", ["morton", "given"])
 def test_after_updates_the_answers_are_those_of_fresh_instances(
-    device: hizvk.Device, pyramid: hizvk.Pyramid, make: Callable[..., Bounds], order: hizvk.device.StoredOrder
+    device: hizvk.Device,
+    pyramid: hizvk.Pyramid,
+    make: Callable[..., Bounds],
+    order: hizvk.device.StoredOrder,
 ) -> None:
     centers, sizes = crowd(3000, 1)
     centers[77] = np.nan
     instances = device.instances(make(centers, sizes), order=order)
-    for seed, (first, count) in enumerate([(0, 0), (77, 1), (5, 900), (2999, 1), (0, 3000), (64, 64), (3000, 0)]):
+    for seed, (first, count) in enumerate(
+        [(0, 0), (77, 1), (5, 900), (2999, 1), (0, 3000), (64, 64), (3000, 0)]
+    ):
         new_centers, new_sizes = crowd(count, 10 + seed)
         new_centers[3:4] = np.inf
         instances.update(first, make(new_centers, new_sizes))
         centers[first : first + count], sizes[first : first + count] = new_centers, new_sizes
         bad = np.flatnonzero(~np.isfinite(centers).all(axis=1))
         assert instances.invalid.tolist() == bad.tolist()
-        fresh = device.cull(device.instances(make(centers, sizes), order="given"), pyramid.camera, pyramid)
+        fresh = device.cull(
+            device.instances(make(centers, sizes), order="given"), pyramid.camera, pyramid
+        )
         result = device.cull(instances, pyramid.camera, pyramid)
         assert result.verdicts.tolist() == fresh.verdicts.tolist()
         assert result.mask.tolist() == fresh.mask.tolist()
@@ -100,7 +109,10 @@ def test_strict_refuses_and_changes_nothing(device: hizvk.Device, pyramid: hizvk
     instances = device.instances(boxes(centers, sizes), strict=True)
     before = verdicts(device, instances, pyramid)
     bad = np.stack([np.full(3, np.nan), np.zeros(3)])
-    with pytest.raises(ValueError, match=r"^bounds: expected finite numbers .*, got 1 bad of 2, the first at index 0$"):
+    with pytest.raises(
+        ValueError,
+        match=r"^bounds: expected finite numbers .*, got 1 bad of 2, the first at index 0$",
+    ):
         instances.update(7, hizvk.Boxes(bad, bad), strict=True)
     assert verdicts(device, instances, pyramid) == before
     assert len(instances.invalid) == 0
@@ -112,7 +124,9 @@ def test_strict_refuses_and_changes_nothing(device: hizvk.Device, pyramid: hizvk
 
 def test_float64_far_away_and_other_dtypes_than_before(device: hizvk.Device) -> None:
     eye = np.array([1e7, 2e7, -3e7])
-    camera = hizvk.Camera.look_at(eye, eye - np.array([0, 0, 10]), fov_y_deg=70, size=(45, 64), near=0.125)
+    camera = hizvk.Camera.look_at(
+        eye, eye - np.array([0, 0, 10]), fov_y_deg=70, size=(45, 64), near=0.125
+    )
     pyramid = device.pyramid(np.full(camera.size, 12.0), camera, kind="z")
     centers, sizes = crowd(200, 3)
     instances = device.instances(spheres(np.zeros_like(centers), sizes))
@@ -124,7 +138,8 @@ def test_float64_far_away_and_other_dtypes_than_before(device: hizvk.Device) -> 
 
 def test_a_cull_in_flight_sees_the_old_bounds(device: hizvk.Device, pyramid: hizvk.Pyramid) -> None:
     old, new = crowd(20_000, 4), crowd(20_000, 5)
-    # Flat: a group of moved members is another one than that of new ones, and its test may read other texels.
+    # Flat: a group of moved members is another one than that of new ones, and its test may read
+    # other texels.
     expected = [verdicts(device, device.instances(spheres(*each)), pyramid) for each in (old, new)]
     assert expected[0] != expected[1]
     instances = device.instances(spheres(*old))
@@ -150,12 +165,16 @@ def test_updates_of_many_threads(device: hizvk.Device, pyramid: hizvk.Pyramid) -
 
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(work, range(4)))
-    assert verdicts(device, instances, pyramid) == verdicts(device, device.instances(boxes(*end)), pyramid)
+    assert verdicts(device, instances, pyramid) == verdicts(
+        device, device.instances(boxes(*end)), pyramid
+    )
 
 
 def test_memory(device: hizvk.Device) -> None:
     centers, sizes = crowd(64_000, 8)
-    sorted_, given = (device.instances(spheres(centers, sizes), order=order) for order in ("morton", "given"))
+    sorted_, given = (
+        device.instances(spheres(centers, sizes), order=order) for order in ("morton", "given")
+    )
     assert sorted_.device_bytes == given.device_bytes
     assert sorted_.host_bytes - given.host_bytes == 8 * 64_000
     assert given.host_bytes == 88 * 1000

@@ -8,14 +8,18 @@ How data flows, and which object holds it::
     Spheres, Boxes, OrientedBoxes ── Device.instances ──> Instances ────────────────────────────┤
     Camera ─────────────────────────────────────────────────────────────────────────────────────┘
                                                                                                 v
-                        CullResult: .mask .verdicts .indices .count .draws (indirect draw arguments) .stats .explain(i)
+                        CullResult: .mask .verdicts .indices .count .draws (indirect draw arguments)
+                        .stats .explain(i)
 
-A pyramid keeps the farthest depth of every 2^k x 2^k block of pixels on its level k. A cull looks up the few texels
-that cover an instance's bounds; when all of the bounds are provably farther than those, it hides the instance, and the
-others are appended to the list that an indirect draw takes. The promise: for the numbers as given, whatever could
-show in one pixel of the depth image is kept. `reference` holds the slow exact oracle, and `compare` counts false culls
-(there are none) and false keeps (a cost). A small depth image promises for larger ones if it was rendered with
-``conservative=True``; `check_proxy` and `check_bounds` say whether occluders and bounds are what they should be.
+A pyramid keeps the farthest depth of every 2^k x 2^k block of pixels on its level k.
+A cull looks up the few texels that cover an instance's bounds; when all of the bounds are provably
+farther than those, it hides the instance, and the others are appended to the list that an indirect
+draw takes.
+The promise: for the numbers as given, whatever could show in one pixel of the depth image is kept.
+`reference` holds the slow exact oracle, and `compare` counts false culls (there are none) and false
+keeps (a cost).
+A small depth image promises for larger ones if it was rendered with ``conservative=True``;
+`check_proxy` and `check_bounds` say whether occluders and bounds are what they should be.
 
     >>> import hizvk
     >>> import numpy as np
@@ -32,9 +36,10 @@ show in one pixel of the depth image is kept. `reference` holds the slow exact o
 
 or in one call, with a depth image of one's own, `visible`.
 
-Conventions: matrices are C-order (4, 4) for column vectors, NDC is x right, y up, z in 0..1, sizes are (height, width),
-row 0 of an image is its top, and the first pixel's centre is at (0.5, 0.5). Bad arguments raise `TypeError` or
-`ValueError` with the parameter's name; everything that the device refuses is a `HizError`.
+Conventions: matrices are C-order (4, 4) for column vectors, NDC is x right, y up, z in 0..1, sizes
+are (height, width), row 0 of an image is its top, and the first pixel's centre is at (0.5, 0.5).
+Bad arguments raise `TypeError` or `ValueError` with the parameter's name; everything that the
+device refuses is a `HizError`.
 """
 
 from . import reference
@@ -45,7 +50,14 @@ from .camera import Camera
 from .comparison import Comparison, compare
 from .containment import BoundsCheck, ProxyCheck, check_bounds, check_proxy
 from .device import Adapter, Device, adapters
-from .errors import DeviceLostError, HizError, HizWarning, LimitError, NoAdapterError, OutOfMemoryError
+from .errors import (
+    DeviceLostError,
+    HizError,
+    HizWarning,
+    LimitError,
+    NoAdapterError,
+    OutOfMemoryError,
+)
 from .oneline import visible
 from .resources import DepthImage, Instances, Mesh, Occluders, Pyramid
 from .result import DRAW_DTYPE, CullResult, CullStats, DrawTemplate, Explanation, Verdict

@@ -1,8 +1,9 @@
 """Checks of arguments, in one place, so that every message reads the same.
 
-``<parameter>: expected <what>, got <what came>``: a `TypeError` when the type or the kind of dtype is wrong, a
-`ValueError` when the shape or the value is. Nothing here copies an array that is already as the engine takes it
-(float32 or float64, C order, native byte order, aligned).
+``<parameter>: expected <what>, got <what came>``: a `TypeError` when the type or the kind of dtype
+is wrong, a `ValueError` when the shape or the value is.
+Nothing here copies an array that is already as the engine takes it (float32 or float64, C order,
+native byte order, aligned).
 """
 
 from __future__ import annotations
@@ -61,12 +62,18 @@ def explained(texts: Mapping[str, str]) -> Callable[[Callable[P, T]], Callable[P
 
     def decorate(maker: Callable[P, T]) -> Callable[P, T]:
         parameters = inspect.signature(maker).parameters
-        needed = [name for name in texts if name in parameters and parameters[name].default is inspect.Parameter.empty]
+        needed = [
+            name
+            for name in texts
+            if name in parameters and parameters[name].default is inspect.Parameter.empty
+        ]
         strange = texts.keys() - parameters.keys()
 
         @functools.wraps(maker)
         def checked(*args: P.args, **kwargs: P.kwargs) -> T:
-            for name in [name for name in needed if name not in kwargs] + sorted(strange & kwargs.keys()):
+            for name in [name for name in needed if name not in kwargs] + sorted(
+                strange & kwargs.keys()
+            ):
                 raise TypeError(f"{name}: {texts[name]}")
             return maker(*args, **kwargs)
 
@@ -95,7 +102,9 @@ def _as_array(name: str, expected: str, value: object) -> npt.NDArray[Any]:
     if is_masked(value):
         # Only floats have a NaN to fill with, and not every parameter takes a NaN.
         is_float = isinstance(value, np.ma.MaskedArray) and value.dtype.kind == "f"
-        way = "fill it first, e.g. with " + (".filled(np.nan)" if is_float else ".astype(np.float64).filled(np.nan)")
+        way = "fill it first, e.g. with " + (
+            ".filled(np.nan)" if is_float else ".astype(np.float64).filled(np.nan)"
+        )
         if "finite" in expected:
             way = "leave out what is masked"
         raise TypeError(f"{name}: expected {expected}, got a masked array; {way}")
@@ -104,7 +113,9 @@ def _as_array(name: str, expected: str, value: object) -> npt.NDArray[Any]:
     try:
         array = np.asarray(value)
     except ValueError as error:  # a ragged list
-        raise ValueError(f"{name}: expected {expected}, got a sequence that is no array ({error})") from None
+        raise ValueError(
+            f"{name}: expected {expected}, got a sequence that is no array ({error})"
+        ) from None
     if array.dtype.kind in "iu" and not hasattr(value, "dtype"):
         if array.size and max(abs(int(array.min())), abs(int(array.max()))) > LARGEST_EXACT_INTEGER:
             raise ValueError(f"{name}: expected {expected}, got integers that float64 cannot hold")
@@ -131,10 +142,14 @@ def shape_hint(shape: Sequence[int | str], sides: Sequence[int]) -> str:
     return ""
 
 
-def _check_shape(name: str, expected: str, array: npt.NDArray[Any], shape: Sequence[int | str], hint: str = "") -> None:
+def _check_shape(
+    name: str, expected: str, array: npt.NDArray[Any], shape: Sequence[int | str], hint: str = ""
+) -> None:
     if not _fits(shape, array.shape):
         hint = shape_hint(shape, array.shape) or hint
-        raise ValueError(f"{name}: expected {expected}, got {_shape_text(array.shape)} {array.dtype}{hint}")
+        raise ValueError(
+            f"{name}: expected {expected}, got {_shape_text(array.shape)} {array.dtype}{hint}"
+        )
 
 
 def _host_memory() -> int:
@@ -145,14 +160,17 @@ def _host_memory() -> int:
 def copied(name: str, array: npt.NDArray[Any], wanted: npt.DTypeLike) -> npt.NDArray[Any]:
     """The array in this dtype, native, aligned and in C order; itself where it is that.
 
-    A broadcast view can claim terabytes that are nowhere: what this machine cannot hold is refused, not tried.
+    A broadcast view can claim terabytes that are nowhere: what this machine cannot hold is refused,
+    not tried.
     """
     flags = array.flags
     if not (flags.c_contiguous and flags.aligned and array.dtype == wanted):
         needed, there = array.size * np.dtype(wanted).itemsize, _host_memory()
         if needed > there:
             got = describe(array)
-            raise OutOfMemoryError(f"{name}: a copy of {got} takes {needed} bytes, this machine has {there}")
+            raise OutOfMemoryError(
+                f"{name}: a copy of {got} takes {needed} bytes, this machine has {there}"
+            )
     try:
         return np.require(array, dtype=wanted, requirements=["C", "A"])
     except MemoryError:
@@ -161,10 +179,14 @@ def copied(name: str, array: npt.NDArray[Any], wanted: npt.DTypeLike) -> npt.NDA
 
 def _ready(name: str, array: npt.NDArray[Any]) -> FloatArray:
     """The array as the engine reads it: float32 or float64; itself where it is that."""
-    return copied(name, array, np.float64 if array.dtype.itemsize == 8 else np.float32)  # float16 widens exactly
+    return copied(
+        name, array, np.float64 if array.dtype.itemsize == 8 else np.float32
+    )  # float16 widens exactly
 
 
-def floats(name: str, value: object, shape: Sequence[int | str], *, why: str = "", hint: str = "") -> FloatArray:
+def floats(
+    name: str, value: object, shape: Sequence[int | str], *, why: str = "", hint: str = ""
+) -> FloatArray:
     """A float array of this shape (letters are free sides), converted only where it has to be.
 
     `why` follows the expected shape, and `hint` an error of the shape that has no plainer way out.
@@ -173,7 +195,11 @@ def floats(name: str, value: object, shape: Sequence[int | str], *, why: str = "
     array = _as_array(name, expected, value)
     if array.dtype.kind != "f" or array.dtype.itemsize not in (2, 4, 8):
         got = describe(array if array.ndim else value)
-        way = "; convert it with .astype(np.float64)" if array.dtype.kind in "iufO" and array.ndim else ""
+        way = (
+            "; convert it with .astype(np.float64)"
+            if array.dtype.kind in "iufO" and array.ndim
+            else ""
+        )
         raise TypeError(f"{name}: expected {expected}, got {got}{way}")
     _check_shape(name, expected, array, shape, hint)
     return _ready(name, array)
@@ -181,7 +207,9 @@ def floats(name: str, value: object, shape: Sequence[int | str], *, why: str = "
 
 def _is_real(value: object) -> bool:
     """Whether it is one number; truth values are none, and NumPy's durations, though they say so."""
-    return isinstance(value, numbers.Real) and not isinstance(value, (bool, np.bool_, np.timedelta64))
+    return isinstance(value, numbers.Real) and not isinstance(
+        value, (bool, np.bool_, np.timedelta64)
+    )
 
 
 def floats_or_scalar(name: str, value: object, count: int) -> FloatArray:
@@ -200,13 +228,17 @@ def finite_floats(name: str, value: object, shape: Sequence[int | str]) -> Float
     """`floats`, all of them finite."""
     if is_masked(value):
         expected = f"finite float {_shape_text(shape)}"
-        raise TypeError(f"{name}: expected {expected}, got a masked array; leave out what is masked")
+        raise TypeError(
+            f"{name}: expected {expected}, got a masked array; leave out what is masked"
+        )
     array = floats(name, value, shape)
     # Row by row in blocks: no temporary array as long as the argument.
     blocks = (array[start : start + BLOCK] for start in range(0, len(array), BLOCK))
     bad = sum(int(np.count_nonzero(~np.isfinite(block))) for block in blocks)
     if bad:
-        raise ValueError(f"{name}: expected finite float {_shape_text(shape)}, got {bad} NaN or infinite numbers")
+        raise ValueError(
+            f"{name}: expected finite float {_shape_text(shape)}, got {bad} NaN or infinite numbers"
+        )
     return array
 
 
@@ -215,17 +247,22 @@ def numbers_of_shape(
 ) -> npt.NDArray[np.float64]:
     """A small float64 array of finite numbers (a vector or matrix of a camera); integers are welcome here.
 
-    Any of `shapes` will do. `of` comes before them in an error, and `hint` after what came.
+    Any of `shapes` will do.
+    `of` comes before them in an error, and `hint` after what came.
     """
     expected = f"{of}{' or '.join(map(_shape_text, shapes))} finite numbers"
     array = _as_array(name, expected, value)
     if array.dtype.kind not in "fiu" or array.dtype.itemsize > 8:
-        raise TypeError(f"{name}: expected {expected}, got {describe(array if array.ndim else value)}")
+        raise TypeError(
+            f"{name}: expected {expected}, got {describe(array if array.ndim else value)}"
+        )
     if array.shape not in shapes:
         _check_shape(name, expected, array, shapes[-1], hint)
     result: npt.NDArray[np.float64] = np.array(array, dtype=np.float64, order="C")
     if not np.isfinite(result).all():
-        raise ValueError(f"{name}: expected {expected}, got {' '.join(str(result.tolist()).split())}")
+        raise ValueError(
+            f"{name}: expected {expected}, got {' '.join(str(result.tolist()).split())}"
+        )
     return result
 
 
@@ -265,7 +302,9 @@ def _rotation_and_translation(
     hint = "; a rotation vector becomes a matrix by cv2.Rodrigues(rvec)[0]"
     linear = numbers_of_shape(name, rotation, (3, 3), of="R of a pair (R, t) to be ", hint=hint)
     # OpenCV's translations are columns.
-    moved = numbers_of_shape(name, translation, (3, 1), (1, 3), (3,), of="t of a pair (R, t) to be ")
+    moved = numbers_of_shape(
+        name, translation, (3, 1), (1, 3), (3,), of="t of a pair (R, t) to be "
+    )
     return linear, moved.reshape(3)
 
 
@@ -286,7 +325,9 @@ def _refuse_singular(name: str, expected: str, square: npt.NDArray[np.float64]) 
     for axis in (1, 0, 1, 0):
         largest = np.abs(scaled).max(axis=axis, keepdims=True)
         if not (largest > 0.0).all():
-            raise ValueError(f"{name}: expected {expected}, got a singular one (a row or column is zero)")
+            raise ValueError(
+                f"{name}: expected {expected}, got a singular one (a row or column is zero)"
+            )
         scaled = scaled / np.exp2(np.floor(np.log2(largest)))
     if np.linalg.svd(scaled, compute_uv=False)[-1] < 1e-15:
         raise ValueError(f"{name}: expected {expected}, got a singular one")
@@ -318,7 +359,9 @@ def number(
         raise _wrong_value(name, expected, value) from None
     fits = math.isfinite(result)
     fits = fits and (above is None or result > above) and (below is None or result < below)
-    fits = fits and (at_least is None or result >= at_least) and (at_most is None or result <= at_most)
+    fits = (
+        fits and (at_least is None or result >= at_least) and (at_most is None or result <= at_most)
+    )
     if not fits:
         raise _wrong_value(name, expected, value)
     return result
@@ -400,7 +443,9 @@ def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
     if array.size == 0 and not hasattr(value, "dtype"):
         array = array.astype(np.bool_)
     if array.dtype.kind != "b":
-        raise TypeError(f"{name}: expected {expected}, got {describe(array if array.ndim else value)}")
+        raise TypeError(
+            f"{name}: expected {expected}, got {describe(array if array.ndim else value)}"
+        )
     _check_shape(name, expected, array, shape)
     return copied(name, array, np.bool_)
 
@@ -409,22 +454,30 @@ def triangles(name: str, value: object, vertex_count: int) -> npt.NDArray[np.uin
     """``(T, 3)`` indices of vertices, as uint32; any integer dtype comes in."""
     expected = "integer (T, 3)"
     if is_masked(value):
-        raise TypeError(f"{name}: expected {expected}, got a masked array; leave out the triangles that are masked")
+        raise TypeError(
+            f"{name}: expected {expected}, got a masked array; leave out the triangles that are masked"
+        )
     if isinstance(value, (str, bytes)) or value is None:
         raise _wrong_type(name, expected, value)
     try:
         array = np.asarray(value)
     except ValueError as error:
-        raise ValueError(f"{name}: expected {expected}, got a sequence that is no array ({error})") from None
+        raise ValueError(
+            f"{name}: expected {expected}, got a sequence that is no array ({error})"
+        ) from None
     if array.size == 0 and not hasattr(value, "dtype"):
         array = array.reshape(0, 3).astype(np.uint32)
     if array.dtype.kind not in "iu":
-        raise TypeError(f"{name}: expected {expected}, got {describe(array if array.ndim else value)}")
+        raise TypeError(
+            f"{name}: expected {expected}, got {describe(array if array.ndim else value)}"
+        )
     _check_shape(name, expected, array, ("T", 3))
     array = copied(name, array, array.dtype.newbyteorder("="))
     if array.size:
         low, high = int(array.min()), int(array.max())
         if low < 0 or high >= vertex_count:
             wrong = low if low < 0 else high
-            raise ValueError(f"{name}: expected vertex indices in 0..{vertex_count - 1}, got {wrong}")
+            raise ValueError(
+                f"{name}: expected vertex indices in 0..{vertex_count - 1}, got {wrong}"
+            )
     return copied(name, array, np.uint32)

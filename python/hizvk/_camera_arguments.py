@@ -48,7 +48,10 @@ COLMAP_KEYWORDS: Final = {
     **POSE_KEYWORDS,
 }
 #: And about a camera matrix of which nobody says where its pixels' centres are.
-KEYWORDS: Final = {"pixel_center": f"expected {_CENTERS}, got nothing; {_NO_DEFAULT}", **POSE_KEYWORDS}
+KEYWORDS: Final = {
+    "pixel_center": f"expected {_CENTERS}, got nothing; {_NO_DEFAULT}",
+    **POSE_KEYWORDS,
+}
 
 #: COLMAP's models that are a pinhole where what follows cx and cy is 0, and the order of their
 #: parameters in cameras.txt and pycolmap (colmap/src/colmap/sensor/models/).
@@ -68,16 +71,18 @@ COLMAP_CURVED: Final = (
     "SIMPLE_FISHEYE", "FISHEYE", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "OPENCV_FISHEYE", "THIN_PRISM_FISHEYE",
     "RAD_TAN_THIN_PRISM_FISHEYE", "EUCM", "EQUIRECTANGULAR",
 )  # fmt: skip
-_UNDISTORT = (
-    "run COLMAP's image_undistorter, and pass the PINHOLE camera that it writes (its depth maps belong to that camera)"
-)
+_UNDISTORT = "run COLMAP's image_undistorter, and pass the PINHOLE camera that it writes (its depth maps belong to that camera)"
 #: How far a quaternion of a file may be from length 1.
 UNIT_TOLERANCE = 1e-2
 
 
 def view(eye: object, target: object, up: object) -> tuple[Vector, Vector, Vector]:
     """The three vectors of a view; the engine refuses those that leave it without a direction."""
-    return _arguments.vector("eye", eye), _arguments.vector("target", target), _arguments.vector("up", up)
+    return (
+        _arguments.vector("eye", eye),
+        _arguments.vector("target", target),
+        _arguments.vector("up", up),
+    )
 
 
 def near_far(near: object, far: object) -> tuple[float, float | None]:
@@ -91,7 +96,9 @@ def near_far(near: object, far: object) -> tuple[float, float | None]:
 def pixel_center(value: object) -> PixelCenter:
     """Where the first pixel's centre is in the coordinates of a camera matrix."""
     if not isinstance(value, str):
-        raise TypeError(f"pixel_center: expected {_CENTERS}, got {_arguments.describe(value)}; {_NO_DEFAULT}")
+        raise TypeError(
+            f"pixel_center: expected {_CENTERS}, got {_arguments.describe(value)}; {_NO_DEFAULT}"
+        )
     if value not in TO_HALF:
         raise ValueError(f"pixel_center: expected {_CENTERS}, got {_arguments.describe(value)}")
     return value  # type: ignore[return-value]
@@ -119,7 +126,9 @@ def refuse_distortion(distortion: object) -> None:
     coefficients = np.asarray(distortion)
     if coefficients.size > MOST_COEFFICIENTS:
         got = _arguments.describe(coefficients)
-        raise ValueError(f"distortion: expected None or at most {MOST_COEFFICIENTS} zeros, got {got}")
+        raise ValueError(
+            f"distortion: expected None or at most {MOST_COEFFICIENTS} zeros, got {got}"
+        )
     if coefficients.dtype.kind not in "fiu":
         got = _arguments.describe(coefficients if coefficients.ndim else distortion)
         raise TypeError(f"distortion: expected None or an array of zeros, got {got}")
@@ -142,7 +151,9 @@ def one_pose(camera_from_world: object, world_from_camera: object) -> Pose:
     return "world_from_camera", _arguments.pose("world_from_camera", world_from_camera)
 
 
-def colmap_pose(qvec: object, tvec: object, camera_from_world: object, world_from_camera: object) -> Pose:
+def colmap_pose(
+    qvec: object, tvec: object, camera_from_world: object, world_from_camera: object
+) -> Pose:
     """The pose of an image of COLMAP: a matrix, or quaternion and translation of images.txt."""
     if qvec is None and tvec is None:
         if camera_from_world is None and world_from_camera is None:
@@ -153,41 +164,63 @@ def colmap_pose(qvec: object, tvec: object, camera_from_world: object, world_fro
         raise ValueError("qvec, tvec: expected alone, or camera_from_world instead; got both")
     for name, value in (("qvec", qvec), ("tvec", tvec)):
         if value is None:
-            raise ValueError(f"{name}: expected the other half of the pose, as images.txt has it; got None")
+            raise ValueError(
+                f"{name}: expected the other half of the pose, as images.txt has it; got None"
+            )
     quaternion = _arguments.numbers_of_shape("qvec", qvec, (4,))
     length = float(np.linalg.norm(quaternion))
     if not abs(length - 1.0) <= UNIT_TOLERANCE:
         expected = "a quaternion (w, x, y, z) of length 1"
-        raise ValueError(f"qvec: expected {expected}, got {quaternion.tolist()} of length {length:g}")
+        raise ValueError(
+            f"qvec: expected {expected}, got {quaternion.tolist()} of length {length:g}"
+        )
     result = np.eye(4)
     result[:3, :3] = _rotations.from_quaternions(*quaternion[:, None])[0]
     result[:3, 3] = _arguments.vector("tvec", tvec)
     return "camera_from_world", result
 
 
-def colmap_intrinsics(model: object, params: object) -> tuple[str, npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def colmap_intrinsics(
+    model: object, params: object
+) -> tuple[str, npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """The model's name, its parameters, and the camera matrix that they are."""
     expected = f"one of COLMAP's models {', '.join(COLMAP_MODELS)}"
-    name = model if isinstance(model, str) else getattr(model, "name", None)  # pycolmap: an enumeration
+    name = (
+        model if isinstance(model, str) else getattr(model, "name", None)
+    )  # pycolmap: an enumeration
     if not isinstance(name, str):
         raise TypeError(f"model: expected {expected}, got {_arguments.describe(model)}")
     if name in COLMAP_CURVED:
-        raise ValueError(f"model: expected {expected}, got {name}, which is no pinhole with any numbers; {_UNDISTORT}")
+        raise ValueError(
+            f"model: expected {expected}, got {name}, which is no pinhole with any numbers; {_UNDISTORT}"
+        )
     if name not in COLMAP_MODELS:
         raise ValueError(f"model: expected {expected}, got {_arguments.describe(name)}")
     words = COLMAP_MODELS[name].split(", ")
-    listed = _arguments.numbers_of_shape("params", params, (len(words),), of=f"{COLMAP_MODELS[name]} of {name}, ")
+    listed = _arguments.numbers_of_shape(
+        "params", params, (len(words),), of=f"{COLMAP_MODELS[name]} of {name}, "
+    )
     values = dict(zip(words, listed.tolist(), strict=True))
     fx, fy = (values["f"], values["f"]) if "f" in values else (values["fx"], values["fy"])
     if not (fx > 0.0 and fy > 0.0):
-        raise ValueError(f"params: expected {COLMAP_MODELS[name]} of {name} with focal lengths above 0, got {values}")
-    bent = {word: value for word, value in values.items() if word not in ("f", "fx", "fy", "cx", "cy") and value != 0.0}
+        raise ValueError(
+            f"params: expected {COLMAP_MODELS[name]} of {name} with focal lengths above 0, got {values}"
+        )
+    bent = {
+        word: value
+        for word, value in values.items()
+        if word not in ("f", "fx", "fy", "cx", "cy") and value != 0.0
+    }
     if bent:
         got = ", ".join(f"{word}={value:g}" for word, value in bent.items())
         raise ValueError(
             f"params: expected no distortion, all zeros behind cx and cy, got {got} of {name}; {_UNDISTORT}"
         )
-    return name, listed, np.array([[fx, 0.0, values["cx"]], [0.0, fy, values["cy"]], [0.0, 0.0, 1.0]])
+    return (
+        name,
+        listed,
+        np.array([[fx, 0.0, values["cx"]], [0.0, fy, values["cy"]], [0.0, 0.0, 1.0]]),
+    )
 
 
 def only_one(names: Sequence[str], values: Sequence[object]) -> str:
@@ -203,14 +236,18 @@ def nothing_beside(what: str, values: Mapping[str, object]) -> None:
     """Refuse parameters that would mean nothing."""
     for name, value in values.items():
         if value is not None:
-            raise TypeError(f"{name}: expected nothing beside {what}, got {_arguments.describe(value)}")
+            raise TypeError(
+                f"{name}: expected nothing beside {what}, got {_arguments.describe(value)}"
+            )
 
 
 def only_beside(what: str, values: Mapping[str, object], came: str) -> None:
     """Refuse parameters that mean something beside another one alone."""
     for name, value in values.items():
         if value is not None:
-            raise TypeError(f"{name}: expected beside {what} alone, got {_arguments.describe(value)} beside {came}")
+            raise TypeError(
+                f"{name}: expected beside {what} alone, got {_arguments.describe(value)} beside {came}"
+            )
 
 
 def opengl_projection(projection: object) -> npt.NDArray[np.float64]:

@@ -1,7 +1,8 @@
 """What ending processes, forks and the driver's environment ask of this package.
 
-A lock that another thread holds at a fork is never released in the child. So nothing here or elsewhere in the package
-waits for a lock of another process: what has one belongs to a process (`per_process`), and `cached_property` has none.
+A lock that another thread holds at a fork is never released in the child.
+So nothing here or elsewhere in the package waits for a lock of another process: what has one
+belongs to a process (`per_process`), and `cached_property` has none.
 """
 
 from __future__ import annotations
@@ -113,14 +114,18 @@ def _c_functions() -> tuple[Any, Any] | None:
 
 _at_exit = _c_functions()
 if _at_exit is not None:
-    _exit, _fflush = (ctypes.cast(f, ctypes.c_void_p) for f in (ctypes.CDLL(None)._exit, ctypes.CDLL(None).fflush))
+    _exit, _fflush = (
+        ctypes.cast(f, ctypes.c_void_p) for f in (ctypes.CDLL(None)._exit, ctypes.CDLL(None).fflush)
+    )
 
 
 def _after_fork_in_child() -> None:
     """Without any lock: the environment as it was, and an end without the parent's drivers.
 
-    Mesa joins threads at a C program's exit. In a fork they do not exist, and it crashes or waits for ever. So the
-    child of a process that has asked a driver ends, once Python has ended, without its parent's C exit handlers.
+    Mesa joins threads at a C program's exit.
+    In a fork they do not exist, and it crashes or waits for ever.
+    So the child of a process that has asked a driver ends, once Python has ended, without its
+    parent's C exit handlers.
     (`multiprocessing` ends its children so in any case.)
     """
     if not _environments:
@@ -129,7 +134,8 @@ def _after_fork_in_child() -> None:
         environment.restore()
     if _at_exit is not None:
         on_exit, cxa_atexit = _at_exit
-        # The last one runs first: C's streams are written out, then the process ends with its status.
+        # The last one runs first: C's streams are written out, then the process ends with its
+        # status.
         on_exit(_exit, None)
         cxa_atexit(_fflush, None, None)
 

@@ -46,8 +46,12 @@ def about(axis: tuple[float, float, float], degrees: npt.NDArray[Any]) -> npt.ND
         sine, cosine = np.sin(rest), np.cos(rest)
         turn = np.mod(quarters, 4.0)
         sine, cosine = (
-            np.select([turn == 0, turn == 1, turn == 2, turn == 3], [sine, cosine, -sine, -cosine], np.nan),
-            np.select([turn == 0, turn == 1, turn == 2, turn == 3], [cosine, -sine, -cosine, sine], np.nan),
+            np.select(
+                [turn == 0, turn == 1, turn == 2, turn == 3], [sine, cosine, -sine, -cosine], np.nan
+            ),
+            np.select(
+                [turn == 0, turn == 1, turn == 2, turn == 3], [cosine, -sine, -cosine, sine], np.nan
+            ),
         )
     x, y, z = direction
     across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

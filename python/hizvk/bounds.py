@@ -1,9 +1,10 @@
 """The volumes that are tested: spheres, axis-aligned boxes and oriented boxes, as arrays over the instances.
 
-The arrays are kept as they come (float32 and float64 in C order without a copy) and are read when they are uploaded
-(`Device.instances`). Positions may be float64: the engine re-centres them on the eye before it rounds. Bad bounds
-(NaN, infinite, a negative radius or half size, min > max) are no error here: a cull keeps them visible and counts them,
-or `Device.instances(..., strict=True)` refuses them.
+The arrays are kept as they come (float32 and float64 in C order without a copy) and are read when
+they are uploaded (`Device.instances`).
+Positions may be float64: the engine re-centres them on the eye before it rounds.
+Bad bounds (NaN, infinite, a negative radius or half size, min > max) are no error here: a cull
+keeps them visible and counts them, or `Device.instances(..., strict=True)` refuses them.
 """
 
 from __future__ import annotations
@@ -123,9 +124,10 @@ class OrientedBoxes:
     """Boxes with axes of their own.
 
     `from_yaw`, `from_quaternions` and `from_transforms` make them from what data sets hold instead
-    of `rotations`. The matrices that they form in float64 *are* the boxes' rotations from then on:
-    what a cull promises, it promises about the boxes with those matrices. They are off an exact
-    turn by some 1e-16, as far as a half size of 1 km by 1e-13 m.
+    of `rotations`.
+    The matrices that they form in float64 *are* the boxes' rotations from then on: what a cull
+    promises, it promises about the boxes with those matrices.
+    They are off an exact turn by some 1e-16, as far as a half size of 1 km by 1e-13 m.
 
     Parameters
     ----------
@@ -134,8 +136,9 @@ class OrientedBoxes:
     half_sizes : (N, 3) float array
         Half the side along each of the box's own axes.
     rotations : (N, 3, 3) float array
-        Column ``k`` is the world direction of the box's axis ``k``: ``world = center + rotation @ local``. Any matrix
-        is allowed (scaled, sheared, mirrored, flat), not rotations alone.
+        Column ``k`` is the world direction of the box's axis ``k``: ``world = center + rotation @
+        local``.
+        Any matrix is allowed (scaled, sheared, mirrored, flat), not rotations alone.
 
     Raises
     ------
@@ -149,34 +152,45 @@ class OrientedBoxes:
     half_sizes: FloatArray
     rotations: FloatArray
 
-    def __init__(self, centers: npt.ArrayLike, half_sizes: npt.ArrayLike, rotations: npt.ArrayLike) -> None:
+    def __init__(
+        self, centers: npt.ArrayLike, half_sizes: npt.ArrayLike, rotations: npt.ArrayLike
+    ) -> None:
         centers = _arguments.floats("centers", centers, ("N", 3))
         count = len(centers)
         object.__setattr__(self, "centers", centers)
-        object.__setattr__(self, "half_sizes", _arguments.floats("half_sizes", half_sizes, (count, 3)))
+        object.__setattr__(
+            self, "half_sizes", _arguments.floats("half_sizes", half_sizes, (count, 3))
+        )
         checked = _arguments.floats("rotations", rotations, (count, 3, 3), hint=_OTHER_ROTATIONS)
         object.__setattr__(self, "rotations", checked)
 
     @classmethod
     @_arguments.explained(_KEYWORDS)
     def from_yaw(
-        cls, centers: npt.ArrayLike, half_sizes: npt.ArrayLike, yaw_deg: npt.ArrayLike, *, up: npt.ArrayLike
+        cls,
+        centers: npt.ArrayLike,
+        half_sizes: npt.ArrayLike,
+        yaw_deg: npt.ArrayLike,
+        *,
+        up: npt.ArrayLike,
     ) -> Self:
         """Boxes that are turned about one axis, as in most driving data.
 
         Parameters
         ----------
         centers : (N, 3) float array
-            World positions of the boxes' centres. (KITTI's labels hold the middle of the lower
-            face.)
+            World positions of the boxes' centres.
+            (KITTI's labels hold the middle of the lower face.)
         half_sizes : (N, 3) or (3,) float array, or one number
             Half the side along each of the box's own axes, which are the world's at an angle of 0.
         yaw_deg : (N,) float array or one number
             Degrees (``np.degrees`` of a data set's radians) by which the boxes turn about `up`, by
             the right-hand rule: for ``up=(0, 0, 1)`` from x towards y, as CARLA has it in its
-            left-handed coordinates, too. Whole quarter turns are exact.
+            left-handed coordinates, too.
+            Whole quarter turns are exact.
         up : three numbers
-            The axis, of any length: ``(0, 0, 1)`` where z is up. There is no default.
+            The axis, of any length: ``(0, 0, 1)`` where z is up.
+            There is no default.
 
         Raises
         ------
@@ -217,10 +231,12 @@ class OrientedBoxes:
             Half the side along each of the box's own axes.
         quaternions : (N, 4) float array
             The turn from the box's axes to the world's; of any length but 0, for they are
-            normalised. One of length 0, or not finite, makes a box that is no volume: a cull keeps
-            it and counts it as invalid.
+            normalised.
+            One of length 0, or not finite, makes a box that is no volume: a cull keeps it and
+            counts it as invalid.
         order : {"wxyz", "xyzw"}
-            Where the scalar part is. There is no default.
+            Where the scalar part is.
+            There is no default.
 
         Raises
         ------
@@ -228,28 +244,35 @@ class OrientedBoxes:
             They name the parameter, what it expects and what came.
         """
         if not isinstance(order, str):
-            raise TypeError(f"order: expected {_ORDERS}, got {_arguments.describe(order)}; {_NO_DEFAULT}")
+            raise TypeError(
+                f"order: expected {_ORDERS}, got {_arguments.describe(order)}; {_NO_DEFAULT}"
+            )
         if order not in ("wxyz", "xyzw"):
             raise ValueError(f"order: expected {_ORDERS}, got {_arguments.describe(order)}")
         centers = _arguments.floats("centers", centers, ("N", 3))
         half_sizes = _for_each("half_sizes", half_sizes, len(centers))
         columns = _arguments.floats("quaternions", quaternions, (len(centers), 4)).T
-        w, x, y, z = columns if order == "wxyz" else (columns[3], columns[0], columns[1], columns[2])
+        w, x, y, z = (
+            columns if order == "wxyz" else (columns[3], columns[0], columns[1], columns[2])
+        )
         return cls(centers, half_sizes, _rotations.from_quaternions(w, x, y, z))
 
     @classmethod
-    def from_transforms(cls, world_from_box: npt.ArrayLike, half_sizes: npt.ArrayLike = 0.5) -> Self:
+    def from_transforms(
+        cls, world_from_box: npt.ArrayLike, half_sizes: npt.ArrayLike = 0.5
+    ) -> Self:
         """Boxes that are placed by matrices: cubes of a scene graph, poses of a tracker.
 
         Parameters
         ----------
         world_from_box : (N, 4, 4) or (N, 3, 4) float array; or one matrix without the N
-            ``world = M @ [x, y, z, 1]`` for column vectors, with any turn, scale, shear or mirroring;
-            the last row of a ``(4, 4)`` is 0, 0, 0, 1. A matrix that is not finite makes a box that
-            is no volume: a cull keeps it and counts it as invalid.
+            ``world = M @ [x, y, z, 1]`` for column vectors, with any turn, scale, shear or
+            mirroring; the last row of a ``(4, 4)`` is 0, 0, 0, 1.
+            A matrix that is not finite makes a box that is no volume: a cull keeps it and counts it
+            as invalid.
         half_sizes : (N, 3) or (3,) float array, or one number
-            Half the side along each of the box's own axes, before the matrix. The default is the
-            cube from -0.5 to 0.5.
+            Half the side along each of the box's own axes, before the matrix.
+            The default is the cube from -0.5 to 0.5.
 
         Raises
         ------

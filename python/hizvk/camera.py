@@ -1,9 +1,11 @@
 """The camera: which clip coordinates a world position has, in which image, in which depth convention.
 
-Conventions are named constructors, never guessed. Matrices are C-order ``(4, 4)`` for column vectors
-(``clip = M @ [x, y, z, 1]``), normalised device coordinates have x right, y up and z in 0..1, image sizes are
-``(height, width)`` and row 0 is the top of the image. The numbers are float64 from here to the engine, which re-centres
-everything on the eye, so that world positions of millions of metres are fine.
+Conventions are named constructors, never guessed.
+Matrices are C-order ``(4, 4)`` for column vectors (``clip = M @ [x, y, z, 1]``), normalised device
+coordinates have x right, y up and z in 0..1, image sizes are ``(height, width)`` and row 0 is the
+top of the image.
+The numbers are float64 from here to the engine, which re-centres everything on the eye, so that
+world positions of millions of metres are fine.
 """
 
 from __future__ import annotations
@@ -41,10 +43,12 @@ class Camera:
     `Camera.from_matrices`  matrices that already are in this library's conventions
     ======================  ==========================================================================
 
-    ``docs/conventions.md`` has the call for each of a dozen tools. Poses are ``(4, 4)``, ``(3, 4)``
-    or a pair ``(R, t)`` of ``(3, 3)`` and ``(3,)``, for column vectors.
+    ``docs/conventions.md`` has the call for each of a dozen tools.
+    Poses are ``(4, 4)``, ``(3, 4)`` or a pair ``(R, t)`` of ``(3, 3)`` and ``(3,)``, for column
+    vectors.
 
-    Cameras compare by what they project, can be hashed, copied and pickled, and may be used from any thread.
+    Cameras compare by what they project, can be hashed, copied and pickled, and may be used from
+    any thread.
     """
 
     __slots__ = ("_inner", "_recipe")
@@ -66,7 +70,8 @@ class Camera:
         object.__setattr__(camera, "_recipe", (name, tuple(arguments.items())))
         return camera
 
-    # -- constructors ------------------------------------------------------------------------------------------------
+    # --
+    # constructors ------------------------------------------------------------------------------------------------
 
     @classmethod
     def look_at(
@@ -88,16 +93,18 @@ class Camera:
         eye, target : three numbers
             World positions.
         up : three numbers
-            The direction that points to the top of the image. The default is +y: in a world whose z
-            is up (Blender, CARLA, ROS, maps) pass ``(0, 0, 1)``, or the image comes out rolled. It
-            must not be parallel to the view direction: to look straight down, pass what shall be
+            The direction that points to the top of the image.
+            The default is +y: in a world whose z is up (Blender, CARLA, ROS, maps) pass ``(0, 0,
+            1)``, or the image comes out rolled.
+            It must not be parallel to the view direction: to look straight down, pass what shall be
             at the top, such as the heading, or north.
         fov_y_deg : float
             The full vertical angle of view in degrees, above 0 and below 180.
         size : (height, width)
             Pixels of the image; they are square.
         near, far : float
-            Distances of the near and far plane along the view direction, ``0 < near < far``; None is infinitely far.
+            Distances of the near and far plane along the view direction, ``0 < near < far``; None
+            is infinitely far.
         reversed_z : bool
             True: depth 1 at the near plane and 0 at the far plane; False: 0 near, 1 far.
 
@@ -111,7 +118,9 @@ class Camera:
         size = _arguments.size("size", size)
         near, far = _camera_arguments.near_far(near, far)
         reversed_z = _arguments.flag("reversed_z", reversed_z)
-        core = _core.Camera.perspective(eye, target, up, math.radians(fov_y_deg), near, far, reversed_z, size)
+        core = _core.Camera.perspective(
+            eye, target, up, math.radians(fov_y_deg), near, far, reversed_z, size
+        )
         return cls._made(
             core, "look_at", eye=eye, target=target, up=up, fov_y_deg=fov_y_deg, size=size, near=near, far=far,
             reversed_z=reversed_z,
@@ -140,8 +149,8 @@ class Camera:
         eye, target, up : three numbers
             As in `look_at`.
         left, right, bottom, top : float
-            The image borders at view depth 1: tangents of the angles to the view direction, x to the right and y up;
-            ``left < right`` and ``bottom < top``.
+            The image borders at view depth 1: tangents of the angles to the view direction, x to
+            the right and y up; ``left < right`` and ``bottom < top``.
         size, near, far, reversed_z
             As in `look_at`.
 
@@ -186,12 +195,13 @@ class Camera:
         eye, target, up : three numbers
             As in `look_at`.
         height, width : float
-            What the image shows, in world units. ``width=None``: the pixels are square.
+            What the image shows, in world units.
+            ``width=None``: the pixels are square.
         size : (height, width)
             Pixels of the image.
         near, far : float
-            The two planes, as distances from `eye` along the view direction; ``near < far``, both finite; near may be
-            negative.
+            The two planes, as distances from `eye` along the view direction; ``near < far``, both
+            finite; near may be negative.
         reversed_z : bool
             As in `look_at`.
 
@@ -238,28 +248,30 @@ class Camera:
         k : (3, 3)
             ``[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]`` in pixels.
         pixel_center : {"integer", "half"}
-            Where `k` has the centre of the first pixel. There is no default: half a pixel too far
-            hides what can be seen.
+            Where `k` has the centre of the first pixel.
+            There is no default: half a pixel too far hides what can be seen.
 
-            ``"integer"``: at (0, 0), as in OpenCV, ROS, KITTI and Open3D's cameras. Here it is at
-            (0.5, 0.5), so ``cx + 0.5`` and ``cy + 0.5`` are used.
+            ``"integer"``: at (0, 0), as in OpenCV, ROS, KITTI and Open3D's cameras.
+            Here it is at (0.5, 0.5), so ``cx + 0.5`` and ``cy + 0.5`` are used.
             ``"half"``: at (0.5, 0.5), as in COLMAP, nerfstudio, gsplat, and wherever ``cx`` is half
-            of the width (CARLA). `cx` and `cy` are used as they are.
+            of the width (CARLA).
+            `cx` and `cy` are used as they are.
         camera_from_world, world_from_camera : (4, 4), (3, 4) or a pair (R, t)
-            The pose; pass exactly one. ``camera_from_world`` is OpenCV's ``[R | t]``: of
-            ``solvePnP`` pass ``(cv2.Rodrigues(rvec)[0], tvec)``. ``world_from_camera`` is its
-            inverse.
+            The pose; pass exactly one.
+            ``camera_from_world`` is OpenCV's ``[R | t]``: of ``solvePnP`` pass
+            ``(cv2.Rodrigues(rvec)[0], tvec)``.
+            ``world_from_camera`` is its inverse.
         size : (height, width)
-            Pixels of the image that `k` belongs to. For a depth image of another resolution, take
-            `resized` of the camera; the view stays.
+            Pixels of the image that `k` belongs to.
+            For a depth image of another resolution, take `resized` of the camera; the view stays.
         near, far, reversed_z
             As in `look_at`; view depth is the camera's z.
         distortion : array, optional
-            Lens distortion coefficients; None or all zero. Others are refused: remap the depth
-            image first (``cv2.initUndistortRectifyMap`` and ``cv2.remap`` with
-            ``cv2.INTER_NEAREST``; ``cv2.undistort`` interpolates, and makes depth that nothing has)
-            and pass the new camera matrix. A fisheye is no pinhole, even with coefficients of 0
-            (``cv2.fisheye``).
+            Lens distortion coefficients; None or all zero.
+            Others are refused: remap the depth image first (``cv2.initUndistortRectifyMap`` and
+            ``cv2.remap`` with ``cv2.INTER_NEAREST``; ``cv2.undistort`` interpolates, and makes
+            depth that nothing has) and pass the new camera matrix.
+            A fisheye is no pinhole, even with coefficients of 0 (``cv2.fisheye``).
 
         Raises
         ------
@@ -282,7 +294,9 @@ class Camera:
         near, far = _camera_arguments.near_far(near, far)
         _camera_arguments.refuse_distortion(distortion)
         reversed_z = _arguments.flag("reversed_z", reversed_z)
-        core = _posed(_pinhole(k, pixel_center, near, far, reversed_z, size), name, pose, reversed_z, size)
+        core = _posed(
+            _pinhole(k, pixel_center, near, far, reversed_z, size), name, pose, reversed_z, size
+        )
         return cls._made(
             core, "from_opencv", k=k, pixel_center=pixel_center, **{name: pose}, size=size, near=near, far=far,
             reversed_z=reversed_z,
@@ -306,30 +320,32 @@ class Camera:
     ) -> Self:
         """A camera of a COLMAP model (cameras.txt and images.txt, or pycolmap).
 
-        Its axes are OpenCV's (x right, y down, z forward), and the first pixel's centre is at
-        (0.5, 0.5), as it is here.
+        Its axes are OpenCV's (x right, y down, z forward), and the first pixel's centre is at (0.5,
+        0.5), as it is here.
 
         Parameters
         ----------
         model : str
-            The camera's model, ``"PINHOLE"`` or ``"SIMPLE_PINHOLE"``. Models with distortion
-            (``"SIMPLE_RADIAL"``, ``"OPENCV"``, ...) are taken if all of it is 0; a fisheye never
-            is. The way out is COLMAP's ``image_undistorter``, whose cameras are ``PINHOLE``.
-            pycolmap's ``camera.model`` will do.
+            The camera's model, ``"PINHOLE"`` or ``"SIMPLE_PINHOLE"``.
+            Models with distortion (``"SIMPLE_RADIAL"``, ``"OPENCV"``, ...) are taken if all of it
+            is 0; a fisheye never is.
+            The way out is COLMAP's ``image_undistorter``, whose cameras are ``PINHOLE``. pycolmap's
+            ``camera.model`` will do.
         params : (P,) numbers
             The model's parameters in COLMAP's order, ``fx, fy, cx, cy`` of ``PINHOLE``.
         qvec : (4,) numbers, optional
             The image's rotation from world to camera in the order of images.txt: **w, x, y, z**.
-            (In pycolmap, ``rotation.quat`` is x, y, z, w: pass ``camera_from_world`` there.) The
-            camera denotes the float64 matrix that is formed of it.
+            (In pycolmap, ``rotation.quat`` is x, y, z, w: pass ``camera_from_world`` there.)
+            The camera denotes the float64 matrix that is formed of it.
         tvec : (3,) numbers, optional
-            The translation that belongs to it. It is not the camera's position.
+            The translation that belongs to it.
+            It is not the camera's position.
         camera_from_world, world_from_camera : (4, 4), (3, 4) or a pair (R, t), optional
             The pose instead of `qvec` and `tvec`; pycolmap's is
             ``camera_from_world=image.cam_from_world().matrix()``.
         size : (height, width)
-            Pixels of the camera; COLMAP writes the width first. For a depth image of another
-            resolution, take `resized` of the camera.
+            Pixels of the camera; COLMAP writes the width first.
+            For a depth image of another resolution, take `resized` of the camera.
         near, far, reversed_z
             As in `look_at`; view depth is the camera's z.
 
@@ -351,7 +367,9 @@ class Camera:
         size = _arguments.size("size", size)
         near, far = _camera_arguments.near_far(near, far)
         reversed_z = _arguments.flag("reversed_z", reversed_z)
-        core = _posed(_pinhole(k, "half", near, far, reversed_z, size), name, pose, reversed_z, size)
+        core = _posed(
+            _pinhole(k, "half", near, far, reversed_z, size), name, pose, reversed_z, size
+        )
         return cls._made(
             core, "from_colmap", model=model, params=params, **{name: pose}, size=size, near=near, far=far,
             reversed_z=reversed_z,
@@ -377,19 +395,21 @@ class Camera:
     ) -> Self:
         """A camera with OpenGL's axes (and Blender's, nerfstudio's, pyrender's, trimesh's).
 
-        It has x right, y up, and looks along -z. What it sees is one of four: OpenGL's
-        `projection`; or `k`, `fov_x_deg` or `fov_y_deg`, each with `near` and `far`.
+        It has x right, y up, and looks along -z.
+        What it sees is one of four: OpenGL's `projection`; or `k`, `fov_x_deg` or `fov_y_deg`, each
+        with `near` and `far`.
 
         With a `projection` (clip z in -w..w, mapped to 0..w here) the camera has standard depth,
-        and a depth buffer that was read back in 0..1 is of kind ``"ndc"``. Its rows start at the
-        bottom in OpenGL: turn them, ``depth[::-1]``. A projection that was made for
-        ``glClipControl(..., GL_ZERO_TO_ONE)`` belongs into `from_matrices`.
+        and a depth buffer that was read back in 0..1 is of kind ``"ndc"``.
+        Its rows start at the bottom in OpenGL: turn them, ``depth[::-1]``.
+        A projection that was made for ``glClipControl(..., GL_ZERO_TO_ONE)`` belongs into
+        `from_matrices`.
 
         Parameters
         ----------
         projection : (4, 4)
-            ``clip_from_camera`` for column vectors. OpenGL's and glm's memory is column by column:
-            transpose it.
+            ``clip_from_camera`` for column vectors.
+            OpenGL's and glm's memory is column by column: transpose it.
         k : (3, 3)
             ``[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]`` in pixels from the top-left corner, as
             nerfstudio writes it beside poses of this kind.
@@ -398,22 +418,24 @@ class Camera:
             trimesh: ``"half"``.
         fov_x_deg, fov_y_deg : float
             The full horizontal or vertical angle of view in degrees, above 0 and below 180, of
-            square pixels with the axis in the middle. Blender, NeRF and pyrender have radians: pass
-            ``np.degrees(angle)``.
+            square pixels with the axis in the middle.
+            Blender, NeRF and pyrender have radians: pass ``np.degrees(angle)``.
         camera_from_world, world_from_camera : (4, 4), (3, 4) or a pair (R, t)
-            The pose; pass exactly one. ``camera_from_world`` is what OpenGL calls the view matrix;
-            ``world_from_camera`` is Blender's ``matrix_world``, nerfstudio's ``transform_matrix``.
+            The pose; pass exactly one.
+            ``camera_from_world`` is what OpenGL calls the view matrix; ``world_from_camera`` is
+            Blender's ``matrix_world``, nerfstudio's ``transform_matrix``.
         size : (height, width)
-            Pixels of the viewport. For a depth image of another resolution, take `resized` of the
-            camera.
+            Pixels of the viewport.
+            For a depth image of another resolution, take `resized` of the camera.
         near, far : float
             As in `look_at`, along -z; `near` is needed without a `projection`, which has its own.
         distortion : array, optional
             Lens distortion that belongs to `k`, as in `from_opencv`: None or all zero.
         reversed_z : bool, optional
-            As in `look_at`; None is True, as in all constructors that take `near`. Metric depth
-            does not care; for a depth buffer of OpenGL's pass False, or the projection. Not beside
-            a `projection`.
+            As in `look_at`; None is True, as in all constructors that take `near`.
+            Metric depth does not care; for a depth buffer of OpenGL's pass False, or the
+            projection.
+            Not beside a `projection`.
 
         Raises
         ------
@@ -424,7 +446,9 @@ class Camera:
             ("projection", "k", "fov_x_deg", "fov_y_deg"), (projection, k, fov_x_deg, fov_y_deg)
         )
         if way != "k":
-            _camera_arguments.only_beside("k", {"pixel_center": pixel_center, "distortion": distortion}, way)
+            _camera_arguments.only_beside(
+                "k", {"pixel_center": pixel_center, "distortion": distortion}, way
+            )
         if way == "projection":
             beside = {"near": near, "far": far, "reversed_z": reversed_z}
             _camera_arguments.nothing_beside("a projection, which has its own", beside)
@@ -447,16 +471,31 @@ class Camera:
             seen = {"k": k, "pixel_center": pixel_center}
             projected = _pinhole(k, pixel_center, near, far, reversed_z, size) @ _TURNED
         else:
-            angle = _arguments.number(way, fov_x_deg if way == "fov_x_deg" else fov_y_deg, above=0.0, below=180.0)
+            angle = _arguments.number(
+                way, fov_x_deg if way == "fov_x_deg" else fov_y_deg, above=0.0, below=180.0
+            )
             seen = {way: angle}
-            tangent, side = math.tan(math.radians(angle) / 2.0), size[1] if way == "fov_x_deg" else size[0]
+            tangent, side = (
+                math.tan(math.radians(angle) / 2.0),
+                size[1] if way == "fov_x_deg" else size[0],
+            )
             right, top = tangent * size[1] / side, tangent * size[0] / side
             projected = (
-                np.array(_core.frustum_matrix((-right, right, -top, top), near, far, reversed_z, size)) @ _BACKWARDS
+                np.array(
+                    _core.frustum_matrix((-right, right, -top, top), near, far, reversed_z, size)
+                )
+                @ _BACKWARDS
             )
         core = _posed(projected, name, pose, reversed_z, size)
         return cls._made(
-            core, "from_opengl", **seen, **{name: pose}, size=size, near=near, far=far, reversed_z=reversed_z
+            core,
+            "from_opengl",
+            **seen,
+            **{name: pose},
+            size=size,
+            near=near,
+            far=far,
+            reversed_z=reversed_z,
         )
 
     @classmethod
@@ -473,19 +512,22 @@ class Camera:
     ) -> Self:
         """A camera from matrices in this library's conventions (those of Vulkan's clip volume, with y up).
 
-        Pass `clip_from_world` alone, or `clip_from_camera` with exactly one of `camera_from_world` and
-        `world_from_camera`. Two matrices are better far away from the origin: the eye is then known exactly.
+        Pass `clip_from_world` alone, or `clip_from_camera` with exactly one of `camera_from_world`
+        and `world_from_camera`.
+        Two matrices are better far away from the origin: the eye is then known exactly.
 
         Parameters
         ----------
         clip_from_world, clip_from_camera : (4, 4)
-            Clip space has x right, y up and ``0 <= z <= w``. The camera space between may be any.
+            Clip space has x right, y up and ``0 <= z <= w``.
+            The camera space between may be any.
         camera_from_world, world_from_camera : (4, 4), (3, 4) or a pair (R, t)
             The pose; the last row of a ``(4, 4)`` is 0, 0, 0, 1.
         size : (height, width)
             Pixels of the image.
         reversed_z : bool
-            True when ``z = w`` is the near plane, False when it is the far plane. There is no default: only you know.
+            True when ``z = w`` is the near plane, False when it is the far plane.
+            There is no default: only you know.
 
         Raises
         ------
@@ -497,10 +539,14 @@ class Camera:
         if clip_from_world is not None:
             others = (clip_from_camera, camera_from_world, world_from_camera)
             if any(other is not None for other in others):
-                raise ValueError("clip_from_world: expected alone, or clip_from_camera with one pose instead; got both")
+                raise ValueError(
+                    "clip_from_world: expected alone, or clip_from_camera with one pose instead; got both"
+                )
             clip = _arguments.matrix("clip_from_world", clip_from_world)
             core = _core.Camera.from_clip_from_world(clip.tolist(), reversed_z, size)
-            return cls._made(core, "from_matrices", clip_from_world=clip, size=size, reversed_z=reversed_z)
+            return cls._made(
+                core, "from_matrices", clip_from_world=clip, size=size, reversed_z=reversed_z
+            )
         if clip_from_camera is None:
             raise ValueError(
                 "clip_from_world: expected (4, 4), or clip_from_camera=(4, 4) with one pose instead; got neither"
@@ -508,9 +554,17 @@ class Camera:
         clip = _arguments.matrix("clip_from_camera", clip_from_camera)
         name, pose = _camera_arguments.one_pose(camera_from_world, world_from_camera)
         core = _posed(clip, name, pose, reversed_z, size)
-        return cls._made(core, "from_matrices", clip_from_camera=clip, **{name: pose}, size=size, reversed_z=reversed_z)
+        return cls._made(
+            core,
+            "from_matrices",
+            clip_from_camera=clip,
+            **{name: pose},
+            size=size,
+            reversed_z=reversed_z,
+        )
 
-    # -- what it is --------------------------------------------------------------------------------------------------
+    # -- what it
+    # is --------------------------------------------------------------------------------------------------
 
     @property
     def size(self) -> Size:
@@ -542,7 +596,8 @@ class Camera:
         size = _arguments.size("size", size)
         return self._made(self._inner.with_size(size), "resized", camera=self, size=size)
 
-    # -- as a value --------------------------------------------------------------------------------------------------
+    # -- as a
+    # value --------------------------------------------------------------------------------------------------
 
     def __setattr__(self, name: str, value: object) -> NoReturn:
         raise AttributeError(f"cannot set {name!r}: a Camera is immutable")
@@ -563,7 +618,9 @@ class Camera:
         if name == "resized":
             return f"{arguments[0][1]!r}.resized({self.size})"
         shown = ", ".join(
-            f"{key}=<{'x'.join(map(str, value.shape))}>" if isinstance(value, np.ndarray) else f"{key}={value!r}"
+            f"{key}=<{'x'.join(map(str, value.shape))}>"
+            if isinstance(value, np.ndarray)
+            else f"{key}={value!r}"
             for key, value in arguments
         )
         return f"Camera.{name}({shown})"
@@ -594,17 +651,28 @@ _BACKWARDS = np.diag([1.0, 1.0, -1.0, 1.0])
 
 
 def _pinhole(
-    k: npt.NDArray[np.float64], pixel_center: PixelCenter, near: float, far: float | None, reversed_z: bool, size: Size
+    k: npt.NDArray[np.float64],
+    pixel_center: PixelCenter,
+    near: float,
+    far: float | None,
+    reversed_z: bool,
+    size: Size,
 ) -> npt.NDArray[np.float64]:
     """``clip_from_camera`` of a camera matrix, for OpenCV's axes."""
     (fx, skew, cx), (_, fy, cy), _ = k.tolist()
     height, width = size
-    cx, cy = cx + _camera_arguments.TO_HALF[pixel_center], cy + _camera_arguments.TO_HALF[pixel_center]
+    cx, cy = (
+        cx + _camera_arguments.TO_HALF[pixel_center],
+        cy + _camera_arguments.TO_HALF[pixel_center],
+    )
     borders = (-cx / fx, (width - cx) / fx, (cy - height) / fy, cy / fy)
-    # From OpenCV's camera (y down) to one with y up, and the skew as a shear: fx (X + skew / fx Y) + cx Z.
+    # From OpenCV's camera (y down) to one with y up, and the skew as a shear: fx (X + skew / fx
+    # Y) + cx Z.
     upright_from_opencv = np.diag([1.0, -1.0, 1.0, 1.0])
     upright_from_opencv[0, 1] = skew / fx
-    projection: npt.NDArray[np.float64] = np.array(_core.frustum_matrix(borders, near, far, reversed_z, size))
+    projection: npt.NDArray[np.float64] = np.array(
+        _core.frustum_matrix(borders, near, far, reversed_z, size)
+    )
     return projection @ upright_from_opencv
 
 

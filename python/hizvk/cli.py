@@ -30,7 +30,10 @@ DRIVER_FOLDERS = ("/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/usr/sh
 #: Variables that choose drivers and adapters.
 VARIABLES = ("HIZVK_ADAPTER", "VK_DRIVER_FILES", "VK_ICD_FILENAMES", "VK_ADD_DRIVER_FILES")
 #: The commands that live in modules of their own: ``main(arguments) -> exit code``.
-DELEGATED = {"demo": "the demo scene: culls it, draws it, checks it", "bench": "measures this machine"}
+DELEGATED = {
+    "demo": "the demo scene: culls it, draws it, checks it",
+    "bench": "measures this machine",
+}
 
 INSTALL_HINT = "apt install libvulkan1 mesa-vulkan-drivers"
 
@@ -38,15 +41,22 @@ INSTALL_HINT = "apt install libvulkan1 mesa-vulkan-drivers"
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command and returns the exit code: 0 good, 1 something is wrong, 2 wrong usage."""
     arguments = list(sys.argv[1:] if arguments is None else arguments)
-    parser = argparse.ArgumentParser(prog="hizvk", description="Occlusion culling that never hides what can be seen.")
+    parser = argparse.ArgumentParser(
+        prog="hizvk", description="Occlusion culling that never hides what can be seen."
+    )
     parser.add_argument("--version", action="version", version=f"hizvk {hizvk.__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="command")
-    for name, help_text in (("info", "versions and adapters"), ("doctor", "checks that culling works here")):
+    for name, help_text in (
+        ("info", "versions and adapters"),
+        ("doctor", "checks that culling works here"),
+    ):
         command = commands.add_parser(name, help=help_text, description=help_text)
         command.add_argument("--json", action="store_true", help="print one JSON object")
     for name, help_text in DELEGATED.items():
         commands.add_parser(name, help=help_text, add_help=False)
-    if arguments and arguments[0] in DELEGATED:  # its own module parses the rest, --help and --json among it
+    if (
+        arguments and arguments[0] in DELEGATED
+    ):  # its own module parses the rest, --help and --json among it
         return _delegate(arguments[0], arguments[1:])
     parsed = parser.parse_args(arguments)
     return _info(parsed.json) if parsed.command == "info" else _doctor(parsed.json)
@@ -103,7 +113,9 @@ class Check:
 
 def checks() -> list[Check]:
     """Everything that culling needs, from the bottom up; it stops where the rest cannot work."""
-    found = [Check("package", True, f"hizvk {hizvk.__version__}, Python {platform.python_version()}")]
+    found = [
+        Check("package", True, f"hizvk {hizvk.__version__}, Python {platform.python_version()}")
+    ]
     try:
         ctypes.CDLL("libvulkan.so.1")
         found.append(Check("vulkan loader", True, "libvulkan.so.1"))
@@ -117,9 +129,13 @@ def checks() -> list[Check]:
     try:
         device = hizvk.Device()
     except hizvk.HizError as error:
-        advice = "HIZVK_ADAPTER has to name one of the adapters" if "HIZVK_ADAPTER" in os.environ else ""
+        advice = (
+            "HIZVK_ADAPTER has to name one of the adapters" if "HIZVK_ADAPTER" in os.environ else ""
+        )
         return [*found, Check("device", False, str(error), advice)]
-    found.append(Check("device", True, f"{device.adapter}, images up to {device.max_image_side} a side"))
+    found.append(
+        Check("device", True, f"{device.adapter}, images up to {device.max_image_side} a side")
+    )
     return [*found, *(_try_culling(device, reversed_z) for reversed_z in (True, False))]
 
 
@@ -133,7 +149,12 @@ def _drivers() -> Check:
         files = sorted(file for folder in folders for file in glob(os.path.join(folder, "*.json")))
     missing = [file for file in files if not os.path.exists(file)]
     if missing:
-        return Check("vulkan drivers", False, f"no such file: {', '.join(missing)}", "correct or unset VK_DRIVER_FILES")
+        return Check(
+            "vulkan drivers",
+            False,
+            f"no such file: {', '.join(missing)}",
+            "correct or unset VK_DRIVER_FILES",
+        )
     if not files:
         return Check("vulkan drivers", False, "no driver description found", INSTALL_HINT)
     return Check("vulkan drivers", True, ", ".join(files))
@@ -143,7 +164,12 @@ def _try_culling(device: hizvk.Device, reversed_z: bool) -> Check:
     """A wall at depth 10 before three points: in front of it, behind it, and behind the camera."""
     name = f"cull ({'reversed' if reversed_z else 'standard'} depth)"
     camera = hizvk.Camera.look_at(
-        (0.0, 0.0, 0.0), (0.0, 0.0, -1.0), fov_y_deg=90.0, size=(45, 64), near=0.1, reversed_z=reversed_z
+        (0.0, 0.0, 0.0),
+        (0.0, 0.0, -1.0),
+        fov_y_deg=90.0,
+        size=(45, 64),
+        near=0.1,
+        reversed_z=reversed_z,
     )
     wall = np.full(camera.size, 10.0, dtype=np.float32)
     spheres = hizvk.Spheres(np.array([[0.0, 0.0, -5.0], [0.0, 0.0, -20.0], [0.0, 0.0, 20.0]]), 1.0)
@@ -154,14 +180,24 @@ def _try_culling(device: hizvk.Device, reversed_z: bool) -> Check:
         return Check(name, False, str(error))
     expected = [hizvk.Verdict.VISIBLE, hizvk.Verdict.OCCLUDED, hizvk.Verdict.OUTSIDE]
     words = ", ".join(hizvk.Verdict(code).name.lower() for code in got)
-    return Check(name, got == expected, words, "" if got == expected else "please report this with `hizvk info --json`")
+    return Check(
+        name,
+        got == expected,
+        words,
+        "" if got == expected else "please report this with `hizvk info --json`",
+    )
 
 
 def _doctor(as_json: bool) -> int:
     found = checks()
     healthy = all(check.passed for check in found)
     if as_json:
-        print(json.dumps({"healthy": healthy, "checks": [dataclasses.asdict(check) for check in found]}, indent=2))
+        print(
+            json.dumps(
+                {"healthy": healthy, "checks": [dataclasses.asdict(check) for check in found]},
+                indent=2,
+            )
+        )
         return 0 if healthy else 1
     for check in found:
         print(f"{'ok  ' if check.passed else 'FAIL'} {check.name}: {check.detail}")

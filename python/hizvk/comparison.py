@@ -98,11 +98,15 @@ the hidden)>
     codes = np.asarray(truth)
     if isinstance(truth, np.ndarray) and codes.dtype == np.uint8:
         if codes.shape != kept.shape:
-            raise ValueError(f"truth: expected uint8 ({len(kept)},), got {_arguments.describe(truth)}")
+            raise ValueError(
+                f"truth: expected uint8 ({len(kept)},), got {_arguments.describe(truth)}"
+            )
         known = (reference.HIDDEN, reference.VISIBLE, reference.INVALID, reference.UNDECIDED)
         unknown = codes[~np.isin(codes, known)]
         if unknown.size:
-            raise ValueError(f"truth: expected codes of hizvk.reference {known}, got {int(unknown[0])}")
+            raise ValueError(
+                f"truth: expected codes of hizvk.reference {known}, got {int(unknown[0])}"
+            )
         is_visible = (codes == reference.VISIBLE) | (codes == reference.INVALID)
         is_hidden = codes == reference.HIDDEN
     else:

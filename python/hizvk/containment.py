@@ -1,8 +1,10 @@
 """What a cull takes for granted, checked exactly: occluder proxies lie inside their mesh, bounds contain theirs.
 
-A proxy that sticks out hides what can be seen, and an instance that sticks out of its bounds is hidden while it shows.
-The checks decide in exact arithmetic (``crates/hiz_ref``), so that touching is inside and a protrusion of one rounding
-is found. They need no device, and are for tools and tests, not for every frame.
+A proxy that sticks out hides what can be seen, and an instance that sticks out of its bounds is
+hidden while it shows.
+The checks decide in exact arithmetic (``crates/hiz_ref``), so that touching is inside and a
+protrusion of one rounding is found.
+They need no device, and are for tools and tests, not for every frame.
 """
 
 from __future__ import annotations
@@ -63,25 +65,31 @@ class BoundsCheck:
         return bool(self.contained.all())
 
 
-def check_proxy(proxy: MeshLike | tuple[npt.ArrayLike, ...], mesh: MeshLike | tuple[npt.ArrayLike, ...]) -> ProxyCheck:
+def check_proxy(
+    proxy: MeshLike | tuple[npt.ArrayLike, ...], mesh: MeshLike | tuple[npt.ArrayLike, ...]
+) -> ProxyCheck:
     """Whether an occluder proxy may be rendered in its mesh's stead.
 
-    Inside means: every point of every proxy triangle lies in the closed solid of the mesh, which is its surface and all
-    points that it winds about (so parts may overlap, and the whole may run either way round). Then every ray from
-    outside of the solid that meets the proxy has met the mesh before, or meets it there, and the proxy hides nothing
-    that the mesh does not hide. Touching is allowed. The proxy need not be closed; its triangles without area hide
-    nothing and are passed over.
+    Inside means: every point of every proxy triangle lies in the closed solid of the mesh, which is
+    its surface and all points that it winds about (so parts may overlap, and the whole may run
+    either way round).
+    Then every ray from outside of the solid that meets the proxy has met the mesh before, or meets
+    it there, and the proxy hides nothing that the mesh does not hide.
+    Touching is allowed.
+    The proxy need not be closed; its triangles without area hide nothing and are passed over.
 
-    What is proved is about the numbers as given. A renderer that moves or rounds the two differently has to leave room.
-    For a camera inside of the mesh's solid, or a near plane that cuts it, nothing is said; nor for a mesh of which a
-    renderer leaves out the back faces while it keeps those of the proxy.
+    What is proved is about the numbers as given.
+    A renderer that moves or rounds the two differently has to leave room.
+    For a camera inside of the mesh's solid, or a near plane that cuts it, nothing is said; nor for
+    a mesh of which a renderer leaves out the back faces while it keeps those of the proxy.
 
     Parameters
     ----------
     proxy, mesh : Mesh, tuple, or a mesh of trimesh or Open3D
-        A tuple is ``(vertices, triangles)``. In the same coordinates, without transforms. The mesh is closed and
-        consistently oriented: each of its edges runs as often one way as the other, where equal positions count as
-        one vertex.
+        A tuple is ``(vertices, triangles)``.
+        In the same coordinates, without transforms.
+        The mesh is closed and consistently oriented: each of its edges runs as often one way as the
+        other, where equal positions count as one vertex.
 
     Returns
     -------
@@ -90,7 +98,8 @@ def check_proxy(proxy: MeshLike | tuple[npt.ArrayLike, ...], mesh: MeshLike | tu
     Raises
     ------
     TypeError, ValueError
-        They name the parameter, what it expects and what came; also for an open mesh, which has no inside.
+        They name the parameter, what it expects and what came; also for an open mesh, which has no
+        inside.
 
     Examples
     --------
@@ -110,19 +119,22 @@ def check_proxy(proxy: MeshLike | tuple[npt.ArrayLike, ...], mesh: MeshLike | tu
     )
 
 
-def check_bounds(bounds: Bounds, meshes: MeshLike | Sequence[MeshLike | tuple[npt.ArrayLike, ...]]) -> BoundsCheck:
+def check_bounds(
+    bounds: Bounds, meshes: MeshLike | Sequence[MeshLike | tuple[npt.ArrayLike, ...]]
+) -> BoundsCheck:
     """Whether bounds contain what they bound.
 
-    Bounds are convex, so a mesh lies in them if its vertices do. Each vertex is ``world_from_mesh @ (x, y, z, 1)`` in
-    exact arithmetic, not as some renderer rounds it; the bounds are the numbers as given.
+    Bounds are convex, so a mesh lies in them if its vertices do.
+    Each vertex is ``world_from_mesh @ (x, y, z, 1)`` in exact arithmetic, not as some renderer
+    rounds it; the bounds are the numbers as given.
 
     Parameters
     ----------
     bounds : Spheres, Boxes or OrientedBoxes
         The N volumes.
     meshes : list of Mesh, of tuples, or of meshes of trimesh or Open3D; or one Mesh
-        One for each instance in order; a mesh with K transforms stands for K instances in a row. A tuple is
-        ``(vertices, triangles)`` or ``(vertices, triangles, transforms)``.
+        One for each instance in order; a mesh with K transforms stands for K instances in a row.
+        A tuple is ``(vertices, triangles)`` or ``(vertices, triangles, transforms)``.
 
     Returns
     -------
@@ -132,7 +144,8 @@ def check_bounds(bounds: Bounds, meshes: MeshLike | Sequence[MeshLike | tuple[np
     Raises
     ------
     TypeError, ValueError
-        They name the parameter, what it expects and what came; also for another number of meshes than of bounds.
+        They name the parameter, what it expects and what came; also for another number of meshes
+        than of bounds.
     """
     kind, arrays = as_arrays("bounds", bounds)
     pairs: list[_Pair] = []
@@ -146,7 +159,9 @@ def check_bounds(bounds: Bounds, meshes: MeshLike | Sequence[MeshLike | tuple[np
             matrices += list(np.asarray(mesh.transforms, np.float64))
         pairs.append(_pair(mesh))
     if len(instances) != len(bounds):
-        raise ValueError(f"meshes: expected one for each of the {len(bounds)} bounds, got {len(instances)}")
+        raise ValueError(
+            f"meshes: expected one for each of the {len(bounds)} bounds, got {len(instances)}"
+        )
     stacked = np.stack(matrices) if matrices else np.empty((0, 4, 4))
     outside = _core.check_bounds(kind, arrays, pairs, np.ascontiguousarray(stacked), instances)
     offenders = np.flatnonzero(outside >= 0.0)

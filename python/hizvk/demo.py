@@ -1,8 +1,9 @@
 """``hizvk demo``: culls trees in the mountains, draws what happened, and checks it against the truth.
 
-Each view goes the library's way: `Device.render_depth` of the terrain, `Device.pyramid`, `Device.cull` of the trees'
-boxes. What is visible is then found out without the library (`hizvk.truth`), and the exit code is 1 if a visible tree
-was culled.
+Each view goes the library's way: `Device.render_depth` of the terrain, `Device.pyramid`,
+`Device.cull` of the trees' boxes.
+What is visible is then found out without the library (`hizvk.truth`), and the exit code is 1 if a
+visible tree was culled.
 """
 
 from __future__ import annotations
@@ -53,7 +54,9 @@ class Culled:
     ms: dict[str, float]
 
 
-def cull_view(device: hizvk.Device, terrain: hizvk.Occluders, trees: hizvk.Instances, camera: hizvk.Camera) -> Culled:
+def cull_view(
+    device: hizvk.Device, terrain: hizvk.Occluders, trees: hizvk.Instances, camera: hizvk.Camera
+) -> Culled:
     """Depth, pyramid, cull; each stage is waited for and timed by the clock on the wall."""
     marks = [time.perf_counter()]
 
@@ -69,11 +72,16 @@ def cull_view(device: hizvk.Device, terrain: hizvk.Occluders, trees: hizvk.Insta
     mark()
     verdicts, mask, drawn = seen.verdicts, seen.mask, int(seen.draws["instance_count"].sum())
     mark()
-    ms = {stage: 1000.0 * float(took) for stage, took in zip(reports.STAGES, np.diff(marks), strict=True)}
+    ms = {
+        stage: 1000.0 * float(took)
+        for stage, took in zip(reports.STAGES, np.diff(marks), strict=True)
+    }
     return Culled(verdicts, mask, drawn, seen.stats, depth.numpy(), pyramid, ms)
 
 
-def run(out: Path, *, views: int, size: Size, trees: int, seed: int = 2010, pictures: bool = True) -> reports.Report:
+def run(
+    out: Path, *, views: int, size: Size, trees: int, seed: int = 2010, pictures: bool = True
+) -> reports.Report:
     """Runs the demo and leaves its pictures and its report in `out`.
 
     Parameters
@@ -124,11 +132,15 @@ def run(out: Path, *, views: int, size: Size, trees: int, seed: int = 2010, pict
             sight = caster.look(view, size, truth.linear_depth(one.depth, view.near))
             checked = truth.check(scene, view, one.mask, one.depth, sight, caster)
             difference = _depth_difference(caster, view, one.depth)
-            found.views.append(reports.ViewReport.of(view.name, one.stats, one.drawn, checked, difference, one.ms))
+            found.views.append(
+                reports.ViewReport.of(view.name, one.stats, one.drawn, checked, difference, one.ms)
+            )
             if pictures:
                 shown.append(_draw_station(out, number, scene, view, sight, caster, one))
         steps.step(f"drawing view {best}")
-        sight = caster.look(scene.views[best], size, truth.linear_depth(culled[best].depth, scene.views[best].near))
+        sight = caster.look(
+            scene.views[best], size, truth.linear_depth(culled[best].depth, scene.views[best].near)
+        )
         shown = _draw_best(out, best, scene, sight, caster, culled[best], found) + shown
         found.seconds = time.perf_counter() - started
         reports.write(found, out, shown)
@@ -137,7 +149,9 @@ def run(out: Path, *, views: int, size: Size, trees: int, seed: int = 2010, pict
     return found
 
 
-def _depth_difference(caster: truth.Caster, view: View, depth: npt.NDArray[np.float32]) -> float | None:
+def _depth_difference(
+    caster: truth.Caster, view: View, depth: npt.NDArray[np.float32]
+) -> float | None:
     """The median relative difference of rendered and ray-cast depth, where both see the ground."""
     if not isinstance(caster, truth.RayCaster):
         return None
@@ -150,7 +164,13 @@ def _depth_difference(caster: truth.Caster, view: View, depth: npt.NDArray[np.fl
 
 
 def _draw_station(
-    out: Path, number: int, scene: Scene, view: View, sight: truth.Sight, caster: truth.Caster, one: Culled
+    out: Path,
+    number: int,
+    scene: Scene,
+    view: View,
+    sight: truth.Sight,
+    caster: truth.Caster,
+    one: Culled,
 ) -> tuple[str, str]:
     """One view of the flight, beside the scene from above."""
     from . import plots
@@ -163,7 +183,13 @@ def _draw_station(
 
 
 def _draw_best(
-    out: Path, number: int, scene: Scene, sight: truth.Sight, caster: truth.Caster, one: Culled, found: reports.Report
+    out: Path,
+    number: int,
+    scene: Scene,
+    sight: truth.Sight,
+    caster: truth.Caster,
+    one: Culled,
+    found: reports.Report,
 ) -> list[tuple[str, str]]:
     """All pictures of the view where most is hidden."""
     from . import plots
@@ -173,9 +199,15 @@ def _draw_best(
     levels = [one.pyramid.level(k) for k in range(one.pyramid.num_levels)]
     picture = plots.view_picture(scene, view, sight, caster, samples=2)
     plots.save(out / "view.png", picture)
-    plots.save(out / "depth.png", plots.colour_depth(one.depth, view.near, plots.depth_span(one.depth, view.near)))
+    plots.save(
+        out / "depth.png",
+        plots.colour_depth(one.depth, view.near, plots.depth_span(one.depth, view.near)),
+    )
     plots.pyramid_sheet(
-        out / "pyramid.png", levels, view.near, f"view {number}: the farthest depth of every 2^k x 2^k pixels"
+        out / "pyramid.png",
+        levels,
+        view.near,
+        f"view {number}: the farthest depth of every 2^k x 2^k pixels",
     )
     plots.top_picture(out / "top.png", scene, view, one.verdicts, width / height)
     told = found.views[number]
@@ -186,9 +218,14 @@ def _draw_best(
     )
     red = plots.with_culled(picture, scene, view, sight, one.verdicts)
     note = f"red: the {one.stats.occluded:,} trees in the view that the ridges hide"
-    plots.overview(out / "overview.png", red, scene, view, one.verdicts, title, note=note, colours=PALETTE)
+    plots.overview(
+        out / "overview.png", red, scene, view, one.verdicts, title, note=note, colours=PALETTE
+    )
     return [
-        ("overview.png", "Where most is hidden: the view with the culled trees in red, and the scene from above"),
+        (
+            "overview.png",
+            "Where most is hidden: the view with the culled trees in red, and the scene from above",
+        ),
         ("view.png", "The same view as it is drawn"),
         ("depth.png", "Its depth image, the terrain alone (bright is near)"),
         ("pyramid.png", "Its depth pyramid, the depth linearised"),
@@ -202,11 +239,15 @@ def _parser() -> argparse.ArgumentParser:
         description="Culls trees in the mountains of a real elevation model, draws it, and checks that no visible tree "
         "was culled (exit code 1 otherwise).",
     )
-    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for pictures and report (out)")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out"), help="folder for pictures and report (out)"
+    )
     parser.add_argument("--views", type=count, help=f"stations of the flight ({DEFAULTS['views']})")
     parser.add_argument("--size", type=size, metavar="WIDTHxHEIGHT", help="of the images (960x540)")
     parser.add_argument("--trees", type=count, help=f"instances ({DEFAULTS['trees']})")
-    parser.add_argument("--quick", action="store_true", help="few trees and views, small images, fewer pictures")
+    parser.add_argument(
+        "--quick", action="store_true", help="few trees and views, small images, fewer pictures"
+    )
     parser.add_argument("--json", action="store_true", help="print the report as one JSON object")
     return parser
 
@@ -215,7 +256,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command and returns its exit code: 0 good, 1 a visible tree was culled or it cannot run."""
     parsed = _parser().parse_args(arguments)
     chosen = {**DEFAULTS, **(QUICK if parsed.quick else {})}
-    chosen.update({name: getattr(parsed, name) for name in DEFAULTS if getattr(parsed, name) is not None})
+    chosen.update(
+        {name: getattr(parsed, name) for name in DEFAULTS if getattr(parsed, name) is not None}
+    )
     try:
         found = run(parsed.out, pictures=not parsed.quick, **chosen)  # type: ignore[arg-type]
     except (ImportError, hizvk.HizError, OSError) as error:
@@ -233,7 +276,9 @@ def _tell(found: reports.Report, out: Path) -> None:
     times = ", ".join(f"{stage} {took:.2f}" for stage, took in found.median_ms().items())
     print(f"adapter  {found.adapter}")
     if _core.__build__ != "release":
-        print("build    development: what runs on the host is not optimised; `make wheel` makes a release build")
+        print(
+            "build    development: what runs on the host is not optimised; `make wheel` makes a release build"
+        )
     print(
         f"culled   {tested - kept:,} of {tested:,} ({100.0 * (1.0 - kept / tested):.1f} %) in {len(found.views)} views"
     )

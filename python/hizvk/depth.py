@@ -56,7 +56,9 @@ def checked_image(
     """The image as the engine takes it and what its numbers mean, or an error that says why not."""
     if kind is None:
         words = ", ".join(f'"{word}"' for word in DEPTH_KINDS)
-        raise TypeError(f"kind: expected one of {words}, got None; there is no default, a wrong guess hides things")
+        raise TypeError(
+            f"kind: expected one of {words}, got None; there is no default, a wrong guess hides things"
+        )
     kind_: DepthKind = _arguments.choice("kind", kind, DEPTH_KINDS)  # type: ignore[assignment]
     if kind_ not in _METRIC and kind_ != camera.depth_kind:
         meaning = {"ndc": "0 near and 1 far", "reversed_ndc": "1 near and 0 far"}
@@ -76,7 +78,8 @@ def checked_image(
         mask = None if value.mask is np.ma.nomask else np.asarray(value.mask)
         value = value.data
     elif not isinstance(value, (np.ndarray, list, tuple, str, bytes, type(None))):
-        # An image of another library, or a buffer: its dtype says what its numbers mean, as an array's does.
+        # An image of another library, or a buffer: its dtype says what its numbers mean, as an
+        # array's does.
         array = np.asarray(value)
         value = array if array.ndim else value
     elif isinstance(value, (list, tuple)):
@@ -106,7 +109,8 @@ def _rounding(dtype: np.dtype[Any], kind: DepthKind) -> Rounding:
 def _from_rows(name: str, rows: Sequence[Any]) -> Any:
     """Listed rows or numbers of NumPy, at any depth, as the array of their dtype; Python's own as they are.
 
-    Of several dtypes NumPy makes a wider one, which would not say what the narrower numbers had rounded.
+    Of several dtypes NumPy makes a wider one, which would not say what the narrower numbers had
+    rounded.
     """
     try:
         array = np.asarray(rows)
@@ -132,7 +136,9 @@ def _from_rows(name: str, rows: Sequence[Any]) -> Any:
 def _refuse_dtype(name: str, array: npt.NDArray[Any], kind: DepthKind) -> None:
     """Whole numbers are depth where a sensor writes them: 16 bits without a sign, in steps of `scale`."""
     metric = kind in _METRIC
-    if array.dtype.kind not in "iub" or (array.dtype.kind == "u" and array.dtype.itemsize == 2 and metric):
+    if array.dtype.kind not in "iub" or (
+        array.dtype.kind == "u" and array.dtype.itemsize == 2 and metric
+    ):
         return
     hint = ""
     if metric and array.dtype.kind != "b" and array.dtype.itemsize > 1:
@@ -157,7 +163,9 @@ def _refuse_shape(name: str, array: npt.NDArray[Any], camera: Camera) -> None:
     elif array.ndim == 3 and array.shape[0] == 1:
         hint = f"; {name}[0] is the image without its leading axis"
     elif array.ndim == 2 and 0 not in array.shape and max(array.shape) <= _arguments.LARGEST_SIDE:
-        hint = f"; a smaller or larger image of the same view goes with camera.resized({name}.shape)"
+        hint = (
+            f"; a smaller or larger image of the same view goes with camera.resized({name}.shape)"
+        )
         if array.shape == size[::-1]:
             hint = f"; it looks transposed, and a turned image needs a turned camera{hint}"
     got = _arguments.describe(array)
@@ -182,11 +190,15 @@ def _no_data(invalid: object, dtype: np.dtype[Any]) -> tuple[float, ...]:
         held = float(value)
         if dtype.kind == "u":
             if held != int(held) or not 0 <= held <= np.iinfo(dtype).max:
-                raise ValueError(f"invalid: expected {expected}, got {value!r}, which no {dtype} is")
+                raise ValueError(
+                    f"invalid: expected {expected}, got {value!r}, which no {dtype} is"
+                )
         else:
             with np.errstate(over="ignore"):
                 held = float(np.asarray(value, dtype=np.float64).astype(dtype))
             if not np.isfinite(held):
-                raise ValueError(f"invalid: expected {expected}, got {value!r}, which no {dtype} is")
+                raise ValueError(
+                    f"invalid: expected {expected}, got {value!r}, which no {dtype} is"
+                )
         found.append(held)
     return tuple(found)

@@ -1,7 +1,7 @@
 """What can go wrong beyond a bad argument: every error of the device is a `HizError`.
 
-Bad arguments are plain `TypeError` (a wrong type or kind of dtype) and `ValueError` (a wrong shape, a camera with
-NaN, a stale pyramid); their text names the parameter, what it expects and what came.
+Bad arguments are plain `TypeError` (a wrong type or kind of dtype) and `ValueError` (a wrong shape,
+a camera with NaN, a stale pyramid); their text names the parameter, what it expects and what came.
 """
 
 from __future__ import annotations
@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-__all__ = ["DeviceLostError", "HizError", "HizWarning", "LimitError", "NoAdapterError", "OutOfMemoryError"]
+__all__ = [
+    "DeviceLostError",
+    "HizError",
+    "HizWarning",
+    "LimitError",
+    "NoAdapterError",
+    "OutOfMemoryError",
+]
 
 
 class HizError(Exception):
@@ -29,7 +36,8 @@ class NoAdapterError(HizError):
     seen : tuple of str
         The adapters that were found, one line each; empty when there is no Vulkan driver.
     hint : str
-        What to do about it: how to choose one of those seen, or the line that installs a software driver.
+        What to do about it: how to choose one of those seen, or the line that installs a software
+        driver.
     request : str
         What was asked for, in words.
     """

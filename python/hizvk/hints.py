@@ -1,7 +1,8 @@
 """What looks like a mistake in a cull that is right as it was asked: everything outside, nothing that could hide.
 
-No hint changes a result, and each says something that holds for all instances or all pixels, so that a scene which is
-as it should be gets none. `hizvk.visible` warns (`HizWarning`), `CullResult.hints` tells when asked.
+No hint changes a result, and each says something that holds for all instances or all pixels, so
+that a scene which is as it should be gets none.
+`hizvk.visible` warns (`HizWarning`), `CullResult.hints` tells when asked.
 """
 
 from __future__ import annotations
@@ -157,7 +158,9 @@ def _middles(bounds: Bounds | None) -> npt.NDArray[np.float64]:
         case None:
             return np.zeros((0, 3))
         case Boxes():
-            low, high = (np.asarray(corner[_some(bounds)], np.float64) for corner in (bounds.min, bounds.max))
+            low, high = (
+                np.asarray(corner[_some(bounds)], np.float64) for corner in (bounds.min, bounds.max)
+            )
             return 0.5 * (low + high)
     return np.asarray(bounds.centers[_some(bounds)], np.float64)
 

@@ -70,7 +70,8 @@ def visible(
 ) -> npt.NDArray[np.bool_]:
     """Which bounds can be seen: False only for what is surely outside the view or surely behind the depth image.
 
-    For many calls with the same bounds, upload them once (`Device.instances`) and use `Device.cull`.
+    For many calls with the same bounds, upload them once (`Device.instances`) and use
+    `Device.cull`.
 
     Parameters
     ----------
@@ -85,8 +86,8 @@ def visible(
     scale : float
         World units of one step of `depth`, for the kinds ``"z"`` and ``"distance"``.
     invalid : collection of float, optional
-        Which numbers of an array mean "no data", in its own units (before `scale`); None: what its dtype is written
-        with, 0 and 65535 for uint16, 65504 for float16 (see `Device.pyramid`).
+        Which numbers of an array mean "no data", in its own units (before `scale`); None: what its
+        dtype is written with, 0 and 65535 for uint16, 65504 for float16 (see `Device.pyramid`).
     device : Device, optional
         None: one that is made at the first call and kept.
     coverage, guard_px, depth_slack, depth_slack_abs, transform_slack, footprint, descent, fit
@@ -107,8 +108,9 @@ def visible(
     Warns
     -----
     HizWarning
-        Of what is right as it was asked and looks like a mistake: all bounds outside of the view, points of size zero
-        with ``coverage="sample"``, depth that is far everywhere or sparse (see `CullResult.hints`).
+        Of what is right as it was asked and looks like a mistake: all bounds outside of the view,
+        points of size zero with ``coverage="sample"``, depth that is far everywhere or sparse (see
+        `CullResult.hints`).
 
     Examples
     --------
@@ -131,10 +133,14 @@ def visible(
     if isinstance(depth, DepthImage):
         device = depth.device if device is None else device
         if camera != depth.camera:
-            raise ValueError(f"camera: expected the camera of depth, {depth.camera!r}, got {camera!r}")
+            raise ValueError(
+                f"camera: expected the camera of depth, {depth.camera!r}, got {camera!r}"
+            )
         for name, value in (("kind", kind), ("invalid", invalid)):
             if value is not None:
-                raise TypeError(f"{name}: expected nothing beside a DepthImage, got {_arguments.describe(value)}")
+                raise TypeError(
+                    f"{name}: expected nothing beside a DepthImage, got {_arguments.describe(value)}"
+                )
         pyramid = device.pyramid(depth, scale=scale)
     else:
         if device is not None:
@@ -148,6 +154,8 @@ def visible(
         guard_px=guard, depth_slack=slack, depth_slack_abs=slack_abs, transform_slack=transform, footprint=side,
         descent=budget, fit=fit_, statistics=False,  # type: ignore[arg-type]
     )  # fmt: skip
-    for hint in Question(camera, pyramid, coverage_, are_points(bounds)).hints(result.stats, bounds):
+    for hint in Question(camera, pyramid, coverage_, are_points(bounds)).hints(
+        result.stats, bounds
+    ):
         warnings.warn(hint, HizWarning, stacklevel=2)
     return result.mask.copy()

@@ -1,7 +1,7 @@
 """Pictures of a cull: the view, the depth, the pyramid's levels with linear depth, and who was culled, from above.
 
-Needs matplotlib (the extra ``viz``). Nothing here decides anything: it draws what `truth.Sight` and a cull's verdicts
-say.
+Needs matplotlib (the extra ``viz``).
+Nothing here decides anything: it draws what `truth.Sight` and a cull's verdicts say.
 """
 
 from __future__ import annotations
@@ -55,11 +55,15 @@ def save(path: Path, image: Image, *, colours: int | None = None) -> None:
 
     picture = pillow.fromarray(image)
     if colours is not None:
-        picture = picture.quantize(colours, method=pillow.Quantize.MEDIANCUT, dither=pillow.Dither.NONE)
+        picture = picture.quantize(
+            colours, method=pillow.Quantize.MEDIANCUT, dither=pillow.Dither.NONE
+        )
     picture.save(path, optimize=colours is not None)
 
 
-def view_picture(scene: Scene, view: View, sight: Sight, caster: Caster, *, samples: int = 1) -> Image:
+def view_picture(
+    scene: Scene, view: View, sight: Sight, caster: Caster, *, samples: int = 1
+) -> Image:
     """The scene in sunlight, as the rays saw it; ``(height, width, 3)``.
 
     Parameters
@@ -67,7 +71,8 @@ def view_picture(scene: Scene, view: View, sight: Sight, caster: Caster, *, samp
     scene, view, sight
         What is seen from where.
     caster
-        Who saw it. A `RayCaster` also tells what lies in the shade, and may be asked again:
+        Who saw it.
+        A `RayCaster` also tells what lies in the shade, and may be asked again:
     samples : int
         Points a side of each pixel that are averaged, for smooth edges.
     """
@@ -82,7 +87,9 @@ def view_picture(scene: Scene, view: View, sight: Sight, caster: Caster, *, samp
     return _to_bytes(total / samples**2)
 
 
-def with_culled(picture: Image, scene: Scene, view: View, sight: Sight, verdicts: npt.NDArray[np.uint8]) -> Image:
+def with_culled(
+    picture: Image, scene: Scene, view: View, sight: Sight, verdicts: npt.NDArray[np.uint8]
+) -> Image:
     """`picture` with the occluded instances shining through the ground as red triangles.
 
     Those are in the view: what is outside is not occluded (`Verdict`).
@@ -141,7 +148,9 @@ def depth_span(depth: npt.NDArray[np.float32], near: float) -> tuple[float, floa
     return float(low), float(max(high, 1.01 * low))
 
 
-def pyramid_sheet(path: Path, levels: list[npt.NDArray[np.float32]], near: float, title: str) -> None:
+def pyramid_sheet(
+    path: Path, levels: list[npt.NDArray[np.float32]], near: float, title: str
+) -> None:
     """Writes a contact sheet of all levels of a pyramid, each as large as the first, with a scale in kilometres."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
@@ -153,7 +162,9 @@ def pyramid_sheet(path: Path, levels: list[npt.NDArray[np.float32]], near: float
     rows = -(-len(levels) // columns)
     height, width = levels[0].shape
     figure = Figure(
-        figsize=(13.0, 13.0 / columns * height / width * rows * 0.86 + 0.25 * rows + 0.4), layout="constrained", dpi=90
+        figsize=(13.0, 13.0 / columns * height / width * rows * 0.86 + 0.25 * rows + 0.4),
+        layout="constrained",
+        dpi=90,
     )
     axes = figure.subplots(rows, columns, squeeze=False)
     for k, axis in enumerate(axes.flat):
@@ -169,7 +180,9 @@ def pyramid_sheet(path: Path, levels: list[npt.NDArray[np.float32]], near: float
             axis.set_ylim(height, 0)
             axis.set_title(f"level {k}: {texels.shape[1]}x{texels.shape[0]}", fontsize=9)
     scale = ScalarMappable(LogNorm(span[0] / 1000.0, span[1] / 1000.0), "magma_r")
-    bar = figure.colorbar(scale, ax=axes, label="km to the farthest point of the texel (white: sky)", shrink=0.8)
+    bar = figure.colorbar(
+        scale, ax=axes, label="km to the farthest point of the texel (white: sky)", shrink=0.8
+    )
     bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     bar.ax.yaxis.set_major_formatter("{x:g}")
     bar.ax.yaxis.set_minor_locator(NullLocator())
@@ -224,7 +237,9 @@ def overview(
     save(path, _rendered(figure), colours=colours)
 
 
-def top_picture(path: Path, scene: Scene, view: View, verdicts: npt.NDArray[np.uint8], aspect: float) -> None:
+def top_picture(
+    path: Path, scene: Scene, view: View, verdicts: npt.NDArray[np.uint8], aspect: float
+) -> None:
     """Writes the scene from above alone: culled red, kept white."""
     from matplotlib.figure import Figure
 
@@ -241,7 +256,9 @@ def _rendered(figure: Any) -> Image:
     return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3])
 
 
-def _top_view(axis: Any, scene: Scene, view: View, verdicts: npt.NDArray[np.uint8], aspect: float) -> None:
+def _top_view(
+    axis: Any, scene: Scene, view: View, verdicts: npt.NDArray[np.uint8], aspect: float
+) -> None:
     """Instances from above in kilometres east and north, with the view's angle, over a dark relief."""
     middle = (scene.box_min + scene.box_max)[:, :2] / 2.0 - MAP_CORNER[:2]
     centre = (middle.min(axis=0) + middle.max(axis=0)) / 2.0
@@ -250,7 +267,11 @@ def _top_view(axis: Any, scene: Scene, view: View, verdicts: npt.NDArray[np.uint
     reach = max(reach, 1.05 * float(np.abs(eye - centre).max()))
     low, high = (centre - reach) / 1000.0, (centre + reach) / 1000.0
     if scene.terrain is not None:
-        axis.imshow(_relief(scene.terrain, low, high), extent=(low[0], high[0], low[1], high[1]), origin="lower")
+        axis.imshow(
+            _relief(scene.terrain, low, high),
+            extent=(low[0], high[0], low[1], high[1]),
+            origin="lower",
+        )
     east, north = (middle / 1000.0).T
     groups = (
         (verdicts == Verdict.OUTSIDE, OUTSIDE, 1.2, "culled, outside the view"),
@@ -259,24 +280,38 @@ def _top_view(axis: Any, scene: Scene, view: View, verdicts: npt.NDArray[np.uint
     )
     for chosen, colour, area, label in groups:
         label = f"{int(chosen.sum()):,} {label}"
-        axis.scatter(east[chosen], north[chosen], s=area, color=colour, linewidths=0, label=label, rasterized=True)
+        axis.scatter(
+            east[chosen],
+            north[chosen],
+            s=area,
+            color=colour,
+            linewidths=0,
+            label=label,
+            rasterized=True,
+        )
     half = np.arctan(np.tan(np.radians(view.fov_y_deg) / 2.0) * aspect)
     heading = np.arctan2(view.target[1] - view.eye[1], view.target[0] - view.eye[0])
     for angle in (heading - half, heading + half):
         tip = eye / 1000.0 + 40.0 * np.array([np.cos(angle), np.sin(angle)])
-        axis.plot([eye[0] / 1000.0, tip[0]], [eye[1] / 1000.0, tip[1]], color="#ffd84a", linewidth=1.1)
+        axis.plot(
+            [eye[0] / 1000.0, tip[0]], [eye[1] / 1000.0, tip[1]], color="#ffd84a", linewidth=1.1
+        )
     axis.plot(eye[0] / 1000.0, eye[1] / 1000.0, "o", color="#ffd84a", markersize=6)
     axis.set_xlim(low[0], high[0])
     axis.set_ylim(low[1], high[1])
     axis.set_axis_off()
-    legend = axis.legend(loc="lower left", fontsize=8.5, markerscale=3.5, labelcolor="white", handletextpad=0.2)
+    legend = axis.legend(
+        loc="lower left", fontsize=8.5, markerscale=3.5, labelcolor="white", handletextpad=0.2
+    )
     legend.get_frame().set(facecolor="#14181c", alpha=0.85, edgecolor="none")
 
 
 def _relief(terrain: Terrain, low: Floats, high: Floats) -> Floats:
     """A dark hill shading of the square between two corners, given in kilometres."""
     spot = (np.arange(700) + 0.5) / 700.0
-    x, y = np.meshgrid(*(1000.0 * (low[k] + spot * (high[k] - low[k])) + MAP_CORNER[k] for k in range(2)))
+    x, y = np.meshgrid(
+        *(1000.0 * (low[k] + spot * (high[k] - low[k])) + MAP_CORNER[k] for k in range(2))
+    )
     light = np.clip(terrain.normal_at(x, y) @ MAP_LIGHT, 0.0, 1.0)
     tall = (terrain.height_at(x, y) - 250.0) / 800.0
     grey = 0.10 + 0.42 * light**1.6 * (0.55 + 0.6 * tall)
@@ -296,7 +331,9 @@ def _colours(scene: Scene, view: View, sight: Sight, caster: Caster, rays: Float
     is_ground = owner[seen] == OCCLUDER
     albedo = _leaves(owner[seen])
     if scene.terrain is not None:
-        albedo[is_ground], normal[is_ground] = _ground(scene.terrain, points[is_ground], depth[is_ground])
+        albedo[is_ground], normal[is_ground] = _ground(
+            scene.terrain, points[is_ground], depth[is_ground]
+        )
     sun = np.clip(normal @ SUN, 0.0, 1.0)
     if isinstance(caster, RayCaster):
         sun *= caster.in_light(points + normal * (0.05 + 2e-4 * depth)[:, None], SUN)
@@ -308,7 +345,9 @@ def _colours(scene: Scene, view: View, sight: Sight, caster: Caster, rays: Float
 
 def _leaves(owner: npt.NDArray[np.int32]) -> Floats:
     """A green of its own for each instance."""
-    vary = (owner.astype(np.uint32) * np.uint32(2654435761) >> np.uint32(8)).astype(np.float64) / 2.0**24
+    vary = (owner.astype(np.uint32) * np.uint32(2654435761) >> np.uint32(8)).astype(
+        np.float64
+    ) / 2.0**24
     green: Floats = np.array([0.13, 0.25, 0.12]) + vary[:, None] * np.array([0.15, 0.14, 0.04])
     return green
 
@@ -318,12 +357,24 @@ def _ground(terrain: Terrain, points: Floats, distance: Floats) -> tuple[Floats,
     x, y, z = points.T
     normal = terrain.normal_at(x, y)
     patch, fine = np.zeros(len(x)), np.zeros(len(x))
-    for length, heading in ((1900.0, 0.4), (1130.0, 1.9), (690.0, 2.7), (410.0, 0.9), (233.0, 2.2), (129.0, 1.4)):
-        patch += np.cos((x * np.cos(heading) + y * np.sin(heading)) * 2.0 * np.pi / length + 3.0 * patch) / 6.0
+    for length, heading in (
+        (1900.0, 0.4),
+        (1130.0, 1.9),
+        (690.0, 2.7),
+        (410.0, 0.9),
+        (233.0, 2.2),
+        (129.0, 1.4),
+    ):
+        patch += (
+            np.cos((x * np.cos(heading) + y * np.sin(heading)) * 2.0 * np.pi / length + 3.0 * patch)
+            / 6.0
+        )
     for length, heading in ((83.0, 0.2), (47.0, 1.7), (29.0, 2.9), (17.0, 1.1)):
         fade = np.exp(-distance * 1.2 / (30.0 * length))  # before it is finer than the pixels
         fine += fade * np.cos(
-            (x * np.cos(heading) + y * np.sin(heading)) * 2.0 * np.pi / length + 4.0 * patch + 2.0 * fine
+            (x * np.cos(heading) + y * np.sin(heading)) * 2.0 * np.pi / length
+            + 4.0 * patch
+            + 2.0 * fine
         )
     high = np.clip((z - 470.0) / 480.0 + 0.45 * patch, 0.0, 1.0)[:, None]
     steep = np.clip((0.95 - normal[:, 2]) * 5.0 + 0.5 * patch, 0.0, 1.0)[:, None]

@@ -1,7 +1,8 @@
 """The oracle: what a cull may and may not hide, in float64 and exact arithmetic, by brute force and without a GPU.
 
-It shares no code with the engine. It is slow (it looks at every pixel that an instance can meet), so it is for tests
-and for the last word about single instances.
+It shares no code with the engine.
+It is slow (it looks at every pixel that an instance can meet), so it is for tests and for the last
+word about single instances.
 """
 
 from __future__ import annotations
@@ -60,13 +61,15 @@ def classify(
     depth : (height, width) array
         The depth image, row 0 on top.
     kind, scale, invalid
-        What its numbers are, as in `Device.pyramid`. The oracle finds the NDC depth of ``"z"`` and ``"distance"`` by
-        itself, exactly, between two neighbouring float32.
+        What its numbers are, as in `Device.pyramid`.
+        The oracle finds the NDC depth of ``"z"`` and ``"distance"`` by itself, exactly, between two
+        neighbouring float32.
     coverage : "area" or "sample"
         What of a pixel counts: its closed square, or its centre.
     own_depth : "nearest" or "pixel"
-        A pixel hides the bounds if it is nearer than all of them (``"nearest"``: what ``fit="rectangle"`` may cull at
-        most), or than the part of them that it can show (``"pixel"``, for ``fit="volume"``).
+        A pixel hides the bounds if it is nearer than all of them (``"nearest"``: what
+        ``fit="rectangle"`` may cull at most), or than the part of them that it can show
+        (``"pixel"``, for ``fit="volume"``).
 
     Returns
     -------

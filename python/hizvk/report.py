@@ -76,7 +76,13 @@ class ViewReport:
 
     @classmethod
     def of(
-        cls, name: str, stats: CullStats, drawn: int, found: Check, difference: float | None, ms: dict[str, float]
+        cls,
+        name: str,
+        stats: CullStats,
+        drawn: int,
+        found: Check,
+        difference: float | None,
+        ms: dict[str, float],
     ) -> ViewReport:
         """The report of a cull and its check."""
         return cls(
@@ -145,11 +151,16 @@ class Report:
         """Everything as plain data for JSON."""
         return {
             "passed": self.passed,
-            "totals": {name: self.total(name) for name in TOTALS} | {"false_keep_share": self.false_keep_share},
+            "totals": {name: self.total(name) for name in TOTALS}
+            | {"false_keep_share": self.false_keep_share},
             "median_ms": self.median_ms(),
             "first_ms": self.views[0].ms,
             **asdict(self),
-            "versions": {"hizvk": __version__, "python": platform.python_version(), "numpy": np.__version__},
+            "versions": {
+                "hizvk": __version__,
+                "python": platform.python_version(),
+                "numpy": np.__version__,
+            },
         }
 
     def verdict(self) -> str:
@@ -177,7 +188,9 @@ def write(report: Report, folder: Path, pictures: Iterable[tuple[str, str]]) -> 
     pictures : iterable of (str, str)
         File names relative to `folder`, and what they show.
     """
-    (folder / "report.json").write_text(json.dumps(report.as_data(), indent=2) + "\n", encoding="utf-8")
+    (folder / "report.json").write_text(
+        json.dumps(report.as_data(), indent=2) + "\n", encoding="utf-8"
+    )
     (folder / "report.md").write_text("\n".join(_page(report, pictures)) + "\n", encoding="utf-8")
 
 
@@ -203,7 +216,10 @@ def _page(report: Report, pictures: Iterable[tuple[str, str]]) -> list[str]:
         "",
         "| stage | median | first view | |",
         "|---|---:|---:|---|",
-        *(f"| {stage} | {median[stage]:.2f} | {first[stage]:.2f} | {what} |" for stage, what in STAGES.items()),
+        *(
+            f"| {stage} | {median[stage]:.2f} | {first[stage]:.2f} | {what} |"
+            for stage, what in STAGES.items()
+        ),
         "",
         "## Counts",
         "",
@@ -231,14 +247,20 @@ def _page(report: Report, pictures: Iterable[tuple[str, str]]) -> list[str]:
         f"- Culled trees that are visible by a hair: {report.total('hairs')} (the ray moved by 1/16 pixel, or the "
         "depth by 1e-6, hides them, and a rasteriser may do either).",
     ]
-    differences = [view.depth_difference for view in report.views if view.depth_difference is not None]
+    differences = [
+        view.depth_difference for view in report.views if view.depth_difference is not None
+    ]
     if differences:
-        lines.append(f"- Rendered against ray-cast depth, relative: median {statistics.median(differences):.1e}.")
+        lines.append(
+            f"- Rendered against ray-cast depth, relative: median {statistics.median(differences):.1e}."
+        )
     for number, view in enumerate(report.views):
         for what, culled in (("visible", view.false_culls), ("promised", view.broken_promises)):
             if culled:
                 more = ", ..." if len(culled) > NAMED else ""
-                lines.append(f"- View {number} culled {what} trees: {', '.join(map(str, culled[:NAMED]))}{more}")
+                lines.append(
+                    f"- View {number} culled {what} trees: {', '.join(map(str, culled[:NAMED]))}{more}"
+                )
     lines += ["", "## Pictures", ""]
     for name, what in pictures:
         lines += [f"{what}:", "", f"![{what}]({name})", ""]
@@ -255,7 +277,9 @@ def _row(first: str, numbers: ViewReport | Report) -> str:
         return len(value) if isinstance(value, list) else int(value)
 
     name = numbers.name if isinstance(numbers, ViewReport) else ""
-    vain = f"{count('false_keeps'):,} ({100.0 * count('false_keeps') / max(count('hidden'), 1):.1f} %)"
+    vain = (
+        f"{count('false_keeps'):,} ({100.0 * count('false_keeps') / max(count('hidden'), 1):.1f} %)"
+    )
     wrong = count("false_culls") + count("broken_promises")
     plain = " | ".join(f"{count(each):,}" for each in ("outside", "occluded", "kept", "visible"))
     return f"| {first} | {name} | {plain} | {wrong} | {vain} | {count('required'):,} |"

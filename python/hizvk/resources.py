@@ -34,7 +34,8 @@ class Mesh:
     triangles : (T, 3) integer array
         Indices of vertices; seen from the front they run counter-clockwise.
     transforms : (K, 4, 4) or (4, 4) float array, optional
-        ``world_from_mesh`` of each copy, last row 0, 0, 0, 1. None: one copy, where the vertices are.
+        ``world_from_mesh`` of each copy, last row 0, 0, 0, 1.
+        None: one copy, where the vertices are.
 
     Raises
     ------
@@ -47,22 +48,31 @@ class Mesh:
     transforms: FloatArray | None
 
     def __init__(
-        self, vertices: npt.ArrayLike, triangles: npt.ArrayLike, transforms: npt.ArrayLike | None = None
+        self,
+        vertices: npt.ArrayLike,
+        triangles: npt.ArrayLike,
+        transforms: npt.ArrayLike | None = None,
     ) -> None:
         checked = _arguments.finite_floats("vertices", vertices, ("V", 3))
         object.__setattr__(self, "vertices", checked)
-        object.__setattr__(self, "triangles", _arguments.triangles("triangles", triangles, len(checked)))
+        object.__setattr__(
+            self, "triangles", _arguments.triangles("triangles", triangles, len(checked))
+        )
         placed: FloatArray | None = None
         if transforms is not None:
             single = np.ndim(transforms) == 2
-            placed = _arguments.finite_floats("transforms", transforms, (4, 4) if single else ("K", 4, 4))
+            placed = _arguments.finite_floats(
+                "transforms", transforms, (4, 4) if single else ("K", 4, 4)
+            )
             _arguments.check_affine("transforms", placed)
             placed = placed.reshape(-1, 4, 4)
         object.__setattr__(self, "transforms", placed)
 
     def __repr__(self) -> str:
         copies = 1 if self.transforms is None else len(self.transforms)
-        return f"Mesh({len(self.vertices)} vertices, {len(self.triangles)} triangles, {copies} copies)"
+        return (
+            f"Mesh({len(self.vertices)} vertices, {len(self.triangles)} triangles, {copies} copies)"
+        )
 
 
 class _HasFaces(Protocol):
@@ -124,35 +134,40 @@ class Instances:
     def host_bytes(self) -> int:
         """Memory that they take on the host.
 
-        8 bytes an instance for where it is stored (none with ``order="given"``), 88 for each group of 64, and 48
-        an instance in groups of which a part was updated.
+        8 bytes an instance for where it is stored (none with ``order="given"``), 88 for each group
+        of 64, and 48 an instance in groups of which a part was updated.
         """
         return self._inner.host_bytes()
 
     def update(self, first: int, bounds: Bounds, *, strict: bool = False) -> None:
         """Replaces instances ``first``, ``first + 1``, ... by new bounds of the same kind, as many as there are.
 
-        A cull that was submitted earlier sees the old bounds, also where its result is read later; one that is
-        submitted later sees the new ones. (`CullResult.explain` runs again, so it explains the bounds of now.) From
-        several threads, updates take effect one after the other.
+        A cull that was submitted earlier sees the old bounds, also where its result is read later;
+        one that is submitted later sees the new ones.
+        (`CullResult.explain` runs again, so it explains the bounds of now.)
+        From several threads, updates take effect one after the other.
 
-        Instances keep the place in storage that the upload gave them; the boxes of their groups follow exactly. So an
-        update costs about as much as the upload of as many instances without the sort, and results are always right.
-        But groups whose members part are large, and large boxes are hidden less often: once most instances have moved
-        farther than neighbours lie apart, a new `Device.instances` (a re-sort) makes culls as fast as at first. It
-        pays when it costs less than what the culls until the next one save by it. After an update that failed (for lack
-        of memory), groups that are touched are no longer tested as a whole: results stay right, and new instances are
-        fast again.
+        Instances keep the place in storage that the upload gave them; the boxes of their groups
+        follow exactly.
+        So an update costs about as much as the upload of as many instances without the sort, and
+        results are always right.
+        But groups whose members part are large, and large boxes are hidden less often: once most
+        instances have moved farther than neighbours lie apart, a new `Device.instances` (a re-sort)
+        makes culls as fast as at first.
+        It pays when it costs less than what the culls until the next one save by it.
+        After an update that failed (for lack of memory), groups that are touched are no longer
+        tested as a whole: results stay right, and new instances are fast again.
 
         Parameters
         ----------
         first : int
             The first instance that is replaced, ``0 <= first <= len(self)``.
         bounds : Spheres, Boxes or OrientedBoxes
-            What replaces them: n volumes of the kind that they have, ``first + n <= len(self)``; none is allowed.
+            What replaces them: n volumes of the kind that they have, ``first + n <= len(self)``;
+            none is allowed.
         strict : bool
-            True refuses bounds that are no volume, and then nothing has changed. False keeps them visible, as
-            `Device.instances` does; `invalid` follows.
+            True refuses bounds that are no volume, and then nothing has changed.
+            False keeps them visible, as `Device.instances` does; `invalid` follows.
 
         Raises
         ------
@@ -171,7 +186,9 @@ class Instances:
         first = _arguments.integer("first", first, low=0, high=len(self))
         kind, arrays = as_arrays("bounds", bounds)
         if kind != self.kind:
-            raise TypeError(f"bounds: expected {self.kind} as the instances are, got {_arguments.describe(bounds)}")
+            raise TypeError(
+                f"bounds: expected {self.kind} as the instances are, got {_arguments.describe(bounds)}"
+            )
         if len(bounds) > len(self) - first:
             expected = f"at most {len(self) - first} from instance {first} of {len(self)} on"
             raise ValueError(f"bounds: expected {expected}, got {len(bounds)}")
@@ -217,8 +234,8 @@ class Occluders:
     def host_bytes(self) -> int:
         """Memory that they take on the host.
 
-        The float64 mesh, 24 bytes a vertex and 12 a triangle, and what the first conservative depth image adds to it
-        for good (about 42 bytes a triangle and 24 a vertex).
+        The float64 mesh, 24 bytes a vertex and 12 a triangle, and what the first conservative depth
+        image adds to it for good (about 42 bytes a triangle and 24 a vertex).
         """
         return self._inner.host_bytes()
 
@@ -268,7 +285,9 @@ class Pyramid:
     Made by `Device.pyramid`.
     """
 
-    def __init__(self, device: Device, core: _core.Pyramid, camera: Camera, *, is_rendered: bool = False) -> None:
+    def __init__(
+        self, device: Device, core: _core.Pyramid, camera: Camera, *, is_rendered: bool = False
+    ) -> None:
         self._device = device
         self._inner = core
         self._camera = camera
@@ -348,7 +367,11 @@ def as_mesh(name: str, value: object, expected: str) -> Mesh:
     if parts is None:
         # A scene of trimesh's holds meshes by name; it has none of its own.
         is_scene = hasattr(value, "geometry") and hasattr(value, "dump")
-        hint = "; of a trimesh scene pass scene.to_mesh(), or scene.dump(concatenate=True)" if is_scene else ""
+        hint = (
+            "; of a trimesh scene pass scene.to_mesh(), or scene.dump(concatenate=True)"
+            if is_scene
+            else ""
+        )
         raise TypeError(f"{name}: expected {expected}, got {_arguments.describe(value)}{hint}")
     try:
         return Mesh(*parts)
@@ -387,5 +410,9 @@ def as_meshes(vertices: Any, triangles: Any, transforms: Any) -> list[Mesh]:
     if transforms is not None and parts is not None:  # it has none of its own
         return [Mesh(*parts, transforms)]
     if transforms is not None:
-        raise TypeError("transforms: expected nothing beside a list of meshes, which have their own")
-    return meshes_of("vertices", vertices, f"{A_MESH}, or a list of them when triangles is left out")
+        raise TypeError(
+            "transforms: expected nothing beside a list of meshes, which have their own"
+        )
+    return meshes_of(
+        "vertices", vertices, f"{A_MESH}, or a list of them when triangles is left out"
+    )

@@ -1,8 +1,8 @@
 """What a cull answers: who is visible, in a mask, a list and draw arguments, and how each verdict came about.
 
-Nothing is read from the device before it is asked for; what was read is kept. The arrays are shared
-with the next one who asks, so they are read-only: ``.copy()`` gives one to write to, and DLPack
-(``torch.from_dlpack``) gets a copy.
+Nothing is read from the device before it is asked for; what was read is kept.
+The arrays are shared with the next one who asks, so they are read-only: ``.copy()`` gives one to
+write to, and DLPack (``torch.from_dlpack``) gets a copy.
 """
 
 from __future__ import annotations
@@ -40,8 +40,9 @@ class Verdict(enum.IntEnum):
     """What a cull decides about one instance; the codes of `CullResult.verdicts`.
 
     What is outside and hidden by the depth image as well is `OUTSIDE`, also as a member of a group
-    of 64 that was hidden as a whole. So verdicts do not depend on ``hierarchy=``, but for the few
-    instances that a group's test hides and their own would keep: those are `OCCLUDED`.
+    of 64 that was hidden as a whole.
+    So verdicts do not depend on ``hierarchy=``, but for the few instances that a group's test hides
+    and their own would keep: those are `OCCLUDED`.
     """
 
     OUTSIDE = 0
@@ -90,8 +91,9 @@ class CullStats:
     """The numbers of one cull.
 
     ``tested = outside + occluded + kept``, and `invalid` of those that were kept have no valid
-    bounds. They are the counts of `CullResult.verdicts`. The four times are told by the clock on
-    the wall.
+    bounds.
+    They are the counts of `CullResult.verdicts`.
+    The four times are told by the clock on the wall.
     """
 
     tested: int
@@ -144,9 +146,9 @@ class CullStats:
 class Explanation:
     """How the verdict of one instance came about: the cull's own test of it, run once more.
 
-    A member of a group of 64 that was hidden as a whole was never tested by itself. Its verdict is
-    the group's (see `group`), or `Verdict.OUTSIDE` where its own test says so. Everything else here
-    is its own test, which may have kept it.
+    A member of a group of 64 that was hidden as a whole was never tested by itself.
+    Its verdict is the group's (see `group`), or `Verdict.OUTSIDE` where its own test says so.
+    Everything else here is its own test, which may have kept it.
     """
 
     index: int
@@ -247,8 +249,8 @@ SHOWN_TEXELS: Final = 16
 class SharedArray(np.ndarray):
     """A read-only array that all who ask for it share.
 
-    What is computed from it is a plain array, and whoever imports it by DLPack gets a copy. An
-    older DLPack cannot say that memory is read-only, so NumPy refuses to export such arrays, and
+    What is computed from it is a plain array, and whoever imports it by DLPack gets a copy.
+    An older DLPack cannot say that memory is read-only, so NumPy refuses to export such arrays, and
     consumers of the newer one need not heed it.
     """
 
@@ -301,10 +303,13 @@ def _explanation(index: int, told: _core.Explanation) -> Explanation:
 class CullResult:
     """The answer of `Device.cull`; reading any part of it waits for the device.
 
-    Not made by hand. May be read from any thread.
+    Not made by hand.
+    May be read from any thread.
     """
 
-    def __init__(self, culling: _core.Culling, statistics: bool, question: Question | None = None) -> None:
+    def __init__(
+        self, culling: _core.Culling, statistics: bool, question: Question | None = None
+    ) -> None:
         self._culling = culling
         self._statistics = statistics
         self._question = question
@@ -361,7 +366,9 @@ class CullResult:
         """
         demand = self._demand_and_written[0]
         if demand is None:
-            raise ValueError('outputs: expected "mask" or "verdicts" beside a list that is full, got neither')
+            raise ValueError(
+                'outputs: expected "mask" or "verdicts" beside a list that is full, got neither'
+            )
         return demand
 
     @property
@@ -394,8 +401,9 @@ class CullResult:
     def hints(self) -> tuple[str, ...]:
         """What looks like a mistake, in sentences; empty where nothing does.
 
-        Everything outside of the view, points of size zero with ``coverage="sample"``, depth that is far everywhere or
-        sparse. It is cheap beside a cull, but for an image that hides nothing, which may be read back.
+        Everything outside of the view, points of size zero with ``coverage="sample"``, depth that
+        is far everywhere or sparse.
+        It is cheap beside a cull, but for an image that hides nothing, which may be read back.
 
         Raises
         ------
@@ -426,7 +434,9 @@ class CullResult:
         try:
             index = _arguments.integer("index", index, low=0, high=count - 1)
         except ValueError:
-            expected = f"an integer in 0..{count - 1}" if count else "nothing, for there are no instances"
+            expected = (
+                f"an integer in 0..{count - 1}" if count else "nothing, for there are no instances"
+            )
             raise IndexError(f"index: expected {expected}, got {index}") from None
         return _explanation(index, self._culling.explain(index))
 

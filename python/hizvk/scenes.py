@@ -1,9 +1,10 @@
 """Scenes with known geometry: the mountains of the demo, with a tree at every instance, and a small room.
 
-A `Scene` holds the occluders, the instances with their real triangles, and the views. Positions are float64 and lie
-far from the origin where the scene does (the mountains stand at coordinates like those of a map, millions of metres
-out). All of them are multiples of 1/64 m, so that ``scene.vertices - scene.origin`` is exact in float32 and the ray
-caster that checks a cull starts from the same numbers as the cull.
+A `Scene` holds the occluders, the instances with their real triangles, and the views.
+Positions are float64 and lie far from the origin where the scene does (the mountains stand at
+coordinates like those of a map, millions of metres out).
+All of them are multiples of 1/64 m, so that ``scene.vertices - scene.origin`` is exact in float32
+and the ray caster that checks a cull starts from the same numbers as the cull.
 """
 
 from __future__ import annotations
@@ -87,7 +88,13 @@ class View:
     def camera(self, size: Size) -> Camera:
         """The library's camera for this view, reversed Z."""
         return Camera.look_at(
-            self.eye, self.target, up=self.up, fov_y_deg=self.fov_y_deg, size=size, near=self.near, far=self.far
+            self.eye,
+            self.target,
+            up=self.up,
+            fov_y_deg=self.fov_y_deg,
+            size=size,
+            near=self.near,
+            far=self.far,
         )
 
     def basis(self) -> Floats:
@@ -130,11 +137,16 @@ class Terrain:
         vertices = np.stack([x, y, self.heights], axis=-1).reshape(-1, 3) + self.corner
         number = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
         sw, se, nw, ne = (
-            part.reshape(-1) for part in (number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:])
+            part.reshape(-1)
+            for part in (number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:])
         )
-        return vertices, np.concatenate([np.stack([sw, se, ne], axis=1), np.stack([sw, ne, nw], axis=1)])
+        return vertices, np.concatenate(
+            [np.stack([sw, se, ne], axis=1), np.stack([sw, ne, nw], axis=1)]
+        )
 
-    def _cells(self, x: Floats, y: Floats) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Floats, Floats]:
+    def _cells(
+        self, x: Floats, y: Floats
+    ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Floats, Floats]:
         rows, columns = self.heights.shape
         u = np.clip((x - self.corner[0]) / self.step[0], 0.0, columns - 1.0)
         v = np.clip((y - self.corner[1]) / self.step[1], 0.0, rows - 1.0)
@@ -146,7 +158,12 @@ class Terrain:
         """The height of the mesh's surface at world positions."""
         row, column, u, v = self._cells(x, y)
         h = self.heights
-        sw, se, nw, ne = h[row, column], h[row, column + 1], h[row + 1, column], h[row + 1, column + 1]
+        sw, se, nw, ne = (
+            h[row, column],
+            h[row, column + 1],
+            h[row + 1, column],
+            h[row + 1, column + 1],
+        )
         east_first = sw + u * (se - sw) + v * (ne - se)
         north_first = sw + v * (nw - sw) + u * (ne - nw)
         surface: Floats = np.where(u >= v, east_first, north_first)
@@ -160,7 +177,10 @@ class Terrain:
 
         def smooth(grid: Floats) -> Floats:
             south = grid[row, column] * (1.0 - u) + grid[row, column + 1] * u
-            return south * (1.0 - v) + (grid[row + 1, column] * (1.0 - u) + grid[row + 1, column + 1] * u) * v
+            return (
+                south * (1.0 - v)
+                + (grid[row + 1, column] * (1.0 - u) + grid[row + 1, column + 1] * u) * v
+            )
 
         normal = np.stack([-smooth(east), -smooth(north), np.ones_like(u)], axis=-1)
         unit: Floats = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
@@ -209,14 +229,15 @@ def box_mesh(low: npt.ArrayLike, high: npt.ArrayLike) -> tuple[Floats, npt.NDArr
 
     Returns
     -------
-    vertices : (8 N, 3) float64 array
-    triangles : (12 N, 3) uint32 array
+    vertices : (8 N, 3) float64 array triangles : (12 N, 3) uint32 array
         Twelve in a row for each box.
     """
     low, high = np.asarray(low, np.float64), np.asarray(high, np.float64)
     corner = (np.arange(8)[:, None] >> np.arange(3)) & 1
     vertices = np.where(corner, high[:, None], low[:, None]).reshape(-1, 3)
-    sides = np.array([[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]])
+    sides = np.array(
+        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
+    )
     one = np.concatenate([sides[:, [0, 1, 2]], sides[:, [0, 2, 3]]])
     triangles = (one + 8 * np.arange(len(low))[:, None, None]).reshape(-1, 3)
     return vertices, triangles.astype(np.uint32)
@@ -284,7 +305,11 @@ def mountains(trees: int = 20_000, views: int = 12, *, seed: int = 2010) -> Scen
     ground, ground_triangles = terrain.mesh()
     return Scene(
         name="mountains around the Jacksboro fault, Tennessee (elevation model: matplotlib's sample data)",
-        origin=(MAP_CORNER[0] + 1000.0 * round(FOREST[0]), MAP_CORNER[1] + 1000.0 * round(FOREST[1]), 0.0),
+        origin=(
+            MAP_CORNER[0] + 1000.0 * round(FOREST[0]),
+            MAP_CORNER[1] + 1000.0 * round(FOREST[1]),
+            0.0,
+        ),
         vertices=ground,
         triangles=ground_triangles,
         instance_vertices=vertices.reshape(-1, 3),
@@ -300,8 +325,8 @@ def mountains(trees: int = 20_000, views: int = 12, *, seed: int = 2010) -> Scen
 def room(seed: int = 1999, crates: int = 240) -> Scene:
     """A floor of 16 by 12 m whose two walls with a door each hide much of the crates on it; four views.
 
-    Walls, floor and crates are axis-aligned boxes, so that boxes are the instances' real geometry. The world is the
-    origin's surroundings, up is z, and all coordinates are multiples of 1/64 m.
+    Walls, floor and crates are axis-aligned boxes, so that boxes are the instances' real geometry.
+    The world is the origin's surroundings, up is z, and all coordinates are multiples of 1/64 m.
 
     Parameters
     ----------
@@ -327,10 +352,15 @@ def room(seed: int = 1999, crates: int = 240) -> Scene:
     )
     rng = np.random.default_rng(seed)
     scale = min(1.0, float(np.sqrt(240.0 / crates)))
-    size = np.round(scale * rng.uniform([0.1, 0.1, 0.1], [0.7, 0.7, 1.1], (crates, 3)) / GRID) * GRID
+    size = (
+        np.round(scale * rng.uniform([0.1, 0.1, 0.1], [0.7, 0.7, 1.1], (crates, 3)) / GRID) * GRID
+    )
     size = np.maximum(size, GRID)
     bay = rng.choice([0.1, 5.35, 10.35], crates)
-    low = np.stack([bay + rng.uniform(0.0, 3.8, crates), rng.uniform(0.1, 11.1, crates), np.zeros(crates)], axis=1)
+    low = np.stack(
+        [bay + rng.uniform(0.0, 3.8, crates), rng.uniform(0.1, 11.1, crates), np.zeros(crates)],
+        axis=1,
+    )
     low = np.round(low / GRID) * GRID
     vertices, triangles = box_mesh(walls[:, :3], walls[:, 3:])
     crate_vertices, crate_triangles = box_mesh(low, low + size)
@@ -406,21 +436,39 @@ def _flight(terrain: Terrain, count: int) -> tuple[View, ...]:
         # The last tenth is kept for looking ahead.
         here = 0.9 * length[-1] * (number / max(count - 1, 1))
         east, north, above = (np.interp(here, length, curve[:, k]) for k in range(3))
-        ahead_east, ahead_north = (np.interp(here + 0.09 * length[-1], length, curve[:, k]) for k in range(2))
+        ahead_east, ahead_north = (
+            np.interp(here + 0.09 * length[-1], length, curve[:, k]) for k in range(2)
+        )
         x, y = MAP_CORNER[0] + east, MAP_CORNER[1] + north
         z = float(terrain.height_at(np.array([x]), np.array([y]))[0]) + above
         reach = float(np.hypot(ahead_east - east, ahead_north - north))
         eye = (_on_grid(x), _on_grid(y), _on_grid(z))
-        target = (x + ahead_east - east, y + ahead_north - north, z - reach * (0.07 + 0.0006 * min(above, 300.0)))
-        views.append(View(f"{east / 1000:.1f} km E, {north / 1000:.1f} km N, {above:.0f} m up", eye, target, 46.0, 1.0))
+        target = (
+            x + ahead_east - east,
+            y + ahead_north - north,
+            z - reach * (0.07 + 0.0006 * min(above, 300.0)),
+        )
+        views.append(
+            View(
+                f"{east / 1000:.1f} km E, {north / 1000:.1f} km N, {above:.0f} m up",
+                eye,
+                target,
+                46.0,
+                1.0,
+            )
+        )
     return tuple(views)
 
 
 def _catmull_rom(points: Floats, where: Floats) -> Floats:
     """The smooth curve through `points` at the parameters `where` (0 is the first point, 1 the second, ...)."""
-    padded = np.concatenate([2.0 * points[:1] - points[1:2], points, 2.0 * points[-1:] - points[-2:-1]])
+    padded = np.concatenate(
+        [2.0 * points[:1] - points[1:2], points, 2.0 * points[-1:] - points[-2:-1]]
+    )
     start = np.minimum(where.astype(np.intp), len(points) - 2)
     t = (where - start)[:, None]
     a, b, c, d = (padded[start + k] for k in range(4))
-    curve: Floats = b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
+    curve: Floats = b + 0.5 * t * (
+        c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a))
+    )
     return curve

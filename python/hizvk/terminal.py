@@ -48,7 +48,9 @@ class Progress:
             full = self.WIDTH * self._done // self._total
             seconds = time.monotonic() - self._started
             bar = "#" * full + "-" * (self.WIDTH - full)
-            self._stream.write(f"\r\x1b[K[{bar}] {self._done}/{self._total}  {seconds:3.0f} s  {doing}")
+            self._stream.write(
+                f"\r\x1b[K[{bar}] {self._done}/{self._total}  {seconds:3.0f} s  {doing}"
+            )
             self._stream.flush()
 
     def close(self) -> None:
@@ -61,8 +63,12 @@ class Progress:
 def size(text: str) -> Size:
     """``"960x540"`` as ``(height, width)``, for argparse."""
     width, cross, height = text.partition("x")
-    if not (cross and width.isdecimal() and height.isdecimal() and int(width) > 0 and int(height) > 0):
-        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT in pixels, like 960x540, got {text!r}")
+    if not (
+        cross and width.isdecimal() and height.isdecimal() and int(width) > 0 and int(height) > 0
+    ):
+        raise argparse.ArgumentTypeError(
+            f"expected WIDTHxHEIGHT in pixels, like 960x540, got {text!r}"
+        )
     return int(height), int(width)
 
 

@@ -1,14 +1,17 @@
 """What is really seen, for checking a cull: rays through the pixel centres, or pixels against the boxes.
 
-With `embreex` (the extra ``scene``) rays are cast at the real triangles of occluders and instances together; neither
-the rendered depth nor any matrix of the library takes part. Without it the instances' boxes are intersected with the
-pixels' rays in float64 and compared with the depth image as given: that says nothing about the depth image, and
-`Sight.method` says so in the report.
+With `embreex` (the extra ``scene``) rays are cast at the real triangles of occluders and instances
+together; neither the rendered depth nor any matrix of the library takes part.
+Without it the instances' boxes are intersected with the pixels' rays in float64 and compared with
+the depth image as given: that says nothing about the depth image, and `Sight.method` says so in the
+report.
 
-An instance is visible when it owns a pixel: when the nearest thing on the ray through the pixel's centre is one of its
-triangles. Where an instance is visible by a hair, a rasteriser may hide it rightly: Vulkan lets it move corners by
-1/16 of a pixel, and float32 depth cannot tell surfaces apart that are 1e-6 of the distance from each other. `firm`
-tells those from the others, as measured by rays alone, and a check lists them apart.
+An instance is visible when it owns a pixel: when the nearest thing on the ray through the pixel's
+centre is one of its triangles.
+Where an instance is visible by a hair, a rasteriser may hide it rightly: Vulkan lets it move
+corners by 1/16 of a pixel, and float32 depth cannot tell surfaces apart that are 1e-6 of the
+distance from each other.
+`firm` tells those from the others, as measured by rays alone, and a check lists them apart.
 """
 
 from __future__ import annotations
@@ -29,7 +32,17 @@ if TYPE_CHECKING:
     from ._arguments import Size
     from .scenes import Floats, Scene, View
 
-__all__ = ["OCCLUDER", "SKY", "BoxCaster", "Caster", "Check", "RayCaster", "Sight", "check", "make_caster"]
+__all__ = [
+    "OCCLUDER",
+    "SKY",
+    "BoxCaster",
+    "Caster",
+    "Check",
+    "RayCaster",
+    "Sight",
+    "check",
+    "make_caster",
+]
 
 Indices: TypeAlias = npt.NDArray[np.intp]
 
@@ -70,7 +83,9 @@ class Caster(Protocol):
         """What `view` shows; `given` is the view depth of the occluders as the depth image under test has it."""
         ...
 
-    def firm(self, view: View, sight: Sight, given: Floats, instances: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+    def firm(
+        self, view: View, sight: Sight, given: Floats, instances: npt.ArrayLike
+    ) -> npt.NDArray[np.bool_]:
         """Which of the visible `instances` ``(M,)`` own a pixel by more than a hair; ``(M,)``."""
         ...
 
@@ -78,10 +93,13 @@ class Caster(Protocol):
 class RayCaster:
     """Casts rays at the real triangles with Embree.
 
-    Embree (float32, watertight) chooses the triangle; the depth is that of the triangle's plane, in float64.
+    Embree (float32, watertight) chooses the triangle; the depth is that of the triangle's plane, in
+    float64.
     """
 
-    method = "rays through the pixel centres (Embree) at the real triangles of occluders and instances"
+    method = (
+        "rays through the pixel centres (Embree) at the real triangles of occluders and instances"
+    )
 
     def __init__(self, scene: Scene) -> None:
         self._origin = np.array(scene.origin)
@@ -99,13 +117,17 @@ class RayCaster:
     def look_shifted(self, view: View, size: Size, shift: tuple[float, float]) -> Sight:
         """As `look`, through points `shift` pixels beside the centres."""
         owner, depth, normal = self._cast(self._all, view, view.rays(size, shift).reshape(-1, 3))
-        return Sight(owner.reshape(size), depth.reshape(size), normal.reshape(*size, 3), self.method)
+        return Sight(
+            owner.reshape(size), depth.reshape(size), normal.reshape(*size, 3), self.method
+        )
 
     def occluder_depth(self, view: View, rays: Floats) -> Floats:
         """View depth of the occluders alone along `rays` ``(..., 3)``, infinite where there are none."""
         return self._cast(self._occluders, view, rays.reshape(-1, 3))[1].reshape(rays.shape[:-1])
 
-    def firm(self, view: View, sight: Sight, given: Floats | None, instances: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+    def firm(
+        self, view: View, sight: Sight, given: Floats | None, instances: npt.ArrayLike
+    ) -> npt.NDArray[np.bool_]:
         """Which own a pixel that no occluder takes when the ray moves by `SNAP` or the depth by `TIE`."""
         rows, columns = np.nonzero(np.isin(sight.owner, instances))
         limit = sight.depth[rows, columns] * (1.0 + TIE)
@@ -129,7 +151,9 @@ class RayCaster:
         # From the near plane to the far one: what lies outside of them is not drawn either.
         start = (eye + view.near * rays).astype(np.float32)
         reach = np.full(len(rays), np.inf if view.far is None else view.far - view.near, np.float32)
-        answer = embree.run(start, rays.astype(np.float32), dists=reach, query="INTERSECT", output=True)
+        answer = embree.run(
+            start, rays.astype(np.float32), dists=reach, query="INTERSECT", output=True
+        )
         owner = np.full(len(rays), SKY, np.int32)
         depth = np.full(len(rays), np.inf)
         normal = np.zeros((len(rays), 3), np.float32)
@@ -171,25 +195,35 @@ class BoxCaster:
         normal[owner == OCCLUDER] = (0.0, 0.0, 1.0)
         boxes, x0, y0, x1, y1 = _pixel_rectangles(self._scene, view, size)
         area = (x1 - x0) * (y1 - y0)
-        edges = np.searchsorted(np.cumsum(area), np.arange(self.CHUNK, max(int(area.sum()), 1), self.CHUNK))
+        edges = np.searchsorted(
+            np.cumsum(area), np.arange(self.CHUNK, max(int(area.sum()), 1), self.CHUNK)
+        )
         for part in np.split(np.arange(len(boxes)), np.unique(edges)):
             turn = np.repeat(part, area[part])
-            within = np.arange(len(turn)) - np.repeat(np.cumsum(area[part]) - area[part], area[part])
+            within = np.arange(len(turn)) - np.repeat(
+                np.cumsum(area[part]) - area[part], area[part]
+            )
             wide = (x1 - x0)[turn]
             pixel = (y0[turn] + within // wide) * size[1] + x0[turn] + within % wide
             enter, side = self._enter(view, boxes[turn], rays[pixel])
             seen = enter < depth[pixel]
             pixel, box, enter, side = pixel[seen], boxes[turn[seen]], enter[seen], side[seen]
-            last = np.argsort(-enter, kind="stable")  # of several on one pixel, the nearest is written last
+            last = np.argsort(
+                -enter, kind="stable"
+            )  # of several on one pixel, the nearest is written last
             pixel, box, enter, side = pixel[last], box[last], enter[last], side[last]
             depth[pixel] = enter
             owner[pixel] = box
             normal[pixel] = np.eye(3, dtype=np.float32)[side] * -np.sign(
                 np.take_along_axis(rays[pixel], side[:, None], 1)
             )
-        return Sight(owner.reshape(size), depth.reshape(size), normal.reshape(*size, 3), self.method)
+        return Sight(
+            owner.reshape(size), depth.reshape(size), normal.reshape(*size, 3), self.method
+        )
 
-    def firm(self, view: View, sight: Sight, given: Floats, instances: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+    def firm(
+        self, view: View, sight: Sight, given: Floats, instances: npt.ArrayLike
+    ) -> npt.NDArray[np.bool_]:
         """Which own a pixel where they are nearer than the depth image by more than `TIE`."""
         return np.isin(instances, sight.owner[given > sight.depth * (1.0 + TIE)])
 
@@ -258,7 +292,8 @@ def check(
     given = linear_depth(depth, view.near, view.far)
     comparison = compare(mask, sight.pixels(len(scene)) > 0)
     firm = caster.firm(view, sight, given, comparison.false_culls)
-    # The oracle is asked where float64 does not see at once that a box is outside: it is slow there.
+    # The oracle is asked where float64 does not see at once that a box is outside: it is slow
+    # there.
     asked = np.flatnonzero(~_outside(scene, view, size))
     boxes = Boxes(scene.box_min[asked], scene.box_max[asked])
     codes = reference.classify(boxes, view.camera(size), depth, kind="reversed_ndc")
@@ -304,12 +339,20 @@ def _outside(scene: Scene, view: View, size: Size) -> npt.NDArray[np.bool_]:
     tangent = np.tan(np.radians(view.fov_y_deg) / 2.0)
     wide, tall = tangent * size[1] / size[0] * z, tangent * z
     margin = 1e-6 * (np.abs(x) + np.abs(y) + np.abs(z))
-    sides = (x < -wide - margin, x > wide + margin, y < -tall - margin, y > tall + margin, z < view.near - margin)
+    sides = (
+        x < -wide - margin,
+        x > wide + margin,
+        y < -tall - margin,
+        y > tall + margin,
+        z < view.near - margin,
+    )
     outside: npt.NDArray[np.bool_] = np.any([side.all(axis=1) for side in sides], axis=0)
     return outside
 
 
-def _pixel_rectangles(scene: Scene, view: View, size: Size) -> tuple[Indices, Indices, Indices, Indices, Indices]:
+def _pixel_rectangles(
+    scene: Scene, view: View, size: Size
+) -> tuple[Indices, Indices, Indices, Indices, Indices]:
     """Boxes that may be seen, and the pixels ``x0 <= x < x1``, ``y0 <= y < y1`` that they can meet."""
     height, width = size
     x, y, z = np.moveaxis(_corners(scene, view), -1, 0)
@@ -320,6 +363,9 @@ def _pixel_rectangles(scene: Scene, view: View, size: Size) -> tuple[Indices, In
     row = (1.0 - y / depth / tangent) / 2.0 * height
     x0, x1 = (np.clip(edge, 0, width) for edge in (np.floor(column.min(1)), np.ceil(column.max(1))))
     y0, y1 = (np.clip(edge, 0, height) for edge in (np.floor(row.min(1)), np.ceil(row.max(1))))
-    x0, y0, x1, y1 = (np.where(crosses, whole, edge) for whole, edge in ((0, x0), (0, y0), (width, x1), (height, y1)))
+    x0, y0, x1, y1 = (
+        np.where(crosses, whole, edge)
+        for whole, edge in ((0, x0), (0, y0), (width, x1), (height, y1))
+    )
     boxes = np.flatnonzero((x1 > x0) & (y1 > y0) & (z.max(axis=1) > view.near))
     return boxes, *(edge[boxes].astype(np.intp) for edge in (x0, y0, x1, y1))  # type: ignore[return-value]

@@ -1,6 +1,7 @@
 // Axis-aligned boxes (twin: `crates/hiz_core/src/bounds.rs`, BoxRecord).
 
-// xyz: the centre's high half; its low half; the half sizes. The second w: the caller's index.
+// xyz: the centre's high half; its low half; the half sizes.
+// The second w: the caller's index.
 const RECORD_TEXELS: u32 = 3u;
 
 fn caller_index(i: u32) -> u32 {

@@ -1,4 +1,5 @@
-// What axis-aligned and oriented boxes share: the support is a 1-norm over the half axes, no eight corners needed.
+// What axis-aligned and oriented boxes share: the support is a 1-norm over the half axes, no eight
+// corners needed.
 
 struct Volume {
     // About the reference point.
@@ -27,9 +28,11 @@ struct Extent {
     above: f32,
 }
 
-// Seen from the centre's ratio, r / w is greatest at the corner that lies farthest along r - ratio w, and least at the opposite one
-// (a step of Dinkelbach, "On Nonlinear Fractional Programming", 1967). Where that is another corner, for the ratio there is another
-// one, `above` and `below` say by how much the volume reaches beyond.
+// Seen from the centre's ratio, r / w is greatest at the corner that lies farthest along r - ratio
+// w, and least at the opposite one (a step of Dinkelbach, "On Nonlinear Fractional Programming",
+// 1967).
+// Where that is another corner, for the ratio there is another one, `above` and `below` say by how
+// much the volume reaches beyond.
 fn extent_of(r: Value, w: Value, w_min: f32) -> Extent {
     let ratio = r.center / w.center;
     let toward = select(vec3<f32>(-1.0), vec3<f32>(1.0), r.half - ratio * w.half >= vec3<f32>(0.0));
@@ -44,8 +47,10 @@ fn extent_of(r: Value, w: Value, w_min: f32) -> Extent {
         max(support(r.half - high * w.half) + (r.center - high * w.center) + error_bound(r, high, w), 0.0));
 }
 
-// True implies: r / w > edge on all of the volume, where w >= w_min > 0. For r - edge w = (r - low w) + (low - edge) w. (Barred: the
-// edge is an exact sum of larger numbers. Taken one by one from `low` they would leave roundings of their size behind.)
+// True implies: r / w > edge on all of the volume, where w >= w_min > 0.
+// For r - edge w = (r - low w) + (low - edge) w.
+// (Barred: the edge is an exact sum of larger numbers. Taken one by one from `low` they would leave
+// roundings of their size behind.)
 fn surely_after(r: Value, w: Value, extent: Extent, edge: f32, w_min: f32) -> bool {
     return (extent.low - bar(edge)) * w_min > extent.below;
 }

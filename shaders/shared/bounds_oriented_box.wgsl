@@ -1,6 +1,7 @@
 // Oriented boxes (twin: `crates/hiz_core/src/bounds.rs`, OrientedBoxRecord).
 
-// xyz: the centre's high half, its low half, two half axes; the first three w: the third half axis; the last w: the caller's index.
+// xyz: the centre's high half, its low half, two half axes; the first three w: the third half axis;
+// the last w: the caller's index.
 const RECORD_TEXELS: u32 = 4u;
 
 fn caller_index(i: u32) -> u32 {

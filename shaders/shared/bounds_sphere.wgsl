@@ -1,6 +1,7 @@
 // Spheres (twin: `crates/hiz_core/src/bounds.rs`, SphereRecord).
 
-// xyz: the centre's high half, and its low half; the first w: the radius; the second w: the caller's index.
+// xyz: the centre's high half, and its low half; the first w: the radius; the second w: the
+// caller's index.
 const RECORD_TEXELS: u32 = 2u;
 
 struct Volume {
@@ -29,8 +30,8 @@ fn on_half_axes(m: vec3<f32>, volume: Volume) -> vec3<f32> {
     return m * volume.radius;
 }
 
-// The support of a sphere is a 2-norm, compared squared so that no square root needs trust; 1.000001 covers the roundings
-// of both squares, 2^-100 their underflow.
+// The support of a sphere is a 2-norm, compared squared so that no square root needs trust;
+// 1.000001 covers the roundings of both squares, 2^-100 their underflow.
 fn exceeds_support(center: f32, half: vec3<f32>) -> bool {
     return center > 0.0 && center * center > dot(half, half) * 1.000001 + 0x1p-100;
 }
@@ -39,9 +40,11 @@ fn support(half: vec3<f32>) -> f32 {
     return sqrt(dot(half, half));
 }
 
-// An estimate of the least and greatest r / w. Mara and McGuire, "2D Polyhedral Bounds of a Clipped, Perspective-Projected
-// 3D Sphere" (JCGT 2013), written for any two linear functions: about the centre's ratio t, the ratio of a point u of the unit
-// sphere is t + g.u / (1 + n.u); its extremes are the roots of q d^2 + 2 p d - g.g = 0, each in the form that does not cancel.
+// An estimate of the least and greatest r / w.
+// Mara and McGuire, "2D Polyhedral Bounds of a Clipped, Perspective-Projected 3D Sphere" (JCGT
+// 2013), written for any two linear functions: about the centre's ratio t, the ratio of a point u
+// of the unit sphere is t + g.u / (1 + n.u); its extremes are the roots of q d^2 + 2 p d - g.g = 0,
+// each in the form that does not cancel.
 fn ratio_interval(r: Value, w: Value) -> vec2<f32> {
     let n = w.half / w.center;
     let q = max(1.0 - dot(n, n), 1e-30);
@@ -81,7 +84,8 @@ fn surely_before(r: Value, w: Value, extent: Extent, edge: f32, w_min: f32) -> b
     return surely_below(r, edge, w);
 }
 
-// 16 directions of the outline (four are the rectangle's), and two rings of 4 points about the one that is nearest to the eye.
+// 16 directions of the outline (four are the rectangle's), and two rings of 4 points about the one
+// that is nearest to the eye.
 const CANDIDATES: u32 = 24u;
 const TURN: f32 = 6.2831853;
 const RING_ANGLES: vec2<f32> = vec2<f32>(0.7, 1.2);

@@ -1,19 +1,24 @@
-// The cull of one instance. A verdict that hides it rests on certificates alone; the rectangle, the level, divisions and
-// conversions only choose what is tested, and where they go wrong a certificate fails and the instance is kept.
+// The cull of one instance.
+// A verdict that hides it rests on certificates alone; the rectangle, the level, divisions and
+// conversions only choose what is tested, and where they go wrong a certificate fails and the
+// instance is kept.
 
 // Pixel centres alone count; otherwise whole pixel squares.
 override SAMPLE_COVERAGE: bool;
 // Descend to finer levels where the footprint cannot decide.
 override DESCENT: bool;
-// Compare each texel with the volume's own outline and front there, not with its rectangle at one nearest depth.
+// Compare each texel with the volume's own outline and front there, not with its rectangle at one
+// nearest depth.
 override FIT_VOLUME: bool;
 
 // Below, a ratio could overflow; the margins alone reach 2^-70.
 const LEAST_W: f32 = 0x1p-66;
 
-// The first and last pixel that an extent (relative to the image's middle) may touch; first > last: none. It is widened by what its
-// certificate will ask for, and a little more; and by what adding half an image rounds away (without it a volume that ends exactly
-// on a pixel border would be tested without the pixel beyond, and kept for that).
+// The first and last pixel that an extent (relative to the image's middle) may touch; first > last:
+// none.
+// It is widened by what its certificate will ask for, and a little more; and by what adding half an
+// image rounds away (without it a volume that ends exactly on a pixel border would be tested
+// without the pixel beyond, and kept for that).
 fn pixel_interval(extent: Extent, per_w: f32, half_size: f32, size: i32) -> vec2<i32> {
     let rounding = 4.0 * EPS * half_size + view.reach;
     let low = extent.low - (extent.below * per_w + rounding) + half_size;
@@ -29,7 +34,8 @@ fn between_samples(r: Value, w: Value, first: i32, half_size: f32) -> bool {
     return surely_above(r, left + view.reach, w) && surely_below(r, left - view.reach, w);
 }
 
-// The block of texels lo..hi of a level spans every pixel that the volume can touch, inside the image.
+// The block of texels lo..hi of a level spans every pixel that the volume can touch, inside the
+// image.
 fn inside_block(
     r: Value, w: Value, extent: Extent, w_min: f32, lo: u32, hi: u32, level: u32, half_size: f32, size: i32,
 ) -> bool {
@@ -54,10 +60,11 @@ fn surely_behind(bits: u32, z: Value, w: Value) -> bool {
     return can_occlude(d) && surely_above(z, t, w);
 }
 
-// Whether no pixel of the rectangle first..last shows anything of the volume: a walk down the pyramid, from the footprint t of
-// the level `top`, that enters only the texels that cannot tell, and of them only what the rectangle touches. (Greene, Kass and
-// Miller, "Hierarchical Z-Buffer Visibility", SIGGRAPH 1993, descend so.) False where a pixel may show some of it, or the
-// budget ends.
+// Whether no pixel of the rectangle first..last shows anything of the volume: a walk down the
+// pyramid, from the footprint t of the level `top`, that enters only the texels that cannot tell,
+// and of them only what the rectangle touches.
+// (Greene, Kass and Miller, "Hierarchical Z-Buffer Visibility", SIGGRAPH 1993, descend so.)
+// False where a pixel may show some of it, or the budget ends.
 fn descend(
     top: u32, t: vec4<u32>, first: vec2<u32>, last: vec2<u32>, p: Projected, texels_read: ptr<function, u32>,
 ) -> bool {
@@ -85,7 +92,8 @@ fn descend(
                 clear = surely_clear(&planes, max(begin, first), min(end, last + vec2<u32>(1u)), bits);
                 tell_clear(clear);
             } else if all(begin >= first) && all(end <= last + vec2<u32>(1u)) {
-                // One of its pixels has that depth, and the rectangle has them all: no finer level can decide otherwise.
+                // One of its pixels has that depth, and the rectangle has them all: no finer level
+                // can decide otherwise.
                 return false;
             }
         }
@@ -152,7 +160,8 @@ fn classify(i: u32) -> Outcome {
         return out;
     }
 
-    // 2. Crossing w = 0: no rectangle. A lower bound of w (of spheres an estimate: the root is not trusted).
+    // 2. Crossing w = 0: no rectangle.
+    //    A lower bound of w (of spheres an estimate: the root is not trusted).
     out.stage = AT_EYE_PLANE;
     out.verdict = VISIBLE;
     let w_min = w.center - support(w.half) - error_bound(w, 0.0, w);
@@ -210,7 +219,8 @@ fn classify(i: u32) -> Outcome {
     if hidden {
         out.stage = AT_BLOCK;
     } else if (DESCENT && level > 0u) || FIT_VOLUME {
-        // Texel by texel, and into finer levels, over the pixels of the rectangle alone: its texels of level 0.
+        // Texel by texel, and into finer levels, over the pixels of the rectangle alone: its texels
+        // of level 0.
         out.stage = AT_DESCENT;
         hidden = descend(level, t, first, last, Projected(x, y, z, w, w_min), &texels_read);
         out.texels_read = texels_read;

@@ -1,4 +1,5 @@
-// Depths travel as bits. Non-negative floats order like unsigned integers, so farthest is an integer min or max: exact on
+// Depths travel as bits.
+// Non-negative floats order like unsigned integers, so farthest is an integer min or max: exact on
 // every driver, whatever it does with NaN, -0 and subnormals.
 
 // True: near 1, far 0.
@@ -34,10 +35,12 @@ fn farthest4(v: vec4<u32>) -> u32 {
 
 // The farthest of four sanitized depths, with less work than sanitizing each.
 //
-// Reversed, everything but LEAST_NORMAL_BITS..ONE_BITS is 0 in the end, and 0 is farthest: of ONE_BITS - bits, wrapping, the greatest is
-// that of the farthest, or more than any such number has. Standard, order and sanitizing agree but for -0, which is 0
-// although its bits are above 1's. Where the greatest is -0 there is no other number with a sign, so the greatest of them as
-// signed integers, -0 the least, is that of the rest.
+// Reversed, everything but LEAST_NORMAL_BITS..ONE_BITS is 0 in the end, and 0 is farthest: of
+// ONE_BITS - bits, wrapping, the greatest is that of the farthest, or more than any such number
+// has.
+// Standard, order and sanitizing agree but for -0, which is 0 although its bits are above 1's.
+// Where the greatest is -0 there is no other number with a sign, so the greatest of them as signed
+// integers, -0 the least, is that of the rest.
 fn farthest_sanitized4(v: vec4<u32>) -> u32 {
     if REVERSED {
         let below_one = vec4<u32>(ONE_BITS) - v;

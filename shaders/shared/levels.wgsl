@@ -1,15 +1,18 @@
-// Which level is read. Level 0, the depth image, is always there; of the others those from first_stored to last_stored
+// Which level is read.
+// Level 0, the depth image, is always there; of the others those from first_stored to last_stored
 // (of the pyramid, in registers).
 
 var<private> first_stored: u32;
 var<private> last_stored: u32;
 
-// Which bit is the highest one that is set, for 0 < v < 2^24: the exponent of a float that holds v exactly.
+// Which bit is the highest one that is set, for 0 < v < 2^24: the exponent of a float that holds v
+// exactly.
 fn leading_bit(v: u32) -> u32 {
     return (bitcast<u32>(f32(v)) >> 23u) - 127u;
 }
 
-// The finest level at which the pixels first..last span no more texels than the footprint. Integer bits, no log2: that rounds.
+// The finest level at which the pixels first..last span no more texels than the footprint.
+// Integer bits, no log2: that rounds.
 fn finest_level(first: vec2<u32>, last: vec2<u32>) -> u32 {
     let pixels = last - first;
     let level = max(leading_bit(pixels.x | pixels.y | 1u), FOOTPRINT_LOG2 - 1u) - (FOOTPRINT_LOG2 - 1u);

@@ -11,7 +11,8 @@ const AT_LEVEL: u32 = 7u;
 struct Outcome {
     verdict: u32,
     stage: u32,
-    // Valid from AT_DEPTH on: pixel rectangle (inclusive), level, texel rectangle, the farthest depth in it.
+    // Valid from AT_DEPTH on: pixel rectangle (inclusive), level, texel rectangle, the farthest
+    // depth in it.
     pixels: vec4<i32>,
     level: u32,
     texels: vec4<u32>,

@@ -1,4 +1,5 @@
-// A piece of the instances: what one storage binding and one dispatch can hold. Its indices stay the caller's.
+// A piece of the instances: what one storage binding and one dispatch can hold.
+// Its indices stay the caller's.
 
 struct Piece {
     // The caller's index of this piece's first instance, and how many there are.

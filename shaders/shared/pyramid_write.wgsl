@@ -13,7 +13,8 @@ struct Step {
     // This reduction's number, for the header; 0: no header.
     reduction: u32,
     padding: u32,
-    // How many 8x8 blocks: a multiple of 4 columns, so that rows are whole vectors on the third level too.
+    // How many 8x8 blocks: a multiple of 4 columns, so that rows are whole vectors on the third
+    // level too.
     blocks: vec2<u32>,
     padding_1: vec2<u32>,
 }
@@ -21,9 +22,11 @@ struct Step {
 // True: neighbouring invocations read below each other.
 override TALL: bool;
 
-// What an invocation of a workgroup of 64 reads: of 64 places in a row, or, TALL, of eight columns of eight. (A software driver reads for
-// eight invocations at once. Eight below each other walk along their rows in small steps, which the processor foresees, eight in a
-// row in large ones: docs/performance.md.)
+// What an invocation of a workgroup of 64 reads: of 64 places in a row, or, TALL, of eight columns
+// of eight.
+// (A software driver reads for eight invocations at once. Eight below each other walk along their
+// rows in small steps, which the processor foresees, eight in a row in large ones:
+// docs/performance.md.)
 fn place_of(workgroup: vec2<u32>, lane: u32) -> vec2<u32> {
     if TALL {
         return 8u * workgroup + place_in_square(lane);

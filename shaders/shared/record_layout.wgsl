@@ -1,5 +1,6 @@
-// Where a record lies: in a texture, whose texels a software driver fetches whole, where it picks a buffer's words one by one
-// (docs/performance.md). Twin: `crates/hiz_core/src/records.rs`.
+// Where a record lies: in a texture, whose texels a software driver fetches whole, where it picks a
+// buffer's words one by one (docs/performance.md).
+// Twin: `crates/hiz_core/src/records.rs`.
 
 // Records in a row of the texture, as a power of two.
 const RECORDS_PER_ROW_LOG2: u32 = 10u;

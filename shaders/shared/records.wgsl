@@ -6,8 +6,8 @@ fn record_texel(i: u32, k: u32) -> vec4<u32> {
     return textureLoad(records, record_position(i, k, RECORD_TEXELS));
 }
 
-// A bound of everything that a row is multiplied with, all axes added: d_hi and d_lo, what a position's halves cannot hold, and `own`,
-// the volume's half axes.
+// A bound of everything that a row is multiplied with, all axes added: d_hi and d_lo, what a
+// position's halves cannot hold, and `own`, the volume's half axes.
 fn size_of(d_hi: vec3<f32>, own: f32) -> f32 {
     return sum_abs(d_hi) + (own + view.halves_size);
 }

@@ -1,11 +1,12 @@
-// What a cull leaves behind: for each instance a bit in the caller's numbering, a verdict in the stored one, and its place in the
-// draw's list; of these what was asked for.
+// What a cull leaves behind: for each instance a bit in the caller's numbering, a verdict in the
+// stored one, and its place in the draw's list; of these what was asked for.
 
 // A bit for each instance that is kept.
 override MASK: bool;
 // Its verdict.
 override VERDICTS: bool;
-// Count what is kept in the draw arguments, here, in whatever order invocations arrive; otherwise `compact.wgsl` counts the mask.
+// Count what is kept in the draw arguments, here, in whatever order invocations arrive; otherwise
+// `compact.wgsl` counts the mask.
 override APPEND: bool;
 // And list it.
 override LIST: bool;
@@ -21,8 +22,8 @@ struct DrawIndexedIndirect {
 }
 
 @group(1) @binding(0) var<uniform> piece: Piece;
-// Bit i of the first words: the caller's instance i of the piece is kept. Then, from a multiple of 4 on, a word for each place: the
-// verdict of who is stored there.
+// Bit i of the first words: the caller's instance i of the piece is kept.
+// Then, from a multiple of 4 on, a word for each place: the verdict of who is stored there.
 @group(2) @binding(0) var<storage, read_write> mask: array<atomic<u32>>;
 @group(2) @binding(1) var<storage, read_write> list: array<u32>;
 @group(2) @binding(2) var<storage, read_write> draws: array<DrawIndexedIndirect>;
@@ -38,8 +39,8 @@ fn room() -> u32 {
     return left;
 }
 
-// The count is the draw's own: it never ends above the room, for who finds none takes its one back, and nobody can have
-// taken a slot below the room before.
+// The count is the draw's own: it never ends above the room, for who finds none takes its one back,
+// and nobody can have taken a slot below the room before.
 fn append(index: u32) {
     let slot = atomicAdd(&draws[piece.index].instance_count, 1u);
     if CAPPED {
@@ -76,8 +77,8 @@ fn report(place: u32) {
     }
 }
 
-// Tests the RUN members of a group that one of the SHARE invocations has, and then reports those that are kept: few, so that
-// the dear part is done for few.
+// Tests the RUN members of a group that one of the SHARE invocations has, and then reports those
+// that are kept: few, so that the dear part is done for few.
 fn cull_run(group: u32, share: u32) {
     let first = group * GROUP + share;
     var kept = 0u;

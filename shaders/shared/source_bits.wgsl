@@ -1,5 +1,6 @@
-// Level 0 is a texture of float32 bits, four pixels of a row a texel (rgba32uint): uploads travel so, for a driver may alter NaN and
-// subnormals of a float texture, and a software driver reads four pixels at once in less time than one (docs/performance.md).
+// Level 0 is a texture of float32 bits, four pixels of a row a texel (rgba32uint): uploads travel
+// so, for a driver may alter NaN and subnormals of a float texture, and a software driver reads
+// four pixels at once in less time than one (docs/performance.md).
 // Pixels of a row's last texel that lie past the image's width count as depth of its last ones.
 
 @group(0) @binding(0) var source: texture_storage_2d<rgba32uint, read>;
@@ -8,8 +9,8 @@ fn source_bits(x: u32, y: u32) -> u32 {
     return sanitized(textureLoad(source, vec2<u32>(x >> 2u, y))[x & 3u]);
 }
 
-// Quads of 2x2 pixels, the farthest depth of each: columns 4x to 4x + 3 of quads in their row y. Pixels past the edge are replaced by
-// ones at the edge.
+// Quads of 2x2 pixels, the farthest depth of each: columns 4x to 4x + 3 of quads in their row y.
+// Pixels past the edge are replaced by ones at the edge.
 fn source_quad_row(x: u32, y: u32) -> vec4<u32> {
     let edge = textureDimensions(source) - vec2<u32>(1u);
     let first = min(vec2<u32>(2u * x, 2u * y), edge);

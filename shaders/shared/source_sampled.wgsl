@@ -1,9 +1,10 @@
-// Level 0 is a texture that is sampled (`source_depth.wgsl`, `source_float.wgsl`): four pixels about a corner by one gather.
+// Level 0 is a texture that is sampled (`source_depth.wgsl`, `source_float.wgsl`): four pixels
+// about a corner by one gather.
 
 @group(0) @binding(1) var source_sampler: sampler;
 
-// The common corner of the pixels (2x, 2y) to (2x + 1, 2y + 1), in units of the image: half a pixel from where a gather would take
-// others, so that rounding is harmless.
+// The common corner of the pixels (2x, 2y) to (2x + 1, 2y + 1), in units of the image: half a pixel
+// from where a gather would take others, so that rounding is harmless.
 fn quad_corner(x: u32, y: u32) -> vec2<f32> {
     return vec2<f32>(f32(2u * x + 1u), f32(2u * y + 1u)) / vec2<f32>(textureDimensions(source));
 }
@@ -22,8 +23,9 @@ fn quad_column(x: u32, y: u32) -> vec4<u32> {
     return vec4<u32>(quad(x, y), quad(x, y + 1u), quad(x, y + 2u), quad(x, y + 3u));
 }
 
-// The four rows of a block of 8x8 pixels. They are read column by column: the first touches all cache lines of the block, so that
-// the waits for them overlap (0.92 of the time row by row, on lavapipe).
+// The four rows of a block of 8x8 pixels.
+// They are read column by column: the first touches all cache lines of the block, so that the waits
+// for them overlap (0.92 of the time row by row, on lavapipe).
 fn source_quads(block: vec2<u32>) -> array<vec4<u32>, 4> {
     let x = 4u * block.x;
     let y = 4u * block.y;
@@ -36,8 +38,9 @@ fn source_quads(block: vec2<u32>) -> array<vec4<u32>, 4> {
         vec4<u32>(c0.z, c1.z, c2.z, c3.z), vec4<u32>(c0.w, c1.w, c2.w, c3.w));
 }
 
-// The pixels at columns t.x and t.z and rows t.y and t.w, as given; at most one apart. One gather about their common corner, and
-// where two are the same what it brought of others is replaced.
+// The pixels at columns t.x and t.z and rows t.y and t.w, as given; at most one apart.
+// One gather about their common corner, and where two are the same what it brought of others is
+// replaced.
 fn source_corners(t: vec4<u32>) -> vec4<u32> {
     let corner = vec2<f32>(f32(t.x + 1u), f32(t.y + 1u)) / vec2<f32>(textureDimensions(source));
     // From the sampler's order to rows.

@@ -1,13 +1,17 @@
-// A volume's own outline and front: planes that bound all of it, tilted to its faces. A texel that lies beyond one of them
-// shows nothing of the volume, or only what is farther than its depth.
+// A volume's own outline and front: planes that bound all of it, tilted to its faces.
+// A texel that lies beyond one of them shows nothing of the volume, or only what is farther than
+// its depth.
 //
-// A plane is a linear function of pixel position and depth, facing z / w + slope . (x, y) / w > offset on all of the volume.
-// Its slope is a guess; one certificate proves its offset, once; after that a texel costs a multiplication an axis.
+// A plane is a linear function of pixel position and depth, facing z / w + slope .
+// (x, y) / w > offset on all of the volume.
+// Its slope is a guess; one certificate proves its offset, once; after that a texel costs a
+// multiplication an axis.
 
 struct SupportingPlane {
     // Depth units (an outline: pixels) per pixel.
     slope: vec2<f32>,
-    // 1, reversed -1: bounds the depth of a front face. 0: bounds the outline.
+    // 1, reversed -1: bounds the depth of a front face.
+    // 0: bounds the outline.
     facing: f32,
     offset: f32,
 }
@@ -30,7 +34,8 @@ struct Projected {
     w_min: f32,
 }
 
-// The bits of 2^60, from which on squares of products could overflow. Decided on bits: a compiler may assume that no float is NaN or infinite.
+// The bits of 2^60, from which on squares of products could overflow.
+// Decided on bits: a compiler may assume that no float is NaN or infinite.
 const LARGEST_BITS: u32 = 0x5d800000u;
 
 fn is_small(bits: u32) -> bool {
@@ -39,7 +44,8 @@ fn is_small(bits: u32) -> bool {
 
 // The bits of 2^16: steeper planes say nothing, and could overflow a product.
 const STEEPEST_BITS: u32 = 0x47800000u;
-// Flatter is flat: a subnormal slope could be flushed in one product and not in another, and X' may be large.
+// Flatter is flat: a subnormal slope could be flushed in one product and not in another, and X' may
+// be large.
 const FLATTEST: f32 = 0x1p-100;
 
 // The sign that makes farther greater.
@@ -69,8 +75,9 @@ fn proved_interval(r: Value, w: Value, w_min: f32) -> vec2<f32> {
         select(BEYOND, high, surely_below(r, high, w)));
 }
 
-// The planes of a volume's candidates that touch it, less a margin; those alone that a certificate proves. (Through a pointer: handed
-// over by value, so much takes twice as long to compile.)
+// The planes of a volume's candidates that touch it, less a margin; those alone that a certificate
+// proves.
+// (Through a pointer: handed over by value, so much takes twice as long to compile.)
 fn supporting_planes(planes: ptr<function, SupportingPlanes>, p: Projected) {
     (*planes).count = 0u;
     let columns = proved_interval(p.x, p.w, p.w_min);
@@ -82,7 +89,8 @@ fn supporting_planes(planes: ptr<function, SupportingPlanes>, p: Projected) {
         if any((bitcast<vec2<u32>>(guess.slope) & vec2<u32>(0x7fffffffu)) > vec2<u32>(STEEPEST_BITS)) {
             continue;
         }
-        // Barred, so that no compiler moves the slope's own quotient into the products: that would certify another slope.
+        // Barred, so that no compiler moves the slope's own quotient into the products: that would
+        // certify another slope.
         var slope = bar2(select(guess.slope, vec2<f32>(0.0), abs(guess.slope) < vec2<f32>(FLATTEST)));
         var r = Value(
             guess.facing * p.z.center + slope.x * p.x.center + slope.y * p.y.center,
@@ -109,7 +117,8 @@ fn supporting_planes(planes: ptr<function, SupportingPlanes>, p: Projected) {
     }
 }
 
-// True implies: pixels from `begin` to before `end` that are no farther than the stored depth show nothing of the volume.
+// True implies: pixels from `begin` to before `end` that are no farther than the stored depth show
+// nothing of the volume.
 fn surely_clear(planes: ptr<function, SupportingPlanes>, begin: vec2<u32>, end: vec2<u32>, bits: u32) -> bool {
     // Exact: multiples of 2^-8 below 2^16, and then one of two numbers.
     let left_top = max(vec2<f32>(begin) - view.reach - view.half_size, (*planes).left_top);

@@ -1,4 +1,5 @@
-// The pyramid as a cull reads it, wherever its levels lie (`texels_apart.wgsl`, `texels_atlas.wgsl`).
+// The pyramid as a cull reads it, wherever its levels lie (`texels_apart.wgsl`,
+// `texels_atlas.wgsl`).
 
 // The footprint is at most 2^n x 2^n texels.
 override FOOTPRINT_LOG2: u32;
@@ -9,7 +10,8 @@ override FOOTPRINT_LOG2: u32;
 // Whether the pyramid is the one that was promised, and not one whose reduction has yet to run.
 var<private> is_reduced: bool;
 
-// The first thing that an entry point calls: what it holds in registers a software driver does not fetch again for every instance.
+// The first thing that an entry point calls: what it holds in registers a software driver does not
+// fetch again for every instance.
 fn begin() {
     view = view_uniform;
     is_reduced = reduction_number() == view.reduction;

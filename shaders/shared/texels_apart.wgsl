@@ -28,7 +28,8 @@ fn stored_corners(level: u32, t: vec4<u32>) -> vec4<u32> {
         stored_bits(top + t.x), stored_bits(top + t.z), stored_bits(bottom + t.x), stored_bits(bottom + t.z));
 }
 
-// The same of any level; level 0's as given. Both are read, whatever the level: a software driver goes both ways of a branch.
+// The same of any level; level 0's as given.
+// Both are read, whatever the level: a software driver goes both ways of a branch.
 fn corners(level: u32, t: vec4<u32>) -> vec4<u32> {
     return select(stored_corners(level, t), source_corners(t), level == 0u);
 }

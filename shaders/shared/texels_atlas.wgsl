@@ -1,10 +1,10 @@
-// All levels that are there in one texture, four pixels or texels of a row a texel of it (`crates/hiz_core/src/atlas.rs`): one fetch
-// serves every level.
+// All levels that are there in one texture, four pixels or texels of a row a texel of it
+// (`crates/hiz_core/src/atlas.rs`): one fetch serves every level.
 
 @group(0) @binding(3) var atlas: texture_storage_2d<rgba32uint, read>;
 
-// The number of the reduction whose depth image and stored levels these are; 0, which none has, where they are of two reductions: the
-// copies ran after the next one.
+// The number of the reduction whose depth image and stored levels these are; 0, which none has,
+// where they are of two reductions: the copies ran after the next one.
 fn reduction_number() -> u32 {
     let column = textureDimensions(atlas).x - 2u;
     let of_image = textureLoad(atlas, vec2<u32>(column, 0u)).x;

@@ -1,5 +1,5 @@
-// What a test reads is told to nobody here: calls of nothing, which compilers drop. `explain.wgsl`
-// has functions that write it down.
+// What a test reads is told to nobody here: calls of nothing, which compilers drop.
+// `explain.wgsl` has functions that write it down.
 
 fn tell_corners(level: u32, t: vec4<u32>, bits: vec4<u32>) {}
 

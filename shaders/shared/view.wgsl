@@ -1,28 +1,35 @@
-// What one cull knows of its camera (twin: `crates/hiz_core/src/cull/view_uniform.rs`, ViewUniform).
+// What one cull knows of its camera (twin: `crates/hiz_core/src/cull/view_uniform.rs`,
+// ViewUniform).
 
 struct View {
-    // Rows, linear functions m . (d, 1) of the position d about the reference point. Times w: pixel column right of the image's
-    // middle, pixel row below it, depth less z_slope times w; and w itself.
+    // Rows, linear functions m .
+    // (d, 1) of the position d about the reference point.
+    // Times w: pixel column right of the image's middle, pixel row below it, depth less z_slope
+    // times w; and w itself.
     x: vec4<f32>,
     y: vec4<f32>,
     z: vec4<f32>,
     w: vec4<f32>,
-    // Of these four rows: the greatest magnitude among the linear coefficients, and that of the constant. Times float32's eps they
-    // bound the coefficients' own errors as well.
+    // Of these four rows: the greatest magnitude among the linear coefficients, and that of the
+    // constant.
+    // Times float32's eps they bound the coefficients' own errors as well.
     magnitudes: vec4<f32>,
     constant_magnitudes: vec4<f32>,
-    // The reference point is exactly eye_hi + eye_lo: the eye, or a point nearer to what is seen (`Reference` in view.rs).
+    // The reference point is exactly eye_hi + eye_lo: the eye, or a point nearer to what is seen
+    // (`Reference` in view.rs).
     eye_hi: vec3<f32>,
     z_slope: f32,
     eye_lo: vec3<f32>,
-    // All axes added: at least |eye_lo|, and what low halves and what both halves cannot hold come to near the eye, twice 2^-24 of
+    // All axes added: at least |eye_lo|, and what low halves and what both halves cannot hold come
+    // to near the eye, twice 2^-24 of
     // |eye_hi|. (Elsewhere it is an eps of |d_hi| more.)
     halves_size: f32,
     half_size: vec2<f32>,
-    // How far a volume's projection must stay away from a pixel square that it does not touch: the guard, less half a pixel
-    // in sample coverage.
+    // How far a volume's projection must stay away from a pixel square that it does not touch: the
+    // guard, less half a pixel in sample coverage.
     reach: f32,
-    // What a stored depth is multiplied by before anything is called farther: 1 + slack, reversed 1 - slack.
+    // What a stored depth is multiplied by before anything is called farther: 1 + slack, reversed
+    // 1 - slack.
     depth_factor: f32,
     size: vec2<i32>,
     // 0, but no compiler knows: see `bar`.
@@ -40,7 +47,8 @@ struct View {
 
 var<private> view: View;
 
-// Keeps a compiler from folding what follows into the cancelling sum x was made by, as WGSL lets it.
+// Keeps a compiler from folding what follows into the cancelling sum x was made by, as WGSL lets
+// it.
 fn bar(x: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(x) ^ view.runtime_zero);
 }

@@ -1,5 +1,7 @@
-// A yardstick: the cull without its certificates, as one would write it who trusts float32. The same records, tests, footprint and
-// level, from the same frame; no margins, no bars, nothing proved. It hides what can be seen, and exists to be measured against.
+// A yardstick: the cull without its certificates, as one would write it who trusts float32.
+// The same records, tests, footprint and level, from the same frame; no margins, no bars, nothing
+// proved.
+// It hides what can be seen, and exists to be measured against.
 // For boxes.
 
 // Choices of the frame that it does not offer.

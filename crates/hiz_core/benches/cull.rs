@@ -1,7 +1,10 @@
-//! The cull against its yardstick, with everything made beforehand: kinds of volumes, flat and by groups, and what each output costs.
+//! The cull against its yardstick, with everything made beforehand: kinds of volumes, flat and by
+//! groups, and what each output costs.
 //!
-//! First tables of medians, then criterion's own figures. `cargo bench --workspace --bench cull` (`-- --test`: everything once;
-//! `-- nothing`: the tables alone). `HIZVK_BENCH_INSTANCES`: how many (100000).
+//! First tables of medians, then criterion's own figures.
+//! `cargo bench --workspace --bench cull` (`-- --test`: everything once; `-- nothing`: the tables
+//! alone).
+//! `HIZVK_BENCH_INSTANCES`: how many (100000).
 
 mod common;
 
@@ -11,8 +14,9 @@ use common::{Way, measure, table};
 use hiz_core::headless::{DepthImage, Engine};
 use hiz_core::yardstick::{empty_submit_ms, record_uncertified_cull, submitted_ms};
 use hiz_core::{
-    Bounds, Camera, CullOptions, DepthConvention, Floats, Hierarchy, ImageSize, InstanceOptions, Instances, MeshData,
-    OccluderOptions, Order, Outputs, Pose, Projection, Pyramid, VisibleOptions,
+    Bounds, Camera, CullOptions, DepthConvention, Floats, Hierarchy, ImageSize, InstanceOptions,
+    Instances, MeshData, OccluderOptions, Order, Outputs, Pose, Projection, Pyramid,
+    VisibleOptions,
 };
 
 /// Half the width of the crowd by its distance, well inside the view.
@@ -25,7 +29,8 @@ struct Random(u64);
 
 impl Random {
     fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 40) as f64 / f64::from(1 << 24)
     }
 }
@@ -54,10 +59,16 @@ impl Crowd {
             rotations: Vec::with_capacity(9 * count),
         };
         for _ in 0..count {
-            let (near, far) = if random.unit() < behind { (1.2 * WALL, 8.0 * WALL) } else { (0.1 * WALL, 0.9 * WALL) };
+            let (near, far) = if random.unit() < behind {
+                (1.2 * WALL, 8.0 * WALL)
+            } else {
+                (0.1 * WALL, 0.9 * WALL)
+            };
             let z = (near * near + random.unit() * (far * far - near * near)).sqrt();
-            let center = [(2.0 * random.unit() - 1.0) * HALF_WIDTH * z, (random.unit() - 0.5) * 0.1 * z, -z];
-            let half: [f64; 3] = std::array::from_fn(|_| 0.15 + 1.35 * random.unit() * random.unit());
+            let center =
+                [(2.0 * random.unit() - 1.0) * HALF_WIDTH * z, (random.unit() - 0.5) * 0.1 * z, -z];
+            let half: [f64; 3] =
+                std::array::from_fn(|_| 0.15 + 1.35 * random.unit() * random.unit());
             let (sin, cos) = (6.3 * random.unit()).sin_cos();
             let numbers = |values: &[f64]| values.iter().map(|v| *v as f32).collect::<Vec<_>>();
             this.centers.extend(numbers(&center));
@@ -91,7 +102,11 @@ impl Crowd {
 fn wall(engine: &Engine, camera: &Camera) -> DepthImage {
     let (x, y) = (2.0 * WALL, WALL);
     let vertices = [-x, -y, -WALL, x, -y, -WALL, x, y, -WALL, -x, y, -WALL];
-    let mesh = MeshData { vertices: Floats::F64(&vertices), triangles: &[0, 1, 2, 0, 2, 3], transforms: None };
+    let mesh = MeshData {
+        vertices: Floats::F64(&vertices),
+        triangles: &[0, 1, 2, 0, 2, 3],
+        transforms: None,
+    };
     let occluders = engine.occluders(&[mesh], &OccluderOptions::default()).expect("occluders");
     engine.render_depth(&occluders, camera).expect("a depth image")
 }
@@ -111,9 +126,13 @@ fn way<'a>(
     let run = move || {
         submitted_ms(engine, |encoder| {
             if certified {
-                engine.context().record_cull(encoder, &instances, camera, pyramid, &visible, &options)
+                engine
+                    .context()
+                    .record_cull(encoder, &instances, camera, pyramid, &visible, &options)
             } else {
-                record_uncertified_cull(engine, encoder, &instances, camera, pyramid, &visible, &options)
+                record_uncertified_cull(
+                    engine, encoder, &instances, camera, pyramid, &visible, &options,
+                )
             }
         })
         .expect("a cull")
@@ -124,7 +143,11 @@ fn way<'a>(
 const MASK: Outputs = Outputs { mask: true, ..Outputs::NONE };
 
 /// Flat and by groups, of each kind; the mask alone.
-fn kinds<'a>(engine: &'a Engine, crowd: &Crowd, seen: (&'a Camera, &'a Arc<Pyramid>)) -> Vec<Way<'a>> {
+fn kinds<'a>(
+    engine: &'a Engine,
+    crowd: &Crowd,
+    seen: (&'a Camera, &'a Arc<Pyramid>),
+) -> Vec<Way<'a>> {
     let mut ways = Vec::new();
     for (kind, bounds) in crowd.bounds() {
         let instances = engine.instances(&bounds, &InstanceOptions::default()).expect("instances");
@@ -172,11 +195,18 @@ fn outputs<'a>(
 fn main() {
     let engine = common::engine();
     let mut criterion = common::criterion();
-    let count = std::env::var("HIZVK_BENCH_INSTANCES").ok().map_or(100_000, |text| text.parse().expect("a number"));
+    let count = std::env::var("HIZVK_BENCH_INSTANCES")
+        .ok()
+        .map_or(100_000, |text| text.parse().expect("a number"));
     let pose = Pose { eye: [0.0, 0.0, 0.0], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
-    let projection =
-        Projection::Perspective { fov_y: 1.05, near: 0.1, far: None, convention: DepthConvention::Reversed };
-    let camera = Camera::look_at(&pose, &projection, ImageSize::new(1920, 1080)).expect("a plain camera");
+    let projection = Projection::Perspective {
+        fov_y: 1.05,
+        near: 0.1,
+        far: None,
+        convention: DepthConvention::Reversed,
+    };
+    let camera =
+        Camera::look_at(&pose, &projection, ImageSize::new(1920, 1080)).expect("a plain camera");
     let pyramid = engine.pyramid(&wall(&engine, &camera)).expect("a pyramid");
     let seen = (&camera, &pyramid);
     for (hidden, behind) in [("95 % hidden", 0.95), ("0 % hidden", 0.0)] {

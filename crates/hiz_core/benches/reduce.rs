@@ -1,8 +1,10 @@
 //! The depth reduction against its yardsticks.
 //!
-//! First a table of medians, all ways taken in turns so that a busy moment hits all of them; then criterion's own figures.
-//! `cargo bench --workspace --bench reduce` (`-- --test`: everything once; `-- nothing`: the tables alone). `HIZVK_BENCH_SIZES` chooses among
-//! 1080p and 4K.
+//! First a table of medians, all ways taken in turns so that a busy moment hits all of them; then
+//! criterion's own figures.
+//! `cargo bench --workspace --bench reduce` (`-- --test`: everything once; `-- nothing`: the tables
+//! alone).
+//! `HIZVK_BENCH_SIZES` chooses among 1080p and 4K.
 
 mod common;
 
@@ -11,15 +13,18 @@ use std::time::Instant;
 
 use common::{Way, measure, table};
 use hiz_core::headless::{DepthImage, Engine};
-use hiz_core::yardstick::{PerLevelReduction, ReductionShape, empty_submit_ms, memcpy_ms, reduce, submitted_ms};
+use hiz_core::yardstick::{
+    PerLevelReduction, ReductionShape, empty_submit_ms, memcpy_ms, reduce, submitted_ms,
+};
 use hiz_core::{
-    Camera, DepthConvention, Floats, ImageSize, MeshData, OccluderOptions, Pose, Projection, Pyramid, PyramidOptions,
-    StoredLevels, wgpu,
+    Camera, DepthConvention, Floats, ImageSize, MeshData, OccluderOptions, Pose, Projection,
+    Pyramid, PyramidOptions, StoredLevels, wgpu,
 };
 
 fn camera(size: ImageSize, convention: DepthConvention) -> Camera {
     let pose = Pose { eye: [0.0, 0.0, 0.0], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
-    let projection = Projection::Perspective { fov_y: 1.0, near: 0.1, far: Some(1000.0), convention };
+    let projection =
+        Projection::Perspective { fov_y: 1.0, near: 0.1, far: Some(1000.0), convention };
     Camera::look_at(&pose, &projection, size).expect("a plain camera")
 }
 
@@ -27,7 +32,8 @@ fn camera(size: ImageSize, convention: DepthConvention) -> Camera {
 fn depth_texture(engine: &Engine, camera: &Camera) -> DepthImage {
     let mut state = 1_u64;
     let mut unit = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 40) as f64 / f64::from(1 << 24)
     };
     let mut vertices = Vec::new();
@@ -38,7 +44,8 @@ fn depth_texture(engine: &Engine, camera: &Camera) -> DepthImage {
         }
     }
     let triangles: Vec<u32> = (0..900).collect();
-    let mesh = MeshData { vertices: Floats::F64(&vertices), triangles: &triangles, transforms: None };
+    let mesh =
+        MeshData { vertices: Floats::F64(&vertices), triangles: &triangles, transforms: None };
     let occluders = engine.occluders(&[mesh], &OccluderOptions::default()).expect("occluders");
     engine.render_depth(&occluders, camera).expect("a depth texture")
 }
@@ -60,7 +67,9 @@ fn ways<'a>(engine: &'a Engine, depth: &'a DepthImage) -> Vec<Way<'a>> {
     ] {
         let options = PyramidOptions { levels, ..PyramidOptions::default() };
         let pyramid: Arc<Pyramid> = engine.pyramid_with(depth, &options).expect("a pyramid");
-        let run = move || submitted_ms(engine, |e| reduce(engine, e, depth, &pyramid)).expect("a reduction");
+        let run = move || {
+            submitted_ms(engine, |e| reduce(engine, e, depth, &pyramid)).expect("a reduction")
+        };
         ways.push((name.to_owned(), Box::new(run)));
     }
     for (name, shape) in [
@@ -80,7 +89,8 @@ fn ways<'a>(engine: &'a Engine, depth: &'a DepthImage) -> Vec<Way<'a>> {
     ways
 }
 
-/// Ways of an image from the host to a texture, each with a texture of its own, as an upload has it.
+/// Ways of an image from the host to a texture, each with a texture of its own, as an upload has
+/// it.
 fn uploads<'a>(engine: &'a Engine, numbers: &'a [f32], camera: &'a Camera) -> Vec<Way<'a>> {
     let mut copy = vec![0.0; numbers.len()];
     let ours = move || {
@@ -95,7 +105,11 @@ fn uploads<'a>(engine: &'a Engine, numbers: &'a [f32], camera: &'a Camera) -> Ve
         let size = camera.size();
         let texture = engine.device().create_texture(&wgpu::TextureDescriptor {
             label: Some("bench.depth"),
-            size: wgpu::Extent3d { width: size.width / 4, height: size.height, depth_or_array_layers: 1 },
+            size: wgpu::Extent3d {
+                width: size.width / 4,
+                height: size.height,
+                depth_or_array_layers: 1,
+            },
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
@@ -106,7 +120,11 @@ fn uploads<'a>(engine: &'a Engine, numbers: &'a [f32], camera: &'a Camera) -> Ve
         engine.queue().write_texture(
             texture.as_image_copy(),
             bytemuck::cast_slice(numbers),
-            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * size.width), rows_per_image: None },
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(4 * size.width),
+                rows_per_image: None,
+            },
             texture.size(),
         );
         engine.queue().submit([]);
@@ -124,7 +142,8 @@ fn main() {
     let engine = common::engine();
     let mut criterion = common::criterion();
     let sizes = std::env::var("HIZVK_BENCH_SIZES").unwrap_or_default();
-    for (label, size) in [("1080p", ImageSize::new(1920, 1080)), ("4K", ImageSize::new(3840, 2160))] {
+    for (label, size) in [("1080p", ImageSize::new(1920, 1080)), ("4K", ImageSize::new(3840, 2160))]
+    {
         if !sizes.is_empty() && !sizes.contains(label) {
             continue;
         }
@@ -132,7 +151,11 @@ fn main() {
             let camera = camera(size, convention);
             let texture = depth_texture(&engine, &camera);
             let numbers = texture.read().expect("depth");
-            table(&format!("{label} to the device"), "memcpies", &mut uploads(&engine, &numbers, &camera));
+            table(
+                &format!("{label} to the device"),
+                "memcpies",
+                &mut uploads(&engine, &numbers, &camera),
+            );
             let uploaded = engine.upload_depth(&numbers, &camera).expect("an upload");
             for (source, depth) in [("depth texture", &texture), ("upload", &uploaded)] {
                 let mut ways = ways(&engine, depth);

@@ -1,5 +1,6 @@
-//! What uploads and updates take by the number of instances: `cargo run --release --workspace --example upload -- 10000000`, the
-//! argument being the largest. Positions are random, which is the worst that a sort can meet.
+//! What uploads and updates take by the number of instances: `cargo run --release --workspace
+//! --example upload -- 10000000`, the argument being the largest.
+//! Positions are random, which is the worst that a sort can meet.
 
 use std::time::Instant;
 
@@ -64,7 +65,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 Bounds::Spheres { centers: min, radii },
                 Bounds::Spheres { centers: part(min, 3), radii: part(radii, 1) },
             ),
-            ("box", Bounds::Boxes { min, max }, Bounds::Boxes { min: part(min, 3), max: part(max, 3) }),
+            (
+                "box",
+                Bounds::Boxes { min, max },
+                Bounds::Boxes { min: part(min, 3), max: part(max, 3) },
+            ),
         ] {
             let rounds = if n > 10_000_000 { 1 } else { 7 };
             let upload = |order| -> Result<f64, hiz_core::Error> {

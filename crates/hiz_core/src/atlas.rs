@@ -1,6 +1,7 @@
-//! All levels of a pyramid, the depth image among them, in one texture, for culls of many instances: a software driver goes both ways of
-//! a branch, so with level 0 and the others apart it fetches from both, and a word of a buffer costs it four times a texel
-//! (`docs/performance.md`). Twin: `shaders/shared/texels_atlas.wgsl`.
+//! All levels of a pyramid, the depth image among them, in one texture, for culls of many
+//! instances: a software driver goes both ways of a branch, so with level 0 and the others apart it
+//! fetches from both, and a word of a buffer costs it four times a texel (`docs/performance.md`).
+//! Twin: `shaders/shared/texels_atlas.wgsl`.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -19,8 +20,9 @@ const PIXELS: u32 = 4;
 /// Columns of headers; `shaders/shared/texels_atlas.wgsl`, `reduction_number`.
 const HEADERS: u32 = 2;
 
-/// Where the levels lie, in texels: level 0 on the left, beside it the stored ones below each other, and in columns of their own
-/// two headers: the number of the reduction whose depth image level 0 is, and that of the reduction that left the stored levels.
+/// Where the levels lie, in texels: level 0 on the left, beside it the stored ones below each
+/// other, and in columns of their own two headers: the number of the reduction whose depth image
+/// level 0 is, and that of the reduction that left the stored levels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct AtlasLayout {
     pub(crate) width: u32,
@@ -49,14 +51,14 @@ impl AtlasLayout {
     }
 }
 
-/// Whether culls read the depth image and the stored levels from one texture, into which both are copied once a reduction. The answers
-/// are the same.
+/// Whether culls read the depth image and the stored levels from one texture, into which both are
+/// copied once a reduction.
+/// The answers are the same.
 ///
 /// It can be where the depth image is [`Depth32Float`](wgpu::TextureFormat::Depth32Float),
 /// [`R32Float`](wgpu::TextureFormat::R32Float) or [`Rgba32Uint`](wgpu::TextureFormat::Rgba32Uint),
-/// has the usage
-/// [`COPY_SRC`](wgpu::TextureUsages::COPY_SRC), and is no larger than a texture, and a buffer that it passes through, may be; otherwise
-/// culls read them where they are.
+/// has the usage [`COPY_SRC`](wgpu::TextureUsages::COPY_SRC), and is no larger than a texture, and
+/// a buffer that it passes through, may be; otherwise culls read them where they are.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum AtlasUse {
     /// Where a cull has enough instances for the copy to pay.
@@ -80,7 +82,11 @@ pub(crate) struct Atlas {
 }
 
 /// Whether an atlas can be made of these levels and the depth image `source`.
-pub(crate) fn is_possible(layout: &PyramidLayout, source: &wgpu::Texture, limits: &wgpu::Limits) -> bool {
+pub(crate) fn is_possible(
+    layout: &PyramidLayout,
+    source: &wgpu::Texture,
+    limits: &wgpu::Limits,
+) -> bool {
     travels(source.format())
         && source.usage().contains(wgpu::TextureUsages::COPY_SRC)
         && layout.chunk_sizes().len() == 1
@@ -88,15 +94,15 @@ pub(crate) fn is_possible(layout: &PyramidLayout, source: &wgpu::Texture, limits
         && (source.format() == FORMAT || staging_bytes(layout.size) <= limits.max_buffer_size)
 }
 
-/// Whether images of a format can be copied as the bits of float32. (Those of `Depth24Plus` cannot
-/// be copied, those of other formats hold other bits.)
+/// Whether images of a format can be copied as the bits of float32.
+/// (Those of `Depth24Plus` cannot be copied, those of other formats hold other bits.)
 pub(crate) fn travels(format: wgpu::TextureFormat) -> bool {
     matches!(format, wgpu::TextureFormat::Depth32Float | wgpu::TextureFormat::R32Float | FORMAT)
 }
 
 impl AtlasUse {
-    /// Whether culls of so many instances ask for one. A copied pixel costs about a quarter of what it saves an instance
-    /// (`docs/performance.md`).
+    /// Whether culls of so many instances ask for one.
+    /// A copied pixel costs about a quarter of what it saves an instance (`docs/performance.md`).
     pub(crate) fn pays(self, layout: &PyramidLayout, instances: u32) -> bool {
         match self {
             Self::Auto => 4 * u64::from(instances) >= layout.size.pixels() + layout.texels,
@@ -136,8 +142,9 @@ impl Atlas {
 
     /// Records the copies of all levels.
     ///
-    /// Two headers go with them, for what is copied is settled at different times: the depth image now, the stored levels when the copies
-    /// run, perhaps after the next reduction. Where they are not both of the reduction that a cull asks for, it keeps everything.
+    /// Two headers go with them, for what is copied is settled at different times: the depth image
+    /// now, the stored levels when the copies run, perhaps after the next reduction.
+    /// Where they are not both of the reduction that a cull asks for, it keeps everything.
     pub(crate) fn record(
         &mut self,
         gpu: &Gpu,
@@ -148,7 +155,8 @@ impl Atlas {
     ) -> Result<()> {
         let source = built.source.texture();
         // Nothing is recorded before all is there.
-        let staging = if source.format() == FORMAT { None } else { Some(self.staging_or_new(gpu, layout)?) };
+        let staging =
+            if source.format() == FORMAT { None } else { Some(self.staging_or_new(gpu, layout)?) };
         let of_image = gpu.filled(
             "hiz.pyramid.atlas_header",
             bytemuck::cast_slice(&[built.reduction, 0, 0, 0]),
@@ -168,7 +176,11 @@ impl Atlas {
             self.record_rows(encoder, stored, layout.atlas.origins[k], rows);
         }
         let Some(staging) = staging else {
-            encoder.copy_texture_to_texture(source.as_image_copy(), self.texture.as_image_copy(), source.size());
+            encoder.copy_texture_to_texture(
+                source.as_image_copy(),
+                self.texture.as_image_copy(),
+                source.size(),
+            );
             return Ok(());
         };
         let (width, height) = (layout.size.width, layout.size.height);
@@ -202,7 +214,10 @@ impl Atlas {
     ) {
         encoder.copy_buffer_to_texture(
             wgpu::TexelCopyBufferInfo { buffer, layout: copy_layout(offset, pitch) },
-            wgpu::TexelCopyTextureInfo { origin: wgpu::Origin3d { x, y, z: 0 }, ..self.texture.as_image_copy() },
+            wgpu::TexelCopyTextureInfo {
+                origin: wgpu::Origin3d { x, y, z: 0 },
+                ..self.texture.as_image_copy()
+            },
             wgpu::Extent3d { width: width.div_ceil(PIXELS), height, depth_or_array_layers: 1 },
         );
     }
@@ -226,7 +241,11 @@ struct Rows {
 }
 
 fn copy_layout(offset: u64, pitch: u32) -> wgpu::TexelCopyBufferLayout {
-    wgpu::TexelCopyBufferLayout { offset, bytes_per_row: (pitch > 0).then_some(pitch), rows_per_image: None }
+    wgpu::TexelCopyBufferLayout {
+        offset,
+        bytes_per_row: (pitch > 0).then_some(pitch),
+        rows_per_image: None,
+    }
 }
 
 #[cfg(test)]
@@ -236,20 +255,36 @@ mod tests {
 
     #[test]
     fn levels_lie_beside_each_other() {
-        for (w, h) in [(1, 1), (5, 3), (1, 9000), (9000, 1), (1920, 1080), (640, 481), (8191, 8001)] {
-            for levels in [StoredLevels::ALL, StoredLevels::only(3), StoredLevels { first: 2, last: 4 }] {
+        for (w, h) in [(1, 1), (5, 3), (1, 9000), (9000, 1), (1920, 1080), (640, 481), (8191, 8001)]
+        {
+            for levels in
+                [StoredLevels::ALL, StoredLevels::only(3), StoredLevels { first: 2, last: 4 }]
+            {
                 let layout = PyramidLayout::new(ImageSize::new(w, h), levels, 25).unwrap();
                 let atlas = &layout.atlas;
                 // Column, row, width, height; the headers last.
-                let mut areas = vec![[0, 0, w.div_ceil(4), h], [atlas.width - 1, 0, 1, 1], [atlas.width - 2, 0, 1, 1]];
+                let mut areas = vec![
+                    [0, 0, w.div_ceil(4), h],
+                    [atlas.width - 1, 0, 1, 1],
+                    [atlas.width - 2, 0, 1, 1],
+                ];
                 for (k, level) in layout.stored_levels() {
                     let [x, y, ..] = atlas.origins[k];
                     areas.push([x, y, level.width.div_ceil(4), level.height]);
                 }
                 for (i, [x, y, width, height]) in areas.iter().enumerate() {
-                    assert!(x + width <= atlas.width && y + height <= atlas.height, "{w}x{h} {levels:?}");
+                    assert!(
+                        x + width <= atlas.width && y + height <= atlas.height,
+                        "{w}x{h} {levels:?}"
+                    );
                     for [u, v, across, down] in &areas[..i] {
-                        assert!(x + width <= *u || u + across <= *x || y + height <= *v || v + down <= *y, "{w}x{h}");
+                        assert!(
+                            x + width <= *u
+                                || u + across <= *x
+                                || y + height <= *v
+                                || v + down <= *y,
+                            "{w}x{h}"
+                        );
                     }
                 }
             }

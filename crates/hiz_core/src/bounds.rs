@@ -1,9 +1,12 @@
-//! Bounding volumes: from the caller's arrays (float32 or float64) to the records that the cull shader reads.
+//! Bounding volumes: from the caller's arrays (float32 or float64) to the records that the cull
+//! shader reads.
 //!
-//! A position becomes two float32, `hi + lo`, so that the shader can subtract the eye before it rounds. Radii and half
-//! sizes are rounded up, with what the position cannot hold added: the stored volume contains the given one. Bad bounds
-//! (NaN, infinite, negative radius, min > max) are not repaired: their record fails the shader's test of its bits, the
-//! instance is kept visible and counted as invalid.
+//! A position becomes two float32, `hi + lo`, so that the shader can subtract the eye before it
+//! rounds.
+//! Radii and half sizes are rounded up, with what the position cannot hold added: the stored volume
+//! contains the given one.
+//! Bad bounds (NaN, infinite, negative radius, min > max) are not repaired: their record fails the
+//! shader's test of its bits, the instance is kept visible and counted as invalid.
 
 use crate::error::{Error, Result};
 use crate::view::{round_up, split};
@@ -71,7 +74,8 @@ pub enum Bounds<'a> {
         /// N greatest corners, 3 scalars each.
         max: Floats<'a>,
     },
-    /// Oriented boxes: `center + A (h * u)` for u in `[-1, 1]^3`. `A` may be any 3x3 matrix, singular ones included.
+    /// Oriented boxes: `center + A (h * u)` for u in `[-1, 1]^3`.
+    /// `A` may be any 3x3 matrix, singular ones included.
     OrientedBoxes {
         /// N centres, 3 scalars each.
         centers: Floats<'a>,
@@ -120,11 +124,18 @@ impl Bounds<'_> {
     /// [`Error::Invalid`] where the arrays' lengths do not agree.
     pub fn len(&self) -> Result<usize> {
         let (columns, first): (_, Floats<'_>) = match *self {
-            Self::Spheres { centers, radii } => (vec![("centers", centers, 3), ("radii", radii, 1)], centers),
-            Self::Boxes { min, max } => (vec![("min", min, 3), ("max", max, 3)], min),
-            Self::OrientedBoxes { centers, half_sizes, rotations } => {
-                (vec![("centers", centers, 3), ("half_sizes", half_sizes, 3), ("rotations", rotations, 9)], centers)
+            Self::Spheres { centers, radii } => {
+                (vec![("centers", centers, 3), ("radii", radii, 1)], centers)
             }
+            Self::Boxes { min, max } => (vec![("min", min, 3), ("max", max, 3)], min),
+            Self::OrientedBoxes { centers, half_sizes, rotations } => (
+                vec![
+                    ("centers", centers, 3),
+                    ("half_sizes", half_sizes, 3),
+                    ("rotations", rotations, 9),
+                ],
+                centers,
+            ),
         };
         let n = first.len() / 3;
         for (name, array, width) in columns {
@@ -146,14 +157,21 @@ impl Bounds<'_> {
         Ok(self.len()? == 0)
     }
 
-    /// Writes the record of instance `i` (`record_bytes()` bytes), which says that the caller's number is `index`; false for bad bounds.
+    /// Writes the record of instance `i` (`record_bytes()` bytes), which says that the caller's
+    /// number is `index`; false for bad bounds.
     pub(crate) fn write_record(&self, i: usize, index: u32, out: &mut [u8]) -> bool {
         match *self {
-            Self::Spheres { centers, radii } => write(out, index, SphereRecord::new(centers.array(i), radii.get(i))),
-            Self::Boxes { min, max } => write(out, index, BoxRecord::new(min.array(i), max.array(i))),
-            Self::OrientedBoxes { centers, half_sizes, rotations } => {
-                write(out, index, OrientedBoxRecord::new(centers.array(i), half_sizes.array(i), rotations.array(i)))
+            Self::Spheres { centers, radii } => {
+                write(out, index, SphereRecord::new(centers.array(i), radii.get(i)))
             }
+            Self::Boxes { min, max } => {
+                write(out, index, BoxRecord::new(min.array(i), max.array(i)))
+            }
+            Self::OrientedBoxes { centers, half_sizes, rotations } => write(
+                out,
+                index,
+                OrientedBoxRecord::new(centers.array(i), half_sizes.array(i), rotations.array(i)),
+            ),
         }
     }
 }
@@ -165,11 +183,13 @@ fn write<R: Record>(out: &mut [u8], index: u32, record: R) -> bool {
     is_valid
 }
 
-/// Sizes and coordinates from here on are no volume: with those below, no product of the shader overflows.
+/// Sizes and coordinates from here on are no volume: with those below, no product of the shader
+/// overflows.
 const LARGEST: f32 = 1_152_921_504_606_846_976.0;
 
-/// What bad bounds become: beyond every camera's coordinate limit, so that the shader keeps the instance and says that it is invalid. It
-/// need not know NaN or infinity, which a compiler may take for absent.
+/// What bad bounds become: beyond every camera's coordinate limit, so that the shader keeps the
+/// instance and says that it is invalid.
+/// It need not know NaN or infinity, which a compiler may take for absent.
 const BEYOND_LIMITS: f32 = 4.0 * LARGEST;
 
 trait Record: bytemuck::Pod {
@@ -209,7 +229,8 @@ pub(crate) struct BoxRecord {
     padding_2: f32,
 }
 
-/// `shaders/shared/bounds_oriented_box.wgsl`, `OrientedBoxRecord`: the third half axis fills the fourth lanes.
+/// `shaders/shared/bounds_oriented_box.wgsl`, `OrientedBoxRecord`: the third half axis fills the
+/// fourth lanes.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct OrientedBoxRecord {
@@ -223,8 +244,11 @@ pub(crate) struct OrientedBoxRecord {
     index: u32,
 }
 
-const _: () =
-    assert!(size_of::<SphereRecord>() == 32 && size_of::<BoxRecord>() == 48 && size_of::<OrientedBoxRecord>() == 64);
+const _: () = assert!(
+    size_of::<SphereRecord>() == 32
+        && size_of::<BoxRecord>() == 48
+        && size_of::<OrientedBoxRecord>() == 64
+);
 
 /// A position as two halves, and what they cannot hold, axis by axis (0 for float32 input).
 struct Position {
@@ -236,8 +260,10 @@ struct Position {
 impl Position {
     fn new(p: [f64; 3]) -> Self {
         let halves = p.map(split);
-        // Exact: `p - hi` is (both are float64 within a factor of two or hi is 0), and so is taking `lo` from it.
-        let rest = std::array::from_fn(|k| (p[k] - f64::from(halves[k].0) - f64::from(halves[k].1)).abs());
+        // Exact: `p - hi` is (both are float64 within a factor of two or hi is 0), and so is taking
+        // `lo` from it.
+        let rest =
+            std::array::from_fn(|k| (p[k] - f64::from(halves[k].0) - f64::from(halves[k].1)).abs());
         Self { hi: halves.map(|h| h.0), lo: halves.map(|h| h.1), rest }
     }
 }
@@ -260,14 +286,18 @@ impl SphereRecord {
 }
 
 impl Record for SphereRecord {
-    const NO_VOLUME: Self = Self { center_hi: [0.0; 3], radius: BEYOND_LIMITS, center_lo: [0.0; 3], index: 0 };
+    const NO_VOLUME: Self =
+        Self { center_hi: [0.0; 3], radius: BEYOND_LIMITS, center_lo: [0.0; 3], index: 0 };
 
     fn numbered(self, index: u32) -> Self {
         Self { index, ..self }
     }
 
     fn is_valid(&self) -> bool {
-        all_small(self.center_hi) && all_small(self.center_lo) && all_small([self.radius]) && self.radius >= 0.0
+        all_small(self.center_hi)
+            && all_small(self.center_lo)
+            && all_small([self.radius])
+            && self.radius >= 0.0
     }
 }
 
@@ -286,15 +316,24 @@ impl BoxRecord {
             if min[k] > max[k] {
                 return -1.0;
             }
-            let half = sum_up_difference(max[k], center[k]).max(sum_up_difference(center[k], min[k]));
+            let half =
+                sum_up_difference(max[k], center[k]).max(sum_up_difference(center[k], min[k]));
             round_up(sum_up(half, p.rest[k]))
         });
         // A NaN corner makes a NaN centre, so that it cannot hide in the maximum above.
-        Self { center_hi: p.hi, padding_0: 0.0, center_lo: p.lo, index: 0, half_size, padding_2: 0.0 }
+        Self {
+            center_hi: p.hi,
+            padding_0: 0.0,
+            center_lo: p.lo,
+            index: 0,
+            half_size,
+            padding_2: 0.0,
+        }
     }
 }
 
-/// The least float64 that is surely not below the exact `a - b`: the rounding error is found by Knuth's two-sum.
+/// The least float64 that is surely not below the exact `a - b`: the rounding error is found by
+/// Knuth's two-sum.
 fn sum_up_difference(a: f64, b: f64) -> f64 {
     let d = a - b;
     let bb = a - d;
@@ -325,18 +364,23 @@ impl Record for BoxRecord {
 }
 
 impl OrientedBoxRecord {
-    /// The half axes `A_k h_k` are formed in float64 and rounded to nearest. Neither that nor what the centre's two halves
-    /// cannot hold is added to the sizes, for a flat box has no size that could take it: the error bound does, `docs/accuracy.md`.
+    /// The half axes `A_k h_k` are formed in float64 and rounded to nearest.
+    /// Neither that nor what the centre's two halves cannot hold is added to the sizes, for a flat
+    /// box has no size that could take it: the error bound does, `docs/accuracy.md`.
     fn new(center: [f64; 3], half_size: [f64; 3], rotation: [f64; 9]) -> Self {
         let p = Position::new(center);
-        #[expect(clippy::cast_possible_truncation, reason = "rounding to nearest; the error bound covers it")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "rounding to nearest; the error bound covers it"
+        )]
         let half_axis = |k: usize| -> [f32; 3] {
             std::array::from_fn(|i| {
                 let v = (rotation[3 * i + k] * half_size[k]) as f32;
                 if v.is_subnormal() { 0.0 } else { v }
             })
         };
-        // The half axes alone could not tell a negative size. An infinite entry times a zero size is NaN and fails by its bits.
+        // The half axes alone could not tell a negative size.
+        // An infinite entry times a zero size is NaN and fails by its bits.
         let negative = !half_size.iter().all(|h| *h >= 0.0);
         let last = half_axis(2);
         Self {
@@ -388,8 +432,11 @@ mod tests {
         // 1 + 2^-53 * k needs more bits than two float32 of this pair hold exactly.
         let center = [1.0 + 4.0 * TINY + 1.0e-9, 1.0e7 + 1.0 / 3.0, -1.0e-30];
         let record = SphereRecord::new(center, 0.1);
-        let off: f64 =
-            (0..3).map(|k| (center[k] - f64::from(record.center_hi[k]) - f64::from(record.center_lo[k])).abs()).sum();
+        let off: f64 = (0..3)
+            .map(|k| {
+                (center[k] - f64::from(record.center_hi[k]) - f64::from(record.center_lo[k])).abs()
+            })
+            .sum();
         assert!(f64::from(record.radius) >= 0.1 + off);
         assert!(f64::from(record.radius) < 0.100_001);
         assert!(record.is_valid());
@@ -407,7 +454,8 @@ mod tests {
         assert_eq!(record.half_size[2], 0.0);
     }
 
-    /// Far from the origin, where two halves cannot hold a centre: what they leave over is added, and rounded up.
+    /// Far from the origin, where two halves cannot hold a centre: what they leave over is added,
+    /// and rounded up.
     #[test]
     fn stored_boxes_contain_what_their_centres_cannot_hold() {
         // Multiples of 2^-23 about 1e9, so that float64 takes these differences exactly.
@@ -419,8 +467,14 @@ mod tests {
             let record = BoxRecord::new(min, max);
             let (hi, lo) = (f64::from(record.center_hi[0]), f64::from(record.center_lo[0]));
             let stored = f64::from(record.half_size[0]);
-            assert!(stored >= (max[0] - hi) - lo && stored >= lo - (min[0] - hi), "{k}: {min:?} {max:?} {record:?}");
-            assert!(stored <= (half + 2e-6) * (1.0 + 1e-6), "{k}: not much larger: {half} {record:?}");
+            assert!(
+                stored >= (max[0] - hi) - lo && stored >= lo - (min[0] - hi),
+                "{k}: {min:?} {max:?} {record:?}"
+            );
+            assert!(
+                stored <= (half + 2e-6) * (1.0 + 1e-6),
+                "{k}: not much larger: {half} {record:?}"
+            );
         }
     }
 
@@ -432,12 +486,38 @@ mod tests {
     #[test]
     fn bad_bounds_are_counted_and_named() {
         let bounds = Bounds::Boxes {
-            min: Floats::F64(&[0.0, 0.0, 0.0, 2.0, 0.0, 0.0, f64::NAN, 0.0, 0.0, 0.0, 0.0, f64::NEG_INFINITY]),
+            min: Floats::F64(&[
+                0.0,
+                0.0,
+                0.0,
+                2.0,
+                0.0,
+                0.0,
+                f64::NAN,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                f64::NEG_INFINITY,
+            ]),
             max: Floats::F64(&[1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]),
         };
         assert_eq!(invalid(&bounds), [1, 2, 3]);
         let spheres = Bounds::Spheres {
-            centers: Floats::F32(&[0.0, 0.0, 0.0, f32::INFINITY, 0.0, 0.0, 1e30, 0.0, 0.0, 0.0, 0.0, 0.0]),
+            centers: Floats::F32(&[
+                0.0,
+                0.0,
+                0.0,
+                f32::INFINITY,
+                0.0,
+                0.0,
+                1e30,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+            ]),
             radii: Floats::F32(&[-0.0, 1.0, 1.0, -1e-30]),
         };
         assert_eq!(invalid(&spheres), [1, 2, 3]);
@@ -458,7 +538,11 @@ mod tests {
 
     #[test]
     fn arrays_that_do_not_agree_are_refused() {
-        let bounds = Bounds::Spheres { centers: Floats::F32(&[0.0; 6]), radii: Floats::F32(&[1.0; 3]) };
-        assert_eq!(bounds.len().unwrap_err().to_string(), "radii: expected 2 x 1 = 2 numbers, got 3");
+        let bounds =
+            Bounds::Spheres { centers: Floats::F32(&[0.0; 6]), radii: Floats::F32(&[1.0; 3]) };
+        assert_eq!(
+            bounds.len().unwrap_err().to_string(),
+            "radii: expected 2 x 1 = 2 numbers, got 3"
+        );
     }
 }

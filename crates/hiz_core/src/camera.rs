@@ -1,8 +1,10 @@
 //! Cameras in float64, on the host: what the inputs denote, before anything is rounded.
 //!
-//! A camera is four clip-space rows about an origin: `clip = rows * (p - origin, 1)`. Named cameras take the eye as the
-//! origin, so that a camera a million metres from the world's origin loses nothing. Clip space is that of Vulkan, Direct3D
-//! and WebGPU: NDC x right, y **up**, z in `0..1`; column vectors; pixel (0, 0) is the top-left one.
+//! A camera is four clip-space rows about an origin: `clip = rows * (p - origin, 1)`.
+//! Named cameras take the eye as the origin, so that a camera a million metres from the world's
+//! origin loses nothing.
+//! Clip space is that of Vulkan, Direct3D and WebGPU: NDC x right, y **up**, z in `0..1`; column
+//! vectors; pixel (0, 0) is the top-left one.
 
 use crate::error::{Error, Result};
 
@@ -13,7 +15,8 @@ pub type Mat3 = [[f64; 3]; 3];
 /// A row-major 4x4 matrix of float64 for column vectors.
 pub type Mat4 = [[f64; 4]; 4];
 
-/// The largest image side that the certificates are derived for (pixel edges times 2^16 stay inside float32).
+/// The largest image side that the certificates are derived for (pixel edges times 2^16 stay inside
+/// float32).
 pub const MAX_IMAGE_SIDE: u32 = 32_768;
 
 /// Which end of the depth range is far.
@@ -74,8 +77,8 @@ pub struct Pose {
     pub eye: Vec3,
     /// A point that appears on the optical axis.
     pub target: Vec3,
-    /// A direction that appears upwards; not parallel to the viewing direction. To look straight down, take what
-    /// shall be at the top of the image, such as the heading.
+    /// A direction that appears upwards; not parallel to the viewing direction.
+    /// To look straight down, take what shall be at the top of the image, such as the heading.
     pub up: Vec3,
 }
 
@@ -89,14 +92,22 @@ impl Pose {
         }
         let towards = sub(self.target, self.eye);
         if !towards.iter().all(|x| x.is_finite()) {
-            return Err(Error::invalid("target", "expected a point whose difference to eye float64 can hold"));
+            return Err(Error::invalid(
+                "target",
+                "expected a point whose difference to eye float64 can hold",
+            ));
         }
         let forward = normalized(towards).ok_or_else(|| {
-            Error::invalid("target", format!("expected a point apart from eye, got {:?} for both", self.eye))
+            Error::invalid(
+                "target",
+                format!("expected a point apart from eye, got {:?} for both", self.eye),
+            )
         })?;
-        let up = normalized(self.up).ok_or_else(|| Error::invalid("up", "expected a direction, got a zero vector"))?;
+        let up = normalized(self.up)
+            .ok_or_else(|| Error::invalid("up", "expected a direction, got a zero vector"))?;
         let right = cross(forward, up);
-        // Below this sine of the angle between them the image would turn with the last bits of the input.
+        // Below this sine of the angle between them the image would turn with the last bits of the
+        // input.
         if dot(right, right) < 1e-20 {
             return Err(Error::invalid(
                 "up",
@@ -108,13 +119,14 @@ impl Pose {
                 ),
             ));
         }
-        let right =
-            normalized(right).ok_or_else(|| Error::invalid("up", "expected a direction apart from target - eye"))?;
+        let right = normalized(right)
+            .ok_or_else(|| Error::invalid("up", "expected a direction apart from target - eye"))?;
         Ok([right, cross(right, forward), forward])
     }
 }
 
-/// An axis across `up`: what is at the top of the image for who looks along `up`, in the worlds that have it so.
+/// An axis across `up`: what is at the top of the image for who looks along `up`, in the worlds
+/// that have it so.
 fn across(up: Vec3) -> &'static str {
     let [x, y, z] = up.map(f64::abs);
     if y >= x && y >= z {
@@ -126,10 +138,12 @@ fn across(up: Vec3) -> &'static str {
     }
 }
 
-/// How camera space (x right, y up, z **forward**, so view depth is positive in front) becomes clip space.
+/// How camera space (x right, y up, z **forward**, so view depth is positive in front) becomes clip
+/// space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Projection {
-    /// A centred perspective; the horizontal field of view follows from the image's aspect ratio (square pixels).
+    /// A centred perspective; the horizontal field of view follows from the image's aspect ratio
+    /// (square pixels).
     Perspective {
         /// Vertical field of view in radians, in (0, pi).
         fov_y: f64,
@@ -197,7 +211,10 @@ impl Projection {
                 if !(fov_y > 0.0 && fov_y < std::f64::consts::PI) {
                     return Err(Error::invalid(
                         "fov_y",
-                        format!("expected an angle in (0, 180) degrees, got {}", fov_y.to_degrees()),
+                        format!(
+                            "expected an angle in (0, 180) degrees, got {}",
+                            fov_y.to_degrees()
+                        ),
                     ));
                 }
                 let top = (fov_y / 2.0).tan();
@@ -209,7 +226,12 @@ impl Projection {
                 check_borders(left, right, bottom, top)?;
                 let [z, w] = perspective_depth(near, far, convention)?;
                 let (dx, dy) = (right - left, top - bottom);
-                Ok([[2.0 / dx, 0.0, -(right + left) / dx, 0.0], [0.0, 2.0 / dy, -(top + bottom) / dy, 0.0], z, w])
+                Ok([
+                    [2.0 / dx, 0.0, -(right + left) / dx, 0.0],
+                    [0.0, 2.0 / dy, -(top + bottom) / dy, 0.0],
+                    z,
+                    w,
+                ])
             }
             Self::Orthographic { left, right, bottom, top, near, far, convention } => {
                 check_borders(left, right, bottom, top)?;
@@ -236,15 +258,25 @@ impl Projection {
 }
 
 /// The z and w rows of a perspective with view depth as w.
-fn perspective_depth(near: f64, far: Option<f64>, convention: DepthConvention) -> Result<[[f64; 4]; 2]> {
+fn perspective_depth(
+    near: f64,
+    far: Option<f64>,
+    convention: DepthConvention,
+) -> Result<[[f64; 4]; 2]> {
     if !(near.is_finite() && near > 0.0) {
-        return Err(Error::invalid("near", format!("expected a finite view depth > 0, got {near}")));
+        return Err(Error::invalid(
+            "near",
+            format!("expected a finite view depth > 0, got {near}"),
+        ));
     }
     let far = far.filter(|f| *f != f64::INFINITY);
     if let Some(far) = far
         && !(far.is_finite() && far > near)
     {
-        return Err(Error::invalid("far", format!("expected a view depth beyond near = {near}, or none, got {far}")));
+        return Err(Error::invalid(
+            "far",
+            format!("expected a view depth beyond near = {near}, or none, got {far}"),
+        ));
     }
     let (slope, constant) = match (convention, far) {
         (DepthConvention::Standard, Some(f)) => (f / (f - near), -f * near / (f - near)),
@@ -257,28 +289,42 @@ fn perspective_depth(near: f64, far: Option<f64>, convention: DepthConvention) -
 
 fn check_borders(left: f64, right: f64, bottom: f64, top: f64) -> Result<()> {
     if !(left.is_finite() && right.is_finite() && left < right) {
-        return Err(Error::invalid("right", format!("expected a finite border beyond left = {left}, got {right}")));
+        return Err(Error::invalid(
+            "right",
+            format!("expected a finite border beyond left = {left}, got {right}"),
+        ));
     }
     if !(bottom.is_finite() && top.is_finite() && bottom < top) {
-        return Err(Error::invalid("top", format!("expected a finite border beyond bottom = {bottom}, got {top}")));
+        return Err(Error::invalid(
+            "top",
+            format!("expected a finite border beyond bottom = {bottom}, got {top}"),
+        ));
     }
     Ok(())
 }
 
 fn check_size(size: ImageSize) -> Result<()> {
     if size.width == 0 || size.height == 0 {
-        return Err(Error::invalid("size", format!("expected at least one pixel a side, got {size}")));
+        return Err(Error::invalid(
+            "size",
+            format!("expected at least one pixel a side, got {size}"),
+        ));
     }
     let side = size.width.max(size.height);
     if side > MAX_IMAGE_SIDE {
-        return Err(Error::limit("image side in pixels", u64::from(side), u64::from(MAX_IMAGE_SIDE)));
+        return Err(Error::limit(
+            "image side in pixels",
+            u64::from(side),
+            u64::from(MAX_IMAGE_SIDE),
+        ));
     }
     Ok(())
 }
 
 /// A view of the world: four clip-space rows about an origin, an image size and a depth convention.
 ///
-/// The camera *denotes* exactly these float64 numbers; everything that the cull promises is promised about them.
+/// The camera *denotes* exactly these float64 numbers; everything that the cull promises is
+/// promised about them.
 #[derive(Debug, Clone)]
 pub struct Camera {
     rows: Mat4,
@@ -292,7 +338,8 @@ pub struct Camera {
 /// Cameras are equal that denote the same numbers, whichever constructor made them.
 impl PartialEq for Camera {
     fn eq(&self, other: &Self) -> bool {
-        (self.rows, self.origin, self.size, self.convention) == (other.rows, other.origin, other.size, other.convention)
+        (self.rows, self.origin, self.size, self.convention)
+            == (other.rows, other.origin, other.size, other.convention)
     }
 }
 
@@ -300,39 +347,59 @@ impl Camera {
     /// A camera from clip-space rows about an origin: `clip = rows * (p - origin, 1)`.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for NaN or infinite entries, an empty image and singular matrices; [`Error::Limit`] for an image
-    /// side above [`MAX_IMAGE_SIDE`].
-    pub fn from_rows(rows: Mat4, origin: Vec3, size: ImageSize, convention: DepthConvention) -> Result<Self> {
+    /// [`Error::Invalid`] for NaN or infinite entries, an empty image and singular matrices;
+    /// [`Error::Limit`] for an image side above [`MAX_IMAGE_SIDE`].
+    pub fn from_rows(
+        rows: Mat4,
+        origin: Vec3,
+        size: ImageSize,
+        convention: DepthConvention,
+    ) -> Result<Self> {
         check_size(size)?;
         if let Some(bad) = rows.iter().flatten().chain(&origin).find(|x| !x.is_finite()) {
-            return Err(Error::invalid("camera", format!("expected finite matrix entries, got {bad}")));
+            return Err(Error::invalid(
+                "camera",
+                format!("expected finite matrix entries, got {bad}"),
+            ));
         }
         check_regular(&rows)?;
         Ok(Self { rows, origin, size, convention, posed: true })
     }
 
-    /// A camera that stands at `pose` and sees through `projection`; its rows are formed about the eye.
+    /// A camera that stands at `pose` and sees through `projection`; its rows are formed about the
+    /// eye.
     ///
     /// # Errors
     /// [`Error::Invalid`] names the field that cannot be used.
     pub fn look_at(pose: &Pose, projection: &Projection, size: ImageSize) -> Result<Self> {
         let clip_from_camera = projection.clip_from_camera(size)?;
         let axes = pose.axes()?;
-        Self::from_rows(linear_after(&clip_from_camera, &axes, [0.0; 3]), pose.eye, size, projection.convention())
+        Self::from_rows(
+            linear_after(&clip_from_camera, &axes, [0.0; 3]),
+            pose.eye,
+            size,
+            projection.convention(),
+        )
     }
 
     /// A camera from one float64 matrix, `clip = m * (x, y, z, 1)`.
     ///
     /// # Errors
     /// As [`Camera::from_rows`].
-    pub fn from_clip_from_world(m: Mat4, size: ImageSize, convention: DepthConvention) -> Result<Self> {
+    pub fn from_clip_from_world(
+        m: Mat4,
+        size: ImageSize,
+        convention: DepthConvention,
+    ) -> Result<Self> {
         Ok(Self { posed: false, ..Self::from_rows(m, [0.0; 3], size, convention)? })
     }
 
-    /// A camera from a projection and an affine world-to-camera matrix (any camera axes, as long as both agree).
+    /// A camera from a projection and an affine world-to-camera matrix (any camera axes, as long as
+    /// both agree).
     ///
     /// # Errors
-    /// As [`Camera::from_rows`], and for a `camera_from_world` whose last row is not (0, 0, 0, 1) or that is singular.
+    /// As [`Camera::from_rows`], and for a `camera_from_world` whose last row is not (0, 0, 0, 1)
+    /// or that is singular.
     pub fn from_clip_from_camera(
         clip_from_camera: Mat4,
         camera_from_world: Mat4,
@@ -340,12 +407,19 @@ impl Camera {
         convention: DepthConvention,
     ) -> Result<Self> {
         let (linear, translation) = affine_parts("camera_from_world", &camera_from_world)?;
-        let inverse = inverse3(&linear)
-            .ok_or_else(|| Error::invalid("camera_from_world", "expected an invertible matrix, got a singular one"))?;
-        // The rows stand about (nearly) the eye: what the rounded eye leaves over is kept as the residual.
+        let inverse = inverse3(&linear).ok_or_else(|| {
+            Error::invalid("camera_from_world", "expected an invertible matrix, got a singular one")
+        })?;
+        // The rows stand about (nearly) the eye: what the rounded eye leaves over is kept as the
+        // residual.
         let origin = mul3(&inverse, translation).map(|x| -x);
         let residual: Vec3 = std::array::from_fn(|i| dot(linear[i], origin) + translation[i]);
-        Self::from_rows(linear_after(&clip_from_camera, &linear, residual), origin, size, convention)
+        Self::from_rows(
+            linear_after(&clip_from_camera, &linear, residual),
+            origin,
+            size,
+            convention,
+        )
     }
 
     /// A camera from a projection and an affine camera-to-world matrix, the camera's pose.
@@ -359,8 +433,9 @@ impl Camera {
         convention: DepthConvention,
     ) -> Result<Self> {
         let (linear, eye) = affine_parts("world_from_camera", &world_from_camera)?;
-        let inverse = inverse3(&linear)
-            .ok_or_else(|| Error::invalid("world_from_camera", "expected an invertible matrix, got a singular one"))?;
+        let inverse = inverse3(&linear).ok_or_else(|| {
+            Error::invalid("world_from_camera", "expected an invertible matrix, got a singular one")
+        })?;
         Self::from_rows(linear_after(&clip_from_camera, &inverse, [0.0; 3]), eye, size, convention)
     }
 
@@ -369,7 +444,10 @@ impl Camera {
     /// # Errors
     /// As [`Camera::from_rows`].
     pub fn with_size(&self, size: ImageSize) -> Result<Self> {
-        Ok(Self { posed: self.posed, ..Self::from_rows(self.rows, self.origin, size, self.convention)? })
+        Ok(Self {
+            posed: self.posed,
+            ..Self::from_rows(self.rows, self.origin, size, self.convention)?
+        })
     }
 
     /// The image's size.
@@ -402,13 +480,20 @@ impl Camera {
         self.rows[3][..3] == [0.0; 3]
     }
 
-    /// The rows times the power of two that brings w (orthographic: its constant; otherwise its largest coefficient) into
-    /// `[1, 2)`. It changes no comparison and has to come first: products with tiny rows would lose bits below float64's range.
+    /// The rows times the power of two that brings w (orthographic: its constant; otherwise its
+    /// largest coefficient) into `[1, 2)`.
+    /// It changes no comparison and has to come first: products with tiny rows would lose bits
+    /// below float64's range.
     pub(crate) fn rows_near_one(&self) -> Mat4 {
         let w = self.rows[3];
-        let unit = if self.is_orthographic() { w[3].abs() } else { w[..3].iter().fold(0.0_f64, |m, v| m.max(v.abs())) };
-        // log2 may be off by an ulp at a power of two: then w lies a hair outside [1, 2), which no bound needs exactly. A
-        // subnormal unit makes an infinite scale, and rows that are refused.
+        let unit = if self.is_orthographic() {
+            w[3].abs()
+        } else {
+            w[..3].iter().fold(0.0_f64, |m, v| m.max(v.abs()))
+        };
+        // log2 may be off by an ulp at a power of two: then w lies a hair outside [1, 2), which no
+        // bound needs exactly.
+        // A subnormal unit makes an infinite scale, and rows that are refused.
         let scale = 2.0_f64.powf(unit.log2().floor()).recip();
         self.rows.map(|row| row.map(|v| v * scale))
     }
@@ -469,7 +554,8 @@ pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// The unit vector, or nothing for a vector without a direction. Scaled first, so that no square over- or underflows.
+/// The unit vector, or nothing for a vector without a direction.
+/// Scaled first, so that no square over- or underflows.
 pub(crate) fn normalized(v: Vec3) -> Option<Vec3> {
     let largest = v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     if !(largest > 0.0 && largest.is_finite()) {
@@ -491,7 +577,8 @@ pub(crate) fn mul3(m: &Mat3, v: Vec3) -> Vec3 {
     m.map(|row| dot(row, v))
 }
 
-/// The inverse by cofactors of the rows scaled to length 1 (so that the test for singularity has no units).
+/// The inverse by cofactors of the rows scaled to length 1 (so that the test for singularity has no
+/// units).
 pub(crate) fn inverse3(m: &Mat3) -> Option<Mat3> {
     let mut unit = [[0.0; 3]; 3];
     let mut length = [0.0; 3];
@@ -517,7 +604,12 @@ mod tests {
     fn forward_camera(convention: DepthConvention, far: Option<f64>) -> Camera {
         // At (10, 20, 30) looking along -z, so view depth = 30 - z.
         let pose = Pose { eye: [10.0, 20.0, 30.0], target: [10.0, 20.0, 0.0], up: [0.0, 5.0, 0.0] };
-        let projection = Projection::Perspective { fov_y: std::f64::consts::FRAC_PI_2, near: 1.0, far, convention };
+        let projection = Projection::Perspective {
+            fov_y: std::f64::consts::FRAC_PI_2,
+            near: 1.0,
+            far,
+            convention,
+        };
         Camera::look_at(&pose, &projection, SIZE).unwrap()
     }
 
@@ -531,10 +623,14 @@ mod tests {
         let camera = forward_camera(DepthConvention::Standard, Some(3.0));
         // One unit right and up at view depth 2: ndc x = 1 / (2 * aspect 2) = 0.25, y = 1/2.
         let [x, y, z, w] = clip(&camera, [11.0, 21.0, 28.0]);
-        assert!((w - 2.0).abs() < 1e-12 && (x / w - 0.25).abs() < 1e-12 && (y / w - 0.5).abs() < 1e-12);
+        assert!(
+            (w - 2.0).abs() < 1e-12 && (x / w - 0.25).abs() < 1e-12 && (y / w - 0.5).abs() < 1e-12
+        );
         // depth (f - f n / z) / (f - n) = (3 - 3 / 2) / 2
         assert!((z / w - 0.75).abs() < 1e-12);
-        for (convention, at_near) in [(DepthConvention::Standard, 0.0), (DepthConvention::Reversed, 1.0)] {
+        for (convention, at_near) in
+            [(DepthConvention::Standard, 0.0), (DepthConvention::Reversed, 1.0)]
+        {
             for far in [Some(3.0), None] {
                 let [.., z, w] = clip(&forward_camera(convention, far), [10.0, 20.0, 29.0]);
                 assert!((z / w - at_near).abs() < 1e-12, "{convention:?} {far:?}");
@@ -544,12 +640,28 @@ mod tests {
 
     #[test]
     fn poses_and_their_inverses_denote_the_same_camera() {
-        let p = Projection::Perspective { fov_y: 1.0, near: 0.1, far: None, convention: DepthConvention::Reversed };
+        let p = Projection::Perspective {
+            fov_y: 1.0,
+            near: 0.1,
+            far: None,
+            convention: DepthConvention::Reversed,
+        };
         let p = p.clip_from_camera(SIZE).unwrap();
         // A rotation by 90 degrees about y and a translation; the inverse is written down by hand.
-        let pose = [[0.0, 0.0, 1.0, 5.0], [0.0, 1.0, 0.0, 6.0], [-1.0, 0.0, 0.0, 7.0], [0.0, 0.0, 0.0, 1.0]];
-        let inverse = [[0.0, 0.0, -1.0, 7.0], [0.0, 1.0, 0.0, -6.0], [1.0, 0.0, 0.0, -5.0], [0.0, 0.0, 0.0, 1.0]];
-        let a = Camera::from_clip_from_camera_pose(p, pose, SIZE, DepthConvention::Reversed).unwrap();
+        let pose = [
+            [0.0, 0.0, 1.0, 5.0],
+            [0.0, 1.0, 0.0, 6.0],
+            [-1.0, 0.0, 0.0, 7.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ];
+        let inverse = [
+            [0.0, 0.0, -1.0, 7.0],
+            [0.0, 1.0, 0.0, -6.0],
+            [1.0, 0.0, 0.0, -5.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ];
+        let a =
+            Camera::from_clip_from_camera_pose(p, pose, SIZE, DepthConvention::Reversed).unwrap();
         let b = Camera::from_clip_from_camera(p, inverse, SIZE, DepthConvention::Reversed).unwrap();
         assert_eq!(a.origin(), [5.0, 6.0, 7.0]);
         for point in [[1.0, 2.0, 3.0], [9.0, 6.0, 7.5]] {
@@ -562,8 +674,12 @@ mod tests {
     #[test]
     fn who_looks_along_up_is_told_a_direction_that_works() {
         let camera = |target: Vec3, up: Vec3| {
-            let good =
-                Projection::Perspective { fov_y: 1.0, near: 0.1, far: None, convention: DepthConvention::Reversed };
+            let good = Projection::Perspective {
+                fov_y: 1.0,
+                near: 0.1,
+                far: None,
+                convention: DepthConvention::Reversed,
+            };
             Camera::look_at(&Pose { eye: [0.0; 3], target, up }, &good, SIZE)
         };
         for (target, up, said, other) in [
@@ -580,7 +696,12 @@ mod tests {
     #[test]
     fn unusable_cameras_are_refused_by_name() {
         let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
-        let good = Projection::Perspective { fov_y: 1.0, near: 0.1, far: None, convention: DepthConvention::Reversed };
+        let good = Projection::Perspective {
+            fov_y: 1.0,
+            near: 0.1,
+            far: None,
+            convention: DepthConvention::Reversed,
+        };
         let message = |pose: &Pose, projection: &Projection, size| {
             Camera::look_at(pose, projection, size).unwrap_err().to_string()
         };
@@ -589,12 +710,17 @@ mod tests {
         assert!(message(&Pose { eye: [f64::NAN; 3], ..pose }, &good, SIZE).starts_with("eye:"));
         assert!(message(&pose, &good, ImageSize::new(0, 1)).starts_with("size:"));
         assert!(message(&pose, &good, ImageSize::new(32_769, 1)).contains("32768"));
-        let bad =
-            |fov_y, near, far| Projection::Perspective { fov_y, near, far, convention: DepthConvention::Standard };
+        let bad = |fov_y, near, far| Projection::Perspective {
+            fov_y,
+            near,
+            far,
+            convention: DepthConvention::Standard,
+        };
         assert!(message(&pose, &bad(0.0, 0.1, None), SIZE).starts_with("fov_y:"));
         assert!(message(&pose, &bad(1.0, 0.0, None), SIZE).starts_with("near:"));
         assert!(message(&pose, &bad(1.0, 1.0, Some(1.0)), SIZE).starts_with("far:"));
-        let error = Camera::from_clip_from_world([[0.0; 4]; 4], SIZE, DepthConvention::Standard).unwrap_err();
+        let error = Camera::from_clip_from_world([[0.0; 4]; 4], SIZE, DepthConvention::Standard)
+            .unwrap_err();
         assert!(error.to_string().contains("singular"));
     }
 }

@@ -19,23 +19,32 @@ pub(crate) struct Compaction {
 }
 
 impl Compaction {
-    pub(crate) fn new(gpu: &Gpu, instances: &Instances, visible: &Visible, lists: &Lists) -> Result<Self> {
+    pub(crate) fn new(
+        gpu: &Gpu,
+        instances: &Instances,
+        visible: &Visible,
+        lists: &Lists,
+    ) -> Result<Self> {
         let of_pieces = instances.pieces.iter().zip(&visible.pieces).zip(&lists.pieces);
-        let pieces = of_pieces.filter(|((piece, _), _)| piece.count() > 0).map(|((piece, output), list)| {
-            let bind_group = gpu.bind_group(
-                "hiz.compact.piece",
-                &gpu.layouts().compact,
-                &[
-                    entry(0, piece.uniform.as_entire_binding()),
-                    entry(1, output.mask.as_entire_binding()),
-                    entry(2, list.bound().as_entire_binding()),
-                    entry(3, lists.draws.as_entire_binding()),
-                    entry(4, list.before.as_entire_binding()),
-                    entry(5, lists.capacity_uniform.as_entire_binding()),
-                ],
-            )?;
-            Ok((bind_group, list.indices.as_ref().map(|_| piece.words().div_ceil(SCATTER_WORKGROUP))))
-        });
+        let pieces =
+            of_pieces.filter(|((piece, _), _)| piece.count() > 0).map(|((piece, output), list)| {
+                let bind_group = gpu.bind_group(
+                    "hiz.compact.piece",
+                    &gpu.layouts().compact,
+                    &[
+                        entry(0, piece.uniform.as_entire_binding()),
+                        entry(1, output.mask.as_entire_binding()),
+                        entry(2, list.bound().as_entire_binding()),
+                        entry(3, lists.draws.as_entire_binding()),
+                        entry(4, list.before.as_entire_binding()),
+                        entry(5, lists.capacity_uniform.as_entire_binding()),
+                    ],
+                )?;
+                Ok((
+                    bind_group,
+                    list.indices.as_ref().map(|_| piece.words().div_ceil(SCATTER_WORKGROUP)),
+                ))
+            });
         Ok(Self {
             scan: gpu.compact_pipeline("scan")?,
             scatter: gpu.compact_pipeline("scatter")?,

@@ -15,15 +15,18 @@ use crate::tolerance::DepthTolerance;
 use crate::update;
 use crate::visible::{Visible, VisibleOptions};
 
-/// Everything that is made once a device. Cheap to clone.
+/// Everything that is made once a device.
+/// Cheap to clone.
 ///
-/// Nothing here submits, polls or maps: `record_*` writes into the caller's encoder, `create_*` makes buffers.
+/// Nothing here submits, polls or maps: `record_*` writes into the caller's encoder, `create_*`
+/// makes buffers.
 ///
 /// # Errors
 /// What wgpu finds wrong with what is made here comes back as an [`Error`], and never at the
-/// device's own error handler, which ends the process by default. After an error the caller's
-/// encoder and device can be used on: nothing that is invalid was recorded. (What was recorded
-/// before the error came up may be part of the work.)
+/// device's own error handler, which ends the process by default.
+/// After an error the caller's encoder and device can be used on: nothing that is invalid was
+/// recorded.
+/// (What was recorded before the error came up may be part of the work.)
 ///
 /// Three things cannot be known here:
 ///
@@ -48,18 +51,22 @@ impl HizContext {
         Self::with_pipeline_cache(device, None)
     }
 
-    /// The same, with a cache that pipelines are compiled into and taken from: of a device with the feature `PIPELINE_CACHE`, whose
-    /// data the caller keeps from run to run. Pipelines are made when they are first used, each once; drivers that have a shader
-    /// cache of their own on the disk, as Mesa's have, need nothing more.
+    /// The same, with a cache that pipelines are compiled into and taken from: of a device with the
+    /// feature `PIPELINE_CACHE`, whose data the caller keeps from run to run.
+    /// Pipelines are made when they are first used, each once; drivers that have a shader cache of
+    /// their own on the disk, as Mesa's have, need nothing more.
     ///
     /// # Errors
     /// As [`HizContext::new`].
-    pub fn with_pipeline_cache(device: &wgpu::Device, cache: Option<wgpu::PipelineCache>) -> Result<Self> {
+    pub fn with_pipeline_cache(
+        device: &wgpu::Device,
+        cache: Option<wgpu::PipelineCache>,
+    ) -> Result<Self> {
         Self::make(device, cache, &[])
     }
 
-    /// For tests: a context whose shaders have texts replaced, `(what, by what)`. A suite is trusted once a planted fault
-    /// turns it red.
+    /// For tests: a context whose shaders have texts replaced, `(what, by what)`.
+    /// A suite is trusted once a planted fault turns it red.
     ///
     /// # Panics
     /// If no shader holds such a text: a fault that was never planted proves nothing.
@@ -68,7 +75,11 @@ impl HizContext {
         Self::make(device, None, faults)
     }
 
-    fn make(device: &wgpu::Device, cache: Option<wgpu::PipelineCache>, faults: &[(&str, &str)]) -> Result<Self> {
+    fn make(
+        device: &wgpu::Device,
+        cache: Option<wgpu::PipelineCache>,
+        faults: &[(&str, &str)],
+    ) -> Result<Self> {
         let have = device.limits();
         for (name, need, have) in needed(&have) {
             if have < need {
@@ -78,15 +89,15 @@ impl HizContext {
         Ok(Self { gpu: Arc::new(Gpu::new(device, cache, faults)?) })
     }
 
-    /// Limits that are enough for a device: WebGPU's defaults. [`HizContext::new`] takes less where
-    /// the shaders, their bindings and one row of records fit into it, and names the first limit
-    /// that is too low.
+    /// Limits that are enough for a device: WebGPU's defaults.
+    /// [`HizContext::new`] takes less where the shaders, their bindings and one row of records fit
+    /// into it, and names the first limit that is too low.
     pub fn required_limits() -> wgpu::Limits {
         wgpu::Limits::default()
     }
 
-    /// The features that a device needs: none. (A
-    /// [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0 needs
+    /// The features that a device needs: none.
+    /// (A [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0 needs
     /// `INDIRECT_FIRST_INSTANCE`.)
     pub fn required_features() -> wgpu::Features {
         wgpu::Features::empty()
@@ -124,20 +135,25 @@ impl HizContext {
         })
     }
 
-    /// Records the replacement of instances `first..first + n` by the `n` new bounds, of the same kind. They keep their places in the
-    /// stored order, and the boxes of their groups of 64 follow: where instances have moved far, groups have grown, and
-    /// new [`Instances`] are faster to cull. `strict` refuses bad bounds, and then nothing has changed.
+    /// Records the replacement of instances `first..first + n` by the `n` new bounds, of the same
+    /// kind.
+    /// They keep their places in the stored order, and the boxes of their groups of 64 follow:
+    /// where instances have moved far, groups have grown, and new [`Instances`] are faster to cull.
+    /// `strict` refuses bad bounds, and then nothing has changed.
     ///
-    /// What was submitted before sees the old bounds, what is submitted later the new ones. (The
-    /// verdicts of an [`Engine`](crate::headless::Engine)'s culls are refined here, from the old
-    /// bounds. Of a cull that is submitted between this recording and its submit, read them
-    /// before.) Submit updates of the same instances in
-    /// the order in which they were recorded, each one: after one that was left out or overtaken, groups that are touched are never
-    /// culled as a whole any more. (Nothing visible is culled for it.) The new records wait in memory of the device until then.
+    /// What was submitted before sees the old bounds, what is submitted later the new ones.
+    /// (The verdicts of an [`Engine`](crate::headless::Engine)'s culls are refined here, from the
+    /// old bounds. Of a cull that is submitted between this recording and its submit, read them
+    /// before.)
+    /// Submit updates of the same instances in the order in which they were recorded, each one:
+    /// after one that was left out or overtaken, groups that are touched are never culled as a
+    /// whole any more.
+    /// (Nothing visible is culled for it.)
+    /// The new records wait in memory of the device until then.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for another kind of bounds or context, [`Error::Invalid`] for instances that there are not and, with
-    /// `strict`, for bad bounds, [`Error::OutOfMemory`].
+    /// [`Error::Mismatch`] for another kind of bounds or context, [`Error::Invalid`] for instances
+    /// that there are not and, with `strict`, for bad bounds, [`Error::OutOfMemory`].
     pub fn record_update(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -163,7 +179,11 @@ impl HizContext {
     /// [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0 on a
     /// device without the feature `INDIRECT_FIRST_INSTANCE`, [`Error::OutOfMemory`],
     /// [`Error::Device`] where the device is lost.
-    pub fn create_visible(&self, instances: &Instances, options: &VisibleOptions) -> Result<Visible> {
+    pub fn create_visible(
+        &self,
+        instances: &Instances,
+        options: &VisibleOptions,
+    ) -> Result<Visible> {
         Visible::new(&self.gpu, instances, options)
     }
 
@@ -172,7 +192,11 @@ impl HizContext {
     /// # Errors
     /// [`Error::Invalid`] for arrays that do not fit and indices out of range, [`Error::Limit`]
     /// past the device's buffers, [`Error::OutOfMemory`].
-    pub fn create_occluders(&self, meshes: &[MeshData<'_>], options: &OccluderOptions) -> Result<Occluders> {
+    pub fn create_occluders(
+        &self,
+        meshes: &[MeshData<'_>],
+        options: &OccluderOptions,
+    ) -> Result<Occluders> {
         Occluders::new(&self.gpu, meshes, options)
     }
 
@@ -198,16 +222,17 @@ impl HizContext {
     ///
     /// `depth` is a view of a 2D texture of one mip level, sample and layer, whose whole depth is
     /// read, whatever part of it the view shows: the default view of a texture with a stencil will
-    /// do. Formats and usages:
+    /// do.
+    /// Formats and usages:
     ///
     /// - any depth format, `R32Float` or `R16Float`, with `TEXTURE_BINDING`;
-    /// - `Rgba32Uint` with `STORAGE_BINDING`: the float bits of four pixels of a row in a texel. It
-    ///   is `width.div_ceil(4)` texels wide; pixels past the width count as depth of the row's last
-    ///   ones, so repeat the last.
+    /// - `Rgba32Uint` with `STORAGE_BINDING`: the float bits of four pixels of a row in a texel.
+    ///   It is `width.div_ceil(4)` texels wide; pixels past the width count as depth of the row's
+    ///   last ones, so repeat the last.
     ///
-    /// Give it `COPY_SRC` as well, and large culls read faster ([`AtlasUse`](crate::AtlasUse)). The
-    /// texture must neither change nor be destroyed before the culls that use it have run. Submit
-    /// the reduction before them or with them: a cull that runs before it keeps everything.
+    /// Give it `COPY_SRC` as well, and large culls read faster ([`AtlasUse`](crate::AtlasUse)).
+    /// The texture must neither change nor be destroyed before the culls that use it have run.
+    /// Submit the reduction before them or with them: a cull that runs before it keeps everything.
     ///
     /// What the format rounds is slack that the pyramid keeps ([`Pyramid::tolerance`]), and every
     /// cull counts it beside the slack of its [`CullOptions`]: a step of `Depth16Unorm`,
@@ -226,10 +251,11 @@ impl HizContext {
         pyramid::record_reduce(&self.gpu, encoder, depth, camera, pyramid, DepthTolerance::NONE)
     }
 
-    /// Records the cull of `instances` against `pyramid`, whose depth image must be `camera`'s; `visible` takes what is found.
+    /// Records the cull of `instances` against `pyramid`, whose depth image must be `camera`'s;
+    /// `visible` takes what is found.
     ///
-    /// A cull of a quarter as many instances as depth image and stored levels have texels copies them into one texture first, which costs less
-    /// than it saves ([`AtlasUse`](crate::AtlasUse)).
+    /// A cull of a quarter as many instances as depth image and stored levels have texels copies
+    /// them into one texture first, which costs less than it saves ([`AtlasUse`](crate::AtlasUse)).
     ///
     /// # Errors
     /// [`Error::Mismatch`] for objects that do not belong together, for a depth image that was
@@ -244,13 +270,15 @@ impl HizContext {
         visible: &Visible,
         options: &CullOptions,
     ) -> Result<()> {
-        let inputs = CullInputs { instances, camera, pyramid, options, certified: true, idle: false };
+        let inputs =
+            CullInputs { instances, camera, pyramid, options, certified: true, idle: false };
         cull::record(&self.gpu, encoder, &inputs, visible)
     }
 }
 
-/// What the shaders and their bindings need of a device, and what it has. `tests/validation.rs`
-/// runs everything on a device that has just this, and on devices with one less.
+/// What the shaders and their bindings need of a device, and what it has.
+/// `tests/validation.rs` runs everything on a device that has just this, and on devices with one
+/// less.
 fn needed(have: &wgpu::Limits) -> Vec<(&'static str, u64, u64)> {
     macro_rules! limits {
         ($($name:ident >= $need:expr,)*) => {

@@ -1,4 +1,5 @@
-//! What can go wrong, each with a message that names the parameter, what was expected and what came.
+//! What can go wrong, each with a message that names the parameter, what was expected and what
+//! came.
 
 /// The errors of this crate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -32,7 +33,8 @@ pub enum Error {
         /// What was expected and what came.
         message: String,
     },
-    /// Objects that do not belong together: another camera, size, device, or a pyramid that was never built.
+    /// Objects that do not belong together: another camera, size, device, or a pyramid that was
+    /// never built.
     #[error("{parameter}: {message}")]
     Mismatch {
         /// The parameter's name.
@@ -40,8 +42,9 @@ pub enum Error {
         /// What was expected and what came.
         message: String,
     },
-    /// The device belongs to another process, of which this one is a fork. What a driver keeps beside it, threads above all, stays
-    /// behind in a fork: a call would wait for ever.
+    /// The device belongs to another process, of which this one is a fork.
+    /// What a driver keeps beside it, threads above all, stays behind in a fork: a call would wait
+    /// for ever.
     #[error(
         "this device was made by process {made_by}, and process {here} is a fork of it: no device works after a fork. Make one in \
          this process, or start processes without a fork"
@@ -58,7 +61,8 @@ pub enum Error {
     /// The device ran out of memory, or the host did.
     #[error("out of memory: {0}")]
     OutOfMemory(String),
-    /// The driver or wgpu refused something that this crate believes to be right: a bug worth reporting.
+    /// The driver or wgpu refused something that this crate believes to be right: a bug worth
+    /// reporting.
     #[error("the device reported an error: {0}")]
     Device(String),
 }

@@ -1,4 +1,5 @@
-//! Axis-aligned boxes in float64 that contain given volumes for the exact real numbers: every sum is rounded outwards.
+//! Axis-aligned boxes in float64 that contain given volumes for the exact real numbers: every sum
+//! is rounded outwards.
 
 use crate::bounds::{Bounds, Floats};
 
@@ -28,24 +29,33 @@ impl Extent {
     /// `center +- reach`, rounded outwards.
     fn about(center: [f64; 3], reach: [f64; 3]) -> Self {
         Self {
-            min: std::array::from_fn(|k| if reach[k] == 0.0 { center[k] } else { (center[k] - reach[k]).next_down() }),
-            max: std::array::from_fn(|k| if reach[k] == 0.0 { center[k] } else { (center[k] + reach[k]).next_up() }),
+            min: std::array::from_fn(|k| {
+                if reach[k] == 0.0 { center[k] } else { (center[k] - reach[k]).next_down() }
+            }),
+            max: std::array::from_fn(|k| {
+                if reach[k] == 0.0 { center[k] } else { (center[k] + reach[k]).next_up() }
+            }),
         }
     }
 
     /// Ordered, and neither NaN nor infinite.
     fn is_box(&self) -> bool {
-        (0..3).all(|k| self.min[k].is_finite() && self.max[k].is_finite() && self.min[k] <= self.max[k])
+        (0..3).all(|k| {
+            self.min[k].is_finite() && self.max[k].is_finite() && self.min[k] <= self.max[k]
+        })
     }
 }
 
 impl Bounds<'_> {
-    /// The box around volume `i`; `None` where it is no volume: a number that is not finite, a negative size, min > max.
+    /// The box around volume `i`; `None` where it is no volume: a number that is not finite, a
+    /// negative size, min > max.
     pub(crate) fn extent(&self, i: usize) -> Option<Extent> {
         let extent = match *self {
             Self::Spheres { centers, radii } => sphere(centers.array(i), radii.get(i))?,
             Self::Boxes { min, max } => Extent { min: min.array(i), max: max.array(i) },
-            Self::OrientedBoxes { centers, half_sizes, rotations } => oriented_box(centers, half_sizes, rotations, i)?,
+            Self::OrientedBoxes { centers, half_sizes, rotations } => {
+                oriented_box(centers, half_sizes, rotations, i)?
+            }
         };
         extent.is_box().then_some(extent)
     }
@@ -56,7 +66,12 @@ fn sphere(center: [f64; 3], radius: f64) -> Option<Extent> {
 }
 
 /// Along each axis of the world the box reaches `sum over k of |A_ik| h_k`.
-fn oriented_box(centers: Floats<'_>, half_sizes: Floats<'_>, rotations: Floats<'_>, i: usize) -> Option<Extent> {
+fn oriented_box(
+    centers: Floats<'_>,
+    half_sizes: Floats<'_>,
+    rotations: Floats<'_>,
+    i: usize,
+) -> Option<Extent> {
     let (h, a): ([f64; 3], [f64; 9]) = (half_sizes.array(i), rotations.array(i));
     if !h.iter().all(|h| *h >= 0.0) {
         return None;
@@ -70,7 +85,8 @@ fn oriented_box(centers: Floats<'_>, half_sizes: Floats<'_>, rotations: Floats<'
     Some(Extent::about(centers.array(i), reach))
 }
 
-/// A float64 that is not below the exact product of two numbers >= 0. A product that vanishes for its smallness alone does not.
+/// A float64 that is not below the exact product of two numbers >= 0.
+/// A product that vanishes for its smallness alone does not.
 fn product_up(a: f64, b: f64) -> f64 {
     let product = a * b;
     if a == 0.0 || b == 0.0 { product } else { product.next_up() }

@@ -1,12 +1,18 @@
-//! Groups: 64 instances that are stored one after the other, with a box around all of them. What hides the box hides every member.
+//! Groups: 64 instances that are stored one after the other, with a box around all of them.
+//! What hides the box hides every member.
 //!
-//! A box contains the *given* volumes of its members for the exact real numbers, in float64; its record on the device contains the
-//! box. A group with a member that is no volume has a record that is none either, so that it is never culled as a whole.
+//! A box contains the *given* volumes of its members for the exact real numbers, in float64; its
+//! record on the device contains the box.
+//! A group with a member that is no volume has a record that is none either, so that it is never
+//! culled as a whole.
 //!
-//! An update moves some members and says nothing of the others, and the host keeps no bounds. It keeps a box for each group, and for
-//! a group of which a *part* was moved the boxes of the moved members: the new box is the union of those and of the box that
-//! held the others from the start. So a group does not grow along the path of a moving member; it is as tight as a new one
-//! once all members were moved at least once; and what never moves, or moves as a whole, costs 88 bytes a group.
+//! An update moves some members and says nothing of the others, and the host keeps no bounds.
+//! It keeps a box for each group, and for a group of which a *part* was moved the boxes of the
+//! moved members: the new box is the union of those and of the box that held the others from the
+//! start.
+//! So a group does not grow along the path of a moving member; it is as tight as a new one once all
+//! members were moved at least once; and what never moves, or moves as a whole, costs 88 bytes a
+//! group.
 
 use wgpu::WriteOnly;
 
@@ -20,7 +26,8 @@ use crate::threads::on_two_threads;
 /// Instances of a group, as many as a `u64` has bits.
 pub(crate) const GROUP: usize = 64;
 
-/// From how many instances on a second thread packs: it takes tens of microseconds to start, they take hundreds.
+/// From how many instances on a second thread packs: it takes tens of microseconds to start, they
+/// take hundreds.
 const PARALLEL_FROM: usize = 1 << 13;
 
 #[derive(Debug)]
@@ -31,7 +38,8 @@ struct Group {
     invalid: u64,
     /// Bit k: member k was moved since `around` was formed.
     moved: u64,
-    /// The boxes of the moved members, each at its number, empty for what is no volume. No element before a part was moved.
+    /// The boxes of the moved members, each at its number, empty for what is no volume.
+    /// No element before a part was moved.
     extents: Vec<Extent>,
 }
 
@@ -51,8 +59,9 @@ pub(crate) struct Source {
     pub(crate) index: u32,
 }
 
-/// Some members of one group: first their numbers, fetched one after the other from wherever the caller has them, so that the
-/// processor waits for many at once; then their records, before they are copied to where the device finds them.
+/// Some members of one group: first their numbers, fetched one after the other from wherever the
+/// caller has them, so that the processor waits for many at once; then their records, before they
+/// are copied to where the device finds them.
 struct Part {
     indices: [u32; GROUP],
     threes: [[f64; 3 * GROUP]; 2],
@@ -74,8 +83,9 @@ impl Part {
         }
     }
 
-    /// Packs the volumes `sources` of `bounds` into the beginning of `target`, and tells `each` of them the box around it, if it
-    /// is a volume. What is left of the target.
+    /// Packs the volumes `sources` of `bounds` into the beginning of `target`, and tells `each` of
+    /// them the box around it, if it is a volume.
+    /// What is left of the target.
     fn pack<'a>(
         &mut self,
         bounds: &Bounds<'_>,
@@ -107,9 +117,11 @@ impl Part {
         let fetched = match bounds {
             Bounds::Spheres { .. } => Bounds::Spheres { centers: first, radii: Floats::F64(ones) },
             Bounds::Boxes { .. } => Bounds::Boxes { min: first, max: second },
-            Bounds::OrientedBoxes { .. } => {
-                Bounds::OrientedBoxes { centers: first, half_sizes: second, rotations: Floats::F64(nines) }
-            }
+            Bounds::OrientedBoxes { .. } => Bounds::OrientedBoxes {
+                centers: first,
+                half_sizes: second,
+                rotations: Floats::F64(nines),
+            },
         };
         let record_bytes = bounds.kind().record_bytes() as usize;
         for (k, record) in records.chunks_exact_mut(record_bytes).take(count).enumerate() {
@@ -137,7 +149,13 @@ impl Group {
     }
 
     /// Takes the boxes of `members`, of which those of `invalid` are no volume.
-    fn replace(&mut self, all: u64, members: u64, invalid: u64, extents: &[Extent; GROUP]) -> Result<()> {
+    fn replace(
+        &mut self,
+        all: u64,
+        members: u64,
+        invalid: u64,
+        extents: &[Extent; GROUP],
+    ) -> Result<()> {
         if members == all {
             let around = extents.iter().fold(Extent::EMPTY, |sum, e| sum.union(e));
             *self = Self { around, invalid, ..Self::new() };
@@ -162,8 +180,9 @@ fn all_members(count: usize, group: usize) -> u64 {
 }
 
 impl Groups {
-    /// Writes the records of a piece's instances to `records` in their stored order and forms their groups. `source` says what is
-    /// stored at a place of the piece.
+    /// Writes the records of a piece's instances to `records` in their stored order and forms their
+    /// groups.
+    /// `source` says what is stored at a place of the piece.
     pub(crate) fn packed(
         bounds: &Bounds<'_>,
         count: usize,
@@ -203,7 +222,10 @@ impl Groups {
 
     /// Places of the members that are no volume, ascending.
     pub(crate) fn invalid(&self) -> impl Iterator<Item = usize> {
-        self.groups.iter().enumerate().flat_map(|(g, group)| bits(group.invalid).map(move |k| g * GROUP + k))
+        self.groups
+            .iter()
+            .enumerate()
+            .flat_map(|(g, group)| bits(group.invalid).map(move |k| g * GROUP + k))
     }
 
     /// The box around a group; `None` if a member is no volume.
@@ -222,8 +244,9 @@ impl Groups {
         (self.groups.capacity() * size_of::<Group>() + extents * size_of::<Extent>()) as u64
     }
 
-    /// Takes new bounds for the instances at `places` (ascending, each once), `source(places[k])`, and writes their
-    /// records, one after the other, to `records`. The groups that they are in, ascending.
+    /// Takes new bounds for the instances at `places` (ascending, each once), `source(places[k])`,
+    /// and writes their records, one after the other, to `records`.
+    /// The groups that they are in, ascending.
     pub(crate) fn replace(
         &mut self,
         bounds: &Bounds<'_>,
@@ -256,12 +279,17 @@ impl Groups {
             Ok(())
         };
         // The second half begins with a group, and is never empty.
-        let half_group = if places.len() < PARALLEL_FROM { 0 } else { group_of(places[places.len() / 2]) };
+        let half_group =
+            if places.len() < PARALLEL_FROM { 0 } else { group_of(places[places.len() / 2]) };
         let half = places.partition_point(|place| group_of(*place) < half_group);
         let (first, second) = self.groups.split_at_mut(half_group);
         let first = (half > 0).then_some((0, &places[..half], 0, first));
         on_two_threads(first, (half, &places[half..], half_group, second), work)?;
-        let touched = || places.chunk_by(|a, b| group_of(*a) == group_of(*b)).map(|part| group_of(part[0]) as u32);
+        let touched = || {
+            places
+                .chunk_by(|a, b| group_of(*a) == group_of(*b))
+                .map(|part| group_of(part[0]) as u32)
+        };
         let mut list = host::list(touched().count(), "update")?;
         list.extend(touched());
         Ok(list)

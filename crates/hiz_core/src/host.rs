@@ -1,11 +1,15 @@
-//! Memory of the host for what a caller's sizes decide: running out of it is an error here, where `Vec` alone would abort.
+//! Memory of the host for what a caller's sizes decide: running out of it is an error here, where
+//! `Vec` alone would abort.
 
 use crate::error::{Error, Result};
 
 /// Makes room for `more` elements, and some where that comes again and again.
 pub(crate) fn reserve<T>(vec: &mut Vec<T>, more: usize, what: &str) -> Result<()> {
     vec.try_reserve(more).map_err(|_| {
-        Error::OutOfMemory(format!("no host memory for {more} elements of {} bytes ({what})", size_of::<T>()))
+        Error::OutOfMemory(format!(
+            "no host memory for {more} elements of {} bytes ({what})",
+            size_of::<T>()
+        ))
     })
 }
 
@@ -30,7 +34,10 @@ mod tests {
     #[test]
     fn what_no_machine_has_is_an_error() {
         let error = list::<u64>(1 << 55, "texels").unwrap_err().to_string();
-        assert_eq!(error, "out of memory: no host memory for 36028797018963968 elements of 8 bytes (texels)");
+        assert_eq!(
+            error,
+            "out of memory: no host memory for 36028797018963968 elements of 8 bytes (texels)"
+        );
         assert_eq!(collected([1, 2, 3].into_iter(), "numbers").unwrap(), [1, 2, 3]);
     }
 }

@@ -1,7 +1,8 @@
-//! Instances on the device: the bounding volumes of one call, cut into pieces that fit a binding and a dispatch, each stored along
-//! a curve through space (`morton`) and in groups (`groups`).
+//! Instances on the device: the bounding volumes of one call, cut into pieces that fit a binding
+//! and a dispatch, each stored along a curve through space (`morton`) and in groups (`groups`).
 //!
-//! A *place* is where an instance is stored in its piece; its *index* is the caller's number, which everything public speaks of.
+//! A *place* is where an instance is stored in its piece; its *index* is the caller's number, which
+//! everything public speaks of.
 
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -17,24 +18,28 @@ use crate::pyramid::entry;
 use crate::records::{Records, Upload};
 use crate::watch::Watches;
 
-/// In which order instances are stored. The indices that come out are the caller's in either.
+/// In which order instances are stored.
+/// The indices that come out are the caller's in either.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum StoredOrder {
     /// Neighbours in space together (Morton order), sorted once when they are uploaded.
     #[default]
     Morton,
-    /// As they came: no sort, and 8 bytes an instance less on the host. For what is in such an order already.
+    /// As they came: no sort, and 8 bytes an instance less on the host.
+    /// For what is in such an order already.
     Given,
 }
 
 /// How instances are uploaded.
 #[derive(Debug, Clone, Default)]
 pub struct InstanceOptions {
-    /// Refuse bad bounds (NaN, infinite, negative radius, min > max) instead of keeping them visible.
+    /// Refuse bad bounds (NaN, infinite, negative radius, min > max) instead of keeping them
+    /// visible.
     pub strict: bool,
     /// The order in which they are stored, piece by piece.
     pub order: StoredOrder,
-    /// Instances of one piece, at most; `None`: what the device allows. Tests make it small.
+    /// Instances of one piece, at most; `None`: what the device allows.
+    /// Tests make it small.
     pub piece_capacity: Option<u32>,
 }
 
@@ -91,7 +96,9 @@ impl PieceOrder {
         let mut places = host::list(range.len(), "update")?;
         if range.len() > self.indices.len() / 16 {
             // A look at every place is cheaper than a sort.
-            let here = |(place, index): (usize, &u32)| range.contains(&(*index as usize)).then_some(place as u32);
+            let here = |(place, index): (usize, &u32)| {
+                range.contains(&(*index as usize)).then_some(place as u32)
+            };
             places.extend(self.indices.iter().enumerate().filter_map(here));
         } else {
             places.extend_from_slice(&self.places[range]);
@@ -161,8 +168,9 @@ pub struct Instances {
 }
 
 impl Instances {
-    /// `copy` records the copies of one piece, into an encoder that it is given or has; it is told whether more pieces follow, so that
-    /// who owns the queue may let go of this one's staging area.
+    /// `copy` records the copies of one piece, into an encoder that it is given or has; it is told
+    /// whether more pieces follow, so that who owns the queue may let go of this one's staging
+    /// area.
     pub(crate) fn new(
         gpu: &Gpu,
         bounds: &Bounds<'_>,
@@ -170,7 +178,8 @@ impl Instances {
         mut copy: impl FnMut(&dyn Fn(&mut wgpu::CommandEncoder), bool) -> Result<()>,
     ) -> Result<Self> {
         let n = bounds.len()?;
-        let total = u32::try_from(n).map_err(|_| Error::limit("instances", n as u64, u64::from(u32::MAX)))?;
+        let total = u32::try_from(n)
+            .map_err(|_| Error::limit("instances", n as u64, u64::from(u32::MAX)))?;
         let kind = bounds.kind();
         let most = piece_capacity(kind.record_bytes(), gpu.limits());
         let capacity = match options.piece_capacity {
@@ -179,7 +188,9 @@ impl Instances {
             Some(c) => {
                 return Err(Error::invalid(
                     "piece_capacity",
-                    format!("expected a multiple of {CULL_WORKGROUP} from {CULL_WORKGROUP} to {most}, got {c}"),
+                    format!(
+                        "expected a multiple of {CULL_WORKGROUP} from {CULL_WORKGROUP} to {most}, got {c}"
+                    ),
                 ));
             }
         };
@@ -189,11 +200,15 @@ impl Instances {
             let start = index * capacity;
             let range = start..total.min(start.saturating_add(capacity));
             let (piece, its_groups, uploads) = packed(gpu, bounds, index, range, options.order)?;
-            copy(&|encoder| uploads.iter().for_each(|upload| upload.record(encoder)), index + 1 < num_pieces)?;
+            copy(
+                &|encoder| uploads.iter().for_each(|upload| upload.record(encoder)),
+                index + 1 < num_pieces,
+            )?;
             pieces.push(piece);
             groups.push(its_groups);
         }
-        let sequence = gpu.filled("hiz.instances.sequence", &[0; 16], wgpu::BufferUsages::STORAGE)?;
+        let sequence =
+            gpu.filled("hiz.instances.sequence", &[0; 16], wgpu::BufferUsages::STORAGE)?;
         let changing = Mutex::new(Changing { groups, next_update: 0 });
         let this = Self {
             context: gpu.id(),
@@ -237,10 +252,12 @@ impl Instances {
     /// [`Error::OutOfMemory`] without memory for the list.
     pub fn invalid(&self) -> Result<Vec<u64>> {
         let changing = self.changing();
-        let mut invalid = host::list(changing.groups.iter().map(|g| g.invalid().count()).sum(), "invalid")?;
+        let mut invalid =
+            host::list(changing.groups.iter().map(|g| g.invalid().count()).sum(), "invalid")?;
         for (piece, groups) in self.pieces.iter().zip(&changing.groups) {
             let places = groups.invalid();
-            invalid.extend(places.map(|p| u64::from(piece.range.start) + piece.order.index(p) as u64));
+            invalid
+                .extend(places.map(|p| u64::from(piece.range.start) + piece.order.index(p) as u64));
         }
         invalid.sort_unstable();
         Ok(invalid)
@@ -251,15 +268,16 @@ impl Instances {
         self.pieces.iter().map(|p| p.records.size() + p.group_records.size()).sum()
     }
 
-    /// Bytes on the host: 8 an instance for its place and its index (none with [`StoredOrder::Given`]), 88 for each 64 of them, and
-    /// 48 an instance in such groups of 64 of which a part was updated.
+    /// Bytes on the host: 8 an instance for its place and its index (none with
+    /// [`StoredOrder::Given`]), 88 for each 64 of them, and 48 an instance in such groups of 64 of
+    /// which a part was updated.
     pub fn host_bytes(&self) -> u64 {
         let groups = self.changing().groups.iter().map(Groups::host_bytes).sum::<u64>();
         self.pieces.iter().map(|p| p.order.host_bytes()).sum::<u64>() + groups
     }
 
-    /// The culls that were submitted. Held while one is submitted and added, and while an update is
-    /// submitted and noted.
+    /// The culls that were submitted.
+    /// Held while one is submitted and added, and while an update is submitted and noted.
     pub(crate) fn watches(&self) -> MutexGuard<'_, Watches> {
         self.watches.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -293,10 +311,14 @@ fn packed(
     let (first, count) = (range.start as usize, range.end - range.start);
     let record_bytes = bounds.kind().record_bytes();
     let order = PieceOrder::new(bounds, first..range.end as usize, order)?;
-    let source = |place: usize| Source { bounds: first + order.index(place), index: order.index(place) as u32 };
-    let (records, upload, groups) = Records::new(gpu, "hiz.instances.records", count, record_bytes, |records| {
-        Groups::packed(bounds, count as usize, source, records)
-    })?;
+    let source = |place: usize| Source {
+        bounds: first + order.index(place),
+        index: order.index(place) as u32,
+    };
+    let (records, upload, groups) =
+        Records::new(gpu, "hiz.instances.records", count, record_bytes, |records| {
+            Groups::packed(bounds, count as usize, source, records)
+        })?;
     let num_groups = groups.len() as u32;
     let box_bytes = size_of::<BoxRecord>() as u64;
     let (group_records, groups_upload, ()) =
@@ -316,16 +338,26 @@ fn packed(
 }
 
 /// A piece's uniform and records as a cull reads them.
-pub(crate) fn bind_records(gpu: &Gpu, uniform: &wgpu::Buffer, records: &Records) -> Result<wgpu::BindGroup> {
+pub(crate) fn bind_records(
+    gpu: &Gpu,
+    uniform: &wgpu::Buffer,
+    records: &Records,
+) -> Result<wgpu::BindGroup> {
     gpu.bind_group(
         "hiz.cull.instances",
         &gpu.layouts().instances,
-        &[entry(0, uniform.as_entire_binding()), entry(1, wgpu::BindingResource::TextureView(&records.view))],
+        &[
+            entry(0, uniform.as_entire_binding()),
+            entry(1, wgpu::BindingResource::TextureView(&records.view)),
+        ],
     )
 }
 
 /// Writes box records, one after the other.
-pub(crate) fn write_boxes(target: &Mapped<'_>, records: impl ExactSizeIterator<Item = BoxRecord>) -> Result<()> {
+pub(crate) fn write_boxes(
+    target: &Mapped<'_>,
+    records: impl ExactSizeIterator<Item = BoxRecord>,
+) -> Result<()> {
     let mut view = target.range(0..(records.len() * size_of::<BoxRecord>()) as u64)?;
     let chunks = view.slice(..).into_chunks::<{ size_of::<BoxRecord>() }>().0;
     chunks.into_iter().zip(records).for_each(|(chunk, record)| chunk.write(bytemuck::cast(record)));

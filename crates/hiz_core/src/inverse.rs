@@ -1,7 +1,10 @@
 //! The inverse of a 3x3 matrix with a bound of its error, however near to singular the matrix is.
 //!
-//! Entries are pairs of float64, improved by Newton's step `A += A (I - M A)` with residuals in pairs. The last residual
-//! bounds what is left. (Ogita, Rump and Oishi, "Accurate sum and dot product", 2005, section 4: sums of products in pairs.)
+//! Entries are pairs of float64, improved by Newton's step `A += A (I - M A)` with residuals in
+//! pairs.
+//! The last residual bounds what is left.
+//! (Ogita, Rump and Oishi, "Accurate sum and dot product", 2005, section 4: sums of products in
+//! pairs.)
 
 use crate::camera::{Mat3, Vec3, inverse3};
 
@@ -55,8 +58,9 @@ impl Bounded {
         (self.value.hi, self.value.lo.abs() + self.error)
     }
 
-    /// `sum a b`. At most 17 sums (four terms and the unit), each off by less than 2^-105 of all magnitudes: 2^-98 covers them, and
-    /// what evaluating the bound itself loses.
+    /// `sum a b`.
+    /// At most 17 sums (four terms and the unit), each off by less than 2^-105 of all magnitudes:
+    /// 2^-98 covers them, and what evaluating the bound itself loses.
     pub(crate) fn dot(terms: &[(f64, Self)]) -> Self {
         let (mut value, mut size, mut inherited) = (Pair::default(), 0.0, 0.0);
         for (a, b) in terms {
@@ -77,14 +81,16 @@ impl From<f64> for Bounded {
     }
 }
 
-/// The entries of the inverse of the matrix with these rows; nothing for one that is singular, or that float64 cannot tell from one.
+/// The entries of the inverse of the matrix with these rows; nothing for one that is singular, or
+/// that float64 cannot tell from one.
 pub(crate) fn inverse(rows: &Mat3) -> Option<[[Bounded; 3]; 3]> {
     // Rows near 1, by powers of two: residuals then mean the same in each.
     let scale = rows.map(|row| near_one(row.iter().fold(0.0, |m, v| m.max(v.abs()))));
     let m: Mat3 = std::array::from_fn(|i| rows[i].map(|v| v * scale[i]));
     let mut a = inverse3(&m)?.map(|row| row.map(Pair::new));
     for _ in 0..4 {
-        // A first inverse is off by 1e-4 at worst (determinants above 1e-12), and each step squares that.
+        // A first inverse is off by 1e-4 at worst (determinants above 1e-12), and each step squares
+        // that.
         let e = residual(&m, &a).map(|row| row.map(|x| x.value.hi));
         let column = |j: usize| -> Vec3 { [e[0][j], e[1][j], e[2][j]] };
         a = a.map(|row| {
@@ -94,12 +100,15 @@ pub(crate) fn inverse(rows: &Mat3) -> Option<[[Bounded; 3]; 3]> {
             })
         });
     }
-    // M A = I - E gives M^-1 - A = A (E + E^2 + ...). No row of |E| sums to more than 1/2, so the series is at most twice the
-    // greatest |E| of each column.
+    // M A = I - E gives M^-1 - A = A (E + E^2 + ...).
+    // No row of |E| sums to more than 1/2, so the series is at most twice the greatest |E| of each
+    // column.
     let e = residual(&m, &a).map(|row| row.map(|x| x.value.hi.abs() + x.value.lo.abs() + x.error));
     // A NaN is kept: `max` would drop it.
-    let row_sum =
-        e.iter().map(|row| row.iter().sum::<f64>()).fold(0.0, |m: f64, x| if x > m || x.is_nan() { x } else { m });
+    let row_sum = e
+        .iter()
+        .map(|row| row.iter().sum::<f64>())
+        .fold(0.0, |m: f64, x| if x > m || x.is_nan() { x } else { m });
     if row_sum.is_nan() || row_sum >= 0.5 {
         return None;
     }
@@ -113,8 +122,12 @@ pub(crate) fn inverse(rows: &Mat3) -> Option<[[Bounded; 3]; 3]> {
     }))
 }
 
-/// The power of two that brings `size` into `[1, 2)` (a hair beside it where log2 is off by an ulp); no number for 0.
-#[expect(clippy::cast_possible_truncation, reason = "an exponent; infinities saturate, and end as NaN")]
+/// The power of two that brings `size` into `[1, 2)` (a hair beside it where log2 is off by an
+/// ulp); no number for 0.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "an exponent; infinities saturate, and end as NaN"
+)]
 fn near_one(size: f64) -> f64 {
     2.0_f64.powi((size.log2().floor() as i32).saturating_neg())
 }
@@ -134,7 +147,8 @@ fn residual(m: &Mat3, a: &[[Pair; 3]; 3]) -> [[Bounded; 3]; 3] {
 mod tests {
     use super::*;
 
-    /// Two rows that differ by `d` in one entry: the inverse by hand has `1/d` in it, exactly, for powers of two.
+    /// Two rows that differ by `d` in one entry: the inverse by hand has `1/d` in it, exactly, for
+    /// powers of two.
     #[test]
     fn nearly_singular_matrices_by_hand() {
         for power in [0, 10, 30, 38] {

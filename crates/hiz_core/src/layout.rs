@@ -1,8 +1,10 @@
 //! Planning: levels, sizes, offsets and pieces; integers only, no device.
 //!
-//! Level 0 of a pyramid is the depth image itself. Levels 1 and up are ceil-halved, so a texel of level k covers exactly the
-//! pixel block `[x << k, (x + 1) << k)`; those that are stored lie one after the other in one list of texels, padded to the whole
-//! blocks of the reduction (which stores vectors and asks for no edge), cut into chunks that each fit one storage binding.
+//! Level 0 of a pyramid is the depth image itself.
+//! Levels 1 and up are ceil-halved, so a texel of level k covers exactly the pixel block `[x << k,
+//! (x + 1) << k)`; those that are stored lie one after the other in one list of texels, padded to
+//! the whole blocks of the reduction (which stores vectors and asks for no edge), cut into chunks
+//! that each fit one storage binding.
 
 use crate::atlas::AtlasLayout;
 use crate::camera::ImageSize;
@@ -12,7 +14,8 @@ use crate::records::RECORDS_PER_ROW;
 /// The most levels a pyramid has: 32768 pixels a side.
 pub const MAX_LEVELS: usize = 16;
 
-/// How many storage bindings hold a pyramid: with level 0 in a texture, 16384 x 16384 pixels need three of 128 MiB.
+/// How many storage bindings hold a pyramid: with level 0 in a texture, 16384 x 16384 pixels need
+/// three of 128 MiB.
 pub(crate) const PYRAMID_CHUNKS: usize = 3;
 
 /// Blocks of a row come in multiples of this many, so that the reduction stores and loads vectors.
@@ -21,11 +24,14 @@ const BLOCK_ALIGNMENT: u32 = 4;
 /// Rows of every level start at multiples of this many texels, as copies into a texture ask for.
 const ROW_ALIGNMENT: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT / 4;
 
-/// Texels before level 1. The first holds the number of the reduction that filled the pyramid: a cull that expects another one
-/// (recorded, but not submitted before it) keeps everything. 0, as buffers begin, is never a number.
+/// Texels before level 1.
+/// The first holds the number of the reduction that filled the pyramid: a cull that expects another
+/// one (recorded, but not submitted before it) keeps everything.
+/// 0, as buffers begin, is never a number.
 const HEADER_TEXELS: u64 = 4;
 
-/// Where a level lies in the list of texels; offset and stride are 0 where it does not, as level 0, the depth texture.
+/// Where a level lies in the list of texels; offset and stride are 0 where it does not, as level 0,
+/// the depth texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct Level {
@@ -35,10 +41,13 @@ pub(crate) struct Level {
     pub(crate) height: u32,
 }
 
-/// Which levels of a pyramid are stored. Level 0, the depth image itself, is always there.
+/// Which levels of a pyramid are stored.
+/// Level 0, the depth image itself, is always there.
 ///
-/// Fewer levels are built faster and keep more: a test goes on to the next coarser stored level, and a rectangle that is too large for
-/// the coarsest one is kept visible unless a descent is allowed. Numbers past an image's coarsest level mean that level.
+/// Fewer levels are built faster and keep more: a test goes on to the next coarser stored level,
+/// and a rectangle that is too large for the coarsest one is kept visible unless a descent is
+/// allowed.
+/// Numbers past an image's coarsest level mean that level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StoredLevels {
     /// The finest stored level, 1..=15.
@@ -51,7 +60,8 @@ impl StoredLevels {
     /// All levels.
     pub const ALL: Self = Self { first: 1, last: MAX_LEVELS as u32 - 1 };
 
-    /// Level `first` and all coarser ones. Without level 1 the reduction writes a quarter as much, without level 2 a sixteenth.
+    /// Level `first` and all coarser ones.
+    /// Without level 1 the reduction writes a quarter as much, without level 2 a sixteenth.
     #[must_use]
     pub const fn from(first: u32) -> Self {
         Self { first, ..Self::ALL }
@@ -82,7 +92,8 @@ impl Default for StoredLevels {
     }
 }
 
-/// Pixels or texels that an invocation of the reduction reads along a side, as a power of two: it makes up to three levels.
+/// Pixels or texels that an invocation of the reduction reads along a side, as a power of two: it
+/// makes up to three levels.
 const BLOCK_LOG2: u32 = 3;
 
 /// One dispatch of the reduction.
@@ -93,12 +104,14 @@ pub(crate) struct Step {
     /// The levels that are written.
     pub(crate) first: u32,
     pub(crate) last: u32,
-    /// Blocks of 8x8 texels of the level that is read, one an invocation; of a coarse step the texels that are written.
+    /// Blocks of 8x8 texels of the level that is read, one an invocation; of a coarse step the
+    /// texels that are written.
     pub(crate) blocks: [u32; 2],
 }
 
 impl Step {
-    /// Whether one workgroup makes all levels that are left: `reduce_tail` of `shaders/reduce.wgsl`.
+    /// Whether one workgroup makes all levels that are left: `reduce_tail` of
+    /// `shaders/reduce.wgsl`.
     pub(crate) fn is_tail(&self) -> bool {
         self.source > 0 && self.last > self.source + BLOCK_LOG2
     }
@@ -134,9 +147,13 @@ pub(crate) struct PyramidLayout {
 impl PyramidLayout {
     /// The layout for an image of `size`, with chunks of `1 << chunk_shift` texels.
     pub(crate) fn new(size: ImageSize, stored: StoredLevels, chunk_shift: u32) -> Result<Self> {
-        debug_assert!(1 << chunk_shift >= BLOCK_ALIGNMENT, "a vector store must not straddle chunks");
+        debug_assert!(
+            1 << chunk_shift >= BLOCK_ALIGNMENT,
+            "a vector store must not straddle chunks"
+        );
         let stored = stored.checked()?;
-        let mut levels = vec![Level { offset: 0, stride: 0, width: size.width, height: size.height }];
+        let mut levels =
+            vec![Level { offset: 0, stride: 0, width: size.width, height: size.height }];
         let (mut width, mut height) = (size.width, size.height);
         while width > 1 || height > 1 {
             (width, height) = (width.div_ceil(2), height.div_ceil(2));
@@ -144,7 +161,10 @@ impl PyramidLayout {
         }
         // An image of one pixel stores nothing: first 1, last 0.
         let coarsest = levels.len() as u32 - 1;
-        let stored = StoredLevels { first: stored.first.min(coarsest.max(1)), last: stored.last.min(coarsest) };
+        let stored = StoredLevels {
+            first: stored.first.min(coarsest.max(1)),
+            last: stored.last.min(coarsest),
+        };
         let steps = passes(&levels, stored);
         let mut texels = HEADER_TEXELS;
         for step in &steps {
@@ -152,8 +172,8 @@ impl PyramidLayout {
                 let level = &mut levels[k as usize];
                 let [stride, rows] = step.blocks.map(|n| n * step.texels_a_block(k));
                 level.stride = stride.next_multiple_of(ROW_ALIGNMENT);
-                level.offset =
-                    u32::try_from(texels).map_err(|_| Error::limit("pyramid texels", texels, u64::from(u32::MAX)))?;
+                level.offset = u32::try_from(texels)
+                    .map_err(|_| Error::limit("pyramid texels", texels, u64::from(u32::MAX)))?;
                 texels += u64::from(level.stride) * u64::from(rows);
             }
         }
@@ -161,7 +181,11 @@ impl PyramidLayout {
         let atlas = AtlasLayout::new(&levels, stored);
         let layout = Self { size, levels, stored, steps, texels, chunk_shift, atlas };
         if layout.chunk_sizes().len() > PYRAMID_CHUNKS {
-            return Err(Error::limit("pyramid texels", texels, (PYRAMID_CHUNKS as u64) << chunk_shift));
+            return Err(Error::limit(
+                "pyramid texels",
+                texels,
+                (PYRAMID_CHUNKS as u64) << chunk_shift,
+            ));
         }
         Ok(layout)
     }
@@ -190,7 +214,10 @@ impl PyramidLayout {
 }
 
 /// Those of `levels` that are stored, and their numbers.
-pub(crate) fn stored_levels(levels: &[Level], stored: StoredLevels) -> impl Iterator<Item = (usize, &Level)> {
+pub(crate) fn stored_levels(
+    levels: &[Level],
+    stored: StoredLevels,
+) -> impl Iterator<Item = (usize, &Level)> {
     let is_stored = move |k: usize| (stored.first..=stored.last).contains(&(k as u32));
     levels.iter().enumerate().filter(move |(k, _)| is_stored(*k))
 }
@@ -200,7 +227,8 @@ const TAIL_TEXELS: u32 = 1 << 15;
 
 /// The passes, the last of them made one dispatch where they are small.
 fn with_tail(levels: &[Level], mut passes: Vec<Step>) -> Vec<Step> {
-    let texels = |step: &Step| levels[step.source as usize].width * levels[step.source as usize].height;
+    let texels =
+        |step: &Step| levels[step.source as usize].width * levels[step.source as usize].height;
     if let Some(i) = passes.iter().position(|step| step.source > 0 && texels(step) <= TAIL_TEXELS) {
         let last = passes[passes.len() - 1].last;
         passes.truncate(i + 1);
@@ -240,19 +268,22 @@ pub(crate) fn chunk_shift(limits: &wgpu::Limits) -> u32 {
     (bytes / 4).ilog2().min(30)
 }
 
-/// Invocations of one workgroup of the cull of groups and of updates; `shaders/cull_groups.wgsl`, `WORKGROUP`, and `update.wgsl`.
+/// Invocations of one workgroup of the cull of groups and of updates; `shaders/cull_groups.wgsl`,
+/// `WORKGROUP`, and `update.wgsl`.
 pub(crate) const CULL_WORKGROUP: u32 = 128;
 
-/// How many instances one piece may hold: its records in one texture and one staging buffer, its verdicts in one binding, its
-/// workgroups in one dimension of a dispatch.
+/// How many instances one piece may hold: its records in one texture and one staging buffer, its
+/// verdicts in one binding, its workgroups in one dimension of a dispatch.
 pub(crate) fn piece_capacity(record_bytes: u64, limits: &wgpu::Limits) -> u32 {
     let rows = u64::from(limits.max_texture_dimension_2d) * u64::from(RECORDS_PER_ROW);
     let staging = limits.max_buffer_size / record_bytes;
     // A word of a verdict, and a bit of the mask.
     let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) / 5;
-    let dispatch = u64::from(limits.max_compute_workgroups_per_dimension) * u64::from(CULL_WORKGROUP);
+    let dispatch =
+        u64::from(limits.max_compute_workgroups_per_dimension) * u64::from(CULL_WORKGROUP);
     // Whole rows, so that a staging area is not padded past the limit.
-    let whole = rows.min(staging).min(binding).min(dispatch).min(1 << 24) / u64::from(RECORDS_PER_ROW);
+    let whole =
+        rows.min(staging).min(binding).min(dispatch).min(1 << 24) / u64::from(RECORDS_PER_ROW);
     u32::try_from(whole * u64::from(RECORDS_PER_ROW)).unwrap_or(1 << 24)
 }
 
@@ -261,7 +292,8 @@ mod tests {
     use super::*;
 
     fn sizes(width: u32, height: u32) -> Vec<(u32, u32)> {
-        let layout = PyramidLayout::new(ImageSize::new(width, height), StoredLevels::ALL, 25).unwrap();
+        let layout =
+            PyramidLayout::new(ImageSize::new(width, height), StoredLevels::ALL, 25).unwrap();
         layout.levels.iter().map(|l| (l.width, l.height)).collect()
     }
 
@@ -280,7 +312,11 @@ mod tests {
             let layout = PyramidLayout::new(ImageSize::new(w, h), StoredLevels::ALL, 25).unwrap();
             let mut end = 4;
             for level in &layout.levels[1..] {
-                assert!(level.offset >= end && level.offset.is_multiple_of(4) && level.stride.is_multiple_of(64));
+                assert!(
+                    level.offset >= end
+                        && level.offset.is_multiple_of(4)
+                        && level.stride.is_multiple_of(64)
+                );
                 assert!(level.stride >= level.width);
                 end = level.offset + level.stride * level.height;
             }
@@ -301,12 +337,16 @@ mod tests {
         let all = steps(screen, StoredLevels::ALL);
         assert_eq!(all.iter().map(|s| (s.source, s.last)).collect::<Vec<_>>(), [(0, 3), (3, 11)]);
         // The header alone: no block may be written where nothing is stored.
-        assert_eq!(steps(pixel, StoredLevels::ALL), [Step { source: 0, first: 1, last: 0, blocks: [0, 0] }]);
+        assert_eq!(
+            steps(pixel, StoredLevels::ALL),
+            [Step { source: 0, first: 1, last: 0, blocks: [0, 0] }]
+        );
     }
 
     #[test]
     fn the_largest_image_of_lavapipe_fits_three_bindings() {
-        let layout = PyramidLayout::new(ImageSize::new(16_384, 16_384), StoredLevels::ALL, 25).unwrap();
+        let layout =
+            PyramidLayout::new(ImageSize::new(16_384, 16_384), StoredLevels::ALL, 25).unwrap();
         assert_eq!(layout.chunk_sizes().len(), 3);
         assert!(layout.chunk_sizes().iter().sum::<u64>() >= layout.texels);
         let error = PyramidLayout::new(ImageSize::new(64, 64), StoredLevels::ALL, 4).unwrap_err();
@@ -327,7 +367,8 @@ mod tests {
         assert_eq!(piece_capacity(64, &large), 1 << 24);
         let rows = wgpu::Limits { max_texture_dimension_2d: 8, ..large.clone() };
         assert_eq!(piece_capacity(64, &rows), 8 * 1024);
-        // 2^20 bytes are 16384 records of 64 bytes. Of 32 bytes they would be 32768.
+        // 2^20 bytes are 16384 records of 64 bytes.
+        // Of 32 bytes they would be 32768.
         let buffer = wgpu::Limits { max_buffer_size: 1 << 20, ..large.clone() };
         assert_eq!((piece_capacity(64, &buffer), piece_capacity(32, &buffer)), (16_384, 32_768));
         // A word of a verdict and a bit of the mask, 5 bytes with room: 209715, in whole rows.
@@ -343,7 +384,10 @@ mod tests {
                 ..wgpu::Limits::default()
             })
         };
-        assert_eq!((chunk(1 << 27, 1 << 40), chunk(1 << 40, 1 << 27), chunk((1 << 27) - 1, 1 << 40)), (25, 25, 24));
+        assert_eq!(
+            (chunk(1 << 27, 1 << 40), chunk(1 << 40, 1 << 27), chunk((1 << 27) - 1, 1 << 40)),
+            (25, 25, 24)
+        );
         assert_eq!(chunk(1 << 40, 1 << 40), 30);
     }
 

@@ -2,20 +2,25 @@
 //!
 //! Data flows one way:
 //!
-//! 1. [`Camera`] says, in float64, what is seen; [`DepthKind`] what a depth image's numbers mean; [`Bounds`] where the instances are.
-//! 2. [`Occluders`] are drawn into a depth texture, or the caller brings one; their [`OccluderSurface`] gives a small depth image that
-//!    holds for larger ones.
-//! 3. [`HizContext::record_reduce`] builds the [`Pyramid`]: the farthest depth of every block of pixels.
-//! 4. [`HizContext::record_cull`] decides for each of the [`Instances`], whole groups first where they are many, and lists the kept
-//!    ones in [`Visible`]; the list's length is the `instance_count` of a [`DrawIndexedIndirect`] record on the device.
+//! 1. [`Camera`] says, in float64, what is seen; [`DepthKind`] what a depth image's numbers mean;
+//!    [`Bounds`] where the instances are.
+//! 2. [`Occluders`] are drawn into a depth texture, or the caller brings one; their
+//!    [`OccluderSurface`] gives a small depth image that holds for larger ones.
+//! 3. [`HizContext::record_reduce`] builds the [`Pyramid`]: the farthest depth of every block of
+//!    pixels.
+//! 4. [`HizContext::record_cull`] decides for each of the [`Instances`], whole groups first where
+//!    they are many, and lists the kept ones in [`Visible`]; the list's length is the
+//!    `instance_count` of a [`DrawIndexedIndirect`] record on the device.
 //! 5. The caller draws with [`Visible::draw_arguments`]; nothing visits the CPU.
 //!
-//! The promise: an instance is culled only if, for the exact real numbers that the inputs denote, every pixel that its
-//! bounds can touch holds a depth nearer than all of the bounds. It is kept by *certificates* computed in float32 with
-//! margins that cover every rounding (`shaders/shared/certificate.wgsl`); whatever is uncertain stays visible.
+//! The promise: an instance is culled only if, for the exact real numbers that the inputs denote,
+//! every pixel that its bounds can touch holds a depth nearer than all of the bounds.
+//! It is kept by *certificates* computed in float32 with margins that cover every rounding
+//! (`shaders/shared/certificate.wgsl`); whatever is uncertain stays visible.
 //!
-//! Everything up to here records into the caller's encoder on the caller's device: nothing submits, polls or maps. The
-//! [`headless`] module owns a device, submits and reads back.
+//! Everything up to here records into the caller's encoder on the caller's device: nothing submits,
+//! polls or maps.
+//! The [`headless`] module owns a device, submits and reads back.
 
 pub mod headless;
 
@@ -58,7 +63,9 @@ pub use wgpu;
 
 pub use atlas::AtlasUse;
 pub use bounds::{Bounds, BoundsKind, Floats};
-pub use camera::{Camera, DepthConvention, ImageSize, MAX_IMAGE_SIDE, Mat3, Mat4, Pose, Projection, Vec3};
+pub use camera::{
+    Camera, DepthConvention, ImageSize, MAX_IMAGE_SIDE, Mat3, Mat4, Pose, Projection, Vec3,
+};
 pub use context::HizContext;
 pub use cull::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
 pub use depth::{DepthKind, ndc_from_kind, ndc_from_kind_within};

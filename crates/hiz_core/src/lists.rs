@@ -46,7 +46,8 @@ pub(crate) struct PieceList {
     pub(crate) indices: Option<wgpu::Buffer>,
     /// Indices that fit, the canary not counted.
     pub(crate) capacity: u32,
-    /// Scratch of the compaction: kept bits before each word of the mask. It also stands in for a list that there is none of.
+    /// Scratch of the compaction: kept bits before each word of the mask.
+    /// It also stands in for a list that there is none of.
     pub(crate) before: wgpu::Buffer,
 }
 
@@ -67,7 +68,8 @@ pub(crate) struct Lists {
 }
 
 impl Lists {
-    /// With room for `capacity` indices in all lists together; `listed`: with lists, not only their lengths.
+    /// With room for `capacity` indices in all lists together; `listed`: with lists, not only their
+    /// lengths.
     pub(crate) fn new(
         gpu: &Gpu,
         instances: &Instances,
@@ -79,14 +81,28 @@ impl Lists {
         let pieces = instances.pieces.iter().map(|piece| {
             let here = if listed { piece.count().min(capacity) } else { 0 };
             Ok(PieceList {
-                indices: if listed { Some(filled_list(gpu, u64::from(here) + CANARY_WORDS)?) } else { None },
+                indices: if listed {
+                    Some(filled_list(gpu, u64::from(here) + CANARY_WORDS)?)
+                } else {
+                    None
+                },
                 capacity: here,
-                before: gpu.empty("hiz.compact.before", 4 * u64::from(piece.words().max(1)), STORAGE)?,
+                before: gpu.empty(
+                    "hiz.compact.before",
+                    4 * u64::from(piece.words().max(1)),
+                    STORAGE,
+                )?,
             })
         });
         let pieces = pieces.collect::<Result<_>>()?;
         let DrawTemplate { index_count, first_index, base_vertex, first_instance } = draw;
-        let draw = DrawIndexedIndirect { index_count, instance_count: 0, first_index, base_vertex, first_instance };
+        let draw = DrawIndexedIndirect {
+            index_count,
+            instance_count: 0,
+            first_index,
+            base_vertex,
+            first_instance,
+        };
         let template = vec![draw; instances.num_pieces()];
         let bytes = (template.len() * size_of::<DrawIndexedIndirect>()) as u64;
         Ok(Self {
@@ -108,7 +124,10 @@ impl Lists {
 
     /// Bytes on the device.
     pub(crate) fn size(&self) -> u64 {
-        let pieces = self.pieces.iter().map(|p| p.indices.as_ref().map_or(0, wgpu::Buffer::size) + p.before.size());
+        let pieces = self
+            .pieces
+            .iter()
+            .map(|p| p.indices.as_ref().map_or(0, wgpu::Buffer::size) + p.before.size());
         pieces.sum::<u64>() + self.draws.size()
     }
 }

@@ -1,9 +1,11 @@
-//! The order in which instances are stored: along the curve of Morton ("A computer oriented geodetic data base and a new
-//! technique in file sequencing", IBM, 1966), so that instances that lie together in space lie together in memory.
+//! The order in which instances are stored: along the curve of Morton ("A computer oriented
+//! geodetic data base and a new technique in file sequencing", IBM, 1966), so that instances that
+//! lie together in space lie together in memory.
 //!
-//! The curve runs through the smallest of a row of nested cubes that holds an instance's centre. The innermost holds what a
-//! sample calls usual, and each cube is 8 times as large as the one inside it: an instance a million times as far away as all
-//! others gets a cube of its own and leaves their cells as fine as they were.
+//! The curve runs through the smallest of a row of nested cubes that holds an instance's centre.
+//! The innermost holds what a sample calls usual, and each cube is 8 times as large as the one
+//! inside it: an instance a million times as far away as all others gets a cube of its own and
+//! leaves their cells as fine as they were.
 
 use std::ops::Range;
 
@@ -27,7 +29,8 @@ const NO_VOLUME: u64 = u64::MAX;
 /// How many centres tell where the innermost cube lies.
 const SAMPLES: usize = 4096;
 
-/// From how many instances on a second thread sorts: it takes tens of microseconds to start, they take milliseconds.
+/// From how many instances on a second thread sorts: it takes tens of microseconds to start, they
+/// take milliseconds.
 const PARALLEL_FROM: usize = 1 << 15;
 
 /// A cell's key, and whose it is.
@@ -45,12 +48,16 @@ struct Cube {
 }
 
 impl Cube {
-    /// About the medians of a sample, reaching as far as its middle eight tenths are wide along the widest axis: of evenly spread
-    /// centres it holds all, and a tenth of outliers to a side cannot move it.
+    /// About the medians of a sample, reaching as far as its middle eight tenths are wide along the
+    /// widest axis: of evenly spread centres it holds all, and a tenth of outliers to a side cannot
+    /// move it.
     fn new(bounds: &Bounds<'_>, range: &Range<usize>) -> Result<Self> {
         let step = range.len().div_ceil(SAMPLES).max(1);
-        let mut axes: [Vec<f64>; 3] =
-            [host::list(SAMPLES, "order")?, host::list(SAMPLES, "order")?, host::list(SAMPLES, "order")?];
+        let mut axes: [Vec<f64>; 3] = [
+            host::list(SAMPLES, "order")?,
+            host::list(SAMPLES, "order")?,
+            host::list(SAMPLES, "order")?,
+        ];
         for extent in range.clone().step_by(step).filter_map(|i| bounds.extent(i)) {
             for (axis, value) in axes.iter_mut().zip(extent.center()) {
                 axis.push(value);
@@ -63,16 +70,20 @@ impl Cube {
         for axis in &mut axes {
             axis.sort_unstable_by(f64::total_cmp);
         }
-        let widest = |low: usize, high: usize| axes.iter().map(|a| a[high] - a[low]).fold(0.0, f64::max);
+        let widest =
+            |low: usize, high: usize| axes.iter().map(|a| a[high] - a[low]).fold(0.0, f64::max);
         let tenth = samples / 10;
-        let width = [widest(tenth, samples - 1 - tenth), widest(0, samples - 1)].into_iter().find(|w| *w > 0.0);
+        let width = [widest(tenth, samples - 1 - tenth), widest(0, samples - 1)]
+            .into_iter()
+            .find(|w| *w > 0.0);
         // 2^-100: nothing between a point and this is told apart, and 63 cubes reach past 2^60.
         let half_size = width.unwrap_or(0.0).clamp(1.0 / 2.0_f64.powi(100), 2.0_f64.powi(60));
         Ok(Self { center: axes.map(|a| a[samples / 2]), half_size })
     }
 
     fn key(&self, center: [f64; 3]) -> u64 {
-        let from_center: [f64; 3] = std::array::from_fn(|k| (center[k] - self.center[k]) / self.half_size);
+        let from_center: [f64; 3] =
+            std::array::from_fn(|k| (center[k] - self.center[k]) / self.half_size);
         let distance = from_center.iter().fold(0.0, |d: f64, v| d.max(v.abs()));
         let cube = if distance < 1.0 { 0 } else { (exponent(distance) / 3 + 1).min(LAST_CUBE) };
         // Cells of half the cube's size over 2^18; casting clamps what lies outside the last cube.
@@ -103,8 +114,9 @@ fn spread(v: u64) -> u64 {
     (v | v << 2) & 0x1249_2492_4924_9249
 }
 
-/// The instances of `range` along the curve, as indices relative to its start. Equal cells keep the caller's order, and what is no
-/// volume comes last: the order is the same on every machine.
+/// The instances of `range` along the curve, as indices relative to its start.
+/// Equal cells keep the caller's order, and what is no volume comes last: the order is the same on
+/// every machine.
 pub(crate) fn order(bounds: &Bounds<'_>, range: Range<usize>) -> Result<Vec<u32>> {
     let cube = Cube::new(bounds, &range)?;
     let mut keyed = host::list(range.len(), "order")?;
@@ -113,7 +125,8 @@ pub(crate) fn order(bounds: &Bounds<'_>, range: Range<usize>) -> Result<Vec<u32>
     let half = if range.len() < PARALLEL_FROM { 0 } else { range.len() / 2 };
     let sort = |(begin, part, spare): (usize, &mut [Keyed], &mut [Keyed])| {
         for (k, keyed) in part.iter_mut().enumerate() {
-            let key = bounds.extent(range.start + begin + k).map_or(NO_VOLUME, |e| cube.key(e.center()));
+            let key =
+                bounds.extent(range.start + begin + k).map_or(NO_VOLUME, |e| cube.key(e.center()));
             *keyed = Keyed { key, index: (begin + k) as u32 };
         }
         radix_sort(part, spare);
@@ -121,14 +134,19 @@ pub(crate) fn order(bounds: &Bounds<'_>, range: Range<usize>) -> Result<Vec<u32>
     };
     let (first, second) = keyed.split_at_mut(half);
     let (first_spare, second_spare) = spare.split_at_mut(half);
-    on_two_threads((half > 0).then_some((0, first, first_spare)), (half, second, second_spare), sort)?;
+    on_two_threads(
+        (half > 0).then_some((0, first, first_spare)),
+        (half, second, second_spare),
+        sort,
+    )?;
     drop(spare);
     let mut order = host::list(range.len(), "order")?;
     merge(&keyed[..half], &keyed[half..], &mut order);
     Ok(order)
 }
 
-/// Indices of two sorted lists in the order of their keys; of equal keys the first list's come first.
+/// Indices of two sorted lists in the order of their keys; of equal keys the first list's come
+/// first.
 fn merge(first: &[Keyed], second: &[Keyed], order: &mut Vec<u32>) {
     let (mut i, mut j) = (0, 0);
     while i < first.len() && j < second.len() {
@@ -147,7 +165,8 @@ fn digit(key: u64, place: usize) -> usize {
     (key >> (place as u32 * DIGIT_BITS) & ((1 << DIGIT_BITS) - 1)) as usize
 }
 
-/// Sorts by key, least digit first; stable. Digits that all keys share are passed over.
+/// Sorts by key, least digit first; stable.
+/// Digits that all keys share are passed over.
 fn radix_sort(keyed: &mut [Keyed], spare: &mut [Keyed]) {
     let mut counts = [[0_u32; 1 << DIGIT_BITS]; DIGITS];
     for k in keyed.iter() {
@@ -198,7 +217,8 @@ mod tests {
     fn order_of(centers: &[f64]) -> Vec<u32> {
         let n = centers.len() / 3;
         let radii = vec![0.5; n];
-        order(&Bounds::Spheres { centers: Floats::F64(centers), radii: Floats::F64(&radii) }, 0..n).unwrap()
+        order(&Bounds::Spheres { centers: Floats::F64(centers), radii: Floats::F64(&radii) }, 0..n)
+            .unwrap()
     }
 
     fn assert_is_permutation(order: &[u32]) {
@@ -212,7 +232,9 @@ mod tests {
     fn every_input_gives_a_permutation() {
         assert_eq!(order_of(&[]), [0_u32; 0]);
         assert_eq!(order_of(&[1.0, 2.0, 3.0]), [0]);
-        for special in [0.0, 1.0, f64::NAN, f64::INFINITY, -1e300, f64::MAX, 1e30, -5e-324, 2.0_f64.powi(60)] {
+        for special in
+            [0.0, 1.0, f64::NAN, f64::INFINITY, -1e300, f64::MAX, 1e30, -5e-324, 2.0_f64.powi(60)]
+        {
             for n in [2, 63, 64, 1000, PARALLEL_FROM + 1] {
                 // All the same, then every seventh.
                 let same = vec![special; 3 * n];
@@ -222,8 +244,9 @@ mod tests {
                     "{special} {n}: equal keys keep their order"
                 );
                 let mut random = Random(n as u64);
-                let centers: Vec<_> =
-                    (0..3 * n).map(|i| if i % 21 < 3 { special } else { random.unit() - 0.5 }).collect();
+                let centers: Vec<_> = (0..3 * n)
+                    .map(|i| if i % 21 < 3 { special } else { random.unit() - 0.5 })
+                    .collect();
                 assert_is_permutation(&order_of(&centers));
                 assert_eq!(order_of(&centers), order_of(&centers), "the same from every run");
             }
@@ -235,7 +258,8 @@ mod tests {
         let centers = [[9.0; 3], [f64::NAN; 3], [0.0; 3], [f64::INFINITY; 3], [3.0; 3]].concat();
         assert_eq!(order_of(&centers)[3..], [1, 3]);
         let radii = [0.5, 0.5, -1.0, 0.5, f64::NAN];
-        let bounds = Bounds::Spheres { centers: Floats::F64(&[0.0; 15]), radii: Floats::F64(&radii) };
+        let bounds =
+            Bounds::Spheres { centers: Floats::F64(&[0.0; 15]), radii: Floats::F64(&radii) };
         assert_eq!(order(&bounds, 0..5).unwrap(), [0, 1, 3, 2, 4]);
         assert_eq!(order(&bounds, 2..5).unwrap(), [1, 0, 2], "relative to the range's start");
     }
@@ -258,7 +282,9 @@ mod tests {
     fn keys_follow_the_z_of_morton() {
         let cube = Cube { center: [0.0; 3], half_size: 1.0 };
         let corners = |scale: f64| {
-            (0..8).map(move |i| [i & 4, i & 2, i & 1].map(|bit| if bit == 0 { -0.5 * scale } else { 0.5 * scale }))
+            (0..8).map(move |i| {
+                [i & 4, i & 2, i & 1].map(|bit| if bit == 0 { -0.5 * scale } else { 0.5 * scale })
+            })
         };
         for scale in [1.0, 4.0, 32.0, 1e20] {
             let keys: Vec<_> = corners(scale).map(|c| cube.key(c)).collect();
@@ -287,7 +313,8 @@ mod tests {
     #[test]
     fn groups_are_small_with_and_without_outliers() {
         let mut random = Random(77);
-        let homes: Vec<[f64; 3]> = (0..20).map(|_| std::array::from_fn(|_| 1000.0 * random.unit())).collect();
+        let homes: Vec<[f64; 3]> =
+            (0..20).map(|_| std::array::from_fn(|_| 1000.0 * random.unit())).collect();
         let n = 40_000;
         let mut centers: Vec<f64> = (0..n)
             .flat_map(|_| {
@@ -296,7 +323,8 @@ mod tests {
             })
             .collect();
         let given: Vec<_> = (0..n as u32).collect();
-        let (random_order, sorted) = (mean_size(&centers, &given), mean_size(&centers, &order_of(&centers)));
+        let (random_order, sorted) =
+            (mean_size(&centers, &given), mean_size(&centers, &order_of(&centers)));
         assert!(sorted < random_order / 100.0, "{sorted} against {random_order}");
         for far in [1e5, 1e9, 1e17] {
             for i in (0..n).step_by(100) {

@@ -13,7 +13,8 @@ use crate::view::{ClipRows, split3};
 /// The format of the depth that is drawn.
 pub const OCCLUDER_DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// Which triangles do not occlude. A front face is counter-clockwise seen from outside.
+/// Which triangles do not occlude.
+/// A front face is counter-clockwise seen from outside.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum FaceCull {
     /// All occlude: two-sided.
@@ -32,7 +33,8 @@ pub struct MeshData<'a> {
     pub vertices: Floats<'a>,
     /// T triangles, 3 indices below V each.
     pub triangles: &'a [u32],
-    /// K affine matrices `world_from_mesh`, 16 row-major scalars each; `None`: the mesh once, in world coordinates.
+    /// K affine matrices `world_from_mesh`, 16 row-major scalars each; `None`: the mesh once, in
+    /// world coordinates.
     pub transforms: Option<Floats<'a>>,
 }
 
@@ -104,7 +106,11 @@ impl OccluderSurface {
 }
 
 impl Occluders {
-    pub(crate) fn new(gpu: &Gpu, meshes: &[MeshData<'_>], options: &OccluderOptions) -> Result<Self> {
+    pub(crate) fn new(
+        gpu: &Gpu,
+        meshes: &[MeshData<'_>],
+        options: &OccluderOptions,
+    ) -> Result<Self> {
         let baked = Baked::all(meshes)?;
         let allowed = gpu.limits().max_buffer_size;
         for bytes in [size_of_val(&baked.vertices[..]), size_of_val(&baked.indices[..])] {
@@ -124,7 +130,11 @@ impl Occluders {
                 bytemuck::cast_slice(&baked.vertices),
                 wgpu::BufferUsages::VERTEX,
             )?,
-            indices: buffer("hiz.occluders.indices", bytemuck::cast_slice(&baked.indices), wgpu::BufferUsages::INDEX)?,
+            indices: buffer(
+                "hiz.occluders.indices",
+                bytemuck::cast_slice(&baked.indices),
+                wgpu::BufferUsages::INDEX,
+            )?,
             triangles: (baked.indices.len() / 3) as u64,
             parts: baked.parts,
             cull_mode: options.cull_mode,
@@ -165,21 +175,34 @@ impl Baked {
     fn add(&mut self, mesh: &MeshData<'_>) -> Result<()> {
         let (scalars, corners) = (mesh.vertices.len(), mesh.triangles.len());
         if !scalars.is_multiple_of(3) {
-            return Err(Error::invalid("vertices", format!("expected 3 numbers a vertex, got {scalars} numbers")));
+            return Err(Error::invalid(
+                "vertices",
+                format!("expected 3 numbers a vertex, got {scalars} numbers"),
+            ));
         }
         if !corners.is_multiple_of(3) {
-            return Err(Error::invalid("triangles", format!("expected 3 indices a triangle, got {corners} indices")));
-        }
-        let num_vertices = scalars / 3;
-        if let Some((i, index)) = mesh.triangles.iter().enumerate().find(|(_, v)| **v as usize >= num_vertices) {
             return Err(Error::invalid(
                 "triangles",
-                format!("expected indices below the {num_vertices} vertices, got {index} in triangle {}", i / 3),
+                format!("expected 3 indices a triangle, got {corners} indices"),
+            ));
+        }
+        let num_vertices = scalars / 3;
+        if let Some((i, index)) =
+            mesh.triangles.iter().enumerate().find(|(_, v)| **v as usize >= num_vertices)
+        {
+            return Err(Error::invalid(
+                "triangles",
+                format!(
+                    "expected indices below the {num_vertices} vertices, got {index} in triangle {}",
+                    i / 3
+                ),
             ));
         }
         let places: Vec<Option<[f64; 16]>> = match mesh.transforms {
             None => vec![None],
-            Some(t) if t.len().is_multiple_of(16) => (0..t.len() / 16).map(|k| Some(t.array(k))).collect(),
+            Some(t) if t.len().is_multiple_of(16) => {
+                (0..t.len() / 16).map(|k| Some(t.array(k))).collect()
+            }
             Some(t) => {
                 return Err(Error::invalid(
                     "transforms",
@@ -196,7 +219,9 @@ impl Baked {
     fn add_part(&mut self, mesh: &MeshData<'_>, place: Option<&[f64; 16]>, k: usize) -> Result<()> {
         let world = |p: Vec3| match place {
             None => p,
-            Some(m) => std::array::from_fn(|i| dot([m[4 * i], m[4 * i + 1], m[4 * i + 2]], p) + m[4 * i + 3]),
+            Some(m) => std::array::from_fn(|i| {
+                dot([m[4 * i], m[4 * i + 1], m[4 * i + 2]], p) + m[4 * i + 3]
+            }),
         };
         let mut mirrored = false;
         if let Some(m) = place {
@@ -212,9 +237,12 @@ impl Baked {
             let column = |c: usize| [m[c], m[4 + c], m[8 + c]];
             mirrored = dot(crate::camera::cross(column(0), column(1)), column(2)) < 0.0;
         }
-        let too_many = |n: usize| Error::limit("occluder vertices or indices", n as u64, i32::MAX as u64);
-        let base_vertex = i32::try_from(self.vertices.len()).map_err(|_| too_many(self.vertices.len()))?;
-        let first_index = u32::try_from(self.indices.len()).map_err(|_| too_many(self.indices.len()))?;
+        let too_many =
+            |n: usize| Error::limit("occluder vertices or indices", n as u64, i32::MAX as u64);
+        let base_vertex =
+            i32::try_from(self.vertices.len()).map_err(|_| too_many(self.vertices.len()))?;
+        let first_index =
+            u32::try_from(self.indices.len()).map_err(|_| too_many(self.indices.len()))?;
         let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         host::reserve(&mut self.vertices, mesh.vertices.len() / 3, "vertices")?;
         host::reserve(&mut self.indices, mesh.triangles.len(), "triangles")?;
@@ -249,8 +277,9 @@ impl Baked {
     }
 }
 
-/// Whether a box is surely outside one plane of the frustum. Keeping too much costs time only; dropping a part that is seen
-/// would merely lose an occluder, so float64 without a proof is enough.
+/// Whether a box is surely outside one plane of the frustum.
+/// Keeping too much costs time only; dropping a part that is seen would merely lose an occluder, so
+/// float64 without a proof is enough.
 fn outside_frustum(camera: &Camera, min: Vec3, max: Vec3) -> bool {
     let rows = camera.rows();
     let clip: [[f64; 4]; 8] = std::array::from_fn(|corner| {
@@ -360,16 +389,22 @@ pub(crate) fn record(
     check_target(camera, target)?;
     let ClipRows { rows, eye_hi, eye_lo } = ClipRows::new(camera)?;
     let wide = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
-    let view = gpu.uniform("hiz.occluders.view", &OccluderView { rows, eye_hi: wide(eye_hi), eye_lo: wide(eye_lo) })?;
+    let view = gpu.uniform(
+        "hiz.occluders.view",
+        &OccluderView { rows, eye_hi: wide(eye_hi), eye_lo: wide(eye_lo) },
+    )?;
     let entries = [entry(0, view.as_entire_binding())];
-    let bind_group = gpu.bind_group("hiz.occluders.view", &gpu.layouts().occluder_view, &entries)?;
+    let bind_group =
+        gpu.bind_group("hiz.occluders.view", &gpu.layouts().occluder_view, &entries)?;
     let key = OccluderKey {
         reversed: camera.convention() == DepthConvention::Reversed,
         cull_mode: occluders.cull_mode.as_seen_by(camera).face(),
     };
     let pipeline = gpu.occluder_pipeline(key, || pipeline(gpu, key))?;
-    let depth_ops =
-        wgpu::Operations { load: wgpu::LoadOp::Clear(camera.convention().far()), store: wgpu::StoreOp::Store };
+    let depth_ops = wgpu::Operations {
+        load: wgpu::LoadOp::Clear(camera.convention().far()),
+        store: wgpu::StoreOp::Store,
+    };
     gpu.can_draw_into(target, depth_ops).map_err(|error| match error {
         Error::Device(why) => Error::mismatch(
             "target",
@@ -402,13 +437,14 @@ pub(crate) fn record(
 }
 
 impl FaceCull {
-    /// The faces that do not occlude as they appear in `camera`'s image: one that mirrors the world (a left-handed one) turns
-    /// every triangle around.
+    /// The faces that do not occlude as they appear in `camera`'s image: one that mirrors the world
+    /// (a left-handed one) turns every triangle around.
     pub(crate) fn as_seen_by(self, camera: &Camera) -> Self {
         let rows = camera.rows();
         let lin = |r: usize| [rows[r][0], rows[r][1], rows[r][2]];
         let (x, y) = (lin(0), lin(1));
-        // Towards the scene: w grows in front of a perspective camera; orthographic depth grows or, reversed, falls.
+        // Towards the scene: w grows in front of a perspective camera; orthographic depth grows or,
+        // reversed, falls.
         let forward = if lin(3) != [0.0; 3] {
             lin(3)
         } else if camera.convention().is_reversed() {

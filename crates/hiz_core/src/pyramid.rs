@@ -12,7 +12,8 @@ use crate::layout::{Level, MAX_LEVELS, PYRAMID_CHUNKS, PyramidLayout, Step, Stor
 use crate::shader::{DepthStore, SourceKind};
 use crate::tolerance::DepthTolerance;
 
-/// Invocations of a workgroup of the reduction, all in a row; `shaders/shared/pyramid_write.wgsl`, `place_of`.
+/// Invocations of a workgroup of the reduction, all in a row; `shaders/shared/pyramid_write.wgsl`,
+/// `place_of`.
 const REDUCE_WORKGROUP: u32 = 64;
 /// Or the side of a square of them, `TALL`.
 const TALL_SIDE: u32 = 8;
@@ -54,7 +55,8 @@ const _: () = assert!(size_of::<StepUniform>() == 32);
 pub struct PyramidOptions {
     /// Which levels are stored: all, if nothing else is asked for.
     pub levels: StoredLevels,
-    /// Texels of one chunk as a power of two; `None`: what one storage binding of the device holds. Tests make it small.
+    /// Texels of one chunk as a power of two; `None`: what one storage binding of the device holds.
+    /// Tests make it small.
     pub chunk_shift: Option<u32>,
     /// Whether culls read all levels from one texture.
     pub atlas: AtlasUse,
@@ -62,8 +64,8 @@ pub struct PyramidOptions {
 
 /// A depth pyramid on the device: for every level, the farthest depth of each block of pixels.
 ///
-/// Level 0 is the depth texture itself, which the pyramid keeps alive but does not copy: **do not write to that texture
-/// between the reduction and the culls that use it**.
+/// Level 0 is the depth texture itself, which the pyramid keeps alive but does not copy: **do not
+/// write to that texture between the reduction and the culls that use it**.
 #[derive(Debug)]
 pub struct Pyramid {
     pub(crate) context: ContextId,
@@ -104,15 +106,25 @@ impl Pyramid {
         let side = size.width.max(size.height);
         let allowed = gpu.limits().max_texture_dimension_2d;
         if side > allowed {
-            return Err(Error::limit("max_texture_dimension_2d", u64::from(side), u64::from(allowed)));
+            return Err(Error::limit(
+                "max_texture_dimension_2d",
+                u64::from(side),
+                u64::from(allowed),
+            ));
         }
         if side == 0 || size.width.min(size.height) == 0 {
-            return Err(Error::invalid("size", format!("expected at least one pixel a side, got {size}")));
+            return Err(Error::invalid(
+                "size",
+                format!("expected at least one pixel a side, got {size}"),
+            ));
         }
         let most = crate::layout::chunk_shift(gpu.limits());
         let chunk_shift = options.chunk_shift.unwrap_or(most);
         if !(2..=most).contains(&chunk_shift) {
-            return Err(Error::invalid("chunk_shift", format!("expected 2 to {most}, got {chunk_shift}")));
+            return Err(Error::invalid(
+                "chunk_shift",
+                format!("expected 2 to {most}, got {chunk_shift}"),
+            ));
         }
         let layout = PyramidLayout::new(size, options.levels, chunk_shift)?;
         let chunks = layout
@@ -128,7 +140,14 @@ impl Pyramid {
         let (StoredLevels { first, last }, origins) = (layout.stored, layout.atlas.origins);
         let uniform = gpu.uniform(
             "hiz.pyramid.layout",
-            &PyramidUniform { levels, origins, chunk_shift, first_stored: first, last_stored: last, padding: 0 },
+            &PyramidUniform {
+                levels,
+                origins,
+                chunk_shift,
+                first_stored: first,
+                last_stored: last,
+                padding: 0,
+            },
         )?;
         Ok(Self {
             context: gpu.id(),
@@ -154,7 +173,8 @@ impl Pyramid {
         self.layout.num_levels()
     }
 
-    /// Which levels above 0 are stored, cut to those that there are; nothing for an image of one pixel.
+    /// Which levels above 0 are stored, cut to those that there are; nothing for an image of one
+    /// pixel.
     pub fn stored_levels(&self) -> Option<StoredLevels> {
         let stored = self.layout.stored;
         (stored.first <= stored.last).then_some(stored)
@@ -190,26 +210,29 @@ impl Pyramid {
         Ok(bindings)
     }
 
-    /// Whether culls of so many instances against `built` (no later reduction, of what may be another kind of image) read an atlas:
-    /// where it can be, and pays.
+    /// Whether culls of so many instances against `built` (no later reduction, of what may be
+    /// another kind of image) read an atlas: where it can be, and pays.
     pub(crate) fn wants_atlas(&self, gpu: &Gpu, built: &Built, instances: u32) -> bool {
         self.atlas_use.pays(&self.layout, instances)
             && !self.no_atlas.load(Ordering::Relaxed)
             && atlas::is_possible(&self.layout, built.source.texture(), gpu.limits())
     }
 
-    /// Something failed on the device: nothing that was made for culls is kept. Whether an atlas was among it.
+    /// Something failed on the device: nothing that was made for culls is kept.
+    /// Whether an atlas was among it.
     pub(crate) fn forget(&self) -> bool {
         self.bindings.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clear();
         self.atlas.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take().is_some()
     }
 
-    /// There is no memory for an atlas: culls read the depth image and the levels where they are from now on.
+    /// There is no memory for an atlas: culls read the depth image and the levels where they are
+    /// from now on.
     pub(crate) fn do_without_atlas(&self) {
         self.no_atlas.store(true, Ordering::Relaxed);
     }
 
-    /// The atlas of what the pyramid was built from; its copies are recorded if they are not known to have run, behind that reduction.
+    /// The atlas of what the pyramid was built from; its copies are recorded if they are not known
+    /// to have run, behind that reduction.
     /// `None` where there is no memory for it, now and from now on.
     pub(crate) fn record_atlas(
         &self,
@@ -259,8 +282,8 @@ impl Pyramid {
     }
 
     /// How far the depths that the pyramid was last built from may lie from those that were stored,
-    /// by the format of the image ([`DepthTolerance::of`]) or by what was uploaded into it. Every
-    /// cull counts it, beside the slack of its options.
+    /// by the format of the image ([`DepthTolerance::of`]) or by what was uploaded into it.
+    /// Every cull counts it, beside the slack of its options.
     pub fn tolerance(&self) -> Option<DepthTolerance> {
         self.built().map(|b| b.tolerance)
     }
@@ -279,7 +302,9 @@ impl Pyramid {
 
     /// Chunk `i`, or what stands in for it.
     pub(crate) fn chunk<'a>(&'a self, gpu: &'a Gpu, i: usize) -> &'a wgpu::Buffer {
-        self.chunks.get(i).unwrap_or_else(|| gpu.stand_in(if i == 1 { StandIn::Chunk1 } else { StandIn::Chunk2 }))
+        self.chunks
+            .get(i)
+            .unwrap_or_else(|| gpu.stand_in(if i == 1 { StandIn::Chunk1 } else { StandIn::Chunk2 }))
     }
 
     pub(crate) fn built(&self) -> Option<Built> {
@@ -289,7 +314,10 @@ impl Pyramid {
     /// The built state for a cull with `camera`, or why there is none.
     pub(crate) fn built_for(&self, camera: &Camera) -> Result<Built> {
         let built = self.built().ok_or_else(|| {
-            Error::mismatch("pyramid", "expected one that was built from a depth image, got one that never was")
+            Error::mismatch(
+                "pyramid",
+                "expected one that was built from a depth image, got one that never was",
+            )
         })?;
         if built.camera == *camera {
             return Ok(built);
@@ -300,7 +328,9 @@ impl Pyramid {
             if theirs == ours {
                 "expected the camera of the pyramid's depth image, got another one".to_owned()
             } else {
-                format!("expected the camera of the pyramid's depth image, size {theirs}, got one of size {ours}")
+                format!(
+                    "expected the camera of the pyramid's depth image, size {theirs}, got one of size {ours}"
+                )
             },
         ))
     }
@@ -319,7 +349,8 @@ pub(crate) fn record_reduce(
     gpu.check_context("pyramid", pyramid.context)?;
     let texture = depth.texture();
     let format = texture.format();
-    let (Some(source_kind), Some(of_format)) = (SourceKind::of(format), DepthTolerance::of(format)) else {
+    let (Some(source_kind), Some(of_format)) = (SourceKind::of(format), DepthTolerance::of(format))
+    else {
         return Err(Error::invalid(
             "depth",
             format!(
@@ -330,8 +361,15 @@ pub(crate) fn record_reduce(
     let (size, texels) = (pyramid.size(), ImageSize::new(texture.width(), texture.height()));
     let expected = source_kind.texture_size(size);
     if texels != expected {
-        let packed = if expected == size { String::new() } else { format!(" as {expected} texels of four pixels") };
-        return Err(Error::mismatch("depth", format!("expected the pyramid's size {size}{packed}, got {texels}")));
+        let packed = if expected == size {
+            String::new()
+        } else {
+            format!(" as {expected} texels of four pixels")
+        };
+        return Err(Error::mismatch(
+            "depth",
+            format!("expected the pyramid's size {size}{packed}, got {texels}"),
+        ));
     }
     if size != camera.size() {
         return Err(Error::mismatch(
@@ -340,7 +378,8 @@ pub(crate) fn record_reduce(
         ));
     }
     // A view does not say which part of its texture it shows, so there must be one part only.
-    let parts = (texture.mip_level_count(), texture.sample_count(), texture.depth_or_array_layers());
+    let parts =
+        (texture.mip_level_count(), texture.sample_count(), texture.depth_or_array_layers());
     if parts != (1, 1, 1) || texture.dimension() != wgpu::TextureDimension::D2 {
         return Err(Error::invalid(
             "depth",
@@ -355,8 +394,12 @@ pub(crate) fn record_reduce(
     }
     let needed = source_kind.usage();
     if !texture.usage().contains(needed) {
-        let name = if source_kind == SourceKind::Bits { "STORAGE_BINDING" } else { "TEXTURE_BINDING" };
-        return Err(Error::invalid("depth", format!("expected the usage {name}, got {:?}", texture.usage())));
+        let name =
+            if source_kind == SourceKind::Bits { "STORAGE_BINDING" } else { "TEXTURE_BINDING" };
+        return Err(Error::invalid(
+            "depth",
+            format!("expected the usage {name}, got {:?}", texture.usage()),
+        ));
     }
     let (source, view) = bind_source(gpu, depth, source_kind, pyramid)?;
     // Everything is there before anything is recorded.
@@ -373,11 +416,16 @@ pub(crate) fn record_reduce(
         })?;
         let uniform = gpu.uniform("hiz.reduce.step", &step_uniform(step, reduction))?;
         let entries = [entry(0, uniform.as_entire_binding())];
-        Ok((pipeline, gpu.bind_group("hiz.reduce.step", &gpu.layouts().one_uniform, &entries)?, workgroups))
+        Ok((
+            pipeline,
+            gpu.bind_group("hiz.reduce.step", &gpu.layouts().one_uniform, &entries)?,
+            workgroups,
+        ))
     };
     let dispatches = pyramid.layout.steps.iter().map(dispatch).collect::<Result<Vec<_>>>()?;
     gpu.recorded(|| {
-        let descriptor = wgpu::ComputePassDescriptor { label: Some("hiz.reduce.pass"), timestamp_writes: None };
+        let descriptor =
+            wgpu::ComputePassDescriptor { label: Some("hiz.reduce.pass"), timestamp_writes: None };
         let mut pass = encoder.begin_compute_pass(&descriptor);
         pass.set_bind_group(0, &source, &[]);
         for (pipeline, bind_group, [columns, rows]) in &dispatches {
@@ -428,7 +476,9 @@ fn bind_source(
     let refused = |error| match error {
         Error::Device(why) => Error::mismatch(
             "depth",
-            format!("expected a texture of this device and context that has not been destroyed, but {why}"),
+            format!(
+                "expected a texture of this device and context that has not been destroyed, but {why}"
+            ),
         ),
         other => other,
     };
@@ -447,8 +497,11 @@ const OF_ANOTHER_DEVICE: &str = "doesn't match";
 /// The shader of a step, and its workgroups.
 fn shape_of(step: &Step, tall: bool) -> (ReduceShape, [u32; 2]) {
     let [columns, rows] = step.blocks;
-    let of_places =
-        if tall { step.blocks.map(|n| n.div_ceil(TALL_SIDE)) } else { [columns.div_ceil(REDUCE_WORKGROUP), rows] };
+    let of_places = if tall {
+        step.blocks.map(|n| n.div_ceil(TALL_SIDE))
+    } else {
+        [columns.div_ceil(REDUCE_WORKGROUP), rows]
+    };
     if step.is_tail() {
         (ReduceShape::Tail, [1, 1])
     } else if !step.is_coarse() {
@@ -461,8 +514,9 @@ fn shape_of(step: &Step, tall: bool) -> (ReduceShape, [u32; 2]) {
     }
 }
 
-/// Whether neighbouring invocations of a step that reads the image read below each other. Blocks next to each other, four pixels a texel,
-/// are loaded in a way that gains nothing; and rows that begin at multiples of a page would all fall into the same lines of a cache
+/// Whether neighbouring invocations of a step that reads the image read below each other.
+/// Blocks next to each other, four pixels a texel, are loaded in a way that gains nothing; and rows
+/// that begin at multiples of a page would all fall into the same lines of a cache
 /// (`docs/performance.md`).
 fn reads_tall(step: &Step, source: SourceKind, size: ImageSize) -> bool {
     (source != SourceKind::Bits || step.is_coarse()) && !size.width.is_multiple_of(PAGE_PIXELS)
@@ -470,7 +524,14 @@ fn reads_tall(step: &Step, source: SourceKind, size: ImageSize) -> bool {
 
 fn step_uniform(step: &Step, reduction: u32) -> StepUniform {
     let reduction = if step.source == 0 { reduction } else { 0 };
-    StepUniform { source: step.source, last: step.last, reduction, padding: 0, blocks: step.blocks, padding_1: [0; 2] }
+    StepUniform {
+        source: step.source,
+        last: step.last,
+        reduction,
+        padding: 0,
+        blocks: step.blocks,
+        padding_1: [0; 2],
+    }
 }
 
 /// Numbers reductions, never 0.

@@ -33,14 +33,16 @@ pub(crate) fn read_buffers(
     if total == 0 {
         return Ok(vec![Vec::new(); ranges.len()]);
     }
-    let mut encoder =
-        device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("hiz.readback.encoder") });
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
+        label: Some("hiz.readback.encoder"),
+    });
     let staged = Staged::record(device, &mut encoder, ranges);
     let submission = queue.submit([encoder.finish()]);
     staged.read(device, submission)
 }
 
-/// Ranges of buffers that wait in a staging area: recorded with what fills them, they take no submit of their own.
+/// Ranges of buffers that wait in a staging area: recorded with what fills them, they take no
+/// submit of their own.
 #[derive(Debug)]
 pub(crate) struct Staged {
     staging: wgpu::Buffer,
@@ -65,7 +67,11 @@ impl Staged {
     }
 
     /// Waits for the submission of the copies; the ranges, in their order.
-    pub(crate) fn read(&self, device: &wgpu::Device, submission: wgpu::SubmissionIndex) -> Result<Vec<Vec<u8>>> {
+    pub(crate) fn read(
+        &self,
+        device: &wgpu::Device,
+        submission: wgpu::SubmissionIndex,
+    ) -> Result<Vec<Vec<u8>>> {
         with_mapped(device, &self.staging, submission, |bytes| {
             let mut rest = bytes;
             let parts = self.sizes.iter().map(|size| {
@@ -78,7 +84,11 @@ impl Staged {
     }
 }
 
-fn read_in_bands(device: &wgpu::Device, queue: &wgpu::Queue, range: &BufferRange<'_>) -> Result<Vec<u8>> {
+fn read_in_bands(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    range: &BufferRange<'_>,
+) -> Result<Vec<u8>> {
     let mut out = host::list(range.size as usize, "readback")?;
     let mut done = 0;
     while done < range.size {
@@ -90,7 +100,8 @@ fn read_in_bands(device: &wgpu::Device, queue: &wgpu::Queue, range: &BufferRange
     Ok(out)
 }
 
-/// Reads the first `row` bytes of each row of a texture: all of a row, but for what pads it to a whole texel of up to 16 bytes.
+/// Reads the first `row` bytes of each row of a texture: all of a row, but for what pads it to a
+/// whole texel of up to 16 bytes.
 pub(crate) fn read_texture(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
@@ -100,8 +111,9 @@ pub(crate) fn read_texture(
     let height = texture.height();
     let padded = row.next_multiple_of(u64::from(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT));
     let staging = staging(device, padded * u64::from(height));
-    let mut encoder =
-        device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("hiz.readback.encoder") });
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
+        label: Some("hiz.readback.encoder"),
+    });
     encoder.copy_texture_to_buffer(
         texture.as_image_copy(),
         wgpu::TexelCopyBufferInfo {
@@ -109,7 +121,8 @@ pub(crate) fn read_texture(
             layout: wgpu::TexelCopyBufferLayout {
                 offset: 0,
                 bytes_per_row: Some(
-                    u32::try_from(padded).map_err(|_| Error::limit("bytes per row", padded, u64::from(u32::MAX)))?,
+                    u32::try_from(padded)
+                        .map_err(|_| Error::limit("bytes per row", padded, u64::from(u32::MAX)))?,
                 ),
                 rows_per_image: None,
             },
@@ -157,11 +170,17 @@ fn with_mapped<T>(
     wait(device, Some(submission))?;
     match receiver.try_recv() {
         Ok(Ok(())) => {}
-        Ok(Err(e)) => return Err(Error::Device(format!("hiz.readback.staging could not be mapped: {e}"))),
+        Ok(Err(e)) => {
+            return Err(Error::Device(format!("hiz.readback.staging could not be mapped: {e}")));
+        }
         // Another thread's poll may be running the callback at this moment.
         Err(_) => match receiver.recv_timeout(std::time::Duration::from_secs(60)) {
             Ok(Ok(())) => {}
-            other => return Err(Error::Device(format!("hiz.readback.staging could not be mapped: {other:?}"))),
+            other => {
+                return Err(Error::Device(format!(
+                    "hiz.readback.staging could not be mapped: {other:?}"
+                )));
+            }
         },
     }
     let view = staging

@@ -1,5 +1,6 @@
-//! Records of volumes on the device: a texture, because a software driver fetches a texel of 16 bytes whole where it picks the words
-//! of a buffer one by one (`docs/performance.md`). Twin: `shaders/shared/record_layout.wgsl`.
+//! Records of volumes on the device: a texture, because a software driver fetches a texel of 16
+//! bytes whole where it picks the words of a buffer one by one (`docs/performance.md`).
+//! Twin: `shaders/shared/record_layout.wgsl`.
 
 use crate::error::Result;
 use crate::gpu::{Gpu, Mapped};
@@ -10,7 +11,8 @@ pub(crate) const RECORDS_PER_ROW: u32 = 1024;
 /// Bytes of a texel: `Rgba32Uint`.
 pub(crate) const TEXEL_BYTES: u64 = 16;
 
-/// A short row is padded to this many records, so that it keeps to the alignment of copies whatever a record takes.
+/// A short row is padded to this many records, so that it keeps to the alignment of copies whatever
+/// a record takes.
 const ROW_MULTIPLE: u32 = 16;
 
 /// The format of the texture.
@@ -31,8 +33,8 @@ pub(crate) struct Upload {
 }
 
 impl Records {
-    /// Makes room for `count` records, which `fill` writes where they are mapped. They
-    /// are on the device once the upload is recorded and has run.
+    /// Makes room for `count` records, which `fill` writes where they are mapped.
+    /// They are on the device once the upload is recorded and has run.
     pub(crate) fn new<T>(
         gpu: &Gpu,
         label: &str,
@@ -50,7 +52,9 @@ impl Records {
             label,
             (columns * (record_bytes / TEXEL_BYTES) as u32, rows),
             FORMAT,
-            wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC,
+            wgpu::TextureUsages::STORAGE_BINDING
+                | wgpu::TextureUsages::COPY_DST
+                | wgpu::TextureUsages::COPY_SRC,
         )?;
         let view = gpu.view(&texture)?;
         let records = Self { view, texture: texture.clone(), record_bytes };
@@ -90,6 +94,11 @@ impl Upload {
     }
 }
 
-const _: () = assert!((ROW_MULTIPLE * 32).is_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT), "spheres");
-const _: () = assert!((ROW_MULTIPLE * 48).is_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT), "boxes");
-const _: () = assert!((ROW_MULTIPLE * 64).is_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT), "oriented boxes");
+const _: () =
+    assert!((ROW_MULTIPLE * 32).is_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT), "spheres");
+const _: () =
+    assert!((ROW_MULTIPLE * 48).is_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT), "boxes");
+const _: () = assert!(
+    (ROW_MULTIPLE * 64).is_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT),
+    "oriented boxes"
+);

@@ -1,4 +1,5 @@
-//! WGSL: which files make which module. Composition is ordered concatenation; there is no preprocessor.
+//! WGSL: which files make which module.
+//! Composition is ordered concatenation; there is no preprocessor.
 
 use crate::bounds::BoundsKind;
 use crate::camera::ImageSize;
@@ -54,7 +55,11 @@ impl SourceKind {
     /// How it is bound.
     pub(crate) fn binding(self) -> wgpu::BindingType {
         let view_dimension = wgpu::TextureViewDimension::D2;
-        let sampled = |sample_type| wgpu::BindingType::Texture { sample_type, view_dimension, multisampled: false };
+        let sampled = |sample_type| wgpu::BindingType::Texture {
+            sample_type,
+            view_dimension,
+            multisampled: false,
+        };
         match self {
             Self::Depth => sampled(wgpu::TextureSampleType::Depth),
             Self::Float => sampled(wgpu::TextureSampleType::Float { filterable: false }),
@@ -106,8 +111,14 @@ pub(crate) fn reduce_coarse(source: SourceKind) -> String {
 }
 
 fn reducing(source: SourceKind, entry: &str) -> String {
-    [wgsl!("shared/depth_bits"), &source.wgsl(), wgsl!("shared/pyramid"), wgsl!("shared/pyramid_write"), entry]
-        .join("\n")
+    [
+        wgsl!("shared/depth_bits"),
+        &source.wgsl(),
+        wgsl!("shared/pyramid"),
+        wgsl!("shared/pyramid_write"),
+        entry,
+    ]
+    .join("\n")
 }
 
 /// A yardstick: one dispatch a level on a flat buffer.
@@ -135,8 +146,12 @@ fn module(store: DepthStore, kind: BoundsKind, classify: &str, entry: &str) -> S
     let store = store.wgsl();
     let bounds = match kind {
         BoundsKind::Sphere => wgsl!("shared/bounds_sphere").to_owned(),
-        BoundsKind::Box => [wgsl!("shared/bounds_box_support"), wgsl!("shared/bounds_box")].join("\n"),
-        BoundsKind::OrientedBox => [wgsl!("shared/bounds_box_support"), wgsl!("shared/bounds_oriented_box")].join("\n"),
+        BoundsKind::Box => {
+            [wgsl!("shared/bounds_box_support"), wgsl!("shared/bounds_box")].join("\n")
+        }
+        BoundsKind::OrientedBox => {
+            [wgsl!("shared/bounds_box_support"), wgsl!("shared/bounds_oriented_box")].join("\n")
+        }
     };
     [
         wgsl!("shared/depth_bits"),
@@ -174,13 +189,24 @@ fn uncertified() -> String {
 }
 
 fn flat_frame() -> String {
-    [wgsl!("shared/piece"), wgsl!("shared/groups"), wgsl!("shared/statistics"), wgsl!("shared/report"), wgsl!("cull")]
-        .join("\n")
+    [
+        wgsl!("shared/piece"),
+        wgsl!("shared/groups"),
+        wgsl!("shared/statistics"),
+        wgsl!("shared/report"),
+        wgsl!("cull"),
+    ]
+    .join("\n")
 }
 
 /// The cull of groups.
 pub(crate) fn cull_groups(store: DepthStore) -> String {
-    let entry = [wgsl!("shared/piece"), wgsl!("shared/groups"), wgsl!("shared/statistics"), wgsl!("cull_groups")];
+    let entry = [
+        wgsl!("shared/piece"),
+        wgsl!("shared/groups"),
+        wgsl!("shared/statistics"),
+        wgsl!("cull_groups"),
+    ];
     classifying(store, BoundsKind::Box, &entry.join("\n"))
 }
 
@@ -234,16 +260,19 @@ pub(crate) fn occluders() -> String {
 }
 
 /// All kinds of source, in the order of their numbers.
-pub(crate) const SOURCES: [SourceKind; 3] = [SourceKind::Depth, SourceKind::Float, SourceKind::Bits];
+pub(crate) const SOURCES: [SourceKind; 3] =
+    [SourceKind::Depth, SourceKind::Float, SourceKind::Bits];
 const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
 
 /// Every module, for those who plant faults in them.
 pub(crate) fn all() -> Vec<String> {
     let culls = |store: DepthStore| {
-        let of_kind = move |kind| [cull(store, kind), cull_members(store, kind), explain(store, kind)];
+        let of_kind =
+            move |kind| [cull(store, kind), cull_members(store, kind), explain(store, kind)];
         KINDS.into_iter().flat_map(of_kind).chain([cull_groups(store), yardstick_cull(store)])
     };
-    let of_source = |source| culls(DepthStore::Apart(source)).chain([reduce(source), reduce_coarse(source)]);
+    let of_source =
+        |source| culls(DepthStore::Apart(source)).chain([reduce(source), reduce_coarse(source)]);
     SOURCES
         .into_iter()
         .flat_map(of_source)
@@ -260,7 +289,8 @@ mod tests {
     use naga::valid::{Capabilities, ValidationFlags, Validator};
 
     fn parse(source: &str) -> naga::Module {
-        let module = naga::front::wgsl::parse_str(source).unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
+        let module = naga::front::wgsl::parse_str(source)
+            .unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
         Validator::new(ValidationFlags::all(), Capabilities::default())
             .validate(&module)
             .unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
@@ -280,8 +310,11 @@ mod tests {
 
     /// Offsets of a WGSL struct's members, and its size.
     fn layout(module: &naga::Module, name: &str) -> (Vec<(String, u32)>, u32) {
-        let (_, ty) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).expect(name);
-        let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("{name} is no struct") };
+        let (_, ty) =
+            module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).expect(name);
+        let naga::TypeInner::Struct { members, span } = &ty.inner else {
+            panic!("{name} is no struct")
+        };
         (members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect(), *span)
     }
 
@@ -337,7 +370,8 @@ mod tests {
         same_layout!(update, "Update", UpdateUniform {
             "count" = count, "texels" = texels, "number" = number, "padding" = padding
         });
-        let oriented = parse(&explain(DepthStore::Apart(SourceKind::Depth), BoundsKind::OrientedBox));
+        let oriented =
+            parse(&explain(DepthStore::Apart(SourceKind::Depth), BoundsKind::OrientedBox));
         same_layout!(oriented, "Explanation", ExplanationRecord {
             "verdict" = verdict, "stage" = stage, "level" = level, "farthest_bits" = farthest_bits, "pixels" = pixels,
             "depths" = depths, "last" = last, "texels_read" = texels_read, "of_footprint" = of_footprint,
@@ -347,7 +381,9 @@ mod tests {
 
     /// How often `caller` calls `callee`.
     fn calls(module: &naga::Module, caller: &str, callee: &str) -> usize {
-        let named = |name: &str| module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(name)).expect("it");
+        let named = |name: &str| {
+            module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(name)).expect("it")
+        };
         let (handle, _) = named(callee);
         named(caller)
             .1
@@ -357,22 +393,33 @@ mod tests {
             .count()
     }
 
-    /// No driver at hand folds what cancels, so no verdict shows whether `bar` stands in the way. (What folding would do is shown by
-    /// `tests/mirror.rs`.)
+    /// No driver at hand folds what cancels, so no verdict shows whether `bar` stands in the way.
+    /// (What folding would do is shown by `tests/mirror.rs`.)
     #[test]
     fn bars_stand_where_a_compiler_could_fold_what_cancels() {
         for kind in KINDS {
             let module = parse(&cull(DepthStore::Apart(SourceKind::Depth), kind));
             for bar in ["bar", "bar2", "bar3"] {
-                let (_, function) = module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(bar)).expect(bar);
+                let (_, function) = module
+                    .functions
+                    .iter()
+                    .find(|(_, f)| f.name.as_deref() == Some(bar))
+                    .expect(bar);
                 let is_xor = |e: &naga::Expression| {
-                    matches!(e, naga::Expression::Binary { op: naga::BinaryOperator::ExclusiveOr, .. })
+                    matches!(
+                        e,
+                        naga::Expression::Binary { op: naga::BinaryOperator::ExclusiveOr, .. }
+                    )
                 };
                 assert!(function.expressions.iter().any(|(_, e)| is_xor(e)), "{bar}");
             }
             assert_eq!(calls(&module, "load_volume", "bar3"), 2, "{kind:?}: d_hi and d_lo");
             assert_eq!(calls(&module, "surely_behind", "bar"), 1, "d - A");
-            assert_eq!(calls(&module, "occluding_depth", "bar"), 1, "the depth that slack has moved");
+            assert_eq!(
+                calls(&module, "occluding_depth", "bar"),
+                1,
+                "the depth that slack has moved"
+            );
             assert_eq!(calls(&module, "classify", "bar"), 2, "-A and 1 - A");
             if kind != BoundsKind::Sphere {
                 assert_eq!(calls(&module, "extent_of", "bar"), 2, "low and high");
@@ -387,15 +434,18 @@ mod tests {
     }
 
     /// Drivers clamp what is drawn to 0..=1, and nothing else may be copied into a depth texture:
-    /// no verdict of theirs shows whether its single pixels are sanitized. (`tests/no_depth.rs` has
-    /// what other textures hold.)
+    /// no verdict of theirs shows whether its single pixels are sanitized.
+    /// (`tests/no_depth.rs` has what other textures hold.)
     #[test]
     fn single_pixels_of_every_source_are_sanitized() {
         for source in SOURCES {
             let module = parse(&cull(DepthStore::Apart(source), BoundsKind::Box));
             assert_eq!(calls(&module, "source_bits", "sanitized"), 1, "{source:?}");
         }
-        assert_eq!(calls(&parse(&cull(DepthStore::Atlas, BoundsKind::Box)), "texel", "sanitized"), 1);
+        assert_eq!(
+            calls(&parse(&cull(DepthStore::Atlas, BoundsKind::Box)), "texel", "sanitized"),
+            1
+        );
     }
 
     /// A guess is mostly right, so that no verdict shows whether it was proved.
@@ -403,39 +453,63 @@ mod tests {
     fn every_plane_and_side_is_certified() {
         for kind in KINDS {
             let module = parse(&cull(DepthStore::Apart(SourceKind::Depth), kind));
-            assert_eq!(calls(&module, "supporting_planes", "surely_above"), 1, "{kind:?}: a plane's offset");
-            assert_eq!(calls(&module, "proved_interval", "surely_above"), 1, "{kind:?}: left and top");
-            assert_eq!(calls(&module, "proved_interval", "surely_below"), 1, "{kind:?}: right and bottom");
+            assert_eq!(
+                calls(&module, "supporting_planes", "surely_above"),
+                1,
+                "{kind:?}: a plane's offset"
+            );
+            assert_eq!(
+                calls(&module, "proved_interval", "surely_above"),
+                1,
+                "{kind:?}: left and top"
+            );
+            assert_eq!(
+                calls(&module, "proved_interval", "surely_below"),
+                1,
+                "{kind:?}: right and bottom"
+            );
         }
     }
 
     /// The f32 that a shader says after `before`.
     fn number(shader: &str, before: &str) -> f64 {
         let rest = shader.split_once(before).unwrap_or_else(|| panic!("{before}")).1;
-        let text: String = rest.chars().take_while(|c| c.is_alphanumeric() || ".-".contains(*c)).collect();
+        let text: String =
+            rest.chars().take_while(|c| c.is_alphanumeric() || ".-".contains(*c)).collect();
         match text.split_once("p") {
             Some(("0x1", exponent)) => 2.0_f64.powi(exponent.parse().expect("an exponent")),
             _ => text.parse().expect("a number"),
         }
     }
 
-    /// What docs/accuracy.md derives of constants whose absence shows in no verdict but the mirror's: they cover what it counts.
+    /// What docs/accuracy.md derives of constants whose absence shows in no verdict but the
+    /// mirror's: they cover what it counts.
     #[test]
     fn constants_cover_what_is_counted() {
         let eps = crate::view::EPS;
         let certificate = wgsl!("shared/certificate");
-        assert!(number(certificate, "ERROR_FLOOR: f32 = ") >= 2.0_f64.powi(-70), "flushed subnormals");
-        // Both squares, the product and the sum lose at most 6 eps, and squares below 2^-126 what they are.
+        assert!(
+            number(certificate, "ERROR_FLOOR: f32 = ") >= 2.0_f64.powi(-70),
+            "flushed subnormals"
+        );
+        // Both squares, the product and the sum lose at most 6 eps, and squares below 2^-126 what
+        // they are.
         let sphere = wgsl!("shared/bounds_sphere");
         assert!(number(sphere, "dot(half, half) * ") >= 1.0 + 6.0 * eps, "a sphere's squares");
         assert!(number(sphere, "1.000001 + ") >= 2.0_f64.powi(-100), "what vanishes of them");
         // The margin is at least 2^-70; a ratio may not overflow.
-        assert!(number(wgsl!("shared/classify"), "LEAST_W: f32 = ") >= 2.0_f64.powi(-66), "the least w");
+        assert!(
+            number(wgsl!("shared/classify"), "LEAST_W: f32 = ") >= 2.0_f64.powi(-66),
+            "the least w"
+        );
         let planes = wgsl!("shared/supporting_planes");
         // Six roundings of a texel's comparison.
         assert!(number(planes, "let margin = ") >= 6.0, "a texel's margin");
         assert!(number(planes, "abs(bound)) + ") >= 2.0_f64.powi(-100), "what is flushed there");
-        assert!(number(planes, "FLATTEST: f32 = ") >= 2.0_f64.powi(-100), "slopes that one product would flush");
+        assert!(
+            number(planes, "FLATTEST: f32 = ") >= 2.0_f64.powi(-100),
+            "slopes that one product would flush"
+        );
     }
 
     #[test]
@@ -449,9 +523,13 @@ mod tests {
         assert!(wgsl!("shared/groups").contains(&group));
         let run = format!("RUN: u32 = {}u;", crate::cull::GROUPS_OF_RUN);
         assert!(wgsl!("shared/groups").contains(&run));
-        let survivors = format!("SURVIVORS_PER_ROW_LOG2: u32 = {}u;", crate::visible::SURVIVORS_PER_ROW.ilog2());
+        let survivors = format!(
+            "SURVIVORS_PER_ROW_LOG2: u32 = {}u;",
+            crate::visible::SURVIVORS_PER_ROW.ilog2()
+        );
         assert!(wgsl!("shared/groups").contains(&survivors));
-        let per_row = format!("RECORDS_PER_ROW_LOG2: u32 = {}u;", crate::records::RECORDS_PER_ROW.ilog2());
+        let per_row =
+            format!("RECORDS_PER_ROW_LOG2: u32 = {}u;", crate::records::RECORDS_PER_ROW.ilog2());
         assert!(wgsl!("shared/record_layout").contains(&per_row));
     }
 }

@@ -5,8 +5,8 @@ use std::thread::{Builder, scope};
 
 use crate::error::Result;
 
-/// Runs `work` on both halves of something at the same time; one after the other where memory has no room for a thread, and on this
-/// thread alone where there is no first half.
+/// Runs `work` on both halves of something at the same time; one after the other where memory has
+/// no room for a thread, and on this thread alone where there is no first half.
 pub(crate) fn on_two_threads<T: Send>(
     first: Option<T>,
     second: T,
@@ -19,7 +19,8 @@ pub(crate) fn on_two_threads<T: Send>(
         half.map_or(Ok(()), &work)
     };
     scope(|scope| {
-        let thread = if is_split { Builder::new().spawn_scoped(scope, run_first).ok() } else { None };
+        let thread =
+            if is_split { Builder::new().spawn_scoped(scope, run_first).ok() } else { None };
         let result = work(second);
         let other = match thread {
             Some(thread) => thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
@@ -51,6 +52,8 @@ mod tests {
         .unwrap();
         assert_eq!(numbers, [2; 7]);
         let bad = |half| if half == 5 { Err(Error::invalid("half", "5")) } else { Ok(()) };
-        assert!(on_two_threads(Some(5), 6, bad).is_err() && on_two_threads(Some(6), 5, bad).is_err());
+        assert!(
+            on_two_threads(Some(5), 6, bad).is_err() && on_two_threads(Some(6), 5, bad).is_err()
+        );
     }
 }

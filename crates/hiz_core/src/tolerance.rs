@@ -8,7 +8,8 @@ use crate::view::EPS;
 /// the stored one, and `absolute` more.
 ///
 /// It says what rounding to a format may lose, in either direction, and what reading the stored
-/// number back as float32 may lose. What computed the depth errs beside that;
+/// number back as float32 may lose.
+/// What computed the depth errs beside that;
 /// [`CullOptions::depth_slack`](crate::CullOptions::depth_slack) and
 /// [`depth_slack_abs`](crate::CullOptions::depth_slack_abs) are for that, and every cull counts
 /// both.
@@ -21,25 +22,27 @@ pub struct DepthTolerance {
 }
 
 impl DepthTolerance {
-    /// Nothing is lost: depth that is stored as it was given, or was rounded towards far. Of
-    /// float32 formats, too: what rounding to float32 loses is what `depth_slack` covers by
+    /// Nothing is lost: depth that is stored as it was given, or was rounded towards far.
+    /// Of float32 formats, too: what rounding to float32 loses is what `depth_slack` covers by
     /// default.
     pub const NONE: Self = Self { relative: 0.0, absolute: 0.0 };
 
-    /// Half floats: 2^-10 relative and 2^-24 absolute, a spacing of theirs. Vulkan lets a driver
-    /// take either neighbour.
+    /// Half floats: 2^-10 relative and 2^-24 absolute, a spacing of theirs.
+    /// Vulkan lets a driver take either neighbour.
     pub const HALF: Self = Self { relative: 1.0 / 1024.0, absolute: 1.0 / 16_777_216.0 };
 
-    /// float32 that was rounded to nearest: half a spacing. For NDC depth `depth_slack` covers it by
-    /// default; a metric depth is rounded before it is converted, and near the near plane a share of
-    /// the converted one would be too little.
+    /// float32 that was rounded to nearest: half a spacing.
+    /// For NDC depth `depth_slack` covers it by default; a metric depth is rounded before it is
+    /// converted, and near the near plane a share of the converted one would be too little.
     pub const SINGLE: Self = Self { relative: 0.5 * EPS, absolute: f32::MIN_POSITIVE as f64 * EPS };
 
     /// Of a format that a pyramid can be built from; `None` for others.
     ///
-    /// `Depth16Unorm`: 1/65535 absolute. `Depth24Plus` and `Depth24PlusStencil8`: 1/(2^24 - 1)
-    /// absolute, which holds for float32 as well, in which a driver without 24 bits keeps them.
-    /// Both: 2^-22 relative for the way back to float32. `R16Float`: [`DepthTolerance::HALF`].
+    /// `Depth16Unorm`: 1/65535 absolute.
+    /// `Depth24Plus` and `Depth24PlusStencil8`: 1/(2^24 - 1) absolute, which holds for float32 as
+    /// well, in which a driver without 24 bits keeps them.
+    /// Both: 2^-22 relative for the way back to float32.
+    /// `R16Float`: [`DepthTolerance::HALF`].
     /// `Depth32Float`, `Depth32FloatStencil8`, `R32Float` and `Rgba32Uint`:
     /// [`DepthTolerance::NONE`].
     pub fn of(format: wgpu::TextureFormat) -> Option<Self> {
@@ -48,9 +51,10 @@ impl DepthTolerance {
             Format::Depth16Unorm => Some(Self::fixed_point(16)),
             Format::Depth24Plus | Format::Depth24PlusStencil8 => Some(Self::fixed_point(24)),
             Format::R16Float => Some(Self::HALF),
-            Format::Depth32Float | Format::Depth32FloatStencil8 | Format::R32Float | Format::Rgba32Uint => {
-                Some(Self::NONE)
-            }
+            Format::Depth32Float
+            | Format::Depth32FloatStencil8
+            | Format::R32Float
+            | Format::Rgba32Uint => Some(Self::NONE),
             _ => None,
         }
     }
@@ -77,9 +81,14 @@ impl DepthTolerance {
     }
 
     pub(crate) fn checked(self) -> Result<Self> {
-        for (name, value) in [("tolerance.relative", self.relative), ("tolerance.absolute", self.absolute)] {
+        for (name, value) in
+            [("tolerance.relative", self.relative), ("tolerance.absolute", self.absolute)]
+        {
             if !(0.0..=0.5).contains(&value) {
-                return Err(Error::invalid(name, format!("expected a number in 0..=0.5, got {value}")));
+                return Err(Error::invalid(
+                    name,
+                    format!("expected a number in 0..=0.5, got {value}"),
+                ));
             }
         }
         Ok(self)
@@ -103,10 +112,21 @@ mod tests {
         };
         let of = |format| DepthTolerance::of(format).expect("a source");
         assert!(close(of(Format::Depth16Unorm), 65_535.0));
-        assert!(close(of(Format::Depth24Plus), 16_777_215.0) && close(of(Format::Depth24PlusStencil8), 16_777_215.0));
+        assert!(
+            close(of(Format::Depth24Plus), 16_777_215.0)
+                && close(of(Format::Depth24PlusStencil8), 16_777_215.0)
+        );
         assert_eq!(of(Format::Depth16Unorm).relative, 2.0_f64.powi(-22));
-        assert_eq!(of(Format::R16Float), DepthTolerance { relative: 2.0_f64.powi(-10), absolute: 2.0_f64.powi(-24) });
-        for format in [Format::Depth32Float, Format::Depth32FloatStencil8, Format::R32Float, Format::Rgba32Uint] {
+        assert_eq!(
+            of(Format::R16Float),
+            DepthTolerance { relative: 2.0_f64.powi(-10), absolute: 2.0_f64.powi(-24) }
+        );
+        for format in [
+            Format::Depth32Float,
+            Format::Depth32FloatStencil8,
+            Format::R32Float,
+            Format::Rgba32Uint,
+        ] {
             assert_eq!(of(format), DepthTolerance::NONE);
         }
         assert_eq!(DepthTolerance::of(Format::Rgba8Unorm), None);
@@ -117,8 +137,10 @@ mod tests {
     /// nearer than by both in turn.
     #[test]
     fn tolerances_add_up_one_after_the_other() {
-        let (format, caller) =
-            (DepthTolerance { relative: 0.001, absolute: 0.25 }, DepthTolerance { relative: 0.5, absolute: 0.125 });
+        let (format, caller) = (
+            DepthTolerance { relative: 0.001, absolute: 0.25 },
+            DepthTolerance { relative: 0.5, absolute: 0.125 },
+        );
         let both = format.after(caller);
         for stored in [0.0, 0.1, 0.5, 1.0] {
             let in_turn = (stored * 1.001 + 0.25) * 1.5 + 0.125;
@@ -137,20 +159,26 @@ mod tests {
     fn metric_halves_are_moved_before_they_are_converted() {
         let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, 1.0], up: [0.0, 1.0, 0.0] };
         for convention in [DepthConvention::Standard, DepthConvention::Reversed] {
-            let projection = Projection::Perspective { fov_y: 1.0, near: 1.0, far: Some(9.0), convention };
+            let projection =
+                Projection::Perspective { fov_y: 1.0, near: 1.0, far: Some(9.0), convention };
             let camera = Camera::look_at(&pose, &projection, ImageSize::new(2, 2)).unwrap();
             // Before the near plane, beyond the far one, and what is no depth at all stay far.
             let image = [3.0, 0.9999, 8.999, f64::NAN];
             for kind in [DepthKind::Z, DepthKind::Distance] {
                 let within = |image: &[f64], scale, tolerance| {
-                    ndc_from_kind_within(Floats::F64(image), kind, scale, &[], &camera, tolerance).unwrap()
+                    ndc_from_kind_within(Floats::F64(image), kind, scale, &[], &camera, tolerance)
+                        .unwrap()
                 };
                 let moved = 3.0 * (1.0 + 1.0 / 1024.0) + 1.0 / 16_777_216.0;
                 let (truth, _) = within(&[moved; 4], 1.0, DepthTolerance::NONE);
                 let (ndc, left) = within(&image, 1.0, DepthTolerance::HALF);
                 assert_eq!(left, DepthTolerance::NONE);
-                let farther = if convention.is_reversed() { truth[0] - ndc[0] } else { ndc[0] - truth[0] };
-                assert!((0.0..1e-6).contains(&farther), "{convention:?} {kind:?}: {ndc:?} {truth:?}");
+                let farther =
+                    if convention.is_reversed() { truth[0] - ndc[0] } else { ndc[0] - truth[0] };
+                assert!(
+                    (0.0..1e-6).contains(&farther),
+                    "{convention:?} {kind:?}: {ndc:?} {truth:?}"
+                );
                 assert_eq!(ndc[3], convention.far());
                 if kind == DepthKind::Z {
                     assert_eq!(ndc[1..3], [convention.far(); 2], "{convention:?}");

@@ -1,9 +1,12 @@
-//! New bounds for some of the instances, which keep their places: records are replaced, the boxes of their groups follow.
+//! New bounds for some of the instances, which keep their places: records are replaced, the boxes
+//! of their groups follow.
 //!
-//! Recording is not running: an update that is dropped, or that runs in another order than it was recorded in, would leave the
-//! device with other volumes than the host formed the next boxes for, and a box must contain its members. So updates are numbered:
-//! the device counts those that ran, and where the numbers part the boxes of all groups that are touched from then on become no
-//! volume (their members are always tested one by one).
+//! Recording is not running: an update that is dropped, or that runs in another order than it was
+//! recorded in, would leave the device with other volumes than the host formed the next boxes for,
+//! and a box must contain its members.
+//! So updates are numbered: the device counts those that ran, and where the numbers part the boxes
+//! of all groups that are touched from then on become no volume (their members are always tested
+//! one by one).
 
 use std::ops::Range;
 
@@ -15,7 +18,8 @@ use crate::instances::{Instances, refuse_bad, write_boxes};
 use crate::pyramid::entry;
 use crate::records::Records;
 
-/// Invocations of one workgroup; `shaders/update.wgsl`. As many as those of the cull, whose pieces fit one dispatch.
+/// Invocations of one workgroup; `shaders/update.wgsl`.
+/// As many as those of the cull, whose pieces fit one dispatch.
 const WORKGROUP: u32 = crate::layout::CULL_WORKGROUP;
 
 /// `shaders/update.wgsl`, `Update`.
@@ -54,12 +58,17 @@ pub(crate) fn record(
             format!("expected the instances' kind, {:?}, got {:?}", instances.kind, bounds.kind()),
         ));
     }
-    let room = instances
-        .len()
-        .checked_sub(first)
-        .ok_or_else(|| Error::invalid("first", format!("expected a number in 0..={}, got {first}", instances.len())))?;
+    let room = instances.len().checked_sub(first).ok_or_else(|| {
+        Error::invalid(
+            "first",
+            format!("expected a number in 0..={}, got {first}", instances.len()),
+        )
+    })?;
     if n > room as usize {
-        return Err(Error::invalid("bounds", format!("expected at most {room} from instance {first} on, got {n}")));
+        return Err(Error::invalid(
+            "bounds",
+            format!("expected at most {room} from instance {first} on, got {n}"),
+        ));
     }
     if strict {
         let mut record = vec![0; instances.kind.record_bytes() as usize];
@@ -101,7 +110,8 @@ pub(crate) fn record(
                 return Ok(());
             }
             let base = piece.range.start;
-            let places = piece.order.places((here.start - base) as usize..(here.end - base) as usize)?;
+            let places =
+                piece.order.places((here.start - base) as usize..(here.end - base) as usize)?;
             let offset = base as usize;
             let source = |place: usize| {
                 let index = piece.order.index(place);
@@ -111,30 +121,44 @@ pub(crate) fn record(
             let groups = &mut changing.groups[p];
             let staging = wgpu::BufferUsages::STORAGE;
             for places in bands(&places, record_bytes, gpu.limits()) {
-                let (fresh, touched) =
-                    gpu.written("hiz.update.records", places.len() as u64 * record_bytes, staging, |records| {
-                        groups.replace(bounds, places, source, records)
-                    })?;
-                dispatch(&Replacement { places, fresh, target: &piece.records }, "replace_records")?;
+                let (fresh, touched) = gpu.written(
+                    "hiz.update.records",
+                    places.len() as u64 * record_bytes,
+                    staging,
+                    |records| groups.replace(bounds, places, source, records),
+                )?;
+                dispatch(
+                    &Replacement { places, fresh, target: &piece.records },
+                    "replace_records",
+                )?;
                 let bytes = (touched.len() * size_of::<BoxRecord>()) as u64;
                 let (fresh, ()) = gpu.written("hiz.update.groups", bytes, staging, |boxes| {
                     write_boxes(boxes, touched.iter().map(|group| groups.record(*group as usize)))
                 })?;
-                dispatch(&Replacement { places: &touched, fresh, target: &piece.group_records }, "replace_groups")?;
+                dispatch(
+                    &Replacement { places: &touched, fresh, target: &piece.group_records },
+                    "replace_groups",
+                )?;
             }
             Ok(())
         })
     });
     if result.is_err() {
-        // The host may have taken a part. No number of the device will agree with it any more.
+        // The host may have taken a part.
+        // No number of the device will agree with it any more.
         changing.next_update = changing.next_update.wrapping_add(1);
     }
     result
 }
 
-/// `places`, ascending, in bands whose new records one storage binding holds. (A piece may hold
-/// more: its own records lie in a texture.) No group is in two of them.
-fn bands<'a>(places: &'a [u32], record_bytes: u64, limits: &wgpu::Limits) -> impl Iterator<Item = &'a [u32]> {
+/// `places`, ascending, in bands whose new records one storage binding holds.
+/// (A piece may hold more: its own records lie in a texture.)
+/// No group is in two of them.
+fn bands<'a>(
+    places: &'a [u32],
+    record_bytes: u64,
+    limits: &wgpu::Limits,
+) -> impl Iterator<Item = &'a [u32]> {
     let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
     let most = u32::try_from(bytes / record_bytes).unwrap_or(u32::MAX);
     let step = (most / GROUP as u32).max(1).saturating_mul(GROUP as u32);
@@ -147,11 +171,18 @@ fn bands<'a>(places: &'a [u32], record_bytes: u64, limits: &wgpu::Limits) -> imp
     })
 }
 
-fn bind(gpu: &Gpu, instances: &Instances, replacement: &Replacement<'_>, number: u32) -> Result<wgpu::BindGroup> {
+fn bind(
+    gpu: &Gpu,
+    instances: &Instances,
+    replacement: &Replacement<'_>,
+    number: u32,
+) -> Result<wgpu::BindGroup> {
     let Replacement { places, fresh, target } = replacement;
-    let uniform = UpdateUniform { count: places.len() as u32, texels: target.texels(), number, padding: 0 };
+    let uniform =
+        UpdateUniform { count: places.len() as u32, texels: target.texels(), number, padding: 0 };
     let uniform = gpu.uniform("hiz.update.uniform", &uniform)?;
-    let places = gpu.filled("hiz.update.places", bytemuck::cast_slice(places), wgpu::BufferUsages::STORAGE)?;
+    let places =
+        gpu.filled("hiz.update.places", bytemuck::cast_slice(places), wgpu::BufferUsages::STORAGE)?;
     gpu.bind_group(
         "hiz.update.piece",
         &gpu.layouts().update,

@@ -1,24 +1,31 @@
-//! From a float64 camera to what the cull shader reads: float32 rows about a reference point, with magnitude rows that bound
-//! every rounding. All of it in float64 on the host, once a camera.
+//! From a float64 camera to what the cull shader reads: float32 rows about a reference point, with
+//! magnitude rows that bound every rounding.
+//! All of it in float64 on the host, once a camera.
 //!
-//! The certificates compare linear functions of the position. Written about the eye, with the depth row relative to w
-//! (`z = A w + Z'`), their rounding errors are proportional to the *distance* instead of the world coordinates: margins come
-//! out near 1e-5 of the distance. Parallel rays have no eye: theirs is the distance from a point that is likely to be near. The magnitude rows carry the share that each coefficient can contribute to an error, in
-//! units of float32's eps; the shader multiplies them by the instance's own magnitudes.
+//! The certificates compare linear functions of the position.
+//! Written about the eye, with the depth row relative to w (`z = A w + Z'`), their rounding errors
+//! are proportional to the *distance* instead of the world coordinates: margins come out near 1e-5
+//! of the distance.
+//! Parallel rays have no eye: theirs is the distance from a point that is likely to be near.
+//! The magnitude rows carry the share that each coefficient can contribute to an error, in units of
+//! float32's eps; the shader multiplies them by the instance's own magnitudes.
 
 use crate::camera::{Camera, Mat3, Mat4, Vec3, dot, solve3, sub};
 use crate::error::{Error, Result};
 
-/// float32's spacing at 1: WGSL calls a result "correctly rounded" when it is off by less than this, up or down.
+/// float32's spacing at 1: WGSL calls a result "correctly rounded" when it is off by less than
+/// this, up or down.
 pub(crate) const EPS: f64 = 1.0 / 8_388_608.0; // 2^-23
 
 /// Half a spacing of float64 at 1: the relative error of one rounding on the host.
 const ROUNDING: f64 = f64::EPSILON / 2.0;
 
-/// The certificates' margin in eps, `docs/accuracy.md`, section "Counting the roundings". The shader's `ERROR_ULPS`.
+/// The certificates' margin in eps, `docs/accuracy.md`, section "Counting the roundings".
+/// The shader's `ERROR_ULPS`.
 pub const ERROR_ULPS: f64 = 24.0;
 
-/// A linear function of the position about the reference point: `m . d + m3`, and the magnitudes that bound its error.
+/// A linear function of the position about the reference point: `m . d + m3`, and the magnitudes
+/// that bound its error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Row {
     /// Three linear coefficients and the constant.
@@ -44,12 +51,14 @@ pub(crate) struct ViewRows {
     pub(crate) eye_hi: [f32; 3],
     /// See `eye_hi`.
     pub(crate) eye_lo: [f32; 3],
-    /// Instances whose magnitudes reach this far are invalid for this camera: products could overflow float32.
+    /// Instances whose magnitudes reach this far are invalid for this camera: products could
+    /// overflow float32.
     pub(crate) coordinate_limit: f32,
 }
 
 impl ViewRows {
-    /// Rounds `camera` to float32. `transform_slack` is kappa: how many eps of `sum |M| |p|` another renderer's own transform
+    /// Rounds `camera` to float32.
+    /// `transform_slack` is kappa: how many eps of `sum |M| |p|` another renderer's own transform
     /// may have cost the depth image (0: the depth is exact for these matrices).
     pub(crate) fn new(camera: &Camera, transform_slack: f64) -> Result<Self> {
         let rows = camera.rows_near_one();
@@ -62,8 +71,10 @@ impl ViewRows {
         let x = about_eye(0).scaled(f64::from(size.width) / 2.0);
         let y = about_eye(1).scaled(-f64::from(size.height) / 2.0);
         let w = about_eye(3);
-        // About the eye: what of z is proportional to w. Elsewhere: the depth of that point, so that Z' and `d - A` are small near it.
-        let slope = if is_eye { dot(z_lin, w_lin) / dot(w_lin, w_lin) } else { about_eye(2).m[3] / w.m[3] };
+        // About the eye: what of z is proportional to w.
+        // Elsewhere: the depth of that point, so that Z' and `d - A` are small near it.
+        let slope =
+            if is_eye { dot(z_lin, w_lin) / dot(w_lin, w_lin) } else { about_eye(2).m[3] / w.m[3] };
         #[expect(
             clippy::cast_possible_truncation,
             reason = "rounding to float32 is the point; what it leaves over stays in Z'"
@@ -90,7 +101,8 @@ impl ViewRows {
                 ),
             ));
         }
-        let coordinate_limit = 2.0_f64.powf((58.0 - linear_limit.log2()).floor()).min(2.0_f64.powi(50));
+        let coordinate_limit =
+            2.0_f64.powf((58.0 - linear_limit.log2()).floor()).min(2.0_f64.powi(50));
         if coordinate_limit < 1.0 {
             return Err(Error::invalid(
                 "camera",
@@ -114,18 +126,23 @@ pub(crate) struct ClipRows {
 impl ClipRows {
     /// Rounds `camera`'s rows to float32, with w scaled to be near 1.
     pub(crate) fn new(camera: &Camera) -> Result<Self> {
-        // The cull's own view decides what float32 can hold: what it refuses is not worth drawing either.
+        // The cull's own view decides what float32 can hold: what it refuses is not worth drawing
+        // either.
         ViewRows::new(camera, 0.0)?;
         let Reference { hi: eye_hi, lo: eye_lo, point: eye, .. } = Reference::of(camera);
-        let rows = camera.rows_near_one().map(|row| Affine::about(eye, row, camera.origin()).rounded(0.0).m);
+        let rows = camera
+            .rows_near_one()
+            .map(|row| Affine::about(eye, row, camera.origin()).rounded(0.0).m);
         Ok(Self { rows, eye_hi, eye_lo })
     }
 }
 
-/// The point that a camera's float32 rows stand about. Any would be *valid*; one near what is tested makes the margins small, for
-/// they are proportional to the distance from it.
+/// The point that a camera's float32 rows stand about.
+/// Any would be *valid*; one near what is tested makes the margins small, for they are proportional
+/// to the distance from it.
 struct Reference {
-    /// The two halves add up to the point without rounding: `lo` holds bits of a float64 below those of `hi`.
+    /// The two halves add up to the point without rounding: `lo` holds bits of a float64 below
+    /// those of `hi`.
     hi: [f32; 3],
     lo: [f32; 3],
     point: Vec3,
@@ -136,8 +153,8 @@ struct Reference {
 impl Reference {
     /// A point of the image's middle axis (x = y = 0).
     ///
-    /// - Perspective: the eye, where w = 0; the near plane where the far one is not twice as far away, so that all that is seen is nearer to
-    ///   it than to the eye.
+    /// - Perspective: the eye, where w = 0; the near plane where the far one is not twice as far
+    ///   away, so that all that is seen is nearer to it than to the eye.
     /// - Parallel rays: [`depth_of_interest`].
     /// - The world's origin where no such point can be found.
     fn of(camera: &Camera) -> Self {
@@ -153,7 +170,11 @@ impl Reference {
             let (eye, ahead) = (middle(3, 0.0), middle(3, 1.0));
             // Along the axis z grows from the eye's by so much for each w.
             let near = eye.zip(ahead).and_then(|(eye, ahead)| {
-                near_of_thin_range(depth(eye), depth(ahead) - depth(eye), camera.convention().is_reversed())
+                near_of_thin_range(
+                    depth(eye),
+                    depth(ahead) - depth(eye),
+                    camera.convention().is_reversed(),
+                )
             });
             match near {
                 Some(w) => (middle(3, w), false),
@@ -162,14 +183,16 @@ impl Reference {
         };
         let origin = camera.origin();
         let point: Vec3 = std::array::from_fn(|k| origin[k] + relative.unwrap_or([0.0; 3])[k]);
-        // Beyond 2^60 the shader would call everything invalid; the origin is as good as any point there.
+        // Beyond 2^60 the shader would call everything invalid; the origin is as good as any point
+        // there.
         let point = if point.iter().all(|v| v.abs() < 2.0_f64.powi(60)) { point } else { [0.0; 3] };
         let (hi, lo) = split3(point);
         Self { hi, lo, point: std::array::from_fn(|k| f64::from(hi[k]) + f64::from(lo[k])), is_eye }
     }
 }
 
-/// w at the near plane, where at the far plane it is less than twice that. Depth is `slope + at_eye / w`.
+/// w at the near plane, where at the far plane it is less than twice that.
+/// Depth is `slope + at_eye / w`.
 fn near_of_thin_range(at_eye: f64, slope: f64, reversed: bool) -> Option<f64> {
     let (at_zero, at_one) = (-at_eye / slope, at_eye / (1.0 - slope));
     let (near, far) = if reversed { (at_one, at_zero) } else { (at_zero, at_one) };
@@ -177,14 +200,17 @@ fn near_of_thin_range(at_eye: f64, slope: f64, reversed: bool) -> Option<f64> {
     (near > 0.0 && near < far && far < 2.0 * near).then_some(near)
 }
 
-/// The z around which a camera with parallel rays is likely to see most: where its eye stands, or at the plane next to it where that is
-/// outside the camera's range. A bare matrix does not say where the eye is: there it is the world's origin, if that is in
-/// view, or else the near plane, in either convention.
+/// The z around which a camera with parallel rays is likely to see most: where its eye stands, or
+/// at the plane next to it where that is outside the camera's range.
+/// A bare matrix does not say where the eye is: there it is the world's origin, if that is in view,
+/// or else the near plane, in either convention.
 fn depth_of_interest(camera: &Camera, rows: &Mat4) -> f64 {
     let [x, y, z, w] = rows.map(|row| row[3]);
-    // The rows stand about the origin, and the constants are its clip coordinates. w is not 0: no NaN.
+    // The rows stand about the origin, and the constants are its clip coordinates. w is not 0: no
+    // NaN.
     let ratios = [x / w, y / w, z / w];
-    let in_view = ratios[0].abs() <= 1.0 && ratios[1].abs() <= 1.0 && (0.0..=1.0).contains(&ratios[2]);
+    let in_view =
+        ratios[0].abs() <= 1.0 && ratios[1].abs() <= 1.0 && (0.0..=1.0).contains(&ratios[2]);
     let near = if camera.convention().is_reversed() { 1.0 } else { 0.0 };
     w * if camera.is_posed() || in_view { ratios[2].clamp(0.0, 1.0) } else { near }
 }
@@ -215,7 +241,9 @@ pub(crate) fn round_up(v: f64) -> f32 {
     if f64::from(nearest) < v { nearest.next_up() } else { nearest }
 }
 
-/// A row in float64, what is known about its errors, and the world-space sizes that kappa multiplies. Index 3: the constant.
+/// A row in float64, what is known about its errors, and the world-space sizes that kappa
+/// multiplies.
+/// Index 3: the constant.
 #[derive(Debug, Clone, Copy)]
 struct Affine {
     m: [f64; 4],
@@ -224,14 +252,17 @@ struct Affine {
 }
 
 impl Affine {
-    /// `row` (about `origin`) about `eye`. The linear part is exact; the constant is evaluated at the eye, and 8 roundings
-    /// of float64 cover its subtraction, three products and three sums with room.
+    /// `row` (about `origin`) about `eye`.
+    /// The linear part is exact; the constant is evaluated at the eye, and 8 roundings of float64
+    /// cover its subtraction, three products and three sums with room.
     fn about(eye: Vec3, row: [f64; 4], origin: Vec3) -> Self {
         let lin = [row[0], row[1], row[2]];
         let from_origin = sub(eye, origin);
         let travelled: f64 = (0..3).map(|k| lin[k].abs() * (eye[k].abs() + origin[k].abs())).sum();
-        // kappa: |p| <= |d| + |eye|, and the renderer's own constant is the one about the world's origin.
-        let world: f64 = (0..3).map(|k| lin[k].abs() * eye[k].abs()).sum::<f64>() + (row[3] - dot(lin, origin)).abs();
+        // kappa: |p| <= |d| + |eye|, and the renderer's own constant is the one about the world's
+        // origin.
+        let world: f64 = (0..3).map(|k| lin[k].abs() * eye[k].abs()).sum::<f64>()
+            + (row[3] - dot(lin, origin)).abs();
         Self {
             m: [lin[0], lin[1], lin[2], dot(lin, from_origin) + row[3]],
             error: [0.0, 0.0, 0.0, 8.0 * ROUNDING * (travelled + row[3].abs())],
@@ -262,8 +293,12 @@ impl Affine {
         }
     }
 
-    /// Rounds to float32 and forms the magnitudes: `a >= |m|`, and `a * eps >=` the coefficient's own error.
-    #[expect(clippy::cast_possible_truncation, reason = "rounding to float32 is the point; the magnitude bounds it")]
+    /// Rounds to float32 and forms the magnitudes: `a >= |m|`, and `a * eps >=` the coefficient's
+    /// own error.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "rounding to float32 is the point; the magnitude bounds it"
+    )]
     fn rounded(&self, transform_slack: f64) -> Row {
         let kappa = transform_slack / ERROR_ULPS;
         let m = self.m.map(|v| flushed(v as f32));
@@ -282,7 +317,8 @@ mod tests {
     use crate::camera::{DepthConvention, ImageSize, Pose, Projection};
 
     fn camera(eye: Vec3, near: f64, far: Option<f64>, convention: DepthConvention) -> Camera {
-        let pose = Pose { eye, target: [eye[0] + 1.0, eye[1] + 2.0, eye[2] - 3.0], up: [0.0, 1.0, 0.0] };
+        let pose =
+            Pose { eye, target: [eye[0] + 1.0, eye[1] + 2.0, eye[2] - 3.0], up: [0.0, 1.0, 0.0] };
         let projection = Projection::Perspective { fov_y: 1.0, near, far, convention };
         Camera::look_at(&pose, &projection, ImageSize::new(641, 359)).unwrap()
     }
@@ -309,17 +345,26 @@ mod tests {
         sub(a, b).iter().all(|v| v.abs() < 1e-9)
     }
 
-    /// A far plane less than twice as far away as the near one: the near one's middle, and its depth. The eye is at (0, 0, 5).
+    /// A far plane less than twice as far away as the near one: the near one's middle, and its
+    /// depth.
+    /// The eye is at (0, 0, 5).
     #[test]
     fn thin_ranges_are_measured_from_their_near_plane() {
         let pose = Pose { eye: [0.0, 0.0, 5.0], target: [0.0; 3], up: [0.0, 1.0, 0.0] };
         for convention in [DepthConvention::Standard, DepthConvention::Reversed] {
-            for (near, far, z) in
-                [(64.0, Some(127.0), -59.0), (64.0, Some(129.0), 5.0), (64.0, None, 5.0), (1.0, Some(1e3), 5.0)]
-            {
+            for (near, far, z) in [
+                (64.0, Some(127.0), -59.0),
+                (64.0, Some(129.0), 5.0),
+                (64.0, None, 5.0),
+                (1.0, Some(1e3), 5.0),
+            ] {
                 let projection = Projection::Perspective { fov_y: 1.0, near, far, convention };
                 let posed = Camera::look_at(&pose, &projection, ImageSize::new(8, 8)).unwrap();
-                let bare = Camera::from_clip_from_world(posed.clip_from_world(), ImageSize::new(8, 8), convention);
+                let bare = Camera::from_clip_from_world(
+                    posed.clip_from_world(),
+                    ImageSize::new(8, 8),
+                    convention,
+                );
                 for camera in [posed, bare.unwrap()] {
                     let view = ViewRows::new(&camera, 0.0).unwrap();
                     assert!(close(point(&view), [0.0, 0.0, z]), "{near} {far:?}: {view:?}");
@@ -337,18 +382,27 @@ mod tests {
         }
     }
 
-    /// Parallel rays: the reference point by hand. The eye is at (0, 0, 5), and looks along -z.
+    /// Parallel rays: the reference point by hand.
+    /// The eye is at (0, 0, 5), and looks along -z.
     #[test]
     fn parallel_rays_are_measured_from_where_things_are() {
         let pose = Pose { eye: [0.0, 0.0, 5.0], target: [0.0; 3], up: [0.0, 1.0, 0.0] };
         for convention in [DepthConvention::Standard, DepthConvention::Reversed] {
             let camera = |near, far, beside: f64| {
                 let (left, right) = (beside - 2.0, beside + 2.0);
-                let projection =
-                    Projection::Orthographic { left, right, bottom: -2.0, top: 2.0, near, far, convention };
+                let projection = Projection::Orthographic {
+                    left,
+                    right,
+                    bottom: -2.0,
+                    top: 2.0,
+                    near,
+                    far,
+                    convention,
+                };
                 Camera::look_at(&pose, &projection, ImageSize::new(8, 8)).unwrap()
             };
-            // View depths of the planes, the image's middle beside the eye, and the point's z: the eye's, or the next plane's.
+            // View depths of the planes, the image's middle beside the eye, and the point's z: the
+            // eye's, or the next plane's.
             for (near, far, beside, z) in [
                 (0.0, 1024.0, 0.0, 5.0),
                 (1.0, 1024.0, 0.0, 4.0),
@@ -362,14 +416,22 @@ mod tests {
                 // Its depth is A, and nothing is left of it in Z'.
                 let depth = (5.0 - z - near) / (far - near);
                 let depth = if convention.is_reversed() { 1.0 - depth } else { depth };
-                assert!((f64::from(view.z_slope) - depth).abs() < 1e-7 && view.z.m[3].abs() < 1e-7, "{view:?}");
+                assert!(
+                    (f64::from(view.z_slope) - depth).abs() < 1e-7 && view.z.m[3].abs() < 1e-7,
+                    "{view:?}"
+                );
             }
-            // A bare matrix: the world's origin where it is in view, at view depth 5; or else the near plane.
-            for (near, far, beside, z) in
-                [(1.0, 1024.0, 0.0, 0.0), (1.0, 1024.0, 8.0, 4.0), (8.0, 1024.0, 0.0, -3.0), (1.0, 2.0, 0.0, 4.0)]
-            {
+            // A bare matrix: the world's origin where it is in view, at view depth 5; or else the
+            // near plane.
+            for (near, far, beside, z) in [
+                (1.0, 1024.0, 0.0, 0.0),
+                (1.0, 1024.0, 8.0, 4.0),
+                (8.0, 1024.0, 0.0, -3.0),
+                (1.0, 2.0, 0.0, 4.0),
+            ] {
                 let m = camera(near, far, beside).clip_from_world();
-                let bare = Camera::from_clip_from_world(m, ImageSize::new(8, 8), convention).unwrap();
+                let bare =
+                    Camera::from_clip_from_world(m, ImageSize::new(8, 8), convention).unwrap();
                 let found = point(&ViewRows::new(&bare, 0.0).unwrap());
                 assert!(close(found, [beside, 0.0, z]), "{near} {far} {beside}: {found:?}");
             }
@@ -382,11 +444,15 @@ mod tests {
         let eye = [1.0e9 + 0.1, -3.0e8 + 0.7, 1.0e7 + 1.0 / 3.0];
         let camera = camera(eye, 0.1, None, DepthConvention::Reversed);
         let view = ViewRows::new(&camera, 0.0).unwrap();
-        let offset: Vec3 = std::array::from_fn(|k| f64::from(view.eye_hi[k]) + f64::from(view.eye_lo[k]) - eye[k]);
+        let offset: Vec3 =
+            std::array::from_fn(|k| f64::from(view.eye_hi[k]) + f64::from(view.eye_lo[k]) - eye[k]);
         for (row, r, scale) in [(view.x, 0, 320.5), (view.y, 1, -179.5), (view.w, 3, 1.0)] {
             let [a, b, c, _] = camera.rows_near_one()[r];
             let expected = scale * dot([a, b, c], offset);
-            assert!(expected.abs() > 1e-9 && (f64::from(row.m[3]) / expected - 1.0).abs() < 1e-3, "{row:?} {expected}");
+            assert!(
+                expected.abs() > 1e-9 && (f64::from(row.m[3]) / expected - 1.0).abs() < 1e-3,
+                "{row:?} {expected}"
+            );
         }
     }
 
@@ -399,7 +465,8 @@ mod tests {
                 assert!(row.a[k] >= row.m[k].abs());
             }
         }
-        // Z' carries the near plane in its constant: -f n / (f - n) up to the power of two, and next to nothing in its linear part.
+        // Z' carries the near plane in its constant: -f n / (f - n) up to the power of two, and
+        // next to nothing in its linear part.
         assert!(view.z.m[..3].iter().all(|v| v.abs() < 1e-6));
         assert!(view.z.m[3] < 0.0);
         // kappa adds kappa / 24 of the world-space size, never less.
@@ -407,7 +474,8 @@ mod tests {
         assert!(slack.z.a.iter().zip(view.z.a).all(|(a, b)| *a > b));
     }
 
-    /// A matrix means the same times any positive number, down to where its products leave float64's range.
+    /// A matrix means the same times any positive number, down to where its products leave
+    /// float64's range.
     #[test]
     fn the_scale_of_the_matrix_does_not_matter() {
         for convention in [DepthConvention::Standard, DepthConvention::Reversed] {
@@ -416,7 +484,8 @@ mod tests {
             for power in [-1000, -500, -1, 1, 500, 990] {
                 let scale = 2.0_f64.powi(power);
                 let m = camera.rows().map(|r| r.map(|v| v * scale));
-                let scaled = Camera::from_rows(m, camera.origin(), camera.size(), convention).unwrap();
+                let scaled =
+                    Camera::from_rows(m, camera.origin(), camera.size(), convention).unwrap();
                 assert_eq!(ViewRows::new(&scaled, 1.0).unwrap(), rows, "2^{power}");
             }
         }
@@ -424,14 +493,23 @@ mod tests {
 
     #[test]
     fn rows_that_float32_cannot_hold_are_refused() {
-        let m = [[1e30, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
-        let camera = Camera::from_clip_from_world(m, ImageSize::new(8, 8), DepthConvention::Standard).unwrap();
+        let m = [
+            [1e30, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+        ];
+        let camera =
+            Camera::from_clip_from_world(m, ImageSize::new(8, 8), DepthConvention::Standard)
+                .unwrap();
         assert!(ViewRows::new(&camera, 0.0).unwrap_err().to_string().contains("2^34"));
         // Half an image of 8 pixels is 4 times the coefficient.
         for (exponent, held) in [(31, true), (33, false)] {
             let mut m = m;
             m[0][0] = 2.0_f64.powi(exponent);
-            let camera = Camera::from_clip_from_world(m, ImageSize::new(8, 8), DepthConvention::Standard).unwrap();
+            let camera =
+                Camera::from_clip_from_world(m, ImageSize::new(8, 8), DepthConvention::Standard)
+                    .unwrap();
             assert_eq!(ViewRows::new(&camera, 0.0).is_ok(), held, "2^{exponent}");
         }
     }

@@ -1,4 +1,5 @@
-//! What a cull finds, on the device: the mask, verdicts, and the packed list with its draw arguments.
+//! What a cull finds, on the device: the mask, verdicts, and the packed list with its draw
+//! arguments.
 
 use std::sync::OnceLock;
 
@@ -7,14 +8,15 @@ use crate::gpu::{ContextId, Gpu};
 use crate::instances::{Instances, Piece};
 use crate::lists::{DrawIndexedIndirect, DrawTemplate, Lists};
 
-/// What a cull is to leave behind. What is not asked for is neither computed nor stored.
+/// What a cull is to leave behind.
+/// What is not asked for is neither computed nor stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Outputs {
     /// A bit for each instance, kept or not.
     pub mask: bool,
     /// Why, for each instance: [`Counts`](crate::headless::Counts) and
-    /// [`verdicts`](crate::headless::Culling::verdicts) come from it, where it is said
-    /// what they mean.
+    /// [`verdicts`](crate::headless::Culling::verdicts) come from it, where it is said what they
+    /// mean.
     pub verdicts: bool,
     /// The packed list of the kept instances.
     pub indices: bool,
@@ -31,8 +33,14 @@ impl Outputs {
 
 impl std::fmt::Display for Outputs {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let all = [(self.mask, "mask"), (self.verdicts, "verdicts"), (self.indices, "indices"), (self.draws, "draws")];
-        let names: Vec<_> = all.into_iter().filter_map(|(asked, name)| asked.then_some(name)).collect();
+        let all = [
+            (self.mask, "mask"),
+            (self.verdicts, "verdicts"),
+            (self.indices, "indices"),
+            (self.draws, "draws"),
+        ];
+        let names: Vec<_> =
+            all.into_iter().filter_map(|(asked, name)| asked.then_some(name)).collect();
         if names.is_empty() { f.write_str("nothing") } else { f.write_str(&names.join(", ")) }
     }
 }
@@ -82,7 +90,8 @@ pub(crate) struct SurvivorsRecord {
 }
 
 /// Before the groups are tested.
-pub(crate) const NO_SURVIVORS: SurvivorsRecord = SurvivorsRecord { workgroups: [0, 1, 1], count: 0 };
+pub(crate) const NO_SURVIVORS: SurvivorsRecord =
+    SurvivorsRecord { workgroups: [0, 1, 1], count: 0 };
 
 /// Groups in a row of the survivors' list; `shaders/shared/groups.wgsl`.
 pub(crate) const SURVIVORS_PER_ROW: u32 = 4096;
@@ -93,7 +102,8 @@ const VERDICT_MULTIPLE: u32 = 4;
 /// The buffers of one piece.
 #[derive(Debug)]
 pub(crate) struct PieceOutput {
-    /// A bit for each of the caller's instances; behind them, at `verdicts_offset`, a word for each place.
+    /// A bit for each of the caller's instances; behind them, at `verdicts_offset`, a word for each
+    /// place.
     pub(crate) mask: wgpu::Buffer,
     /// Made by the first cull that tests groups.
     groups: OnceLock<GroupOutput>,
@@ -110,8 +120,9 @@ pub(crate) struct GroupOutput {
     pub(crate) survivor_list: wgpu::TextureView,
 }
 
-/// What a cull finds: per piece a bit mask of the kept instances, a packed list of their indices and a record of draw
-/// arguments; of these what the [`Outputs`] say. The lists hold the caller's indices and begin as 0xFFFFFFFF.
+/// What a cull finds: per piece a bit mask of the kept instances, a packed list of their indices
+/// and a record of draw arguments; of these what the [`Outputs`] say.
+/// The lists hold the caller's indices and begin as 0xFFFFFFFF.
 #[derive(Debug)]
 pub struct Visible {
     pub(crate) context: ContextId,
@@ -129,7 +140,9 @@ impl Visible {
     pub(crate) fn new(gpu: &Gpu, instances: &Instances, options: &VisibleOptions) -> Result<Self> {
         let VisibleOptions { outputs, capacity, draw } = *options;
         gpu.check_context("instances", instances.context)?;
-        if draw.first_instance != 0 && !gpu.device().features().contains(wgpu::Features::INDIRECT_FIRST_INSTANCE) {
+        if draw.first_instance != 0
+            && !gpu.device().features().contains(wgpu::Features::INDIRECT_FIRST_INSTANCE)
+        {
             return Err(Error::invalid(
                 "first_instance",
                 format!(
@@ -144,7 +157,9 @@ impl Visible {
         Ok(Self {
             context: gpu.id(),
             pieces: pieces.collect::<Result<_>>()?,
-            lists: listed.then(|| Lists::new(gpu, instances, outputs.indices, capacity, draw)).transpose()?,
+            lists: listed
+                .then(|| Lists::new(gpu, instances, outputs.indices, capacity, draw))
+                .transpose()?,
             statistics: OnceLock::new(),
             capacity: capacity.unwrap_or(instances.len()),
             outputs,
@@ -157,8 +172,9 @@ impl Visible {
         self.outputs
     }
 
-    /// The draw arguments, one [`DrawIndexedIndirect`] a piece, for `draw_indexed_indirect` at [`Visible::draw_offset`]. `None` without
-    /// [`Outputs::draws`] and [`Outputs::indices`].
+    /// The draw arguments, one [`DrawIndexedIndirect`] a piece, for `draw_indexed_indirect` at
+    /// [`Visible::draw_offset`].
+    /// `None` without [`Outputs::draws`] and [`Outputs::indices`].
     pub fn draw_arguments(&self) -> Option<&wgpu::Buffer> {
         self.lists.as_ref().map(|lists| &lists.draws)
     }
@@ -173,8 +189,9 @@ impl Visible {
         self.pieces.len()
     }
 
-    /// A piece's packed list of indices (u32, the caller's numbering); usable as storage and as an instance vertex buffer. `None`
-    /// without [`Outputs::indices`].
+    /// A piece's packed list of indices (u32, the caller's numbering); usable as storage and as an
+    /// instance vertex buffer.
+    /// `None` without [`Outputs::indices`].
     ///
     /// # Panics
     /// For a piece that is not below [`Visible::num_pieces`].
@@ -182,8 +199,9 @@ impl Visible {
         self.lists.as_ref()?.pieces[piece].indices.as_ref()
     }
 
-    /// A piece's mask: one bit an instance, kept or not, 32 a word, lowest first, in the caller's numbering; what lies behind is not
-    /// for the caller. `None` without [`Outputs::mask`].
+    /// A piece's mask: one bit an instance, kept or not, 32 a word, lowest first, in the caller's
+    /// numbering; what lies behind is not for the caller.
+    /// `None` without [`Outputs::mask`].
     ///
     /// # Panics
     /// For a piece that is not below [`Visible::num_pieces`].
@@ -225,12 +243,17 @@ impl Visible {
     }
 }
 
-pub(crate) const STORAGE: wgpu::BufferUsages =
-    wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_SRC).union(wgpu::BufferUsages::COPY_DST);
+pub(crate) const STORAGE: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE
+    .union(wgpu::BufferUsages::COPY_SRC)
+    .union(wgpu::BufferUsages::COPY_DST);
 
 impl PieceOutput {
     fn new(gpu: &Gpu, piece: &Piece, outputs: Outputs) -> Result<Self> {
-        let verdicts = if outputs.verdicts { piece.count().max(1).next_multiple_of(VERDICT_MULTIPLE) } else { 0 };
+        let verdicts = if outputs.verdicts {
+            piece.count().max(1).next_multiple_of(VERDICT_MULTIPLE)
+        } else {
+            0
+        };
         let size = verdicts_offset(piece).max(16) + 4 * u64::from(verdicts);
         Ok(Self { mask: gpu.empty("hiz.visible.mask", size, STORAGE)?, groups: OnceLock::new() })
     }
@@ -238,9 +261,14 @@ impl PieceOutput {
     /// For a cull that tests groups.
     pub(crate) fn groups_or_new(&self, gpu: &Gpu, piece: &Piece) -> Result<&GroupOutput> {
         made(&self.groups, || {
-            let (bytes, usage) = (size_of::<SurvivorsRecord>() as u64, STORAGE | wgpu::BufferUsages::INDIRECT);
+            let (bytes, usage) =
+                (size_of::<SurvivorsRecord>() as u64, STORAGE | wgpu::BufferUsages::INDIRECT);
             Ok(GroupOutput {
-                verdicts: gpu.empty("hiz.visible.group_verdicts", 4 * u64::from(piece.groups().max(1)), STORAGE)?,
+                verdicts: gpu.empty(
+                    "hiz.visible.group_verdicts",
+                    4 * u64::from(piece.groups().max(1)),
+                    STORAGE,
+                )?,
                 survivors: gpu.empty("hiz.visible.survivors", bytes, usage)?,
                 survivor_list: survivor_list(gpu, piece)?,
             })
@@ -266,7 +294,12 @@ fn survivor_list(gpu: &Gpu, piece: &Piece) -> Result<wgpu::TextureView> {
     let groups = piece.groups().max(1);
     let size = (groups.min(SURVIVORS_PER_ROW), groups.div_ceil(SURVIVORS_PER_ROW));
     let usage = wgpu::TextureUsages::STORAGE_BINDING;
-    gpu.view(&gpu.texture("hiz.visible.survivor_list", size, wgpu::TextureFormat::R32Uint, usage)?)
+    gpu.view(&gpu.texture(
+        "hiz.visible.survivor_list",
+        size,
+        wgpu::TextureFormat::R32Uint,
+        usage,
+    )?)
 }
 
 /// What `cell` holds, made if there is nothing.

@@ -1,9 +1,10 @@
 //! What a submitted cull has to know of later updates of its instances, and they of it.
 //!
 //! Verdicts of the members of hidden groups are refined when they are first read
-//! (`cull::Refinement`), from the bounds that were culled. So an update refines those of all
-//! submitted culls first; and notes which instances it changed, so that an explanation, which tests
-//! the bounds as they are now, can say that they are not the ones that were culled.
+//! (`cull::Refinement`), from the bounds that were culled.
+//! So an update refines those of all submitted culls first; and notes which instances it changed,
+//! so that an explanation, which tests the bounds as they are now, can say that they are not the
+//! ones that were culled.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -14,7 +15,8 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::instances::Instances;
 
-/// One submitted cull. It lives as long as its answer may be read.
+/// One submitted cull.
+/// It lives as long as its answer may be read.
 #[derive(Debug)]
 pub(crate) struct Watch {
     state: Mutex<State>,
@@ -39,7 +41,11 @@ impl Watch {
     /// Whether any of `instances` was updated since the cull was submitted.
     pub(crate) fn is_updated(&self, instances: &Range<u32>) -> bool {
         let state = self.state();
-        state.updated.range(..instances.end).next_back().is_some_and(|(_, end)| *end > instances.start)
+        state
+            .updated
+            .range(..instances.end)
+            .next_back()
+            .is_some_and(|(_, end)| *end > instances.start)
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -54,7 +60,9 @@ impl State {
         }
         let Range { mut start, mut end } = *range;
         // All that overlap or touch it become one with it.
-        while let Some((first, last)) = self.updated.range(..=end).next_back().map(|(first, last)| (*first, *last)) {
+        while let Some((first, last)) =
+            self.updated.range(..=end).next_back().map(|(first, last)| (*first, *last))
+        {
             if last < start {
                 break;
             }
@@ -128,7 +136,12 @@ impl Watches {
     }
 }
 
-fn record(gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, instances: &Instances, watch: &Watch) -> Result<bool> {
+fn record(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    instances: &Instances,
+    watch: &Watch,
+) -> Result<bool> {
     let state = watch.state();
     let Some(refinement) = &state.refinement else { return Ok(false) };
     refinement.record(gpu, encoder, instances)?;
@@ -149,7 +162,9 @@ mod tests {
         };
         assert!(!watch.is_updated(&(0..u32::MAX)));
         assert_eq!(noted(&[(10, 20), (30, 40)]), [(10, 20), (30, 40)]);
-        for (range, expected) in [(9..10, false), (9..11, true), (19..20, true), (20..30, false), (25..31, true)] {
+        for (range, expected) in
+            [(9..10, false), (9..11, true), (19..20, true), (20..30, false), (25..31, true)]
+        {
             assert_eq!(watch.is_updated(&range), expected, "{range:?}");
         }
         assert_eq!(noted(&[(20, 22)]), [(10, 22), (30, 40)], "it touches the first");

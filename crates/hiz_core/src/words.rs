@@ -1,4 +1,5 @@
-//! For tests: the words that the cull shader reads, so that its arithmetic can be done again on the host.
+//! For tests: the words that the cull shader reads, so that its arithmetic can be done again on the
+//! host.
 
 use crate::bounds::{Bounds, BoundsKind};
 use crate::camera::Camera;
@@ -11,12 +12,14 @@ use crate::readback;
 use crate::records::TEXEL_BYTES;
 use crate::tolerance::DepthTolerance;
 
-/// The view's uniform (`shaders/shared/view.wgsl`, `View`) as 32-bit words. The number of the reduction is 0.
+/// The view's uniform (`shaders/shared/view.wgsl`, `View`) as 32-bit words.
+/// The number of the reduction is 0.
 ///
 /// # Errors
 /// As `HizContext::record_cull`, for options and cameras that it refuses.
 pub fn view(camera: &Camera, options: &CullOptions) -> Result<Vec<u32>> {
-    Ok(bytemuck::cast_slice(&[ViewUniform::new(camera, 0, options, DepthTolerance::NONE)?]).to_vec())
+    Ok(bytemuck::cast_slice(&[ViewUniform::new(camera, 0, options, DepthTolerance::NONE)?])
+        .to_vec())
 }
 
 /// The records of all instances (`shaders/shared/bounds_*.wgsl`) as 32-bit words.
@@ -37,7 +40,8 @@ pub fn instances(bounds: &Bounds<'_>) -> Result<Vec<u32>> {
 pub struct GroupWords {
     /// The caller's indices of its members.
     pub members: Vec<u32>,
-    /// The least and the greatest corner of the box that the host keeps; none if a member is no volume.
+    /// The least and the greatest corner of the box that the host keeps; none if a member is no
+    /// volume.
     pub corners: Option<[[f64; 3]; 2]>,
     /// The box's record on the device.
     pub record: Vec<u32>,
@@ -50,7 +54,12 @@ pub struct GroupWords {
 pub fn groups(engine: &Engine, instances: &Instances) -> Result<Vec<GroupWords>> {
     let read = |p: &Piece| {
         let texture = p.group_records.texture();
-        readback::read_texture(engine.device(), engine.queue(), texture, u64::from(texture.width()) * TEXEL_BYTES)
+        readback::read_texture(
+            engine.device(),
+            engine.queue(),
+            texture,
+            u64::from(texture.width()) * TEXEL_BYTES,
+        )
     };
     let bytes = instances.pieces.iter().map(read).collect::<Result<Vec<_>>>()?;
     let changing = instances.changing();
@@ -58,13 +67,14 @@ pub fn groups(engine: &Engine, instances: &Instances) -> Result<Vec<GroupWords>>
     let of_piece = |((piece, groups), bytes): ((&Piece, &Groups), Vec<u8>)| -> Vec<GroupWords> {
         let record_words = BoundsKind::Box.record_bytes() as usize / 4;
         let words: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
-        let groups = (0..groups.len()).zip(words.chunks_exact(record_words)).map(|(g, record)| GroupWords {
-            members: (g * GROUP..(piece.count() as usize).min((g + 1) * GROUP))
-                .map(|place| piece.range.start + piece.order.index(place) as u32)
-                .collect(),
-            corners: groups.extent(g).map(|e| [e.min, e.max]),
-            record: record.to_vec(),
-        });
+        let groups =
+            (0..groups.len()).zip(words.chunks_exact(record_words)).map(|(g, record)| GroupWords {
+                members: (g * GROUP..(piece.count() as usize).min((g + 1) * GROUP))
+                    .map(|place| piece.range.start + piece.order.index(place) as u32)
+                    .collect(),
+                corners: groups.extent(g).map(|e| [e.min, e.max]),
+                record: record.to_vec(),
+            });
         groups.collect()
     };
     Ok(pieces.flat_map(of_piece).collect())

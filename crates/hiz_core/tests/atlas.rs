@@ -1,5 +1,5 @@
-//! The texture that large culls read all levels from, while its pyramid is reduced again and encoders run in another order than they
-//! were recorded in, or never.
+//! The texture that large culls read all levels from, while its pyramid is reduced again and
+//! encoders run in another order than they were recorded in, or never.
 
 mod common;
 
@@ -9,14 +9,15 @@ use std::sync::Arc;
 use common::{CONVENTIONS, Random, camera_along_z, engine, ndc};
 use hiz_core::headless::{DepthImage, Engine};
 use hiz_core::{
-    AtlasUse, Bounds, Camera, CullOptions, DepthConvention, Floats, HizContext, InstanceOptions, Instances, Pyramid,
-    PyramidOptions, StoredLevels, Visible, VisibleOptions, wgpu,
+    AtlasUse, Bounds, Camera, CullOptions, DepthConvention, Floats, HizContext, InstanceOptions,
+    Instances, Pyramid, PyramidOptions, StoredLevels, Visible, VisibleOptions, wgpu,
 };
 
 const WIDTH: u32 = 37;
 const HEIGHT: u32 = 29;
 
-/// Random orders of recording and running; the first that shows an atlas of one header is number 36.
+/// Random orders of recording and running; the first that shows an atlas of one header is
+/// number 36.
 const ROUNDS: u64 = 40;
 
 fn encoder(engine: &Engine) -> wgpu::CommandEncoder {
@@ -42,7 +43,9 @@ fn images(engine: &Engine, camera: &Camera) -> Vec<DepthImage> {
     let convention = camera.convention();
     let far = if convention == DepthConvention::Reversed { 0.0 } else { 1.0 };
     let mut holes = |near: f32, share: u32| -> Vec<f32> {
-        (0..WIDTH * HEIGHT).map(|_| if random.below(100) < share { far } else { ndc(near, convention) }).collect()
+        (0..WIDTH * HEIGHT)
+            .map(|_| if random.below(100) < share { far } else { ndc(near, convention) })
+            .collect()
     };
     let depths = [holes(4.0, 0), holes(4.0, 100), holes(16.0, 0), holes(4.0, 3)];
     let uploads = depths.iter().map(|depth| engine.upload_depth(depth, camera).unwrap());
@@ -50,17 +53,32 @@ fn images(engine: &Engine, camera: &Camera) -> Vec<DepthImage> {
     uploads.chain(sampled).collect()
 }
 
-fn record_reduce(engine: &Engine, encoder: &mut wgpu::CommandEncoder, image: &DepthImage, pyramid: &Pyramid) {
+fn record_reduce(
+    engine: &Engine,
+    encoder: &mut wgpu::CommandEncoder,
+    image: &DepthImage,
+    pyramid: &Pyramid,
+) {
     let view = image.texture().create_view(&wgpu::TextureViewDescriptor::default());
     engine.context().record_reduce(encoder, &view, image.camera(), pyramid).unwrap();
 }
 
-fn pyramid(engine: &Engine, camera: &Camera, atlas: AtlasUse, levels: StoredLevels) -> Arc<Pyramid> {
+fn pyramid(
+    engine: &Engine,
+    camera: &Camera,
+    atlas: AtlasUse,
+    levels: StoredLevels,
+) -> Arc<Pyramid> {
     let options = PyramidOptions { atlas, levels, ..PyramidOptions::default() };
     Arc::new(engine.context().create_pyramid(camera.size(), &options).unwrap())
 }
 
-fn mask(engine: &Engine, instances: &Arc<Instances>, camera: &Camera, pyramid: &Arc<Pyramid>) -> Vec<bool> {
+fn mask(
+    engine: &Engine,
+    instances: &Arc<Instances>,
+    camera: &Camera,
+    pyramid: &Arc<Pyramid>,
+) -> Vec<bool> {
     engine
         .cull(instances, camera, pyramid, &CullOptions::default(), &VisibleOptions::default())
         .unwrap()
@@ -86,8 +104,10 @@ fn read_mask(engine: &Engine, visible: &Visible, count: usize) -> Vec<bool> {
     (0..count).map(|i| view[i / 8] >> (i % 8) & 1 == 1).collect()
 }
 
-/// A cull that was recorded for an earlier image runs late, after one for a later image has been recorded and before it runs. How many
-/// instances are lost that the later image shows; what is recorded after all that answers for it.
+/// A cull that was recorded for an earlier image runs late, after one for a later image has been
+/// recorded and before it runs.
+/// How many instances are lost that the later image shows; what is recorded after all that answers
+/// for it.
 fn lost_to_a_late_copy(engine: &Engine) -> usize {
     let camera = camera_along_z(WIDTH, HEIGHT, DepthConvention::Standard);
     let images = images(engine, &camera);
@@ -100,9 +120,13 @@ fn lost_to_a_late_copy(engine: &Engine) -> usize {
         engine.queue().submit([encoder.finish()]);
     };
     let recorded = || {
-        let visible = engine.context().create_visible(&instances, &VisibleOptions::default()).unwrap();
+        let visible =
+            engine.context().create_visible(&instances, &VisibleOptions::default()).unwrap();
         let (mut encoder, options) = (encoder(engine), CullOptions::default());
-        engine.context().record_cull(&mut encoder, &instances, &camera, &pyramid, &visible, &options).unwrap();
+        engine
+            .context()
+            .record_cull(&mut encoder, &instances, &camera, &pyramid, &visible, &options)
+            .unwrap();
         (encoder.finish(), visible)
     };
     reduce(near);
@@ -121,12 +145,17 @@ fn lost_to_a_late_copy(engine: &Engine) -> usize {
 #[test]
 fn a_late_copy_of_an_earlier_image_hides_nothing() {
     assert_eq!(lost_to_a_late_copy(&engine()), 0);
-    let one_header = Engine::with_planted_faults(None, &[("of_levels == of_image", "true")]).unwrap();
-    assert!(lost_to_a_late_copy(&one_header) > 0, "a header of the levels alone is enough to hide nothing");
+    let one_header =
+        Engine::with_planted_faults(None, &[("of_levels == of_image", "true")]).unwrap();
+    assert!(
+        lost_to_a_late_copy(&one_header) > 0,
+        "a header of the levels alone is enough to hide nothing"
+    );
 }
 
-/// Whatever runs in whatever order, or never: a cull answers as for the image that it was recorded for, or keeps everything; and what
-/// is recorded and run after all of it answers for the last image.
+/// Whatever runs in whatever order, or never: a cull answers as for the image that it was recorded
+/// for, or keeps everything; and what is recorded and run after all of it answers for the last
+/// image.
 #[test]
 fn culls_in_any_order_answer_for_their_image_or_keep_everything() {
     let engine = &*engine();
@@ -136,17 +165,20 @@ fn culls_in_any_order_answer_for_their_image_or_keep_everything() {
     for round in 0..ROUNDS {
         let mut random = Random(round);
         let camera = camera_along_z(WIDTH, HEIGHT, random.pick(&CONVENTIONS));
-        let levels = random.pick(&[StoredLevels::ALL, StoredLevels::from(2), StoredLevels::only(3)]);
+        let levels =
+            random.pick(&[StoredLevels::ALL, StoredLevels::from(2), StoredLevels::only(3)]);
         let images = images(engine, &camera);
         let expected: Vec<_> = images
             .iter()
             .map(|image| {
-                let options = PyramidOptions { atlas: AtlasUse::Never, levels, ..PyramidOptions::default() };
+                let options =
+                    PyramidOptions { atlas: AtlasUse::Never, levels, ..PyramidOptions::default() };
                 mask(engine, &instances, &camera, &engine.pyramid_with(image, &options).unwrap())
             })
             .collect();
         let kept_all: Vec<_> = {
-            let all_open = engine.upload_depth(&vec![f32::NAN; (WIDTH * HEIGHT) as usize], &camera).unwrap();
+            let all_open =
+                engine.upload_depth(&vec![f32::NAN; (WIDTH * HEIGHT) as usize], &camera).unwrap();
             mask(engine, &instances, &camera, &engine.pyramid(&all_open).unwrap())
         };
         let pyramid = pyramid(engine, &camera, AtlasUse::Always, levels);
@@ -167,12 +199,24 @@ fn culls_in_any_order_answer_for_their_image_or_keep_everything() {
                 }
                 1..=4 => {
                     // In an encoder of its own, or behind what another one has.
-                    let mut encoder =
-                        if random.below(3) == 0 { waiting.pop_back() } else { None }.unwrap_or_else(|| encoder(engine));
-                    let visible = engine.context().create_visible(&instances, &VisibleOptions::default()).unwrap();
+                    let mut encoder = if random.below(3) == 0 { waiting.pop_back() } else { None }
+                        .unwrap_or_else(|| encoder(engine));
+                    let visible = engine
+                        .context()
+                        .create_visible(&instances, &VisibleOptions::default())
+                        .unwrap();
                     let options = CullOptions::default();
                     let context = engine.context();
-                    context.record_cull(&mut encoder, &instances, &camera, &pyramid, &visible, &options).unwrap();
+                    context
+                        .record_cull(
+                            &mut encoder,
+                            &instances,
+                            &camera,
+                            &pyramid,
+                            &visible,
+                            &options,
+                        )
+                        .unwrap();
                     answers.push((current, visible));
                     waiting.push_back(encoder);
                 }
@@ -206,7 +250,8 @@ fn culls_in_any_order_answer_for_their_image_or_keep_everything() {
     assert!(hidden > ROUNDS as u32, "too little was hidden to tell: {hidden}");
 }
 
-/// The depth image passes through a buffer, which may be larger than those that the device has: such an image is read where it is.
+/// The depth image passes through a buffer, which may be larger than those that the device has:
+/// such an image is read where it is.
 #[test]
 fn an_image_that_no_buffer_holds_is_read_where_it_is() {
     let camera = camera_along_z(640, 512, DepthConvention::Standard);
@@ -219,7 +264,9 @@ fn an_image_that_no_buffer_holds_is_read_where_it_is() {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = wgpu::Backends::VULKAN;
     let instance = wgpu::Instance::new(descriptor);
-    let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default())).unwrap();
+    let adapter =
+        pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))
+            .unwrap();
     let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
     let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).unwrap();
     let context = HizContext::new(&device).unwrap();
@@ -233,17 +280,24 @@ fn an_image_that_no_buffer_holds_is_read_where_it_is() {
         usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
         view_formats: &[],
     });
-    let options =
-        PyramidOptions { atlas: AtlasUse::Always, levels: StoredLevels::from(2), ..PyramidOptions::default() };
+    let options = PyramidOptions {
+        atlas: AtlasUse::Always,
+        levels: StoredLevels::from(2),
+        ..PyramidOptions::default()
+    };
     let pyramid = context.create_pyramid(camera.size(), &options).unwrap();
     let bytes = pyramid.device_bytes();
     let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     let view = depth.create_view(&wgpu::TextureViewDescriptor::default());
     context.record_reduce(&mut encoder, &view, &camera, &pyramid).unwrap();
-    let bounds = Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0]), radii: Floats::F32(&[0.1]) };
-    let instances = context.record_instances(&mut encoder, &bounds, &InstanceOptions::default()).unwrap();
+    let bounds =
+        Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0]), radii: Floats::F32(&[0.1]) };
+    let instances =
+        context.record_instances(&mut encoder, &bounds, &InstanceOptions::default()).unwrap();
     let visible = context.create_visible(&instances, &VisibleOptions::default()).unwrap();
-    context.record_cull(&mut encoder, &instances, &camera, &pyramid, &visible, &CullOptions::default()).unwrap();
+    context
+        .record_cull(&mut encoder, &instances, &camera, &pyramid, &visible, &CullOptions::default())
+        .unwrap();
     queue.submit([encoder.finish()]);
     device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
     assert_eq!(pyramid.device_bytes(), bytes, "nothing was copied");

@@ -1,6 +1,7 @@
 //! Coarse levels, where the farthest of thousands of pixels hangs on one of them: images with a
 //! handful of far pixels, and images without any bad number, in which every texel of every level
-//! differs. (Where one pixel in fifty is far, all texels from level 4 on are.)
+//! differs.
+//! (Where one pixel in fifty is far, all texels from level 4 on are.)
 
 mod common;
 
@@ -8,13 +9,30 @@ use common::{CONVENTIONS, Random, camera_along_z, engine};
 use hiz_core::headless::Engine;
 use hiz_core::{DepthConvention, PyramidOptions, StoredLevels};
 
-const SIZES: [(u32, u32); 10] =
-    [(1, 1), (1, 37), (37, 1), (131, 127), (257, 255), (64, 65), (1, 3001), (3001, 2), (1023, 517), (1920, 1080)];
+const SIZES: [(u32, u32); 10] = [
+    (1, 1),
+    (1, 37),
+    (37, 1),
+    (131, 127),
+    (257, 255),
+    (64, 65),
+    (1, 3001),
+    (3001, 2),
+    (1023, 517),
+    (1920, 1080),
+];
 
 /// Depths from 1/4 to 3/4 without a number that is none, all different; then some pixels anywhere
 /// that are farther, each by itself.
-fn image(width: u32, height: u32, convention: DepthConvention, far: u32, random: &mut Random) -> Vec<f32> {
-    let mut depth: Vec<f32> = (0..width * height).map(|_| random.range(0.25, 0.75) as f32).collect();
+fn image(
+    width: u32,
+    height: u32,
+    convention: DepthConvention,
+    far: u32,
+    random: &mut Random,
+) -> Vec<f32> {
+    let mut depth: Vec<f32> =
+        (0..width * height).map(|_| random.range(0.25, 0.75) as f32).collect();
     for _ in 0..far {
         let farther = random.range(0.75, 0.999) as f32;
         let at = random.below(width * height) as usize;
@@ -32,19 +50,26 @@ fn difference(
     far: u32,
     choices: &[StoredLevels],
 ) -> Option<String> {
-    let depth = image(width, height, convention, far, &mut Random(u64::from(width * 7 + height + far)));
+    let depth =
+        image(width, height, convention, far, &mut Random(u64::from(width * 7 + height + far)));
     let camera = camera_along_z(width, height, convention);
     let expected = hiz_ref::pyramid(&depth, width, height, convention.is_reversed());
     let top = expected.len() as u32 - 1;
-    for uploaded in [engine.upload_depth(&depth, &camera), engine.upload_depth_sampled(&depth, &camera)] {
+    for uploaded in
+        [engine.upload_depth(&depth, &camera), engine.upload_depth_sampled(&depth, &camera)]
+    {
         let uploaded = uploaded.unwrap();
         for levels in choices {
             let options = PyramidOptions { levels: *levels, ..PyramidOptions::default() };
             let pyramid = engine.pyramid_with(&uploaded, &options).unwrap();
-            for k in (1..=top).filter(|k| (levels.first.min(top)..=levels.last.min(top)).contains(k)) {
+            for k in
+                (1..=top).filter(|k| (levels.first.min(top)..=levels.last.min(top)).contains(k))
+            {
                 let texels = engine.read_level(&pyramid, k).unwrap();
                 let level = &expected[k as usize];
-                if let Some(i) = texels.iter().zip(&level.texels).position(|(a, b)| a.to_bits() != b.to_bits()) {
+                if let Some(i) =
+                    texels.iter().zip(&level.texels).position(|(a, b)| a.to_bits() != b.to_bits())
+                {
                     return Some(format!(
                         "{width}x{height} {convention:?} {levels:?} level {k} texel {i}: {}",
                         texels[i]
@@ -67,7 +92,13 @@ fn every_coarse_level_alone_has_the_farthest_of_its_pixels() {
     // Both conventions where a workgroup shares a texel, and where it does not.
     assert_eq!(difference(&engine(), (257, 255), CONVENTIONS[1], 3, &alone), None);
     assert_eq!(
-        difference(&engine(), (1920, 1080), CONVENTIONS[0], 5, &[StoredLevels::only(4), StoredLevels::only(7)]),
+        difference(
+            &engine(),
+            (1920, 1080),
+            CONVENTIONS[0],
+            5,
+            &[StoredLevels::only(4), StoredLevels::only(7)]
+        ),
         None
     );
 }
@@ -75,9 +106,20 @@ fn every_coarse_level_alone_has_the_farthest_of_its_pixels() {
 #[test]
 fn all_levels_down_to_the_last_have_the_farthest_of_their_pixels() {
     for size in SIZES {
-        for (convention, far) in [(CONVENTIONS[0], 0), (CONVENTIONS[1], 0), (CONVENTIONS[0], 4), (CONVENTIONS[1], 4)] {
+        for (convention, far) in
+            [(CONVENTIONS[0], 0), (CONVENTIONS[1], 0), (CONVENTIONS[0], 4), (CONVENTIONS[1], 4)]
+        {
             let choices = [StoredLevels::ALL, StoredLevels::from(5)];
-            assert_eq!(difference(&engine(), size, convention, far, &choices[..if far == 0 { 1 } else { 2 }]), None);
+            assert_eq!(
+                difference(
+                    &engine(),
+                    size,
+                    convention,
+                    far,
+                    &choices[..if far == 0 { 1 } else { 2 }]
+                ),
+                None
+            );
         }
     }
 }
@@ -87,8 +129,14 @@ fn all_levels_down_to_the_last_have_the_farthest_of_their_pixels() {
 #[test]
 fn faults_of_coarse_levels_are_seen() {
     let all = [StoredLevels::ALL];
-    let alone = [StoredLevels::only(4), StoredLevels::only(5), StoredLevels::only(6), StoredLevels::only(8)];
-    let mean = |a: &str, b: &str| format!("bitcast<u32>(0.5 * (bitcast<f32>({a}) + bitcast<f32>({b})))");
+    let alone = [
+        StoredLevels::only(4),
+        StoredLevels::only(5),
+        StoredLevels::only(6),
+        StoredLevels::only(8),
+    ];
+    let mean =
+        |a: &str, b: &str| format!("bitcast<u32>(0.5 * (bitcast<f32>({a}) + bitcast<f32>({b})))");
     let rows = mean("a.x", "b.y");
     let eighth = mean("farthest4(q0.xyxy)", "farthest4(q1.xyxy)");
     let two = mean("a", "b");
@@ -103,15 +151,31 @@ fn faults_of_coarse_levels_are_seen() {
         // Half of the shares; shares one off and too short.
         (("i < WORKGROUP; i += 1u", "i < 32u; i += 1u"), &alone),
         (("var bits = parts[0];", "var bits = parts[1];"), &alone),
-        (("let part = side >> SIDE_LOG2;", "let part = max(side >> (SIDE_LOG2 + 1u), 1u);"), &alone),
+        (
+            ("let part = side >> SIDE_LOG2;", "let part = max(side >> (SIDE_LOG2 + 1u), 1u);"),
+            &alone,
+        ),
         // The last column of blocks.
-        (("min(begin + vec2<u32>(side), blocks)", "min(begin + vec2<u32>(side), blocks - vec2<u32>(1u, 0u))"), &alone),
+        (
+            (
+                "min(begin + vec2<u32>(side), blocks)",
+                "min(begin + vec2<u32>(side), blocks - vec2<u32>(1u, 0u))",
+            ),
+            &alone,
+        ),
         // A tail's blocks and lanes.
-        (("blocks = (blocks + vec2<u32>(7u)) / 8u;", "blocks = (blocks + vec2<u32>(3u)) / 8u;"), &all),
-        (("i < blocks.x * blocks.y; i += 64u", "i < min(blocks.x * blocks.y, 64u); i += 64u"), &all),
+        (
+            ("blocks = (blocks + vec2<u32>(7u)) / 8u;", "blocks = (blocks + vec2<u32>(3u)) / 8u;"),
+            &all,
+        ),
+        (
+            ("i < blocks.x * blocks.y; i += 64u", "i < min(blocks.x * blocks.y, 64u); i += 64u"),
+            &all,
+        ),
     ];
     for ((what, by), choices) in planted {
-        let engine = Engine::with_planted_faults(None, &[(what, by)]).expect("the device tests need a Vulkan driver");
+        let engine = Engine::with_planted_faults(None, &[(what, by)])
+            .expect("the device tests need a Vulkan driver");
         let seen = [(1023, 517), (257, 255), (513, 511)]
             .into_iter()
             .flat_map(|size| CONVENTIONS.map(|convention| (size, convention)))

@@ -1,5 +1,6 @@
-//! Conservative occluder depth against exact rays: whatever the mesh, no ray through a pixel gets past its depth; and the tests
-//! of that, tested with planted faults. No device is needed.
+//! Conservative occluder depth against exact rays: whatever the mesh, no ray through a pixel gets
+//! past its depth; and the tests of that, tested with planted faults.
+//! No device is needed.
 
 mod common;
 #[path = "common/exact_rays.rs"]
@@ -8,8 +9,8 @@ mod exact_rays;
 use common::{CONVENTIONS, Random};
 use exact_rays::{ExactScene, Facing};
 use hiz_core::{
-    Camera, ConservativeDepthOptions, FaceCull, Floats, ImageSize, MeshData, OccluderOptions, OccluderSurface,
-    PlantedFault, Pose, Projection,
+    Camera, ConservativeDepthOptions, FaceCull, Floats, ImageSize, MeshData, OccluderOptions,
+    OccluderSurface, PlantedFault, Pose, Projection,
 };
 
 type Vec3 = [f64; 3];
@@ -37,7 +38,8 @@ fn anywhere(random: &mut Random, size: f64) -> Vec3 {
     std::array::from_fn(|_| random.range(-size, size))
 }
 
-/// Triangles among few vertices: shared edges of two, three and more, folds, intersections, duplicates, zero areas.
+/// Triangles among few vertices: shared edges of two, three and more, folds, intersections,
+/// duplicates, zero areas.
 fn tangle(random: &mut Random) -> Mesh {
     let mut mesh = Mesh::default();
     let vertices = 4 + random.below(8);
@@ -74,10 +76,14 @@ fn boxes(random: &mut Random) -> Mesh {
         let (center, half) = (anywhere(random, 1.0), [0; 3].map(|_| random.range(0.05, 1.0)));
         let first = (mesh.vertices.len() / 3) as u32;
         for corner in 0..8 {
-            let p = std::array::from_fn(|k| center[k] + if corner >> k & 1 == 0 { -half[k] } else { half[k] });
+            let p = std::array::from_fn(|k| {
+                center[k] + if corner >> k & 1 == 0 { -half[k] } else { half[k] }
+            });
             mesh.vertex(p);
         }
-        for [a, b, c, d] in [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]] {
+        for [a, b, c, d] in
+            [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
+        {
             mesh.triangles.extend([a, b, c, a, c, d].map(|v| v + first));
         }
     }
@@ -105,7 +111,8 @@ fn terrain(random: &mut Random) -> Mesh {
     mesh
 }
 
-/// A wall of planks with cracks between them, down to widths that float64 hardly tells from none; some planks share vertices.
+/// A wall of planks with cracks between them, down to widths that float64 hardly tells from none;
+/// some planks share vertices.
 fn planks(random: &mut Random) -> Mesh {
     let mut mesh = Mesh::default();
     let mut x = -3.0;
@@ -146,7 +153,15 @@ fn viewed(random: &mut Random, mesh: &Mesh) -> (Camera, Mesh) {
             far: far.unwrap_or(8.0),
             convention,
         },
-        1 => Projection::Frustum { left: -1.0, right: 0.3, bottom: -0.2, top: 0.8, near, far, convention },
+        1 => Projection::Frustum {
+            left: -1.0,
+            right: 0.3,
+            bottom: -0.2,
+            top: 0.8,
+            near,
+            far,
+            convention,
+        },
         _ => Projection::Perspective { fov_y: random.range(0.2, 2.0), near, far, convention },
     };
     let camera = Camera::look_at(&pose, &projection, size).unwrap();
@@ -159,27 +174,47 @@ fn viewed(random: &mut Random, mesh: &Mesh) -> (Camera, Mesh) {
     (camera, moved)
 }
 
-/// Image points of the closed pixel: corners, centre, anywhere, and a hair beside what is drawn through it.
-fn points(random: &mut Random, camera: &Camera, mesh: &Mesh, column: u32, row: u32) -> Vec<[f64; 2]> {
+/// Image points of the closed pixel: corners, centre, anywhere, and a hair beside what is drawn
+/// through it.
+fn points(
+    random: &mut Random,
+    camera: &Camera,
+    mesh: &Mesh,
+    column: u32,
+    row: u32,
+) -> Vec<[f64; 2]> {
     let (x, y) = (f64::from(column), f64::from(row));
-    let mut points: Vec<[f64; 2]> = (0..9).map(|k| [x + f64::from(k % 3) / 2.0, y + f64::from(k / 3) / 2.0]).collect();
+    let mut points: Vec<[f64; 2]> =
+        (0..9).map(|k| [x + f64::from(k % 3) / 2.0, y + f64::from(k / 3) / 2.0]).collect();
     points.extend((0..4).map(|_| [x + random.unit(), y + random.unit()]));
     let size = camera.size();
     let image = |v: u32| {
-        let p: Vec3 = std::array::from_fn(|k| mesh.vertices[3 * v as usize + k] - camera.origin()[k]);
+        let p: Vec3 =
+            std::array::from_fn(|k| mesh.vertices[3 * v as usize + k] - camera.origin()[k]);
         let [cx, cy, _, w] = camera.rows().map(|r| r[0] * p[0] + r[1] * p[1] + r[2] * p[2] + r[3]);
-        (w > 0.0).then(|| [(cx / w + 1.0) * f64::from(size.width) / 2.0, (1.0 - cy / w) * f64::from(size.height) / 2.0])
+        (w > 0.0).then(|| {
+            [
+                (cx / w + 1.0) * f64::from(size.width) / 2.0,
+                (1.0 - cy / w) * f64::from(size.height) / 2.0,
+            ]
+        })
     };
     let inside = |p: &[f64; 2]| (x..=x + 1.0).contains(&p[0]) && (y..=y + 1.0).contains(&p[1]);
     for triangle in mesh.triangles.chunks_exact(3) {
         let k = random.below(3) as usize;
-        let (Some(a), Some(b)) = (image(triangle[k]), image(triangle[(k + 1) % 3])) else { continue };
+        let (Some(a), Some(b)) = (image(triangle[k]), image(triangle[(k + 1) % 3])) else {
+            continue;
+        };
         for t in [0.0, random.unit(), random.unit()] {
             let on = [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])];
             if inside(&on) {
                 let hair = random.pick(&[1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14]);
                 let side = [random.range(-1.0, 1.0), random.range(-1.0, 1.0)];
-                points.extend([on, [on[0] + hair * side[0], on[1] + hair * side[1]]].into_iter().filter(inside));
+                points.extend(
+                    [on, [on[0] + hair * side[0], on[1] + hair * side[1]]]
+                        .into_iter()
+                        .filter(inside),
+                );
             }
         }
     }
@@ -201,7 +236,11 @@ struct Tally {
 }
 
 fn surface(mesh: &Mesh, cull_mode: FaceCull) -> OccluderSurface {
-    let data = MeshData { vertices: Floats::F64(&mesh.vertices), triangles: &mesh.triangles, transforms: None };
+    let data = MeshData {
+        vertices: Floats::F64(&mesh.vertices),
+        triangles: &mesh.triangles,
+        transforms: None,
+    };
     OccluderSurface::from_meshes(&[data], &OccluderOptions { cull_mode }).unwrap()
 }
 
@@ -214,7 +253,8 @@ fn examine(
     fault: Option<PlantedFault>,
     tally: &mut Tally,
 ) {
-    let depth = surface(mesh, cull_mode).conservative_depth_with_fault(camera, options, fault).unwrap();
+    let depth =
+        surface(mesh, cull_mode).conservative_depth_with_fault(camera, options, fault).unwrap();
     let exact = ExactScene::new(camera, &mesh.vertices, &mesh.triangles);
     let facing = match cull_mode {
         FaceCull::None => Facing::Any,
@@ -239,7 +279,9 @@ fn examine(
                 if !exact.blocked(point, depth, facing) {
                     tally.past += 1;
                     if fault.is_none() {
-                        eprintln!("pixel ({column}, {row}), depth {depth}, ray {point:?}\n{camera:?}\n{mesh:?}");
+                        eprintln!(
+                            "pixel ({column}, {row}), depth {depth}, ray {point:?}\n{camera:?}\n{mesh:?}"
+                        );
                     }
                 }
             }
@@ -254,7 +296,8 @@ fn campaign(seed: u64, cases: u32, fault: Option<PlantedFault>) -> Vec<Tally> {
         let kind = case as usize % KINDS.len();
         let mesh = KINDS[kind](&mut random);
         let (camera, mesh) = viewed(&mut random, &mesh);
-        let cull_mode = random.pick(&[FaceCull::None, FaceCull::None, FaceCull::Back, FaceCull::Front]);
+        let cull_mode =
+            random.pick(&[FaceCull::None, FaceCull::None, FaceCull::Back, FaceCull::Front]);
         let options = ConservativeDepthOptions { refinement: random.below(4) };
         examine(&mut random, &camera, &mesh, cull_mode, &options, fault, &mut tallies[kind]);
     }
@@ -267,7 +310,10 @@ fn no_ray_gets_past_a_pixels_depth() {
     for (name, tally) in ["tangle", "soup", "boxes", "terrain", "planks"].iter().zip(&tallies) {
         println!("{name}: {tally:?}");
         assert_eq!(tally.past, 0, "{name}");
-        assert!(tally.deep > 200 && tally.rays > 4000, "a test without depths proves nothing: {name} {tally:?}");
+        assert!(
+            tally.deep > 200 && tally.rays > 4000,
+            "a test without depths proves nothing: {name} {tally:?}"
+        );
     }
 }
 
@@ -291,7 +337,8 @@ fn borders(seed: u64, cases: u32, fault: Option<PlantedFault>) -> Tally {
         let size = ImageSize::new(width, height);
         let scale = random.pick(&[1.0, 1e3, 1e6]);
         let place = anywhere(&mut random, scale);
-        let pose = Pose { eye: place, target: [place[0], place[1], place[2] - 1.0], up: [0.0, 1.0, 0.0] };
+        let pose =
+            Pose { eye: place, target: [place[0], place[1], place[2] - 1.0], up: [0.0, 1.0, 0.0] };
         let fov_y = random.range(0.5, 2.0);
         let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
         let camera = Camera::look_at(&pose, &projection, size).unwrap();
@@ -339,8 +386,9 @@ struct Lossy {
 impl Lossy {
     fn new(random: &mut Random, near: f64) -> Self {
         let place: Vec3 = [0; 3].map(|_| random.range(-1e7, 1e7));
-        let cross =
-            |a: Vec3, b: Vec3| [0, 1, 2].map(|k| a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]);
+        let cross = |a: Vec3, b: Vec3| {
+            [0, 1, 2].map(|k| a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3])
+        };
         let unit = |v: Vec3| v.map(|x| x / v.iter().map(|x| x * x).sum::<f64>().sqrt());
         let (forward, up) = (unit(anywhere(random, 1.0)), anywhere(random, 1.0));
         let right = unit(cross(forward, up));
@@ -376,7 +424,10 @@ fn facing_walls(seed: u64, fault: Option<PlantedFault>) -> Tally {
         let view = Lossy::new(&mut random, near);
         let z = near * random.range(1.5, 9.0);
         let mut mesh = Mesh::default();
-        mesh.quad([[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]].map(|[x, y]| view.at([x * z, y * z, z])));
+        mesh.quad(
+            [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]]
+                .map(|[x, y]| view.at([x * z, y * z, z])),
+        );
         let options = ConservativeDepthOptions { refinement: random.below(2) };
         examine(&mut random, &view.camera, &mesh, FaceCull::None, &options, fault, &mut tally);
     }
@@ -391,7 +442,10 @@ fn walls_at_the_near_plane(seed: u64, fault: Option<PlantedFault>) -> Tally {
         let view = Lossy::new(&mut random, near);
         let z = near + random.range(-3e-9, 3e-9);
         let mut mesh = Mesh::default();
-        mesh.quad([[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]].map(|[x, y]| view.at([x * z, y * z, z])));
+        mesh.quad(
+            [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]]
+                .map(|[x, y]| view.at([x * z, y * z, z])),
+        );
         let options = ConservativeDepthOptions { refinement: 0 };
         examine(&mut random, &view.camera, &mesh, FaceCull::None, &options, fault, &mut tally);
     }
@@ -411,7 +465,8 @@ fn cut_borders(seed: u64, fault: Option<PlantedFault>) -> Tally {
         let x = (2.0 * column / f64::from(width) - 1.0) * view.half[0];
         // The cut is in the first row or above; the far end below the image.
         let y = (1.0 - random.range(-1.0, 1.0) / f64::from(height)) * view.half[1];
-        let (cut, far) = ([x * near, y * near, near], [x, -2.0 * view.half[1], 1.0].map(|v| 1e3 * near * v));
+        let (cut, far) =
+            ([x * near, y * near, near], [x, -2.0 * view.half[1], 1.0].map(|v| 1e3 * near * v));
         let before: Vec3 = std::array::from_fn(|k| cut[k] - 1e-3 * (far[k] - cut[k]));
         let left = |p: Vec3| [p[0] - 9.0, p[1], p[2]];
         let mut mesh = Mesh::default();
@@ -423,7 +478,8 @@ fn cut_borders(seed: u64, fault: Option<PlantedFault>) -> Tally {
 }
 
 /// A wall with a crack that is closed by a triangle that faces away, so narrow that float64 cannot
-/// tell how it faces. It does not occlude: what is seen through the crack?
+/// tell how it faces.
+/// It does not occlude: what is seen through the crack?
 fn closed_from_behind(seed: u64, fault: Option<PlantedFault>) -> Tally {
     let (mut random, mut tally) = (Random(seed), Tally::default());
     for _ in 0..600 {
@@ -433,12 +489,18 @@ fn closed_from_behind(seed: u64, fault: Option<PlantedFault>) -> Tally {
         let crack = x + random.pick(&[1e-9, 2e-9, 4e-9, 8e-9]);
         let mut mesh = Mesh::default();
         let corner = |x: f64, y: f64| view.at([x, y, 1.0]);
-        let [a, b, c, d] = [(-9.0, -9.0), (x, -9.0), (x, 9.0), (-9.0, 9.0)].map(|(x, y)| mesh.vertex(corner(x, y)));
-        let [f, g, h] = [(9.0, -9.0), (9.0, 9.0), (crack, 9.0)].map(|(x, y)| mesh.vertex(corner(x, y)));
+        let [a, b, c, d] = [(-9.0, -9.0), (x, -9.0), (x, 9.0), (-9.0, 9.0)]
+            .map(|(x, y)| mesh.vertex(corner(x, y)));
+        let [f, g, h] =
+            [(9.0, -9.0), (9.0, 9.0), (crack, 9.0)].map(|(x, y)| mesh.vertex(corner(x, y)));
         // Counter-clockwise as seen, but for the one in the crack.
         mesh.triangles.extend([a, b, c, a, c, d, b, f, g, b, g, h, b, c, h]);
         let depth = surface(&mesh, FaceCull::Back)
-            .conservative_depth_with_fault(&view.camera, &ConservativeDepthOptions { refinement: 0 }, fault)
+            .conservative_depth_with_fault(
+                &view.camera,
+                &ConservativeDepthOptions { refinement: 0 },
+                fault,
+            )
             .unwrap();
         let exact = ExactScene::new(&view.camera, &mesh.vertices, &mesh.triangles);
         let middle = (0.5 * (x + crack) / view.half[0] + 1.0) * f64::from(width) / 2.0;
@@ -487,7 +549,10 @@ fn planted_faults_let_rays_through() {
     for (name, past) in [
         ("before the near plane", with(PlantedFault::BeforeNear)),
         ("a cut's side joined", past(&campaign(1, 1000, Some(PlantedFault::CutSidesJoined)))),
-        ("points at the near plane unproved", walls_at_the_near_plane(9, Some(PlantedFault::NearPointsUnproved)).past),
+        (
+            "points at the near plane unproved",
+            walls_at_the_near_plane(9, Some(PlantedFault::NearPointsUnproved)).past,
+        ),
         ("exact depths", facing_walls(3, Some(PlantedFault::DepthsExact)).past),
         ("exact depths of corners", facing_walls(3, Some(PlantedFault::CornerDepthsExact)).past),
         ("exact cuts", cut_borders(4, Some(PlantedFault::CutPointsExact)).past),

@@ -1,4 +1,5 @@
-//! Depth of every kind against the oracle's, which is exact: never nearer, and hardly ever farther than float32 asks for.
+//! Depth of every kind against the oracle's, which is exact: never nearer, and hardly ever farther
+//! than float32 asks for.
 
 mod common;
 
@@ -8,7 +9,9 @@ mod documented;
 
 use common::Random;
 use documented::assert_said;
-use hiz_core::{Camera, DepthConvention, DepthKind, Floats, ImageSize, Pose, Projection, ndc_from_kind};
+use hiz_core::{
+    Camera, DepthConvention, DepthKind, Floats, ImageSize, Pose, Projection, ndc_from_kind,
+};
 use hiz_ref::{DepthMeaning, View, depth_bounds};
 
 const SIZE: ImageSize = ImageSize { width: 5, height: 4 };
@@ -20,8 +23,13 @@ fn engine(image: &[f64], kind: DepthKind, camera: &Camera) -> Option<Vec<f32>> {
     ndc_from_kind(Floats::F64(image), kind, 1.0, &[], camera).ok()
 }
 
-/// Of the pixels that are not far: how many float32 the engine's depths are farther than the least that is not nearer than the exact ones; below zero: nearer.
-fn steps_farther(camera: &Camera, image: &[f64], kinds: (DepthKind, hiz_ref::DepthKind)) -> Option<Vec<i64>> {
+/// Of the pixels that are not far: how many float32 the engine's depths are farther than the least
+/// that is not nearer than the exact ones; below zero: nearer.
+fn steps_farther(
+    camera: &Camera,
+    image: &[f64],
+    kinds: (DepthKind, hiz_ref::DepthKind),
+) -> Option<Vec<i64>> {
     let reversed = camera.convention().is_reversed();
     let view = View {
         rows: camera.rows(),
@@ -30,7 +38,8 @@ fn steps_farther(camera: &Camera, image: &[f64], kinds: (DepthKind, hiz_ref::Dep
         height: camera.size().height,
         reversed,
     };
-    let meaning = DepthMeaning { kind: kinds.1, scale: 1.0, invalid: &[], origin_is_eye: camera.is_posed() };
+    let meaning =
+        DepthMeaning { kind: kinds.1, scale: 1.0, invalid: &[], origin_is_eye: camera.is_posed() };
     let exact = depth_bounds(&view, image, meaning).expect("a view that the engine takes").farther;
     let steps = |d: f32| i64::from(d.to_bits()) * if reversed { -1 } else { 1 };
     let pairs = engine(image, kinds.0, camera)?.into_iter().zip(exact);
@@ -50,13 +59,15 @@ enum Stress {
     Narrow,
     /// A sensor whose columns lean by so much.
     Skew,
-    /// A near plane that leans by so much (Lengyel, "Oblique view frustum depth projection and clipping", 2005).
+    /// A near plane that leans by so much (Lengyel, "Oblique view frustum depth projection and
+    /// clipping", 2005).
     ObliqueNearPlane,
     /// An eye so far away, in a bare matrix.
     FarEye,
 }
 
-/// One of its cameras; `None` where it is refused. With it the near plane's view depth on the axis.
+/// One of its cameras; `None` where it is refused.
+/// With it the near plane's view depth on the axis.
 fn stressed(
     random: &mut Random,
     stress: Stress,
@@ -64,11 +75,13 @@ fn stressed(
     ratio: f64,
     convention: DepthConvention,
 ) -> Option<(Camera, f64)> {
-    let away = if matches!(stress, Stress::FarEye) { size } else { random.pick(&[0.0, 1.0, 1e3, 1e6]) };
+    let away =
+        if matches!(stress, Stress::FarEye) { size } else { random.pick(&[0.0, 1.0, 1e3, 1e6]) };
     let (middle, half) = match stress {
-        Stress::Tangent | Stress::BareTangent => {
-            ([random.range(-1.0, 1.0) * size, random.range(-1.0, 1.0)], [random.pick(&[1.0, size.sqrt(), size]), 1.0])
-        }
+        Stress::Tangent | Stress::BareTangent => (
+            [random.range(-1.0, 1.0) * size, random.range(-1.0, 1.0)],
+            [random.pick(&[1.0, size.sqrt(), size]), 1.0],
+        ),
         Stress::Narrow => ([0.0; 2], [size.recip(); 2]),
         _ => ([random.range(-1.0, 1.0), 0.0], [1.0; 2]),
     };
@@ -89,18 +102,30 @@ fn stressed(
     let mut rows = posed.rows();
     match stress {
         Stress::Skew => rows[0] = std::array::from_fn(|k| rows[0][k] + size * rows[1][k]),
-        Stress::ObliqueNearPlane => rows[2] = std::array::from_fn(|k| rows[2][k] + 0.3 * size * rows[0][k]),
+        Stress::ObliqueNearPlane => {
+            rows[2] = std::array::from_fn(|k| rows[2][k] + 0.3 * size * rows[0][k])
+        }
         _ => {}
     }
     let camera = Camera::from_rows(rows, posed.origin(), SIZE, convention).ok()?;
     let bare = matches!(stress, Stress::BareTangent | Stress::FarEye);
-    let camera =
-        if bare { Camera::from_clip_from_world(camera.clip_from_world(), SIZE, convention).ok()? } else { camera };
+    let camera = if bare {
+        Camera::from_clip_from_world(camera.clip_from_world(), SIZE, convention).ok()?
+    } else {
+        camera
+    };
     Some((camera, near))
 }
 
-/// Depths of each pixel between the planes, for a view depth of `z` at the near plane; distances go by the pixel's ray.
-fn depths(random: &mut Random, camera: &Camera, kind: DepthKind, near: f64, ratio: f64) -> Vec<f64> {
+/// Depths of each pixel between the planes, for a view depth of `z` at the near plane; distances go
+/// by the pixel's ray.
+fn depths(
+    random: &mut Random,
+    camera: &Camera,
+    kind: DepthKind,
+    near: f64,
+    ratio: f64,
+) -> Vec<f64> {
     let rows = camera.rows();
     (0..SIZE.pixels())
         .map(|i| {
@@ -108,7 +133,8 @@ fn depths(random: &mut Random, camera: &Camera, kind: DepthKind, near: f64, rati
             if kind == DepthKind::Z {
                 return z;
             }
-            // By Cramer's rule in plain float64: any number does, one between the planes is worth more.
+            // By Cramer's rule in plain float64: any number does, one between the planes is worth
+            // more.
             let column = (i % u64::from(SIZE.width)) as f64;
             let row = (i / u64::from(SIZE.width)) as f64;
             let at = [(column + 0.5) / 2.5 - 1.0, 1.0 - (row + 0.5) / 2.0, 1.0];
@@ -118,7 +144,8 @@ fn depths(random: &mut Random, camera: &Camera, kind: DepthKind, near: f64, rati
             };
             let columns = [cross(y, w), cross(w, x), cross(x, y)];
             let determinant: f64 = (0..3).map(|k| w[k] * columns[2][k]).sum();
-            let ray: f64 = (0..3).map(|k| (0..3).map(|j| columns[j][k] * at[j]).sum::<f64>().powi(2)).sum();
+            let ray: f64 =
+                (0..3).map(|k| (0..3).map(|j| columns[j][k] * at[j]).sum::<f64>().powi(2)).sum();
             z * ray.sqrt() / determinant.abs()
         })
         .collect()
@@ -139,7 +166,8 @@ fn depth_is_never_nearer_than_the_exact_one() {
             for trial in 0..30 {
                 let ratio = [2.0, 1e2, 1e4, 1e8, 1e16][trial % 5];
                 let convention = [DepthConvention::Standard, DepthConvention::Reversed][trial % 2];
-                let Some((camera, near)) = stressed(&mut random, stress, 10.0_f64.powi(power), ratio, convention)
+                let Some((camera, near)) =
+                    stressed(&mut random, stress, 10.0_f64.powi(power), ratio, convention)
                 else {
                     refused += 2;
                     continue;
@@ -154,7 +182,8 @@ fn depth_is_never_nearer_than_the_exact_one() {
             }
             let count = |wanted: &dyn Fn(i64) -> bool| all.iter().filter(|s| wanted(**s)).count();
             let (nearer, exact, next) = (count(&|s| s < 0), count(&|s| s == 0), count(&|s| s == 1));
-            let (more, most) = (all.len() - nearer - exact - next, all.iter().max().copied().unwrap_or(0));
+            let (more, most) =
+                (all.len() - nearer - exact - next, all.iter().max().copied().unwrap_or(0));
             let pixels = all.len();
             if pixels == exact {
                 all_exact += pixels;
@@ -166,14 +195,17 @@ fn depth_is_never_nearer_than_the_exact_one() {
                 rows.push(row);
             }
             assert_eq!(nearer, 0, "{stress:?} 1e{power}");
-            // Plain cameras lose a float32 where the exact depth lies within float64's rounding of one.
+            // Plain cameras lose a float32 where the exact depth lies within float64's rounding of
+            // one.
             assert!(
                 power > 6 || more == 0,
                 "{stress:?} 1e{power}: {more} of {pixels} are farther than they have to be"
             );
         }
     }
-    let row = format!("| the others, all exact | 1e0 to 1e14 | | {all_exact} | 0 | {all_exact} | 0 | 0 | 0 |");
+    let row = format!(
+        "| the others, all exact | 1e0 to 1e14 | | {all_exact} | 0 | {all_exact} | 0 | 0 | 0 |"
+    );
     println!("{row}");
     assert!(all_exact > 30_000, "{all_exact}");
     rows.push(row);
@@ -181,7 +213,8 @@ fn depth_is_never_nearer_than_the_exact_one() {
     rows.iter().for_each(|row| assert_said(row));
 }
 
-/// Parallel rays: near planes before and behind the eye, wide and thin ranges, eyes far away, images far beside them.
+/// Parallel rays: near planes before and behind the eye, wide and thin ranges, eyes far away,
+/// images far beside them.
 #[test]
 fn parallel_depth_is_never_nearer_than_the_exact_one() {
     let mut random = Random(60);
@@ -203,7 +236,8 @@ fn parallel_depth_is_never_nearer_than_the_exact_one() {
         };
         let eye = [0; 3].map(|_| random.pick(&[0.0, 1.0, 1e6]) * random.range(-1.0, 1.0));
         let target = eye.map(|e| e + 2e6 * random.range(-1.0, 1.0));
-        let camera = Camera::look_at(&Pose { eye, target, up: [0.0, 1.0, 0.1] }, &projection, SIZE).unwrap();
+        let camera =
+            Camera::look_at(&Pose { eye, target, up: [0.0, 1.0, 0.1] }, &projection, SIZE).unwrap();
         let image: Vec<f64> = (0..SIZE.pixels()).map(|_| near + range * random.unit()).collect();
         signs[usize::from(near < 0.0)] += image.iter().filter(|z| **z < 0.0).count();
         for kinds in KINDS {

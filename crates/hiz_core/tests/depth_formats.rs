@@ -1,7 +1,8 @@
 //! What the format of a depth image rounds is slack: what can be seen past a wall is never hidden
-//! because the wall was stored nearer than it stands. Expectations are worked out from the formats'
-//! definitions (Vulkan 1.3, "Fixed-Point Data Conversions" and "Floating-Point Format Conversions":
-//! a number between two that can be stored may become either).
+//! because the wall was stored nearer than it stands.
+//! Expectations are worked out from the formats' definitions (Vulkan 1.3, "Fixed-Point Data
+//! Conversions" and "Floating-Point Format Conversions": a number between two that can be stored
+//! may become either).
 
 mod common;
 
@@ -11,8 +12,8 @@ use common::{CONVENTIONS, camera_along_z, engine};
 use hiz_core::headless::Engine;
 use hiz_core::wgpu::TextureFormat as Format;
 use hiz_core::{
-    AtlasUse, Bounds, Camera, CullOptions, DepthConvention, DepthTolerance, Fit, Floats, Hierarchy, ImageSize,
-    InstanceOptions, Pose, Projection, Pyramid, PyramidOptions, VisibleOptions, wgpu,
+    AtlasUse, Bounds, Camera, CullOptions, DepthConvention, DepthTolerance, Fit, Floats, Hierarchy,
+    ImageSize, InstanceOptions, Pose, Projection, Pyramid, PyramidOptions, VisibleOptions, wgpu,
 };
 
 const OCCLUDED: u8 = 1;
@@ -113,16 +114,18 @@ impl Walls {
             entries: &[wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() }],
         });
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let clear = |value| Some(wgpu::Operations { load: wgpu::LoadOp::Clear(value), store: wgpu::StoreOp::Store });
+        let clear = |value| {
+            Some(wgpu::Operations { load: wgpu::LoadOp::Clear(value), store: wgpu::StoreOp::Store })
+        };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("test.wall"),
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: &view,
                 depth_ops: clear(0.5),
-                stencil_ops: self
-                    .format
-                    .has_stencil_aspect()
-                    .then_some(wgpu::Operations { load: wgpu::LoadOp::Clear(0), store: wgpu::StoreOp::Store }),
+                stencil_ops: self.format.has_stencil_aspect().then_some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0),
+                    store: wgpu::StoreOp::Store,
+                }),
             }),
             ..Default::default()
         });
@@ -137,32 +140,48 @@ impl Walls {
 
 /// A texture of one number, given as its bits.
 fn filled(engine: &Engine, format: Format, bits: u16) -> wgpu::Texture {
-    let texture = texture(engine, format, wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC);
-    let bytes: Vec<u8> = std::iter::repeat_n(bits.to_le_bytes(), (SIDE * SIDE) as usize).flatten().collect();
-    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(2 * SIDE), rows_per_image: None };
+    let texture =
+        texture(engine, format, wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC);
+    let bytes: Vec<u8> =
+        std::iter::repeat_n(bits.to_le_bytes(), (SIDE * SIDE) as usize).flatten().collect();
+    let layout = wgpu::TexelCopyBufferLayout {
+        offset: 0,
+        bytes_per_row: Some(2 * SIDE),
+        rows_per_image: None,
+    };
     engine.queue().write_texture(texture.as_image_copy(), &bytes, layout, texture.size());
     texture
 }
 
 /// The view that a bind group accepts.
 fn depth_view(texture: &wgpu::Texture) -> wgpu::TextureView {
-    let aspect =
-        if texture.format().has_stencil_aspect() { wgpu::TextureAspect::DepthOnly } else { wgpu::TextureAspect::All };
+    let aspect = if texture.format().has_stencil_aspect() {
+        wgpu::TextureAspect::DepthOnly
+    } else {
+        wgpu::TextureAspect::All
+    };
     texture.create_view(&wgpu::TextureViewDescriptor { aspect, ..Default::default() })
 }
 
-fn reduced(engine: &Engine, texture: &wgpu::Texture, camera: &Camera, atlas: AtlasUse) -> Arc<Pyramid> {
+fn reduced(
+    engine: &Engine,
+    texture: &wgpu::Texture,
+    camera: &Camera,
+    atlas: AtlasUse,
+) -> Arc<Pyramid> {
     let options = PyramidOptions { atlas, ..PyramidOptions::default() };
     let pyramid = engine.context().create_pyramid(camera.size(), &options).unwrap();
-    let mut encoder = engine.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let mut encoder =
+        engine.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     engine.context().record_reduce(&mut encoder, &depth_view(texture), camera, &pyramid).unwrap();
     engine.queue().submit([encoder.finish()]);
     Arc::new(pyramid)
 }
 
 /// Boxes of no thickness at these depths, in the middle of the image; 64 of each, so that groups
-/// hold one depth alone. They are as wide as five pixels; where an atlas is asked for less than one
-/// wide, so that the image itself is read.
+/// hold one depth alone.
+/// They are as wide as five pixels; where an atlas is asked for less than one wide, so that the
+/// image itself is read.
 fn verdicts(
     engine: &Engine,
     depths: &[f64],
@@ -180,7 +199,9 @@ fn verdicts(
     }
     let bounds = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };
     let order = hiz_core::StoredOrder::Given;
-    let list = engine.instances(&bounds, &InstanceOptions { order, ..InstanceOptions::default() }).unwrap();
+    let list = engine
+        .instances(&bounds, &InstanceOptions { order, ..InstanceOptions::default() })
+        .unwrap();
     let culling = engine.cull(&list, camera, pyramid, options, &VisibleOptions::default()).unwrap();
     let all = culling.verdicts().unwrap();
     for (i, verdict) in all.iter().enumerate().step_by(64) {
@@ -191,14 +212,19 @@ fn verdicts(
     }
     if options.hierarchy == Hierarchy::Always {
         let hidden = all.iter().filter(|v| **v == OCCLUDED).count() as u64;
-        assert_eq!(culling.counts().unwrap().tested_instances, all.len() as u64 - hidden, "groups decided");
+        assert_eq!(
+            culling.counts().unwrap().tested_instances,
+            all.len() as u64 - hidden,
+            "groups decided"
+        );
     }
     all.into_iter().step_by(64).collect()
 }
 
 /// Every way to ask for depth.
 fn ways() -> Vec<CullOptions> {
-    let plain = CullOptions { depth_slack: 0.0, hierarchy: Hierarchy::Never, ..CullOptions::default() };
+    let plain =
+        CullOptions { depth_slack: 0.0, hierarchy: Hierarchy::Never, ..CullOptions::default() };
     vec![
         plain.clone(),
         CullOptions { hierarchy: Hierarchy::Always, ..plain.clone() },
@@ -213,12 +239,15 @@ fn view_depth(ndc: f64, convention: DepthConvention) -> f64 {
 
 /// `steps` steps of `step` behind `stored`.
 fn behind(stored: f64, steps: f64, step: f64, convention: DepthConvention) -> f64 {
-    view_depth(if convention.is_reversed() { stored - steps * step } else { stored + steps * step }, convention)
+    view_depth(
+        if convention.is_reversed() { stored - steps * step } else { stored + steps * step },
+        convention,
+    )
 }
 
 /// A wall is anywhere up to a step behind the number that is stored: what stands 0.95 of it behind
-/// may be seen, what stands 1.1 of it behind cannot, whatever the way to ask. A half step of slack,
-/// or none, or none for groups, hides the first.
+/// may be seen, what stands 1.1 of it behind cannot, whatever the way to ask.
+/// A half step of slack, or none, or none for groups, hides the first.
 #[test]
 fn a_step_of_the_format_decides() {
     let engine = &engine();
@@ -226,7 +255,8 @@ fn a_step_of_the_format_decides() {
         let camera = camera_along_z(SIDE, SIDE, convention);
         // The bits, the number that they stand for, the step about it.
         let unorm = |c: u16| (Format::Depth16Unorm, c, f64::from(c) / 65_535.0, 1.0 / 65_535.0);
-        let half = |bits, value: f64| (Format::R16Float, bits, value, value / 1024.0 + 2.0_f64.powi(-24));
+        let half =
+            |bits, value: f64| (Format::R16Float, bits, value, value / 1024.0 + 2.0_f64.powi(-24));
         let cases = if convention.is_reversed() {
             // 2^-5; ten of the least subnormal steps.
             [unorm(2000), unorm(9), half(0x2800, 1.0 / 32.0), half(10, 10.0 / 16_777_216.0)]
@@ -236,14 +266,16 @@ fn a_step_of_the_format_decides() {
         for (format, bits, stored, step) in cases {
             let texture = filled(engine, format, bits);
             // An atlas holds float32: asked for one, culls read such an image where it is.
-            for (atlas, ways) in [(AtlasUse::Never, &ways()[..]), (AtlasUse::Always, &ways()[..1])] {
+            for (atlas, ways) in [(AtlasUse::Never, &ways()[..]), (AtlasUse::Always, &ways()[..1])]
+            {
                 let pyramid = reduced(engine, &texture, &camera, atlas);
                 assert_eq!(pyramid.tolerance(), DepthTolerance::of(format));
                 for options in ways {
                     // The shader's own roundings take 2^-23, which is two steps of subnormal
                     // halves.
                     let far = if stored < 1e-6 { 4.0 } else { 1.1 };
-                    let depths = [0.55, 0.95, far, 8.0].map(|k| behind(stored, k, step, convention));
+                    let depths =
+                        [0.55, 0.95, far, 8.0].map(|k| behind(stored, k, step, convention));
                     let got = verdicts(engine, &depths, &camera, (&pyramid, atlas), options);
                     let what = format!("{convention:?} {format:?} {stored} {atlas:?} {options:?}");
                     assert_eq!(got, [VISIBLE, VISIBLE, OCCLUDED, OCCLUDED], "{what}");
@@ -259,8 +291,8 @@ fn a_step_of_the_format_decides() {
 }
 
 /// The same of depth in 24 bits, or in the float32 that a driver keeps instead, and of the formats
-/// of float32, which bring no slack. The wall is drawn; reversed Z, far away, where a step is large
-/// beside float32's.
+/// of float32, which bring no slack.
+/// The wall is drawn; reversed Z, far away, where a step is large beside float32's.
 #[test]
 fn depth_of_24_bits_brings_its_step_and_float32_none() {
     let engine = &engine();
@@ -276,7 +308,8 @@ fn depth_of_24_bits_brings_its_step_and_float32_none() {
         for options in ways() {
             // Beside the step the shader's own roundings take 2^-23, two steps; a tenth is
             // float32's margin.
-            let depths = [0.55, 0.95, 3.3, 10.0].map(|k| behind(stored, k, step, DepthConvention::Reversed));
+            let depths =
+                [0.55, 0.95, 3.3, 10.0].map(|k| behind(stored, k, step, DepthConvention::Reversed));
             let got = verdicts(engine, &depths, &camera, (&pyramid, AtlasUse::Never), &options);
             assert_eq!(got, [expected, expected, OCCLUDED, OCCLUDED], "{format:?} {options:?}");
         }
@@ -284,19 +317,25 @@ fn depth_of_24_bits_brings_its_step_and_float32_none() {
 }
 
 /// Spheres one to three centimetres before a wall 10 to 30 metres away, the wall rasterised: what
-/// the issue of 4,200 hidden spheres of 10,000 describes. Near planes are chosen so that a step of
-/// the format is 6 cm at 20 m. Twenty steps behind the wall spheres are hidden: of 24 bits the
-/// slack of float32 alone, relative to a depth near 1, is eight.
+/// the issue of 4,200 hidden spheres of 10,000 describes.
+/// Near planes are chosen so that a step of the format is 6 cm at 20 m.
+/// Twenty steps behind the wall spheres are hidden: of 24 bits the slack of float32 alone, relative
+/// to a depth near 1, is eight.
 #[test]
 fn nothing_that_stands_before_a_wall_is_hidden() {
     let engine = &engine();
-    let formats = [(Format::Depth16Unorm, 0.1), (Format::Depth24Plus, 4e-4), (Format::Depth24PlusStencil8, 4e-4)];
+    let formats = [
+        (Format::Depth16Unorm, 0.1),
+        (Format::Depth24Plus, 4e-4),
+        (Format::Depth24PlusStencil8, 4e-4),
+    ];
     for (format, near) in formats {
         let walls = Walls::new(engine, format);
         for convention in CONVENTIONS {
             let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, 1.0], up: [0.0, 1.0, 0.0] };
             let far = 100.0;
-            let projection = Projection::Perspective { fov_y: 1.0, near, far: Some(far), convention };
+            let projection =
+                Projection::Perspective { fov_y: 1.0, near, far: Some(far), convention };
             let camera = Camera::look_at(&pose, &projection, ImageSize::new(SIDE, SIDE)).unwrap();
             let steps = if format == Format::Depth16Unorm { 65_535.0 } else { 16_777_215.0 };
             let mut hidden = 0;
@@ -304,7 +343,8 @@ fn nothing_that_stands_before_a_wall_is_hidden() {
                 let z = 10.0 + 0.5 * f64::from(k);
                 let standard = far / (far - near) * (1.0 - near / z);
                 let ndc = if convention.is_reversed() { 1.0 - standard } else { standard };
-                let pyramid = reduced(engine, &walls.draw(engine, ndc as f32), &camera, AtlasUse::Never);
+                let pyramid =
+                    reduced(engine, &walls.draw(engine, ndc as f32), &camera, AtlasUse::Never);
                 // 125 spheres with their farthest points 1 to 3 cm before the wall, and 125 beyond
                 // twenty steps behind it.
                 let step = z * z / near / steps;
@@ -320,15 +360,21 @@ fn nothing_that_stands_before_a_wall_is_hidden() {
                     centers.extend([0.5 * z * u, 0.5 * z * v, z + 20.0 * step + 0.005]);
                     radii.push(0.005);
                 }
-                let bounds = Bounds::Spheres { centers: Floats::F64(&centers), radii: Floats::F64(&radii) };
+                let bounds =
+                    Bounds::Spheres { centers: Floats::F64(&centers), radii: Floats::F64(&radii) };
                 let list = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
                 for hierarchy in [Hierarchy::Never, Hierarchy::Always] {
                     let options = CullOptions { hierarchy, ..CullOptions::default() };
-                    let culling = engine.cull(&list, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap();
+                    let culling = engine
+                        .cull(&list, &camera, &pyramid, &options, &VisibleOptions::default())
+                        .unwrap();
                     let got = culling.verdicts().unwrap();
                     hidden += got[..125].iter().filter(|v| **v != VISIBLE).count();
                     let kept = got[125..].iter().filter(|v| **v != OCCLUDED).count();
-                    assert_eq!(kept, 0, "{format:?} {convention:?} {z}: kept twenty steps behind the wall");
+                    assert_eq!(
+                        kept, 0,
+                        "{format:?} {convention:?} {z}: kept twenty steps behind the wall"
+                    );
                 }
             }
             assert_eq!(hidden, 0, "{format:?} {convention:?}: of 10,000 spheres before their wall");
@@ -353,10 +399,16 @@ fn uploaded_halves_bring_their_step() {
             assert_eq!(image.tolerance(), DepthTolerance::HALF);
             let pyramid = engine.pyramid_with(&image, &options).unwrap();
             assert_eq!(pyramid.tolerance(), Some(DepthTolerance::HALF));
-            let exact = engine.pyramid_with(&engine.upload_depth(&wall, &camera).unwrap(), &options).unwrap();
+            let exact = engine
+                .pyramid_with(&engine.upload_depth(&wall, &camera).unwrap(), &options)
+                .unwrap();
             for options in ways() {
                 let got = verdicts(engine, &depths, &camera, (&pyramid, atlas), &options);
-                assert_eq!(got, [VISIBLE, VISIBLE, OCCLUDED, OCCLUDED], "{convention:?} {atlas:?} {options:?}");
+                assert_eq!(
+                    got,
+                    [VISIBLE, VISIBLE, OCCLUDED, OCCLUDED],
+                    "{convention:?} {atlas:?} {options:?}"
+                );
                 let got = verdicts(engine, &depths, &camera, (&exact, atlas), &options);
                 assert_eq!(got, [OCCLUDED; 4], "{convention:?} {atlas:?} {options:?}");
             }
@@ -372,9 +424,13 @@ fn uploaded_halves_bring_their_step() {
 fn level_0_of_other_bits_is_not_read() {
     let engine = &engine();
     let camera = camera_along_z(SIDE, SIDE, DepthConvention::Standard);
-    let pyramid = reduced(engine, &filled(engine, Format::Depth16Unorm, 32_768), &camera, AtlasUse::Never);
+    let pyramid =
+        reduced(engine, &filled(engine, Format::Depth16Unorm, 32_768), &camera, AtlasUse::Never);
     let error = engine.read_level(&pyramid, 0).unwrap_err().to_string();
-    assert!(error.starts_with("level: expected a level above 0 of a pyramid of Depth16Unorm"), "{error}");
+    assert!(
+        error.starts_with("level: expected a level above 0 of a pyramid of Depth16Unorm"),
+        "{error}"
+    );
     let read = engine.read_level(&pyramid, 1).unwrap();
     assert!(read.iter().all(|d| (f64::from(*d) * 65_535.0 - 32_768.0).abs() < 0.01), "{read:?}");
 }

@@ -4,7 +4,9 @@
 mod common;
 
 use common::{CONVENTIONS, Random};
-use hiz_core::{Camera, DepthConvention, DepthKind, Floats, ImageSize, Pose, Projection, ndc_from_kind};
+use hiz_core::{
+    Camera, DepthConvention, DepthKind, Floats, ImageSize, Pose, Projection, ndc_from_kind,
+};
 
 /// A finite float64 or float32 as an integer times 2^-`scale`.
 fn integer(v: f64, scale: i32) -> i128 {
@@ -41,10 +43,12 @@ fn depth_is_never_nearer_than_the_exact_one() {
             })
             .collect();
         let camera = Camera::look_at(&pose, &projection, ImageSize::new(100, 40)).unwrap();
-        let converted = ndc_from_kind(Floats::F64(&depths), DepthKind::Z, 1.0, &[], &camera).unwrap();
+        let converted =
+            ndc_from_kind(Floats::F64(&depths), DepthKind::Z, 1.0, &[], &camera).unwrap();
         let mut at_the_border = 0;
         for (z, ndc) in depths.iter().zip(&converted) {
-            // Both sides times 8 z: a float32 below 1 is a multiple of 2^-48 here, a depth of 2^-52.
+            // Both sides times 8 z: a float32 below 1 is a multiple of 2^-48 here, a depth of
+            // 2^-52.
             let (d, depth) = (integer(f64::from(*ndc), 48), integer(*z, 52));
             let product = 8 * d * depth;
             let exact = |z: i128, nine: i128| match convention {

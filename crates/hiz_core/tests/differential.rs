@@ -33,21 +33,39 @@ fn assert_green(name: &str, report: &Report) {
 
 #[test]
 fn no_false_cull_in_area_coverage() {
-    let report = Campaign { seed: 11, rounds: 100, modes: ALL, ..Campaign::default() }.run(&engine());
+    let report =
+        Campaign { seed: 11, rounds: 100, modes: ALL, ..Campaign::default() }.run(&engine());
     assert_green("area coverage", &report);
-    assert!(report.total().cases > 3 * 50_000, "50,000 of each kind of volume are promised: {:?}", report.total());
+    assert!(
+        report.total().cases > 3 * 50_000,
+        "50,000 of each kind of volume are promised: {:?}",
+        report.total()
+    );
 }
 
 #[test]
 fn no_false_cull_in_sample_coverage() {
-    let campaign = Campaign { seed: 12, rounds: 34, coverage: Coverage::Sample, modes: ALL, ..Campaign::default() };
+    let campaign = Campaign {
+        seed: 12,
+        rounds: 34,
+        coverage: Coverage::Sample,
+        modes: ALL,
+        ..Campaign::default()
+    };
     assert_green("sample coverage", &campaign.run(&engine()));
 }
 
 #[test]
 fn no_false_cull_with_a_volume_fit() {
     for (seed, coverage) in [(14, Coverage::Area), (15, Coverage::Sample)] {
-        let campaign = Campaign { seed, rounds: 20, coverage, modes: FITTED, fit: Fit::Volume, ..Campaign::default() };
+        let campaign = Campaign {
+            seed,
+            rounds: 20,
+            coverage,
+            modes: FITTED,
+            fit: Fit::Volume,
+            ..Campaign::default()
+        };
         assert_green(&format!("volume fit, {coverage:?}"), &campaign.run(&engine()));
     }
 }
@@ -55,20 +73,37 @@ fn no_false_cull_with_a_volume_fit() {
 /// Level 0 and the stored levels are all that is read, whatever the rectangle asks for.
 #[test]
 fn no_false_cull_with_missing_levels() {
-    for (seed, fit, rounds, modes) in [(16, Fit::Rectangle, 60, ALL), (17, Fit::Volume, 12, FITTED)] {
-        let campaign = Campaign { seed, rounds, modes, fit, levels: MISSING_LEVELS, ..Campaign::default() };
+    for (seed, fit, rounds, modes) in [(16, Fit::Rectangle, 60, ALL), (17, Fit::Volume, 12, FITTED)]
+    {
+        let campaign =
+            Campaign { seed, rounds, modes, fit, levels: MISSING_LEVELS, ..Campaign::default() };
         assert_green(&format!("missing levels, {fit:?}"), &campaign.run(&engine()));
     }
 }
 
-/// Groups first, in both stored orders: nothing more is kept than without, and nothing visible is lost.
+/// Groups first, in both stored orders: nothing more is kept than without, and nothing visible is
+/// lost.
 #[test]
 fn no_false_cull_in_groups() {
     for (seed, coverage) in [(16, Coverage::Area), (17, Coverage::Sample)] {
-        let campaign = Campaign { seed, rounds: 12, coverage, modes: ALL, groups: true, ..Campaign::default() };
+        let campaign = Campaign {
+            seed,
+            rounds: 12,
+            coverage,
+            modes: ALL,
+            groups: true,
+            ..Campaign::default()
+        };
         assert_grouped(&format!("groups, {coverage:?}"), &campaign.run(&engine()));
     }
-    let fitted = Campaign { seed: 18, rounds: 4, modes: FITTED, fit: Fit::Volume, groups: true, ..Campaign::default() };
+    let fitted = Campaign {
+        seed: 18,
+        rounds: 4,
+        modes: FITTED,
+        fit: Fit::Volume,
+        groups: true,
+        ..Campaign::default()
+    };
     assert_grouped("groups, volume fit", &fitted.run(&engine()));
 }
 
@@ -85,25 +120,32 @@ fn assert_grouped(name: &str, report: &Report) {
 
 #[test]
 fn little_that_is_hidden_is_kept() {
-    let report = Campaign { seed: 13, rounds: 15, count_keeps: true, ..Campaign::default() }.run(&engine());
+    let report =
+        Campaign { seed: 13, rounds: 15, count_keeps: true, ..Campaign::default() }.run(&engine());
     assert_green("false keeps", &report);
     // Adversarial cases, made to be undecided; what plain scenes keep is measured on scenes.
     let total = report.total();
     assert!(total.false_keeps < total.cases / 2, "{total:?}");
 }
 
-/// The long form, `make soak`: `HIZVK_SOAK_CASES` (1,000,000) of each kind of volume from seed `HIZVK_SOAK_SEED` (1000) on. It can
-/// be stopped at any time: the next run with the same settings goes on where this one was.
+/// The long form, `make soak`: `HIZVK_SOAK_CASES` (1,000,000) of each kind of volume from seed
+/// `HIZVK_SOAK_SEED` (1000) on.
+/// It can be stopped at any time: the next run with the same settings goes on where this one was.
 #[test]
 #[ignore = "minutes: make soak"]
 fn soak() {
     let setting = |name: &str, default: u64| match std::env::var(name) {
-        Ok(text) => text.parse().unwrap_or_else(|_| panic!("{name}: expected a number, got {text:?}")),
+        Ok(text) => {
+            text.parse().unwrap_or_else(|_| panic!("{name}: expected a number, got {text:?}"))
+        }
         Err(_) => default,
     };
     let (seed, wanted) = (setting("HIZVK_SOAK_SEED", 1000), setting("HIZVK_SOAK_CASES", 1_000_000));
     let adapter = engine().adapter().to_string();
-    let checkpoint = Checkpoint::new("soak", format!("seed {seed} cases {wanted}, flat and in groups, on {adapter}"));
+    let checkpoint = Checkpoint::new(
+        "soak",
+        format!("seed {seed} cases {wanted}, flat and in groups, on {adapter}"),
+    );
     let (mut done, mut report) = checkpoint.load(true);
     if done > 0 {
         eprintln!("soak: goes on after {done} chunks, {} cases", report.total().cases);
@@ -130,7 +172,8 @@ fn soak() {
         checkpoint.save(done, &report);
         let total = report.total();
         let seconds = start.elapsed().as_secs_f64();
-        let left = (3 * wanted).saturating_sub(total.cases as u64) as f64 * seconds / (total.cases - before) as f64;
+        let left = (3 * wanted).saturating_sub(total.cases as u64) as f64 * seconds
+            / (total.cases - before) as f64;
         eprintln!(
             "soak: {} of {} cases, {} culled, {} false culls, {seconds:.0} s, {left:.0} s to go",
             total.cases,

@@ -1,5 +1,6 @@
-//! One campaign on every adapter that Vulkan lists: none may cull what can be seen, and where their verdicts differ, it is
-//! counted. With one driver installed there is nothing to compare; `make test-swiftshader` shows it two.
+//! One campaign on every adapter that Vulkan lists: none may cull what can be seen, and where their
+//! verdicts differ, it is counted.
+//! With one driver installed there is nothing to compare; `make test-swiftshader` shows it two.
 
 mod common;
 
@@ -10,7 +11,8 @@ use campaign::{Campaign, Class, Report};
 use hiz_core::Coverage;
 use hiz_core::headless::{Engine, adapters};
 
-/// A campaign's report for each engine, and how many volumes the first keeps and another culls, and the reverse, by class.
+/// A campaign's report for each engine, and how many volumes the first keeps and another culls, and
+/// the reverse, by class.
 fn compare(engines: &[Engine]) -> (Vec<Report>, Vec<[usize; 2]>) {
     let mut reports = vec![Report::new(&Class::ALL, false); engines.len()];
     let mut differences = vec![[0; 2]; Class::ALL.len()];
@@ -45,10 +47,16 @@ fn drivers_may_differ_but_none_errs() {
         eprintln!("one alone: nothing to compare (make test-swiftshader compares two)");
         return;
     }
-    // Without the margin, too: there verdicts hang on single roundings, and drivers that round otherwise would show.
-    for (margin, faults) in [("full", &[][..]), ("none", &[("ERROR_ULPS: f32 = 24.0", "ERROR_ULPS: f32 = 0.0")][..])] {
+    // Without the margin, too: there verdicts hang on single roundings, and drivers that round
+    // otherwise would show.
+    for (margin, faults) in
+        [("full", &[][..]), ("none", &[("ERROR_ULPS: f32 = 24.0", "ERROR_ULPS: f32 = 0.0")][..])]
+    {
         let engines: Vec<Engine> = (0..names.len())
-            .map(|i| Engine::with_planted_faults(Some(&i.to_string()), faults).expect("an adapter that opens"))
+            .map(|i| {
+                Engine::with_planted_faults(Some(&i.to_string()), faults)
+                    .expect("an adapter that opens")
+            })
             .collect();
         let (reports, differences) = compare(&engines);
         eprintln!("margin {margin}\n{:<18}{:>12}{:>12}", "class", "first keeps", "other keeps");
@@ -56,7 +64,13 @@ fn drivers_may_differ_but_none_errs() {
             eprintln!("{:<18}{first:>12}{other:>12}", format!("{class:?}"));
         }
         let sum = |side: usize| differences.iter().map(|d| d[side]).sum::<usize>();
-        eprintln!("{:<18}{:>12}{:>12} of {} cases", "all", sum(0), sum(1), reports[0].total().cases);
+        eprintln!(
+            "{:<18}{:>12}{:>12} of {} cases",
+            "all",
+            sum(0),
+            sum(1),
+            reports[0].total().cases
+        );
         for (name, report) in names.iter().zip(&reports) {
             eprintln!("margin {margin}, {name}\n{}\n{report}", campaign::HEADER);
             assert!(margin == "none" || report.total().false_culls == 0, "{name}");

@@ -7,14 +7,16 @@ use common::{camera_along_z, engine};
 use hiz_core::yardstick::{PerLevelReduction, ReductionShape, submitted_ms};
 use hiz_core::{Bounds, CullOptions, DepthConvention, Floats, InstanceOptions, VisibleOptions};
 
-/// Pipelines are dropped before the last submit. A driver in software frees them on a thread of its
-/// own, after it has told that the submit is done: then this process ends.
+/// Pipelines are dropped before the last submit.
+/// A driver in software frees them on a thread of its own, after it has told that the submit is
+/// done: then this process ends.
 #[test]
 fn a_process_ends_while_the_driver_frees() {
     let engine = engine();
     let camera = camera_along_z(64, 64, DepthConvention::Standard);
     let depth = engine.upload_depth(&[0.5; 64 * 64], &camera).unwrap();
-    let bounds = Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0]), radii: Floats::F32(&[0.1]) };
+    let bounds =
+        Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0]), radii: Floats::F32(&[0.1]) };
     let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
     let pyramid = engine.pyramid(&depth).unwrap();
     let kept = || {
@@ -22,8 +24,9 @@ fn a_process_ends_while_the_driver_frees() {
         engine.cull(&instances, &camera, &pyramid, &options, &output).unwrap().mask().unwrap()
     };
     assert_eq!(kept(), [false]);
-    let reductions: Vec<_> =
-        (0..8).map(|_| PerLevelReduction::new(&engine, &depth, ReductionShape::Buffer).unwrap()).collect();
+    let reductions: Vec<_> = (0..8)
+        .map(|_| PerLevelReduction::new(&engine, &depth, ReductionShape::Buffer).unwrap())
+        .collect();
     for reduction in &reductions {
         submitted_ms(&engine, |encoder| {
             reduction.record(encoder);

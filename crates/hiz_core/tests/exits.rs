@@ -1,6 +1,6 @@
-//! The end of a device: destroyed with the last object on it, on each way out. A driver in software
-//! has threads of its own, which the destruction joins; so the threads of this process tell whether
-//! it has happened.
+//! The end of a device: destroyed with the last object on it, on each way out.
+//! A driver in software has threads of its own, which the destruction joins; so the threads of this
+//! process tell whether it has happened.
 
 mod common;
 
@@ -14,9 +14,12 @@ use hiz_core::{Bounds, CullOptions, DepthConvention, Floats, InstanceOptions, Vi
 fn submitted(engine: &Engine) -> Culling {
     let camera = camera_along_z(64, 64, DepthConvention::Standard);
     let pyramid = engine.pyramid(&engine.upload_depth(&[0.5; 64 * 64], &camera).unwrap()).unwrap();
-    let bounds = Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0]), radii: Floats::F32(&[0.1]) };
+    let bounds =
+        Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0]), radii: Floats::F32(&[0.1]) };
     let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
-    engine.cull(&instances, &camera, &pyramid, &CullOptions::default(), &VisibleOptions::default()).unwrap()
+    engine
+        .cull(&instances, &camera, &pyramid, &CullOptions::default(), &VisibleOptions::default())
+        .unwrap()
 }
 
 /// The threads of this process: two of a test, and those of the driver.
@@ -50,7 +53,10 @@ fn a_device_ends_with_the_last_object_on_it() {
         threads()
     });
     // One is the thread that counted.
-    assert!(!in_software || seen.unwrap() > before + 1, "a driver without threads: nothing is shown here");
+    assert!(
+        !in_software || seen.unwrap() > before + 1,
+        "a driver without threads: nothing is shown here"
+    );
     assert!(settles(), "the thread that asked for the shared engine has ended");
 
     let panicked = on_a_thread(|| {

@@ -1,5 +1,6 @@
-//! `Fit::Volume` against the exact oracle, on depth images made to fit: each pixel holds just about the depth at which it begins
-//! to show the volume, so that an ulp, or one pixel of them all, decides.
+//! `Fit::Volume` against the exact oracle, on depth images made to fit: each pixel holds just about
+//! the depth at which it begins to show the volume, so that an ulp, or one pixel of them all,
+//! decides.
 
 mod common;
 
@@ -37,7 +38,15 @@ fn run(
     sharp: bool,
 ) -> Tally {
     let mut tally = Tally::default();
-    let campaign = Campaign { seed, rounds, volumes: 4, coverage, modes, fit: Fit::Volume, ..Campaign::default() };
+    let campaign = Campaign {
+        seed,
+        rounds,
+        volumes: 4,
+        coverage,
+        modes,
+        fit: Fit::Volume,
+        ..Campaign::default()
+    };
     for round in campaign.fitted(kinds, sharp) {
         // Nothing for a camera that float32 cannot hold.
         let Some(masks) = round.masks(engine) else { continue };
@@ -67,7 +76,12 @@ fn no_false_cull_on_depth_that_fits() {
     // Few pipelines: each takes long to compile.
     let modes: [(u64, Coverage, Kinds, Modes); 3] = [
         (31, Coverage::Area, &KINDS, &[(Footprint::Two, 4096)]),
-        (32, Coverage::Sample, &[BoundsKind::Sphere, BoundsKind::OrientedBox], &[(Footprint::Two, 4096)]),
+        (
+            32,
+            Coverage::Sample,
+            &[BoundsKind::Sphere, BoundsKind::OrientedBox],
+            &[(Footprint::Two, 4096)],
+        ),
         (33, Coverage::Area, &[BoundsKind::OrientedBox], &[(Footprint::Eight, 0)]),
     ];
     for (seed, coverage, kinds, mode) in modes {
@@ -78,7 +92,8 @@ fn no_false_cull_on_depth_that_fits() {
     }
 }
 
-/// Each fault makes the fit too tight somewhere; a depth image that fits must show it. (One kind: each fault compiles anew.)
+/// Each fault makes the fit too tight somewhere; a depth image that fits must show it.
+/// (One kind: each fault compiles anew.)
 #[test]
 fn planted_faults_turn_it_red() {
     type Faults = [(&'static str, &'static str)];
@@ -92,17 +107,32 @@ fn planted_faults_turn_it_red() {
         ),
         (
             "the texel's nearest corner",
-            &[("select(left_top, right_bottom, plane.slope >", "select(right_bottom, left_top, plane.slope >")],
+            &[(
+                "select(left_top, right_bottom, plane.slope >",
+                "select(right_bottom, left_top, plane.slope >",
+            )],
         ),
         ("a pixel too few", &[("min(end, last + vec2<u32>(1u)), bits)", "min(end, last), bits)")]),
         (
             "a back taken for a front",
-            &[("guess.facing != 0.0 || !on_border(guess.own, interval.y", "!on_border(guess.own, interval.y")],
+            &[(
+                "guess.facing != 0.0 || !on_border(guess.own, interval.y",
+                "!on_border(guess.own, interval.y",
+            )],
         ),
     ];
     for (name, faults) in planted {
-        let engine = Engine::with_planted_faults(None, faults).expect("the device tests need a Vulkan driver");
-        let tally = run(&engine, &[BoundsKind::OrientedBox], 36, 20, Coverage::Area, &[(Footprint::Two, 4096)], true);
+        let engine = Engine::with_planted_faults(None, faults)
+            .expect("the device tests need a Vulkan driver");
+        let tally = run(
+            &engine,
+            &[BoundsKind::OrientedBox],
+            36,
+            20,
+            Coverage::Area,
+            &[(Footprint::Two, 4096)],
+            true,
+        );
         eprintln!("{name}: {tally:?}");
         assert!(tally.false_culls > 0, "{name}: stayed green: {tally:?}");
     }

@@ -1,8 +1,10 @@
-//! What float32 keeps in vain: boxes behind a wall that the engine keeps, beside those that the oracle calls visible, for every kind
-//! of camera, range of depth and size of the world.
+//! What float32 keeps in vain: boxes behind a wall that the engine keeps, beside those that the
+//! oracle calls visible, for every kind of camera, range of depth and size of the world.
 //!
-//! A wall of one depth fills the image. The boxes lie behind it, by 1e-4 of its distance and more. That of some the oracle sees
-//! something is the depth image's own rounding. `docs/accuracy.md` has the table.
+//! A wall of one depth fills the image.
+//! The boxes lie behind it, by 1e-4 of its distance and more.
+//! That of some the oracle sees something is the depth image's own rounding.
+//! `docs/accuracy.md` has the table.
 
 mod common;
 
@@ -12,8 +14,8 @@ mod documented;
 use common::{CONVENTIONS, Random, engine};
 use documented::{assert_said, is_of_this_driver};
 use hiz_core::{
-    Bounds, Camera, CullOptions, DepthConvention, Floats, ImageSize, InstanceOptions, Mat4, Pose, Projection, Vec3,
-    VisibleOptions,
+    Bounds, Camera, CullOptions, DepthConvention, Floats, ImageSize, InstanceOptions, Mat4, Pose,
+    Projection, Vec3, VisibleOptions,
 };
 use hiz_ref::{Verdict, View, Volume};
 
@@ -43,12 +45,20 @@ enum Kind {
     OrthographicMatrix,
     /// A bare matrix of [`Kind::OrthographicAround`], the world's origin at the eye.
     OrthographicMatrixAround,
-    /// The same, the world's origin out of view: nothing says where things are, and depth is measured from the near plane.
+    /// The same, the world's origin out of view: nothing says where things are, and depth is
+    /// measured from the near plane.
     OrthographicMatrixAway,
 }
 
-const PERSPECTIVES: [Kind; 7] =
-    [Kind::LookAt, Kind::Frustum, Kind::OneMatrix, Kind::TwoMatrices, Kind::Pose, Kind::ThinRange, Kind::Telephoto];
+const PERSPECTIVES: [Kind; 7] = [
+    Kind::LookAt,
+    Kind::Frustum,
+    Kind::OneMatrix,
+    Kind::TwoMatrices,
+    Kind::Pose,
+    Kind::ThinRange,
+    Kind::Telephoto,
+];
 const PARALLEL: [Kind; 5] = [
     Kind::Orthographic,
     Kind::OrthographicAround,
@@ -60,12 +70,22 @@ const PARALLEL: [Kind; 5] = [
 /// How many times as far away [`Kind::Telephoto`] stands.
 const TELE: f64 = 1e3;
 
-/// How far the wall is from the eye, and the eye from the world's origin. No wall is nearer than 1e-6 of where it stands in the world.
-const PLACES: [(f64, f64); 7] = [(1e-3, 0.0), (1.0, 0.0), (1e3, 0.0), (1e6, 0.0), (1e-3, 1e3), (1.0, 1e6), (1e3, 1e6)];
+/// How far the wall is from the eye, and the eye from the world's origin.
+/// No wall is nearer than 1e-6 of where it stands in the world.
+const PLACES: [(f64, f64); 7] =
+    [(1e-3, 0.0), (1.0, 0.0), (1e3, 0.0), (1e6, 0.0), (1e-3, 1e3), (1.0, 1e6), (1e3, 1e6)];
 
 impl Kind {
-    /// A camera at `eye` whose wall stands at `distance`; the ratio is that of far to near, or of far to the wall.
-    fn camera(self, eye: Vec3, axes: &[Vec3; 3], distance: f64, ratio: f64, convention: DepthConvention) -> Camera {
+    /// A camera at `eye` whose wall stands at `distance`; the ratio is that of far to near, or of
+    /// far to the wall.
+    fn camera(
+        self,
+        eye: Vec3,
+        axes: &[Vec3; 3],
+        distance: f64,
+        ratio: f64,
+        convention: DepthConvention,
+    ) -> Camera {
         let [right, up, forward] = *axes;
         let target: Vec3 = std::array::from_fn(|k| eye[k] + 3.0 * TELE * distance * forward[k]);
         let pose = Pose { eye, target, up };
@@ -89,8 +109,12 @@ impl Kind {
             convention,
         };
         let range = distance * ratio;
-        let around =
-            matches!(self, Kind::OrthographicAround | Kind::OrthographicMatrixAround | Kind::OrthographicMatrixAway);
+        let around = matches!(
+            self,
+            Kind::OrthographicAround
+                | Kind::OrthographicMatrixAround
+                | Kind::OrthographicMatrixAway
+        );
         let parallel = Projection::Orthographic {
             left: -distance,
             right: distance,
@@ -107,13 +131,17 @@ impl Kind {
             | Kind::OrthographicMatrix
             | Kind::OrthographicMatrixAround
             | Kind::OrthographicMatrixAway => {
-                Camera::from_clip_from_world(named.clip_from_world(), SIZE, convention).expect("a plain matrix")
+                Camera::from_clip_from_world(named.clip_from_world(), SIZE, convention)
+                    .expect("a plain matrix")
             }
             Kind::TwoMatrices => {
-                let row = |axis: Vec3| [axis[0], axis[1], axis[2], -(0..3).map(|k| axis[k] * eye[k]).sum::<f64>()];
+                let row = |axis: Vec3| {
+                    [axis[0], axis[1], axis[2], -(0..3).map(|k| axis[k] * eye[k]).sum::<f64>()]
+                };
                 let view = [row(right), row(up), row(forward), [0.0, 0.0, 0.0, 1.0]];
                 let clip = projection.clip_from_camera(SIZE).expect("a plain projection");
-                Camera::from_clip_from_camera(clip, view, SIZE, convention).expect("two plain matrices")
+                Camera::from_clip_from_camera(clip, view, SIZE, convention)
+                    .expect("two plain matrices")
             }
             Kind::Pose => {
                 let clip = projection.clip_from_camera(SIZE).expect("a plain projection");
@@ -123,7 +151,8 @@ impl Kind {
                     3 => [0.0, 0.0, 0.0, 1.0],
                     _ => [right[k], up[k], -forward[k], eye[k]],
                 });
-                Camera::from_clip_from_camera_pose(clip, pose, SIZE, convention).expect("two plain matrices")
+                Camera::from_clip_from_camera_pose(clip, pose, SIZE, convention)
+                    .expect("two plain matrices")
             }
             _ => named,
         }
@@ -158,7 +187,9 @@ fn counts(
         let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
         v.map(|x| x / length)
     };
-    let cross = |a: Vec3, b: Vec3| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let cross = |a: Vec3, b: Vec3| {
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    };
     let forward = unit(std::array::from_fn(|_| random.range(-1.0, 1.0)));
     let right = unit(cross(forward, [0.1, 1.0, 0.2]));
     let axes = [right, cross(right, forward), forward];
@@ -172,13 +203,15 @@ fn counts(
 
     let (mut low, mut high) = (Vec::new(), Vec::new());
     for _ in 0..BOXES {
-        let half: Vec3 = std::array::from_fn(|_| distance * 10.0_f64.powf(random.range(-3.0, -1.0)));
+        let half: Vec3 =
+            std::array::from_fn(|_| distance * 10.0_f64.powf(random.range(-3.0, -1.0)));
         // How far a corner reaches towards the camera.
         let reach: f64 = (0..3).map(|k| (half[k] * forward[k]).abs()).sum();
         let z = wall_at + distance * 10.0_f64.powf(random.range(-4.0, -0.5)) + reach;
         let width = if PARALLEL.contains(&kind) { distance } else { z * distance / wall_at };
         let middle = if kind == Kind::Frustum { 0.8 } else { 0.0 };
-        let center = at(width * (middle + random.range(-0.6, 0.6)), width * random.range(-0.4, 0.4), z);
+        let center =
+            at(width * (middle + random.range(-0.6, 0.6)), width * random.range(-0.4, 0.4), z);
         low.extend((0..3).map(|k| center[k] - half[k]));
         high.extend((0..3).map(|k| center[k] + half[k]));
     }
@@ -193,7 +226,8 @@ fn counts(
         .chunks_exact(3)
         .zip(high.chunks_exact(3))
         .filter(|(low, high)| {
-            let volume = Volume::Box { min: (*low).try_into().unwrap(), max: (*high).try_into().unwrap() };
+            let volume =
+                Volume::Box { min: (*low).try_into().unwrap(), max: (*high).try_into().unwrap() };
             hiz_ref::classify(&view, &volume, &depth).expect("a finite view") == Verdict::Visible
         })
         .count();
@@ -202,14 +236,17 @@ fn counts(
     let pyramid = engine().pyramid(&engine().upload_depth(&depth, &camera).unwrap()).unwrap();
     // The wall's depth is not nearer than the wall: no slack.
     let options = CullOptions { depth_slack: 0.0, ..CullOptions::default() };
-    let culling = engine().cull(&boxes, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap();
+    let culling =
+        engine().cull(&boxes, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap();
     let kept = culling.mask().unwrap().iter().filter(|kept| **kept).count();
     [seen, kept]
 }
 
 #[test]
 fn hardly_more_than_exact_arithmetic_keeps() {
-    println!("\n| camera | depth | boxes of a cell | far/near or far/wall: 1e2 | 1e4 | 1e6 | 1e9 | 1e12 | infinite |");
+    println!(
+        "\n| camera | depth | boxes of a cell | far/near or far/wall: 1e2 | 1e4 | 1e6 | 1e9 | 1e12 | infinite |"
+    );
     println!("|---|---|---|---|---|---|---|---|---|");
     let mut random = Random(8);
     let (mut worse, mut lines) = (Vec::new(), Vec::new());
@@ -225,13 +262,17 @@ fn hardly_more_than_exact_arithmetic_keeps() {
             _ => &[1e2, 1e4, 1e6, 1e9, 1e12, f64::INFINITY],
         };
         for convention in CONVENTIONS {
-            let mut line = format!("| {kind:?} | {convention:?} | {} |", places.clone().count() * BOXES);
+            let mut line =
+                format!("| {kind:?} | {convention:?} | {} |", places.clone().count() * BOXES);
             for ratio in ratios {
                 let (mut seen, mut kept) = (0, 0);
                 for (distance, away) in places.clone() {
-                    let [visible, left] = counts(kind, &mut random, *away, *distance, *ratio, convention);
+                    let [visible, left] =
+                        counts(kind, &mut random, *away, *distance, *ratio, convention);
                     // A hair, and those that lie a hair behind the depth image's own rounding.
-                    if kind != Kind::OrthographicMatrixAway && left as f64 > 1.05 * visible as f64 + 5.0 {
+                    if kind != Kind::OrthographicMatrixAway
+                        && left as f64 > 1.05 * visible as f64 + 5.0
+                    {
                         worse.push(format!(
                             "{kind:?} {convention:?}, ratio {ratio:e}, wall at {distance:e}, eye {away:e} away: {left} for {visible}"
                         ));

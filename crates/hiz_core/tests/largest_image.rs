@@ -1,5 +1,5 @@
-//! The largest depth image that the device's textures allow: 16384 x 16384 on lavapipe (1 GiB, and a pyramid whose first level
-//! alone is two bindings), 8192 x 8192 on SwiftShader.
+//! The largest depth image that the device's textures allow: 16384 x 16384 on lavapipe (1 GiB, and
+//! a pyramid whose first level alone is two bindings), 8192 x 8192 on SwiftShader.
 
 mod common;
 
@@ -10,7 +10,8 @@ use hiz_core::{Bounds, CullOptions, DepthConvention, Floats, InstanceOptions, Vi
 fn the_largest_image_is_reduced_and_culled_against() {
     let side = engine().max_image_side().min(16_384);
     let camera = camera_along_z(side, side, DepthConvention::Reversed);
-    // A wall at depth 4 with one far pixel in every block of 2048: beside its block's last corner, so that split levels matter.
+    // A wall at depth 4 with one far pixel in every block of 2048: beside its block's last corner,
+    // so that split levels matter.
     let block = 2048;
     let mut depth = vec![0.25_f32; side as usize * side as usize];
     let blocks = side / block;
@@ -28,7 +29,8 @@ fn the_largest_image_is_reduced_and_culled_against() {
     let first = engine().read_level(&pyramid, 1).unwrap();
     assert_eq!(first.iter().filter(|d| **d != 0.25).count(), (blocks * blocks) as usize);
     drop(first);
-    // Specks in the middle of each block's last pixel but one are hidden, those behind the far pixel are not.
+    // Specks in the middle of each block's last pixel but one are hidden, those behind the far
+    // pixel are not.
     let mut centers = Vec::new();
     for (y, x) in (0..blocks).flat_map(|y| (0..blocks).map(move |x| (y, x))) {
         let (row, column) = ((y + 1) * block - 1 - x, (x + 1) * block - 1 - y);
@@ -41,8 +43,9 @@ fn the_largest_image_is_reduced_and_culled_against() {
     let radii = vec![1e-6; centers.len() / 3];
     let bounds = Bounds::Spheres { centers: Floats::F64(&centers), radii: Floats::F64(&radii) };
     let instances = engine().instances(&bounds, &InstanceOptions::default()).unwrap();
-    let culling =
-        engine().cull(&instances, &camera, &pyramid, &CullOptions::default(), &VisibleOptions::default()).unwrap();
+    let culling = engine()
+        .cull(&instances, &camera, &pyramid, &CullOptions::default(), &VisibleOptions::default())
+        .unwrap();
     let expected: Vec<bool> = (0..radii.len()).map(|i| i % 2 == 0).collect();
     assert_eq!(culling.mask().unwrap(), expected);
 }

@@ -1,4 +1,5 @@
-//! The packed lists, their draw arguments, masks and counters: order, capacity, pieces, and nothing written past an end.
+//! The packed lists, their draw arguments, masks and counters: order, capacity, pieces, and nothing
+//! written past an end.
 
 mod common;
 
@@ -7,8 +8,9 @@ use std::sync::Arc;
 use common::{Random, camera_along_z, engine, ndc};
 use hiz_core::headless::Culling;
 use hiz_core::{
-    Bounds, CANARY_WORDS, Camera, Coverage, CullOptions, DepthConvention, DrawIndexedIndirect, DrawTemplate, Floats,
-    Hierarchy, InstanceOptions, Instances, Order, Pyramid, VisibleOptions, wgpu,
+    Bounds, CANARY_WORDS, Camera, Coverage, CullOptions, DepthConvention, DrawIndexedIndirect,
+    DrawTemplate, Floats, Hierarchy, InstanceOptions, Instances, Order, Pyramid, VisibleOptions,
+    wgpu,
 };
 
 const CONVENTION: DepthConvention = DepthConvention::Reversed;
@@ -32,7 +34,8 @@ fn specks(n: usize, share: f64, piece: Option<u32>, seed: u64) -> (Arc<Instances
         }
         centers.extend([0.0, 0.0, if before { 2.0_f32 } else { 8.0 }]);
     }
-    let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&vec![0.125; n]) };
+    let bounds =
+        Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&vec![0.125; n]) };
     let options = InstanceOptions { piece_capacity: piece, ..InstanceOptions::default() };
     (engine().instances(&bounds, &options).unwrap(), kept)
 }
@@ -44,14 +47,17 @@ fn cull(instances: &Arc<Instances>, order: Order, capacity: Option<u32>) -> Cull
     engine().cull(instances, &camera, &pyramid, &options, &output).unwrap()
 }
 
-const DRAW: DrawTemplate = DrawTemplate { index_count: 36, first_index: 7, base_vertex: -3, first_instance: 0 };
+const DRAW: DrawTemplate =
+    DrawTemplate { index_count: 36, first_index: 7, base_vertex: -3, first_instance: 0 };
 
-/// Counts of levels and of texels: boxes of 2, 4 and 8 pixels that begin at texels of the level that fits them.
+/// Counts of levels and of texels: boxes of 2, 4 and 8 pixels that begin at texels of the level
+/// that fits them.
 #[test]
 fn statistics_say_which_level_was_read() {
     let camera = camera_along_z(64, 64, CONVENTION);
     let pyramid = scene().1;
-    // At depth 8 a pixel is a quarter of a unit; the middle is the border of column and row 32. (A box of no size reads one pixel.)
+    // At depth 8 a pixel is a quarter of a unit; the middle is the border of column and row 32.
+    // (A box of no size reads one pixel.)
     let (mut min, mut max) = (Vec::new(), Vec::new());
     for (pixels, copies) in [(0.5, 1), (1.5, 2), (3.5, 3), (7.5, 4), (30.0, 5)] {
         for _ in 0..copies {
@@ -63,7 +69,9 @@ fn statistics_say_which_level_was_read() {
     let instances = engine().instances(&bounds, &InstanceOptions::default()).unwrap();
     for hierarchy in [Hierarchy::Never, Hierarchy::Auto] {
         let options = CullOptions { statistics: true, hierarchy, ..CullOptions::default() };
-        let culling = engine().cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap();
+        let culling = engine()
+            .cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default())
+            .unwrap();
         let counts = culling.counts().unwrap();
         // 1 pixel and 2 x 2 of level 0, then 2 x 2 texels each.
         let mut levels = [0; 16];
@@ -113,11 +121,17 @@ fn buffers_and_bindings_that_are_used_again_answer_for_the_last_cull() {
         (Order::Stable, Hierarchy::Always),
         (Order::Any, Hierarchy::Always),
     ] {
-        let visible = engine().context().create_visible(&instances, &VisibleOptions::default()).unwrap();
+        let visible =
+            engine().context().create_visible(&instances, &VisibleOptions::default()).unwrap();
         let cull = |pyramid: &Pyramid, options: &CullOptions| {
-            let mut encoder = engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let mut encoder = engine()
+                .device()
+                .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             let options = CullOptions { order, hierarchy, ..options.clone() };
-            engine().context().record_cull(&mut encoder, &instances, &camera, pyramid, &visible, &options).unwrap();
+            engine()
+                .context()
+                .record_cull(&mut encoder, &instances, &camera, pyramid, &visible, &options)
+                .unwrap();
             engine().queue().submit([encoder.finish()]);
             let draws = words_of(visible.draw_arguments().unwrap());
             let (mut bits, mut indices) = (Vec::new(), Vec::new());
@@ -125,7 +139,11 @@ fn buffers_and_bindings_that_are_used_again_answer_for_the_last_cull() {
                 let first = 1024 * piece as u32;
                 let here = (3000 - first).min(1024);
                 let mask = words_of(visible.mask(piece).unwrap());
-                bits.extend((0..here).filter(|i| mask[*i as usize / 32] >> (i % 32) & 1 == 1).map(|i| first + i));
+                bits.extend(
+                    (0..here)
+                        .filter(|i| mask[*i as usize / 32] >> (i % 32) & 1 == 1)
+                        .map(|i| first + i),
+                );
                 let count = draws[(visible.draw_offset(piece) / 4) as usize + 1] as usize;
                 indices.extend_from_slice(&words_of(visible.list(piece).unwrap())[..count]);
             }
@@ -170,7 +188,9 @@ fn buffers_and_bindings_that_are_used_again_answer_for_the_last_cull() {
         (CullOptions { transform_slack: 1e6, ..plain() }, [true, true]),
         (plain(), [false, true]),
     ] {
-        let culling = engine().cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap();
+        let culling = engine()
+            .cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default())
+            .unwrap();
         assert_eq!(culling.mask().unwrap(), expected, "{options:?}");
     }
 }
@@ -196,7 +216,11 @@ fn none_one_and_every_size_around_a_word_and_a_workgroup() {
             );
             assert_eq!((counts.outside, counts.invalid), (0, 0));
             assert_eq!(counts.occluded, (n - kept.len()) as u64);
-            assert_eq!(counts.levels.iter().sum::<u64>(), n as u64, "every speck was compared with some level");
+            assert_eq!(
+                counts.levels.iter().sum::<u64>(),
+                n as u64,
+                "every speck was compared with some level"
+            );
             let draw = DrawIndexedIndirect {
                 index_count: 36,
                 instance_count: kept.len() as u32,
@@ -279,7 +303,11 @@ fn pieces_share_one_capacity() {
             let culling = cull(&instances, order, Some(capacity));
             let written = (capacity as usize).min(kept.len());
             let counts = culling.counts().unwrap();
-            assert_eq!((counts.demand, counts.written), (kept.len() as u64, written as u64), "{capacity} {order:?}");
+            assert_eq!(
+                (counts.demand, counts.written),
+                (kept.len() as u64, written as u64),
+                "{capacity} {order:?}"
+            );
             let indices = culling.indices().unwrap();
             assert_eq!(indices.len(), written);
             if order == Order::Stable {
@@ -302,7 +330,8 @@ fn piece_sizes_that_do_not_fit_are_refused() {
     }
 }
 
-/// Past the binding and dispatch limits of lavapipe: 20 million instances come in pieces, and one answer comes out.
+/// Past the binding and dispatch limits of lavapipe: 20 million instances come in pieces, and one
+/// answer comes out.
 #[test]
 fn twenty_million_instances() {
     let n = 20_000_000;

@@ -1,6 +1,6 @@
 //! How large margins, slacks and guards are, and not only that they are there: what lies a little
-//! within one is kept, what lies a little outside is culled. By single instances and by groups,
-//! whose boxes are tested with the same slack.
+//! within one is kept, what lies a little outside is culled.
+//! By single instances and by groups, whose boxes are tested with the same slack.
 //!
 //! Every threshold is worked out here, in float64, from docs/accuracy.md: a claim `R - t W' > 0`
 //! holds where its value exceeds `E = 24 eps (a size + a_3) + |t| (the same of W')`, with the
@@ -12,8 +12,8 @@ use std::sync::Arc;
 
 use common::{CONVENTIONS, camera_along_z, engine, ndc};
 use hiz_core::{
-    Bounds, BoundsKind, Camera, Coverage, CullOptions, DepthConvention, Fit, Floats, Hierarchy, ImageSize,
-    InstanceOptions, Instances, StoredOrder, VisibleOptions,
+    Bounds, BoundsKind, Camera, Coverage, CullOptions, DepthConvention, Fit, Floats, Hierarchy,
+    ImageSize, InstanceOptions, Instances, StoredOrder, VisibleOptions,
 };
 
 const SIDE: u32 = 16;
@@ -42,7 +42,9 @@ fn instances(things: &[Thing], kind: BoundsKind) -> Arc<Instances> {
     );
     let rotations = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0].repeat(things.len());
     let bounds = match kind {
-        BoundsKind::Sphere => Bounds::Spheres { centers: Floats::F64(&centers), radii: Floats::F64(&radii) },
+        BoundsKind::Sphere => {
+            Bounds::Spheres { centers: Floats::F64(&centers), radii: Floats::F64(&radii) }
+        }
         BoundsKind::Box => Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) },
         BoundsKind::OrientedBox => Bounds::OrientedBoxes {
             centers: Floats::F64(&centers),
@@ -72,15 +74,26 @@ fn assert_between(
             let list = instances(things, *kind);
             engine().cull(&list, camera, &pyramid, &options, &VisibleOptions::default()).unwrap()
         };
-        let is_kept = |verdicts: Vec<u8>| verdicts.into_iter().map(|v| v == VISIBLE).collect::<Vec<bool>>();
+        let is_kept =
+            |verdicts: Vec<u8>| verdicts.into_iter().map(|v| v == VISIBLE).collect::<Vec<bool>>();
         let alone = is_kept(culling(Hierarchy::Never, &things).verdicts().unwrap());
         assert_eq!(alone, expected, "{what}, {kind:?}: {things:?}");
         let crowd: Vec<Thing> = things.iter().flat_map(|thing| [*thing; 64]).collect();
         let groups = culling(Hierarchy::Always, &crowd);
         let of_groups = is_kept(groups.verdicts().unwrap());
-        assert!(of_groups.chunks(64).zip(&expected).all(|(group, kept)| group.iter().all(|k| k == kept)), "{what}");
+        assert!(
+            of_groups
+                .chunks(64)
+                .zip(&expected)
+                .all(|(group, kept)| group.iter().all(|k| k == kept)),
+            "{what}"
+        );
         // What is hidden is hidden as a whole group.
-        assert_eq!(groups.counts().unwrap().tested_instances, 64 * kept.len() as u64, "{what}, {kind:?}, groups");
+        assert_eq!(
+            groups.counts().unwrap().tested_instances,
+            64 * kept.len() as u64,
+            "{what}, {kind:?}, groups"
+        );
     }
 }
 
@@ -117,11 +130,15 @@ fn plain() -> CullOptions {
 }
 
 /// Behind a wall at depth 4, what is r away: Z' is 1 (its constant), W' is r and t is 1/4 up to
-/// signs, so that the value is r / 4 - 1. `constant`: the magnitude of that of Z'; `size`: of the
-/// volume without r, and the magnitude of the constant of W'.
+/// signs, so that the value is r / 4 - 1.
+/// `constant`: the magnitude of that of Z'; `size`: of the volume without r, and the magnitude of
+/// the constant of W'.
 fn behind_the_wall(constant: f64, size: f64) -> [f64; 2] {
-    [0.88, 1.12]
-        .map(|share| threshold(3.9, 40.0, |r| r / 4.0 - 1.0 - share * 24.0 * EPS * (constant + 0.25 * (r + size))))
+    [0.88, 1.12].map(|share| {
+        threshold(3.9, 40.0, |r| {
+            r / 4.0 - 1.0 - share * 24.0 * EPS * (constant + 0.25 * (r + size))
+        })
+    })
 }
 
 /// The margin of a depth's certificate: what of it belongs to the constant, to the distance, to the
@@ -145,7 +162,8 @@ fn the_margin_of_depth_is_as_large_as_it_is_derived() {
         ] {
             let camera = camera_at(eye, convention);
             let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
-            let [kept, culled] = behind_the_wall(constant, size).map(|r| [point(at(eye, [0.0, 0.0, r]))]);
+            let [kept, culled] =
+                behind_the_wall(constant, size).map(|r| [point(at(eye, [0.0, 0.0, r]))]);
             assert_between(
                 &format!("a point behind a wall, seen from {eye:?}"),
                 (&camera, &wall),
@@ -154,15 +172,21 @@ fn the_margin_of_depth_is_as_large_as_it_is_derived() {
                 (&kept, &culled),
             );
         }
-        // A flat box of half sizes 3: they count as 6. A sphere of radius 3: as 9, and its nearest
-        // point is 3 nearer; the squares that it is compared by have a millionth, half of it for
-        // the support 3/4.
+        // A flat box of half sizes 3: they count as 6.
+        // A sphere of radius 3: as 9, and its nearest point is 3 nearer; the squares that it is
+        // compared by have a millionth, half of it for the support 3/4.
         let camera = camera_along_z(SIDE, SIDE, convention);
         let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
-        let [kept, culled] =
-            behind_the_wall(1.0, 6.0).map(|r| [Thing { center: [0.0, 0.0, r], half: [3.0, 3.0, 0.0] }]);
+        let [kept, culled] = behind_the_wall(1.0, 6.0)
+            .map(|r| [Thing { center: [0.0, 0.0, r], half: [3.0, 3.0, 0.0] }]);
         let boxes = &KINDS[1..];
-        assert_between("a wide box behind a wall", (&camera, &wall), &plain(), boxes, (&kept, &culled));
+        assert_between(
+            "a wide box behind a wall",
+            (&camera, &wall),
+            &plain(),
+            boxes,
+            (&kept, &culled),
+        );
         let [kept, culled] = [0.88, 1.12].map(|share| {
             threshold(6.0, 40.0, |r| {
                 r / 4.0 - 1.0 - share * (24.0 * EPS * (1.0 + 0.25 * (r + 9.0)) + 0.75 * 5e-7) - 0.75
@@ -171,16 +195,21 @@ fn the_margin_of_depth_is_as_large_as_it_is_derived() {
         // (In a group it is a box: of half sizes 3, at the same depth, which count as 9, too.)
         let ball = |r: f64| [Thing { center: [0.0, 0.0, r], half: [3.0; 3] }];
         let cull = |r: f64| {
-            let pyramid = engine().pyramid(&engine().upload_depth(&wall, &camera).unwrap()).unwrap();
+            let pyramid =
+                engine().pyramid(&engine().upload_depth(&wall, &camera).unwrap()).unwrap();
             let list = instances(&ball(r), BoundsKind::Sphere);
-            engine().cull(&list, &camera, &pyramid, &plain(), &VisibleOptions::default()).unwrap().mask().unwrap()[0]
+            engine()
+                .cull(&list, &camera, &pyramid, &plain(), &VisibleOptions::default())
+                .unwrap()
+                .mask()
+                .unwrap()[0]
         };
         assert!(cull(kept) && !cull(culled), "a sphere behind a wall, {convention:?}");
     }
 }
 
-/// The margin at the planes of the frustum. Right of the image: X' = 8 x, W' = r and t = 8; before
-/// the near plane.
+/// The margin at the planes of the frustum.
+/// Right of the image: X' = 8 x, W' = r and t = 8; before the near plane.
 #[test]
 fn the_margin_of_the_frustums_planes_is_as_large_as_it_is_derived() {
     for convention in CONVENTIONS {
@@ -188,16 +217,25 @@ fn the_margin_of_the_frustums_planes_is_as_large_as_it_is_derived() {
         let open = vec![convention.far(); (SIDE * SIDE) as usize];
         let r = 4.0;
         let beside = |share: f64| {
-            threshold(r - 1.0, r + 1.0, |x| 8.0 * (x - r) - share * 24.0 * EPS * (8.0 * (x + r) + 8.0 * (x + r)))
+            threshold(r - 1.0, r + 1.0, |x| {
+                8.0 * (x - r) - share * 24.0 * EPS * (8.0 * (x + r) + 8.0 * (x + r))
+            })
         };
         // Before the near plane: Z' + W' = r - 1 < 0 (standard), with a constant of 1; reversed the
         // same with other signs.
-        let before = |share: f64| -threshold(-1.5, -0.5, |z| 1.0 + z - share * 24.0 * EPS * (1.0 - z));
+        let before =
+            |share: f64| -threshold(-1.5, -0.5, |z| 1.0 + z - share * 24.0 * EPS * (1.0 - z));
         let [kept, culled] = [0.85, 1.15].map(|share| {
             let (x, z) = (beside(share), before(share));
             [[x, 0.0, r], [-x, 0.0, r], [0.0, x, r], [0.0, -x, r], [0.0, 0.0, z]].map(point)
         });
-        assert_between("the frustum's planes", (&camera, &open), &plain(), &KINDS, (&kept, &culled));
+        assert_between(
+            "the frustum's planes",
+            (&camera, &open),
+            &plain(),
+            &KINDS,
+            (&kept, &culled),
+        );
     }
 }
 
@@ -213,17 +251,21 @@ fn transform_slack_is_as_large_as_it_says() {
             let camera = camera_at(eye, convention);
             let z = eye[2];
             // Of Z' = z - A w and W', with A = 1: 2 for a position, |z| + |z + 1| and twice |z| for
-            // the constants; with A = 0: nothing and 1. Of W': 1, and twice |z|.
+            // the constants; with A = 0: nothing and 1.
+            // Of W': 1, and twice |z|.
             let (linear, constant) = match convention {
                 DepthConvention::Standard => (2.0, 4.0 * z + 1.0),
                 DepthConvention::Reversed => (0.0, 1.0),
             };
             // The halves of the eye count as positions, a little.
             let size = |d: f64| d + EPS * eye.iter().map(|v: &f64| v.abs()).sum::<f64>();
-            let depth_error = |r: f64, t: f64| q * (linear * size(r) + constant + t * (size(r) + 2.0 * z));
-            let behind = |share: f64| threshold(3.0, 1e3, |r| r / 4.0 - 1.0 - share * depth_error(r, 0.25));
+            let depth_error =
+                |r: f64, t: f64| q * (linear * size(r) + constant + t * (size(r) + 2.0 * z));
+            let behind =
+                |share: f64| threshold(3.0, 1e3, |r| r / 4.0 - 1.0 - share * depth_error(r, 0.25));
             let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
-            let [kept, culled] = [0.98, 1.02].map(|share| [point(at(eye, [0.0, 0.0, behind(share)]))]);
+            let [kept, culled] =
+                [0.98, 1.02].map(|share| [point(at(eye, [0.0, 0.0, behind(share)]))]);
             assert_between(
                 &format!("behind a wall, {convention:?}, from {eye:?}"),
                 (&camera, &wall),
@@ -288,8 +330,17 @@ fn orthographic(convention: DepthConvention) -> (Camera, f64, f64) {
 
 /// One whose depth is `slope` times z and a constant.
 fn parallel(convention: DepthConvention, slope: f64, constant: f64) -> (Camera, f64, f64) {
-    let m = [[0.25, 0.0, 0.0, 0.0], [0.0, 0.25, 0.0, 0.0], [0.0, 0.0, slope, constant], [0.0, 0.0, 0.0, 1.0]];
-    (Camera::from_clip_from_world(m, ImageSize::new(SIDE, SIDE), convention).unwrap(), slope, constant)
+    let m = [
+        [0.25, 0.0, 0.0, 0.0],
+        [0.0, 0.25, 0.0, 0.0],
+        [0.0, 0.0, slope, constant],
+        [0.0, 0.0, 0.0, 1.0],
+    ];
+    (
+        Camera::from_clip_from_world(m, ImageSize::new(SIDE, SIDE), convention).unwrap(),
+        slope,
+        constant,
+    )
 }
 
 /// `depth_slack_abs` in units of NDC depth, and 2^-23 more, which what the shader rounds is taken
@@ -298,8 +349,9 @@ fn parallel(convention: DepthConvention, slope: f64, constant: f64) -> (Camera, 
 fn absolute_slack_is_as_large_as_it_says() {
     for convention in CONVENTIONS {
         let far_sign = orthographic(convention).1.signum();
-        // Near depth 0 a float32 is fine enough to tell. The margin is proportional to the distance
-        // from the reference point, which is the origin where it is in view: it lies there.
+        // Near depth 0 a float32 is fine enough to tell.
+        // The margin is proportional to the distance from the reference point, which is the origin
+        // where it is in view: it lies there.
         let small = 2.0_f64.powi(-13);
         for (wall, slack, shares) in [
             (0.25, 1e-3, [0.97, 1.03]),
@@ -343,20 +395,28 @@ fn guards_of_pixels_are_as_large_as_they_say() {
                     for i in 0..SIDE as usize {
                         depth[if axis == 0 { 16 * i + 8 } else { 16 * 8 + i }] = convention.far();
                     }
-                    // At depth 8 a pixel is a unit: column 8 is x in 0..1, row 8 is y in -1..0. A
-                    // box of 1.1 pixels on each side of it.
+                    // At depth 8 a pixel is a unit: column 8 is x in 0..1, row 8 is y in -1..0.
+                    // A box of 1.1 pixels on each side of it.
                     let middle = if axis == 0 { 0.5 } else { -0.5 };
                     let [kept, culled] = [0.97 * size - 2e-3, 1.03 * size + 2e-3].map(|distance| {
                         [-1.0, 1.0].map(|side| {
-                            let mut thing = Thing { center: [0.3, 0.3, 8.0], half: [0.55, 0.55, 0.0] };
+                            let mut thing =
+                                Thing { center: [0.3, 0.3, 8.0], half: [0.55, 0.55, 0.0] };
                             thing.center[axis] = middle + side * (rim + distance + 0.55);
                             thing
                         })
                     });
                     // Down to single pixels, for a footprint alone reads others beside them.
-                    let options = CullOptions { coverage, guard_px: guard, descent: 4096, ..plain() };
+                    let options =
+                        CullOptions { coverage, guard_px: guard, descent: 4096, ..plain() };
                     let what = format!("guard {guard:?} {coverage:?} {convention:?} axis {axis}");
-                    assert_between(&what, (&camera, &depth), &options, &KINDS[1..2], (&kept, &culled));
+                    assert_between(
+                        &what,
+                        (&camera, &depth),
+                        &options,
+                        &KINDS[1..2],
+                        (&kept, &culled),
+                    );
                 }
             }
         }
@@ -391,7 +451,8 @@ fn guards_of_the_image_are_as_large_as_they_say() {
         let [kept, culled] = [0.97, 1.03].map(|share| {
             // Beside the centre of column 8 and of row 8, to both sides.
             let d = share * size;
-            [[0.5 + d, 0.5, 8.0], [0.5 - d, 0.5, 8.0], [0.5, -0.5 + d, 8.0], [0.5, -0.5 - d, 8.0]].map(point)
+            [[0.5 + d, 0.5, 8.0], [0.5 - d, 0.5, 8.0], [0.5, -0.5 + d, 8.0], [0.5, -0.5 - d, 8.0]]
+                .map(point)
         });
         let options = CullOptions { coverage: Coverage::Sample, guard_px: guard, ..plain() };
         let what = format!("guard {guard:?} between centres");

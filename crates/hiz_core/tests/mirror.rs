@@ -1,5 +1,6 @@
-//! The certificates in every arithmetic that WGSL permits: the shader's steps on the host, rounding up and down, fusing,
-//! reassociating and flushing. A device does one of these; the margin has to cover all.
+//! The certificates in every arithmetic that WGSL permits: the shader's steps on the host, rounding
+//! up and down, fusing, reassociating and flushing.
+//! A device does one of these; the margin has to cover all.
 
 mod common;
 
@@ -10,7 +11,10 @@ mod mirror;
 
 use campaign::{Campaign, Class, Round, moved};
 use common::{Random, engine};
-use hiz_core::{BoundsKind, Camera, Coverage, DepthConvention, ERROR_ULPS, Footprint, ImageSize, Pose, Projection};
+use hiz_core::{
+    BoundsKind, Camera, Coverage, DepthConvention, ERROR_ULPS, Footprint, ImageSize, Pose,
+    Projection,
+};
 use hiz_ref::{Verdict, View, Volume};
 use mirror::{Arithmetic, MARGIN_FIRST, Margins, Mirror, STYLES, Style, WITHOUT_BARS};
 
@@ -35,7 +39,8 @@ impl Power {
     fn add(&mut self, round: &Round) {
         let Some(mirror) = Mirror::new(round) else { return };
         // The oracle is asked once about a volume, and only if somebody culls it.
-        let mut visible: Vec<Vec<Option<bool>>> = round.volumes.iter().map(|(_, v)| vec![None; v.len()]).collect();
+        let mut visible: Vec<Vec<Option<bool>>> =
+            round.volumes.iter().map(|(_, v)| vec![None; v.len()]).collect();
         self.cases += visible.iter().map(Vec::len).sum::<usize>();
         for (margin, false_culls) in self.margins.iter().zip(&mut self.false_culls) {
             for (style, count) in self.styles.iter().zip(false_culls) {
@@ -43,8 +48,9 @@ impl Power {
                 let masks = mirror.masks(*margin, &mut arithmetic);
                 for ((volumes, mask), known) in round.volumes.iter().zip(&masks).zip(&mut visible) {
                     for (i, _) in mask.iter().enumerate().filter(|(_, kept)| !**kept) {
-                        let visible =
-                            *known[i].get_or_insert_with(|| round.outcome(&volumes.1[i]).verdict != Verdict::Hidden);
+                        let visible = *known[i].get_or_insert_with(|| {
+                            round.outcome(&volumes.1[i]).verdict != Verdict::Hidden
+                        });
                         *count += usize::from(visible);
                     }
                 }
@@ -79,8 +85,9 @@ impl std::fmt::Display for Power {
     }
 }
 
-/// `round` with each volume twice: moved to where the full margin just keeps it, and to where it just culls it, by a hundredth of
-/// the margin. What a term of the margin contributes shows there, and nowhere else.
+/// `round` with each volume twice: moved to where the full margin just keeps it, and to where it
+/// just culls it, by a hundredth of the margin.
+/// What a term of the margin contributes shows there, and nowhere else.
 fn at_the_margin(mut round: Round, mirror: &Mirror) -> Round {
     let arithmetic = &mut Arithmetic::new(STYLES[0], 0);
     for ((_, volumes), ways) in round.volumes.iter_mut().zip(&round.away) {
@@ -105,9 +112,9 @@ fn at_the_margin(mut round: Round, mirror: &Mirror) -> Round {
     round
 }
 
-/// The mirror is the shader: rounding to nearest it says what the device says, on cases that the oracle's verdict hangs on, on
-/// cases that the margin decides, and with any guard and slack; with the sums at the frustum's planes in the order that the device's compiler
-/// takes them in.
+/// The mirror is the shader: rounding to nearest it says what the device says, on cases that the
+/// oracle's verdict hangs on, on cases that the margin decides, and with any guard and slack; with
+/// the sums at the frustum's planes in the order that the device's compiler takes them in.
 #[test]
 fn to_nearest_it_agrees_with_the_device() {
     let (mut cases, mut culled) = (0, 0);
@@ -116,14 +123,29 @@ fn to_nearest_it_agrees_with_the_device() {
     for (seed, coverage, any_slack) in
         [(31, Coverage::Area, false), (36, Coverage::Area, true), (37, Coverage::Sample, true)]
     {
-        let campaign = Campaign { seed, rounds: 3, coverage, any_slack, modes: FOOTPRINTS, ..Campaign::default() };
+        let campaign = Campaign {
+            seed,
+            rounds: 3,
+            coverage,
+            any_slack,
+            modes: FOOTPRINTS,
+            ..Campaign::default()
+        };
         for round in campaign.rounds() {
             let Some(mirror) = Mirror::new(&round) else { continue };
-            for round in [at_the_margin(campaign.round(round.number).expect("the same again"), &mirror), round] {
-                let (Some(mirror), Some(device)) = (Mirror::new(&round), round.masks(&engine())) else { continue };
+            for round in [
+                at_the_margin(campaign.round(round.number).expect("the same again"), &mirror),
+                round,
+            ] {
+                let (Some(mirror), Some(device)) = (Mirror::new(&round), round.masks(&engine()))
+                else {
+                    continue;
+                };
                 cases += device.iter().map(Vec::len).sum::<usize>();
                 culled += device.iter().flatten().filter(|kept| !**kept).count();
-                for (style, [by_mirror, by_device]) in [STYLES[0], MARGIN_FIRST].iter().zip(&mut differences) {
+                for (style, [by_mirror, by_device]) in
+                    [STYLES[0], MARGIN_FIRST].iter().zip(&mut differences)
+                {
                     let masks = mirror.masks(ERROR_ULPS as f32, &mut Arithmetic::new(*style, 0));
                     for (ours, theirs) in masks.iter().flatten().zip(device.iter().flatten()) {
                         *by_mirror += usize::from(*ours && !theirs);
@@ -134,10 +156,15 @@ fn to_nearest_it_agrees_with_the_device() {
         }
     }
     eprintln!("mirror: {cases} cases, {culled} culled, kept by it alone and by the device alone:");
-    eprintln!("in the order that is written {:?}, the margin first {:?}", differences[0], differences[1]);
-    // These drivers round to nearest, fuse nothing and keep one of the two orders. Another may decide some that lie within a rounding of the
-    // margin otherwise.
-    let plain = ["llvmpipe", "SwiftShader"].iter().any(|name| engine().adapter().to_string().contains(name));
+    eprintln!(
+        "in the order that is written {:?}, the margin first {:?}",
+        differences[0], differences[1]
+    );
+    // These drivers round to nearest, fuse nothing and keep one of the two orders.
+    // Another may decide some that lie within a rounding of the margin otherwise.
+    let plain = ["llvmpipe", "SwiftShader"]
+        .iter()
+        .any(|name| engine().adapter().to_string().contains(name));
     let allowed = if plain { 0 } else { cases / 20 };
     let least = differences.map(|d| d[0] + d[1]).into_iter().min().expect("two");
     assert!(least <= allowed, "the device computes something else");
@@ -147,7 +174,8 @@ fn to_nearest_it_agrees_with_the_device() {
 #[test]
 fn no_arithmetic_gives_a_false_cull() {
     for (seed, coverage) in [(32, Coverage::Area), (33, Coverage::Sample)] {
-        let campaign = Campaign { seed, rounds: 12, coverage, modes: FOOTPRINTS, ..Campaign::default() };
+        let campaign =
+            Campaign { seed, rounds: 12, coverage, modes: FOOTPRINTS, ..Campaign::default() };
         let power = Power::of_campaign(&[ERROR_ULPS as f32], &STYLES, campaign);
         eprintln!("{coverage:?}\n{power}");
         assert_eq!(power.total(0), 0);
@@ -164,8 +192,9 @@ fn a_twenty_fourth_of_the_margin_is_too_little() {
     assert_eq!(power.false_culls[0][0], 0, "to nearest it takes less than that");
 }
 
-/// Why `bar` stands in the shader: a compiler that folds `(hi - eye_hi) + (lo - eye_lo)` or `z - (d - A) w` makes false culls that
-/// no margin in eps covers. (Neither driver at hand folds them, so that taking the bars away turns nothing else red.)
+/// Why `bar` stands in the shader: a compiler that folds `(hi - eye_hi) + (lo - eye_lo)` or `z -
+/// (d - A) w` makes false culls that no margin in eps covers.
+/// (Neither driver at hand folds them, so that taking the bars away turns nothing else red.)
 #[test]
 fn without_bars_a_compiler_could_fold_what_cancels() {
     let campaign = Campaign { seed: 35, rounds: 6, ..Campaign::default() };
@@ -182,7 +211,8 @@ fn false_culls(margins: Margins, styles: &[Style], campaign: Campaign) -> usize 
         for style in styles {
             let masks = mirror.masks(margins, &mut Arithmetic::new(*style, round.number as u64));
             for ((_, volumes), mask) in round.volumes.iter().zip(&masks) {
-                let tallies = volumes.iter().zip(mask).map(|(v, kept)| round.tally(v, *kept, false));
+                let tallies =
+                    volumes.iter().zip(mask).map(|(v, kept)| round.tally(v, *kept, false));
                 false_culls += tallies.map(|tally| tally.false_culls).sum::<usize>();
             }
         }
@@ -190,24 +220,28 @@ fn false_culls(margins: Margins, styles: &[Style], campaign: Campaign) -> usize 
     false_culls
 }
 
-/// Why `below` and `above` of a box's extent end at 0: beside a wild end the rest of the claim has the other sign.
+/// Why `below` and `above` of a box's extent end at 0: beside a wild end the rest of the claim has
+/// the other sign.
 #[test]
 fn an_extent_that_proves_more_than_its_end_says_is_no_use() {
     let wild: Vec<Style> = STYLES.into_iter().filter(|style| style.wild).collect();
     let campaign = Campaign { seed: 39, rounds: 6, modes: FOOTPRINTS, ..Campaign::default() };
     let count = |margins| false_culls(margins, &wild, campaign);
-    let (with, without) = (count(Margins::FULL), count(Margins { clamped: false, ..Margins::FULL }));
+    let (with, without) =
+        (count(Margins::FULL), count(Margins { clamped: false, ..Margins::FULL }));
     eprintln!("false culls with extents that end at 0: {with}, without: {without}");
     assert!(with == 0 && without > 0);
 }
 
-/// `like` with another camera, all pixels at one depth, and a box there that nearly faces it: a thousand times as wide as it is away,
-/// and moved backwards to the last place where the oracle sees it.
+/// `like` with another camera, all pixels at one depth, and a box there that nearly faces it: a
+/// thousand times as wide as it is away, and moved backwards to the last place where the oracle
+/// sees it.
 fn facing(like: Round, random: &mut Random) -> Option<Round> {
     let any = |random: &mut Random| [0; 3].map(|_| random.range(-1.0, 1.0));
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let cross =
-        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let cross = |a: [f64; 3], b: [f64; 3]| {
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    };
     let unit = |v: [f64; 3]| v.map(|x| x / dot(v, v).sqrt());
     let (forward, up) = (unit(any(random)), any(random));
     let (right, z) = (unit(cross(forward, up)), random.range(1.2, 1.9));
@@ -215,15 +249,25 @@ fn facing(like: Round, random: &mut Random) -> Option<Round> {
     let eye = any(random);
     let pose = Pose { eye, target: [0, 1, 2].map(|k| eye[k] + forward[k]), up };
     let convention = random.pick(&[DepthConvention::Standard, DepthConvention::Reversed]);
-    let projection = Projection::Perspective { fov_y: 1.0, near: 0.5, far: Some(100.0), convention };
+    let projection =
+        Projection::Perspective { fov_y: 1.0, near: 0.5, far: Some(100.0), convention };
     let camera = Camera::look_at(&pose, &projection, ImageSize::new(8, 8)).ok()?;
-    let view =
-        View { rows: camera.rows(), origin: camera.origin(), width: 8, height: 8, reversed: convention.is_reversed() };
+    let view = View {
+        rows: camera.rows(),
+        origin: camera.origin(),
+        width: 8,
+        height: 8,
+        reversed: convention.is_reversed(),
+    };
     // A tilt of some eps, so that the box reaches a little nearer at its ends.
     let tilt = random.range(-1e-6, 1e-6);
     let axes = [0, 1, 2].map(|k| [right[k] + tilt * forward[k], up[k], forward[k]]);
     let half_sizes = [1e3 * z, 1e3 * z, 0.0];
-    let at = |s: f64| Volume::OrientedBox { center: [0, 1, 2].map(|k| eye[k] + s * z * forward[k]), half_sizes, axes };
+    let at = |s: f64| Volume::OrientedBox {
+        center: [0, 1, 2].map(|k| eye[k] + s * z * forward[k]),
+        half_sizes,
+        axes,
+    };
     let ndc = 100.0 / 99.5 * (1.0 - 0.5 / z);
     let depth = vec![if view.reversed { 1.0 - ndc } else { ndc } as f32; 64];
     let mut round = Round { camera, view, depth, ..like };
@@ -253,7 +297,8 @@ fn sizes_count_the_volume() {
         let Some(mirror) = Mirror::new(&round) else { continue };
         cases += 1;
         for style in STYLES {
-            let culls = |margins: Margins| !mirror.masks(margins, &mut Arithmetic::new(style, cases))[0][0];
+            let culls =
+                |margins: Margins| !mirror.masks(margins, &mut Arithmetic::new(style, cases))[0][0];
             with += usize::from(culls(Margins::FULL));
             without += usize::from(culls(Margins { own: 0.0, ..Margins::FULL }));
         }
@@ -262,19 +307,23 @@ fn sizes_count_the_volume() {
     assert!(cases > 100 && with == 0 && without > 0);
 }
 
-/// What float64 lost on the host has its share in the magnitudes (`view.rs`): without it constants that cancel at a distant eye
-/// make false culls, to nearest and with the full margin.
+/// What float64 lost on the host has its share in the magnitudes (`view.rs`): without it constants
+/// that cancel at a distant eye make false culls, to nearest and with the full margin.
 #[test]
 fn the_hosts_error_share_is_needed() {
-    let campaign = Campaign { seed: 38, rounds: 60, classes: &[Class::BareMatrix], ..Campaign::default() };
+    let campaign =
+        Campaign { seed: 38, rounds: 60, classes: &[Class::BareMatrix], ..Campaign::default() };
     let mut false_culls = [0; 2];
     for round in campaign.rounds() {
         let mirrors = [Mirror::new(&round), Mirror::new(&round).map(Mirror::without_error_share)];
         for (mirror, count) in mirrors.into_iter().flatten().zip(&mut false_culls) {
             let masks = mirror.masks(ERROR_ULPS as f32, &mut Arithmetic::new(STYLES[0], 0));
             for ((_, volumes), mask) in round.volumes.iter().zip(&masks) {
-                *count +=
-                    volumes.iter().zip(mask).map(|(v, kept)| round.tally(v, *kept, false).false_culls).sum::<usize>();
+                *count += volumes
+                    .iter()
+                    .zip(mask)
+                    .map(|(v, kept)| round.tally(v, *kept, false).false_culls)
+                    .sum::<usize>();
             }
         }
     }
@@ -282,23 +331,34 @@ fn the_hosts_error_share_is_needed() {
     assert!(false_culls[0] == 0 && false_culls[1] > 0, "{false_culls:?}");
 }
 
-/// How much of the margin is needed: false culls by style and margin in a tenth of `HIZVK_SOAK_CASES` (1,000,000) cases of each
-/// kind of volume, from seed `HIZVK_SOAK_SEED` (2000) on; and by style with the full margin in all of them.
+/// How much of the margin is needed: false culls by style and margin in a tenth of
+/// `HIZVK_SOAK_CASES` (1,000,000) cases of each kind of volume, from seed `HIZVK_SOAK_SEED` (2000)
+/// on; and by style with the full margin in all of them.
 #[test]
 #[ignore = "minutes: make soak"]
 fn power() {
     let setting = |name: &str, default: usize| match std::env::var(name) {
-        Ok(text) => text.parse().unwrap_or_else(|_| panic!("{name}: expected a number, got {text:?}")),
+        Ok(text) => {
+            text.parse().unwrap_or_else(|_| panic!("{name}: expected a number, got {text:?}"))
+        }
         Err(_) => default,
     };
-    let (seed, cases) = (setting("HIZVK_SOAK_SEED", 2000) as u64, setting("HIZVK_SOAK_CASES", 1_000_000));
-    for (margins, share) in [(&[0.0, 0.25, 0.5, 1.0, 2.0, 3.0, 4.0][..], 10), (&[ERROR_ULPS as f32][..], 1)] {
+    let (seed, cases) =
+        (setting("HIZVK_SOAK_SEED", 2000) as u64, setting("HIZVK_SOAK_CASES", 1_000_000));
+    for (margins, share) in
+        [(&[0.0, 0.25, 0.5, 1.0, 2.0, 3.0, 4.0][..], 10), (&[ERROR_ULPS as f32][..], 1)]
+    {
         let mut power = Power::new(margins, &STYLES);
         let wanted = 3 * cases / share;
         for chunk in 0.. {
             let coverage = if chunk % 4 == 3 { Coverage::Sample } else { Coverage::Area };
-            let campaign =
-                Campaign { seed: seed + chunk, rounds: 4, coverage, modes: FOOTPRINTS, ..Campaign::default() };
+            let campaign = Campaign {
+                seed: seed + chunk,
+                rounds: 4,
+                coverage,
+                modes: FOOTPRINTS,
+                ..Campaign::default()
+            };
             campaign.rounds().for_each(|round| power.add(&round));
             eprintln!("power: {} of {wanted} cases", power.cases);
             if power.cases >= wanted {

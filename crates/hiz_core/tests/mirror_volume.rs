@@ -1,4 +1,5 @@
-//! The volume fit and the descent in every arithmetic that WGSL permits, over slopes and offsets that may be anything.
+//! The volume fit and the descent in every arithmetic that WGSL permits, over slopes and offsets
+//! that may be anything.
 
 mod common;
 
@@ -12,7 +13,9 @@ use common::engine;
 use hiz_core::headless::Engine;
 use hiz_core::{BoundsKind, Coverage, Fit, Footprint};
 use hiz_ref::Verdict;
-use mirror::{Arithmetic, Losses, Margins, Mirror, STYLES, Style, WILDEST, WITHOUT_SLOPE_BARS, texel_loss};
+use mirror::{
+    Arithmetic, Losses, Margins, Mirror, STYLES, Style, WILDEST, WITHOUT_SLOPE_BARS, texel_loss,
+};
 
 const DESCENTS: &[(Footprint, u32)] = &[(Footprint::Two, 4096)];
 const MODES: &[(Footprint, u32)] =
@@ -34,7 +37,13 @@ struct Power {
 impl Power {
     fn new(styles: &[Style], margins: &[Margins]) -> Self {
         let none = vec![vec![0; margins.len()]; styles.len()];
-        Self { styles: styles.to_vec(), margins: margins.to_vec(), false_culls: none.clone(), culled: none, cases: 0 }
+        Self {
+            styles: styles.to_vec(),
+            margins: margins.to_vec(),
+            false_culls: none.clone(),
+            culled: none,
+            cases: 0,
+        }
     }
 
     fn of(styles: &[Style], margins: &[Margins], rounds: impl Iterator<Item = Round>) -> Self {
@@ -53,10 +62,18 @@ impl Power {
             for (k, margins) in self.margins.iter().enumerate() {
                 let mut arithmetic = Arithmetic::new(*style, round.seed ^ round.number as u64);
                 if !mirror.masks(*margins, &mut arithmetic)[0][0] {
-                    let visible =
-                        *visible.get_or_insert_with(|| round.outcome(&volumes[0]).verdict == Verdict::Visible);
-                    if visible && self.false_culls[i][k] == 0 && margins.certificate == Margins::FULL.certificate {
-                        eprintln!("{} {margins:?}: {}", style.name, round.describe(*kind, &volumes[0]));
+                    let visible = *visible.get_or_insert_with(|| {
+                        round.outcome(&volumes[0]).verdict == Verdict::Visible
+                    });
+                    if visible
+                        && self.false_culls[i][k] == 0
+                        && margins.certificate == Margins::FULL.certificate
+                    {
+                        eprintln!(
+                            "{} {margins:?}: {}",
+                            style.name,
+                            round.describe(*kind, &volumes[0])
+                        );
                     }
                     self.false_culls[i][k] += usize::from(visible);
                     self.culled[i][k] += 1;
@@ -86,15 +103,20 @@ impl std::fmt::Display for Power {
     }
 }
 
-/// To nearest the mirror says what the device says, with any guard and slack; but for the guesses: nothing demands of a device's
-/// quotients, roots and sines what the host's are, and a plane may be proved with the one and not with the other.
+/// To nearest the mirror says what the device says, with any guard and slack; but for the guesses:
+/// nothing demands of a device's quotients, roots and sines what the host's are, and a plane may be
+/// proved with the one and not with the other.
 #[test]
 fn to_nearest_it_agrees_with_the_device() {
-    let (mut cases, mut culled, mut kept_by_mirror, mut kept_by_device, mut false_culls) = (0, 0, 0, 0, 0);
+    let (mut cases, mut culled, mut kept_by_mirror, mut kept_by_device, mut false_culls) =
+        (0, 0, 0, 0, 0);
     for (seed, any_slack) in [(51, false), (59, true)] {
-        let campaign = Campaign { rounds: 6, modes: DESCENTS, any_slack, ..campaign(seed, Coverage::Area) };
+        let campaign =
+            Campaign { rounds: 6, modes: DESCENTS, any_slack, ..campaign(seed, Coverage::Area) };
         for round in campaign.fitted(&KINDS, false) {
-            let (Some(mirror), Some(device)) = (Mirror::new(&round), round.masks(&engine())) else { continue };
+            let (Some(mirror), Some(device)) = (Mirror::new(&round), round.masks(&engine())) else {
+                continue;
+            };
             let ours = mirror.masks(Margins::FULL, &mut Arithmetic::new(STYLES[0], 0))[0][0];
             let theirs = device[0][0];
             cases += 1;
@@ -118,7 +140,10 @@ type Fault = (&'static str, &'static [(&'static str, &'static str)]);
 
 /// What the oracle does not see in `fit_volume.rs`, for it knows neither slack nor guard.
 const FAULTS: &[Fault] = &[
-    ("no slack", &[("bar(occluding_depth(bits) - view.z_slope)", "bar(bitcast<f32>(bits) - view.z_slope)")]),
+    (
+        "no slack",
+        &[("bar(occluding_depth(bits) - view.z_slope)", "bar(bitcast<f32>(bits) - view.z_slope)")],
+    ),
     ("no guard, left and top", &[("vec2<f32>(begin) - view.reach", "vec2<f32>(begin)")]),
     ("no guard, right and bottom", &[("vec2<f32>(end) + view.reach", "vec2<f32>(end)")]),
 ];
@@ -128,7 +153,10 @@ const MORE_FAULTS: &[Fault] = &[
     ("the other convention's front", &[("return select(1.0, -1.0, REVERSED);", "return 1.0;")]),
     (
         "sides that nothing proves",
-        &[("guess.x - widened", "guess.x + widened + 0.1"), ("select(-BEYOND, low, surely_above(r, low, w))", "low")],
+        &[
+            ("guess.x - widened", "guess.x + widened + 0.1"),
+            ("select(-BEYOND, low, surely_above(r, low, w))", "low"),
+        ],
     ),
     ("a column's fall alone", &[("plane.offset - fall.x - fall.y", "plane.offset - fall.x")]),
     (
@@ -149,7 +177,10 @@ const MORE_FAULTS: &[Fault] = &[
             "var plane = (*planes).list[i]; plane.offset = (*planes).list[0].offset;",
         )],
     ),
-    ("one side for both axes", &[("plane.slope > vec2<f32>(0.0)", "vec2<bool>(plane.slope.x > 0.0)")]),
+    (
+        "one side for both axes",
+        &[("plane.slope > vec2<f32>(0.0)", "vec2<bool>(plane.slope.x > 0.0)")],
+    ),
     (
         "no certificate, no margin",
         &[
@@ -157,32 +188,53 @@ const MORE_FAULTS: &[Fault] = &[
             ("bar(least - 3.0 * error_bound(r, least, p.w) / p.w_min)", "least + 1e-4 * extent"),
         ],
     ),
-    ("a margin without the slopes", &[("+ abs(slope.x) * p.x.error + abs(slope.y) * p.y.error", "")]),
-    ("a descent that forgets a row", &[("if (at.y & last_child) < last_child && at.y < end.y {", "if false {")]),
+    (
+        "a margin without the slopes",
+        &[("+ abs(slope.x) * p.x.error + abs(slope.y) * p.y.error", "")],
+    ),
+    (
+        "a descent that forgets a row",
+        &[("if (at.y & last_child) < last_child && at.y < end.y {", "if false {")],
+    ),
 ];
 
-/// What the device culls beyond the mirror is more with each fault than without any. (One kind, one convention: each compiles anew.)
+/// What the device culls beyond the mirror is more with each fault than without any.
+/// (One kind, one convention: each compiles anew.)
 fn assert_seen(kinds: &'static [BoundsKind], faults: &[Fault]) {
     let rounds: Vec<_> = [(61, false), (62, true), (63, true), (64, true)]
         .into_iter()
         .flat_map(|(seed, any_slack)| {
-            let campaign =
-                Campaign { rounds: 8, volumes: 4, modes: DESCENTS, any_slack, ..campaign(seed, Coverage::Area) };
+            let campaign = Campaign {
+                rounds: 8,
+                volumes: 4,
+                modes: DESCENTS,
+                any_slack,
+                ..campaign(seed, Coverage::Area)
+            };
             campaign.fitted(kinds, false).filter(|round| round.view.reversed)
         })
         .filter_map(|round| {
-            let kept = Mirror::new(&round)?.masks(Margins::FULL, &mut Arithmetic::new(STYLES[0], 0))[0][0];
+            let kept =
+                Mirror::new(&round)?.masks(Margins::FULL, &mut Arithmetic::new(STYLES[0], 0))[0][0];
             Some((round, kept))
         })
         .collect();
     let more = |engine: &Engine| {
-        let culled = |(round, kept): &&(Round, bool)| *kept && !round.masks(engine).expect("the mirror took it")[0][0];
+        let culled = |(round, kept): &&(Round, bool)| {
+            *kept && !round.masks(engine).expect("the mirror took it")[0][0]
+        };
         rounds.iter().filter(culled).count()
     };
     let without = more(&engine());
     for (name, planted) in faults {
-        let with = more(&Engine::with_planted_faults(None, planted).expect("the device tests need a Vulkan driver"));
-        eprintln!("{name}: of {} the device culls {with} beyond the mirror, without the fault {without}", rounds.len());
+        let with = more(
+            &Engine::with_planted_faults(None, planted)
+                .expect("the device tests need a Vulkan driver"),
+        );
+        eprintln!(
+            "{name}: of {} the device culls {with} beyond the mirror, without the fault {without}",
+            rounds.len()
+        );
         assert!(with > without, "{name}: stayed green");
     }
 }
@@ -216,14 +268,12 @@ fn no_arithmetic_gives_a_false_cull() {
     }
 }
 
-/// With a 24th of the margin, and none for texels, bent arithmetics err; with none at all each does.
+/// With a 24th of the margin, and none for texels, bent arithmetics err; with none at all each
+/// does.
 #[test]
 fn with_less_margin_some_do() {
-    let margins = [(1.0, 8.0), (1.0, 0.0), (0.0, 8.0), (0.0, 0.0)].map(|(certificate, texel)| Margins {
-        certificate,
-        texel,
-        ..Margins::FULL
-    });
+    let margins = [(1.0, 8.0), (1.0, 0.0), (0.0, 8.0), (0.0, 0.0)]
+        .map(|(certificate, texel)| Margins { certificate, texel, ..Margins::FULL });
     let rounds = Campaign { rounds: 8, ..campaign(55, Coverage::Area) }.fitted(&KINDS, true);
     let power = Power::of(&styles(), &margins, rounds);
     eprintln!("{power}");
@@ -233,15 +283,18 @@ fn with_less_margin_some_do() {
     assert!(power.false_culls.iter().all(|counts| counts[3] > 0), "no margin, and green");
 }
 
-/// What is really lost of the 24 eps of a tilted row's certificate, and of the 8 of a texel's comparison.
+/// What is really lost of the 24 eps of a tilted row's certificate, and of the 8 of a texel's
+/// comparison.
 #[test]
 fn what_certificates_and_texels_lose() {
     let styles = [&styles()[..], &[WITHOUT_SLOPE_BARS]].concat();
     let mut losses = vec![Losses::default(); styles.len()];
-    for round in (Campaign { rounds: 3, volumes: 16, ..campaign(56, Coverage::Area) }).loose(&KINDS) {
+    for round in (Campaign { rounds: 3, volumes: 16, ..campaign(56, Coverage::Area) }).loose(&KINDS)
+    {
         let Some(mirror) = Mirror::new(&round) else { continue };
         for (style, sum) in styles.iter().zip(&mut losses) {
-            let mut arithmetic = Arithmetic::new(Style { wild: true, ..*style }, round.seed ^ round.number as u64);
+            let mut arithmetic =
+                Arithmetic::new(Style { wild: true, ..*style }, round.seed ^ round.number as u64);
             sum.add(mirror.losses(&round, &mut arithmetic));
         }
     }
@@ -269,8 +322,9 @@ fn what_certificates_and_texels_lose() {
     assert!(folded > barred, "a folded slope costs more: {folded} {barred}");
 }
 
-/// Why a slope is never subnormal: flushed in one product of a certificate and not in another, it moves a row by more than
-/// the floor of the margin where X' is large. A slab across all of an image that holds nothing, on a device that guesses such slopes.
+/// Why a slope is never subnormal: flushed in one product of a certificate and not in another, it
+/// moves a row by more than the floor of the margin where X' is large.
+/// A slab across all of an image that holds nothing, on a device that guesses such slopes.
 #[test]
 fn subnormal_slopes_would_be_two_slopes() {
     let mut round = campaign(58, Coverage::Area).rounds().next().expect("a round");
@@ -282,17 +336,24 @@ fn subnormal_slopes_would_be_two_slopes() {
     ];
     let size = hiz_core::ImageSize::new(1, 1);
     round.camera =
-        hiz_core::Camera::from_clip_from_world(m, size, hiz_core::DepthConvention::Reversed).expect("a camera");
+        hiz_core::Camera::from_clip_from_world(m, size, hiz_core::DepthConvention::Reversed)
+            .expect("a camera");
     (round.view.width, round.view.height, round.view.reversed) = (1, 1, true);
     round.depth = vec![0.0];
-    // Just within the camera's coordinate limit, 2^42, and so far away that it is not taken for one that crosses the eye's plane.
+    // Just within the camera's coordinate limit, 2^42, and so far away that it is not taken for one
+    // that crosses the eye's plane.
     let (across, away) = (0.95 * 2.0_f64.powi(42), 2.0_f64.powi(25));
-    let slab = hiz_ref::Volume::Box { min: [-0.5 * away, -0.5 * away, away], max: [across, 0.5 * away, 1.5 * away] };
+    let slab = hiz_ref::Volume::Box {
+        min: [-0.5 * away, -0.5 * away, away],
+        max: [across, 0.5 * away, 1.5 * away],
+    };
     round.volumes = vec![(hiz_core::BoundsKind::Box, vec![slab])];
     let mirror = Mirror::new(&round).expect("rows that float32 holds");
     let culls = |flattest: f32| {
         let margins = Margins { flattest, ..Margins::FULL };
-        (0..4000).filter(|seed| !mirror.masks(margins, &mut Arithmetic::new(WILDEST, *seed))[0][0]).count()
+        (0..4000)
+            .filter(|seed| !mirror.masks(margins, &mut Arithmetic::new(WILDEST, *seed))[0][0])
+            .count()
     };
     let (without, with) = (culls(0.0), culls(Margins::FULL.flattest));
     eprintln!("false culls with subnormal slopes {without}, without {with}");

@@ -11,8 +11,8 @@ use std::sync::Arc;
 use common::{CONVENTIONS, camera_along_z, engine, ndc};
 use hiz_core::headless::Engine;
 use hiz_core::{
-    AtlasUse, Bounds, Camera, CullOptions, DepthConvention, Fit, Floats, Footprint, Hierarchy, InstanceOptions,
-    Instances, Pyramid, PyramidOptions, StoredOrder, VisibleOptions,
+    AtlasUse, Bounds, Camera, CullOptions, DepthConvention, Fit, Floats, Footprint, Hierarchy,
+    InstanceOptions, Instances, Pyramid, PyramidOptions, StoredOrder, VisibleOptions,
 };
 use sources::{SOURCES, Source, pyramid_from};
 
@@ -22,8 +22,17 @@ const CELL: u32 = 11;
 const CELLS: u32 = 8;
 const SIDE: u32 = CELL * CELLS;
 
-const BAD: [f32; 9] =
-    [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.5, -1e-40, 1.5, 3e38, f32::from_bits(0x3f80_0001)];
+const BAD: [f32; 9] = [
+    f32::NAN,
+    -f32::NAN,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    -0.5,
+    -1e-40,
+    1.5,
+    3e38,
+    f32::from_bits(0x3f80_0001),
+];
 
 /// A way to read texels: what is asked for, and how many pixels a thing is wide.
 #[derive(Debug, Clone, Copy)]
@@ -98,12 +107,14 @@ fn kept(
 ) -> (Vec<bool>, u64) {
     let Way { footprint, descent, fit, .. } = way;
     let options = CullOptions { footprint, descent, fit, hierarchy, ..CullOptions::default() };
-    let culling = engine.cull(things, camera, pyramid, &options, &VisibleOptions::default()).unwrap();
+    let culling =
+        engine.cull(things, camera, pyramid, &options, &VisibleOptions::default()).unwrap();
     (culling.mask().unwrap(), culling.counts().unwrap().tested_instances)
 }
 
-/// Which cells have an open pixel. What a depth texture holds in place of a number that is no depth
-/// is the driver's choice: where it is one that hides depth 8, nothing is asked of its cell.
+/// Which cells have an open pixel.
+/// What a depth texture holds in place of a number that is no depth is the driver's choice: where
+/// it is one that hides depth 8, nothing is asked of its cell.
 fn open_cells(camera: &Camera, pixels: u32, shift: u32, pyramid: &Pyramid) -> Vec<bool> {
     let convention = camera.convention();
     let image = engine().read_level(pyramid, 0).unwrap();
@@ -167,9 +178,11 @@ fn what_is_no_depth_hides_nothing_in_sampled_textures() {
 
 #[test]
 fn what_is_no_depth_hides_nothing_in_an_atlas() {
-    for (source, convention) in
-        SOURCES.into_iter().zip([DepthConvention::Standard, DepthConvention::Reversed, DepthConvention::Standard])
-    {
+    for (source, convention) in SOURCES.into_iter().zip([
+        DepthConvention::Standard,
+        DepthConvention::Reversed,
+        DepthConvention::Standard,
+    ]) {
         check(source, AtlasUse::Always, convention, &WAYS);
     }
 }
@@ -177,9 +190,11 @@ fn what_is_no_depth_hides_nothing_in_an_atlas() {
 /// Groups have a footprint and a descent of their own.
 #[test]
 fn what_is_no_depth_hides_no_group() {
-    for (source, atlas) in
-        [(Source::Bits, AtlasUse::Never), (Source::Float, AtlasUse::Never), (Source::Bits, AtlasUse::Always)]
-    {
+    for (source, atlas) in [
+        (Source::Bits, AtlasUse::Never),
+        (Source::Float, AtlasUse::Never),
+        (Source::Bits, AtlasUse::Always),
+    ] {
         for convention in CONVENTIONS {
             let camera = camera_along_z(SIDE, SIDE, convention);
             let options = PyramidOptions { atlas, ..PyramidOptions::default() };
@@ -187,19 +202,27 @@ fn what_is_no_depth_hides_no_group() {
             let whole = pyramid_from(&engine(), source, &wall, &camera, &options);
             for way in [WAYS[1], WAYS[2], WAYS[5]] {
                 let crowd = things(&engine(), way.pixels, 64);
-                let (hidden, tested) = kept(&engine(), &crowd, &camera, &whole, way, Hierarchy::Always);
-                assert!(hidden.iter().all(|kept| !kept) && tested == 0, "whole groups are hidden: {way:?}");
+                let (hidden, tested) =
+                    kept(&engine(), &crowd, &camera, &whole, way, Hierarchy::Always);
+                assert!(
+                    hidden.iter().all(|kept| !kept) && tested == 0,
+                    "whole groups are hidden: {way:?}"
+                );
                 let depth = wall_with_bad_pixels(convention, way.pixels, 0);
                 let pyramid = pyramid_from(&engine(), source, &depth, &camera, &options);
                 let (seen, _) = kept(&engine(), &crowd, &camera, &pyramid, way, Hierarchy::Always);
-                assert!(seen.iter().all(|kept| *kept), "{source:?} {atlas:?} {convention:?} {way:?}");
+                assert!(
+                    seen.iter().all(|kept| *kept),
+                    "{source:?} {atlas:?} {convention:?} {way:?}"
+                );
             }
         }
     }
 }
 
-/// A footprint of four and a descent read single pixels; without what cleans those they hide what is
-/// seen. (A depth texture holds no such pixel here: `shader.rs` looks at the text of its shader.)
+/// A footprint of four and a descent read single pixels; without what cleans those they hide what
+/// is seen.
+/// (A depth texture holds no such pixel here: `shader.rs` looks at the text of its shader.)
 #[test]
 fn pixels_that_nobody_cleans_hide_something() {
     for (source, atlas, (what, by)) in [
@@ -213,9 +236,14 @@ fn pixels_that_nobody_cleans_hide_something() {
             ),
         ),
         (Source::Bits, AtlasUse::Always, ("sanitized(textureLoad(atlas,", "(textureLoad(atlas,")),
-        (Source::Bits, AtlasUse::Never, ("return farthest_sanitized4(bits);", "return farthest4(bits);")),
+        (
+            Source::Bits,
+            AtlasUse::Never,
+            ("return farthest_sanitized4(bits);", "return farthest4(bits);"),
+        ),
     ] {
-        let faulty = Engine::with_planted_faults(None, &[(what, by)]).expect("the device tests need a Vulkan driver");
+        let faulty = Engine::with_planted_faults(None, &[(what, by)])
+            .expect("the device tests need a Vulkan driver");
         for convention in CONVENTIONS {
             let camera = camera_along_z(SIDE, SIDE, convention);
             let options = PyramidOptions { atlas, ..PyramidOptions::default() };

@@ -1,4 +1,5 @@
-//! Occluder meshes: drawn at any size, relative to the eye, one- or two-sided; and pyramids of textures that were not uploaded.
+//! Occluder meshes: drawn at any size, relative to the eye, one- or two-sided; and pyramids of
+//! textures that were not uploaded.
 
 mod common;
 
@@ -6,12 +7,13 @@ use common::{CONVENTIONS, Random, camera_along_z, engine, ndc};
 use hiz_core::headless::Engine;
 use hiz_core::wgpu;
 use hiz_core::{
-    Camera, DepthConvention, FaceCull, Floats, ImageSize, MeshData, OccluderOptions, Pose, Projection, Pyramid,
-    PyramidOptions, StoredLevels,
+    Camera, DepthConvention, FaceCull, Floats, ImageSize, MeshData, OccluderOptions, Pose,
+    Projection, Pyramid, PyramidOptions, StoredLevels,
 };
 
-/// A square at depth `z` from (-r, -r) to (r, r), seen counter-clockwise by a camera with x right, y up that looks along +z... which
-/// is a left-handed one: in this world a triangle that appears counter-clockwise in the image is listed so.
+/// A square at depth `z` from (-r, -r) to (r, r), seen counter-clockwise by a camera with x right,
+/// y up that looks along +z... which is a left-handed one: in this world a triangle that appears
+/// counter-clockwise in the image is listed so.
 fn square(z: f64, r: f64) -> (Vec<f64>, Vec<u32>) {
     (vec![-r, -r, z, r, -r, z, r, r, z, -r, r, z], vec![0, 1, 2, 0, 2, 3])
 }
@@ -23,7 +25,11 @@ fn draw(
     cull_mode: FaceCull,
     camera: &Camera,
 ) -> Vec<f32> {
-    let mesh = MeshData { vertices: Floats::F64(vertices), triangles, transforms: transforms.map(Floats::F64) };
+    let mesh = MeshData {
+        vertices: Floats::F64(vertices),
+        triangles,
+        transforms: transforms.map(Floats::F64),
+    };
     let occluders = engine().occluders(&[mesh], &OccluderOptions { cull_mode }).unwrap();
     engine().render_depth(&occluders, camera).unwrap().read().unwrap()
 }
@@ -32,7 +38,12 @@ fn draw(
 fn right_handed(eye: [f64; 3], size: ImageSize, convention: DepthConvention) -> Camera {
     let pose = Pose { eye, target: [eye[0], eye[1], eye[2] - 1.0], up: [0.0, 1.0, 0.0] };
     let fov_y = std::f64::consts::FRAC_PI_2;
-    Camera::look_at(&pose, &Projection::Perspective { fov_y, near: 1.0, far: None, convention }, size).unwrap()
+    Camera::look_at(
+        &pose,
+        &Projection::Perspective { fov_y, near: 1.0, far: None, convention },
+        size,
+    )
+    .unwrap()
 }
 
 #[test]
@@ -42,12 +53,16 @@ fn a_wall_has_its_depth_and_nothing_is_far() {
             let camera = camera_along_z(width, height, convention);
             let (vertices, triangles) = square(4.0, 100.0);
             let depth = draw(&vertices, &triangles, None, FaceCull::None, &camera);
-            assert!(depth.iter().all(|d| *d == ndc(4.0, convention)), "{width}x{height} {convention:?}");
+            assert!(
+                depth.iter().all(|d| *d == ndc(4.0, convention)),
+                "{width}x{height} {convention:?}"
+            );
             let nothing = draw(&[], &[], None, FaceCull::None, &camera);
             assert!(nothing.iter().all(|d| *d == convention.far()));
             // Behind the camera and beside the frustum: culled by their bounds.
             for place in [[0.0, 0.0, -20.0], [500.0, 0.0, 0.0]] {
-                let moved: Vec<f64> = vertices.iter().enumerate().map(|(i, v)| v + place[i % 3]).collect();
+                let moved: Vec<f64> =
+                    vertices.iter().enumerate().map(|(i, v)| v + place[i % 3]).collect();
                 let depth = draw(&moved, &triangles, None, FaceCull::None, &camera);
                 assert!(depth.iter().all(|d| *d == convention.far()));
             }
@@ -99,7 +114,9 @@ fn faces_are_culled_by_their_orientation_in_the_world() {
     assert!(seen(&front, None, FaceCull::Back) && !seen(&back, None, FaceCull::Back));
     assert!(!seen(&front, None, FaceCull::Front) && seen(&back, None, FaceCull::Front));
     // A mirror does not turn a mesh inside out.
-    assert!(seen(&front, Some(&mirror), FaceCull::Back) && !seen(&back, Some(&mirror), FaceCull::Back));
+    assert!(
+        seen(&front, Some(&mirror), FaceCull::Back) && !seen(&back, Some(&mirror), FaceCull::Back)
+    );
     // Nor does a left-handed camera: the same faces are seen from the same side.
     let flipped = Camera::from_clip_from_world(
         [[-1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, -1.0, 0.0]],
@@ -115,7 +132,9 @@ fn faces_are_culled_by_their_orientation_in_the_world() {
 fn transforms_place_a_mesh_many_times() {
     let camera = camera_along_z(8, 8, DepthConvention::Reversed);
     let (vertices, triangles) = square(0.0, 1.0);
-    let place = |x: f64, y: f64, z: f64| [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0];
+    let place = |x: f64, y: f64, z: f64| {
+        [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0]
+    };
     let transforms = [place(-1.0, 1.0, 2.0), place(1.0, -1.0, 2.0)].concat();
     let depth = draw(&vertices, &triangles, Some(&transforms), FaceCull::None, &camera);
     for (i, d) in depth.iter().enumerate() {
@@ -125,16 +144,18 @@ fn transforms_place_a_mesh_many_times() {
     }
 }
 
-/// A wall as far from the origin as a city or a planet's surface trembles by no more than float64's own positions do.
+/// A wall as far from the origin as a city or a planet's surface trembles by no more than float64's
+/// own positions do.
 #[test]
 fn distance_from_the_origin_costs_nothing() {
     let size = ImageSize::new(32, 32);
     for offset in [0.0, 1e3, 1e6, 1e9] {
         let camera = right_handed([offset, -offset, offset], size, DepthConvention::Reversed);
-        let vertices: Vec<f64> = [[-100.0, -100.0, -4.0], [100.0, -100.0, -4.0], [0.0, 300.0, -4.0]]
-            .iter()
-            .flat_map(|p| [p[0] + offset, p[1] - offset, p[2] + offset])
-            .collect();
+        let vertices: Vec<f64> =
+            [[-100.0, -100.0, -4.0], [100.0, -100.0, -4.0], [0.0, 300.0, -4.0]]
+                .iter()
+                .flat_map(|p| [p[0] + offset, p[1] - offset, p[2] + offset])
+                .collect();
         let depth = draw(&vertices, &[0, 1, 2], None, FaceCull::None, &camera);
         assert!(
             depth.iter().all(|d| (d - 0.25).abs() <= 4.0 * f32::EPSILON * 0.25),
@@ -145,18 +166,22 @@ fn distance_from_the_origin_costs_nothing() {
 }
 
 /// Slanted walls seen from eyes that float32 does not hold, against float64: every pixel's depth,
-/// and which pixels are covered. The faults that leave a half out move what is drawn by up to half
-/// a unit.
+/// and which pixels are covered.
+/// The faults that leave a half out move what is drawn by up to half a unit.
 #[test]
 fn eyes_that_float32_does_not_hold_see_what_float64_says() {
     assert_eq!(wrong_pixels(&engine()), 0);
     for (what, by) in [
         ("(lo - view.eye_lo.xyz)", "lo"),
         ("(lo - view.eye_lo.xyz)", "(vec3<f32>(0.0) - view.eye_lo.xyz)"),
-        ("(hi - view.eye_hi.xyz) + (lo - view.eye_lo.xyz)", "(hi + lo) - (view.eye_hi.xyz + view.eye_lo.xyz)"),
+        (
+            "(hi - view.eye_hi.xyz) + (lo - view.eye_lo.xyz)",
+            "(hi + lo) - (view.eye_hi.xyz + view.eye_lo.xyz)",
+        ),
         ("dot(view.clip_from_eye[0], d)", "dot(view.clip_from_eye[0], d) + 0.1 * d.z"),
     ] {
-        let faulty = Engine::with_planted_faults(None, &[(what, by)]).expect("the device tests need a Vulkan driver");
+        let faulty = Engine::with_planted_faults(None, &[(what, by)])
+            .expect("the device tests need a Vulkan driver");
         assert!(wrong_pixels(&faulty) > 100, "{what} -> {by}: stayed green");
     }
 }
@@ -166,15 +191,25 @@ fn wrong_pixels(engine: &Engine) -> usize {
     let size = ImageSize::new(40, 24);
     let mut wrong = 0;
     for convention in CONVENTIONS {
-        for eye in [[1e6 + 0.3, -1e6 - 0.7, 1e6 + 0.1], [0.3, 1e7 + 0.45, -1e5 - 0.01], [-3e7 - 1.3, 0.7, 2e6 + 0.6]] {
+        for eye in [
+            [1e6 + 0.3, -1e6 - 0.7, 1e6 + 0.1],
+            [0.3, 1e7 + 0.45, -1e5 - 0.01],
+            [-3e7 - 1.3, 0.7, 2e6 + 0.6],
+        ] {
             let camera = right_handed(eye, size, convention);
             // A quadrangle that tilts away to the right and upwards: its depth is 4 + 0.5 x + 0.25
             // y, and x and y end at 2 and 1.
             let (right, top) = (2.0, 1.0);
             let depth = |x: f64, y: f64| 4.0 + 0.5 * x + 0.25 * y;
             let corner = |x: f64, y: f64| [eye[0] + x, eye[1] + y, eye[2] - depth(x, y)];
-            let vertices = [corner(-9.0, -9.0), corner(right, -9.0), corner(right, top), corner(-9.0, top)].concat();
-            let mesh = MeshData { vertices: Floats::F64(&vertices), triangles: &[0, 1, 2, 0, 2, 3], transforms: None };
+            let vertices =
+                [corner(-9.0, -9.0), corner(right, -9.0), corner(right, top), corner(-9.0, top)]
+                    .concat();
+            let mesh = MeshData {
+                vertices: Floats::F64(&vertices),
+                triangles: &[0, 1, 2, 0, 2, 3],
+                transforms: None,
+            };
             let occluders = engine.occluders(&[mesh], &OccluderOptions::default()).unwrap();
             let drawn = engine.render_depth(&occluders, &camera).unwrap().read().unwrap();
             for (i, got) in (0..).zip(drawn) {
@@ -188,7 +223,8 @@ fn wrong_pixels(engine: &Engine) -> usize {
                 // (The corners at the left and below are behind the plane z = 1, or beyond the
                 // image.)
                 let beyond = (x - right).max(y - top);
-                let expected = if beyond > 0.0 { f64::from(convention.far()) } else { ndc64(z, convention) };
+                let expected =
+                    if beyond > 0.0 { f64::from(convention.far()) } else { ndc64(z, convention) };
                 let is_near = beyond.abs() < 0.02 || z < 1.1;
                 wrong += usize::from(!is_near && (f64::from(got) - expected).abs() > 2e-6);
             }
@@ -204,14 +240,26 @@ fn ndc64(z: f64, convention: DepthConvention) -> f64 {
 #[test]
 fn bad_meshes_are_refused_by_name() {
     let message = |vertices: &[f64], triangles: &[u32], transforms: Option<&[f64]>| {
-        let mesh = MeshData { vertices: Floats::F64(vertices), triangles, transforms: transforms.map(Floats::F64) };
+        let mesh = MeshData {
+            vertices: Floats::F64(vertices),
+            triangles,
+            transforms: transforms.map(Floats::F64),
+        };
         engine().occluders(&[mesh], &OccluderOptions::default()).unwrap_err().to_string()
     };
     assert!(message(&[0.0; 4], &[], None).starts_with("vertices: expected 3 numbers a vertex"));
     assert!(message(&[0.0; 9], &[0, 1], None).starts_with("triangles: expected 3 indices"));
-    assert!(message(&[0.0; 9], &[0, 1, 3], None).contains("below the 3 vertices, got 3 in triangle 0"));
-    assert!(message(&[f64::NAN; 9], &[0, 1, 2], None).starts_with("vertices: expected finite positions"));
-    assert!(message(&[0.0; 9], &[0, 1, 2], Some(&[1.0; 15])).starts_with("transforms: expected 16 numbers"));
+    assert!(
+        message(&[0.0; 9], &[0, 1, 3], None).contains("below the 3 vertices, got 3 in triangle 0")
+    );
+    assert!(
+        message(&[f64::NAN; 9], &[0, 1, 2], None)
+            .starts_with("vertices: expected finite positions")
+    );
+    assert!(
+        message(&[0.0; 9], &[0, 1, 2], Some(&[1.0; 15]))
+            .starts_with("transforms: expected 16 numbers")
+    );
     assert!(message(&[0.0; 9], &[0, 1, 2], Some(&[1.0; 16])).contains("last row"));
 }
 
@@ -219,10 +267,12 @@ fn bad_meshes_are_refused_by_name() {
 #[test]
 fn pyramids_of_rendered_depth_are_bit_exact() {
     let mut random = Random(8);
-    let vertices: Vec<f64> =
-        (0..300 * 3).flat_map(|_| [random.range(-6.0, 6.0), random.range(-6.0, 6.0), random.range(0.5, 9.0)]).collect();
+    let vertices: Vec<f64> = (0..300 * 3)
+        .flat_map(|_| [random.range(-6.0, 6.0), random.range(-6.0, 6.0), random.range(0.5, 9.0)])
+        .collect();
     let triangles: Vec<u32> = (0..900).collect();
-    let mesh = MeshData { vertices: Floats::F64(&vertices), triangles: &triangles, transforms: None };
+    let mesh =
+        MeshData { vertices: Floats::F64(&vertices), triangles: &triangles, transforms: None };
     let occluders = engine().occluders(&[mesh], &OccluderOptions::default()).unwrap();
     for convention in CONVENTIONS {
         for (width, height) in [(1, 1), (2, 3), (17, 31), (640, 360), (1001, 563)] {
@@ -230,7 +280,9 @@ fn pyramids_of_rendered_depth_are_bit_exact() {
             let image = engine().render_depth(&occluders, &camera).unwrap();
             let depth = image.read().unwrap();
             let pyramid = engine().pyramid(&image).unwrap();
-            for (k, level) in hiz_ref::pyramid(&depth, width, height, convention.is_reversed()).iter().enumerate() {
+            for (k, level) in
+                hiz_ref::pyramid(&depth, width, height, convention.is_reversed()).iter().enumerate()
+            {
                 assert_eq!(
                     engine().read_level(&pyramid, k as u32).unwrap(),
                     level.texels,
@@ -257,10 +309,16 @@ fn pyramids_of_float_textures_are_bit_exact() {
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
             format: wgpu::TextureFormat::R32Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::COPY_DST
+                | wgpu::TextureUsages::COPY_SRC,
             view_formats: &[],
         });
-        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * width), rows_per_image: None };
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(4 * width),
+            rows_per_image: None,
+        };
         let bytes: Vec<u8> = depth.iter().flat_map(|d| d.to_le_bytes()).collect();
         queue.write_texture(texture.as_image_copy(), &bytes, layout, extent);
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
@@ -269,31 +327,53 @@ fn pyramids_of_float_textures_are_bit_exact() {
             for levels in LEVELS {
                 let options = PyramidOptions { levels, ..PyramidOptions::default() };
                 let pyramid = engine.context().create_pyramid(camera.size(), &options).unwrap();
-                let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                let mut encoder =
+                    device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
                 engine.context().record_reduce(&mut encoder, &view, &camera, &pyramid).unwrap();
                 queue.submit([encoder.finish()]);
                 assert_levels(&pyramid, &depth, convention);
             }
-            let pyramid = engine.context().create_pyramid(camera.size(), &PyramidOptions::default()).unwrap();
+            let pyramid =
+                engine.context().create_pyramid(camera.size(), &PyramidOptions::default()).unwrap();
             let other = camera_along_z(width + 1, height, convention);
-            let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            let error = engine.context().record_reduce(&mut encoder, &view, &other, &pyramid).unwrap_err();
-            assert!(error.to_string().starts_with("camera: expected the depth image's size"), "{error}");
+            let mut encoder =
+                device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let error =
+                engine.context().record_reduce(&mut encoder, &view, &other, &pyramid).unwrap_err();
+            assert!(
+                error.to_string().starts_with("camera: expected the depth image's size"),
+                "{error}"
+            );
         }
     }
 }
 
-/// One of each kind of dispatch: all, without fine ones, one by an invocation, one by a workgroup a texel.
-const LEVELS: [StoredLevels; 5] =
-    [StoredLevels::ALL, StoredLevels::from(2), StoredLevels::only(3), StoredLevels::from(4), StoredLevels::only(6)];
+/// One of each kind of dispatch: all, without fine ones, one by an invocation, one by a workgroup a
+/// texel.
+const LEVELS: [StoredLevels; 5] = [
+    StoredLevels::ALL,
+    StoredLevels::from(2),
+    StoredLevels::only(3),
+    StoredLevels::from(4),
+    StoredLevels::only(6),
+];
 
 /// The stored levels are those of the oracle.
 fn assert_levels(pyramid: &Pyramid, depth: &[f32], convention: DepthConvention) {
     let ImageSize { width, height } = pyramid.size();
-    for (k, level) in hiz_ref::pyramid(depth, width, height, convention.is_reversed()).iter().enumerate() {
-        if k == 0 || pyramid.stored_levels().is_some_and(|s| (s.first..=s.last).contains(&(k as u32))) {
+    for (k, level) in
+        hiz_ref::pyramid(depth, width, height, convention.is_reversed()).iter().enumerate()
+    {
+        if k == 0
+            || pyramid.stored_levels().is_some_and(|s| (s.first..=s.last).contains(&(k as u32)))
+        {
             let texels = engine().read_level(pyramid, k as u32).unwrap();
-            assert_eq!(texels, level.texels, "{width}x{height} level {k} of {:?}", pyramid.stored_levels());
+            assert_eq!(
+                texels,
+                level.texels,
+                "{width}x{height} level {k} of {:?}",
+                pyramid.stored_levels()
+            );
         }
     }
 }
@@ -302,18 +382,26 @@ fn assert_levels(pyramid: &Pyramid, depth: &[f32], convention: DepthConvention) 
 #[test]
 fn depth_textures_are_reduced_to_the_chosen_levels() {
     let mut random = common::Random(9);
-    let vertices: Vec<f64> =
-        (0..900).map(|i| if i % 3 == 2 { random.range(1.5, 30.0) } else { random.range(-9.0, 9.0) }).collect();
+    let vertices: Vec<f64> = (0..900)
+        .map(|i| if i % 3 == 2 { random.range(1.5, 30.0) } else { random.range(-9.0, 9.0) })
+        .collect();
     let triangles: Vec<u32> = (0..300).collect();
-    let mesh = MeshData { vertices: Floats::F64(&vertices), triangles: &triangles, transforms: None };
+    let mesh =
+        MeshData { vertices: Floats::F64(&vertices), triangles: &triangles, transforms: None };
     let occluders = engine().occluders(&[mesh], &OccluderOptions::default()).unwrap();
     for (width, height) in [(1, 1), (1, 83), (89, 1), (64, 65), (127, 129), (401, 233)] {
         for convention in CONVENTIONS {
-            let image = engine().render_depth(&occluders, &camera_along_z(width, height, convention)).unwrap();
+            let image = engine()
+                .render_depth(&occluders, &camera_along_z(width, height, convention))
+                .unwrap();
             let depth = image.read().unwrap();
             for levels in LEVELS {
                 let options = PyramidOptions { levels, ..PyramidOptions::default() };
-                assert_levels(&engine().pyramid_with(&image, &options).unwrap(), &depth, convention);
+                assert_levels(
+                    &engine().pyramid_with(&image, &options).unwrap(),
+                    &depth,
+                    convention,
+                );
             }
         }
     }

@@ -1,5 +1,5 @@
-//! Faults planted into the shaders: each must turn the suite red. A fault that stays green means that a margin, a clamp or an
-//! order is not tested.
+//! Faults planted into the shaders: each must turn the suite red.
+//! A fault that stays green means that a margin, a clamp or an order is not tested.
 
 mod common;
 
@@ -14,14 +14,19 @@ use common::{CONVENTIONS, Random, camera_along_z};
 use documented::{assert_said, is_of_this_driver};
 use hiz_core::headless::Engine;
 use hiz_core::{
-    Bounds, BoundsKind, Coverage, CullOptions, DepthConvention, Fit, Floats, Footprint, InstanceOptions, VisibleOptions,
+    Bounds, BoundsKind, Coverage, CullOptions, DepthConvention, Fit, Floats, Footprint,
+    InstanceOptions, VisibleOptions,
 };
 
 fn faulty(faults: &[(&str, &str)]) -> Engine {
     Engine::with_planted_faults(None, faults).expect("the device tests need a Vulkan driver")
 }
 
-fn campaign(faults: &[(&str, &str)], coverage: Coverage, modes: &'static [(Footprint, u32)]) -> Report {
+fn campaign(
+    faults: &[(&str, &str)],
+    coverage: Coverage,
+    modes: &'static [(Footprint, u32)],
+) -> Report {
     Campaign { seed: 21, rounds: 6, coverage, modes, ..Campaign::default() }.run(&faulty(faults))
 }
 
@@ -53,7 +58,8 @@ fn without_faults_it_is_green() {
     }
 }
 
-/// The campaign's power: every class finds that there is no margin, and all together that there is a 48th of it.
+/// The campaign's power: every class finds that there is no margin, and all together that there is
+/// a 48th of it.
 #[test]
 fn cuts_of_the_margin() {
     let is_documented = is_of_this_driver(&faulty(&[]));
@@ -66,35 +72,50 @@ fn cuts_of_the_margin() {
         reports.push(report.clone());
         if ulps == "0.0" {
             eprintln!("{HEADER}\n{report}");
-            let green: Vec<Class> =
-                report.classes.iter().filter(|(_, t)| t.false_culls == 0).map(|(class, _)| *class).collect();
+            let green: Vec<Class> = report
+                .classes
+                .iter()
+                .filter(|(_, t)| t.false_culls == 0)
+                .map(|(class, _)| *class)
+                .collect();
             assert!(green.is_empty(), "no margin, and green: {green:?}");
         }
     }
     if is_documented {
-        let all: Vec<String> =
-            reports.iter().map(|r| format!("{} of {}", r.total().false_culls, r.total().cases)).collect();
+        let all: Vec<String> = reports
+            .iter()
+            .map(|r| format!("{} of {}", r.total().false_culls, r.total().cases))
+            .collect();
         assert_said(&format!("| **device**, of so many cases | {} |", all.join(" | ")));
         for (k, (class, tally)) in reports[0].classes.iter().enumerate() {
-            let counts: Vec<String> = reports.iter().map(|r| r.classes[k].1.false_culls.to_string()).collect();
+            let counts: Vec<String> =
+                reports.iter().map(|r| r.classes[k].1.false_culls.to_string()).collect();
             assert_said(&format!("| {class:?} | {} | {} |", tally.cases, counts.join(" | ")));
         }
     }
 }
 
 /// The block's certificates along one axis, as the cull calls them.
-const INSIDE_X: &str = "inside_block(x, w, extent_x, w_min, block.x, block.z, level, view.half_size.x, view.size.x)";
-const INSIDE_Y: &str = "inside_block(y, w, extent_y, w_min, block.y, block.w, level, view.half_size.y, view.size.y)";
+const INSIDE_X: &str =
+    "inside_block(x, w, extent_x, w_min, block.x, block.z, level, view.half_size.x, view.size.x)";
+const INSIDE_Y: &str =
+    "inside_block(y, w, extent_y, w_min, block.y, block.w, level, view.half_size.y, view.size.y)";
 
 #[test]
 fn a_level_too_fine_without_block_certificates() {
-    let finer = ("return level + select(0u, 1u, (texels.x | texels.y) >= (1u << FOOTPRINT_LOG2));", "return level;");
+    let finer = (
+        "return level + select(0u, 1u, (texels.x | texels.y) >= (1u << FOOTPRINT_LOG2));",
+        "return level;",
+    );
     assert_red("level", &[finer, (INSIDE_X, "true"), (INSIDE_Y, "true")]);
 }
 
 #[test]
 fn nearest_instead_of_farthest() {
-    assert_red("swap", &[("select(max(a, b), min(a, b), REVERSED)", "select(min(a, b), max(a, b), REVERSED)")]);
+    assert_red(
+        "swap",
+        &[("select(max(a, b), min(a, b), REVERSED)", "select(min(a, b), max(a, b), REVERSED)")],
+    );
 }
 
 /// The mean of two depths in the place of the farthest: where a footprint is read, and where four
@@ -102,11 +123,14 @@ fn nearest_instead_of_farthest() {
 #[test]
 fn a_mean_instead_of_the_farthest() {
     const FOUR: &[(Footprint, u32)] = &[(Footprint::Four, 0)];
-    let mean = |a: &str, b: &str| format!("bitcast<u32>(0.5 * (bitcast<f32>({a}) + bitcast<f32>({b})))");
+    let mean =
+        |a: &str, b: &str| format!("bitcast<u32>(0.5 * (bitcast<f32>({a}) + bitcast<f32>({b})))");
     let texels = format!("bits = {};", mean("bits", "here"));
     assert_red_with("mean of a footprint", &[("bits = farthest(bits, here);", &texels)], FOUR);
-    let (standard, reversed) =
-        (mean("greatest", "min(min(v.x, v.y), min(v.z, v.w))"), "(max(below_one.x, below_one.y) / 2u)");
+    let (standard, reversed) = (
+        mean("greatest", "min(min(v.x, v.y), min(v.z, v.w))"),
+        "(max(below_one.x, below_one.y) / 2u)",
+    );
     assert_red(
         "mean of four",
         &[(
@@ -121,12 +145,13 @@ fn a_mean_instead_of_the_farthest() {
 }
 
 /// Slanted plates, each nearest at one end, which is half a pixel inside the pixel where it begins:
-/// left, right, top and bottom. Of that end a tenth of a pixel is nearer than the wall. Which are
-/// culled by their own fit?
+/// left, right, top and bottom.
+/// Of that end a tenth of a pixel is nearer than the wall.
+/// Which are culled by their own fit?
 fn culled_slanted_plates(faults: &[(&str, &str)]) -> [bool; 4] {
     let engine = faulty(faults);
-    // At depth 8 a pixel is a unit. A tenth of a pixel from such an end a plate is at depth 8.1,
-    // two tenths at 8.2.
+    // At depth 8 a pixel is a unit.
+    // A tenth of a pixel from such an end a plate is at depth 8.1, two tenths at 8.2.
     let camera = camera_along_z(16, 16, DepthConvention::Reversed);
     let image = engine.upload_depth(&[1.0 / 8.1; 256], &camera).unwrap();
     let pyramid = engine.pyramid(&image).unwrap();
@@ -135,7 +160,8 @@ fn culled_slanted_plates(faults: &[(&str, &str)]) -> [bool; 4] {
     // Rows run downwards: the top's end is at y = -1/2, half a pixel below a border, and goes on
     // downwards.
     [(0, 1.0), (0, -1.0), (1, -1.0), (1, 1.0)].map(|(axis, sign)| {
-        let (mut along, mut across, mut end) = ([0.0, 0.0, c], [0.0, 0.0, -sign * c], [0.0, 0.0, 8.0]);
+        let (mut along, mut across, mut end) =
+            ([0.0, 0.0, c], [0.0, 0.0, -sign * c], [0.0, 0.0, 8.0]);
         (along[axis], across[axis], end[axis]) = (sign * c, c, 0.5 * sign);
         let mut beside = [1.0, 1.0, 0.0];
         beside[axis] = 0.0;
@@ -147,7 +173,9 @@ fn culled_slanted_plates(faults: &[(&str, &str)]) -> [bool; 4] {
             rotations: Floats::F64(&rotation),
         };
         let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
-        let culling = engine.cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap();
+        let culling = engine
+            .cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default())
+            .unwrap();
         !culling.mask().unwrap()[0]
     })
 }
@@ -181,7 +209,8 @@ fn a_depth_certificate_at_the_centre_alone() {
 #[test]
 fn a_rectangle_that_is_too_small_without_block_certificates() {
     // The rectangle alone, unwidened: the edges are what certificates are for.
-    let unwidened = ["below", "above"].map(|end| (format!("(extent.{end} * per_w + rounding)"), "view.reach"));
+    let unwidened =
+        ["below", "above"].map(|end| (format!("(extent.{end} * per_w + rounding)"), "view.reach"));
     let [low, high] = unwidened.each_ref().map(|(what, by)| (what.as_str(), *by));
     assert_red("rectangle", &[low, high, (INSIDE_X, "true"), (INSIDE_Y, "true")]);
 }
@@ -189,10 +218,13 @@ fn a_rectangle_that_is_too_small_without_block_certificates() {
 /// What the rectangle is widened by besides its own error.
 const WIDENING: &str = "let rounding = 4.0 * EPS * half_size + view.reach;";
 /// A rectangle 0.7 pixels too small on each side.
-const TOO_SMALL: (&str, &str) = (WIDENING, "let rounding = 4.0 * EPS * half_size + view.reach - 0.7;");
+const TOO_SMALL: (&str, &str) =
+    (WIDENING, "let rounding = 4.0 * EPS * half_size + view.reach - 0.7;");
 
-/// The rectangle only chooses what is certified: where it is wrong, less is culled and nothing wrongly. (The level that follows
-/// from it is integer arithmetic, and no heuristic: four corners are all texels of a 2 x 2 footprint only.)
+/// The rectangle only chooses what is certified: where it is wrong, less is culled and nothing
+/// wrongly.
+/// (The level that follows from it is integer arithmetic, and no heuristic: four corners are all
+/// texels of a 2 x 2 footprint only.)
 #[test]
 fn a_rectangle_that_is_too_small_is_harmless() {
     for coverage in [Coverage::Area, Coverage::Sample] {
@@ -205,8 +237,14 @@ fn a_rectangle_that_is_too_small_is_harmless() {
 #[test]
 fn each_block_certificate_is_needed() {
     for gone in [
-        ("(lo == 0u | surely_after(r, w, extent, f32(begin) + view.reach - half_size, w_min))", "true"),
-        ("(end >= size | surely_before(r, w, extent, f32(end) - view.reach - half_size, w_min))", "true"),
+        (
+            "(lo == 0u | surely_after(r, w, extent, f32(begin) + view.reach - half_size, w_min))",
+            "true",
+        ),
+        (
+            "(end >= size | surely_before(r, w, extent, f32(end) - view.reach - half_size, w_min))",
+            "true",
+        ),
         (INSIDE_X, "true"),
         (INSIDE_Y, "true"),
     ] {
@@ -220,7 +258,8 @@ fn each_block_certificate_is_needed() {
 #[test]
 fn a_descent_without_its_certificates_or_past_its_budget() {
     let (x, y) = ((INSIDE_X, "true"), (INSIDE_Y, "true"));
-    let unfinished = ("if left == 0u {\n            return false;", "if left == 0u {\n            return true;");
+    let unfinished =
+        ("if left == 0u {\n            return false;", "if left == 0u {\n            return true;");
     for (name, faults, modes) in [
         ("descent, columns", &[TOO_SMALL, x][..], &[(Footprint::Two, 4096)]),
         ("descent, rows", &[TOO_SMALL, y][..], &[(Footprint::Two, 4096)]),
@@ -232,29 +271,37 @@ fn a_descent_without_its_certificates_or_past_its_budget() {
     }
 }
 
-/// Boxes a quarter of a pixel beside a hole, left, right, above and below of it, with half a pixel of guard: are any culled?
+/// Boxes a quarter of a pixel beside a hole, left, right, above and below of it, with half a pixel
+/// of guard: are any culled?
 fn culls_within_the_guard(engine: &Engine) -> bool {
     let camera = camera_along_z(16, 16, DepthConvention::Reversed);
     let options = CullOptions { guard_px: Some(0.5), ..CullOptions::default() };
     // At depth 8 a pixel is a unit wide; column 8 is x in 0..1, and row 8 is y in -1..0.
     let (low, high) = ([-1.25, -0.25], [1.25, 2.25]);
-    [(0, low), (0, high), (1, low.map(|v: f64| -v)), (1, high.map(|v| -v))].into_iter().any(|(axis, span)| {
-        let mut depth = [0.25; 256];
-        for i in 0..16 {
-            depth[if axis == 0 { 16 * i + 8 } else { 128 + i }] = 0.0;
-        }
-        let pyramid = engine.pyramid(&engine.upload_depth(&depth, &camera).unwrap()).unwrap();
-        let (mut min, mut max) = ([-0.4, -0.4, 8.0], [0.4, 0.4, 8.0]);
-        (min[axis], max[axis]) = (span[0].min(span[1]), span[0].max(span[1]));
-        let bounds = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };
-        let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
-        !engine.cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap().mask().unwrap()[0]
-    })
+    [(0, low), (0, high), (1, low.map(|v: f64| -v)), (1, high.map(|v| -v))].into_iter().any(
+        |(axis, span)| {
+            let mut depth = [0.25; 256];
+            for i in 0..16 {
+                depth[if axis == 0 { 16 * i + 8 } else { 128 + i }] = 0.0;
+            }
+            let pyramid = engine.pyramid(&engine.upload_depth(&depth, &camera).unwrap()).unwrap();
+            let (mut min, mut max) = ([-0.4, -0.4, 8.0], [0.4, 0.4, 8.0]);
+            (min[axis], max[axis]) = (span[0].min(span[1]), span[0].max(span[1]));
+            let bounds = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };
+            let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
+            !engine
+                .cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default())
+                .unwrap()
+                .mask()
+                .unwrap()[0]
+        },
+    )
 }
 
-/// The guard in the block's certificates. The rectangle is widened by it as well, so that in area coverage no input reaches them
-/// alone; with a rectangle that forgets the guard they have to keep what lies within it. (In sample coverage the same terms decide
-/// what is *culled*: `outcomes.rs`.)
+/// The guard in the block's certificates.
+/// The rectangle is widened by it as well, so that in area coverage no input reaches them alone;
+/// with a rectangle that forgets the guard they have to keep what lies within it.
+/// (In sample coverage the same terms decide what is *culled*: `outcomes.rs`.)
 #[test]
 fn the_guard_stands_in_the_block_certificates_too() {
     let forgetful = (WIDENING, "let rounding = 4.0 * EPS * half_size;");
@@ -274,7 +321,8 @@ fn a_descent_that_forgets_a_column() {
     assert_red_with("descent", &[fault], &[(Footprint::Two, 4096)]);
 }
 
-/// A level that is too fine for a rectangle, or not there at all; a descent past missing levels that forgets children.
+/// A level that is too fine for a rectangle, or not there at all; a descent past missing levels
+/// that forgets children.
 #[test]
 fn wrong_levels_where_some_are_missing() {
     let chosen = "select(clamp(level, first_stored, last_stored), 0u, level == 0u)";
@@ -286,7 +334,8 @@ fn wrong_levels_where_some_are_missing() {
         ("let last_child = (1u << up) - 1u;", "let last_child = 1u;", &[(Footprint::Two, 4096)]),
         ("select(1u, level, level <= first_stored)", "1u", &[(Footprint::Two, 4096)]),
     ] {
-        let campaign = Campaign { seed: 25, rounds: 8, modes, levels: MISSING_LEVELS, ..Campaign::default() };
+        let campaign =
+            Campaign { seed: 25, rounds: 8, modes, levels: MISSING_LEVELS, ..Campaign::default() };
         assert_report_red(&format!("{what} -> {by}"), &campaign.run(&faulty(&[(what, by)])));
     }
 }
@@ -313,15 +362,27 @@ fn claims_of_the_extent_and_the_sizes() {
         // Where the farthest corner for the centre's ratio is not the extreme one.
         (
             "extent, no support",
-            &[(support, "-(r.center - low * w.center)"), (other_support, "(r.center - high * w.center)")],
+            &[
+                (support, "-(r.center - low * w.center)"),
+                (other_support, "(r.center - high * w.center)"),
+            ],
         ),
         (
             "extent, no margin",
-            &[("+ error_bound(r, low, w), 0.0)", ", 0.0)"), ("+ error_bound(r, high, w), 0.0)", ", 0.0)")],
+            &[
+                ("+ error_bound(r, low, w), 0.0)", ", 0.0)"),
+                ("+ error_bound(r, high, w), 0.0)", ", 0.0)"),
+            ],
         ),
         ("least w, no support", &[(least_w, "w.center - error_bound(w, 0.0, w)")]),
-        ("frustum, half mirrored", &[(beyond, "surely_above(Value(side * r.center, r.error, r.half), t, w)")]),
-        ("another row's margin", &[("value_of(view.x, errors.x, volume)", "value_of(view.x, errors.z, volume)")]),
+        (
+            "frustum, half mirrored",
+            &[(beyond, "surely_above(Value(side * r.center, r.error, r.half), t, w)")],
+        ),
+        (
+            "another row's margin",
+            &[("value_of(view.x, errors.x, volume)", "value_of(view.x, errors.z, volume)")],
+        ),
     ];
     for (name, faults) in faults {
         let campaign = Campaign { seed: 25, rounds: 12, ..Campaign::default() };
@@ -329,21 +390,29 @@ fn claims_of_the_extent_and_the_sizes() {
     }
 }
 
-/// The constants' share of a margin covers what float64 lost in them: large where they cancel at a distant eye.
+/// The constants' share of a margin covers what float64 lost in them: large where they cancel at a
+/// distant eye.
 #[test]
 fn margins_count_the_constants() {
-    let fault = ("(volume.size * view.magnitudes + view.constant_magnitudes)", "(volume.size * view.magnitudes)");
-    let campaign = Campaign { seed: 38, rounds: 60, classes: &[Class::BareMatrix], ..Campaign::default() };
+    let fault = (
+        "(volume.size * view.magnitudes + view.constant_magnitudes)",
+        "(volume.size * view.magnitudes)",
+    );
+    let campaign =
+        Campaign { seed: 38, rounds: 60, classes: &[Class::BareMatrix], ..Campaign::default() };
     assert_report_red("no constants", &campaign.run(&faulty(&[fault])));
 }
 
-/// Pixels of level 0 come four at a time. Those beside a rectangle that is narrower are replaced; left in they only cost culls, and
-/// taken in another order they let something through.
+/// Pixels of level 0 come four at a time.
+/// Those beside a rectangle that is narrower are replaced; left in they only cost culls, and taken
+/// in another order they let something through.
 #[test]
 fn gathered_pixels_beside_the_rectangle() {
     let run = |faults: &[(&str, &str)]| campaign(faults, Coverage::Area, PLAIN);
-    let left_in =
-        [("select(pixels.xxzz, pixels, t.x < t.z)", "pixels"), ("select(columns.xyxy, columns, t.y < t.w)", "columns")];
+    let left_in = [
+        ("select(pixels.xxzz, pixels, t.x < t.z)", "pixels"),
+        ("select(columns.xyxy, columns, t.y < t.w)", "columns"),
+    ];
     let (without, with) = (run(&[]).total(), run(&left_in).total());
     eprintln!("gathered: {} culled, with their neighbours {}", without.culled, with.culled);
     assert!(with.false_culls == 0 && with.culled < without.culled, "{with:?}");
@@ -373,7 +442,8 @@ fn uploaded_pixels_beside_the_right_ones() {
     }
 }
 
-/// Groups: what is planted in them alone. (Boxes themselves are left out where a fault would reach them, too.)
+/// Groups: what is planted in them alone.
+/// (Boxes themselves are left out where a fault would reach them, too.)
 #[test]
 fn groups_that_forget_members_or_shrink() {
     const ALL: &[BoundsKind] = &campaign::KINDS;
@@ -402,7 +472,14 @@ fn groups_that_forget_members_or_shrink() {
         ("groups of 32, which", ("group * GROUP + share", "group * 32u + share"), ALL),
         ("half of the shares", ("lane % SHARE", "lane % 4u"), ALL),
     ] {
-        let campaign = Campaign { seed: 26, rounds: 3, volumes: 12, kinds, groups: true, ..Campaign::default() };
+        let campaign = Campaign {
+            seed: 26,
+            rounds: 3,
+            volumes: 12,
+            kinds,
+            groups: true,
+            ..Campaign::default()
+        };
         assert_report_red(name, &campaign.run(&faulty(&[fault])));
     }
 }
@@ -412,7 +489,14 @@ fn groups_that_forget_members_or_shrink() {
 fn refined_verdicts() {
     let run = |faults: &[(&str, &str)]| {
         const KIND: &[BoundsKind] = &[BoundsKind::Sphere];
-        let campaign = Campaign { seed: 26, rounds: 2, volumes: 12, kinds: KIND, groups: true, ..Campaign::default() };
+        let campaign = Campaign {
+            seed: 26,
+            rounds: 2,
+            volumes: 12,
+            kinds: KIND,
+            groups: true,
+            ..Campaign::default()
+        };
         campaign.run(&faulty(faults)).tested.contradictions
     };
     assert_eq!(run(&[]), 0);
@@ -433,7 +517,8 @@ fn refined_verdicts() {
 #[test]
 fn dropped_rows_and_columns() {
     for (what, by) in [
-        // The last row of an odd level; the last columns, where a block reaches past the row's padding.
+        // The last row of an odd level; the last columns, where a block reaches past the row's
+        // padding.
         ("min(2u * y + 1u, level.height - 1u)", "min(2u * y, level.height - 1u)"),
         ("let right = min(8u * x + 4u, last);", "let right = left;"),
         ("vec2<u32>(2u * x + 1u, 2u * y + 1u)", "vec2<u32>(2u * x, 2u * y + 1u)"),
@@ -447,7 +532,8 @@ fn dropped_rows_and_columns() {
         let engine = faulty(&[(what, by)]);
         let mut random = Random(5);
         let (width, height) = (37, 29);
-        // Blocks of one kind here and there, for what is farther than a block's other depths does not show in it.
+        // Blocks of one kind here and there, for what is farther than a block's other depths does
+        // not show in it.
         let odd = [-0.0, 1e-40, f32::MIN_POSITIVE];
         let depth: Vec<f32> = (0..width * height)
             .map(|i| if i / 4 % 5 == 0 { odd[(i / 4 % 3) as usize] } else { random.unit() as f32 })
@@ -456,7 +542,9 @@ fn dropped_rows_and_columns() {
         for convention in CONVENTIONS {
             let camera = camera_along_z(width, height, convention);
             let expected = hiz_ref::pyramid(&depth, width, height, convention.is_reversed());
-            for image in [engine.upload_depth(&depth, &camera), engine.upload_depth_sampled(&depth, &camera)] {
+            for image in
+                [engine.upload_depth(&depth, &camera), engine.upload_depth_sampled(&depth, &camera)]
+            {
                 let pyramid = engine.pyramid(&image.unwrap()).unwrap();
                 for (k, level) in (0..).zip(&expected) {
                     red |= engine.read_level(&pyramid, k).unwrap() != level.texels;

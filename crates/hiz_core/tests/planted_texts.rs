@@ -1,6 +1,7 @@
 //! Every text that a test plants a fault at stands in a shader: in tests that are ignored, in
-//! Python's and in what is written about it, too. (`Engine::with_planted_faults` panics at a text
-//! that is gone, but an ignored test says so only when somebody runs it.)
+//! Python's and in what is written about it, too.
+//! (`Engine::with_planted_faults` panics at a text that is gone, but an ignored test says so only
+//! when somebody runs it.)
 
 use std::collections::HashMap;
 use std::fs;
@@ -143,25 +144,33 @@ fn every_planted_text_stands_in_a_shader() {
     let shaders = read_all(&root.join("shaders"), "wgsl");
     let mut planted_at: Vec<(PathBuf, String)> = Vec::new();
     for (path, source) in read_all(&root.join("crates/hiz_core/tests"), "rs") {
-        if source.contains("planted_faults(") && path.file_name().is_some_and(|name| name != "planted_texts.rs") {
+        if source.contains("planted_faults(")
+            && path.file_name().is_some_and(|name| name != "planted_texts.rs")
+        {
             planted_at.extend(planted(&source).into_iter().map(|what| (path.clone(), what)));
         }
     }
     let in_rust = planted_at.len();
     let written = ["docs", "tests"].into_iter().zip(["md", "py"]).flat_map(|(folder, ending)| {
         let python = ending == "py";
-        read_all(&root.join(folder), ending).into_iter().filter(move |(_, s)| !python || s.contains("PLANTED_FAULT"))
+        read_all(&root.join(folder), ending)
+            .into_iter()
+            .filter(move |(_, s)| !python || s.contains("PLANTED_FAULT"))
     });
     let contributing = root.join("CONTRIBUTING.md");
-    let contributing = (contributing.clone(), fs::read_to_string(contributing).expect("CONTRIBUTING.md"));
+    let contributing =
+        (contributing.clone(), fs::read_to_string(contributing).expect("CONTRIBUTING.md"));
     for (path, source) in written.chain([contributing]) {
-        planted_at.extend(planted_by_variable(&source).into_iter().map(|what| (path.clone(), what)));
+        planted_at
+            .extend(planted_by_variable(&source).into_iter().map(|what| (path.clone(), what)));
     }
     eprintln!("{} planted texts, {in_rust} of them in Rust", planted_at.len());
     assert!(in_rust > 80, "the search for planted texts is blind: {in_rust}");
     assert!(planted_at.len() > in_rust, "and blind to HIZVK_PLANTED_FAULT");
-    let gone: Vec<_> =
-        planted_at.iter().filter(|(_, what)| !shaders.iter().any(|(_, shader)| shader.contains(what))).collect();
+    let gone: Vec<_> = planted_at
+        .iter()
+        .filter(|(_, what)| !shaders.iter().any(|(_, shader)| shader.contains(what)))
+        .collect();
     assert!(gone.is_empty(), "no shader says what faults are planted at: {gone:#?}");
 }
 
@@ -175,9 +184,9 @@ fn planted_texts_are_found_as_tests_write_them() {
             on", "by", MODES), ("a name", &[("inner", "by"), ("made", &by)])];
         text.replace("no", "fault"); assert!(("no fault" == "by"), "really");
     "#;
-    let expected = ["what", "select(min(a, b))", "a wide text", "what \"more\"\nand on", "inner", "made"];
+    let expected =
+        ["what", "select(min(a, b))", "a wide text", "what \"more\"\nand on", "inner", "made"];
     assert_eq!(planted(source), expected);
-    let shell =
-        "  HIZVK_PLANTED_FAULT='a - 1u => a - 2u' cargo test\n    \"max(a, b) => min(a, b)\",\nnot this => that";
+    let shell = "  HIZVK_PLANTED_FAULT='a - 1u => a - 2u' cargo test\n    \"max(a, b) => min(a, b)\",\nnot this => that";
     assert_eq!(planted_by_variable(shell), ["a - 1u", "max(a, b)"]);
 }

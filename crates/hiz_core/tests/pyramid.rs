@@ -1,4 +1,5 @@
-//! The depth pyramid, bit for bit against the oracle's, which takes every texel directly from the image.
+//! The depth pyramid, bit for bit against the oracle's, which takes every texel directly from the
+//! image.
 
 mod common;
 
@@ -8,12 +9,12 @@ use common::{CONVENTIONS, Random, camera_along_z, engine, ndc};
 use hiz_core::headless::DepthImage;
 use hiz_core::yardstick::{PerLevelReduction, ReductionShape, submitted_ms};
 use hiz_core::{
-    AtlasUse, Bounds, CullOptions, DepthConvention, Floats, Footprint, ImageSize, InstanceOptions, MeshData,
-    OccluderOptions, Pyramid, PyramidOptions, StoredLevels, VisibleOptions, wgpu,
+    AtlasUse, Bounds, CullOptions, DepthConvention, Floats, Footprint, ImageSize, InstanceOptions,
+    MeshData, OccluderOptions, Pyramid, PyramidOptions, StoredLevels, VisibleOptions, wgpu,
 };
 
-/// Every size class that has broken somebody's reduction: single pixels, rows, columns, odd in one or both sides, powers of two
-/// and their neighbours, primes, common screens.
+/// Every size class that has broken somebody's reduction: single pixels, rows, columns, odd in one
+/// or both sides, powers of two and their neighbours, primes, common screens.
 const SIZES: [(u32, u32); 34] = [
     (1, 1),
     (1, 2),
@@ -75,23 +76,39 @@ fn image(width: u32, height: u32, random: &mut Random) -> Vec<f32> {
         .collect()
 }
 
-fn check(width: u32, height: u32, depth: &[f32], convention: DepthConvention, options: &PyramidOptions) {
+fn check(
+    width: u32,
+    height: u32,
+    depth: &[f32],
+    convention: DepthConvention,
+    options: &PyramidOptions,
+) {
     let camera = camera_along_z(width, height, convention);
-    for uploaded in [engine().upload_depth(depth, &camera), engine().upload_depth_sampled(depth, &camera)] {
+    for uploaded in
+        [engine().upload_depth(depth, &camera), engine().upload_depth_sampled(depth, &camera)]
+    {
         check_image(&uploaded.unwrap(), depth, convention, options);
     }
 }
 
-/// SwiftShader's compiler takes more memory than there is for a reduction over several chunks. Its largest image, 8192 x 8192, needs one.
+/// SwiftShader's compiler takes more memory than there is for a reduction over several chunks.
+/// Its largest image, 8192 x 8192, needs one.
 fn only_one_chunk() -> bool {
     let swiftshader = engine().adapter().to_string().contains("SwiftShader");
     if swiftshader {
-        eprintln!("skipped: SwiftShader cannot compile a reduction over several chunks, and its images need none");
+        eprintln!(
+            "skipped: SwiftShader cannot compile a reduction over several chunks, and its images need none"
+        );
     }
     swiftshader
 }
 
-fn check_image(image: &DepthImage, depth: &[f32], convention: DepthConvention, options: &PyramidOptions) {
+fn check_image(
+    image: &DepthImage,
+    depth: &[f32],
+    convention: DepthConvention,
+    options: &PyramidOptions,
+) {
     let ImageSize { width, height } = image.size();
     let pyramid = engine().pyramid_with(image, options).unwrap();
     let expected = hiz_ref::pyramid(depth, width, height, convention.is_reversed());
@@ -102,11 +119,16 @@ fn check_image(image: &DepthImage, depth: &[f32], convention: DepthConvention, o
         assert_eq!(pyramid.level_size(k as u32), Some(ImageSize::new(level.width, level.height)));
         if k > 0 && !(asked.first.min(top)..=asked.last.min(top)).contains(&(k as u32)) {
             let error = engine().read_level(&pyramid, k as u32).unwrap_err().to_string();
-            assert!(error.contains("expected 0 or a stored level") && error.ends_with(&format!("got {k}")), "{error}");
+            assert!(
+                error.contains("expected 0 or a stored level")
+                    && error.ends_with(&format!("got {k}")),
+                "{error}"
+            );
             continue;
         }
         let texels = engine().read_level(&pyramid, k as u32).unwrap();
-        let differing = texels.iter().zip(&level.texels).position(|(a, b)| a.to_bits() != b.to_bits());
+        let differing =
+            texels.iter().zip(&level.texels).position(|(a, b)| a.to_bits() != b.to_bits());
         assert_eq!(texels.len(), level.texels.len());
         if let Some(i) = differing {
             panic!(
@@ -131,7 +153,8 @@ fn every_size_is_bit_exact_in_both_conventions() {
     }
 }
 
-/// All fours of numbers that are special to the bits of a depth: what lies on either side of each border, and depths between.
+/// All fours of numbers that are special to the bits of a depth: what lies on either side of each
+/// border, and depths between.
 #[test]
 fn four_of_any_kind_have_the_farthest_of_their_depths() {
     let special = [
@@ -175,19 +198,36 @@ fn random_small_sizes_are_bit_exact() {
     }
 }
 
-/// Every choice of levels, by both shaders and their seams: up to three levels a pass, one coarse level by an invocation or a
-/// workgroup a texel, and what goes on from there.
+/// Every choice of levels, by both shaders and their seams: up to three levels a pass, one coarse
+/// level by an invocation or a workgroup a texel, and what goes on from there.
 #[test]
 fn chosen_levels_are_bit_exact() {
     let mut random = Random(4);
-    let sizes = [(1, 1), (2, 2), (1, 37), (41, 1), (17, 16), (31, 33), (127, 129), (251, 241), (1, 3001), (1023, 517)];
+    let sizes = [
+        (1, 1),
+        (2, 2),
+        (1, 37),
+        (41, 1),
+        (17, 16),
+        (31, 33),
+        (127, 129),
+        (251, 241),
+        (1, 3001),
+        (1023, 517),
+    ];
     for (number, (width, height)) in sizes.into_iter().enumerate() {
         let depth = image(width, height, &mut random);
         for first in 1..=11 {
             let convention = CONVENTIONS[(number + first as usize) % 2];
             for last in [first, first + 1, first + 4, 15] {
                 let levels = StoredLevels { first, last };
-                check(width, height, &depth, convention, &PyramidOptions { levels, ..PyramidOptions::default() });
+                check(
+                    width,
+                    height,
+                    &depth,
+                    convention,
+                    &PyramidOptions { levels, ..PyramidOptions::default() },
+                );
             }
         }
     }
@@ -197,8 +237,10 @@ fn chosen_levels_are_bit_exact() {
 fn levels_that_make_no_sense_are_refused() {
     let camera = camera_along_z(8, 8, DepthConvention::Standard);
     for (first, last) in [(0, 3), (3, 2), (16, 16), (1, 16), (u32::MAX, u32::MAX)] {
-        let options = PyramidOptions { levels: StoredLevels { first, last }, ..PyramidOptions::default() };
-        let error = engine().context().create_pyramid(camera.size(), &options).unwrap_err().to_string();
+        let options =
+            PyramidOptions { levels: StoredLevels { first, last }, ..PyramidOptions::default() };
+        let error =
+            engine().context().create_pyramid(camera.size(), &options).unwrap_err().to_string();
         assert!(error.starts_with("levels: expected 1 <= first <= last <= 15"), "{error}");
     }
 }
@@ -210,7 +252,8 @@ fn the_yardsticks_have_the_same_levels() {
     for (width, height) in [(64, 64), (77, 41), (1, 19), (130, 3)] {
         let depth = image(width, height, &mut random);
         for convention in CONVENTIONS {
-            let uploaded = engine().upload_depth(&depth, &camera_along_z(width, height, convention)).unwrap();
+            let uploaded =
+                engine().upload_depth(&depth, &camera_along_z(width, height, convention)).unwrap();
             let pyramid = engine().pyramid(&uploaded).unwrap();
             for shape in [ReductionShape::Buffer, ReductionShape::Textures] {
                 let reduction = PerLevelReduction::new(&engine(), &uploaded, shape).unwrap();
@@ -221,7 +264,11 @@ fn the_yardsticks_have_the_same_levels() {
                 .unwrap();
                 for k in 1..pyramid.num_levels() {
                     let ours = engine().read_level(&pyramid, k).unwrap();
-                    assert_eq!(reduction.read(&engine(), k as usize).unwrap(), ours, "{shape:?} level {k}");
+                    assert_eq!(
+                        reduction.read(&engine(), k as usize).unwrap(),
+                        ours,
+                        "{shape:?} level {k}"
+                    );
                 }
             }
         }
@@ -238,7 +285,9 @@ fn split_pyramids_are_bit_exact() {
     for (width, height) in [(64, 64), (64, 72), (77, 41), (130, 129)] {
         let depth = image(width, height, &mut random);
         for convention in CONVENTIONS {
-            let pyramid = engine().context().create_pyramid(ImageSize::new(width, height), &PyramidOptions::default());
+            let pyramid = engine()
+                .context()
+                .create_pyramid(ImageSize::new(width, height), &PyramidOptions::default());
             let texels = pyramid.unwrap().device_bytes() / 4;
             // Two chunks and, where they are enough, three.
             let two = (texels - 1).ilog2();
@@ -255,11 +304,18 @@ fn split_pyramids_are_bit_exact() {
     }
 }
 
-/// A single far pixel at each border must reach the top: dropped rows and columns show here by name.
+/// A single far pixel at each border must reach the top: dropped rows and columns show here by
+/// name.
 #[test]
 fn no_border_pixel_is_dropped() {
     for (width, height) in [(5, 5), (7, 3), (9, 9), (33, 17), (100, 75)] {
-        for (x, y) in [(0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1), (width - 1, height / 2)] {
+        for (x, y) in [
+            (0, 0),
+            (width - 1, 0),
+            (0, height - 1),
+            (width - 1, height - 1),
+            (width - 1, height / 2),
+        ] {
             for convention in CONVENTIONS {
                 let near = if convention.is_reversed() { 0.75 } else { 0.25 };
                 let mut depth = vec![near; (width * height) as usize];
@@ -282,7 +338,9 @@ fn limits_are_named() {
         let error = engine().upload_depth(&vec![0.0; side as usize], &camera).unwrap_err();
         assert!(error.to_string().contains("max_texture_dimension_2d: requested"), "{error}");
     }
-    let depth = engine().upload_depth(&[0.0; 4096], &camera_along_z(64, 64, DepthConvention::Standard)).unwrap();
+    let depth = engine()
+        .upload_depth(&[0.0; 4096], &camera_along_z(64, 64, DepthConvention::Standard))
+        .unwrap();
     let error = engine()
         .pyramid_with(&depth, &PyramidOptions { chunk_shift: Some(4), ..PyramidOptions::default() })
         .unwrap_err();
@@ -295,7 +353,9 @@ fn triangles(random: &mut Random) -> MeshData<'static> {
         .flat_map(|_| {
             let z = 3.0 + 9.0 * random.unit();
             let (x, y) = (z * (2.0 * random.unit() - 1.0), z * (2.0 * random.unit() - 1.0));
-            (0..3).flat_map(|_| [x + 3.0 * random.unit(), y + 3.0 * random.unit(), z]).collect::<Vec<_>>()
+            (0..3)
+                .flat_map(|_| [x + 3.0 * random.unit(), y + 3.0 * random.unit(), z])
+                .collect::<Vec<_>>()
         })
         .map(|v| v as f32)
         .collect();
@@ -303,8 +363,8 @@ fn triangles(random: &mut Random) -> MeshData<'static> {
     MeshData { vertices: Floats::F32(vertices.leak()), triangles: indices.leak(), transforms: None }
 }
 
-/// Culls that read all levels from one texture answer as those that read them where they are, for each kind of depth image,
-/// and follow the next reduction.
+/// Culls that read all levels from one texture answer as those that read them where they are, for
+/// each kind of depth image, and follow the next reduction.
 #[test]
 fn an_atlas_culls_alike_and_follows_the_next_reduction() {
     let mut random = Random(9);
@@ -326,9 +386,11 @@ fn an_atlas_culls_alike_and_follows_the_next_reduction() {
     ] {
         for convention in CONVENTIONS {
             let camera = camera_along_z(width, height, convention);
-            let mut wall = || if random.below(40) == 0 { 1e6 } else { 4.0 + 8.0 * random.unit() as f32 };
+            let mut wall =
+                || if random.below(40) == 0 { 1e6 } else { 4.0 + 8.0 * random.unit() as f32 };
             let depth: Vec<f32> = (0..width * height).map(|_| ndc(wall(), convention)).collect();
-            let occluders = engine().occluders(&[triangles(&mut random)], &OccluderOptions::default()).unwrap();
+            let occluders =
+                engine().occluders(&[triangles(&mut random)], &OccluderOptions::default()).unwrap();
             let images = [
                 engine().upload_depth(&depth, &camera).unwrap(),
                 engine().upload_depth_sampled(&depth, &camera).unwrap(),
@@ -342,15 +404,27 @@ fn an_atlas_culls_alike_and_follows_the_next_reduction() {
             for depth in [&images[0], &images[1], &images[2], &images[0]] {
                 let view = depth.texture().create_view(&wgpu::TextureViewDescriptor::default());
                 let verdicts = pyramids.each_ref().map(|pyramid| {
-                    let mut encoder =
-                        engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-                    engine().context().record_reduce(&mut encoder, &view, &camera, pyramid).unwrap();
+                    let mut encoder = engine()
+                        .device()
+                        .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                    engine()
+                        .context()
+                        .record_reduce(&mut encoder, &view, &camera, pyramid)
+                        .unwrap();
                     engine().queue().submit([encoder.finish()]);
                     let cull = |options: &CullOptions| {
                         let output = VisibleOptions::default();
-                        engine().cull(&instances, &camera, pyramid, options, &output).unwrap().verdicts().unwrap()
+                        engine()
+                            .cull(&instances, &camera, pyramid, options, &output)
+                            .unwrap()
+                            .verdicts()
+                            .unwrap()
                     };
-                    let wide = CullOptions { footprint: Footprint::Four, descent: 16, ..CullOptions::default() };
+                    let wide = CullOptions {
+                        footprint: Footprint::Four,
+                        descent: 16,
+                        ..CullOptions::default()
+                    };
                     [cull(&CullOptions::default()), cull(&wide)]
                 });
                 assert!(verdicts[0] == verdicts[1], "{width}x{height} {convention:?}");
@@ -379,23 +453,34 @@ fn without_an_atlas_culls_go_on() {
     };
     let uncopied = engine().device().create_texture(&descriptor);
     let near = engine().upload_depth_sampled(&[0.0; 64 * 64], &camera).unwrap();
-    let bounds = Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0]), radii: Floats::F32(&[0.1]) };
+    let bounds =
+        Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0]), radii: Floats::F32(&[0.1]) };
     let instances = engine().instances(&bounds, &InstanceOptions::default()).unwrap();
     let one_chunk_only = only_one_chunk();
     for (texture, chunk_shift) in [(&uncopied, None), (near.texture(), Some(11))] {
         if one_chunk_only && chunk_shift.is_some() {
             continue;
         }
-        let options = PyramidOptions { atlas: AtlasUse::Always, chunk_shift, ..PyramidOptions::default() };
+        let options =
+            PyramidOptions { atlas: AtlasUse::Always, chunk_shift, ..PyramidOptions::default() };
         let pyramid = Arc::new(engine().context().create_pyramid(camera.size(), &options).unwrap());
         let bytes = pyramid.device_bytes();
-        let mut encoder = engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder =
+            engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         engine().context().record_reduce(&mut encoder, &view, &camera, &pyramid).unwrap();
         engine().queue().submit([encoder.finish()]);
         let (options, output) = (CullOptions::default(), VisibleOptions::default());
-        let mask = engine().cull(&instances, &camera, &pyramid, &options, &output).unwrap().mask().unwrap();
-        assert_eq!((mask, pyramid.device_bytes()), (vec![false], bytes), "all depths are 0, the nearest");
+        let mask = engine()
+            .cull(&instances, &camera, &pyramid, &options, &output)
+            .unwrap()
+            .mask()
+            .unwrap();
+        assert_eq!(
+            (mask, pyramid.device_bytes()),
+            (vec![false], bytes),
+            "all depths are 0, the nearest"
+        );
     }
 }
 
@@ -403,13 +488,17 @@ fn without_an_atlas_culls_go_on() {
 #[test]
 fn a_copy_that_never_ran_is_made_again() {
     let camera = camera_along_z(32, 24, DepthConvention::Reversed);
-    let wall = engine().upload_depth(&[ndc(4.0, DepthConvention::Reversed); 32 * 24], &camera).unwrap();
-    let bounds =
-        Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0].repeat(5000)), radii: Floats::F32(&[0.1; 5000]) };
+    let wall =
+        engine().upload_depth(&[ndc(4.0, DepthConvention::Reversed); 32 * 24], &camera).unwrap();
+    let bounds = Bounds::Spheres {
+        centers: Floats::F32(&[0.0, 0.0, 8.0].repeat(5000)),
+        radii: Floats::F32(&[0.1; 5000]),
+    };
     let instances = engine().instances(&bounds, &InstanceOptions::default()).unwrap();
     let context = engine().context().clone();
     let view = wall.texture().create_view(&wgpu::TextureViewDescriptor::default());
-    let encoder = || engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let encoder =
+        || engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     let kept = |pyramid: &Arc<Pyramid>| {
         let (options, output) = (CullOptions::default(), VisibleOptions::default());
         let culling = engine().cull(&instances, &camera, pyramid, &options, &output).unwrap();
@@ -418,18 +507,31 @@ fn a_copy_that_never_ran_is_made_again() {
     // A cull whose encoder was dropped.
     let pyramid = engine().pyramid(&wall).unwrap();
     let visible = context.create_visible(&instances, &VisibleOptions::default()).unwrap();
-    context.record_cull(&mut encoder(), &instances, &camera, &pyramid, &visible, &CullOptions::default()).unwrap();
+    context
+        .record_cull(
+            &mut encoder(),
+            &instances,
+            &camera,
+            &pyramid,
+            &visible,
+            &CullOptions::default(),
+        )
+        .unwrap();
     assert_eq!(kept(&pyramid), 0);
     // A cull before its reduction.
-    let early = Arc::new(context.create_pyramid(camera.size(), &PyramidOptions::default()).unwrap());
+    let early =
+        Arc::new(context.create_pyramid(camera.size(), &PyramidOptions::default()).unwrap());
     let mut reduction = encoder();
     context.record_reduce(&mut reduction, &view, &camera, &early).unwrap();
     assert_eq!(kept(&early), 5000, "the reduction has not run");
     engine().queue().submit([reduction.finish()]);
     assert_eq!(kept(&early), 0);
     // A cull that was refused.
-    let refused = CullOptions { transform_slack: 1e6, guard_px: Some(0.3), ..CullOptions::default() };
+    let refused =
+        CullOptions { transform_slack: 1e6, guard_px: Some(0.3), ..CullOptions::default() };
     let fresh = engine().pyramid(&wall).unwrap();
-    assert!(engine().cull(&instances, &camera, &fresh, &refused, &VisibleOptions::default()).is_err());
+    assert!(
+        engine().cull(&instances, &camera, &fresh, &refused, &VisibleOptions::default()).is_err()
+    );
     assert_eq!(kept(&fresh), 0);
 }

@@ -1,5 +1,5 @@
-//! The example renderer: with culling and without, pixel for pixel, in three scenes; and how much slack a driver's depth needs for
-//! that.
+//! The example renderer: with culling and without, pixel for pixel, in three scenes; and how much
+//! slack a driver's depth needs for that.
 
 #[path = "common/cameras.rs"]
 mod cameras;
@@ -37,8 +37,9 @@ fn soak() -> usize {
 }
 
 fn number<T: std::str::FromStr>(variable: &str, default: T) -> T {
-    std::env::var(variable)
-        .map_or(default, |s| s.parse().unwrap_or_else(|_| panic!("{variable}: expected a number, got {s:?}")))
+    std::env::var(variable).map_or(default, |s| {
+        s.parse().unwrap_or_else(|_| panic!("{variable}: expected a number, got {s:?}"))
+    })
 }
 
 /// One way to cull; a picture has to come out the same with each.
@@ -48,7 +49,11 @@ const WAYS: [Way; 6] = [
     ("2x2 texels", |options| options),
     ("8x8 texels", |options| CullOptions { footprint: Footprint::Eight, ..options }),
     ("a descent", |options| CullOptions { descent: 4096, ..options }),
-    ("its own outline and depth", |options| CullOptions { descent: 4096, fit: Fit::Volume, ..options }),
+    ("its own outline and depth", |options| CullOptions {
+        descent: 4096,
+        fit: Fit::Volume,
+        ..options
+    }),
     ("its own outline and depth at samples", |options| CullOptions {
         coverage: Coverage::Sample,
         guard_px: Some(0.125),
@@ -56,7 +61,8 @@ const WAYS: [Way; 6] = [
         fit: Fit::Volume,
         ..options
     }),
-    // What a rasteriser snaps to sixteenths of a pixel moves by half of one: the guard is four times that.
+    // What a rasteriser snaps to sixteenths of a pixel moves by half of one: the guard is four
+    // times that.
     ("sample coverage", |options| CullOptions {
         coverage: Coverage::Sample,
         guard_px: Some(0.125),
@@ -76,7 +82,10 @@ const SCENES: [MakeScene; 4] = [
 
 fn open(faults: &[(&str, &str)]) -> Renderer {
     let renderer = Renderer::open(faults).expect("the device tests need a Vulkan driver");
-    let adapter = format!("{} ({} {})", renderer.adapter.name, renderer.adapter.driver, renderer.adapter.driver_info);
+    let adapter = format!(
+        "{} ({} {})",
+        renderer.adapter.name, renderer.adapter.driver, renderer.adapter.driver_info
+    );
     eprintln!("adapter: {adapter}");
     if let Ok(expected) = std::env::var("HIZVK_EXPECT_ADAPTER") {
         assert!(
@@ -101,12 +110,17 @@ impl Seen<'_> {
         self.all.differing_pixels(&self.culled.picture)
     }
 
-    /// Those that the rasteriser does not account for. It does where the body that is missing was drawn nearer than its own bounds,
-    /// by more than the slack, or where the depth image was nearer than what the picture without culling shows: faces that are
-    /// seen edge-on take any depth.
+    /// Those that the rasteriser does not account for.
+    /// It does where the body that is missing was drawn nearer than its own bounds, by more than
+    /// the slack, or where the depth image was nearer than what the picture without culling shows:
+    /// faces that are seen edge-on take any depth.
     fn unaccounted(&self, slack: Slack) -> usize {
         let (camera, all) = (&self.shot.camera, self.all);
-        let pixels = all.ids.iter().zip(&self.culled.picture.ids).zip(all.depth.iter().zip(&self.culled.prepass));
+        let pixels = all
+            .ids
+            .iter()
+            .zip(&self.culled.picture.ids)
+            .zip(all.depth.iter().zip(&self.culled.prepass));
         let accounted = |id: u32, depth: f32, prepass: f32| {
             let limit = if is_orthographic(camera) { slack.absolute } else { slack.relative };
             let (depth, prepass) = (f64::from(depth), f64::from(prepass));
@@ -118,7 +132,11 @@ impl Seen<'_> {
                 .is_some_and(|range| nearer(camera, nearest(camera, range), depth) > limit);
             out_of_bounds || nearer(camera, depth, prepass) > limit
         };
-        pixels.filter(|((id, culled), (depth, prepass))| id != culled && !accounted(**id, **depth, **prepass)).count()
+        pixels
+            .filter(|((id, culled), (depth, prepass))| {
+                id != culled && !accounted(**id, **depth, **prepass)
+            })
+            .count()
     }
 
     fn label(&self) -> String {
@@ -128,7 +146,13 @@ impl Seen<'_> {
 }
 
 /// Draws every shot of a scene without culling, and with it in each way.
-fn draw_each(renderer: &Renderer, scene: &Scene, shots: &[Shot], ways: &[Way], mut look: impl FnMut(&Seen<'_>)) {
+fn draw_each(
+    renderer: &Renderer,
+    scene: &Scene,
+    shots: &[Shot],
+    ways: &[Way],
+    mut look: impl FnMut(&Seen<'_>),
+) {
     let stage = renderer.build(scene).unwrap();
     for shot in shots {
         let all = renderer.draw_all(&stage, shot);
@@ -142,7 +166,10 @@ fn draw_each(renderer: &Renderer, scene: &Scene, shots: &[Shot], ways: &[Way], m
 
 /// The example's cameras.
 fn example_shots((_, shots, origin): &MakeScene) -> Vec<Shot> {
-    SIZES.iter().flat_map(|(width, height)| shots(*origin, ImageSize::new(*width, *height)).unwrap()).collect()
+    SIZES
+        .iter()
+        .flat_map(|(width, height)| shots(*origin, ImageSize::new(*width, *height)).unwrap())
+        .collect()
 }
 
 #[test]
@@ -151,20 +178,29 @@ fn pictures_with_culling_equal_those_without() {
     for make in &SCENES {
         let (scene, shots) = (make.0(make.2), example_shots(make));
         draw_each(&renderer, &scene, &shots, &WAYS[..1], |seen| {
-            let (label, counts, crowd) = (seen.label(), seen.culled.counts, seen.scene.crowd.len() as u32);
+            let (label, counts, crowd) =
+                (seen.label(), seen.culled.counts, seen.scene.crowd.len() as u32);
             assert_eq!(seen.differing(), 0, "{label}");
             assert_eq!(counts.drawn, counts.kept, "{label}");
             assert_eq!(counts.kept + counts.occluded + counts.outside, crowd);
             // Equal pictures prove nothing where nothing is hidden or nobody is seen.
-            assert!(counts.kept < 2 * crowd / 3 && counts.occluded > crowd / 8, "{label}: {counts:?}");
-            assert!(seen.all.ids.iter().any(|id| (1..=crowd).contains(id)), "{label}: nobody there");
+            assert!(
+                counts.kept < 2 * crowd / 3 && counts.occluded > crowd / 8,
+                "{label}: {counts:?}"
+            );
+            assert!(
+                seen.all.ids.iter().any(|id| (1..=crowd).contains(id)),
+                "{label}: nobody there"
+            );
         });
     }
 }
 
-/// Random cameras, each in some ways. Fails with all cameras whose pictures differ by more than the rasteriser accounts for, and if
-/// it has to account for more than a pixel in a hundred pictures (lavapipe: none; `SwiftShader` draws a fragment of depth 0 where a
-/// face is thinner than the sixteenth of a pixel that it snaps to, now and then).
+/// Random cameras, each in some ways.
+/// Fails with all cameras whose pictures differ by more than the rasteriser accounts for, and if it
+/// has to account for more than a pixel in a hundred pictures (lavapipe: none; `SwiftShader` draws
+/// a fragment of depth 0 where a face is thinner than the sixteenth of a pixel that it snaps to,
+/// now and then).
 fn random_cameras(number: usize, seed: u64, ways: impl Fn(usize) -> Vec<Way>) {
     let renderer = open(&[]);
     let (mut differing, mut tolerated, mut pictures) = (Vec::new(), 0, 0);
@@ -181,7 +217,8 @@ fn random_cameras(number: usize, seed: u64, ways: impl Fn(usize) -> Vec<Way>) {
                 occluded += u64::from(counts.occluded);
                 pictures += 1;
                 let pixels = seen.differing();
-                if pixels > 0 && seen.unaccounted(slack(&renderer.adapter, &seen.shot.camera)) == 0 {
+                if pixels > 0 && seen.unaccounted(slack(&renderer.adapter, &seen.shot.camera)) == 0
+                {
                     tolerated += pixels;
                 } else if pixels > 0 {
                     let label = seen.label();
@@ -199,9 +236,15 @@ fn random_cameras(number: usize, seed: u64, ways: impl Fn(usize) -> Vec<Way>) {
             scene.name,
             total - kept - occluded
         );
-        assert!(occluded > total / 50 && kept > total / 100, "{}: nothing is hidden or seen", scene.name);
+        assert!(
+            occluded > total / 50 && kept > total / 100,
+            "{}: nothing is hidden or seen",
+            scene.name
+        );
     }
-    eprintln!("{pictures} pictures, {tolerated} pixels differ where a face was drawn out of its bounds");
+    eprintln!(
+        "{pictures} pictures, {tolerated} pixels differ where a face was drawn out of its bounds"
+    );
     assert!(differing.is_empty(), "{differing:?}");
     assert!(100 * tolerated <= pictures, "{tolerated} pixels in {pictures} pictures");
 }
@@ -226,7 +269,9 @@ fn red(faults: &[(&str, &str)], way: Way) -> Vec<(String, usize)> {
         let mut shots = make.1(make.2, ImageSize::new(SIZES[1].0, SIZES[1].1)).unwrap();
         let scene = make.0(make.2);
         shots.extend(random_shots(&scene, 8, 5));
-        draw_each(&renderer, &scene, &shots, &[way], |seen| differing.push((seen.label(), seen.differing())));
+        draw_each(&renderer, &scene, &shots, &[way], |seen| {
+            differing.push((seen.label(), seen.differing()))
+        });
     }
     differing.retain(|(_, pixels)| *pixels > 0);
     eprintln!(
@@ -238,18 +283,22 @@ fn red(faults: &[(&str, &str)], way: Way) -> Vec<(String, usize)> {
     differing
 }
 
-/// The comparison would see a false cull: the pyramid holds the nearest depth instead of the farthest.
+/// The comparison would see a false cull: the pyramid holds the nearest depth instead of the
+/// farthest.
 #[test]
 fn a_pyramid_upside_down_is_seen() {
-    let fault = ("select(max(a, b), min(a, b), REVERSED)", "select(min(a, b), max(a, b), REVERSED)");
+    let fault =
+        ("select(max(a, b), min(a, b), REVERSED)", "select(min(a, b), max(a, b), REVERSED)");
     assert!(red(&[fault], WAYS[0]).len() >= 12);
 }
 
 /// And a single body that the draw forgets: the last of each list.
 #[test]
 fn a_forgotten_body_is_seen() {
-    let fault =
-        ("instance_count = min(sums[lane], room());", "instance_count = max(1u, min(sums[lane], room())) - 1u;");
+    let fault = (
+        "instance_count = min(sums[lane], room());",
+        "instance_count = max(1u, min(sums[lane], room())) - 1u;",
+    );
     assert!(!red(&[fault], WAYS[0]).is_empty());
 }
 
@@ -266,15 +315,17 @@ fn a_shifted_footprint_is_seen() {
     assert!(red(&faults, WAYS[0]).len() >= 12);
 }
 
-/// With neither margin nor slack bodies are hidden by their own depth. (Without slack alone that takes faces that are seen edge-on:
-/// a picture in thousands.)
+/// With neither margin nor slack bodies are hidden by their own depth.
+/// (Without slack alone that takes faces that are seen edge-on: a picture in thousands.)
 #[test]
 fn no_margin_and_no_slack_is_seen() {
-    let none: Way = ("no slack", |options| CullOptions { depth_slack: 0.0, depth_slack_abs: 0.0, ..options });
+    let none: Way =
+        ("no slack", |options| CullOptions { depth_slack: 0.0, depth_slack_abs: 0.0, ..options });
     assert!(!red(&[("ERROR_ULPS: f32 = 24.0", "ERROR_ULPS: f32 = 0.0")], none).is_empty());
 }
 
-/// The least and greatest depth of a body's bounds in float64; nothing if they cross the near or far plane.
+/// The least and greatest depth of a body's bounds in float64; nothing if they cross the near or
+/// far plane.
 fn depth_range(body: &Body, camera: &Camera) -> Option<[f64; 2]> {
     let rows = camera.rows();
     let dot = |a: Vec3, b: Vec3| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -342,14 +393,16 @@ struct Worst {
     beyond: u64,
 }
 
-/// For perspective (relative) cameras, for those whose eye may lie in a face's plane, and for orthographic (absolute) ones; standard
-/// and reversed depth.
+/// For perspective (relative) cameras, for those whose eye may lie in a face's plane, and for
+/// orthographic (absolute) ones; standard and reversed depth.
 fn measure(renderer: &Renderer, number: usize, seed: u64) -> [[Worst; 2]; 3] {
     let mut worst = [[Worst::default(); 2]; 3];
     for (place, make) in SCENES.iter().enumerate() {
         let scene = make.0(make.2);
-        let shots: Vec<_> =
-            example_shots(make).into_iter().chain(random_shots(&scene, number, seed + place as u64)).collect();
+        let shots: Vec<_> = example_shots(make)
+            .into_iter()
+            .chain(random_shots(&scene, number, seed + place as u64))
+            .collect();
         draw_each(renderer, &scene, &shots, &WAYS[..1], |seen| {
             let camera = &seen.shot.camera;
             let kind = match seen.shot.name {
@@ -382,25 +435,32 @@ fn measure(renderer: &Renderer, number: usize, seed: u64) -> [[Worst; 2]; 3] {
     worst
 }
 
-/// What [`slack`] has to cover. A culled body lies behind the prepass exactly; it stays unseen only if its own rasterised depth
-/// comes out no nearer than its bounds, and the walls' no farther than in the prepass, both up to the slack together. The same
-/// keeps a body from being hidden by itself.
+/// What [`slack`] has to cover.
+/// A culled body lies behind the prepass exactly; it stays unseen only if its own rasterised depth
+/// comes out no nearer than its bounds, and the walls' no farther than in the prepass, both up to
+/// the slack together.
+/// The same keeps a body from being hidden by itself.
 ///
-/// At most `share` of the fragments may be off by more: the nearer to edge-on a face is seen the more it is off, without a bound.
+/// At most `share` of the fragments may be off by more: the nearer to edge-on a face is seen the
+/// more it is off, without a bound.
 fn check_slack(number: usize, seed: u64, share: f64) {
     let renderer = open(&[]);
     let worst = measure(&renderer, number, seed);
     let mut enough = true;
     for (kind, pair) in worst.iter().enumerate() {
-        for (convention, Worst { bodies, prepass, fragments, beyond }) in CONVENTIONS.into_iter().zip(pair) {
+        for (convention, Worst { bodies, prepass, fragments, beyond }) in
+            CONVENTIONS.into_iter().zip(pair)
+        {
             let Slack { relative, absolute } = example_slack(&renderer, kind == 2, convention);
             let given = relative.max(absolute);
-            let name = ["perspective", "perspective, the eye in a face's plane", "orthographic"][kind];
+            let name =
+                ["perspective", "perspective, the eye in a face's plane", "orthographic"][kind];
             eprintln!(
                 "{name}, {convention:?}: bodies {bodies:.2e} nearer than their bounds, {prepass:.2e} farther than in the \
                  prepass, slack {given:.0e}, beyond it {beyond} of {fragments} fragments"
             );
-            // A face whose plane holds the eye takes any depth: that is printed, and no slack covers it.
+            // A face whose plane holds the eye takes any depth: that is printed, and no slack
+            // covers it.
             enough &= kind == 1 || *beyond as f64 <= share * *fragments as f64;
         }
     }
@@ -408,13 +468,16 @@ fn check_slack(number: usize, seed: u64, share: f64) {
 }
 
 /// [`slack`] of any camera of a kind.
-fn example_slack(renderer: &Renderer, orthographic: bool, convention: hiz_core::DepthConvention) -> Slack {
+fn example_slack(
+    renderer: &Renderer,
+    orthographic: bool,
+    convention: hiz_core::DepthConvention,
+) -> Slack {
     let scene = SCENES[0].0([0.0; 3]);
     let shots = random_shots(&scene, 100, 1);
-    let camera = shots
-        .iter()
-        .map(|shot| &shot.camera)
-        .find(|camera| is_orthographic(camera) == orthographic && camera.convention() == convention);
+    let camera = shots.iter().map(|shot| &shot.camera).find(|camera| {
+        is_orthographic(camera) == orthographic && camera.convention() == convention
+    });
     slack(&renderer.adapter, camera.expect("a hundred cameras are of every kind"))
 }
 

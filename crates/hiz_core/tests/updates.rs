@@ -1,4 +1,5 @@
-//! Stored order, groups and updates: the same answers as fresh instances in the caller's order, and boxes that contain their members.
+//! Stored order, groups and updates: the same answers as fresh instances in the caller's order, and
+//! boxes that contain their members.
 
 mod common;
 
@@ -8,8 +9,8 @@ use common::{Random, camera_along_z, engine, ndc};
 use hiz_core::headless::Culling;
 use hiz_core::words::GroupWords;
 use hiz_core::{
-    Bounds, BoundsKind, CullOptions, DepthConvention, Floats, InstanceOptions, Instances, Order, StoredOrder,
-    VisibleOptions, words,
+    Bounds, BoundsKind, CullOptions, DepthConvention, Floats, InstanceOptions, Instances, Order,
+    StoredOrder, VisibleOptions, words,
 };
 use num_bigint::BigInt;
 
@@ -32,7 +33,8 @@ impl Crowd {
     fn new(n: usize, random: &mut Random) -> Self {
         let mut crowd = Self::default();
         for _ in 0..n {
-            let center = [8.0 * random.unit() - 4.0, 8.0 * random.unit() - 4.0, 12.0 * random.unit() - 1.0];
+            let center =
+                [8.0 * random.unit() - 4.0, 8.0 * random.unit() - 4.0, 12.0 * random.unit() - 1.0];
             let sizes = [0.3 * random.unit(), 0.3 * random.unit(), 0.3 * random.unit()];
             crowd.push(center, sizes, std::array::from_fn(|_| 2.0 * random.unit() - 1.0));
         }
@@ -50,10 +52,13 @@ impl Crowd {
 
     fn bounds(&self, kind: BoundsKind) -> Bounds<'_> {
         match kind {
-            BoundsKind::Sphere => {
-                Bounds::Spheres { centers: Floats::F64(&self.centers), radii: Floats::F64(&self.radii) }
+            BoundsKind::Sphere => Bounds::Spheres {
+                centers: Floats::F64(&self.centers),
+                radii: Floats::F64(&self.radii),
+            },
+            BoundsKind::Box => {
+                Bounds::Boxes { min: Floats::F64(&self.min), max: Floats::F64(&self.max) }
             }
-            BoundsKind::Box => Bounds::Boxes { min: Floats::F64(&self.min), max: Floats::F64(&self.max) },
             BoundsKind::OrientedBox => Bounds::OrientedBoxes {
                 centers: Floats::F64(&self.centers),
                 half_sizes: Floats::F64(&self.sizes),
@@ -100,7 +105,8 @@ impl Crowd {
                     (at(&self.centers).minus(&reach), at(&self.centers).plus(&reach))
                 }
             };
-            Exact::new(corners[0][k]).is_at_most(&low) && high.is_at_most(&Exact::new(corners[1][k]))
+            Exact::new(corners[0][k]).is_at_most(&low)
+                && high.is_at_most(&Exact::new(corners[1][k]))
         })
     }
 }
@@ -136,22 +142,29 @@ impl Exact {
 }
 
 fn instances(crowd: &Crowd, kind: BoundsKind, order: StoredOrder) -> Arc<Instances> {
-    let options = InstanceOptions { order, piece_capacity: Some(384), ..InstanceOptions::default() };
+    let options =
+        InstanceOptions { order, piece_capacity: Some(384), ..InstanceOptions::default() };
     engine().instances(&crowd.bounds(kind), &options).unwrap()
 }
 
 /// A wall that hides the left of what lies behind it.
 fn cull(instances: &Arc<Instances>, order: Order) -> Culling {
     let camera = camera_along_z(64, 64, CONVENTION);
-    let depth: Vec<_> = (0..64 * 64).map(|i| if i % 64 < 40 { ndc(4.0, CONVENTION) } else { 0.0 }).collect();
+    let depth: Vec<_> =
+        (0..64 * 64).map(|i| if i % 64 < 40 { ndc(4.0, CONVENTION) } else { 0.0 }).collect();
     let pyramid = engine().pyramid(&engine().upload_depth(&depth, &camera).unwrap()).unwrap();
     let options = CullOptions { order, ..CullOptions::default() };
     engine().cull(instances, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap()
 }
 
-/// What is wrong with the groups: members missing or twice, a box that does not contain its members or is larger than `slack` times
-/// what it must be, a record that is not the box's.
-fn wrong_groups(groups: &[GroupWords], crowd: &Crowd, kind: BoundsKind, invalid: &[usize]) -> Option<String> {
+/// What is wrong with the groups: members missing or twice, a box that does not contain its members
+/// or is larger than `slack` times what it must be, a record that is not the box's.
+fn wrong_groups(
+    groups: &[GroupWords],
+    crowd: &Crowd,
+    kind: BoundsKind,
+    invalid: &[usize],
+) -> Option<String> {
     let mut members: Vec<_> = groups.iter().flat_map(|g| g.members.clone()).collect();
     members.sort_unstable();
     if !members.iter().copied().eq(0..crowd.radii.len() as u32) {
@@ -161,7 +174,8 @@ fn wrong_groups(groups: &[GroupWords], crowd: &Crowd, kind: BoundsKind, invalid:
         let is_valid = !group.members.iter().any(|i| invalid.contains(&(*i as usize)));
         let Some(corners) = group.corners else {
             let nan = Floats::F64(&[f64::NAN; 3]);
-            let is_nan = group.record == words::instances(&Bounds::Boxes { min: nan, max: nan }).unwrap();
+            let is_nan =
+                group.record == words::instances(&Bounds::Boxes { min: nan, max: nan }).unwrap();
             if is_valid || !is_nan {
                 return Some(format!("{group:?} is no volume"));
             }
@@ -170,7 +184,9 @@ fn wrong_groups(groups: &[GroupWords], crowd: &Crowd, kind: BoundsKind, invalid:
         if !is_valid {
             return Some(format!("{group:?} has a member that is no volume"));
         }
-        if let Some(i) = group.members.iter().find(|i| !crowd.is_within(kind, **i as usize, &corners)) {
+        if let Some(i) =
+            group.members.iter().find(|i| !crowd.is_within(kind, **i as usize, &corners))
+        {
             return Some(format!("instance {i} is not within {group:?}"));
         }
         let (min, max) = (Floats::F64(&corners[0]), Floats::F64(&corners[1]));
@@ -182,7 +198,8 @@ fn wrong_groups(groups: &[GroupWords], crowd: &Crowd, kind: BoundsKind, invalid:
 }
 
 fn assert_same_as_fresh(instances: &Arc<Instances>, crowd: &Crowd, kind: BoundsKind, what: &str) {
-    let invalid: Vec<_> = (0..crowd.radii.len()).filter(|i| crowd.centers[3 * i].is_nan()).collect();
+    let invalid: Vec<_> =
+        (0..crowd.radii.len()).filter(|i| crowd.centers[3 * i].is_nan()).collect();
     let found: Vec<_> = instances.invalid().unwrap().iter().map(|i| *i as usize).collect();
     assert_eq!(found, invalid, "{what}");
     let groups = words::groups(&engine(), instances).unwrap();
@@ -209,7 +226,11 @@ fn assert_same_as_fresh(instances: &Arc<Instances>, crowd: &Crowd, kind: BoundsK
     }
     let culling = cull(instances, Order::Stable);
     for i in (0..crowd.radii.len()).step_by(97) {
-        assert_eq!(culling.explain(i as u64).unwrap(), fresh.explain(i as u64).unwrap(), "{what}: instance {i}");
+        assert_eq!(
+            culling.explain(i as u64).unwrap(),
+            fresh.explain(i as u64).unwrap(),
+            "{what}: instance {i}"
+        );
     }
 }
 
@@ -223,7 +244,12 @@ fn sorted_instances_get_the_verdicts_of_unsorted_ones() {
                 crowd.spoil(70);
             }
             for order in ORDERS {
-                assert_same_as_fresh(&instances(&crowd, kind, order), &crowd, kind, &format!("{kind:?} {order:?} {n}"));
+                assert_same_as_fresh(
+                    &instances(&crowd, kind, order),
+                    &crowd,
+                    kind,
+                    &format!("{kind:?} {order:?} {n}"),
+                );
             }
         }
     }
@@ -238,7 +264,8 @@ fn updated_instances_get_the_verdicts_of_fresh_ones() {
             crowd.spoil(3);
             crowd.spoil(500);
             let list = instances(&crowd, kind, order);
-            // Across borders of pieces (384) and groups, one alone, one twice, all, none; bad ones mended and made.
+            // Across borders of pieces (384) and groups, one alone, one twice, all, none; bad ones
+            // mended and made.
             for (first, n, spoilt) in [
                 (0, 1, None),
                 (999, 1, None),
@@ -259,7 +286,12 @@ fn updated_instances_get_the_verdicts_of_fresh_ones() {
                 }
                 engine().update(&list, first as u32, &moved.bounds(kind), false).unwrap();
                 crowd.replace(first, &moved);
-                assert_same_as_fresh(&list, &crowd, kind, &format!("{kind:?} {order:?}: {n} from {first}"));
+                assert_same_as_fresh(
+                    &list,
+                    &crowd,
+                    kind,
+                    &format!("{kind:?} {order:?}: {n} from {first}"),
+                );
             }
         }
     }
@@ -284,18 +316,27 @@ fn boxes_of_groups_contain_their_members_exactly() {
             let list = instances(&crowd, kind, order);
             let groups = words::groups(&engine(), &list).unwrap();
             assert_eq!(wrong_groups(&groups, &crowd, kind, &[]), None, "{kind:?} {order:?}");
-            // The check can fail: a box that is a few units in the last place smaller, a sphere without its radius.
+            // The check can fail: a box that is a few units in the last place smaller, a sphere
+            // without its radius.
             for k in 0..3 {
                 let mut small = groups.clone();
                 let [min, max] = small[7].corners.as_mut().unwrap();
                 max[k] -= 1e-14 * (min[k].abs() + max[k].abs());
-                assert!(wrong_groups(&small, &crowd, kind, &[]).unwrap().contains("is not within"), "{kind:?}");
+                assert!(
+                    wrong_groups(&small, &crowd, kind, &[]).unwrap().contains("is not within"),
+                    "{kind:?}"
+                );
             }
         }
     }
     let points = Crowd { radii: vec![0.0; 2000], ..crowd.clone() };
-    let groups = words::groups(&engine(), &instances(&points, BoundsKind::Sphere, StoredOrder::Given)).unwrap();
-    assert!(wrong_groups(&groups, &crowd, BoundsKind::Sphere, &[]).is_some(), "boxes of centres alone are found out");
+    let groups =
+        words::groups(&engine(), &instances(&points, BoundsKind::Sphere, StoredOrder::Given))
+            .unwrap();
+    assert!(
+        wrong_groups(&groups, &crowd, BoundsKind::Sphere, &[]).is_some(),
+        "boxes of centres alone are found out"
+    );
 }
 
 /// What the tests above would see if groups were not refitted.
@@ -311,7 +352,8 @@ fn boxes_from_before_an_update_are_found_out() {
     assert!(wrong_groups(&before, &crowd, BoundsKind::Box, &[]).unwrap().contains("is not within"));
 }
 
-/// A group does not grow along a member's path, and is as tight as a new one once all have been moved.
+/// A group does not grow along a member's path, and is as tight as a new one once all have been
+/// moved.
 #[test]
 fn boxes_forget_where_members_were() {
     let place = |x: f64| {
@@ -336,7 +378,11 @@ fn boxes_forget_where_members_were() {
     engine().update(&list, 0, &crowd.bounds(kind), false).unwrap();
     assert_eq!(corners(), [0.0, 63.0], "moved as a whole");
     engine().update(&list, 63, &place(5.0).bounds(kind), false).unwrap();
-    assert_eq!(corners(), [0.0, 63.0], "where the others are is known as of the last move of the whole");
+    assert_eq!(
+        corners(),
+        [0.0, 63.0],
+        "where the others are is known as of the last move of the whole"
+    );
 }
 
 impl Crowd {
@@ -354,16 +400,21 @@ impl Crowd {
 /// The host's next boxes would be formed for volumes that the device does not have.
 #[test]
 fn after_an_update_that_never_ran_touched_groups_are_never_culled_as_a_whole() {
-    let is_no_volume = |group: &GroupWords| group.record.iter().all(|word| *word == 2.0_f32.powi(62).to_bits());
+    let is_no_volume =
+        |group: &GroupWords| group.record.iter().all(|word| *word == 2.0_f32.powi(62).to_bits());
     let mut random = Random(15);
     let kind = BoundsKind::Sphere;
     for overtaken in [false, true] {
         let mut crowd = Crowd::new(1000, &mut random);
         let list = instances(&crowd, kind, StoredOrder::Given);
         let record = |first: u32, moved: &Crowd| {
-            let mut encoder =
-                engine().device().create_command_encoder(&hiz_core::wgpu::CommandEncoderDescriptor::default());
-            engine().context().record_update(&mut encoder, &list, first, &moved.bounds(kind), false).unwrap();
+            let mut encoder = engine()
+                .device()
+                .create_command_encoder(&hiz_core::wgpu::CommandEncoderDescriptor::default());
+            engine()
+                .context()
+                .record_update(&mut encoder, &list, first, &moved.bounds(kind), false)
+                .unwrap();
             encoder.finish()
         };
         let (one, other) = (Crowd::new(10, &mut random), Crowd::new(10, &mut random));
@@ -382,7 +433,11 @@ fn after_an_update_that_never_ran_touched_groups_are_never_culled_as_a_whole() {
         assert!(!groups[2..].iter().any(is_no_volume), "not touched");
         let fresh = instances(&crowd, kind, StoredOrder::Given);
         let verdicts = |list| cull(list, Order::Stable).verdicts().unwrap();
-        assert_eq!(verdicts(&list), verdicts(&fresh), "records are those that ran, in the order in which they ran");
+        assert_eq!(
+            verdicts(&list),
+            verdicts(&fresh),
+            "records are those that ran, in the order in which they ran"
+        );
     }
 }
 
@@ -395,7 +450,9 @@ fn a_cull_that_was_submitted_before_sees_the_old_bounds() {
     let before = cull(&list, Order::Stable);
     engine().update(&list, 0, &new.bounds(kind), false).unwrap();
     let after = cull(&list, Order::Stable);
-    let fresh = |crowd| cull(&instances(crowd, kind, StoredOrder::Given), Order::Stable).verdicts().unwrap();
+    let fresh = |crowd| {
+        cull(&instances(crowd, kind, StoredOrder::Given), Order::Stable).verdicts().unwrap()
+    };
     assert_ne!(fresh(&old), fresh(&new));
     assert_eq!(before.verdicts().unwrap(), fresh(&old));
     assert_eq!(after.verdicts().unwrap(), fresh(&new));
@@ -409,10 +466,21 @@ fn updates_that_do_not_fit_are_refused_and_change_nothing() {
     let mut bad = Crowd::new(10, &mut random);
     bad.spoil(4);
     bad.spoil(7);
-    let refused = |first, bounds: Bounds<'_>| engine().update(&list, first, &bounds, true).unwrap_err().to_string();
-    assert_eq!(refused(0, bad.bounds(BoundsKind::Box)), "bounds: expected the instances' kind, Sphere, got Box");
-    assert_eq!(refused(101, bad.bounds(BoundsKind::Sphere)), "first: expected a number in 0..=100, got 101");
-    assert_eq!(refused(95, bad.bounds(BoundsKind::Sphere)), "bounds: expected at most 5 from instance 95 on, got 10");
+    let refused = |first, bounds: Bounds<'_>| {
+        engine().update(&list, first, &bounds, true).unwrap_err().to_string()
+    };
+    assert_eq!(
+        refused(0, bad.bounds(BoundsKind::Box)),
+        "bounds: expected the instances' kind, Sphere, got Box"
+    );
+    assert_eq!(
+        refused(101, bad.bounds(BoundsKind::Sphere)),
+        "first: expected a number in 0..=100, got 101"
+    );
+    assert_eq!(
+        refused(95, bad.bounds(BoundsKind::Sphere)),
+        "bounds: expected at most 5 from instance 95 on, got 10"
+    );
     assert_eq!(
         refused(3, bad.bounds(BoundsKind::Sphere)),
         "bounds: expected finite numbers below 2^60, lengths >= 0 and min <= max, got 2 bad of 10, the first at index 4"

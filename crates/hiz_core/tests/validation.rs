@@ -1,16 +1,19 @@
 //! What wgpu's validation would find wrong in the library's own calls comes back as an error that
-//! names the parameter. Devices here have wgpu's own error handler, which ends a process: whatever
-//! gets there fails the test. After each error the same encoder is finished and submitted, and the
-//! same device culls as before.
+//! names the parameter.
+//! Devices here have wgpu's own error handler, which ends a process: whatever gets there fails the
+//! test.
+//! After each error the same encoder is finished and submitted, and the same device culls as
+//! before.
 
 mod common;
 
 use common::camera_along_z;
 use hiz_core::wgpu::{self, TextureFormat as Format, TextureUsages as Usages};
 use hiz_core::{
-    AtlasUse, Bounds, BoundsKind, Camera, CullOptions, DepthConvention, DrawTemplate, Error, FaceCull, Floats,
-    Footprint, Hierarchy, HizContext, ImageSize, InstanceOptions, Instances, MeshData, OccluderOptions, Occluders,
-    Order, Pyramid, PyramidOptions, Result, StoredLevels, StoredOrder, Visible, VisibleOptions,
+    AtlasUse, Bounds, BoundsKind, Camera, CullOptions, DepthConvention, DrawTemplate, Error,
+    FaceCull, Floats, Footprint, Hierarchy, HizContext, ImageSize, InstanceOptions, Instances,
+    MeshData, OccluderOptions, Occluders, Order, Pyramid, PyramidOptions, Result, StoredLevels,
+    StoredOrder, Visible, VisibleOptions,
 };
 
 const SIDE: u32 = 16;
@@ -24,9 +27,16 @@ fn adapter() -> wgpu::Adapter {
         .expect("the device tests need a Vulkan driver")
 }
 
-fn open(adapter: &wgpu::Adapter, features: wgpu::Features, limits: &wgpu::Limits) -> (wgpu::Device, wgpu::Queue) {
-    let descriptor =
-        wgpu::DeviceDescriptor { required_features: features, required_limits: limits.clone(), ..Default::default() };
+fn open(
+    adapter: &wgpu::Adapter,
+    features: wgpu::Features,
+    limits: &wgpu::Limits,
+) -> (wgpu::Device, wgpu::Queue) {
+    let descriptor = wgpu::DeviceDescriptor {
+        required_features: features,
+        required_limits: limits.clone(),
+        ..Default::default()
+    };
     pollster::block_on(adapter.request_device(&descriptor)).expect("a device")
 }
 
@@ -59,10 +69,12 @@ impl World {
         world
     }
 
-    /// Two devices of one instance. (Of two instances wgpu mixes up what lives on them.)
+    /// Two devices of one instance.
+    /// (Of two instances wgpu mixes up what lives on them.)
     fn two() -> [Self; 2] {
         let adapter = adapter();
-        let open = || Self::on(open(&adapter, wgpu::Features::empty(), &HizContext::required_limits()));
+        let open =
+            || Self::on(open(&adapter, wgpu::Features::empty(), &HizContext::required_limits()));
         [open(), open()]
     }
 
@@ -70,8 +82,12 @@ impl World {
         let context = HizContext::new(&device).unwrap();
         let camera = camera_along_z(SIDE, SIDE, STANDARD);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let instances = context.record_instances(&mut encoder, &TWO_BOXES, &InstanceOptions::default()).unwrap();
-        let occluders = context.create_occluders(&[WALL], &OccluderOptions { cull_mode: FaceCull::None }).unwrap();
+        let instances = context
+            .record_instances(&mut encoder, &TWO_BOXES, &InstanceOptions::default())
+            .unwrap();
+        let occluders = context
+            .create_occluders(&[WALL], &OccluderOptions { cull_mode: FaceCull::None })
+            .unwrap();
         let pyramid = context.create_pyramid(camera.size(), &PyramidOptions::default()).unwrap();
         let visible = context.create_visible(&instances, &VisibleOptions::default()).unwrap();
         queue.submit([encoder.finish()]);
@@ -111,7 +127,9 @@ impl World {
     fn wall(&self, encoder: &mut wgpu::CommandEncoder) -> wgpu::Texture {
         let usage = Usages::RENDER_ATTACHMENT | Usages::TEXTURE_BINDING | Usages::COPY_SRC;
         let wall = self.texture(Format::Depth32Float, usage);
-        self.context.record_occluders(encoder, &self.occluders, &self.camera, &plain(&wall)).unwrap();
+        self.context
+            .record_occluders(encoder, &self.occluders, &self.camera, &plain(&wall))
+            .unwrap();
         wall
     }
 
@@ -143,11 +161,15 @@ impl World {
     /// Everything still works, in an encoder that was used before.
     fn works(&self, mut encoder: wgpu::CommandEncoder, what: &str) {
         let wall = self.wall(&mut encoder);
-        let pyramid = self.context.create_pyramid(self.camera.size(), &PyramidOptions::default()).unwrap();
-        let visible = self.context.create_visible(&self.instances, &VisibleOptions::default()).unwrap();
+        let pyramid =
+            self.context.create_pyramid(self.camera.size(), &PyramidOptions::default()).unwrap();
+        let visible =
+            self.context.create_visible(&self.instances, &VisibleOptions::default()).unwrap();
         self.context.record_reduce(&mut encoder, &plain(&wall), &self.camera, &pyramid).unwrap();
         let options = CullOptions::default();
-        self.context.record_cull(&mut encoder, &self.instances, &self.camera, &pyramid, &visible, &options).unwrap();
+        self.context
+            .record_cull(&mut encoder, &self.instances, &self.camera, &pyramid, &visible, &options)
+            .unwrap();
         assert_eq!(self.mask(encoder, &visible), 0b01, "{what}");
     }
 }
@@ -187,7 +209,8 @@ const SAMPLED: Usages = Usages::TEXTURE_BINDING;
 fn depth_images_that_cannot_be_reduced_are_refused_by_name() {
     let [world, other] = World::two();
     let other_context = HizContext::new(&world.device).unwrap();
-    let of_another = other_context.create_pyramid(world.camera.size(), &PyramidOptions::default()).unwrap();
+    let of_another =
+        other_context.create_pyramid(world.camera.size(), &PyramidOptions::default()).unwrap();
     let smaller = camera_along_z(SIDE, 8, STANDARD);
     let destroyed = |world: &World, format, usage| {
         let texture = world.texture(format, usage);
@@ -197,8 +220,9 @@ fn depth_images_that_cannot_be_reduced_are_refused_by_name() {
     };
     let combined = Format::Depth24PlusStencil8;
     let gone = "depth: expected a texture of this device and context that has not been destroyed";
-    let view_of =
-        |texture: wgpu::Texture, descriptor: wgpu::TextureViewDescriptor<'static>| texture.create_view(&descriptor);
+    let view_of = |texture: wgpu::Texture, descriptor: wgpu::TextureViewDescriptor<'static>| {
+        texture.create_view(&descriptor)
+    };
     let with = |view: wgpu::TextureView| {
         let world = &world;
         Box::new(move |encoder: &mut wgpu::CommandEncoder| world.reduce(encoder, &view)) as Box<_>
@@ -211,19 +235,36 @@ fn depth_images_that_cannot_be_reduced_are_refused_by_name() {
     run(
         &world,
         &[
-            ("the default view of depth and stencil", "", with(plain(&world.texture(combined, SAMPLED)))),
-            ("its depth", "", with(view_of(world.texture(combined, SAMPLED), aspect(wgpu::TextureAspect::DepthOnly)))),
+            (
+                "the default view of depth and stencil",
+                "",
+                with(plain(&world.texture(combined, SAMPLED))),
+            ),
+            (
+                "its depth",
+                "",
+                with(view_of(
+                    world.texture(combined, SAMPLED),
+                    aspect(wgpu::TextureAspect::DepthOnly),
+                )),
+            ),
             (
                 "its stencil",
                 "",
-                with(view_of(world.texture(combined, SAMPLED), aspect(wgpu::TextureAspect::StencilOnly))),
+                with(view_of(
+                    world.texture(combined, SAMPLED),
+                    aspect(wgpu::TextureAspect::StencilOnly),
+                )),
             ),
             (
                 "a view to draw into alone",
                 "",
                 with(view_of(
                     world.texture(Format::Depth32Float, both),
-                    wgpu::TextureViewDescriptor { usage: Some(Usages::RENDER_ATTACHMENT), ..Default::default() },
+                    wgpu::TextureViewDescriptor {
+                        usage: Some(Usages::RENDER_ATTACHMENT),
+                        ..Default::default()
+                    },
                 )),
             ),
             (
@@ -239,14 +280,30 @@ fn depth_images_that_cannot_be_reduced_are_refused_by_name() {
             ),
             ("16 bits", "", with(plain(&world.texture(Format::Depth16Unorm, SAMPLED)))),
             ("half floats", "", with(plain(&world.texture(Format::R16Float, SAMPLED)))),
-            ("another device's depth", gone, with(plain(&other.texture(Format::Depth32Float, SAMPLED)))),
-            ("another device's floats", gone, with(plain(&other.texture(Format::R32Float, SAMPLED)))),
+            (
+                "another device's depth",
+                gone,
+                with(plain(&other.texture(Format::Depth32Float, SAMPLED))),
+            ),
+            (
+                "another device's floats",
+                gone,
+                with(plain(&other.texture(Format::R32Float, SAMPLED))),
+            ),
             ("another device's stencil", gone, with(plain(&other.texture(combined, SAMPLED)))),
             ("destroyed depth", gone, with(destroyed(&world, Format::Depth32Float, SAMPLED))),
             ("destroyed floats", gone, with(destroyed(&world, Format::R32Float, SAMPLED))),
             ("destroyed stencil", gone, with(destroyed(&world, combined, SAMPLED))),
-            ("another device's destroyed depth", gone, with(destroyed(&other, Format::Depth32Float, SAMPLED))),
-            ("another device's destroyed stencil", gone, with(destroyed(&other, combined, SAMPLED))),
+            (
+                "another device's destroyed depth",
+                gone,
+                with(destroyed(&other, Format::Depth32Float, SAMPLED)),
+            ),
+            (
+                "another device's destroyed stencil",
+                gone,
+                with(destroyed(&other, combined, SAMPLED)),
+            ),
             (
                 "colors",
                 "depth: expected a depth format, R32Float",
@@ -319,8 +376,9 @@ fn targets_that_cannot_be_drawn_into_are_refused_by_name() {
     let usage = Usages::RENDER_ATTACHMENT;
     let into = |view: wgpu::TextureView| {
         let World { context, occluders, camera, .. } = &world;
-        Box::new(move |encoder: &mut wgpu::CommandEncoder| context.record_occluders(encoder, occluders, camera, &view))
-            as Box<_>
+        Box::new(move |encoder: &mut wgpu::CommandEncoder| {
+            context.record_occluders(encoder, occluders, camera, &view)
+        }) as Box<_>
     };
     let but = |usage, change: &dyn Fn(&mut wgpu::TextureDescriptor<'_>)| {
         into(plain(&world.texture_but(depth, usage, change)))
@@ -350,11 +408,9 @@ fn targets_that_cannot_be_drawn_into_are_refused_by_name() {
             (
                 "a view without the usage",
                 gone,
-                into(
-                    world
-                        .texture(depth, usage | SAMPLED)
-                        .create_view(&wgpu::TextureViewDescriptor { usage: Some(SAMPLED), ..Default::default() }),
-                ),
+                into(world.texture(depth, usage | SAMPLED).create_view(
+                    &wgpu::TextureViewDescriptor { usage: Some(SAMPLED), ..Default::default() },
+                )),
             ),
             ("no usage", "target: expected the usage RENDER_ATTACHMENT", but(SAMPLED, &|_| ())),
             (
@@ -409,7 +465,10 @@ fn a_cull_of_what_was_destroyed_is_refused_by_name() {
             let options = CullOptions { hierarchy, ..CullOptions::default() };
             wall.destroy();
             let gone = "pyramid: expected one whose depth image has not been destroyed";
-            run(&world, &[("the depth image", gone, Box::new(|encoder| world.cull(encoder, &options)))]);
+            run(
+                &world,
+                &[("the depth image", gone, Box::new(|encoder| world.cull(encoder, &options)))],
+            );
         }
     }
     let (world, _) = culled(World::new(), AtlasUse::Never);
@@ -417,7 +476,8 @@ fn a_cull_of_what_was_destroyed_is_refused_by_name() {
     for order in [Order::Stable, Order::Any] {
         let options = CullOptions { order, ..CullOptions::default() };
         for part in 0..3 {
-            let visible = world.context.create_visible(&world.instances, &VisibleOptions::default()).unwrap();
+            let visible =
+                world.context.create_visible(&world.instances, &VisibleOptions::default()).unwrap();
             let buffers = [visible.draw_arguments(), visible.list(0), visible.mask(0)];
             buffers[part].expect("all outputs").destroy();
             let World { context, instances, camera, pyramid, .. } = &world;
@@ -433,17 +493,27 @@ fn a_cull_of_what_was_destroyed_is_refused_by_name() {
 fn culls_of_what_does_not_belong_are_refused_by_name() {
     let [world, other] = World::two();
     let (world, _) = culled(world, AtlasUse::Auto);
-    let never_built = world.context.create_pyramid(world.camera.size(), &PyramidOptions::default()).unwrap();
+    let never_built =
+        world.context.create_pyramid(world.camera.size(), &PyramidOptions::default()).unwrap();
     let reversed = camera_along_z(SIDE, SIDE, DepthConvention::Reversed);
     let mut encoder = world.encoder();
-    let single = Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0]), radii: Floats::F32(&[1.0]) };
-    let single = world.context.record_instances(&mut encoder, &single, &InstanceOptions::default()).unwrap();
+    let single =
+        Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0]), radii: Floats::F32(&[1.0]) };
+    let single =
+        world.context.record_instances(&mut encoder, &single, &InstanceOptions::default()).unwrap();
     world.works(encoder, "an upload");
     let of_single = world.context.create_visible(&single, &VisibleOptions::default()).unwrap();
     let cull = |instances, camera, pyramid, visible| {
         let context = &world.context;
         Box::new(move |encoder: &mut wgpu::CommandEncoder| {
-            context.record_cull(encoder, instances, camera, pyramid, visible, &CullOptions::default())
+            context.record_cull(
+                encoder,
+                instances,
+                camera,
+                pyramid,
+                visible,
+                &CullOptions::default(),
+            )
         }) as Box<_>
     };
     let World { context, instances, camera, pyramid, visible, .. } = &world;
@@ -460,7 +530,9 @@ fn culls_of_what_does_not_belong_are_refused_by_name() {
     };
     let boxes = |centers: Floats<'static>, radii: Floats<'static>, options: InstanceOptions| {
         Box::new(move |encoder: &mut wgpu::CommandEncoder| {
-            context.record_instances(encoder, &Bounds::Spheres { centers, radii }, &options).map(drop)
+            context
+                .record_instances(encoder, &Bounds::Spheres { centers, radii }, &options)
+                .map(drop)
         }) as Box<_>
     };
     run(
@@ -486,7 +558,11 @@ fn culls_of_what_does_not_belong_are_refused_by_name() {
                 "visible: expected buffers that were created for these",
                 cull(instances, camera, pyramid, &of_single),
             ),
-            ("no reduction", "pyramid: expected one that was built", cull(instances, camera, &never_built, visible)),
+            (
+                "no reduction",
+                "pyramid: expected one that was built",
+                cull(instances, camera, &never_built, visible),
+            ),
             (
                 "another camera",
                 "camera: expected the camera of the pyramid's depth image",
@@ -497,16 +573,36 @@ fn culls_of_what_does_not_belong_are_refused_by_name() {
                 "depth_slack: expected a number in 0..=0.5",
                 options(CullOptions { depth_slack: -1.0, ..plain() }),
             ),
-            ("guard", "guard_px: expected", options(CullOptions { guard_px: Some(0.3), ..plain() })),
-            ("descent", "descent: expected a number in 0..=65536", options(CullOptions { descent: 65_537, ..plain() })),
-            ("an update of another device's", "instances: expected an object", update(&other.instances, 0, &TWO_BOXES)),
-            ("an update of another kind", "bounds: expected the instances' kind", update(instances, 0, &theirs)),
+            (
+                "guard",
+                "guard_px: expected",
+                options(CullOptions { guard_px: Some(0.3), ..plain() }),
+            ),
+            (
+                "descent",
+                "descent: expected a number in 0..=65536",
+                options(CullOptions { descent: 65_537, ..plain() }),
+            ),
+            (
+                "an update of another device's",
+                "instances: expected an object",
+                update(&other.instances, 0, &TWO_BOXES),
+            ),
+            (
+                "an update of another kind",
+                "bounds: expected the instances' kind",
+                update(instances, 0, &theirs),
+            ),
             (
                 "an update past the end",
                 "bounds: expected at most 1 from instance 1 on",
                 update(instances, 1, &TWO_BOXES),
             ),
-            ("an update beyond the end", "first: expected a number in 0..=2", update(instances, 3, &TWO_BOXES)),
+            (
+                "an update beyond the end",
+                "first: expected a number in 0..=2",
+                update(instances, 3, &TWO_BOXES),
+            ),
             (
                 "centers and radii",
                 "radii: ",
@@ -545,7 +641,9 @@ fn what_cannot_be_made_is_refused_by_name() {
     };
     let visible = |instances, draw| {
         Box::new(move |_: &mut wgpu::CommandEncoder| {
-            context.create_visible(instances, &VisibleOptions { draw, ..VisibleOptions::default() }).map(drop)
+            context
+                .create_visible(instances, &VisibleOptions { draw, ..VisibleOptions::default() })
+                .map(drop)
         }) as Box<_>
     };
     let occluders = |mesh: MeshData<'static>| {
@@ -557,12 +655,24 @@ fn what_cannot_be_made_is_refused_by_name() {
     run(
         &world,
         &[
-            ("no pixels", "size: expected at least one pixel a side", pyramid(0, 4, PyramidOptions::default())),
-            ("too many", "max_texture_dimension_2d: requested 8193", pyramid(8193, 1, PyramidOptions::default())),
+            (
+                "no pixels",
+                "size: expected at least one pixel a side",
+                pyramid(0, 4, PyramidOptions::default()),
+            ),
+            (
+                "too many",
+                "max_texture_dimension_2d: requested 8193",
+                pyramid(8193, 1, PyramidOptions::default()),
+            ),
             (
                 "chunks",
                 "chunk_shift: expected 2 to",
-                pyramid(4, 4, PyramidOptions { chunk_shift: Some(40), ..PyramidOptions::default() }),
+                pyramid(
+                    4,
+                    4,
+                    PyramidOptions { chunk_shift: Some(40), ..PyramidOptions::default() },
+                ),
             ),
             (
                 "levels",
@@ -570,13 +680,20 @@ fn what_cannot_be_made_is_refused_by_name() {
                 pyramid(
                     4,
                     4,
-                    PyramidOptions { levels: StoredLevels { first: 0, last: 3 }, ..PyramidOptions::default() },
+                    PyramidOptions {
+                        levels: StoredLevels { first: 0, last: 3 },
+                        ..PyramidOptions::default()
+                    },
                 ),
             ),
             (
                 "too many chunks",
                 "pyramid texels: requested",
-                pyramid(64, 64, PyramidOptions { chunk_shift: Some(2), ..PyramidOptions::default() }),
+                pyramid(
+                    64,
+                    64,
+                    PyramidOptions { chunk_shift: Some(2), ..PyramidOptions::default() },
+                ),
             ),
             (
                 "a first instance",
@@ -593,7 +710,11 @@ fn what_cannot_be_made_is_refused_by_name() {
                 "triangles: expected indices below the 4",
                 occluders(MeshData { triangles: &[0, 1, 4], ..WALL }),
             ),
-            ("two indices", "triangles: expected 3 indices", occluders(MeshData { triangles: &[0, 1], ..WALL })),
+            (
+                "two indices",
+                "triangles: expected 3 indices",
+                occluders(MeshData { triangles: &[0, 1], ..WALL }),
+            ),
             (
                 "transforms",
                 "transforms: expected 16 numbers",
@@ -605,7 +726,11 @@ fn what_cannot_be_made_is_refused_by_name() {
                 occluders(MeshData { vertices: Floats::F32(&[f32::NAN; 12]), ..WALL }),
             ),
             ("no triangle", "", occluders(MeshData { triangles: &[], ..WALL })),
-            ("no vertex", "", occluders(MeshData { vertices: Floats::F32(&[]), triangles: &[], ..WALL })),
+            (
+                "no vertex",
+                "",
+                occluders(MeshData { vertices: Floats::F32(&[]), triangles: &[], ..WALL }),
+            ),
         ],
     );
     // With the feature it is taken.
@@ -613,7 +738,10 @@ fn what_cannot_be_made_is_refused_by_name() {
     let world = World::on(open(&adapter(), features, &HizContext::required_limits()));
     world
         .context
-        .create_visible(&world.instances, &VisibleOptions { draw: first, ..VisibleOptions::default() })
+        .create_visible(
+            &world.instances,
+            &VisibleOptions { draw: first, ..VisibleOptions::default() },
+        )
         .unwrap();
 }
 
@@ -622,21 +750,28 @@ fn what_cannot_be_made_is_refused_by_name() {
 fn nothing_at_all_is_drawn_reduced_and_culled() {
     let mut world = World::new();
     world.camera = camera_along_z(1, 1, STANDARD);
-    world.pyramid = world.context.create_pyramid(world.camera.size(), &PyramidOptions::default()).unwrap();
+    world.pyramid =
+        world.context.create_pyramid(world.camera.size(), &PyramidOptions::default()).unwrap();
     let mut encoder = world.encoder();
     let nothing = Bounds::Boxes { min: Floats::F32(&[]), max: Floats::F32(&[]) };
-    world.instances = world.context.record_instances(&mut encoder, &nothing, &InstanceOptions::default()).unwrap();
-    world.visible = world.context.create_visible(&world.instances, &VisibleOptions::default()).unwrap();
+    world.instances = world
+        .context
+        .record_instances(&mut encoder, &nothing, &InstanceOptions::default())
+        .unwrap();
+    world.visible =
+        world.context.create_visible(&world.instances, &VisibleOptions::default()).unwrap();
     world.context.record_update(&mut encoder, &world.instances, 0, &nothing, true).unwrap();
     let no_mesh = world.context.create_occluders(&[], &OccluderOptions::default()).unwrap();
-    let target = world.texture_but(Format::Depth32Float, Usages::RENDER_ATTACHMENT | SAMPLED, |d| {
-        (d.size.width, d.size.height) = (1, 1);
-    });
+    let target =
+        world.texture_but(Format::Depth32Float, Usages::RENDER_ATTACHMENT | SAMPLED, |d| {
+            (d.size.width, d.size.height) = (1, 1);
+        });
     world.context.record_occluders(&mut encoder, &no_mesh, &world.camera, &plain(&target)).unwrap();
     world.reduce(&mut encoder, &plain(&target)).unwrap();
     for order in [Order::Stable, Order::Any] {
         for hierarchy in [Hierarchy::Never, Hierarchy::Always] {
-            let options = CullOptions { order, hierarchy, statistics: true, ..CullOptions::default() };
+            let options =
+                CullOptions { order, hierarchy, statistics: true, ..CullOptions::default() };
             world.cull(&mut encoder, &options).unwrap();
         }
     }
@@ -669,7 +804,8 @@ fn a_lost_device_ends_nothing() {
 }
 
 /// wgpu tells of an encoder of another device where that is finished, and of one with an open pass
-/// at once or there. Nothing panics here, and the devices can be used on.
+/// at once or there.
+/// Nothing panics here, and the devices can be used on.
 #[test]
 fn encoders_that_cannot_be_used_are_told_of() {
     let [world, other] = World::two();
@@ -691,16 +827,22 @@ fn encoders_that_cannot_be_used_are_told_of() {
         &|encoder| world.cull(encoder, &CullOptions::default()),
         &|encoder| context.record_occluders(encoder, occluders, camera, &view),
         &|encoder| context.record_update(encoder, instances, 0, &TWO_BOXES, true),
-        &|encoder| context.record_instances(encoder, &TWO_BOXES, &InstanceOptions::default()).map(drop),
+        &|encoder| {
+            context.record_instances(encoder, &TWO_BOXES, &InstanceOptions::default()).map(drop)
+        },
     ];
     for (i, act) in acts.iter().enumerate() {
         let mut encoder = world.encoder();
-        let pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()).forget_lifetime();
+        let pass =
+            encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()).forget_lifetime();
         let outcome = act(&mut encoder);
         // Where copies come first wgpu tells later.
         if [0, 2, 3].contains(&i) {
             let text = outcome.unwrap_err().to_string();
-            assert!(text.starts_with("encoder: expected one of this device without an open pass, but"), "{i}: {text}");
+            assert!(
+                text.starts_with("encoder: expected one of this device without an open pass, but"),
+                "{i}: {text}"
+            );
         }
         let scope = world.device.push_error_scope(wgpu::ErrorFilter::Validation);
         drop(pass);
@@ -788,7 +930,10 @@ fn devices_with_less_than_the_shaders_need_are_refused() {
         lower(&mut limits);
         let (device, _queue) = open(&adapter, wgpu::Features::empty(), &limits);
         let error = HizContext::new(&device).unwrap_err();
-        assert!(matches!(&error, Error::Limit { name: limit, .. } if limit == name), "{name}: {error}");
+        assert!(
+            matches!(&error, Error::Limit { name: limit, .. } if limit == name),
+            "{name}: {error}"
+        );
     }
 }
 
@@ -810,8 +955,12 @@ fn the_least_limits_are_enough_for_everything() {
         let n = 3000;
         let (centers, sizes) = (vec![8.0_f32; 3 * n], vec![1.0_f32; 3 * n]);
         let bounds = match kind {
-            BoundsKind::Sphere => Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&sizes[..n]) },
-            BoundsKind::Box => Bounds::Boxes { min: Floats::F32(&sizes), max: Floats::F32(&centers) },
+            BoundsKind::Sphere => {
+                Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&sizes[..n]) }
+            }
+            BoundsKind::Box => {
+                Bounds::Boxes { min: Floats::F32(&sizes), max: Floats::F32(&centers) }
+            }
             BoundsKind::OrientedBox => Bounds::OrientedBoxes {
                 centers: Floats::F32(&centers),
                 half_sizes: Floats::F32(&sizes),
@@ -819,7 +968,8 @@ fn the_least_limits_are_enough_for_everything() {
             },
         };
         let mut encoder = world.encoder();
-        let instances = context.record_instances(&mut encoder, &bounds, &InstanceOptions::default()).unwrap();
+        let instances =
+            context.record_instances(&mut encoder, &bounds, &InstanceOptions::default()).unwrap();
         context.record_update(&mut encoder, &instances, 0, &bounds, false).unwrap();
         let visible = context.create_visible(&instances, &VisibleOptions::default()).unwrap();
         for atlas in [AtlasUse::Never, AtlasUse::Always] {
@@ -829,9 +979,23 @@ fn the_least_limits_are_enough_for_everything() {
             for hierarchy in [Hierarchy::Never, Hierarchy::Always] {
                 for order in [Order::Stable, Order::Any] {
                     let footprint = Footprint::Four;
-                    let options =
-                        CullOptions { hierarchy, order, footprint, statistics: true, ..CullOptions::default() };
-                    context.record_cull(&mut encoder, &instances, &world.camera, &pyramid, &visible, &options).unwrap();
+                    let options = CullOptions {
+                        hierarchy,
+                        order,
+                        footprint,
+                        statistics: true,
+                        ..CullOptions::default()
+                    };
+                    context
+                        .record_cull(
+                            &mut encoder,
+                            &instances,
+                            &world.camera,
+                            &pyramid,
+                            &visible,
+                            &options,
+                        )
+                        .unwrap();
                 }
             }
         }
@@ -842,7 +1006,8 @@ fn the_least_limits_are_enough_for_everything() {
     let mesh = MeshData { vertices: Floats::F32(&many), triangles: &[0, 1, 2], transforms: None };
     let error = context.create_occluders(&[mesh], &OccluderOptions::default()).unwrap_err();
     assert_eq!(error.to_string(), "max_buffer_size: requested 72000, the device allows 65536");
-    let error = context.create_pyramid(ImageSize::new(4096, 4096), &PyramidOptions::default()).unwrap_err();
+    let error =
+        context.create_pyramid(ImageSize::new(4096, 4096), &PyramidOptions::default()).unwrap_err();
     assert!(error.to_string().starts_with("pyramid texels: requested"), "{error}");
 }
 
@@ -856,7 +1021,9 @@ fn an_update_larger_than_a_binding_reaches_every_instance() {
     let count = 1000;
     let random: Vec<[f32; 2]> = {
         let mut random = common::Random(11);
-        (0..count).map(|_| [random.range(-0.5, 0.5) as f32, random.range(-0.5, 0.5) as f32]).collect()
+        (0..count)
+            .map(|_| [random.range(-0.5, 0.5) as f32, random.range(-0.5, 0.5) as f32])
+            .collect()
     };
     let at = |z: f32| -> Vec<f32> { random.iter().flat_map(|[x, y]| [x * z, y * z, z]).collect() };
     let radii = vec![0.01_f32; count];
@@ -879,7 +1046,16 @@ fn an_update_larger_than_a_binding_reaches_every_instance() {
             let visible = context.create_visible(&instances, &VisibleOptions::default()).unwrap();
             let mut encoder = std::mem::replace(&mut encoder, world.encoder());
             let options = CullOptions { hierarchy, ..CullOptions::default() };
-            context.record_cull(&mut encoder, &instances, &world.camera, &world.pyramid, &visible, &options).unwrap();
+            context
+                .record_cull(
+                    &mut encoder,
+                    &instances,
+                    &world.camera,
+                    &world.pyramid,
+                    &visible,
+                    &options,
+                )
+                .unwrap();
             let staging = world.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("test.mask"),
                 size: 128,

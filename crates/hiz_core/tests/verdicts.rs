@@ -9,8 +9,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use common::{CONVENTIONS, Random, camera_along_z, engine, ndc};
 use hiz_core::headless::{Culling, Engine, Explanation};
 use hiz_core::{
-    AtlasUse, Bounds, BoundsKind, Camera, Coverage, CullOptions, DepthConvention, Fit, Floats, Footprint, Hierarchy,
-    InstanceOptions, Instances, Pyramid, PyramidOptions, VisibleOptions, wgpu,
+    AtlasUse, Bounds, BoundsKind, Camera, Coverage, CullOptions, DepthConvention, Fit, Floats,
+    Footprint, Hierarchy, InstanceOptions, Instances, Pyramid, PyramidOptions, VisibleOptions,
+    wgpu,
 };
 
 const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
@@ -20,7 +21,8 @@ const VISIBLE: u8 = 2;
 const SIDE: u32 = 64;
 
 /// Volumes behind the wall at depth 4, a good part of them beside what the camera sees: |x| and |y|
-/// up to z. In arrays of any kind; the volume of each holds the sphere about its centre.
+/// up to z.
+/// In arrays of any kind; the volume of each holds the sphere about its centre.
 struct Crowd {
     centers: Vec<f64>,
     radii: Vec<f64>,
@@ -33,23 +35,28 @@ struct Crowd {
 impl Crowd {
     fn new(n: usize, seed: u64) -> Self {
         let mut random = Random(seed);
-        let place =
-            |random: &mut Random| [random.range(-14.0, 14.0), random.range(-14.0, 14.0), random.range(6.0, 12.0)];
+        let place = |random: &mut Random| {
+            [random.range(-14.0, 14.0), random.range(-14.0, 14.0), random.range(6.0, 12.0)]
+        };
         let centers: Vec<f64> = (0..n).flat_map(|_| place(&mut random)).collect();
         let radii: Vec<f64> = (0..n).map(|_| random.range(0.0, 0.2)).collect();
         let halves: Vec<f64> = radii.iter().flat_map(|r| [*r; 3]).collect();
         let corner = |sign: f64| centers.iter().zip(&halves).map(|(c, h)| c + sign * h).collect();
         let (min, max) = (corner(-1.0), corner(1.0));
-        let rotations = (0..n).flat_map(|_| [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]).collect();
+        let rotations =
+            (0..n).flat_map(|_| [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]).collect();
         Self { centers, radii, halves, min, max, rotations }
     }
 
     fn bounds(&self, kind: BoundsKind) -> Bounds<'_> {
         match kind {
-            BoundsKind::Sphere => {
-                Bounds::Spheres { centers: Floats::F64(&self.centers), radii: Floats::F64(&self.radii) }
+            BoundsKind::Sphere => Bounds::Spheres {
+                centers: Floats::F64(&self.centers),
+                radii: Floats::F64(&self.radii),
+            },
+            BoundsKind::Box => {
+                Bounds::Boxes { min: Floats::F64(&self.min), max: Floats::F64(&self.max) }
             }
-            BoundsKind::Box => Bounds::Boxes { min: Floats::F64(&self.min), max: Floats::F64(&self.max) },
             BoundsKind::OrientedBox => Bounds::OrientedBoxes {
                 centers: Floats::F64(&self.centers),
                 half_sizes: Floats::F64(&self.halves),
@@ -59,8 +66,8 @@ impl Crowd {
     }
 
     /// How far the sphere within volume `i` and the box around it stay from the sides of the view,
-    /// x = +-z and y = +-z: negative inside. Worked out by hand, as a distance times the square
-    /// root of 2.
+    /// x = +-z and y = +-z: negative inside.
+    /// Worked out by hand, as a distance times the square root of 2.
     fn beside(&self, i: usize) -> [f64; 2] {
         let [x, y, z] = [0, 1, 2].map(|k| self.centers[3 * i + k]);
         let (side, r) = (x.abs().max(y.abs()) - z, self.radii[i]);
@@ -78,7 +85,8 @@ fn upload(engine: &Engine, crowd: &Crowd, kind: BoundsKind) -> Arc<Instances> {
 fn wall(engine: &Engine, camera: &Camera, hole: bool, atlas: AtlasUse) -> Arc<Pyramid> {
     let convention = camera.convention();
     let is_hole = |i: u32| hole && (20..30).contains(&(i % SIDE)) && (40..43).contains(&(i / SIDE));
-    let depth: Vec<_> = (0..SIDE * SIDE).map(|i| ndc(if is_hole(i) { 1e6 } else { 4.0 }, convention)).collect();
+    let depth: Vec<_> =
+        (0..SIDE * SIDE).map(|i| ndc(if is_hole(i) { 1e6 } else { 4.0 }, convention)).collect();
     let options = PyramidOptions { atlas, ..PyramidOptions::default() };
     engine.pyramid_with(&engine.upload_depth(&depth, camera).unwrap(), &options).unwrap()
 }
@@ -95,7 +103,9 @@ fn counted(verdicts: &[u8], culling: &Culling) -> bool {
     let counts = culling.counts().unwrap();
     let told = [counts.outside, counts.occluded, counts.visible, counts.invalid];
     let of = |verdict: u8| verdicts.iter().filter(|v| **v == verdict).count() as u64;
-    told == [0, 1, 2, 3].map(of) && counts.demand == counts.visible && counts.tested == verdicts.len() as u64
+    told == [0, 1, 2, 3].map(of)
+        && counts.demand == counts.visible
+        && counts.tested == verdicts.len() as u64
 }
 
 /// Verdicts and counts do not depend on the hierarchy, and what is outside is so by hand.
@@ -107,7 +117,9 @@ fn verdicts_are_the_same_with_groups_and_without() {
         let instances = upload(&engine(), &crowd, kind);
         for convention in CONVENTIONS {
             let camera = camera_along_z(SIDE, SIDE, convention);
-            for (atlas, coverage) in [(AtlasUse::Never, Coverage::Area), (AtlasUse::Always, Coverage::Sample)] {
+            for (atlas, coverage) in
+                [(AtlasUse::Never, Coverage::Area), (AtlasUse::Always, Coverage::Sample)]
+            {
                 let pyramid = wall(&engine(), &camera, true, atlas);
                 let with = |hierarchy| {
                     let options = CullOptions { coverage, hierarchy, ..CullOptions::default() };
@@ -116,13 +128,21 @@ fn verdicts_are_the_same_with_groups_and_without() {
                 let (flat, grouped) = (with(Hierarchy::Never), with(Hierarchy::Always));
                 // One reads the counts first, the other the verdicts.
                 let counts = grouped.counts().unwrap();
-                assert!(counts.tested_instances < counts.tested / 2, "most groups are hidden: {counts:?}");
-                let (flat_verdicts, verdicts) = (flat.verdicts().unwrap(), grouped.verdicts().unwrap());
+                assert!(
+                    counts.tested_instances < counts.tested / 2,
+                    "most groups are hidden: {counts:?}"
+                );
+                let (flat_verdicts, verdicts) =
+                    (flat.verdicts().unwrap(), grouped.verdicts().unwrap());
                 let what = format!("{kind:?} {convention:?} {coverage:?}");
                 assert!(counted(&verdicts, &grouped) && counted(&flat_verdicts, &flat), "{what}");
                 let mask = grouped.mask().unwrap();
                 let kept = mask.iter().filter(|kept| **kept).count() as u64;
-                assert_eq!((grouped.demand_and_written().unwrap(), kept > 0), ((Some(kept), kept), true), "{what}");
+                assert_eq!(
+                    (grouped.demand_and_written().unwrap(), kept > 0),
+                    ((Some(kept), kept), true),
+                    "{what}"
+                );
                 for (i, (flat, verdict)) in flat_verdicts.iter().zip(&verdicts).enumerate() {
                     assert!(
                         flat == verdict || (*flat, *verdict) == (VISIBLE, OCCLUDED),
@@ -136,10 +156,12 @@ fn verdicts_are_the_same_with_groups_and_without() {
                         assert_ne!(*verdict, OUTSIDE, "{what} {i}: in the view by {of_sphere}");
                     }
                 }
-                let told: Vec<_> = (0..2500).step_by(101).map(|i| grouped.explain(i).unwrap()).collect();
+                let told: Vec<_> =
+                    (0..2500).step_by(101).map(|i| grouped.explain(i).unwrap()).collect();
                 for (told, i) in told.iter().zip((0..2500).step_by(101)) {
                     assert_eq!(told.verdict, verdicts[i], "{what} {i}: {told:?}");
-                    let is_of_occluded = told.group.as_ref().is_some_and(|group| group.verdict == OCCLUDED);
+                    let is_of_occluded =
+                        told.group.as_ref().is_some_and(|group| group.verdict == OCCLUDED);
                     refined += usize::from(is_of_occluded && told.verdict == OUTSIDE);
                 }
             }
@@ -157,8 +179,11 @@ fn verdicts_are_those_of_the_bounds_that_were_culled() {
     let pyramid = wall(&engine(), &camera, false, AtlasUse::Never);
     let options = CullOptions { hierarchy: Hierarchy::Always, ..CullOptions::default() };
     for kind in KINDS {
-        let fresh =
-            |crowd| cull(&engine(), (&upload(&engine(), crowd, kind), &camera, &pyramid), &options).verdicts().unwrap();
+        let fresh = |crowd| {
+            cull(&engine(), (&upload(&engine(), crowd, kind), &camera, &pyramid), &options)
+                .verdicts()
+                .unwrap()
+        };
         let (expected, later) = (fresh(&before), fresh(&after));
         assert_ne!(expected, later);
         let update = |instances: &Arc<Instances>, raw: bool| {
@@ -166,7 +191,9 @@ fn verdicts_are_those_of_the_bounds_that_were_culled() {
             if !raw {
                 return engine().update(instances, 0, &bounds, true).unwrap();
             }
-            let encoder = || engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let encoder = || {
+                engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
+            };
             let (mut kept, mut dropped) = (encoder(), encoder());
             // One that is recorded and submitted, after the refinement of a cull was recorded that
             // never ran.
@@ -176,7 +203,9 @@ fn verdicts_are_those_of_the_bounds_that_were_culled() {
         };
         for raw in [false, true] {
             let instances = upload(&engine(), &before, kind);
-            let culls: Vec<_> = (0..3).map(|_| cull(&engine(), (&instances, &camera, &pyramid), &options)).collect();
+            let culls: Vec<_> = (0..3)
+                .map(|_| cull(&engine(), (&instances, &camera, &pyramid), &options))
+                .collect();
             assert_eq!(culls[0].verdicts().unwrap(), expected, "{kind:?}: read before");
             update(&instances, raw);
             let new = cull(&engine(), (&instances, &camera, &pyramid), &options);
@@ -184,7 +213,11 @@ fn verdicts_are_those_of_the_bounds_that_were_culled() {
             for culling in &culls {
                 assert_eq!(culling.verdicts().unwrap(), expected, "{kind:?} raw {raw}");
             }
-            assert_eq!(new.verdicts().unwrap().iter().zip(&later).filter(|(a, b)| a != b).count(), 0, "{kind:?} {raw}");
+            assert_eq!(
+                new.verdicts().unwrap().iter().zip(&later).filter(|(a, b)| a != b).count(),
+                0,
+                "{kind:?} {raw}"
+            );
             let told = culls[0].explain(3).unwrap();
             assert!(told.stale && told.reason.starts_with("updated since the cull"), "{told:?}");
             assert!(!new.explain(3).unwrap().stale);
@@ -203,13 +236,17 @@ fn explanations_of_updated_instances_are_stale() {
     let options = CullOptions { hierarchy: Hierarchy::Always, ..CullOptions::default() };
     let culling = cull(&engine(), (&instances, &camera, &pyramid), &options);
     let told: Vec<_> = (0..640).map(|i| culling.explain(i).unwrap()).collect();
-    assert!(told.iter().all(|told| !told.stale && told.group.as_ref().is_none_or(|group| !group.stale)));
-    let moved = Bounds::Spheres { centers: Floats::F64(&[0.0, 0.0, 2.0]), radii: Floats::F64(&[0.5]) };
+    assert!(
+        told.iter().all(|told| !told.stale && told.group.as_ref().is_none_or(|group| !group.stale))
+    );
+    let moved =
+        Bounds::Spheres { centers: Floats::F64(&[0.0, 0.0, 2.0]), radii: Floats::F64(&[0.5]) };
     engine().update(&instances, 77, &moved, true).unwrap();
     let again: Vec<_> = (0..640).map(|i| culling.explain(i).unwrap()).collect();
     let stale: Vec<_> = (0..640).filter(|i| again[*i].stale).collect();
     assert_eq!((stale, again[77].verdict), (vec![77], VISIBLE));
-    let groups = again.iter().filter(|told| told.group.as_ref().is_some_and(|group| group.stale)).count();
+    let groups =
+        again.iter().filter(|told| told.group.as_ref().is_some_and(|group| group.stale)).count();
     assert!(groups < 64 && (groups == 63 || told[77].group.is_none()), "{groups}");
     assert!((0..640).all(|i| i == 77 || again[i].verdict == told[i].verdict));
 }
@@ -232,9 +269,11 @@ fn verdicts_on_threads() {
     let pyramid = wall(&engine(), &camera, false, AtlasUse::Never);
     let options = CullOptions { hierarchy: Hierarchy::Always, ..CullOptions::default() };
     let flat = CullOptions { hierarchy: Hierarchy::Never, ..CullOptions::default() };
-    let expected = states
-        .each_ref()
-        .map(|crowd| cull(&engine(), (&upload(&engine(), crowd, kind), &camera, &pyramid), &flat).verdicts().unwrap());
+    let expected = states.each_ref().map(|crowd| {
+        cull(&engine(), (&upload(&engine(), crowd, kind), &camera, &pyramid), &flat)
+            .verdicts()
+            .unwrap()
+    });
     let instances = upload(&engine(), &states[0], kind);
     let running = AtomicUsize::new(2);
     std::thread::scope(|scope| {
@@ -247,7 +286,10 @@ fn verdicts_on_threads() {
                     for culling in [&later, &culling] {
                         let is_counted = counted(&culling.verdicts().unwrap(), culling);
                         let verdicts = culling.verdicts().unwrap();
-                        assert!(is_counted && expected.contains(&verdicts), "cull {k} mixes two states");
+                        assert!(
+                            is_counted && expected.contains(&verdicts),
+                            "cull {k} mixes two states"
+                        );
                     }
                 }
             });
@@ -255,7 +297,8 @@ fn verdicts_on_threads() {
         scope.spawn(|| {
             for k in (1..).take_while(|_| running.load(Ordering::Relaxed) > 0) {
                 engine().update(&instances, 0, &states[k % 2].bounds(kind), true).unwrap();
-                // Otherwise a slow driver's queue fills with updates, and each cull waits for all of them.
+                // Otherwise a slow driver's queue fills with updates, and each cull waits for all
+                // of them.
                 engine().wait().unwrap();
             }
         });
@@ -287,7 +330,12 @@ fn explain_tells_what_was_read() {
         let camera = camera_along_z(SIDE, SIDE, convention);
         // A wall with dents of all depths.
         let depth: Vec<_> = (0..SIDE * SIDE)
-            .map(|_| ndc(if random.below(40) == 0 { 4.0 + 60.0 * random.unit() as f32 } else { 4.0 }, convention))
+            .map(|_| {
+                ndc(
+                    if random.below(40) == 0 { 4.0 + 60.0 * random.unit() as f32 } else { 4.0 },
+                    convention,
+                )
+            })
             .collect();
         let pyramid = engine().pyramid(&engine().upload_depth(&depth, &camera).unwrap()).unwrap();
         let levels: Vec<_> = (0..7).map(|k| engine().read_level(&pyramid, k).unwrap()).collect();
@@ -306,10 +354,14 @@ fn explain_tells_what_was_read() {
                 let z = random.range(5.0, 40.0);
                 let center = [random.range(-0.9, 0.9) * z, random.range(-0.9, 0.9) * z, z];
                 let radius = [0.02 * z + random.range(0.0, 0.3) * z];
-                let bounds = Bounds::Spheres { centers: Floats::F64(&center), radii: Floats::F64(&radius) };
-                let (culling, texels_read) = texels_counted(&engine(), &camera, &pyramid, &bounds, &options);
+                let bounds =
+                    Bounds::Spheres { centers: Floats::F64(&center), radii: Floats::F64(&radius) };
+                let (culling, texels_read) =
+                    texels_counted(&engine(), &camera, &pyramid, &bounds, &options);
                 let told = culling.explain(0).unwrap();
-                let what = format!("{convention:?} {footprint:?} {descent} {fit:?} {center:?} {radius:?} {told:#?}");
+                let what = format!(
+                    "{convention:?} {footprint:?} {descent} {fit:?} {center:?} {radius:?} {told:#?}"
+                );
                 assert_eq!(told.verdict, culling.verdicts().unwrap()[0], "{what}");
                 assert_eq!(u64::from(told.texels_read), texels_read, "{what}");
                 assert_told(&told, &levels, &what);
@@ -320,9 +372,13 @@ fn explain_tells_what_was_read() {
                 if told.verdict == VISIBLE && is_descent && descent > 0 {
                     // At a texel that decides no budget helps, and where a budget ended one does.
                     let deeper = CullOptions { descent: 65_536, ..options.clone() };
-                    let (deeper, more) = texels_counted(&engine(), &camera, &pyramid, &bounds, &deeper);
+                    let (deeper, more) =
+                        texels_counted(&engine(), &camera, &pyramid, &bounds, &deeper);
                     let same = deeper.verdicts().unwrap()[0] == VISIBLE && more == texels_read;
-                    assert!(if told.reason.contains("budget") { more > texels_read } else { same }, "{what} {more}");
+                    assert!(
+                        if told.reason.contains("budget") { more > texels_read } else { same },
+                        "{what} {more}"
+                    );
                 }
                 *ends.entry(format!("{} {}", told.verdict, told.reason)).or_default() += 1;
             }
@@ -344,8 +400,14 @@ fn footprint_of(told: &Explanation) -> Vec<[u32; 2]> {
 
 fn assert_told(told: &Explanation, levels: &[Vec<f32>], what: &str) {
     let listed = told.texels.len();
-    assert_eq!([listed, told.texel_levels.len(), told.texel_depths.len()], [told.texels_read as usize; 3], "{what}");
-    for ((level, [x, y]), depth) in told.texel_levels.iter().zip(&told.texels).zip(&told.texel_depths) {
+    assert_eq!(
+        [listed, told.texel_levels.len(), told.texel_depths.len()],
+        [told.texels_read as usize; 3],
+        "{what}"
+    );
+    for ((level, [x, y]), depth) in
+        told.texel_levels.iter().zip(&told.texels).zip(&told.texel_depths)
+    {
         let width = SIDE >> level;
         assert_eq!(levels[*level as usize][(y * width + x) as usize], *depth, "{what}");
     }
@@ -357,13 +419,19 @@ fn assert_told(told: &Explanation, levels: &[Vec<f32>], what: &str) {
     if told.texels_read as usize == footprint.len() {
         let depths = told.texel_depths.iter().copied();
         let decided = told.decisive.map(|i| told.texel_depths[i]);
-        assert!(decided.is_none() || decided == depths.clone().reduce(f32::min) || decided == depths.reduce(f32::max));
+        assert!(
+            decided.is_none()
+                || decided == depths.clone().reduce(f32::min)
+                || decided == depths.reduce(f32::max)
+        );
     }
 }
 
 /// A depth that hides is nearer than the bounds' nearest one, a depth that does not is not.
 fn assert_farthest(told: &Explanation, convention: DepthConvention, what: &str) {
-    let (Some(farthest), Some(nearest)) = (told.farthest.map(f64::from), told.nearest) else { return };
+    let (Some(farthest), Some(nearest)) = (told.farthest.map(f64::from), told.nearest) else {
+        return;
+    };
     let before = if convention.is_reversed() { farthest - nearest } else { nearest - farthest };
     match told.verdict {
         OCCLUDED => assert!(before > 0.0, "{what}"),
@@ -384,13 +452,15 @@ fn what_is_not_listed_is_counted() {
     let convention = DepthConvention::Reversed;
     let camera = camera_along_z(512, 512, convention);
     // One pixel in four is a dent that a box behind the wall does not show in; the last one does.
-    let mut depth: Vec<_> =
-        (0..512 * 512).map(|i| ndc(if i % 2 == 0 && i / 512 % 2 == 0 { 6.0 } else { 4.0 }, convention)).collect();
-    let bounds = Bounds::Boxes { min: Floats::F64(&[-7.0, -7.0, 8.0]), max: Floats::F64(&[7.0, 7.0, 9.0]) };
+    let mut depth: Vec<_> = (0..512 * 512)
+        .map(|i| ndc(if i % 2 == 0 && i / 512 % 2 == 0 { 6.0 } else { 4.0 }, convention))
+        .collect();
+    let bounds =
+        Bounds::Boxes { min: Floats::F64(&[-7.0, -7.0, 8.0]), max: Floats::F64(&[7.0, 7.0, 9.0]) };
     let options = CullOptions { descent: 65_536, ..CullOptions::default() };
     for (far, verdict) in [(None, OCCLUDED), (Some(511 - 40), VISIBLE)] {
-        // At depth 8 the box spans pixels 32 to 479: below, a pixel of the last rows. And the dents
-        // hide a box at depth 8.
+        // At depth 8 the box spans pixels 32 to 479: below, a pixel of the last rows.
+        // And the dents hide a box at depth 8.
         if let Some(row) = far {
             depth[row * 512 + 470] = ndc(50.0, convention);
         }
@@ -399,7 +469,9 @@ fn what_is_not_listed_is_counted() {
         let (culling, texels_read) = texels_counted(&engine(), &camera, &pyramid, &bounds, &deeper);
         let told = culling.explain(0).unwrap();
         assert_eq!((told.verdict, u64::from(told.texels_read)), (verdict, texels_read));
-        assert!(told.texels.len() <= 4096 && told.texels.len() == told.texels_read.min(4096) as usize);
+        assert!(
+            told.texels.len() <= 4096 && told.texels.len() == told.texels_read.min(4096) as usize
+        );
         let farthest = if verdict == OCCLUDED { 6.0 } else { 50.0 };
         assert_eq!(told.farthest, Some(ndc(farthest, convention)), "{}", told.reason);
     }
@@ -414,16 +486,27 @@ fn the_reads_of_groups_are_counted() {
     for convention in CONVENTIONS {
         let camera = camera_along_z(SIDE, SIDE, convention);
         let pyramid = wall(&engine(), &camera, false, AtlasUse::Never);
-        let options = CullOptions { hierarchy: Hierarchy::Always, statistics: true, ..CullOptions::default() };
+        let options = CullOptions {
+            hierarchy: Hierarchy::Always,
+            statistics: true,
+            ..CullOptions::default()
+        };
         let culling = cull(&engine(), (&instances, &camera, &pyramid), &options);
         let counts = culling.counts().unwrap();
         assert_eq!((counts.occluded, counts.tested_groups, counts.tested_instances), (64, 1, 0));
-        // From x = -0.1 to 0.73 at depth 7.9: pixels 31 to 34, and rows 31 and 32. Three texels of
-        // level 1 are too many, so level 2 is read: columns 7 and 8, rows 7 and 8.
-        assert_eq!((counts.texels_read, counts.levels[2], counts.levels.iter().sum::<u64>()), (4, 1, 1));
+        // From x = -0.1 to 0.73 at depth 7.9: pixels 31 to 34, and rows 31 and 32.
+        // Three texels of level 1 are too many, so level 2 is read: columns 7 and 8, rows 7 and 8.
+        assert_eq!(
+            (counts.texels_read, counts.levels[2], counts.levels.iter().sum::<u64>()),
+            (4, 1, 1)
+        );
         let told = culling.explain(5).unwrap();
         assert_eq!((told.verdict, told.group.as_ref().unwrap().texels_read), (OCCLUDED, 4));
-        assert!(told.reason.starts_with("its group of 64 is hidden as a whole (behind"), "{}", told.reason);
+        assert!(
+            told.reason.starts_with("its group of 64 is hidden as a whole (behind"),
+            "{}",
+            told.reason
+        );
         let without = CullOptions { statistics: false, ..options };
         let counts = cull(&engine(), (&instances, &camera, &pyramid), &without).counts().unwrap();
         assert_eq!((counts.occluded, counts.texels_read), (64, 0));
@@ -440,13 +523,17 @@ fn compiling_is_told_apart() {
     let pyramid = wall(engine, &camera, true, AtlasUse::Never);
     for hierarchy in [Hierarchy::Never, Hierarchy::Always] {
         let options = CullOptions { hierarchy, ..CullOptions::default() };
-        let [first, second] = [0, 1].map(|_| cull(engine, (&instances, &camera, &pyramid), &options));
+        let [first, second] =
+            [0, 1].map(|_| cull(engine, (&instances, &camera, &pyramid), &options));
         // What the driver compiled with did not cull: the answers are the same.
         assert_eq!(first.verdicts().unwrap(), second.verdicts().unwrap());
         assert_eq!(first.indices().unwrap(), second.indices().unwrap());
         let (first, second) = (first.timings(), second.timings());
         eprintln!("{hierarchy:?}: first {first:?}, second {second:?}");
-        assert!(first.compile_ms > 0.0 && first.record_ms > 0.0 && first.wall_ms > 0.0, "{first:?}");
+        assert!(
+            first.compile_ms > 0.0 && first.record_ms > 0.0 && first.wall_ms > 0.0,
+            "{first:?}"
+        );
         assert!(second.compile_ms == 0.0, "{second:?}");
         // It ends when the device is seen to be done, whoever asks and whenever the answer is read.
         let third = cull(engine, (&instances, &camera, &pyramid), &options);

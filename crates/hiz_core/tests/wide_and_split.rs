@@ -11,14 +11,20 @@ use campaign::{Campaign, Class};
 use common::{Random, camera_along_z, engine, ndc};
 use hiz_core::headless::Engine;
 use hiz_core::{
-    Bounds, CullOptions, DepthConvention, Floats, Footprint, Hierarchy, InstanceOptions, Order, StoredOrder,
-    VisibleOptions,
+    Bounds, CullOptions, DepthConvention, Floats, Footprint, Hierarchy, InstanceOptions, Order,
+    StoredOrder, VisibleOptions,
 };
 
 const WIDE: &[(u32, u32)] = &[(1920, 1080), (1031, 7), (3, 2053), (641, 1025), (4099, 2)];
 const MODES: &[(Footprint, u32)] = &[(Footprint::Two, 0), (Footprint::Two, 4096)];
-const IN_IMAGES: &[Class] =
-    &[Class::PixelBorders, Class::Holes, Class::Grazing, Class::Random, Class::Huge, Class::InfiniteReversed];
+const IN_IMAGES: &[Class] = &[
+    Class::PixelBorders,
+    Class::Holes,
+    Class::Grazing,
+    Class::Random,
+    Class::Huge,
+    Class::InfiniteReversed,
+];
 
 /// SwiftShader's compiler takes more memory than there is for a reduction over several chunks.
 fn has_chunks() -> bool {
@@ -43,7 +49,14 @@ fn wide_images_give_no_false_cull() {
 
 /// Culls that read chunks past the first.
 fn split(engine: &Engine, chunks: u64, rounds: usize) -> campaign::Tally {
-    let campaign = Campaign { seed: 72, rounds, classes: IN_IMAGES, modes: &MODES[..1], chunks, ..Campaign::default() };
+    let campaign = Campaign {
+        seed: 72,
+        rounds,
+        classes: IN_IMAGES,
+        modes: &MODES[..1],
+        chunks,
+        ..Campaign::default()
+    };
     campaign.run(engine).total()
 }
 
@@ -57,14 +70,18 @@ fn culls_of_split_pyramids_give_no_false_cull() {
         let total = split(&engine(), chunks, 3);
         eprintln!("{chunks} chunks: {total:?}");
         // The same rounds: whatever chunk a level lies in, its texels are the same.
-        assert!(total == whole && total.false_culls == 0 && total.culled > total.cases / 10, "{total:?} {whole:?}");
+        assert!(
+            total == whole && total.false_culls == 0 && total.culled > total.cases / 10,
+            "{total:?} {whole:?}"
+        );
     }
     for (what, by, chunks) in [
         ("case 1u: { return chunk_1[i]; }", "case 1u: { return chunk_0[i]; }", 2),
         ("default: { return chunk_2[i]; }", "default: { return chunk_1[i]; }", 3),
         ("let i = index - (chunk << pyramid.chunk_shift);", "let i = index;", 2),
     ] {
-        let faulty = Engine::with_planted_faults(None, &[(what, by)]).expect("the device tests need a Vulkan driver");
+        let faulty = Engine::with_planted_faults(None, &[(what, by)])
+            .expect("the device tests need a Vulkan driver");
         let total = split(&faulty, chunks, 3);
         eprintln!("{what} -> {by}: {total:?}");
         assert!(total.false_culls > 0, "{what} -> {by}: stayed green");
@@ -73,22 +90,31 @@ fn culls_of_split_pyramids_give_no_false_cull() {
 
 /// More instances than a row of the survivors' list has groups (4096 of 64), than the scan's
 /// invocations have words (256 of 32), and than a row of records has places; pieces that begin past
-/// 2^16. What is kept is known one by one, and nothing is kept beside it.
+/// 2^16.
+/// What is kept is known one by one, and nothing is kept beside it.
 fn crowd(engine: &Engine, piece: Option<u32>, hierarchy: Hierarchy, order: Order) -> bool {
     let count: usize = 300_000;
     let mut random = Random(6);
     // One in sixteen before the wall, so that nearly every group survives.
     let kept: Vec<bool> = (0..count).map(|_| random.below(16) == 0).collect();
-    let centers: Vec<f32> = kept.iter().flat_map(|kept| [0.0, 0.0, if *kept { 2.0 } else { 8.0 }]).collect();
+    let centers: Vec<f32> =
+        kept.iter().flat_map(|kept| [0.0, 0.0, if *kept { 2.0 } else { 8.0 }]).collect();
     let radii = vec![0.125; count];
     let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
-    let options = InstanceOptions { order: StoredOrder::Given, piece_capacity: piece, ..InstanceOptions::default() };
+    let options = InstanceOptions {
+        order: StoredOrder::Given,
+        piece_capacity: piece,
+        ..InstanceOptions::default()
+    };
     let instances = engine.instances(&bounds, &options).unwrap();
     let convention = DepthConvention::Reversed;
     let camera = camera_along_z(16, 16, convention);
-    let pyramid = engine.pyramid(&engine.upload_depth(&[ndc(4.0, convention); 256], &camera).unwrap()).unwrap();
+    let pyramid = engine
+        .pyramid(&engine.upload_depth(&[ndc(4.0, convention); 256], &camera).unwrap())
+        .unwrap();
     let options = CullOptions { hierarchy, order, ..CullOptions::default() };
-    let culling = engine.cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap();
+    let culling =
+        engine.cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap();
     let expected: Vec<u32> = (0..count as u32).filter(|i| kept[*i as usize]).collect();
     let mut indices = culling.indices().unwrap();
     indices.sort_unstable();
@@ -124,10 +150,14 @@ fn faults_of_many_instances_are_seen() {
         ("(piece.words + LANES - 1u) / LANES", "piece.words / LANES"),
         ("before[w] = count;", "before[w] = sums[lane] - sum;"),
         ("workgroup.x * RUN + lane / SHARE", "workgroup.x % 512u * RUN + lane / SHARE"),
-        ("atomicAdd(&survivors.workgroups, 1u);", "atomicMax(&survivors.workgroups, min(slot / RUN + 1u, 512u));"),
+        (
+            "atomicAdd(&survivors.workgroups, 1u);",
+            "atomicMax(&survivors.workgroups, min(slot / RUN + 1u, 512u));",
+        ),
         ("let vector = id.x * VECTORS + v;", "let vector = (id.x & 0x3fffu) * VECTORS + v;"),
     ] {
-        let faulty = Engine::with_planted_faults(None, &[(what, by)]).expect("the device tests need a Vulkan driver");
+        let faulty = Engine::with_planted_faults(None, &[(what, by)])
+            .expect("the device tests need a Vulkan driver");
         assert!(
             !crowd(&faulty, None, Hierarchy::Always, Order::Stable)
                 || !crowd(&faulty, None, Hierarchy::Never, Order::Stable),

@@ -8,7 +8,8 @@ use pyo3::prelude::*;
 /// `(height, width)` of a level and its texels in C order.
 pub(crate) type LevelArray<'py> = ((u32, u32), Bound<'py, PyArray1<f32>>);
 
-/// A float array of any shape. Held during a call, so that its memory stays; read without the interpreter lock.
+/// A float array of any shape.
+/// Held during a call, so that its memory stays; read without the interpreter lock.
 #[derive(FromPyObject)]
 pub(crate) enum FloatArray<'py> {
     #[pyo3(transparent, annotation = "float32 array")]
@@ -35,20 +36,29 @@ impl FloatArray<'_> {
 
 /// `as_slice` also takes Fortran order, whose numbers come in another sequence.
 pub(crate) fn in_c_order(is_c_contiguous: bool) -> PyResult<()> {
-    if is_c_contiguous { Ok(()) } else { Err(PyValueError::new_err("expected an array in C order")) }
+    if is_c_contiguous {
+        Ok(())
+    } else {
+        Err(PyValueError::new_err("expected an array in C order"))
+    }
 }
 
 /// The bounds of this kind in these arrays.
 pub(crate) fn bounds<'a>(kind: &str, arrays: &'a [FloatArray<'_>]) -> PyResult<Bounds<'a>> {
     match (kind, arrays) {
-        ("spheres", [centers, radii]) => Ok(Bounds::Spheres { centers: centers.floats()?, radii: radii.floats()? }),
+        ("spheres", [centers, radii]) => {
+            Ok(Bounds::Spheres { centers: centers.floats()?, radii: radii.floats()? })
+        }
         ("boxes", [min, max]) => Ok(Bounds::Boxes { min: min.floats()?, max: max.floats()? }),
         ("oriented_boxes", [centers, half_sizes, rotations]) => Ok(Bounds::OrientedBoxes {
             centers: centers.floats()?,
             half_sizes: half_sizes.floats()?,
             rotations: rotations.floats()?,
         }),
-        _ => Err(PyValueError::new_err(format!("bounds: no kind {kind:?} of {} arrays", arrays.len()))),
+        _ => Err(PyValueError::new_err(format!(
+            "bounds: no kind {kind:?} of {} arrays",
+            arrays.len()
+        ))),
     }
 }
 

@@ -31,7 +31,8 @@ impl Camera {
         reversed_z: bool,
         size: (u32, u32),
     ) -> PyResult<Self> {
-        let projection = Projection::Perspective { fov_y, near, far, convention: convention(reversed_z) };
+        let projection =
+            Projection::Perspective { fov_y, near, far, convention: convention(reversed_z) };
         looking(py, &Pose { eye, target, up }, &projection, size)
     }
 
@@ -66,7 +67,8 @@ impl Camera {
     ) -> PyResult<Self> {
         let (left, right, bottom, top) = borders;
         let convention = convention(reversed_z);
-        let projection = Projection::Orthographic { left, right, bottom, top, near, far, convention };
+        let projection =
+            Projection::Orthographic { left, right, bottom, top, near, far, convention };
         looking(py, &Pose { eye, target, up }, &projection, size)
     }
 
@@ -77,7 +79,14 @@ impl Camera {
         reversed_z: bool,
         size: (u32, u32),
     ) -> PyResult<Self> {
-        made(py, hiz_core::Camera::from_clip_from_world(clip_from_world, image_size(size), convention(reversed_z)))
+        made(
+            py,
+            hiz_core::Camera::from_clip_from_world(
+                clip_from_world,
+                image_size(size),
+                convention(reversed_z),
+            ),
+        )
     }
 
     #[staticmethod]
@@ -89,7 +98,15 @@ impl Camera {
         size: (u32, u32),
     ) -> PyResult<Self> {
         let (size, convention) = (image_size(size), convention(reversed_z));
-        made(py, hiz_core::Camera::from_clip_from_camera(clip_from_camera, camera_from_world, size, convention))
+        made(
+            py,
+            hiz_core::Camera::from_clip_from_camera(
+                clip_from_camera,
+                camera_from_world,
+                size,
+                convention,
+            ),
+        )
     }
 
     #[staticmethod]
@@ -101,7 +118,15 @@ impl Camera {
         size: (u32, u32),
     ) -> PyResult<Self> {
         let (size, convention) = (image_size(size), convention(reversed_z));
-        made(py, hiz_core::Camera::from_clip_from_camera_pose(clip_from_camera, world_from_camera, size, convention))
+        made(
+            py,
+            hiz_core::Camera::from_clip_from_camera_pose(
+                clip_from_camera,
+                world_from_camera,
+                size,
+                convention,
+            ),
+        )
     }
 
     fn with_size(&self, py: Python<'_>, size: (u32, u32)) -> PyResult<Self> {
@@ -139,14 +164,26 @@ pub(crate) fn frustum_matrix(
     reversed_z: bool,
     size: (u32, u32),
 ) -> PyResult<Mat4> {
-    off_centre(borders, near, far, reversed_z).clip_from_camera(image_size(size)).map_err(|error| raised(py, error))
+    off_centre(borders, near, far, reversed_z)
+        .clip_from_camera(image_size(size))
+        .map_err(|error| raised(py, error))
 }
 
-fn off_centre((left, right, bottom, top): Borders, near: f64, far: Option<f64>, reversed_z: bool) -> Projection {
+fn off_centre(
+    (left, right, bottom, top): Borders,
+    near: f64,
+    far: Option<f64>,
+    reversed_z: bool,
+) -> Projection {
     Projection::Frustum { left, right, bottom, top, near, far, convention: convention(reversed_z) }
 }
 
-fn looking(py: Python<'_>, pose: &Pose, projection: &Projection, size: (u32, u32)) -> PyResult<Camera> {
+fn looking(
+    py: Python<'_>,
+    pose: &Pose,
+    projection: &Projection,
+    size: (u32, u32),
+) -> PyResult<Camera> {
     made(py, hiz_core::Camera::look_at(pose, projection, image_size(size)))
 }
 

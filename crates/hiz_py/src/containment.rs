@@ -27,7 +27,11 @@ fn mesh<'a>((vertices, triangles): &'a MeshArrays<'_>) -> PyResult<TriangleMesh<
 /// What of a proxy is not inside of its mesh.
 #[pyfunction]
 #[expect(clippy::needless_pass_by_value, reason = "the arrays are held during the call")]
-pub(crate) fn check_proxy(py: Python<'_>, proxy: MeshArrays<'_>, mesh: MeshArrays<'_>) -> PyResult<Protrusion> {
+pub(crate) fn check_proxy(
+    py: Python<'_>,
+    proxy: MeshArrays<'_>,
+    mesh: MeshArrays<'_>,
+) -> PyResult<Protrusion> {
     let (proxy, mesh) = (self::mesh(&proxy)?, self::mesh(&mesh)?);
     let found = py
         .detach(|| hiz_ref::check_proxy(&proxy, &mesh))
@@ -35,8 +39,8 @@ pub(crate) fn check_proxy(py: Python<'_>, proxy: MeshArrays<'_>, mesh: MeshArray
     Ok((found.triangles, found.witnesses, found.vertices, found.distance))
 }
 
-/// How far each instance's vertices are outside of its bounds; -1 for those that contain them. `instances`: number of a mesh and,
-/// where it is placed, of a matrix.
+/// How far each instance's vertices are outside of its bounds; -1 for those that contain them.
+/// `instances`: number of a mesh and, where it is placed, of a matrix.
 #[pyfunction]
 #[expect(clippy::needless_pass_by_value, reason = "the arrays are held during the call")]
 pub(crate) fn check_bounds<'py>(
@@ -57,11 +61,17 @@ pub(crate) fn check_bounds<'py>(
         *mesh < meshes.len() && matrix.is_none_or(|matrix| matrix < matrices.len())
     };
     if instances.len() != count || !instances.iter().all(known) {
-        return Err(PyValueError::new_err(format!("meshes: expected one for each of {count} instances")));
+        return Err(PyValueError::new_err(format!(
+            "meshes: expected one for each of {count} instances"
+        )));
     }
     let outside: Vec<f64> = py.detach(|| {
         let check = |(i, (mesh, matrix)): (usize, &(usize, Option<usize>))| {
-            hiz_ref::check_bounds(&volume(&volumes, i), meshes[*mesh].vertices, matrix.map(|k| &matrices[k]))
+            hiz_ref::check_bounds(
+                &volume(&volumes, i),
+                meshes[*mesh].vertices,
+                matrix.map(|k| &matrices[k]),
+            )
         };
         instances.iter().enumerate().map(|one| check(one).unwrap_or(-1.0)).collect()
     });

@@ -1,7 +1,8 @@
 //! The answer of a cull, read on request.
 
 use hiz_core::{
-    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, Order, Outputs, VisibleOptions, headless,
+    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, Order, Outputs, VisibleOptions,
+    headless,
 };
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
@@ -109,7 +110,9 @@ impl Culling {
 
     /// The records one after the other, 20 bytes each.
     fn draws<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        self.0.run(py, headless::Culling::draws).map(|draws| PyBytes::new(py, bytemuck::cast_slice(&draws)))
+        self.0
+            .run(py, headless::Culling::draws)
+            .map(|draws| PyBytes::new(py, bytemuck::cast_slice(&draws)))
     }
 
     fn counts(&self, py: Python<'_>) -> PyResult<Counts> {

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use hiz_core::headless::{self, AdapterSummary};
 use hiz_core::{
-    ConservativeDepthOptions, DepthConvention, DepthKind, DepthTolerance, FaceCull, Floats, InstanceOptions, MeshData,
-    OccluderOptions, PyramidOptions, StoredLevels, StoredOrder,
+    ConservativeDepthOptions, DepthConvention, DepthKind, DepthTolerance, FaceCull, Floats,
+    InstanceOptions, MeshData, OccluderOptions, PyramidOptions, StoredLevels, StoredOrder,
 };
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -40,12 +40,14 @@ fn open(adapter: Option<&str>) -> hiz_core::Result<headless::Engine> {
 }
 
 /// `HIZVK_PLANTED_FAULT` (`what => by what`, one a line) replaces texts in the shaders, as for the
-/// Rust tests: does a Python test turn red? A release has no word of it.
+/// Rust tests: does a Python test turn red?
+/// A release has no word of it.
 #[cfg(debug_assertions)]
 fn open(adapter: Option<&str>) -> hiz_core::Result<headless::Engine> {
     let planted = std::env::var("HIZVK_PLANTED_FAULT").unwrap_or_default();
     let planted: Vec<String> = planted.lines().map(|line| line.replace("\\n", "\n")).collect();
-    let faults: Vec<(&str, &str)> = planted.iter().filter_map(|line| line.split_once(" => ")).collect();
+    let faults: Vec<(&str, &str)> =
+        planted.iter().filter_map(|line| line.split_once(" => ")).collect();
     headless::Engine::with_planted_faults(adapter, &faults)
 }
 
@@ -129,7 +131,12 @@ impl Engine {
             .map(|occluders| Occluders(Held::new(py, occluders)))
     }
 
-    fn render_depth(&self, py: Python<'_>, occluders: &Occluders, camera: &Camera) -> PyResult<DepthImage> {
+    fn render_depth(
+        &self,
+        py: Python<'_>,
+        occluders: &Occluders,
+        camera: &Camera,
+    ) -> PyResult<DepthImage> {
         let occluders = occluders.0.get(py)?;
         self.0
             .run(py, |engine| engine.render_depth(&occluders, &camera.0))
@@ -150,7 +157,8 @@ impl Engine {
             .map(|depth| DepthImage(Held::new(py, depth)))
     }
 
-    /// `rounding`: to which floats the numbers had been rounded before they came, "none", "single" or "half".
+    /// `rounding`: to which floats the numbers had been rounded before they came, "none", "single"
+    /// or "half".
     #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn upload_depth(
         &self,
@@ -180,7 +188,9 @@ impl Engine {
                 engine.upload_depth_within(ndc, camera, tolerance)
             }
             _ => {
-                let (ndc, left) = hiz_core::ndc_from_kind_within(image, kind, scale, &invalid, camera, tolerance)?;
+                let (ndc, left) = hiz_core::ndc_from_kind_within(
+                    image, kind, scale, &invalid, camera, tolerance,
+                )?;
                 engine.upload_depth_within(&ndc, camera, left)
             }
         };
@@ -191,7 +201,9 @@ impl Engine {
         let levels = StoredLevels { first: levels.0, last: levels.1 };
         let options = PyramidOptions { levels, ..PyramidOptions::default() };
         let depth = depth.0.get(py)?;
-        let reduce = |engine: &headless::Engine| Ok((engine.clone(), engine.pyramid_with(&depth, &options)?));
+        let reduce = |engine: &headless::Engine| {
+            Ok((engine.clone(), engine.pyramid_with(&depth, &options)?))
+        };
         self.0.run(py, reduce).map(|built| Pyramid(Held::new(py, built)))
     }
 
@@ -244,7 +256,8 @@ impl Engine {
         self.0.run(py, headless::Engine::wait)
     }
 
-    /// For tests: what the engine itself says in a fork, where [`Held::get`] speaks first; and a clone of it is dropped.
+    /// For tests: what the engine itself says in a fork, where [`Held::get`] speaks first; and a
+    /// clone of it is dropped.
     fn wait_without_guard(&self, py: Python<'_>) -> PyResult<()> {
         let engine = headless::Engine::clone(&*self.0.look(py)?);
         detached(py, move || engine.wait())
@@ -274,7 +287,9 @@ impl Instances {
     }
 
     fn invalid<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u64>>> {
-        self.0.run(py, |instances| instances.invalid()).map(|invalid| PyArray1::from_vec(py, invalid))
+        self.0
+            .run(py, |instances| instances.invalid())
+            .map(|invalid| PyArray1::from_vec(py, invalid))
     }
 
     fn host_bytes(&self, py: Python<'_>) -> PyResult<u64> {
@@ -299,7 +314,8 @@ impl Occluders {
         Ok(self.0.look(py)?.surface().host_bytes())
     }
 
-    /// World positions, 3 a vertex; vertices, 3 a triangle; and the faces that do not occlude. Copies.
+    /// World positions, 3 a vertex; vertices, 3 a triangle; and the faces that do not occlude.
+    /// Copies.
     fn surface<'py>(&self, py: Python<'py>) -> PyResult<SurfaceArrays<'py>> {
         let occluders = self.0.look(py)?;
         let surface = occluders.surface();

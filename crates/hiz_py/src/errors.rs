@@ -1,4 +1,5 @@
-//! Errors of the engine as the exceptions of `hizvk.errors`, or as plain `ValueError` for what an argument did wrong.
+//! Errors of the engine as the exceptions of `hizvk.errors`, or as plain `ValueError` for what an
+//! argument did wrong.
 
 use hiz_core::Error;
 use pyo3::exceptions::PyValueError;
@@ -35,7 +36,8 @@ static LIMIT: Exception = Exception::new("LimitError");
 static DEVICE_LOST: Exception = Exception::new("DeviceLostError");
 static OUT_OF_MEMORY: Exception = Exception::new("OutOfMemoryError");
 
-/// Imports all of them: what is made once at its first use has a lock, which a forked child may find held.
+/// Imports all of them: what is made once at its first use has a lock, which a forked child may
+/// find held.
 pub(crate) fn prepare(py: Python<'_>) -> PyResult<()> {
     for exception in [&HIZ_ERROR, &NO_ADAPTER, &LIMIT, &DEVICE_LOST, &OUT_OF_MEMORY] {
         exception.class.import(py, "hizvk.errors", exception.name)?;

@@ -2,12 +2,13 @@
 //! refused in a fork of it.
 //!
 //! A driver may be at work on threads of its own after the last wait for it; only the destruction
-//! of the device joins them. The interpreter drops nothing that a module still names when it ends,
-//! so [`let_go`] empties every holder at its exit.
+//! of the device joins them.
+//! The interpreter drops nothing that a module still names when it ends, so [`let_go`] empties
+//! every holder at its exit.
 //!
-//! A lock that another thread holds at a fork is never released in the child. So those here are
-//! only held with the interpreter lock, which whoever forks has; and [`before_fork`] waits until no
-//! call is within the driver, whose locks a child would meet.
+//! A lock that another thread holds at a fork is never released in the child.
+//! So those here are only held with the interpreter lock, which whoever forks has; and
+//! [`before_fork`] waits until no call is within the driver, whose locks a child would meet.
 
 use std::any::Any;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
@@ -41,7 +42,10 @@ pub(crate) struct Held<T: OnDevice>(Arc<Cell<T>>);
 
 impl<T: OnDevice> Held<T> {
     pub(crate) fn new(py: Python<'_>, value: T) -> Self {
-        let cell = Arc::new(Cell { process: std::process::id(), contents: Mutex::new(Some(Arc::new(value))) });
+        let cell = Arc::new(Cell {
+            process: std::process::id(),
+            contents: Mutex::new(Some(Arc::new(value))),
+        });
         let as_any: Arc<dyn Empty> = cell.clone();
         house(py).admit(Arc::downgrade(&as_any));
         Self(cell)
@@ -74,13 +78,18 @@ impl<T: OnDevice> Held<T> {
     }
 
     /// [`detached`] with what is held.
-    pub(crate) fn run<R: Send>(&self, py: Python<'_>, work: impl Send + FnOnce(&T) -> Result<R, Error>) -> PyResult<R> {
+    pub(crate) fn run<R: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl Send + FnOnce(&T) -> Result<R, Error>,
+    ) -> PyResult<R> {
         let value = self.get(py)?;
         detached(py, || work(&value))
     }
 }
 
-/// What a [`Held`] holds. The lock is held for moments, with the interpreter lock.
+/// What a [`Held`] holds.
+/// The lock is held for moments, with the interpreter lock.
 struct Cell<T> {
     process: u32,
     contents: Mutex<Option<Arc<T>>>,
@@ -97,7 +106,9 @@ impl<T> Drop for Cell<T> {
         if self.process != std::process::id() {
             // In a fork the device's threads are gone, and its locks may be held for ever: nothing
             // of it may be touched.
-            std::mem::forget(self.contents.get_mut().unwrap_or_else(PoisonError::into_inner).take());
+            std::mem::forget(
+                self.contents.get_mut().unwrap_or_else(PoisonError::into_inner).take(),
+            );
         }
     }
 }
@@ -146,7 +157,8 @@ impl House {
     }
 }
 
-/// The one of this process. Like a cell's, its lock is only held with the interpreter lock.
+/// The one of this process.
+/// Like a cell's, its lock is only held with the interpreter lock.
 fn house(_with_the_interpreter_lock: Python<'_>) -> MutexGuard<'static, House> {
     static HOUSE: Mutex<House> = Mutex::new(House::new(0, false));
     let mut house = HOUSE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -204,8 +216,8 @@ where
     result.map_err(|error| raised(py, error))
 }
 
-/// Lets other threads have the interpreter for a moment. (Waiting by a condition variable would
-/// hold a lock without the interpreter's.)
+/// Lets other threads have the interpreter for a moment.
+/// (Waiting by a condition variable would hold a lock without the interpreter's.)
 fn nap(py: Python<'_>) {
     py.detach(|| std::thread::sleep(Duration::from_millis(1)));
 }
@@ -219,11 +231,12 @@ pub(crate) fn before_fork(py: Python<'_>) {
         nap(py);
     }
     let holders = house(py).holders.clone();
-    let engines: Vec<_> = holders.iter().filter_map(Weak::upgrade).filter_map(|holder| holder.engine()).collect();
+    let engines: Vec<_> =
+        holders.iter().filter_map(Weak::upgrade).filter_map(|holder| holder.engine()).collect();
     py.detach(|| {
         for engine in &engines {
-            // What is freed after the end of one submit is freed before that of the next. A lost
-            // device is idle.
+            // What is freed after the end of one submit is freed before that of the next.
+            // A lost device is idle.
             engine.queue().submit([]);
             drop(engine.wait());
         }
@@ -240,7 +253,8 @@ pub(crate) fn after_fork(py: Python<'_>) {
 }
 
 /// The interpreter is about to end: waits for the calls of threads that it does not wait for
-/// (daemons), and lets go of every device. What comes later is an error.
+/// (daemons), and lets go of every device.
+/// What comes later is an error.
 #[pyfunction]
 pub(crate) fn let_go(py: Python<'_>) {
     house(py).closed = true;
@@ -248,6 +262,7 @@ pub(crate) fn let_go(py: Python<'_>) {
         nap(py);
     }
     let holders = std::mem::take(&mut house(py).holders);
-    let held: Vec<_> = holders.iter().filter_map(Weak::upgrade).filter_map(|holder| holder.empty()).collect();
+    let held: Vec<_> =
+        holders.iter().filter_map(Weak::upgrade).filter_map(|holder| holder.empty()).collect();
     py.detach(|| drop(held));
 }

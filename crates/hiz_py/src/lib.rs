@@ -1,7 +1,9 @@
-//! The module `hizvk._core`: conversion of arguments, release of the interpreter lock, errors. No algorithm lives here.
+//! The module `hizvk._core`: conversion of arguments, release of the interpreter lock, errors.
+//! No algorithm lives here.
 //!
-//! The Python modules around it check every argument first, so what arrives here is float32 or float64 in C order; what is
-//! still wrong is refused by `hiz_core` in the same words. Every class is frozen and may be used from any thread.
+//! The Python modules around it check every argument first, so what arrives here is float32 or
+//! float64 in C order; what is still wrong is refused by `hiz_core` in the same words.
+//! Every class is frozen and may be used from any thread.
 
 mod arguments;
 mod camera;
@@ -13,7 +15,8 @@ mod held;
 mod reference;
 mod yardstick;
 
-/// The compiled engine of `hizvk`. Not public: use the modules around it.
+/// The compiled engine of `hizvk`.
+/// Not public: use the modules around it.
 #[pyo3::pymodule]
 mod _core {
     #[pymodule_export]

@@ -54,7 +54,9 @@ pub(crate) fn reference_classify<'py>(
         own_depth: match own_depth {
             "nearest" => OwnDepth::Nearest,
             "pixel" => OwnDepth::PerPixel,
-            other => return Err(PyValueError::new_err(format!("own_depth: no own depth {other:?}"))),
+            other => {
+                return Err(PyValueError::new_err(format!("own_depth: no own depth {other:?}")));
+            }
         },
         ..Options::default()
     };
@@ -76,7 +78,8 @@ pub(crate) fn reference_classify<'py>(
             hiz_ref::depth_bounds(&view, &numbers, meaning)
         })
         .map_err(refused)?;
-    let verdict = |i| hiz_ref::classify_between(&view, &volume(&volumes, i), &depth, options).map(code);
+    let verdict =
+        |i| hiz_ref::classify_between(&view, &volume(&volumes, i), &depth, options).map(code);
     let mut codes = Vec::with_capacity(count);
     while codes.len() < count {
         let batch = codes.len()..count.min(codes.len() + BATCH);
@@ -99,7 +102,10 @@ pub(crate) fn reference_pyramid<'py>(
     in_c_order(depth.is_c_contiguous())?;
     let depth = depth.as_slice()?;
     let levels = py.detach(|| hiz_ref::pyramid(depth, width, height, reversed_z));
-    Ok(levels.into_iter().map(|level| ((level.height, level.width), PyArray1::from_vec(py, level.texels))).collect())
+    Ok(levels
+        .into_iter()
+        .map(|level| ((level.height, level.width), PyArray1::from_vec(py, level.texels)))
+        .collect())
 }
 
 fn code(verdict: Verdict) -> u8 {
@@ -117,14 +123,20 @@ fn numbers<const N: usize>(array: &Floats<'_>, first: usize) -> [f64; N] {
 
 pub(crate) fn volume(bounds: &Bounds<'_>, i: usize) -> Volume {
     match bounds {
-        Bounds::Spheres { centers, radii } => Volume::Sphere { center: numbers(centers, 3 * i), radius: radii.get(i) },
-        Bounds::Boxes { min, max } => Volume::Box { min: numbers(min, 3 * i), max: numbers(max, 3 * i) },
+        Bounds::Spheres { centers, radii } => {
+            Volume::Sphere { center: numbers(centers, 3 * i), radius: radii.get(i) }
+        }
+        Bounds::Boxes { min, max } => {
+            Volume::Box { min: numbers(min, 3 * i), max: numbers(max, 3 * i) }
+        }
         Bounds::OrientedBoxes { centers, half_sizes, rotations } => {
             let rows: [f64; 9] = numbers(rotations, 9 * i);
             Volume::OrientedBox {
                 center: numbers(centers, 3 * i),
                 half_sizes: numbers(half_sizes, 3 * i),
-                axes: std::array::from_fn(|row| std::array::from_fn(|column| rows[3 * row + column])),
+                axes: std::array::from_fn(|row| {
+                    std::array::from_fn(|column| rows[3 * row + column])
+                }),
             }
         }
     }

@@ -1,9 +1,12 @@
-//! What `hizvk bench --speed` times: submits of work whose buffers were made beforehand, and the same work in other shapes.
+//! What `hizvk bench --speed` times: submits of work whose buffers were made beforehand, and the
+//! same work in other shapes.
 
 use std::sync::Arc;
 
 use hiz_core::yardstick::{self, PerLevelReduction, ReductionShape};
-use hiz_core::{CullOptions, Error, Instances, Pyramid, PyramidOptions, StoredLevels, Visible, headless};
+use hiz_core::{
+    CullOptions, Error, Instances, Pyramid, PyramidOptions, StoredLevels, Visible, headless,
+};
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -47,12 +50,17 @@ impl Yardstick {
         in_c_order(source.is_c_contiguous() && target.is_c_contiguous())?;
         let (from, to) = (source.as_slice()?, target.as_slice_mut()?);
         if from.len() != to.len() {
-            return Err(PyValueError::new_err(format!("target: expected {} numbers, got {}", from.len(), to.len())));
+            return Err(PyValueError::new_err(format!(
+                "target: expected {} numbers, got {}",
+                from.len(),
+                to.len()
+            )));
         }
         detached(py, || Ok(yardstick::memcpy_ms(from, to)))
     }
 
-    /// The reduction of `depth`: the library's own with these levels, or one dispatch a level, which makes all of them.
+    /// The reduction of `depth`: the library's own with these levels, or one dispatch a level,
+    /// which makes all of them.
     fn reduction(
         &self,
         py: Python<'_>,
@@ -61,8 +69,11 @@ impl Yardstick {
         levels: (u32, u32),
     ) -> PyResult<YardstickReduction> {
         let (engine, depth) = (self.0.get(py)?, depth.0.get(py)?);
-        let (engine, depth) = (headless::Engine::clone(&engine), headless::DepthImage::clone(&depth));
-        let per_level = |shape| detached(py, || PerLevelReduction::new(&engine, &depth, shape)).map(Reducer::PerLevel);
+        let (engine, depth) =
+            (headless::Engine::clone(&engine), headless::DepthImage::clone(&depth));
+        let per_level = |shape| {
+            detached(py, || PerLevelReduction::new(&engine, &depth, shape)).map(Reducer::PerLevel)
+        };
         let reducer = match shape {
             "own" => {
                 let levels = StoredLevels { first: levels.0, last: levels.1 };
@@ -76,7 +87,8 @@ impl Yardstick {
         Ok(YardstickReduction(Held::new(py, Reduction { engine, depth, reducer })))
     }
 
-    /// The cull of `instances`, into buffers of its own; with `depth` its reduction into `pyramid` goes before it.
+    /// The cull of `instances`, into buffers of its own; with `depth` its reduction into `pyramid`
+    /// goes before it.
     #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn cull(
         &self,
@@ -203,7 +215,9 @@ impl Cull {
         if self.certified {
             engine.context().record_cull(encoder, instances, camera, pyramid, visible, options)
         } else {
-            yardstick::record_uncertified_cull(engine, encoder, instances, camera, pyramid, visible, options)
+            yardstick::record_uncertified_cull(
+                engine, encoder, instances, camera, pyramid, visible, options,
+            )
         }
     }
 }

@@ -1,4 +1,5 @@
-//! How many verdicts a second one core gives: `cargo run --release -p hiz_ref --example throughput`.
+//! How many verdicts a second one core gives: `cargo run --release -p hiz_ref --example
+//! throughput`.
 
 #[path = "../tests/common/mod.rs"]
 mod common;

@@ -1,8 +1,11 @@
-//! What the numbers of a depth image mean: the NDC depth of each pixel, exactly, between two neighbouring float32.
+//! What the numbers of a depth image mean: the NDC depth of each pixel, exactly, between two
+//! neighbouring float32.
 //!
-//! Every depth here has the form `(a + b sqrt(q)) / n` with a, b, q and n polynomials in the inputs: a ray's length is the only root.
-//! Whether it lies above a float32 is the sign of a polynomial again (`a - f n` against `b sqrt(q)`, squared), so the two float32 around it are
-//! found by float64 with an error bound, and by exact arithmetic where that leaves more than two.
+//! Every depth here has the form `(a + b sqrt(q)) / n` with a, b, q and n polynomials in the
+//! inputs: a ray's length is the only root.
+//! Whether it lies above a float32 is the sign of a polynomial again (`a - f n` against `b
+//! sqrt(q)`, squared), so the two float32 around it are found by float64 with an error bound, and
+//! by exact arithmetic where that leaves more than two.
 
 use crate::Error;
 use crate::dyadic::Dyadic;
@@ -19,7 +22,8 @@ pub enum DepthKind {
     Ndc,
     /// NDC depth, near 1, far 0.
     ReversedNdc,
-    /// World units along the viewing direction: the normal of the planes of equal w; of a parallel projection, the rays.
+    /// World units along the viewing direction: the normal of the planes of equal w; of a parallel
+    /// projection, the rays.
     Z,
     /// World units along the ray through the pixel's centre.
     Distance,
@@ -34,7 +38,8 @@ pub struct DepthMeaning<'a> {
     pub scale: f64,
     /// Numbers of the image, before `scale`, that mean "no data".
     pub invalid: &'a [f64],
-    /// Whether `view.origin` is where the camera stands. View depth of a parallel projection starts there, or nobody knows where.
+    /// Whether `view.origin` is where the camera stands.
+    /// View depth of a parallel projection starts there, or nobody knows where.
     pub origin_is_eye: bool,
 }
 
@@ -51,25 +56,36 @@ pub struct DepthBounds {
 
 /// The NDC depth of each pixel of `image` (row order, row 0 on top).
 ///
-/// "No data", which is as far as can be: NaN, infinite and `invalid` numbers; what lies outside `0..=1` of NDC depth; of kinds `Z` and `Distance`
-/// zero and negative numbers too, unless the view is a parallel projection whose near plane lies behind `view.origin` (by more than 2^-40 of
-/// the depth range and 2^-48 of what `origin` moves depth by). View depth 0 of a parallel projection is at `view.origin`.
+/// "No data", which is as far as can be: NaN, infinite and `invalid` numbers; what lies outside
+/// `0..=1` of NDC depth; of kinds `Z` and `Distance` zero and negative numbers too, unless the view
+/// is a parallel projection whose near plane lies behind `view.origin` (by more than 2^-40 of the
+/// depth range and 2^-48 of what `origin` moves depth by).
+/// View depth 0 of a parallel projection is at `view.origin`.
 ///
 /// # Errors
 ///
 /// If the view is not finite, of another size or singular, or if kind or scale contradict it.
-pub fn depth_bounds(view: &View, image: &[f64], meaning: DepthMeaning) -> Result<DepthBounds, Error> {
+pub fn depth_bounds(
+    view: &View,
+    image: &[f64],
+    meaning: DepthMeaning,
+) -> Result<DepthBounds, Error> {
     view.check()?;
     view.check_length(image.len())?;
     let DepthMeaning { kind, scale, invalid, origin_is_eye } = meaning;
     let far = if view.reversed { 0.0 } else { 1.0 };
-    let mut bounds = DepthBounds { nearer: Vec::with_capacity(image.len()), farther: Vec::with_capacity(image.len()) };
+    let mut bounds = DepthBounds {
+        nearer: Vec::with_capacity(image.len()),
+        farther: Vec::with_capacity(image.len()),
+    };
     let metric = matches!(kind, DepthKind::Z | DepthKind::Distance);
     if !metric && (kind == DepthKind::ReversedNdc) != view.reversed {
         return Err(Error::DepthMeaning("kind: expected NDC depth in the view's own convention"));
     }
     if !(scale > 0.0 && scale.is_finite()) || (!metric && scale != 1.0) {
-        return Err(Error::DepthMeaning("scale: expected a positive finite number, 1 for NDC depth"));
+        return Err(Error::DepthMeaning(
+            "scale: expected a positive finite number, 1 for NDC depth",
+        ));
     }
     if metric && !origin_is_eye && view.rows[3][..3] == [0.0; 3] {
         return Err(Error::DepthMeaning(
@@ -83,8 +99,12 @@ pub fn depth_bounds(view: &View, image: &[f64], meaning: DepthMeaning) -> Result
             let number = *pixels.next().expect("as many as pixels");
             let around = match &rays {
                 _ if !number.is_finite() || invalid.contains(&number) => None,
-                None => bracket(number, number, |f| number.partial_cmp(&f64::from(f)).expect("a finite number")),
-                Some(rays) if number > 0.0 || rays.signed => rays.around([column, row], number, scale),
+                None => bracket(number, number, |f| {
+                    number.partial_cmp(&f64::from(f)).expect("a finite number")
+                }),
+                Some(rays) if number > 0.0 || rays.signed => {
+                    rays.around([column, row], number, scale)
+                }
                 Some(_) => None,
             };
             let [low, high] = around.unwrap_or([far; 2]);
@@ -109,7 +129,9 @@ impl<'a> Rays<'a> {
     fn new(view: &'a View, kind: DepthKind) -> Result<Self, Error> {
         let exact = Geometry::<Dyadic>::new(view);
         if exact.determinant.is_zero() {
-            return Err(Error::DepthMeaning("view: expected an invertible projection, got a singular matrix"));
+            return Err(Error::DepthMeaning(
+                "view: expected an invertible projection, got a singular matrix",
+            ));
         }
         if exact.parallel && exact.along.is_zero() {
             return Err(Error::DepthMeaning("view: expected depth to change along the rays"));
@@ -122,18 +144,23 @@ impl<'a> Rays<'a> {
         Ok(Rays { view, kind, signed, float, exact })
     }
 
-    /// The float32 next to the depth of `number * scale` in a pixel; `None` where it is outside `0..=1`.
+    /// The float32 next to the depth of `number * scale` in a pixel; `None` where it is outside
+    /// `0..=1`.
     fn around(&self, pixel: [u32; 2], number: f64, scale: f64) -> Option<[f32; 2]> {
         let quick = self.float.depth(self.view, self.kind, pixel, number, scale).rounded();
         let exact = OnceCell::new();
         bracket(quick.mid - quick.err(), quick.mid + quick.err(), |f| {
-            exact.get_or_init(|| self.exact.depth(self.view, self.kind, pixel, number, scale)).compare(f)
+            exact
+                .get_or_init(|| self.exact.depth(self.view, self.kind, pixel, number, scale))
+                .compare(f)
         })
     }
 }
 
-/// The float32 next to a number of `0..=1` that lies in `low..=high` and compares to a float32 as told; both are it where it is
-/// one. `None` where the number is outside. Below the least normal float32 stand 0 and that one.
+/// The float32 next to a number of `0..=1` that lies in `low..=high` and compares to a float32 as
+/// told; both are it where it is one.
+/// `None` where the number is outside.
+/// Below the least normal float32 stand 0 and that one.
 fn bracket(low: f64, high: f64, compare: impl Fn(f32) -> Ordering) -> Option<[f32; 2]> {
     // Outwards once more, for the rounding of the ends; NaN is no end.
     let low = if low.is_nan() { f64::NEG_INFINITY } else { low.next_down() };
@@ -141,7 +168,9 @@ fn bracket(low: f64, high: f64, compare: impl Fn(f32) -> Ordering) -> Option<[f3
     if low > 1.0 || high < 0.0 {
         return None;
     }
-    for (end, open, outside) in [(0.0, low <= 0.0, Ordering::Less), (1.0, high >= 1.0, Ordering::Greater)] {
+    for (end, open, outside) in
+        [(0.0, low <= 0.0, Ordering::Less), (1.0, high >= 1.0, Ordering::Greater)]
+    {
         if open {
             match compare(end) {
                 Ordering::Equal => return Some([end; 2]),
@@ -225,8 +254,9 @@ fn cross<S: Scalar>(a: &Vector<S>, b: &Vector<S>) -> Vector<S> {
 
 /// What all pixels share.
 ///
-/// Through an eye: the matrix M of the linear rows x, y, w, by its adjugate. A point p whose clip coordinates are `w (x, y, 1)` is
-/// `M^-1 (w (x, y, 1) - constants)`. Parallel: M has the rows x, y and the rays' direction `x times y` instead.
+/// Through an eye: the matrix M of the linear rows x, y, w, by its adjugate.
+/// A point p whose clip coordinates are `w (x, y, 1)` is `M^-1 (w (x, y, 1) - constants)`.
+/// Parallel: M has the rows x, y and the rays' direction `x times y` instead.
 struct Geometry<S> {
     parallel: bool,
     /// Columns of the adjugate: `M^-1 = adjugate / determinant`.
@@ -236,8 +266,9 @@ struct Geometry<S> {
     z: Vector<S>,
     /// The linear part of w, squared.
     w_square: S,
-    /// Through an eye: determinant times z at the eye. Parallel: determinant times z where clip x and y are 0, on the plane through the
-    /// origin across the rays.
+    /// Through an eye: determinant times z at the eye.
+    /// Parallel: determinant times z where clip x and y are 0, on the plane through the origin
+    /// across the rays.
     constant: S,
     /// Parallel: how z grows along the direction, and the constant w.
     along: S,
@@ -266,11 +297,28 @@ impl<S: Scalar> Geometry<S> {
         let grows = along.sign() == Some(Ordering::Greater);
         let away = if grows == (view.reversed == (view.rows[3][3] < 0.0)) { 1.0 } else { -1.0 };
         let w_square = dot(&w_linear, &w_linear);
-        Geometry { parallel, adjugate, determinant, w_square, constant: start, along, w: constant(3), z, away }
+        Geometry {
+            parallel,
+            adjugate,
+            determinant,
+            w_square,
+            constant: start,
+            along,
+            w: constant(3),
+            z,
+            away,
+        }
     }
 
     /// The NDC depth at which `number * scale` lies in a pixel.
-    fn depth(&self, view: &View, kind: DepthKind, [column, row]: [u32; 2], number: f64, scale: f64) -> Root<S> {
+    fn depth(
+        &self,
+        view: &View,
+        kind: DepthKind,
+        [column, row]: [u32; 2],
+        number: f64,
+        scale: f64,
+    ) -> Root<S> {
         let (width, height) = (f64::from(view.width), f64::from(view.height));
         // The pixel's centre in NDC, times width and height: whole numbers.
         let area = S::exact(width * height);
@@ -282,10 +330,12 @@ impl<S: Scalar> Geometry<S> {
             let sum = a.times(&x).plus(&b.times(&y));
             if self.parallel { sum } else { sum.plus(&c.times(&area)) }
         };
-        // Times determinant and area: the ray along which w grows by 1. Parallel: the pixel's place beside that of x = y = 0.
+        // Times determinant and area: the ray along which w grows by 1.
+        // Parallel: the pixel's place beside that of x = y = 0.
         let ray = [at(0), at(1), at(2)];
         if self.parallel {
-            // z = (constant + w z.ray / area) / determinant + along value / |direction|, and |direction|^2 is the determinant.
+            // z = (constant + w z.ray / area) / determinant + along value / |direction|, and
+            // |direction|^2 is the determinant.
             let place = self.constant.times(&area).plus(&dot(&self.z, &ray).times(&self.w));
             let grown = self.along.times(&value).times(&area).times(&S::exact(self.away));
             return Root {

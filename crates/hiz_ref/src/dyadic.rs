@@ -4,8 +4,9 @@ use crate::scalar::Scalar;
 use num_bigint::{BigInt, Sign};
 use std::cmp::Ordering;
 
-/// An exact number. Every finite float64 is one, and sums, differences and products stay among them, so there is never a common
-/// denominator to reduce: several times faster here than fractions in lowest terms.
+/// An exact number.
+/// Every finite float64 is one, and sums, differences and products stay among them, so there is
+/// never a common denominator to reduce: several times faster here than fractions in lowest terms.
 #[derive(Clone, Debug)]
 pub(crate) struct Dyadic {
     mantissa: BigInt,
@@ -19,7 +20,9 @@ impl Dyadic {
         &self.mantissa << shift
     }
 
-    /// `mantissa * 2^exponent` in float64, 62 bits of the number cut off and rounded once: less than 2^-52 off, relative. 0 for 0.
+    /// `mantissa * 2^exponent` in float64, 62 bits of the number cut off and rounded once: less
+    /// than 2^-52 off, relative.
+    /// 0 for 0.
     fn leading(&self) -> (f64, i64) {
         let bits = self.mantissa.bits();
         let cut = bits.saturating_sub(62);
@@ -28,7 +31,8 @@ impl Dyadic {
         (sign * digits as f64, i64::from(self.exponent) + i64::try_from(cut).expect("fits memory"))
     }
 
-    /// `self / other`, less than 2^-48 off, relative; `None` where float64 cannot hold it, and for `other` 0.
+    /// `self / other`, less than 2^-48 off, relative; `None` where float64 cannot hold it, and for
+    /// `other` 0.
     pub(crate) fn quotient(&self, other: &Self) -> Option<f64> {
         let ((a, i), (b, j)) = (self.leading(), other.leading());
         let power = i32::try_from(i - j).ok().filter(|power| power.abs() < 2000)?;
@@ -49,8 +53,10 @@ impl Scalar for Dyadic {
         let bits = value.to_bits();
         let field = i32::try_from((bits >> 52) & 0x7ff).expect("eleven bits");
         let fraction = bits & ((1 << 52) - 1);
-        // IEEE 754: exponent field 0 means a subnormal, which has no hidden bit and the exponent of field 1.
-        let (integer, exponent) = if field == 0 { (fraction, -1074) } else { (fraction | (1 << 52), field - 1075) };
+        // IEEE 754: exponent field 0 means a subnormal, which has no hidden bit and the exponent of
+        // field 1.
+        let (integer, exponent) =
+            if field == 0 { (fraction, -1074) } else { (fraction | (1 << 52), field - 1075) };
         if integer == 0 {
             return Dyadic { mantissa: BigInt::ZERO, exponent: 0 };
         }
@@ -84,7 +90,10 @@ impl Scalar for Dyadic {
     }
 
     fn times(&self, other: &Self) -> Self {
-        Dyadic { mantissa: &self.mantissa * &other.mantissa, exponent: self.exponent + other.exponent }
+        Dyadic {
+            mantissa: &self.mantissa * &other.mantissa,
+            exponent: self.exponent + other.exponent,
+        }
     }
 
     fn negated(&self) -> Self {
@@ -163,7 +172,8 @@ mod tests {
 
     #[test]
     fn one_tenth_three_times_is_not_three_tenths() {
-        // The float64 nearest 0.1 lies above it and the one nearest 0.3 below: 3 * 0.1 > 0.3, although the two are within an ulp.
+        // The float64 nearest 0.1 lies above it and the one nearest 0.3 below: 3 * 0.1 > 0.3,
+        // although the two are within an ulp.
         let difference = Dyadic::exact(0.1).times(&Dyadic::exact(3.0)).minus(&Dyadic::exact(0.3));
         assert_eq!(difference.sign(), Some(Ordering::Greater));
         let least = Dyadic::exact(f64::from_bits(1));

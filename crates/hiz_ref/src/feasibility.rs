@@ -1,18 +1,28 @@
-//! Whether a cube or a ball meets a set of half-spaces, by complete enumeration of separating certificates.
+//! Whether a cube or a ball meets a set of half-spaces, by complete enumeration of separating
+//! certificates.
 //!
-//! Everything happens in the local coordinates of a volume, where it is the cube `[-1, 1]^3` or the unit ball and a linear function
-//! of position is a [`Form`]. If no point satisfies all of the conditions `R_i >= 0`, then some combination with weights
-//! `lambda_i >= 0` is negative on the whole volume (Farkas; the weight of a condition `R_i = 0` may have either sign). Such weights are
-//! found among finitely many candidates, each a polynomial in the inputs, so that signs of sums of products decide.
+//! Everything happens in the local coordinates of a volume, where it is the cube `[-1, 1]^3` or the
+//! unit ball and a linear function of position is a [`Form`].
+//! If no point satisfies all of the conditions `R_i >= 0`, then some combination with weights
+//! `lambda_i >= 0` is negative on the whole volume (Farkas; the weight of a condition `R_i = 0` may
+//! have either sign).
+//! Such weights are found among finitely many candidates, each a polynomial in the inputs, so that
+//! signs of sums of products decide.
 //!
-//! *Cube.* `g(lambda) = sum lambda_i m_i + sum_k |sum lambda_i v_ik|`, the maximum of the combination over the cube, is linear on each cell
-//! into which the hyperplanes `sum lambda_i v_ik = 0` cut the cone of weights, so it is negative somewhere only if it is on an edge of
-//! a cell: one, two, three or four weights with none, one, two or all three of these sums zero. (Four mean a negative constant: the
-//! half-spaces have no common point at all. For what the pixels of a camera see, one is easily found, and then four need no trial.)
+//! *Cube.*
+//! `g(lambda) = sum lambda_i m_i + sum_k |sum lambda_i v_ik|`, the maximum of the combination over
+//! the cube, is linear on each cell into which the hyperplanes `sum lambda_i v_ik = 0` cut the cone
+//! of weights, so it is negative somewhere only if it is on an edge of a cell: one, two, three or
+//! four weights with none, one, two or all three of these sums zero.
+//! (Four mean a negative constant: the half-spaces have no common point at all. For what the pixels
+//! of a camera see, one is easily found, and then four need no trial.)
 //!
-//! *Ball.* The nearest point of the intersection is the projection of the centre to the planes that are active there, and at most three
-//! independent ones are needed (Karush, Kuhn, Tucker; Caratheodory). With their values `m` at the centre and the Gram matrix `G` of
-//! their normals, the weights are `-adj(G) m` and the squared distance is `m . adj(G) m / det G`, to be compared with 1.
+//! *Ball.*
+//! The nearest point of the intersection is the projection of the centre to the planes that are
+//! active there, and at most three independent ones are needed (Karush, Kuhn, Tucker;
+//! Caratheodory).
+//! With their values `m` at the centre and the Gram matrix `G` of their normals, the weights are
+//! `-adj(G) m` and the squared distance is `m . adj(G) m / det G`, to be compared with 1.
 
 use crate::scalar::{Ball, Scalar};
 use std::cmp::Ordering;
@@ -36,7 +46,10 @@ pub(crate) struct Form<S> {
 impl<S: Scalar> Form<S> {
     pub(crate) fn scaled(&self, factor: f64) -> Form<S> {
         let factor = S::exact(factor);
-        Form { middle: self.middle.times(&factor), along: [0, 1, 2].map(|k| self.along[k].times(&factor)) }
+        Form {
+            middle: self.middle.times(&factor),
+            along: [0, 1, 2].map(|k| self.along[k].times(&factor)),
+        }
     }
 
     pub(crate) fn minus(&self, other: &Form<S>) -> Form<S> {
@@ -89,15 +102,22 @@ impl<S> Constraint<S> {
     }
 }
 
-/// Whether some point of the volume satisfies every constraint. With an exact scalar the answer is never `None`.
+/// Whether some point of the volume satisfies every constraint.
+/// With an exact scalar the answer is never `None`.
 ///
-/// `consistent` says that some point, of the volume or not, is known to satisfy them; it saves work.
-pub(crate) fn feasible<S: Scalar>(constraints: &[Constraint<S>], shape: Shape, consistent: bool) -> Option<bool> {
+/// `consistent` says that some point, of the volume or not, is known to satisfy them; it saves
+/// work.
+pub(crate) fn feasible<S: Scalar>(
+    constraints: &[Constraint<S>],
+    shape: Shape,
+    consistent: bool,
+) -> Option<bool> {
     let separated = match shape {
         Shape::Cube => cube_separated(constraints, consistent),
         Shape::Ball => {
             let separated = ball_separated(constraints);
-            // Its certificates presuppose that the half-spaces have a common point; if none is known, the cube around the ball decides.
+            // Its certificates presuppose that the half-spaces have a common point; if none is
+            // known, the cube around the ball decides.
             if consistent || separated == Some(true) {
                 separated
             } else {
@@ -108,10 +128,12 @@ pub(crate) fn feasible<S: Scalar>(constraints: &[Constraint<S>], shape: Shape, c
     separated.map(|separated| !separated)
 }
 
-/// The same in float64, with shortcuts for what is plain: one plane separates, or a guessed point satisfies everything.
+/// The same in float64, with shortcuts for what is plain: one plane separates, or a guessed point
+/// satisfies everything.
 pub(crate) fn feasible_in_float(constraints: &[Constraint<Ball>], shape: Shape) -> Option<bool> {
     for constraint in constraints.iter().filter(|c| !c.equality) {
-        let negated = Form { middle: constraint.form.middle.negated(), along: constraint.form.along };
+        let negated =
+            Form { middle: constraint.form.middle.negated(), along: constraint.form.along };
         if negated.is_positive_on(shape) == Some(true) {
             return Some(false);
         }
@@ -122,8 +144,9 @@ pub(crate) fn feasible_in_float(constraints: &[Constraint<Ball>], shape: Shape) 
     feasible(constraints, shape, is_consistent(constraints))
 }
 
-/// Whether some point, of the volume or not, surely satisfies all constraints. Tries one: if they come in opposite pairs (left and right,
-/// top and bottom, near and far), the point that is equally far inside both of each pair.
+/// Whether some point, of the volume or not, surely satisfies all constraints.
+/// Tries one: if they come in opposite pairs (left and right, top and bottom, near and far), the
+/// point that is equally far inside both of each pair.
 pub(crate) fn is_consistent(constraints: &[Constraint<Ball>]) -> bool {
     let [left, right, top, bottom, near, far] = constraints else {
         return false;
@@ -136,7 +159,8 @@ pub(crate) fn is_consistent(constraints: &[Constraint<Ball>]) -> bool {
     // Cramer's rule, columns i, j, k of the three rows.
     let det = |i: usize, j: usize, k: usize| {
         let [a, b, c] = &rows;
-        a[i] * (b[j] * c[k] - b[k] * c[j]) - a[j] * (b[i] * c[k] - b[k] * c[i]) + a[k] * (b[i] * c[j] - b[j] * c[i])
+        a[i] * (b[j] * c[k] - b[k] * c[j]) - a[j] * (b[i] * c[k] - b[k] * c[i])
+            + a[k] * (b[i] * c[j] - b[j] * c[i])
     };
     let scale = det(0, 1, 2);
     let point = [det(3, 1, 2) / scale, det(0, 3, 2) / scale, det(0, 1, 3) / scale];
@@ -166,8 +190,8 @@ fn or(a: Option<bool>, b: Option<bool>) -> Option<bool> {
     and(a.map(|x| !x), b.map(|x| !x)).map(|x| !x)
 }
 
-/// Looks for a point by projecting onto the worst violated half-space again and again. Nobody has to trust the search:
-/// its result counts only if every constraint surely holds there.
+/// Looks for a point by projecting onto the worst violated half-space again and again.
+/// Nobody has to trust the search: its result counts only if every constraint surely holds there.
 fn guess_point(constraints: &[Constraint<Ball>], shape: Shape) -> bool {
     const STEPS: usize = 24;
     /// Overshooting leads into the inside, where signs are certain.
@@ -261,9 +285,11 @@ fn cube_separated<S: Scalar>(constraints: &[Constraint<S>], consistent: bool) ->
     if consistent {
         return result;
     }
-    // Cramer: the weights that make four vectors of three components vanish are their 3x3 minors with alternating signs.
+    // Cramer: the weights that make four vectors of three components vanish are their 3x3 minors
+    // with alternating signs.
     let minor = |i: usize, j: usize, l: usize| {
-        let [a, b, c] = [[1, 2], [2, 0], [0, 1]].map(|[p, q]| cross(v(j, p), v(l, q), v(j, q), v(l, p)));
+        let [a, b, c] =
+            [[1, 2], [2, 0], [0, 1]].map(|[p, q]| cross(v(j, p), v(l, q), v(j, q), v(l, p)));
         let [a, b, c] = [a.times(v(i, 0)), b.times(v(i, 1)), c.times(v(i, 2))];
         a.plus(&b).plus(&c)
     };
@@ -271,7 +297,12 @@ fn cube_separated<S: Scalar>(constraints: &[Constraint<S>], consistent: bool) ->
         for j in i + 1..n {
             for l in j + 1..n {
                 for m in l + 1..n {
-                    let weights = [minor(j, l, m), minor(i, l, m).negated(), minor(i, j, m), minor(i, j, l).negated()];
+                    let weights = [
+                        minor(j, l, m),
+                        minor(i, l, m).negated(),
+                        minor(i, j, m),
+                        minor(i, j, l).negated(),
+                    ];
                     if try_weights(&[i, j, l, m], &weights, &[0, 1, 2]) {
                         return Some(true);
                     }
@@ -282,8 +313,10 @@ fn cube_separated<S: Scalar>(constraints: &[Constraint<S>], consistent: bool) ->
     result
 }
 
-/// Whether these weights, or their negatives, make a combination that is negative on the whole cube and have the signs that they need.
-/// The weights are known up to a common sign; `vanishing` lists the axes along which the combination is zero by construction.
+/// Whether these weights, or their negatives, make a combination that is negative on the whole cube
+/// and have the signs that they need.
+/// The weights are known up to a common sign; `vanishing` lists the axes along which the
+/// combination is zero by construction.
 fn is_certificate<S: Scalar>(
     constraints: &[Constraint<S>],
     members: &[usize],
@@ -322,18 +355,21 @@ fn is_certificate<S: Scalar>(
     or(and(positive, below(middle.clone())), and(negative, below(middle.negated())))
 }
 
-/// Whether the nearest point to the centre of some active set of at most three planes is outside the unit ball.
+/// Whether the nearest point to the centre of some active set of at most three planes is outside
+/// the unit ball.
 fn ball_separated<S: Scalar>(constraints: &[Constraint<S>]) -> Option<bool> {
     let n = constraints.len();
     let form = |i: usize| &constraints[i].form;
     let value = |i: usize| &form(i).middle;
-    let gram: Vec<Vec<S>> = (0..n).map(|i| (0..n).map(|j| form(i).dot(form(j))).collect()).collect();
+    let gram: Vec<Vec<S>> =
+        (0..n).map(|i| (0..n).map(|j| form(i).dot(form(j))).collect()).collect();
     let g = |i: usize, j: usize| &gram[i][j];
     // a b - c d
     let cross = |a: &S, b: &S, c: &S, d: &S| a.times(b).minus(&c.times(d));
 
-    // `solution` is adj(G) m, the weights times -1; `square` is det G. Any weights of the right signs with
-    // m . adj(G) m > det G separate, even where G is singular: then the combination is a negative constant.
+    // `solution` is adj(G) m, the weights times -1; `square` is det G.
+    // Any weights of the right signs with m . adj(G) m > det G separate, even where G is singular:
+    // then the combination is a negative constant.
     let mut result = Some(false);
     let mut try_solution = |members: &[usize], solution: &[S], square: &S| {
         let mut signs = Some(true);
@@ -362,7 +398,10 @@ fn ball_separated<S: Scalar>(constraints: &[Constraint<S>]) -> Option<bool> {
     }
     for i in 0..n {
         for j in i + 1..n {
-            let solution = [cross(g(j, j), value(i), g(i, j), value(j)), cross(g(i, i), value(j), g(i, j), value(i))];
+            let solution = [
+                cross(g(j, j), value(i), g(i, j), value(j)),
+                cross(g(i, i), value(j), g(i, j), value(i)),
+            ];
             let square = cross(g(i, i), g(j, j), g(i, j), g(i, j));
             if try_solution(&[i, j], &solution, &square) {
                 return Some(true);
@@ -379,7 +418,9 @@ fn ball_separated<S: Scalar>(constraints: &[Constraint<S>]) -> Option<bool> {
                 let jj = cross(g(i, i), g(l, l), g(i, l), g(i, l));
                 let jl = cross(g(i, j), g(i, l), g(i, i), g(j, l));
                 let ll = cross(g(i, i), g(j, j), g(i, j), g(i, j));
-                let row = |a: &S, b: &S, c: &S, x: &S, y: &S, z: &S| a.times(x).plus(&b.times(y)).plus(&c.times(z));
+                let row = |a: &S, b: &S, c: &S, x: &S, y: &S, z: &S| {
+                    a.times(x).plus(&b.times(y)).plus(&c.times(z))
+                };
                 let apply = |a: &S, b: &S, c: &S| row(a, b, c, value(i), value(j), value(l));
                 let solution = [apply(&ii, &ij, &il), apply(&ij, &jj, &jl), apply(&il, &jl, &ll)];
                 let square = row(&ii, &ij, &il, g(i, i), g(i, j), g(i, l));

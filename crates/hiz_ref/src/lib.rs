@@ -1,25 +1,34 @@
-//! The oracle of hizvk: what an occlusion cull may and may not hide, by brute force and without a GPU.
+//! The oracle of hizvk: what an occlusion cull may and may not hide, by brute force and without a
+//! GPU.
 //!
-//! A cull is right if everything that it hides is really hidden in the depth image that it was given. This crate says what "really" means,
-//! in exact arithmetic, and shares no code with the engine that it judges. From top to bottom:
+//! A cull is right if everything that it hides is really hidden in the depth image that it was
+//! given.
+//! This crate says what "really" means, in exact arithmetic, and shares no code with the engine
+//! that it judges.
+//! From top to bottom:
 //!
-//! 1. A [`View`] is a projection and an image size, a [`Volume`] a sphere or box. Their numbers are taken as the exact real
-//!    numbers that the float64 values denote.
-//! 2. A pixel is **touched** if some point of the volume with w > 0 and `0 <= z <= w` has pixel coordinates in the pixel's closed
-//!    square (or on its centre: [`Coverage`]).
-//! 3. A pixel **hides** the volume if its depth is strictly nearer than *all* of the volume: `z - depth w > 0` on all of it
-//!    (reversed Z: `< 0`), the parts outside of the frustum included; or, with [`OwnDepth::PerPixel`], than the part of it that
-//!    the pixel can show. Depths are cleaned up first ([`sanitized_depth`]).
-//! 4. [`classify`]: if some touched pixel does not hide the volume, it is [`Verdict::Visible`], and to cull it would be a false cull.
+//! 1. A [`View`] is a projection and an image size, a [`Volume`] a sphere or box.
+//!    Their numbers are taken as the exact real numbers that the float64 values denote.
+//! 2. A pixel is **touched** if some point of the volume with w > 0 and `0 <= z <= w` has pixel
+//!    coordinates in the pixel's closed square (or on its centre: [`Coverage`]).
+//! 3. A pixel **hides** the volume if its depth is strictly nearer than *all* of the volume: `z -
+//!    depth w > 0` on all of it (reversed Z: `< 0`), the parts outside of the frustum included; or,
+//!    with [`OwnDepth::PerPixel`], than the part of it that the pixel can show.
+//!    Depths are cleaned up first ([`sanitized_depth`]).
+//! 4. [`classify`]: if some touched pixel does not hide the volume, it is [`Verdict::Visible`], and
+//!    to cull it would be a false cull.
 //!    Otherwise it is [`Verdict::Hidden`]: outside of the frustum, or occluded.
-//! 5. [`depth_bounds`] says what the numbers of an image that holds no NDC depth are as NDC depth, between two float32;
-//!    [`classify_between`] judges by such an image.
-//! 6. [`pyramid()`] is the reference of the depth pyramid, each texel computed from all of its pixels.
-//! 7. [`check_proxy`] and [`check_bounds`] say whether an occluder proxy lies inside its mesh and whether bounds contain theirs.
+//! 5. [`depth_bounds`] says what the numbers of an image that holds no NDC depth are as NDC depth,
+//!    between two float32; [`classify_between`] judges by such an image.
+//! 6. [`pyramid()`] is the reference of the depth pyramid, each texel computed from all of its
+//!    pixels.
+//! 7. [`check_proxy`] and [`check_bounds`] say whether an occluder proxy lies inside its mesh and
+//!    whether bounds contain theirs.
 //!
-//! Inside, "touched" is the question whether a convex volume meets a few half-spaces, and "hides" whether it lies on one side of a
-//! plane; both come down to signs of polynomials in the inputs. These are evaluated in float64 with a running bound of
-//! the error, and in exact dyadic fractions where the bound leaves a sign open, so no verdict depends on rounding.
+//! Inside, "touched" is the question whether a convex volume meets a few half-spaces, and "hides"
+//! whether it lies on one side of a plane; both come down to signs of polynomials in the inputs.
+//! These are evaluated in float64 with a running bound of the error, and in exact dyadic fractions
+//! where the bound leaves a sign open, so no verdict depends on rounding.
 //!
 //! ```
 //! use hiz_ref::{Verdict, View, Volume, classify};
@@ -63,7 +72,8 @@ pub enum Verdict {
     Visible,
     /// Every touched pixel hides the volume, or none is touched: it may be culled.
     Hidden,
-    /// Float64 could not tell. Only with [`Arithmetic::Float`].
+    /// Float64 could not tell.
+    /// Only with [`Arithmetic::Float`].
     Undecided,
     /// Not a volume ([`Volume::is_valid`]): it has to be kept.
     Invalid,
@@ -77,8 +87,9 @@ pub enum Arithmetic {
     /// Float64 with error bounds, and exact arithmetic for what that leaves open.
     #[default]
     Escalate,
-    /// Exact arithmetic wherever a verdict hangs on it; float64 proofs serve only to leave out what lies far away. Slow; the tests compare
-    /// the others with it.
+    /// Exact arithmetic wherever a verdict hangs on it; float64 proofs serve only to leave out what
+    /// lies far away.
+    /// Slow; the tests compare the others with it.
     Exact,
 }
 
@@ -88,7 +99,9 @@ pub enum OwnDepth {
     /// All of it: one nearest depth stands for the whole volume.
     #[default]
     Nearest,
-    /// The part inside the frustum that projects into the pixel's square (or onto its centre: [`Coverage`]). Hides more.
+    /// The part inside the frustum that projects into the pixel's square (or onto its centre:
+    /// [`Coverage`]).
+    /// Hides more.
     PerPixel,
 }
 
@@ -108,13 +121,16 @@ pub struct Options {
 pub struct Outcome {
     /// The verdict.
     pub verdict: Verdict,
-    /// Whether no point of the volume is inside the frustum (with [`Coverage::Sample`]: the frustum through the hull of the image's
-    /// samples). `None` if float64 alone could not tell, or if the volume is invalid.
+    /// Whether no point of the volume is inside the frustum (with [`Coverage::Sample`]: the frustum
+    /// through the hull of the image's samples).
+    /// `None` if float64 alone could not tell, or if the volume is invalid.
     pub outside: Option<bool>,
-    /// For a visible volume: column and row of a touched pixel that does not hide it. (`None` if float64 alone lost its trail.)
+    /// For a visible volume: column and row of a touched pixel that does not hide it.
+    /// (`None` if float64 alone lost its trail.)
     pub witness: Option<[u32; 2]>,
-    /// The NDC depth of the volume's nearest point, in plain float64 and for the eyes alone: no verdict rests on it. `None` unless all of
-    /// the volume has w > 0.
+    /// The NDC depth of the volume's nearest point, in plain float64 and for the eyes alone: no
+    /// verdict rests on it.
+    /// `None` unless all of the volume has w > 0.
     pub nearest_depth: Option<f64>,
 }
 
@@ -149,7 +165,8 @@ pub enum Error {
     DepthMeaning(&'static str),
 }
 
-/// Whether a cull may hide `volume`, given the NDC depth image `depth` (row order, row 0 on top, `view.width * view.height` values).
+/// Whether a cull may hide `volume`, given the NDC depth image `depth` (row order, row 0 on top,
+/// `view.width * view.height` values).
 ///
 /// Never [`Verdict::Undecided`].
 ///
@@ -165,11 +182,21 @@ pub fn classify(view: &View, volume: &Volume, depth: &[f32]) -> Result<Verdict, 
 /// # Errors
 ///
 /// Those of [`classify`].
-pub fn classify_with(view: &View, volume: &Volume, depth: &[f32], options: Options) -> Result<Outcome, Error> {
+pub fn classify_with(
+    view: &View,
+    volume: &Volume,
+    depth: &[f32],
+    options: Options,
+) -> Result<Outcome, Error> {
     view.check()?;
     view.check_length(depth.len())?;
     if !volume.is_valid() {
-        return Ok(Outcome { verdict: Verdict::Invalid, outside: None, witness: None, nearest_depth: None });
+        return Ok(Outcome {
+            verdict: Verdict::Invalid,
+            outside: None,
+            witness: None,
+            nearest_depth: None,
+        });
     }
     let projected = Projected::new(view, volume, options);
     // Asked first: what misses the image as a whole needs no search of its pixels.
@@ -188,13 +215,19 @@ pub fn classify_with(view: &View, volume: &Volume, depth: &[f32], options: Optio
 
 /// [`classify_with`], by an image that is known to lie between two.
 ///
-/// A volume is [`Verdict::Visible`] if it is so in the nearer image, which hides most, and [`Verdict::Hidden`] if it is so in the farther one.
+/// A volume is [`Verdict::Visible`] if it is so in the nearer image, which hides most, and
+/// [`Verdict::Hidden`] if it is so in the farther one.
 /// Between them it is [`Verdict::Undecided`].
 ///
 /// # Errors
 ///
 /// Those of [`classify`].
-pub fn classify_between(view: &View, volume: &Volume, depth: &DepthBounds, options: Options) -> Result<Verdict, Error> {
+pub fn classify_between(
+    view: &View,
+    volume: &Volume,
+    depth: &DepthBounds,
+    options: Options,
+) -> Result<Verdict, Error> {
     let Outcome { verdict, outside, .. } = classify_with(view, volume, &depth.nearer, options)?;
     if verdict != Verdict::Hidden || outside == Some(true) || depth.nearer == depth.farther {
         return Ok(verdict);
@@ -205,8 +238,10 @@ pub fn classify_between(view: &View, volume: &Volume, depth: &DepthBounds, optio
     })
 }
 
-/// Whether no point of `volume` is inside the frustum: `w > 0`, `0 <= z <= w`, pixel coordinates in the closed image.
-/// Exact. `false` for an invalid volume, which has to be kept.
+/// Whether no point of `volume` is inside the frustum: `w > 0`, `0 <= z <= w`, pixel coordinates in
+/// the closed image.
+/// Exact.
+/// `false` for an invalid volume, which has to be kept.
 ///
 /// # Errors
 ///
@@ -220,8 +255,10 @@ pub fn is_outside(view: &View, volume: &Volume) -> Result<bool, Error> {
     Ok(projected.meets(view.image()) == Some(false))
 }
 
-/// Whether `depth` (after [`sanitized_depth`]) is strictly nearer than all of `volume`, wherever in the image that may be.
-/// Exact. `false` for an invalid volume, and for the far plane, which hides nothing.
+/// Whether `depth` (after [`sanitized_depth`]) is strictly nearer than all of `volume`, wherever in
+/// the image that may be.
+/// Exact.
+/// `false` for an invalid volume, and for the far plane, which hides nothing.
 ///
 /// # Errors
 ///
@@ -237,13 +274,18 @@ pub fn hides(view: &View, volume: &Volume, depth: f32) -> Result<bool, Error> {
     Ok(projected.is_beyond(depth) == Some(true))
 }
 
-/// Column and row of every pixel that `volume` touches, in row order. Exact, and as slow as it sounds for large volumes. Empty for an
-/// invalid volume.
+/// Column and row of every pixel that `volume` touches, in row order.
+/// Exact, and as slow as it sounds for large volumes.
+/// Empty for an invalid volume.
 ///
 /// # Errors
 ///
 /// If the view is not finite or its size is wrong.
-pub fn touched_pixels(view: &View, volume: &Volume, coverage: Coverage) -> Result<Vec<[u32; 2]>, Error> {
+pub fn touched_pixels(
+    view: &View,
+    volume: &Volume,
+    coverage: Coverage,
+) -> Result<Vec<[u32; 2]>, Error> {
     view.check()?;
     if !volume.is_valid() {
         return Ok(Vec::new());
@@ -254,8 +296,10 @@ pub fn touched_pixels(view: &View, volume: &Volume, coverage: Coverage) -> Resul
     Ok(pixels)
 }
 
-/// The nearest depth at which pixel (`column`, `row`) shows something of `volume`: every nearer one hides there what
-/// [`OwnDepth::PerPixel`] asks for. `None` if the pixel is not touched, or the volume invalid. Exact.
+/// The nearest depth at which pixel (`column`, `row`) shows something of `volume`: every nearer one
+/// hides there what [`OwnDepth::PerPixel`] asks for.
+/// `None` if the pixel is not touched, or the volume invalid.
+/// Exact.
 ///
 /// # Errors
 ///
@@ -271,7 +315,12 @@ pub fn own_depth(
     [column, row]: [u32; 2],
 ) -> Result<Option<f32>, Error> {
     view.check()?;
-    assert!(column < view.width && row < view.height, "pixel ({column}, {row}) of {}x{}", view.width, view.height);
+    assert!(
+        column < view.width && row < view.height,
+        "pixel ({column}, {row}) of {}x{}",
+        view.width,
+        view.height
+    );
     if !volume.is_valid() {
         return Ok(None);
     }

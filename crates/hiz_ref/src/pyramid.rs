@@ -9,8 +9,10 @@ const MINUS_ZERO: u32 = 0x8000_0000;
 
 /// The depth that a pixel of a depth image stands for, decided on its bits.
 ///
-/// NaN, infinities and what lies outside 0..1 (negative subnormals among it) are "far": 1, or 0 if `reversed`. Positive subnormals and
-/// -0 are +0. Everything else is itself.
+/// NaN, infinities and what lies outside 0..1 (negative subnormals among it) are "far": 1, or 0 if
+/// `reversed`.
+/// Positive subnormals and -0 are +0.
+/// Everything else is itself.
 #[must_use]
 pub fn sanitized_depth(depth: f32, reversed: bool) -> f32 {
     let bits = depth.to_bits();
@@ -36,11 +38,14 @@ pub struct Level {
     pub texels: Vec<f32>,
 }
 
-/// The farthest-depth pyramid of an NDC depth image (row order, row 0 on top), from level 0 down to 1x1.
+/// The farthest-depth pyramid of an NDC depth image (row order, row 0 on top), from level 0 down to
+/// 1x1.
 ///
-/// Level `k` has `ceil(width / 2^k)` by `ceil(height / 2^k)` texels; texel (x, y) is the farthest [sanitized](sanitized_depth) depth (greatest, or least
-/// if `reversed`) of the pixel block `[x << k, (x + 1) << k) x [y << k, (y + 1) << k)`. Each texel is computed from all of its pixels,
-/// never from the level before, so that a mistake of a reduction cannot repeat itself here.
+/// Level `k` has `ceil(width / 2^k)` by `ceil(height / 2^k)` texels; texel (x, y) is the farthest
+/// [sanitized](sanitized_depth) depth (greatest, or least if `reversed`) of the pixel block `[x <<
+/// k, (x + 1) << k) x [y << k, (y + 1) << k)`.
+/// Each texel is computed from all of its pixels, never from the level before, so that a mistake of
+/// a reduction cannot repeat itself here.
 ///
 /// # Panics
 ///
@@ -48,13 +53,19 @@ pub struct Level {
 #[must_use]
 pub fn pyramid(depth: &[f32], width: u32, height: u32, reversed: bool) -> Vec<Level> {
     assert!(width > 0 && height > 0, "image size: expected at least 1x1, got {width}x{height}");
-    assert_eq!(depth.len(), width as usize * height as usize, "depth: expected {width}x{height} values");
+    assert_eq!(
+        depth.len(),
+        width as usize * height as usize,
+        "depth: expected {width}x{height} values"
+    );
     let farther = |a: f32, b: f32| if reversed { a.min(b) } else { a.max(b) };
     let mut levels = Vec::new();
     for k in 0.. {
         let side = 1usize << k;
         let size = [width, height].map(|n| n.div_ceil(1 << k));
-        let block = |texel: u32, n: u32| texel as usize * side..((texel as usize + 1) * side).min(n as usize);
+        let block = |texel: u32, n: u32| {
+            texel as usize * side..((texel as usize + 1) * side).min(n as usize)
+        };
         let mut texels = Vec::with_capacity(size[0] as usize * size[1] as usize);
         for y in 0..size[1] {
             for x in 0..size[0] {

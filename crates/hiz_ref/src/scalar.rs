@@ -1,13 +1,15 @@
 //! Numbers that know what they know: the arithmetic every decision is written in.
 //!
-//! A decision of this crate is the sign of a polynomial in the inputs. It is written once, over [`Scalar`], and run twice:
-//! in [`Ball`] (float64 and a bound of its own error; nearly always enough) and, where a ball's sign is open, in
+//! A decision of this crate is the sign of a polynomial in the inputs.
+//! It is written once, over [`Scalar`], and run twice: in [`Ball`] (float64 and a bound of its own
+//! error; nearly always enough) and, where a ball's sign is open, in
 //! [`Dyadic`](crate::dyadic::Dyadic) (exact).
 
 use std::cmp::Ordering;
 
-/// A number with ring operations and a sign that may be unknown. No division: every test is cross-multiplied instead, so that the
-/// dyadic fractions (to which every float64 belongs) are closed under all that is needed.
+/// A number with ring operations and a sign that may be unknown.
+/// No division: every test is cross-multiplied instead, so that the dyadic fractions (to which
+/// every float64 belongs) are closed under all that is needed.
 pub(crate) trait Scalar: Clone {
     /// The number that a finite float64 denotes, exactly.
     fn exact(value: f64) -> Self;
@@ -18,7 +20,8 @@ pub(crate) trait Scalar: Clone {
     /// The sign of the true value, or `None` if it is open.
     fn sign(&self) -> Option<Ordering>;
 
-    /// The absolute value. A ball around 0 may keep its centre's sign: it still contains the true absolute value.
+    /// The absolute value.
+    /// A ball around 0 may keep its centre's sign: it still contains the true absolute value.
     fn magnitude(&self) -> Self;
 
     fn is_zero(&self) -> bool {
@@ -28,13 +31,16 @@ pub(crate) trait Scalar: Clone {
 
 /// Half an ulp of a number in [1, 2): the relative error of one rounded operation.
 const UNIT: f64 = f64::EPSILON / 2.0;
-/// More than what the at most nine roundings of an error bound's own computation can lose: `(1 - UNIT)^9 * GROW > 1`.
+/// More than what the at most nine roundings of an error bound's own computation can lose: `(1 -
+/// UNIT)^9 * GROW > 1`.
 const GROW: f64 = 1.0 + 8.0 * f64::EPSILON;
 
-/// A float64 and a bound of its distance from the true value: the true value lies in `[mid - err, mid + err]`.
+/// A float64 and a bound of its distance from the true value: the true value lies in `[mid - err,
+/// mid + err]`.
 ///
-/// Overflow gives an infinite or NaN bound, which decides nothing. A bound of 0 means that `mid` is the true value; exact zeros
-/// are kept exact, because the coefficients of axis-aligned views and boxes are full of them.
+/// Overflow gives an infinite or NaN bound, which decides nothing.
+/// A bound of 0 means that `mid` is the true value; exact zeros are kept exact, because the
+/// coefficients of axis-aligned views and boxes are full of them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ball {
     pub(crate) mid: f64,
@@ -54,7 +60,8 @@ impl Ball {
         self.err <= self.mid.abs() * 1e-6
     }
 
-    /// Contains every quotient of a number of this ball and one of `other`; anything where `other` may be 0.
+    /// Contains every quotient of a number of this ball and one of `other`; anything where `other`
+    /// may be 0.
     pub(crate) fn divided_by(self, other: Ball) -> Ball {
         let least = other.mid.abs() - other.err;
         if least.is_nan() || least <= 0.0 {
@@ -101,7 +108,8 @@ impl Scalar for Ball {
             return *self;
         }
         let mid = self.mid + other.mid;
-        // Half an ulp of the sum is at most UNIT |mid|, among the subnormals too, where sums are exact.
+        // Half an ulp of the sum is at most UNIT |mid|, among the subnormals too, where sums are
+        // exact.
         let err = (self.err + other.err + UNIT * mid.abs()) * GROW;
         Ball { mid, err }
     }
@@ -178,7 +186,8 @@ mod tests {
     }
 
     proptest! {
-        /// A quotient is checked by multiplying it back: `|mid b - a| <= err |b|` for every a and b of the balls, here their ends.
+        /// A quotient is checked by multiplying it back: `|mid b - a| <= err |b|` for every a and b
+        /// of the balls, here their ends.
         #[test]
         fn quotients_are_contained(a in -9.0f64..9.0, b in -9.0f64..9.0, fuzz in 0.0f64..1.0) {
             let (x, y) = (Ball { mid: a, err: fuzz * 1e-3 }, Ball { mid: b, err: fuzz * fuzz });

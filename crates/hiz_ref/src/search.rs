@@ -9,7 +9,8 @@ use crate::volume::{Frame, Volume};
 use crate::{Arithmetic, Options, OwnDepth};
 use std::cell::OnceCell;
 
-/// A volume as a view sees it, and the two questions about it: does it meet a block of pixels, does a depth hide it.
+/// A volume as a view sees it, and the two questions about it: does it meet a block of pixels, does
+/// a depth hide it.
 pub(crate) struct Projected<'a> {
     view: &'a View,
     volume: &'a Volume,
@@ -37,7 +38,11 @@ impl<'a> Projected<'a> {
     }
 
     /// Runs a decision in the arithmetic that the options name.
-    fn decide(&self, float: impl FnOnce() -> Option<bool>, exact: impl FnOnce() -> Option<bool>) -> Option<bool> {
+    fn decide(
+        &self,
+        float: impl FnOnce() -> Option<bool>,
+        exact: impl FnOnce() -> Option<bool>,
+    ) -> Option<bool> {
         match self.options.arithmetic {
             Arithmetic::Float => float(),
             Arithmetic::Escalate => float().or_else(exact),
@@ -58,7 +63,8 @@ impl<'a> Projected<'a> {
         )
     }
 
-    /// Whether a point of the volume is inside the frustum and the block, and not farther than a depth in 0..=1.
+    /// Whether a point of the volume is inside the frustum and the block, and not farther than a
+    /// depth in 0..=1.
     pub(crate) fn meets_before(&self, block: Block, depth: f32) -> Option<bool> {
         let coverage = self.options.coverage;
         let before = self.float.inside_and_before(self.view, block, coverage, depth);
@@ -71,11 +77,12 @@ impl<'a> Projected<'a> {
         )
     }
 
-    /// The nearest depth at which a pixel shows something of the volume: by bisection over the float32 numbers from near to far, for
-    /// what one depth shows the farther ones show, too.
+    /// The nearest depth at which a pixel shows something of the volume: by bisection over the
+    /// float32 numbers from near to far, for what one depth shows the farther ones show, too.
     pub(crate) fn own_depth(&self, [x, y]: [u32; 2]) -> Option<f32> {
         let pixel = Block { x: [x, x + 1], y: [y, y + 1] };
-        let depth = |steps: u32| f32::from_bits(if self.view.reversed { ONE - steps } else { steps });
+        let depth =
+            |steps: u32| f32::from_bits(if self.view.reversed { ONE - steps } else { steps });
         let shows = |steps: u32| self.meets_before(pixel, depth(steps)) == Some(true);
         let (mut hidden, mut shown) = (0, ONE);
         if !shows(shown) {
@@ -104,26 +111,34 @@ impl<'a> Projected<'a> {
         self.decide(|| beyond(&self.float, depth, self), || beyond(self.exact(), depth, self))
     }
 
-    /// Whether all of the volume has w > 0. If that is open, so be it: it only saves work.
+    /// Whether all of the volume has w > 0.
+    /// If that is open, so be it: it only saves work.
     fn is_in_front(&self) -> bool {
         self.float.w.is_positive_on(self.shape) == Some(true)
     }
 
-    /// A block that holds every pixel that the volume can touch, most often much smaller than the image.
+    /// A block that holds every pixel that the volume can touch, most often much smaller than the
+    /// image.
     ///
-    /// The rectangle is guessed from eight corners. It counts only where the part of the image that it leaves out is proved empty.
+    /// The rectangle is guessed from eight corners.
+    /// It counts only where the part of the image that it leaves out is proved empty.
     fn bounding_block(&self) -> Block {
         let image = self.view.image();
         let mut low = [f64::INFINITY; 2];
         let mut high = [f64::NEG_INFINITY; 2];
         for corner in 0..8u8 {
             let s = [1, 2, 4].map(|bit| if corner & bit == 0 { -1.0 } else { 1.0 });
-            let [x, y, w] = [&self.float.width_x, &self.float.height_y, &self.float.w]
-                .map(|form| form.middle.mid + (0..3).map(|k| form.along[k].mid * s[k]).sum::<f64>());
+            let [x, y, w] =
+                [&self.float.width_x, &self.float.height_y, &self.float.w].map(|form| {
+                    form.middle.mid + (0..3).map(|k| form.along[k].mid * s[k]).sum::<f64>()
+                });
             if w <= 0.0 || w.is_nan() {
                 return image;
             }
-            let pixel = [0.5 * (f64::from(self.view.width) + x / w), 0.5 * (f64::from(self.view.height) - y / w)];
+            let pixel = [
+                0.5 * (f64::from(self.view.width) + x / w),
+                0.5 * (f64::from(self.view.height) - y / w),
+            ];
             for axis in 0..2 {
                 low[axis] = low[axis].min(pixel[axis]);
                 high[axis] = high[axis].max(pixel[axis]);
@@ -131,7 +146,9 @@ impl<'a> Projected<'a> {
         }
         let mut guess = [image.x, image.y];
         for (axis, [from, to]) in guess.iter_mut().enumerate() {
-            // A little wider than the guess, since what touches the border of an outer strip cannot be left out. Casts saturate.
+            // A little wider than the guess, since what touches the border of an outer strip cannot
+            // be left out.
+            // Casts saturate.
             let first = (low[axis] - 0.01).floor().max(0.0) as u32;
             let last = (high[axis] + 0.01).floor().max(0.0) as u32;
             *from = first.min(*to - 1);
@@ -174,7 +191,8 @@ impl<'a> Projected<'a> {
         (pixels, decided)
     }
 
-    /// The NDC depth of the volume's nearest point, in plain float64; `None` unless all of the volume has w > 0.
+    /// The NDC depth of the volume's nearest point, in plain float64; `None` unless all of the
+    /// volume has w > 0.
     pub(crate) fn nearest_depth(&self) -> Option<f64> {
         if !self.is_in_front() {
             return None;
@@ -193,7 +211,8 @@ impl<'a> Projected<'a> {
                 let nearer = |a: f64, b: f64| if sign * a < sign * b { a } else { b };
                 depths.reduce(nearer)?
             }
-            // The depths t whose plane z - t w = 0 is tangent: (z0 - t w0)^2 = |zv - t wv|^2, as a t^2 - 2 b t + c = 0.
+            // The depths t whose plane z - t w = 0 is tangent: (z0 - t w0)^2 = |zv - t wv|^2, as a
+            // t^2 - 2 b t + c = 0.
             Shape::Ball => {
                 let a = w0 * w0 - dot(wv, wv);
                 let b = z0 * w0 - dot(zv, wv);
@@ -212,8 +231,9 @@ impl<'a> Projected<'a> {
 
 /// What is known so far about which depths hide a volume.
 ///
-/// If w > 0 on the volume, a depth that is nearer than one that hides it hides it too: then the answers are kept as two
-/// bounds that close in on the threshold, and an image needs a few evaluations, not one a pixel.
+/// If w > 0 on the volume, a depth that is nearer than one that hides it hides it too: then the
+/// answers are kept as two bounds that close in on the threshold, and an image needs a few
+/// evaluations, not one a pixel.
 struct Hiding<'a> {
     projected: &'a Projected<'a>,
     monotone: bool,
@@ -253,7 +273,8 @@ impl<'a> Hiding<'a> {
 
 /// What the search found.
 pub(crate) enum Found {
-    /// A touched pixel that does not hide the volume. (Its place is unknown if float64 alone could not follow it.)
+    /// A touched pixel that does not hide the volume.
+    /// (Its place is unknown if float64 alone could not follow it.)
     Open(Option<[u32; 2]>),
     /// There is none.
     Nothing,
@@ -269,8 +290,10 @@ enum Pixels {
     Mixed,
 }
 
-/// Looks for a touched pixel that does not hide the volume: blocks are halved, and dropped where all pixels hide it or none is touched.
-/// With [`OwnDepth::PerPixel`] "hides" is asked anew in every block, against the farthest of its depths.
+/// Looks for a touched pixel that does not hide the volume: blocks are halved, and dropped where
+/// all pixels hide it or none is touched.
+/// With [`OwnDepth::PerPixel`] "hides" is asked anew in every block, against the farthest of its
+/// depths.
 pub(crate) fn find_open_pixel(projected: &Projected, depth: &[f32]) -> Found {
     let mut hiding = Hiding::new(projected);
     let width = projected.view.width as usize;
@@ -300,14 +323,18 @@ pub(crate) fn find_open_pixel(projected: &Projected, depth: &[f32]) -> Found {
         }
         let meets = match projected.options.own_depth {
             OwnDepth::Nearest => projected.meets(block),
-            OwnDepth::PerPixel => projected.meets_before(block, farthest(projected.view, depth, block)),
+            OwnDepth::PerPixel => {
+                projected.meets_before(block, farthest(projected.view, depth, block))
+            }
         };
         if meets == Some(false) {
             continue;
         }
-        // Squares cover their block; samples do not, nor does the farthest depth stand for all, so there only single pixels count.
+        // Squares cover their block; samples do not, nor does the farthest depth stand for all, so
+        // there only single pixels count.
         let Options { coverage, own_depth, .. } = projected.options;
-        let counts = (coverage == Coverage::Area && own_depth == OwnDepth::Nearest) || block.is_pixel();
+        let counts =
+            (coverage == Coverage::Area && own_depth == OwnDepth::Nearest) || block.is_pixel();
         if meets == Some(true) && pixels == Pixels::NoneHides && counts {
             return Found::Open(follow(projected, block));
         }

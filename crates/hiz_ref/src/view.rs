@@ -1,4 +1,5 @@
-//! A view: the exact projection, its image, and what "inside a block of pixels" means as linear inequalities.
+//! A view: the exact projection, its image, and what "inside a block of pixels" means as linear
+//! inequalities.
 
 use crate::Error;
 use crate::feasibility::{Constraint, Form};
@@ -8,22 +9,25 @@ use crate::volume::Frame;
 /// The largest image side that is accepted; hizvk promises no more either.
 const MAX_SIDE: u32 = 32768;
 
-/// A projection to an image, taken exactly as written: `clip = rows * (p - origin, 1)` in real arithmetic.
+/// A projection to an image, taken exactly as written: `clip = rows * (p - origin, 1)` in real
+/// arithmetic.
 ///
-/// NDC is `clip.xyz / clip.w` with x to the right, y up and z from 0 to 1. Pixel (column `j`, row `i`) is the closed square
-/// `[j, j+1] x [i, i+1]` of pixel coordinates
+/// NDC is `clip.xyz / clip.w` with x to the right, y up and z from 0 to 1.
+/// Pixel (column `j`, row `i`) is the closed square `[j, j+1] x [i, i+1]` of pixel coordinates
 ///
 /// ```text
 /// x_pixel = width/2 + width/2 * ndc.x          y_pixel = height/2 - height/2 * ndc.y
 /// ```
 ///
-/// so row 0 is on top, as in an image array. A point is inside the frustum if `w > 0`, `0 <= z <= w` and its pixel coordinates lie
-/// in the closed image rectangle.
+/// so row 0 is on top, as in an image array.
+/// A point is inside the frustum if `w > 0`, `0 <= z <= w` and its pixel coordinates lie in the
+/// closed image rectangle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
     /// Rows of the 4x4 matrix that takes `(p - origin, 1)` to clip coordinates x, y, z, w.
     pub rows: [[f64; 4]; 4],
-    /// The world point that positions are taken relative to before they meet `rows`, in world units.
+    /// The world point that positions are taken relative to before they meet `rows`, in world
+    /// units.
     pub origin: [f64; 3],
     /// Image width in pixels.
     pub width: u32,
@@ -69,7 +73,8 @@ pub enum Coverage {
     Sample,
 }
 
-/// A rectangle of pixels, half open: columns `x[0]..x[1]`, rows `y[0]..y[1]`. Never empty.
+/// A rectangle of pixels, half open: columns `x[0]..x[1]`, rows `y[0]..y[1]`.
+/// Never empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Block {
     pub(crate) x: [u32; 2],
@@ -81,7 +86,8 @@ impl Block {
         self.x[1] - self.x[0] == 1 && self.y[1] - self.y[0] == 1
     }
 
-    /// Two halves across the longer side. (Not for single pixels.)
+    /// Two halves across the longer side.
+    /// (Not for single pixels.)
     pub(crate) fn halves(self) -> [Block; 2] {
         let Block { x, y } = self;
         if x[1] - x[0] >= y[1] - y[0] {
@@ -94,10 +100,12 @@ impl Block {
     }
 }
 
-/// The clip coordinates of a volume's points, as functions of its local coordinates (see [`Frame`]).
+/// The clip coordinates of a volume's points, as functions of its local coordinates (see
+/// [`Frame`]).
 #[derive(Debug)]
 pub(crate) struct Clip<S> {
-    /// Image width times clip x, and image height times clip y: pixel edges then have whole-numbered coefficients.
+    /// Image width times clip x, and image height times clip y: pixel edges then have
+    /// whole-numbered coefficients.
     pub(crate) width_x: Form<S>,
     pub(crate) height_y: Form<S>,
     pub(crate) z: Form<S>,
@@ -115,13 +123,15 @@ impl<S: Scalar> Clip<S> {
         }
     }
 
-    /// `z - depth w`, signed so that it is positive where a point lies strictly farther than `depth`.
+    /// `z - depth w`, signed so that it is positive where a point lies strictly farther than
+    /// `depth`.
     pub(crate) fn beyond(&self, depth: f32, reversed: bool) -> Form<S> {
         let threshold = self.w.scaled(f64::from(depth));
         if reversed { threshold.minus(&self.z) } else { self.z.minus(&threshold) }
     }
 
-    /// [`Clip::inside`] the block and not farther than `depth`: what a pixel of that depth does not hide.
+    /// [`Clip::inside`] the block and not farther than `depth`: what a pixel of that depth does not
+    /// hide.
     pub(crate) fn inside_and_before(
         &self,
         view: &View,
@@ -130,8 +140,9 @@ impl<S: Scalar> Clip<S> {
         depth: f32,
     ) -> Vec<Constraint<S>> {
         let mut all = self.inside(view, block, coverage);
-        // z >= 0 and w - z >= 0 stand last. One of them follows from the new condition and the other one, unless the depth is the near
-        // plane's: then they alone keep w from being negative.
+        // z >= 0 and w - z >= 0 stand last.
+        // One of them follows from the new condition and the other one, unless the depth is the
+        // near plane's: then they alone keep w from being negative.
         let at_near_plane = depth == if view.reversed { 1.0 } else { 0.0 };
         if !at_near_plane {
             all.remove(all.len() - if view.reversed { 2 } else { 1 });
@@ -140,24 +151,33 @@ impl<S: Scalar> Clip<S> {
         all
     }
 
-    /// The conditions under which a point is inside the frustum and inside the block (its closed rectangle, or the hull of its samples).
+    /// The conditions under which a point is inside the frustum and inside the block (its closed
+    /// rectangle, or the hull of its samples).
     ///
-    /// `w > 0` needs no condition of its own: `0 <= z <= w` gives `w >= 0`, and `w = 0` leaves only the points with
-    /// `x = y = z = w = 0`, which a matrix of full rank does not have. For a singular matrix such a point counts as inside, so that
-    /// the answer errs towards visible.
-    pub(crate) fn inside(&self, view: &View, block: Block, coverage: Coverage) -> Vec<Constraint<S>> {
+    /// `w > 0` needs no condition of its own: `0 <= z <= w` gives `w >= 0`, and `w = 0` leaves only
+    /// the points with `x = y = z = w = 0`, which a matrix of full rank does not have.
+    /// For a singular matrix such a point counts as inside, so that the answer errs towards
+    /// visible.
+    pub(crate) fn inside(
+        &self,
+        view: &View,
+        block: Block,
+        coverage: Coverage,
+    ) -> Vec<Constraint<S>> {
         let inset = match coverage {
             Coverage::Area => 0.0,
             Coverage::Sample => 1.0,
         };
         // Edges in half pixels, so that samples are whole numbers too (and all of them exact).
-        let edges = |[from, to]: [u32; 2]| (2.0 * f64::from(from) + inset, 2.0 * f64::from(to) - inset);
+        let edges =
+            |[from, to]: [u32; 2]| (2.0 * f64::from(from) + inset, 2.0 * f64::from(to) - inset);
         let (width, height) = (f64::from(view.width), f64::from(view.height));
         let (left, right) = edges(block.x);
         let (top, bottom) = edges(block.y);
 
         let mut all = Vec::with_capacity(6);
-        // From x_pixel >= left/2, times 2w: width x - (left - width) w >= 0. From y_pixel >= top/2: (height - top) w - height y >= 0.
+        // From x_pixel >= left/2, times 2w: width x - (left - width) w >= 0.
+        // From y_pixel >= top/2: (height - top) w - height y >= 0.
         let from_left = self.width_x.minus(&self.w.scaled(left - width));
         let from_top = self.w.scaled(height - top).minus(&self.height_y);
         if left == right {
@@ -170,7 +190,9 @@ impl<S: Scalar> Clip<S> {
             all.push(Constraint::zero(from_top));
         } else {
             all.push(Constraint::at_least_zero(from_top));
-            all.push(Constraint::at_least_zero(self.height_y.minus(&self.w.scaled(height - bottom))));
+            all.push(Constraint::at_least_zero(
+                self.height_y.minus(&self.w.scaled(height - bottom)),
+            ));
         }
         all.push(Constraint::at_least_zero(self.z.clone()));
         all.push(Constraint::at_least_zero(self.w.minus(&self.z)));

@@ -3,9 +3,11 @@
 use crate::feasibility::{Form, Shape};
 use crate::scalar::Scalar;
 
-/// A closed convex volume in world units; its numbers are the exact real numbers that the float64 values denote.
+/// A closed convex volume in world units; its numbers are the exact real numbers that the float64
+/// values denote.
 ///
-/// Zero sizes are valid (a point, a segment, a rectangle), and so are mirrored, sheared or singular `axes`.
+/// Zero sizes are valid (a point, a segment, a rectangle), and so are mirrored, sheared or singular
+/// `axes`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Volume {
     /// All points within `radius` of `center`.
@@ -39,7 +41,9 @@ impl Volume {
     pub fn is_valid(&self) -> bool {
         let finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
         match self {
-            Volume::Sphere { center, radius } => finite(center) && radius.is_finite() && *radius >= 0.0,
+            Volume::Sphere { center, radius } => {
+                finite(center) && radius.is_finite() && *radius >= 0.0
+            }
             Volume::Box { min, max } => {
                 finite(min) && finite(max) && min.iter().zip(max).all(|(low, high)| low <= high)
             }
@@ -60,7 +64,8 @@ impl Volume {
     }
 }
 
-/// Local coordinates of a volume: it is the image of the unit ball, or of the cube `[-1, 1]^3`, under `s -> center + sum_k axes[k] s_k`.
+/// Local coordinates of a volume: it is the image of the unit ball, or of the cube `[-1, 1]^3`,
+/// under `s -> center + sum_k axes[k] s_k`.
 pub(crate) struct Frame<S> {
     /// Centre relative to the view's origin.
     center: [S; 3],
@@ -85,12 +90,16 @@ impl<S: Scalar> Frame<S> {
                 Frame { center: relative(center), axes: diagonal([radius; 3].map(number)) }
             }
             Volume::Box { min, max } => {
-                // Relative to the origin first: far from it the halves would otherwise cost float64 its last digits.
+                // Relative to the origin first: far from it the halves would otherwise cost float64
+                // its last digits.
                 let (low, high) = (relative(min), relative(max));
                 let half = number(0.5);
                 let axis = |i: usize| low[i].plus(&high[i]).times(&half);
                 let length = |i: usize| number(max[i]).minus(&number(min[i])).times(&half);
-                Frame { center: [axis(0), axis(1), axis(2)], axes: diagonal([length(0), length(1), length(2)]) }
+                Frame {
+                    center: [axis(0), axis(1), axis(2)],
+                    axes: diagonal([length(0), length(1), length(2)]),
+                }
             }
             Volume::OrientedBox { center, half_sizes, axes } => {
                 let axis = |k: usize| {
@@ -105,8 +114,12 @@ impl<S: Scalar> Frame<S> {
     /// A matrix row as a function of the local coordinates.
     pub(crate) fn form(&self, row: &[f64; 4]) -> Form<S> {
         let row = row.map(S::exact);
-        let dot = |v: &[S; 3]| row[0].times(&v[0]).plus(&row[1].times(&v[1])).plus(&row[2].times(&v[2]));
-        Form { middle: dot(&self.center).plus(&row[3]), along: [0, 1, 2].map(|k| dot(&self.axes[k])) }
+        let dot =
+            |v: &[S; 3]| row[0].times(&v[0]).plus(&row[1].times(&v[1])).plus(&row[2].times(&v[2]));
+        Form {
+            middle: dot(&self.center).plus(&row[3]),
+            along: [0, 1, 2].map(|k| dot(&self.axes[k])),
+        }
     }
 }
 

@@ -1,10 +1,13 @@
-//! Float64 with error bounds, float64 with exact escalation, and exact arithmetic throughout give the same answers.
+//! Float64 with error bounds, float64 with exact escalation, and exact arithmetic throughout give
+//! the same answers.
 
 mod common;
 
 use common::Random;
 use common::scenes::{image, scene, volume};
-use hiz_ref::{Arithmetic, Coverage, Options, OwnDepth, Verdict, classify_with, hides, touched_pixels};
+use hiz_ref::{
+    Arithmetic, Coverage, Options, OwnDepth, Verdict, classify_with, hides, touched_pixels,
+};
 
 #[test]
 fn all_arithmetics_agree_on_scenes() {
@@ -46,7 +49,10 @@ fn all_arithmetics_agree_on_scenes() {
             }
         }
     }
-    println!("{visible} visible, {hidden} occluded, {undecided} undecided in float64, of {}", 2 * CASES);
+    println!(
+        "{visible} visible, {hidden} occluded, {undecided} undecided in float64, of {}",
+        2 * CASES
+    );
     assert!(visible > 500 && hidden > 500);
     assert!(undecided < 2 * CASES / 50, "float64 leaves {undecided} open");
 }
@@ -66,7 +72,9 @@ fn the_search_agrees_with_the_definition() {
             let depth = image(&mut random, view, probe.nearest_depth);
             let touched = touched_pixels(view, &volume, coverage).expect("valid");
             assert_eq!(probe.verdict == Verdict::Visible, !touched.is_empty());
-            let open = |&[x, y]: &[u32; 2]| !hides(view, &volume, depth[(y * 16 + x) as usize]).expect("valid");
+            let open = |&[x, y]: &[u32; 2]| {
+                !hides(view, &volume, depth[(y * 16 + x) as usize]).expect("valid")
+            };
             let outcome = classify_with(view, &volume, &depth, options).expect("valid");
             let visible = touched.iter().any(open);
             let name = format!("case {number} {coverage:?}: {view:?} {volume:?}");

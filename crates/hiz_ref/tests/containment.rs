@@ -1,5 +1,5 @@
-//! Proxies in meshes and meshes in bounds: cases by hand, and random ones whose truth comes from cutting triangles at boxes in
-//! ordinary fractions.
+//! Proxies in meshes and meshes in bounds: cases by hand, and random ones whose truth comes from
+//! cutting triangles at boxes in ordinary fractions.
 
 use hiz_ref::{MeshError, TriangleMesh, Volume, check_bounds, check_proxy, contains};
 use num_rational::BigRational;
@@ -22,9 +22,12 @@ impl Mesh {
     fn add_box(&mut self, low: Vec3, high: Vec3) {
         let first = self.vertices.len() as u32;
         for corner in 0..8 {
-            self.vertices.push(std::array::from_fn(|k| if corner >> k & 1 == 0 { low[k] } else { high[k] }));
+            self.vertices
+                .push(std::array::from_fn(|k| if corner >> k & 1 == 0 { low[k] } else { high[k] }));
         }
-        for [a, b, c, d] in [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]] {
+        for [a, b, c, d] in
+            [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
+        {
             self.triangles.extend([[a, b, c], [a, c, d]].map(|t: [u32; 3]| t.map(|v| v + first)));
         }
     }
@@ -68,7 +71,8 @@ fn boxes_in_boxes() {
     assert!(!is_inside(&box_mesh([0.5; 3], [1.0_f64.next_up(); 3]), &mesh));
 }
 
-/// A block with a notch from above: a bridge over it has its vertices inside and its middle in the open.
+/// A block with a notch from above: a bridge over it has its vertices inside and its middle in the
+/// open.
 #[test]
 fn a_bridge_over_a_notch_is_outside_with_all_its_vertices_inside() {
     let mut mesh = Mesh::default();
@@ -120,7 +124,10 @@ fn meshes_without_an_inside_are_refused() {
     assert!(is_inside(&proxy, &closed));
     assert!(is_inside(&triangle([[5.0; 3], [6.0; 3], [7.0; 3]]), &closed));
     let nan = triangle([[f64::NAN; 3], [0.0; 3], [1.0; 3]]);
-    assert_eq!(check_proxy(&nan.borrowed(), &closed.borrowed()).unwrap_err(), MeshError::NonFinite(0));
+    assert_eq!(
+        check_proxy(&nan.borrowed(), &closed.borrowed()).unwrap_err(),
+        MeshError::NonFinite(0)
+    );
     let index = Mesh { triangles: vec![[0, 1, 3]], ..proxy };
     assert_eq!(
         check_proxy(&index.borrowed(), &closed.borrowed()).unwrap_err(),
@@ -147,7 +154,9 @@ fn clipped(polygon: &Polygon, axis: usize, at: f64, sign: i32) -> Polygon {
         }
         if (hp.is_positive() && hn.is_negative()) || (hp.is_negative() && hn.is_positive()) {
             let t = hp.clone() / (hp - hn);
-            out.push(std::array::from_fn(|i| p[i].clone() + (next[i].clone() - p[i].clone()) * t.clone()));
+            out.push(std::array::from_fn(|i| {
+                p[i].clone() + (next[i].clone() - p[i].clone()) * t.clone()
+            }));
         }
     }
     out
@@ -158,13 +167,14 @@ fn has_area(polygon: &Polygon) -> bool {
     let to = |p: &[Q; 3]| -> [Q; 3] { std::array::from_fn(|i| p[i].clone() - first[i].clone()) };
     polygon.windows(2).any(|pair| {
         let (u, v) = (to(&pair[0]), to(&pair[1]));
-        [(0, 1), (1, 2), (2, 0)]
-            .iter()
-            .any(|(i, j)| !(u[*i].clone() * v[*j].clone() - u[*j].clone() * v[*i].clone()).is_zero())
+        [(0, 1), (1, 2), (2, 0)].iter().any(|(i, j)| {
+            !(u[*i].clone() * v[*j].clone() - u[*j].clone() * v[*i].clone()).is_zero()
+        })
     })
 }
 
-/// Whether closed boxes together cover a triangle: cut each box out and see whether any area is left.
+/// Whether closed boxes together cover a triangle: cut each box out and see whether any area is
+/// left.
 fn covered(corners: [Vec3; 3], boxes: &[(Vec3, Vec3)]) -> bool {
     let mut left: Vec<Polygon> = vec![corners.iter().map(|p| p.map(q)).collect()];
     for (low, high) in boxes {
@@ -173,7 +183,8 @@ fn covered(corners: [Vec3; 3], boxes: &[(Vec3, Vec3)]) -> bool {
             for axis in 0..3 {
                 for (at, inner) in [(low[axis], 1), (high[axis], -1)] {
                     let outer = clipped(&polygon, axis, at, -inner);
-                    // A polygon on the border is cut to itself on both sides, and belongs to the closed box.
+                    // A polygon on the border is cut to itself on both sides, and belongs to the
+                    // closed box.
                     let beyond = |p: &[Q; 3]| p[axis] != q(at);
                     if has_area(&outer) && outer.iter().any(beyond) {
                         still.push(outer);
@@ -217,7 +228,8 @@ fn straightened([x, y, z]: Vec3, shear: [i32; 4]) -> Vec3 {
 #[test]
 fn witnesses_of_crooked_meshes_are_outside() {
     let sphere = |rings: u32| {
-        let mut mesh = Mesh { vertices: vec![[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], ..Mesh::default() };
+        let mut mesh =
+            Mesh { vertices: vec![[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], ..Mesh::default() };
         let around = 2 * rings;
         for i in 1..rings {
             for k in 0..around {
@@ -239,8 +251,11 @@ fn witnesses_of_crooked_meshes_are_outside() {
         for i in 0..rings {
             for k in 0..around {
                 let [a, b, c, d] = [at(i, k), at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)];
-                mesh.triangles
-                    .extend([[a, b, c], [a, c, d]].into_iter().filter(|[a, b, c]| a != b && b != c && c != a));
+                mesh.triangles.extend(
+                    [[a, b, c], [a, c, d]]
+                        .into_iter()
+                        .filter(|[a, b, c]| a != b && b != c && c != a),
+                );
             }
         }
         mesh
@@ -301,7 +316,8 @@ proptest! {
         }
     }
 
-    /// Points made of half axes lie in an oriented box, solid or flat; beyond its farthest point in some direction they do not.
+    /// Points made of half axes lie in an oriented box, solid or flat; beyond its farthest point in
+    /// some direction they do not.
     #[test]
     fn oriented_boxes_contain_their_points_and_no_others(
         center in [-9_i32..9, -9..9, -9..9],

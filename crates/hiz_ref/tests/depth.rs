@@ -1,16 +1,19 @@
 //! What a depth image's numbers mean, by hand.
 
 use hiz_ref::{
-    DepthBounds, DepthKind, DepthMeaning, Error, Options, Verdict, View, Volume, classify_between, depth_bounds,
+    DepthBounds, DepthKind, DepthMeaning, Error, Options, Verdict, View, Volume, classify_between,
+    depth_bounds,
 };
 
-const PLAIN: DepthMeaning<'_> = DepthMeaning { kind: DepthKind::Z, scale: 1.0, invalid: &[], origin_is_eye: true };
+const PLAIN: DepthMeaning<'_> =
+    DepthMeaning { kind: DepthKind::Z, scale: 1.0, invalid: &[], origin_is_eye: true };
 
 fn view(rows: [[f64; 4]; 4], reversed: bool) -> View {
     View { rows, origin: [0.0; 3], width: 1, height: 1, reversed }
 }
 
-/// 90 degrees wide, looks along +z from the origin, near 1, no far plane: depth is 1 - 1/z, or 1/z reversed.
+/// 90 degrees wide, looks along +z from the origin, near 1, no far plane: depth is 1 - 1/z, or 1/z
+/// reversed.
 fn perspective(reversed: bool) -> View {
     let z = if reversed { [0.0, 0.0, 0.0, 1.0] } else { [0.0, 0.0, 1.0, -1.0] };
     view([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], z, [0.0, 0.0, 1.0, 0.0]], reversed)
@@ -18,7 +21,11 @@ fn perspective(reversed: bool) -> View {
 
 /// Looks along +z, from view depth `near` to 8 more.
 fn parallel(near: f64, reversed: bool) -> View {
-    let z = if reversed { [0.0, 0.0, -0.125, 1.0 + near / 8.0] } else { [0.0, 0.0, 0.125, -near / 8.0] };
+    let z = if reversed {
+        [0.0, 0.0, -0.125, 1.0 + near / 8.0]
+    } else {
+        [0.0, 0.0, 0.125, -near / 8.0]
+    };
     view([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], z, [0.0, 0.0, 0.0, 1.0]], reversed)
 }
 
@@ -41,7 +48,9 @@ fn around(found: [f32; 2], truth: f64, reversed: bool) {
 
 #[test]
 fn what_float32_holds_is_met_exactly() {
-    for (number, depth) in [(8.0, 0.875), (2.0, 0.5), (1.0, 0.0), (1.0 + f64::EPSILON * 8192.0, 0.0)] {
+    for (number, depth) in
+        [(8.0, 0.875), (2.0, 0.5), (1.0, 0.0), (1.0 + f64::EPSILON * 8192.0, 0.0)]
+    {
         if number == 1.0 || number >= 2.0 {
             assert_eq!(z(&perspective(false), number), [depth; 2]);
             assert_eq!(z(&perspective(true), number), [1.0 - depth; 2]);
@@ -55,7 +64,8 @@ fn what_float32_holds_is_met_exactly() {
     tripled.rows = tripled.rows.map(|row| row.map(|v| 3.0 * v));
     assert_eq!(z(&tripled, 8.0), [0.875; 2]);
     // 8000 thousandths are 8 only nearly: 0.001 is no dyadic fraction, and lies above.
-    let [nearer, farther] = bounds(&perspective(false), 8000.0, DepthMeaning { scale: 0.001, ..PLAIN });
+    let [nearer, farther] =
+        bounds(&perspective(false), 8000.0, DepthMeaning { scale: 0.001, ..PLAIN });
     assert_eq!([nearer, farther], [0.875, 0.875_f32.next_up()]);
 }
 
@@ -79,7 +89,8 @@ fn distances_by_pythagoras() {
             row[3] -= row[2] * eye;
         }
         assert_eq!(bounds(&bare, 10.0, distance), bounds(&leaning, 10.0, distance));
-        // A border at a tangent of 2^36: the ray is longer than its view depth by as much, and a hair.
+        // A border at a tangent of 2^36: the ray is longer than its view depth by as much, and a
+        // hair.
         let mut far_off = perspective(reversed);
         let tangent = 2.0_f64.powi(36);
         far_off.rows[0] = [1.0, 0.0, -tangent, 0.0];
@@ -104,15 +115,24 @@ fn pixels_are_where_they_are() {
 
 #[test]
 fn parallel_rays_and_planes_behind_the_eye() {
-    for (number, depth) in [(-4.0, 0.0), (-2.0, 0.25), (0.0, 0.5), (-0.0, 0.5), (3.0, 0.875), (4.0, 1.0)] {
+    for (number, depth) in
+        [(-4.0, 0.0), (-2.0, 0.25), (0.0, 0.5), (-0.0, 0.5), (3.0, 0.875), (4.0, 1.0)]
+    {
         for kind in [DepthKind::Z, DepthKind::Distance] {
             let meaning = DepthMeaning { kind, ..PLAIN };
             assert_eq!(bounds(&parallel(-4.0, false), number, meaning), [depth; 2], "{number}");
-            assert_eq!(bounds(&parallel(-4.0, true), number, meaning), [1.0 - depth; 2], "{number}");
+            assert_eq!(
+                bounds(&parallel(-4.0, true), number, meaning),
+                [1.0 - depth; 2],
+                "{number}"
+            );
         }
     }
     for number in [-5.0, 4.5, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        assert_eq!((z(&parallel(-4.0, false), number), z(&parallel(-4.0, true), number)), ([1.0; 2], [0.0; 2]));
+        assert_eq!(
+            (z(&parallel(-4.0, false), number), z(&parallel(-4.0, true), number)),
+            ([1.0; 2], [0.0; 2])
+        );
     }
     // A near plane at the eye, or before it: zero and less are no data.
     for near in [0.0, 1.0] {
@@ -139,7 +159,11 @@ fn no_data_is_far() {
         }
         let invalid = DepthMeaning { invalid: &[8.0, -1.0], scale: 2.0, ..PLAIN };
         assert_eq!(bounds(&perspective(reversed), 8.0, invalid), far);
-        assert_ne!(bounds(&perspective(reversed), 4.0, invalid), far, "invalid values are not scaled");
+        assert_ne!(
+            bounds(&perspective(reversed), 4.0, invalid),
+            far,
+            "invalid values are not scaled"
+        );
     }
 }
 
@@ -160,8 +184,13 @@ fn ndc_depth_is_itself() {
         assert_eq!(bounds(&perspective(true), number, reversed), [0.0; 2]);
     }
     assert_eq!(bounds(&perspective(false), 0.5, DepthMeaning { invalid: &[0.5], ..ndc }), [1.0; 2]);
-    for meaning in [reversed, DepthMeaning { scale: 2.0, ..ndc }, DepthMeaning { scale: 0.0, ..PLAIN }] {
-        assert!(matches!(depth_bounds(&perspective(false), &[0.5], meaning), Err(Error::DepthMeaning(_))));
+    for meaning in
+        [reversed, DepthMeaning { scale: 2.0, ..ndc }, DepthMeaning { scale: 0.0, ..PLAIN }]
+    {
+        assert!(matches!(
+            depth_bounds(&perspective(false), &[0.5], meaning),
+            Err(Error::DepthMeaning(_))
+        ));
     }
 }
 
@@ -177,7 +206,8 @@ fn between_two_images_nothing_is_said() {
     // Depth 7/8 is a float32: equal depth can be told, and shows.
     assert_eq!(verdict(8.0, 8.0), Verdict::Visible);
     assert_eq!(verdict(8.0, 8.000_001), Verdict::Hidden);
-    // 2/3 is none. Its neighbours are 3e-7 apart in view depth.
+    // 2/3 is none.
+    // Its neighbours are 3e-7 apart in view depth.
     assert_eq!(verdict(3.0, 3.0), Verdict::Undecided);
     assert_eq!(verdict(3.0, 3.000_001), Verdict::Hidden);
     assert_eq!(verdict(3.0, 2.999_999), Verdict::Visible);

@@ -1,16 +1,21 @@
 //! Cases worked by hand: every expectation follows from the few lines of arithmetic beside it.
 
 use hiz_ref::{
-    Coverage, Error, Options, OwnDepth, Verdict, View, Volume, classify, classify_with, hides, is_outside, own_depth,
-    touched_pixels,
+    Coverage, Error, Options, OwnDepth, Verdict, View, Volume, classify, classify_with, hides,
+    is_outside, own_depth, touched_pixels,
 };
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// From the origin along +z, 90 degrees, near plane 1, infinite far plane, standard Z. With 4x4 pixels a point has
-/// `x_pixel = 2 + 2 x/z`, `y_pixel = 2 - 2 y/z`, depth `1 - 1/z`.
+/// From the origin along +z, 90 degrees, near plane 1, infinite far plane, standard Z.
+/// With 4x4 pixels a point has `x_pixel = 2 + 2 x/z`, `y_pixel = 2 - 2 y/z`, depth `1 - 1/z`.
 fn perspective(width: u32, height: u32) -> View {
     View {
-        rows: [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0], [0.0, 0.0, 1.0, 0.0]],
+        rows: [
+            [1.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, -1.0],
+            [0.0, 0.0, 1.0, 0.0],
+        ],
         origin: [0.0; 3],
         width,
         height,
@@ -26,7 +31,8 @@ fn reversed(width: u32, height: u32) -> View {
     view
 }
 
-/// World coordinates are NDC. With 4x4 pixels `x_pixel = 2 + 2 x`, `y_pixel = 2 - 2 y`.
+/// World coordinates are NDC.
+/// With 4x4 pixels `x_pixel = 2 + 2 x`, `y_pixel = 2 - 2 y`.
 fn orthographic(width: u32, height: u32) -> View {
     let mut view = perspective(width, height);
     view.rows[2] = [0.0, 0.0, 1.0, 0.0];
@@ -55,7 +61,9 @@ fn verdict(view: &View, volume: Volume, depth: &[f32]) -> Verdict {
 
 #[test]
 fn a_pixel_is_closed() {
-    // At z = 2, x = 1 is x_pixel = 3: the edge between columns 2 and 3. y in 0.1..0.2 is y_pixel 1.8..1.9: row 1. Depth 0.5.
+    // At z = 2, x = 1 is x_pixel = 3: the edge between columns 2 and 3. y in 0.1..0.2 is y_pixel
+    // 1.8..1.9: row 1.
+    // Depth 0.5.
     let view = perspective(4, 4);
     let plate = |left| aabb([left, 0.1, 2.0], [1.5, 0.2, 2.0]);
     let image = hole(&view, 0.25, [2, 1], 1.0);
@@ -83,9 +91,10 @@ fn equal_depth_is_visible_and_one_step_nearer_hides() {
         },
     ] {
         // The oriented box reaches from z = 10 - 2 to 10 + 2: its axis 1 is along z.
-        for (view, depth, nearer) in
-            [(perspective(5, 3), 0.875f32, 0.875f32.next_down()), (reversed(5, 3), 0.125, 0.125f32.next_up())]
-        {
+        for (view, depth, nearer) in [
+            (perspective(5, 3), 0.875f32, 0.875f32.next_down()),
+            (reversed(5, 3), 0.125, 0.125f32.next_up()),
+        ] {
             assert!(!hides(&view, &volume, depth).expect("valid"), "{volume:?}");
             assert!(hides(&view, &volume, nearer).expect("valid"), "{volume:?}");
             assert_eq!(verdict(&view, volume, &[depth; 15]), Verdict::Visible);
@@ -101,8 +110,9 @@ fn equal_depth_is_visible_and_one_step_nearer_hides() {
 
 #[test]
 fn a_sphere_tangent_to_a_pixel_edge() {
-    // Eight columns: x_pixel = 4 + 4 x/z, so x_pixel = 7 is the plane 4 x - 3 z = 0. From (0, 0, 10) it is 30/5 = 6 away, and the
-    // foot is (4.8, 0, 6.4), well in front of the near plane: radius 6 touches column 7, the float64 below 6 does not.
+    // Eight columns: x_pixel = 4 + 4 x/z, so x_pixel = 7 is the plane 4 x - 3 z = 0.
+    // From (0, 0, 10) it is 30/5 = 6 away, and the foot is (4.8, 0, 6.4), well in front of the near
+    // plane: radius 6 touches column 7, the float64 below 6 does not.
     let view = perspective(8, 8);
     let image: Vec<f32> = (0..64).map(|i| if i % 8 == 7 { 1.0 } else { 0.0 }).collect();
     let ball = |radius: f64| sphere([0.0, 0.0, 10.0], radius);
@@ -116,8 +126,10 @@ fn a_sphere_tangent_to_a_pixel_edge() {
 
 #[test]
 fn a_disk_misses_the_corners_of_its_square() {
-    // Orthographic, 8x8: one pixel is a quarter wide. Radius 0.75 about the middle reaches column 7 (x from 0.75) only where y = 0;
-    // the corner of pixel (6, 1) that is nearest to the middle is (0.5, 0.5), 0.707 away: touched. With 0.7 it is not.
+    // Orthographic, 8x8: one pixel is a quarter wide.
+    // Radius 0.75 about the middle reaches column 7 (x from 0.75) only where y = 0; the corner of
+    // pixel (6, 1) that is nearest to the middle is (0.5, 0.5), 0.707 away: touched.
+    // With 0.7 it is not.
     let view = orthographic(8, 8);
     let ball = |radius| sphere([0.0, 0.0, 0.5], radius);
     let touched = |volume| touched_pixels(&view, &volume, Coverage::Area).expect("valid");
@@ -151,7 +163,8 @@ fn row_0_is_on_top() {
 fn the_near_plane_and_what_lies_behind() {
     let view = perspective(4, 4);
     let nearest = [0.0f32; 16];
-    // Around the camera, and across the near plane inside the frustum: visible whatever the image says.
+    // Around the camera, and across the near plane inside the frustum: visible whatever the image
+    // says.
     assert_eq!(verdict(&view, sphere([0.0; 3], 3.0), &nearest), Verdict::Visible);
     let across = aabb([-0.1, -0.1, 0.5], [0.1, 0.1, 5.0]);
     assert_eq!(verdict(&view, across, &nearest), Verdict::Visible);
@@ -174,7 +187,8 @@ fn the_near_plane_and_what_lies_behind() {
 
 #[test]
 fn the_corner_of_the_frustum_where_no_plane_alone_decides() {
-    // Orthographic: a ball beyond the corner (1, 1), nearer than its radius to both side planes but not to the edge: 3-4-5.
+    // Orthographic: a ball beyond the corner (1, 1), nearer than its radius to both side planes but
+    // not to the edge: 3-4-5.
     let view = orthographic(4, 4);
     let ball = |radius| sphere([1.0 + 3.0, 1.0 + 4.0, 0.5], radius);
     assert!(!is_outside(&view, &ball(5.0)).expect("valid"));
@@ -183,7 +197,8 @@ fn the_corner_of_the_frustum_where_no_plane_alone_decides() {
     let ball = |radius| sphere([1.0 + 2.0, 1.0 + 3.0, 1.0 + 6.0], radius);
     assert!(!is_outside(&view, &ball(7.0)).expect("valid"));
     assert!(is_outside(&view, &ball(7.0f64.next_down())).expect("valid"));
-    // A square standing on its tip beyond the corner: |x - 3| + |y - 3| <= 4 reaches exactly (1, 1).
+    // A square standing on its tip beyond the corner: |x - 3| + |y - 3| <= 4 reaches exactly (1,
+    // 1).
     let diamond = |half| Volume::OrientedBox {
         center: [3.0, 3.0, 0.5],
         half_sizes: [half, half, 0.25],
@@ -216,7 +231,8 @@ fn special_depths() {
     for far in [f32::NAN, f32::NEG_INFINITY, -0.5, 1.5, 0.0, -0.0, 1e-40] {
         assert_eq!(verdict(&back, far_away, &[far]), Verdict::Visible, "{far}");
     }
-    // Beyond the far plane a depth of 1 is nearer than everything; it stands for "nothing there" and hides nothing all the same.
+    // Beyond the far plane a depth of 1 is nearer than everything; it stands for "nothing there"
+    // and hides nothing all the same.
     let beyond = sphere([0.0, 0.0, 5.0], 1.0);
     assert!(!hides(&orthographic(1, 1), &beyond, 1.0).expect("valid"));
     assert!(hides(&orthographic(1, 1), &beyond, 1.0f32.next_down()).expect("valid"));
@@ -242,7 +258,8 @@ fn samples_count_alone_where_asked() {
     assert_eq!(sample(plate(0.25f64.next_down())), (Verdict::Hidden, None));
     assert_eq!(verdict(&view, plate(0.2), &[1.0; 16]), Verdict::Visible, "the square is touched");
     let ball = |radius| sphere([-0.05, 0.65, 0.5], radius);
-    // The sample nearest to (-0.05, 0.65) is (-0.25, 0.75), the centre of pixel (1, 0): sqrt(0.05) = 0.2236 away.
+    // The sample nearest to (-0.05, 0.65) is (-0.25, 0.75), the centre of pixel (1, 0):
+    // sqrt(0.05) = 0.2236 away.
     assert_eq!(sample(ball(0.22)), (Verdict::Hidden, None));
     assert_eq!(sample(ball(0.23)), (Verdict::Visible, Some([1, 0])));
     let touched = touched_pixels(&view, &plate(0.25), Coverage::Sample).expect("valid");
@@ -280,8 +297,10 @@ fn huge_and_tiny_numbers_are_decided_exactly() {
 
 #[test]
 fn a_matrix_that_float64_cannot_follow() {
-    // x = 5 K p.x - 4 K p.y - K p.z + 0.6 is 0.6 for p = (t, t, t), but each product is rounded by up to 32: in plain float64 the point
-    // lands anywhere. `x_pixel` = 2 + 1.2: column 3; `y_pixel` = 2 - 0.2: row 1. Mirrored, and with x and y exchanged, likewise.
+    // x = 5 K p.x - 4 K p.y - K p.z + 0.6 is 0.6 for p = (t, t, t), but each product is rounded by
+    // up to 32: in plain float64 the point lands anywhere.
+    // `x_pixel` = 2 + 1.2: column 3; `y_pixel` = 2 - 0.2: row 1.
+    // Mirrored, and with x and y exchanged, likewise.
     const K: f64 = 1e17;
     for (sign, exchanged, pixel) in
         [(1.0, false, [3, 1]), (-1.0, false, [0, 1]), (1.0, true, [2, 0]), (-1.0, true, [2, 3])]
@@ -303,13 +322,18 @@ fn a_matrix_that_float64_cannot_follow() {
 
 #[test]
 fn strange_matrices() {
-    // Negated rows: 0 <= z <= w asks for points behind the camera whose z/w is that of points before it. There are none.
+    // Negated rows: 0 <= z <= w asks for points behind the camera whose z/w is that of points
+    // before it.
+    // There are none.
     let mut negated = perspective(4, 4);
     negated.rows = negated.rows.map(|row| row.map(|x| -x));
-    for volume in [sphere([0.0, 0.0, 10.0], 5.0), sphere([0.0, 0.0, -10.0], 5.0), aabb([-1e6; 3], [1e6; 3])] {
+    for volume in
+        [sphere([0.0, 0.0, 10.0], 5.0), sphere([0.0, 0.0, -10.0], 5.0), aabb([-1e6; 3], [1e6; 3])]
+    {
         assert!(is_outside(&negated, &volume).expect("valid"), "{volume:?}");
     }
-    // A singular matrix has a point with clip = (0, 0, 0, 0): it counts as touched everywhere, the safe side.
+    // A singular matrix has a point with clip = (0, 0, 0, 0): it counts as touched everywhere, the
+    // safe side.
     let mut singular = perspective(4, 4);
     singular.rows[2] = [0.0; 4];
     let eye = sphere([0.0; 3], 0.0);
@@ -346,8 +370,10 @@ fn invalid_volumes_and_bad_input_have_names() {
 
 #[test]
 fn a_pixel_shows_its_own_part_of_a_slope() {
-    // World is NDC: columns 0..4 are x in -1..1. A plate that recedes to the right: depth 0.5 at its middle (x = 0), 0.25 at
-    // x = -0.9, 0.75 at x = 0.9. In column 0 (x below -0.5) it reaches from 0.25 to 0.361, in column 3 from 0.639 to 0.75.
+    // World is NDC: columns 0..4 are x in -1..1.
+    // A plate that recedes to the right: depth 0.5 at its middle (x = 0), 0.25 at x = -0.9, 0.75 at
+    // x = 0.9.
+    // In column 0 (x below -0.5) it reaches from 0.25 to 0.361, in column 3 from 0.639 to 0.75.
     let view = orthographic(4, 1);
     let slope = Volume::OrientedBox {
         center: [0.0, 0.0, 0.5],
@@ -355,13 +381,15 @@ fn a_pixel_shows_its_own_part_of_a_slope() {
         axes: [[0.9, 0.0, 0.0], [0.0, 1.0, 0.0], [0.25, 0.0, 1.0]],
     };
     let ask = |depth: [f32; 4], own_depth| {
-        classify_with(&view, &slope, &depth, Options { own_depth, ..Options::default() }).expect("valid input")
+        classify_with(&view, &slope, &depth, Options { own_depth, ..Options::default() })
+            .expect("valid input")
     };
     let following = [0.24, 0.36, 0.49, 0.63];
     assert_eq!(ask(following, OwnDepth::PerPixel).verdict, Verdict::Hidden);
     assert_eq!(ask(following, OwnDepth::Nearest).verdict, Verdict::Visible);
     // What column 2 shows begins with the depth of x = 0.
-    let begins = |column| own_depth(&view, &slope, Coverage::Area, [column, 0]).expect("valid input");
+    let begins =
+        |column| own_depth(&view, &slope, Coverage::Area, [column, 0]).expect("valid input");
     assert_eq!(begins(2), Some(0.5));
     assert!((f64::from(begins(3).expect("touched")) - (0.5 + 0.5 / 0.9 * 0.25)).abs() < 1e-7);
     // At x = 0.5 it is 0.6389 deep.

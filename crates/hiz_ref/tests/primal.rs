@@ -1,13 +1,16 @@
-//! The oracle decides by certificates that separate; here the same questions are decided by points that belong to both sides, in whole
-//! numbers, for every pixel of small images: a second method that shares nothing with the first.
+//! The oracle decides by certificates that separate; here the same questions are decided by points
+//! that belong to both sides, in whole numbers, for every pixel of small images: a second method
+//! that shares nothing with the first.
 //!
-//! All numbers are small integers, so degenerate cases (touching, parallel, flat, singular) are the rule.
+//! All numbers are small integers, so degenerate cases (touching, parallel, flat, singular) are the
+//! rule.
 
 mod common;
 
 use common::Random;
 use hiz_ref::{
-    Arithmetic, Coverage, Options, OwnDepth, Verdict, View, Volume, classify_with, is_outside, touched_pixels,
+    Arithmetic, Coverage, Options, OwnDepth, Verdict, View, Volume, classify_with, is_outside,
+    touched_pixels,
 };
 
 /// `v . s + m >= 0`, in local coordinates of the volume.
@@ -17,7 +20,8 @@ struct Plane {
     m: i128,
 }
 
-/// A case in whole numbers. Local coordinates: world = center + axes s, with s in the cube or in the unit ball.
+/// A case in whole numbers.
+/// Local coordinates: world = center + axes s, with s in the cube or in the unit ball.
 struct Case {
     rows: [[i128; 4]; 4],
     center: [i128; 3],
@@ -96,7 +100,8 @@ impl Case {
 
     /// `sum_r weights[r] * rows[r]` as a function of local coordinates.
     fn plane(&self, weights: [i128; 4]) -> Plane {
-        let row: [i128; 4] = [0, 1, 2, 3].map(|c| (0..4).map(|r| weights[r] * self.rows[r][c]).sum());
+        let row: [i128; 4] =
+            [0, 1, 2, 3].map(|c| (0..4).map(|r| weights[r] * self.rows[r][c]).sum());
         let along = |p: [i128; 3]| (0..3).map(|i| row[i] * p[i]).sum::<i128>();
         Plane { v: self.axes.map(along), m: along(self.center) + row[3] }
     }
@@ -137,7 +142,11 @@ impl Case {
 
     /// Whether a depth (in eighths) is nearer than every point.
     fn is_hidden_by(&self, depth: i128) -> bool {
-        let plane = if self.reversed { self.plane([0, 0, -8, depth]) } else { self.plane([0, 0, 8, -depth]) };
+        let plane = if self.reversed {
+            self.plane([0, 0, -8, depth])
+        } else {
+            self.plane([0, 0, 8, -depth])
+        };
         if self.ball {
             return plane.m > 0 && plane.m * plane.m > dot(plane.v, plane.v);
         }
@@ -157,7 +166,8 @@ fn dot(a: [i128; 3], b: [i128; 3]) -> i128 {
 }
 
 fn det([a, b, c]: [[i128; 3]; 3]) -> i128 {
-    a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+    a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
+        + a[2] * (b[0] * c[1] - b[1] * c[0])
 }
 
 /// Solves `matrix x = right` by Cramer's rule: numerators and a positive denominator.
@@ -187,13 +197,15 @@ fn polytope_is_not_empty(planes: &[Plane]) -> bool {
         (i + 1..n).any(|j| {
             (j + 1..n).any(|l| {
                 let [a, b, c] = [planes[i], planes[j], planes[l]];
-                solve([a.v, b.v, c.v], [-a.m, -b.m, -c.m]).is_some_and(|point| satisfies(planes, point))
+                solve([a.v, b.v, c.v], [-a.m, -b.m, -c.m])
+                    .is_some_and(|point| satisfies(planes, point))
             })
         })
     })
 }
 
-/// The nearest point to the centre is the centre or its projection to one, two or three of the planes: tries all that are inside.
+/// The nearest point to the centre is the centre or its projection to one, two or three of the
+/// planes: tries all that are inside.
 fn ball_meets(planes: &[Plane]) -> bool {
     let close = |(x, d): ([i128; 3], i128)| dot(x, x) <= d * d && satisfies(planes, (x, d));
     if close(([0; 3], 1)) {
@@ -208,7 +220,8 @@ fn ball_meets(planes: &[Plane]) -> bool {
         }
         (i + 1..n).any(|j| {
             let b = planes[j];
-            // The foot lies in both planes and in the plane through the centre that their normals span.
+            // The foot lies in both planes and in the plane through the centre that their normals
+            // span.
             let across = [
                 a.v[1] * b.v[2] - a.v[2] * b.v[1],
                 a.v[2] * b.v[0] - a.v[0] * b.v[2],
@@ -217,7 +230,9 @@ fn ball_meets(planes: &[Plane]) -> bool {
             if solve([a.v, b.v, across], [-a.m, -b.m, 0]).is_some_and(close) {
                 return true;
             }
-            planes[j + 1..].iter().any(|c| solve([a.v, b.v, c.v], [-a.m, -b.m, -c.m]).is_some_and(close))
+            planes[j + 1..]
+                .iter()
+                .any(|c| solve([a.v, b.v, c.v], [-a.m, -b.m, -c.m]).is_some_and(close))
         })
     })
 }
@@ -281,7 +296,12 @@ fn certificates_and_points_agree() {
                 let outcome = classify_with(&view, &volume, &depth, options).expect("valid");
                 if outcome.verdict != Verdict::Undecided {
                     let expected = if open.is_empty() { Verdict::Hidden } else { Verdict::Visible };
-                    assert_eq!(outcome.verdict, expected, "{arithmetic:?}, own depth in a pixel, {}", name());
+                    assert_eq!(
+                        outcome.verdict,
+                        expected,
+                        "{arithmetic:?}, own depth in a pixel, {}",
+                        name()
+                    );
                 }
                 if let Some(witness) = outcome.witness {
                     assert!(open.contains(&witness), "{}", name());

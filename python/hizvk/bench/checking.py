@@ -1,9 +1,12 @@
 """What `hizvk.recommend` holds its candidates against, so that none is recommended that hides what can be seen.
 
-Occluders, where every ray counts: what conservative depth hides is proven to be hidden. What a candidate culls beyond
-that is looked at by rays in float64 from the camera to points of the bounds, at the triangles (`clear`). It is visible,
-or unclear; of a bare point rays decide either. Depth images, or pixel centres alone: the exact oracle
-(`hizvk.reference`) on the full image as it is. Where there is much to look at, a part is.
+Occluders, where every ray counts: what conservative depth hides is proven to be hidden.
+What a candidate culls beyond that is looked at by rays in float64 from the camera to points of the
+bounds, at the triangles (`clear`).
+It is visible, or unclear; of a bare point rays decide either.
+Depth images, or pixel centres alone: the exact oracle (`hizvk.reference`) on the full image as it
+is.
+Where there is much to look at, a part is.
 """
 
 from __future__ import annotations
@@ -118,9 +121,11 @@ def hold(
     tool
         Of `by_rays` or `by_oracle`.
     every_ray : bool
-        Whether every ray counts, so that what conservative depth hides is proven to be hidden and what it keeps is not.
-        Otherwise the image as it is counts; and of bare points with a guard among the candidates, what the guard keeps
-        counts as visible: they lie on what the image shows, whose depth it knows at its pixels' centres alone.
+        Whether every ray counts, so that what conservative depth hides is proven to be hidden and
+        what it keeps is not.
+        Otherwise the image as it is counts; and of bare points with a guard among the candidates,
+        what the guard keeps counts as visible: they lie on what the image shows, whose depth it
+        knows at its pixels' centres alone.
     """
     method, most, judge = tool
     found = Check(method, [0] * len(chosen), [0] * len(chosen))
@@ -139,7 +144,9 @@ def hold(
             if points and not every_ray and any(chosen[number].guard_px for number in members):
                 found.method = GUARD
                 asked = np.flatnonzero(by_some)
-                visible = np.logical_or.reduce([~culled[number] for number in members if chosen[number].guard_px])
+                visible = np.logical_or.reduce(
+                    [~culled[number] for number in members if chosen[number].guard_px]
+                )
                 open_[:] = False
             elif isinstance(bounds, Instances):
                 asked = np.zeros(0, np.intp)

@@ -1,9 +1,11 @@
 """A street-level city from a seed: buildings hide, and cars, people, lamps, trees and balconies are tested.
 
-Streets run along x and y, `PITCH` metres apart; the blocks between them are cut into lots with one building each. All
-solids are boxes. Those of the furniture are turned with it, so that an axis-aligned box, a sphere and an oriented box
-about a thing differ as they do in practice (a lamp post is far thinner than its sphere). Coordinates are multiples of
-1/64 m, as in `hizvk.scenes`.
+Streets run along x and y, `PITCH` metres apart; the blocks between them are cut into lots with one
+building each.
+All solids are boxes.
+Those of the furniture are turned with it, so that an axis-aligned box, a sphere and an oriented box
+about a thing differ as they do in practice (a lamp post is far thinner than its sphere).
+Coordinates are multiples of 1/64 m, as in `hizvk.scenes`.
 """
 
 from __future__ import annotations
@@ -60,7 +62,11 @@ class City:
 
 
 def city(
-    things: int = 20_000, views: int = 16, *, seed: int = 2010, corner: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    things: int = 20_000,
+    views: int = 16,
+    *,
+    seed: int = 2010,
+    corner: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> City:
     """Buildings as occluders, street furniture and balconies as instances, views at eye height along the streets.
 
@@ -104,7 +110,11 @@ def city(
             axis=-1,
         )
         meshes.append(np.round(solid / GRID) * GRID)
-        faces.append((one + vertices + len(shape) * np.arange(count)[:, None, None]).reshape(-1, 3).astype(np.uint32))
+        faces.append(
+            (one + vertices + len(shape) * np.arange(count)[:, None, None])
+            .reshape(-1, 3)
+            .astype(np.uint32)
+        )
         owners.append(np.repeat(np.arange(placed, placed + count, dtype=np.int32), len(one)))
         turns.append(yaw)
         placed += count
@@ -133,24 +143,36 @@ def _buildings(rng: np.random.Generator) -> tuple[Floats, Floats]:
         for i in range(len(cuts[0]) - 1):
             for k in range(len(cuts[1]) - 1):
                 near = start + np.array([cuts[0][i], cuts[1][k]])
-                far = start + np.array([cuts[0][i + 1], cuts[1][k + 1]]) - rng.choice([0.0, 0.0, 3.0], 2)
+                far = (
+                    start
+                    + np.array([cuts[0][i + 1], cuts[1][k + 1]])
+                    - rng.choice([0.0, 0.0, 3.0], 2)
+                )
                 low.append((*near, 0.0))
                 high.append((*far, rng.uniform(9.0, 30.0) + 40.0 * rng.random() ** 6))
-    return np.round(np.array(low, np.float64) / GRID) * GRID, np.round(np.array(high, np.float64) / GRID) * GRID
+    return np.round(np.array(low, np.float64) / GRID) * GRID, np.round(
+        np.array(high, np.float64) / GRID
+    ) * GRID
 
 
 def _in_streets(rng: np.random.Generator, count: int, jitter: float) -> tuple[Floats, Floats]:
     """Feet between the middle of a street and its houses, never in a crossing; and yaws, turned by up to `jitter`."""
     street = rng.integers(0, BLOCKS + 1, count) * PITCH + STREET / 2.0
     across = street + rng.choice([-1.0, 1.0], count) * rng.uniform(3.0, 6.0, count)
-    along = rng.integers(0, BLOCKS, count) * PITCH + STREET + rng.uniform(0.0, PITCH - STREET, count)
+    along = (
+        rng.integers(0, BLOCKS, count) * PITCH + STREET + rng.uniform(0.0, PITCH - STREET, count)
+    )
     north = rng.random(count) < 0.5
-    foot = np.stack([np.where(north, across, along), np.where(north, along, across), np.zeros(count)], axis=1)
+    foot = np.stack(
+        [np.where(north, across, along), np.where(north, along, across), np.zeros(count)], axis=1
+    )
     yaw: Floats = np.where(north, np.pi / 2.0, 0.0) + rng.uniform(-jitter, jitter, count)
     return foot, yaw
 
 
-def _on_walls(rng: np.random.Generator, count: int, low: Floats, high: Floats) -> tuple[Floats, Floats]:
+def _on_walls(
+    rng: np.random.Generator, count: int, low: Floats, high: Floats
+) -> tuple[Floats, Floats]:
     """Feet on the fronts of buildings, three metres up or more; yaws such that y points out of the wall."""
     house, front = rng.integers(0, len(low), count), rng.integers(0, 4, count)
     place = low[house] + rng.uniform(0.1, 0.9, (count, 3)) * (high[house] - low[house])
@@ -162,7 +184,9 @@ def _on_walls(rng: np.random.Generator, count: int, low: Floats, high: Floats) -
     return place, yaw
 
 
-def _eyes(rng: np.random.Generator, count: int, corner: tuple[float, float, float]) -> tuple[View, ...]:
+def _eyes(
+    rng: np.random.Generator, count: int, corner: tuple[float, float, float]
+) -> tuple[View, ...]:
     """Eyes near the middle of streets and in crossings, looking along the street or across it."""
     views = []
     for number in range(count):
@@ -171,11 +195,15 @@ def _eyes(rng: np.random.Generator, count: int, corner: tuple[float, float, floa
         if number % 4 == 3:  # in a crossing, where three streets show
             along = rng.integers(2, BLOCKS - 1) * PITCH + STREET / 2.0
         north = number % 2 == 0
-        heading = rng.uniform(-0.5, 0.5) + rng.choice([0.0, np.pi]) + (np.pi / 2.0 if north else 0.0)
+        heading = (
+            rng.uniform(-0.5, 0.5) + rng.choice([0.0, np.pi]) + (np.pi / 2.0 if north else 0.0)
+        )
         x, y = (street, along) if north else (along, street)
         eye = np.array([x, y]) + rng.uniform(-1.0, 1.0, 2)
         eye = np.round(np.array([*eye, EYE]) / GRID) * GRID + corner
-        target = eye + np.array([10.0 * np.cos(heading), 10.0 * np.sin(heading), rng.uniform(-0.5, 1.5)])
+        target = eye + np.array(
+            [10.0 * np.cos(heading), 10.0 * np.sin(heading), rng.uniform(-0.5, 1.5)]
+        )
         name = f"{'crossing' if number % 4 == 3 else 'street'} {number}"
         views.append(View(name, tuple(eye.tolist()), tuple(target.tolist()), 65.0, 0.125))
     return tuple(views)

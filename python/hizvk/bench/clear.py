@@ -1,11 +1,14 @@
 """Which points of a scene no occluder hides: rays in float64 at the triangles themselves, without a depth image.
 
-The check of `hizvk.recommend`. It shares nothing with the engine but the camera's rows. What it calls clear is in view
-and has no triangle before it; in doubt (a hit on an edge, a triangle seen edge-on) it says blocked. So it accuses
-nobody by rounding, and proves nothing about points that it was not asked about.
+The check of `hizvk.recommend`.
+It shares nothing with the engine but the camera's rows.
+What it calls clear is in view and has no triangle before it; in doubt (a hit on an edge, a triangle
+seen edge-on) it says blocked.
+So it accuses nobody by rounding, and proves nothing about points that it was not asked about.
 
-Triangle and point are compared in homogeneous coordinates (Olano and Greer, "Triangle scan conversion using 2D
-homogeneous coordinates", 1997, section 3), so that triangles which cross the eye's plane need no clipping.
+Triangle and point are compared in homogeneous coordinates (Olano and Greer, "Triangle scan
+conversion using 2D homogeneous coordinates", 1997, section 3), so that triangles which cross the
+eye's plane need no clipping.
 """
 
 from __future__ import annotations
@@ -54,7 +57,9 @@ class Blockers:
         Who looks.
     """
 
-    def __init__(self, vertices: Floats, triangles: npt.NDArray[np.uint32], faces: str, camera: Camera) -> None:
+    def __init__(
+        self, vertices: Floats, triangles: npt.NDArray[np.uint32], faces: str, camera: Camera
+    ) -> None:
         self._rows = np.array(camera._inner.rows(), np.float64)
         self._origin = np.array(camera._inner.origin(), np.float64)
         self._reversed = camera.reversed_z
@@ -76,17 +81,26 @@ class Blockers:
         clip = self._clip(points)
         x, y, z, w = clip.T
         clear: Mask = (
-            (w > 0.0) & (np.abs(x) <= w) & (np.abs(y) <= w) & (z >= 0.0) & (z <= w) & np.isfinite(clip).all(axis=1)
+            (w > 0.0)
+            & (np.abs(x) <= w)
+            & (np.abs(y) <= w)
+            & (z >= 0.0)
+            & (z <= w)
+            & np.isfinite(clip).all(axis=1)
         )
         for tiles, (members, first) in zip(TILES, self._lists, strict=True):
             asked = np.flatnonzero(clear)
             cell = _cell(clip[asked], tiles)
             count = first[cell + 1] - first[cell]
             ends = np.cumsum(count)
-            cuts = np.searchsorted(ends, np.arange(CHUNK, max(int(ends[-1]) if len(ends) else 0, 1), CHUNK))
+            cuts = np.searchsorted(
+                ends, np.arange(CHUNK, max(int(ends[-1]) if len(ends) else 0, 1), CHUNK)
+            )
             for part in np.split(np.arange(len(asked)), np.unique(cuts)):
                 turn = np.repeat(part, count[part])
-                within = np.arange(len(turn)) - np.repeat(np.cumsum(count[part]) - count[part], count[part])
+                within = np.arange(len(turn)) - np.repeat(
+                    np.cumsum(count[part]) - count[part], count[part]
+                )
                 triangle = members[np.repeat(first[cell[part]], count[part]) + within]
                 blocked = self._before(clip[asked[turn]], self._corners[triangle])
                 clear[asked[turn[blocked]]] = False
@@ -94,7 +108,9 @@ class Blockers:
 
     def _clip(self, points: Floats) -> Floats:
         with np.errstate(invalid="ignore", over="ignore"):
-            clip: Floats = (np.asarray(points, np.float64) - self._origin) @ self._rows[:, :3].T + self._rows[:, 3]
+            clip: Floats = (np.asarray(points, np.float64) - self._origin) @ self._rows[
+                :, :3
+            ].T + self._rows[:, 3]
         return clip
 
     def _sorted(self, corners: Floats) -> list[tuple[Indices, Indices]]:
@@ -144,7 +160,9 @@ class Blockers:
         if self._parallel:
             ahead = z / depth - point[:, 2] / w
             nearer = ahead > HAIR if self._reversed else ahead < -HAIR
-            own = (corners[:, :, 2] / corners[:, :, 3] - (point[:, 2] / w)[:, None]) * (1 if self._reversed else -1)
+            own = (corners[:, :, 2] / corners[:, :, 3] - (point[:, 2] / w)[:, None]) * (
+                1 if self._reversed else -1
+            )
             touches = (own > HAIR).any(axis=1)
         else:
             nearer = depth < w * (1.0 - HAIR)
@@ -161,7 +179,9 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 def _tile(at: Floats, tiles: int) -> Indices:
     """The tile of each normalised coordinate; NaN goes to the first."""
-    tile: Indices = np.nan_to_num(np.clip(np.floor((at + 1.0) * 0.5 * tiles), 0.0, tiles - 1.0)).astype(np.intp)
+    tile: Indices = np.nan_to_num(
+        np.clip(np.floor((at + 1.0) * 0.5 * tiles), 0.0, tiles - 1.0)
+    ).astype(np.intp)
     return tile
 
 
@@ -174,8 +194,10 @@ def _cell(clip: Floats, tiles: int) -> Indices:
 def points_of(bounds: Bounds, which: Indices, camera: Camera) -> Floats:
     """Points of some bounds that a check looks at, ``(len(which), K, 3)``.
 
-    If all are bare points, K = 1, else `POINTS`. Of a box: corners, middles of edges and faces, and the centre. Of a
-    sphere: its centre, its nearest and farthest point, and two rings of its disc across the view.
+    If all are bare points, K = 1, else `POINTS`.
+    Of a box: corners, middles of edges and faces, and the centre.
+    Of a sphere: its centre, its nearest and farthest point, and two rings of its disc across the
+    view.
     """
     if isinstance(bounds, Spheres):
         centers = np.asarray(bounds.centers, np.float64)[which]
@@ -189,20 +211,27 @@ def points_of(bounds: Bounds, which: Indices, camera: Camera) -> Floats:
             return low[:, None]
         corner = LATTICE[None] > 0.0
         return np.where(
-            LATTICE[None] == 0.0, 0.5 * (low + high)[:, None], np.where(corner, high[:, None], low[:, None])
+            LATTICE[None] == 0.0,
+            0.5 * (low + high)[:, None],
+            np.where(corner, high[:, None], low[:, None]),
         )
     assert isinstance(bounds, OrientedBoxes)
     centers, half, turn = (
-        np.asarray(part, np.float64)[which] for part in (bounds.centers, bounds.half_sizes, bounds.rotations)
+        np.asarray(part, np.float64)[which]
+        for part in (bounds.centers, bounds.half_sizes, bounds.rotations)
     )
     if not half.any():
         return centers[:, None]
-    world: Floats = centers[:, None] + np.einsum("nij,nkj->nki", turn, LATTICE[None] * half[:, None])
+    world: Floats = centers[:, None] + np.einsum(
+        "nij,nkj->nki", turn, LATTICE[None] * half[:, None]
+    )
     return world
 
 
 #: A box's 27 points in units of half its sides.
-LATTICE: Final[Floats] = np.stack(np.meshgrid(*[(-1.0, 0.0, 1.0)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+LATTICE: Final[Floats] = np.stack(
+    np.meshgrid(*[(-1.0, 0.0, 1.0)] * 3, indexing="ij"), axis=-1
+).reshape(-1, 3)
 
 
 def _disc(centers: Floats, camera: Camera) -> Floats:
@@ -221,4 +250,6 @@ def _disc(centers: Floats, camera: Camera) -> Floats:
     ring = np.cos(angle)[:, None] * right[:, None] + np.sin(angle)[:, None] * up[:, None]
     both = np.stack([along, -along], axis=1)
     inside = 1.0 - 1e-12  # so that rounding leaves no point outside of the ball
-    return np.concatenate([np.zeros((len(centers), 1, 3)), inside * both, inside * ring, 0.5 * ring[:, ::2]], axis=1)
+    return np.concatenate(
+        [np.zeros((len(centers), 1, 3)), inside * both, inside * ring, 0.5 * ring[:, ::2]], axis=1
+    )

@@ -102,19 +102,26 @@ def run(
     chosen = EXTENTS[extent]
     size, repetitions = size or chosen.size, repetitions or chosen.repetitions
     device = hizvk.Device()
-    found = report.Report(command=command, seed=seed, extent=extent, adapter=device.adapter, missing=_left_out())
+    found = report.Report(
+        command=command, seed=seed, extent=extent, adapter=device.adapter, missing=_left_out()
+    )
     measured = configurations.matrix(extent)
     plots: dict[str, str] = {}
     for key in keys:
         try:
             bench = scenes.make(
-                key, instances or chosen.instances.get(key, 1), views or chosen.views[key], seed, castle
+                key,
+                instances or chosen.instances.get(key, 1),
+                views or chosen.views[key],
+                seed,
+                castle,
             )
         except scenes.Missing as missing:
             found.missing.append(str(missing))
             continue
         steps = terminal.Progress(
-            len(bench.scene.views) + repetitions, f"hizvk bench: {key}, {len(bench.scene):,} instances"
+            len(bench.scene.views) + repetitions,
+            f"hizvk bench: {key}, {len(bench.scene):,} instances",
         )
         try:
             result = measure(bench, size, measured, repetitions, device, steps.step)
@@ -152,22 +159,42 @@ def _parser() -> argparse.ArgumentParser:
     )
     # Told here, taken by `main`.
     parser.add_argument(
-        "--speed", action="store_true", help="measure times against yardsticks instead: see --speed --help"
+        "--speed",
+        action="store_true",
+        help="measure times against yardsticks instead: see --speed --help",
     )
-    parser.add_argument("--out", type=Path, default=Path("out/bench"), help="folder for report and plots (out/bench)")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("out/bench"),
+        help="folder for report and plots (out/bench)",
+    )
     parser.add_argument(
         "--scene", action="append", choices=scenes.NAMES, metavar="NAME",
         help=f"{', '.join(scenes.NAMES)}; may come several times (all)",
     )  # fmt: skip
     extent = parser.add_mutually_exclusive_group()
-    extent.add_argument("--quick", action="store_const", const="quick", dest="extent", help="small scenes, few rows")
-    extent.add_argument("--full", action="store_const", const="full", dest="extent", help="all combinations; long")
-    parser.add_argument("--castle", type=Path, metavar="PATH", help=f"castle.npz (or the variable {scenes.VARIABLE})")
+    extent.add_argument(
+        "--quick", action="store_const", const="quick", dest="extent", help="small scenes, few rows"
+    )
+    extent.add_argument(
+        "--full", action="store_const", const="full", dest="extent", help="all combinations; long"
+    )
+    parser.add_argument(
+        "--castle",
+        type=Path,
+        metavar="PATH",
+        help=f"castle.npz (or the variable {scenes.VARIABLE})",
+    )
     parser.add_argument("--seed", type=int, default=2010, help="of the scenes (2010)")
     parser.add_argument("--instances", type=terminal.count, help="in every scene but the castle")
     parser.add_argument("--views", type=terminal.count, help="of every scene")
-    parser.add_argument("--size", type=terminal.size, metavar="WIDTHxHEIGHT", help="of the views (640x360)")
-    parser.add_argument("--repetitions", type=terminal.count, help="how often everything is timed (5)")
+    parser.add_argument(
+        "--size", type=terminal.size, metavar="WIDTHxHEIGHT", help="of the views (640x360)"
+    )
+    parser.add_argument(
+        "--repetitions", type=terminal.count, help="how often everything is timed (5)"
+    )
     parser.add_argument("--json", action="store_true", help="print the report as one JSON object")
     parser.set_defaults(extent="default")
     return parser
@@ -200,8 +227,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _tell(found: report.Report, out: Path) -> None:
     print(f"adapter  {found.adapter}")
     for scene in found.scenes:
-        print(f"{scene.key}: the Pareto front of {scene.instances:,} instances, {scene.views} views")
-        for row in sorted((row for row in scene.rows if row.pareto), key=lambda row: -row.hidden_kept):
+        print(
+            f"{scene.key}: the Pareto front of {scene.instances:,} instances, {scene.views} views"
+        )
+        for row in sorted(
+            (row for row in scene.rows if row.pareto), key=lambda row: -row.hidden_kept
+        ):
             total = row.total_ms.median if row.total_ms else float("nan")
             print(
                 f"  {total:8.2f} ms a view, {row.ns_per_instance or 0.0:6.0f} ns an instance, "

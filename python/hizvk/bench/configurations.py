@@ -1,7 +1,9 @@
 """What is compared: which volume, how much is read, what of a pixel counts, which depth image, which order.
 
-All combinations would be hundreds, so each dimension is varied about the same middle (boxes, 2x2 texels, area coverage,
-full resolution, all levels, any order), and in full with those that it depends on. ``--full`` takes the whole product.
+All combinations would be hundreds, so each dimension is varied about the same middle (boxes, 2x2
+texels, area coverage, full resolution, all levels, any order), and in full with those that it
+depends on.
+``--full`` takes the whole product.
 """
 
 from __future__ import annotations
@@ -81,7 +83,10 @@ class Configuration:
     """Pixels by which the bounds grow, as in `Device.cull`."""
 
     def __str__(self) -> str:
-        words = [self.volume.replace("oriented_boxes", "oriented"), f"{self.footprint}x{self.footprint}"]
+        words = [
+            self.volume.replace("oriented_boxes", "oriented"),
+            f"{self.footprint}x{self.footprint}",
+        ]
         words += ["descent"] if self.descent else []
         words += ["volume fit"] if self.fit == "volume" else []
         words += [self.coverage] if self.coverage != "area" else []
@@ -94,7 +99,8 @@ class Configuration:
     def promises(self) -> bool:
         """Whether the promise reaches to the view's own pixels.
 
-        It does not for a smaller image of plain samples, nor for one whose own pixel centres are all that counts.
+        It does not for a smaller image of plain samples, nor for one whose own pixel centres are
+        all that counts.
         """
         return self.depth.divisor == 1 or self.promises_rays
 
@@ -105,7 +111,10 @@ class Configuration:
 
     def cull_options(self) -> dict[str, Any]:
         """The keyword arguments of `Device.cull`."""
-        options = {name: getattr(self, name) for name in ("footprint", "descent", "fit", "coverage", "order")}
+        options = {
+            name: getattr(self, name)
+            for name in ("footprint", "descent", "fit", "coverage", "order")
+        }
         return options | ({} if self.guard_px is None else {"guard_px": self.guard_px})
 
     def render_options(self, full: Size) -> dict[str, Any]:
@@ -134,15 +143,25 @@ def matrix(extent: str) -> tuple[Configuration, ...]:
     if extent == "full":
         chosen = _full()
     elif extent == "quick":
-        chosen = [Configuration(volume, *read) for volume in ("spheres", "boxes") for read in (READS[0], READS[-1])]
+        chosen = [
+            Configuration(volume, *read)
+            for volume in ("spheres", "boxes")
+            for read in (READS[0], READS[-1])
+        ]
         chosen += [Configuration(depth=depth) for depth in (DepthVariant(2), DepthVariant(2, True))]
-        chosen += [Configuration(fit="volume"), Configuration(coverage="sample"), Configuration(order="stable")]
+        chosen += [
+            Configuration(fit="volume"),
+            Configuration(coverage="sample"),
+            Configuration(order="stable"),
+        ]
     else:
         chosen = _default()
     return tuple(dict.fromkeys(chosen))
 
 
-def promised(volumes: Sequence[str], coverage: str, *, rendered: bool, points: bool = False) -> list[Configuration]:
+def promised(
+    volumes: Sequence[str], coverage: str, *, rendered: bool, points: bool = False
+) -> list[Configuration]:
     """What `hizvk.recommend` tries: whatever can be right for some renderer.
 
     Parameters
@@ -154,7 +173,8 @@ def promised(volumes: Sequence[str], coverage: str, *, rendered: bool, points: b
     rendered : bool
         Whether depth is rendered from occluders, so that it can be conservative, or smaller.
     points : bool
-        Whether the bounds are bare points, which lie on what a given image shows more often than not.
+        Whether the bounds are bare points, which lie on what a given image shows more often than
+        not.
     """
     plain, full = DepthVariant(), DepthVariant(1, True)
     ends = (READS[0], READS[-1])
@@ -179,39 +199,56 @@ def promised(volumes: Sequence[str], coverage: str, *, rendered: bool, points: b
     some = [replace(plain, levels=levels) for levels in SOME_LEVELS]
     some += [replace(full, levels=levels) for levels in SOME_LEVELS] if rendered else []
     chosen += [
-        Configuration(volume, *read, depth=depth, coverage="area" if depth.conservative else coverage)
+        Configuration(
+            volume, *read, depth=depth, coverage="area" if depth.conservative else coverage
+        )
         for depth, volume, read in product(some, volumes, ends)
     ]
     if points and not rendered and coverage == "area":
-        chosen += [Configuration(volume, *read, guard_px=0.5) for volume, read in product(volumes, READS)]
+        chosen += [
+            Configuration(volume, *read, guard_px=0.5) for volume, read in product(volumes, READS)
+        ]
     return list(dict.fromkeys(chosen))
 
 
 def _default() -> list[Configuration]:
     volumes = ("spheres", "boxes", "oriented_boxes")
     ends = (READS[0], READS[-1])
-    smaller = [DepthVariant(divisor, conservative) for divisor in (2, 4) for conservative in (False, True)]
+    smaller = [
+        DepthVariant(divisor, conservative) for divisor in (2, 4) for conservative in (False, True)
+    ]
     chosen = [Configuration(volume, *read) for volume, read in product(volumes, READS)]
-    chosen += [Configuration(volume, *read, fit="volume") for volume, read in product(volumes, ends)]
+    chosen += [
+        Configuration(volume, *read, fit="volume") for volume, read in product(volumes, ends)
+    ]
     chosen += [Configuration("boxes", *read, coverage="sample") for read in ends]
     chosen += [Configuration(order="stable")]
     chosen += [Configuration("boxes", *read, depth=depth) for depth, read in product(smaller, ends)]
     chosen += [
-        Configuration("boxes", *read, depth=DepthVariant(levels=some)) for some, read in product(SOME_LEVELS, ends)
+        Configuration("boxes", *read, depth=DepthVariant(levels=some))
+        for some, read in product(SOME_LEVELS, ends)
     ]
     return chosen
 
 
 def _full() -> list[Configuration]:
-    depths = [DepthVariant(), *(DepthVariant(d, c) for d in (1, 2, 4) for c in (False, True) if (d, c) != (1, False))]
+    depths = [
+        DepthVariant(),
+        *(DepthVariant(d, c) for d in (1, 2, 4) for c in (False, True) if (d, c) != (1, False)),
+    ]
     chosen = [
         Configuration(volume, *read, coverage=coverage, fit=fit, depth=depth)
         for volume, read, coverage, fit, depth in product(
-            ("spheres", "boxes", "oriented_boxes"), READS, ("area", "sample"), ("rectangle", "volume"), depths
+            ("spheres", "boxes", "oriented_boxes"),
+            READS,
+            ("area", "sample"),
+            ("rectangle", "volume"),
+            depths,
         )
         if coverage == "area" or depth == DepthVariant()
     ]
     chosen += [
-        Configuration("boxes", *read, depth=DepthVariant(levels=some)) for some, read in product(SOME_LEVELS, READS)
+        Configuration("boxes", *read, depth=DepthVariant(levels=some))
+        for some, read in product(SOME_LEVELS, READS)
     ]
     return [*chosen, Configuration(order="stable")]

@@ -1,9 +1,12 @@
 """Times and counts: every configuration and yardstick on every view of a scene, in turns.
 
-A repetition goes through the views, and in each through all configurations, each time beginning with another one, so
-that what disturbs the machine for a while disturbs all alike; then the same with the yardsticks. Each stage is waited
-for and timed by the clock on the wall, with what Python adds to it. The first call of everything comes before and is
-reported apart. Counts come from culls of their own (counting costs time), and the timed culls have to keep the same.
+A repetition goes through the views, and in each through all configurations, each time beginning
+with another one, so that what disturbs the machine for a while disturbs all alike; then the same
+with the yardsticks.
+Each stage is waited for and timed by the clock on the wall, with what Python adds to it.
+The first call of everything comes before and is reported apart.
+Counts come from culls of their own (counting costs time), and the timed culls have to keep the
+same.
 """
 
 from __future__ import annotations
@@ -41,16 +44,25 @@ class _Run:
     """One scene on the device."""
 
     def __init__(
-        self, bench: BenchScene, size: Size, configurations: Sequence[Configuration], repetitions: int, device: Device
+        self,
+        bench: BenchScene,
+        size: Size,
+        configurations: Sequence[Configuration],
+        repetitions: int,
+        device: Device,
     ) -> None:
         self.device, self.size, self.repetitions = device, size, repetitions
         self.scene = bench.scene
         self.configurations = configurations
-        self.variants = sorted({DepthVariant(), *(one.depth for one in configurations)}, key=DepthVariant.cost)
+        self.variants = sorted(
+            {DepthVariant(), *(one.depth for one in configurations)}, key=DepthVariant.cost
+        )
         self.cameras = [view.camera(size) for view in self.scene.views]
         watch = Stopwatch(device)
         self.occluders = device.occluders(self.scene.vertices, self.scene.triangles)
-        bounds = {kind: bench.bounds(kind) for kind in dict.fromkeys(one.volume for one in configurations)}
+        bounds = {
+            kind: bench.bounds(kind) for kind in dict.fromkeys(one.volume for one in configurations)
+        }
         bounds.setdefault("boxes", bench.bounds("boxes"))
         watch.lap()
         self.instances = {kind: device.instances(one) for kind, one in bounds.items()}
@@ -64,7 +76,8 @@ class _Run:
         self.masks: list[list[Mask]] = []
         self.ms: list[dict[str, npt.NDArray[np.float64]]] = []
 
-    # -- rows that are not hizvk's -----------------------------------------------------------------------------------
+    # -- rows that are not
+    # hizvk's -----------------------------------------------------------------------------------
 
     def yardsticks(self) -> dict[str, Callable[[int, DepthImage], tuple[Mask, dict[str, float]]]]:
         """By label: ``(view, depth image) -> mask, milliseconds by stage``."""
@@ -74,7 +87,9 @@ class _Run:
         }
         if self.rays is not None:
             rays, small = self.rays, DepthVariant(4).size(self.size)
-            found["Embree, one ray a pixel"] = lambda k, _: _timed(lambda: rays.image(self.scene.views[k], self.size))
+            found["Embree, one ray a pixel"] = lambda k, _: _timed(
+                lambda: rays.image(self.scene.views[k], self.size)
+            )
             found["Embree, one ray for 4x4 pixels"] = lambda k, _: _timed(
                 lambda: rays.image(self.scene.views[k], small)
             )
@@ -83,8 +98,12 @@ class _Run:
             )
         return found
 
-    def _numpy(self, k: int, depth: DepthImage, dtype: type[np.floating[Any]]) -> tuple[Mask, dict[str, float]]:
-        low, high = self.boxes32 if dtype is np.float32 else (self.scene.box_min, self.scene.box_max)
+    def _numpy(
+        self, k: int, depth: DepthImage, dtype: type[np.floating[Any]]
+    ) -> tuple[Mask, dict[str, float]]:
+        low, high = (
+            self.boxes32 if dtype is np.float32 else (self.scene.box_min, self.scene.box_max)
+        )
         matrix = self.cameras[k].clip_from_world.astype(dtype)
         start = time.perf_counter()
         pyramid = numpy_hiz.NumpyPyramid.build(depth.numpy().astype(dtype))
@@ -93,7 +112,8 @@ class _Run:
         done = time.perf_counter()
         return mask, {"reduce": 1000.0 * (built - start), "cull": 1000.0 * (done - built)}
 
-    # -- passes ------------------------------------------------------------------------------------------------------
+    # --
+    # passes ------------------------------------------------------------------------------------------------------
 
     def count(self, step: Callable[[str], None]) -> None:
         """The first call of everything, the truth, the masks and the texels."""
@@ -104,7 +124,9 @@ class _Run:
             step(f"counting, view {k}")
             made = {}
             for variant in self.variants:
-                depth, pyramid, render, reduce = rendered(self.device, self.occluders, camera, variant)
+                depth, pyramid, render, reduce = rendered(
+                    self.device, self.occluders, camera, variant
+                )
                 made[variant] = depth, pyramid
                 self.warm_up_ms += render + reduce if k == 0 else 0.0
             plain = made[DepthVariant()][0]
@@ -112,14 +134,22 @@ class _Run:
             for number, one in enumerate(self.configurations):
                 pyramid = made[one.depth][1]
                 if k == 0:
-                    self.rows[number].first_ms = cull(self.device, self.instances[one.volume], pyramid, one)[1]
+                    self.rows[number].first_ms = cull(
+                        self.device, self.instances[one.volume], pyramid, one
+                    )[1]
                     self.warm_up_ms += self.rows[number].first_ms or 0.0
                 seen = self.device.cull(
-                    self.instances[one.volume], pyramid.camera, pyramid, statistics=True, **one.cull_options()
+                    self.instances[one.volume],
+                    pyramid.camera,
+                    pyramid,
+                    statistics=True,
+                    **one.cull_options(),
                 )
                 self.masks[number].append(seen.mask)
                 texels[number] += seen.stats.texels_read or 0
-            for number, (label, ask) in enumerate(self.yardsticks().items(), len(self.configurations)):
+            for number, (label, ask) in enumerate(
+                self.yardsticks().items(), len(self.configurations)
+            ):
                 mask, took = ask(k, plain)
                 if k == 0:
                     self.rows.append(Row(label, None, first_ms=sum(took.values())))
@@ -127,8 +157,12 @@ class _Run:
                 self.masks[number].append(mask)
         for number, row in enumerate(self.rows[: len(self.configurations)]):
             row.texels_per_instance = float(texels[number]) / (len(self.scene) * len(self.cameras))
-        self._add_untimed("best rectangle test (float64, all pixels)", [truth.rectangle for truth in self.truths])
-        self._add_untimed("view volume alone (float64)", [truth.projected.inside for truth in self.truths])
+        self._add_untimed(
+            "best rectangle test (float64, all pixels)", [truth.rectangle for truth in self.truths]
+        )
+        self._add_untimed(
+            "view volume alone (float64)", [truth.projected.inside for truth in self.truths]
+        )
 
     def _add_untimed(self, label: str, masks: list[Mask]) -> None:
         self.rows.append(Row(label, None))
@@ -137,7 +171,8 @@ class _Run:
     def time(self, step: Callable[[str], None]) -> None:
         """All repetitions; each goes through the configurations first and through the yardsticks then.
 
-        The two stay apart, for whatever follows on a yardstick finds cold caches and threads that sleep.
+        The two stay apart, for whatever follows on a yardstick finds cold caches and threads that
+        sleep.
         """
         shape = self.repetitions, len(self.cameras)
         yardsticks = list(self.yardsticks().values())
@@ -158,8 +193,12 @@ class _Run:
                 for turn in range(len(self.configurations)):
                     number = (begin + turn) % len(self.configurations)
                     one = self.configurations[number]
-                    mask, *both = cull(self.device, self.instances[one.volume], made[one.depth], one)
-                    self._note(number, repetition, k, mask, dict(zip(("cull", "read"), both, strict=True)))
+                    mask, *both = cull(
+                        self.device, self.instances[one.volume], made[one.depth], one
+                    )
+                    self._note(
+                        number, repetition, k, mask, dict(zip(("cull", "read"), both, strict=True))
+                    )
             for k, camera in enumerate(self.cameras):
                 depth = self.device.render_depth(self.occluders, camera)
                 self.device.wait()
@@ -178,12 +217,18 @@ class _Run:
             row.total_ms = spread(own, plus=shared)
             row.ns_per_instance = 1e6 * spread(ms["cull"]).median / len(self.scene)
 
-    def _note(self, number: int, repetition: int, k: int, mask: Mask, took: dict[str, float]) -> None:
+    def _note(
+        self, number: int, repetition: int, k: int, mask: Mask, took: dict[str, float]
+    ) -> None:
         """Keeps the times of one row in one view, if it kept what it kept before."""
         if not np.array_equal(mask, self.masks[number][k]):
-            raise RuntimeError(f"{self.rows[number].label}, view {k}: two culls of the same view differ")
+            raise RuntimeError(
+                f"{self.rows[number].label}, view {k}: two culls of the same view differ"
+            )
         for stage, value in took.items():
-            self.ms[number].setdefault(stage, np.zeros((self.repetitions, len(self.cameras))))[repetition, k] = value
+            self.ms[number].setdefault(stage, np.zeros((self.repetitions, len(self.cameras))))[
+                repetition, k
+            ] = value
 
     def one_instance(self) -> float:
         """The median cull of one instance in the middle of the first view."""
@@ -192,7 +237,9 @@ class _Run:
         instances = self.device.instances(Spheres(point, 0.1))
         pyramid = rendered(self.device, self.occluders, self.cameras[0], DepthVariant())[1]
         one = Configuration("spheres")
-        return float(np.median([cull(self.device, instances, pyramid, one)[1] for _ in range(9)][1:]))
+        return float(
+            np.median([cull(self.device, instances, pyramid, one)[1] for _ in range(9)][1:])
+        )
 
 
 def measure(

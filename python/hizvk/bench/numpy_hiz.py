@@ -1,8 +1,9 @@
 """The Hi-Z that a Python user would write: levels by slicing and minimum (reversed Z), 2x2 texels gathered by indexing.
 
-It is as good as such code gets: vectorised, odd sizes padded, the level chosen so that four texels cover the rectangle,
-what crosses the near plane kept. It has no margins, so nothing promises that float32 or coordinates far from the origin
-do no harm; the bench counts what they do.
+It is as good as such code gets: vectorised, odd sizes padded, the level chosen so that four texels
+cover the rectangle, what crosses the near plane kept.
+It has no margins, so nothing promises that float32 or coordinates far from the origin do no harm;
+the bench counts what they do.
 """
 
 from __future__ import annotations
@@ -46,7 +47,9 @@ class NumpyPyramid:
             levels.append(np.minimum(rows[:, 0::2], rows[:, 1::2]))
         sizes = np.array([level.shape for level in levels])
         first = np.concatenate([[0], np.cumsum(sizes.prod(axis=1))[:-1]])
-        return cls(np.concatenate([level.reshape(-1) for level in levels]), first, sizes[:, 1], sizes[:, 0])
+        return cls(
+            np.concatenate([level.reshape(-1) for level in levels]), first, sizes[:, 1], sizes[:, 0]
+        )
 
 
 def cull(
@@ -83,7 +86,11 @@ def cull(
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         ndc = clip[..., :3] / w[..., None]
     low, high = ndc.min(axis=1), ndc.max(axis=1)
-    outside = behind | (~crosses & ((high[:, :2] < -1) | (low[:, :2] > 1)).any(axis=1)) | (~crosses & (high[:, 2] < 0))
+    outside = (
+        behind
+        | (~crosses & ((high[:, :2] < -1) | (low[:, :2] > 1)).any(axis=1))
+        | (~crosses & (high[:, 2] < 0))
+    )
     kept: npt.NDArray[np.bool_] = ~outside
     test = np.flatnonzero(kept & ~crosses)
     low, high = low[test], high[test]

@@ -12,18 +12,21 @@ if TYPE_CHECKING:
 __all__ = ["front"]
 
 
-def front(cost: npt.ArrayLike, error: npt.ArrayLike, allowed: npt.ArrayLike | None = None) -> npt.NDArray[np.bool_]:
+def front(
+    cost: npt.ArrayLike, error: npt.ArrayLike, allowed: npt.ArrayLike | None = None
+) -> npt.NDArray[np.bool_]:
     """Which points no other allowed point dominates.
 
-    A point dominates another one if it is no worse in both numbers and better in one. Equal points stand or fall
-    together.
+    A point dominates another one if it is no worse in both numbers and better in one.
+    Equal points stand or fall together.
 
     Parameters
     ----------
     cost, error : (N,) float array
         Less is better; NaN is on no front.
     allowed : (N,) bool array, optional
-        False: takes no part, such as a configuration that culls what can be seen. None: all take part.
+        False: takes no part, such as a configuration that culls what can be seen.
+        None: all take part.
 
     Returns
     -------

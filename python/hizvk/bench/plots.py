@@ -25,7 +25,8 @@ MARKERS: Final = {1: "o", 2: "s", 4: "D"}
 def draw(path: Path, scene: SceneResult) -> None:
     """Writes a PNG: milliseconds from occluders to mask, and nanoseconds of the cull alone, against hidden kept.
 
-    Points are the rows of the report's table, by number; those on the front are joined and named beside.
+    Points are the rows of the report's table, by number; those on the front are joined and named
+    beside.
 
     Parameters
     ----------
@@ -39,7 +40,8 @@ def draw(path: Path, scene: SceneResult) -> None:
     rows = [(number, row) for number, row in enumerate(scene.rows, 1) if row.total_ms is not None]
     figure = Figure(figsize=(14.0, 6.4), dpi=100, layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
-    # The rows of hizvk decide what is shown; what keeps far less (rays) sits on the lower edge, with an arrow.
+    # The rows of hizvk decide what is shown; what keeps far less (rays) sits on the lower edge,
+    # with an arrow.
     errors = [_error(row) for _, row in rows if row.configuration is not None]
     margin = 0.08 * (max(errors) - min(errors)) + 0.05
     floor = max(min(errors) - margin, 0.0)
@@ -47,7 +49,11 @@ def draw(path: Path, scene: SceneResult) -> None:
     _panel(left, rows, {number: row.total_ms.median for number, row in rows if row.total_ms}, floor)
     left.set_xlabel("ms a view: render, reduce, cull and read")
     left.set_ylabel("hidden instances kept, % of the hidden in the view volume")
-    own = [(number, row) for number, row in rows if row.configuration is None or row.configuration.depth.divisor == 1]
+    own = [
+        (number, row)
+        for number, row in rows
+        if row.configuration is None or row.configuration.depth.divisor == 1
+    ]
     _panel(right, own, {number: row.ns_per_instance or np.nan for number, row in own}, floor)
     right.set_xlabel("ns an instance: the cull alone, depth at full resolution")
     best = next((row for row in scene.rows if row.label.startswith("best rectangle")), None)
@@ -84,11 +90,26 @@ def _panel(axis: Any, rows: list[tuple[int, Row]], cost: dict[int, float], floor
         axis.scatter([cost[number]], [max(_error(row), floor)], zorder=3, clip_on=False, **style)
     axis.set_xscale("log")
     on = fronts([row for _, row in rows], [cost[number] for number, _ in rows])
-    chosen = [(cost[number], _error(row), row) for (number, row), best in zip(rows, on, strict=True) if best]
+    chosen = [
+        (cost[number], _error(row), row)
+        for (number, row), best in zip(rows, on, strict=True)
+        if best
+    ]
     for coverage, line in (("area", "-"), ("sample", "--")):
-        points = sorted((x, y) for x, y, row in chosen if row.configuration and row.configuration.coverage == coverage)
+        points = sorted(
+            (x, y)
+            for x, y, row in chosen
+            if row.configuration and row.configuration.coverage == coverage
+        )
         if points:
-            axis.step(*zip(*points, strict=True), where="post", color="black", linestyle=line, linewidth=1.1, zorder=2)
+            axis.step(
+                *zip(*points, strict=True),
+                where="post",
+                color="black",
+                linestyle=line,
+                linewidth=1.1,
+                zorder=2,
+            )
     axis.grid(True, which="both", color="#eeeeee", zorder=-1)
     axis.xaxis.set_major_formatter("{x:g}")
     axis.xaxis.set_minor_formatter(lambda x, _: f"{x:g}" if str(f"{x:e}")[0] in "235" else "")
@@ -120,7 +141,15 @@ def _number(axis: Any, points: list[tuple[float, float, int, bool, bool]]) -> No
         if on_front:
             _label(axis, on_front, points[first][:2], (5.0, 5.0), "black", "bold")
         if others:
-            _label(axis, others, points[first][:2], (5.0, -9.0 if on_front else 5.0), "#555555", "normal", below)
+            _label(
+                axis,
+                others,
+                points[first][:2],
+                (5.0, -9.0 if on_front else 5.0),
+                "#555555",
+                "normal",
+                below,
+            )
 
 
 def _label(
@@ -142,7 +171,9 @@ def _legend(figure: Any, rows: list[tuple[int, Row]]) -> None:
     from matplotlib.lines import Line2D
 
     def mark(label: str, marker: str, colour: str, **more: Any) -> Any:
-        return Line2D([], [], linestyle="none", marker=marker, color=colour, label=label, markersize=6, **more)
+        return Line2D(
+            [], [], linestyle="none", marker=marker, color=colour, label=label, markersize=6, **more
+        )
 
     handles = [mark(kind.replace("_", " "), "o", colour) for kind, colour in COLOURS.items()]
     handles += [mark("depth 1/2", "s", "#bbbbbb"), mark("depth 1/4", "D", "#bbbbbb")]
@@ -150,11 +181,15 @@ def _legend(figure: Any, rows: list[tuple[int, Row]]) -> None:
     handles += [mark("sample coverage", "o", "#dddddd", markeredgecolor="black")]
     handles += [mark("not by hizvk", "X", YARDSTICK)]
     handles += [Line2D([], [], color="black", label="Pareto front, area coverage")]
-    handles += [Line2D([], [], color="black", linestyle="--", label="Pareto front, sample coverage")]
+    handles += [
+        Line2D([], [], color="black", linestyle="--", label="Pareto front, sample coverage")
+    ]
     handles += [mark("culls what can be seen", "o", WRONG, markerfacecolor="none")]
     handles += [
         Line2D([], [], linestyle="none", label=f"{number}  {row.label}")
         for number, row in rows
         if row.pareto or row.configuration is None
     ]
-    figure.legend(handles=handles, loc="outside right upper", fontsize=8, frameon=False, handletextpad=0.3)
+    figure.legend(
+        handles=handles, loc="outside right upper", fontsize=8, frameon=False, handletextpad=0.3
+    )

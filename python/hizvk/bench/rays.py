@@ -69,12 +69,17 @@ class Rays:
         scene, eye = self._scene, np.array(view.eye)
         bit = ((np.arange(8)[:, None] >> np.arange(3)) & 1).astype(np.float32)
         where = np.concatenate([bit, np.full((1, 3), 0.5, np.float32)])
-        low, high = (scene.box_min - eye).astype(np.float32), (scene.box_max - eye).astype(np.float32)
+        low, high = (
+            (scene.box_min - eye).astype(np.float32),
+            (scene.box_max - eye).astype(np.float32),
+        )
         point = low[:, None] + where * (high - low)[:, None]  # (N, SAMPLES, 3), about the eye
         asked = np.flatnonzero(_in_view(point, view, size))
         towards = point[asked].reshape(-1, 3)
         start = np.broadcast_to((eye - self._origin).astype(np.float32), towards.shape).copy()
-        hit = self._occluders.run(start, towards, dists=np.full(len(towards), REACH, np.float32), query="INTERSECT")
+        hit = self._occluders.run(
+            start, towards, dists=np.full(len(towards), REACH, np.float32), query="INTERSECT"
+        )
         visible = np.zeros(len(scene), dtype=bool)
         visible[asked[(hit.reshape(-1, SAMPLES) < 0).any(axis=1)]] = True
         return visible

@@ -1,8 +1,9 @@
 """Measures the caller's own scene, checks what would be lost there, and says which configuration to use.
 
-Some candidates are proven for every ray, others for the pixels of one image alone. So each is held against what can be
-seen (`checking`), and one that hides something is never recommended. Of the others, the one that keeps less is right
-more often.
+Some candidates are proven for every ray, others for the pixels of one image alone.
+So each is held against what can be seen (`checking`), and one that hides something is never
+recommended.
+Of the others, the one that keeps less is right more often.
 """
 
 from __future__ import annotations
@@ -47,7 +48,8 @@ DEAR_MS: Final = 200.0
 class Candidate:
     """One configuration, measured on the caller's scene.
 
-    It holds all that the call needs: `bounds`, `render_options`, `pyramid_options`, `cull_options`; or `cull` does it.
+    It holds all that the call needs: `bounds`, `render_options`, `pyramid_options`, `cull_options`;
+    or `cull` does it.
     """
 
     configuration: Configuration
@@ -138,7 +140,9 @@ class Candidate:
             depth = device.render_depth(occluders, camera, **self.render_options(camera.size))
         elif render_options(self.configuration.depth, camera.size):
             got = _arguments.describe(depth)
-            raise TypeError(f"depth: expected occluders instead, for {self.configuration.depth}, got {got}")
+            raise TypeError(
+                f"depth: expected occluders instead, for {self.configuration.depth}, got {got}"
+            )
         if isinstance(depth, DepthImage):
             pyramid = device.pyramid(depth, **self.pyramid_options)
         else:
@@ -174,13 +178,19 @@ class Recommendation:
         return tuple(one for one in self.candidates if one.on_front)
 
     def __str__(self) -> str:
-        over = "" if self.within_budget else " (over the budget, as all are that may be recommended)"
+        over = (
+            "" if self.within_budget else " (over the budget, as all are that may be recommended)"
+        )
         lines = [f"on {self.adapter}: {self.best}{over}"]
-        lines.append("    ms a camera        kept     hides   unclear   (* the Pareto front; - not for what was asked)")
+        lines.append(
+            "    ms a camera        kept     hides   unclear   (* the Pareto front; - not for what was asked)"
+        )
         for one in self.candidates:
             share = 100.0 * one.kept / max(self.tested, 1)
             mark = "*" if one.on_front else " " if one.asked else "-"
-            lines.append(f"  {mark} {one.ms.median:11.2f}  {share:8.2f} %  {one.hides:8,}  {one.unclear:8,}   {one}")
+            lines.append(
+                f"  {mark} {one.ms.median:11.2f}  {share:8.2f} %  {one.hides:8,}  {one.unclear:8,}   {one}"
+            )
         lines += [f"checked by {self.check}"] if self.check else []
         return "\n".join([*lines, *self.notes])
 
@@ -190,8 +200,10 @@ def choose(
 ) -> tuple[Candidate, bool]:
     """The candidate to use, and whether it is within the budget.
 
-    Only those that are `Candidate.safe` count. Of those within `max_ms`, the fastest that keeps at most `kept_within`
-    times what the least of them keeps. If none is within it, the fastest of all.
+    Only those that are `Candidate.safe` count.
+    Of those within `max_ms`, the fastest that keeps at most `kept_within` times what the least of
+    them keeps.
+    If none is within it, the fastest of all.
 
     Raises
     ------
@@ -200,7 +212,9 @@ def choose(
     """
     safe = [one for one in candidates if one.safe]
     if not safe:
-        raise ValueError("candidates: expected one that hides nothing that was found visible, got none")
+        raise ValueError(
+            "candidates: expected one that hides nothing that was found visible, got none"
+        )
     able = [one for one in safe if max_ms is None or one.ms.median <= max_ms]
     if not able:
         return min(safe, key=lambda one: one.ms.median), False
@@ -225,36 +239,44 @@ def recommend(
 ) -> Recommendation:
     """Measures configurations on a scene of one's own, checks them there, and recommends one.
 
-    Candidates differ in speed, in how much that is hidden they keep, and in what is proven of them. Conservative depth
-    with area coverage is proven for every ray. A plain depth image knows the depth at its pixels' centres alone: what
-    shows between them may be culled, and so may points that lie on their own occluder. So each candidate is checked on
-    the cameras given, and **one that hides what the check finds visible, or cannot show to be hidden, is never
-    recommended**.
+    Candidates differ in speed, in how much that is hidden they keep, and in what is proven of them.
+    Conservative depth with area coverage is proven for every ray.
+    A plain depth image knows the depth at its pixels' centres alone: what shows between them may be
+    culled, and so may points that lie on their own occluder.
+    So each candidate is checked on the cameras given, and **one that hides what the check finds
+    visible, or cannot show to be hidden, is never recommended**.
 
-    What conservative depth hides is hidden. What a candidate culls beyond that is looked at by rays in float64 at the
-    occluders' triangles, from the camera to the bounds: to a bare point itself, else to 27 points of a volume, as many
-    as 60,000 rays for each camera and kind of bounds. What they find visible is visible (`Candidate.hides`). The rest
-    is unclear (`Candidate.unclear`), but for points, of which a ray decides either. So a plain image that is
-    recommended is right before the cameras given; before others, only conservative depth is proven.
+    What conservative depth hides is hidden.
+    What a candidate culls beyond that is looked at by rays in float64 at the occluders' triangles,
+    from the camera to the bounds: to a bare point itself, else to 27 points of a volume, as many as
+    60,000 rays for each camera and kind of bounds.
+    What they find visible is visible (`Candidate.hides`).
+    The rest is unclear (`Candidate.unclear`), but for points, of which a ray decides either.
+    So a plain image that is recommended is right before the cameras given; before others, only
+    conservative depth is proven.
 
-    With `depths`, or where ``coverage="sample"``, the promise is about the image as it is. The exact oracle
-    (`hizvk.reference`) takes the rays' place then, for 400 instances (10,800 bare points) each. Bare points before
-    given depth mostly lie on what it shows. Those that only a guard of half a pixel keeps count as visible, for the
-    image cannot tell; that guard is a good guess, and no proof.
+    With `depths`, or where ``coverage="sample"``, the promise is about the image as it is.
+    The exact oracle (`hizvk.reference`) takes the rays' place then, for 400 instances (10,800 bare
+    points) each.
+    Bare points before given depth mostly lie on what it shows.
+    Those that only a guard of half a pixel keeps count as visible, for the image cannot tell; that
+    guard is a good guess, and no proof.
 
-    It takes seconds to minutes: each candidate culls `repetitions` times for each camera, and conservative depth of
-    the full size is dear where there are many triangles.
+    It takes seconds to minutes: each candidate culls `repetitions` times for each camera, and
+    conservative depth of the full size is dear where there are many triangles.
 
     Parameters
     ----------
     bounds : Spheres, Boxes, OrientedBoxes or Instances; or a sequence of them
-        The N instances; several kinds of bounds of the same instances are compared with one another. Of `Instances`
-        the host knows no numbers, so no rays are cast: what conservative depth does not hide stays unclear.
+        The N instances; several kinds of bounds of the same instances are compared with one
+        another.
+        Of `Instances` the host knows no numbers, so no rays are cast: what conservative depth does
+        not hide stays unclear.
     cameras : Camera or sequence of Camera
         Typical views.
     occluders : Occluders, Mesh, a mesh of trimesh or Open3D, or a sequence of meshes
-        What hides; rendering is part of the time then, and conservative depth images, small ones too, are among the
-        candidates.
+        What hides; rendering is part of the time then, and conservative depth images, small ones
+        too, are among the candidates.
     depths : sequence of (height, width) arrays
         Instead of `occluders`: the depth image of each camera.
     kind, scale, invalid
@@ -262,22 +284,26 @@ def recommend(
     device : Device, optional
         None: that of the occluders or instances, else one that is made at the first call and kept.
     coverage : "area" or "sample"
-        What counts as seen. ``"area"``: what any ray of the view meets, as for multisampling, jitter, larger images,
-        and points. Candidates of sample coverage are shown beside the others then, and never recommended.
-        ``"sample"``: what covers a pixel's centre; right for a renderer with one sample a pixel, the same viewport and
-        no jitter. Plain depth is proven for that.
+        What counts as seen.
+        ``"area"``: what any ray of the view meets, as for multisampling, jitter, larger images, and
+        points.
+        Candidates of sample coverage are shown beside the others then, and never recommended.
+        ``"sample"``: what covers a pixel's centre; right for a renderer with one sample a pixel,
+        the same viewport and no jitter.
+        Plain depth is proven for that.
     max_ms : float, optional
         Budget for each camera in milliseconds.
     kept_within : float
-        How much more than the least may be kept for the sake of speed: 1.05 is 5 %, 1 takes what keeps least.
+        How much more than the least may be kept for the sake of speed: 1.05 is 5 %, 1 takes what
+        keeps least.
     repetitions : int
         How often each is timed, beside the first call.
 
     Returns
     -------
     Recommendation
-        `Recommendation.best` has the options, and the whole call (`Candidate.cull`); the whole front is there to
-        choose otherwise, `Recommendation.notes` say what to know.
+        `Recommendation.best` has the options, and the whole call (`Candidate.cull`); the whole
+        front is there to choose otherwise, `Recommendation.notes` say what to know.
 
     Raises
     ------
@@ -316,13 +342,18 @@ def recommend(
     images = None if depths is None else _images(depths, views, kind, scale, invalid)
     for name, value in (("kind", kind), ("invalid", invalid)):
         if depths is None and value is not None:
-            raise TypeError(f"{name}: expected nothing beside occluders, got {_arguments.describe(value)}")
+            raise TypeError(
+                f"{name}: expected nothing beside occluders, got {_arguments.describe(value)}"
+            )
     if depths is None and _arguments.number("scale", scale, above=0.0) != 1.0:
         raise ValueError(f"scale: expected 1 beside occluders, got {scale:g}")
     device = device or _device_of(occluders, alternatives) or default_device()
     walls = None if occluders is None else _occluders(occluders, device)
     volumes = {name: _upload(one, device) for name, one in alternatives.items()}
-    points = any(one._points if isinstance(one, Instances) else are_points(one) for one in alternatives.values())
+    points = any(
+        one._points if isinstance(one, Instances) else are_points(one)
+        for one in alternatives.values()
+    )
 
     chosen = promised(tuple(volumes), coverage, rendered=walls is not None, points=points)
     variants = sorted({one.depth for one in chosen}, key=DepthVariant.cost)
@@ -351,7 +382,10 @@ def recommend(
     )
     check = checking.hold(chosen, masks, alternatives, tool, every_ray=every_ray)
     shared = {variant: spread(ms[1:]).median for variant, ms in depth_ms.items()}
-    total = [spread(culling[k, 1:] + reading[k, 1:], plus=shared[one.depth]) for k, one in enumerate(chosen)]
+    total = [
+        spread(culling[k, 1:] + reading[k, 1:], plus=shared[one.depth])
+        for k, one in enumerate(chosen)
+    ]
     kept = [sum(int(mask.sum()) for mask in of_one) for of_one in masks]
     candidates = [
         Candidate(
@@ -366,11 +400,13 @@ def recommend(
     candidates.sort(key=lambda one: one.ms.median)
     picked, within = choose(candidates, max_ms=max_ms, kept_within=kept_within)
     tested = len(next(iter(volumes.values()))) * len(views)
-    looked = (
-        f"{check.method}: {check.looked:,} of {check.culled:,} that some candidate culls, {check.visible:,} visible"
+    looked = f"{check.method}: {check.looked:,} of {check.culled:,} that some candidate culls, {check.visible:,} visible"
+    notes = _notes(
+        candidates, picked, check, coverage=coverage, points=points, rendered=walls is not None
     )
-    notes = _notes(candidates, picked, check, coverage=coverage, points=points, rendered=walls is not None)
-    return Recommendation(picked, within, tuple(candidates), tested, str(device.adapter), looked, notes)
+    return Recommendation(
+        picked, within, tuple(candidates), tested, str(device.adapter), looked, notes
+    )
 
 
 class _Source:
@@ -387,7 +423,9 @@ class _Source:
         self._turn: dict[tuple[int, bool], tuple[DepthImage, float]] = {}
         self._dear: dict[tuple[int, bool, int], tuple[DepthImage, float]] = {}
 
-    def pyramids(self, variants: list[DepthVariant], k: int) -> dict[DepthVariant, tuple[Pyramid, float]]:
+    def pyramids(
+        self, variants: list[DepthVariant], k: int
+    ) -> dict[DepthVariant, tuple[Pyramid, float]]:
         """The pyramids of view k, each with the milliseconds that it and its image take."""
         self._turn.clear()
         return {variant: self._pyramid(variant, k) for variant in variants}
@@ -403,7 +441,9 @@ class _Source:
     def _pyramid(self, variant: DepthVariant, k: int) -> tuple[Pyramid, float]:
         if self._images is not None:
             watch = Stopwatch(self._device)
-            pyramid = self._device._pyramid_of(self._images[k], self._views[k], stored_levels(variant.levels))
+            pyramid = self._device._pyramid_of(
+                self._images[k], self._views[k], stored_levels(variant.levels)
+            )
             return pyramid, watch.lap()
         depth, took = self._depth(variant, k)
         watch = Stopwatch(self._device)
@@ -418,7 +458,9 @@ class _Source:
         if key not in self._turn:
             watch = Stopwatch(self._device)
             camera = self._views[k]
-            depth = self._device.render_depth(self._walls, camera, **render_options(variant, camera.size))
+            depth = self._device.render_depth(
+                self._walls, camera, **render_options(variant, camera.size)
+            )
             self._turn[key] = depth, watch.lap()
             if self._turn[key][1] > DEAR_MS:
                 self._dear[*key, k] = self._turn[key]
@@ -426,7 +468,13 @@ class _Source:
 
 
 def _notes(
-    candidates: list[Candidate], best: Candidate, check: checking.Check, *, coverage: str, points: bool, rendered: bool
+    candidates: list[Candidate],
+    best: Candidate,
+    check: checking.Check,
+    *,
+    coverage: str,
+    points: bool,
+    rendered: bool,
 ) -> tuple[str, ...]:
     """What to know about a recommendation, a sentence or two each."""
     notes = []
@@ -434,16 +482,24 @@ def _notes(
     if dropped:
         asked = sum(one.asked for one in candidates)
         lost, unclear = max(one.hides for one in dropped), max(one.unclear for one in dropped)
-        what = [f"hide up to {lost:,} of the {check.visible:,} that the check found visible"] if lost else []
+        what = (
+            [f"hide up to {lost:,} of the {check.visible:,} that the check found visible"]
+            if lost
+            else []
+        )
         what += [f"cull up to {unclear:,} that are not shown to be hidden"] if unclear else []
         why = ""
         if rendered and coverage == "area":
             why = " Plain depth knows the depth at its pixels' centres alone."
         elif points:
             why = " The image knows the depth at its pixels' centres alone, and points lie on what it shows."
-        notes.append(f"{len(dropped)} of {asked} candidates were dropped: they {', and '.join(what)}.{why}")
+        notes.append(
+            f"{len(dropped)} of {asked} candidates were dropped: they {', and '.join(what)}.{why}"
+        )
     if best.configuration.guard_px:
-        notes.append("A guard of half a pixel is a good guess for points before an image, and no proof.")
+        notes.append(
+            "A guard of half a pixel is a good guess for points before an image, and no proof."
+        )
     if not best.proven:
         notes.append(
             "The best is right before the cameras given: all that it culls there is hidden. Before other cameras, only "
@@ -484,7 +540,9 @@ def _alternatives(bounds: Any) -> dict[str, Bounds | Instances]:
         raise ValueError(f"bounds: expected {expected}, got an empty sequence")
     counts = {len(one) for one in found.values()}
     if len(counts) > 1:
-        raise ValueError(f"bounds: expected the same instances in each kind, got {sorted(counts)} of them")
+        raise ValueError(
+            f"bounds: expected the same instances in each kind, got {sorted(counts)} of them"
+        )
     return found
 
 
@@ -500,11 +558,17 @@ def _cameras(cameras: Any) -> list[Camera]:
     return list(found)
 
 
-def _images(depths: Any, cameras: list[Camera], kind: Any, scale: Any, invalid: Any) -> list[DepthArray]:
+def _images(
+    depths: Any, cameras: list[Camera], kind: Any, scale: Any, invalid: Any
+) -> list[DepthArray]:
     if not isinstance(depths, (Sequence, np.ndarray)) or isinstance(depths, str):
-        raise TypeError(f"depths: expected a sequence of (height, width) arrays, got {_arguments.describe(depths)}")
+        raise TypeError(
+            f"depths: expected a sequence of (height, width) arrays, got {_arguments.describe(depths)}"
+        )
     if len(depths) != len(cameras):
-        raise ValueError(f"depths: expected {len(cameras)} images, one for each camera, got {len(depths)}")
+        raise ValueError(
+            f"depths: expected {len(cameras)} images, one for each camera, got {len(depths)}"
+        )
     return [
         checked_image("depths", image, camera, kind, scale, invalid)
         for image, camera in zip(depths, cameras, strict=True)
@@ -522,9 +586,13 @@ def _device_of(occluders: object, alternatives: dict[str, Any]) -> Device | None
 def _occluders(occluders: Any, device: Device) -> Occluders:
     if isinstance(occluders, Occluders):
         if occluders.device is not device:
-            raise ValueError("occluders: expected Occluders of this device, got one of another Device")
+            raise ValueError(
+                "occluders: expected Occluders of this device, got one of another Device"
+            )
         return occluders
-    return device.occluders(meshes_of("occluders", occluders, f"Occluders, {A_MESH}, or a sequence of them"))
+    return device.occluders(
+        meshes_of("occluders", occluders, f"Occluders, {A_MESH}, or a sequence of them")
+    )
 
 
 def _upload(bounds: Bounds | Instances, device: Device) -> Instances:

@@ -1,7 +1,8 @@
 """The best that a rectangle test can do: float64, full resolution, every pixel of the rectangle.
 
-It shares no code with the engine or with the oracle. A box is culled if it lies outside the view volume, or if every
-pixel that the rectangle about its projected corners touches shows something nearer than the nearest of its corners.
+It shares no code with the engine or with the oracle.
+A box is culled if it lies outside the view volume, or if every pixel that the rectangle about its
+projected corners touches shows something nearer than the nearest of its corners.
 """
 
 from __future__ import annotations

@@ -13,17 +13,20 @@ report.json holds one object::
     scenes        [scene]
 
     scene: key, name, instances, occluder_triangles, instance_triangles, views, size [height, width], repetitions,
-           truth (how it was found out what is visible), visible, hidden, inside (instances over all views that own a
-           pixel, that own none, and that are inside the view volume), one_instance_ms (a cull of one instance),
-           upload_ms, warm_up_ms (first calls: they compile and build), rows [row]
+           truth (how it was found out what is visible), visible, hidden, inside (instances over all
+           views that own a pixel, that own none, and that are inside the view volume),
+           one_instance_ms (a cull of one instance), upload_ms, warm_up_ms (first calls: they
+           compile and build), rows [row]
 
     row:   label, configuration {volume, footprint, descent, coverage, order, fit,
-           depth {divisor, conservative, levels}} or null for a yardstick,
-           ms {render, reduce, cull, read: spread or null}, total_ms spread or null,
-           ns_per_instance, first_ms, texels_per_instance (null where it was not measured), kept, false_culls, hairs,
-           hidden_kept, hidden_kept_in_view, share_of_rectangle (shares, 0 to 1 and above), pareto bool
+           depth {divisor, conservative, levels}} or null for a yardstick, ms {render, reduce, cull,
+           read: spread or null}, total_ms spread or null, ns_per_instance, first_ms,
+           texels_per_instance (null where it was not measured), kept, false_culls, hairs,
+           hidden_kept, hidden_kept_in_view, share_of_rectangle (shares, 0 to 1 and above), pareto
+           bool
 
-    spread: {median, q1, q3} milliseconds a view: over the repetitions of each view, then the mean over the views
+    spread: {median, q1, q3} milliseconds a view: over the repetitions of each view, then the mean
+    over the views
 
 `results.Row` and `results.SceneResult` say what each number is.
 """
@@ -121,7 +124,9 @@ def write(report: Report, folder: Path, plots: dict[str, str]) -> None:
     plots : dict of str to str
         By scene: the plot's file name relative to `folder`.
     """
-    (folder / "report.json").write_text(json.dumps(report.as_data(), indent=2) + "\n", encoding="utf-8")
+    (folder / "report.json").write_text(
+        json.dumps(report.as_data(), indent=2) + "\n", encoding="utf-8"
+    )
     (folder / "report.md").write_text("\n".join(_page(report, plots)) + "\n", encoding="utf-8")
 
 
@@ -129,7 +134,11 @@ def _page(report: Report, plots: dict[str, str]) -> list[str]:
     known = versions()
     adapter = report.adapter
     broken = report.broken()
-    verdict = f"FAILED: {'; '.join(broken)}" if broken else "no configuration with the promise culled what can be seen"
+    verdict = (
+        f"FAILED: {'; '.join(broken)}"
+        if broken
+        else "no configuration with the promise culled what can be seen"
+    )
     lines = [
         "# hizvk bench",
         "",
@@ -161,7 +170,10 @@ def _picks(scene: SceneResult) -> str:
     able = [
         row
         for row in scene.rows
-        if row.promises and row.configuration and row.configuration.coverage == "area" and not row.false_culls
+        if row.promises
+        and row.configuration
+        and row.configuration.coverage == "area"
+        and not row.false_culls
     ]
 
     def milliseconds(row: Row) -> float:
@@ -172,7 +184,9 @@ def _picks(scene: SceneResult) -> str:
         enough = [row for row in able if row.share_of_rectangle >= share]
         found.append(min(enough, key=milliseconds, default=None))
     found.append(min(able, key=lambda row: (row.hidden_kept, milliseconds(row)), default=None))
-    cells = " | ".join("none" if row is None else f"{row.label}: {milliseconds(row):.2f} ms" for row in found)
+    cells = " | ".join(
+        "none" if row is None else f"{row.label}: {milliseconds(row):.2f} ms" for row in found
+    )
     return f"| {scene.key} | {cells} |"
 
 
@@ -192,7 +206,10 @@ def _scene(scene: SceneResult, plot: str | None) -> list[str]:
     if plot is not None:
         lines += [f"![speed against error, {scene.key}]({plot})", ""]
     head = "| # | | render | reduce | cull | read | sum | quartiles | ns/inst. | texels/inst. | false culls | "
-    lines += [head + "hidden kept | of those in view | of best rect. |", f"|---:|---|{'---:|' * 12}"]
+    lines += [
+        head + "hidden kept | of those in view | of best rect. |",
+        f"|---:|---|{'---:|' * 12}",
+    ]
     for number, row in enumerate(scene.rows, 1):
         lines.append(_row(number, row))
     return [*lines, ""]
@@ -208,7 +225,14 @@ def _row(number: int, row: Row) -> str:
     label = row.label if row.configuration else f"*{row.label}*"
     label = f"**{label}**" if row.pareto else label
     shares = (row.hidden_kept, row.hidden_kept_in_view, row.share_of_rectangle)
-    cells = [f"{number}{' P' if row.pareto else ''}", label, *times, each, texels, f"{row.false_culls:,}"]
+    cells = [
+        f"{number}{' P' if row.pareto else ''}",
+        label,
+        *times,
+        each,
+        texels,
+        f"{row.false_culls:,}",
+    ]
     cells += [f"{100.0 * share:.2f} %" for share in shares]
     return f"| {' | '.join(cells)} |"
 

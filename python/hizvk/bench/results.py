@@ -131,6 +131,10 @@ def fronts(rows: Sequence[Row], cost: Sequence[float]) -> list[bool]:
     """Which rows are on the front of `cost` and hidden kept in the view, as `Row.pareto` says."""
     error = [round(row.hidden_kept_in_view, SAME) for row in rows]
     sound = np.array([row.promises and row.false_culls == 0 for row in rows])
-    area = np.array([row.configuration is not None and row.configuration.coverage == "area" for row in rows])
-    found: list[bool] = (front(cost, error, sound & area) | (front(cost, error, sound) & ~area)).tolist()
+    area = np.array(
+        [row.configuration is not None and row.configuration.coverage == "area" for row in rows]
+    )
+    found: list[bool] = (
+        front(cost, error, sound & area) | (front(cost, error, sound) & ~area)
+    ).tolist()
     return found

@@ -73,7 +73,9 @@ def make(key: str, instances: int, views: int, seed: int, castle: Path | None) -
         except ImportError as error:
             raise Missing(str(error)) from None
     if key in ("city", "city-far"):
-        made = city(instances, views, seed=seed, corner=FAR_CORNER if key == "city-far" else (0.0, 0.0, 0.0))
+        made = city(
+            instances, views, seed=seed, corner=FAR_CORNER if key == "city-far" else (0.0, 0.0, 0.0)
+        )
         return BenchScene(key, made.scene, yaw=made.yaw)
     if key == "room":
         return BenchScene(key, _room(instances, views, seed), yaw=np.zeros(instances))
@@ -95,7 +97,9 @@ def find_castle(given: Path | None) -> Path:
     path = Path(named) if named else beside
     if not path.is_file():
         where = f"{path} is no file" if named else "its file is not part of the package"
-        raise Missing(f"the castle is left out: {where}; name a castle.npz with --castle PATH or {VARIABLE}")
+        raise Missing(
+            f"the castle is left out: {where}; name a castle.npz with --castle PATH or {VARIABLE}"
+        )
     return path
 
 
@@ -105,10 +109,11 @@ def load_castle(path: Path, views: int) -> BenchScene:
     Parameters
     ----------
     path : Path
-        Keys: ``occluder_vertices`` (V, 3), ``occluder_triangles`` (T, 3), ``occluder_instance`` (T,) all -1,
-        ``instance_aabb_min`` and ``instance_aabb_max`` (N, 3), ``instance_vertices``, ``instance_triangles``,
-        ``instance_first_triangle`` (N + 1,), ``up`` (3,), ``name``, ``source``, ``license``, and for K cameras
-        ``camera_name``, ``camera_eye``, ``camera_target``, ``camera_up``, ``camera_fov_y`` (radians), ``camera_near``,
+        Keys: ``occluder_vertices`` (V, 3), ``occluder_triangles`` (T, 3), ``occluder_instance``
+        (T,) all -1, ``instance_aabb_min`` and ``instance_aabb_max`` (N, 3), ``instance_vertices``,
+        ``instance_triangles``, ``instance_first_triangle`` (N + 1,), ``up`` (3,), ``name``,
+        ``source``, ``license``, and for K cameras ``camera_name``, ``camera_eye``,
+        ``camera_target``, ``camera_up``, ``camera_fov_y`` (radians), ``camera_near``,
         ``camera_far``.
     views : int
         At most so many cameras, taken evenly.
@@ -127,7 +132,9 @@ def load_castle(path: Path, views: int) -> BenchScene:
             chosen = np.unique(np.linspace(0, count - 1, min(views, count)).round().astype(int))
             scene = Scene(
                 name=f"{found['name']} ({str(found['source']).split()[0]}, {found['license']})",
-                origin=tuple(np.round(found["instance_aabb_min"].astype(float).mean(axis=0)).tolist()),
+                origin=tuple(
+                    np.round(found["instance_aabb_min"].astype(float).mean(axis=0)).tolist()
+                ),
                 vertices=found["occluder_vertices"].astype(np.float64),
                 triangles=found["occluder_triangles"].astype(np.uint32),
                 instance_vertices=found["instance_vertices"].astype(np.float64),
@@ -141,12 +148,16 @@ def load_castle(path: Path, views: int) -> BenchScene:
                 views=tuple(_castle_view(found, int(k)) for k in chosen),
             )
         except KeyError as error:
-            raise Missing(f"{path}: expected the keys of a bench scene, {error} is missing") from None
+            raise Missing(
+                f"{path}: expected the keys of a bench scene, {error} is missing"
+            ) from None
         return BenchScene("castle", scene, up=int(np.argmax(np.abs(found["up"]))))
 
 
 def _castle_view(found: dict[str, np.ndarray], k: int) -> View:
-    eye, target, up = (tuple(found[f"camera_{key}"][k].astype(float).tolist()) for key in ("eye", "target", "up"))
+    eye, target, up = (
+        tuple(found[f"camera_{key}"][k].astype(float).tolist()) for key in ("eye", "target", "up")
+    )
     fov = float(np.degrees(found["camera_fov_y"][k]))
     near, far = float(found["camera_near"][k]), float(found["camera_far"][k])
     return View(str(found["camera_name"][k]), eye, target, fov, near, up, far)
@@ -162,7 +173,9 @@ def _room(crates: int, views: int, seed: int) -> Scene:
         eye = np.array([bay + rng.uniform(0.0, 4.0), rng.uniform(0.5, 11.5), rng.uniform(1.4, 1.9)])
         eye = np.round(eye / GRID) * GRID
         target = rng.uniform((1.0, 1.0, 0.2), (15.0, 11.0, 1.2))
-        eyes.append(View(f"bay {number % 3}", tuple(eye.tolist()), tuple(target.tolist()), 70.0, 0.0625))
+        eyes.append(
+            View(f"bay {number % 3}", tuple(eye.tolist()), tuple(target.tolist()), 70.0, 0.0625)
+        )
     return Scene(
         name=room.name, origin=room.origin, vertices=room.vertices, triangles=room.triangles,
         instance_vertices=room.instance_vertices, instance_triangles=room.instance_triangles, owner=room.owner,

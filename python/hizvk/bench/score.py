@@ -38,7 +38,9 @@ class ViewTruth:
     """``(N,)``: kept by the best rectangle test."""
 
 
-def look(scene: Scene, view: View, size: Size, depth: npt.NDArray[np.float32], caster: Caster) -> ViewTruth:
+def look(
+    scene: Scene, view: View, size: Size, depth: npt.NDArray[np.float32], caster: Caster
+) -> ViewTruth:
     """The truth about a view.
 
     Parameters
@@ -53,10 +55,19 @@ def look(scene: Scene, view: View, size: Size, depth: npt.NDArray[np.float32], c
     given = linear_depth(depth, view.near, view.far)
     sight = caster.look(view, size, given)
     projected = project(scene, view, size)
-    return ViewTruth(view, sight, given, projected, sight.pixels(len(scene)) > 0, rectangle_test(projected, given))
+    return ViewTruth(
+        view,
+        sight,
+        given,
+        projected,
+        sight.pixels(len(scene)) > 0,
+        rectangle_test(projected, given),
+    )
 
 
-def score(rows: list[Row], masks: list[list[Mask]], truths: list[ViewTruth], caster: Caster) -> None:
+def score(
+    rows: list[Row], masks: list[list[Mask]], truths: list[ViewTruth], caster: Caster
+) -> None:
     """Fills in the counts of each row.
 
     Parameters

@@ -36,7 +36,8 @@ def bounds_of(scene: Scene, kind: str, *, up: int = 2, yaw: Floats | None = None
     up : 0, 1 or 2
         The vertical axis, about which oriented boxes are turned.
     yaw : (N,) float64 array, optional
-        How each instance is turned, in radians. None: of `TURNS` the angle with the smallest box.
+        How each instance is turned, in radians.
+        None: of `TURNS` the angle with the smallest box.
 
     Returns
     -------

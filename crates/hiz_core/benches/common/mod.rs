@@ -1,4 +1,5 @@
-//! What the benches share: a table of medians, all ways taken in turns so that a busy moment hits all of them; then criterion's figures.
+//! What the benches share: a table of medians, all ways taken in turns so that a busy moment hits
+//! all of them; then criterion's figures.
 
 use std::time::Duration;
 
@@ -8,7 +9,9 @@ use hiz_core::headless::Engine;
 /// A name, and what does the work once and returns its milliseconds.
 pub(crate) type Way<'a> = (String, Box<dyn FnMut() -> f64 + 'a>);
 
-/// A device. As in the tests, `HIZVK_PLANTED_FAULT` tries a variant of a shader: `what => by what` in the shaders' text, one a line.
+/// A device.
+/// As in the tests, `HIZVK_PLANTED_FAULT` tries a variant of a shader: `what => by what` in the
+/// shaders' text, one a line.
 pub(crate) fn engine() -> Engine {
     let edits = std::env::var("HIZVK_PLANTED_FAULT").unwrap_or_default().replace("\\n", "\n");
     let edits: Vec<_> = edits.lines().filter_map(|line| line.split_once(" => ")).collect();
@@ -31,8 +34,9 @@ fn median(times: &mut [f64]) -> f64 {
     times[times.len() / 2]
 }
 
-/// Milliseconds that all threads of this process have run: on a busy machine steadier than the clock on the wall, and of a software
-/// driver the whole of its work. 0 where the system does not say.
+/// Milliseconds that all threads of this process have run: on a busy machine steadier than the
+/// clock on the wall, and of a software driver the whole of its work.
+/// 0 where the system does not say.
 fn cpu_ms() -> f64 {
     let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
     let ran = tasks.filter_map(|task| {
@@ -72,7 +76,9 @@ pub(crate) fn measure(criterion: &mut Criterion, name: &str, ways: &mut [Way<'_>
     let mut group = criterion.benchmark_group(name);
     for (way, run) in ways {
         group.bench_function(BenchmarkId::from_parameter(way), |bencher| {
-            bencher.iter_custom(|rounds| (0..rounds).map(|_| Duration::from_secs_f64(run() / 1e3)).sum());
+            bencher.iter_custom(|rounds| {
+                (0..rounds).map(|_| Duration::from_secs_f64(run() / 1e3)).sum()
+            });
         });
     }
     group.finish();

@@ -1,5 +1,6 @@
 // Bodies drawn through a list of their numbers: the packed list of a cull, or simply 0, 1, 2, ...
-// Positions are eye-relative, as in hiz_core's occluder pass: two float32 halves, the eye subtracted half by half.
+// Positions are eye-relative, as in hiz_core's occluder pass: two float32 halves, the eye
+// subtracted half by half.
 
 struct View {
     // Clip-space rows about the eye.

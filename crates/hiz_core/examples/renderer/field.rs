@@ -1,5 +1,5 @@
-//! Hills with hexagonal columns on them, and balls in all heights: nothing is parallel to an axis, and what is culled (spheres)
-//! is not what is drawn (facets inside of them).
+//! Hills with hexagonal columns on them, and balls in all heights: nothing is parallel to an axis,
+//! and what is culled (spheres) is not what is drawn (facets inside of them).
 
 use hiz_core::{Camera, DepthConvention, ImageSize, Pose, Projection, Vec3};
 
@@ -21,14 +21,16 @@ pub(crate) fn scene(origin: Vec3) -> Scene {
     };
     for i in 0..QUADS {
         for j in 0..QUADS {
-            let [a, b, c, d] = [ground(i, j), ground(i, j + 1), ground(i + 1, j), ground(i + 1, j + 1)];
+            let [a, b, c, d] =
+                [ground(i, j), ground(i, j + 1), ground(i + 1, j), ground(i + 1, j + 1)];
             walls.push_triangle([a, b, c], [0.45, 0.6, 0.35]);
             walls.push_triangle([c, b, d], [0.45, 0.6, 0.35]);
         }
     }
     for _ in 0..70 {
         let at = [0; 2].map(|_| random.range(-HALF_SIDE + 3.0, HALF_SIDE - 3.0));
-        let (radius, top, turn) = (random.range(0.6, 2.5), random.range(3.0, 12.0), random.range(0.0, 1.0));
+        let (radius, top, turn) =
+            (random.range(0.6, 2.5), random.range(3.0, 12.0), random.range(0.0, 1.0));
         add_column(&mut walls, at, radius, top, turn);
     }
     let crowd: Vec<Body> = (0..4000)
@@ -36,7 +38,8 @@ pub(crate) fn scene(origin: Vec3) -> Scene {
             let [x, z] = [0; 2].map(|_| random.range(-HALF_SIDE, HALF_SIDE));
             let radius = random.range(0.15, 0.3) * random.pick(&[1.0, 1.0, 3.0]);
             // Some are below the ground, most just above it.
-            let center = [x, height(x, z) + random.range(-1.0, 2.0) * random.pick(&[1.0, 1.0, 4.0]), z];
+            let center =
+                [x, height(x, z) + random.range(-1.0, 2.0) * random.pick(&[1.0, 1.0, 4.0]), z];
             Body { shape: Shape::Ball { center, radius }, colour: random.colour() }
         })
         .collect();
@@ -58,7 +61,8 @@ fn add_column(walls: &mut Mesh, [x, z]: [f64; 2], radius: f64, top: f64, turn: f
     };
     for k in 0..6 {
         // Deep enough that no slope shows its lower end.
-        let [a, b, c, d] = [corner(k, -4.0), corner(k + 1, -4.0), corner(k, top), corner(k + 1, top)];
+        let [a, b, c, d] =
+            [corner(k, -4.0), corner(k + 1, -4.0), corner(k, top), corner(k + 1, top)];
         walls.push_triangle([a, b, c], [0.7, 0.62, 0.5]);
         walls.push_triangle([c, b, d], [0.7, 0.62, 0.5]);
         walls.push_triangle([c, d, [x, foot + top, z]], [0.75, 0.7, 0.6]);
@@ -70,10 +74,12 @@ pub(crate) fn shots(origin: Vec3, size: ImageSize) -> hiz_core::Result<Vec<Shot>
     let shot = |name, eye: Vec3, target: Vec3, (near, far, convention), crowd_occludes| {
         let [eye, target] = [eye, target].map(|p| [0, 1, 2].map(|k| p[k] + origin[k]));
         let projection = Projection::Perspective { fov_y: 0.9, near, far, convention };
-        let camera = Camera::look_at(&Pose { eye, target, up: [0.0, 1.0, 0.0] }, &projection, size)?;
+        let camera =
+            Camera::look_at(&Pose { eye, target, up: [0.0, 1.0, 0.0] }, &projection, size)?;
         Ok(Shot { name, camera, crowd_occludes })
     };
-    let (standard, reversed) = ((0.2, Some(300.0), DepthConvention::Standard), (0.1, None, DepthConvention::Reversed));
+    let (standard, reversed) =
+        ((0.2, Some(300.0), DepthConvention::Standard), (0.1, None, DepthConvention::Reversed));
     Ok(vec![
         shot("field_from_a_valley", [-20.0, 4.5, 40.0], [10.0, 1.0, -20.0], reversed, false)?,
         shot("field_from_above", [-50.0, 25.0, -50.0], [0.0, -2.0, 0.0], standard, false)?,

@@ -1,11 +1,14 @@
-//! A renderer with a device of its own draws three scenes twice, with and without culling, and compares the pictures:
+//! A renderer with a device of its own draws three scenes twice, with and without culling, and
+//! compares the pictures:
 //!
 //! ```text
 //! cargo run --example renderer [FOLDER]
 //! ```
 //!
-//! The pictures land in FOLDER (`out/renderer`): what was drawn with culling, and which body each pixel shows. `renderer.rs`
-//! shows how the crate is embedded; `scene.rs` says what a scene is, `town.rs`, `rooms.rs` and `field.rs` are three.
+//! The pictures land in FOLDER (`out/renderer`): what was drawn with culling, and which body each
+//! pixel shows.
+//! `renderer.rs` shows how the crate is embedded; `scene.rs` says what a scene is, `town.rs`,
+//! `rooms.rs` and `field.rs` are three.
 //! `tests/renderer.rs` runs the same code.
 
 mod field;
@@ -24,10 +27,14 @@ use renderer::{Picture, Renderer};
 use scene::{Scene, Shot};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = std::env::args_os().nth(1).map_or_else(|| PathBuf::from("out/renderer"), PathBuf::from);
+    let folder =
+        std::env::args_os().nth(1).map_or_else(|| PathBuf::from("out/renderer"), PathBuf::from);
     std::fs::create_dir_all(&folder)?;
     let renderer = Renderer::open(&[])?;
-    println!("adapter: {} ({} {})", renderer.adapter.name, renderer.adapter.driver, renderer.adapter.driver_info);
+    println!(
+        "adapter: {} ({} {})",
+        renderer.adapter.name, renderer.adapter.driver, renderer.adapter.driver_info
+    );
     println!(
         "{:>22}  {:>9}  {:>9} {:>6} {:>8} {:>7}  differing pixels",
         "camera", "image", "instances", "kept", "occluded", "outside"
@@ -38,7 +45,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         for shot in shots {
             let size = shot.camera.size();
             let all = renderer.draw_all(&stage, &shot);
-            let culled = renderer.draw_culled(&stage, &shot, &renderer.cull_options(&shot.camera))?;
+            let culled =
+                renderer.draw_culled(&stage, &shot, &renderer.cull_options(&shot.camera))?;
             let differing = all.differing_pixels(&culled.picture);
             differing_in_all += differing;
             let (counts, image) = (culled.counts, format!("{}x{}", size.width, size.height));
@@ -56,7 +64,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     println!("pictures: {}", folder.display());
-    if differing_in_all == 0 { Ok(()) } else { Err(format!("{differing_in_all} pixels differ").into()) }
+    if differing_in_all == 0 {
+        Ok(())
+    } else {
+        Err(format!("{differing_in_all} pixels differ").into())
+    }
 }
 
 /// The scenes at the world's origin, each with its cameras.

@@ -1,13 +1,13 @@
-//! A renderer that owns its device and lets `hiz_core` record into its encoder: depth prepass, pyramid, cull, then a draw
-//! whose instance count only the device knows.
+//! A renderer that owns its device and lets `hiz_core` record into its encoder: depth prepass,
+//! pyramid, cull, then a draw whose instance count only the device knows.
 
 use std::error::Error;
 
 use hiz_core::wgpu::{self, util::DeviceExt};
 use hiz_core::{
-    Camera, CullOptions, DepthConvention, DrawTemplate, Floats, HizContext, ImageSize, InstanceOptions, Instances,
-    MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders, Order, Outputs, PyramidOptions, Visible,
-    VisibleOptions,
+    Camera, CullOptions, DepthConvention, DrawTemplate, Floats, HizContext, ImageSize,
+    InstanceOptions, Instances, MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders, Order,
+    Outputs, PyramidOptions, Visible, VisibleOptions,
 };
 
 use crate::scene::{Mesh, Scene, Shot};
@@ -15,10 +15,12 @@ use crate::scene::{Mesh, Scene, Shot};
 const COLOUR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const ID_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 
-/// Crowds are small here; real ones may be cut into pieces by the device's limits. So is this one, to show the loop.
+/// Crowds are small here; real ones may be cut into pieces by the device's limits.
+/// So is this one, to show the loop.
 const PIECE_CAPACITY: u32 = 2048;
 
-/// How much nearer than its bounds a body may be rasterised: the cull reasons about bounds, a picture is made of fragments.
+/// How much nearer than its bounds a body may be rasterised: the cull reasons about bounds, a
+/// picture is made of fragments.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Slack {
     /// Of its depth; for perspective cameras.
@@ -27,10 +29,12 @@ pub(crate) struct Slack {
     pub(crate) absolute: f64,
 }
 
-/// Beyond the worst that `tests/renderer.rs` measures, and all but a few fragments of millions that its long form does. Nothing
-/// bounds how edge-on a face can be seen: `docs/accuracy.md` has the numbers.
+/// Beyond the worst that `tests/renderer.rs` measures, and all but a few fragments of millions that
+/// its long form does.
+/// Nothing bounds how edge-on a face can be seen: `docs/accuracy.md` has the numbers.
 pub(crate) fn slack(adapter: &wgpu::AdapterInfo, camera: &Camera) -> Slack {
-    // A driver that nobody has measured gets the larger numbers; the test says whether they suffice.
+    // A driver that nobody has measured gets the larger numbers; the test says whether they
+    // suffice.
     let swiftshader = adapter.name.contains("SwiftShader");
     if camera.rows()[3][..3] == [0.0; 3] {
         return Slack { relative: 0.0, absolute: 1e-4 };
@@ -131,7 +135,8 @@ struct VertexRecord {
     body: u32,
 }
 
-/// A position as two float32 that add up to it (to 2^-48): the shader subtracts the eye before anything large is rounded.
+/// A position as two float32 that add up to it (to 2^-48): the shader subtracts the eye before
+/// anything large is rounded.
 fn halves(p: [f64; 3]) -> [[f32; 3]; 2] {
     let hi = p.map(|v| v as f32);
     [hi, [0, 1, 2].map(|k| (p[k] - f64::from(hi[k])) as f32)]
@@ -143,13 +148,19 @@ fn records(mesh: &Mesh, first_body: u32, vertices_per_body: u32) -> Vec<VertexRe
     let record = |(i, (position, colour)): (usize, (&[f64; 3], &[f32; 3]))| {
         let [hi, lo] = halves(*position);
         let [r, g, b] = colour.map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8);
-        VertexRecord { hi, colour: [r, g, b, 255], lo, body: first_body + i as u32 / vertices_per_body }
+        VertexRecord {
+            hi,
+            colour: [r, g, b, 255],
+            lo,
+            body: first_body + i as u32 / vertices_per_body,
+        }
     };
     vertices.map(record).collect()
 }
 
 impl Renderer {
-    /// Opens a Vulkan device: the adapter whose index `$HIZVK_ADAPTER` is, or whose description contains it, or the first.
+    /// Opens a Vulkan device: the adapter whose index `$HIZVK_ADAPTER` is, or whose description
+    /// contains it, or the first.
     /// `faults` is for tests.
     pub(crate) fn open(faults: &[(&str, &str)]) -> Result<Self, Box<dyn Error>> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
@@ -164,14 +175,17 @@ impl Renderer {
             .into_iter()
             .enumerate()
             .find(|(i, adapter)| is_wanted(*i, adapter))
-            .ok_or("no Vulkan adapter (a software driver: apt install libvulkan1 mesa-vulkan-drivers)")?;
-        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
-            label: Some("renderer.device"),
-            // A renderer adds what it needs itself.
-            required_features: HizContext::required_features(),
-            required_limits: HizContext::required_limits(),
-            ..Default::default()
-        }))?;
+            .ok_or(
+                "no Vulkan adapter (a software driver: apt install libvulkan1 mesa-vulkan-drivers)",
+            )?;
+        let (device, queue) =
+            pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+                label: Some("renderer.device"),
+                // A renderer adds what it needs itself.
+                required_features: HizContext::required_features(),
+                required_limits: HizContext::required_limits(),
+                ..Default::default()
+            }))?;
         Ok(Self {
             adapter: adapter.get_info(),
             hiz: HizContext::with_planted_faults(&device, faults)?,
@@ -191,19 +205,27 @@ impl Renderer {
         let first_wall = crowd_mesh.vertices.len() as u32;
         let mut vertices = records(&crowd_mesh, 0, vertices_per_body);
         vertices.extend(records(&scene.walls, num_crowd, u32::MAX));
-        let wall_indices: Vec<[u32; 3]> = scene.walls.triangles.iter().map(|t| t.map(|v| first_wall + v)).collect();
+        let wall_indices: Vec<[u32; 3]> =
+            scene.walls.triangles.iter().map(|t| t.map(|v| first_wall + v)).collect();
         let numbers: Vec<u32> = (0..num_crowd).collect();
 
-        let options =
-            InstanceOptions { strict: true, piece_capacity: Some(PIECE_CAPACITY), ..InstanceOptions::default() };
-        let mut encoder =
-            self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("renderer.upload") });
-        let crowd = scene.with_bounds(|bounds| self.hiz.record_instances(&mut encoder, bounds, &options))?;
+        let options = InstanceOptions {
+            strict: true,
+            piece_capacity: Some(PIECE_CAPACITY),
+            ..InstanceOptions::default()
+        };
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
+            label: Some("renderer.upload"),
+        });
+        let crowd = scene
+            .with_bounds(|bounds| self.hiz.record_instances(&mut encoder, bounds, &options))?;
         self.queue.submit([encoder.finish()]);
         // What the draw arguments say beside the count: how many indices one body has.
         let index_count = 3 * one.triangles.len() as u32;
         let draw = DrawTemplate { index_count, ..DrawTemplate::default() };
-        let visible = |outputs| self.hiz.create_visible(&crowd, &VisibleOptions { outputs, capacity: None, draw });
+        let visible = |outputs| {
+            self.hiz.create_visible(&crowd, &VisibleOptions { outputs, capacity: None, draw })
+        };
         let (visible, in_view) = (
             visible(Outputs { mask: true, verdicts: false, indices: true, draws: true })?,
             visible(Outputs { mask: true, ..Outputs::NONE })?,
@@ -219,13 +241,25 @@ impl Renderer {
                 .collect();
             self.hiz.create_occluders(&parts, &OccluderOptions::default())
         };
-        let indices = |label, triangles: &[[u32; 3]]| buffer(&self.device, label, triangles, wgpu::BufferUsages::INDEX);
+        let indices = |label, triangles: &[[u32; 3]]| {
+            buffer(&self.device, label, triangles, wgpu::BufferUsages::INDEX)
+        };
         Ok(Stage {
-            vertices: buffer(&self.device, "renderer.vertices", &vertices, wgpu::BufferUsages::STORAGE),
+            vertices: buffer(
+                &self.device,
+                "renderer.vertices",
+                &vertices,
+                wgpu::BufferUsages::STORAGE,
+            ),
             vertices_per_body,
             body_indices: indices("renderer.body_indices", &one.triangles),
             wall_indices: indices("renderer.wall_indices", &wall_indices),
-            everybody: buffer(&self.device, "renderer.everybody", &numbers, wgpu::BufferUsages::VERTEX),
+            everybody: buffer(
+                &self.device,
+                "renderer.everybody",
+                &numbers,
+                wgpu::BufferUsages::VERTEX,
+            ),
             num_crowd,
             crowd,
             visible,
@@ -235,17 +269,23 @@ impl Renderer {
         })
     }
 
-    /// How this renderer culls: with the slack that its driver needs, in ascending order. Where two bodies share a face the first
-    /// drawn wins, in both pictures the same.
+    /// How this renderer culls: with the slack that its driver needs, in ascending order.
+    /// Where two bodies share a face the first drawn wins, in both pictures the same.
     pub(crate) fn cull_options(&self, camera: &Camera) -> CullOptions {
         let Slack { relative, absolute } = slack(&self.adapter, camera);
-        CullOptions { order: Order::Stable, depth_slack: relative, depth_slack_abs: absolute, ..CullOptions::default() }
+        CullOptions {
+            order: Order::Stable,
+            depth_slack: relative,
+            depth_slack_abs: absolute,
+            ..CullOptions::default()
+        }
     }
 
     /// Draws everything.
     pub(crate) fn draw_all(&self, stage: &Stage, shot: &Shot) -> Picture {
-        let mut encoder =
-            self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("renderer.all") });
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
+            label: Some("renderer.all"),
+        });
         let targets = Targets::new(&self.device, shot.camera.size());
         let mut pass = self.begin_picture(&mut encoder, stage, &shot.camera, &targets);
         pass.draw_indexed(0..index_count(&stage.body_indices), 0, 0..stage.num_crowd);
@@ -254,7 +294,8 @@ impl Renderer {
         self.read_picture(&targets)
     }
 
-    /// Draws what the cull keeps. From the first pass to the last it is one command buffer: the count never leaves the device.
+    /// Draws what the cull keeps.
+    /// From the first pass to the last it is one command buffer: the count never leaves the device.
     pub(crate) fn draw_culled(
         &self,
         stage: &Stage,
@@ -262,8 +303,9 @@ impl Renderer {
         options: &CullOptions,
     ) -> Result<Culled, Box<dyn Error>> {
         let (camera, size) = (&shot.camera, shot.camera.size());
-        let mut encoder =
-            self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("renderer.culled") });
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
+            label: Some("renderer.culled"),
+        });
 
         let prepass = target(&self.device, "renderer.prepass", size, OCCLUDER_DEPTH_FORMAT);
         let depth_view = prepass.create_view(&wgpu::TextureViewDescriptor::default());
@@ -273,7 +315,14 @@ impl Renderer {
         let pyramid = self.hiz.create_pyramid(size, &PyramidOptions::default())?;
         self.hiz.record_reduce(&mut encoder, &depth_view, camera, &pyramid)?;
 
-        self.hiz.record_cull(&mut encoder, &stage.crowd, camera, &pyramid, &stage.visible, options)?;
+        self.hiz.record_cull(
+            &mut encoder,
+            &stage.crowd,
+            camera,
+            &pyramid,
+            &stage.visible,
+            options,
+        )?;
 
         let targets = Targets::new(&self.device, size);
         let mut pass = self.begin_picture(&mut encoder, stage, camera, &targets);
@@ -294,7 +343,8 @@ impl Renderer {
         })
     }
 
-    /// Begins the pass that makes a picture: walls are drawn, the bodies' indices and the list of everybody are bound.
+    /// Begins the pass that makes a picture: walls are drawn, the bodies' indices and the list of
+    /// everybody are bound.
     fn begin_picture<'e>(
         &self,
         encoder: &'e mut wgpu::CommandEncoder,
@@ -303,11 +353,14 @@ impl Renderer {
         targets: &Targets,
     ) -> wgpu::RenderPass<'e> {
         let [eye_hi, eye_lo] = halves(camera.origin());
-        // The rows stand about the camera's origin, the shader subtracts the two halves of it. What those leave over goes into the
-        // constants, as in the engine's prepass: where a face is seen edge-on its last bit decides what is drawn.
-        let left_over = [0, 1, 2].map(|k| f64::from(eye_hi[k]) + f64::from(eye_lo[k]) - camera.origin()[k]);
+        // The rows stand about the camera's origin, the shader subtracts the two halves of it.
+        // What those leave over goes into the constants, as in the engine's prepass: where a face
+        // is seen edge-on its last bit decides what is drawn.
+        let left_over =
+            [0, 1, 2].map(|k| f64::from(eye_hi[k]) + f64::from(eye_lo[k]) - camera.origin()[k]);
         let about_eye = |[x, y, z, constant]: [f64; 4]| {
-            [x, y, z, x * left_over[0] + y * left_over[1] + z * left_over[2] + constant].map(|v| v as f32)
+            [x, y, z, x * left_over[0] + y * left_over[1] + z * left_over[2] + constant]
+                .map(|v| v as f32)
         };
         let view = ViewUniform {
             clip_from_eye: camera.rows().map(about_eye),
@@ -317,7 +370,8 @@ impl Renderer {
             padding: 0,
         };
         let view = buffer(&self.device, "renderer.view", &[view], wgpu::BufferUsages::UNIFORM);
-        let pipeline = &self.pipelines[usize::from(camera.convention() == DepthConvention::Reversed)];
+        let pipeline =
+            &self.pipelines[usize::from(camera.convention() == DepthConvention::Reversed)];
         let bind_group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("renderer.view"),
             layout: &pipeline.get_bind_group_layout(0),
@@ -333,13 +387,19 @@ impl Renderer {
                 view,
                 depth_slice: None,
                 resolve_target: None,
-                ops: wgpu::Operations { load: wgpu::LoadOp::Clear(colour), store: wgpu::StoreOp::Store },
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(colour),
+                    store: wgpu::StoreOp::Store,
+                },
             })
         };
         let sky = wgpu::Color { r: 0.62, g: 0.74, b: 0.86, a: 1.0 };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("renderer.picture"),
-            color_attachments: &[cleared(&views[0], sky), cleared(&views[1], wgpu::Color::TRANSPARENT)],
+            color_attachments: &[
+                cleared(&views[0], sky),
+                cleared(&views[1], wgpu::Color::TRANSPARENT),
+            ],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: &views[2],
                 depth_ops: Some(wgpu::Operations {
@@ -369,20 +429,35 @@ impl Renderer {
         }
     }
 
-    /// How many are kept, and how many of the others are inside the frustum: a cull against nothing keeps those.
-    fn counts(&self, stage: &Stage, camera: &Camera, options: &CullOptions) -> Result<Counts, Box<dyn Error>> {
-        let mut encoder =
-            self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("renderer.in_view") });
+    /// How many are kept, and how many of the others are inside the frustum: a cull against nothing
+    /// keeps those.
+    fn counts(
+        &self,
+        stage: &Stage,
+        camera: &Camera,
+        options: &CullOptions,
+    ) -> Result<Counts, Box<dyn Error>> {
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
+            label: Some("renderer.in_view"),
+        });
         let depth = target(&self.device, "renderer.nothing", camera.size(), OCCLUDER_DEPTH_FORMAT);
         let depth = depth.create_view(&wgpu::TextureViewDescriptor::default());
         let pyramid = self.hiz.create_pyramid(camera.size(), &PyramidOptions::default())?;
         self.hiz.record_occluders(&mut encoder, &stage.nothing, camera, &depth)?;
         self.hiz.record_reduce(&mut encoder, &depth, camera, &pyramid)?;
-        self.hiz.record_cull(&mut encoder, &stage.crowd, camera, &pyramid, &stage.in_view, options)?;
+        self.hiz.record_cull(
+            &mut encoder,
+            &stage.crowd,
+            camera,
+            &pyramid,
+            &stage.in_view,
+            options,
+        )?;
         self.queue.submit([encoder.finish()]);
 
         let (kept, in_view) = (self.count_kept(&stage.visible), self.count_kept(&stage.in_view));
-        let draws = self.read_buffer(stage.visible.draw_arguments().expect("draws are among the outputs"));
+        let draws =
+            self.read_buffer(stage.visible.draw_arguments().expect("draws are among the outputs"));
         let draws: Vec<hiz_core::DrawIndexedIndirect> = bytemuck::pod_collect_to_vec(&draws);
         Ok(Counts {
             kept,
@@ -404,38 +479,57 @@ impl Renderer {
     fn read_texture(&self, texture: &wgpu::Texture) -> Vec<u8> {
         let row = 4 * texture.width();
         let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let bytes = self.read(u64::from(padded) * u64::from(texture.height()), |encoder, staging| {
-            let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded), rows_per_image: None };
-            let target = wgpu::TexelCopyBufferInfo { buffer: staging, layout };
-            encoder.copy_texture_to_buffer(texture.as_image_copy(), target, texture.size());
-        });
-        bytes.chunks_exact(padded as usize).flat_map(|line| &line[..row as usize]).copied().collect()
+        let bytes =
+            self.read(u64::from(padded) * u64::from(texture.height()), |encoder, staging| {
+                let layout = wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(padded),
+                    rows_per_image: None,
+                };
+                let target = wgpu::TexelCopyBufferInfo { buffer: staging, layout };
+                encoder.copy_texture_to_buffer(texture.as_image_copy(), target, texture.size());
+            });
+        bytes
+            .chunks_exact(padded as usize)
+            .flat_map(|line| &line[..row as usize])
+            .copied()
+            .collect()
     }
 
     fn read_buffer(&self, source: &wgpu::Buffer) -> Vec<u8> {
-        self.read(source.size(), |encoder, staging| encoder.copy_buffer_to_buffer(source, 0, staging, 0, source.size()))
+        self.read(source.size(), |encoder, staging| {
+            encoder.copy_buffer_to_buffer(source, 0, staging, 0, source.size())
+        })
     }
 
     /// Copies into a staging buffer, waits and maps it.
-    fn read(&self, size: u64, copy: impl FnOnce(&mut wgpu::CommandEncoder, &wgpu::Buffer)) -> Vec<u8> {
+    fn read(
+        &self,
+        size: u64,
+        copy: impl FnOnce(&mut wgpu::CommandEncoder, &wgpu::Buffer),
+    ) -> Vec<u8> {
         let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("renderer.staging"),
             size,
             usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
             mapped_at_creation: false,
         });
-        let mut encoder =
-            self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("renderer.read") });
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
+            label: Some("renderer.read"),
+        });
         copy(&mut encoder, &staging);
         self.queue.submit([encoder.finish()]);
-        staging.map_async(wgpu::MapMode::Read, .., |mapped| mapped.expect("a staging buffer can be mapped"));
+        staging.map_async(wgpu::MapMode::Read, .., |mapped| {
+            mapped.expect("a staging buffer can be mapped")
+        });
         self.device.poll(wgpu::PollType::wait_indefinitely()).expect("the device answers");
         let view = staging.get_mapped_range(..).expect("it is mapped");
         view.to_vec()
     }
 }
 
-/// What a picture is drawn into. The depth is the picture's own, not the prepass.
+/// What a picture is drawn into.
+/// The depth is the picture's own, not the prepass.
 struct Targets {
     colour: wgpu::Texture,
     ids: wgpu::Texture,
@@ -456,7 +550,12 @@ fn index_count(indices: &wgpu::Buffer) -> u32 {
     (indices.size() / 4) as u32
 }
 
-fn target(device: &wgpu::Device, label: &str, size: ImageSize, format: wgpu::TextureFormat) -> wgpu::Texture {
+fn target(
+    device: &wgpu::Device,
+    label: &str,
+    size: ImageSize,
+    format: wgpu::TextureFormat,
+) -> wgpu::Texture {
     device.create_texture(&wgpu::TextureDescriptor {
         label: Some(label),
         size: wgpu::Extent3d { width: size.width, height: size.height, depth_or_array_layers: 1 },
@@ -478,7 +577,11 @@ fn buffer<T: bytemuck::NoUninit>(
     usage: wgpu::BufferUsages,
 ) -> wgpu::Buffer {
     let contents = bytemuck::cast_slice(contents);
-    device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
+    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some(label),
+        contents,
+        usage,
+    })
 }
 
 fn pipeline(device: &wgpu::Device, nearer: wgpu::CompareFunction) -> wgpu::RenderPipeline {

@@ -1,4 +1,5 @@
-//! A floor of rooms with doors, seen from inside: walls on all sides, cameras that touch them, and furniture of turned boxes.
+//! A floor of rooms with doors, seen from inside: walls on all sides, cameras that touch them, and
+//! furniture of turned boxes.
 
 use std::f64::consts::PI;
 
@@ -20,7 +21,11 @@ pub(crate) fn scene(origin: Vec3) -> Scene {
     let size = [0, 1].map(|k| ROOMS[k] as f64 * ROOM[k]);
     let mut walls = vec![
         block([-0.5, -0.3, -0.5], [size[0] + 0.5, 0.0, size[1] + 0.5], [0.55, 0.42, 0.3]),
-        block([-0.5, CEILING, -0.5], [size[0] + 0.5, CEILING + 0.3, size[1] + 0.5], [0.9, 0.9, 0.88]),
+        block(
+            [-0.5, CEILING, -0.5],
+            [size[0] + 0.5, CEILING + 0.3, size[1] + 0.5],
+            [0.9, 0.9, 0.88],
+        ),
     ];
     for axis in 0..2 {
         let across = 1 - axis;
@@ -29,7 +34,13 @@ pub(crate) fn scene(origin: Vec3) -> Scene {
                 let outer = line == 0 || line == ROOMS[axis];
                 let begin = room as f64 * ROOM[across];
                 let door = (!outer).then(|| begin + random.range(0.8, ROOM[across] - 0.8));
-                add_wall(&mut walls, axis, line as f64 * ROOM[axis], [begin, begin + ROOM[across]], door);
+                add_wall(
+                    &mut walls,
+                    axis,
+                    line as f64 * ROOM[axis],
+                    [begin, begin + ROOM[across]],
+                    door,
+                );
             }
         }
     }
@@ -101,14 +112,22 @@ pub(crate) fn shots(origin: Vec3, size: ImageSize) -> hiz_core::Result<Vec<Shot>
     let shot = |name, eye: Vec3, target: Vec3, (near, far, convention), crowd_occludes| {
         let [eye, target] = [eye, target].map(|p| [0, 1, 2].map(|k| p[k] + origin[k]));
         let projection = Projection::Perspective { fov_y: 1.2, near, far, convention };
-        let camera = Camera::look_at(&Pose { eye, target, up: [0.0, 1.0, 0.0] }, &projection, size)?;
+        let camera =
+            Camera::look_at(&Pose { eye, target, up: [0.0, 1.0, 0.0] }, &projection, size)?;
         Ok(Shot { name, camera, crowd_occludes })
     };
-    let (standard, reversed) = ((0.05, Some(60.0), DepthConvention::Standard), (0.02, None, DepthConvention::Reversed));
+    let (standard, reversed) =
+        ((0.05, Some(60.0), DepthConvention::Standard), (0.02, None, DepthConvention::Reversed));
     Ok(vec![
         shot("rooms_through_doors", [-12.0, 1.6, -7.0], [5.0, 1.2, 4.0], standard, false)?,
         // The eye is in the plane of a wall's face, 5 m from its end.
-        shot("rooms_on_a_wall", [-10.0 + HALF_WALL, 1.5, -4.0], [-10.0 + HALF_WALL, 1.4, 8.0], reversed, false)?,
+        shot(
+            "rooms_on_a_wall",
+            [-10.0 + HALF_WALL, 1.5, -4.0],
+            [-10.0 + HALF_WALL, 1.4, 8.0],
+            reversed,
+            false,
+        )?,
         shot("rooms_hide_themselves", [1.5, 1.7, 1.0], [9.0, 0.6, -3.0], reversed, true)?,
     ])
 }

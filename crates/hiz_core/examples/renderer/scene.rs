@@ -1,8 +1,10 @@
-//! What is drawn, as data: bodies that are culled, walls that hide them, cameras. No GPU here.
+//! What is drawn, as data: bodies that are culled, walls that hide them, cameras.
+//! No GPU here.
 
 use hiz_core::{Bounds, Camera, Floats, Vec3};
 
-/// A convex body in world coordinates. Its bounds are exactly what is drawn, but for balls, which are drawn inside of theirs.
+/// A convex body in world coordinates.
+/// Its bounds are exactly what is drawn, but for balls, which are drawn inside of theirs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Shape {
     /// Axis-aligned.
@@ -87,10 +89,17 @@ fn corner(v: usize) -> [usize; 3] {
     sides
 }
 
-/// An octahedron whose edges are cut in half and pushed out to the sphere: 18 unit vectors, 32 triangles.
+/// An octahedron whose edges are cut in half and pushed out to the sphere: 18 unit vectors, 32
+/// triangles.
 fn octasphere() -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    const TIPS: [Vec3; 6] =
-        [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]];
+    const TIPS: [Vec3; 6] = [
+        [1.0, 0.0, 0.0],
+        [-1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, -1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, -1.0],
+    ];
     let mut points = TIPS.to_vec();
     let mut triangles = Vec::new();
     let middle = |points: &mut Vec<Vec3>, a: usize, b: usize| {
@@ -117,14 +126,19 @@ impl Body {
             Shape::Box { min, max } => [0, 1, 2].map(|k| [min, max][sides[k]][k]),
             Shape::Turned { center, half, rotation: r } => {
                 let p = [0, 1, 2].map(|k| if sides[k] == 0 { -half[k] } else { half[k] });
-                [0, 1, 2].map(|k| center[k] + r[3 * k] * p[0] + r[3 * k + 1] * p[1] + r[3 * k + 2] * p[2])
+                [0, 1, 2].map(|k| {
+                    center[k] + r[3 * k] * p[0] + r[3 * k + 1] * p[1] + r[3 * k + 2] * p[2]
+                })
             }
             Shape::Ball { .. } => unreachable!("balls have no sides"),
         };
         if let Shape::Ball { center, radius } = self.shape {
             let (points, triangles) = octasphere();
             // A millionth inside, so that no rounding puts a vertex outside.
-            let vertices = points.iter().map(|u| [0, 1, 2].map(|k| center[k] + 0.999_999 * radius * u[k])).collect();
+            let vertices = points
+                .iter()
+                .map(|u| [0, 1, 2].map(|k| center[k] + 0.999_999 * radius * u[k]))
+                .collect();
             let colours = points.iter().map(|u| self.colour.map(|c| c * light(*u))).collect();
             return Mesh { vertices, colours, triangles };
         }
@@ -132,10 +146,13 @@ impl Body {
         let colours = (0..24)
             .map(|v| {
                 let face = v / 4 * 4;
-                self.colour.map(|c| c * light(normal([vertices[face], vertices[face + 1], vertices[face + 2]])))
+                self.colour.map(|c| {
+                    c * light(normal([vertices[face], vertices[face + 1], vertices[face + 2]]))
+                })
             })
             .collect();
-        let triangles = (0..6).flat_map(|f| [[0, 1, 2], [2, 1, 3]].map(|t| t.map(|v| 4 * f + v))).collect();
+        let triangles =
+            (0..6).flat_map(|f| [[0, 1, 2], [2, 1, 3]].map(|t| t.map(|v| 4 * f + v))).collect();
         Mesh { vertices, colours, triangles }
     }
 
@@ -144,7 +161,9 @@ impl Body {
         let at = |p: Vec3| [0, 1, 2].map(|k| p[k] + shift[k]);
         let shape = match self.shape {
             Shape::Box { min, max } => Shape::Box { min: at(min), max: at(max) },
-            Shape::Turned { center, half, rotation } => Shape::Turned { center: at(center), half, rotation },
+            Shape::Turned { center, half, rotation } => {
+                Shape::Turned { center: at(center), half, rotation }
+            }
             Shape::Ball { center, radius } => Shape::Ball { center: at(center), radius },
         };
         Self { shape, ..self }
@@ -170,7 +189,13 @@ pub(crate) struct Scene {
 
 impl Scene {
     /// The scene about `origin`, of bodies about 0.
-    pub(crate) fn at(origin: Vec3, name: &'static str, crowd: &[Body], mut walls: Mesh, reach: Vec3) -> Self {
+    pub(crate) fn at(
+        origin: Vec3,
+        name: &'static str,
+        crowd: &[Body],
+        mut walls: Mesh,
+        reach: Vec3,
+    ) -> Self {
         for vertex in &mut walls.vertices {
             *vertex = [0, 1, 2].map(|k| vertex[k] + origin[k]);
         }
@@ -183,7 +208,9 @@ impl Scene {
         let mut arrays: [Vec<f64>; 3] = Default::default();
         for body in &self.crowd {
             match &body.shape {
-                Shape::Box { min, max } => arrays.iter_mut().zip([min, max]).for_each(|(a, p)| a.extend(p)),
+                Shape::Box { min, max } => {
+                    arrays.iter_mut().zip([min, max]).for_each(|(a, p)| a.extend(p))
+                }
                 Shape::Turned { center, half, rotation } => {
                     let parts: [&[f64]; 3] = [center, half, rotation];
                     arrays.iter_mut().zip(parts).for_each(|(a, p)| a.extend(p));
@@ -197,7 +224,9 @@ impl Scene {
         let [a, b, c] = [&arrays[0], &arrays[1], &arrays[2]].map(|a| Floats::F64(a));
         take(&match self.crowd[0].shape {
             Shape::Box { .. } => Bounds::Boxes { min: a, max: b },
-            Shape::Turned { .. } => Bounds::OrientedBoxes { centers: a, half_sizes: b, rotations: c },
+            Shape::Turned { .. } => {
+                Bounds::OrientedBoxes { centers: a, half_sizes: b, rotations: c }
+            }
             Shape::Ball { .. } => Bounds::Spheres { centers: a, radii: b },
         })
     }
@@ -208,7 +237,8 @@ impl Scene {
 pub(crate) struct Shot {
     pub(crate) name: &'static str,
     pub(crate) camera: Camera,
-    /// Whether the crowd is drawn into the depth prepass, too, so that it hides itself: nobody may be hidden by his own depth.
+    /// Whether the crowd is drawn into the depth prepass, too, so that it hides itself: nobody may
+    /// be hidden by his own depth.
     pub(crate) crowd_occludes: bool,
 }
 

@@ -1,5 +1,5 @@
-//! A small town: ground and houses are the occluders, thousands of boxes in its streets the crowd. Faces that lie in one plane,
-//! twins at one place.
+//! A small town: ground and houses are the occluders, thousands of boxes in its streets the crowd.
+//! Faces that lie in one plane, twins at one place.
 
 use hiz_core::{Camera, DepthConvention, ImageSize, Pose, Projection, Vec3};
 
@@ -15,7 +15,8 @@ pub(crate) fn scene(origin: Vec3) -> Scene {
         let half: Vec3 = std::array::from_fn(|_| random.range(0.1, 0.7));
         let mut at = [random.range(-62.0, 62.0), half[1], random.range(-62.0, 62.0)];
         match i % 10 {
-            // Most stand on the ground, in the streets and, never seen, in the houses. Some hover.
+            // Most stand on the ground, in the streets and, never seen, in the houses.
+            // Some hover.
             0..7 => {}
             7 => at[1] = random.range(1.0, 25.0),
             // A crowd around the crossing at the origin, for the camera inside of it.
@@ -28,12 +29,14 @@ pub(crate) fn scene(origin: Vec3) -> Scene {
         let corner = |side: f64| [0, 1, 2].map(|k| at[k] + side * half[k]);
         crowd.push(block(corner(-1.0), corner(1.0), random.colour()));
     }
-    // Twins of another colour at the same place: which one is seen is a matter of the order of drawing alone.
+    // Twins of another colour at the same place: which one is seen is a matter of the order of
+    // drawing alone.
     for i in (0..5000).step_by(20) {
         let colour = crowd[i].colour.map(|c| 1.15 - c);
         crowd.push(Body { colour, ..crowd[i] });
     }
-    let walls: Vec<Body> = walls.iter().map(|(min, max, colour)| block(*min, *max, *colour)).collect();
+    let walls: Vec<Body> =
+        walls.iter().map(|(min, max, colour)| block(*min, *max, *colour)).collect();
     Scene::at(origin, "town", &crowd, Mesh::of_bodies(&walls), [70.0, 20.0, 70.0])
 }
 
@@ -51,7 +54,8 @@ fn walls(random: &mut Random) -> Vec<Block> {
     walls
 }
 
-/// A box whose face lies in the plane of a house's face (a tie, which must stay) or a hair behind it (which may go).
+/// A box whose face lies in the plane of a house's face (a tie, which must stay) or a hair behind
+/// it (which may go).
 fn near_a_face(house: Block, random: &mut Random) -> Body {
     let axis = 2 * random.below(2);
     let along = 2 - axis;
@@ -100,14 +104,21 @@ pub(crate) fn shots(origin: Vec3, size: ImageSize) -> hiz_core::Result<Vec<Shot>
     };
     let shot = |name, eye: Vec3, target: Vec3, projection, crowd_occludes| {
         let [eye, target] = [eye, target].map(|p| std::array::from_fn(|k| p[k] + origin[k]));
-        let camera = Camera::look_at(&Pose { eye, target, up: [0.0, 1.0, 0.0] }, &projection, size)?;
+        let camera =
+            Camera::look_at(&Pose { eye, target, up: [0.0, 1.0, 0.0] }, &projection, size)?;
         Ok(Shot { name, camera, crowd_occludes })
     };
     let street = ([1.0, 1.7, 58.0], [-1.0, 3.0, 0.0]);
     let hill = ([-70.0, 26.0, 68.0], [0.0, 0.0, 0.0]);
     let (walls_occlude, crowd_occludes) = (false, true);
     Ok(vec![
-        shot("street", street.0, street.1, perspective(60.0, 0.5, Some(160.0), Standard), walls_occlude)?,
+        shot(
+            "street",
+            street.0,
+            street.1,
+            perspective(60.0, 0.5, Some(160.0), Standard),
+            walls_occlude,
+        )?,
         shot(
             "corner",
             [21.0, 2.5, 41.0],
@@ -116,10 +127,29 @@ pub(crate) fn shots(origin: Vec3, size: ImageSize) -> hiz_core::Result<Vec<Shot>
             walls_occlude,
         )?,
         shot("hill", hill.0, hill.1, perspective(50.0, 0.1, None, Reversed), walls_occlude)?,
-        // Straight along an axis: faces towards the eye have one depth, those beside it are seen edge-on.
-        shot("off_centre", [-41.0, 3.0, 62.0], [-41.0, 3.0, 0.0], off_centre(0.3, None, Standard), walls_occlude)?,
-        shot("parallel", [3.0, 9.0, 90.0], [3.0, 9.0, 0.0], parallel(16.0, 200.0, Standard), walls_occlude)?,
-        shot("isometric", [80.0, 60.0, 70.0], [0.0, 0.0, 0.0], parallel(24.0, 250.0, Reversed), walls_occlude)?,
+        // Straight along an axis: faces towards the eye have one depth, those beside it are seen
+        // edge-on.
+        shot(
+            "off_centre",
+            [-41.0, 3.0, 62.0],
+            [-41.0, 3.0, 0.0],
+            off_centre(0.3, None, Standard),
+            walls_occlude,
+        )?,
+        shot(
+            "parallel",
+            [3.0, 9.0, 90.0],
+            [3.0, 9.0, 0.0],
+            parallel(16.0, 200.0, Standard),
+            walls_occlude,
+        )?,
+        shot(
+            "isometric",
+            [80.0, 60.0, 70.0],
+            [0.0, 0.0, 0.0],
+            parallel(24.0, 250.0, Reversed),
+            walls_occlude,
+        )?,
         // The eye is 3 cm off a wall and looks into it at less than a degree.
         shot(
             "along_a_wall",
@@ -136,7 +166,13 @@ pub(crate) fn shots(origin: Vec3, size: ImageSize) -> hiz_core::Result<Vec<Shot>
             perspective(80.0, 0.3, Some(150.0), Standard),
             walls_occlude,
         )?,
-        shot("crowd_hides_crowd", hill.0, hill.1, perspective(50.0, 1.0, Some(220.0), Standard), crowd_occludes)?,
+        shot(
+            "crowd_hides_crowd",
+            hill.0,
+            hill.1,
+            perspective(50.0, 1.0, Some(220.0), Standard),
+            crowd_occludes,
+        )?,
         shot(
             "straight_hides_crowd",
             [1.0, 1.7, 66.0],

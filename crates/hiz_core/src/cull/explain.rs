@@ -32,8 +32,8 @@ pub(crate) const LEVEL_MASK: u32 = 0xFF;
 pub(crate) const BEHIND: u32 = 0x100;
 pub(crate) const CLEAR: u32 = 0x200;
 
-/// How many readings an explanation tells at most. A descent may read 65,536 texels; what comes
-/// after these is counted.
+/// How many readings an explanation tells at most.
+/// A descent may read 65,536 texels; what comes after these is counted.
 pub(crate) const TEXELS_TOLD: usize = 4096;
 
 /// Records the explanation of instance `index`, or of the box around its group, into `target`, an
@@ -47,7 +47,10 @@ pub(crate) fn record_explain(
 ) -> Result<()> {
     let instances = inputs.instances;
     let piece = instances.pieces.iter().find(|p| p.range.contains(&index)).ok_or_else(|| {
-        Error::invalid("index", format!("expected an instance below {}, got {index}", instances.len()))
+        Error::invalid(
+            "index",
+            format!("expected an instance below {}, got {index}", instances.len()),
+        )
     })?;
     let mut seen = Seen::new(gpu, inputs, None)?;
     let place = piece.order.place((index - piece.range.start) as usize);
@@ -64,9 +67,12 @@ pub(crate) fn record_explain(
         &gpu.layouts().two_storages,
         &[entry(0, target.as_entire_binding()), entry(1, readings.as_entire_binding())],
     )?;
-    let (pipeline, records) = (gpu.explain_pipeline(seen.key)?, bind_records(gpu, &which, records)?);
-    let mut pass = encoder
-        .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.explain.pass"), timestamp_writes: None });
+    let (pipeline, records) =
+        (gpu.explain_pipeline(seen.key)?, bind_records(gpu, &which, records)?);
+    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+        label: Some("hiz.explain.pass"),
+        timestamp_writes: None,
+    });
     pass.set_pipeline(&pipeline);
     pass.set_bind_group(0, &view, &[]);
     pass.set_bind_group(1, &records, &[]);

@@ -5,7 +5,9 @@ mod options;
 mod refine;
 mod view_uniform;
 
-pub(crate) use explain::{BEHIND, CLEAR, ExplanationRecord, LEVEL_MASK, Reading, TEXELS_TOLD, record_explain};
+pub(crate) use explain::{
+    BEHIND, CLEAR, ExplanationRecord, LEVEL_MASK, Reading, TEXELS_TOLD, record_explain,
+};
 pub use options::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
 pub(crate) use refine::{Refinement, VERDICT_MASK};
 pub(crate) use view_uniform::ViewUniform;
@@ -51,8 +53,13 @@ struct Seen {
 }
 
 impl Seen {
-    /// For `encoder`, which takes the copies into an atlas where one is needed; without it there is none.
-    fn new(gpu: &Gpu, inputs: &CullInputs<'_>, encoder: Option<&mut wgpu::CommandEncoder>) -> Result<Self> {
+    /// For `encoder`, which takes the copies into an atlas where one is needed; without it there is
+    /// none.
+    fn new(
+        gpu: &Gpu,
+        inputs: &CullInputs<'_>,
+        encoder: Option<&mut wgpu::CommandEncoder>,
+    ) -> Result<Self> {
         let CullInputs { instances, camera, pyramid, options, .. } = *inputs;
         check_contexts(gpu, inputs)?;
         let built = pyramid.built_for(camera)?;
@@ -64,7 +71,11 @@ impl Seen {
             None => None,
         };
         let key = CullKey {
-            store: if atlas.is_some() { DepthStore::Atlas } else { DepthStore::Apart(built.source_kind) },
+            store: if atlas.is_some() {
+                DepthStore::Atlas
+            } else {
+                DepthStore::Apart(built.source_kind)
+            },
             kind: instances.kind,
             reversed: camera.convention().is_reversed(),
             chunks: if atlas.is_some() { 1 } else { pyramid.chunks.len() },
@@ -87,31 +98,55 @@ impl Seen {
         self.bind_view(gpu, pyramid, ViewUniform { descent_budget, ..self.view })
     }
 
-    fn bind_view(&self, gpu: &Gpu, pyramid: &Pyramid, view: ViewUniform) -> Result<wgpu::BindGroup> {
-        pyramid.bindings((self.key.store, bytemuck::cast(view)), || self.create(gpu, pyramid, &view))
+    fn bind_view(
+        &self,
+        gpu: &Gpu,
+        pyramid: &Pyramid,
+        view: ViewUniform,
+    ) -> Result<wgpu::BindGroup> {
+        pyramid
+            .bindings((self.key.store, bytemuck::cast(view)), || self.create(gpu, pyramid, &view))
     }
 
-    fn create(&self, gpu: &Gpu, pyramid: &Pyramid, uniform: &ViewUniform) -> Result<wgpu::BindGroup> {
+    fn create(
+        &self,
+        gpu: &Gpu,
+        pyramid: &Pyramid,
+        uniform: &ViewUniform,
+    ) -> Result<wgpu::BindGroup> {
         let view = gpu.uniform("hiz.cull.view", uniform)?;
-        let mut entries = vec![entry(2, pyramid.uniform.as_entire_binding()), entry(6, view.as_entire_binding())];
+        let mut entries =
+            vec![entry(2, pyramid.uniform.as_entire_binding()), entry(6, view.as_entire_binding())];
         if let Some(atlas) = &self.atlas {
             entries.push(entry(3, wgpu::BindingResource::TextureView(atlas)));
         } else {
             entries.push(entry(0, wgpu::BindingResource::TextureView(&self.built.source)));
             entries.push(entry(1, wgpu::BindingResource::Sampler(gpu.sampler())));
-            entries.extend((0..3).map(|c| entry(3 + c, pyramid.chunk(gpu, c as usize).as_entire_binding())));
+            entries.extend(
+                (0..3).map(|c| entry(3 + c, pyramid.chunk(gpu, c as usize).as_entire_binding())),
+            );
         }
         gpu.bind_group("hiz.cull.view", gpu.layouts().cull(self.key.store), &entries)
     }
 }
 
-fn bind_output(gpu: &Gpu, piece: &Piece, visible: &Visible, p: usize, statistics: bool) -> Result<wgpu::BindGroup> {
+fn bind_output(
+    gpu: &Gpu,
+    piece: &Piece,
+    visible: &Visible,
+    p: usize,
+    statistics: bool,
+) -> Result<wgpu::BindGroup> {
     let lists = visible.lists.as_ref();
     let list = lists.map_or(gpu.stand_in(StandIn::List), |lists| lists.pieces[p].bound());
     let draws = lists.map_or(gpu.stand_in(StandIn::Draws), |lists| &lists.draws);
     // Any uniform will do where nothing is listed.
     let capacity = lists.map_or(&piece.uniform, |lists| &lists.capacity_uniform);
-    let statistics = if statistics { visible.statistics_or_new(gpu)? } else { gpu.stand_in(StandIn::Statistics) };
+    let statistics = if statistics {
+        visible.statistics_or_new(gpu)?
+    } else {
+        gpu.stand_in(StandIn::Statistics)
+    };
     gpu.bind_group(
         "hiz.cull.visible",
         &gpu.layouts().visible,
@@ -124,9 +159,10 @@ fn bind_output(gpu: &Gpu, piece: &Piece, visible: &Visible, p: usize, statistics
         ],
     )
     .map_err(|error| match error {
-        Error::Device(why) => {
-            Error::mismatch("visible", format!("expected buffers that have not been destroyed, but {why}"))
-        }
+        Error::Device(why) => Error::mismatch(
+            "visible",
+            format!("expected buffers that have not been destroyed, but {why}"),
+        ),
         other => other,
     })
 }
@@ -140,12 +176,20 @@ pub(crate) fn record(
     gpu.recorded(|| record_all(gpu, encoder, inputs, visible))
 }
 
-fn record_all(gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, inputs: &CullInputs<'_>, visible: &Visible) -> Result<()> {
+fn record_all(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    inputs: &CullInputs<'_>,
+    visible: &Visible,
+) -> Result<()> {
     let CullInputs { instances, pyramid, options, .. } = *inputs;
     check_contexts(gpu, inputs)?;
     gpu.check_context("visible", visible.context)?;
     if !visible.counts().iter().copied().eq(instances.pieces.iter().map(Piece::count)) {
-        return Err(Error::mismatch("visible", "expected buffers that were created for these instances, got others"));
+        return Err(Error::mismatch(
+            "visible",
+            "expected buffers that were created for these instances, got others",
+        ));
     }
     let report = report_key(visible, options);
     let pieces = || instances.pieces.iter().zip(&visible.pieces);
@@ -174,13 +218,16 @@ fn record_all(gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, inputs: &CullInputs
     let flat = if grouped.iter().all(Option::is_some) {
         None
     } else {
-        let pipeline = if inputs.certified { Gpu::cull_pipeline } else { Gpu::yardstick_cull_pipeline };
+        let pipeline =
+            if inputs.certified { Gpu::cull_pipeline } else { Gpu::yardstick_cull_pipeline };
         Some(pipeline(gpu, key, report)?)
     };
     let workgroups = |count: u32| if inputs.idle { 0 } else { count };
     record_clears(gpu, encoder, inputs, visible, report)?;
-    let mut pass = encoder
-        .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("hiz.cull.pass"), timestamp_writes: None });
+    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+        label: Some("hiz.cull.pass"),
+        timestamp_writes: None,
+    });
     pass.set_bind_group(0, &view, &[]);
     for ((piece, output), groups) in instances.pieces.iter().zip(&outputs).zip(&grouped) {
         if let (Some(groups), Some(group_view)) = (groups, &group_view) {
@@ -247,12 +294,12 @@ fn record_clears(
 /// Groups whose members one workgroup tests; `shaders/shared/groups.wgsl`, `RUN`.
 pub(crate) const GROUPS_OF_RUN: u32 = 8;
 
-/// Texels of finer levels that a group's test may read: a box around 64 instances is large, so its footprint is coarse
-/// (`docs/performance.md`).
+/// Texels of finer levels that a group's test may read: a box around 64 instances is large, so its
+/// footprint is coarse (`docs/performance.md`).
 const GROUP_DESCENT: u32 = 16;
 
-/// From how many instances on groups are culled first: fewer are tested one by one before the groups' own dispatches have begun
-/// (`docs/performance.md`).
+/// From how many instances on groups are culled first: fewer are tested one by one before the
+/// groups' own dispatches have begun (`docs/performance.md`).
 const GROUPS_PAY_FROM: u32 = 16_384;
 
 /// The options of a group's test.

@@ -22,7 +22,8 @@ pub enum Coverage {
     Sample,
 }
 
-/// How many texels of one level a test may read, as N x N. More texels mean a finer level: less is kept, more is read.
+/// How many texels of one level a test may read, as N x N.
+/// More texels mean a finer level: less is kept, more is read.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Footprint {
     /// 2 x 2.
@@ -50,8 +51,8 @@ pub enum Fit {
     /// The rectangle around its projection, at its nearest depth.
     #[default]
     Rectangle,
-    /// Where the rectangle cannot decide: its own outline, and in each texel its own depth there. Less is kept, more is computed; with
-    /// a descent it comes down to single pixels.
+    /// Where the rectangle cannot decide: its own outline, and in each texel its own depth there.
+    /// Less is kept, more is computed; with a descent it comes down to single pixels.
     Volume,
 }
 
@@ -74,28 +75,35 @@ pub struct CullOptions {
     pub order: Order,
     /// Area or sample coverage.
     pub coverage: Coverage,
-    /// Extra distance in pixels, a multiple of 1/256 in 0..=16, that a projection must keep from what it does not touch. `None`: 0 in area
-    /// coverage, 1/64 in sample coverage (what a rasteriser's snapping may move a sample).
+    /// Extra distance in pixels, a multiple of 1/256 in 0..=16, that a projection must keep from
+    /// what it does not touch.
+    /// `None`: 0 in area coverage, 1/64 in sample coverage (what a rasteriser's snapping may move a
+    /// sample).
     pub guard_px: Option<f64>,
     /// Relative slack of the stored depth, 0..=0.5: 2^-23 covers float32 depth that was rounded to
-    /// nearest. What another format rounds comes beside it, from the pyramid
+    /// nearest.
+    /// What another format rounds comes beside it, from the pyramid
     /// ([`DepthTolerance`](crate::DepthTolerance)).
     pub depth_slack: f64,
-    /// Absolute slack of the stored depth, 0..=0.5, in units of NDC depth and beside the relative one: the rasteriser of an
-    /// orthographic camera errs by the same amount near and far. Anything above 0 counts 2^-23 more.
+    /// Absolute slack of the stored depth, 0..=0.5, in units of NDC depth and beside the relative
+    /// one: the rasteriser of an orthographic camera errs by the same amount near and far.
+    /// Anything above 0 counts 2^-23 more.
     pub depth_slack_abs: f64,
-    /// kappa, 0..=1e6: how many eps of `sum |M| |p|` the transform of the depth image's renderer may have cost; 0 for depth that
-    /// is exact for the camera's matrices, about 4 for a renderer that transforms world coordinates in float32.
+    /// kappa, 0..=1e6: how many eps of `sum |M| |p|` the transform of the depth image's renderer
+    /// may have cost; 0 for depth that is exact for the camera's matrices, about 4 for a renderer
+    /// that transforms world coordinates in float32.
     pub transform_slack: f64,
     /// How many texels a test reads.
     pub footprint: Footprint,
-    /// How many texels of finer levels a test may read where the footprint cannot decide, 0..=65536; 0: none. With enough of
-    /// them the answer is that of a rectangle test at full resolution.
+    /// How many texels of finer levels a test may read where the footprint cannot decide,
+    /// 0..=65536; 0: none.
+    /// With enough of them the answer is that of a rectangle test at full resolution.
     pub descent: u32,
     /// What stands for a volume.
     pub fit: Fit,
-    /// Whether groups are tested first. What a group's test hides, its members' own tests would have hidden but for the level that they
-    /// read: what is kept differs by next to nothing, and verdicts but for that not at all.
+    /// Whether groups are tested first.
+    /// What a group's test hides, its members' own tests would have hidden but for the level that
+    /// they read: what is kept differs by next to nothing, and verdicts but for that not at all.
     pub hierarchy: Hierarchy,
     /// Count the depth tests of each level and the texels read.
     pub statistics: bool,

@@ -40,7 +40,8 @@ impl Refinement {
         options: &CullOptions,
         visible: &Arc<Visible>,
     ) -> Result<Option<Self>> {
-        let is_needed = visible.outputs().verdicts && instances.pieces.iter().any(|p| is_grouped(p, options));
+        let is_needed =
+            visible.outputs().verdicts && instances.pieces.iter().any(|p| is_grouped(p, options));
         if !is_needed {
             return Ok(None);
         }
@@ -50,27 +51,42 @@ impl Refinement {
         Ok(Some(Self { view, options: options.clone(), pyramid, visible }))
     }
 
-    /// Records it. It may run more than once, and the first time counts.
-    pub(crate) fn record(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, instances: &Instances) -> Result<()> {
+    /// Records it.
+    /// It may run more than once, and the first time counts.
+    pub(crate) fn record(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &Instances,
+    ) -> Result<()> {
         let view = gpu.uniform("hiz.refine.view", &self.view)?;
         let view = gpu.bind_group(
             "hiz.refine.view",
             gpu.layouts().cull(DepthStore::Nowhere),
-            &[entry(2, self.pyramid.uniform.as_entire_binding()), entry(6, view.as_entire_binding())],
+            &[
+                entry(2, self.pyramid.uniform.as_entire_binding()),
+                entry(6, view.as_entire_binding()),
+            ],
         )?;
         let is_sample = self.options.coverage == Coverage::Sample;
-        let (of_groups, of_members) = (gpu.refine_groups_pipeline()?, gpu.refine_pipeline(instances.kind, is_sample)?);
+        let (of_groups, of_members) =
+            (gpu.refine_groups_pipeline()?, gpu.refine_pipeline(instances.kind, is_sample)?);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("hiz.refine.pass"),
             timestamp_writes: None,
         });
         pass.set_bind_group(0, &view, &[]);
         for (piece, output) in instances.pieces.iter().zip(&self.visible.pieces) {
-            let Some(groups) = output.groups().filter(|_| is_grouped(piece, &self.options)) else { continue };
+            let Some(groups) = output.groups().filter(|_| is_grouped(piece, &self.options)) else {
+                continue;
+            };
             let verdicts = gpu.bind_group(
                 "hiz.refine.verdicts",
                 &gpu.layouts().two_storages,
-                &[entry(0, output.mask.as_entire_binding()), entry(1, groups.verdicts.as_entire_binding())],
+                &[
+                    entry(0, output.mask.as_entire_binding()),
+                    entry(1, groups.verdicts.as_entire_binding()),
+                ],
             )?;
             pass.set_bind_group(2, &verdicts, &[]);
             if !is_sample {

@@ -67,7 +67,10 @@ impl ViewUniform {
             (None, Coverage::Sample) => 1.0 / 64.0,
         };
         if (guard * 256.0).fract() != 0.0 {
-            return Err(Error::invalid("guard_px", format!("expected a multiple of 1/256, got {guard}")));
+            return Err(Error::invalid(
+                "guard_px",
+                format!("expected a multiple of 1/256, got {guard}"),
+            ));
         }
         let reach = match options.coverage {
             Coverage::Area => guard,
@@ -79,17 +82,23 @@ impl ViewUniform {
         } else {
             crate::view::round_up(1.0 + slack)
         };
-        // The product and the sum in the shader lose less than 2^-24 each where the depth stays below 1: that is added here. 0
-        // adds nothing and loses nothing.
-        let depth_offset = if slack_abs > 0.0 { crate::view::round_up(slack_abs + EPS) } else { 0.0 };
-        let depth_offset = if camera.convention().is_reversed() { -depth_offset } else { depth_offset };
-        let rows = ViewRows::new(camera, kappa).map_err(|error| match ViewRows::new(camera, 0.0) {
-            Ok(_) if kappa > 0.0 => Error::invalid(
-                "transform_slack",
-                format!("expected a number that leaves room for this camera in float32, got {kappa}"),
-            ),
-            _ => error,
-        })?;
+        // The product and the sum in the shader lose less than 2^-24 each where the depth stays
+        // below 1: that is added here.
+        // 0 adds nothing and loses nothing.
+        let depth_offset =
+            if slack_abs > 0.0 { crate::view::round_up(slack_abs + EPS) } else { 0.0 };
+        let depth_offset =
+            if camera.convention().is_reversed() { -depth_offset } else { depth_offset };
+        let rows =
+            ViewRows::new(camera, kappa).map_err(|error| match ViewRows::new(camera, 0.0) {
+                Ok(_) if kappa > 0.0 => Error::invalid(
+                    "transform_slack",
+                    format!(
+                        "expected a number that leaves room for this camera in float32, got {kappa}"
+                    ),
+                ),
+                _ => error,
+            })?;
         let size = camera.size();
         let all = [rows.x, rows.y, rows.z, rows.w];
         Ok(Self {
@@ -117,8 +126,9 @@ impl ViewUniform {
     }
 }
 
-/// What low halves of positions near the eye come to, all axes added: those of the eye, and twice 2^-24 of the high halves, for theirs
-/// and for what both cannot hold; and a little, for the roundings of this sum.
+/// What low halves of positions near the eye come to, all axes added: those of the eye, and twice
+/// 2^-24 of the high halves, for theirs and for what both cannot hold; and a little, for the
+/// roundings of this sum.
 fn halves_size(rows: &ViewRows) -> f64 {
     let sum = |v: [f32; 3]| v.iter().map(|v| f64::from(v.abs())).sum::<f64>();
     sum(rows.eye_lo) * (1.0 + EPS) + EPS * (1.0 + 1.0 / 256.0) * sum(rows.eye_hi)
@@ -129,27 +139,37 @@ mod tests {
     use super::*;
     use crate::camera::{DepthConvention, ImageSize};
 
-    /// Slack is never less than what was asked for: a factor rounded to nearest would be, half of the time.
+    /// Slack is never less than what was asked for: a factor rounded to nearest would be, half of
+    /// the time.
     #[test]
     fn the_depth_factor_is_rounded_towards_far() {
-        for (convention, z) in
-            [(DepthConvention::Standard, [0.0, 0.0, 1.0, -1.0]), (DepthConvention::Reversed, [0.0, 0.0, 0.0, 1.0])]
-        {
+        for (convention, z) in [
+            (DepthConvention::Standard, [0.0, 0.0, 1.0, -1.0]),
+            (DepthConvention::Reversed, [0.0, 0.0, 0.0, 1.0]),
+        ] {
             let rows = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], z, [0.0, 0.0, 1.0, 0.0]];
-            let camera = Camera::from_clip_from_world(rows, ImageSize::new(8, 8), convention).unwrap();
+            let camera =
+                Camera::from_clip_from_world(rows, ImageSize::new(8, 8), convention).unwrap();
             for k in 0..100 {
                 let depth_slack = 0.5 * 10.0_f64.powf(-f64::from(k) / 8.0);
                 let options = CullOptions { depth_slack, ..CullOptions::default() };
-                let factor =
-                    f64::from(ViewUniform::new(&camera, 0, &options, DepthTolerance::NONE).unwrap().depth_factor);
+                let factor = f64::from(
+                    ViewUniform::new(&camera, 0, &options, DepthTolerance::NONE)
+                        .unwrap()
+                        .depth_factor,
+                );
                 let moved = if convention.is_reversed() { 1.0 - factor } else { factor - 1.0 };
-                assert!(moved >= depth_slack && moved <= depth_slack + EPS, "{convention:?} {depth_slack}: {factor}");
+                assert!(
+                    moved >= depth_slack && moved <= depth_slack + EPS,
+                    "{convention:?} {depth_slack}: {factor}"
+                );
             }
         }
     }
 
     /// A format's step is in what the shader reads: whole, and no more than what rounding upwards
-    /// adds. With the caller's slack on top, in either convention.
+    /// adds.
+    /// With the caller's slack on top, in either convention.
     #[test]
     fn the_step_of_a_format_comes_before_the_callers_slack() {
         use wgpu::TextureFormat as Format;
@@ -160,21 +180,32 @@ mod tests {
             (Format::Depth24PlusStencil8, 1.0 / 16_777_215.0, 2.0_f64.powi(-22)),
             (Format::R16Float, 2.0_f64.powi(-24), 2.0_f64.powi(-10)),
         ];
-        for (convention, z) in
-            [(DepthConvention::Standard, [0.0, 0.0, 1.0, -1.0]), (DepthConvention::Reversed, [0.0, 0.0, 0.0, 1.0])]
-        {
+        for (convention, z) in [
+            (DepthConvention::Standard, [0.0, 0.0, 1.0, -1.0]),
+            (DepthConvention::Reversed, [0.0, 0.0, 0.0, 1.0]),
+        ] {
             let rows = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], z, [0.0, 0.0, 1.0, 0.0]];
-            let camera = Camera::from_clip_from_world(rows, ImageSize::new(8, 8), convention).unwrap();
+            let camera =
+                Camera::from_clip_from_world(rows, ImageSize::new(8, 8), convention).unwrap();
             for (format, step, relative) in formats {
-                for (depth_slack, depth_slack_abs) in [(0.0, 0.0), (EPS, 0.0), (0.25, 0.0), (0.0, 1e-3), (0.25, 1e-3)] {
-                    let options = CullOptions { depth_slack, depth_slack_abs, ..CullOptions::default() };
+                for (depth_slack, depth_slack_abs) in
+                    [(0.0, 0.0), (EPS, 0.0), (0.25, 0.0), (0.0, 1e-3), (0.25, 1e-3)]
+                {
+                    let options =
+                        CullOptions { depth_slack, depth_slack_abs, ..CullOptions::default() };
                     let tolerance = DepthTolerance::of(format).unwrap();
                     let view = ViewUniform::new(&camera, 0, &options, tolerance).unwrap();
-                    let (factor, offset) = (f64::from(view.depth_factor), f64::from(view.depth_offset));
-                    let (moved, offset) =
-                        if convention.is_reversed() { (1.0 - factor, -offset) } else { (factor - 1.0, offset) };
+                    let (factor, offset) =
+                        (f64::from(view.depth_factor), f64::from(view.depth_offset));
+                    let (moved, offset) = if convention.is_reversed() {
+                        (1.0 - factor, -offset)
+                    } else {
+                        (factor - 1.0, offset)
+                    };
                     let of_both = (1.0 + relative) * (1.0 + depth_slack) - 1.0;
-                    let what = format!("{convention:?} {format:?} {depth_slack} {depth_slack_abs}: {moved} {offset}");
+                    let what = format!(
+                        "{convention:?} {format:?} {depth_slack} {depth_slack_abs}: {moved} {offset}"
+                    );
                     assert!(moved >= of_both && moved <= of_both + 1.01 * EPS, "{what}");
                     let of_both = step * (1.0 + depth_slack) + depth_slack_abs + EPS;
                     assert!(offset >= of_both && offset <= of_both * 1.000_001, "{what}");

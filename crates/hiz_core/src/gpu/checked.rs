@@ -1,9 +1,11 @@
 //! What is made on the device, each with what wgpu finds wrong with it as an error, at once.
 //!
 //! wgpu reports errors to the device's handler, which ends the process unless the caller has set
-//! another one. Error scopes belong to a thread and are popped at once, so a scope around each call
-//! catches that call's own errors and nobody else's. It has to be each call: an object that could
-//! not be made must not get into the caller's encoder, whose `finish` would fail for it.
+//! another one.
+//! Error scopes belong to a thread and are popped at once, so a scope around each call catches that
+//! call's own errors and nobody else's.
+//! It has to be each call: an object that could not be made must not get into the caller's encoder,
+//! whose `finish` would fail for it.
 
 use std::future::Future;
 use std::pin::pin;
@@ -36,8 +38,9 @@ fn in_a_line(error: &wgpu::Error) -> String {
     if texts.is_empty() { error.to_string() } else { texts.join(": ") }
 }
 
-/// What a scope has caught. Where wgpu runs natively it is there as soon as the scope is popped;
-/// elsewhere it is not waited for.
+/// What a scope has caught.
+/// Where wgpu runs natively it is there as soon as the scope is popped; elsewhere it is not waited
+/// for.
 fn found(scope: impl Future<Output = Option<wgpu::Error>>) -> Option<wgpu::Error> {
     match pin!(scope).poll(&mut Context::from_waker(Waker::noop())) {
         Poll::Ready(error) => error,
@@ -71,9 +74,14 @@ impl Gpu {
         self.filled(label, bytemuck::bytes_of(value), wgpu::BufferUsages::UNIFORM)
     }
 
-    /// A buffer that holds `contents` (a multiple of 4 bytes) from the start. (wgpu's own helper
-    /// panics where a lost device or memory that ran out leave nothing to map.)
-    pub(crate) fn filled(&self, label: &str, contents: &[u8], usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
+    /// A buffer that holds `contents` (a multiple of 4 bytes) from the start.
+    /// (wgpu's own helper panics where a lost device or memory that ran out leave nothing to map.)
+    pub(crate) fn filled(
+        &self,
+        label: &str,
+        contents: &[u8],
+        usage: wgpu::BufferUsages,
+    ) -> Result<wgpu::Buffer> {
         let buffer = self.mapped(label, contents.len() as u64, usage)?;
         write_mapped(label, &buffer, 0, contents)?;
         buffer.unmap();
@@ -81,13 +89,33 @@ impl Gpu {
     }
 
     /// A buffer of `size` bytes, all 0.
-    pub(crate) fn empty(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
-        self.buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
+    pub(crate) fn empty(
+        &self,
+        label: &str,
+        size: u64,
+        usage: wgpu::BufferUsages,
+    ) -> Result<wgpu::Buffer> {
+        self.buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size,
+            usage,
+            mapped_at_creation: false,
+        })
     }
 
     /// A buffer of `size` bytes (a multiple of 4) that is mapped.
-    pub(crate) fn mapped(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
-        self.buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: true })
+    pub(crate) fn mapped(
+        &self,
+        label: &str,
+        size: u64,
+        usage: wgpu::BufferUsages,
+    ) -> Result<wgpu::Buffer> {
+        self.buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size,
+            usage,
+            mapped_at_creation: true,
+        })
     }
 
     /// A buffer of `size` bytes (a multiple of 4) whose contents `fill` writes where they are
@@ -115,7 +143,11 @@ impl Gpu {
     ) -> Result<wgpu::Texture> {
         let allowed = self.limits.max_texture_dimension_2d;
         if width.max(height) > allowed {
-            return Err(Error::limit("max_texture_dimension_2d", width.max(height).into(), allowed.into()));
+            return Err(Error::limit(
+                "max_texture_dimension_2d",
+                width.max(height).into(),
+                allowed.into(),
+            ));
         }
         self.checked(|device| {
             device.create_texture(&wgpu::TextureDescriptor {
@@ -152,25 +184,32 @@ impl Gpu {
         self.checked(|device| device.create_bind_group(&descriptor))
     }
 
-    /// Runs `record`, which writes into the caller's encoder. With a pass open there it can take
-    /// nothing, and wgpu says so at once.
+    /// Runs `record`, which writes into the caller's encoder.
+    /// With a pass open there it can take nothing, and wgpu says so at once.
     pub(crate) fn recorded<T>(&self, record: impl FnOnce() -> Result<T>) -> Result<T> {
         match checked(&self.device, record) {
             Ok(result) => result,
-            Err(Error::Device(why)) => {
-                Err(Error::invalid("encoder", format!("expected one of this device without an open pass, but {why}")))
-            }
+            Err(Error::Device(why)) => Err(Error::invalid(
+                "encoder",
+                format!("expected one of this device without an open pass, but {why}"),
+            )),
             Err(other) => Err(other),
         }
     }
 
     /// Whether a render pass can draw depth into `target` and clear it first: the same pass,
-    /// recorded into an encoder that is thrown away. Nothing else tells what a view shows, where
-    /// its texture lives, and whether it is still there.
-    pub(crate) fn can_draw_into(&self, target: &wgpu::TextureView, depth_ops: wgpu::Operations<f32>) -> Result<()> {
+    /// recorded into an encoder that is thrown away.
+    /// Nothing else tells what a view shows, where its texture lives, and whether it is still
+    /// there.
+    pub(crate) fn can_draw_into(
+        &self,
+        target: &wgpu::TextureView,
+        depth_ops: wgpu::Operations<f32>,
+    ) -> Result<()> {
         self.checked(|device| {
             let label = Some("hiz.occluders.check");
-            let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
+            let mut encoder =
+                device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
             drop(encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label,
                 color_attachments: &[],
@@ -187,9 +226,11 @@ impl Gpu {
         self.view(target.texture()).map(drop)
     }
 
-    /// A shader with the planted faults in it: whoever makes a pipeline takes its module from here, within the pipeline's own check.
+    /// A shader with the planted faults in it: whoever makes a pipeline takes its module from here,
+    /// within the pipeline's own check.
     pub(crate) fn shader_module(&self, label: &str, source: &str) -> wgpu::ShaderModule {
-        let source = self.edits.iter().fold(source.to_owned(), |text, (what, by)| text.replace(what, by));
+        let source =
+            self.edits.iter().fold(source.to_owned(), |text, (what, by)| text.replace(what, by));
         self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(label),
             source: wgpu::ShaderSource::Wgsl(source.into()),
@@ -197,7 +238,10 @@ impl Gpu {
     }
 
     /// See `occluders::pipeline`.
-    pub(crate) fn render_pipeline(&self, make: impl FnOnce() -> wgpu::RenderPipeline) -> Result<wgpu::RenderPipeline> {
+    pub(crate) fn render_pipeline(
+        &self,
+        make: impl FnOnce() -> wgpu::RenderPipeline,
+    ) -> Result<wgpu::RenderPipeline> {
         self.checked(|_| make())
     }
 

@@ -40,34 +40,62 @@ enum Binding {
 
 impl Layouts {
     pub(super) fn new(device: &wgpu::Device) -> Self {
-        use Binding::{Read, ReadQuads, ReadTexels, Sampler, Texture, Uniform, Write, WriteQuads, WriteTexels};
+        use Binding::{
+            Read, ReadQuads, ReadTexels, Sampler, Texture, Uniform, Write, WriteQuads, WriteTexels,
+        };
         let layout = |label: &str, entries: &[(u32, Binding)]| {
-            let entries: Vec<_> = entries.iter().map(|(binding, kind)| layout_entry(*binding, *kind)).collect();
-            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+            let entries: Vec<_> =
+                entries.iter().map(|(binding, kind)| layout_entry(*binding, *kind)).collect();
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some(label),
+                entries: &entries,
+            })
         };
         Self {
             reduce: SOURCES.map(|s| {
                 layout(
                     "hiz.reduce.layout",
-                    &[(0, Texture(s)), (1, Sampler), (2, Uniform), (3, Write), (4, Write), (5, Write)],
+                    &[
+                        (0, Texture(s)),
+                        (1, Sampler),
+                        (2, Uniform),
+                        (3, Write),
+                        (4, Write),
+                        (5, Write),
+                    ],
                 )
             }),
             cull_apart: SOURCES.map(|s| {
                 let apart = [(0, Texture(s)), (1, Sampler), (3, Read), (4, Read), (5, Read)];
-                layout("hiz.cull.view_layout", &[&apart[..], &[(2, Uniform), (6, Uniform)]].concat())
+                layout(
+                    "hiz.cull.view_layout",
+                    &[&apart[..], &[(2, Uniform), (6, Uniform)]].concat(),
+                )
             }),
-            cull_atlas: layout("hiz.cull.atlas_layout", &[(2, Uniform), (3, ReadQuads), (6, Uniform)]),
+            cull_atlas: layout(
+                "hiz.cull.atlas_layout",
+                &[(2, Uniform), (3, ReadQuads), (6, Uniform)],
+            ),
             cull_nowhere: layout("hiz.cull.no_depth_layout", &[(2, Uniform), (6, Uniform)]),
             instances: layout("hiz.cull.instances_layout", &[(0, Uniform), (1, ReadQuads)]),
-            visible: layout("hiz.cull.visible_layout", &[(0, Write), (1, Write), (2, Write), (3, Write), (4, Uniform)]),
+            visible: layout(
+                "hiz.cull.visible_layout",
+                &[(0, Write), (1, Write), (2, Write), (3, Write), (4, Uniform)],
+            ),
             compact: layout(
                 "hiz.compact.layout",
                 &[(0, Uniform), (1, Read), (2, Write), (3, Write), (4, Write), (5, Uniform)],
             ),
-            survivors: layout("hiz.cull_groups.layout", &[(0, Write), (1, Write), (2, WriteTexels), (3, Write)]),
+            survivors: layout(
+                "hiz.cull_groups.layout",
+                &[(0, Write), (1, Write), (2, WriteTexels), (3, Write)],
+            ),
             members: layout("hiz.cull_members.layout", &[(0, Read), (1, ReadTexels)]),
             count: layout("hiz.count.layout", &[(0, Uniform), (1, Read), (2, Write)]),
-            update: layout("hiz.update.layout", &[(0, Uniform), (1, Read), (2, Read), (3, WriteQuads), (4, Write)]),
+            update: layout(
+                "hiz.update.layout",
+                &[(0, Uniform), (1, Read), (2, Read), (3, WriteQuads), (4, Write)],
+            ),
             one_uniform: layout("hiz.uniform_layout", &[(0, Uniform)]),
             two_storages: layout("hiz.storage_layout", &[(0, Write), (1, Write)]),
             occluder_view: device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
@@ -94,7 +122,8 @@ impl Layouts {
 }
 
 fn layout_entry(binding: u32, kind: Binding) -> wgpu::BindGroupLayoutEntry {
-    let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let buffer =
+        |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     let storage_texture = |format, access| wgpu::BindingType::StorageTexture {
         access,
         format,

@@ -1,4 +1,5 @@
-//! The device and what is made once on it: pipelines (when first used), bind group layouts, buffers with contents.
+//! The device and what is made once on it: pipelines (when first used), bind group layouts, buffers
+//! with contents.
 
 mod checked;
 mod layouts;
@@ -19,7 +20,8 @@ use crate::error::{Error, Result};
 use crate::shader::{self, DepthStore, SourceKind};
 use crate::visible::NO_SURVIVORS;
 
-/// Tells objects of one context from those of another. (wgpu's own handles compare equal across its instances.)
+/// Tells objects of one context from those of another.
+/// (wgpu's own handles compare equal across its instances.)
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ContextId(u64);
 
@@ -80,7 +82,8 @@ pub(crate) enum ReduceShape {
     Coarse { shared: bool },
 }
 
-/// Buffers that a pipeline may ask for and a call do without. Each has its own: one may not be bound twice to be written.
+/// Buffers that a pipeline may ask for and a call do without.
+/// Each has its own: one may not be bound twice to be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StandIn {
     /// The second chunk of a pyramid.
@@ -95,12 +98,14 @@ pub(crate) enum StandIn {
     Statistics,
 }
 
-const STAND_INS: [&str; 5] = ["hiz.no_chunk_1", "hiz.no_chunk_2", "hiz.no_list", "hiz.no_draws", "hiz.no_statistics"];
+const STAND_INS: [&str; 5] =
+    ["hiz.no_chunk_1", "hiz.no_chunk_2", "hiz.no_list", "hiz.no_draws", "hiz.no_statistics"];
 
 /// As large as the largest structure that is bound so.
 const STAND_IN_BYTES: u64 = 256;
 
-/// What makes one cull pipeline differ from another; each is compiled without the branches that it does not take.
+/// What makes one cull pipeline differ from another; each is compiled without the branches that it
+/// does not take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct CullKey {
     pub(crate) store: DepthStore,
@@ -140,7 +145,8 @@ impl<K: Hash + Eq, P: Clone> Cache<K, P> {
         Self(Mutex::new(HashMap::new()))
     }
 
-    /// The lock is held while a pipeline is made: two threads that want the same one compile it once.
+    /// The lock is held while a pipeline is made: two threads that want the same one compile it
+    /// once.
     fn get(&self, key: K, make: impl FnOnce() -> Result<P>) -> Result<P> {
         let start = Instant::now();
         let mut made = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -214,7 +220,10 @@ impl Gpu {
                 device: device.clone(),
                 limits: device.limits(),
                 pipeline_cache: cache,
-                edits: faults.iter().map(|(what, by)| ((*what).to_owned(), (*by).to_owned())).collect(),
+                edits: faults
+                    .iter()
+                    .map(|(what, by)| ((*what).to_owned(), (*by).to_owned()))
+                    .collect(),
                 layouts: Layouts::new(device),
                 sampler,
                 stand_in,
@@ -268,7 +277,8 @@ impl Gpu {
             return Ok(buffer);
         }
         let contents = bytemuck::bytes_of(&NO_SURVIVORS);
-        let buffer = self.filled("hiz.cull.no_survivors", contents, wgpu::BufferUsages::COPY_SRC)?;
+        let buffer =
+            self.filled("hiz.cull.no_survivors", contents, wgpu::BufferUsages::COPY_SRC)?;
         Ok(self.no_survivors.get_or_init(|| buffer))
     }
 
@@ -280,18 +290,25 @@ impl Gpu {
         if theirs == self.id {
             Ok(())
         } else {
-            Err(Error::mismatch(parameter, "expected an object of this device and context, got one of another"))
+            Err(Error::mismatch(
+                parameter,
+                "expected an object of this device and context, got one of another",
+            ))
         }
     }
 
     pub(crate) fn reduce_pipeline(&self, key: ReduceKey) -> Result<wgpu::ComputePipeline> {
         let layouts = self.layouts();
         self.reduce.get(key, || {
-            let mut constants =
-                vec![("REVERSED", flag(key.reversed)), ("CHUNKS", key.chunks as f64), ("TALL", flag(key.tall))];
+            let mut constants = vec![
+                ("REVERSED", flag(key.reversed)),
+                ("CHUNKS", key.chunks as f64),
+                ("TALL", flag(key.tall)),
+            ];
             let (source, entry_point) = match key.shape {
                 ReduceShape::Blocks { from_source, first } => {
-                    constants.extend([("FROM_SOURCE", flag(from_source)), ("FIRST", f64::from(first))]);
+                    constants
+                        .extend([("FROM_SOURCE", flag(from_source)), ("FIRST", f64::from(first))]);
                     (shader::reduce(key.source), "reduce")
                 }
                 ReduceShape::Tail => {
@@ -313,7 +330,11 @@ impl Gpu {
         })
     }
 
-    pub(crate) fn cull_pipeline(&self, key: CullKey, report: ReportKey) -> Result<wgpu::ComputePipeline> {
+    pub(crate) fn cull_pipeline(
+        &self,
+        key: CullKey,
+        report: ReportKey,
+    ) -> Result<wgpu::ComputePipeline> {
         let layouts = self.layouts();
         self.cull.get((key, report), || {
             self.pipeline(
@@ -327,7 +348,11 @@ impl Gpu {
     }
 
     /// See `yardstick`.
-    pub(crate) fn yardstick_cull_pipeline(&self, key: CullKey, report: ReportKey) -> Result<wgpu::ComputePipeline> {
+    pub(crate) fn yardstick_cull_pipeline(
+        &self,
+        key: CullKey,
+        report: ReportKey,
+    ) -> Result<wgpu::ComputePipeline> {
         let layouts = self.layouts();
         self.yardstick_cull.get((key, report), || {
             self.pipeline(
@@ -340,7 +365,11 @@ impl Gpu {
         })
     }
 
-    pub(crate) fn cull_groups_pipeline(&self, key: CullKey, statistics: bool) -> Result<wgpu::ComputePipeline> {
+    pub(crate) fn cull_groups_pipeline(
+        &self,
+        key: CullKey,
+        statistics: bool,
+    ) -> Result<wgpu::ComputePipeline> {
         let layouts = self.layouts();
         self.cull_groups.get((key, statistics), || {
             self.pipeline(
@@ -353,16 +382,30 @@ impl Gpu {
         })
     }
 
-    pub(crate) fn refine_pipeline(&self, kind: BoundsKind, sample_coverage: bool) -> Result<wgpu::ComputePipeline> {
+    pub(crate) fn refine_pipeline(
+        &self,
+        kind: BoundsKind,
+        sample_coverage: bool,
+    ) -> Result<wgpu::ComputePipeline> {
         self.refine.get((kind, sample_coverage), || {
-            self.refining("hiz.refine.pipeline", &shader::refine(kind), "refine", (kind, sample_coverage))
+            self.refining(
+                "hiz.refine.pipeline",
+                &shader::refine(kind),
+                "refine",
+                (kind, sample_coverage),
+            )
         })
     }
 
     pub(crate) fn refine_groups_pipeline(&self) -> Result<wgpu::ComputePipeline> {
         let kind = BoundsKind::Box;
         self.refine_groups.get((), || {
-            self.refining("hiz.refine_groups.pipeline", &shader::refine_groups(), "refine_groups", (kind, false))
+            self.refining(
+                "hiz.refine_groups.pipeline",
+                &shader::refine_groups(),
+                "refine_groups",
+                (kind, false),
+            )
         })
     }
 
@@ -377,12 +420,25 @@ impl Gpu {
         let store = DepthStore::Nowhere;
         // What is said of depth is all the same: none is read.
         let (reversed, descent, fit_volume) = (false, false, false);
-        let key = CullKey { store, kind, reversed, chunks: 1, sample_coverage, footprint_log2: 1, descent, fit_volume };
+        let key = CullKey {
+            store,
+            kind,
+            reversed,
+            chunks: 1,
+            sample_coverage,
+            footprint_log2: 1,
+            descent,
+            fit_volume,
+        };
         let groups = [layouts.cull(store), &layouts.instances, &layouts.two_storages];
         self.pipeline(label, source, entry_point, &groups, &classify_constants(&key))
     }
 
-    pub(crate) fn cull_members_pipeline(&self, key: CullKey, report: ReportKey) -> Result<wgpu::ComputePipeline> {
+    pub(crate) fn cull_members_pipeline(
+        &self,
+        key: CullKey,
+        report: ReportKey,
+    ) -> Result<wgpu::ComputePipeline> {
         let layouts = self.layouts();
         self.cull_members.get((key, report), || {
             self.pipeline(
@@ -396,8 +452,15 @@ impl Gpu {
     }
 
     pub(crate) fn count_pipeline(&self) -> Result<wgpu::ComputePipeline> {
-        self.count
-            .get((), || self.pipeline("hiz.count.pipeline", &shader::count(), "count", &[&self.layouts().count], &[]))
+        self.count.get((), || {
+            self.pipeline(
+                "hiz.count.pipeline",
+                &shader::count(),
+                "count",
+                &[&self.layouts().count],
+                &[],
+            )
+        })
     }
 
     pub(crate) fn explain_pipeline(&self, key: CullKey) -> Result<wgpu::ComputePipeline> {
@@ -413,15 +476,33 @@ impl Gpu {
         })
     }
 
-    pub(crate) fn compact_pipeline(&self, entry_point: &'static str) -> Result<wgpu::ComputePipeline> {
+    pub(crate) fn compact_pipeline(
+        &self,
+        entry_point: &'static str,
+    ) -> Result<wgpu::ComputePipeline> {
         self.compact.get(entry_point, || {
-            self.pipeline("hiz.compact.pipeline", &shader::compact(), entry_point, &[&self.layouts().compact], &[])
+            self.pipeline(
+                "hiz.compact.pipeline",
+                &shader::compact(),
+                entry_point,
+                &[&self.layouts().compact],
+                &[],
+            )
         })
     }
 
-    pub(crate) fn update_pipeline(&self, entry_point: &'static str) -> Result<wgpu::ComputePipeline> {
+    pub(crate) fn update_pipeline(
+        &self,
+        entry_point: &'static str,
+    ) -> Result<wgpu::ComputePipeline> {
         self.update.get(entry_point, || {
-            self.pipeline("hiz.update.pipeline", &shader::update(), entry_point, &[&self.layouts().update], &[])
+            self.pipeline(
+                "hiz.update.pipeline",
+                &shader::update(),
+                entry_point,
+                &[&self.layouts().update],
+                &[],
+            )
         })
     }
 
@@ -434,22 +515,31 @@ impl Gpu {
     }
 }
 
-/// A buffer that is mapped at its creation. Threads open ranges of their own.
+/// A buffer that is mapped at its creation.
+/// Threads open ranges of their own.
 pub(crate) struct Mapped<'a> {
     label: &'a str,
     buffer: &'a wgpu::Buffer,
 }
 
 impl Mapped<'_> {
-    /// Bytes of `range`, not empty, which begins at a multiple of 8. Opening costs more than writing a record.
+    /// Bytes of `range`, not empty, which begins at a multiple of 8.
+    /// Opening costs more than writing a record.
     pub(crate) fn range(&self, range: std::ops::Range<u64>) -> Result<wgpu::BufferViewMut> {
         let Self { label, buffer } = self;
-        buffer.get_mapped_range_mut(range).map_err(|e| Error::Device(format!("{label} could not be mapped: {e}")))
+        buffer
+            .get_mapped_range_mut(range)
+            .map_err(|e| Error::Device(format!("{label} could not be mapped: {e}")))
     }
 }
 
 /// Writes into a buffer that was mapped at its creation.
-pub(crate) fn write_mapped(label: &str, buffer: &wgpu::Buffer, offset: u64, contents: &[u8]) -> Result<()> {
+pub(crate) fn write_mapped(
+    label: &str,
+    buffer: &wgpu::Buffer,
+    offset: u64,
+    contents: &[u8],
+) -> Result<()> {
     let range = offset..offset + contents.len() as u64;
     Mapped { label, buffer }.range(range)?.copy_from_slice(contents);
     Ok(())

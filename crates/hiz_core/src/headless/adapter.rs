@@ -6,7 +6,8 @@ use crate::error::Error;
 pub const ADAPTER_VARIABLE: &str = "HIZVK_ADAPTER";
 
 /// How to install a software driver: the advice where there is no adapter at all.
-pub const INSTALL_HINT: &str = "A software Vulkan driver: apt install libvulkan1 mesa-vulkan-drivers";
+pub const INSTALL_HINT: &str =
+    "A software Vulkan driver: apt install libvulkan1 mesa-vulkan-drivers";
 
 /// A Vulkan adapter, as text.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -56,7 +57,9 @@ impl AdapterSummary {
             return index == self.index;
         }
         let request = request.to_lowercase();
-        [&self.name, &self.driver, &self.driver_info].iter().any(|text| text.to_lowercase().contains(&request))
+        [&self.name, &self.driver, &self.driver_info]
+            .iter()
+            .any(|text| text.to_lowercase().contains(&request))
     }
 }
 
@@ -66,7 +69,8 @@ impl std::fmt::Display for AdapterSummary {
     }
 }
 
-/// The error of a request that no adapter answers to: with how to choose one of those that are there, or how to get one.
+/// The error of a request that no adapter answers to: with how to choose one of those that are
+/// there, or how to get one.
 pub(super) fn no_adapter(request: String, seen: &[AdapterSummary]) -> Error {
     let hint = if seen.is_empty() {
         INSTALL_HINT.to_owned()

@@ -9,8 +9,8 @@ use crate::camera::Camera;
 use crate::compact::Compaction;
 use crate::count;
 use crate::cull::{
-    CullInputs, CullOptions, ExplanationRecord, Reading, TEXELS_TOLD, VERDICT_MASK, group_options, is_grouped,
-    record_explain,
+    CullInputs, CullOptions, ExplanationRecord, Reading, TEXELS_TOLD, VERDICT_MASK, group_options,
+    is_grouped, record_explain,
 };
 use crate::error::{Error, Result};
 use crate::groups::GROUP;
@@ -20,12 +20,13 @@ use crate::lists::{DrawIndexedIndirect, Lists};
 use crate::pyramid::Pyramid;
 use crate::readback::{self, BufferRange, Staged};
 use crate::visible::{
-    CounterRecord, GroupOutput, PieceOutput, STORAGE, StatisticsRecord, SurvivorsRecord, Visible, VisibleOptions,
-    verdicts_offset,
+    CounterRecord, GroupOutput, PieceOutput, STORAGE, StatisticsRecord, SurvivorsRecord, Visible,
+    VisibleOptions, verdicts_offset,
 };
 use crate::watch::Watch;
 
-/// Up to this size, of 131,072 instances, a mask is copied to where it can be read by the submit of its cull.
+/// Up to this size, of 131,072 instances, a mask is copied to where it can be read by the submit of
+/// its cull.
 const STAGED_MASK_BYTES: u64 = 1 << 14;
 
 /// The verdicts of `shaders/shared/verdict.wgsl`.
@@ -68,16 +69,17 @@ pub struct Timings {
     /// Making the pipelines that were not there yet, the driver's own compiling included; next to 0
     /// in a cull like an earlier one.
     pub compile_ms: f64,
-    /// From the submit until the device was seen to be done with it; 0 before that. What was
-    /// submitted earlier and was not done yet comes first, so it counts. A device tells only who
-    /// asks: that is each read and wait, and each submit. Who does something else before the first
-    /// of them finds more than the device took.
+    /// From the submit until the device was seen to be done with it; 0 before that.
+    /// What was submitted earlier and was not done yet comes first, so it counts.
+    /// A device tells only who asks: that is each read and wait, and each submit.
+    /// Who does something else before the first of them finds more than the device took.
     pub wall_ms: f64,
     /// Copies to the host after that, so far.
     pub readback_ms: f64,
 }
 
-/// A cull that was submitted. Reading waits for it.
+/// A cull that was submitted.
+/// Reading waits for it.
 #[derive(Debug)]
 pub struct Culling {
     pub(super) engine: Engine,
@@ -115,7 +117,8 @@ impl Culling {
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost).
     pub fn wait(&self) -> Result<()> {
-        self.engine.scoped(|| readback::wait(self.engine.device(), Some(self.submission.clone())))?;
+        self.engine
+            .scoped(|| readback::wait(self.engine.device(), Some(self.submission.clone())))?;
         // The wait itself has called back, unless another thread's is about to.
         self.done.get_or_init(Instant::now);
         Ok(())
@@ -127,7 +130,8 @@ impl Culling {
         Timings { wall_ms, ..*locked(&self.timings) }
     }
 
-    /// Records the copy of a mask that is asked for and so small that a submit of its own would cost more.
+    /// Records the copy of a mask that is asked for and so small that a submit of its own would
+    /// cost more.
     pub(super) fn stage_mask(
         device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
@@ -148,7 +152,8 @@ impl Culling {
         };
         self.wait()?;
         let start = Instant::now();
-        let bytes = self.engine.scoped(|| staged.read(self.engine.device(), self.submission.clone()))?;
+        let bytes =
+            self.engine.scoped(|| staged.read(self.engine.device(), self.submission.clone()))?;
         locked(&self.timings).readback_ms += milliseconds(start, Instant::now());
         Ok(bytes)
     }
@@ -156,7 +161,9 @@ impl Culling {
     fn read(&self, ranges: &[BufferRange<'_>]) -> Result<Vec<Vec<u8>>> {
         self.wait()?;
         let start = Instant::now();
-        let bytes = self.engine.scoped(|| readback::read_buffers(self.engine.device(), self.engine.queue(), ranges))?;
+        let bytes = self
+            .engine
+            .scoped(|| readback::read_buffers(self.engine.device(), self.engine.queue(), ranges))?;
         locked(&self.timings).readback_ms += milliseconds(start, Instant::now());
         Ok(bytes)
     }
@@ -164,7 +171,8 @@ impl Culling {
     /// Whether each instance is kept.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without [`Outputs::mask`](crate::Outputs::mask), [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::Mismatch`] for a cull without [`Outputs::mask`](crate::Outputs::mask),
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn mask(&self) -> Result<Vec<bool>> {
         self.require("mask", self.visible.outputs().mask)?;
         let planes = self.mask_words()?;
@@ -179,14 +187,16 @@ impl Culling {
     /// Each instance's verdict: 0 outside, 1 occluded, 2 visible, 3 invalid (kept).
     ///
     /// Outside is what lies outside the frustum by a certificate of its own or of its group's box
-    /// (in sample coverage also what lies between all pixel centres). Occluded is every other
-    /// instance that is hidden. So a verdict does not depend on whether groups were tested, but for
-    /// the few instances that a group's test hides and their own would keep: they are occluded.
+    /// (in sample coverage also what lies between all pixel centres).
+    /// Occluded is every other instance that is hidden.
+    /// So a verdict does not depend on whether groups were tested, but for the few instances that a
+    /// group's test hides and their own would keep: they are occluded.
     /// Members of hidden groups get theirs by a pass of its own, when verdicts or counts are first
     /// read, or before the next update.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without [`Outputs::verdicts`](crate::Outputs::verdicts), [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::Mismatch`] for a cull without [`Outputs::verdicts`](crate::Outputs::verdicts),
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn verdicts(&self) -> Result<Vec<u8>> {
         self.require("verdicts", self.visible.outputs().verdicts)?;
         self.refine()?;
@@ -206,10 +216,12 @@ impl Culling {
         Ok(verdicts)
     }
 
-    /// The draw arguments, one record a piece. Where the cull left none they are made from its mask.
+    /// The draw arguments, one record a piece.
+    /// Where the cull left none they are made from its mask.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without draws, indices and mask, [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::Mismatch`] for a cull without draws, indices and mask, [`Error::DeviceLost`],
+    /// [`Error::OutOfMemory`].
     pub fn draws(&self) -> Result<Vec<DrawIndexedIndirect>> {
         let draws = match &self.visible.lists {
             Some(lists) => &lists.draws,
@@ -219,10 +231,12 @@ impl Culling {
         Ok(bytemuck::pod_collect_to_vec(&bytes[0]))
     }
 
-    /// The packed list, the pieces joined. Where the cull left none it is made from its mask, ascending.
+    /// The packed list, the pieces joined.
+    /// Where the cull left none it is made from its mask, ascending.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without indices and mask, [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::Mismatch`] for a cull without indices and mask, [`Error::DeviceLost`],
+    /// [`Error::OutOfMemory`].
     pub fn indices(&self) -> Result<Vec<u32>> {
         let lists = match &self.visible.lists {
             Some(lists) if self.visible.outputs().indices => lists,
@@ -233,7 +247,12 @@ impl Culling {
         let ranges: Vec<_> = draws
             .iter()
             .zip(&lists.pieces)
-            .map(|(draw, list)| BufferRange::first(list.bound(), 4 * u64::from(draw.instance_count.min(list.capacity))))
+            .map(|(draw, list)| {
+                BufferRange::first(
+                    list.bound(),
+                    4 * u64::from(draw.instance_count.min(list.capacity)),
+                )
+            })
             .collect();
         let parts = self.read(&ranges)?;
         let mut indices = host::list(parts.iter().map(|bytes| bytes.len() / 4).sum(), "indices")?;
@@ -244,7 +263,8 @@ impl Culling {
     /// How many instances met which end.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without [`Outputs::verdicts`](crate::Outputs::verdicts), [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::Mismatch`] for a cull without [`Outputs::verdicts`](crate::Outputs::verdicts),
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn counts(&self) -> Result<Counts> {
         self.require("verdicts", self.visible.outputs().verdicts)?;
         self.refine()?;
@@ -267,7 +287,11 @@ impl Culling {
         }));
         // The last group may have fewer members.
         ranges.extend(self.ranges(|piece, output| match self.groups(piece, output) {
-            Some(groups) => BufferRange { buffer: &groups.verdicts, offset: groups.verdicts.size() - 4, size: 4 },
+            Some(groups) => BufferRange {
+                buffer: &groups.verdicts,
+                offset: groups.verdicts.size() - 4,
+                size: 4,
+            },
             None => BufferRange::first(&output.mask, 0),
         }));
         let statistics = self.visible.statistics().filter(|_| self.options.statistics);
@@ -276,10 +300,13 @@ impl Culling {
         let record: CounterRecord = bytemuck::pod_read_unaligned(&bytes[0]);
         let (survivors, rest) = bytes[1..].split_at(self.instances.num_pieces());
         let (last_verdicts, statistics) = rest.split_at(self.instances.num_pieces());
-        let statistics: StatisticsRecord =
-            statistics.first().map_or_else(StatisticsRecord::default, |bytes| bytemuck::pod_read_unaligned(bytes));
+        let statistics: StatisticsRecord = statistics
+            .first()
+            .map_or_else(StatisticsRecord::default, |bytes| bytemuck::pod_read_unaligned(bytes));
         let (mut tested_groups, mut tested_instances) = (0, 0);
-        for ((piece, survivors), last) in self.instances.pieces.iter().zip(survivors).zip(last_verdicts) {
+        for ((piece, survivors), last) in
+            self.instances.pieces.iter().zip(survivors).zip(last_verdicts)
+        {
             let count = u64::from(piece.count());
             if survivors.is_empty() {
                 tested_instances += count;
@@ -308,17 +335,22 @@ impl Culling {
         })
     }
 
-    /// How many instances are kept, and how many of them the lists hold. The first is unknown to a cull that was asked for full lists
-    /// alone.
+    /// How many instances are kept, and how many of them the lists hold.
+    /// The first is unknown to a cull that was asked for full lists alone.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull that left nothing that tells, [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::Mismatch`] for a cull that left nothing that tells, [`Error::DeviceLost`],
+    /// [`Error::OutOfMemory`].
     pub fn demand_and_written(&self) -> Result<(Option<u64>, u64)> {
         let capacity = u64::from(self.visible.capacity());
         let outputs = self.visible.outputs();
         if outputs.mask {
             let words = self.mask_words()?;
-            let demand = words.iter().flat_map(|bytes| to_u32(bytes)).map(|word| u64::from(word.count_ones())).sum();
+            let demand = words
+                .iter()
+                .flat_map(|bytes| to_u32(bytes))
+                .map(|word| u64::from(word.count_ones()))
+                .sum();
             return Ok((Some(demand), capacity.min(demand)));
         }
         if outputs.verdicts {
@@ -384,7 +416,10 @@ impl Culling {
             return Ok(());
         }
         let got = self.visible.outputs();
-        Err(Error::mismatch("outputs", format!("expected a cull that was asked for {output}, got one with {got}")))
+        Err(Error::mismatch(
+            "outputs",
+            format!("expected a cull that was asked for {output}, got one with {got}"),
+        ))
     }
 
     /// What this cull left of a piece's groups, if it tested them.
@@ -392,13 +427,21 @@ impl Culling {
         output.groups().filter(|_| is_grouped(piece, &self.options))
     }
 
-    fn ranges<'a>(&'a self, of: impl Fn(&Piece, &'a PieceOutput) -> BufferRange<'a>) -> Vec<BufferRange<'a>> {
-        self.instances.pieces.iter().zip(&self.visible.pieces).map(|(piece, output)| of(piece, output)).collect()
+    fn ranges<'a>(
+        &'a self,
+        of: impl Fn(&Piece, &'a PieceOutput) -> BufferRange<'a>,
+    ) -> Vec<BufferRange<'a>> {
+        self.instances
+            .pieces
+            .iter()
+            .zip(&self.visible.pieces)
+            .map(|(piece, output)| of(piece, output))
+            .collect()
     }
 
-    /// Why instance `index` got its verdict: the cull's own steps, run for it once more. They read
-    /// the bounds as they are now: those of an instance that was updated since make an explanation
-    /// that is [`stale`](Explanation::stale).
+    /// Why instance `index` got its verdict: the cull's own steps, run for it once more.
+    /// They read the bounds as they are now: those of an instance that was updated since make an
+    /// explanation that is [`stale`](Explanation::stale).
     ///
     /// # Errors
     /// [`Error::Invalid`](crate::Error::Invalid) for an index past the end.
@@ -407,14 +450,18 @@ impl Culling {
         let mut told = self.test(index, false)?;
         told.stale = self.watch.is_updated(&(index..index.saturating_add(1)));
         if told.stale {
-            told.reason = format!("updated since the cull, so this is of its new bounds: {}", told.reason);
+            told.reason =
+                format!("updated since the cull, so this is of its new bounds: {}", told.reason);
             return Ok(told);
         }
         let Some((of_group, is_updated)) = self.hidden_group(index)? else { return Ok(told) };
         let mut group = self.test(index, true)?;
         group.stale = is_updated;
         told.verdict = if told.verdict == OUTSIDE { OUTSIDE } else { of_group };
-        told.reason = format!("its group of 64 is hidden as a whole ({}); by itself: {}", group.reason, told.reason);
+        told.reason = format!(
+            "its group of 64 is hidden as a whole ({}); by itself: {}",
+            group.reason, told.reason
+        );
         told.group = Some(Box::new(group));
         Ok(told)
     }
@@ -424,8 +471,13 @@ impl Culling {
         let engine = &self.engine;
         let bytes = engine.scoped(|| {
             let gpu = &engine.context().gpu;
-            let target = gpu.empty("hiz.explain.target", size_of::<ExplanationRecord>() as u64, STORAGE)?;
-            let readings = gpu.empty("hiz.explain.readings", (TEXELS_TOLD * size_of::<Reading>()) as u64, STORAGE)?;
+            let target =
+                gpu.empty("hiz.explain.target", size_of::<ExplanationRecord>() as u64, STORAGE)?;
+            let readings = gpu.empty(
+                "hiz.explain.readings",
+                (TEXELS_TOLD * size_of::<Reading>()) as u64,
+                STORAGE,
+            )?;
             let mut encoder = engine.encoder("hiz.explain.encoder");
             let inputs = CullInputs {
                 instances: &self.instances,
@@ -437,7 +489,8 @@ impl Culling {
             };
             record_explain(gpu, &mut encoder, &inputs, (index, whole_group), [&target, &readings])?;
             engine.queue().submit([encoder.finish()]);
-            let ranges = [&target, &readings].map(|buffer| BufferRange::first(buffer, buffer.size()));
+            let ranges =
+                [&target, &readings].map(|buffer| BufferRange::first(buffer, buffer.size()));
             readback::read_buffers(engine.device(), engine.queue(), &ranges)
         })?;
         let record: ExplanationRecord = bytemuck::pod_read_unaligned(&bytes[0]);
@@ -452,13 +505,21 @@ impl Culling {
     /// members was updated since.
     fn hidden_group(&self, index: u32) -> Result<Option<(u8, bool)>> {
         let pieces = self.instances.pieces.iter().zip(&self.visible.pieces);
-        let Some((piece, output)) = pieces.into_iter().find(|(piece, _)| piece.range.contains(&index)) else {
+        let Some((piece, output)) =
+            pieces.into_iter().find(|(piece, _)| piece.range.contains(&index))
+        else {
             return Ok(None);
         };
         let Some(groups) = self.groups(piece, output) else { return Ok(None) };
         let group = piece.order.place((index - piece.range.start) as usize) / GROUP;
-        let word = self.read(&[BufferRange { buffer: &groups.verdicts, offset: 4 * group as u64, size: 4 }])?;
-        let Some(word) = word[0].first().copied().filter(|word| is_hidden(*word)) else { return Ok(None) };
+        let word = self.read(&[BufferRange {
+            buffer: &groups.verdicts,
+            offset: 4 * group as u64,
+            size: 4,
+        }])?;
+        let Some(word) = word[0].first().copied().filter(|word| is_hidden(*word)) else {
+            return Ok(None);
+        };
         let members = group * GROUP..((group + 1) * GROUP).min(piece.count() as usize);
         let is_updated = |place| {
             let index = piece.range.start + piece.order.index(place) as u32;

@@ -45,11 +45,14 @@ impl DepthImage {
     /// The depth as given, row 0 on top.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost),
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn read(&self) -> Result<Vec<f32>> {
         let engine = &self.engine;
         let row = 4 * u64::from(self.size().width);
-        let bytes = engine.scoped(|| readback::read_texture(engine.device(), engine.queue(), &self.texture, row))?;
+        let bytes = engine.scoped(|| {
+            readback::read_texture(engine.device(), engine.queue(), &self.texture, row)
+        })?;
         host::collected(to_u32(&bytes).map(f32::from_bits), "depth")
     }
 
@@ -64,12 +67,20 @@ impl DepthImage {
         let side = size.width.max(size.height);
         let allowed = engine.device().limits().max_texture_dimension_2d;
         if side > allowed {
-            return Err(Error::limit("max_texture_dimension_2d", u64::from(side), u64::from(allowed)));
+            return Err(Error::limit(
+                "max_texture_dimension_2d",
+                u64::from(side),
+                u64::from(allowed),
+            ));
         }
         let texels = SourceKind::of(format).map_or(size, |kind| kind.texture_size(size));
         let texture = engine.device().create_texture(&wgpu::TextureDescriptor {
             label: Some("hiz.depth.image"),
-            size: wgpu::Extent3d { width: texels.width, height: texels.height, depth_or_array_layers: 1 },
+            size: wgpu::Extent3d {
+                width: texels.width,
+                height: texels.height,
+                depth_or_array_layers: 1,
+            },
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
@@ -78,22 +89,42 @@ impl DepthImage {
             view_formats: &[],
         });
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        Ok(Self { engine: engine.clone(), texture, view, camera: camera.clone(), tolerance: DepthTolerance::NONE })
+        Ok(Self {
+            engine: engine.clone(),
+            texture,
+            view,
+            camera: camera.clone(),
+            tolerance: DepthTolerance::NONE,
+        })
     }
 
-    /// An image of the numbers given, for shaders that read it as `kind`, which is none of a depth texture.
-    pub(super) fn uploaded(engine: &Engine, kind: SourceKind, ndc: &[f32], camera: &Camera) -> Result<Self> {
+    /// An image of the numbers given, for shaders that read it as `kind`, which is none of a depth
+    /// texture.
+    pub(super) fn uploaded(
+        engine: &Engine,
+        kind: SourceKind,
+        ndc: &[f32],
+        camera: &Camera,
+    ) -> Result<Self> {
         let size = camera.size();
         if ndc.len() as u64 != size.pixels() {
             return Err(Error::invalid(
                 "depth",
-                format!("expected the camera's size {size} = {} numbers, got {}", size.pixels(), ndc.len()),
+                format!(
+                    "expected the camera's size {size} = {} numbers, got {}",
+                    size.pixels(),
+                    ndc.len()
+                ),
             ));
         }
-        let format =
-            if kind == SourceKind::Bits { wgpu::TextureFormat::Rgba32Uint } else { wgpu::TextureFormat::R32Float };
+        let format = if kind == SourceKind::Bits {
+            wgpu::TextureFormat::Rgba32Uint
+        } else {
+            wgpu::TextureFormat::R32Float
+        };
         engine.scoped(|| {
-            let usage = kind.usage() | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC;
+            let usage =
+                kind.usage() | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC;
             let image = Self::new(engine, camera, format, usage)?;
             let rows_at_once = (STAGING_BYTES / (4 * size.width)).max(1);
             for (band, rows) in (0..).zip(ndc.chunks((rows_at_once * size.width) as usize)) {
@@ -119,7 +150,11 @@ impl DepthImage {
                     ..self.texture.as_image_copy()
                 },
                 bytes,
-                wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(bytes_per_row), rows_per_image: None },
+                wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(bytes_per_row),
+                    rows_per_image: None,
+                },
                 wgpu::Extent3d { width: texels, height, depth_or_array_layers: 1 },
             );
         };
@@ -129,7 +164,9 @@ impl DepthImage {
         if whole < self.texture.width() {
             // What fills a row's last texel repeats its last pixel.
             let (begin, end) = ((whole * pixels_of_texel) as usize, width as usize);
-            let last = rows.chunks_exact(end).flat_map(|row| (0..4).map(move |i| row[(begin + i).min(end - 1)]));
+            let last = rows
+                .chunks_exact(end)
+                .flat_map(|row| (0..4).map(move |i| row[(begin + i).min(end - 1)]));
             write(whole, 1, bytemuck::cast_slice(&last.collect::<Vec<_>>()), 16);
         }
     }

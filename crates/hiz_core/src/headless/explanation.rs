@@ -8,9 +8,9 @@ use super::culling::OCCLUDED;
 
 /// Why an instance got its verdict: the cull's own steps, run for it once more.
 ///
-/// A member of a group that was hidden as a whole was never tested by itself. Its verdict is then
-/// the group's (told of in `group`), or outside where its own test says so; everything else here is
-/// its own test, which may have kept it.
+/// A member of a group that was hidden as a whole was never tested by itself.
+/// Its verdict is then the group's (told of in `group`), or outside where its own test says so;
+/// everything else here is its own test, which may have kept it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explanation {
     /// 0 outside, 1 occluded, 2 visible, 3 invalid (kept).
@@ -30,18 +30,19 @@ pub struct Explanation {
     /// How many were read, those that are not listed included.
     pub texels_read: u32,
     /// Which of the listed texels decided: the farthest one that hides it, or the one that does
-    /// not. `None` where no single one did or it is not listed.
+    /// not.
+    /// `None` where no single one did or it is not listed.
     pub decisive: Option<usize>,
     /// The farthest depth of those that hide it, or the depth that does not.
     pub farthest: Option<f32>,
     /// The NDC depth of the bounds' nearest point, an estimate.
     pub nearest: Option<f64>,
-    /// `farthest` as view depth, in world units; infinite for far. `None` where the camera's NDC
-    /// depth does not tell it alone: an orthographic camera of a bare matrix, an oblique near
-    /// plane.
+    /// `farthest` as view depth, in world units; infinite for far.
+    /// `None` where the camera's NDC depth does not tell it alone: an orthographic camera of a bare
+    /// matrix, an oblique near plane.
     pub farthest_z: Option<f64>,
-    /// The view depth of the bounds' nearest point in world units, an estimate. `None` for an
-    /// orthographic camera of a bare matrix.
+    /// The view depth of the bounds' nearest point in world units, an estimate.
+    /// `None` for an orthographic camera of a bare matrix.
     pub nearest_z: Option<f64>,
     /// The instance was updated since the cull: everything here is of its new bounds, and the
     /// cull's verdict may be another.
@@ -116,17 +117,23 @@ impl Told<'_> {
         let record = &self.record;
         let is_hidden = record.verdict == u32::from(OCCLUDED);
         match record.stage {
-            0 => End::new("the bounds are not finite, negative, or too large for this camera: kept"),
+            0 => {
+                End::new("the bounds are not finite, negative, or too large for this camera: kept")
+            }
             1 => End::new("outside one plane of the frustum"),
             2 => End::new("crosses the plane of the eye: kept"),
             AT_RECTANGLE if record.verdict == 0 => End::new("between the pixel centres"),
-            AT_RECTANGLE => End::new("touches no pixel for sure, but no plane of the frustum separates it: kept"),
+            AT_RECTANGLE => End::new(
+                "touches no pixel for sure, but no plane of the frustum separates it: kept",
+            ),
             _ if record.texels_read == 0 => End::new(match record.stage {
                 AT_DEPTH => "the pyramid's reduction has not run: kept",
                 _ => "spans more texels of the coarsest stored level than the footprint has: kept",
             }),
             AT_DEPTH => self.footprint("not surely behind the farthest depth of the texels: kept"),
-            5 if is_hidden => self.footprint("behind the farthest depth of all texels that it can touch"),
+            5 if is_hidden => {
+                self.footprint("behind the farthest depth of all texels that it can touch")
+            }
             5 => End::new("behind the texels, but not surely inside their block: kept"),
             _ if is_hidden => {
                 let farthest = (record.any_before != 0).then_some(record.farthest_before);
@@ -143,8 +150,13 @@ impl Told<'_> {
 
     fn footprint(&self, reason: &'static str) -> End {
         let bits = self.record.farthest_bits;
-        let of_footprint = &self.readings[..self.readings.len().min(self.record.of_footprint as usize)];
-        End { reason, decisive: of_footprint.iter().position(|r| r[3] == bits), farthest: Some(f32::from_bits(bits)) }
+        let of_footprint =
+            &self.readings[..self.readings.len().min(self.record.of_footprint as usize)];
+        End {
+            reason,
+            decisive: of_footprint.iter().position(|r| r[3] == bits),
+            farthest: Some(f32::from_bits(bits)),
+        }
     }
 
     /// Why a descent did not hide the volume: at a texel that shows it, at the end of its budget,

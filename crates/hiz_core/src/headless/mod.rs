@@ -1,19 +1,26 @@
-//! A device of its own: for scripts and tests that have no renderer. This is what the Python package drives.
+//! A device of its own: for scripts and tests that have no renderer.
+//! This is what the Python package drives.
 //!
-//! Everything here is `Send + Sync`; an [`Engine`] is cheap to clone and may be used from any thread.
+//! Everything here is `Send + Sync`; an [`Engine`] is cheap to clone and may be used from any
+//! thread.
 //!
 //! # The end of a process
-//! A driver may still be at work when the last wait for it has returned: Mesa's lavapipe frees pipelines on a thread of its own, which
-//! only the destruction of the device joins. A process that ends meanwhile may crash in the driver. So **let go of every device before
-//! the process ends**: the last clone of an [`Engine`] waits until its device is idle, and the device is destroyed with the last object
-//! on it (instances, pyramids, results, and whatever was made on [`Engine::device`]). Keep none of them in a `static`, which is never
-//! dropped; a local of `main` and a `thread_local!` are. The same goes for a device of your own under a
-//! [`HizContext`]. `std::process::exit` drops nothing: return from `main` instead.
+//! A driver may still be at work when the last wait for it has returned: Mesa's lavapipe frees
+//! pipelines on a thread of its own, which only the destruction of the device joins.
+//! A process that ends meanwhile may crash in the driver.
+//! So **let go of every device before the process ends**: the last clone of an [`Engine`] waits
+//! until its device is idle, and the device is destroyed with the last object on it (instances,
+//! pyramids, results, and whatever was made on [`Engine::device`]).
+//! Keep none of them in a `static`, which is never dropped; a local of `main` and a `thread_local!`
+//! are.
+//! The same goes for a device of your own under a [`HizContext`].
+//! `std::process::exit` drops nothing: return from `main` instead.
 //!
 //! # Forks
-//! No device works in a fork of the process that made it. There every call of an [`Engine`], [`DepthImage`] or [`Culling`] is
-//! [`Error::OtherProcess`], before it takes any lock; dropping an [`Engine`] there lets go of nothing. Other objects on the device
-//! (instances, pyramids) are better forgotten in the fork than dropped.
+//! No device works in a fork of the process that made it.
+//! There every call of an [`Engine`], [`DepthImage`] or [`Culling`] is [`Error::OtherProcess`],
+//! before it takes any lock; dropping an [`Engine`] there lets go of nothing.
+//! Other objects on the device (instances, pyramids) are better forgotten in the fork than dropped.
 
 mod adapter;
 mod culling;
@@ -50,7 +57,8 @@ use crate::update;
 use crate::visible::{Visible, VisibleOptions};
 use crate::watch::Watch;
 
-/// A device, its queue and the pipelines on it. The last clone waits until the device is idle, and lets go of it.
+/// A device, its queue and the pipelines on it.
+/// The last clone waits until the device is idle, and lets go of it.
 #[derive(Debug, Clone)]
 pub struct Engine {
     shared: Arc<Shared>,
@@ -59,7 +67,8 @@ pub struct Engine {
 impl Drop for Engine {
     fn drop(&mut self) {
         if self.shared.process.check().is_err() {
-            // Destroying the device would join threads that a fork does not have. One more owner keeps it for good.
+            // Destroying the device would join threads that a fork does not have.
+            // One more owner keeps it for good.
             std::mem::forget(Arc::clone(&self.shared));
         }
     }
@@ -89,12 +98,13 @@ fn locked<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 }
 
 impl Engine {
-    /// Opens a Vulkan device: the adapter whose index is, or whose name or driver contains, `adapter`; without it what the
-    /// environment variable [`ADAPTER_VARIABLE`] says; without that the best one, real GPUs first.
+    /// Opens a Vulkan device: the adapter whose index is, or whose name or driver contains,
+    /// `adapter`; without it what the environment variable [`ADAPTER_VARIABLE`] says; without that
+    /// the best one, real GPUs first.
     ///
     /// # Errors
-    /// [`Error::NoAdapter`] where none fits, with the adapters that were seen and how to choose one of them; where there are none,
-    /// with the line that installs a software driver.
+    /// [`Error::NoAdapter`] where none fits, with the adapters that were seen and how to choose one
+    /// of them; where there are none, with the line that installs a software driver.
     pub fn new(adapter: Option<&str>) -> Result<Self> {
         Self::with_planted_faults(adapter, &[])
     }
@@ -109,9 +119,11 @@ impl Engine {
         if let Some(request) = &request {
             found.retain(|(summary, _)| summary.matches(request));
         }
-        let Some((summary, adapter)) = found.into_iter().min_by_key(|(summary, _)| (summary.rank(), summary.index))
+        let Some((summary, adapter)) =
+            found.into_iter().min_by_key(|(summary, _)| (summary.rank(), summary.index))
         else {
-            let request = request.map_or_else(|| "was found".to_owned(), |r| format!("matches {r:?}"));
+            let request =
+                request.map_or_else(|| "was found".to_owned(), |r| format!("matches {r:?}"));
             return Err(adapter::no_adapter(request, &seen));
         };
         let features = adapter.features() & wgpu::Features::INDIRECT_FIRST_INSTANCE;
@@ -134,11 +146,22 @@ impl Engine {
         }));
         let context = HizContext::with_planted_faults(&device, faults)?;
         let process = Process::this();
-        Ok(Self { shared: Arc::new(Shared { process, context, device, queue, adapter: summary, lost, uncaught }) })
+        Ok(Self {
+            shared: Arc::new(Shared {
+                process,
+                context,
+                device,
+                queue,
+                adapter: summary,
+                lost,
+                uncaught,
+            }),
+        })
     }
 
-    /// Refuses to go on in a fork of the process that made the device. To be asked before any lock is taken: one that another thread
-    /// held at the fork is never released there.
+    /// Refuses to go on in a fork of the process that made the device.
+    /// To be asked before any lock is taken: one that another thread held at the fork is never
+    /// released there.
     fn check_process(&self) -> Result<()> {
         self.shared.process.check()
     }
@@ -172,7 +195,11 @@ impl Engine {
     ///
     /// # Errors
     /// As [`HizContext::record_instances`], and [`Error::OutOfMemory`].
-    pub fn instances(&self, bounds: &Bounds<'_>, options: &InstanceOptions) -> Result<Arc<Instances>> {
+    pub fn instances(
+        &self,
+        bounds: &Bounds<'_>,
+        options: &InstanceOptions,
+    ) -> Result<Arc<Instances>> {
         // One piece at a time, so that only one has its copy in a staging area.
         let copy = |copies: &dyn Fn(&mut wgpu::CommandEncoder), more: bool| {
             let mut encoder = self.encoder("hiz.instances.encoder");
@@ -183,13 +210,20 @@ impl Engine {
         self.scoped(|| Instances::new(&self.context().gpu, bounds, options, copy)).map(Arc::new)
     }
 
-    /// Replaces instances `first..first + n`: records and submits. A cull that was submitted before
-    /// sees the old bounds, whenever its answer is read. May be called from any thread; updates of
-    /// the same instances run in the order in which they come here.
+    /// Replaces instances `first..first + n`: records and submits.
+    /// A cull that was submitted before sees the old bounds, whenever its answer is read.
+    /// May be called from any thread; updates of the same instances run in the order in which they
+    /// come here.
     ///
     /// # Errors
     /// As [`HizContext::record_update`].
-    pub fn update(&self, instances: &Instances, first: u32, bounds: &Bounds<'_>, strict: bool) -> Result<()> {
+    pub fn update(
+        &self,
+        instances: &Instances,
+        first: u32,
+        bounds: &Bounds<'_>,
+        strict: bool,
+    ) -> Result<()> {
         self.scoped(|| {
             let _in_order = locked(&instances.submitting);
             let gpu = &self.context().gpu;
@@ -202,7 +236,8 @@ impl Engine {
             // Short, so that culls on other threads do not wait for the packing above.
             let watches = instances.watches();
             let mut before = self.encoder("hiz.refine.encoder");
-            let before = watches.record_refinements(gpu, &mut before, instances)?.then(|| before.finish());
+            let before =
+                watches.record_refinements(gpu, &mut before, instances)?.then(|| before.finish());
             self.queue().submit(before.into_iter().chain([encoder.finish()]));
             watches.all_refined();
             watches.note(&updated);
@@ -214,7 +249,11 @@ impl Engine {
     ///
     /// # Errors
     /// As [`HizContext::create_occluders`], and [`Error::OutOfMemory`].
-    pub fn occluders(&self, meshes: &[MeshData<'_>], options: &OccluderOptions) -> Result<Arc<Occluders>> {
+    pub fn occluders(
+        &self,
+        meshes: &[MeshData<'_>],
+        options: &OccluderOptions,
+    ) -> Result<Arc<Occluders>> {
         self.scoped(|| self.context().create_occluders(meshes, options)).map(Arc::new)
     }
 
@@ -235,8 +274,8 @@ impl Engine {
         })
     }
 
-    /// Occluder depth that holds for every larger image of the same view ([`OccluderSurface::conservative_depth`]), made on the
-    /// host and uploaded.
+    /// Occluder depth that holds for every larger image of the same view
+    /// ([`OccluderSurface::conservative_depth`]), made on the host and uploaded.
     ///
     /// # Errors
     /// As [`Engine::upload_depth`] and [`OccluderSurface::conservative_depth`].
@@ -253,10 +292,12 @@ impl Engine {
         self.upload_depth(&occluders.surface().conservative_depth(camera, options)?, camera)
     }
 
-    /// Uploads NDC depth (row 0 on top, the camera's size and convention). What is no depth becomes far when it is read.
+    /// Uploads NDC depth (row 0 on top, the camera's size and convention).
+    /// What is no depth becomes far when it is read.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for another number of pixels, [`Error::Limit`] for an image larger than the device's textures.
+    /// [`Error::Invalid`] for another number of pixels, [`Error::Limit`] for an image larger than
+    /// the device's textures.
     pub fn upload_depth(&self, ndc: &[f32], camera: &Camera) -> Result<DepthImage> {
         DepthImage::uploaded(self, SourceKind::Bits, ndc, camera)
     }
@@ -266,7 +307,12 @@ impl Engine {
     ///
     /// # Errors
     /// As [`Engine::upload_depth`], and [`Error::Invalid`] for a tolerance outside 0..=0.5.
-    pub fn upload_depth_within(&self, ndc: &[f32], camera: &Camera, tolerance: DepthTolerance) -> Result<DepthImage> {
+    pub fn upload_depth_within(
+        &self,
+        ndc: &[f32],
+        camera: &Camera,
+        tolerance: DepthTolerance,
+    ) -> Result<DepthImage> {
         let tolerance = tolerance.checked()?;
         Ok(DepthImage { tolerance, ..self.upload_depth(ndc, camera)? })
     }
@@ -289,13 +335,24 @@ impl Engine {
     ///
     /// # Errors
     /// As [`Engine::pyramid`].
-    pub fn pyramid_with(&self, depth: &DepthImage, options: &PyramidOptions) -> Result<Arc<Pyramid>> {
+    pub fn pyramid_with(
+        &self,
+        depth: &DepthImage,
+        options: &PyramidOptions,
+    ) -> Result<Arc<Pyramid>> {
         self.context().gpu.check_context("depth", depth.engine.context().gpu.id())?;
         self.scoped(|| {
             let pyramid = self.context().create_pyramid(depth.size(), options)?;
             let mut encoder = self.encoder("hiz.reduce.encoder");
             let DepthImage { view, camera, tolerance, .. } = depth;
-            pyramid::record_reduce(&self.context().gpu, &mut encoder, view, camera, &pyramid, *tolerance)?;
+            pyramid::record_reduce(
+                &self.context().gpu,
+                &mut encoder,
+                view,
+                camera,
+                &pyramid,
+                *tolerance,
+            )?;
             self.queue().submit([encoder.finish()]);
             Ok(Arc::new(pyramid))
         })
@@ -304,12 +361,16 @@ impl Engine {
     /// Reads a level of a pyramid: sanitised depth, row 0 on top.
     ///
     /// # Errors
-    /// [`Error::Invalid`] past the last level and for one that is not stored, [`Error::Mismatch`] for a pyramid that was never built.
+    /// [`Error::Invalid`] past the last level and for one that is not stored, [`Error::Mismatch`]
+    /// for a pyramid that was never built.
     pub fn read_level(&self, pyramid: &Pyramid, level: u32) -> Result<Vec<f32>> {
         self.check_process()?;
         self.context().gpu.check_context("pyramid", pyramid.context)?;
         let layout = pyramid.layout.levels.get(level as usize).ok_or_else(|| {
-            Error::invalid("level", format!("expected a level below {}, got {level}", pyramid.num_levels()))
+            Error::invalid(
+                "level",
+                format!("expected a level below {}, got {level}", pyramid.num_levels()),
+            )
         })?;
         if !pyramid.layout.is_there(level) {
             let StoredLevels { first, last } = pyramid.layout.stored;
@@ -319,24 +380,34 @@ impl Engine {
             ));
         }
         let built = pyramid.built().ok_or_else(|| {
-            Error::mismatch("pyramid", "expected one that was built from a depth image, got one that never was")
+            Error::mismatch(
+                "pyramid",
+                "expected one that was built from a depth image, got one that never was",
+            )
         })?;
         if level == 0 {
             let format = built.source.texture().format();
             if !atlas::travels(format) {
                 return Err(Error::invalid(
                     "level",
-                    format!("expected a level above 0 of a pyramid of {format:?}, which is not read as float32, got 0"),
+                    format!(
+                        "expected a level above 0 of a pyramid of {format:?}, which is not read as float32, got 0"
+                    ),
                 ));
             }
             let row = 4 * u64::from(layout.width);
-            let bytes =
-                self.scoped(|| readback::read_texture(self.device(), self.queue(), built.source.texture(), row))?;
+            let bytes = self.scoped(|| {
+                readback::read_texture(self.device(), self.queue(), built.source.texture(), row)
+            })?;
             let convention = built.camera.convention();
-            return host::collected(to_u32(&bytes).map(|bits| crate::depth::sanitized(bits, convention)), "level");
+            return host::collected(
+                to_u32(&bytes).map(|bits| crate::depth::sanitized(bits, convention)),
+                "level",
+            );
         }
         let (width, stride) = (layout.width as usize, layout.stride as usize);
-        let (first, count) = (u64::from(layout.offset), u64::from(layout.stride) * u64::from(layout.height));
+        let (first, count) =
+            (u64::from(layout.offset), u64::from(layout.stride) * u64::from(layout.height));
         let chunk = 1_u64 << pyramid.layout.chunk_shift;
         let ranges: Vec<_> = (first / chunk..=(first + count - 1) / chunk)
             .map(|c| {
@@ -349,7 +420,8 @@ impl Engine {
                 }
             })
             .collect();
-        let bytes = self.scoped(|| readback::read_buffers(self.device(), self.queue(), &ranges))?.concat();
+        let bytes =
+            self.scoped(|| readback::read_buffers(self.device(), self.queue(), &ranges))?.concat();
         let mut texels = host::list(width * layout.height as usize, "level")?;
         for row in bytes.chunks_exact(4 * stride) {
             texels.extend(to_u32(&row[..4 * width]).map(f32::from_bits));
@@ -357,9 +429,9 @@ impl Engine {
         Ok(texels)
     }
 
-    /// Culls: records and submits; reading the answer waits. A cull that needs a pipeline that was
-    /// not made before makes it, and waits until the driver has compiled it
-    /// ([`Timings::compile_ms`]).
+    /// Culls: records and submits; reading the answer waits.
+    /// A cull that needs a pipeline that was not made before makes it, and waits until the driver
+    /// has compiled it ([`Timings::compile_ms`]).
     ///
     /// # Errors
     /// As [`HizContext::record_cull`], and [`Error::OutOfMemory`].
@@ -376,7 +448,8 @@ impl Engine {
         let attempt = || {
             let (start, made_before) = (Instant::now(), PipelinesMade::so_far());
             let visible = Arc::new(self.context().create_visible(instances, output)?);
-            let inputs = CullInputs { instances, camera, pyramid, options, certified: true, idle: false };
+            let inputs =
+                CullInputs { instances, camera, pyramid, options, certified: true, idle: false };
             let mut encoder = self.encoder("hiz.cull.encoder");
             cull::record(gpu, &mut encoder, &inputs, &visible)?;
             let staged_mask = Culling::stage_mask(self.device(), &mut encoder, instances, &visible);
@@ -393,7 +466,8 @@ impl Engine {
             if made.count > 0 {
                 let making_ms = 1e3 * made.time.as_secs_f64();
                 record_ms -= making_ms;
-                compile_ms = making_ms + self.compile(&CullInputs { idle: true, ..inputs }, &visible)?;
+                compile_ms =
+                    making_ms + self.compile(&CullInputs { idle: true, ..inputs }, &visible)?;
             }
             let watches = &mut instances.watches();
             let submitted = Instant::now();
@@ -428,8 +502,8 @@ impl Engine {
     }
 
     /// Lets the driver compile what it leaves to the first dispatch of a pipeline: submits the same
-    /// work of no workgroups, and waits. How many milliseconds that took, what was submitted before
-    /// not counted.
+    /// work of no workgroups, and waits.
+    /// How many milliseconds that took, what was submitted before not counted.
     fn compile(&self, inputs: &CullInputs<'_>, visible: &Visible) -> Result<f64> {
         readback::wait(self.device(), None)?;
         let start = Instant::now();
@@ -464,7 +538,8 @@ impl Engine {
         let internal = device.push_error_scope(wgpu::ErrorFilter::Internal);
         let result = work();
         if result.is_err() {
-            // A loss is told by a callback, which runs when the device is polled; what it broke may be reported as anything.
+            // A loss is told by a callback, which runs when the device is polled; what it broke may
+            // be reported as anything.
             drop(device.poll(wgpu::PollType::wait_indefinitely()));
         }
         // The innermost scope goes first.

@@ -11,10 +11,15 @@ impl Process {
         Self(std::process::id())
     }
 
-    /// An error in a fork of it. Takes no lock.
+    /// An error in a fork of it.
+    /// Takes no lock.
     pub(super) fn check(self) -> Result<()> {
         let here = Self::this();
-        if self == here { Ok(()) } else { Err(Error::OtherProcess { made_by: self.0, here: here.0 }) }
+        if self == here {
+            Ok(())
+        } else {
+            Err(Error::OtherProcess { made_by: self.0, here: here.0 })
+        }
     }
 }
 

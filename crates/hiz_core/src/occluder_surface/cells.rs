@@ -1,5 +1,5 @@
-//! The surface as a camera sees it: triangles clipped at the near plane, in pixels, with error bounds, and which of them are
-//! neighbours.
+//! The surface as a camera sees it: triangles clipped at the near plane, in pixels, with error
+//! bounds, and which of them are neighbours.
 
 use super::PlantedFault;
 use super::square::{Point, ROUNDING, UP};
@@ -16,14 +16,17 @@ pub(super) const NO_MATE: u32 = u32::MAX;
 /// Set in `Cells::mates` where both lie on the same side of their edge.
 pub(super) const FOLD: u32 = 1 << 31;
 
-/// Triangles in the image. Half-edge `3 c + k` runs from corner k of cell c to the next.
+/// Triangles in the image.
+/// Half-edge `3 c + k` runs from corner k of cell c to the next.
 #[derive(Debug, Default)]
 pub(super) struct Cells {
     pub(super) points: Vec<Point>,
     pub(super) corners: Vec<[u32; 3]>,
     /// +1 or -1 by the sense of rotation, as float64 sees it.
     pub(super) signs: Vec<i8>,
-    /// By half-edge: the neighbour's half-edge along the same exact edge, with `FOLD`; or `NO_MATE`. Mutual.
+    /// By half-edge: the neighbour's half-edge along the same exact edge, with `FOLD`; or
+    /// `NO_MATE`.
+    /// Mutual.
     pub(super) mates: Vec<u32>,
     /// The least `far` of the corners; for pruning, no proof rests on it.
     pub(super) nearest: Vec<f64>,
@@ -69,14 +72,16 @@ impl Lens {
         }
     }
 
-    /// `d` is one rounding off, each product two, the sums three more: 6 roundings of every term, 8 with room.
+    /// `d` is one rounding off, each product two, the sums three more: 6 roundings of every term, 8
+    /// with room.
     fn clip(&self, p: Vec3) -> Clip {
         let d = sub(p, self.origin);
         let mut clip = Clip { at: [0.0; 4], error: [0.0; 4] };
         for (i, row) in self.rows.iter().enumerate() {
             let terms = [row[0] * d[0], row[1] * d[1], row[2] * d[2]];
             clip.at[i] = terms[0] + terms[1] + terms[2] + row[3];
-            clip.error[i] = 8.0 * ROUNDING * (terms[0].abs() + terms[1].abs() + terms[2].abs() + row[3].abs());
+            clip.error[i] =
+                8.0 * ROUNDING * (terms[0].abs() + terms[1].abs() + terms[2].abs() + row[3].abs());
         }
         clip
     }
@@ -104,7 +109,8 @@ impl Lens {
         let pixels = |half: f64, s: f64, e: f64| half * (e + 4.0 * ROUNDING * (s.abs() + 1.0));
         let margin = pixels(self.half[0], sx, ex).max(pixels(self.half[1], sy, ey)) * UP;
         let far_error = ef * UP;
-        let unproved = if self.fault == Some(PlantedFault::NearPointsUnproved) { 0.0 } else { far_error };
+        let unproved =
+            if self.fault == Some(PlantedFault::NearPointsUnproved) { 0.0 } else { far_error };
         if !(margin <= LARGEST_MARGIN && far - unproved >= self.near && far.is_finite()) {
             return None;
         }
@@ -113,22 +119,35 @@ impl Lens {
             Some(PlantedFault::DepthsExact) => (margin, 0.0),
             _ => (margin, far_error),
         };
-        Some(Point { x: (sx + 1.0) * self.half[0], y: (1.0 - sy) * self.half[1], far, margin, far_error })
+        Some(Point {
+            x: (sx + 1.0) * self.half[0],
+            y: (1.0 - sy) * self.half[1],
+            far,
+            margin,
+            far_error,
+        })
     }
 }
 
-/// The exact point `a + t (b - a)` for the float64 number t, which the two triangles of an edge share: it need not lie on the
-/// clipping plane, for any part of a triangle is an occluder.
+/// The exact point `a + t (b - a)` for the float64 number t, which the two triangles of an edge
+/// share: it need not lie on the clipping plane, for any part of a triangle is an occluder.
 fn between(a: &Clip, b: &Clip, t: f64) -> Clip {
     Clip {
         at: std::array::from_fn(|i| a.at[i] + t * (b.at[i] - a.at[i])),
-        error: std::array::from_fn(|i| a.error[i].max(b.error[i]) + 8.0 * ROUNDING * (a.at[i].abs() + b.at[i].abs())),
+        error: std::array::from_fn(|i| {
+            a.error[i].max(b.error[i]) + 8.0 * ROUNDING * (a.at[i].abs() + b.at[i].abs())
+        }),
     }
 }
 
 impl Cells {
     /// `culled`: the faces that do not occlude, as seen by this camera.
-    pub(super) fn new(topology: &Topology, camera: &Camera, culled: FaceCull, fault: Option<PlantedFault>) -> Self {
+    pub(super) fn new(
+        topology: &Topology,
+        camera: &Camera,
+        culled: FaceCull,
+        fault: Option<PlantedFault>,
+    ) -> Self {
         let mut builder = Builder::new(topology, Lens::new(camera, fault));
         let size = camera.size();
         let image = [f64::from(size.width), f64::from(size.height)];
@@ -161,7 +180,11 @@ impl<'a> Builder<'a> {
     fn new(topology: &'a Topology, lens: Lens) -> Self {
         let clips: Vec<Clip> = topology.positions.iter().map(|p| lens.clip(*p)).collect();
         let inside: Vec<bool> = clips.iter().map(|c| lens.depth_in(c) > 0.0).collect();
-        let points = clips.iter().zip(&inside).map(|(c, inside)| lens.point(c).filter(|_| *inside)).collect();
+        let points = clips
+            .iter()
+            .zip(&inside)
+            .map(|(c, inside)| lens.point(c).filter(|_| *inside))
+            .collect();
         Self {
             lens,
             clips,
@@ -174,7 +197,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Where an edge is cut; computed in the edge's own direction, so that both its triangles agree.
+    /// Where an edge is cut; computed in the edge's own direction, so that both its triangles
+    /// agree.
     fn cut(&mut self, half: u32) -> u32 {
         let edge = self.topology.edges[half as usize] as usize;
         if self.cuts[edge] == NO_MATE {
@@ -193,7 +217,8 @@ impl<'a> Builder<'a> {
         self.cuts[edge]
     }
 
-    /// Clips a triangle (Sutherland and Hodgman 1974, one plane) and adds what is left as one or two cells.
+    /// Clips a triangle (Sutherland and Hodgman 1974, one plane) and adds what is left as one or
+    /// two cells.
     fn add(&mut self, t: u32, image: [f64; 2], culled: FaceCull) {
         let corners = self.topology.triangles[t as usize];
         let inside = corners.map(|v| self.inside[v as usize]);
@@ -221,20 +246,34 @@ impl<'a> Builder<'a> {
                 let first = self.add_cell([a, b, (c.0, NO_MATE)], image, culled);
                 let second = self.add_cell([(a.0, NO_MATE), c, d], image, culled);
                 if let (Some(first), Some(second)) = (first, second) {
-                    self.marry(3 * first + 2, 3 * second, self.sign(3 * first) != self.sign(3 * second));
+                    self.marry(
+                        3 * first + 2,
+                        3 * second,
+                        self.sign(3 * first) != self.sign(3 * second),
+                    );
                 }
             }
             _ => {}
         }
     }
 
-    fn add_cell(&mut self, corners: [(u32, u32); 3], image: [f64; 2], culled: FaceCull) -> Option<u32> {
+    fn add_cell(
+        &mut self,
+        corners: [(u32, u32); 3],
+        image: [f64; 2],
+        culled: FaceCull,
+    ) -> Option<u32> {
         let ids = corners.map(|corner| corner.0);
         let [Some(a), Some(b), Some(c)] = ids.map(|i| self.points[i as usize]) else { return None };
         let mut bounds = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY];
         for p in [&a, &b, &c] {
             let m = p.margin * UP + 2.0 * ROUNDING * (p.x.abs() + p.y.abs());
-            bounds = [bounds[0].min(p.x - m), bounds[1].max(p.x + m), bounds[2].min(p.y - m), bounds[3].max(p.y + m)];
+            bounds = [
+                bounds[0].min(p.x - m),
+                bounds[1].max(p.x + m),
+                bounds[2].min(p.y - m),
+                bounds[3].max(p.y + m),
+            ];
         }
         // Neither it nor its edges can meet a pixel.
         if bounds[1] < 0.0 || bounds[0] > image[0] || bounds[3] < 0.0 || bounds[2] > image[1] {
@@ -244,8 +283,10 @@ impl<'a> Builder<'a> {
         let area = ux * vy - uy * vx;
         let margin = a.margin.max(b.margin).max(c.margin);
         let area_error = 8.0 * ROUNDING * ((ux * vy).abs() + (uy * vx).abs())
-            + (2.0 * margin * (ux.abs() + uy.abs() + vx.abs() + vy.abs()) + 8.0 * margin * margin) * UP;
-        let area_error = if self.lens.fault == Some(PlantedFault::FacingUnproved) { 0.0 } else { area_error };
+            + (2.0 * margin * (ux.abs() + uy.abs() + vx.abs() + vy.abs()) + 8.0 * margin * margin)
+                * UP;
+        let area_error =
+            if self.lens.fault == Some(PlantedFault::FacingUnproved) { 0.0 } else { area_error };
         // Rows run downwards, so what is counter-clockwise with y up has a negative area here.
         let occludes = match culled {
             FaceCull::None => true,
@@ -279,8 +320,9 @@ impl<'a> Builder<'a> {
         self.cells.mates[b as usize] = a | flag;
     }
 
-    /// Pairs the half-edges of every edge: first those that lie on different sides of it, then what is left by twos. Any pairs
-    /// would be right; where more than two triangles meet these are as good as others.
+    /// Pairs the half-edges of every edge: first those that lie on different sides of it, then what
+    /// is left by twos.
+    /// Any pairs would be right; where more than two triangles meet these are as good as others.
     fn finish(mut self) -> Cells {
         let (mut forward, mut backward) = (Vec::new(), Vec::new());
         for edge in 0..self.topology.num_edges() {
@@ -292,8 +334,13 @@ impl<'a> Builder<'a> {
                     continue;
                 }
                 let [a, b] = self.topology.ends(*half);
-                // Turned the same way round as seen, two triangles on different sides run along their edge in opposite directions.
-                if (a < b) == (self.sign(placed) > 0) { forward.push(placed) } else { backward.push(placed) }
+                // Turned the same way round as seen, two triangles on different sides run along
+                // their edge in opposite directions.
+                if (a < b) == (self.sign(placed) > 0) {
+                    forward.push(placed)
+                } else {
+                    backward.push(placed)
+                }
             }
             while let (Some(a), Some(b)) = (forward.last(), backward.last()) {
                 self.marry(*a, *b, false);
@@ -306,7 +353,13 @@ impl<'a> Builder<'a> {
             }
         }
         // Cells use sound points alone; the others stay as a place that nobody looks at.
-        let nowhere = Point { x: f64::NAN, y: f64::NAN, far: f64::NAN, margin: f64::NAN, far_error: f64::NAN };
+        let nowhere = Point {
+            x: f64::NAN,
+            y: f64::NAN,
+            far: f64::NAN,
+            margin: f64::NAN,
+            far_error: f64::NAN,
+        };
         self.cells.points = self.points.into_iter().map(|p| p.unwrap_or(nowhere)).collect();
         self.cells
     }

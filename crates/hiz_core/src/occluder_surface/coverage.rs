@@ -1,4 +1,5 @@
-//! How far every ray through a square of the image is blocked: sheets of neighbouring cells that leave no gap in the square.
+//! How far every ray through a square of the image is blocked: sheets of neighbouring cells that
+//! leave no gap in the square.
 //! The proof stands in the module above.
 
 use super::PlantedFault;
@@ -13,7 +14,8 @@ const BLOCK: u32 = 8;
 #[derive(Debug, Clone, Copy)]
 struct Member {
     cell: u32,
-    /// In the list of members; itself for a sheet's head. (Union-find.)
+    /// In the list of members; itself for a sheet's head.
+    /// (Union-find.)
     parent: u32,
     sides: [Side; 3],
     sums: Sums,
@@ -48,14 +50,16 @@ impl<'a> Coverage<'a> {
         Self { cells, places: vec![0; count], stamps: vec![0; count], stamp: 0, fault }
     }
 
-    /// For every pixel of the image, row 0 on top, the value of `far` that every ray through its closed square is blocked at or
-    /// before; `beyond` where that cannot be shown. `refinement`: how often a pixel is quartered where it cannot be shown for
-    /// the whole.
+    /// For every pixel of the image, row 0 on top, the value of `far` that every ray through its
+    /// closed square is blocked at or before; `beyond` where that cannot be shown.
+    /// `refinement`: how often a pixel is quartered where it cannot be shown for the whole.
     pub(super) fn image(&mut self, size: ImageSize, beyond: f64, refinement: u32) -> Vec<f64> {
         let mut best = vec![beyond; size.pixels() as usize];
         let touched = self.scatter(size, &mut best);
         // Cells by pixel: count, sum up, fill.
-        let still = |best: &[f64], pixel: u32, cell: u32| self.cells.nearest[cell as usize] < best[pixel as usize];
+        let still = |best: &[f64], pixel: u32, cell: u32| {
+            self.cells.nearest[cell as usize] < best[pixel as usize]
+        };
         let mut first = vec![0_u32; best.len() + 1];
         for (pixel, cell) in &touched {
             first[*pixel as usize + 1] += u32::from(still(&best, *pixel, *cell));
@@ -82,7 +86,8 @@ impl<'a> Coverage<'a> {
         best
     }
 
-    /// Lowers `best` where a single cell covers a pixel; returns the other cells that touch one, as (pixel, cell).
+    /// Lowers `best` where a single cell covers a pixel; returns the other cells that touch one, as
+    /// (pixel, cell).
     fn scatter(&self, size: ImageSize, best: &mut [f64]) -> Vec<(u32, u32)> {
         // The nearest first: they leave little to do for the others.
         let nearest = &self.cells.nearest;
@@ -95,7 +100,11 @@ impl<'a> Coverage<'a> {
             for block_row in (rows.start..rows.end).step_by(BLOCK as usize) {
                 for block_column in (columns.start..columns.end).step_by(BLOCK as usize) {
                     let half = f64::from(BLOCK) / 2.0;
-                    let block = Square { x: f64::from(block_column) + half, y: f64::from(block_row) + half, half };
+                    let block = Square {
+                        x: f64::from(block_column) + half,
+                        y: f64::from(block_row) + half,
+                        half,
+                    };
                     let large = columns.len() > 2 || rows.len() > 2;
                     if large && matches!(self.relation(cell, block).0, Relation::Apart) {
                         continue;
@@ -122,7 +131,11 @@ impl<'a> Coverage<'a> {
     }
 
     /// The columns (axis 0) or rows (2) of the image that a cell's bounds meet.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the image first")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to the image first"
+    )]
     fn reach(&self, cell: u32, axis: usize, side: u32) -> std::ops::Range<u32> {
         let bounds = self.cells.bounds[cell as usize];
         // Closed pixels: a bound on a border reaches the pixel before it, too.
@@ -149,7 +162,8 @@ impl<'a> Coverage<'a> {
         farthest(self.cells.corners_of(cell), &Square { half, ..square }, self.fault)
     }
 
-    /// At most `bound`, which is known to hold already: the depth that every ray through `square` is blocked at or before.
+    /// At most `bound`, which is known to hold already: the depth that every ray through `square`
+    /// is blocked at or before.
     fn blocked(&mut self, candidates: &[u32], square: Square, bound: f64, refinement: u32) -> f64 {
         let mut best = bound;
         let mut members: Vec<Member> = Vec::with_capacity(candidates.len());
@@ -174,20 +188,28 @@ impl<'a> Coverage<'a> {
         self.link(&mut members, square);
         let folds = self.folds(&members);
         let mut covering = vec![false; members.len()];
-        best = best.min(nearest_sheet(&members, &mut covering, |s| !s.open && !s.folded && s.winding != 0));
+        best = best.min(nearest_sheet(&members, &mut covering, |s| {
+            !s.open && !s.folded && s.winding != 0
+        }));
         if !folds.is_empty() {
             for (a, b) in folds {
                 unite(&mut members, a, b);
             }
-            // Across folds the senses of rotation disagree, and only whether the winding is odd is constant.
-            best = best.min(nearest_sheet(&members, &mut covering, |s| !s.open && s.winding % 2 != 0));
+            // Across folds the senses of rotation disagree, and only whether the winding is odd is
+            // constant.
+            best =
+                best.min(nearest_sheet(&members, &mut covering, |s| !s.open && s.winding % 2 != 0));
         }
         let nearest = &self.cells.nearest;
-        let hopeful = members.iter().zip(&covering).any(|(m, covers)| !covers && nearest[m.cell as usize] < best);
+        let hopeful = members
+            .iter()
+            .zip(&covering)
+            .any(|(m, covers)| !covers && nearest[m.cell as usize] < best);
         if refinement == 0 || !hopeful {
             return best;
         }
-        let list: Vec<u32> = members.iter().map(|m| m.cell).filter(|c| nearest[*c as usize] < best).collect();
+        let list: Vec<u32> =
+            members.iter().map(|m| m.cell).filter(|c| nearest[*c as usize] < best).collect();
         let mut most = f64::NEG_INFINITY;
         for quarter in square.quarters() {
             let far = self.blocked(&list, quarter, best, refinement - 1);
@@ -199,7 +221,8 @@ impl<'a> Coverage<'a> {
         most
     }
 
-    /// Unites members that share an edge which may meet the square and lie on different sides of it; notes borders and folds.
+    /// Unites members that share an edge which may meet the square and lie on different sides of
+    /// it; notes borders and folds.
     fn link(&mut self, members: &mut [Member], square: Square) {
         self.stamp += 1;
         for (i, member) in members.iter().enumerate() {
@@ -218,7 +241,9 @@ impl<'a> Coverage<'a> {
                 match self.mate(3 * cell + k as u32) {
                     Some((_, true)) => sums.folded = true,
                     Some((other, false)) => unite(members, i as u32, other),
-                    None if self.fault == Some(PlantedFault::ContoursIgnored) => sums.winding += crossing,
+                    None if self.fault == Some(PlantedFault::ContoursIgnored) => {
+                        sums.winding += crossing
+                    }
                     None => sums.open = true,
                 }
             }
@@ -226,7 +251,8 @@ impl<'a> Coverage<'a> {
         }
     }
 
-    /// The member across a half-edge and whether it lies on the same side, if it is in the current list.
+    /// The member across a half-edge and whether it lies on the same side, if it is in the current
+    /// list.
     fn mate(&self, half: u32) -> Option<(u32, bool)> {
         let mate = self.cells.mates[half as usize];
         let other = ((mate & !FOLD) / 3) as usize;
@@ -239,7 +265,9 @@ impl<'a> Coverage<'a> {
         let mut folds = Vec::new();
         for (i, member) in members.iter().enumerate().filter(|(_, m)| m.sums.folded) {
             for k in 0..3 {
-                if let (true, Some((other, true))) = (member.sides[k].meets, self.mate(3 * member.cell + k as u32)) {
+                if let (true, Some((other, true))) =
+                    (member.sides[k].meets, self.mate(3 * member.cell + k as u32))
+                {
                     folds.push((i as u32, other));
                 }
             }
@@ -275,7 +303,8 @@ fn unite(members: &mut [Member], a: u32, b: u32) {
     members[a.max(b) as usize].parent = a.min(b);
 }
 
-/// The least depth among the sheets that cover the square, infinity without one; marks their members.
+/// The least depth among the sheets that cover the square, infinity without one; marks their
+/// members.
 fn nearest_sheet(members: &[Member], covering: &mut [bool], covers: impl Fn(&Sums) -> bool) -> f64 {
     let mut total = vec![Sums { far: f64::NEG_INFINITY, ..Sums::default() }; members.len()];
     let heads: Vec<usize> = (0..members.len() as u32).map(|i| head(members, i) as usize).collect();

@@ -1,42 +1,67 @@
-//! Occluder depth that holds for every larger image of the same view, whatever its sample positions.
+//! Occluder depth that holds for every larger image of the same view, whatever its sample
+//! positions.
 //!
-//! A rasterised depth image knows its sample points: between them it may show a wall where a larger image finds the gap beside
-//! it, and a cull by it hides what can be seen through the gap. The image made here promises instead:
+//! A rasterised depth image knows its sample points: between them it may show a wall where a larger
+//! image finds the gap beside it, and a cull by it hides what can be seen through the gap.
+//! The image made here promises instead:
 //!
 //! > Every ray through the **closed square** of a pixel meets an occluder at the pixel's depth or nearer (inside of the near
 //! > plane). Where that cannot be shown the pixel is far.
 //!
-//! So every point of a larger image (any size, jitter or multisampling) has an occluder at most as far as the pixel that it
-//! lies in, and a cull with area coverage by the small image is right for the large one. Hardware and "inner conservative"
-//! rasterisers (Akenine-Moller and Aila 2005) give that for one triangle alone and lose every pixel that an inner edge of a mesh
-//! crosses; Masked Software Occlusion Culling (Hasselgren, Andersson, Akenine-Moller 2016) merges by sample coverage and admits
-//! the error. Here pixels are covered by *sheets*, on the host in float64:
+//! So every point of a larger image (any size, jitter or multisampling) has an occluder at most as
+//! far as the pixel that it lies in, and a cull with area coverage by the small image is right for
+//! the large one.
+//! Hardware and "inner conservative" rasterisers (Akenine-Moller and Aila 2005) give that for one
+//! triangle alone and lose every pixel that an inner edge of a mesh crosses; Masked Software
+//! Occlusion Culling (Hasselgren, Andersson, Akenine-Moller 2016) merges by sample coverage and
+//! admits the error.
+//! Here pixels are covered by *sheets*, on the host in float64:
 //!
-//! **Sheets.** Let P be a closed square and G a set of triangles, seen in the image. Turn each the same way round. Along an edge
-//! that two triangles of G share from different sides, their borders run in opposite directions and cancel; what remains is
-//! the border of G. The number of times that the border winds about a point is the sum of that over the triangles, and it
-//! does not change while the point does not cross the border. So if **no remaining edge meets P, and the border winds about
-//! P's centre a number of times other than 0, then every point of P lies in a triangle of G**, and no ray through P gets farther
-//! than the farthest depth that triangles of G reach in P. This needs nothing of G: it may fold, overlap, intersect itself, be
-//! wrong way round, have zero areas or three triangles at an edge, and every choice of G gives a valid depth.
+//! **Sheets.**
+//! Let P be a closed square and G a set of triangles, seen in the image.
+//! Turn each the same way round.
+//! Along an edge that two triangles of G share from different sides, their borders run in opposite
+//! directions and cancel; what remains is the border of G.
+//! The number of times that the border winds about a point is the sum of that over the triangles,
+//! and it does not change while the point does not cross the border.
+//! So if **no remaining edge meets P, and the border winds about P's centre a number of times other
+//! than 0, then every point of P lies in a triangle of G**, and no ray through P gets farther than
+//! the farthest depth that triangles of G reach in P.
+//! This needs nothing of G: it may fold, overlap, intersect itself, be wrong way round, have zero
+//! areas or three triangles at an edge, and every choice of G gives a valid depth.
 //!
-//! **Which sheets.** `coverage` takes the components of the triangles that touch P, linked across shared edges that meet P (a
-//! triangle that is missing from the list leaves its neighbour's edge unpaired, which only spoils that sheet). Of all sheets
-//! that cover P the nearest counts. A lamp post before a wall spoils its own sheet, not the wall's. Where triangles lie on the *same*
-//! side of their edge (a fold, the silhouette of a closed mesh), borders add up instead of cancelling; modulo 2 they cancel
-//! again, and an odd winding covers P too. That closes small folds. What still is open is tried again by quarters of P
-//! (`refinement`): a ray through P goes through a quarter, so the farthest quarter counts for P.
+//! **Which sheets.**
+//! `coverage` takes the components of the triangles that touch P, linked across shared edges that
+//! meet P (a triangle that is missing from the list leaves its neighbour's edge unpaired, which
+//! only spoils that sheet).
+//! Of all sheets that cover P the nearest counts.
+//! A lamp post before a wall spoils its own sheet, not the wall's.
+//! Where triangles lie on the *same* side of their edge (a fold, the silhouette of a closed mesh),
+//! borders add up instead of cancelling; modulo 2 they cancel again, and an odd winding covers P
+//! too.
+//! That closes small folds.
+//! What still is open is tried again by quarters of P (`refinement`): a ray through P goes through
+//! a quarter, so the farthest quarter counts for P.
 //!
-//! **Rounding.** No step trusts a sign that float64 could have got wrong. Each projected vertex carries a bound of its error (a
-//! few roundings of its terms, counted in `cells`). An exact edge lies within its ends' margins of the computed one: an edge
-//! misses P only if the computed one misses P grown by that (`square`). Moving all vertices from their computed to their
-//! exact places moves no border across P, so the winding of the computed border, each of whose edges lies certainly on one side of
-//! P's centre, is that of the exact one. Inner edges that miss P cancel exactly, since the float64 expression for the edge from b
-//! to a is the negative of that for a to b. Depths are bounded over P grown by the margins, and rounded to float32 towards far.
+//! **Rounding.**
+//! No step trusts a sign that float64 could have got wrong.
+//! Each projected vertex carries a bound of its error (a few roundings of its terms, counted in
+//! `cells`).
+//! An exact edge lies within its ends' margins of the computed one: an edge misses P only if the
+//! computed one misses P grown by that (`square`).
+//! Moving all vertices from their computed to their exact places moves no border across P, so the
+//! winding of the computed border, each of whose edges lies certainly on one side of P's centre, is
+//! that of the exact one.
+//! Inner edges that miss P cancel exactly, since the float64 expression for the edge from b to a is
+//! the negative of that for a to b.
+//! Depths are bounded over P grown by the margins, and rounded to float32 towards far.
 //!
-//! **Near and far.** Triangles are clipped a millionth of the depth range behind the near plane, at points that lie exactly on
-//! their edges and that neighbours share; the cut is a border. What cannot be projected with certainty is dropped, which
-//! makes borders of its neighbours' edges. Beyond the far plane nothing is hidden: such depths become far.
+//! **Near and far.**
+//! Triangles are clipped a millionth of the depth range behind the near plane, at points that lie
+//! exactly on their edges and that neighbours share; the cut is a border.
+//! What cannot be projected with certainty is dropped, which makes borders of its neighbours'
+//! edges.
+//! Beyond the far plane nothing is hidden: such depths become far.
 
 mod cells;
 mod coverage;
@@ -59,8 +84,8 @@ const LEAST_DEPTH: f32 = f32::MIN_POSITIVE;
 /// Choices for [`OccluderSurface::conservative_depth`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ConservativeDepthOptions {
-    /// How often a pixel is quartered where no sheet covers all of it, at most 8. Each step finds more occlusion beside silhouettes
-    /// and costs time there; any number is right.
+    /// How often a pixel is quartered where no sheet covers all of it, at most 8.
+    /// Each step finds more occlusion beside silhouettes and costs time there; any number is right.
     pub refinement: u32,
 }
 
@@ -70,7 +95,8 @@ impl Default for ConservativeDepthOptions {
     }
 }
 
-/// For tests: a way to make [`OccluderSurface::conservative_depth`] wrong. A suite is trusted once a planted fault turns it red.
+/// For tests: a way to make [`OccluderSurface::conservative_depth`] wrong.
+/// A suite is trusted once a planted fault turns it red.
 #[doc(hidden)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PlantedFault {
@@ -102,8 +128,8 @@ pub enum PlantedFault {
 
 /// The occluders' triangles on the host, in float64 world coordinates.
 ///
-/// 24 bytes a vertex and 12 a triangle; the first conservative depth image adds about 42 bytes a triangle and 24 a vertex for
-/// good, and while it is made about 110 of either.
+/// 24 bytes a vertex and 12 a triangle; the first conservative depth image adds about 42 bytes a
+/// triangle and 24 a vertex for good, and while it is made about 110 of either.
 #[derive(Debug)]
 pub struct OccluderSurface {
     positions: Vec<Vec3>,
@@ -117,12 +143,17 @@ impl OccluderSurface {
         Self { positions, triangles, cull_mode, topology: OnceLock::new() }
     }
 
-    /// NDC depth of `camera`'s size and convention, row 0 on top: every ray through a pixel's closed square meets an occluder at
-    /// this depth or nearer; far where that cannot be shown. It holds for every larger image of the same view.
+    /// NDC depth of `camera`'s size and convention, row 0 on top: every ray through a pixel's
+    /// closed square meets an occluder at this depth or nearer; far where that cannot be shown.
+    /// It holds for every larger image of the same view.
     ///
     /// # Errors
     /// [`Error::Limit`](crate::Error::Limit) for more than 357 million triangles.
-    pub fn conservative_depth(&self, camera: &Camera, options: &ConservativeDepthOptions) -> Result<Vec<f32>> {
+    pub fn conservative_depth(
+        &self,
+        camera: &Camera,
+        options: &ConservativeDepthOptions,
+    ) -> Result<Vec<f32>> {
         self.conservative_depth_with_fault(camera, options, None)
     }
 
@@ -134,16 +165,19 @@ impl OccluderSurface {
         options: &ConservativeDepthOptions,
         fault: Option<PlantedFault>,
     ) -> Result<Vec<f32>> {
-        let topology = self.topology.get_or_init(|| Topology::new(&self.positions, &self.triangles));
+        let topology =
+            self.topology.get_or_init(|| Topology::new(&self.positions, &self.triangles));
         let topology = topology.as_ref().map_err(Clone::clone)?;
         let convention = camera.convention();
         let culled = self.cull_mode.as_seen_by(camera);
         let cells = Cells::new(topology, camera, culled, fault);
         // `far` of the far plane; reversed Z counts its depths negative.
         let beyond = if convention.is_reversed() { 0.0 } else { 1.0 };
-        let far = Coverage::new(&cells, fault).image(camera.size(), beyond, options.refinement.min(8));
+        let far =
+            Coverage::new(&cells, fault).image(camera.size(), beyond, options.refinement.min(8));
         #[expect(clippy::cast_possible_truncation, reason = "the fault that is planted")]
-        let rounded = if fault == Some(PlantedFault::RoundedToNearest) { |far| far as f32 } else { round_up };
+        let rounded =
+            if fault == Some(PlantedFault::RoundedToNearest) { |far| far as f32 } else { round_up };
         let ndc = |far: f64| match (far < beyond, convention.is_reversed()) {
             (false, _) => convention.far(),
             (true, false) => rounded(far).min(1.0),
@@ -157,7 +191,8 @@ impl OccluderSurface {
         &self.positions
     }
 
-    /// Triangles as indices of [`positions`](Self::positions). A mirrored copy's corners are turned round.
+    /// Triangles as indices of [`positions`](Self::positions).
+    /// A mirrored copy's corners are turned round.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
@@ -170,6 +205,7 @@ impl OccluderSurface {
     /// Bytes on the host, with the topology if it was made.
     pub fn host_bytes(&self) -> u64 {
         let made = self.topology.get().and_then(|topology| topology.as_ref().ok());
-        (size_of_val(&self.positions[..]) + size_of_val(&self.triangles[..])) as u64 + made.map_or(0, Topology::bytes)
+        (size_of_val(&self.positions[..]) + size_of_val(&self.triangles[..])) as u64
+            + made.map_or(0, Topology::bytes)
     }
 }

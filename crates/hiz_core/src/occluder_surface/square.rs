@@ -1,5 +1,6 @@
-//! The two questions about a square of the image that everything rests on: does an edge surely miss it, and how far does a
-//! triangle reach within it. Both allow for the error of the points and for every rounding here.
+//! The two questions about a square of the image that everything rests on: does an edge surely miss
+//! it, and how far does a triangle reach within it.
+//! Both allow for the error of the points and for every rounding here.
 
 use super::PlantedFault;
 
@@ -8,7 +9,9 @@ pub(super) const ROUNDING: f64 = f64::EPSILON / 2.0;
 /// Covers a handful of relative roundings in the bounds themselves.
 pub(super) const UP: f64 = 1.0 + 64.0 * ROUNDING;
 
-/// A vertex in the image. The exact one lies within `margin` of `(x, y)` in both coordinates and within `far_error` of `far`.
+/// A vertex in the image.
+/// The exact one lies within `margin` of `(x, y)` in both coordinates and within `far_error` of
+/// `far`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Point {
     /// Pixels from the left.
@@ -43,16 +46,20 @@ impl Square {
 /// How an edge from a to b lies to a square.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Side {
-    /// Whether the exact edge may meet the square. False is certain.
+    /// Whether the exact edge may meet the square.
+    /// False is certain.
     pub(super) meets: bool,
-    /// +1 or -1 if the edge crosses the ray from the square's centre to the right, downwards or upwards; 0 if not. Certain where
-    /// `meets` is false, and exactly the opposite for the edge from b to a.
+    /// +1 or -1 if the edge crosses the ray from the square's centre to the right, downwards or
+    /// upwards; 0 if not.
+    /// Certain where `meets` is false, and exactly the opposite for the edge from b to a.
     pub(super) crossing: i32,
 }
 
-/// The separating axes of a segment and a square are x, y and the segment's normal (Akenine-Moller and Aila, "Conservative and
-/// tiled rasterization using a modified triangle set-up", 2005, for the half-plane form). An exact edge lies within the larger of
-/// its ends' margins of the one between the points, so the square is grown by that.
+/// The separating axes of a segment and a square are x, y and the segment's normal (Akenine-Moller
+/// and Aila, "Conservative and tiled rasterization using a modified triangle set-up", 2005, for the
+/// half-plane form).
+/// An exact edge lies within the larger of its ends' margins of the one between the points, so the
+/// square is grown by that.
 pub(super) fn side(a: &Point, b: &Point, square: &Square) -> Side {
     let half = (square.half + a.margin.max(b.margin)) * UP;
     // Each is one rounding off, relative to itself: the square's centre is exact.
@@ -65,7 +72,8 @@ pub(super) fn side(a: &Point, b: &Point, square: &Square) -> Side {
     let left_or_right = beside(ax, bx);
     let beyond = cross.abs() > half * ((b.x - a.x).abs() + (b.y - a.y).abs()) * UP + error;
     let meets = !(left_or_right || beside(ay, by) || beyond);
-    // Where the edge passes the height of the centre, its side is that of both ends or, if they disagree, of the cross product.
+    // Where the edge passes the height of the centre, its side is that of both ends or, if they
+    // disagree, of the cross product.
     let crossing = match (ay > 0.0, by > 0.0) {
         (false, true) if (left_or_right && ax > 0.0) || (!left_or_right && cross > 0.0) => 1,
         (true, false) if (left_or_right && ax > 0.0) || (!left_or_right && cross < 0.0) => -1,
@@ -76,12 +84,16 @@ pub(super) fn side(a: &Point, b: &Point, square: &Square) -> Side {
 
 /// A bound of the exact triangle's depth over the square: no point of it in there is farther.
 ///
-/// Points of the exact triangle and of the one between the points correspond by their barycentric coordinates. Corresponding
-/// points are at most the largest margin apart, and their depths the largest depth error; so it is enough to bound the plane
-/// through the points over the square grown by that margin. A triangle too thin for its plane is bounded by its corners.
+/// Points of the exact triangle and of the one between the points correspond by their barycentric
+/// coordinates.
+/// Corresponding points are at most the largest margin apart, and their depths the largest depth
+/// error; so it is enough to bound the plane through the points over the square grown by that
+/// margin.
+/// A triangle too thin for its plane is bounded by its corners.
 pub(super) fn farthest(corners: [&Point; 3], square: &Square, fault: Option<PlantedFault>) -> f64 {
     let [a, b, c] = corners;
-    let corner_error = |p: &Point| if fault == Some(PlantedFault::CornerDepthsExact) { 0.0 } else { p.far_error };
+    let corner_error =
+        |p: &Point| if fault == Some(PlantedFault::CornerDepthsExact) { 0.0 } else { p.far_error };
     let top = corners.iter().fold(f64::NEG_INFINITY, |m, p| m.max(p.far + corner_error(p)));
     let top = top + 2.0 * ROUNDING * top.abs();
     let half = (square.half + a.margin.max(b.margin).max(c.margin)) * UP;
@@ -97,9 +109,11 @@ pub(super) fn farthest(corners: [&Point; 3], square: &Square, fault: Option<Plan
     let value = fb * (qx * vy - qy * vx) + fc * (ux * qy - uy * qx);
     let value_error = 16.0
         * ROUNDING
-        * (fb.abs() * ((qx * vy).abs() + (qy * vx).abs()) + fc.abs() * ((ux * qy).abs() + (uy * qx).abs()));
+        * (fb.abs() * ((qx * vy).abs() + (qy * vx).abs())
+            + fc.abs() * ((ux * qy).abs() + (uy * qx).abs()));
     let spread = (fb * vy - fc * uy).abs() + (fc * ux - fb * vx).abs();
-    let spread_error = 8.0 * ROUNDING * ((fb * vy).abs() + (fc * uy).abs() + (fc * ux).abs() + (fb * vx).abs());
+    let spread_error =
+        8.0 * ROUNDING * ((fb * vy).abs() + (fc * uy).abs() + (fc * ux).abs() + (fb * vx).abs());
     let most = value * area.signum() + value_error + half * (spread + spread_error) * UP;
     // The area is certain to 1 part in 1024, so its error counts at most twice.
     let rise = most / area.abs();
@@ -120,7 +134,9 @@ mod tests {
     #[test]
     fn touching_counts_as_meeting() {
         let square = Square { x: 0.5, y: 0.5, half: 0.5 };
-        let meets = |a: (f64, f64), b: (f64, f64)| side(&point(a.0, a.1, 0.0), &point(b.0, b.1, 0.0), &square).meets;
+        let meets = |a: (f64, f64), b: (f64, f64)| {
+            side(&point(a.0, a.1, 0.0), &point(b.0, b.1, 0.0), &square).meets
+        };
         assert!(meets((1.0, -3.0), (1.0, 9.0)), "along the border");
         assert!(meets((2.0, 0.0), (0.0, 2.0)), "through a corner");
         assert!(meets((0.4, 0.4), (0.6, 0.5)), "inside");
@@ -134,7 +150,9 @@ mod tests {
         let corners = [point(-9.0, -9.0, 0.0), point(9.0, -8.0, 0.0), point(0.0, 20.0, 0.0)];
         let winding = |x: f64, y: f64, order: [usize; 3]| -> i32 {
             let square = Square { x, y, half: 1e-3 };
-            (0..3).map(|k| side(&corners[order[k]], &corners[order[(k + 1) % 3]], &square).crossing).sum()
+            (0..3)
+                .map(|k| side(&corners[order[k]], &corners[order[(k + 1) % 3]], &square).crossing)
+                .sum()
         };
         assert_eq!(winding(0.0, 0.0, [0, 1, 2]), -winding(0.0, 0.0, [0, 2, 1]));
         assert_eq!(winding(0.0, 0.0, [0, 1, 2]).abs(), 1);
@@ -145,9 +163,14 @@ mod tests {
 
     #[test]
     fn planes_are_bounded_by_their_far_corner_of_the_square() {
-        // far = x / 8 + y / 16 over a large triangle: over the unit square about (2.5, 1.5) that is at most 3/8 + 2/16.
+        // far = x / 8 + y / 16 over a large triangle: over the unit square about (2.5, 1.5) that is
+        // at most 3/8 + 2/16.
         let corners = [point(0.0, 0.0, 0.0), point(16.0, 0.0, 2.0), point(0.0, 16.0, 1.0)];
-        let bound = farthest([&corners[0], &corners[2], &corners[1]], &Square { x: 2.5, y: 1.5, half: 0.5 }, None);
+        let bound = farthest(
+            [&corners[0], &corners[2], &corners[1]],
+            &Square { x: 2.5, y: 1.5, half: 0.5 },
+            None,
+        );
         assert!((0.5..0.5 + 1e-12).contains(&bound), "{bound}");
         // Past the triangle's own reach its corners decide.
         assert!((2.0..2.0 + 1e-12).contains(&farthest(

@@ -3,10 +3,12 @@
 use crate::camera::Vec3;
 use crate::error::{Error, Result};
 
-/// The half-edges of all triangles have to fit 31 bits, twice: clipping may make two cells of a triangle.
+/// The half-edges of all triangles have to fit 31 bits, twice: clipping may make two cells of a
+/// triangle.
 const MAX_TRIANGLES: usize = (1 << 31) / 6 - 1;
 
-/// Triangles with vertices welded by equal position. Half-edge `3 t + k` runs from corner k of triangle t to the next.
+/// Triangles with vertices welded by equal position.
+/// Half-edge `3 t + k` runs from corner k of triangle t to the next.
 #[derive(Debug)]
 pub(super) struct Topology {
     /// World positions, no two equal.
@@ -22,10 +24,15 @@ pub(super) struct Topology {
 }
 
 impl Topology {
-    /// Welds positions that are equal as numbers, across meshes too, and drops triangles that have two equal corners: they cover nothing.
+    /// Welds positions that are equal as numbers, across meshes too, and drops triangles that have
+    /// two equal corners: they cover nothing.
     pub(super) fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self> {
         if triangles.len() > MAX_TRIANGLES {
-            return Err(Error::limit("occluder triangles", triangles.len() as u64, MAX_TRIANGLES as u64));
+            return Err(Error::limit(
+                "occluder triangles",
+                triangles.len() as u64,
+                MAX_TRIANGLES as u64,
+            ));
         }
         let (positions, welded) = weld(positions);
         let triangles: Vec<[u32; 3]> = triangles
@@ -49,7 +56,13 @@ impl Topology {
             edges[*half as usize] = first.len() as u32 - 1;
         }
         first.push(runs.len() as u32);
-        Ok(Self { positions, triangles, edges, first, incident: runs.into_iter().map(|run| run.1).collect() })
+        Ok(Self {
+            positions,
+            triangles,
+            edges,
+            first,
+            incident: runs.into_iter().map(|run| run.1).collect(),
+        })
     }
 
     pub(super) fn num_edges(&self) -> usize {
@@ -106,11 +119,21 @@ mod tests {
 
     #[test]
     fn equal_places_are_one_vertex_and_edges_know_their_triangles() {
-        // A square of two triangles with six vertices of their own, one corner at -0, and a triangle without area.
-        let positions =
-            [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [-0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        // A square of two triangles with six vertices of their own, one corner at -0, and a
+        // triangle without area.
+        let positions = [
+            [0.0; 3],
+            [1.0, 0.0, 0.0],
+            [1.0, 1.0, 0.0],
+            [-0.0, 0.0, 0.0],
+            [1.0, 1.0, 0.0],
+            [0.0, 1.0, 0.0],
+        ];
         let topology = Topology::new(&positions, &[[0, 1, 2], [3, 4, 5], [0, 3, 1]]).unwrap();
-        assert_eq!((topology.positions.len(), topology.triangles.len(), topology.num_edges()), (4, 2, 5));
+        assert_eq!(
+            (topology.positions.len(), topology.triangles.len(), topology.num_edges()),
+            (4, 2, 5)
+        );
         let mut sharing: Vec<usize> = (0..5).map(|e| topology.around(e).len()).collect();
         sharing.sort_unstable();
         assert_eq!(sharing, [1, 1, 1, 1, 2]);

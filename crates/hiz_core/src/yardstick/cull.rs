@@ -10,11 +10,13 @@ use crate::pyramid::Pyramid;
 use crate::readback::{self, BufferRange};
 use crate::visible::Visible;
 
-/// Records the cull of `instances`, boxes, as one would write it who trusts float32: it hides what can be seen. Of the options order
-/// and footprint count.
+/// Records the cull of `instances`, boxes, as one would write it who trusts float32: it hides what
+/// can be seen.
+/// Of the options order and footprint count.
 ///
 /// # Errors
-/// As [`HizContext::record_cull`](crate::HizContext::record_cull), and [`Error::Invalid`] for other volumes.
+/// As [`HizContext::record_cull`](crate::HizContext::record_cull), and [`Error::Invalid`] for other
+/// volumes.
 pub fn record_uncertified_cull(
     engine: &Engine,
     encoder: &mut wgpu::CommandEncoder,
@@ -25,21 +27,29 @@ pub fn record_uncertified_cull(
     options: &CullOptions,
 ) -> Result<()> {
     if instances.kind() != BoundsKind::Box {
-        return Err(Error::invalid("instances", format!("expected boxes, got {:?}", instances.kind())));
+        return Err(Error::invalid(
+            "instances",
+            format!("expected boxes, got {:?}", instances.kind()),
+        ));
     }
-    let options = &CullOptions { hierarchy: Hierarchy::Never, statistics: false, ..options.clone() };
+    let options =
+        &CullOptions { hierarchy: Hierarchy::Never, statistics: false, ..options.clone() };
     let inputs = CullInputs { instances, camera, pyramid, options, certified: false, idle: false };
     cull::record(&engine.context().gpu, encoder, &inputs, visible)
 }
 
-/// Whether each instance is kept, by the mask of the last cull into `visible`: what a yardstick hides is counted beside its time.
+/// Whether each instance is kept, by the mask of the last cull into `visible`: what a yardstick
+/// hides is counted beside its time.
 ///
 /// # Errors
 /// [`Error::Mismatch`] where there is no mask, [`Error::DeviceLost`].
 pub fn read_mask(engine: &Engine, visible: &Visible) -> Result<Vec<bool>> {
     if !visible.outputs().mask {
         let got = visible.outputs();
-        return Err(Error::mismatch("outputs", format!("expected a cull that was asked for mask, got one with {got}")));
+        return Err(Error::mismatch(
+            "outputs",
+            format!("expected a cull that was asked for mask, got one with {got}"),
+        ));
     }
     let planes: Vec<_> = visible
         .pieces

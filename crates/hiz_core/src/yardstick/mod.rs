@@ -1,4 +1,5 @@
-//! What the library is measured against: the same work in the shapes that others give it. For benchmarks and their tests alone.
+//! What the library is measured against: the same work in the shapes that others give it.
+//! For benchmarks and their tests alone.
 
 mod cull;
 mod reduce;
@@ -12,15 +13,20 @@ use crate::error::Result;
 use crate::headless::Engine;
 use crate::readback;
 
-/// Milliseconds on the wall from the submit of what `record` records to its end. (Timestamps are wrong on lavapipe once a render pass
-/// has run.) Whatever was submitted before is waited for first; recording is not counted.
+/// Milliseconds on the wall from the submit of what `record` records to its end.
+/// (Timestamps are wrong on lavapipe once a render pass has run.)
+/// Whatever was submitted before is waited for first; recording is not counted.
 ///
 /// # Errors
 /// Those of `record`, and [`Error::DeviceLost`](crate::Error::DeviceLost).
-pub fn submitted_ms(engine: &Engine, record: impl FnOnce(&mut wgpu::CommandEncoder) -> Result<()>) -> Result<f64> {
+pub fn submitted_ms(
+    engine: &Engine,
+    record: impl FnOnce(&mut wgpu::CommandEncoder) -> Result<()>,
+) -> Result<f64> {
     let device = engine.device();
-    let mut encoder =
-        device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("hiz.yardstick.encoder") });
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
+        label: Some("hiz.yardstick.encoder"),
+    });
     record(&mut encoder)?;
     let commands = encoder.finish();
     readback::wait(device, None)?;
@@ -38,7 +44,8 @@ pub fn empty_submit_ms(engine: &Engine) -> Result<f64> {
     submitted_ms(engine, |_| Ok(()))
 }
 
-/// Milliseconds of copying `from` into `to` on one thread of the host: what touching every number once costs.
+/// Milliseconds of copying `from` into `to` on one thread of the host: what touching every number
+/// once costs.
 ///
 /// # Panics
 /// If the two are not of the same length.

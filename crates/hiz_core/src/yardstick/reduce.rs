@@ -17,7 +17,8 @@ pub enum ReductionShape {
     Textures,
 }
 
-/// `shaders/yardstick/reduce_buffer.wgsl`, `YardstickLevel`: offset and stride in vectors of four texels.
+/// `shaders/yardstick/reduce_buffer.wgsl`, `YardstickLevel`: offset and stride in vectors of four
+/// texels.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct Level {
@@ -40,7 +41,8 @@ enum Storage {
     Textures(wgpu::Texture),
 }
 
-/// All levels of a depth image's pyramid, reduced by one dispatch each; everything that can be made beforehand is.
+/// All levels of a depth image's pyramid, reduced by one dispatch each; everything that can be made
+/// beforehand is.
 #[derive(Debug)]
 pub struct PerLevelReduction {
     levels: Vec<Level>,
@@ -68,7 +70,9 @@ impl PerLevelReduction {
             }
             ReductionShape::Textures => Storage::Textures(mip_levels(gpu, &levels)),
         };
-        let steps = (1..levels.len()).map(|k| step(gpu, depth, &levels, &storage, k)).collect::<Result<_>>()?;
+        let steps = (1..levels.len())
+            .map(|k| step(gpu, depth, &levels, &storage, k))
+            .collect::<Result<_>>()?;
         Ok(Self { levels, storage, steps })
     }
 
@@ -94,8 +98,11 @@ impl PerLevelReduction {
         let device = engine.device();
         let bytes = match &self.storage {
             Storage::Buffer(buffer) => {
-                let range =
-                    BufferRange { buffer, offset: 16 * u64::from(offset), size: 16 * u64::from(stride * height) };
+                let range = BufferRange {
+                    buffer,
+                    offset: 16 * u64::from(offset),
+                    size: 16 * u64::from(stride * height),
+                };
                 readback::read_buffers(device, engine.queue(), &[range])?.swap_remove(0)
             }
             Storage::Textures(texture) => {
@@ -106,9 +113,13 @@ impl PerLevelReduction {
                     usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
                     mapped_at_creation: false,
                 });
-                let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                let mut encoder =
+                    device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
                 encoder.copy_texture_to_buffer(
-                    wgpu::TexelCopyTextureInfo { mip_level: k as u32 - 1, ..texture.as_image_copy() },
+                    wgpu::TexelCopyTextureInfo {
+                        mip_level: k as u32 - 1,
+                        ..texture.as_image_copy()
+                    },
                     wgpu::TexelCopyBufferInfo {
                         buffer: &copied,
                         layout: wgpu::TexelCopyBufferLayout {
@@ -120,8 +131,12 @@ impl PerLevelReduction {
                     wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
                 );
                 engine.queue().submit([encoder.finish()]);
-                readback::read_buffers(device, engine.queue(), &[BufferRange::first(&copied, copied.size())])?
-                    .swap_remove(0)
+                readback::read_buffers(
+                    device,
+                    engine.queue(),
+                    &[BufferRange::first(&copied, copied.size())],
+                )?
+                .swap_remove(0)
             }
         };
         Ok(bytes
@@ -148,7 +163,9 @@ pub fn reduce(
 fn levels(size: ImageSize) -> Vec<Level> {
     let mut levels = vec![Level { offset: 0, stride: 0, width: size.width, height: size.height }];
     let mut offset = 0;
-    while let Some(Level { width, height, .. }) = levels.last().filter(|l| l.width > 1 || l.height > 1) {
+    while let Some(Level { width, height, .. }) =
+        levels.last().filter(|l| l.width > 1 || l.height > 1)
+    {
         let (width, height) = (width.div_ceil(2), height.div_ceil(2));
         let stride = width.div_ceil(4);
         levels.push(Level { offset, stride, width, height });
@@ -157,7 +174,8 @@ fn levels(size: ImageSize) -> Vec<Level> {
     levels
 }
 
-/// A texture halves its mip levels downwards, a pyramid upwards: sides that are powers of two hold both.
+/// A texture halves its mip levels downwards, a pyramid upwards: sides that are powers of two hold
+/// both.
 fn mip_levels(gpu: &Gpu, levels: &[Level]) -> wgpu::Texture {
     gpu.device().create_texture(&wgpu::TextureDescriptor {
         label: Some("hiz.yardstick.mips"),
@@ -178,7 +196,13 @@ fn mip_levels(gpu: &Gpu, levels: &[Level]) -> wgpu::Texture {
 }
 
 /// The dispatch that makes level `k` out of the one before.
-fn step(gpu: &Gpu, depth: &DepthImage, levels: &[Level], storage: &Storage, k: usize) -> Result<Step> {
+fn step(
+    gpu: &Gpu,
+    depth: &DepthImage,
+    levels: &[Level],
+    storage: &Storage,
+    k: usize,
+) -> Result<Step> {
     let kind = SourceKind::of(depth.texture().format()).expect("a depth image's own format");
     let (read, written) = (levels[k - 1], levels[k]);
     let source = depth.texture().create_view(&wgpu::TextureViewDescriptor::default());
@@ -234,7 +258,10 @@ fn step(gpu: &Gpu, depth: &DepthImage, levels: &[Level], storage: &Storage, k: u
             (
                 shader::yardstick_reduce_texture(kind),
                 "reduce_texture",
-                gpu.uniform("hiz.yardstick.step", &[written.width, written.height, read.width, read.height])?,
+                gpu.uniform(
+                    "hiz.yardstick.step",
+                    &[written.width, written.height, read.width, read.height],
+                )?,
                 [written.width.div_ceil(8), written.height.div_ceil(8)],
             )
         }

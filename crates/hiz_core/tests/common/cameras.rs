@@ -1,4 +1,5 @@
-//! Random cameras for a scene: where rasterisers and float32 err the most, where depths tie, and anywhere.
+//! Random cameras for a scene: where rasterisers and float32 err the most, where depths tie, and
+//! anywhere.
 
 use hiz_core::{Camera, DepthConvention, ImageSize, Pose, Projection, Vec3};
 
@@ -12,7 +13,8 @@ pub(crate) const KINDS: [&str; 8] = [
     // The eye in a face's plane or next to it, looking along it at less than a degree.
     "grazing",
     "off_centre",
-    // In no special direction: lavapipe gives faces that are seen exactly edge-on any depth at all (`docs/accuracy.md`).
+    // In no special direction: lavapipe gives faces that are seen exactly edge-on any depth at all
+    // (`docs/accuracy.md`).
     "orthographic",
     // The eye on a body or inside of it.
     "touching",
@@ -22,8 +24,18 @@ pub(crate) const KINDS: [&str; 8] = [
     "orthographic_inside",
 ];
 
-const SIZES: [(u32, u32); 10] =
-    [(321, 203), (320, 180), (257, 129), (127, 255), (128, 128), (321, 203), (199, 101), (65, 63), (33, 17), (5, 3)];
+const SIZES: [(u32, u32); 10] = [
+    (321, 203),
+    (320, 180),
+    (257, 129),
+    (127, 255),
+    (128, 128),
+    (321, 203),
+    (199, 101),
+    (65, 63),
+    (33, 17),
+    (5, 3),
+];
 
 const CONVENTIONS: [DepthConvention; 2] = [DepthConvention::Standard, DepthConvention::Reversed];
 
@@ -48,7 +60,8 @@ fn axis(random: &mut Random) -> Vec3 {
 
 /// A point of a random triangle, the triangle's normal, and a direction in its plane.
 fn on_a_face(mesh: &Mesh, random: &mut Random) -> (Vec3, Vec3, Vec3) {
-    let corners = mesh.triangles[random.below(mesh.triangles.len())].map(|v| mesh.vertices[v as usize]);
+    let corners =
+        mesh.triangles[random.below(mesh.triangles.len())].map(|v| mesh.vertices[v as usize]);
     let [a, b, c] = corners;
     let [u, v] = [random.range(0.0, 0.5), random.range(0.0, 0.5)];
     let [to_b, to_c] = [b, c].map(|p| along(p, a, -1.0));
@@ -63,7 +76,8 @@ pub(crate) fn random_shots(scene: &Scene, count: usize, seed: u64) -> Vec<Shot> 
 }
 
 fn random_shot(scene: &Scene, name: &'static str, random: &mut Random) -> Shot {
-    let mut eye: Vec3 = [0, 1, 2].map(|k| scene.origin[k] + random.range(-1.1, 1.1) * scene.reach[k]);
+    let mut eye: Vec3 =
+        [0, 1, 2].map(|k| scene.origin[k] + random.range(-1.1, 1.1) * scene.reach[k]);
     if random.below(4) > 0 {
         eye[1] = scene.origin[1] + random.range(0.2, 1.0) * scene.reach[1];
     }
@@ -75,23 +89,36 @@ fn random_shot(scene: &Scene, name: &'static str, random: &mut Random) -> Shot {
             let bodies = Mesh::of_bodies([&random.pick(&scene.crowd)]);
             let mesh = if random.below(3) == 0 { &bodies } else { &scene.walls };
             let (point, away, tangent) = on_a_face(mesh, random);
-            eye = along(along(point, away, random.pick(&[0.0, 1e-6, 1e-3, 0.03])), tangent, -random.range(0.0, 3.0));
+            eye = along(
+                along(point, away, random.pick(&[0.0, 1e-6, 1e-3, 0.03])),
+                tangent,
+                -random.range(0.0, 3.0),
+            );
             forward = unit(along(tangent, away, random.pick(&[0.0, 1e-4, -1e-3, -1e-2])));
         }
         "touching" => {
             let bodies = Mesh::of_bodies([&random.pick(&scene.crowd)]);
             let (point, away, tangent) = on_a_face(&bodies, random);
             eye = along(point, away, random.pick(&[0.0, 1e-5, 0.05, -1e-5, -0.05]));
-            forward = unit(along(along(tangent, away, random.range(-1.0, 1.0)), direction(random), 0.3));
+            forward =
+                unit(along(along(tangent, away, random.range(-1.0, 1.0)), direction(random), 0.3));
         }
         "cutting" => {
-            forward = unit(along(direction(random), unit([0, 1, 2].map(|k| scene.origin[k] - eye[k] + 1e-3)), 1.0));
+            forward = unit(along(
+                direction(random),
+                unit([0, 1, 2].map(|k| scene.origin[k] - eye[k] + 1e-3)),
+                1.0,
+            ));
         }
         _ => {}
     }
     let convention = random.pick(&CONVENTIONS);
     let far = random.pick(&[None, Some(90.0), Some(400.0)]);
-    let near = if name == "cutting" { random.range(0.5, 8.0) } else { 10.0_f64.powf(random.range(-3.0, 0.0)) };
+    let near = if name == "cutting" {
+        random.range(0.5, 8.0)
+    } else {
+        10.0_f64.powf(random.range(-3.0, 0.0))
+    };
     let (width, height) = random.pick(&SIZES);
     let aspect = f64::from(width) / f64::from(height);
     let projection = match name {
@@ -115,7 +142,8 @@ fn random_shot(scene: &Scene, name: &'static str, random: &mut Random) -> Shot {
             if !inside {
                 eye = along(scene.origin, forward, -0.5 * depth);
             }
-            // The pose stands where depth is 0: there the engine's own prepass has its origin, too, and rounds as the picture does.
+            // The pose stands where depth is 0: there the engine's own prepass has its origin, too,
+            // and rounds as the picture does.
             let (near, far) = if convention.is_reversed() { (-length, 0.0) } else { (0.0, length) };
             if convention.is_reversed() {
                 eye = along(eye, forward, length);
@@ -138,6 +166,7 @@ fn random_shot(scene: &Scene, name: &'static str, random: &mut Random) -> Shot {
         up = [1.0, 0.0, 0.0];
     }
     let pose = Pose { eye, target: along(eye, forward, 7.0), up };
-    let camera = Camera::look_at(&pose, &projection, ImageSize::new(width, height)).expect("a camera that can be used");
+    let camera = Camera::look_at(&pose, &projection, ImageSize::new(width, height))
+        .expect("a camera that can be used");
     Shot { name, camera, crowd_occludes: random.below(2) == 0 }
 }

@@ -1,6 +1,8 @@
-//! Tables of docs/accuracy.md that are counts: the tests that print them hold them against the page.
+//! Tables of docs/accuracy.md that are counts: the tests that print them hold them against the
+//! page.
 
-/// Nothing is compared on another driver than the one that the page names: its guesses are others, and a few counts with them.
+/// Nothing is compared on another driver than the one that the page names: its guesses are others,
+/// and a few counts with them.
 pub(crate) fn is_of_this_driver(engine: &hiz_core::headless::Engine) -> bool {
     let adapter = engine.adapter();
     [&adapter.name, &adapter.driver_info].iter().all(|part| page().contains(part.as_str()))

@@ -1,4 +1,5 @@
-//! The truth about rays and triangles: exact integers, brute force, no code of the crate but a camera's rows.
+//! The truth about rays and triangles: exact integers, brute force, no code of the crate but a
+//! camera's rows.
 
 use hiz_core::Camera;
 use num_bigint::{BigInt, Sign};
@@ -14,7 +15,8 @@ fn exact(x: f64) -> BigInt {
     let bits = x.to_bits();
     let field = ((bits >> 52) & 0x7ff) as i32;
     let fraction = bits & ((1 << 52) - 1);
-    let (integer, exponent) = if field == 0 { (fraction, -1074) } else { (fraction | 1 << 52, field - 1075) };
+    let (integer, exponent) =
+        if field == 0 { (fraction, -1074) } else { (fraction | 1 << 52, field - 1075) };
     let shift = exponent + SCALE;
     let magnitude = if shift >= 0 {
         BigInt::from(integer) << shift as usize
@@ -43,10 +45,15 @@ impl ExactScene {
             .chunks_exact(3)
             .map(|p| {
                 let d: Vec<BigInt> = p.iter().zip(&origin).map(|(p, o)| exact(*p) - o).collect();
-                std::array::from_fn(|i| (0..3).fold(&rows[i][3] << SCALE as usize, |sum, k| sum + &rows[i][k] * &d[k]))
+                std::array::from_fn(|i| {
+                    (0..3).fold(&rows[i][3] << SCALE as usize, |sum, k| sum + &rows[i][k] * &d[k])
+                })
             })
             .collect();
-        let triangles = triangles.chunks_exact(3).map(|t| [0, 1, 2].map(|k| clip[t[k] as usize].clone())).collect();
+        let triangles = triangles
+            .chunks_exact(3)
+            .map(|t| [0, 1, 2].map(|k| clip[t[k] as usize].clone()))
+            .collect();
         let size = camera.size();
         Self {
             triangles,
@@ -55,8 +62,9 @@ impl ExactScene {
         }
     }
 
-    /// Whether the ray through image point `at` (pixels, row 0 on top) meets a triangle of `facing` inside of the near plane at
-    /// `depth` or nearer. Triangles seen exactly edge-on count as missed.
+    /// Whether the ray through image point `at` (pixels, row 0 on top) meets a triangle of `facing`
+    /// inside of the near plane at `depth` or nearer.
+    /// Triangles seen exactly edge-on count as missed.
     pub(crate) fn blocked(&self, at: [f64; 2], depth: f32, facing: Facing) -> bool {
         let [width, height] = self.size.map(exact);
         let (px, py) = (exact(at[0]), exact(at[1]));
@@ -65,8 +73,9 @@ impl ExactScene {
         let depth = exact(f64::from(depth));
         self.triangles.iter().any(|t| {
             // The ray's line meets the corners' combination whose x W = q w.
-            let u: [[BigInt; 2]; 3] =
-                std::array::from_fn(|i| [&t[i][0] * &width - &qx * &t[i][3], &t[i][1] * &height - &qy * &t[i][3]]);
+            let u: [[BigInt; 2]; 3] = std::array::from_fn(|i| {
+                [&t[i][0] * &width - &qx * &t[i][3], &t[i][1] * &height - &qy * &t[i][3]]
+            });
             let beside = |axis: usize, sign| u.iter().all(|corner| corner[axis].sign() == sign);
             if [0, 1].iter().any(|axis| beside(*axis, Sign::Plus) || beside(*axis, Sign::Minus)) {
                 return false;
@@ -89,7 +98,11 @@ impl ExactScene {
             let at_depth = &depth * &w;
             let z = z << SCALE as usize;
             let w = w << SCALE as usize;
-            if self.reversed { z <= w && z >= at_depth } else { z.sign() != Sign::Minus && z <= at_depth }
+            if self.reversed {
+                z <= w && z >= at_depth
+            } else {
+                z.sign() != Sign::Minus && z <= at_depth
+            }
         })
     }
 }

@@ -1,4 +1,5 @@
-//! What the device tests share: one engine a process, its adapter printed and checked, and a small seeded generator.
+//! What the device tests share: one engine a process, its adapter printed and checked, and a small
+//! seeded generator.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
 use std::cell::OnceCell;
@@ -7,12 +8,15 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use hiz_core::headless::Engine;
 use hiz_core::{Camera, DepthConvention, ImageSize, Mat4};
 
-/// The engine that the tests of this process share. It lives as long as one of their threads: each that has asked for it holds it until
-/// the thread ends, and then the device is waited for and destroyed. (A static would keep it until the process ends, and lavapipe may
-/// then still be freeing memory on a thread of its own: `free(): invalid size`.)
+/// The engine that the tests of this process share.
+/// It lives as long as one of their threads: each that has asked for it holds it until the thread
+/// ends, and then the device is waited for and destroyed.
+/// (A static would keep it until the process ends, and lavapipe may then still be freeing memory on
+/// a thread of its own: `free(): invalid size`.)
 ///
 /// `HIZVK_EXPECT_ADAPTER` (a part of the adapter's name or driver) refuses any other.
-/// `HIZVK_PLANTED_FAULT` (`what => by what`, one a line) replaces texts in the shaders: does any test turn red?
+/// `HIZVK_PLANTED_FAULT` (`what => by what`, one a line) replaces texts in the shaders: does any
+/// test turn red?
 pub(crate) fn engine() -> Arc<Engine> {
     // A weak reference holds no device.
     static SHARED: Mutex<Weak<Engine>> = Mutex::new(Weak::new());
@@ -35,7 +39,8 @@ struct Held(Option<Arc<Engine>>);
 impl Drop for Held {
     fn drop(&mut self) {
         if let Some(last) = self.0.take().and_then(Arc::into_inner) {
-            // On a thread of its own: those of this thread's locals that wgpu uses may be gone already.
+            // On a thread of its own: those of this thread's locals that wgpu uses may be gone
+            // already.
             std::thread::spawn(move || drop(last)).join().expect("the device is let go of");
         }
     }
@@ -44,8 +49,10 @@ impl Drop for Held {
 fn open() -> Engine {
     let planted = std::env::var("HIZVK_PLANTED_FAULT").unwrap_or_default();
     let planted = planted.lines().map(|line| line.replace("\\n", "\n")).collect::<Vec<_>>();
-    let faults: Vec<(&str, &str)> = planted.iter().filter_map(|line| line.split_once(" => ")).collect();
-    let engine = Engine::with_planted_faults(None, &faults).expect("the device tests need a Vulkan driver");
+    let faults: Vec<(&str, &str)> =
+        planted.iter().filter_map(|line| line.split_once(" => ")).collect();
+    let engine =
+        Engine::with_planted_faults(None, &faults).expect("the device tests need a Vulkan driver");
     let adapter = engine.adapter().to_string();
     eprintln!("adapter: {adapter}");
     if let Ok(expected) = std::env::var("HIZVK_EXPECT_ADAPTER") {
@@ -57,7 +64,8 @@ fn open() -> Engine {
     engine
 }
 
-/// A camera at the origin whose clip coordinates are written down: view depth is z, x and y span -1..1 at depth 1.
+/// A camera at the origin whose clip coordinates are written down: view depth is z, x and y span
+/// -1..1 at depth 1.
 pub(crate) fn camera_along_z(width: u32, height: u32, convention: DepthConvention) -> Camera {
     // Near plane at 1, infinitely far: standard z = w - 1, reversed z = 1.
     let z = match convention {
@@ -65,7 +73,8 @@ pub(crate) fn camera_along_z(width: u32, height: u32, convention: DepthConventio
         DepthConvention::Reversed => [0.0, 0.0, 0.0, 1.0],
     };
     let m: Mat4 = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], z, [0.0, 0.0, 1.0, 0.0]];
-    Camera::from_clip_from_world(m, ImageSize::new(width, height), convention).expect("a plain camera")
+    Camera::from_clip_from_world(m, ImageSize::new(width, height), convention)
+        .expect("a plain camera")
 }
 
 /// The NDC depth of view depth `z` for [`camera_along_z`]; exact for powers of two.
@@ -76,7 +85,8 @@ pub(crate) fn ndc(z: f32, convention: DepthConvention) -> f32 {
     }
 }
 
-pub(crate) const CONVENTIONS: [DepthConvention; 2] = [DepthConvention::Standard, DepthConvention::Reversed];
+pub(crate) const CONVENTIONS: [DepthConvention; 2] =
+    [DepthConvention::Standard, DepthConvention::Reversed];
 
 /// `SplitMix64` (Steele, Lea, Flood, OOPSLA 2014): small, seeded, the same everywhere.
 #[derive(Debug)]

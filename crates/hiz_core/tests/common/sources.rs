@@ -38,9 +38,15 @@ fn texture_of(
     words: &[u8],
 ) -> wgpu::Texture {
     let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
-    let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC;
+    let usage = wgpu::TextureUsages::TEXTURE_BINDING
+        | wgpu::TextureUsages::COPY_DST
+        | wgpu::TextureUsages::COPY_SRC;
     let texture = engine.device().create_texture(&descriptor(size, format, usage));
-    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * width), rows_per_image: None };
+    let layout = wgpu::TexelCopyBufferLayout {
+        offset: 0,
+        bytes_per_row: Some(4 * width),
+        rows_per_image: None,
+    };
     engine.queue().write_texture(texture.as_image_copy(), words, layout, size);
     texture
 }
@@ -62,14 +68,20 @@ fn descriptor(
     }
 }
 
-/// A depth texture whose pixels are what fragments say. (What a driver makes of NaN is its own
-/// affair.)
+/// A depth texture whose pixels are what fragments say.
+/// (What a driver makes of NaN is its own affair.)
 fn drawn(engine: &Engine, (width, height): (u32, u32), depth: &[f32]) -> wgpu::Texture {
     let device = engine.device();
-    let bits = texture_of(engine, (width, height), wgpu::TextureFormat::R32Uint, bytemuck::cast_slice(depth));
+    let bits = texture_of(
+        engine,
+        (width, height),
+        wgpu::TextureFormat::R32Uint,
+        bytemuck::cast_slice(depth),
+    );
     let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
-    let usage =
-        wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
+    let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
+        | wgpu::TextureUsages::TEXTURE_BINDING
+        | wgpu::TextureUsages::COPY_SRC;
     let target = device.create_texture(&descriptor(size, wgpu::TextureFormat::Depth32Float, usage));
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("test.drawn"),
@@ -107,7 +119,9 @@ fn drawn(engine: &Engine, (width, height): (u32, u32), depth: &[f32]) -> wgpu::T
         layout: &pipeline.get_bind_group_layout(0),
         entries: &[wgpu::BindGroupEntry {
             binding: 0,
-            resource: wgpu::BindingResource::TextureView(&bits.create_view(&wgpu::TextureViewDescriptor::default())),
+            resource: wgpu::BindingResource::TextureView(
+                &bits.create_view(&wgpu::TextureViewDescriptor::default()),
+            ),
         }],
     });
     let view = target.create_view(&wgpu::TextureViewDescriptor::default());
@@ -116,7 +130,10 @@ fn drawn(engine: &Engine, (width, height): (u32, u32), depth: &[f32]) -> wgpu::T
         label: Some("test.drawn"),
         depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
             view: &view,
-            depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
+            depth_ops: Some(wgpu::Operations {
+                load: wgpu::LoadOp::Clear(0.0),
+                store: wgpu::StoreOp::Store,
+            }),
             stencil_ops: None,
         }),
         ..Default::default()
@@ -139,13 +156,20 @@ pub(crate) fn pyramid_from(
 ) -> Arc<Pyramid> {
     let size = (camera.size().width, camera.size().height);
     let texture = match source {
-        Source::Bits => return engine.pyramid_with(&engine.upload_depth(depth, camera).unwrap(), options).unwrap(),
-        Source::Float => texture_of(engine, size, wgpu::TextureFormat::R32Float, bytemuck::cast_slice(depth)),
+        Source::Bits => {
+            return engine
+                .pyramid_with(&engine.upload_depth(depth, camera).unwrap(), options)
+                .unwrap();
+        }
+        Source::Float => {
+            texture_of(engine, size, wgpu::TextureFormat::R32Float, bytemuck::cast_slice(depth))
+        }
         Source::Depth => drawn(engine, size, depth),
     };
     let pyramid = Arc::new(engine.context().create_pyramid(camera.size(), options).unwrap());
     let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-    let mut encoder = engine.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let mut encoder =
+        engine.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     engine.context().record_reduce(&mut encoder, &view, camera, &pyramid).unwrap();
     engine.queue().submit([encoder.finish()]);
     pyramid

@@ -16,14 +16,22 @@ pub fn contains(volume: &Volume, point: [f64; 3]) -> bool {
             .expect("exact numbers have a sign")
 }
 
-/// How far the points `world_from_mesh * p` of `vertices` lie outside of the volume, in world units: none if all of them lie in it, the
-/// products taken exactly; infinite for a volume that is none or a point that is not finite.
+/// How far the points `world_from_mesh * p` of `vertices` lie outside of the volume, in world
+/// units: none if all of them lie in it, the products taken exactly; infinite for a volume that is
+/// none or a point that is not finite.
 ///
-/// The distance is in plain float64 and no more than what really sticks out, up to rounding. (The volume is convex: the mesh lies in it if
-/// its vertices do.)
-pub fn check_bounds(volume: &Volume, vertices: &[[f64; 3]], world_from_mesh: Option<&[f64; 16]>) -> Option<f64> {
+/// The distance is in plain float64 and no more than what really sticks out, up to rounding.
+/// (The volume is convex: the mesh lies in it if its vertices do.)
+pub fn check_bounds(
+    volume: &Volume,
+    vertices: &[[f64; 3]],
+    world_from_mesh: Option<&[f64; 16]>,
+) -> Option<f64> {
     let finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
-    if !volume.is_valid() || !world_from_mesh.is_none_or(|m| finite(m)) || !finite(vertices.as_flattened()) {
+    if !volume.is_valid()
+        || !world_from_mesh.is_none_or(|m| finite(m))
+        || !finite(vertices.as_flattened())
+    {
         return Some(f64::INFINITY);
     }
     let mut worst: Option<f64> = None;
@@ -71,20 +79,24 @@ fn rests<S: Scalar>(volume: &Volume, p: &[S; 3]) -> Vec<S> {
     match volume {
         Volume::Sphere { center, radius } => {
             let square = |x: S| x.times(&x.clone());
-            let distance = (0..3).fold(number(0.0), |sum, i| sum.plus(&square(p[i].minus(&number(center[i])))));
+            let distance = (0..3)
+                .fold(number(0.0), |sum, i| sum.plus(&square(p[i].minus(&number(center[i])))));
             vec![square(number(*radius)).minus(&distance)]
         }
-        Volume::Box { min, max } => {
-            (0..3).flat_map(|i| [p[i].minus(&number(min[i])), number(max[i]).minus(&p[i])]).collect()
-        }
+        Volume::Box { min, max } => (0..3)
+            .flat_map(|i| [p[i].minus(&number(min[i])), number(max[i]).minus(&p[i])])
+            .collect(),
         Volume::OrientedBox { center, half_sizes, axes } => {
             let d = [0, 1, 2].map(|i| p[i].minus(&number(center[i])));
-            let half_axis = |k: usize| [0, 1, 2].map(|i| number(axes[i][k]).times(&number(half_sizes[k])));
+            let half_axis =
+                |k: usize| [0, 1, 2].map(|i| number(axes[i][k]).times(&number(half_sizes[k])));
             let half_axes = [half_axis(0), half_axis(1), half_axis(2)];
             normals(&half_axes)
                 .iter()
                 .map(|n| {
-                    let support = half_axes.iter().fold(number(0.0), |sum, e| sum.plus(&dot(n, e).magnitude()));
+                    let support = half_axes
+                        .iter()
+                        .fold(number(0.0), |sum, e| sum.plus(&dot(n, e).magnitude()));
                     support.minus(&dot(n, &d).magnitude())
                 })
                 .collect()
@@ -92,8 +104,9 @@ fn rests<S: Scalar>(volume: &Volume, p: &[S; 3]) -> Vec<S> {
     }
 }
 
-/// Directions whose slabs together are the parallelepiped with these half axes: cross products of two where it is solid; where it is
-/// flat, what bounds it within its plane or line, too. Every direction's slab contains it, so that none is wrong.
+/// Directions whose slabs together are the parallelepiped with these half axes: cross products of
+/// two where it is solid; where it is flat, what bounds it within its plane or line, too.
+/// Every direction's slab contains it, so that none is wrong.
 fn normals<S: Scalar>(e: &[[S; 3]; 3]) -> Vec<[S; 3]> {
     let pairs = [(0, 1), (1, 2), (2, 0)];
     let faces = pairs.map(|(i, j): (usize, usize)| cross(&e[i], &e[j]));
@@ -112,7 +125,8 @@ fn normals<S: Scalar>(e: &[[S; 3]; 3]) -> Vec<[S; 3]> {
 }
 
 fn cross<S: Scalar>(u: &[S; 3], v: &[S; 3]) -> [S; 3] {
-    [(1, 2), (2, 0), (0, 1)].map(|(i, j): (usize, usize)| u[i].times(&v[j]).minus(&u[j].times(&v[i])))
+    [(1, 2), (2, 0), (0, 1)]
+        .map(|(i, j): (usize, usize)| u[i].times(&v[j]).minus(&u[j].times(&v[i])))
 }
 
 fn dot<S: Scalar>(u: &[S; 3], v: &[S; 3]) -> S {
@@ -127,7 +141,9 @@ fn distance(volume: &Volume, p: [f64; 3]) -> f64 {
     };
     match volume {
         Volume::Sphere { center, radius } => norm([0, 1, 2].map(|i| p[i] - center[i])) - radius,
-        Volume::Box { min, max } => norm([0, 1, 2].map(|i| (min[i] - p[i]).max(p[i] - max[i]).max(0.0))),
+        Volume::Box { min, max } => {
+            norm([0, 1, 2].map(|i| (min[i] - p[i]).max(p[i] - max[i]).max(0.0)))
+        }
         Volume::OrientedBox { center, half_sizes, axes } => {
             let half_axes = [0, 1, 2].map(|k| [0, 1, 2].map(|i| axes[i][k] * half_sizes[k]));
             let d = [0, 1, 2].map(|i| p[i] - center[i]);

@@ -1,4 +1,5 @@
-//! Whether occluder proxies lie inside their mesh and bounds contain theirs: what a cull takes for granted, decided exactly.
+//! Whether occluder proxies lie inside their mesh and bounds contain theirs: what a cull takes for
+//! granted, decided exactly.
 
 mod bounds;
 mod proxy;
@@ -8,11 +9,16 @@ mod winding;
 pub use bounds::{check_bounds, contains};
 pub use proxy::{Protrusion, check_proxy};
 
-/// A power of two that brings the largest of the numbers near 1. Distances are told in plain float64, and its squares and products leave
-/// its range where coordinates are large or small; times a power of two nothing is lost.
+/// A power of two that brings the largest of the numbers near 1.
+/// Distances are told in plain float64, and its squares and products leave its range where
+/// coordinates are large or small; times a power of two nothing is lost.
 fn unit_scale(numbers: impl IntoIterator<Item = f64>) -> f64 {
     let largest = numbers.into_iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-    if largest > 0.0 && largest.is_finite() { (-largest.log2().floor()).clamp(-1000.0, 1000.0).exp2() } else { 1.0 }
+    if largest > 0.0 && largest.is_finite() {
+        (-largest.log2().floor()).clamp(-1000.0, 1000.0).exp2()
+    } else {
+        1.0
+    }
 }
 
 /// A triangle mesh, borrowed from the caller.

@@ -1,9 +1,11 @@
 //! Whether an occluder proxy lies inside its mesh.
 //!
-//! The solid of a closed mesh is its surface and all points that it winds about. A proxy triangle lies in it if the mesh winds about all
-//! of its points that are not on the mesh. The mesh meets the triangle's plane in segments and in triangles of that plane; between
-//! the segments the winding is constant. So one point of each part decides: the parts are found by slabs between the
-//! x coordinates of all ends and crossings of segments, exactly, and each part has a point in the middle of some slab.
+//! The solid of a closed mesh is its surface and all points that it winds about.
+//! A proxy triangle lies in it if the mesh winds about all of its points that are not on the mesh.
+//! The mesh meets the triangle's plane in segments and in triangles of that plane; between the
+//! segments the winding is constant.
+//! So one point of each part decides: the parts are found by slabs between the x coordinates of all
+//! ends and crossings of segments, exactly, and each part has a point in the middle of some slab.
 
 use super::ratio::Ratio;
 use super::winding::{Place, surely_beside};
@@ -19,18 +21,26 @@ pub struct Protrusion {
     pub witnesses: Vec<[f64; 3]>,
     /// Proxy vertices of triangles that are outside, ascending.
     pub vertices: Vec<usize>,
-    /// The largest distance of a witness or an outside vertex to the mesh, in plain float64: no more than what the proxy really protrudes.
+    /// The largest distance of a witness or an outside vertex to the mesh, in plain float64: no
+    /// more than what the proxy really protrudes.
     pub distance: f64,
 }
 
-/// What of `proxy` does not lie in the closed solid of `mesh`: nothing, if the proxy is safe to draw in its mesh's stead. Exact.
+/// What of `proxy` does not lie in the closed solid of `mesh`: nothing, if the proxy is safe to
+/// draw in its mesh's stead.
+/// Exact.
 ///
-/// Any ray from outside of the solid that meets a safe proxy has met the mesh before, or meets it there. The proxy need not be closed.
+/// Any ray from outside of the solid that meets a safe proxy has met the mesh before, or meets it
+/// there.
+/// The proxy need not be closed.
 /// Proxy triangles without area hide nothing and are passed over.
 ///
 /// # Errors
 /// Meshes with bad positions or indices, and a `mesh` that is not closed: it has no inside.
-pub fn check_proxy(proxy: &TriangleMesh<'_>, mesh: &TriangleMesh<'_>) -> Result<Protrusion, MeshError> {
+pub fn check_proxy(
+    proxy: &TriangleMesh<'_>,
+    mesh: &TriangleMesh<'_>,
+) -> Result<Protrusion, MeshError> {
     proxy.check()?;
     mesh.check()?;
     mesh.check_closed()?;
@@ -72,9 +82,11 @@ struct Flat {
 impl Flat {
     /// None for a triangle without area.
     fn new(corners: [[f64; 3]; 3]) -> Option<Flat> {
-        let edge = |k: usize| [0, 1, 2].map(|i| Ratio::of(corners[k][i]).minus(&Ratio::of(corners[0][i])));
+        let edge =
+            |k: usize| [0, 1, 2].map(|i| Ratio::of(corners[k][i]).minus(&Ratio::of(corners[0][i])));
         let (u, v) = (edge(1), edge(2));
-        let normal = [(1, 2), (2, 0), (0, 1)].map(|(i, j): (usize, usize)| u[i].times(&v[j]).minus(&u[j].times(&v[i])));
+        let normal = [(1, 2), (2, 0), (0, 1)]
+            .map(|(i, j): (usize, usize)| u[i].times(&v[j]).minus(&u[j].times(&v[i])));
         // Any axis that the plane is not parallel to will do; the best one keeps balls small.
         let dropped = (0..3)
             .filter(|i| normal[*i].sign() != Ordering::Equal)
@@ -119,7 +131,9 @@ impl Flat {
 fn outside_point(flat: &Flat, mesh: &TriangleMesh<'_>) -> Option<[f64; 3]> {
     let mut segments = Vec::new();
     let mut coplanar = Vec::new();
-    let range = |t: &[[f64; 3]; 3], i: usize, pick: fn(f64, f64) -> f64| pick(pick(t[0][i], t[1][i]), t[2][i]);
+    let range = |t: &[[f64; 3]; 3], i: usize, pick: fn(f64, f64) -> f64| {
+        pick(pick(t[0][i], t[1][i]), t[2][i])
+    };
     for number in 0..mesh.triangles.len() {
         let t = mesh.corners(number);
         let apart = (0..3).any(|i| {
@@ -163,7 +177,8 @@ fn outside_point(flat: &Flat, mesh: &TriangleMesh<'_>) -> Option<[f64; 3]> {
         // Between its two borders here lies the triangle; nowhere if the strip is beside it.
         let [low, high] = &heights(&border)[..] else { continue };
         for pair in heights(&segments).windows(2) {
-            if pair[0].compare(low) != Ordering::Less && pair[1].compare(high) != Ordering::Greater {
+            if pair[0].compare(low) != Ordering::Less && pair[1].compare(high) != Ordering::Greater
+            {
                 let found = outside(&[x.clone(), pair[0].between(&pair[1])]);
                 if found.is_some() {
                     return found;
@@ -175,7 +190,12 @@ fn outside_point(flat: &Flat, mesh: &TriangleMesh<'_>) -> Option<[f64; 3]> {
 }
 
 /// Where a triangle of the mesh meets the plane: a segment, or all of it.
-fn cut(flat: &Flat, t: &[[f64; 3]; 3], segments: &mut Vec<[Point; 2]>, coplanar: &mut Vec<[[f64; 3]; 3]>) {
+fn cut(
+    flat: &Flat,
+    t: &[[f64; 3]; 3],
+    segments: &mut Vec<[Point; 2]>,
+    coplanar: &mut Vec<[[f64; 3]; 3]>,
+) {
     let heights = t.map(|p| flat.height(p));
     let signs = [0, 1, 2].map(|k| heights[k].sign());
     if signs == [Ordering::Equal; 3] {
@@ -183,7 +203,8 @@ fn cut(flat: &Flat, t: &[[f64; 3]; 3], segments: &mut Vec<[Point; 2]>, coplanar:
         segments.extend([0, 1, 2].map(|k| [flat.drawn(t[k]), flat.drawn(t[(k + 1) % 3])]));
         return;
     }
-    let mut ends: Vec<Point> = (0..3).filter(|k| signs[*k] == Ordering::Equal).map(|k| flat.drawn(t[k])).collect();
+    let mut ends: Vec<Point> =
+        (0..3).filter(|k| signs[*k] == Ordering::Equal).map(|k| flat.drawn(t[k])).collect();
     for k in 0..3 {
         let next = (k + 1) % 3;
         if signs[k] != Ordering::Equal && signs[next] == signs[k].reverse() {
@@ -212,13 +233,17 @@ fn is_beyond(s: &[Point; 2], edge: &[Point; 2], border: &[[Point; 2]; 3]) -> boo
 fn crossing_x(s: &[Point; 2], other: &[Point; 2]) -> Option<Ratio> {
     let difference = |a: &Point, b: &Point| [0, 1].map(|i| b[i].minus(&a[i]));
     let cross = |u: &Point, v: &Point| u[0].times(&v[1]).minus(&u[1].times(&v[0]));
-    let (u, v, d) = (difference(&s[0], &s[1]), difference(&other[0], &other[1]), difference(&s[0], &other[0]));
+    let (u, v, d) =
+        (difference(&s[0], &s[1]), difference(&other[0], &other[1]), difference(&s[0], &other[0]));
     let parallel = cross(&u, &v);
     if parallel.sign() == Ordering::Equal {
         return None;
     }
-    let within = |part: &Ratio| part.sign() != Ordering::Less && part.compare(&Ratio::of(1.0)) != Ordering::Greater;
-    let (at_s, at_other) = (cross(&d, &v).divided_by(&parallel), cross(&d, &u).divided_by(&parallel));
+    let within = |part: &Ratio| {
+        part.sign() != Ordering::Less && part.compare(&Ratio::of(1.0)) != Ordering::Greater
+    };
+    let (at_s, at_other) =
+        (cross(&d, &v).divided_by(&parallel), cross(&d, &u).divided_by(&parallel));
     (within(&at_s) && within(&at_other)).then(|| s[0][0].plus(&u[0].times(&at_s)))
 }
 
@@ -233,7 +258,8 @@ fn y_at(s: &[Point; 2], x: &Ratio) -> Option<Ratio> {
     Some(a[1].plus(&b[1].minus(&a[1]).times(&part)))
 }
 
-/// The distance of a point to the nearest triangle, in plain float64 (Ericson, Real-Time Collision Detection, 5.1.5).
+/// The distance of a point to the nearest triangle, in plain float64 (Ericson, Real-Time Collision
+/// Detection, 5.1.5).
 fn distance_to(mesh: &TriangleMesh<'_>, p: [f64; 3]) -> f64 {
     let scale = unit_scale(mesh.vertices.iter().flatten().copied().chain(p));
     let scaled = |p: [f64; 3]| p.map(|x| x * scale);
@@ -245,8 +271,9 @@ fn distance_to(mesh: &TriangleMesh<'_>, p: [f64; 3]) -> f64 {
 fn distance_to_triangle([a, b, c]: &[[f64; 3]; 3], p: [f64; 3]) -> f64 {
     let sub = |u: [f64; 3], v: [f64; 3]| [u[0] - v[0], u[1] - v[1], u[2] - v[2]];
     let dot = |u: [f64; 3], v: [f64; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
-    let cross =
-        |u: [f64; 3], v: [f64; 3]| [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    let cross = |u: [f64; 3], v: [f64; 3]| {
+        [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+    };
     let to_segment = |a: [f64; 3], b: [f64; 3]| {
         let (along, to) = (sub(b, a), sub(p, a));
         let length = dot(along, along);
@@ -255,7 +282,9 @@ fn distance_to_triangle([a, b, c]: &[[f64; 3]; 3], p: [f64; 3]) -> f64 {
         dot(off, off).sqrt()
     };
     let normal = cross(sub(*b, *a), sub(*c, *a));
-    let inside = [(a, b), (b, c), (c, a)].iter().all(|(u, v)| dot(cross(sub(**v, **u), sub(p, **u)), normal) >= 0.0);
+    let inside = [(a, b), (b, c), (c, a)]
+        .iter()
+        .all(|(u, v)| dot(cross(sub(**v, **u), sub(p, **u)), normal) >= 0.0);
     let length = dot(normal, normal).sqrt();
     let edges = to_segment(*a, *b).min(to_segment(*b, *c)).min(to_segment(*c, *a));
     if inside && length > 0.0 { (dot(sub(p, *a), normal) / length).abs().min(edges) } else { edges }

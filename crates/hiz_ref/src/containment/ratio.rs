@@ -1,4 +1,5 @@
-//! Fractions with a float64 in front: compared by a ball where that decides, exactly where it does not.
+//! Fractions with a float64 in front: compared by a ball where that decides, exactly where it does
+//! not.
 
 use crate::dyadic::Dyadic;
 use crate::scalar::{Ball, Scalar};
@@ -17,7 +18,8 @@ impl Ratio {
         Ratio { ball: Ball::exact(value), over: Dyadic::exact(value), under: Dyadic::exact(1.0) }
     }
 
-    /// `under` is positive; a ball that cancellation or a division made useless is drawn anew from the exact numbers.
+    /// `under` is positive; a ball that cancellation or a division made useless is drawn anew from
+    /// the exact numbers.
     fn new(ball: Ball, over: Dyadic, under: Dyadic) -> Ratio {
         let ball = match (ball.is_tight(), over.quotient(&under)) {
             (false, Some(quotient)) => Ball::around(quotient, quotient.abs() * 2.0_f64.powi(-48)),
@@ -43,14 +45,19 @@ impl Ratio {
     }
 
     pub(super) fn times(&self, other: &Ratio) -> Ratio {
-        Ratio::new(self.ball.times(&other.ball), self.over.times(&other.over), self.under.times(&other.under))
+        Ratio::new(
+            self.ball.times(&other.ball),
+            self.over.times(&other.over),
+            self.under.times(&other.under),
+        )
     }
 
     /// `other` is not 0.
     pub(super) fn divided_by(&self, other: &Ratio) -> Ratio {
         let (over, under) = (self.over.times(&other.under), self.under.times(&other.over));
         let negative = other.sign() == Ordering::Less;
-        let (over, under) = if negative { (over.negated(), under.negated()) } else { (over, under) };
+        let (over, under) =
+            if negative { (over.negated(), under.negated()) } else { (over, under) };
         Ratio::new(self.ball.divided_by(other.ball), over, under)
     }
 
@@ -63,10 +70,12 @@ impl Ratio {
         self.ball.minus(&other.ball).sign().or_else(exact).expect("exact numbers have a sign")
     }
 
-    /// A number strictly between two different ones; a float64 where there is one, so that it stays short.
+    /// A number strictly between two different ones; a float64 where there is one, so that it stays
+    /// short.
     pub(super) fn between(&self, other: &Ratio) -> Ratio {
         let middle = Ratio::of(self.ball.mid / 2.0 + other.ball.mid / 2.0);
-        let (low, high) = if self.compare(other) == Ordering::Less { (self, other) } else { (other, self) };
+        let (low, high) =
+            if self.compare(other) == Ordering::Less { (self, other) } else { (other, self) };
         if middle.ball.mid.is_finite()
             && low.compare(&middle) == Ordering::Less
             && middle.compare(high) == Ordering::Less
@@ -82,7 +91,8 @@ impl Ratio {
 mod tests {
     use super::*;
 
-    /// Witnesses are told from the balls: on real meshes some lay far from their triangle when balls were left as they came.
+    /// Witnesses are told from the balls: on real meshes some lay far from their triangle when
+    /// balls were left as they came.
     #[test]
     fn what_cancels_keeps_a_useful_ball() {
         let tiny = Ratio::of(1.0).plus(&Ratio::of(1e-17)).minus(&Ratio::of(1.0));
@@ -101,6 +111,9 @@ mod tests {
         // No float64 lies between these two.
         let above = third.plus(&Ratio::of(1e-300));
         let middle = above.between(&third);
-        assert_eq!((third.compare(&middle), middle.compare(&above)), (Ordering::Less, Ordering::Less));
+        assert_eq!(
+            (third.compare(&middle), middle.compare(&above)),
+            (Ordering::Less, Ordering::Less)
+        );
     }
 }

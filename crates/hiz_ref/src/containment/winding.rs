@@ -33,7 +33,10 @@ impl Place {
             z.over.times(&x.under).times(&y.under),
         ];
         let w = x.under.times(&y.under).times(&z.under);
-        Place { ball: Homogeneous { at: [x.ball, y.ball, z.ball], w: Ball::exact(1.0) }, exact: Homogeneous { at, w } }
+        Place {
+            ball: Homogeneous { at: [x.ball, y.ball, z.ball], w: Ball::exact(1.0) },
+            exact: Homogeneous { at, w },
+        }
     }
 
     /// In float64, for the eyes.
@@ -46,7 +49,10 @@ impl Place {
         ball: impl Fn(&Homogeneous<Ball>) -> Ball,
         exact: impl Fn(&Homogeneous<Dyadic>) -> Dyadic,
     ) -> Ordering {
-        ball(&self.ball).sign().or_else(|| exact(&self.exact).sign()).expect("exact numbers have a sign")
+        ball(&self.ball)
+            .sign()
+            .or_else(|| exact(&self.exact).sign())
+            .expect("exact numbers have a sign")
     }
 
     /// On which side of the plane through three points.
@@ -67,8 +73,9 @@ impl Place {
         self.decide(|p| difference(p, axis, value), |p| difference(p, axis, value))
     }
 
-    /// How often a triangle winds about the point as seen along `axis`, the point moved by less than anything where it lies on an
-    /// edge: half-open intervals, and edges that it lies on count as passed.
+    /// How often a triangle winds about the point as seen along `axis`, the point moved by less
+    /// than anything where it lies on an edge: half-open intervals, and edges that it lies on count
+    /// as passed.
     fn winds_along(&self, axis: usize, t: &[[f64; 3]; 3]) -> i32 {
         let up = (axis + 2) % 3;
         let above = t.map(|p| self.compare(up, p[up]) == Ordering::Less);
@@ -89,8 +96,10 @@ impl Place {
     /// Whether the point lies in the closed triangle; not for triangles without area.
     pub(super) fn lies_in(&self, t: &[[f64; 3]; 3]) -> bool {
         (0..3).all(|axis| {
-            let [low, high] = [f64::min, f64::max].map(|pick| pick(pick(t[0][axis], t[1][axis]), t[2][axis]));
-            self.compare(axis, low) != Ordering::Less && self.compare(axis, high) != Ordering::Greater
+            let [low, high] =
+                [f64::min, f64::max].map(|pick| pick(pick(t[0][axis], t[1][axis]), t[2][axis]));
+            self.compare(axis, low) != Ordering::Less
+                && self.compare(axis, high) != Ordering::Greater
         }) && self.side(t) == Ordering::Equal
             && (0..3).all(|axis| {
                 // In the plane already: in the triangle if it is so from every side.
@@ -100,9 +109,11 @@ impl Place {
     }
 }
 
-/// Whether three points lie strictly on one side of the plane through `t`, as far as float64 can tell.
+/// Whether three points lie strictly on one side of the plane through `t`, as far as float64 can
+/// tell.
 pub(super) fn surely_beside(t: &[[f64; 3]; 3], points: &[[f64; 3]; 3]) -> bool {
-    let sides = points.map(|p| volume(t, &Homogeneous { at: p.map(Ball::exact), w: Ball::exact(1.0) }).sign());
+    let sides = points
+        .map(|p| volume(t, &Homogeneous { at: p.map(Ball::exact), w: Ball::exact(1.0) }).sign());
     sides == [Some(Ordering::Less); 3] || sides == [Some(Ordering::Greater); 3]
 }
 
@@ -126,16 +137,19 @@ fn area<S: Scalar>(axis: usize, a: [f64; 3], b: [f64; 3], p: &Homogeneous<S>) ->
 }
 
 impl TriangleMesh<'_> {
-    /// How often the closed mesh winds about a point that does not lie on it: signed crossings of the ray along +x.
+    /// How often the closed mesh winds about a point that does not lie on it: signed crossings of
+    /// the ray along +x.
     ///
-    /// The ray is moved sideways by less than anything, so it meets no edge; it cannot start on the mesh, as the point is off it.
+    /// The ray is moved sideways by less than anything, so it meets no edge; it cannot start on the
+    /// mesh, as the point is off it.
     pub(super) fn winding_about(&self, place: &Place) -> i32 {
         const X: usize = 0;
         (0..self.triangles.len())
             .map(|number| {
                 let t = self.corners(number);
                 let winds = place.winds_along(X, &t);
-                // The normal's x has the sign of `winds`; the crossing lies ahead if the point lies against the normal.
+                // The normal's x has the sign of `winds`; the crossing lies ahead if the point lies
+                // against the normal.
                 let ahead = if winds > 0 { Ordering::Less } else { Ordering::Greater };
                 if winds != 0 && place.side(&t) == ahead { winds } else { 0 }
             })

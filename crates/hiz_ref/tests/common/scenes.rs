@@ -1,4 +1,5 @@
-//! Random views and volumes as scenes have them, in float64, and some that sit on a border on purpose.
+//! Random views and volumes as scenes have them, in float64, and some that sit on a border on
+//! purpose.
 
 use super::Random;
 use hiz_ref::{View, Volume};
@@ -45,10 +46,14 @@ pub struct Scene {
     pub axes: [Vector; 3],
 }
 
-/// Perspective or orthographic, standard or reversed, finite or infinite, off-centre, somewhere in a large world.
+/// Perspective or orthographic, standard or reversed, finite or infinite, off-centre, somewhere in
+/// a large world.
 pub fn scene(random: &mut Random, width: u32, height: u32) -> Scene {
-    let axes =
-        if random.whole(0, 3) == 0 { [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] } else { random.rotation() };
+    let axes = if random.whole(0, 3) == 0 {
+        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    } else {
+        random.rotation()
+    };
     let [right, up, forward] = axes;
     let reversed = random.whole(0, 1) == 1;
     let scale = random.uniform(0.5, 2.0);
@@ -59,7 +64,8 @@ pub fn scene(random: &mut Random, width: u32, height: u32) -> Scene {
         let [a, b, c] = [0, 1, 2].map(|i| scale * v[i] + shift * forward[i]);
         [a, b, c, constant]
     };
-    // z = slope * depth + offset, by hand from z(near), z(far) = 0, w and w, 0 for the two conventions.
+    // z = slope * depth + offset, by hand from z(near), z(far) = 0, w and w, 0 for the two
+    // conventions.
     let depth_row = |slope: f64, offset: f64| {
         let [a, b, c] = forward.map(|x| slope * x);
         [a, b, c, offset]
@@ -84,10 +90,21 @@ pub fn scene(random: &mut Random, width: u32, height: u32) -> Scene {
             (false, _) => (far / (far - near), -near * far / (far - near)),
             (true, _) => (-near / (far - near), near * far / (far - near)),
         };
-        [row(right, shift_x, 0.0), row(up, shift_y, 0.0), depth_row(slope, offset), depth_row(1.0, 0.0)]
+        [
+            row(right, shift_x, 0.0),
+            row(up, shift_y, 0.0),
+            depth_row(slope, offset),
+            depth_row(1.0, 0.0),
+        ]
     };
     let world = if random.whole(0, 1) == 0 { 0.0 } else { random.power(2.0, 7.0) };
-    let view = View { rows, origin: [0; 3].map(|_| random.uniform(-world, world)), width, height, reversed };
+    let view = View {
+        rows,
+        origin: [0; 3].map(|_| random.uniform(-world, world)),
+        width,
+        height,
+        reversed,
+    };
     Scene { view, axes }
 }
 
@@ -112,7 +129,8 @@ pub fn volume(random: &mut Random, scene: &Scene) -> Volume {
     }
 }
 
-/// An image whose depths lie about the volume's nearest depth: all nearer, with holes, equal, or noise.
+/// An image whose depths lie about the volume's nearest depth: all nearer, with holes, equal, or
+/// noise.
 pub fn image(random: &mut Random, view: &View, nearest: Option<f64>) -> Vec<f32> {
     let count = view.width as usize * view.height as usize;
     let nearest = nearest.unwrap_or(0.5).clamp(0.0, 1.0) as f32;

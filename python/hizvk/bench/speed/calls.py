@@ -57,7 +57,9 @@ def _call(run: Run, instances: Instances, pyramid: Pyramid, *, read: bool) -> Ca
 
 
 def _recorded(run: Run, instances: Instances, pyramid: Pyramid) -> float:
-    return run.device.cull(instances, pyramid.camera, pyramid, outputs=["mask"])._culling.timings()[0]
+    return run.device.cull(instances, pyramid.camera, pyramid, outputs=["mask"])._culling.timings()[
+        0
+    ]
 
 
 def _ours(run: Run, scene: Town, depth: DepthImage, pyramid: Pyramid) -> None:
@@ -130,17 +132,26 @@ def _others(run: Run, scene: Town, depth: DepthImage, pyramid: Pyramid) -> None:
 
         ways |= {"Embree, one ray a pixel": pixels, "Embree, rays to 9 points of a box": points}
     else:
-        run.found.notes.append("rays by Embree were left out: embreex is not installed (pip install embreex)")
+        run.found.notes.append(
+            "rays by Embree were left out: embreex is not installed (pip install embreex)"
+        )
     ms = in_turns(ways, SLOW_ROUNDS)
     run.found.timed("beside others", ms)
     for label in ways:
         if label.startswith(("numpy, cull", "Embree")):
-            run.found.ratio(f"others.{label}", f"{label} / hizvk, mask read", ms[label], ms["hizvk, mask read"])
+            run.found.ratio(
+                f"others.{label}", f"{label} / hizvk, mask read", ms[label], ms["hizvk, mask read"]
+            )
     run.found.ratio(
-        "others.numpy, pyramid", "numpy, pyramid / hizvk, all levels", ms["numpy, pyramid"], ms["hizvk, reduction"]
+        "others.numpy, pyramid",
+        "numpy, pyramid / hizvk, all levels",
+        ms["numpy, pyramid"],
+        ms["hizvk, reduction"],
     )
     judge = Judge(run, scene.boxes, depth)
-    judge.judge("calls", "hizvk", run.device.cull(boxes, depth.camera, pyramid, outputs=["mask"]).mask)
+    judge.judge(
+        "calls", "hizvk", run.device.cull(boxes, depth.camera, pyramid, outputs=["mask"]).mask
+    )
     for label, mask in masks.items():
         judge.judge("calls", label, mask, promises=False)
 

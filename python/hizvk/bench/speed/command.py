@@ -67,8 +67,12 @@ def run(
     started = time.perf_counter()
     out.mkdir(parents=True, exist_ok=True)
     device = hizvk.Device()
-    found = Found(command, seed, extent, device.adapter, build=_core.Yardstick.profile(), cores=_cores())
-    found.notes.append("Intel's culler, which some targets are ratios to, is no part of this run: see ns an instance")
+    found = Found(
+        command, seed, extent, device.adapter, build=_core.Yardstick.profile(), cores=_cores()
+    )
+    found.notes.append(
+        "Intel's culler, which some targets are ratios to, is no part of this run: see ns an instance"
+    )
     shown = terminal.Progress(len(parts), f"hizvk bench --speed, {extent}")
     measured = Run(device, EXTENTS[extent], seed, found, shown.show)
     try:
@@ -80,7 +84,9 @@ def run(
         shown.close()
     plot = None
     if importlib.util.find_spec("matplotlib") is None:
-        found.notes.append("plots were left out: matplotlib is not installed (pip install matplotlib)")
+        found.notes.append(
+            "plots were left out: matplotlib is not installed (pip install matplotlib)"
+        )
     elif found.instance_counts and found.image_sizes:
         from . import plots
 
@@ -112,13 +118,21 @@ def _parser() -> argparse.ArgumentParser:
         "their targets and the error that they were bought at (exit code 1 if a cull with the promise hid what can be "
         "seen; a missed target is told, no more).",
     )
-    parser.add_argument("--out", type=Path, default=Path("out/speed"), help="folder for report and plot (out/speed)")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/speed"), help="folder for report and plot (out/speed)"
+    )
     parser.add_argument(
         "--part", action="append", choices=tuple(PARTS), metavar="NAME",
         help=f"{', '.join(PARTS)}; may come several times (all)",
     )  # fmt: skip
     extent = parser.add_mutually_exclusive_group()
-    extent.add_argument("--quick", action="store_const", const="quick", dest="extent", help="few rounds, small sizes")
+    extent.add_argument(
+        "--quick",
+        action="store_const",
+        const="quick",
+        dest="extent",
+        help="few rounds, small sizes",
+    )
     extent.add_argument(
         "--full",
         action="store_const",

@@ -46,7 +46,9 @@ def measure(run: Run) -> None:
         try:
             _large(run, run.extent.large)
         except (MemoryError, OutOfMemoryError, LimitError) as error:
-            run.found.notes.append(f"culls of {run.extent.large:,} instances were left out: {error}")
+            run.found.notes.append(
+                f"culls of {run.extent.large:,} instances were left out: {error}"
+            )
 
 
 def _ready(run: Run, scene: town.Town) -> tuple[DepthImage, Pyramid]:
@@ -69,7 +71,10 @@ def _by_share(run: Run, hidden: float) -> None:
         culls["boxes, groups, with their reduction"] = run.cull(
             boxes, depth.camera, run.device.pyramid(depth), groups=True, depth=depth
         )
-        for kind, bounds in (("spheres", town.spheres(scene)), ("oriented boxes", town.oriented(scene, run.seed))):
+        for kind, bounds in (
+            ("spheres", town.spheres(scene)),
+            ("oriented boxes", town.oriented(scene, run.seed)),
+        ):
             instances = run.device.instances(bounds)
             culls[f"{kind}, flat"] = run.cull(instances, depth.camera, pyramid)
             culls[f"{kind}, groups"] = run.cull(instances, depth.camera, pyramid, groups=True)
@@ -77,7 +82,9 @@ def _by_share(run: Run, hidden: float) -> None:
     ms = in_turns(ways | {"empty submit": run.yardstick.empty_submit_ms}, run.extent.rounds)
     found, key, part = run.found, f"cull.hidden{100 * hidden:.0f}", f"cull, {name}"
     found.timed(part, ms)
-    found.number(f"{key}.share", f"{name}: hidden in truth, of a sample", judge.hidden_share, "share")
+    found.number(
+        f"{key}.share", f"{name}: hidden in truth, of a sample", judge.hidden_share, "share"
+    )
     found.ratio(
         f"{key}.flat_over_uncertified", f"{name}: flat, certified / uncertified", ms["boxes, flat"],
         ms["boxes, uncertified"], 1.25 if hidden == HIDDEN[0] else None,
@@ -87,8 +94,13 @@ def _by_share(run: Run, hidden: float) -> None:
         1.1 if hidden == 0.0 else None,
     )  # fmt: skip
     for label in culls:
-        found.spread(f"{key}.ns.{label}", f"{name}: {label}, an instance", 1e6 * ms[label] / len(boxes), "ns")
-    masks = {label: culls[label].mask() for label in ("boxes, flat", "boxes, groups", "boxes, uncertified")}
+        found.spread(
+            f"{key}.ns.{label}", f"{name}: {label}, an instance", 1e6 * ms[label] / len(boxes), "ns"
+        )
+    masks = {
+        label: culls[label].mask()
+        for label in ("boxes, flat", "boxes, groups", "boxes, uncertified")
+    }
     for label, mask in masks.items():
         judge.judge(part, label, mask, promises="uncertified" not in label)
     differing = masks["boxes, flat"] != masks["boxes, groups"]
@@ -99,8 +111,12 @@ def _by_share(run: Run, hidden: float) -> None:
         "share",
         SAME_KEPT,
     )
-    stats = run.device.cull(boxes, depth.camera, pyramid, hierarchy=True, outputs=["verdicts"]).stats
-    found.number(f"{key}.tests", f"{name}: tests spent, groups / flat", stats.comparisons / stats.tested, "x")
+    stats = run.device.cull(
+        boxes, depth.camera, pyramid, hierarchy=True, outputs=["verdicts"]
+    ).stats
+    found.number(
+        f"{key}.tests", f"{name}: tests spent, groups / flat", stats.comparisons / stats.tested, "x"
+    )
 
 
 def _by_output(run: Run) -> None:
@@ -109,14 +125,19 @@ def _by_output(run: Run) -> None:
     boxes = run.device.instances(scene.boxes)
     for way, groups in (("flat", False), ("groups", True)):
         ways = {
-            label: run.cull(boxes, depth.camera, pyramid, groups=groups, order=order, outputs=outputs).ms
+            label: run.cull(
+                boxes, depth.camera, pyramid, groups=groups, order=order, outputs=outputs
+            ).ms
             for label, (order, outputs) in OUTPUTS.items()
         }
         ms = in_turns(ways, run.extent.rounds)
         run.found.timed(f"outputs, {way}", ms)
         for label in OUTPUTS:
             run.found.ratio(
-                f"outputs.{way}.{label}", f"{way}: {label} / everything, stable", ms[label], ms["everything, stable"]
+                f"outputs.{way}.{label}",
+                f"{way}: {label} / everything, stable",
+                ms[label],
+                ms["everything, stable"],
             )
 
 
@@ -130,7 +151,9 @@ def _large(run: Run, large: int) -> None:
             for way, groups in (("flat", False), ("groups", True))
         }
 
-    ms = in_turns(flat_and_groups(run.extent.crowd) | flat_and_groups(large), max(3, run.extent.rounds // 3))
+    ms = in_turns(
+        flat_and_groups(run.extent.crowd) | flat_and_groups(large), max(3, run.extent.rounds // 3)
+    )
     run.found.timed("cull, many", ms)
     for way in ("flat", "groups"):
         run.found.ratio(

@@ -36,8 +36,12 @@ class Judge:
     def __init__(self, run: Run, bounds: Bounds, depth: DepthImage) -> None:
         self._run = run
         count = min(run.extent.sample, len(bounds))
-        self._sample = np.sort(np.random.default_rng(run.seed).choice(len(bounds), count, replace=False))
-        codes = reference.classify(_part(bounds, self._sample), depth.camera, depth.numpy(), kind="reversed_ndc")
+        self._sample = np.sort(
+            np.random.default_rng(run.seed).choice(len(bounds), count, replace=False)
+        )
+        codes = reference.classify(
+            _part(bounds, self._sample), depth.camera, depth.numpy(), kind="reversed_ndc"
+        )
         self._hidden = codes == reference.HIDDEN
         self._visible = codes == reference.VISIBLE
 
@@ -46,7 +50,9 @@ class Judge:
         """Of the sample, what is hidden for certain."""
         return float(self._hidden.mean()) if len(self._hidden) else 0.0
 
-    def judge(self, part: str, label: str, mask: npt.NDArray[np.bool_], *, promises: bool = True) -> Error:
+    def judge(
+        self, part: str, label: str, mask: npt.NDArray[np.bool_], *, promises: bool = True
+    ) -> Error:
         """Counts what `mask`, ``(N,)``, keeps and what of that is wrong."""
         kept = mask[self._sample]
         error = Error(

@@ -168,17 +168,28 @@ class Found:
         for label, ms in ways.items():
             self.times.append(Time(part, label, quartiles(ms), float(ms.min()), float(ms.max())))
 
-    def number(self, key: str, label: str, value: float, unit: str, target: float | None = None) -> None:
+    def number(
+        self, key: str, label: str, value: float, unit: str, target: float | None = None
+    ) -> None:
         """A figure that is counted, or taken once."""
         self.figures.append(Figure(key, label, value, unit, target=target))
 
-    def spread(self, key: str, label: str, values: Floats, unit: str, target: float | None = None) -> None:
+    def spread(
+        self, key: str, label: str, values: Floats, unit: str, target: float | None = None
+    ) -> None:
         """A figure of which every round has one."""
         told = quartiles(values)
         self.figures.append(Figure(key, label, told.median, unit, told.q1, told.q3, target))
 
     def ratio(
-        self, key: str, label: str, over: Floats, under: Floats, target: float | None = None, *, at_least: bool = False
+        self,
+        key: str,
+        label: str,
+        over: Floats,
+        under: Floats,
+        target: float | None = None,
+        *,
+        at_least: bool = False,
     ) -> None:
         """A ratio of medians, with the quartiles of the rounds' ratios."""
         value = float(np.median(over) / np.median(under))

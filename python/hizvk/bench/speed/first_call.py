@@ -61,7 +61,9 @@ def measure(run: Run) -> None:
     scene = run.town(run.extent.calls, 0.95)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "town.npz"
-        np.savez(file, low=scene.low, high=scene.high, vertices=scene.vertices, triangles=scene.triangles)
+        np.savez(
+            file, low=scene.low, high=scene.high, vertices=scene.vertices, triangles=scene.triangles
+        )
         told: dict[str, list[list[float]]] = {"cold": [], "warm": []}
         for number in range(run.extent.processes):
             cache = Path(folder) / f"cache{number}"
@@ -89,7 +91,11 @@ def measure(run: Run) -> None:
 def _process(file: Path, cache: Path) -> list[float]:
     environment = os.environ | {CACHE: str(cache), "MESA_SHADER_CACHE_DISABLE": "false"}
     ran = subprocess.run(
-        [sys.executable, "-c", CHILD, str(file)], capture_output=True, text=True, check=True, env=environment
+        [sys.executable, "-c", CHILD, str(file)],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=environment,
     )
     seconds: list[float] = json.loads(ran.stdout)
     return seconds

@@ -85,14 +85,18 @@ def _host(run: Run) -> None:
     count = 4 * run.extent.crowd
     for order, name in (("morton", "Morton"), ("given", "given")):
         ran = subprocess.run(
-            [sys.executable, "-c", CHILD, str(count), str(run.seed), order], capture_output=True, text=True, check=False
+            [sys.executable, "-c", CHILD, str(count), str(run.seed), order],
+            capture_output=True,
+            text=True,
+            check=False,
         )
         if ran.returncode != 0:
             reason = (ran.stderr.strip().splitlines() or ["?"])[-1]
             run.found.notes.append(f"the peak of the host's memory was left out: {reason}")
             return
         peak, device_bytes, host_bytes, piece = json.loads(ran.stdout)
-        # A software driver's device is the host: what the device keeps is taken off, else it would be counted twice.
+        # A software driver's device is the host: what the device keeps is taken off, else it would
+        # be counted twice.
         on_host = run.device.adapter.device_type == "cpu"
         beyond = peak - host_bytes - (device_bytes if on_host else 0)
         run.found.number(

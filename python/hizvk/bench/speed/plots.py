@@ -38,7 +38,12 @@ def draw(path: Path, found: Found) -> None:
             "groups": [row.groups_ms for row in rows],
         },
     )  # fmt: skip
-    _panel(axes[0, 1], "bytes on the device", by_count, {"instances, outputs": [row.device_bytes for row in rows]})
+    _panel(
+        axes[0, 1],
+        "bytes on the device",
+        by_count,
+        {"instances, outputs": [row.device_bytes for row in rows]},
+    )
     _panel(
         axes[0, 2], "texels read, tests spent", by_count,
         {
@@ -55,8 +60,15 @@ def draw(path: Path, found: Found) -> None:
             "cull, groups": [row.groups_ms for row in images],
         },
     )  # fmt: skip
-    _panel(axes[1, 1], "bytes on the device", by_pixels, {"depth and pyramid": [row.device_bytes for row in images]})
-    _panel(axes[1, 2], "texels read, an instance", by_pixels, {"flat": [row.texels for row in images]})
+    _panel(
+        axes[1, 1],
+        "bytes on the device",
+        by_pixels,
+        {"depth and pyramid": [row.device_bytes for row in images]},
+    )
+    _panel(
+        axes[1, 2], "texels read, an instance", by_pixels, {"flat": [row.texels for row in images]}
+    )
     for axis in axes[0]:
         axis.set_xlabel("instances, 95 % hidden")
     for axis in axes[1]:
@@ -75,7 +87,13 @@ def _panel(axis: Any, label: str, sizes: list[int], lines: dict[str, list[Any]])
         axis.plot(*zip(*shown, strict=True), marker="o", markersize=4, label=name)
         (least, first), (most, last) = shown[0], shown[-1]
         if last / first > most / least / FOLLOWS:
-            axis.plot([least, most], [last * least / most, last], linestyle=":", linewidth=0.8, color="#999999")
+            axis.plot(
+                [least, most],
+                [last * least / most, last],
+                linestyle=":",
+                linewidth=0.8,
+                color="#999999",
+            )
     bottom, top = axis.get_ylim()
     axis.set_ylim(min(bottom, top / 10.0), top)
     axis.set_ylabel(label)

@@ -43,7 +43,9 @@ def measure(run: Run) -> None:
         rendered = run.depth(scene, size)
         numbers = rendered.numpy()
         camera = rendered.camera
-        uploaded = run.device._engine.upload_depth(numbers, camera.depth_kind, 1.0, (), "none", camera._inner)
+        uploaded = run.device._engine.upload_depth(
+            numbers, camera.depth_kind, 1.0, (), "none", camera._inner
+        )
         for source, depth in (("rendered", rendered._inner), ("uploaded", uploaded)):
             run.step(f"reduction of a {source} image, {name}")
             _one(run, name, source, depth, numbers)
@@ -51,7 +53,13 @@ def measure(run: Run) -> None:
     _errors(run)
 
 
-def _one(run: Run, name: str, source: str, depth: _core.DepthImage, numbers: np.typing.NDArray[np.float32]) -> None:
+def _one(
+    run: Run,
+    name: str,
+    source: str,
+    depth: _core.DepthImage,
+    numbers: np.typing.NDArray[np.float32],
+) -> None:
     part, target = f"reduction {name} {source}", np.empty_like(numbers)
     ways: dict[str, Callable[[], float]] = {
         "memcpy of the input": lambda: run.yardstick.memcpy_ms(numbers, target),
@@ -83,4 +91,8 @@ def _errors(run: Run) -> None:
     judge = Judge(run, scene.boxes, depth)
     for choice, levels in CHOICES.items():
         pyramid = run.device.pyramid(depth, levels=levels)
-        judge.judge("reduction", choice, run.device.cull(crowd, depth.camera, pyramid, outputs=["mask"]).mask)
+        judge.judge(
+            "reduction",
+            choice,
+            run.device.cull(crowd, depth.camera, pyramid, outputs=["mask"]).mask,
+        )

@@ -61,7 +61,9 @@ def write(found: Found, folder: Path, plot: str | None) -> None:
     plot : str, optional
         The plot's file name relative to `folder`.
     """
-    (folder / "report.json").write_text(json.dumps(as_data(found), indent=2) + "\n", encoding="utf-8")
+    (folder / "report.json").write_text(
+        json.dumps(as_data(found), indent=2) + "\n", encoding="utf-8"
+    )
     (folder / "report.md").write_text("\n".join(_page(found, plot)) + "\n", encoding="utf-8")
 
 
@@ -86,7 +88,9 @@ def _with_unit(number: float, unit: str) -> str:
 def _target(figure: Figure) -> str:
     if figure.target is None:
         return ""
-    return f"{'at least' if figure.at_least else 'at most'} {_with_unit(figure.target, figure.unit)}"
+    return (
+        f"{'at least' if figure.at_least else 'at most'} {_with_unit(figure.target, figure.unit)}"
+    )
 
 
 def _spread(figure: Figure) -> str:
@@ -96,7 +100,13 @@ def _spread(figure: Figure) -> str:
 def targets(found: Found) -> list[tuple[str, str, str, str, str]]:
     """Label, value, quartiles, target and verdict of every figure that has a target."""
     return [
-        (figure.label, value(figure), _spread(figure), _target(figure), "met" if figure.met else "not met")
+        (
+            figure.label,
+            value(figure),
+            _spread(figure),
+            _target(figure),
+            "met" if figure.met else "not met",
+        )
         for figure in found.figures
         if figure.target is not None
     ]
@@ -109,7 +119,11 @@ def _table(head: str, right: str, rows: list[list[str]]) -> list[str]:
 def _page(found: Found, plot: str | None) -> list[str]:
     known, adapter, broken = versions(), found.adapter, found.broken()
     met, of = judged(found)
-    verdict = f"FAILED: {'; '.join(broken)}" if broken else "no cull with the promise hid what can be seen"
+    verdict = (
+        f"FAILED: {'; '.join(broken)}"
+        if broken
+        else "no cull with the promise hid what can be seen"
+    )
     load = f"; load by part {', '.join(f'{one:.1f}' for one in found.load)}" if found.load else ""
     lines = [
         "# hizvk bench --speed",
@@ -122,7 +136,8 @@ def _page(found: Found, plot: str | None) -> list[str]:
         f"{known['embreex'] or 'not installed'}; {known['platform']}, {found.cores} cores{load}",
         f"- The extension module is a {found.build} build"
         + (
-            "; what the host does (uploads, calls) is slower in it than in a release build" * (found.build != "release")
+            "; what the host does (uploads, calls) is slower in it than in a release build"
+            * (found.build != "release")
         ),
         *(f"- {each}" for each in found.notes),
         "",
@@ -133,13 +148,24 @@ def _page(found: Found, plot: str | None) -> list[str]:
         "",
     ]
     lines += _table(
-        "| | measured | quartiles | target | |", "|---|---:|---:|---:|---|", [list(row) for row in targets(found)]
+        "| | measured | quartiles | target | |",
+        "|---|---:|---:|---:|---|",
+        [list(row) for row in targets(found)],
     )
     lines += ["## Told, not judged", ""]
-    told = [[figure.label, value(figure), _spread(figure)] for figure in found.figures if figure.target is None]
+    told = [
+        [figure.label, value(figure), _spread(figure)]
+        for figure in found.figures
+        if figure.target is None
+    ]
     lines += _table("| | measured | quartiles |", "|---|---:|---:|", told)
     lines += _errors(found) + _first_calls(found) + _scale(found, plot)
-    lines += ["## Times", "", "Milliseconds from a submit to the end of the wait for it, or of a whole call.", ""]
+    lines += [
+        "## Times",
+        "",
+        "Milliseconds from a submit to the end of the wait for it, or of a whole call.",
+        "",
+    ]
     times = [
         [
             time.part,
@@ -151,7 +177,9 @@ def _page(found: Found, plot: str | None) -> list[str]:
         ]
         for time in found.times
     ]
-    return lines + _table("| | | median | quartiles | least | most |", "|---|---|---:|---:|---:|---:|", times)
+    return lines + _table(
+        "| | | median | quartiles | least | most |", "|---|---|---:|---:|---:|---:|", times
+    )
 
 
 def _errors(found: Found) -> list[str]:
@@ -172,7 +200,9 @@ def _errors(found: Found) -> list[str]:
         "culled. *Italic*: without the promise. (Scenes with ray-cast truth: `hizvk bench`.)",
         "",
         *_table(
-            "| | | instances | kept | sample | hidden | of these kept | false culls |", "|---|---|" + "---:|" * 6, rows
+            "| | | instances | kept | sample | hidden | of these kept | false culls |",
+            "|---|---|" + "---:|" * 6,
+            rows,
         ),
     ]
 
@@ -183,7 +213,13 @@ def _first_calls(found: Found) -> list[str]:
             call.cache,
             *(
                 f"{seconds:.2f}"
-                for seconds in (call.import_s, call.device_s, call.first_s, call.total_s, call.second_s)
+                for seconds in (
+                    call.import_s,
+                    call.device_s,
+                    call.first_s,
+                    call.total_s,
+                    call.second_s,
+                )
             ),
         ]
         for call in found.first_calls
@@ -196,7 +232,11 @@ def _first_calls(found: Found) -> list[str]:
         "Seconds of a fresh process: importing numpy and hizvk, opening the device, the way from arrays to the first "
         "mask; the same way once more. The interpreter's own start is not counted.",
         "",
-        *_table("| shader cache | import | device | first mask | sum | once more |", "|---|" + "---:|" * 5, rows),
+        *_table(
+            "| shader cache | import | device | first mask | sum | once more |",
+            "|---|" + "---:|" * 5,
+            rows,
+        ),
     ]
 
 
@@ -212,7 +252,10 @@ def _scale(found: Found, plot: str | None) -> list[str]:
         ]
         for row in found.instance_counts
     ]  # fmt: skip
-    lines += ["95 % hidden, cull for mask, indices and draws; milliseconds, nanoseconds and the rest an instance.", ""]
+    lines += [
+        "95 % hidden, cull for mask, indices and draws; milliseconds, nanoseconds and the rest an instance.",
+        "",
+    ]
     lines += _table(
         "| instances | pieces | upload | flat | groups | flat, ns | groups, ns | tests, groups | texels, flat | "
         "device bytes |",

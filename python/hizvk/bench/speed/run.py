@@ -85,7 +85,9 @@ class Run:
 
     def depth(self, scene: towns.Town, size: Size) -> DepthImage:
         """The walls as they are rendered."""
-        return self.device.render_depth(self.device.occluders(scene.vertices, scene.triangles), scene.view.camera(size))
+        return self.device.render_depth(
+            self.device.occluders(scene.vertices, scene.triangles), scene.view.camera(size)
+        )
 
     def cull(
         self,

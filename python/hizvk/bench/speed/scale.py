@@ -59,8 +59,12 @@ def _instances(run: Run, count: int) -> InstanceCount:
     run.device.wait()
     upload = 1e3 * (time.perf_counter() - start)
     del scene
-    stats = run.device.cull(boxes, depth.camera, pyramid, hierarchy=False, outputs=["verdicts"], statistics=True).stats
-    tests = run.device.cull(boxes, depth.camera, pyramid, hierarchy=True, outputs=["verdicts"]).stats.comparisons
+    stats = run.device.cull(
+        boxes, depth.camera, pyramid, hierarchy=False, outputs=["verdicts"], statistics=True
+    ).stats
+    tests = run.device.cull(
+        boxes, depth.camera, pyramid, hierarchy=True, outputs=["verdicts"]
+    ).stats.comparisons
     cull = {
         way: run.cull(boxes, depth.camera, pyramid, groups=groups, outputs=OUTPUTS)
         for way, groups in (("flat", False), ("groups", True))
@@ -78,7 +82,9 @@ def _image(run: Run, side: int) -> ImageSize:
     depth = run.depth(scene, (side, side))
     pyramid = run.device.pyramid(depth)
     boxes = run.device.instances(scene.boxes)
-    stats = run.device.cull(boxes, depth.camera, pyramid, hierarchy=False, outputs=["verdicts"], statistics=True).stats
+    stats = run.device.cull(
+        boxes, depth.camera, pyramid, hierarchy=False, outputs=["verdicts"], statistics=True
+    ).stats
     numbers = depth.numpy()
     target = np.empty_like(numbers)
     ways: dict[str, Any] = {

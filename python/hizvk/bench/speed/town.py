@@ -1,8 +1,10 @@
 """A town from a seed whose walls hide a chosen share of a crowd, coherently.
 
-The eye stands on a square. Two rows of houses, with lanes between them, stand across all of the view; behind them is
-one part of the crowd, on the square before them the other. So what is hidden lies together, as it does in towns, and
-how much of it there is can be chosen. All of the crowd is inside the view volume: nothing is culled for free.
+The eye stands on a square.
+Two rows of houses, with lanes between them, stand across all of the view; behind them is one part
+of the crowd, on the square before them the other.
+So what is hidden lies together, as it does in towns, and how much of it there is can be chosen.
+All of the crowd is inside the view volume: nothing is culled for free.
 """
 
 from __future__ import annotations
@@ -86,7 +88,9 @@ def _walls(rng: np.random.Generator) -> tuple[Floats, Floats]:
     return np.round(np.array(low) * 64.0) / 64.0, np.round(np.array(high) * 64.0) / 64.0
 
 
-def crowd(count: int, behind: float, seed: int) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+def crowd(
+    count: int, behind: float, seed: int
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
     """``(N, 3)`` float32 corners of boxes of 0.3 to 3 m, of which the share `behind` stands behind the houses."""
     low, high = np.empty((2, count, 3), np.float32)
     for batch, first in enumerate(range(0, count, BATCH)):

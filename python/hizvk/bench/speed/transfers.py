@@ -67,14 +67,21 @@ def _uploads(run: Run) -> None:
     run.found.timed("transfers", ms)
     for order in ("Morton", "given"):
         way = f"upload, {order} order"
-        run.found.spread(f"transfers.upload.{order}", f"{way}, an instance", 1e6 * ms[way] / count, "ns")
+        run.found.spread(
+            f"transfers.upload.{order}", f"{way}, an instance", 1e6 * ms[way] / count, "ns"
+        )
         run.found.ratio(
-            f"transfers.memcpies.{order}", f"{way} / memcpy of the input", ms[way], ms["memcpy of the input"]
+            f"transfers.memcpies.{order}",
+            f"{way} / memcpy of the input",
+            ms[way],
+            ms["memcpy of the input"],
         )
     for share in SHARES:
         way = f"update of {100 * share:g} %"
         each = 1e6 * ms[way] / int(share * count)
-        run.found.spread(f"transfers.update.{100 * share:g}", f"{way}, a moved instance", each, "ns")
+        run.found.spread(
+            f"transfers.update.{100 * share:g}", f"{way}, a moved instance", each, "ns"
+        )
 
 
 def _moved(run: Run) -> None:
@@ -83,9 +90,15 @@ def _moved(run: Run) -> None:
     depth = run.depth(scene, run.extent.images[0][1])
     pyramid = device.pyramid(depth)
     rng = np.random.default_rng(run.seed)
-    worlds = {f"{100 * share:g} % gone elsewhere": _elsewhere(rng, scene.boxes, share) for share in GONE}
-    worlds |= {f"all moved by up to {metres:g} m": _drifted(rng, scene.boxes, metres) for metres in DRIFT}
-    resort = float(np.median([_waited(run, lambda: device.instances(scene.boxes))() for _ in range(3)]))
+    worlds = {
+        f"{100 * share:g} % gone elsewhere": _elsewhere(rng, scene.boxes, share) for share in GONE
+    }
+    worlds |= {
+        f"all moved by up to {metres:g} m": _drifted(rng, scene.boxes, metres) for metres in DRIFT
+    }
+    resort = float(
+        np.median([_waited(run, lambda: device.instances(scene.boxes))() for _ in range(3)])
+    )
     for label, boxes in worlds.items():
         old, fresh = device.instances(scene.boxes), device.instances(boxes)
         old.update(0, boxes)
@@ -95,17 +108,29 @@ def _moved(run: Run) -> None:
         }
         ms = in_turns(ways, run.extent.rounds)
         run.found.timed(f"moved: {label}", ms)
-        run.found.ratio(f"moved.{label}", f"{label}: cull, updated / uploaded anew", ms["updated"], ms["uploaded anew"])
+        run.found.ratio(
+            f"moved.{label}",
+            f"{label}: cull, updated / uploaded anew",
+            ms["updated"],
+            ms["uploaded anew"],
+        )
         tests = [
-            device.cull(one, depth.camera, pyramid, hierarchy=True, outputs=["verdicts"]).stats.comparisons
+            device.cull(
+                one, depth.camera, pyramid, hierarchy=True, outputs=["verdicts"]
+            ).stats.comparisons
             for one in (old, fresh)
         ]
         run.found.number(
-            f"moved.tests.{label}", f"{label}: tests spent, updated / uploaded anew", tests[0] / tests[1], "x"
+            f"moved.tests.{label}",
+            f"{label}: tests spent, updated / uploaded anew",
+            tests[0] / tests[1],
+            "x",
         )
         saved = float(np.median(ms["updated"]) - np.median(ms["uploaded anew"]))
         if tests[0] > WORTH * tests[1] and saved > 0.0:
-            run.found.number(f"moved.pays.{label}", f"{label}: a re-sort pays after", resort / saved, "culls")
+            run.found.number(
+                f"moved.pays.{label}", f"{label}: a re-sort pays after", resort / saved, "culls"
+            )
 
 
 def _elsewhere(rng: np.random.Generator, boxes: Boxes, share: float) -> Boxes:
@@ -118,5 +143,7 @@ def _elsewhere(rng: np.random.Generator, boxes: Boxes, share: float) -> Boxes:
 
 def _drifted(rng: np.random.Generator, boxes: Boxes, metres: float) -> Boxes:
     """The boxes, each moved along the ground in a way of its own."""
-    shift = rng.uniform(-metres, metres, (len(boxes), 3)).astype(np.float32) * np.array([1.0, 1.0, 0.0], np.float32)
+    shift = rng.uniform(-metres, metres, (len(boxes), 3)).astype(np.float32) * np.array(
+        [1.0, 1.0, 0.0], np.float32
+    )
     return Boxes(boxes.min + shift, boxes.max + shift)

@@ -38,7 +38,9 @@ impl Arrays {
         match kind {
             BoundsKind::Sphere => Bounds::Spheres { centers: a, radii: b },
             BoundsKind::Box => Bounds::Boxes { min: a, max: b },
-            BoundsKind::OrientedBox => Bounds::OrientedBoxes { centers: a, half_sizes: b, rotations: c },
+            BoundsKind::OrientedBox => {
+                Bounds::OrientedBoxes { centers: a, half_sizes: b, rotations: c }
+            }
         }
     }
 }

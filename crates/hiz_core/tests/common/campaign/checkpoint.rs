@@ -1,4 +1,5 @@
-//! A long campaign's place in a file: it can be stopped at any time, and the next run goes on from there.
+//! A long campaign's place in a file: it can be stopped at any time, and the next run goes on from
+//! there.
 
 use std::path::PathBuf;
 
@@ -16,10 +17,14 @@ pub(crate) struct Checkpoint {
 impl Checkpoint {
     /// The place of the campaign `settings` (one line), in the build's folder for tests.
     pub(crate) fn new(name: &str, settings: String) -> Self {
-        Self { path: PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.txt")), settings }
+        Self {
+            path: PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.txt")),
+            settings,
+        }
     }
 
-    /// How many chunks are done and what they found; nothing is, where no run of these settings stopped.
+    /// How many chunks are done and what they found; nothing is, where no run of these settings
+    /// stopped.
     pub(crate) fn load(&self, keeps: bool) -> (u64, Report) {
         let fresh = || (0, Report::new(&Class::ALL, keeps));
         let Ok(text) = std::fs::read_to_string(&self.path) else { return fresh() };
@@ -31,21 +36,27 @@ impl Checkpoint {
         let Some(Ok(done)) = lines.next().map(str::parse) else { return fresh() };
         for (class, line) in Class::ALL.iter().zip(lines) {
             let numbers: Result<Vec<usize>, _> = line.split(' ').map(str::parse).collect();
-            let Ok([cases, culled, false_culls, false_keeps]) = numbers.as_deref() else { return fresh() };
-            let (cases, culled, false_culls, false_keeps) = (*cases, *culled, *false_culls, *false_keeps);
+            let Ok([cases, culled, false_culls, false_keeps]) = numbers.as_deref() else {
+                return fresh();
+            };
+            let (cases, culled, false_culls, false_keeps) =
+                (*cases, *culled, *false_culls, *false_keeps);
             report.add(*class, Tally { cases, culled, false_culls, false_keeps });
         }
         (done, report)
     }
 
-    /// Notes the place. Written beside and renamed, so that a run that is killed leaves the last one.
+    /// Notes the place.
+    /// Written beside and renamed, so that a run that is killed leaves the last one.
     pub(crate) fn save(&self, done: u64, report: &Report) {
         let mut text = format!("{}\n{done}\n", self.settings);
         for (_, t) in &report.classes {
             text += &format!("{} {} {} {}\n", t.cases, t.culled, t.false_culls, t.false_keeps);
         }
         let beside = self.path.with_extension("new");
-        std::fs::write(&beside, text).and_then(|()| std::fs::rename(&beside, &self.path)).expect("a place to note");
+        std::fs::write(&beside, text)
+            .and_then(|()| std::fs::rename(&beside, &self.path))
+            .expect("a place to note");
     }
 
     /// The campaign is over: the next run begins anew.

@@ -43,7 +43,8 @@ pub(crate) enum Class {
     AspectRatios,
     /// Worlds from 1e-24 to 1e12 units across, the unit of the camera being 1.
     Scale,
-    /// A matrix about the world's origin, its camera far away: constants cancel at the eye, and the rows have to own up to it.
+    /// A matrix about the world's origin, its camera far away: constants cancel at the eye, and the
+    /// rows have to own up to it.
     BareMatrix,
 }
 
@@ -75,10 +76,13 @@ impl Class {
         match self {
             Self::Random | Self::Tiny | Self::Huge => {}
             Self::PixelBorders => s.style = random.pick(&[DepthStyle::Column, DepthStyle::Row]),
-            Self::Grazing => s.style = random.pick(&[DepthStyle::Column, DepthStyle::Row, DepthStyle::Far]),
+            Self::Grazing => {
+                s.style = random.pick(&[DepthStyle::Column, DepthStyle::Row, DepthStyle::Far])
+            }
             Self::NearPlane => s.style = random.pick(&[DepthStyle::Far, DepthStyle::Near]),
             Self::OffCentre => {
-                s.middle = [0, 1].map(|k| random.pick(&[-3.0, -1.0, 1.0, 3.0]) * random.unit() * s.half[k]);
+                s.middle = [0, 1]
+                    .map(|k| random.pick(&[-3.0, -1.0, 1.0, 3.0]) * random.unit() * s.half[k]);
             }
             Self::Orthographic => s.orthographic = true,
             Self::InfiniteReversed => {
@@ -110,8 +114,10 @@ impl Class {
                 s.bare_matrix = true;
                 let distance = 10.0_f64.powf(random.range(0.0, 9.0));
                 s.stand_away(distance, random);
-                // A near plane so close that what float64 lost in the constants is large beside it, and volumes far behind it:
-                // there nothing else in the margin of a depth covers that. (Without a far plane z and w lose the same.)
+                // A near plane so close that what float64 lost in the constants is large beside it,
+                // and volumes far behind it: there nothing else in the margin of a depth covers
+                // that.
+                // (Without a far plane z and w lose the same.)
                 s.near = distance * 10.0_f64.powf(random.range(-13.0, -10.0));
                 s.far = s.near * 10.0_f64.powf(random.range(4.0, 8.0));
                 s.style = random.pick(&[DepthStyle::Equal, s.style]);
@@ -125,7 +131,10 @@ impl Class {
             Self::Tiny => 10.0_f64.powf(random.range(-9.0, -2.0)),
             Self::Huge => f64::from(side) * 10.0_f64.powf(random.range(1.0, 5.0)),
             Self::AspectRatios => 10.0_f64.powf(random.range(-4.0, 2.0)),
-            _ => random.pick(&[0.0, 0.01, 0.5, 1.0, 2.0, 4.0]) + f64::from(random.below(side + 1)) * random.unit(),
+            _ => {
+                random.pick(&[0.0, 0.01, 0.5, 1.0, 2.0, 4.0])
+                    + f64::from(random.below(side + 1)) * random.unit()
+            }
         }
     }
 }

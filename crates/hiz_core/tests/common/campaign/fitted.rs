@@ -1,5 +1,6 @@
-//! Depth images that fit a volume: each pixel holds just about the depth at which it begins to show the volume, so that an ulp,
-//! or one pixel of them all, decides. What `Fit::Volume` culls is decided there.
+//! Depth images that fit a volume: each pixel holds just about the depth at which it begins to show
+//! the volume, so that an ulp, or one pixel of them all, decides.
+//! What `Fit::Volume` culls is decided there.
 
 use hiz_core::{BoundsKind, Coverage};
 use hiz_ref::{Verdict, View, Volume};
@@ -10,36 +11,52 @@ use crate::common::Random;
 /// Some steps of float32 nearer (below 0) or farther, within 0..=1.
 fn stepped(depth: f32, steps: i64, reversed: bool) -> f32 {
     let steps = if reversed { -steps } else { steps };
-    f32::from_bits((i64::from(depth.to_bits()) + steps).clamp(0, i64::from(1.0_f32.to_bits())) as u32)
+    f32::from_bits(
+        (i64::from(depth.to_bits()) + steps).clamp(0, i64::from(1.0_f32.to_bits())) as u32
+    )
 }
 
-/// Depth that is nearer than what a volume shows in each pixel, by a few ulps or by a share of the way to the nearest depth of all;
-/// often one pixel is spoilt.
-fn tight_image(random: &mut Random, view: &View, volume: &Volume, coverage: hiz_ref::Coverage) -> Vec<f32> {
+/// Depth that is nearer than what a volume shows in each pixel, by a few ulps or by a share of the
+/// way to the nearest depth of all; often one pixel is spoilt.
+fn tight_image(
+    random: &mut Random,
+    view: &View,
+    volume: &Volume,
+    coverage: hiz_ref::Coverage,
+) -> Vec<f32> {
     let own: Vec<Option<f32>> = (0..view.height)
         .flat_map(|y| (0..view.width).map(move |x| [x, y]))
         .map(|pixel| hiz_ref::own_depth(view, volume, coverage, pixel).expect("a finite view"))
         .collect();
-    let nearest = own.iter().flatten().copied().reduce(if view.reversed { f32::max } else { f32::min });
+    let nearest =
+        own.iter().flatten().copied().reduce(if view.reversed { f32::max } else { f32::min });
     let ulps = random.pick(&[0, 1, 20, 1000, 30_000]);
     let share = random.pick(&[0.0, 0.0, 0.02, 0.2, 0.6]);
-    // The pixels that it does not touch: far beyond it (they must be told apart), or in front of it.
+    // The pixels that it does not touch: far beyond it (they must be told apart), or in front of
+    // it.
     let outside = random.pick(&[0.0, 1.0]);
     let mut depth: Vec<f32> = own
         .iter()
         .map(|own| match (own, nearest) {
-            (Some(own), Some(nearest)) => stepped(own + share * (nearest - own), -ulps, view.reversed),
+            (Some(own), Some(nearest)) => {
+                stepped(own + share * (nearest - own), -ulps, view.reversed)
+            }
             _ => outside,
         })
         .collect();
     if random.below(2) == 0 {
         let pixel = random.below(view.width * view.height) as usize;
-        depth[pixel] = stepped(own[pixel].unwrap_or(outside), random.pick(&[0, 1, 20, 1000, 30_000]), view.reversed);
+        depth[pixel] = stepped(
+            own[pixel].unwrap_or(outside),
+            random.pick(&[0, 1, 20, 1000, 30_000]),
+            view.reversed,
+        );
     }
     depth
 }
 
-/// Boxes at every angle, and plates that recede before the eye: faces that recede are what the fit is for.
+/// Boxes at every angle, and plates that recede before the eye: faces that recede are what the fit
+/// is for.
 fn tilted(random: &mut Random, round: &Round, volume: &Volume) -> Volume {
     let Volume::OrientedBox { center, half_sizes, .. } = *volume else { return *volume };
     let (a, b) = (unit(any_vector(random)), any_vector(random));
@@ -61,14 +78,19 @@ fn tilted(random: &mut Random, round: &Round, volume: &Volume) -> Volume {
     }
 }
 
-/// `round` with its one volume moved to the last place where the oracle still sees some of it, to within 1e-10 of its distance, or
-/// a hair before. Unchanged where there is no such place nearby.
+/// `round` with its one volume moved to the last place where the oracle still sees some of it, to
+/// within 1e-10 of its distance, or a hair before.
+/// Unchanged where there is no such place nearby.
 fn on_the_edge(mut round: Round, random: &mut Random) -> Round {
     let volume = round.volumes[0].1[0];
     let distance = length(round.away[0][0]);
     let line_of_sight = match volume {
-        Volume::Sphere { center, .. } | Volume::OrientedBox { center, .. } => minus(center, round.camera.origin()),
-        Volume::Box { min, max } => minus([0, 1, 2].map(|k| 0.5 * (min[k] + max[k])), round.camera.origin()),
+        Volume::Sphere { center, .. } | Volume::OrientedBox { center, .. } => {
+            minus(center, round.camera.origin())
+        }
+        Volume::Box { min, max } => {
+            minus([0, 1, 2].map(|k| 0.5 * (min[k] + max[k])), round.camera.origin())
+        }
     };
     let way = match random.below(3) {
         0 => round.away[0][0],
@@ -79,8 +101,10 @@ fn on_the_edge(mut round: Round, random: &mut Random) -> Round {
     let visible = |s: f64| round.outcome(&at(s)).verdict == Verdict::Visible;
     let start = visible(0.0);
     let sign = if random.below(2) == 0 { 1.0 } else { -1.0 };
-    let Some(first) =
-        [1e-9, 1e-7, 1e-5, 1e-3, 0.1].iter().flat_map(|s| [sign * s, -sign * s]).find(|s| visible(*s) != start)
+    let Some(first) = [1e-9, 1e-7, 1e-5, 1e-3, 0.1]
+        .iter()
+        .flat_map(|s| [sign * s, -sign * s])
+        .find(|s| visible(*s) != start)
     else {
         return round;
     };
@@ -98,9 +122,14 @@ fn on_the_edge(mut round: Round, random: &mut Random) -> Round {
 }
 
 impl Campaign {
-    /// Rounds of one volume each, with a depth image that fits it; `sharp`: and then moved to where the oracle's verdict
-    /// changes. Small images alone: the depth of each pixel is searched for.
-    pub(crate) fn fitted(self, kinds: &'static [BoundsKind], sharp: bool) -> impl Iterator<Item = Round> {
+    /// Rounds of one volume each, with a depth image that fits it; `sharp`: and then moved to where
+    /// the oracle's verdict changes.
+    /// Small images alone: the depth of each pixel is searched for.
+    pub(crate) fn fitted(
+        self,
+        kinds: &'static [BoundsKind],
+        sharp: bool,
+    ) -> impl Iterator<Item = Round> {
         let coverage = match self.coverage {
             Coverage::Area => hiz_ref::Coverage::Area,
             Coverage::Sample => hiz_ref::Coverage::Sample,
@@ -109,7 +138,8 @@ impl Campaign {
         small.flat_map(move |round| {
             let mut random = Random(self.seed ^ round.number as u64);
             let mut fitted = Vec::new();
-            for ((kind, volumes), ways) in round.volumes.iter().zip(&round.away).filter(|((k, _), _)| kinds.contains(k))
+            for ((kind, volumes), ways) in
+                round.volumes.iter().zip(&round.away).filter(|((k, _), _)| kinds.contains(k))
             {
                 for (volume, away) in volumes.iter().zip(ways) {
                     let volume = tilted(&mut random, &round, volume);
@@ -126,10 +156,15 @@ impl Campaign {
     pub(crate) fn loose(self, kinds: &'static [BoundsKind]) -> impl Iterator<Item = Round> {
         self.rounds().flat_map(move |round| {
             let mut random = Random(self.seed ^ round.number as u64);
-            let each = round.volumes.iter().zip(&round.away).filter(|((k, _), _)| kinds.contains(k));
-            each.flat_map(|((kind, volumes), ways)| volumes.iter().zip(ways).map(move |(v, away)| (*kind, v, away)))
-                .map(|(kind, v, away)| round.alone(kind, tilted(&mut random, &round, v), *away, round.depth.clone()))
-                .collect::<Vec<_>>()
+            let each =
+                round.volumes.iter().zip(&round.away).filter(|((k, _), _)| kinds.contains(k));
+            each.flat_map(|((kind, volumes), ways)| {
+                volumes.iter().zip(ways).map(move |(v, away)| (*kind, v, away))
+            })
+            .map(|(kind, v, away)| {
+                round.alone(kind, tilted(&mut random, &round, v), *away, round.depth.clone())
+            })
+            .collect::<Vec<_>>()
         })
     }
 }

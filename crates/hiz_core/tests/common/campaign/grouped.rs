@@ -1,5 +1,5 @@
-//! A round culled in groups: each volume many times over, so that some groups hold nothing else and their boxes are as nearly decided
-//! as it is.
+//! A round culled in groups: each volume many times over, so that some groups hold nothing else and
+//! their boxes are as nearly decided as it is.
 
 use hiz_core::headless::Engine;
 use hiz_core::{Coverage, CullOptions, Hierarchy, InstanceOptions, StoredOrder, VisibleOptions};
@@ -28,8 +28,9 @@ impl Tested {
 }
 
 impl Round {
-    /// What the device keeps with groups, for each kind, in any stored order. A volume is kept if all of its copies are. Nothing for a
-    /// camera that is refused.
+    /// What the device keeps with groups, for each kind, in any stored order.
+    /// A volume is kept if all of its copies are.
+    /// Nothing for a camera that is refused.
     pub(crate) fn grouped_masks(&self, engine: &Engine) -> Option<(Vec<Vec<bool>>, Tested)> {
         let random = &mut Random(self.seed ^ (self.number as u64) << 32);
         // Whole groups of one volume, groups of a few, and one of all.
@@ -47,7 +48,13 @@ impl Round {
             let instances = engine.instances(&arrays.bounds(*kind), &options).expect("instances");
             let cull = |hierarchy| {
                 let options = CullOptions { hierarchy, ..self.options.clone() };
-                engine.cull(&instances, &self.camera, &pyramid, &options, &VisibleOptions::default())
+                engine.cull(
+                    &instances,
+                    &self.camera,
+                    &pyramid,
+                    &options,
+                    &VisibleOptions::default(),
+                )
             };
             let (flat_cull, grouped) = match (cull(Hierarchy::Never), cull(Hierarchy::Always)) {
                 (Ok(flat), Ok(grouped)) => (flat, grouped),
@@ -55,26 +62,35 @@ impl Round {
                 (Err(error), _) | (_, Err(error)) => panic!("{error}"),
             };
             let (flat, mask) = (flat_cull.mask().expect("mask"), grouped.mask().expect("mask"));
-            let (counts, verdicts) = (grouped.counts().expect("counts"), grouped.verdicts().expect("verdicts"));
+            let (counts, verdicts) =
+                (grouped.counts().expect("counts"), grouped.verdicts().expect("verdicts"));
             let alone = flat_cull.verdicts().expect("verdicts");
             let pairs = alone.chunks_exact(copies).zip(verdicts.chunks_exact(copies)).zip(volumes);
             let changed = pairs.map(|((alone, verdicts), volume)| {
                 // By the certificate of its group's box, which is another one than its own.
-                let by_box =
-                    alone.iter().zip(verdicts).filter(|(alone, verdict)| matches!(alone, 1 | 2) && **verdict == 0);
+                let by_box = alone
+                    .iter()
+                    .zip(verdicts)
+                    .filter(|(alone, verdict)| matches!(alone, 1 | 2) && **verdict == 0);
                 let by_box = by_box.count() as u64;
-                let is_right =
-                    by_box == 0 || !is_area || hiz_ref::is_outside(&self.view, volume).expect("a finite view");
-                let others =
-                    alone.iter().zip(verdicts).filter(|pair| !matches!(pair, (1 | 2, 0) | (2, 1)) && pair.0 != pair.1);
+                let is_right = by_box == 0
+                    || !is_area
+                    || hiz_ref::is_outside(&self.view, volume).expect("a finite view");
+                let others = alone
+                    .iter()
+                    .zip(verdicts)
+                    .filter(|pair| !matches!(pair, (1 | 2, 0) | (2, 1)) && pair.0 != pair.1);
                 others.count() as u64 + if is_right { 0 } else { by_box }
             });
             let counted = [counts.outside, counts.occluded, counts.visible, counts.invalid];
             let wrong_counts = (0..4_u8).map(|verdict| {
-                counted[usize::from(verdict)].abs_diff(verdicts.iter().filter(|v| **v == verdict).count() as u64)
+                counted[usize::from(verdict)]
+                    .abs_diff(verdicts.iter().filter(|v| **v == verdict).count() as u64)
             });
             let kept = mask.iter().filter(|kept| **kept).count() as u64;
-            let kept_alone = flat.iter().zip(&mask).filter(|(flat, grouped)| **grouped && !**flat).count() as u64;
+            let kept_alone =
+                flat.iter().zip(&mask).filter(|(flat, grouped)| **grouped && !**flat).count()
+                    as u64;
             tested.add(Tested {
                 instances: many.len() as u64,
                 one_by_one: counts.tested_instances,
@@ -83,7 +99,9 @@ impl Round {
                     + changed.sum::<u64>()
                     + wrong_counts.sum::<u64>(),
             });
-            masks.push(mask.chunks_exact(copies).map(|copies| copies.iter().all(|kept| *kept)).collect());
+            masks.push(
+                mask.chunks_exact(copies).map(|copies| copies.iter().all(|kept| *kept)).collect(),
+            );
         }
         Some((masks, tested))
     }

@@ -1,9 +1,11 @@
 //! Random and adversarial culls against the oracle.
 //!
-//! A round is a camera, a depth image and a few dozen volumes of each kind, of one [`Class`], made so that something is nearly
-//! decided the other way: their nearest points share a depth that the image repeats, their silhouettes end on pixel borders
-//! beside holes or at the frustum's planes, and most are moved by bisection to where the oracle's verdict hangs on the last
-//! bits. The oracle decides exactly; a volume that is culled although the oracle calls it visible is a false cull.
+//! A round is a camera, a depth image and a few dozen volumes of each kind, of one [`Class`], made
+//! so that something is nearly decided the other way: their nearest points share a depth that the
+//! image repeats, their silhouettes end on pixel borders beside holes or at the frustum's planes,
+//! and most are moved by bisection to where the oracle's verdict hangs on the last bits.
+//! The oracle decides exactly; a volume that is culled although the oracle calls it visible is a
+//! false cull.
 #![allow(dead_code, unused_imports, reason = "each test binary uses its own part")]
 
 mod arrays;
@@ -17,8 +19,8 @@ mod volume;
 
 use hiz_core::headless::{DepthImage, Engine};
 use hiz_core::{
-    AtlasUse, BoundsKind, Camera, Coverage, CullOptions, Fit, Footprint, Hierarchy, InstanceOptions, PyramidOptions,
-    StoredLevels, VisibleOptions,
+    AtlasUse, BoundsKind, Camera, Coverage, CullOptions, Fit, Footprint, Hierarchy,
+    InstanceOptions, PyramidOptions, StoredLevels, VisibleOptions,
 };
 use hiz_ref::{Options, Outcome, OwnDepth, Verdict, View, Volume};
 
@@ -33,7 +35,8 @@ pub(crate) use report::{HEADER, Report, Tally};
 pub(crate) use volume::moved;
 
 /// Every kind of bounding volume.
-pub(crate) const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
+pub(crate) const KINDS: [BoundsKind; 3] =
+    [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
 
 /// What a cull reads by default.
 pub(crate) const PLAIN: &[(Footprint, u32)] = &[(Footprint::Two, 0)];
@@ -61,7 +64,8 @@ pub(crate) struct Campaign {
     pub(crate) volumes: usize,
     pub(crate) kinds: &'static [BoundsKind],
     pub(crate) coverage: Coverage,
-    /// Footprints and descent budgets to choose from. (Each costs pipelines, and those cost time.)
+    /// Footprints and descent budgets to choose from.
+    /// (Each costs pipelines, and those cost time.)
     pub(crate) modes: &'static [(Footprint, u32)],
     pub(crate) fit: Fit,
     /// Which levels are stored, to choose from.
@@ -117,7 +121,8 @@ pub(crate) struct Round {
 }
 
 impl Campaign {
-    /// The rounds, made as they are asked for. Those whose camera float64 or float32 cannot hold are left out.
+    /// The rounds, made as they are asked for.
+    /// Those whose camera float64 or float32 cannot hold are left out.
     pub(crate) fn rounds(self) -> impl Iterator<Item = Round> {
         (0..self.rounds * self.classes.len()).filter_map(move |number| self.round(number))
     }
@@ -141,14 +146,16 @@ impl Campaign {
             ..CullOptions::default()
         };
         if self.any_slack {
-            options.guard_px = random.pick(&[Some(0.0), Some(1.0 / 64.0), Some(0.5), Some(3.0), None]);
+            options.guard_px =
+                random.pick(&[Some(0.0), Some(1.0 / 64.0), Some(0.5), Some(3.0), None]);
             options.depth_slack = random.pick(&[0.0, 1e-6, 1e-3]);
             options.transform_slack = random.pick(&[0.0, 4.0]);
         }
         let mut volumes = Vec::new();
         let mut away = Vec::new();
         for kind in self.kinds.iter().copied() {
-            let (these, ways) = (0..self.volumes).map(|_| scene.volume(class, kind, random)).unzip();
+            let (these, ways) =
+                (0..self.volumes).map(|_| scene.volume(class, kind, random)).unzip();
             volumes.push((kind, these));
             away.push(ways);
         }
@@ -156,7 +163,19 @@ impl Campaign {
         // Last, so that a round is the same whatever is stored.
         let levels = random.pick(self.levels);
         let (seed, chunks) = (self.seed, self.chunks);
-        Some(Round { seed, number, class, camera, view, depth, options, levels, chunks, volumes, away })
+        Some(Round {
+            seed,
+            number,
+            class,
+            camera,
+            view,
+            depth,
+            options,
+            levels,
+            chunks,
+            volumes,
+            away,
+        })
     }
 
     /// Culls every round on the device and asks the oracle.
@@ -194,14 +213,17 @@ impl Round {
         (self.number as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 62
     }
 
-    /// The depth image; in two of four ways in a texture that is gathered from, like a depth texture.
+    /// The depth image; in two of four ways in a texture that is gathered from, like a depth
+    /// texture.
     pub(crate) fn upload(&self, engine: &Engine) -> DepthImage {
-        let upload = if self.way() % 2 == 1 { Engine::upload_depth_sampled } else { Engine::upload_depth };
+        let upload =
+            if self.way() % 2 == 1 { Engine::upload_depth_sampled } else { Engine::upload_depth };
         upload(engine, &self.depth, &self.camera).expect("upload")
     }
 
     /// The levels of this round; in two of four ways, one of each kind of image, culls read all of
-    /// them from one texture. Of more than one chunk there is none.
+    /// them from one texture.
+    /// Of more than one chunk there is none.
     pub(crate) fn pyramid_options(&self, engine: &Engine) -> PyramidOptions {
         let atlas = if self.way() < 2 { AtlasUse::Always } else { AtlasUse::Never };
         let options = PyramidOptions { levels: self.levels, atlas, ..PyramidOptions::default() };
@@ -210,19 +232,30 @@ impl Round {
         }
         let whole = engine.context().create_pyramid(self.camera.size(), &options).expect("pyramid");
         // The least chunks of a power of two of which so many are enough.
-        let shift = (2..30).find(|shift| whole.device_bytes() / 4 <= self.chunks << shift).expect("a small pyramid");
+        let shift = (2..30)
+            .find(|shift| whole.device_bytes() / 4 <= self.chunks << shift)
+            .expect("a small pyramid");
         PyramidOptions { chunk_shift: Some(shift), ..options }
     }
 
-    /// What the device keeps, for each kind. Nothing for a camera that is refused: float32 cannot hold its rows.
+    /// What the device keeps, for each kind.
+    /// Nothing for a camera that is refused: float32 cannot hold its rows.
     pub(crate) fn masks(&self, engine: &Engine) -> Option<Vec<Vec<bool>>> {
         let image = self.upload(engine);
         let pyramid = engine.pyramid_with(&image, &self.pyramid_options(engine)).expect("pyramid");
         let mut masks = Vec::new();
         for (kind, volumes) in &self.volumes {
             let arrays = Arrays::new(volumes);
-            let instances = engine.instances(&arrays.bounds(*kind), &InstanceOptions::default()).expect("instances");
-            match engine.cull(&instances, &self.camera, &pyramid, &self.options, &VisibleOptions::default()) {
+            let instances = engine
+                .instances(&arrays.bounds(*kind), &InstanceOptions::default())
+                .expect("instances");
+            match engine.cull(
+                &instances,
+                &self.camera,
+                &pyramid,
+                &self.options,
+                &VisibleOptions::default(),
+            ) {
                 Ok(culling) => masks.push(culling.mask().expect("mask")),
                 Err(hiz_core::Error::Invalid { .. }) => return None,
                 Err(error) => panic!("{error}"),
@@ -250,7 +283,8 @@ impl Round {
         hiz_ref::classify_with(&self.view, volume, &self.depth, options).expect("a finite view")
     }
 
-    /// The count of one verdict. What is kept is right unless false keeps are asked for.
+    /// The count of one verdict.
+    /// What is kept is right unless false keeps are asked for.
     pub(crate) fn tally(&self, volume: &Volume, kept: bool, count_keeps: bool) -> Tally {
         let mut tally = Tally { cases: 1, culled: usize::from(!kept), ..Tally::default() };
         if !kept || count_keeps {

@@ -10,7 +10,8 @@ pub(crate) struct Tally {
     pub(crate) culled: usize,
     /// Culled although visible: must be 0.
     pub(crate) false_culls: usize,
-    /// Kept although hidden: the price. (Only where the campaign counts them.)
+    /// Kept although hidden: the price.
+    /// (Only where the campaign counts them.)
     pub(crate) false_keeps: usize,
 }
 
@@ -35,7 +36,11 @@ pub(crate) struct Report {
 
 impl Report {
     pub(crate) fn new(classes: &[Class], keeps: bool) -> Self {
-        Self { classes: classes.iter().map(|c| (*c, Tally::default())).collect(), keeps, tested: Tested::default() }
+        Self {
+            classes: classes.iter().map(|c| (*c, Tally::default())).collect(),
+            keeps,
+            tested: Tested::default(),
+        }
     }
 
     pub(crate) fn add(&mut self, class: Class, tally: Tally) {
@@ -65,7 +70,8 @@ impl Report {
 impl std::fmt::Display for Report {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let mut line = |name: &str, t: &Tally| {
-            let keeps = if self.keeps { format!("{:>12}", t.false_keeps) } else { format!("{:>12}", "-") };
+            let keeps =
+                if self.keeps { format!("{:>12}", t.false_keeps) } else { format!("{:>12}", "-") };
             writeln!(f, "{name:<18}{:>10}{:>10}{:>12}{keeps}", t.cases, t.culled, t.false_culls)
         };
         for (class, tally) in &self.classes {

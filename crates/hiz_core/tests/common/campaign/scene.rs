@@ -39,7 +39,8 @@ pub(super) struct Settings {
     pub(super) near: f64,
     /// Infinite: none (a perspective alone).
     pub(super) far: f64,
-    /// Half the image in world units at view depth 1 (perspective) or anywhere (orthographic), and its middle.
+    /// Half the image in world units at view depth 1 (perspective) or anywhere (orthographic), and
+    /// its middle.
     pub(super) half: [f64; 2],
     pub(super) middle: [f64; 2],
     pub(super) orthographic: bool,
@@ -60,7 +61,11 @@ impl Settings {
             eye: [0.0; 3],
             away: 0.0,
             near,
-            far: if random.below(3) == 0 { f64::INFINITY } else { near * 10.0_f64.powf(random.range(0.5, 8.0)) },
+            far: if random.below(3) == 0 {
+                f64::INFINITY
+            } else {
+                near * 10.0_f64.powf(random.range(0.5, 8.0))
+            },
             half,
             middle: half.map(|h| if centred { 0.0 } else { random.range(-1.0, 1.0) * h }),
             orthographic: random.below(5) == 0,
@@ -82,7 +87,8 @@ impl Settings {
         settings
     }
 
-    /// Puts the camera up to `distance` from the world's origin along each axis; farther views are of larger things.
+    /// Puts the camera up to `distance` from the world's origin along each axis; farther views are
+    /// of larger things.
     pub(super) fn stand_away(&mut self, distance: f64, random: &mut Random) {
         self.away = distance;
         self.eye = [0; 3].map(|_| distance * random.range(-1.0, 1.0));
@@ -92,9 +98,16 @@ impl Settings {
     }
 
     fn camera(&self, random: &mut Random) -> Option<Camera> {
-        let direction: [f64; 3] =
-            if self.aligned { [0.0, 0.0, -1.0] } else { std::array::from_fn(|_| random.range(-1.0, 1.0)) };
-        let up = if self.aligned { [0.0, 1.0, 0.0] } else { std::array::from_fn(|_| random.range(-1.0, 1.0)) };
+        let direction: [f64; 3] = if self.aligned {
+            [0.0, 0.0, -1.0]
+        } else {
+            std::array::from_fn(|_| random.range(-1.0, 1.0))
+        };
+        let up = if self.aligned {
+            [0.0, 1.0, 0.0]
+        } else {
+            std::array::from_fn(|_| random.range(-1.0, 1.0))
+        };
         // A target beyond the rounding of a distant eye.
         let target = std::array::from_fn(|k| self.eye[k] + (1.0 + self.away) * direction[k]);
         let (left, right) = (self.middle[0] - self.half[0], self.middle[0] + self.half[0]);
@@ -107,9 +120,11 @@ impl Settings {
             let far = self.far.is_finite().then_some(self.far);
             Projection::Frustum { left, right, bottom, top, near, far, convention }
         };
-        let camera = Camera::look_at(&Pose { eye: self.eye, target, up }, &projection, self.size).ok()?;
+        let camera =
+            Camera::look_at(&Pose { eye: self.eye, target, up }, &projection, self.size).ok()?;
         if self.bare_matrix {
-            return Camera::from_clip_from_world(camera.clip_from_world(), self.size, convention).ok();
+            return Camera::from_clip_from_world(camera.clip_from_world(), self.size, convention)
+                .ok();
         }
         Some(camera)
     }
@@ -137,7 +152,12 @@ pub(super) struct Scene {
 
 impl Scene {
     /// Nothing where float64 cannot make such a camera.
-    pub(super) fn new(class: Class, coverage: Coverage, sizes: &[(u32, u32)], random: &mut Random) -> Option<Self> {
+    pub(super) fn new(
+        class: Class,
+        coverage: Coverage,
+        sizes: &[(u32, u32)],
+        random: &mut Random,
+    ) -> Option<Self> {
         let mut settings = Settings::new(random);
         class.insist(&mut settings, random);
         if !sizes.is_empty() {
@@ -147,8 +167,13 @@ impl Scene {
         let camera = settings.camera(random)?;
         let rows = camera.rows();
         let reversed = settings.convention.is_reversed();
-        let view =
-            View { rows, origin: camera.origin(), width: settings.size.width, height: settings.size.height, reversed };
+        let view = View {
+            rows,
+            origin: camera.origin(),
+            width: settings.size.width,
+            height: settings.size.height,
+            reversed,
+        };
         // The axes as the camera has them, up to float64.
         let unit = |v: [f64; 3]| {
             let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -173,13 +198,25 @@ impl Scene {
             Class::BareMatrix => random.range(0.3, 1.0),
             _ => random.unit().min(3.0 / range.log10()),
         };
-        let front = near * range.powf(exponent) * random.pick(&[1.0, 1.0, 1.0, 1.0 - 1e-6, 1.0 + 1e-6, 0.9]);
+        let front = near
+            * range.powf(exponent)
+            * random.pick(&[1.0, 1.0, 1.0, 1.0 - 1e-6, 1.0 + 1e-6, 0.9]);
         let hole = [random.below(size.width), random.below(size.height)];
         let edges = match coverage {
             Coverage::Area => [0.0, 1.0],
             Coverage::Sample => [0.5, 0.5],
         };
-        let mut scene = Self { settings, camera, view, axes, front, front_depth: 0.0, hole, depth: Vec::new(), edges };
+        let mut scene = Self {
+            settings,
+            camera,
+            view,
+            axes,
+            front,
+            front_depth: 0.0,
+            hole,
+            depth: Vec::new(),
+            edges,
+        };
         scene.paint(random);
         Some(scene)
     }
@@ -190,9 +227,11 @@ impl Scene {
         for _ in 0..random.below(3) {
             equal = if random.below(2) == 0 { equal.next_up() } else { equal.next_down() };
         }
-        let clear = self.ndc(self.settings.near + 0.5 * (self.front - self.settings.near).max(0.0)) as f32;
+        let clear =
+            self.ndc(self.settings.near + 0.5 * (self.front - self.settings.near).max(0.0)) as f32;
         let style = self.settings.style;
-        let (width, height, hole) = (self.settings.size.width, self.settings.size.height, self.hole);
+        let (width, height, hole) =
+            (self.settings.size.width, self.settings.size.height, self.hole);
         self.depth = (0..height)
             .flat_map(|y| (0..width).map(move |x| (x == hole[0], y == hole[1])))
             .map(|(in_column, in_row)| {
@@ -230,13 +269,16 @@ impl Scene {
 
     /// NDC depth of view depth `z`.
     fn ndc(&self, z: f64) -> f64 {
-        let [clip_z, clip_w] = [2, 3].map(|r| self.along_forward(r)).map(|[slope, constant]| slope * z + constant);
+        let [clip_z, clip_w] =
+            [2, 3].map(|r| self.along_forward(r)).map(|[slope, constant]| slope * z + constant);
         clip_z / clip_w
     }
 
     /// World position of view space (right, up, forward).
     pub(super) fn world(&self, v: [f64; 3]) -> [f64; 3] {
-        std::array::from_fn(|k| self.settings.eye[k] + (0..3).map(|j| self.axes[j][k] * v[j]).sum::<f64>())
+        std::array::from_fn(|k| {
+            self.settings.eye[k] + (0..3).map(|j| self.axes[j][k] * v[j]).sum::<f64>()
+        })
     }
 
     /// View-space x and y of a pixel position at view depth `z`.
@@ -249,13 +291,15 @@ impl Scene {
         ]
     }
 
-    /// The view of the pixel columns (axis 0) or rows (axis 1) from `begin` to `end` alone, up to float64: good for a search.
+    /// The view of the pixel columns (axis 0) or rows (axis 1) from `begin` to `end` alone, up to
+    /// float64: good for a search.
     pub(super) fn cropped(&self, axis: usize, begin: f64, end: f64) -> View {
         let size = f64::from([self.view.width, self.view.height][axis]);
         let (stretch, shift) = (size / (end - begin), (size - begin - end) / (end - begin));
         let shift = if axis == 0 { shift } else { -shift };
         let mut view = self.view.clone();
-        view.rows[axis] = std::array::from_fn(|k| stretch * view.rows[axis][k] + shift * view.rows[3][k]);
+        view.rows[axis] =
+            std::array::from_fn(|k| stretch * view.rows[axis][k] + shift * view.rows[3][k]);
         view
     }
 }

@@ -1,5 +1,5 @@
-//! Volumes that are nearly decided the other way: placed beside a hole or before a depth, then moved until the oracle's verdict
-//! hangs on the last bits.
+//! Volumes that are nearly decided the other way: placed beside a hole or before a depth, then
+//! moved until the oracle's verdict hangs on the last bits.
 
 use hiz_core::BoundsKind;
 use hiz_ref::{View, Volume};
@@ -19,8 +19,14 @@ struct Way<'a> {
 }
 
 impl Scene {
-    /// A volume of `kind` as `class` wants it, and the way, as long as its distance, on which it becomes hidden.
-    pub(super) fn volume(&self, class: Class, kind: BoundsKind, random: &mut Random) -> (Volume, [f64; 3]) {
+    /// A volume of `kind` as `class` wants it, and the way, as long as its distance, on which it
+    /// becomes hidden.
+    pub(super) fn volume(
+        &self,
+        class: Class,
+        kind: BoundsKind,
+        random: &mut Random,
+    ) -> (Volume, [f64; 3]) {
         let placed = if class == Class::Grazing && kind != BoundsKind::Sphere {
             self.plate(kind, random)
         } else {
@@ -35,7 +41,8 @@ impl Scene {
         (self.last_before(placed, away, &*way.cleared, random).unwrap_or(placed), away)
     }
 
-    /// An interval in pixels along an axis: anywhere, or ending a hair beside the border of the hole or of a texel.
+    /// An interval in pixels along an axis: anywhere, or ending a hair beside the border of the
+    /// hole or of a texel.
     fn interval(&self, class: Class, axis: usize, random: &mut Random) -> [f64; 2] {
         let side = [self.view.width, self.view.height][axis];
         let hole = f64::from(self.hole[axis]);
@@ -60,7 +67,8 @@ impl Scene {
     /// A volume whose front faces the camera at the scene's depth.
     fn placed(&self, class: Class, kind: BoundsKind, random: &mut Random) -> Volume {
         let z = self.front;
-        let ([x0, x1], [y0, y1]) = (self.interval(class, 0, random), self.interval(class, 1, random));
+        let ([x0, x1], [y0, y1]) =
+            (self.interval(class, 0, random), self.interval(class, 1, random));
         let ([left, top], [right, bottom]) = (self.at([x0, y0], z), self.at([x1, y1], z));
         let middle = [0.5 * (left + right), 0.5 * (top + bottom)];
         let half = [0.5 * (right - left).abs(), 0.5 * (top - bottom).abs()];
@@ -79,7 +87,8 @@ impl Scene {
                 Volume::Sphere { center: self.world([middle[0], middle[1], z + radius]), radius }
             }
             BoundsKind::Box if self.settings.aligned => {
-                // The camera looks along -z of the world with y up: view (x, y, depth) is world (x, y, -depth).
+                // The camera looks along -z of the world with y up: view (x, y, depth) is world (x,
+                // y, -depth).
                 let a = self.world([left.min(right), top.min(bottom), z + thickness]);
                 let b = self.world([left.max(right), top.max(bottom), z]);
                 spanned(a, b)
@@ -92,31 +101,44 @@ impl Scene {
             BoundsKind::OrientedBox => {
                 let [right, up, forward] = self.axes;
                 // A roll about the view keeps the front where it is; so does a shear along it.
-                let (s, c) = if random.below(3) == 0 { random.range(0.0, 6.3).sin_cos() } else { (0.0, 1.0) };
+                let (s, c) = if random.below(3) == 0 {
+                    random.range(0.0, 6.3).sin_cos()
+                } else {
+                    (0.0, 1.0)
+                };
                 let mirror = random.pick(&[1.0, -1.0]);
-                let axes = [0, 1, 2].map(|k| [c * right[k] + s * up[k], c * up[k] - s * right[k], mirror * forward[k]]);
+                let axes = [0, 1, 2].map(|k| {
+                    [c * right[k] + s * up[k], c * up[k] - s * right[k], mirror * forward[k]]
+                });
                 let center = self.world([middle[0], middle[1], z + thickness]);
                 Volume::OrientedBox { center, half_sizes: [half[0], half[1], thickness], axes }
             }
         }
     }
 
-    /// A flat box that holds a line of sight: all of it projects onto a line, along a border of the hole.
+    /// A flat box that holds a line of sight: all of it projects onto a line, along a border of the
+    /// hole.
     fn plate(&self, kind: BoundsKind, random: &mut Random) -> Volume {
         let z = self.front;
         let axis = if self.settings.style == DepthStyle::Row { 1 } else { 0 };
-        let mut pixel = [0, 1].map(|k| random.unit() * f64::from([self.view.width, self.view.height][k]));
+        let mut pixel =
+            [0, 1].map(|k| random.unit() * f64::from([self.view.width, self.view.height][k]));
         pixel[axis] = f64::from(self.hole[axis]) + random.pick(&self.edges) + random.pick(&HAIRS);
         let [x, y] = self.at(pixel, z);
         let along = if self.settings.orthographic { [0.0, 0.0, 1.0] } else { [x / z, y / z, 1.0] };
         let depth = 0.5 * z * random.unit();
-        let height = random.pick(&[1e-3, 0.1, 1.0]) * (self.at([0.0, 1.0], z)[1] - self.at([0.0, 0.0], z)[1]).abs();
-        let (forward, center) = (self.world(along), self.world([0, 1, 2].map(|k| [x, y, z][k] + depth * along[k])));
+        let height = random.pick(&[1e-3, 0.1, 1.0])
+            * (self.at([0.0, 1.0], z)[1] - self.at([0.0, 0.0], z)[1]).abs();
+        let (forward, center) =
+            (self.world(along), self.world([0, 1, 2].map(|k| [x, y, z][k] + depth * along[k])));
         if kind == BoundsKind::Box {
             // Along the world's axes a plate is seen edge-on from on or near its plane alone.
             let mut half = [depth; 3];
             half[random.below(3) as usize] = 0.0;
-            return spanned([0, 1, 2].map(|k| center[k] - half[k]), [0, 1, 2].map(|k| center[k] + half[k]));
+            return spanned(
+                [0, 1, 2].map(|k| center[k] - half[k]),
+                [0, 1, 2].map(|k| center[k] + half[k]),
+            );
         }
         let up = self.axes[1 - axis];
         let axes = [0, 1, 2].map(|k| [forward[k] - self.settings.eye[k], up[k], 0.0]);
@@ -130,7 +152,8 @@ impl Scene {
         match self.settings.style {
             // Backwards, until it is behind the depth.
             DepthStyle::Equal | DepthStyle::Near | DepthStyle::Noise => {
-                let hidden = |v: &Volume| hiz_ref::hides(&self.view, v, self.front_depth).unwrap_or(false);
+                let hidden =
+                    |v: &Volume| hiz_ref::hides(&self.view, v, self.front_depth).unwrap_or(false);
                 Way { direction: forward, cleared: Box::new(hidden) }
             }
             // Away from the frustum's middle, until it is outside.
@@ -139,7 +162,10 @@ impl Scene {
                     Class::NearPlane => (forward, -1.0),
                     _ => (random.pick(&[right, up, forward]), random.pick(&[1.0, -1.0])),
                 };
-                Way { direction: axis.map(|x| sign * x), cleared: Box::new(outside(self.view.clone())) }
+                Way {
+                    direction: axis.map(|x| sign * x),
+                    cleared: Box::new(outside(self.view.clone())),
+                }
             }
             // Away from the hole, until it no longer touches it.
             DepthStyle::Column | DepthStyle::Row | DepthStyle::Cross | DepthStyle::Pixel => {
@@ -150,9 +176,11 @@ impl Scene {
                 };
                 let size = f64::from([self.view.width, self.view.height][axis]);
                 let hole = f64::from(self.hole[axis]);
-                // Towards smaller pixel coordinates, clear of the hole and all beyond it; or the other way.
+                // Towards smaller pixel coordinates, clear of the hole and all beyond it; or the
+                // other way.
                 let down = random.below(2) == 0;
-                let (begin, end) = if down { (hole + self.edges[0], size) } else { (0.0, hole + self.edges[1]) };
+                let (begin, end) =
+                    if down { (hole + self.edges[0], size) } else { (0.0, hole + self.edges[1]) };
                 // Pixel rows count downwards.
                 let sign = if down == (axis == 0) { -1.0 } else { 1.0 };
                 let direction = [right, up][axis].map(|x| sign * x);
@@ -161,8 +189,9 @@ impl Scene {
         }
     }
 
-    /// Moves `volume` along `away` to the last place where it is not yet `cleared`, to within 1e-10 of its distance, or some eps
-    /// before it. Nothing where there is no such place nearby.
+    /// Moves `volume` along `away` to the last place where it is not yet `cleared`, to within 1e-10
+    /// of its distance, or some eps before it.
+    /// Nothing where there is no such place nearby.
     fn last_before(
         &self,
         volume: Volume,

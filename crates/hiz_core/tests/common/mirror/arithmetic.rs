@@ -1,5 +1,6 @@
-//! float32 `+ - *` in every way that WGSL permits: a result may be either neighbour of the exact one, a product and a sum may
-//! be fused, sums may be taken in any order, subnormals may be flushed.
+//! float32 `+ - *` in every way that WGSL permits: a result may be either neighbour of the exact
+//! one, a product and a sum may be fused, sums may be taken in any order, subnormals may be
+//! flushed.
 
 use crate::common::Random;
 
@@ -14,7 +15,8 @@ pub(crate) enum Rounding {
     Down,
     /// Either, drawn for each operation.
     Either,
-    /// Either, drawn for each *part* of the computation: what a part loses adds up, as the margin has to assume.
+    /// Either, drawn for each *part* of the computation: what a part loses adds up, as the margin
+    /// has to assume.
     EitherByPart,
 }
 
@@ -29,9 +31,11 @@ pub(crate) struct Style {
     pub(crate) reassociated: bool,
     /// Subnormals are 0: in 1 of `n` operations at random, 1: in all, 0: in none.
     pub(crate) flushed: u32,
-    /// The rectangle is anything, and so are the slopes and offsets of a volume fit: they only choose what is certified.
+    /// The rectangle is anything, and so are the slopes and offsets of a volume fit: they only
+    /// choose what is certified.
     pub(crate) wild: bool,
-    /// `bar` and `bar3` stop the compiler from folding a difference that cancels into what it was made of.
+    /// `bar` and `bar3` stop the compiler from folding a difference that cancels into what it was
+    /// made of.
     pub(crate) bars: bool,
     /// `bar2` stops it from folding the quotient that a slope is into what it is multiplied with.
     pub(crate) slope_bars: bool,
@@ -52,7 +56,8 @@ const PLAIN: Style = Style {
 };
 
 /// What lavapipe's compiler makes of the plain one.
-pub(crate) const MARGIN_FIRST: Style = Style { name: "nearest, margin first", margin_first: true, ..PLAIN };
+pub(crate) const MARGIN_FIRST: Style =
+    Style { name: "nearest, margin first", margin_first: true, ..PLAIN };
 
 /// What reassociation may do where no bar stops it; no style that the margin covers.
 pub(crate) const WITHOUT_BARS: Style = Style { name: "no bars", bars: false, ..PLAIN };
@@ -69,8 +74,22 @@ pub(crate) const STYLES: [Style; 14] = [
     Style { name: "flushed", flushed: 1, ..PLAIN },
     Style { name: "fused, up", fused: 1, rounding: Rounding::Up, ..PLAIN },
     Style { name: "fused, down", fused: 1, rounding: Rounding::Down, ..PLAIN },
-    Style { name: "all, up or down", rounding: Rounding::Either, fused: 2, reassociated: true, flushed: 1, ..PLAIN },
-    Style { name: "all, by part", rounding: Rounding::EitherByPart, fused: 2, reassociated: true, flushed: 1, ..PLAIN },
+    Style {
+        name: "all, up or down",
+        rounding: Rounding::Either,
+        fused: 2,
+        reassociated: true,
+        flushed: 1,
+        ..PLAIN
+    },
+    Style {
+        name: "all, by part",
+        rounding: Rounding::EitherByPart,
+        fused: 2,
+        reassociated: true,
+        flushed: 1,
+        ..PLAIN
+    },
     Style { name: "wild guesses", wild: true, ..PLAIN },
     Style { name: "wild, by part", wild: true, rounding: Rounding::EitherByPart, ..PLAIN },
 ];
@@ -108,9 +127,11 @@ impl Arithmetic {
         if flushes { 0.0 } else { v }
     }
 
-    /// The float32 that the exact number `value + rest` becomes; `nearest` is what to nearest makes of it.
+    /// The float32 that the exact number `value + rest` becomes; `nearest` is what to nearest makes
+    /// of it.
     fn rounded(&mut self, value: f64, rest: f64, nearest: f32) -> f32 {
-        // Exact: `nearest` is within half a spacing of `value`. So the sign of the sum is that of the error.
+        // Exact: `nearest` is within half a spacing of `value`.
+        // So the sign of the sum is that of the error.
         let error = (value - f64::from(nearest)) + rest;
         let up = match self.style.rounding {
             Rounding::Nearest => return self.flush(nearest),
@@ -188,7 +209,8 @@ impl Arithmetic {
         terms[1..].iter().fold(first, |sum, (a, b)| self.mul_add(*a, *b, sum))
     }
 
-    /// Whether the sums of one expression are taken as one, in any order: half of the time where that is permitted.
+    /// Whether the sums of one expression are taken as one, in any order: half of the time where
+    /// that is permitted.
     pub(crate) fn takes_any_order(&mut self) -> bool {
         self.style.reassociated && self.random.below(2) == 0
     }
@@ -210,7 +232,8 @@ impl Arithmetic {
     }
 }
 
-/// What a volume fit has to stand besides [`STYLES`]: subnormals flushed in one place and not in another.
+/// What a volume fit has to stand besides [`STYLES`]: subnormals flushed in one place and not in
+/// another.
 pub(crate) const WILDEST: Style = Style {
     name: "all, wild",
     rounding: Rounding::EitherByPart,
@@ -222,7 +245,8 @@ pub(crate) const WILDEST: Style = Style {
 };
 
 /// The same, and slopes that are certified are not those that are compared with.
-pub(crate) const WITHOUT_SLOPE_BARS: Style = Style { name: "no bars at slopes", slope_bars: false, ..WILDEST };
+pub(crate) const WITHOUT_SLOPE_BARS: Style =
+    Style { name: "no bars at slopes", slope_bars: false, ..WILDEST };
 
 /// Knuth's: the float64 sum, and what it lost, exactly.
 fn two_sum(a: f64, b: f64) -> (f64, f64) {

@@ -1,5 +1,5 @@
-//! `extent_of` and what is certified by it (`bounds_box_support.wgsl`, `bounds_sphere.wgsl`): of boxes over ends that may be
-//! anything, for what is proved is proved of them.
+//! `extent_of` and what is certified by it (`bounds_box_support.wgsl`, `bounds_sphere.wgsl`): of
+//! boxes over ends that may be anything, for what is proved is proved of them.
 
 use hiz_core::BoundsKind;
 
@@ -15,7 +15,8 @@ pub(super) struct Extent {
     pub(super) above: f32,
 }
 
-/// An end that a wild device may take for the least or greatest ratio: near the right one or anywhere in the image.
+/// An end that a wild device may take for the least or greatest ratio: near the right one or
+/// anywhere in the image.
 fn wild_end(end: f32, half_size: f32, f: &mut Arithmetic) -> f32 {
     let unit = f.below(1 << 24) as f32 / (1 << 23) as f32 - 1.0;
     let small = 0.1_f32.powi(1 + f.below(7) as i32);
@@ -35,13 +36,18 @@ impl Certificates<'_> {
         self.arithmetic.part();
         let support = self.support(w.half);
         if self.arithmetic.takes_any_order() {
-            return self.arithmetic.sum_in_any_order([(w.center, 1.0), (-support, 1.0), (-w.error, 1.0)]);
+            return self.arithmetic.sum_in_any_order([
+                (w.center, 1.0),
+                (-support, 1.0),
+                (-w.error, 1.0),
+            ]);
         }
         let least = self.arithmetic.sub(w.center, support);
         self.arithmetic.sub(least, w.error)
     }
 
-    /// `extent_of`, along an axis of which the image has `half_size` pixels on each side of its middle.
+    /// `extent_of`, along an axis of which the image has `half_size` pixels on each side of its
+    /// middle.
     pub(super) fn extent_of(&mut self, r: &Value, w: &Value, half_size: f32) -> Extent {
         if self.kind == BoundsKind::Sphere {
             let [low, high] = ratio_interval(self.kind, r, w);
@@ -49,7 +55,8 @@ impl Certificates<'_> {
             return Extent { low, high, below, above };
         }
         let ratio = r.center / w.center;
-        let toward = [0, 1, 2].map(|k| if r.half[k] - ratio * w.half[k] >= 0.0 { 1.0 } else { -1.0 });
+        let toward =
+            [0, 1, 2].map(|k| if r.half[k] - ratio * w.half[k] >= 0.0 { 1.0 } else { -1.0 });
         let (r_half, w_half) = (dot(toward, r.half), dot(toward, w.half));
         let mut low = (r.center - r_half) / (w.center - w_half);
         let mut high = (r.center + r_half) / (w.center + w_half);
@@ -61,15 +68,21 @@ impl Certificates<'_> {
         Extent { low, high, below, above }
     }
 
-    /// `below` for the end `t` and the sign 1, `above` for -1: `sign (r - t w)` is nowhere less than its negative.
+    /// `below` for the end `t` and the sign 1, `above` for -1: `sign (r - t w)` is nowhere less
+    /// than its negative.
     fn beyond(&mut self, sign: f32, r: &Value, t: f32, w: &Value) -> f32 {
         self.arithmetic.part();
         let half = [0, 1, 2].map(|k| self.arithmetic.mul_add(-t, w.half[k], r.half[k]));
         let support = self.support(half);
         self.arithmetic.part();
         let beyond = if self.arithmetic.takes_any_order() {
-            let terms =
-                [(support, 1.0), (-sign * r.center, 1.0), (sign * t, w.center), (r.error, 1.0), (t.abs(), w.error)];
+            let terms = [
+                (support, 1.0),
+                (-sign * r.center, 1.0),
+                (sign * t, w.center),
+                (r.error, 1.0),
+                (t.abs(), w.error),
+            ];
             self.arithmetic.sum_in_any_order(terms)
         } else {
             let difference = self.arithmetic.mul_add(-t, w.center, r.center);
@@ -82,7 +95,14 @@ impl Certificates<'_> {
     }
 
     /// `surely_after`; `edge` is exact in any arithmetic.
-    pub(super) fn surely_after(&mut self, r: &Value, w: &Value, extent: &Extent, edge: f32, w_min: f32) -> bool {
+    pub(super) fn surely_after(
+        &mut self,
+        r: &Value,
+        w: &Value,
+        extent: &Extent,
+        edge: f32,
+        w_min: f32,
+    ) -> bool {
         if self.kind == BoundsKind::Sphere {
             return self.surely_above(r, edge, w);
         }
@@ -92,7 +112,14 @@ impl Certificates<'_> {
     }
 
     /// `surely_before`.
-    pub(super) fn surely_before(&mut self, r: &Value, w: &Value, extent: &Extent, edge: f32, w_min: f32) -> bool {
+    pub(super) fn surely_before(
+        &mut self,
+        r: &Value,
+        w: &Value,
+        extent: &Extent,
+        edge: f32,
+        w_min: f32,
+    ) -> bool {
         if self.kind == BoundsKind::Sphere {
             return self.surely_below(r, edge, w);
         }

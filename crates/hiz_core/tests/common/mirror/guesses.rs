@@ -1,5 +1,5 @@
-//! `candidate` and `on_border` of `bounds_box_support.wgsl` and `bounds_sphere.wgsl`: guesses that nothing rests on, so plain
-//! float32 will do in every style.
+//! `candidate` and `on_border` of `bounds_box_support.wgsl` and `bounds_sphere.wgsl`: guesses that
+//! nothing rests on, so plain float32 will do in every style.
 
 use hiz_core::BoundsKind;
 
@@ -63,10 +63,15 @@ fn of_box(i: u32, p: &Projected, facing: f32) -> Candidate {
     }
     let e = axis((i - 12) >> 1);
     let at = |a: f32, b: f32| corner(p, each(|k| sign(1) * e[k] + a * zxy(e)[k] + b * yzx(e)[k]));
-    let (begin, diagonal, left, right) = (at(-1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0), at(1.0, -1.0));
+    let (begin, diagonal, left, right) =
+        (at(-1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0), at(1.0, -1.0));
     let normal = cross(each(|k| diagonal[k] - begin[k]), each(|k| left[k] - right[k]));
     let slope = [facing * normal[0] / normal[2], facing * normal[1] / normal[2]];
-    Candidate { facing, slope, own: facing * begin[2] + (slope[0] * begin[0] + slope[1] * begin[1]) }
+    Candidate {
+        facing,
+        slope,
+        own: facing * begin[2] + (slope[0] * begin[0] + slope[1] * begin[1]),
+    }
 }
 
 /// `gradient`.
@@ -102,5 +107,9 @@ fn of_sphere(i: u32, p: &Projected, facing: f32) -> Candidate {
     let image = [&p.x, &p.y, &p.z].map(|r| gradient(r, &p.w, point));
     let on_image = |v: Vector| image.map(|g| dot(v, g));
     let normal = cross(on_image(down), on_image(cross(point, down)));
-    Candidate { facing, slope: [facing * normal[0] / normal[2], facing * normal[1] / normal[2]], own: 0.0 }
+    Candidate {
+        facing,
+        slope: [facing * normal[0] / normal[2], facing * normal[1] / normal[2]],
+        own: 0.0,
+    }
 }

@@ -1,4 +1,5 @@
-//! How many eps the arithmetic really loses: what a certificate or a texel's comparison claims, against the same in float64.
+//! How many eps the arithmetic really loses: what a certificate or a texel's comparison claims,
+//! against the same in float64.
 
 use hiz_core::BoundsKind;
 use hiz_ref::Volume as Exact;
@@ -47,13 +48,17 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 impl Mirror {
-    /// What certificates on the round's one volume lose: the margin, less what is left of it in float64. In a wild arithmetic, for
-    /// it alone moves the supporting planes' offsets to where they just hold.
+    /// What certificates on the round's one volume lose: the margin, less what is left of it in
+    /// float64.
+    /// In a wild arithmetic, for it alone moves the supporting planes' offsets to where they just
+    /// hold.
     pub(crate) fn losses(&self, round: &Round, arithmetic: &mut Arithmetic) -> Losses {
         let mut losses = Losses::default();
         let (kind, words) = &self.words[0];
         let view = &self.view;
-        let Some(volume) = Volume::load(*kind, words, view, &Margins::FULL, arithmetic) else { return losses };
+        let Some(volume) = Volume::load(*kind, words, view, &Margins::FULL, arithmetic) else {
+            return losses;
+        };
         let mut c = Certificates { kind: *kind, margins: Margins::FULL, arithmetic };
         let [x, y, z, w] = [&view.x, &view.y, &view.z, &view.w].map(|row| c.value_of(row, &volume));
         let w_min = c.least_w(&w);
@@ -65,9 +70,14 @@ impl Mirror {
         let ulps = f64::from(Margins::FULL.certificate);
         let add = |loss: &mut Loss, plane: &Plane, spare: f32| {
             let [sx, sy] = plane.slope.map(f32::abs);
-            let error = plane.facing.abs() * z.error + sx * x.error + sy * y.error + plane.offset.abs() * w.error;
+            let error = plane.facing.abs() * z.error
+                + sx * x.error
+                + sy * y.error
+                + plane.offset.abs() * w.error;
             let unit = f64::from(error) / ulps;
-            if let Some(left) = self.left(round, plane, 0.02 * unit).filter(|_| unit > f64::from(two_to(-50))) {
+            if let Some(left) =
+                self.left(round, plane, 0.02 * unit).filter(|_| unit > f64::from(two_to(-50)))
+            {
                 loss.add(Loss { eps: ulps - (left + f64::from(spare)) / unit, claims: 1 });
             }
         };
@@ -81,7 +91,11 @@ impl Mirror {
                     slope[k] = sign;
                     // Where it ends at 0 it claims less than it has proved.
                     if beyond > 0.0 && end.is_finite() {
-                        add(&mut losses.extents, &Plane { slope, facing: 0.0, offset: sign * end }, beyond);
+                        add(
+                            &mut losses.extents,
+                            &Plane { slope, facing: 0.0, offset: sign * end },
+                            beyond,
+                        );
                     }
                 }
             }
@@ -90,12 +104,13 @@ impl Mirror {
         losses
     }
 
-    /// The least of `facing Z' + slope . (X', Y') - offset W'` on the volume, in float64; nothing where that is off by more than
-    /// `tolerance`.
+    /// The least of `facing Z' + slope . (X', Y') - offset W'` on the volume, in float64; nothing
+    /// where that is off by more than `tolerance`.
     fn left(&self, round: &Round, plane: &Plane, tolerance: f64) -> Option<f64> {
         let (rows, origin) = (&round.view.rows, round.view.origin);
         // The rows that the shader reads are these times a power of two.
-        let k = (0..4).max_by(|a, b| rows[3][*a].abs().total_cmp(&rows[3][*b].abs())).expect("four");
+        let k =
+            (0..4).max_by(|a, b| rows[3][*a].abs().total_cmp(&rows[3][*b].abs())).expect("four");
         let perspective = rows[3][..3].iter().any(|v| *v != 0.0);
         let k = if perspective && k == 3 {
             (0..3).max_by(|a, b| rows[3][*a].abs().total_cmp(&rows[3][*b].abs())).expect("three")
@@ -107,13 +122,16 @@ impl Mirror {
         let [sx, sy] = plane.slope.map(f64::from);
         let [half_width, half_height] = self.view.half_size.map(f64::from);
         let slope = f64::from(self.view.z_slope);
-        let factors = [sx * half_width, -sy * half_height, facing, -(facing * slope + offset)].map(|v| v * scale);
+        let factors = [sx * half_width, -sy * half_height, facing, -(facing * slope + offset)]
+            .map(|v| v * scale);
         let row: [f64; 4] = std::array::from_fn(|k| (0..4).map(|r| factors[r] * rows[r][k]).sum());
-        let sizes: [f64; 4] = std::array::from_fn(|k| (0..4).map(|r| (factors[r] * rows[r][k]).abs()).sum());
+        let sizes: [f64; 4] =
+            std::array::from_fn(|k| (0..4).map(|r| (factors[r] * rows[r][k]).abs()).sum());
         let linear = [row[0], row[1], row[2]];
         let about = |p: [f64; 3]| dot(linear, [0, 1, 2].map(|k| p[k] - origin[k])) + row[3];
-        let far =
-            |p: [f64; 3], h: f64| (0..3).map(|k| sizes[k] * (p[k].abs() + origin[k].abs() + h)).sum::<f64>() + sizes[3];
+        let far = |p: [f64; 3], h: f64| {
+            (0..3).map(|k| sizes[k] * (p[k].abs() + origin[k].abs() + h)).sum::<f64>() + sizes[3]
+        };
         let (least, magnitude) = match &round.volumes[0].1[0] {
             Exact::Sphere { center, radius } => {
                 (about(*center) - radius * dot(linear, linear).sqrt(), far(*center, *radius))
@@ -121,18 +139,26 @@ impl Mirror {
             Exact::Box { min, max } => {
                 let center = [0, 1, 2].map(|k| 0.5 * (min[k] + max[k]));
                 let half = [0, 1, 2].map(|k| 0.5 * (max[k] - min[k]));
-                (about(center) - dot(linear.map(f64::abs), half), far(center, half[0] + half[1] + half[2]))
+                (
+                    about(center) - dot(linear.map(f64::abs), half),
+                    far(center, half[0] + half[1] + half[2]),
+                )
             }
             Exact::OrientedBox { center, half_sizes, axes } => {
-                let support = |k: usize| (half_sizes[k] * dot(linear, axes.map(|row| row[k]))).abs();
-                (about(*center) - (0..3).map(support).sum::<f64>(), far(*center, half_sizes.iter().sum()))
+                let support =
+                    |k: usize| (half_sizes[k] * dot(linear, axes.map(|row| row[k]))).abs();
+                (
+                    about(*center) - (0..3).map(support).sum::<f64>(),
+                    far(*center, half_sizes.iter().sum()),
+                )
             }
         };
         (16.0 * f64::EPSILON * magnitude < tolerance).then_some(least)
     }
 }
 
-/// What a texel's comparison with a plane loses: random terms that nearly cancel, offsets moved to where it just holds with 8 eps.
+/// What a texel's comparison with a plane loses: random terms that nearly cancel, offsets moved to
+/// where it just holds with 8 eps.
 pub(crate) fn texel_loss(cases: usize, arithmetic: &mut Arithmetic) -> Loss {
     let mut loss = Loss::default();
     for _ in 0..cases {
@@ -149,7 +175,11 @@ pub(crate) fn texel_loss(cases: usize, arithmetic: &mut Arithmetic) -> Loss {
         let falls = [0, 1].map(|k| f64::from(slope[k]) * f64::from(corner[k]));
         let near = falls[0] + falls[1] + exact;
         let size = near.abs() + falls[0].abs() + falls[1].abs() + exact.abs();
-        let at = |s: f64| Plane { slope, facing: 1.0, offset: (near + s * f64::from(EPS) * size) as f32 };
+        let at = |s: f64| Plane {
+            slope,
+            facing: 1.0,
+            offset: (near + s * f64::from(EPS) * size) as f32,
+        };
         let (mut open, mut proved) = (0.0, 20.0);
         for _ in 0..10 {
             let middle = 0.5 * (open + proved);
@@ -161,7 +191,8 @@ pub(crate) fn texel_loss(cases: usize, arithmetic: &mut Arithmetic) -> Loss {
         }
         let plane = at(proved);
         if surely_beyond(&plane, corner, bound, Margins::FULL.texel, arithmetic) {
-            let unit = f64::from(EPS) * (f64::from(plane.offset.abs()) + falls[0].abs() + falls[1].abs() + exact.abs());
+            let unit = f64::from(EPS)
+                * (f64::from(plane.offset.abs()) + falls[0].abs() + falls[1].abs() + exact.abs());
             let left = f64::from(plane.offset) - near;
             loss.add(Loss { eps: f64::from(Margins::FULL.texel) - left / unit, claims: 1 });
         }

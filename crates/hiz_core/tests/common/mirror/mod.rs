@@ -1,5 +1,7 @@
-//! The cull shader once more, on the host: the same words in, the same steps, but the arithmetic is an argument. It shows what
-//! the certificates would do on devices that round, fuse, reassociate and flush otherwise than the ones at hand.
+//! The cull shader once more, on the host: the same words in, the same steps, but the arithmetic is
+//! an argument.
+//! It shows what the certificates would do on devices that round, fuse, reassociate and flush
+//! otherwise than the ones at hand.
 #![allow(dead_code, unused_imports, reason = "each test binary uses its own part")]
 
 mod arithmetic;
@@ -13,7 +15,9 @@ use hiz_core::{BoundsKind, CullOptions, ERROR_ULPS, Fit, Footprint};
 
 use crate::campaign::{Arrays, Round};
 
-pub(crate) use arithmetic::{Arithmetic, MARGIN_FIRST, STYLES, Style, WILDEST, WITHOUT_BARS, WITHOUT_SLOPE_BARS};
+pub(crate) use arithmetic::{
+    Arithmetic, MARGIN_FIRST, STYLES, Style, WILDEST, WITHOUT_BARS, WITHOUT_SLOPE_BARS,
+};
 use extent::Extent;
 pub(crate) use loss::{Losses, texel_loss};
 use planes::Projected;
@@ -33,7 +37,8 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// How many eps a certificate, and how many a texel's comparison with a supporting plane keeps back.
+/// How many eps a certificate, and how many a texel's comparison with a supporting plane keeps
+/// back.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Margins {
     pub(crate) certificate: f32,
@@ -63,7 +68,8 @@ impl From<f32> for Margins {
     }
 }
 
-/// A linear function, and what its margin is made from (`view.wgsl`, `magnitudes` and `constant_magnitudes`).
+/// A linear function, and what its margin is made from (`view.wgsl`, `magnitudes` and
+/// `constant_magnitudes`).
 #[derive(Debug, Clone, Copy)]
 struct Row {
     m: [f32; 4],
@@ -158,7 +164,10 @@ impl Mirror {
             .iter()
             .map(|(kind, volumes)| {
                 let arrays = Arrays::new(volumes);
-                (*kind, hiz_core::words::instances(&arrays.bounds(*kind)).expect("arrays that agree"))
+                (
+                    *kind,
+                    hiz_core::words::instances(&arrays.bounds(*kind)).expect("arrays that agree"),
+                )
             })
             .collect();
         Some(Self {
@@ -172,12 +181,18 @@ impl Mirror {
             },
             descent: descent > 0,
             fit_volume: fit == Fit::Volume,
-            levels: hiz_ref::pyramid(&round.depth, round.view.width, round.view.height, round.view.reversed),
+            levels: hiz_ref::pyramid(
+                &round.depth,
+                round.view.width,
+                round.view.height,
+                round.view.reversed,
+            ),
             words,
         })
     }
 
-    /// The same without the host's share in the magnitudes: they bound the coefficients, and not what float64 lost in them.
+    /// The same without the host's share in the magnitudes: they bound the coefficients, and not
+    /// what float64 lost in them.
     pub(crate) fn without_error_share(mut self) -> Self {
         let view = &mut self.view;
         for row in [&mut view.x, &mut view.y, &mut view.z, &mut view.w] {
@@ -188,13 +203,20 @@ impl Mirror {
     }
 
     /// What is kept, for each kind.
-    pub(crate) fn masks(&self, margins: impl Into<Margins>, arithmetic: &mut Arithmetic) -> Vec<Vec<bool>> {
+    pub(crate) fn masks(
+        &self,
+        margins: impl Into<Margins>,
+        arithmetic: &mut Arithmetic,
+    ) -> Vec<Vec<bool>> {
         let margins = margins.into();
         self.words
             .iter()
             .map(|(kind, words)| {
                 let stride = kind.record_bytes() as usize / 4;
-                words.chunks_exact(stride).map(|record| !self.culls(*kind, record, margins, arithmetic)).collect()
+                words
+                    .chunks_exact(stride)
+                    .map(|record| !self.culls(*kind, record, margins, arithmetic))
+                    .collect()
             })
             .collect()
     }
@@ -217,9 +239,17 @@ impl Mirror {
     }
 
     /// `classify.wgsl`, `classify`; the numbers are its steps.
-    fn culls(&self, kind: BoundsKind, record: &[u32], margins: Margins, arithmetic: &mut Arithmetic) -> bool {
+    fn culls(
+        &self,
+        kind: BoundsKind,
+        record: &[u32],
+        margins: Margins,
+        arithmetic: &mut Arithmetic,
+    ) -> bool {
         let view = &self.view;
-        let Some(volume) = Volume::load(kind, record, view, &margins, arithmetic) else { return false };
+        let Some(volume) = Volume::load(kind, record, view, &margins, arithmetic) else {
+            return false;
+        };
         let mut c = Certificates { kind, margins, arithmetic };
         let [x, y, z, w] = [&view.x, &view.y, &view.z, &view.w].map(|row| c.value_of(row, &volume));
         let a = view.z_slope;
@@ -274,12 +304,19 @@ impl Mirror {
         }
         let (from, to) = (first.map(|v| v >> level), last.map(|v| v >> level));
 
-        // 5. All of it is farther than the farthest depth there, or 5a. than the depths in finer levels, each texel by itself.
+        // 5. All of it is farther than the farthest depth there, or 5a. than the depths in finer
+        //    levels, each texel by itself.
         let farthest = self.farthest(level as usize, from, to);
         let block = if self.surely_behind(farthest, &z, &w, &mut c) {
             (from, to, level)
         } else if (self.descent && level > 0) || self.fit_volume {
-            if !self.descends(level, [from, to], [first, last], &Projected { x, y, z, w, w_min }, &mut c) {
+            if !self.descends(
+                level,
+                [from, to],
+                [first, last],
+                &Projected { x, y, z, w, w_min },
+                &mut c,
+            ) {
                 return false;
             }
             (first, last, 0)
@@ -441,7 +478,12 @@ impl Certificates<'_> {
     fn surely(&mut self, sign: f32, r: &Value, t: f32, w: &Value) -> bool {
         self.arithmetic.part();
         let center = if self.arithmetic.takes_any_order() {
-            let terms = [(sign * r.center, 1.0), (-sign * t, w.center), (-r.error, 1.0), (-t.abs(), w.error)];
+            let terms = [
+                (sign * r.center, 1.0),
+                (-sign * t, w.center),
+                (-r.error, 1.0),
+                (-t.abs(), w.error),
+            ];
             self.arithmetic.sum_in_any_order(terms)
         } else {
             let difference = self.arithmetic.mul_add(-t, w.center, r.center);
@@ -490,7 +532,14 @@ impl Certificates<'_> {
     }
 
     /// Pixel edges are multiples of 2^-8 below 2^16, so sums of them are exact in any arithmetic.
-    fn between_samples(&mut self, r: &Value, w: &Value, first: i32, view: &View, axis: usize) -> bool {
+    fn between_samples(
+        &mut self,
+        r: &Value,
+        w: &Value,
+        first: i32,
+        view: &View,
+        axis: usize,
+    ) -> bool {
         let left = first as f32 - view.half_size[axis];
         self.surely_above(r, left + view.reach, w) && self.surely_below(r, left - view.reach, w)
     }

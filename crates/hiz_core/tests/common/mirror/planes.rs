@@ -1,4 +1,5 @@
-//! `supporting_planes.wgsl`: the certified planes in any arithmetic, over slopes and offsets that are guessed or wild.
+//! `supporting_planes.wgsl`: the certified planes in any arithmetic, over slopes and offsets that
+//! are guessed or wild.
 
 use super::guesses::{self, Candidate};
 use super::volume::ratio_interval;
@@ -45,8 +46,15 @@ fn wild_slope(guessed: f32, f: &mut Arithmetic) -> f32 {
     }
 }
 
-/// `surely_clear`, its comparison at a texel's corner: `offset - slope . corner > bound` with `ulps` eps of margin.
-pub(super) fn surely_beyond(plane: &Plane, corner: [f32; 2], bound: f32, ulps: f32, f: &mut Arithmetic) -> bool {
+/// `surely_clear`, its comparison at a texel's corner: `offset - slope . corner > bound` with
+/// `ulps` eps of margin.
+pub(super) fn surely_beyond(
+    plane: &Plane,
+    corner: [f32; 2],
+    bound: f32,
+    ulps: f32,
+    f: &mut Arithmetic,
+) -> bool {
     f.part();
     let fall = [0, 1].map(|k| f.mul(plane.slope[k], corner[k]));
     let mut size = f.add(plane.offset.abs(), fall[0].abs());
@@ -54,12 +62,15 @@ pub(super) fn surely_beyond(plane: &Plane, corner: [f32; 2], bound: f32, ulps: f
     size = f.add(size, bound.abs());
     let margin = f.mul_add(ulps * EPS, size, two_to(-100));
     f.part();
-    f.difference(plane.offset, [(plane.slope[0], corner[0]), (plane.slope[1], corner[1])], margin) > bound
+    f.difference(plane.offset, [(plane.slope[0], corner[0]), (plane.slope[1], corner[1])], margin)
+        > bound
 }
 
 impl Certificates<'_> {
-    /// The greatest `t` near `guess` (`width` says how near) at which `sign (r - t w) > 0` is certified: an offset is trusted no
-    /// more than a slope is, so a wild one lies where the certificate is tightest. `sign` -1: the least.
+    /// The greatest `t` near `guess` (`width` says how near) at which `sign (r - t w) > 0` is
+    /// certified: an offset is trusted no more than a slope is, so a wild one lies where the
+    /// certificate is tightest.
+    /// `sign` -1: the least.
     fn wild_offset(&mut self, sign: f32, r: &Value, w: &Value, guess: f32, width: f32) -> f32 {
         let (mut proved, mut open) = (guess, guess + sign * width);
         // Some to where nothing but the margin's floor is left.
@@ -91,14 +102,17 @@ impl Certificates<'_> {
     /// The row `facing z + slope . (x, y)`.
     fn tilted(&mut self, p: &Projected, facing: f32, slope: [f32; 2]) -> Value {
         let factors = [facing, slope[0], slope[1]];
-        // Without a bar the slope's own quotient may be folded into the products: another slope, by a few roundings.
+        // Without a bar the slope's own quotient may be folded into the products: another slope, by
+        // a few roundings.
         let mut on = |factors: [f32; 3], values: [f32; 3]| {
             self.arithmetic.part();
             let factors = if self.arithmetic.style.slope_bars {
                 factors
             } else {
                 factors.map(|v| {
-                    (0..4).fold(v, |v, _| if self.arithmetic.below(2) == 0 { v.next_up() } else { v.next_down() })
+                    (0..4).fold(v, |v, _| {
+                        if self.arithmetic.below(2) == 0 { v.next_up() } else { v.next_down() }
+                    })
                 })
             };
             self.arithmetic.sum_of_products(factors, values, None)
@@ -107,7 +121,8 @@ impl Certificates<'_> {
         let half = [0, 1, 2].map(|k| on(factors, [p.z.half[k], p.x.half[k], p.y.half[k]]));
         self.arithmetic.part();
         let errors = [p.z.error, p.x.error, p.y.error];
-        let error = self.arithmetic.sum_of_products(factors.map(f32::abs), errors, Some(two_to(-70)));
+        let error =
+            self.arithmetic.sum_of_products(factors.map(f32::abs), errors, Some(two_to(-70)));
         Value { center, error, half }
     }
 
@@ -153,7 +168,11 @@ impl Certificates<'_> {
             offset = self.wild_offset(1.0, &r, &p.w, offset, 6.0 * error / p.w_min);
         }
         let small = offset.abs() < two_to(60) && self.error_bound(&r, offset, &p.w) < two_to(38);
-        (small && self.surely_above(&r, offset, &p.w)).then_some(Plane { slope, facing: guess.facing, offset })
+        (small && self.surely_above(&r, offset, &p.w)).then_some(Plane {
+            slope,
+            facing: guess.facing,
+            offset,
+        })
     }
 
     /// `surely_clear`; `depth` is the stored one's, with its slack.
