@@ -2,18 +2,25 @@
 
 use std::sync::Arc;
 
-use crate::bounds::Bounds;
-use crate::camera::{Camera, ImageSize};
-use crate::cull::{self, CullInputs, CullOptions};
+use crate::cull::inputs::CullInputs;
+use crate::cull::options::CullOptions;
+use crate::cull::record::record_cull;
 use crate::error::{Error, Result};
-use crate::gpu::Gpu;
+use crate::gpu::device::Gpu;
+use crate::input::bounds::Bounds;
+use crate::input::camera::Camera;
+use crate::input::image::ImageSize;
+use crate::input::mesh::MeshData;
+use crate::input::tolerance::DepthTolerance;
+use crate::instances::piece::CULL_WORKGROUP;
+use crate::instances::update::record_update;
 use crate::instances::{InstanceOptions, Instances};
-use crate::layout::CULL_WORKGROUP;
-use crate::occluders::{self, MeshData, OccluderOptions, Occluders};
-use crate::pyramid::{self, Pyramid, PyramidOptions, PyramidUniform};
-use crate::tolerance::DepthTolerance;
-use crate::update;
-use crate::visible::{Visible, VisibleOptions};
+use crate::occluders::raster::record_occluders;
+use crate::occluders::{OccluderOptions, Occluders};
+use crate::output::outputs::Outputs;
+use crate::output::visible::Visible;
+use crate::pyramid::reduce::record_reduce;
+use crate::pyramid::{Pyramid, PyramidOptions, PyramidUniform};
 
 /// Everything that is made once a device.
 /// Cheap to clone.
@@ -62,31 +69,27 @@ impl HizContext {
         device: &wgpu::Device,
         cache: Option<wgpu::PipelineCache>,
     ) -> Result<Self> {
-        Self::make(device, cache, &[])
-    }
-
-    /// For tests: a context whose shaders have texts replaced, `(what, by what)`.
-    /// A suite is trusted once a planted fault turns it red.
-    ///
-    /// # Panics
-    /// If no shader holds such a text: a fault that was never planted proves nothing.
-    #[doc(hidden)]
-    pub fn with_planted_faults(device: &wgpu::Device, faults: &[(&str, &str)]) -> Result<Self> {
-        Self::make(device, None, faults)
-    }
-
-    fn make(
-        device: &wgpu::Device,
-        cache: Option<wgpu::PipelineCache>,
-        faults: &[(&str, &str)],
-    ) -> Result<Self> {
         let have = device.limits();
         for (name, need, have) in needed(&have) {
             if have < need {
                 return Err(Error::limit(name, need, have));
             }
         }
-        Ok(Self { gpu: Arc::new(Gpu::new(device, cache, faults)?) })
+        Ok(Self { gpu: Arc::new(Gpu::new(device, cache)?) })
+    }
+
+    /// A context whose shaders have texts replaced, `(what, by what)`, for tests: a suite is
+    /// trusted once a planted fault turns it red.
+    ///
+    /// # Errors
+    /// As [`HizContext::new`].
+    ///
+    /// # Panics
+    /// If no shader holds such a text: a fault that was never planted proves nothing.
+    #[cfg(feature = "testing")]
+    pub fn with_planted_faults(device: &wgpu::Device, faults: &[(&str, &str)]) -> Result<Self> {
+        Self::new(device)?;
+        Ok(Self { gpu: Arc::new(Gpu::new(device, None)?.with_planted_faults(faults)) })
     }
 
     /// Limits that are enough for a device: WebGPU's defaults.
@@ -162,11 +165,11 @@ impl HizContext {
         bounds: &Bounds<'_>,
         strict: bool,
     ) -> Result<()> {
-        update::record(&self.gpu, encoder, instances, first, bounds, strict, |encoder, range| {
+        record_update(&self.gpu, encoder, instances, first, bounds, strict, |encoder, range| {
             // Recording is not running: the verdicts stay to be refined, which a second time
             // changes nothing.
             let watches = instances.watches();
-            watches.record_refinements(&self.gpu, encoder, instances)?;
+            watches.record_refinements(&self.gpu, encoder)?;
             watches.note(&range);
             Ok(())
         })
@@ -179,12 +182,8 @@ impl HizContext {
     /// [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0 on a
     /// device without the feature `INDIRECT_FIRST_INSTANCE`, [`Error::OutOfMemory`],
     /// [`Error::Device`] where the device is lost.
-    pub fn create_visible(
-        &self,
-        instances: &Instances,
-        options: &VisibleOptions,
-    ) -> Result<Visible> {
-        Visible::new(&self.gpu, instances, options)
+    pub fn create_visible(&self, instances: &Instances, outputs: &Outputs) -> Result<Visible> {
+        Visible::new(&self.gpu, instances, outputs)
     }
 
     /// Uploads triangle meshes.
@@ -215,7 +214,7 @@ impl HizContext {
         camera: &Camera,
         target: &wgpu::TextureView,
     ) -> Result<()> {
-        occluders::record(&self.gpu, encoder, occluders, camera, target)
+        record_occluders(&self.gpu, encoder, occluders, camera, target)
     }
 
     /// Records the reduction of a depth image of `camera` into `pyramid`.
@@ -248,7 +247,7 @@ impl HizContext {
         camera: &Camera,
         pyramid: &Pyramid,
     ) -> Result<()> {
-        pyramid::record_reduce(&self.gpu, encoder, depth, camera, pyramid, DepthTolerance::NONE)
+        record_reduce(&self.gpu, encoder, depth, camera, pyramid, DepthTolerance::NONE)
     }
 
     /// Records the cull of `instances` against `pyramid`, whose depth image must be `camera`'s;
@@ -270,9 +269,8 @@ impl HizContext {
         visible: &Visible,
         options: &CullOptions,
     ) -> Result<()> {
-        let inputs =
-            CullInputs { instances, camera, pyramid, options, certified: true, idle: false };
-        cull::record(&self.gpu, encoder, &inputs, visible)
+        let inputs = CullInputs { instances, camera, pyramid, options, idle: false };
+        record_cull(&self.gpu, encoder, &inputs, visible)
     }
 }
 

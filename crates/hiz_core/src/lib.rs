@@ -16,71 +16,58 @@
 //! The promise: an instance is culled only if, for the exact real numbers that the inputs denote,
 //! every pixel that its bounds can touch holds a depth nearer than all of the bounds.
 //! It is kept by *certificates* computed in float32 with margins that cover every rounding
-//! (`shaders/shared/certificate.wgsl`); whatever is uncertain stays visible.
+//! (`shaders/cull/certificate.wgsl`); whatever is uncertain stays visible.
 //!
 //! Everything up to here records into the caller's encoder on the caller's device: nothing submits,
 //! polls or maps.
 //! The [`headless`] module owns a device, submits and reads back.
 
-pub mod headless;
+// What only a readback asks for is idle in an embedder's build.
+#![cfg_attr(not(feature = "headless"), allow(dead_code))]
 
-mod atlas;
-mod bounds;
-mod camera;
-mod compact;
 mod context;
-mod count;
 mod cull;
-mod depth;
 mod error;
-mod extent;
 mod gpu;
-mod groups;
+#[cfg(feature = "headless")]
+pub mod headless;
 mod host;
+mod input;
 mod instances;
-mod inverse;
-mod layout;
-mod lists;
-mod morton;
-mod occluder_surface;
 mod occluders;
+mod output;
 mod pyramid;
-mod readback;
-mod records;
-mod shader;
-mod threads;
-mod tolerance;
-mod update;
-mod view;
-mod visible;
-mod watch;
-#[doc(hidden)]
-pub mod words;
-#[doc(hidden)]
+#[cfg(feature = "testing")]
+pub mod testing;
+#[cfg(feature = "yardstick")]
 pub mod yardstick;
 
 pub use wgpu;
 
-pub use atlas::AtlasUse;
-pub use bounds::{Bounds, BoundsKind, Floats};
-pub use camera::{
-    Camera, DepthConvention, ImageSize, MAX_IMAGE_SIDE, Mat3, Mat4, Pose, Projection, Vec3,
-};
 pub use context::HizContext;
-pub use cull::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
-pub use depth::{DepthKind, ndc_from_kind, ndc_from_kind_within};
+pub use cull::options::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
 pub use error::{Error, Result};
-pub use instances::{InstanceOptions, Instances, StoredOrder};
-pub use layout::{MAX_LEVELS, StoredLevels};
-pub use lists::{CANARY_WORDS, DrawIndexedIndirect, DrawTemplate};
-#[doc(hidden)]
-pub use occluder_surface::PlantedFault;
-pub use occluder_surface::{ConservativeDepthOptions, OccluderSurface};
-pub use occluders::{FaceCull, MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders};
+pub use host::linear::{Mat3, Mat4, Vec3};
+pub use input::bounds::{Bounds, BoundsKind, Floats};
+pub use input::camera::Camera;
+pub use input::depth::{DepthKind, ndc_from_kind, ndc_from_kind_within};
+pub use input::image::{DepthConvention, ImageSize, MAX_IMAGE_SIDE};
+pub use input::mesh::{FaceCull, MeshData};
+pub use input::projection::{Pose, Projection};
+pub use input::tolerance::DepthTolerance;
+pub use input::view::ERROR_ULPS;
+pub use instances::order::StoredOrder;
+pub use instances::{InstanceOptions, Instances};
+pub use occluders::raster::OCCLUDER_DEPTH_FORMAT;
+pub use occluders::surface::{ConservativeDepthOptions, OccluderSurface};
+pub use occluders::{OccluderOptions, Occluders};
+pub use output::draw::{DrawIndexedIndirect, DrawTemplate};
+pub use output::outputs::Outputs;
+pub use output::verdict::Verdict;
+pub use output::visible::Visible;
+pub use pyramid::atlas::AtlasUse;
+pub use pyramid::levels::{MAX_LEVELS, StoredLevels};
 pub use pyramid::{Pyramid, PyramidOptions};
-pub use tolerance::DepthTolerance;
-pub use view::ERROR_ULPS;
-pub use visible::{Outputs, Visible, VisibleOptions};
 
 /// The README's program is compiled and run with the tests.
 #[cfg(doctest)]

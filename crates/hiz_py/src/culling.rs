@@ -1,7 +1,7 @@
 //! The answer of a cull, read on request.
 
 use hiz_core::{
-    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, Order, Outputs, VisibleOptions,
+    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, Order, Outputs, Verdict,
     headless,
 };
 use numpy::PyArray1;
@@ -75,12 +75,11 @@ impl CullArguments<'_> {
     }
 
     /// The room for the list, and what is drawn.
-    pub(crate) fn output(&self) -> VisibleOptions {
+    pub(crate) fn output(&self) -> Outputs {
         let (index_count, first_index, base_vertex, first_instance) = self.draw;
         let draw = DrawTemplate { index_count, first_index, base_vertex, first_instance };
         let (mask, verdicts, indices, draws) = self.outputs;
-        let outputs = Outputs { mask, verdicts, indices, draws };
-        VisibleOptions { outputs, capacity: self.capacity, draw }
+        Outputs { mask, verdicts, indices, draws, capacity: self.capacity, draw }
     }
 }
 
@@ -101,7 +100,9 @@ impl Culling {
     }
 
     fn verdicts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
-        self.0.run(py, headless::Culling::verdicts).map(|verdicts| PyArray1::from_vec(py, verdicts))
+        let codes =
+            |culling: &headless::Culling| culling.verdicts().map(bytemuck::cast_vec::<Verdict, u8>);
+        self.0.run(py, codes).map(|verdicts| PyArray1::from_vec(py, verdicts))
     }
 
     fn indices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
@@ -172,7 +173,7 @@ pub(crate) struct Explanation(headless::Explanation);
 impl Explanation {
     #[getter]
     fn verdict(&self) -> u8 {
-        self.0.verdict
+        self.0.verdict as u8
     }
 
     #[getter]

@@ -1,6 +1,6 @@
 //! How instances are culled.
 
-use crate::view::EPS;
+use crate::host::rounding::EPS;
 
 /// In which order the indices of the kept instances are listed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]

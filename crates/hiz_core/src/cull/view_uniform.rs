@@ -1,12 +1,13 @@
 //! What the shader knows of a camera and of the options.
 
-use super::options::{Coverage, CullOptions};
-use crate::camera::Camera;
+use crate::cull::options::{Coverage, CullOptions};
 use crate::error::{Error, Result};
-use crate::tolerance::DepthTolerance;
-use crate::view::{EPS, ViewRows};
+use crate::host::rounding::{EPS, round_up};
+use crate::input::camera::Camera;
+use crate::input::tolerance::DepthTolerance;
+use crate::input::view::ViewRows;
 
-/// `shaders/shared/view.wgsl`, `View`.
+/// `shaders/cull/view.wgsl`, `View`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct ViewUniform {
@@ -78,15 +79,14 @@ impl ViewUniform {
         };
         // Rounded towards far; what the product itself rounds away stays (docs/accuracy.md).
         let depth_factor = if camera.convention().is_reversed() {
-            -crate::view::round_up(slack - 1.0)
+            -round_up(slack - 1.0)
         } else {
-            crate::view::round_up(1.0 + slack)
+            round_up(1.0 + slack)
         };
         // The product and the sum in the shader lose less than 2^-24 each where the depth stays
         // below 1: that is added here.
         // 0 adds nothing and loses nothing.
-        let depth_offset =
-            if slack_abs > 0.0 { crate::view::round_up(slack_abs + EPS) } else { 0.0 };
+        let depth_offset = if slack_abs > 0.0 { round_up(slack_abs + EPS) } else { 0.0 };
         let depth_offset =
             if camera.convention().is_reversed() { -depth_offset } else { depth_offset };
         let rows =
@@ -111,7 +111,7 @@ impl ViewUniform {
             eye_hi: rows.eye_hi,
             z_slope: rows.z_slope,
             eye_lo: rows.eye_lo,
-            halves_size: crate::view::round_up(halves_size(&rows)),
+            halves_size: round_up(halves_size(&rows)),
             half_size: [size.width as f32 / 2.0, size.height as f32 / 2.0],
             reach: reach as f32,
             depth_factor,
@@ -137,7 +137,7 @@ fn halves_size(rows: &ViewRows) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{DepthConvention, ImageSize};
+    use crate::input::image::{DepthConvention, ImageSize};
 
     /// Slack is never less than what was asked for: a factor rounded to nearest would be, half of
     /// the time.

@@ -84,21 +84,32 @@ pub(super) fn no_adapter(request: String, seen: &[AdapterSummary]) -> Error {
     Error::NoAdapter { request, seen, hint }
 }
 
+/// Those that this crate was built with: one more would silently take over where a driver is
+/// missing.
+fn backends() -> wgpu::Backends {
+    let built = [
+        (cfg!(feature = "vulkan"), wgpu::Backends::VULKAN),
+        (cfg!(feature = "metal"), wgpu::Backends::METAL),
+        (cfg!(feature = "dx12"), wgpu::Backends::DX12),
+    ];
+    built.into_iter().filter_map(|(is_built, backend)| is_built.then_some(backend)).collect()
+}
+
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-    descriptor.backends = wgpu::Backends::VULKAN;
+    descriptor.backends = backends();
     wgpu::Instance::new(descriptor)
 }
 
 pub(super) fn enumerate() -> Vec<(AdapterSummary, wgpu::Adapter)> {
-    pollster::block_on(instance().enumerate_adapters(wgpu::Backends::VULKAN))
+    pollster::block_on(instance().enumerate_adapters(backends()))
         .into_iter()
         .enumerate()
         .map(|(i, adapter)| (AdapterSummary::new(i, &adapter.get_info()), adapter))
         .collect()
 }
 
-/// The Vulkan adapters of this machine; none without a driver.
+/// The adapters of this machine that the built backends see; none without a driver.
 pub fn adapters() -> Vec<AdapterSummary> {
     enumerate().into_iter().map(|(summary, _)| summary).collect()
 }

@@ -1,12 +1,16 @@
 //! Depth images on the device: made, filled from the host, read back.
 
-use super::{Engine, to_u32};
-use crate::camera::{Camera, ImageSize};
 use crate::error::{Error, Result};
-use crate::host;
-use crate::readback;
-use crate::shader::SourceKind;
-use crate::tolerance::DepthTolerance;
+use crate::gpu::depth_source::SourceKind;
+use crate::headless::engine::Engine;
+use crate::headless::readback::{self, to_u32};
+use crate::host::memory;
+use crate::input::camera::Camera;
+use crate::input::image::ImageSize;
+use crate::input::tolerance::DepthTolerance;
+use crate::occluders::Occluders;
+use crate::occluders::raster::OCCLUDER_DEPTH_FORMAT;
+use crate::occluders::surface::ConservativeDepthOptions;
 
 /// Bytes of an upload's staging area at most: larger images go in bands of rows.
 const STAGING_BYTES: u32 = 1 << 26;
@@ -53,7 +57,7 @@ impl DepthImage {
         let bytes = engine.scoped(|| {
             readback::read_texture(engine.device(), engine.queue(), &self.texture, row)
         })?;
-        host::collected(to_u32(&bytes).map(f32::from_bits), "depth")
+        memory::collected(to_u32(&bytes).map(f32::from_bits), "depth")
     }
 
     /// An image that holds nothing yet.
@@ -169,5 +173,76 @@ impl DepthImage {
                 .flat_map(|row| (0..4).map(move |i| row[(begin + i).min(end - 1)]));
             write(whole, 1, bytemuck::cast_slice(&last.collect::<Vec<_>>()), 16);
         }
+    }
+}
+
+impl Engine {
+    /// Draws occluders into a depth image of the camera's size.
+    ///
+    /// # Errors
+    /// [`Error::Limit`] for an image larger than the device's textures, [`Error::OutOfMemory`].
+    pub fn render_depth(&self, occluders: &Occluders, camera: &Camera) -> Result<DepthImage> {
+        self.scoped(|| {
+            let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
+                | wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::COPY_SRC;
+            let depth = DepthImage::new(self, camera, OCCLUDER_DEPTH_FORMAT, usage)?;
+            let mut encoder = self.encoder("hiz.occluders.encoder");
+            self.context().record_occluders(&mut encoder, occluders, camera, &depth.view)?;
+            self.queue().submit([encoder.finish()]);
+            Ok(depth)
+        })
+    }
+
+    /// Occluder depth that holds for every larger image of the same view
+    /// ([`OccluderSurface::conservative_depth`]), made on the host and uploaded.
+    ///
+    /// # Errors
+    /// As [`Engine::upload_depth`] and [`OccluderSurface::conservative_depth`].
+    ///
+    /// [`OccluderSurface::conservative_depth`]: crate::OccluderSurface::conservative_depth
+    pub fn render_depth_conservative(
+        &self,
+        occluders: &Occluders,
+        camera: &Camera,
+        options: &ConservativeDepthOptions,
+    ) -> Result<DepthImage> {
+        self.check_process()?;
+        self.context().gpu.check_context("occluders", occluders.context)?;
+        self.upload_depth(&occluders.surface().conservative_depth(camera, options)?, camera)
+    }
+
+    /// Uploads NDC depth (row 0 on top, the camera's size and convention).
+    /// What is no depth becomes far when it is read.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for another number of pixels, [`Error::Limit`] for an image larger than
+    /// the device's textures.
+    pub fn upload_depth(&self, ndc: &[f32], camera: &Camera) -> Result<DepthImage> {
+        DepthImage::uploaded(self, SourceKind::Bits, ndc, camera)
+    }
+
+    /// The same of depth that was rounded within `tolerance` before it came here: of half floats
+    /// [`DepthTolerance::HALF`].
+    ///
+    /// # Errors
+    /// As [`Engine::upload_depth`], and [`Error::Invalid`] for a tolerance outside 0..=0.5.
+    pub fn upload_depth_within(
+        &self,
+        ndc: &[f32],
+        camera: &Camera,
+        tolerance: DepthTolerance,
+    ) -> Result<DepthImage> {
+        let tolerance = tolerance.checked()?;
+        Ok(DepthImage { tolerance, ..self.upload_depth(ndc, camera)? })
+    }
+
+    /// The same into a float texture, which is sampled like a depth texture, for tests.
+    ///
+    /// # Errors
+    /// As [`Engine::upload_depth`].
+    #[cfg(feature = "testing")]
+    pub fn upload_depth_sampled(&self, ndc: &[f32], camera: &Camera) -> Result<DepthImage> {
+        DepthImage::uploaded(self, SourceKind::Float, ndc, camera)
     }
 }

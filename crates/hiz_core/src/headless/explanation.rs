@@ -1,10 +1,10 @@
 //! The explanation of one verdict, out of what the shader wrote down.
 
-use crate::camera::Camera;
-use crate::cull::{BEHIND, CLEAR, CullOptions, ExplanationRecord, Fit, LEVEL_MASK, Reading};
-use crate::depth::ViewDepth;
-
-use super::culling::OCCLUDED;
+use crate::cull::explain::{BEHIND, CLEAR, ExplanationRecord, LEVEL_MASK, Reading, Stage};
+use crate::cull::options::{CullOptions, Fit};
+use crate::input::camera::Camera;
+use crate::input::depth::ViewDepth;
+use crate::output::verdict::Verdict;
 
 /// Why an instance got its verdict: the cull's own steps, run for it once more.
 ///
@@ -13,8 +13,8 @@ use super::culling::OCCLUDED;
 /// everything else here is its own test, which may have kept it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explanation {
-    /// 0 outside, 1 occluded, 2 visible, 3 invalid (kept).
-    pub verdict: u8,
+    /// The verdict.
+    pub verdict: Verdict,
     /// First and last pixel column and row that the projection may touch, inclusive: x0, y0, x1,
     /// y1.
     pub rectangle: Option<[i32; 4]>,
@@ -75,18 +75,14 @@ impl End {
     }
 }
 
-// The stages of `shaders/shared/outcome.wgsl` from which on there is a rectangle, and pixels in it.
-const AT_RECTANGLE: u32 = 3;
-const AT_DEPTH: u32 = 4;
-
 impl Told<'_> {
     pub(super) fn explanation(&self) -> Explanation {
         let record = &self.record;
-        let reached_depth = record.stage >= AT_DEPTH;
+        let reached_depth = record.stage() >= Stage::Depth;
         let End { reason, decisive, farthest } = self.end();
         let [least, greatest, w_least, _] = record.depths.map(f64::from);
         let nearest = if self.camera.convention().is_reversed() { greatest } else { least };
-        let is_before_eye = record.stage >= AT_RECTANGLE;
+        let is_before_eye = record.stage() >= Stage::Rectangle;
         let view_depth = ViewDepth::new(self.camera);
         let z_of = |ndc: f64| view_depth.as_ref().and_then(|view| view.of_ndc(ndc));
         let nearest_z = match view_depth.as_ref().and_then(|view| view.of_w(w_least)) {
@@ -94,7 +90,7 @@ impl Told<'_> {
             None => z_of(nearest),
         };
         Explanation {
-            verdict: record.verdict as u8,
+            verdict: Verdict::of_word(record.verdict),
             rectangle: reached_depth.then_some(record.pixels),
             level: reached_depth.then_some(record.level),
             texels: self.readings.iter().map(|[_, x, y, _]| [*x, *y]).collect(),
@@ -112,30 +108,37 @@ impl Told<'_> {
         }
     }
 
-    /// How the test ended; the stages of `shaders/shared/outcome.wgsl`.
+    /// How the test ended.
     fn end(&self) -> End {
         let record = &self.record;
-        let is_hidden = record.verdict == u32::from(OCCLUDED);
-        match record.stage {
-            0 => {
+        let verdict = Verdict::of_word(record.verdict);
+        let is_hidden = verdict == Verdict::Occluded;
+        match record.stage() {
+            Stage::Validity => {
                 End::new("the bounds are not finite, negative, or too large for this camera: kept")
             }
-            1 => End::new("outside one plane of the frustum"),
-            2 => End::new("crosses the plane of the eye: kept"),
-            AT_RECTANGLE if record.verdict == 0 => End::new("between the pixel centres"),
-            AT_RECTANGLE => End::new(
+            Stage::Frustum => End::new("outside one plane of the frustum"),
+            Stage::EyePlane => End::new("crosses the plane of the eye: kept"),
+            Stage::Rectangle if verdict == Verdict::Outside => {
+                End::new("between the pixel centres")
+            }
+            Stage::Rectangle => End::new(
                 "touches no pixel for sure, but no plane of the frustum separates it: kept",
             ),
-            _ if record.texels_read == 0 => End::new(match record.stage {
-                AT_DEPTH => "the pyramid's reduction has not run: kept",
-                _ => "spans more texels of the coarsest stored level than the footprint has: kept",
-            }),
-            AT_DEPTH => self.footprint("not surely behind the farthest depth of the texels: kept"),
-            5 if is_hidden => {
+            Stage::Depth if record.texels_read == 0 => {
+                End::new("the pyramid's reduction has not run: kept")
+            }
+            _ if record.texels_read == 0 => End::new(
+                "spans more texels of the coarsest stored level than the footprint has: kept",
+            ),
+            Stage::Depth => {
+                self.footprint("not surely behind the farthest depth of the texels: kept")
+            }
+            Stage::Block if is_hidden => {
                 self.footprint("behind the farthest depth of all texels that it can touch")
             }
-            5 => End::new("behind the texels, but not surely inside their block: kept"),
-            _ if is_hidden => {
+            Stage::Block => End::new("behind the texels, but not surely inside their block: kept"),
+            Stage::Descent | Stage::Level if is_hidden => {
                 let farthest = (record.any_before != 0).then_some(record.farthest_before);
                 let is_it = |r: &Reading| r[0] & BEHIND != 0 && Some(r[3]) == farthest;
                 End {
@@ -144,7 +147,7 @@ impl Told<'_> {
                     farthest: farthest.map(f32::from_bits),
                 }
             }
-            _ => self.failed_descent(),
+            Stage::Descent | Stage::Level => self.failed_descent(),
         }
     }
 

@@ -1,14 +1,30 @@
 //! The flat cull of boxes without certificates, in the same frame.
 
-use crate::bounds::BoundsKind;
-use crate::camera::Camera;
-use crate::cull::{self, CullInputs, CullOptions, Hierarchy};
+use crate::cull::inputs::CullInputs;
+use crate::cull::options::{CullOptions, Hierarchy};
+use crate::cull::pipelines::{CullKey, DepthStore, FLAT, ReportKey, flat_pipeline, module};
+use crate::cull::record::record_cull_by;
 use crate::error::{Error, Result};
+use crate::gpu::device::Gpu;
+use crate::gpu::shader::{Source, wgsl};
 use crate::headless::Engine;
+use crate::headless::readback::{self, BufferRange};
+use crate::input::bounds::BoundsKind;
+use crate::input::camera::Camera;
 use crate::instances::Instances;
+use crate::output::visible::Visible;
 use crate::pyramid::Pyramid;
-use crate::readback::{self, BufferRange};
-use crate::visible::Visible;
+
+/// The flat cull of boxes without certificates.
+pub(crate) fn cull_module(store: DepthStore) -> Source {
+    // The kinds of bounds speak of supporting planes, which nobody asks for here.
+    let classify = [wgsl!("cull/supporting_planes"), wgsl!("yardstick/classify_uncertified")];
+    module(store, BoundsKind::Box, &classify, FLAT)
+}
+
+fn pipeline(gpu: &Gpu, key: &CullKey, report: &ReportKey) -> Result<wgpu::ComputePipeline> {
+    flat_pipeline(gpu, "hiz.yardstick.cull", cull_module(key.store), key, report)
+}
 
 /// Records the cull of `instances`, boxes, as one would write it who trusts float32: it hides what
 /// can be seen.
@@ -34,8 +50,8 @@ pub fn record_uncertified_cull(
     }
     let options =
         &CullOptions { hierarchy: Hierarchy::Never, statistics: false, ..options.clone() };
-    let inputs = CullInputs { instances, camera, pyramid, options, certified: false, idle: false };
-    cull::record(&engine.context().gpu, encoder, &inputs, visible)
+    let inputs = CullInputs { instances, camera, pyramid, options, idle: false };
+    record_cull_by(&engine.context().gpu, encoder, &inputs, visible, pipeline)
 }
 
 /// Whether each instance is kept, by the mask of the last cull into `visible`: what a yardstick

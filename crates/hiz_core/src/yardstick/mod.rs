@@ -6,12 +6,15 @@ mod reduce;
 
 use std::time::Instant;
 
+#[cfg(feature = "testing")]
+pub(crate) use cull::cull_module;
 pub use cull::{read_mask, record_uncertified_cull};
+#[cfg(feature = "testing")]
+pub(crate) use reduce::modules;
 pub use reduce::{PerLevelReduction, ReductionShape, reduce};
 
 use crate::error::Result;
-use crate::headless::Engine;
-use crate::readback;
+use crate::headless::{Engine, readback};
 
 /// Milliseconds on the wall from the submit of what `record` records to its end.
 /// (Timestamps are wrong on lavapipe once a render pass has run.)

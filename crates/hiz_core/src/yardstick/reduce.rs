@@ -1,12 +1,32 @@
 //! The reduction as one dispatch a level, on a flat buffer or on a texture's mip levels.
 
-use crate::camera::ImageSize;
 use crate::error::Result;
-use crate::gpu::Gpu;
+use crate::gpu::buffers::entry;
+use crate::gpu::depth_source::SourceKind;
+use crate::gpu::device::Gpu;
+use crate::gpu::layouts::Binding;
+use crate::gpu::pipelines::{Compute, flag};
+use crate::gpu::shader::{File, Source, wgsl};
+use crate::headless::readback::{self, BufferRange};
 use crate::headless::{DepthImage, Engine};
-use crate::pyramid::{Pyramid, entry};
-use crate::readback::{self, BufferRange};
-use crate::shader::{self, SourceKind};
+use crate::input::image::ImageSize;
+use crate::pyramid::Pyramid;
+
+fn module(source: SourceKind, entry: File) -> Source {
+    Source::of(&[&[wgsl!("gpu/depth_bits")], source.files(), &[entry]])
+}
+
+const IN_BUFFER: File = wgsl!("yardstick/reduce_buffer");
+const IN_TEXTURE: File = wgsl!("yardstick/reduce_texture");
+
+/// A name and the module of each shape.
+#[cfg(feature = "testing")]
+pub(crate) fn modules(source: SourceKind) -> [(&'static str, Source); 2] {
+    [
+        ("one dispatch a level, buffer", module(source, IN_BUFFER)),
+        ("one dispatch a level, textures", module(source, IN_TEXTURE)),
+    ]
+}
 
 /// What one dispatch a level writes into.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -213,50 +233,26 @@ fn step(
             ..Default::default()
         })
     };
-    let from_source = [("FROM_SOURCE", f64::from(u8::from(k == 1)))];
-    let reversed = ("REVERSED", f64::from(u8::from(depth.camera().convention().is_reversed())));
-    let constants = [reversed, from_source[0]];
-    let texture = |binding| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::COMPUTE,
-        ty: wgpu::BindingType::Texture {
-            sample_type: wgpu::TextureSampleType::Float { filterable: false },
-            view_dimension: wgpu::TextureViewDimension::D2,
-            multisampled: false,
-        },
-        count: None,
-    };
-    let mut entries = vec![
-        wgpu::BindGroupLayoutEntry { ty: kind.binding(), ..texture(0) },
-        wgpu::BindGroupLayoutEntry {
-            ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering),
-            ..texture(1)
-        },
-        wgpu::BindGroupLayoutEntry { ty: buffer(wgpu::BufferBindingType::Uniform), ..texture(2) },
+    let constants = [
+        ("REVERSED", flag(depth.camera().convention().is_reversed())),
+        ("FROM_SOURCE", flag(k == 1)),
     ];
-    let (module, name, uniform, workgroups) = match storage {
+    let mut bindings =
+        vec![(0, Binding::Depth(kind)), (1, Binding::Sampler), (2, Binding::Uniform)];
+    let (source_module, entry_point, uniform, workgroups) = match storage {
         Storage::Buffer(_) => {
-            let storage = buffer(wgpu::BufferBindingType::Storage { read_only: false });
-            entries.push(wgpu::BindGroupLayoutEntry { ty: storage, ..texture(3) });
+            bindings.push((3, Binding::Write));
             (
-                shader::yardstick_reduce_buffer(kind),
+                module(kind, IN_BUFFER),
                 "reduce_buffer",
                 gpu.uniform("hiz.yardstick.step", &[read, written])?,
                 [written.stride.div_ceil(64), written.height],
             )
         }
         Storage::Textures(_) => {
-            entries.push(texture(3));
-            entries.push(wgpu::BindGroupLayoutEntry {
-                ty: wgpu::BindingType::StorageTexture {
-                    access: wgpu::StorageTextureAccess::WriteOnly,
-                    format: wgpu::TextureFormat::R32Float,
-                    view_dimension: wgpu::TextureViewDimension::D2,
-                },
-                ..texture(4)
-            });
+            bindings.extend([(3, Binding::Depth(SourceKind::Float)), (4, Binding::WriteFloats)]);
             (
-                shader::yardstick_reduce_texture(kind),
+                module(kind, IN_TEXTURE),
                 "reduce_texture",
                 gpu.uniform(
                     "hiz.yardstick.step",
@@ -266,11 +262,14 @@ fn step(
             )
         }
     };
-    let layout = gpu.device().create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("hiz.yardstick.layout"),
-        entries: &entries,
-    });
-    let pipeline = gpu.pipeline("hiz.yardstick.pipeline", &module, name, &[&layout], &constants)?;
+    let layout = gpu.layout("hiz.yardstick.layout", &bindings)?;
+    let pipeline = gpu.compute_pipeline(&Compute {
+        label: "hiz.yardstick.pipeline",
+        source: source_module,
+        entry_point,
+        layouts: std::slice::from_ref(&layout),
+        constants: &constants,
+    })?;
     let mut bound = vec![
         entry(0, wgpu::BindingResource::TextureView(&source)),
         entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
@@ -287,16 +286,8 @@ fn step(
             bound.push(entry(4, wgpu::BindingResource::TextureView(&views[1])));
         }
     }
-    let bindings = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("hiz.yardstick.bindings"),
-        layout: &layout,
-        entries: &bound,
-    });
+    let bindings = gpu.bind_group("hiz.yardstick.bindings", &layout, &bound)?;
     Ok(Step { pipeline, bindings, workgroups })
-}
-
-fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
-    wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None }
 }
 
 /// Something to bind where nothing is read.

@@ -1,0 +1,55 @@
+//! Triangle meshes, borrowed from the caller.
+
+use crate::host::linear::{cross, dot};
+use crate::input::bounds::Floats;
+use crate::input::camera::Camera;
+
+/// Which triangles do not occlude.
+/// A front face is counter-clockwise seen from outside.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum FaceCull {
+    /// All occlude: two-sided.
+    #[default]
+    None,
+    /// Back faces do not.
+    Back,
+    /// Front faces do not.
+    Front,
+}
+
+/// A triangle mesh, borrowed from the caller.
+#[derive(Debug, Clone, Copy)]
+pub struct MeshData<'a> {
+    /// V positions, 3 scalars each.
+    pub vertices: Floats<'a>,
+    /// T triangles, 3 indices below V each.
+    pub triangles: &'a [u32],
+    /// K affine matrices `world_from_mesh`, 16 row-major scalars each; `None`: the mesh once, in
+    /// world coordinates.
+    pub transforms: Option<Floats<'a>>,
+}
+
+impl FaceCull {
+    /// The faces that do not occlude as they appear in `camera`'s image: one that mirrors the world
+    /// (a left-handed one) turns every triangle around.
+    pub(crate) fn as_seen_by(self, camera: &Camera) -> Self {
+        let rows = camera.rows();
+        let lin = |r: usize| [rows[r][0], rows[r][1], rows[r][2]];
+        let (x, y) = (lin(0), lin(1));
+        // Towards the scene: w grows in front of a perspective camera; orthographic depth grows or,
+        // reversed, falls.
+        let forward = if lin(3) != [0.0; 3] {
+            lin(3)
+        } else if camera.convention().is_reversed() {
+            lin(2).map(|v| -v)
+        } else {
+            lin(2)
+        };
+        let mirrored = dot(cross(x, y), forward) > 0.0;
+        match (self, mirrored) {
+            (Self::Back, true) => Self::Front,
+            (Self::Front, true) => Self::Back,
+            (as_it_is, _) => as_it_is,
+        }
+    }
+}
