@@ -39,4 +39,5 @@ def table(text: str, *head: str) -> list[dict[str, str]]:
 def is_of_this_driver(text: str) -> bool:
     """Whether the page names the adapter of this run: on another one rasterised depth has other last bits."""
     adapter = hizvk.Device().adapter
+    text = " ".join(text.split())  # a name may go on in the next line
     return all(part in text for part in (adapter.name, adapter.driver, adapter.driver_info))

@@ -4,7 +4,7 @@
 //! A wall of one depth fills the image.
 //! The boxes lie behind it, by 1e-4 of its distance and more.
 //! That of some the oracle sees something is the depth image's own rounding.
-//! `docs/accuracy.md` has the table.
+//! `docs/accuracy_log.md` has the table.
 
 mod common;
 
