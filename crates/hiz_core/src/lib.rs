@@ -73,3 +73,8 @@ pub use pyramid::{Pyramid, PyramidOptions};
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
 mod readme {}
+
+/// And so are those of the page for Rust.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/rust.md")]
+mod rust_page {}
