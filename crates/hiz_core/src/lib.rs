@@ -25,22 +25,36 @@
 // What only a readback asks for is idle in an embedder's build.
 #![cfg_attr(not(feature = "headless"), allow(dead_code))]
 
-mod context;
-mod cull;
+// The rooms, in the order of the data: each imports only what stands above it here
+// (`tests/rooms.rs`). Empty lines keep rustfmt from sorting them.
 mod error;
+
+mod host;
+
+mod input;
+
 mod gpu;
+
+mod pyramid;
+
+mod occluders;
+
+mod instances;
+
+mod output;
+
+mod cull;
+
+mod context;
+
 #[cfg(feature = "headless")]
 pub mod headless;
-mod host;
-mod input;
-mod instances;
-mod occluders;
-mod output;
-mod pyramid;
-#[cfg(feature = "testing")]
-pub mod testing;
+
 #[cfg(feature = "yardstick")]
 pub mod yardstick;
+
+#[cfg(feature = "testing")]
+pub mod testing;
 
 pub use wgpu;
 
