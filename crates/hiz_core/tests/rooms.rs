@@ -1,4 +1,4 @@
-//! The rooms of hiz_core: data goes one way.
+//! The rooms of `hiz_core`: data goes one way.
 //!
 //! The imports between the files of `src/` are read from their text.
 //! No file may lead back to itself, and no file may import one from a room that `lib.rs` declares
