@@ -1,17 +1,19 @@
-//! The inverse of a 3x3 matrix with a bound of its error, however near to singular the matrix is.
+//! The inverse of a 3x3 matrix with an error bound for each entry, also for nearly singular
+//! matrices.
 //!
-//! Entries are pairs of float64, improved by Newton's step `A += A (I - M A)` with residuals in
-//! pairs.
-//! The last residual bounds what is left.
-//! (Ogita, Rump and Oishi, "Accurate sum and dot product", 2005, section 4: sums of products in
-//! pairs.)
+//! Each entry is a pair of float64.
+//! Newton's step `A += A (I - M A)` improves the pairs, with residuals that are computed in pairs
+//! too.
+//! The last residual bounds the remaining error.
+//! Sums of products in pairs follow Ogita, Rump and Oishi, "Accurate sum and dot product", 2005,
+//! section 4.
 
 use crate::host::linear::{Mat3, Vec3, inverse3};
 
-/// More than what products below float64's range lose.
+/// An absolute bound, with room, of the error of products that underflow float64.
 const TINY: f64 = 1e-280;
 
-/// The number `hi + lo`, never evaluated.
+/// The unevaluated sum `hi + lo`.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Pair {
     hi: f64,
@@ -23,14 +25,14 @@ impl Pair {
         Self { hi, lo: 0.0 }
     }
 
-    /// `a + b` without an error (Knuth).
+    /// `a + b` without an error: the two-sum of Knuth.
     fn sum(a: f64, b: f64) -> Self {
         let hi = a + b;
         let from_b = hi - a;
         Self { hi, lo: (a - (hi - from_b)) + (b - from_b) }
     }
 
-    /// `a * b` without an error but [`TINY`].
+    /// `a * b` with an error below [`TINY`].
     fn product(a: f64, b: f64) -> Self {
         let hi = a * b;
         Self { hi, lo: a.mul_add(b, -hi) }
@@ -42,7 +44,7 @@ impl Pair {
     }
 }
 
-/// A number and how far it may be off.
+/// A number and a bound of its absolute error.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Bounded {
     value: Pair,
@@ -50,14 +52,16 @@ pub(crate) struct Bounded {
 }
 
 impl Bounded {
-    /// The nearest float64, and how far it may be off.
+    /// The nearest float64 and a bound of its absolute error.
     pub(crate) fn rounded(self) -> (f64, f64) {
         (self.value.hi, self.value.lo.abs() + self.error)
     }
 
-    /// `sum a b`.
-    /// At most 17 sums (four terms and the unit), each off by less than 2^-105 of all magnitudes:
-    /// 2^-98 covers them, and what evaluating the bound itself loses.
+    /// The sum of the products `a * b` over `terms`.
+    ///
+    /// The error bound takes each sum to be off by less than 2^-105 of the sum of all magnitudes.
+    /// There are at most 17 sums: four terms and the unit.
+    /// The factor 2^-98 covers them, and the roundings of the bound itself.
     pub(crate) fn dot(terms: &[(f64, Self)]) -> Self {
         let (mut value, mut size, mut inherited) = (Pair::default(), 0.0, 0.0);
         for (a, b) in terms {
@@ -78,16 +82,17 @@ impl From<f64> for Bounded {
     }
 }
 
-/// The entries of the inverse of the matrix with these rows; nothing for one that is singular, or
-/// that float64 cannot tell from one.
+/// The entries of the inverse of the matrix with these rows.
+///
+/// `None` for a singular matrix, and for one that float64 cannot distinguish from a singular one.
 pub(crate) fn inverse(rows: &Mat3) -> Option<[[Bounded; 3]; 3]> {
-    // Rows near 1, by powers of two: residuals then mean the same in each.
+    // Powers of two bring every row near 1, so that residuals mean the same in each row.
     let scale = rows.map(|row| near_one(row.iter().fold(0.0, |m, v| m.max(v.abs()))));
     let m: Mat3 = std::array::from_fn(|i| rows[i].map(|v| v * scale[i]));
     let mut a = inverse3(&m)?.map(|row| row.map(Pair::new));
     for _ in 0..4 {
-        // A first inverse is off by 1e-4 at worst (determinants above 1e-12), and each step squares
-        // that.
+        // The first inverse is off by at most 1e-4, since determinants are above 1e-12.
+        // Each step squares the error.
         let e = residual(&m, &a).map(|row| row.map(|x| x.value.hi));
         let column = |j: usize| -> Vec3 { [e[0][j], e[1][j], e[2][j]] };
         a = a.map(|row| {
@@ -98,10 +103,10 @@ pub(crate) fn inverse(rows: &Mat3) -> Option<[[Bounded; 3]; 3]> {
         });
     }
     // M A = I - E gives M^-1 - A = A (E + E^2 + ...).
-    // No row of |E| sums to more than 1/2, so the series is at most twice the greatest |E| of each
+    // The row sums of |E| are below 1/2, so the series is at most twice the greatest |E| of each
     // column.
     let e = residual(&m, &a).map(|row| row.map(|x| x.value.hi.abs() + x.value.lo.abs() + x.error));
-    // A NaN is kept: `max` would drop it.
+    // `f64::max` would drop a NaN; this fold keeps it.
     let row_sum = e
         .iter()
         .map(|row| row.iter().sum::<f64>())
@@ -119,8 +124,10 @@ pub(crate) fn inverse(rows: &Mat3) -> Option<[[Bounded; 3]; 3]> {
     }))
 }
 
-/// The power of two that brings `size` into `[1, 2)` (a hair beside it where log2 is off by an
-/// ulp); no number for 0.
+/// The power of two that brings `size` into `[1, 2)`.
+///
+/// Where log2 is off by an ulp, the result lies marginally outside.
+/// The power is infinite for 0, which makes the scaled row NaN.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "an exponent; infinities saturate, and end as NaN"
@@ -144,8 +151,9 @@ fn residual(m: &Mat3, a: &[[Pair; 3]; 3]) -> [[Bounded; 3]; 3] {
 mod tests {
     use super::*;
 
-    /// Two rows that differ by `d` in one entry: the inverse by hand has `1/d` in it, exactly, for
-    /// powers of two.
+    /// Two rows that differ by `d` in one entry.
+    /// The expected inverse is worked out by hand; it contains `1/d`, which is exact for powers of
+    /// two.
     #[test]
     fn nearly_singular_matrices_by_hand() {
         for power in [0, 10, 30, 38] {

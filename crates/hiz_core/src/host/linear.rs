@@ -1,4 +1,4 @@
-//! Vectors and matrices of float64 with three and four rows.
+//! Algebra of 3-vectors and of 3x3 and 4x4 matrices in float64.
 
 /// A 3-vector of float64.
 pub type Vec3 = [f64; 3];
@@ -19,8 +19,9 @@ pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// The unit vector, or nothing for a vector without a direction.
-/// Scaled first, so that no square over- or underflows.
+/// The unit vector along `v`; `None` for a vector that is zero or not finite.
+///
+/// `v` is scaled by its largest coordinate first, so that no square overflows or underflows.
 pub(crate) fn normalized(v: Vec3) -> Option<Vec3> {
     let largest = v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     if !(largest > 0.0 && largest.is_finite()) {
@@ -31,7 +32,7 @@ pub(crate) fn normalized(v: Vec3) -> Option<Vec3> {
     Some(v.map(|x| x / length))
 }
 
-/// The solution of `m x = b`, or nothing where the rows are (nearly) dependent.
+/// The solution of `m x = b`; `None` where the rows are linearly dependent or nearly so.
 pub(crate) fn solve3(m: &Mat3, b: Vec3) -> Option<Vec3> {
     let inverse = inverse3(m)?;
     let x = mul3(&inverse, b);
@@ -42,8 +43,9 @@ pub(crate) fn mul3(m: &Mat3, v: Vec3) -> Vec3 {
     m.map(|row| dot(row, v))
 }
 
-/// The inverse by cofactors of the rows scaled to length 1 (so that the test for singularity has no
-/// units).
+/// The inverse by cofactors; `None` where the rows are linearly dependent or nearly so.
+///
+/// The rows are scaled to length 1 first, so that the threshold for singularity has no units.
 pub(crate) fn inverse3(m: &Mat3) -> Option<Mat3> {
     let mut unit = [[0.0; 3]; 3];
     let mut length = [0.0; 3];

@@ -1,9 +1,12 @@
-//! Memory of the host for what a caller's sizes decide: running out of it is an error here, where
-//! `Vec` alone would abort.
+//! Host memory whose size a caller decides.
+//!
+//! `Vec` alone would abort the process when memory runs out; here that is an error.
 
 use crate::error::{Error, Result};
 
-/// Makes room for `more` elements, and some where that comes again and again.
+/// Reserves room for at least `more` elements.
+///
+/// Like [`Vec::reserve`] it may reserve extra room, so repeated calls stay cheap.
 pub(crate) fn reserve<T>(vec: &mut Vec<T>, more: usize, what: &str) -> Result<()> {
     vec.try_reserve(more).map_err(|_| {
         Error::OutOfMemory(format!(
@@ -20,7 +23,7 @@ pub(crate) fn list<T>(len: usize, what: &str) -> Result<Vec<T>> {
     Ok(vec)
 }
 
-/// The elements of an iterator that knows how many there are.
+/// The elements of an iterator of known length.
 pub(crate) fn collected<T>(items: impl ExactSizeIterator<Item = T>, what: &str) -> Result<Vec<T>> {
     let mut vec = list(items.len(), what)?;
     vec.extend(items);

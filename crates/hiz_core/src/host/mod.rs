@@ -1,4 +1,7 @@
-//! Arithmetic, memory and threads of the host.
+//! Vector algebra, rounding, memory and threads on the host.
+//!
+//! This room knows numbers and the standard library alone: no camera, no instance, no device.
+//! Every other room may use it.
 
 pub(crate) mod inverse;
 pub(crate) mod linear;

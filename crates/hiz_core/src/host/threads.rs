@@ -1,11 +1,13 @@
-//! Locks, and work on two threads where a second one can be had.
+//! Locks, and work that is split between two threads.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, scope};
 
 use crate::error::Result;
 
-/// A value behind a lock that no panic poisons: what is guarded here is replaced as a whole.
+/// A value behind a lock that ignores poisoning.
+///
+/// That is safe here: values are replaced as a whole, so a panic leaves no half-written one.
 #[derive(Debug, Default)]
 pub(crate) struct Locked<T>(Mutex<T>);
 
@@ -20,8 +22,11 @@ impl<T> Locked<T> {
     }
 }
 
-/// Runs `work` on both halves of something at the same time; one after the other where memory has
-/// no room for a thread, and on this thread alone where there is no first half.
+/// Runs `work` on both halves of a job at the same time.
+///
+/// The halves run one after the other where no thread can be spawned.
+/// Without a first half everything runs on this thread.
+/// If both halves fail, the error of the first one is returned.
 pub(crate) fn on_two_threads<T: Send>(
     first: Option<T>,
     second: T,
