@@ -1,4 +1,6 @@
-//! Bounding volumes, borrowed from the caller as flat arrays of float32 or float64.
+//! Bounds of instances, borrowed from the caller as flat arrays of float32 or float64.
+//!
+//! How they are validated and rounded is up to the room `instances`.
 
 /// A flat array of float32 or float64 in C order.
 #[derive(Debug, Clone, Copy)]
@@ -23,7 +25,10 @@ impl Floats<'_> {
         self.len() == 0
     }
 
-    /// Scalar `i` as float64, which holds either kind exactly.
+    /// Scalar `i` as float64, which holds both types exactly.
+    ///
+    /// # Panics
+    /// If `i` is not below [`Floats::len`].
     pub fn get(&self, i: usize) -> f64 {
         match self {
             Self::F32(v) => f64::from(v[i]),
@@ -32,7 +37,8 @@ impl Floats<'_> {
     }
 
     pub(crate) fn array<const N: usize>(&self, i: usize) -> [f64; N] {
-        // One look at which they are: this is the inner loop of every upload.
+        // The type is matched once per element, not per scalar: this is the inner loop of every
+        // upload.
         match self {
             Self::F32(v) => {
                 let v = &v[N * i..N * (i + 1)];
@@ -46,31 +52,33 @@ impl Floats<'_> {
     }
 }
 
-/// Bounding volumes of N instances, borrowed from the caller.
+/// The bounds of N instances in world coordinates, borrowed from the caller.
 #[derive(Debug, Clone, Copy)]
 pub enum Bounds<'a> {
     /// Spheres.
     Spheres {
         /// N centres, 3 scalars each.
         centers: Floats<'a>,
-        /// N radii.
+        /// N radii, >= 0.
         radii: Floats<'a>,
     },
     /// Axis-aligned boxes.
     Boxes {
-        /// N least corners, 3 scalars each.
+        /// N least corners, 3 scalars each: x, y, z.
         min: Floats<'a>,
-        /// N greatest corners, 3 scalars each.
+        /// N greatest corners, 3 scalars each, not below the least ones.
         max: Floats<'a>,
     },
     /// Oriented boxes: `center + A (h * u)` for u in `[-1, 1]^3`.
-    /// `A` may be any 3x3 matrix, singular ones included.
+    ///
+    /// `A` may be any finite 3x3 matrix, also a singular one.
     OrientedBoxes {
         /// N centres, 3 scalars each.
         centers: Floats<'a>,
-        /// N half sizes h along the box's axes, 3 scalars each, >= 0.
+        /// N half sizes h along the axes of the box, 3 scalars each, >= 0.
         half_sizes: Floats<'a>,
-        /// N row-major matrices A, 9 scalars each; column k is the world direction of axis k.
+        /// N row-major matrices A, 9 scalars each.
+        /// Column k is the world direction of axis k.
         rotations: Floats<'a>,
     },
 }

@@ -1,10 +1,11 @@
-//! Cameras in float64, on the host: what the inputs denote, before anything is rounded.
+//! Cameras in float64, on the host: the numbers that the inputs denote, before any rounding.
 //!
 //! A camera is four clip-space rows about an origin: `clip = rows * (p - origin, 1)`.
-//! Named cameras take the eye as the origin, so that a camera a million metres from the world's
-//! origin loses nothing.
-//! Clip space is that of Vulkan, Direct3D and WebGPU: NDC x right, y **up**, z in `0..1`; column
-//! vectors; pixel (0, 0) is the top-left one.
+//! Cameras with a pose take the eye as the origin.
+//! A camera a million metres from the world's origin therefore loses no precision.
+//!
+//! Clip space is that of Vulkan, Direct3D and WebGPU: NDC x right, y **up**, z in `0..1`.
+//! Vectors are columns, and pixel (0, 0) is the top-left one.
 
 use crate::error::{Error, Result};
 use crate::host::linear::{Mat3, Mat4, Vec3, cross, dot, inverse3, mul3, normalized};
@@ -13,19 +14,19 @@ use crate::input::projection::{Pose, Projection};
 
 /// A view of the world: four clip-space rows about an origin, an image size and a depth convention.
 ///
-/// The camera *denotes* exactly these float64 numbers; everything that the cull promises is
-/// promised about them.
+/// The camera denotes exactly these float64 numbers.
+/// Everything that a cull promises is promised about them.
 #[derive(Debug, Clone)]
 pub struct Camera {
     rows: Mat4,
     origin: Vec3,
     size: ImageSize,
     convention: DepthConvention,
-    /// Whether `origin` is where the camera stands (false for a bare matrix).
+    /// Whether `origin` is where the camera stands; false for a bare matrix.
     posed: bool,
 }
 
-/// Cameras are equal that denote the same numbers, whichever constructor made them.
+/// Cameras are equal if they denote the same numbers, whichever constructor made them.
 impl PartialEq for Camera {
     fn eq(&self, other: &Self) -> bool {
         (self.rows, self.origin, self.size, self.convention)
@@ -35,6 +36,8 @@ impl PartialEq for Camera {
 
 impl Camera {
     /// A camera from clip-space rows about an origin: `clip = rows * (p - origin, 1)`.
+    ///
+    /// `rows` are x, y, z and w in this order; `origin` is in world units and counts as the eye.
     ///
     /// # Errors
     /// [`Error::Invalid`] for NaN or infinite entries, an empty image and singular matrices;
@@ -56,11 +59,12 @@ impl Camera {
         Ok(Self { rows, origin, size, convention, posed: true })
     }
 
-    /// A camera that stands at `pose` and sees through `projection`; its rows are formed about the
-    /// eye.
+    /// A camera at `pose` that sees through `projection`; its rows are about the eye.
     ///
     /// # Errors
-    /// [`Error::Invalid`] names the field that cannot be used.
+    /// [`Error::Invalid`] for a pose, a projection or a size that cannot be used; it names the
+    /// field.
+    /// [`Error::Limit`] for an image side above [`MAX_IMAGE_SIDE`](crate::MAX_IMAGE_SIDE).
     pub fn look_at(pose: &Pose, projection: &Projection, size: ImageSize) -> Result<Self> {
         let clip_from_camera = projection.clip_from_camera(size)?;
         let axes = pose.axes()?;
@@ -72,7 +76,9 @@ impl Camera {
         )
     }
 
-    /// A camera from one float64 matrix, `clip = m * (x, y, z, 1)`.
+    /// A camera from one float64 matrix `clip_from_world`, row-major: `clip = m * (x, y, z, 1)`.
+    ///
+    /// A bare matrix does not tell where the camera stands; see [`Camera::is_posed`].
     ///
     /// # Errors
     /// As [`Camera::from_rows`].
@@ -84,8 +90,9 @@ impl Camera {
         Ok(Self { posed: false, ..Self::from_rows(m, [0.0; 3], size, convention)? })
     }
 
-    /// A camera from a projection and an affine world-to-camera matrix (any camera axes, as long as
-    /// both agree).
+    /// A camera from a projection and an affine world-to-camera matrix, both row-major.
+    ///
+    /// The camera's axes may be any, as long as both matrices agree on them.
     ///
     /// # Errors
     /// As [`Camera::from_rows`], and for a `camera_from_world` whose last row is not (0, 0, 0, 1)
@@ -100,8 +107,7 @@ impl Camera {
         let inverse = inverse3(&linear).ok_or_else(|| {
             Error::invalid("camera_from_world", "expected an invertible matrix, got a singular one")
         })?;
-        // The rows stand about (nearly) the eye: what the rounded eye leaves over is kept as the
-        // residual.
+        // The rows are about the eye as float64 rounds it; the translation keeps the remainder.
         let origin = mul3(&inverse, translation).map(|x| -x);
         let residual: Vec3 = std::array::from_fn(|i| dot(linear[i], origin) + translation[i]);
         Self::from_rows(
@@ -112,7 +118,9 @@ impl Camera {
         )
     }
 
-    /// A camera from a projection and an affine camera-to-world matrix, the camera's pose.
+    /// A camera from a projection and an affine camera-to-world matrix, which is the camera's pose.
+    ///
+    /// Both matrices are row-major, and must agree on the camera's axes.
     ///
     /// # Errors
     /// As [`Camera::from_clip_from_camera`].
@@ -140,12 +148,12 @@ impl Camera {
         })
     }
 
-    /// The image's size.
+    /// The image's size in pixels.
     pub fn size(&self) -> ImageSize {
         self.size
     }
 
-    /// Which end of the depth range is far.
+    /// Which end of the NDC depth range is far.
     pub fn convention(&self) -> DepthConvention {
         self.convention
     }
@@ -155,12 +163,12 @@ impl Camera {
         self.rows
     }
 
-    /// The point that the rows stand about, in world units; the eye of a named camera.
+    /// The point that the rows are about, in world units; the eye of a camera with a pose.
     pub fn origin(&self) -> Vec3 {
         self.origin
     }
 
-    /// Whether [`Camera::origin`] is where the camera stands; a bare matrix does not say that.
+    /// Whether [`Camera::origin`] is where the camera stands; a bare matrix does not tell that.
     pub fn is_posed(&self) -> bool {
         self.posed
     }
@@ -170,10 +178,11 @@ impl Camera {
         self.rows[3][..3] == [0.0; 3]
     }
 
-    /// The rows times the power of two that brings w (orthographic: its constant; otherwise its
-    /// largest coefficient) into `[1, 2)`.
-    /// It changes no comparison and has to come first: products with tiny rows would lose bits
-    /// below float64's range.
+    /// The rows times the power of two that brings w into `[1, 2)`.
+    ///
+    /// That is w's constant for an orthographic camera, and w's largest coefficient otherwise.
+    /// The scale changes no comparison.
+    /// It has to come first, because products with tiny rows would lose bits below float64's range.
     pub(crate) fn rows_near_one(&self) -> Mat4 {
         let w = self.rows[3];
         let unit = if self.is_orthographic() {
@@ -181,20 +190,20 @@ impl Camera {
         } else {
             w[..3].iter().fold(0.0_f64, |m, v| m.max(v.abs()))
         };
-        // log2 may be off by an ulp at a power of two: then w lies a hair outside [1, 2), which no
-        // bound needs exactly.
-        // A subnormal unit makes an infinite scale, and rows that are refused.
+        // log2 may be off by an ulp at a power of two.
+        // w then lies marginally outside of [1, 2), which no bound depends on.
+        // A subnormal unit makes the scale infinite, and rows with infinities are refused later.
         let scale = 2.0_f64.powf(unit.log2().floor()).recip();
         self.rows.map(|row| row.map(|v| v * scale))
     }
 
-    /// The float64 matrix about the world's origin, rounded: `clip = m * (x, y, z, 1)`.
+    /// The row-major float64 matrix about the world's origin, rounded: `clip = m * (x, y, z, 1)`.
     pub fn clip_from_world(&self) -> Mat4 {
         self.rows.map(|r| [r[0], r[1], r[2], r[3] - dot([r[0], r[1], r[2]], self.origin)])
     }
 }
 
-/// Refuses matrices that squash the world to a plane: no depth test could mean anything there.
+/// Refuses matrices that squash the world to a plane, where no depth test has a meaning.
 fn check_regular(rows: &Mat4) -> Result<()> {
     let linear = |r: usize| [rows[r][0], rows[r][1], rows[r][2]];
     let third = if linear(3) == [0.0; 3] { 2 } else { 3 };
@@ -210,7 +219,7 @@ fn check_regular(rows: &Mat4) -> Result<()> {
     }
 }
 
-/// `p * [linear | translation]` for an affine second factor.
+/// `p * [linear | translation]`, where the second factor is affine.
 fn linear_after(p: &Mat4, linear: &Mat3, translation: Vec3) -> Mat4 {
     p.map(|r| {
         let head = [r[0], r[1], r[2]];
@@ -240,7 +249,7 @@ mod tests {
     const SIZE: ImageSize = ImageSize { width: 4, height: 2 };
 
     fn forward_camera(convention: DepthConvention, far: Option<f64>) -> Camera {
-        // At (10, 20, 30) looking along -z, so view depth = 30 - z.
+        // At (10, 20, 30), looking along -z, so view depth is 30 - z.
         let pose = Pose { eye: [10.0, 20.0, 30.0], target: [10.0, 20.0, 0.0], up: [0.0, 5.0, 0.0] };
         let projection = Projection::Perspective {
             fov_y: std::f64::consts::FRAC_PI_2,

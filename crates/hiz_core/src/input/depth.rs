@@ -1,9 +1,12 @@
-//! Depth images of other makers: from what their numbers mean to NDC depth, in float64, rounded
-//! towards far.
+//! Depth images from other sources, converted to NDC depth in float64 and rounded towards far.
 //!
-//! Rounding towards far loses culling by a hair and never hides anything.
-//! What is no depth at all (NaN, infinite, one of the caller's invalid values, outside the camera's
-//! range; for most cameras zero and negative) becomes far, which never occludes.
+//! Rounding towards far loses a little culling and never hides anything.
+//! These numbers are no depth, and become far, which never occludes:
+//!
+//! - NaN and infinity;
+//! - the caller's invalid values;
+//! - depth outside the camera's range;
+//! - for most cameras, zero and negative numbers.
 
 use crate::error::{Error, Result};
 use crate::host::inverse::{Bounded, inverse};
@@ -18,30 +21,42 @@ use crate::input::tolerance::DepthTolerance;
 /// What the numbers of a depth image mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum DepthKind {
-    /// NDC depth, near 0, far 1.
+    /// NDC depth: near 0, far 1.
     Ndc,
-    /// NDC depth, near 1, far 0.
+    /// NDC depth in reversed Z: near 1, far 0.
     ReversedNdc,
     /// View depth: world units along the viewing direction.
     Z,
-    /// World units along the ray through the pixel's centre.
+    /// Distance from the eye: world units along the ray through the pixel's centre.
     Distance,
 }
 
-/// The NDC depth in `camera`'s convention of each pixel of `image` (row 0 on top), `scale` times
-/// its numbers being depth of `kind`.
-/// The lens is that of `camera`; a view depth or distance belongs to the pixel's centre.
+/// Converts a depth image to NDC depth in `camera`'s convention, rounded to float32 towards far.
+///
+/// `image` has one number per pixel of `camera`, rows from top to bottom.
+/// `scale` times a number is depth of `kind`; it must be 1 for NDC depth.
+/// `camera` must have the lens that the image was made with.
+/// A view depth or distance belongs to the pixel's centre.
+/// The result has the shape of `image`.
 ///
 /// `invalid` lists the numbers of `image`, before `scale`, that mean "no data": they become far.
-/// Beside a float32 image they are rounded to float32.
-/// NaN and infinity never are depth, and of kinds `Z` and `Distance` neither are zero and negative
-/// numbers, but for one kind of camera: an orthographic one whose near plane lies behind the eye
-/// (`near < 0`) sees depth of either sign.
+/// For a float32 image they are rounded to float32 before they are compared.
+/// NaN and infinity become far as well.
+/// For the kinds `Z` and `Distance` so do zero and negative numbers, with one exception.
+/// An orthographic camera whose near plane lies behind the eye (`near < 0`) sees depth of either
+/// sign.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a number of pixels other than the camera's, a kind that contradicts its
-/// convention, a scale that is not positive and finite, and for kinds `Z` and `Distance` an
-/// orthographic camera made from a bare matrix (it does not say where its depth starts).
+/// [`Error::Invalid`] for
+///
+/// - a number of pixels that differs from the camera's;
+/// - a kind that contradicts the camera's convention;
+/// - a scale that is not positive and finite, or not 1 for NDC depth;
+/// - for the kinds `Z` and `Distance`: a singular camera, or an orthographic one that was made from
+///   a bare matrix, which does not tell where depth starts, or whose depth does not grow along its
+///   rays.
+///
+/// [`Error::OutOfMemory`](crate::Error::OutOfMemory) if the host has no room for the result.
 pub fn ndc_from_kind(
     image: Floats<'_>,
     kind: DepthKind,
@@ -52,12 +67,14 @@ pub fn ndc_from_kind(
     converted(image, kind, scale, invalid, camera, DepthTolerance::NONE)
 }
 
-/// [`ndc_from_kind`] of an image whose numbers were rounded within `tolerance` (in their own units,
-/// before `scale`) before they came here; and the tolerance that is left for the pyramid to keep.
+/// [`ndc_from_kind`] for an image whose numbers were rounded within `tolerance` before this call.
 ///
-/// Numbers of the kinds `Z` and `Distance` are moved away from the eye by it before they are
-/// converted, and nothing is left.
-/// NDC depth stays as it is, and so does its tolerance.
+/// `tolerance` is in the units of the numbers, before `scale`.
+/// The result holds the NDC depth, and the tolerance that is left for the pyramid to account for.
+///
+/// - Numbers of the kinds `Z` and `Distance` are moved away from the eye by the tolerance before
+///   they are converted, and none is left.
+/// - NDC depth keeps its numbers and its tolerance.
 ///
 /// # Errors
 /// As [`ndc_from_kind`], and [`Error::Invalid`] for a tolerance outside 0..=0.5.
@@ -75,8 +92,10 @@ pub fn ndc_from_kind_within(
     Ok((ndc, if is_ndc { tolerance } else { DepthTolerance::NONE }))
 }
 
-/// Numbers of the kinds `Z` and `Distance` are taken at the far end of `tolerance`; NDC depth stays
-/// as it is.
+/// [`ndc_from_kind`] with numbers of the kinds `Z` and `Distance` taken at the far end of
+/// `tolerance`.
+///
+/// NDC depth ignores the tolerance.
 fn converted(
     image: Floats<'_>,
     kind: DepthKind,
@@ -140,7 +159,7 @@ fn converted(
                     let known = value.is_finite()
                         && (value > 0.0 || lens.signed)
                         && !invalid.contains(&number);
-                    // A hair more than all that it lost, for the roundings of this line.
+                    // Slightly more than the tolerance, to cover the roundings of this expression.
                     let off = (number.abs() * tolerance.relative + tolerance.absolute)
                         * scale
                         * (1.0 + 1e-15);
@@ -156,7 +175,7 @@ fn converted(
     }
 }
 
-/// The caller's values as the image can hold them.
+/// The caller's invalid values, rounded to the image's own type.
 #[expect(clippy::cast_possible_truncation, reason = "rounded as the image's own numbers were")]
 fn as_stored(invalid: &[f64], image: Floats<'_>) -> Vec<f64> {
     match image {
@@ -165,8 +184,9 @@ fn as_stored(invalid: &[f64], image: Floats<'_>) -> Vec<f64> {
     }
 }
 
-/// `d` as float32 that is not nearer; far where it is outside 0..1 or NaN. float32 input passes
-/// unchanged in value.
+/// `d` rounded to float32 towards far; far where `d` is NaN or outside 0..1.
+///
+/// A number that float32 holds keeps its value.
 #[expect(clippy::cast_possible_truncation, reason = "rounded towards far in the next lines")]
 fn toward_far(d: f64, reversed: bool) -> f32 {
     if !(0.0..=1.0).contains(&d) {
@@ -180,8 +200,9 @@ fn toward_far(d: f64, reversed: bool) -> f32 {
     }
 }
 
-/// A stored depth as the shaders read it: NaN and what is outside 0..1 is far, subnormals and -0
-/// are 0.
+/// A stored depth as the shaders read it.
+///
+/// NaN and numbers outside 0..1 become far; subnormals and -0 become 0.
 pub(crate) fn sanitized(bits: u32, convention: DepthConvention) -> f32 {
     let d = f32::from_bits(bits);
     if !(0.0..=1.0).contains(&d) {
@@ -193,35 +214,38 @@ pub(crate) fn sanitized(bits: u32, convention: DepthConvention) -> f32 {
     }
 }
 
-/// How a camera's rays run: what turns a depth along them into NDC depth.
+/// How a camera's rays run, which turns a depth along them into NDC depth.
 struct Lens {
     reversed: bool,
-    /// Whether zero and negative numbers are depth, too: the near plane lies behind the eye.
+    /// Whether zero and negative numbers are depth too, since the near plane lies behind the eye.
     signed: bool,
     size: [f64; 2],
     rays: Rays,
 }
 
 enum Rays {
-    /// Clip z is `k . (x, y, w) + constant` everywhere, so NDC depth is `k . (ndc x, ndc y, 1) +
-    /// constant / w`.
+    /// Rays through an eye.
+    ///
+    /// Clip z is `k . (x, y, w) + constant` everywhere.
+    /// NDC depth therefore is `k . (ndc x, ndc y, 1) + constant / w`.
     FromEye {
         k: Vec3,
         constant: f64,
-        /// How far each of them may be off.
+        /// Error bounds of the entries of `k`.
         k_error: Vec3,
         constant_error: f64,
-        /// The inverse of the rows x, y, w: directions of rays; and how far its entries may be off.
+        /// The inverse of the rows x, y, w, which maps NDC positions to directions of rays.
+        /// Each entry comes with its error bound.
         inverse: [[(f64, f64); 3]; 3],
-        /// The length of w's linear part: w for a view depth of 1.
+        /// w at view depth 1: the length of the linear part of the w row.
         w_length: f64,
     },
-    /// Depth starts at the plane through the origin and grows along the rays.
+    /// Parallel rays: depth is 0 on the plane through the origin and grows along the rays.
     Parallel {
         slope: f64,
         constant: f64,
-        /// How far rays that are not quite the direction in which depth grows can put it off, over
-        /// all of the image.
+        /// A bound of the error of NDC depth anywhere in the image.
+        /// It is due to rays that are not exactly parallel to the direction in which depth grows.
         tilt: f64,
     },
 }
@@ -239,11 +263,14 @@ impl Lens {
         Ok(Self { reversed, signed, size, rays })
     }
 
-    /// Of a depth along the ray, which may be off by so much.
+    /// The NDC depth of the number `value` of `kind` at a pixel, rounded towards far.
+    ///
+    /// `value` may be off by up to `off` in either direction.
     fn ndc(&self, column: u32, row: u32, (value, off): (f64, f64), kind: DepthKind) -> f32 {
         match &self.rays {
-            // Rays are parallel: both kinds are the same.
-            // `value`, the slope (6), the constant, the product and the sum: less than 12.
+            // The rays are parallel, so view depth and distance are the same.
+            // Roundings: `value`, the slope (6), the constant, the product and the sum, less than
+            // 12 in all.
             Rays::Parallel { slope, constant, tilt } => {
                 let terms = [slope * value, *constant];
                 let of_value = slope.abs() * off * (1.0 + 16.0 * ROUNDING);
@@ -251,11 +278,11 @@ impl Lens {
                 toward_far_by(terms[0] + terms[1], lost, self.reversed)
             }
             Rays::FromEye { k, constant, k_error, constant_error, inverse, w_length } => {
-                // Whole numbers, exact: each ratio is rounded once.
+                // The numerators are whole numbers and exact, so each ratio is rounded once.
                 let x = (2.0 * f64::from(column) + 1.0 - self.size[0]) / self.size[0];
                 let y = (self.size[1] - 2.0 * f64::from(row) - 1.0) / self.size[1];
                 let at = [x, y, 1.0];
-                // 1 / w, and what it may be off by beyond the roundings counted below.
+                // 1 / w, and a bound of its error beyond the roundings that are counted below.
                 let (per_w, per_w_error) = match kind {
                     DepthKind::Z => ((value * w_length).recip(), 0.0),
                     _ => {
@@ -263,7 +290,7 @@ impl Lens {
                         (length / value, error / value)
                     }
                 };
-                // A depth that is off by a share s has 1 / w off by s / (1 - s) of it.
+                // Where depth is off by a share s, 1 / w is off by at most the share s / (1 - s).
                 let share = off / value;
                 if share >= 0.5 {
                     return if self.reversed { 0.0 } else { 1.0 };
@@ -271,9 +298,10 @@ impl Lens {
                 let per_w_error = per_w_error
                     + (per_w + per_w_error) * share / (1.0 - share) * (1.0 + 16.0 * ROUNDING);
                 let terms = [k[0] * x, k[1] * y, k[2], constant * per_w];
-                // Of a term: x 1, the product 1, three sums; of the last one: w_length (5) or the
-                // length's division, `value`, the product, a sum.
-                // 16 cover each.
+                // Roundings of a term: `x`, the product and three sums.
+                // Roundings of the last term: `w_length` (5) or the length's division, `value`, the
+                // product and a sum.
+                // 16 cover each term.
                 let size: f64 = terms.iter().map(|t| t.abs()).sum();
                 let inherited = (0..3).map(|i| k_error[i] * at[i].abs()).sum::<f64>()
                     + constant_error * per_w
@@ -285,28 +313,30 @@ impl Lens {
     }
 }
 
-/// How long the ray through `at` is that w grows by 1 along, and how far that may be off.
+/// The length of the part of the ray through `at` along which w grows by 1, and its error bound.
 fn ray_length(inverse: &[[(f64, f64); 3]; 3], at: Vec3) -> (f64, f64) {
     let (mut ray, mut error) = ([0.0; 3], 0.0);
     for (coordinate, entries) in ray.iter_mut().zip(inverse) {
         for ((entry, off), v) in entries.iter().zip(at) {
             *coordinate += entry * v;
-            // v's rounding, the product's and two sums'.
+            // Roundings of `v`, of the product and of two sums.
             error += (off + 5.0 * ROUNDING * entry.abs()) * v.abs();
         }
     }
-    // Scaled, so that no square over- or underflows.
-    // The length of a vector is off by no more than the sum of its coordinates' errors.
+    // Scaled by the largest coordinate, so that no square overflows or underflows.
+    // The error of a vector's length is at most the sum of the errors of its coordinates.
     let largest = ray.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
     let scaled = ray.map(|c| c / largest);
     let length = largest * dot(scaled, scaled).sqrt();
     (length, error * (1.0 + 1e-9) + 8.0 * ROUNDING * length)
 }
 
-/// What view depth, in world units, a camera's NDC depth and w stand for: for people, nothing is
-/// decided by it.
+/// Converts NDC depth and w back to view depth in world units.
+///
+/// It serves explanations that people read; no decision rests on it.
 pub(crate) enum ViewDepth {
-    /// NDC depth is `slope + constant / w`, within the error, where it depends on w alone.
+    /// `ndc` is the slope, its error bound and the constant of `slope + constant / w`.
+    /// It is `None` where NDC depth depends on the pixel as well.
     FromEye {
         w_length: f64,
         ndc: Option<[f64; 3]>,
@@ -318,8 +348,8 @@ pub(crate) enum ViewDepth {
 }
 
 impl ViewDepth {
-    /// Nothing for a parallel camera that does not say where its depth starts or whose depth does
-    /// not grow along its rays.
+    /// `None` for a parallel camera if it does not tell where its depth starts, or if its depth
+    /// does not grow along its rays.
     pub(crate) fn new(camera: &Camera) -> Option<Self> {
         let rows = camera.rows_near_one();
         let rays = if camera.is_orthographic() { parallel(camera, &rows) } else { from_eye(&rows) };
@@ -335,7 +365,7 @@ impl ViewDepth {
         }
     }
 
-    /// Of an NDC depth; infinite for that of an infinitely far point.
+    /// The view depth of an NDC depth; infinite for the depth of an infinitely far point.
     pub(crate) fn of_ndc(&self, depth: f64) -> Option<f64> {
         match *self {
             Self::Parallel { slope, constant } => Some((depth - constant) / slope),
@@ -350,7 +380,9 @@ impl ViewDepth {
         }
     }
 
-    /// Of w, as the rows near one have it; parallel rays have the same everywhere.
+    /// The view depth of w, scaled as in [`Camera::rows_near_one`].
+    ///
+    /// `None` for parallel rays, whose w is the same everywhere.
     pub(crate) fn of_w(&self, w: f64) -> Option<f64> {
         match *self {
             Self::Parallel { .. } => None,
@@ -359,10 +391,12 @@ impl ViewDepth {
     }
 }
 
-/// The depth of rays through an eye.
+/// The rays of a perspective camera.
+///
 /// `k` solves `k . (x_lin, y_lin, w_lin) = z_lin`.
-/// Far off the axis these rows are nearly parallel, and the constant `z3 - k . (x3, y3, w3)`
-/// cancels for an eye far from the origin: both in pairs of float64, with their bounds.
+/// Far off the axis these rows are nearly parallel.
+/// For an eye far from the origin the constant `z3 - k . (x3, y3, w3)` cancels.
+/// Both are therefore computed in pairs of float64, with error bounds.
 fn from_eye(rows: &Mat4) -> Result<Rays> {
     let used = [0, 1, 3];
     let lin = |r: usize| [rows[r][0], rows[r][1], rows[r][2]];
@@ -386,8 +420,10 @@ fn from_eye(rows: &Mat4) -> Result<Rays> {
     Ok(Rays::FromEye { k, constant, k_error, constant_error, inverse, w_length })
 }
 
-/// Whether an orthographic camera's near plane lies behind its eye, by more than forming the rows
-/// may have moved it: where view depth 0 is farther than the near plane.
+/// Whether the near plane of an orthographic camera lies behind its eye.
+///
+/// View depth 0 then is farther than the near plane, by more than the roundings of the rows
+/// explain.
 fn starts_behind_the_eye(rows: &Mat4, origin: Vec3, reversed: bool) -> bool {
     let (z, w) = (rows[2], rows[3][3]);
     let at_eye = z[3] / w;
@@ -396,18 +432,22 @@ fn starts_behind_the_eye(rows: &Mat4, origin: Vec3, reversed: bool) -> bool {
     behind_near > 2.0_f64.powi(-40) + 2.0_f64.powi(-48) * moved
 }
 
-/// The depth of parallel rays, if the camera says where it starts and if it grows along them.
+/// The rays of an orthographic camera.
+///
+/// # Errors
+/// [`Error::Invalid`] where the camera does not tell where depth starts, or depth does not grow
+/// along the rays.
 fn parallel(camera: &Camera, rows: &Mat4) -> Result<Rays> {
     if !camera.is_posed() {
         return Err(Error::invalid(
             "kind",
-            "expected ndc or reversed_ndc for an orthographic camera made from a bare matrix: it does not say where view depth starts",
+            "expected ndc or reversed_ndc for an orthographic camera made from a bare matrix: it \
+             does not say where view depth starts",
         ));
     }
     let lin = |r: usize| [rows[r][0], rows[r][1], rows[r][2]];
     let unit = |r: usize| normalized(lin(r));
-    // The axes of the image, and between the ray and the direction in which depth grows the sine of
-    // the angle.
+    // The axes of the image, and the direction in which depth grows.
     let (Some(x), Some(y), Some(z)) = (unit(0), unit(1), unit(2)) else {
         return Err(Error::invalid(
             "camera",
@@ -416,26 +456,29 @@ fn parallel(camera: &Camera, rows: &Mat4) -> Result<Rays> {
     };
     let across = cross(x, y);
     let sine = normalized(across).map_or(f64::NAN, |ray| dot(cross(ray, z), cross(ray, z)).sqrt());
-    // NaN is tilted, too.
+    // The comparison refuses NaN, too.
     if sine.is_nan() || sine >= 1e-12 {
         return Err(Error::invalid(
             "kind",
-            "expected ndc or reversed_ndc for an orthographic camera whose depth does not grow along its rays (a sheared or oblique matrix)",
+            "expected ndc or reversed_ndc for an orthographic camera whose depth does not grow \
+             along its rays (a sheared or oblique matrix)",
         ));
     }
     let w = rows[3][3];
-    // Lengths of vectors that may be beyond their squares' range.
+    // The lengths of rows whose squares may leave float64's range.
     let length = |r: usize| {
         lin(r).iter().map(|v| v.abs()).fold(0.0, f64::max) / unit(r).map_or(f64::NAN, largest)
     };
-    // Depth grows (standard) or falls (reversed) along the view.
+    // Along the view depth grows (standard) or falls (reversed).
     let slope = if camera.convention().is_reversed() { -length(2) } else { length(2) } / w.abs();
-    // How far the image's points are from the ray through the origin: where x and y are w and more,
-    // in a basis that may be skewed.
+    // A bound of the distance between any point of the image and the ray through the origin.
+    // There |x| <= |w|, so the linear part of x is at most |w| plus its constant's size, and
+    // likewise y.
+    // The axes may be skewed, which divides by the sine of their angle.
     let reach: f64 = (0..2).map(|r| (w.abs() + rows[r][3].abs()) / length(r)).sum::<f64>()
         / dot(across, across).sqrt();
-    // 16 roundings of the three unit vectors and their products, and the angle that skewed axes
-    // magnify them by.
+    // 16 roundings cover the three unit vectors and their products.
+    // Skewed axes magnify them by 1 / the sine of their angle.
     let sine = sine + 16.0 * ROUNDING / dot(across, across).sqrt();
     Ok(Rays::Parallel { slope, constant: rows[2][3] / w, tilt: 1.01 * sine * reach * slope.abs() })
 }
@@ -444,12 +487,13 @@ fn largest(v: Vec3) -> f64 {
     v.iter().fold(0.0, |m, x| m.max(x.abs()))
 }
 
-/// `d`, pushed towards far by what float64 may have lost, then rounded towards far; far where it
-/// may be outside 0..1.
+/// `d`, moved towards far by the error bound `lost` and rounded towards far.
+///
+/// The result is far wherever the exact depth may lie outside 0..1.
 fn toward_far_by(d: f64, lost: f64, reversed: bool) -> f32 {
     let (nearest, farthest) = if reversed { (d + lost, d - lost) } else { (d - lost, d + lost) };
-    // Before the near plane; written so that NaN is, too.
-    // Past the far one it is far anyway.
+    // In front of the near plane, or NaN, which fails the comparison.
+    // Past the far plane the result is far anyway.
     let inside = if reversed { nearest <= 1.0 } else { nearest >= 0.0 };
     toward_far(if inside { farthest } else { f64::NAN }, reversed)
 }
@@ -474,8 +518,8 @@ mod tests {
 
     #[test]
     fn view_depth_and_distance_give_hand_worked_ndc_depth() {
-        // Pixel centres lie at tangents +-1/2, so a ray is sqrt(1 + 1/4 + 1/4) times its view depth
-        // long.
+        // Pixel centres lie at tangents +-1/2.
+        // A ray is sqrt(1 + 1/4 + 1/4) times as long as its view depth.
         let length = 1.5_f64.sqrt();
         for (convention, expected) in [
             (DepthConvention::Standard, (9.0 - 9.0 / 3.0) / 8.0),
@@ -498,10 +542,10 @@ mod tests {
         }
     }
 
-    /// An eye far from the origin in a bare matrix: the constant cancels, and what that loses has
-    /// to go towards far.
-    /// The truth is that of integers: at eye (0, 0, e) looking along +z, near 1, far 9, the matrix
-    /// is exact, and so is (9 - 9 / z) / 8.
+    /// For an eye far from the origin in a bare matrix the constant cancels.
+    /// The error has to go towards far.
+    /// The truth consists of integers: for an eye at (0, 0, e) that looks along +z, near 1 and far
+    /// 9, the matrix is exact, and so is (9 - 9 / z) / 8.
     #[test]
     fn a_cancelling_eye_rounds_towards_far() {
         for e in [1.0e4, 1.0e6, 1.0e9] {
@@ -551,7 +595,7 @@ mod tests {
                 let d = ndc_from_kind(Floats::F64(&[3.0; 4]), kind, 1.0, &[], &camera).unwrap();
                 assert!(d.iter().all(|d| (f64::from(*d) - expected).abs() < 1e-7), "{d:?}");
             }
-            // Depth that also depends on x: a wall of one view depth has no one NDC depth.
+            // Depth that also depends on x: a wall at one view depth has more than one NDC depth.
             let s = if convention.is_reversed() { -1.0 } else { 1.0 };
             let p = [
                 [1.0, 0.0, 0.0, 0.0],
@@ -570,8 +614,7 @@ mod tests {
         }
     }
 
-    /// View depth back from NDC depth, and from w: planes of the test's cameras at depths that are
-    /// worked out by hand.
+    /// View depth from NDC depth and from w, at depths that are worked out by hand.
     #[test]
     fn view_depth_comes_back() {
         let near = |z: Option<f64>, expected: f64| {
@@ -587,7 +630,7 @@ mod tests {
             let far = Projection::Perspective { fov_y: 1.0, near: 0.5, far: None, convention };
             let endless = Camera::look_at(&POSE, &far, ImageSize::new(2, 3)).unwrap();
             let view = ViewDepth::new(&endless).unwrap();
-            // Depth 2 of near 1/2: a quarter of the way.
+            // View depth 2 with near 1/2: a quarter of the way.
             near(view.of_ndc(if convention.is_reversed() { 0.25 } else { 0.75 }), 2.0);
             assert_eq!(view.of_ndc(f64::from(convention.far())), Some(f64::INFINITY));
             let (left, right, bottom, top) = (-1.0, 3.0, -1.0, 1.0);
@@ -607,8 +650,8 @@ mod tests {
             near(view.of_ndc(at_3), 5.0);
             assert_eq!(view.of_w(1.0), None);
         }
-        // A bare orthographic matrix does not say where depth starts; with an oblique near plane
-        // NDC depth depends on the pixel.
+        // A bare orthographic matrix does not tell where depth starts.
+        // With an oblique near plane NDC depth depends on the pixel.
         let size = ImageSize::new(2, 2);
         let bare = |z, w| {
             let rows = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], z, w];
@@ -636,7 +679,7 @@ mod tests {
                     [far; 4]
                 );
             }
-            // Before the near plane and beyond the far one.
+            // In front of the near plane and beyond the far one.
             assert_eq!(
                 ndc_from_kind(Floats::F64(&[0.5, 9.5, 0.99, 1e9]), DepthKind::Z, 1.0, &[], &camera)
                     .unwrap(),
@@ -645,7 +688,7 @@ mod tests {
         }
     }
 
-    /// Looks along -z from z = 3, from view depth `near` to `far`.
+    /// A camera at z = 3 that looks along -z and sees view depths from `near` to `far`.
     fn orthographic(near: f64, far: f64, convention: DepthConvention) -> Camera {
         let projection = Projection::Orthographic {
             left: -1.0,
@@ -659,14 +702,15 @@ mod tests {
         Camera::look_at(&POSE, &projection, ImageSize::new(2, 2)).unwrap()
     }
 
-    /// A near plane behind the eye: 8 units from -4 to 4, so depth is (z + 4) / 8 up to a float32.
+    /// A near plane behind the eye: 8 units from -4 to 4, so depth is (z + 4) / 8 up to float32's
+    /// rounding.
     #[test]
     fn depth_of_either_sign_behind_the_eye() {
         for (convention, far) in
             [(DepthConvention::Standard, 1.0), (DepthConvention::Reversed, 0.0)]
         {
             let camera = orthographic(-4.0, 4.0, convention);
-            // An image of another size looks from the same place.
+            // An image of another size is seen from the same place.
             for camera in [camera.clone(), camera.with_size(ImageSize::new(4, 1)).unwrap()] {
                 for kind in [DepthKind::Z, DepthKind::Distance] {
                     let found = ndc_from_kind(
@@ -691,7 +735,7 @@ mod tests {
                         ndc_from_kind(Floats::F64(&no_data), kind, 1.0, &[], &camera).unwrap(),
                         [far; 4]
                     );
-                    // Zero is depth there, unless the caller says otherwise.
+                    // Zero is depth for this camera, unless the caller lists it as invalid.
                     let zero = ndc_from_kind(
                         Floats::F64(&[0.0, -0.0, 2.0, -2.0]),
                         kind,
@@ -715,8 +759,8 @@ mod tests {
                 );
                 assert_eq!(found.unwrap(), [far; 4], "near {near}");
             }
-            // Behind the eye by rounding alone: eyes that float64 cannot hold in world-to-camera
-            // form, the near plane at them.
+            // Near planes at the eye that lie behind it by rounding alone.
+            // float64 cannot hold these eyes exactly in world-to-camera form.
             let mut behind = 0;
             for step in 1..20 {
                 let t = 1.0e6 / 3.0 * f64::from(step);
@@ -742,7 +786,8 @@ mod tests {
         }
     }
 
-    /// Numbers of the image, before the scale, as it stores them; in every kind.
+    /// Invalid values are numbers of the image, before the scale, as the image stores them; for
+    /// every kind.
     #[test]
     fn invalid_values_are_far() {
         for (convention, far) in
@@ -770,8 +815,9 @@ mod tests {
         }
     }
 
-    /// Before the near plane by less than float64 can tell is before it; so is the plane itself,
-    /// where it cannot tell.
+    /// A number in front of the near plane is far, even where float64 cannot separate it from the
+    /// plane.
+    /// So is a number on the plane where float64 cannot tell.
     #[test]
     fn at_the_near_plane_nothing_is_nearer() {
         for (convention, far) in

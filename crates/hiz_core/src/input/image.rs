@@ -1,17 +1,20 @@
-//! The size of an image and its depth convention.
+//! The size of an image, and its depth convention.
 
 use crate::error::{Error, Result};
 
-/// The largest image side that the certificates are derived for (pixel edges times 2^16 stay inside
-/// float32).
+/// The largest image side in pixels: 32768.
+///
+/// The certificates are derived for it: pixel edges times 2^16 stay inside float32.
 pub const MAX_IMAGE_SIDE: u32 = 32_768;
 
-/// Which end of the depth range is far.
+/// Which end of the NDC depth range `0..1` is far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum DepthConvention {
     /// Near 0, far 1.
     Standard,
-    /// Near 1, far 0: with float depth the precision is spread evenly over the distance.
+    /// Near 1, far 0, also called reversed Z.
+    ///
+    /// With float depth this spreads the precision evenly over the distance.
     Reversed,
 }
 
@@ -21,7 +24,7 @@ impl DepthConvention {
         self == Self::Reversed
     }
 
-    /// The depth of nothing: 1 (standard) or 0 (reversed).
+    /// The depth where nothing is drawn: 1 (standard) or 0 (reversed).
     pub fn far(self) -> f32 {
         match self {
             Self::Standard => 1.0,

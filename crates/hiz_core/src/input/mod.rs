@@ -1,5 +1,8 @@
-//! What the caller gives, in float64: nothing is rounded to float32 before the records and rows that
-//! the device reads are formed.
+//! What the caller gives, checked and converted in float64, without a device.
+//!
+//! Nothing is rounded to float32 before the records and rows that the device reads are formed.
+//! Cameras and depth images become float32 here (`view`, `depth`); bounds do so in the room
+//! `instances`.
 
 pub(crate) mod bounds;
 pub(crate) mod camera;

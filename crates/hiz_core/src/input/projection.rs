@@ -1,4 +1,4 @@
-//! Where a camera stands, and how camera space becomes clip space.
+//! The pose of a camera, and the projection from camera space to clip space.
 
 use crate::error::{Error, Result};
 use crate::host::linear::Mat4;
@@ -10,17 +10,23 @@ use crate::input::image::check_size;
 /// Where a camera stands and what it looks at, in world units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
-    /// The centre of projection (for an orthographic camera: a point of its image plane).
+    /// The centre of projection; for an orthographic camera the point at view depth 0 on the axis.
     pub eye: Vec3,
-    /// A point that appears on the optical axis.
+    /// A point that appears on the optical axis; it must differ from `eye`.
     pub target: Vec3,
-    /// A direction that appears upwards; not parallel to the viewing direction.
-    /// To look straight down, take what shall be at the top of the image, such as the heading.
+    /// A direction that appears upwards, of any length but 0 and not parallel to `target - eye`.
+    ///
+    /// To look straight down, pass the direction that should be at the top of the image, such as
+    /// the heading.
     pub up: Vec3,
 }
 
 impl Pose {
-    /// The orthonormal rows (right, up, forward) of the camera's axes in the world.
+    /// The camera's axes in the world: orthonormal rows right, up and forward.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for numbers that are not finite, and for directions that are zero or
+    /// parallel.
     pub(super) fn axes(&self) -> Result<Mat3> {
         for (name, v) in [("eye", self.eye), ("target", self.target), ("up", self.up)] {
             if !v.iter().all(|x| x.is_finite()) {
@@ -43,14 +49,14 @@ impl Pose {
         let up = normalized(self.up)
             .ok_or_else(|| Error::invalid("up", "expected a direction, got a zero vector"))?;
         let right = cross(forward, up);
-        // Below this sine of the angle between them the image would turn with the last bits of the
-        // input.
+        // For a smaller sine of the angle between them the image would rotate with the last bits of
+        // the input.
         if dot(right, right) < 1e-20 {
             return Err(Error::invalid(
                 "up",
                 format!(
-                    "expected a direction that is not parallel to target - eye, got {:?}; pass what shall be at the top \
-                     of the image, such as {} or the camera's heading",
+                    "expected a direction that is not parallel to target - eye, got {:?}; pass \
+                     what shall be at the top of the image, such as {} or the camera's heading",
                     self.up,
                     across(self.up)
                 ),
@@ -62,8 +68,9 @@ impl Pose {
     }
 }
 
-/// An axis across `up`: what is at the top of the image for who looks along `up`, in the worlds
-/// that have it so.
+/// An axis across `up`, to suggest as the top of the image when a camera looks along `up`.
+///
+/// It follows the usual orientation of worlds with that up axis.
 pub(crate) fn across(up: Vec3) -> &'static str {
     let [x, y, z] = up.map(f64::abs);
     if y >= x && y >= z {
@@ -75,25 +82,31 @@ pub(crate) fn across(up: Vec3) -> &'static str {
     }
 }
 
-/// How camera space (x right, y up, z **forward**, so view depth is positive in front) becomes clip
-/// space.
+/// How camera space becomes clip space.
+///
+/// In camera space x points right, y up and z **forward**, so view depth is positive in front of
+/// the camera.
+/// Lengths are in world units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Projection {
-    /// A centred perspective; the horizontal field of view follows from the image's aspect ratio
-    /// (square pixels).
+    /// A centred perspective with square pixels.
+    ///
+    /// The horizontal field of view follows from the aspect ratio of the image.
     Perspective {
         /// Vertical field of view in radians, in (0, pi).
         fov_y: f64,
-        /// View depth of the near plane, > 0.
+        /// View depth of the near plane, > 0 and finite.
         near: f64,
-        /// View depth of the far plane, > near; `None`: infinitely far.
+        /// View depth of the far plane, > near; `None` or infinity: infinitely far.
         far: Option<f64>,
         /// Which end of the depth range is far.
         convention: DepthConvention,
     },
-    /// An off-centre perspective: the image's borders as tangents, that is at view depth 1.
+    /// An off-centre perspective.
+    ///
+    /// The borders of the image are given as tangents, that is as coordinates at view depth 1.
     Frustum {
-        /// Tangent of the left border (negative: left of the axis).
+        /// Tangent of the left border, negative to the left of the axis.
         left: f64,
         /// Tangent of the right border, > left.
         right: f64,
@@ -101,14 +114,14 @@ pub enum Projection {
         bottom: f64,
         /// Tangent of the top border, > bottom.
         top: f64,
-        /// View depth of the near plane, > 0.
+        /// View depth of the near plane, > 0 and finite.
         near: f64,
-        /// View depth of the far plane, > near; `None`: infinitely far.
+        /// View depth of the far plane, > near; `None` or infinity: infinitely far.
         far: Option<f64>,
         /// Which end of the depth range is far.
         convention: DepthConvention,
     },
-    /// A parallel projection; borders in world units.
+    /// A parallel projection with borders in world units.
     Orthographic {
         /// Left border.
         left: f64,
@@ -118,9 +131,9 @@ pub enum Projection {
         bottom: f64,
         /// Top border, > bottom.
         top: f64,
-        /// View depth of the near plane (may be negative).
+        /// View depth of the near plane, finite; it may be negative.
         near: f64,
-        /// View depth of the far plane, > near.
+        /// View depth of the far plane, finite and > near.
         far: f64,
         /// Which end of the depth range is far.
         convention: DepthConvention,
@@ -137,10 +150,14 @@ impl Projection {
         }
     }
 
-    /// The clip-space rows for camera space (x right, y up, z forward).
+    /// The clip-space rows x, y, z, w for camera space (x right, y up, z forward).
+    ///
+    /// `size` is that of the image; its aspect ratio matters for [`Projection::Perspective`] alone.
+    /// NDC depth is in `0..1`, in the convention of the projection.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for borders, angles or planes out of range.
+    /// [`Error::Invalid`] for borders, angles or planes out of range, and for an empty image;
+    /// [`Error::Limit`] for an image side above [`MAX_IMAGE_SIDE`](crate::MAX_IMAGE_SIDE).
     pub fn clip_from_camera(&self, size: ImageSize) -> Result<Mat4> {
         check_size(size)?;
         match *self {
@@ -194,7 +211,7 @@ impl Projection {
     }
 }
 
-/// The z and w rows of a perspective with view depth as w.
+/// The z and w rows of a perspective, where w is view depth.
 fn perspective_depth(
     near: f64,
     far: Option<f64>,

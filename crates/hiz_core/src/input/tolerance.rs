@@ -1,50 +1,60 @@
-//! What the format of a depth image rounds: slack that is due before the caller adds any
-//! (`docs/accuracy.md`, section "What a depth format rounds").
+//! The rounding of depth formats, as a tolerance that every cull adds to the caller's slack.
+//!
+//! The numbers are derived in `docs/accuracy.md`, section "What a depth format rounds".
 
 use crate::error::{Error, Result};
 use crate::host::rounding::EPS;
 
-/// How far a stored depth may lie from the depth that was given to be stored: by `relative` times
-/// the stored one, and `absolute` more.
+/// How far a stored depth may lie from the depth that was given to be stored.
 ///
-/// It says what rounding to a format may lose, in either direction, and what reading the stored
-/// number back as float32 may lose.
-/// What computed the depth errs beside that;
+/// The distance is at most `relative` times the stored depth plus `absolute`, in either direction.
+/// It covers two roundings: to the format, and of the stored number read back as float32.
+///
+/// Errors of the renderer that computed the depth are separate.
 /// [`CullOptions::depth_slack`](crate::CullOptions::depth_slack) and
-/// [`depth_slack_abs`](crate::CullOptions::depth_slack_abs) are for that, and every cull counts
-/// both.
+/// [`depth_slack_abs`](crate::CullOptions::depth_slack_abs) cover those.
+/// Every cull counts both.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DepthTolerance {
-    /// Per unit of the stored number.
+    /// Relative to the stored number, in 0..=0.5.
     pub relative: f64,
-    /// In units of the stored number: of NDC depth in a depth texture.
+    /// In the units of the stored number, in 0..=0.5; those of NDC depth in a depth texture.
     pub absolute: f64,
 }
 
 impl DepthTolerance {
-    /// Nothing is lost: depth that is stored as it was given, or was rounded towards far.
-    /// Of float32 formats, too: what rounding to float32 loses is what `depth_slack` covers by
+    /// Nothing is lost: the depth is stored as it was given, or was rounded towards far.
+    ///
+    /// This holds for float32 formats, too, since `depth_slack` covers the rounding to float32 by
     /// default.
     pub const NONE: Self = Self { relative: 0.0, absolute: 0.0 };
 
-    /// Half floats: 2^-10 relative and 2^-24 absolute, a spacing of theirs.
-    /// Vulkan lets a driver take either neighbour.
+    /// Half floats: 2^-10 relative and 2^-24 absolute, one spacing of half floats.
+    ///
+    /// Vulkan lets a driver round to either neighbour.
     pub const HALF: Self = Self { relative: 1.0 / 1024.0, absolute: 1.0 / 16_777_216.0 };
 
-    /// float32 that was rounded to nearest: half a spacing.
-    /// For NDC depth `depth_slack` covers it by default; a metric depth is rounded before it is
-    /// converted, and near the near plane a share of the converted one would be too little.
+    /// Rounding to nearest in float32: half a spacing.
+    ///
+    /// For NDC depth the default `depth_slack` covers it.
+    /// A metric depth is rounded before it is converted.
+    /// Close to the near plane a relative slack of the converted depth would be too little for
+    /// that.
     pub const SINGLE: Self = Self { relative: 0.5 * EPS, absolute: f32::MIN_POSITIVE as f64 * EPS };
 
-    /// Of a format that a pyramid can be built from; `None` for others.
+    /// The tolerance of a texture format; `None` for formats that no pyramid can be built from.
     ///
-    /// `Depth16Unorm`: 1/65535 absolute.
-    /// `Depth24Plus` and `Depth24PlusStencil8`: 1/(2^24 - 1) absolute, which holds for float32 as
-    /// well, in which a driver without 24 bits keeps them.
-    /// Both: 2^-22 relative for the way back to float32.
-    /// `R16Float`: [`DepthTolerance::HALF`].
-    /// `Depth32Float`, `Depth32FloatStencil8`, `R32Float` and `Rgba32Uint`:
-    /// [`DepthTolerance::NONE`].
+    /// | format | relative | absolute |
+    /// |---|---|---|
+    /// | `Depth16Unorm` | 2^-22 | 1/65535 |
+    /// | `Depth24Plus`, `Depth24PlusStencil8` | 2^-22 | 1/(2^24 - 1) |
+    /// | `R16Float` | 2^-10 | 2^-24: [`DepthTolerance::HALF`] |
+    /// | `Depth32Float`, `Depth32FloatStencil8` | 0 | 0: [`DepthTolerance::NONE`] |
+    /// | `R32Float`, `Rgba32Uint` | 0 | 0: [`DepthTolerance::NONE`] |
+    ///
+    /// The relative 2^-22 is for the conversion back to float32.
+    /// A driver without 24 bits stores `Depth24Plus` as float32, for which the numbers hold as
+    /// well.
     pub fn of(format: wgpu::TextureFormat) -> Option<Self> {
         use wgpu::TextureFormat as Format;
         match format {
@@ -59,15 +69,13 @@ impl DepthTolerance {
         }
     }
 
-    /// Normalised integers of so many bits: one step, and two spacings of float32 for the number
-    /// that is read.
+    /// Normalised integers of `bits` bits: one step, and two spacings of float32 for reading back.
     fn fixed_point(bits: u32) -> Self {
         let steps = f64::from((1_u32 << bits) - 1);
         Self { relative: 2.0 * EPS, absolute: (1.0 / steps).next_up() }
     }
 
-    /// Of a depth that was moved by `self` after it was moved by `before`: by both, one after the
-    /// other, rounded up.
+    /// The tolerance of a depth that was moved by `before` first and by `self` second, rounded up.
     #[must_use]
     pub fn after(self, before: Self) -> Self {
         if self == Self::NONE || before == Self::NONE {
@@ -104,7 +112,7 @@ mod tests {
     use crate::input::image::{DepthConvention, ImageSize};
     use crate::input::projection::{Pose, Projection};
 
-    /// Worked out by hand: a step of the format, never less, and no more than a hair above.
+    /// Worked out by hand: a step of the format, never less, and at most slightly more.
     #[test]
     fn each_format_has_its_step() {
         use wgpu::TextureFormat as Format;
@@ -134,8 +142,8 @@ mod tests {
         assert_eq!(DepthTolerance::of(Format::Stencil8), None);
     }
 
-    /// A thousandth and a quarter, one after the other: in either convention no depth comes out
-    /// nearer than by both in turn.
+    /// A relative 0.001 and an absolute 0.25, then 0.5 and 0.125.
+    /// In either convention the sum is at least as far as both in turn.
     #[test]
     fn tolerances_add_up_one_after_the_other() {
         let (format, caller) = (
@@ -154,8 +162,8 @@ mod tests {
         assert_eq!(DepthTolerance::NONE.after(caller), caller);
     }
 
-    /// View depth 3 as a half float may be anything up to 3.0029...: that depth is what comes out,
-    /// in either convention.
+    /// View depth 3 as a half float may mean anything up to 3.0029...
+    /// The result is that depth, in either convention.
     #[test]
     fn metric_halves_are_moved_before_they_are_converted() {
         let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, 1.0], up: [0.0, 1.0, 0.0] };
@@ -163,7 +171,7 @@ mod tests {
             let projection =
                 Projection::Perspective { fov_y: 1.0, near: 1.0, far: Some(9.0), convention };
             let camera = Camera::look_at(&pose, &projection, ImageSize::new(2, 2)).unwrap();
-            // Before the near plane, beyond the far one, and what is no depth at all stay far.
+            // Depths in front of the near plane, beyond the far plane, and NaN stay far.
             let image = [3.0, 0.9999, 8.999, f64::NAN];
             for kind in [DepthKind::Z, DepthKind::Distance] {
                 let within = |image: &[f64], scale, tolerance| {
@@ -184,7 +192,7 @@ mod tests {
                 if kind == DepthKind::Z {
                     assert_eq!(ndc[1..3], [convention.far(); 2], "{convention:?}");
                 }
-                // In steps of a thousandth the tolerance is in those.
+                // In steps of a thousandth the tolerance is in steps, too.
                 let (in_steps, _) = within(&[3000.0; 4], 0.001, DepthTolerance::HALF);
                 let most = 3.0 * (1.0 + 1.0 / 1024.0) + 0.001 / 16_777_216.0;
                 let (truth, _) = within(&[most; 4], 1.0, DepthTolerance::NONE);

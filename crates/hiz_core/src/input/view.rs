@@ -1,14 +1,18 @@
-//! From a float64 camera to what the cull shader reads: float32 rows about a reference point, with
-//! magnitude rows that bound every rounding.
-//! All of it in float64 on the host, once a camera.
+//! From a float64 camera to the float32 rows that the cull shader reads.
 //!
-//! The certificates compare linear functions of the position.
-//! Written about the eye, with the depth row relative to w (`z = A w + Z'`), their rounding errors
-//! are proportional to the *distance* instead of the world coordinates: margins come out near 1e-5
-//! of the distance.
-//! Parallel rays have no eye: theirs is the distance from a point that is likely to be near.
-//! The magnitude rows carry the share that each coefficient can contribute to an error, in units of
-//! float32's eps; the shader multiplies them by the instance's own magnitudes.
+//! Everything here runs in float64 on the host, once per camera.
+//! The rows are linear functions of the position about a reference point.
+//! Magnitude rows beside them bound every rounding.
+//!
+//! The certificates compare these linear functions.
+//! About the eye, with the depth row relative to w (`z = A w + Z'`), rounding errors are
+//! proportional to the distance from the eye, not to the world coordinates.
+//! Margins then are near 1e-5 of the distance.
+//! Parallel rays have no eye; their reference point is one that is likely to be near the instances.
+//!
+//! A magnitude row holds what each coefficient can contribute to an error, in units of float32's
+//! eps.
+//! The shader multiplies these by the instance's own magnitudes.
 
 use crate::error::{Error, Result};
 use crate::host::linear::Mat3;
@@ -22,46 +26,56 @@ use crate::host::rounding::split3;
 use crate::host::rounding::{EPS, flushed, round_up};
 use crate::input::camera::Camera;
 
-/// The certificates' margin in eps, `docs/accuracy.md`, section "Counting the roundings".
-/// The shader's `ERROR_ULPS`.
+/// The certificates' margin in units of float32's eps (2^-23).
+///
+/// It is derived in `docs/accuracy.md`, section "Counting the roundings".
+/// The shader calls it `ERROR_ULPS`, too.
 pub const ERROR_ULPS: f64 = 24.0;
 
-/// A linear function of the position about the reference point: `m . d + m3`, and the magnitudes
-/// that bound its error.
+/// A linear function of the position `d` about the reference point, with bounds of its errors.
+///
+/// The value is `m . d + m3`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Row {
-    /// Three linear coefficients and the constant.
+    /// Three linear coefficients, then the constant.
     pub(crate) m: [f32; 4],
-    /// An upper bound of each coefficient's size, raised where its own error exceeds an eps.
+    /// Upper bounds of the sizes of the coefficients, raised where a coefficient's error exceeds
+    /// one eps.
     pub(crate) a: [f32; 4],
 }
 
-/// A camera made ready for float32.
+/// A camera in float32: four rows, the reference point, and the range of coordinates they hold for.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ViewRows {
-    /// Pixel column relative to the image's middle, times w.
+    /// Pixel column relative to the middle of the image, times w.
     pub(crate) x: Row,
-    /// Pixel row relative to the image's middle (downwards), times w.
+    /// Pixel row relative to the middle of the image, downwards, times w.
     pub(crate) y: Row,
-    /// Depth: z less `z_slope` times w.
+    /// Depth: clip z minus `z_slope` times w.
     pub(crate) z: Row,
-    /// w: view depth up to a power of two.
+    /// w, which is view depth times a power of two.
     pub(crate) w: Row,
-    /// A: `z = A w + Z'`.
+    /// A in `z = A w + Z'`.
     pub(crate) z_slope: f32,
     /// The reference point is exactly `eye_hi + eye_lo`.
     pub(crate) eye_hi: [f32; 3],
     /// See `eye_hi`.
     pub(crate) eye_lo: [f32; 3],
-    /// Instances whose magnitudes reach this far are invalid for this camera: products could
-    /// overflow float32.
+    /// Instances whose magnitudes reach this limit are invalid for this camera, since products
+    /// could overflow float32.
     pub(crate) coordinate_limit: f32,
 }
 
 impl ViewRows {
-    /// Rounds `camera` to float32.
-    /// `transform_slack` is kappa: how many eps of `sum |M| |p|` another renderer's own transform
-    /// may have cost the depth image (0: the depth is exact for these matrices).
+    /// Rounds the rows of `camera` to float32.
+    ///
+    /// `transform_slack` is kappa, in eps of `sum |M| |p|`.
+    /// It allows for another renderer that computed the depth image with float32 matrices of its
+    /// own.
+    /// With 0 the depth image is taken to be exact for this camera's float64 numbers.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a camera whose rows float32 cannot hold.
     pub(crate) fn new(camera: &Camera, transform_slack: f64) -> Result<Self> {
         let rows = camera.rows_near_one();
         let linear = |r: usize| [rows[r][0], rows[r][1], rows[r][2]];
@@ -73,8 +87,9 @@ impl ViewRows {
         let x = about_eye(0).scaled(f64::from(size.width) / 2.0);
         let y = about_eye(1).scaled(-f64::from(size.height) / 2.0);
         let w = about_eye(3);
-        // About the eye: what of z is proportional to w.
-        // Elsewhere: the depth of that point, so that Z' and `d - A` are small near it.
+        // About the eye, A is the part of z that is proportional to w.
+        // About another point, A is the depth of that point, so that Z' and `d - A` are small near
+        // it.
         let slope =
             if is_eye { dot(z_lin, w_lin) / dot(w_lin, w_lin) } else { about_eye(2).m[3] / w.m[3] };
         #[expect(
@@ -93,13 +108,13 @@ impl ViewRows {
             .iter()
             .map(|(r, factor)| f64::from(r.a[3]) * factor)
             .fold(0.0_f64, f64::max);
-        // Written so that NaN fails, too.
+        // The condition is negated so that NaN is refused, too.
         if !(linear_limit <= 2.0_f64.powi(34) && constant_limit <= 2.0_f64.powi(58)) {
             return Err(Error::invalid(
                 "camera",
                 format!(
-                    "expected rows whose coefficients stay below 2^34 and constants below 2^58 when w is scaled to 1, \
-                     got {linear_limit:e} and {constant_limit:e}"
+                    "expected rows whose coefficients stay below 2^34 and constants below 2^58 \
+                     when w is scaled to 1, got {linear_limit:e} and {constant_limit:e}"
                 ),
             ));
         }
@@ -126,10 +141,12 @@ pub(crate) struct ClipRows {
 }
 
 impl ClipRows {
-    /// Rounds `camera`'s rows to float32, with w scaled to be near 1.
+    /// Rounds the rows of `camera` to float32, scaled so that w is near 1.
+    ///
+    /// # Errors
+    /// As [`ViewRows::new`].
     pub(crate) fn new(camera: &Camera) -> Result<Self> {
-        // The cull's own view decides what float32 can hold: what it refuses is not worth drawing
-        // either.
+        // A camera that the cull refuses is not worth drawing with, so both refuse the same ones.
         ViewRows::new(camera, 0.0)?;
         let Reference { hi: eye_hi, lo: eye_lo, point: eye, .. } = Reference::of(camera);
         let rows = camera
@@ -139,26 +156,28 @@ impl ClipRows {
     }
 }
 
-/// The point that a camera's float32 rows stand about.
-/// Any would be *valid*; one near what is tested makes the margins small, for they are proportional
-/// to the distance from it.
+/// The point that a camera's float32 rows are relative to.
+///
+/// Every point would be valid.
+/// Margins are proportional to the distance from it, so one near the tested instances is best.
 struct Reference {
-    /// The two halves add up to the point without rounding: `lo` holds bits of a float64 below
-    /// those of `hi`.
+    /// `hi + lo` is the point without rounding, since `lo` holds lower bits of a float64 than `hi`.
     hi: [f32; 3],
     lo: [f32; 3],
     point: Vec3,
-    /// Whether it is the centre of projection.
+    /// Whether the point is the centre of projection.
     is_eye: bool,
 }
 
 impl Reference {
-    /// A point of the image's middle axis (x = y = 0).
+    /// Chooses a point on the middle axis of the image (x = y = 0).
     ///
-    /// - Perspective: the eye, where w = 0; the near plane where the far one is not twice as far
-    ///   away, so that all that is seen is nearer to it than to the eye.
+    /// - Perspective: the eye, where w = 0.
+    /// - Perspective with a far plane less than twice as far away as the near plane: the near
+    ///   plane.
+    ///   Everything visible is then nearer to it than to the eye.
     /// - Parallel rays: [`depth_of_interest`].
-    /// - The world's origin where no such point can be found.
+    /// - Where no such point can be computed: the world's origin.
     fn of(camera: &Camera) -> Self {
         let rows = camera.rows_near_one();
         let middle = |third: usize, value: f64| {
@@ -170,7 +189,8 @@ impl Reference {
         } else {
             let depth = |p: Vec3| dot([rows[2][0], rows[2][1], rows[2][2]], p) + rows[2][3];
             let (eye, ahead) = (middle(3, 0.0), middle(3, 1.0));
-            // Along the axis z grows from the eye's by so much for each w.
+            // On the axis z is linear in w; the factor is the difference of its values at w = 1 and
+            // at w = 0.
             let near = eye.zip(ahead).and_then(|(eye, ahead)| {
                 near_of_thin_range(
                     depth(eye),
@@ -185,31 +205,33 @@ impl Reference {
         };
         let origin = camera.origin();
         let point: Vec3 = std::array::from_fn(|k| origin[k] + relative.unwrap_or([0.0; 3])[k]);
-        // Beyond 2^60 the shader would call everything invalid; the origin is as good as any point
-        // there.
+        // Beyond 2^60 the shader finds every instance invalid, so the world's origin serves as
+        // well.
         let point = if point.iter().all(|v| v.abs() < 2.0_f64.powi(60)) { point } else { [0.0; 3] };
         let (hi, lo) = split3(point);
         Self { hi, lo, point: std::array::from_fn(|k| f64::from(hi[k]) + f64::from(lo[k])), is_eye }
     }
 }
 
-/// w at the near plane, where at the far plane it is less than twice that.
-/// Depth is `slope + at_eye / w`.
+/// w at the near plane, if w at the far plane is less than twice that; `None` otherwise.
+///
+/// Depth along the axis is `slope + at_eye / w`.
 fn near_of_thin_range(at_eye: f64, slope: f64, reversed: bool) -> Option<f64> {
     let (at_zero, at_one) = (-at_eye / slope, at_eye / (1.0 - slope));
     let (near, far) = if reversed { (at_one, at_zero) } else { (at_zero, at_one) };
-    // Written so that NaN is not thin, either.
+    // Comparisons with NaN are false, so NaN gives `None`.
     (near > 0.0 && near < far && far < 2.0 * near).then_some(near)
 }
 
-/// The z around which a camera with parallel rays is likely to see most: where its eye stands, or
-/// at the plane next to it where that is outside the camera's range.
-/// A bare matrix does not say where the eye is: there it is the world's origin, if that is in view,
-/// or else the near plane, in either convention.
+/// The z around which a camera with parallel rays is likely to see most.
+///
+/// With a known eye this is the depth of the eye, clamped to the camera's range.
+/// A bare matrix does not tell where the eye is.
+/// It gives the depth of the world's origin if that is in view, and the near plane otherwise.
 fn depth_of_interest(camera: &Camera, rows: &Mat4) -> f64 {
     let [x, y, z, w] = rows.map(|row| row[3]);
-    // The rows stand about the origin, and the constants are its clip coordinates. w is not 0: no
-    // NaN.
+    // The rows are about the origin, so their constants are the origin's clip coordinates.
+    // w is not 0, so no ratio is NaN.
     let ratios = [x / w, y / w, z / w];
     let in_view =
         ratios[0].abs() <= 1.0 && ratios[1].abs() <= 1.0 && (0.0..=1.0).contains(&ratios[2]);
@@ -217,9 +239,9 @@ fn depth_of_interest(camera: &Camera, rows: &Mat4) -> f64 {
     w * if camera.is_posed() || in_view { ratios[2].clamp(0.0, 1.0) } else { near }
 }
 
-/// A row in float64, what is known about its errors, and the world-space sizes that kappa
-/// multiplies.
-/// Index 3: the constant.
+/// A row in float64, bounds of its errors, and the world-space magnitudes that kappa multiplies.
+///
+/// Index 3 of each array belongs to the constant.
 #[derive(Debug, Clone, Copy)]
 struct Affine {
     m: [f64; 4],
@@ -228,15 +250,17 @@ struct Affine {
 }
 
 impl Affine {
-    /// `row` (about `origin`) about `eye`.
-    /// The linear part is exact; the constant is evaluated at the eye, and 8 roundings of float64
-    /// cover its subtraction, three products and three sums with room.
+    /// Moves `row` from `origin` to `eye`.
+    ///
+    /// The linear part stays exact, and the constant becomes the row's value at the eye.
+    /// That takes one subtraction, three products and three sums; 8 roundings of float64 cover
+    /// them.
     fn about(eye: Vec3, row: [f64; 4], origin: Vec3) -> Self {
         let lin = [row[0], row[1], row[2]];
         let from_origin = sub(eye, origin);
         let travelled: f64 = (0..3).map(|k| lin[k].abs() * (eye[k].abs() + origin[k].abs())).sum();
-        // kappa: |p| <= |d| + |eye|, and the renderer's own constant is the one about the world's
-        // origin.
+        // For kappa: |p| <= |d| + |eye|, and the other renderer's constant is the one about the
+        // world's origin.
         let world: f64 = (0..3).map(|k| lin[k].abs() * eye[k].abs()).sum::<f64>()
             + (row[3] - dot(lin, origin)).abs();
         Self {
@@ -246,7 +270,9 @@ impl Affine {
         }
     }
 
-    /// `s * self`; exact where `s` is a power of two, and one rounding is charged anyway.
+    /// `s * self`.
+    ///
+    /// This is exact where `s` is a power of two; one rounding is charged anyway.
     fn scaled(&self, s: f64) -> Self {
         Self {
             m: self.m.map(|v| v * s),
@@ -255,7 +281,9 @@ impl Affine {
         }
     }
 
-    /// `self - slope * other`; what cancels leaves its rounding behind, in all four coefficients.
+    /// `self - slope * other`.
+    ///
+    /// Where terms cancel their roundings remain, in all four coefficients.
     fn minus(&self, slope: f64, other: &Self) -> Self {
         let each = |f: &dyn Fn(usize) -> f64| std::array::from_fn(f);
         Self {
@@ -269,8 +297,9 @@ impl Affine {
         }
     }
 
-    /// Rounds to float32 and forms the magnitudes: `a >= |m|`, and `a * eps >=` the coefficient's
-    /// own error.
+    /// Rounds to float32 and forms the magnitudes.
+    ///
+    /// They satisfy `a >= |m|`, and `a * eps` is at least the error of the coefficient.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "rounding to float32 is the point; the magnitude bounds it"
@@ -308,7 +337,7 @@ mod tests {
             let sum = f64::from(rows.eye_hi[k]) + f64::from(rows.eye_lo[k]);
             assert!((sum - coordinate).abs() <= coordinate.abs() * 2.0_f64.powi(-47));
         }
-        // x, y and w vanish at the eye up to what the two halves leave over.
+        // x, y and w vanish at the eye, up to the remainder that two float32 cannot represent.
         for row in [rows.x, rows.y, rows.w] {
             assert!(f64::from(row.m[3]).abs() < 1e-4, "{row:?}");
         }
@@ -322,8 +351,8 @@ mod tests {
         sub(a, b).iter().all(|v| v.abs() < 1e-9)
     }
 
-    /// A far plane less than twice as far away as the near one: the near one's middle, and its
-    /// depth.
+    /// With a far plane less than twice as far away as the near plane, the reference point is the
+    /// middle of the near plane, and A is its depth.
     /// The eye is at (0, 0, 5).
     #[test]
     fn thin_ranges_are_measured_from_their_near_plane() {
@@ -359,8 +388,8 @@ mod tests {
         }
     }
 
-    /// Parallel rays: the reference point by hand.
-    /// The eye is at (0, 0, 5), and looks along -z.
+    /// The reference point of parallel rays, worked out by hand.
+    /// The eye is at (0, 0, 5) and looks along -z.
     #[test]
     fn parallel_rays_are_measured_from_where_things_are() {
         let pose = Pose { eye: [0.0, 0.0, 5.0], target: [0.0; 3], up: [0.0, 1.0, 0.0] };
@@ -378,8 +407,9 @@ mod tests {
                 };
                 Camera::look_at(&pose, &projection, ImageSize::new(8, 8)).unwrap()
             };
-            // View depths of the planes, the image's middle beside the eye, and the point's z: the
-            // eye's, or the next plane's.
+            // Each case: view depths of the near and far planes, how far the image's middle is
+            // beside the eye, and the expected z of the point.
+            // That z is the eye's, or the one of the nearest plane.
             for (near, far, beside, z) in [
                 (0.0, 1024.0, 0.0, 5.0),
                 (1.0, 1024.0, 0.0, 4.0),
@@ -390,7 +420,7 @@ mod tests {
                 let view = ViewRows::new(&camera, 0.0).unwrap();
                 let found = point(&view);
                 assert!(close(found, [beside, 0.0, z]), "{near} {far}: {found:?}");
-                // Its depth is A, and nothing is left of it in Z'.
+                // A is the depth of the point, so Z' has no constant.
                 let depth = (5.0 - z - near) / (far - near);
                 let depth = if convention.is_reversed() { 1.0 - depth } else { depth };
                 assert!(
@@ -398,8 +428,8 @@ mod tests {
                     "{view:?}"
                 );
             }
-            // A bare matrix: the world's origin where it is in view, at view depth 5; or else the
-            // near plane.
+            // A bare matrix: the world's origin, at view depth 5, where it is in view; the near
+            // plane otherwise.
             for (near, far, beside, z) in [
                 (1.0, 1024.0, 0.0, 0.0),
                 (1.0, 1024.0, 8.0, 4.0),
@@ -415,7 +445,7 @@ mod tests {
         }
     }
 
-    /// The two halves are not the eye: what lies between stays in the constants.
+    /// The two float32 halves are not exactly the eye; the constants hold the difference.
     #[test]
     fn constants_stand_at_the_two_halves() {
         let eye = [1.0e9 + 0.1, -3.0e8 + 0.7, 1.0e7 + 1.0 / 3.0];
@@ -442,17 +472,16 @@ mod tests {
                 assert!(row.a[k] >= row.m[k].abs());
             }
         }
-        // Z' carries the near plane in its constant: -f n / (f - n) up to the power of two, and
-        // next to nothing in its linear part.
+        // The constant of Z' is -f n / (f - n) up to the power of two; the linear part is almost 0.
         assert!(view.z.m[..3].iter().all(|v| v.abs() < 1e-6));
         assert!(view.z.m[3] < 0.0);
-        // kappa adds kappa / 24 of the world-space size, never less.
+        // kappa adds at least kappa / 24 of the world-space magnitude.
         let slack = ViewRows::new(&camera, 24.0).unwrap();
         assert!(slack.z.a.iter().zip(view.z.a).all(|(a, b)| *a > b));
     }
 
-    /// A matrix means the same times any positive number, down to where its products leave
-    /// float64's range.
+    /// A matrix means the same times any positive number, as long as its products stay in float64's
+    /// range.
     #[test]
     fn the_scale_of_the_matrix_does_not_matter() {
         for convention in [DepthConvention::Standard, DepthConvention::Reversed] {
@@ -480,7 +509,7 @@ mod tests {
             Camera::from_clip_from_world(m, ImageSize::new(8, 8), DepthConvention::Standard)
                 .unwrap();
         assert!(ViewRows::new(&camera, 0.0).unwrap_err().to_string().contains("2^34"));
-        // Half an image of 8 pixels is 4 times the coefficient.
+        // Half of an image of 8 pixels is 4, so the row is 4 times the coefficient.
         for (exponent, held) in [(31, true), (33, false)] {
             let mut m = m;
             m[0][0] = 2.0_f64.powi(exponent);
