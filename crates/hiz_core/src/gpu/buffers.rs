@@ -1,4 +1,4 @@
-//! Buffers, textures and bind groups, each made within a check of its own.
+//! Buffers, textures and bind groups, each made inside an error scope of its own.
 
 use std::sync::OnceLock;
 
@@ -6,16 +6,21 @@ use crate::error::{Error, Result};
 use crate::gpu::checked::checked;
 use crate::gpu::device::Gpu;
 
-/// A buffer that is mapped at its creation.
-/// Threads open ranges of their own.
+/// A buffer that is mapped at creation, for the time of the mapping.
+///
+/// Several threads may write to ranges of their own.
 pub(crate) struct Mapped<'a> {
     label: &'a str,
     buffer: &'a wgpu::Buffer,
 }
 
 impl Mapped<'_> {
-    /// Bytes of `range`, not empty, which begins at a multiple of 8.
-    /// Opening costs more than writing a record.
+    /// The bytes of `range`, which must not be empty and must begin at a multiple of 8.
+    ///
+    /// Opening a range costs more than writing one record, so open few.
+    ///
+    /// # Errors
+    /// [`Error::Device`] where the range cannot be mapped, as on a lost device.
     pub(crate) fn range(&self, range: std::ops::Range<u64>) -> Result<wgpu::BufferViewMut> {
         let Self { label, buffer } = self;
         buffer
@@ -24,7 +29,7 @@ impl Mapped<'_> {
     }
 }
 
-/// Writes into a buffer that was mapped at its creation.
+/// Writes `contents` at byte `offset` into a buffer that is mapped at creation.
 pub(crate) fn write_mapped(
     label: &str,
     buffer: &wgpu::Buffer,
@@ -44,7 +49,7 @@ pub(crate) const STORAGE: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE
     .union(wgpu::BufferUsages::COPY_SRC)
     .union(wgpu::BufferUsages::COPY_DST);
 
-/// What `cell` holds, made if there is nothing.
+/// The value in `cell`, which `make` provides on first use.
 pub(crate) fn made<T>(cell: &OnceLock<T>, make: impl FnOnce() -> Result<T>) -> Result<&T> {
     if let Some(there) = cell.get() {
         return Ok(there);
@@ -53,18 +58,20 @@ pub(crate) fn made<T>(cell: &OnceLock<T>, make: impl FnOnce() -> Result<T>) -> R
     Ok(cell.get_or_init(|| fresh))
 }
 
-/// As large as the largest structure that a stand-in is bound for.
+/// Bytes of a stand-in: the size of the largest structure that one is bound for.
 const STAND_IN_BYTES: u64 = 256;
 
 impl Gpu {
-    /// A buffer to bind where a pipeline asks for one and a call does without.
-    /// Each label has its own: one may not be bound twice to be written.
+    /// A buffer to bind where a pipeline has a binding that this call does not use.
+    ///
+    /// Each label has a buffer of its own, since one buffer may not have two writable bindings in a
+    /// dispatch.
     pub(crate) fn stand_in(&self, label: &'static str) -> Result<wgpu::Buffer> {
         let usage = wgpu::BufferUsages::STORAGE;
         self.buffers.get(label, || self.empty(label, STAND_IN_BYTES, usage))
     }
 
-    /// The buffer of this label, which holds `contents` from the first call on.
+    /// The buffer with this label, which the first call fills with `contents`.
     pub(crate) fn constant(
         &self,
         label: &'static str,
@@ -77,7 +84,7 @@ impl Gpu {
     fn buffer(&self, descriptor: &wgpu::BufferDescriptor<'_>) -> Result<wgpu::Buffer> {
         let wgpu::Limits { max_buffer_size, max_storage_buffer_binding_size, .. } = *self.limits();
         let is_storage = descriptor.usage.contains(wgpu::BufferUsages::STORAGE);
-        // Storage is bound as a whole.
+        // Storage buffers are bound as a whole, so the limit of one binding applies.
         let (name, allowed) = if is_storage && max_storage_buffer_binding_size < max_buffer_size {
             ("max_storage_buffer_binding_size", max_storage_buffer_binding_size)
         } else {
@@ -89,14 +96,18 @@ impl Gpu {
         self.checked(|device| device.create_buffer(descriptor))
     }
 
-    /// A uniform buffer that holds `value` from the start: no queue is needed, and every recording
-    /// has its own.
+    /// A uniform buffer that holds `value` from its creation.
+    ///
+    /// No queue is needed for that, and every recording has a uniform of its own.
     pub(crate) fn uniform<T: bytemuck::Pod>(&self, label: &str, value: &T) -> Result<wgpu::Buffer> {
         self.filled(label, bytemuck::bytes_of(value), wgpu::BufferUsages::UNIFORM)
     }
 
-    /// A buffer that holds `contents` (a multiple of 4 bytes) from the start.
-    /// (wgpu's own helper panics where a lost device or memory that ran out leave nothing to map.)
+    /// A buffer that holds `contents` from its creation; their length must be a multiple of 4
+    /// bytes.
+    ///
+    /// wgpu's own helper is not used.
+    /// It panics where a lost device or exhausted memory leaves nothing to map.
     pub(crate) fn filled(
         &self,
         label: &str,
@@ -124,7 +135,7 @@ impl Gpu {
         })
     }
 
-    /// A buffer of `size` bytes (a multiple of 4) that is mapped.
+    /// A buffer of `size` bytes, a multiple of 4, that is mapped at creation.
     pub(crate) fn mapped(
         &self,
         label: &str,
@@ -139,8 +150,9 @@ impl Gpu {
         })
     }
 
-    /// A buffer of `size` bytes (a multiple of 4) whose contents `fill` writes where they are
-    /// mapped, without a copy on the host.
+    /// A buffer of `size` bytes, a multiple of 4, whose contents `fill` writes into the mapping.
+    ///
+    /// That saves a copy on the host.
     pub(crate) fn written<T>(
         &self,
         label: &str,
@@ -184,7 +196,7 @@ impl Gpu {
         })
     }
 
-    /// The view of a whole texture of this device; of its depth where it has a stencil, too.
+    /// The view of a whole texture of this device; of its depth alone if it has a stencil as well.
     pub(crate) fn view(&self, texture: &wgpu::Texture) -> Result<wgpu::TextureView> {
         let aspect = if texture.format().is_combined_depth_stencil_format() {
             wgpu::TextureAspect::DepthOnly
@@ -206,7 +218,10 @@ impl Gpu {
     }
 
     /// Runs `record`, which writes into the caller's encoder.
-    /// With a pass open there it can take nothing, and wgpu says so at once.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for the encoder if a pass is open in it: it can take no commands, and
+    /// wgpu reports that at once.
     pub(crate) fn recorded<T>(&self, record: impl FnOnce() -> Result<T>) -> Result<T> {
         match checked(self.device(), record) {
             Ok(result) => result,
@@ -218,10 +233,11 @@ impl Gpu {
         }
     }
 
-    /// Whether a render pass can draw depth into `target` and clear it first: the same pass,
-    /// recorded into an encoder that is thrown away.
-    /// Nothing else tells what a view shows, where its texture lives, and whether it is still
-    /// there.
+    /// Checks that a render pass can clear `target` and draw depth into it.
+    ///
+    /// The same pass is recorded into an encoder that is thrown away.
+    /// wgpu offers no other way to find out what a view shows, which device its texture belongs to,
+    /// and whether it has been destroyed.
     pub(crate) fn can_draw_into(
         &self,
         target: &wgpu::TextureView,
@@ -243,7 +259,8 @@ impl Gpu {
             }));
             drop(encoder.finish());
         })?;
-        // A destroyed texture is not told of before the submit.
+        // wgpu reports a destroyed texture on submission only, but at once where a view of it is
+        // made.
         self.view(target.texture()).map(drop)
     }
 }

@@ -1,22 +1,22 @@
-//! What level 0 of a pyramid is read from: kinds of textures and how each is bound.
+//! The kinds of textures that can be level 0 of a pyramid, and how each is bound.
 
 use crate::gpu::shader::File;
 use crate::gpu::shader::wgsl;
 use crate::input::image::ImageSize;
 
-/// What level 0 of a pyramid is read from.
+/// The kind of texture that level 0 of a pyramid is read from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum SourceKind {
     /// A depth texture.
     Depth,
-    /// A float color texture.
+    /// A float colour texture with one channel.
     Float,
-    /// A texture of float32 bits, four pixels a texel.
+    /// A texture of float32 bits, with four pixels of a row per texel.
     Bits,
 }
 
 impl SourceKind {
-    /// The files that read it.
+    /// The shader files that read this kind.
     pub(crate) fn files(self) -> &'static [File] {
         match self {
             Self::Depth => &[wgsl!("gpu/source_depth"), wgsl!("gpu/source_sampled")],
@@ -25,7 +25,7 @@ impl SourceKind {
         }
     }
 
-    /// How it is bound.
+    /// The type of its binding.
     pub(crate) fn binding(self) -> wgpu::BindingType {
         let view_dimension = wgpu::TextureViewDimension::D2;
         let sampled = |sample_type| wgpu::BindingType::Texture {
@@ -44,7 +44,7 @@ impl SourceKind {
         }
     }
 
-    /// The usage that its texture needs for that.
+    /// The usage that its texture needs to be bound.
     pub(crate) fn usage(self) -> wgpu::TextureUsages {
         match self {
             Self::Depth | Self::Float => wgpu::TextureUsages::TEXTURE_BINDING,
@@ -57,12 +57,12 @@ impl SourceKind {
         if self == Self::Bits { 4 } else { 1 }
     }
 
-    /// The size of the texture of an image.
+    /// The size in texels of the texture for an image of this size in pixels.
     pub(crate) fn texture_size(self, image: ImageSize) -> ImageSize {
         ImageSize::new(image.width.div_ceil(self.pixels_of_texel()), image.height)
     }
 
-    /// The kind that fits a texture's format.
+    /// The kind for a texture format; `None` for formats that no pyramid can be built from.
     pub(crate) fn of(format: wgpu::TextureFormat) -> Option<Self> {
         match format {
             wgpu::TextureFormat::R32Float | wgpu::TextureFormat::R16Float => Some(Self::Float),
@@ -73,7 +73,7 @@ impl SourceKind {
     }
 }
 
-/// All kinds of source, in the order of their numbers.
+/// All kinds of source, in the order of their declaration.
 #[cfg(feature = "testing")]
 pub(crate) const SOURCES: [SourceKind; 3] =
     [SourceKind::Depth, SourceKind::Float, SourceKind::Bits];

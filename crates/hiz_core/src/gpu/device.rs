@@ -1,4 +1,4 @@
-//! The device, and what is made once on it.
+//! The device, and the objects that are made on it once.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -11,8 +11,9 @@ use crate::gpu::pipelines::{Compute, Depth, Pipelines};
 use crate::gpu::shader::FILES;
 use crate::gpu::shader::Source;
 
-/// Tells objects of one context from those of another.
-/// (wgpu's own handles compare equal across its instances.)
+/// Distinguishes the objects of one context from those of another.
+///
+/// wgpu's handles cannot do that: those of two wgpu instances may compare equal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ContextId(u64);
 
@@ -23,7 +24,7 @@ impl ContextId {
     }
 }
 
-/// The device, and everything that is made once on it.
+/// A device, its limits, and the objects that are made on it once.
 #[derive(Debug)]
 pub(crate) struct Gpu {
     id: ContextId,
@@ -34,7 +35,7 @@ pub(crate) struct Gpu {
     pub(super) layouts: Layouts,
     pub(super) pipelines: Pipelines,
     pub(super) buffers: KeptBuffers,
-    /// Texts of the shaders that are replaced, and by what.
+    /// Texts of the shaders that are replaced, as (what, by what).
     #[cfg(feature = "testing")]
     faults: Vec<(String, String)>,
 }
@@ -63,7 +64,10 @@ impl Gpu {
         })
     }
 
-    /// The same with texts of the shaders replaced, `(what, by what)`.
+    /// This device with texts of the shaders replaced, as `(what, by what)`.
+    ///
+    /// # Panics
+    /// If no shader contains one of the texts.
     #[cfg(feature = "testing")]
     pub(crate) fn with_planted_faults(self, faults: &[(&str, &str)]) -> Self {
         for (what, _) in faults {
@@ -74,7 +78,6 @@ impl Gpu {
         Self { faults: faults.collect(), ..self }
     }
 
-    /// The device.
     pub(crate) fn device(&self) -> &wgpu::Device {
         &self.device
     }
@@ -83,7 +86,7 @@ impl Gpu {
         &self.limits
     }
 
-    /// What reads a depth image at a pixel's centre, and the border's pixel beyond it.
+    /// A sampler with nearest filtering, which clamps to the border pixels.
     pub(crate) fn sampler(&self) -> &wgpu::Sampler {
         &self.sampler
     }
@@ -107,7 +110,7 @@ impl Gpu {
         checked(&self.device, || make(&self.device))
     }
 
-    /// The layout of these bindings.
+    /// The layout of these bindings, made on first use.
     pub(crate) fn layout(
         &self,
         label: &str,
@@ -123,7 +126,7 @@ impl Gpu {
         })
     }
 
-    /// The pipeline of `recipe`.
+    /// The pipeline that `recipe` describes, made on first use.
     pub(crate) fn compute_pipeline(&self, recipe: &Compute<'_>) -> Result<wgpu::ComputePipeline> {
         let Compute { label, source, entry_point, layouts, constants } = recipe;
         self.pipelines.compute(recipe, || {
@@ -133,7 +136,8 @@ impl Gpu {
                     layout: Some(&self.pipeline_layout(label, layouts)),
                     module: &self.shader_module(label, source),
                     entry_point: Some(entry_point),
-                    // The shaders write workgroup memory before they read it.
+                    // No initialization is needed: the shaders write workgroup memory before they
+                    // read it.
                     compilation_options: wgpu::PipelineCompilationOptions {
                         constants,
                         zero_initialize_workgroup_memory: false,
@@ -144,7 +148,7 @@ impl Gpu {
         })
     }
 
-    /// The pipeline of `recipe`.
+    /// The pipeline that `recipe` describes, made on first use.
     pub(crate) fn depth_pipeline(&self, recipe: &Depth<'_>) -> Result<wgpu::RenderPipeline> {
         let Depth { label, source, entry_point, layouts, state } = recipe;
         self.pipelines.depth(recipe, || {

@@ -1,5 +1,4 @@
-//! What is made once and kept: buffers by their label, and the last bind groups by the words that
-//! they stand for.
+//! Objects that are made once and kept: buffers by label, and the last bind groups by key.
 
 use std::collections::HashMap;
 
@@ -11,7 +10,7 @@ use crate::host::threads::Locked;
 pub(crate) struct KeptBuffers(Locked<HashMap<&'static str, wgpu::Buffer>>);
 
 impl KeptBuffers {
-    /// The buffer of this label, made if there is none.
+    /// The buffer with this label, made by `make` on first use.
     pub(crate) fn get(
         &self,
         label: &'static str,
@@ -27,16 +26,19 @@ impl KeptBuffers {
     }
 }
 
-/// How many bind groups are kept: those of a test of instances and of a test of groups, for two
-/// views.
+/// How many bind groups are kept: for two views, one to test instances and one to test groups.
 const KEPT_BINDINGS: usize = 4;
 
-/// The last bind groups, each by the words that tell it from others.
+/// The last bind groups, each with the key words that identify it.
+///
+/// The words are opaque here: the stage that asks for a bind group chooses them.
 #[derive(Debug, Default)]
 pub(crate) struct KeptBindings(Locked<Vec<(Vec<u32>, wgpu::BindGroup)>>);
 
 impl KeptBindings {
-    /// The bind group of these words, made where it is not among the last ones.
+    /// The bind group with these key words, made by `make` if it is not among the last ones.
+    ///
+    /// The oldest one gives way.
     pub(crate) fn get(
         &self,
         words: &[u32],
@@ -54,7 +56,7 @@ impl KeptBindings {
         Ok(bindings)
     }
 
-    /// Lets go of all.
+    /// Releases all bind groups, and with them the resources that they hold.
     pub(crate) fn clear(&self) {
         self.0.lock().clear();
     }

@@ -1,4 +1,4 @@
-//! Bind group layouts, each made once.
+//! Bind group layouts, each made once per device.
 
 use std::collections::HashMap;
 
@@ -6,36 +6,36 @@ use crate::error::Result;
 use crate::gpu::depth_source::SourceKind;
 use crate::host::threads::Locked;
 
-/// What one binding of a layout is.
+/// The type of one binding in a layout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Binding {
     /// A depth image.
     Depth(SourceKind),
-    /// The sampler beside it.
+    /// The sampler for a depth image.
     Sampler,
     Uniform,
-    /// A uniform of a vertex shader.
+    /// A uniform buffer of a vertex shader; all other bindings are for compute shaders.
     VertexUniform,
-    /// A storage buffer.
+    /// Storage buffers.
     Read,
     Write,
-    /// A storage texture of `Rgba32Uint`.
+    /// Storage textures of format `Rgba32Uint`.
     ReadQuads,
     WriteQuads,
-    /// A storage texture of `R32Uint`.
+    /// Storage textures of format `R32Uint`.
     ReadTexels,
     WriteTexels,
-    /// A storage texture of `R32Float`.
+    /// A storage texture of format `R32Float`.
     #[cfg(feature = "yardstick")]
     WriteFloats,
 }
 
-/// Layouts by their bindings: two of the same bindings are the same layout.
+/// Layouts by their bindings: equal bindings share a layout.
 #[derive(Debug, Default)]
 pub(crate) struct Layouts(Locked<HashMap<Vec<(u32, Binding)>, wgpu::BindGroupLayout>>);
 
 impl Layouts {
-    /// The layout of these bindings, made if it was not asked for before.
+    /// The layout of these bindings, made by `make` on first use.
     pub(crate) fn get(
         &self,
         bindings: &[(u32, Binding)],

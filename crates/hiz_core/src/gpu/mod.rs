@@ -1,7 +1,10 @@
-//! The device and what is made on it.
+//! The device, and the objects that are made on it.
 //!
-//! No stage is known here: pipelines, bindings and buffers are described by the stage that asks for
-//! them.
+//! This room knows no stage: each stage describes the pipelines, bindings and buffers that it asks
+//! for.
+//! Every object is made inside an error scope of its own (`checked`), so that wgpu's errors are
+//! returned.
+//! Nothing here submits, waits or reads back.
 
 pub(crate) mod buffers;
 mod checked;

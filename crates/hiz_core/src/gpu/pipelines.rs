@@ -1,6 +1,7 @@
 //! The one cache of pipelines.
-//! A pipeline is told from others by its module, its entry point and its constants, and one that
-//! draws by its fixed-function state besides.
+//!
+//! The key of a pipeline is its module, its entry point and its constants.
+//! A render pipeline's key contains its fixed-function state as well.
 
 use std::cell::Cell;
 use std::collections::HashMap;
@@ -17,12 +18,12 @@ pub(crate) struct Compute<'a> {
     pub(crate) label: &'static str,
     pub(crate) source: Source,
     pub(crate) entry_point: &'static str,
-    /// Those of the module, so they tell no pipeline from another.
+    /// The module determines the layouts, so they are no part of the key.
     pub(crate) layouts: &'a [wgpu::BindGroupLayout],
     pub(crate) constants: &'a [(&'static str, f64)],
 }
 
-/// A pipeline of a vertex shader that draws triangles into a depth attachment alone.
+/// A render pipeline without a fragment stage, which draws triangles into a depth attachment.
 #[derive(Debug)]
 pub(crate) struct Depth<'a> {
     pub(crate) label: &'static str,
@@ -37,14 +38,14 @@ pub(crate) struct Depth<'a> {
 pub(crate) struct DepthState {
     pub(crate) format: wgpu::TextureFormat,
     pub(crate) compare: wgpu::CompareFunction,
-    /// Front faces are counter-clockwise.
+    /// Faces that are not drawn; the corners of a front face run counter-clockwise.
     pub(crate) cull_mode: Option<wgpu::Face>,
     /// Bytes from one vertex to the next.
     pub(crate) stride: u64,
     pub(crate) attributes: &'static [wgpu::VertexAttribute],
 }
 
-/// 1 for true: a constant of WGSL that a module compares with 0 or reads as a bool.
+/// 1 for true and 0 for false: the value of a WGSL `override` constant.
 pub(crate) fn flag(value: bool) -> f64 {
     f64::from(u8::from(value))
 }
@@ -53,7 +54,7 @@ pub(crate) fn flag(value: bool) -> f64 {
 struct Key {
     source: Source,
     entry_point: &'static str,
-    /// The numbers as their bits, which can be compared.
+    /// The values as bits, which can be compared and hashed.
     constants: Vec<(&'static str, u64)>,
     state: Option<DepthState>,
 }
@@ -71,7 +72,7 @@ type Slot = Arc<Locked<Option<Pipeline>>>;
 pub(crate) struct Pipelines(Locked<HashMap<Key, Slot>>);
 
 impl Pipelines {
-    /// The pipeline of `recipe`, made if it was not asked for before.
+    /// The compute pipeline that `recipe` describes, made by `make` on first use.
     pub(crate) fn compute(
         &self,
         recipe: &Compute<'_>,
@@ -89,7 +90,7 @@ impl Pipelines {
         }
     }
 
-    /// The same for one that draws.
+    /// The render pipeline that `recipe` describes, made by `make` on first use.
     pub(crate) fn depth(
         &self,
         recipe: &Depth<'_>,
@@ -107,8 +108,11 @@ impl Pipelines {
         }
     }
 
-    /// A slot's own lock is held while its pipeline is made: two threads that want the same one
-    /// compile it once, and nobody who wants another one waits.
+    /// The pipeline with this key, made by `make` on first use.
+    ///
+    /// While a pipeline is made only the lock of its own slot is held.
+    /// Two threads that want the same pipeline compile it once.
+    /// Threads that want other pipelines do not wait.
     fn get(&self, key: Key, make: impl FnOnce() -> Result<Pipeline>) -> Result<Pipeline> {
         let start = Instant::now();
         let slot = Arc::clone(self.0.lock().entry(key).or_default());
@@ -123,12 +127,12 @@ impl Pipelines {
     }
 }
 
-/// What a thread has spent on getting pipelines.
+/// How many pipelines a thread has made, and the time it spent on getting pipelines.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct PipelinesMade {
-    /// How many it made.
+    /// The number of pipelines made.
     pub(crate) count: u32,
-    /// How long it took to get them, also those that were there.
+    /// The time spent on getting pipelines, those from the cache included.
     pub(crate) time: Duration,
 }
 
@@ -138,12 +142,12 @@ thread_local! {
 }
 
 impl PipelinesMade {
-    /// All that this thread has.
+    /// The totals of this thread.
     pub(crate) fn so_far() -> Self {
         MADE.get()
     }
 
-    /// Since `earlier`, on the same thread.
+    /// The difference from `earlier`, which must come from the same thread.
     pub(crate) fn since(self, earlier: Self) -> Self {
         Self { count: self.count - earlier.count, time: self.time - earlier.time }
     }

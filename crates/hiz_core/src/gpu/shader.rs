@@ -1,10 +1,12 @@
-//! WGSL files, and the modules that are made of them.
-//! A module is its files one after the other: there is no preprocessor.
+//! WGSL files, and the shader modules that consist of them.
+//!
+//! A module is the concatenation of its files; there is no preprocessor.
 
 use std::hash::{Hash, Hasher};
 
-/// A file below `shaders/`.
-/// Two of the same path are the same file.
+/// A file in `shaders/`.
+///
+/// Files with the same path are equal.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct File {
     pub(crate) path: &'static str,
@@ -25,7 +27,9 @@ impl Hash for File {
     }
 }
 
-/// The file of a path without its extension; `build.rs` says where `shaders/` lies.
+/// The file with this path below `shaders/`, given without its extension.
+///
+/// `build.rs` sets `HIZ_SHADERS` to that folder.
 macro_rules! wgsl {
     ($path:literal) => {
         $crate::gpu::shader::File {
@@ -36,17 +40,17 @@ macro_rules! wgsl {
 }
 pub(crate) use wgsl;
 
-/// A module as the files that it consists of.
+/// A shader module as a list of files.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct Source(Vec<File>);
 
 impl Source {
-    /// The files of all `parts`, in their order.
+    /// The module that consists of the files of all `parts`, in their order.
     pub(crate) fn of(parts: &[&[File]]) -> Self {
         Self(parts.concat())
     }
 
-    /// The text.
+    /// The WGSL text of the module.
     pub(crate) fn text(&self) -> String {
         self.0.iter().map(|file| file.text).collect::<Vec<_>>().join("\n")
     }
