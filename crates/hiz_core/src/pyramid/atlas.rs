@@ -1,7 +1,9 @@
-//! All levels of a pyramid, the depth image among them, in one texture, for culls of many
-//! instances: a software driver goes both ways of a branch, so with level 0 and the others apart it
-//! fetches from both, and a word of a buffer costs it four times a texel (`docs/performance.md`).
-//! Twin: `shaders/pyramid/texels_atlas.wgsl`.
+//! All levels of a pyramid, the depth image included, in one texture for culls of many instances.
+//!
+//! A software driver takes both ways of every branch.
+//! If level 0 and the stored levels are apart, it fetches from both.
+//! A word of a buffer costs it four times as much as a texel (`docs/performance.md`).
+//! The shader's side is `shaders/pyramid/texels_atlas.wgsl`.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -15,37 +17,46 @@ use crate::pyramid::levels::Level;
 
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 
-/// Whether culls read the depth image and the stored levels from one texture, into which both are
-/// copied once a reduction.
-/// The answers are the same.
+/// Whether culls read the depth image and the stored levels from one texture, the atlas.
 ///
-/// It can be where the depth image is [`Depth32Float`](wgpu::TextureFormat::Depth32Float),
-/// [`R32Float`](wgpu::TextureFormat::R32Float) or [`Rgba32Uint`](wgpu::TextureFormat::Rgba32Uint),
-/// has the usage [`COPY_SRC`](wgpu::TextureUsages::COPY_SRC), and is no larger than a texture, and
-/// a buffer that it passes through, may be; otherwise culls read them where they are.
+/// Both are copied into it once per reduction.
+/// The results of culls are the same.
+///
+/// An atlas is possible under these conditions; otherwise culls read the levels in place:
+///
+/// - The depth image has the format
+///   [`Depth32Float`](wgpu::TextureFormat::Depth32Float),
+///   [`R32Float`](wgpu::TextureFormat::R32Float) or
+///   [`Rgba32Uint`](wgpu::TextureFormat::Rgba32Uint).
+/// - It has the usage [`COPY_SRC`](wgpu::TextureUsages::COPY_SRC).
+/// - The stored levels fit one storage binding.
+/// - The atlas fits a texture of the device, and the depth image fits a buffer that it is copied
+///   through.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum AtlasUse {
     /// Where a cull has enough instances for the copy to pay.
+    ///
+    /// That is a quarter of the number of texels in the depth image and the stored levels.
     #[default]
     Auto,
-    /// Whatever their number.
+    /// Whatever the number of instances.
     Always,
-    /// Not at all: no copy, and no memory for it.
+    /// Never: no copy, and no memory for it.
     Never,
 }
 
-/// The texture, and what is known to be in it.
+/// The texture of an atlas, and what it is known to hold.
 #[derive(Debug)]
 pub(crate) struct Atlas {
     texture: wgpu::Texture,
     view: wgpu::TextureView,
-    /// Where the depth image passes on its way from a texture of another format.
+    /// The buffer through which a depth image of another format is copied.
     staging: Option<wgpu::Buffer>,
-    /// The reduction whose levels it is known to hold; 0: none.
+    /// The reduction whose levels it is known to hold; 0 for none.
     contents: Arc<AtomicU32>,
 }
 
-/// Whether an atlas can be made of these levels and the depth image `source`.
+/// Whether these levels and the depth image `source` can be copied into an atlas.
 pub(crate) fn is_possible(
     layout: &PyramidLayout,
     source: &wgpu::Texture,
@@ -59,14 +70,17 @@ pub(crate) fn is_possible(
 }
 
 /// Whether images of a format can be copied as the bits of float32.
-/// (Those of `Depth24Plus` cannot be copied, those of other formats hold other bits.)
+///
+/// `Depth24Plus` cannot be copied, and other formats hold other bits.
 pub(crate) fn travels(format: wgpu::TextureFormat) -> bool {
     matches!(format, wgpu::TextureFormat::Depth32Float | wgpu::TextureFormat::R32Float | FORMAT)
 }
 
 impl AtlasUse {
-    /// Whether culls of so many instances ask for one.
-    /// A copied pixel costs about a quarter of what it saves an instance (`docs/performance.md`).
+    /// Whether culls of `instances` instances ask for an atlas.
+    ///
+    /// Copying a pixel costs about a quarter of what the atlas saves per instance
+    /// (`docs/performance.md`).
     pub(crate) fn pays(self, layout: &PyramidLayout, instances: u32) -> bool {
         match self {
             Self::Auto => 4 * u64::from(instances) >= layout.size.pixels() + layout.texels,
@@ -88,12 +102,12 @@ impl Atlas {
         self.view.clone()
     }
 
-    /// Whether the levels of a reduction are known to be there.
+    /// Whether the atlas is known to hold the levels of this reduction.
     pub(crate) fn holds(&self, reduction: u32) -> bool {
         self.contents.load(Ordering::Acquire) == reduction
     }
 
-    /// The number of the reduction whose levels are there, for who learns that.
+    /// The number of the reduction whose levels it holds, shared with the callback that sets it.
     pub(crate) fn contents(&self) -> Arc<AtomicU32> {
         Arc::clone(&self.contents)
     }
@@ -104,11 +118,13 @@ impl Atlas {
         texture + self.staging.as_ref().map_or(0, wgpu::Buffer::size)
     }
 
-    /// Records the copies of all levels.
+    /// Records the copies of all levels, and of two headers.
     ///
-    /// Two headers go with them, for what is copied is settled at different times: the depth image
-    /// now, the stored levels when the copies run, perhaps after the next reduction.
-    /// Where they are not both of the reduction that a cull asks for, it keeps everything.
+    /// What is copied is settled at different times.
+    /// For the depth image that is now; for the stored levels it is when the copies run, which may
+    /// be after the next reduction.
+    /// A header therefore goes with each.
+    /// A cull keeps everything if either header differs from the reduction that it expects.
     pub(crate) fn record(
         &mut self,
         gpu: &Gpu,
@@ -118,7 +134,7 @@ impl Atlas {
         built: &Built,
     ) -> Result<()> {
         let source = built.source.texture();
-        // Nothing is recorded before all is there.
+        // Everything that can fail comes before the first command is recorded.
         let staging =
             if source.format() == FORMAT { None } else { Some(self.staging_or_new(gpu, layout)?) };
         let of_image = gpu.filled(
@@ -149,7 +165,7 @@ impl Atlas {
         };
         let (width, height) = (layout.size.width, layout.size.height);
         let pitch = staging_pitch(layout.size);
-        // In one piece: a depth texture cannot be copied in parts.
+        // All at once, since a depth texture cannot be copied in parts.
         encoder.copy_texture_to_buffer(
             source.as_image_copy(),
             wgpu::TexelCopyBufferInfo { buffer: &staging, layout: copy_layout(0, pitch) },
@@ -168,7 +184,7 @@ impl Atlas {
         Ok(self.staging.insert(staging).clone())
     }
 
-    /// Records the copy of a level to where it begins.
+    /// Records the copy of one level from `buffer` to column x and row y of the atlas.
     fn record_rows(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -187,7 +203,9 @@ impl Atlas {
     }
 }
 
-/// Bytes of a row of an image on its way, at four a pixel of an image that the device can hold.
+/// Bytes per row of an image in the staging buffer, at 4 bytes per pixel.
+///
+/// The image fits the device's textures, so this cannot overflow.
 fn staging_pitch(size: ImageSize) -> u32 {
     (4 * size.width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
 }
@@ -196,7 +214,7 @@ fn staging_bytes(size: ImageSize) -> u64 {
     u64::from(staging_pitch(size)) * u64::from(size.height)
 }
 
-/// Rows in a buffer: bytes, but for `width` in pixels.
+/// Rows in a buffer: `offset` and `pitch` in bytes, `width` in pixels.
 struct Rows {
     offset: u64,
     pitch: u32,
@@ -227,7 +245,7 @@ mod tests {
             {
                 let layout = PyramidLayout::new(ImageSize::new(w, h), levels, 25).unwrap();
                 let atlas = &layout.atlas;
-                // Column, row, width, height; the headers last.
+                // Column, row, width and height of each area; the headers have the last columns.
                 let mut areas = vec![
                     [0, 0, w.div_ceil(4), h],
                     [atlas.width - 1, 0, 1, 1],

@@ -1,17 +1,19 @@
 //! What a pyramid was last built from.
+//!
+//! It is a file of its own because both the reduction and the atlas need it.
 
 use crate::gpu::depth_source::SourceKind;
 use crate::input::camera::Camera;
 use crate::input::tolerance::DepthTolerance;
 
-/// What a pyramid was last built from.
+/// The depth image of a reduction, and what a cull has to know about it.
 #[derive(Debug, Clone)]
 pub(crate) struct Built {
-    /// The number of the reduction, which stands in the pyramid's header once it has run.
+    /// The number of the reduction; once that has run, the pyramid's header holds it.
     pub(crate) reduction: u32,
     pub(crate) source: wgpu::TextureView,
     pub(crate) source_kind: SourceKind,
     pub(crate) camera: Camera,
-    /// What the image's depths have been rounded by, for every cull to count.
+    /// The rounding of the image's depths, which every cull takes into account.
     pub(crate) tolerance: DepthTolerance,
 }

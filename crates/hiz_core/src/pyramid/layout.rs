@@ -1,29 +1,35 @@
-//! Planning: levels, sizes, offsets and pieces; integers only, no device.
+//! The plan of a pyramid: levels, sizes, offsets and dispatches; integers only, no device.
 //!
 //! Level 0 of a pyramid is the depth image itself.
-//! Levels 1 and up are ceil-halved, so a texel of level k covers exactly the pixel block `[x << k,
-//! (x + 1) << k)`; those that are stored lie one after the other in one list of texels, padded to
-//! the whole blocks of the reduction (which stores vectors and asks for no edge), cut into chunks
-//! that each fit one storage binding.
+//! Each further level halves the one before it, rounding up.
+//! A texel of level k therefore covers exactly the pixel block `[x << k, (x + 1) << k)`.
+//!
+//! Stored levels follow each other in one list of texels.
+//! Each is padded to whole blocks of the reduction, which stores vectors and checks no edges.
+//! The list is cut into chunks that each fit one storage binding.
 
 use crate::error::{Error, Result};
 use crate::input::image::ImageSize;
 use crate::pyramid::levels::{Level, MAX_LEVELS, StoredLevels, stored_levels};
 
-/// Pixels of a row that a texel holds.
+/// Pixels of a row that one texel of the atlas holds.
 pub(crate) const PIXELS: u32 = 4;
 
-/// Columns of headers; `shaders/pyramid/texels_atlas.wgsl`, `reduction_number`.
+/// Columns of headers in the atlas; `shaders/pyramid/texels_atlas.wgsl`, `reduction_number`.
 pub(crate) const HEADERS: u32 = 2;
 
-/// Where the levels lie, in texels: level 0 on the left, beside it the stored ones below each
-/// other, and in columns of their own two headers: the number of the reduction whose depth image
-/// level 0 is, and that of the reduction that left the stored levels.
+/// Where the levels lie in the atlas, in texels of the atlas.
+///
+/// - Level 0 is on the left.
+/// - The stored levels are to its right, below each other.
+/// - Two headers have the last two columns: the number of the reduction whose depth image level 0
+///   is, and the number of the reduction that made the stored levels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct AtlasLayout {
     pub(crate) width: u32,
     pub(crate) height: u32,
-    /// Column and row where each level begins; `shaders/pyramid/pyramid.wgsl` pads them.
+    /// Column and row where each level begins; `shaders/pyramid/pyramid.wgsl` pads them to four
+    /// words.
     pub(crate) origins: [[u32; 4]; MAX_LEVELS],
 }
 
@@ -41,30 +47,33 @@ impl AtlasLayout {
         Self { width: column + width + HEADERS, height: levels[0].height.max(rows), origins }
     }
 
-    /// Whether the device has such textures.
+    /// Whether the device has textures of this size.
     pub(super) fn fits(&self, limits: &wgpu::Limits) -> bool {
         self.width.max(self.height) <= limits.max_texture_dimension_2d
     }
 }
 
-/// How many storage bindings hold a pyramid: with level 0 in a texture, 16384 x 16384 pixels need
-/// three of 128 MiB.
+/// The most storage bindings that hold a pyramid.
+///
+/// With level 0 in a texture, 16384 x 16384 pixels need three of 128 MiB.
 pub(crate) const PYRAMID_CHUNKS: usize = 3;
 
-/// Blocks of a row come in multiples of this many, so that the reduction stores and loads vectors.
+/// Columns of blocks come in multiples of this, so that the reduction loads and stores vectors.
 const BLOCK_ALIGNMENT: u32 = 4;
 
-/// Rows of every level start at multiples of this many texels, as copies into a texture ask for.
+/// Texels to which the rows of every level are aligned, as copies into a texture require.
 const ROW_ALIGNMENT: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT / 4;
 
 /// Texels before level 1.
-/// The first holds the number of the reduction that filled the pyramid: a cull that expects another
-/// one (recorded, but not submitted before it) keeps everything.
-/// 0, as buffers begin, is never a number.
+///
+/// The first one holds the number of the reduction that filled the pyramid.
+/// A cull that expects another number keeps everything: its reduction was not submitted before it.
+/// Buffers start as 0, which is never a number of a reduction.
 const HEADER_TEXELS: u64 = 4;
 
-/// Pixels or texels that an invocation of the reduction reads along a side, as a power of two: it
-/// makes up to three levels.
+/// The side in texels, as a power of two, of the block that an invocation of the reduction reads.
+///
+/// The invocation makes up to three levels from the block.
 const BLOCK_LOG2: u32 = 3;
 
 /// One dispatch of the reduction.
@@ -72,27 +81,31 @@ const BLOCK_LOG2: u32 = 3;
 pub(crate) struct Step {
     /// The level that is read.
     pub(crate) source: u32,
-    /// The levels that are written.
+    /// The first and the last level that are written.
     pub(crate) first: u32,
     pub(crate) last: u32,
-    /// Blocks of 8x8 texels of the level that is read, one an invocation; of a coarse step the
-    /// texels that are written.
+    /// Columns and rows of invocations.
+    ///
+    /// Each takes a block of 8x8 texels of the source level, or in a coarse step a texel that is
+    /// written.
     pub(crate) blocks: [u32; 2],
 }
 
 impl Step {
-    /// Whether one workgroup makes all levels that are left: `reduce_tail` of
+    /// Whether one workgroup makes all remaining levels: `reduce_tail` in
     /// `shaders/pyramid/reduce.wgsl`.
     pub(crate) fn is_tail(&self) -> bool {
         self.source > 0 && self.last > self.source + BLOCK_LOG2
     }
 
-    /// Whether a texel takes more than one block: `shaders/pyramid/reduce_coarse.wgsl` makes such a level.
+    /// Whether a texel takes more than one block.
+    ///
+    /// `shaders/pyramid/reduce_coarse.wgsl` makes such a level.
     pub(crate) fn is_coarse(&self) -> bool {
         self.first > self.source + BLOCK_LOG2
     }
 
-    /// Texels along a side that a block makes of level `k`.
+    /// Texels of level `k` along a side that one block makes.
     fn texels_a_block(&self, k: u32) -> u32 {
         if self.is_coarse() { 1 } else { 1 << BLOCK_LOG2 >> (k - self.source) }
     }
@@ -102,9 +115,9 @@ impl Step {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct PyramidLayout {
     pub(crate) size: ImageSize,
-    /// All levels; offset and stride are 0 where one is not stored.
+    /// All levels; offset and stride are 0 for a level that is not stored.
     pub(crate) levels: Vec<Level>,
-    /// Which are stored, cut to those that there are; `first` past the last: none.
+    /// Which levels are stored, limited to those that exist; none if `first` is past `last`.
     pub(crate) stored: StoredLevels,
     pub(crate) steps: Vec<Step>,
     /// Texels of the header and of the stored levels, padding included.
@@ -117,6 +130,10 @@ pub(crate) struct PyramidLayout {
 
 impl PyramidLayout {
     /// The layout for an image of `size`, with chunks of `1 << chunk_shift` texels.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for levels out of range;
+    /// [`Error::Limit`] for more texels than [`PYRAMID_CHUNKS`] chunks or 32-bit offsets can hold.
     pub(crate) fn new(size: ImageSize, stored: StoredLevels, chunk_shift: u32) -> Result<Self> {
         debug_assert!(
             1 << chunk_shift >= BLOCK_ALIGNMENT,
@@ -130,7 +147,7 @@ impl PyramidLayout {
             (width, height) = (width.div_ceil(2), height.div_ceil(2));
             levels.push(Level { offset: 0, stride: 0, width, height });
         }
-        // An image of one pixel stores nothing: first 1, last 0.
+        // An image of one pixel stores nothing: first is 1, last is 0.
         let coarsest = levels.len() as u32 - 1;
         let stored = StoredLevels {
             first: stored.first.min(coarsest.max(1)),
@@ -161,12 +178,12 @@ impl PyramidLayout {
         Ok(layout)
     }
 
-    /// Whether a level, 0 among them, can be read.
+    /// Whether a level can be read: level 0, or a stored one.
     pub(crate) fn is_there(&self, level: u32) -> bool {
         level == 0 || (self.stored.first..=self.stored.last).contains(&level)
     }
 
-    /// The stored levels and their numbers.
+    /// The stored levels with their numbers.
     pub(crate) fn stored_levels(&self) -> impl Iterator<Item = (usize, &Level)> {
         stored_levels(&self.levels, self.stored)
     }
@@ -184,10 +201,11 @@ impl PyramidLayout {
     }
 }
 
-/// One workgroup reads so many texels faster than a dispatch starts (docs/performance.md).
+/// One workgroup reads this many texels faster than another dispatch starts
+/// (`docs/performance.md`).
 const TAIL_TEXELS: u32 = 1 << 15;
 
-/// The passes, the last of them made one dispatch where they are small.
+/// The same passes, where the last ones become one dispatch if they are small.
 fn with_tail(levels: &[Level], mut passes: Vec<Step>) -> Vec<Step> {
     let texels =
         |step: &Step| levels[step.source as usize].width * levels[step.source as usize].height;
@@ -199,7 +217,9 @@ fn with_tail(levels: &[Level], mut passes: Vec<Step>) -> Vec<Step> {
     passes
 }
 
-/// The passes that fill the stored levels; one at least, for it writes the header.
+/// The passes that fill the stored levels.
+///
+/// There is at least one, since a pass writes the header.
 fn passes(levels: &[Level], stored: StoredLevels) -> Vec<Step> {
     let StoredLevels { first, last } = stored;
     let mut steps = Vec::new();
@@ -209,7 +229,8 @@ fn passes(levels: &[Level], stored: StoredLevels) -> Vec<Step> {
         return vec![Step { source, first, last, blocks: [0, 0] }];
     }
     if first > BLOCK_LOG2 {
-        // More than a block a texel: a shader of its own makes this level alone.
+        // A texel of this level takes more than one block, so a shader of its own makes the level
+        // alone.
         let Level { width, height, .. } = levels[first as usize];
         steps.push(Step { source, first, last: first, blocks: [columns(width), height] });
         (source, first) = (first, first + 1);
@@ -224,7 +245,7 @@ fn passes(levels: &[Level], stored: StoredLevels) -> Vec<Step> {
     steps
 }
 
-/// How many texels one storage binding may hold, as a power of two.
+/// How many texels of 4 bytes one storage binding may hold, as a power of two of at most 30.
 pub(crate) fn chunk_shift(limits: &wgpu::Limits) -> u32 {
     let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).max(4);
     (bytes / 4).ilog2().min(30)
@@ -279,7 +300,7 @@ mod tests {
         }
         let all = steps(screen, StoredLevels::ALL);
         assert_eq!(all.iter().map(|s| (s.source, s.last)).collect::<Vec<_>>(), [(0, 3), (3, 11)]);
-        // The header alone: no block may be written where nothing is stored.
+        // The header alone: nothing is stored, so no block may be written.
         assert_eq!(
             steps(pixel, StoredLevels::ALL),
             [Step { source: 0, first: 1, last: 0, blocks: [0, 0] }]

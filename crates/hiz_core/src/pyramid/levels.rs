@@ -2,11 +2,13 @@
 
 use crate::error::{Error, Result};
 
-/// The most levels a pyramid has: 32768 pixels a side.
+/// The most levels that a pyramid has; images of 32768 pixels a side have all of them.
 pub const MAX_LEVELS: usize = 16;
 
-/// Where a level lies in the list of texels; offset and stride are 0 where it does not, as level 0,
-/// the depth texture.
+/// Where a level lies in the list of texels; twin of `Level` in `shaders/pyramid/pyramid.wgsl`.
+///
+/// Offset, stride, width and height are in texels.
+/// Offset and stride are 0 for levels that are not stored, such as level 0, the depth texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct Level {
@@ -17,12 +19,14 @@ pub(crate) struct Level {
 }
 
 /// Which levels of a pyramid are stored.
-/// Level 0, the depth image itself, is always there.
 ///
-/// Fewer levels are built faster and keep more: a test goes on to the next coarser stored level,
-/// and a rectangle that is too large for the coarsest one is kept visible unless a descent is
+/// Level 0, the depth image itself, is always there.
+/// Fewer levels are built faster, but culls keep more.
+/// A test reads the next coarser level where the one it wants is not stored.
+/// A rectangle that is too large for the coarsest stored level stays visible, unless a descent is
 /// allowed.
-/// Numbers past an image's coarsest level mean that level.
+///
+/// Numbers past the coarsest level of an image mean that level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StoredLevels {
     /// The finest stored level, 1..=15.
@@ -36,6 +40,7 @@ impl StoredLevels {
     pub const ALL: Self = Self { first: 1, last: MAX_LEVELS as u32 - 1 };
 
     /// Level `first` and all coarser ones.
+    ///
     /// Without level 1 the reduction writes a quarter as much, without level 2 a sixteenth.
     #[must_use]
     pub const fn from(first: u32) -> Self {
@@ -67,7 +72,7 @@ impl Default for StoredLevels {
     }
 }
 
-/// Those of `levels` that are stored, and their numbers.
+/// The stored ones of `levels`, with their numbers.
 pub(crate) fn stored_levels(
     levels: &[Level],
     stored: StoredLevels,

@@ -1,4 +1,14 @@
 //! The depth pyramid: its storage, and the passes that fill it.
+//!
+//! Data flows through the room in this order:
+//!
+//! 1. `layout` plans levels, offsets and dispatches, without a device; `levels` says which are
+//!    stored.
+//! 2. [`Pyramid`] holds the buffers of the stored levels.
+//! 3. `reduce` records the passes that fill them from a depth image; `built` remembers that image.
+//! 4. `atlas` copies all levels into one texture for large culls.
+//!
+//! Passes are recorded into the caller's encoder; nothing here submits, waits or reads back.
 
 pub(crate) mod atlas;
 pub(crate) mod built;
@@ -21,7 +31,7 @@ use crate::pyramid::built::Built;
 use crate::pyramid::layout::{PYRAMID_CHUNKS, PyramidLayout, chunk_shift};
 use crate::pyramid::levels::{Level, MAX_LEVELS, StoredLevels};
 
-/// `shaders/pyramid/pyramid.wgsl`, `Pyramid`.
+/// Twin of `Pyramid` in `shaders/pyramid/pyramid.wgsl`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct PyramidUniform {
@@ -35,15 +45,17 @@ pub(crate) struct PyramidUniform {
 
 const _: () = assert!(size_of::<PyramidUniform>() == 528);
 
-/// What stands in for chunks that a small pyramid does without.
+/// Labels of the stand-ins that are bound for the chunks that a small pyramid does not have.
 const NO_CHUNK: [&str; PYRAMID_CHUNKS] = ["hiz.no_chunk_0", "hiz.no_chunk_1", "hiz.no_chunk_2"];
 
 /// How a pyramid is stored.
 #[derive(Debug, Clone, Default)]
 pub struct PyramidOptions {
-    /// Which levels are stored: all, if nothing else is asked for.
+    /// Which levels are stored; all by default.
     pub levels: StoredLevels,
-    /// Texels of one chunk as a power of two; `None`: what one storage binding of the device holds.
+    /// Texels per chunk as a power of two, at least 2.
+    ///
+    /// `None`: as many as one storage binding of the device holds, which is the most allowed.
     #[cfg(feature = "testing")]
     pub chunk_shift: Option<u32>,
     /// Whether culls read all levels from one texture.
@@ -51,7 +63,7 @@ pub struct PyramidOptions {
 }
 
 impl PyramidOptions {
-    /// Texels of one chunk as a power of two, at most `most`.
+    /// Texels per chunk as a power of two, at most `most`.
     #[cfg(feature = "testing")]
     fn checked_chunk_shift(&self, most: u32) -> Result<u32> {
         let shift = self.chunk_shift.unwrap_or(most);
@@ -70,8 +82,8 @@ impl PyramidOptions {
 
 /// A depth pyramid on the device: for every level, the farthest depth of each block of pixels.
 ///
-/// Level 0 is the depth texture itself, which the pyramid keeps alive but does not copy: **do not
-/// write to that texture between the reduction and the culls that use it**.
+/// Level 0 is the depth texture itself, which the pyramid keeps alive but does not copy.
+/// **Do not write to that texture between the reduction and the culls that use it.**
 #[derive(Debug)]
 pub struct Pyramid {
     pub(crate) context: ContextId,
@@ -80,12 +92,12 @@ pub struct Pyramid {
     pub(crate) uniform: wgpu::Buffer,
     built: Locked<Option<Built>>,
     atlas_use: AtlasUse,
-    /// There was no memory for one.
+    /// Set once there was no memory for an atlas.
     no_atlas: AtomicBool,
     atlas: Locked<Option<Atlas>>,
-    /// The last reduction that is known to have run: what was only recorded may never do so.
+    /// The last reduction that is known to have run; one that was only recorded may never run.
     reduced: Arc<AtomicU32>,
-    /// The last bindings of culls, of instances and of groups: many culls see the same view.
+    /// The last bind groups of culls, for instances and for groups, since many culls share a view.
     pub(crate) bindings: KeptBindings,
 }
 
@@ -144,59 +156,65 @@ impl Pyramid {
         })
     }
 
-    /// The depth image's size.
+    /// The depth image's size in pixels.
     pub fn size(&self) -> ImageSize {
         self.layout.size
     }
 
-    /// The number of levels, down to 1x1, level 0 included.
+    /// The number of levels, from level 0 down to the level of 1x1.
     pub fn num_levels(&self) -> u32 {
         self.layout.num_levels()
     }
 
-    /// Which levels above 0 are stored, cut to those that there are; nothing for an image of one
-    /// pixel.
+    /// Which levels above 0 are stored, limited to those that exist.
+    ///
+    /// `None` for an image of one pixel, which has level 0 alone.
     pub fn stored_levels(&self) -> Option<StoredLevels> {
         let stored = self.layout.stored;
         (stored.first <= stored.last).then_some(stored)
     }
 
-    /// The size of a level, or nothing past the last.
+    /// The size of a level in texels; `None` past the last level.
     pub fn level_size(&self, level: u32) -> Option<ImageSize> {
         self.layout.levels.get(level as usize).map(|l| ImageSize::new(l.width, l.height))
     }
 
-    /// Bytes on the device, the depth texture not counted.
+    /// Bytes on the device, including an atlas and excluding the depth texture.
     pub fn device_bytes(&self) -> u64 {
         let atlas = self.atlas.lock();
         let atlas = atlas.as_ref().map_or(0, Atlas::bytes);
         self.chunks.iter().map(wgpu::Buffer::size).sum::<u64>() + atlas
     }
 
-    /// Whether culls of so many instances against `built` (no later reduction, of what may be
-    /// another kind of image) read an atlas: where it can be, and pays.
+    /// Whether culls of `instances` instances read an atlas: where one is possible, and pays.
+    ///
+    /// `built` is what the cull is against.
+    /// The pyramid may meanwhile be built from another kind of image.
     pub(crate) fn wants_atlas(&self, gpu: &Gpu, built: &Built, instances: u32) -> bool {
         self.atlas_use.pays(&self.layout, instances)
             && !self.no_atlas.load(Ordering::Relaxed)
             && atlas::is_possible(&self.layout, built.source.texture(), gpu.limits())
     }
 
-    /// Something failed on the device: nothing that was made for culls is kept.
-    /// Whether an atlas was among it.
+    /// Releases everything that was made for culls, after an error on the device.
+    ///
+    /// Returns whether that included an atlas.
     pub(crate) fn forget(&self) -> bool {
         self.bindings.clear();
         self.atlas.lock().take().is_some()
     }
 
-    /// There is no memory for an atlas: culls read the depth image and the levels where they are
-    /// from now on.
+    /// Called where there is no memory for an atlas.
+    ///
+    /// From now on culls read the depth image and the stored levels in place.
     pub(crate) fn do_without_atlas(&self) {
         self.no_atlas.store(true, Ordering::Relaxed);
     }
 
-    /// The atlas of what the pyramid was built from; its copies are recorded if they are not known
-    /// to have run, behind that reduction.
-    /// `None` where there is no memory for it, now and from now on.
+    /// The atlas of what the pyramid was built from; `None` where there is no memory for one.
+    ///
+    /// The copies into it are recorded, unless they are known to have run after that reduction.
+    /// Once memory was short the pyramid never tries an atlas again.
     pub(crate) fn record_atlas(
         &self,
         gpu: &Gpu,
@@ -219,7 +237,7 @@ impl Pyramid {
             Ok(atlas) => return Ok(Some(kept.insert(atlas).view())),
             Err(error) => error,
         };
-        // They may hold the one that is gone.
+        // The kept bind groups may refer to the atlas that was just dropped.
         self.bindings.clear();
         if matches!(error, Error::OutOfMemory(_)) {
             self.do_without_atlas();
@@ -228,42 +246,52 @@ impl Pyramid {
         Err(error)
     }
 
-    /// Once the copies into an atlas have run it is known what it holds.
+    /// Notes what the atlas holds once the copies into it have run.
     fn note_copies(&self, encoder: &wgpu::CommandEncoder, atlas: &Atlas, reduction: u32) {
         let (contents, reduced) = (atlas.contents(), self.reduced());
         encoder.on_submitted_work_done(move || {
-            // Copies that ran before their reduction, or after the next one, have spoiled what was
-            // there.
+            // If the copies ran before their reduction or after the next one, they have overwritten
+            // the atlas with other levels.
             let ran_behind_it = reduced.load(Ordering::Acquire) == reduction;
             contents.store(if ran_behind_it { reduction } else { 0 }, Ordering::Release);
         });
     }
 
-    /// The camera of the depth image that the pyramid was last built from.
+    /// The camera of the depth image that the pyramid was last built from; `None` before the first.
     pub fn camera(&self) -> Option<Camera> {
         self.built().map(|b| b.camera)
     }
 
-    /// How far the depths that the pyramid was last built from may lie from those that were stored,
-    /// by the format of the image ([`DepthTolerance::of`]) or by what was uploaded into it.
+    /// How far the depths in the pyramid may lie from those that were given to be stored.
+    ///
+    /// The bound combines the format of the depth image ([`DepthTolerance::of`]) and the rounding
+    /// of what was uploaded into it.
+    /// `None` before the first reduction.
     /// Every cull counts it, beside the slack of its options.
     pub fn tolerance(&self) -> Option<DepthTolerance> {
         self.built().map(|b| b.tolerance)
     }
 
-    /// Whether the depth image that `built` was made of is still there: a cull would bind it, and
-    /// what was destroyed ends the caller's encoder.
+    /// Checks that the depth image of `built` has not been destroyed.
+    ///
+    /// A cull would bind it, and a destroyed texture makes the caller's encoder invalid.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] for a destroyed depth image.
     pub(crate) fn check_source(gpu: &Gpu, built: &Built) -> Result<()> {
         gpu.view(built.source.texture()).map(drop).map_err(|error| match error {
             Error::Device(why) => Error::mismatch(
                 "pyramid",
-                format!("expected one whose depth image has not been destroyed since it was reduced, but {why}"),
+                format!(
+                    "expected one whose depth image has not been destroyed since it was \
+                     reduced, but {why}"
+                ),
             ),
             other => other,
         })
     }
 
-    /// Chunk `i`, or what stands in for it.
+    /// The buffer of chunk `i`, or a stand-in if the pyramid has fewer chunks.
     pub(crate) fn chunk(&self, gpu: &Gpu, i: usize) -> Result<wgpu::Buffer> {
         match self.chunks.get(i) {
             Some(chunk) => Ok(chunk.clone()),
@@ -271,14 +299,15 @@ impl Pyramid {
         }
     }
 
-    /// A reduction was recorded.
+    /// Notes that a reduction was recorded.
     pub(super) fn set_built(&self, built: Built) {
-        // They hold the last depth image.
+        // The kept bind groups refer to the last depth image.
         self.bindings.clear();
         *self.built.lock() = Some(built);
     }
 
-    /// The number of the last reduction that is known to have run, for whoever learns that.
+    /// The number of the last reduction that is known to have run, shared with the callback that
+    /// sets it.
     pub(super) fn reduced(&self) -> Arc<AtomicU32> {
         Arc::clone(&self.reduced)
     }
@@ -287,7 +316,10 @@ impl Pyramid {
         self.built.lock().clone()
     }
 
-    /// The built state for a cull with `camera`, or why there is none.
+    /// What the pyramid was built from, for a cull with `camera`.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] if the pyramid was never built, or was built with another camera.
     pub(crate) fn built_for(&self, camera: &Camera) -> Result<Built> {
         let built = self.built().ok_or_else(|| {
             Error::mismatch(
@@ -305,7 +337,8 @@ impl Pyramid {
                 "expected the camera of the pyramid's depth image, got another one".to_owned()
             } else {
                 format!(
-                    "expected the camera of the pyramid's depth image, size {theirs}, got one of size {ours}"
+                    "expected the camera of the pyramid's depth image, size {theirs}, got one of \
+                     size {ours}"
                 )
             },
         ))

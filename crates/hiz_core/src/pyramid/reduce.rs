@@ -1,4 +1,8 @@
 //! The reduction: the passes that fill a pyramid from a depth image.
+//!
+//! Each pass reads one level, and writes up to three coarser ones, or all of the rest.
+//! The passes follow AMD's Single Pass Downsampler (FidelityFX SPD, 2020).
+//! `shaders/pyramid/reduce.wgsl` says where they differ from it.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -16,24 +20,24 @@ use crate::pyramid::Pyramid;
 use crate::pyramid::built::Built;
 use crate::pyramid::layout::Step;
 
-/// What the reduction reads and writes.
+/// The bindings of the depth image and the pyramid.
 const fn bindings(source: SourceKind) -> [(u32, Binding); 6] {
     use Binding::{Depth, Sampler, Uniform, Write};
     [(0, Depth(source)), (1, Sampler), (2, Uniform), (3, Write), (4, Write), (5, Write)]
 }
 
-/// One step.
+/// The binding of one step.
 const STEP_BINDINGS: &[(u32, Binding)] = &[(0, Binding::Uniform)];
 
-/// The shaders of the reduction.
+/// Which shader and entry point make a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Shape {
-    /// `shaders/pyramid/reduce.wgsl`; `first`: the first level that is stored, above the one that
-    /// is read.
+    /// `shaders/pyramid/reduce.wgsl`, `reduce`.
+    /// `first` is the first stored level, counted from the level that is read.
     Blocks { from_source: bool, first: u32 },
-    /// Its entry point for all levels that are left.
+    /// `shaders/pyramid/reduce.wgsl`, `reduce_tail`, which makes all remaining levels.
     Tail,
-    /// `shaders/pyramid/reduce_coarse.wgsl`; `shared`: a texel takes a workgroup.
+    /// `shaders/pyramid/reduce_coarse.wgsl`; if `shared`, a whole workgroup makes each texel.
     Coarse { shared: bool },
 }
 
@@ -45,12 +49,12 @@ fn module(source: SourceKind, entry: File) -> Source {
     ])
 }
 
-/// The depth reduction, three levels a pass.
+/// The shader module of the reduction, three levels per pass.
 pub(crate) fn blocks_module(source: SourceKind) -> Source {
     module(source, wgsl!("pyramid/reduce"))
 }
 
-/// The depth reduction to one coarse level.
+/// The shader module of the reduction to one coarse level.
 pub(crate) fn coarse_module(source: SourceKind) -> Source {
     module(source, wgsl!("pyramid/reduce_coarse"))
 }
@@ -90,17 +94,18 @@ fn pipeline(
     })
 }
 
-/// Invocations of a workgroup of the reduction, all in a row; `shaders/pyramid/pyramid_write.wgsl`,
-/// `place_of`.
+/// Invocations per workgroup of the reduction, in one row.
+/// The shader's side is `place_of` in `shaders/pyramid/pyramid_write.wgsl`.
 const REDUCE_WORKGROUP: u32 = 64;
-/// Or the side of a square of them, `TALL`.
+/// The side of the square that a workgroup forms instead if `TALL` is set.
 const TALL_SIDE: u32 = 8;
-/// Pixels of 4 KiB.
+/// Pixels of 4 KiB, a page, at 4 bytes per pixel.
 const PAGE_PIXELS: u32 = 1024;
-/// From this level on a workgroup shares one texel, if it is made alone: 8x8 pixels an invocation.
+/// The finest level whose texels are shared by a workgroup if it is made alone.
+/// Each invocation then reads at least 8x8 pixels.
 const SHARED_LEVEL: u32 = 6;
 
-/// `shaders/pyramid/reduce.wgsl`, `Step`.
+/// Twin of `Step` in `shaders/pyramid/pyramid_write.wgsl`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct StepUniform {
@@ -114,8 +119,12 @@ pub(crate) struct StepUniform {
 
 const _: () = assert!(size_of::<StepUniform>() == 32);
 
-/// Records the reduction of `depth` (all of its texture's first mip level) into `pyramid`.
-/// `uploaded` is what its depths were rounded by before they came into the texture.
+/// Records the reduction of `depth` into `pyramid`; all of the texture's first mip level is read.
+///
+/// `uploaded` is the rounding of the depths before they were uploaded into the texture.
+///
+/// # Errors
+/// As [`HizContext::record_reduce`](crate::HizContext::record_reduce).
 pub(crate) fn record_reduce(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
@@ -132,7 +141,8 @@ pub(crate) fn record_reduce(
         return Err(Error::invalid(
             "depth",
             format!(
-                "expected a depth format, R32Float, R16Float or Rgba32Uint (the bits of four pixels), got {format:?}"
+                "expected a depth format, R32Float, R16Float or Rgba32Uint (the bits of four \
+                 pixels), got {format:?}"
             ),
         ));
     };
@@ -155,14 +165,16 @@ pub(crate) fn record_reduce(
             format!("expected the depth image's size {size}, got {}", camera.size()),
         ));
     }
-    // A view does not say which part of its texture it shows, so there must be one part only.
+    // A view does not tell which part of its texture it shows, so the texture may have one part
+    // only.
     let parts =
         (texture.mip_level_count(), texture.sample_count(), texture.depth_or_array_layers());
     if parts != (1, 1, 1) || texture.dimension() != wgpu::TextureDimension::D2 {
         return Err(Error::invalid(
             "depth",
             format!(
-                "expected a 2D texture of one mip level, sample and layer, got {:?} with {} mip levels, {} samples, {} layers",
+                "expected a 2D texture of one mip level, sample and layer, got {:?} with {} mip \
+                 levels, {} samples, {} layers",
                 texture.dimension(),
                 parts.0,
                 parts.1,
@@ -180,7 +192,7 @@ pub(crate) fn record_reduce(
         ));
     }
     let (source, view) = bind_source(gpu, depth, source_kind, pyramid)?;
-    // Everything is there before anything is recorded.
+    // Everything that can fail comes before the first command is recorded.
     let reduction = next_reduction();
     let dispatch = |step: &Step| {
         let tall = step.source == 0 && reads_tall(step, source_kind, size);
@@ -201,7 +213,7 @@ pub(crate) fn record_reduce(
         for (pipeline, bind_group, [columns, rows]) in &dispatches {
             pass.set_pipeline(pipeline);
             pass.set_bind_group(1, bind_group, &[]);
-            // One at least, for the header, where nothing is stored.
+            // At least one workgroup, which writes the header even if nothing is stored.
             pass.dispatch_workgroups((*columns).max(1), (*rows).max(1), 1);
         }
         Ok(())
@@ -214,9 +226,11 @@ pub(crate) fn record_reduce(
     Ok(())
 }
 
-/// What the reduction reads and writes; and the view of the image's depth that can be bound: the
-/// caller's, or where that shows another part or use of the texture, as the default view of a
-/// texture with a stencil does, the whole depth of it.
+/// The bind group of the reduction, and the view of the depth image that it binds.
+///
+/// That is the caller's view if it can be bound.
+/// The default view of a texture with a stencil cannot, for example; then it is a view of the whole
+/// depth.
 fn bind_source(
     gpu: &Gpu,
     depth: &wgpu::TextureView,
@@ -247,12 +261,13 @@ fn bind_source(
         Error::Device(why) => Error::mismatch(
             "depth",
             format!(
-                "expected a texture of this device and context that has not been destroyed, but {why}"
+                "expected a texture of this device and context that has not been destroyed, but \
+                 {why}"
             ),
         ),
         other => other,
     };
-    // A view of another device's texture would tell that device of its errors, whose handler may
+    // A view of another device's texture would report its errors to that device, whose handler may
     // end the process.
     if error.to_string().contains(OF_ANOTHER_DEVICE) {
         return Err(refused(error));
@@ -261,7 +276,7 @@ fn bind_source(
     Ok((bind(&view).map_err(refused)?, view))
 }
 
-/// What wgpu says of objects of another device.
+/// What wgpu's message contains for objects of another device.
 const OF_ANOTHER_DEVICE: &str = "doesn't match";
 
 /// The shader of a step, and its workgroups.
@@ -284,10 +299,12 @@ fn shape_of(step: &Step, tall: bool) -> (Shape, [u32; 2]) {
     }
 }
 
-/// Whether neighbouring invocations of a step that reads the image read below each other.
-/// Blocks next to each other, four pixels a texel, are loaded in a way that gains nothing; and rows
-/// that begin at multiples of a page would all fall into the same lines of a cache
-/// (`docs/performance.md`).
+/// Whether neighbouring invocations of a step that reads the depth image read below each other.
+///
+/// Two cases gain nothing (`docs/performance.md`):
+///
+/// - Images with four pixels per texel, except in coarse steps.
+/// - Rows that begin at multiples of a page, which would all fall into the same lines of a cache.
 fn reads_tall(step: &Step, source: SourceKind, size: ImageSize) -> bool {
     (source != SourceKind::Bits || step.is_coarse()) && !size.width.is_multiple_of(PAGE_PIXELS)
 }
@@ -304,7 +321,7 @@ fn step_uniform(step: &Step, reduction: u32) -> StepUniform {
     }
 }
 
-/// Numbers reductions, never 0.
+/// A new number for a reduction, never 0.
 fn next_reduction() -> u32 {
     static NEXT: AtomicU32 = AtomicU32::new(1);
     NEXT.fetch_add(1, Ordering::Relaxed).max(1)
