@@ -64,8 +64,7 @@ const STAND_IN_BYTES: u64 = 256;
 impl Gpu {
     /// A buffer to bind where a pipeline has a binding that this call does not use.
     ///
-    /// Each label has a buffer of its own, since one buffer may not have two writable bindings in a
-    /// dispatch.
+    /// Each label has its own buffer, since a dispatch may not bind one buffer twice for writing.
     pub(crate) fn stand_in(&self, label: &'static str) -> Result<wgpu::Buffer> {
         let usage = wgpu::BufferUsages::STORAGE;
         self.buffers.get(label, || self.empty(label, STAND_IN_BYTES, usage))
@@ -103,8 +102,7 @@ impl Gpu {
         self.filled(label, bytemuck::bytes_of(value), wgpu::BufferUsages::UNIFORM)
     }
 
-    /// A buffer that holds `contents` from its creation; their length must be a multiple of 4
-    /// bytes.
+    /// A buffer that holds `contents`, a multiple of 4 bytes, from its creation.
     ///
     /// wgpu's own helper is not used.
     /// It panics where a lost device or exhausted memory leaves nothing to map.
@@ -259,8 +257,7 @@ impl Gpu {
             }));
             drop(encoder.finish());
         })?;
-        // wgpu reports a destroyed texture on submission only, but at once where a view of it is
-        // made.
+        // wgpu reports a destroyed texture at the submit only, but at once if a view is made.
         self.view(target.texture()).map(drop)
     }
 }

@@ -6,8 +6,7 @@
 //! A scope that is pushed before a call and popped right after it therefore catches the errors of
 //! that call alone.
 //! Each call needs a scope of its own.
-//! An invalid object must not get into the caller's encoder, whose `finish` would fail because of
-//! it.
+//! An invalid object must not get into the caller's encoder, since its `finish` would fail.
 
 use std::future::Future;
 use std::pin::pin;

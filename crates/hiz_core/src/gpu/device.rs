@@ -136,8 +136,7 @@ impl Gpu {
                     layout: Some(&self.pipeline_layout(label, layouts)),
                     module: &self.shader_module(label, source),
                     entry_point: Some(entry_point),
-                    // No initialization is needed: the shaders write workgroup memory before they
-                    // read it.
+                    // Not needed: the shaders write workgroup memory before they read it.
                     compilation_options: wgpu::PipelineCompilationOptions {
                         constants,
                         zero_initialize_workgroup_memory: false,

@@ -1,9 +1,7 @@
 //! The device, and the objects that are made on it.
 //!
-//! This room knows no stage: each stage describes the pipelines, bindings and buffers that it asks
-//! for.
-//! Every object is made inside an error scope of its own (`checked`), so that wgpu's errors are
-//! returned.
+//! This room knows no stage: each stage describes the pipelines, bindings and buffers it needs.
+//! Every object is made in an error scope of its own (`checked`), which returns wgpu's errors.
 //! Nothing here submits, waits or reads back.
 
 pub(crate) mod buffers;

@@ -1,9 +1,7 @@
-//! The inverse of a 3x3 matrix with an error bound for each entry, also for nearly singular
-//! matrices.
+//! The inverse of a 3x3 matrix with an error bound per entry, also for nearly singular matrices.
 //!
 //! Each entry is a pair of float64.
-//! Newton's step `A += A (I - M A)` improves the pairs, with residuals that are computed in pairs
-//! too.
+//! Newton's step `A += A (I - M A)` improves the pairs, with residuals in pairs too.
 //! The last residual bounds the remaining error.
 //! Sums of products in pairs follow Ogita, Rump and Oishi, "Accurate sum and dot product", 2005,
 //! section 4.
@@ -103,8 +101,7 @@ pub(crate) fn inverse(rows: &Mat3) -> Option<[[Bounded; 3]; 3]> {
         });
     }
     // M A = I - E gives M^-1 - A = A (E + E^2 + ...).
-    // The row sums of |E| are below 1/2, so the series is at most twice the greatest |E| of each
-    // column.
+    // Row sums of |E| are below 1/2, so the series is at most twice the greatest |E| per column.
     let e = residual(&m, &a).map(|row| row.map(|x| x.value.hi.abs() + x.value.lo.abs() + x.error));
     // `f64::max` would drop a NaN; this fold keeps it.
     let row_sum = e
@@ -152,8 +149,7 @@ mod tests {
     use super::*;
 
     /// Two rows that differ by `d` in one entry.
-    /// The expected inverse is worked out by hand; it contains `1/d`, which is exact for powers of
-    /// two.
+    /// The inverse, worked out by hand, contains `1/d`, which is exact for powers of two.
     #[test]
     fn nearly_singular_matrices_by_hand() {
         for power in [0, 10, 30, 38] {

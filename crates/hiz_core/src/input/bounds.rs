@@ -37,8 +37,7 @@ impl Floats<'_> {
     }
 
     pub(crate) fn array<const N: usize>(&self, i: usize) -> [f64; N] {
-        // The type is matched once per element, not per scalar: this is the inner loop of every
-        // upload.
+        // Matched once per element, not per scalar: this is the inner loop of every upload.
         match self {
             Self::F32(v) => {
                 let v = &v[N * i..N * (i + 1)];

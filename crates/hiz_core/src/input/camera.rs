@@ -62,8 +62,7 @@ impl Camera {
     /// A camera at `pose` that sees through `projection`; its rows are about the eye.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for a pose, a projection or a size that cannot be used; it names the
-    /// field.
+    /// [`Error::Invalid`], with the field's name, for an unusable pose, projection or size;
     /// [`Error::Limit`] for an image side above [`MAX_IMAGE_SIDE`](crate::MAX_IMAGE_SIDE).
     pub fn look_at(pose: &Pose, projection: &Projection, size: ImageSize) -> Result<Self> {
         let clip_from_camera = projection.clip_from_camera(size)?;

@@ -43,8 +43,7 @@ pub enum DepthKind {
 /// For a float32 image they are rounded to float32 before they are compared.
 /// NaN and infinity become far as well.
 /// For the kinds `Z` and `Distance` so do zero and negative numbers, with one exception.
-/// An orthographic camera whose near plane lies behind the eye (`near < 0`) sees depth of either
-/// sign.
+/// An orthographic camera with a near plane behind the eye (`near < 0`) sees depth of either sign.
 ///
 /// # Errors
 /// [`Error::Invalid`] for
@@ -92,8 +91,7 @@ pub fn ndc_from_kind_within(
     Ok((ndc, if is_ndc { tolerance } else { DepthTolerance::NONE }))
 }
 
-/// [`ndc_from_kind`] with numbers of the kinds `Z` and `Distance` taken at the far end of
-/// `tolerance`.
+/// [`ndc_from_kind`] with kinds `Z` and `Distance` taken at the far end of `tolerance`.
 ///
 /// NDC depth ignores the tolerance.
 fn converted(
@@ -422,8 +420,7 @@ fn from_eye(rows: &Mat4) -> Result<Rays> {
 
 /// Whether the near plane of an orthographic camera lies behind its eye.
 ///
-/// View depth 0 then is farther than the near plane, by more than the roundings of the rows
-/// explain.
+/// View depth 0 then is farther than the near plane, by more than the rows' roundings.
 fn starts_behind_the_eye(rows: &Mat4, origin: Vec3, reversed: bool) -> bool {
     let (z, w) = (rows[2], rows[3][3]);
     let at_eye = z[3] / w;
@@ -472,8 +469,7 @@ fn parallel(camera: &Camera, rows: &Mat4) -> Result<Rays> {
     // Along the view depth grows (standard) or falls (reversed).
     let slope = if camera.convention().is_reversed() { -length(2) } else { length(2) } / w.abs();
     // A bound of the distance between any point of the image and the ray through the origin.
-    // There |x| <= |w|, so the linear part of x is at most |w| plus its constant's size, and
-    // likewise y.
+    // There |x| <= |w|, so x without its constant is at most |w| + |constant|; likewise y.
     // The axes may be skewed, which divides by the sine of their angle.
     let reach: f64 = (0..2).map(|r| (w.abs() + rows[r][3].abs()) / length(r)).sum::<f64>()
         / dot(across, across).sqrt();
@@ -702,8 +698,7 @@ mod tests {
         Camera::look_at(&POSE, &projection, ImageSize::new(2, 2)).unwrap()
     }
 
-    /// A near plane behind the eye: 8 units from -4 to 4, so depth is (z + 4) / 8 up to float32's
-    /// rounding.
+    /// A near plane behind the eye: 8 units from -4 to 4, so depth is (z + 4) / 8, rounded.
     #[test]
     fn depth_of_either_sign_behind_the_eye() {
         for (convention, far) in
@@ -786,8 +781,7 @@ mod tests {
         }
     }
 
-    /// Invalid values are numbers of the image, before the scale, as the image stores them; for
-    /// every kind.
+    /// For every kind, invalid values are numbers as the image stores them, before the scale.
     #[test]
     fn invalid_values_are_far() {
         for (convention, far) in
@@ -815,8 +809,7 @@ mod tests {
         }
     }
 
-    /// A number in front of the near plane is far, even where float64 cannot separate it from the
-    /// plane.
+    /// A number in front of the near plane is far, however little it is in front.
     /// So is a number on the plane where float64 cannot tell.
     #[test]
     fn at_the_near_plane_nothing_is_nearer() {

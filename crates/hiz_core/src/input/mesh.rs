@@ -26,8 +26,7 @@ pub struct MeshData<'a> {
     pub vertices: Floats<'a>,
     /// T triangles, 3 indices below V each.
     pub triangles: &'a [u32],
-    /// K affine matrices `world_from_mesh`, 16 row-major scalars each, with the last row (0, 0, 0,
-    /// 1).
+    /// K affine matrices `world_from_mesh`, 16 row-major scalars each, last row (0, 0, 0, 1).
     ///
     /// `None`: one copy of the mesh, whose vertices are in world coordinates.
     pub transforms: Option<Floats<'a>>,
@@ -36,8 +35,7 @@ pub struct MeshData<'a> {
 impl FaceCull {
     /// The faces that do not occlude, as they appear in the image of `camera`.
     ///
-    /// A camera that mirrors the world, such as a left-handed one, reverses every triangle's
-    /// winding.
+    /// A camera that mirrors the world, such as a left-handed one, reverses all windings.
     pub(crate) fn as_seen_by(self, camera: &Camera) -> Self {
         let rows = camera.rows();
         let lin = |r: usize| [rows[r][0], rows[r][1], rows[r][2]];

@@ -16,8 +16,7 @@ pub struct Pose {
     pub target: Vec3,
     /// A direction that appears upwards, of any length but 0 and not parallel to `target - eye`.
     ///
-    /// To look straight down, pass the direction that should be at the top of the image, such as
-    /// the heading.
+    /// To look straight down, pass what should be at the top of the image, such as the heading.
     pub up: Vec3,
 }
 
@@ -25,8 +24,7 @@ impl Pose {
     /// The camera's axes in the world: orthonormal rows right, up and forward.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for numbers that are not finite, and for directions that are zero or
-    /// parallel.
+    /// [`Error::Invalid`] for numbers that are not finite, and for zero or parallel directions.
     pub(super) fn axes(&self) -> Result<Mat3> {
         for (name, v) in [("eye", self.eye), ("target", self.target), ("up", self.up)] {
             if !v.iter().all(|x| x.is_finite()) {
@@ -49,8 +47,7 @@ impl Pose {
         let up = normalized(self.up)
             .ok_or_else(|| Error::invalid("up", "expected a direction, got a zero vector"))?;
         let right = cross(forward, up);
-        // For a smaller sine of the angle between them the image would rotate with the last bits of
-        // the input.
+        // For a smaller sine of their angle the image would rotate with the input's last bits.
         if dot(right, right) < 1e-20 {
             return Err(Error::invalid(
                 "up",
@@ -84,8 +81,7 @@ pub(crate) fn across(up: Vec3) -> &'static str {
 
 /// How camera space becomes clip space.
 ///
-/// In camera space x points right, y up and z **forward**, so view depth is positive in front of
-/// the camera.
+/// In camera space x points right, y up and z **forward**, so view depth is positive in front.
 /// Lengths are in world units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Projection {

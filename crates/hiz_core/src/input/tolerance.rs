@@ -25,8 +25,7 @@ pub struct DepthTolerance {
 impl DepthTolerance {
     /// Nothing is lost: the depth is stored as it was given, or was rounded towards far.
     ///
-    /// This holds for float32 formats, too, since `depth_slack` covers the rounding to float32 by
-    /// default.
+    /// This holds for float32 formats, too, since the default `depth_slack` covers their rounding.
     pub const NONE: Self = Self { relative: 0.0, absolute: 0.0 };
 
     /// Half floats: 2^-10 relative and 2^-24 absolute, one spacing of half floats.
@@ -38,8 +37,7 @@ impl DepthTolerance {
     ///
     /// For NDC depth the default `depth_slack` covers it.
     /// A metric depth is rounded before it is converted.
-    /// Close to the near plane a relative slack of the converted depth would be too little for
-    /// that.
+    /// Close to the near plane a relative slack of the converted depth would be too small.
     pub const SINGLE: Self = Self { relative: 0.5 * EPS, absolute: f32::MIN_POSITIVE as f64 * EPS };
 
     /// The tolerance of a texture format; `None` for formats that no pyramid can be built from.
@@ -53,8 +51,7 @@ impl DepthTolerance {
     /// | `R32Float`, `Rgba32Uint` | 0 | 0: [`DepthTolerance::NONE`] |
     ///
     /// The relative 2^-22 is for the conversion back to float32.
-    /// A driver without 24 bits stores `Depth24Plus` as float32, for which the numbers hold as
-    /// well.
+    /// A driver without 24 bits stores `Depth24Plus` as float32; the numbers hold for that, too.
     pub fn of(format: wgpu::TextureFormat) -> Option<Self> {
         use wgpu::TextureFormat as Format;
         match format {

@@ -10,8 +10,7 @@
 //! Margins then are near 1e-5 of the distance.
 //! Parallel rays have no eye; their reference point is one that is likely to be near the instances.
 //!
-//! A magnitude row holds what each coefficient can contribute to an error, in units of float32's
-//! eps.
+//! A magnitude row holds what each coefficient can contribute to an error, in eps of float32.
 //! The shader multiplies these by the instance's own magnitudes.
 
 use crate::error::{Error, Result};
@@ -39,8 +38,7 @@ pub const ERROR_ULPS: f64 = 24.0;
 pub(crate) struct Row {
     /// Three linear coefficients, then the constant.
     pub(crate) m: [f32; 4],
-    /// Upper bounds of the sizes of the coefficients, raised where a coefficient's error exceeds
-    /// one eps.
+    /// Upper bounds of the coefficients' sizes, raised where a coefficient's error exceeds one eps.
     pub(crate) a: [f32; 4],
 }
 
@@ -70,8 +68,7 @@ impl ViewRows {
     /// Rounds the rows of `camera` to float32.
     ///
     /// `transform_slack` is kappa, in eps of `sum |M| |p|`.
-    /// It allows for another renderer that computed the depth image with float32 matrices of its
-    /// own.
+    /// It allows for a renderer that computed the depth image with its own float32 matrices.
     /// With 0 the depth image is taken to be exact for this camera's float64 numbers.
     ///
     /// # Errors
@@ -88,8 +85,7 @@ impl ViewRows {
         let y = about_eye(1).scaled(-f64::from(size.height) / 2.0);
         let w = about_eye(3);
         // About the eye, A is the part of z that is proportional to w.
-        // About another point, A is the depth of that point, so that Z' and `d - A` are small near
-        // it.
+        // About another point, A is that point's depth, so that Z' and `d - A` are small near it.
         let slope =
             if is_eye { dot(z_lin, w_lin) / dot(w_lin, w_lin) } else { about_eye(2).m[3] / w.m[3] };
         #[expect(
@@ -205,8 +201,7 @@ impl Reference {
         };
         let origin = camera.origin();
         let point: Vec3 = std::array::from_fn(|k| origin[k] + relative.unwrap_or([0.0; 3])[k]);
-        // Beyond 2^60 the shader finds every instance invalid, so the world's origin serves as
-        // well.
+        // Beyond 2^60 every instance is invalid in the shader, so the world's origin will do.
         let point = if point.iter().all(|v| v.abs() < 2.0_f64.powi(60)) { point } else { [0.0; 3] };
         let (hi, lo) = split3(point);
         Self { hi, lo, point: std::array::from_fn(|k| f64::from(hi[k]) + f64::from(lo[k])), is_eye }
@@ -253,14 +248,13 @@ impl Affine {
     /// Moves `row` from `origin` to `eye`.
     ///
     /// The linear part stays exact, and the constant becomes the row's value at the eye.
-    /// That takes one subtraction, three products and three sums; 8 roundings of float64 cover
-    /// them.
+    /// One subtraction, three products and three sums: 8 roundings of float64 cover them.
     fn about(eye: Vec3, row: [f64; 4], origin: Vec3) -> Self {
         let lin = [row[0], row[1], row[2]];
         let from_origin = sub(eye, origin);
         let travelled: f64 = (0..3).map(|k| lin[k].abs() * (eye[k].abs() + origin[k].abs())).sum();
-        // For kappa: |p| <= |d| + |eye|, and the other renderer's constant is the one about the
-        // world's origin.
+        // For kappa: |p| <= |d| + |eye|; the renderer's constant is the one about the world's
+        // origin.
         let world: f64 = (0..3).map(|k| lin[k].abs() * eye[k].abs()).sum::<f64>()
             + (row[3] - dot(lin, origin)).abs();
         Self {
@@ -428,8 +422,8 @@ mod tests {
                     "{view:?}"
                 );
             }
-            // A bare matrix: the world's origin, at view depth 5, where it is in view; the near
-            // plane otherwise.
+            // A bare matrix: the world's origin, at view depth 5, if it is in view, or the near
+            // plane.
             for (near, far, beside, z) in [
                 (1.0, 1024.0, 0.0, 0.0),
                 (1.0, 1024.0, 8.0, 4.0),
@@ -480,7 +474,7 @@ mod tests {
         assert!(slack.z.a.iter().zip(view.z.a).all(|(a, b)| *a > b));
     }
 
-    /// A matrix means the same times any positive number, as long as its products stay in float64's
+    /// A matrix means the same times any positive number while its products stay in float64's
     /// range.
     #[test]
     fn the_scale_of_the_matrix_does_not_matter() {

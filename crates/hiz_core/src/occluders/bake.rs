@@ -1,4 +1,7 @@
-//! The host's side of an upload of meshes: world positions in two halves, one part for each place.
+//! The host's part of an upload of meshes: checked arrays, and vertices moved to world coordinates.
+//!
+//! Each mesh becomes one part per transform.
+//! World positions are kept in float64 for the surface, and as two float32 for the device.
 
 use crate::error::{Error, Result};
 use crate::host::linear::{Vec3, cross, dot};
@@ -6,7 +9,9 @@ use crate::host::memory;
 use crate::host::rounding::split3;
 use crate::input::mesh::MeshData;
 
-/// A vertex: its world position as two halves; `shaders/occluders/occluders.wgsl`, locations 0 and 1.
+/// A world position as two float32, `hi + lo`.
+///
+/// Its twin is the vertex input of `shaders/occluders/occluders.wgsl`, locations 0 and 1.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(super) struct Vertex {
@@ -14,11 +19,13 @@ pub(super) struct Vertex {
     lo: [f32; 3],
 }
 
-/// The halves of a [`Vertex`] at their locations.
+/// The vertex attributes for the two halves of a [`Vertex`].
 pub(super) const VERTEX_ATTRIBUTES: [wgpu::VertexAttribute; 2] =
     wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3];
 
-/// One mesh in one place: a draw, if its bounds meet the frustum.
+/// One copy of one mesh, with its bounds in world coordinates.
+///
+/// It is one draw, which is left out if the bounds do not meet the frustum.
 #[derive(Debug, Clone)]
 pub(super) struct Part {
     pub(super) indices: std::ops::Range<u32>,
@@ -27,13 +34,13 @@ pub(super) struct Part {
     pub(super) max: Vec3,
 }
 
-/// The host's side of the upload.
+/// What is uploaded, and the same triangles in float64.
 #[derive(Default)]
 pub(super) struct Baked {
     pub(super) vertices: Vec<Vertex>,
     pub(super) indices: Vec<u32>,
     pub(super) parts: Vec<Part>,
-    /// The same in float64, indices counted through all parts.
+    /// World positions in float64; `triangles` counts them through all parts.
     pub(super) world: Vec<Vec3>,
     pub(super) triangles: Vec<[u32; 3]>,
 }
@@ -68,7 +75,8 @@ impl Baked {
             return Err(Error::invalid(
                 "triangles",
                 format!(
-                    "expected indices below the {num_vertices} vertices, got {index} in triangle {}",
+                    "expected indices below the {num_vertices} vertices, got {index} in triangle \
+                     {}",
                     i / 3
                 ),
             ));
@@ -104,7 +112,8 @@ impl Baked {
                 return Err(Error::invalid(
                     "transforms",
                     format!(
-                        "expected finite affine matrices with last row (0, 0, 0, 1), got {:?} in matrix {k}",
+                        "expected finite affine matrices with last row (0, 0, 0, 1), got {:?} in \
+                         matrix {k}",
                         &m[12..]
                     ),
                 ));
@@ -123,7 +132,7 @@ impl Baked {
         memory::reserve(&mut self.indices, mesh.triangles.len(), "triangles")?;
         for v in 0..mesh.vertices.len() / 3 {
             let p = world(mesh.vertices.array(v));
-            // float32 must hold it: beyond, the halves would be infinite.
+            // float32 must hold the position, or the halves would be infinite.
             if !p.iter().all(|x| x.abs() < 1e30) {
                 return Err(Error::invalid(
                     "vertices",
@@ -139,7 +148,7 @@ impl Baked {
             self.world.push(p);
         }
         for t in mesh.triangles.chunks_exact(3) {
-            // A mirror turns outside in: the order of the corners keeps it out.
+            // A mirroring transform turns a mesh inside out; reversing the corners undoes that.
             let corners = if mirrored { [t[0], t[2], t[1]] } else { [t[0], t[1], t[2]] };
             self.indices.extend(corners);
             self.triangles.push(corners.map(|v| v + base_vertex.unsigned_abs()));

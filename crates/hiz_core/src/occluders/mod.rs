@@ -1,4 +1,11 @@
-//! Occluders: triangle meshes on the device, drawn as depth.
+//! Occluders: triangle meshes that hide other things.
+//!
+//! They exist twice, made from the same vertices (`bake`):
+//!
+//! - on the device, where `raster` draws them as depth;
+//! - on the host in float64, where `surface` computes conservative depth from them.
+//!
+//! The drawing is recorded into the caller's encoder; nothing here submits or reads back.
 
 mod bake;
 pub(crate) mod raster;
@@ -13,11 +20,13 @@ use crate::occluders::surface::OccluderSurface;
 /// How occluders are drawn.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct OccluderOptions {
-    /// Which triangles do not occlude.
+    /// Which triangles do not occlude; all occlude by default.
     pub cull_mode: FaceCull,
 }
 
 /// Triangle meshes on the device, in world coordinates.
+///
+/// Each mesh is stored once per transform, 24 bytes per vertex and 4 bytes per index.
 #[derive(Debug)]
 pub struct Occluders {
     pub(crate) context: ContextId,
@@ -30,10 +39,7 @@ pub struct Occluders {
 }
 
 impl OccluderSurface {
-    /// The surface of `meshes` without a device.
-    ///
-    /// # Errors
-    /// As [`HizContext::create_occluders`](crate::HizContext::create_occluders).
+    /// The surface of `meshes`, made without a device.
     pub fn from_meshes(meshes: &[MeshData<'_>], options: &OccluderOptions) -> Result<Self> {
         let baked = Baked::all(meshes)?;
         Ok(Self::new(baked.world, baked.triangles, options.cull_mode))
@@ -54,7 +60,7 @@ impl Occluders {
             }
         }
         let buffer = |label, contents: &[u8], usage| {
-            // An empty buffer cannot be bound.
+            // A vertex or index buffer may not be empty.
             let contents = if contents.is_empty() { &[0; 24][..] } else { contents };
             gpu.filled(label, contents, usage)
         };
@@ -77,17 +83,17 @@ impl Occluders {
         })
     }
 
-    /// The triangles on the host, which give conservative depth.
+    /// The triangles on the host, from which conservative depth is computed.
     pub fn surface(&self) -> &OccluderSurface {
         &self.surface
     }
 
-    /// Triangles in all places.
+    /// The number of triangles, counted once per transform of their mesh.
     pub fn num_triangles(&self) -> u64 {
         self.triangles
     }
 
-    /// Meshes times the places that they stand in.
+    /// The number of meshes, counted once per transform; meshes without triangles do not count.
     pub fn num_parts(&self) -> usize {
         self.parts.len()
     }

@@ -14,10 +14,10 @@ use crate::input::view::ClipRows;
 use crate::occluders::Occluders;
 use crate::occluders::bake::{VERTEX_ATTRIBUTES, Vertex};
 
-/// The format of the depth that is drawn.
+/// The format of the texture that occluders are drawn into.
 pub const OCCLUDER_DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// `shaders/occluders/occluders.wgsl`, `OccluderView`.
+/// Twin of `OccluderView` in `shaders/occluders/occluders.wgsl`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct OccluderView {
@@ -26,9 +26,10 @@ struct OccluderView {
     eye_lo: [f32; 4],
 }
 
-/// Whether a box is surely outside one plane of the frustum.
-/// Keeping too much costs time only; dropping a part that is seen would merely lose an occluder, so
+/// Whether a box is outside one plane of the frustum.
+///
 /// float64 without a proof is enough.
+/// A part kept wrongly costs time; a part dropped wrongly is a lost occluder, not a false cull.
 fn outside_frustum(camera: &Camera, min: Vec3, max: Vec3) -> bool {
     let rows = camera.rows();
     let clip: [[f64; 4]; 8] = std::array::from_fn(|corner| {
@@ -47,10 +48,10 @@ fn outside_frustum(camera: &Camera, min: Vec3, max: Vec3) -> bool {
         || all(&|c| c[3] - c[2])
 }
 
-/// What a draw reads.
+/// The binding of a draw.
 const BINDINGS: &[(u32, Binding)] = &[(0, Binding::VertexUniform)];
 
-/// The occluder pass.
+/// The shader module of the occluder pass.
 pub(crate) fn module() -> Source {
     Source::of(&[&[wgsl!("occluders/occluders")]])
 }
@@ -79,7 +80,7 @@ fn pipeline(gpu: &Gpu, reversed: bool, faces: FaceCull) -> Result<wgpu::RenderPi
     })
 }
 
-/// What a texture tells of itself.
+/// Checks what a texture tells: size, format, dimension, mip levels, samples and usage.
 fn check_target(camera: &Camera, target: &wgpu::TextureView) -> Result<()> {
     let texture = target.texture();
     let (want, have) = (camera.size(), (texture.width(), texture.height()));
@@ -87,7 +88,8 @@ fn check_target(camera: &Camera, target: &wgpu::TextureView) -> Result<()> {
         return Err(Error::mismatch(
             "target",
             format!(
-                "expected a {OCCLUDER_DEPTH_FORMAT:?} texture of the camera's size {want}, got {:?} of (height {}, width {})",
+                "expected a {OCCLUDER_DEPTH_FORMAT:?} texture of the camera's size {want}, got \
+                 {:?} of (height {}, width {})",
                 texture.format(),
                 have.1,
                 have.0
@@ -99,7 +101,8 @@ fn check_target(camera: &Camera, target: &wgpu::TextureView) -> Result<()> {
         return Err(Error::invalid(
             "target",
             format!(
-                "expected a 2D texture of one mip level and one sample a pixel, got {:?} with {mips} mip levels, {samples} samples",
+                "expected a 2D texture of one mip level and one sample a pixel, got {:?} with \
+                 {mips} mip levels, {samples} samples",
                 texture.dimension()
             ),
         ));
@@ -113,6 +116,10 @@ fn check_target(camera: &Camera, target: &wgpu::TextureView) -> Result<()> {
     Ok(())
 }
 
+/// Records the pass that clears `target` and draws `occluders` into it.
+///
+/// # Errors
+/// As [`HizContext::record_occluders`](crate::HizContext::record_occluders).
 pub(crate) fn record_occluders(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
@@ -140,7 +147,10 @@ pub(crate) fn record_occluders(
     gpu.can_draw_into(target, depth_ops).map_err(|error| match error {
         Error::Device(why) => Error::mismatch(
             "target",
-            format!("expected a view of one layer of a texture of this device that has not been destroyed, but {why}"),
+            format!(
+                "expected a view of one layer of a texture of this device that has not been \
+                 destroyed, but {why}"
+            ),
         ),
         other => other,
     })?;

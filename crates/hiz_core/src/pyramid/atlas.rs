@@ -30,8 +30,7 @@ const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 ///   [`Rgba32Uint`](wgpu::TextureFormat::Rgba32Uint).
 /// - It has the usage [`COPY_SRC`](wgpu::TextureUsages::COPY_SRC).
 /// - The stored levels fit one storage binding.
-/// - The atlas fits a texture of the device, and the depth image fits a buffer that it is copied
-///   through.
+/// - The atlas fits a texture of the device, and the depth image a buffer to copy it through.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum AtlasUse {
     /// Where a cull has enough instances for the copy to pay.

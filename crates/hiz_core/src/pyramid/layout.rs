@@ -28,8 +28,7 @@ pub(crate) const HEADERS: u32 = 2;
 pub(crate) struct AtlasLayout {
     pub(crate) width: u32,
     pub(crate) height: u32,
-    /// Column and row where each level begins; `shaders/pyramid/pyramid.wgsl` pads them to four
-    /// words.
+    /// Column and row where each level begins, padded as in `shaders/pyramid/pyramid.wgsl`.
     pub(crate) origins: [[u32; 4]; MAX_LEVELS],
 }
 
@@ -86,8 +85,7 @@ pub(crate) struct Step {
     pub(crate) last: u32,
     /// Columns and rows of invocations.
     ///
-    /// Each takes a block of 8x8 texels of the source level, or in a coarse step a texel that is
-    /// written.
+    /// Each reads a block of 8x8 texels of the source level; in a coarse step it writes a texel.
     pub(crate) blocks: [u32; 2],
 }
 
@@ -229,8 +227,7 @@ fn passes(levels: &[Level], stored: StoredLevels) -> Vec<Step> {
         return vec![Step { source, first, last, blocks: [0, 0] }];
     }
     if first > BLOCK_LOG2 {
-        // A texel of this level takes more than one block, so a shader of its own makes the level
-        // alone.
+        // A texel of this level takes several blocks, so a shader of its own makes the level.
         let Level { width, height, .. } = levels[first as usize];
         steps.push(Step { source, first, last: first, blocks: [columns(width), height] });
         (source, first) = (first, first + 1);

@@ -23,8 +23,7 @@ pub(crate) struct Level {
 /// Level 0, the depth image itself, is always there.
 /// Fewer levels are built faster, but culls keep more.
 /// A test reads the next coarser level where the one it wants is not stored.
-/// A rectangle that is too large for the coarsest stored level stays visible, unless a descent is
-/// allowed.
+/// A rectangle too large for the coarsest stored level stays visible, unless a descent is allowed.
 ///
 /// Numbers past the coarsest level of an image mean that level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

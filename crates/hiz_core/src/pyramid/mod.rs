@@ -2,8 +2,7 @@
 //!
 //! Data flows through the room in this order:
 //!
-//! 1. `layout` plans levels, offsets and dispatches, without a device; `levels` says which are
-//!    stored.
+//! 1. `layout` plans levels, offsets and dispatches without a device; `levels` says what is stored.
 //! 2. [`Pyramid`] holds the buffers of the stored levels.
 //! 3. `reduce` records the passes that fill them from a depth image; `built` remembers that image.
 //! 4. `atlas` copies all levels into one texture for large culls.
@@ -306,8 +305,7 @@ impl Pyramid {
         *self.built.lock() = Some(built);
     }
 
-    /// The number of the last reduction that is known to have run, shared with the callback that
-    /// sets it.
+    /// The last reduction that is known to have run, shared with the callback that sets it.
     pub(super) fn reduced(&self) -> Arc<AtomicU32> {
         Arc::clone(&self.reduced)
     }

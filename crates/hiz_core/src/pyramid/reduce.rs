@@ -165,8 +165,7 @@ pub(crate) fn record_reduce(
             format!("expected the depth image's size {size}, got {}", camera.size()),
         ));
     }
-    // A view does not tell which part of its texture it shows, so the texture may have one part
-    // only.
+    // A view does not tell which part of its texture it shows, so only one may exist.
     let parts =
         (texture.mip_level_count(), texture.sample_count(), texture.depth_or_array_layers());
     if parts != (1, 1, 1) || texture.dimension() != wgpu::TextureDimension::D2 {
@@ -229,8 +228,7 @@ pub(crate) fn record_reduce(
 /// The bind group of the reduction, and the view of the depth image that it binds.
 ///
 /// That is the caller's view if it can be bound.
-/// The default view of a texture with a stencil cannot, for example; then it is a view of the whole
-/// depth.
+/// If not, as with the default view of a texture with a stencil, it is a view of the whole depth.
 fn bind_source(
     gpu: &Gpu,
     depth: &wgpu::TextureView,

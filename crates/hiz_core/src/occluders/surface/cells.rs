@@ -1,5 +1,7 @@
-//! The surface as a camera sees it: triangles clipped at the near plane, in pixels, with error
-//! bounds, and which of them are neighbours.
+//! The surface as a camera sees it.
+//!
+//! Triangles are clipped at the near plane and projected to pixels, with error bounds.
+//! What is left of them are cells, which know their neighbours.
 
 use crate::host::linear::{Vec3, sub};
 use crate::host::rounding::ROUNDING;
@@ -9,34 +11,38 @@ use crate::occluders::surface::planted_fault::{Planted, is_planted};
 use crate::occluders::surface::square::{Point, UP};
 use crate::occluders::surface::topology::Topology;
 
-/// Clipped this part of the depth range behind the near plane: the room that rounding needs.
+/// Triangles are clipped this part of the depth range behind the near plane.
+/// Rounding needs that room.
 const NEAR_ROOM: f64 = 1.0 / (1 << 20) as f64;
-/// A point that is less certain than this (in pixels) is of no use.
+/// The largest margin in pixels with which a point is still of use.
 const LARGEST_MARGIN: f64 = 0.25;
-/// No neighbour in `Cells::mates`.
+/// In `Cells::mates`: no neighbour.
 pub(super) const NO_MATE: u32 = u32::MAX;
-/// Set in `Cells::mates` where both lie on the same side of their edge.
+/// In `Cells::mates`: set where both cells lie on the same side of their edge.
 pub(super) const FOLD: u32 = 1 << 31;
 
 /// Triangles in the image.
-/// Half-edge `3 c + k` runs from corner k of cell c to the next.
+///
+/// Half-edge `3 c + k` runs from corner k of cell c to its next corner.
 #[derive(Debug, Default)]
 pub(super) struct Cells {
     pub(super) points: Vec<Point>,
     pub(super) corners: Vec<[u32; 3]>,
-    /// +1 or -1 by the sense of rotation, as float64 sees it.
+    /// +1 or -1 by orientation, as float64 computes it.
     pub(super) signs: Vec<i8>,
-    /// By half-edge: the neighbour's half-edge along the same exact edge, with `FOLD`; or
-    /// `NO_MATE`.
-    /// Mutual.
+    /// By half-edge: the neighbour's half-edge along the same edge, with `FOLD`, or `NO_MATE`.
+    ///
+    /// The relation is mutual.
     pub(super) mates: Vec<u32>,
-    /// The least `far` of the corners; for pruning, no proof rests on it.
+    /// The least `far` of the corners, for pruning; no proof rests on it.
     pub(super) nearest: Vec<f64>,
-    /// Least and greatest x and y, errors included.
+    /// Least and greatest x, least and greatest y, errors included.
     pub(super) bounds: Vec<[f64; 4]>,
 }
 
-/// Clip coordinates x, y, far (z, in reversed Z its negative), w and a bound of the error of each.
+/// Clip coordinates x, y, far and w, with a bound of the error of each.
+///
+/// `far` is clip z, or its negative in reversed Z.
 #[derive(Debug, Clone, Copy)]
 struct Clip {
     at: [f64; 4],
@@ -48,7 +54,7 @@ struct Lens {
     rows: [[f64; 4]; 4],
     origin: Vec3,
     half: [f64; 2],
-    /// Values of `far`: at the near plane, and where the surface is clipped.
+    /// Values of `far`: at the near plane, and where triangles are clipped.
     near: f64,
     clipped: f64,
     fault: Planted,
@@ -74,8 +80,10 @@ impl Lens {
         }
     }
 
-    /// `d` is one rounding off, each product two, the sums three more: 6 roundings of every term, 8
-    /// with room.
+    /// The clip coordinates of a world position.
+    ///
+    /// `d` has one rounding, each product two, and the sums add three: 6 roundings of every term.
+    /// The bound takes 8.
     fn clip(&self, p: Vec3) -> Clip {
         let d = sub(p, self.origin);
         let mut clip = Clip { at: [0.0; 4], error: [0.0; 4] };
@@ -88,26 +96,26 @@ impl Lens {
         clip
     }
 
-    /// How far behind the clipping plane, times w.
+    /// How far a point is behind the clipping plane, times w.
     fn depth_in(&self, c: &Clip) -> f64 {
         c.at[2] - self.clipped * c.at[3]
     }
 
-    /// The point in the image, if it is certain enough and not in front of the near plane.
+    /// The point in the image; `None` if it is too uncertain or may be in front of the near plane.
     fn point(&self, c: &Clip) -> Option<Point> {
         let ([x, y, far, w], [ex, ey, ef, ew]) = (c.at, c.error);
         let least_w = w - ew;
-        // Written so that NaN fails, too.
+        // The condition is negated so that NaN fails it, too.
         if !(least_w > w / 2.0 && w > 0.0) {
             return None;
         }
         let divided = |v: f64, e: f64| {
             let q = v / w;
-            // v'/w' - q = ((v' - v) - q (w' - w)) / w', and the division's own rounding.
+            // v'/w' - q = ((v' - v) - q (w' - w)) / w', plus the rounding of the division.
             (q, (e + q.abs() * ew) / least_w + 2.0 * ROUNDING * q.abs())
         };
         let ((sx, ex), (sy, ey), (far, ef)) = (divided(x, ex), divided(y, ey), divided(far, ef));
-        // A sum and a product more.
+        // One more sum and one more product.
         let pixels = |half: f64, s: f64, e: f64| half * (e + 4.0 * ROUNDING * (s.abs() + 1.0));
         let margin = pixels(self.half[0], sx, ex).max(pixels(self.half[1], sy, ey)) * UP;
         let far_error = ef * UP;
@@ -129,8 +137,10 @@ impl Lens {
     }
 }
 
-/// The exact point `a + t (b - a)` for the float64 number t, which the two triangles of an edge
-/// share: it need not lie on the clipping plane, for any part of a triangle is an occluder.
+/// The exact point `a + t (b - a)` for the float64 number t.
+///
+/// Both triangles of an edge use the same t, so they share the point.
+/// It need not lie on the clipping plane, since any part of a triangle is an occluder.
 fn between(a: &Clip, b: &Clip, t: f64) -> Clip {
     Clip {
         at: std::array::from_fn(|i| a.at[i] + t * (b.at[i] - a.at[i])),
@@ -141,7 +151,9 @@ fn between(a: &Clip, b: &Clip, t: f64) -> Clip {
 }
 
 impl Cells {
-    /// `culled`: the faces that do not occlude, as seen by this camera.
+    /// The cells of all triangles that may meet the image.
+    ///
+    /// `culled` are the faces that do not occlude, as seen by this camera.
     pub(super) fn new(
         topology: &Topology,
         camera: &Camera,
@@ -167,11 +179,11 @@ struct Builder<'a> {
     lens: Lens,
     clips: Vec<Clip>,
     inside: Vec<bool>,
-    /// Points of vertices, then of cut edges.
+    /// Points of vertices, then those of cut edges.
     points: Vec<Option<Point>>,
-    /// By edge: its point on the clipping plane, or none yet.
+    /// By edge: the index of its point on the clipping plane, or `NO_MATE` if there is none yet.
     cuts: Vec<u32>,
-    /// By half-edge of the topology: that of its cell.
+    /// By half-edge of the topology: the half-edge of the cell, or `NO_MATE`.
     placed: Vec<u32>,
     cells: Cells,
 }
@@ -197,8 +209,9 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Where an edge is cut; computed in the edge's own direction, so that both its triangles
-    /// agree.
+    /// The index of the point where an edge is cut.
+    ///
+    /// It is computed in the edge's own direction, so that both triangles of the edge agree.
     fn cut(&mut self, half: u32) -> u32 {
         let edge = self.topology.edges[half as usize] as usize;
         if self.cuts[edge] == NO_MATE {
@@ -217,12 +230,13 @@ impl<'a> Builder<'a> {
         self.cuts[edge]
     }
 
-    /// Clips a triangle (Sutherland and Hodgman 1974, one plane) and adds what is left as one or
-    /// two cells.
+    /// Clips a triangle at one plane (Sutherland and Hodgman 1974), and adds the rest as cells.
+    ///
+    /// The rest is one or two cells, or none.
     fn add(&mut self, t: u32, image: [f64; 2], culled: FaceCull) {
         let corners = self.topology.triangles[t as usize];
         let inside = corners.map(|v| self.inside[v as usize]);
-        // Corners of the polygon, and the half-edge that each one's next side belongs to.
+        // Corners of the polygon, each with the half-edge that its next side belongs to.
         let (mut polygon, mut count) = ([(0, NO_MATE); 4], 0);
         let mut push = |corner| {
             polygon[count] = corner;
@@ -275,7 +289,7 @@ impl<'a> Builder<'a> {
                 bounds[3].max(p.y + m),
             ];
         }
-        // Neither it nor its edges can meet a pixel.
+        // Neither the cell nor its edges can meet a pixel.
         if bounds[1] < 0.0 || bounds[0] > image[0] || bounds[3] < 0.0 || bounds[2] > image[1] {
             return None;
         }
@@ -320,9 +334,10 @@ impl<'a> Builder<'a> {
         self.cells.mates[b as usize] = a | flag;
     }
 
-    /// Pairs the half-edges of every edge: first those that lie on different sides of it, then what
-    /// is left by twos.
-    /// Any pairs would be right; where more than two triangles meet these are as good as others.
+    /// Pairs the half-edges of every edge.
+    ///
+    /// Half-edges on different sides are paired first, then the rest by twos.
+    /// Any pairing is valid; where more than two triangles meet, this one is as good as any.
     fn finish(mut self) -> Cells {
         let (mut forward, mut backward) = (Vec::new(), Vec::new());
         for edge in 0..self.topology.num_edges() {
@@ -334,8 +349,8 @@ impl<'a> Builder<'a> {
                     continue;
                 }
                 let [a, b] = self.topology.ends(*half);
-                // Turned the same way round as seen, two triangles on different sides run along
-                // their edge in opposite directions.
+                // In the image all triangles are oriented the same way round.
+                // Two triangles on different sides then run along it in opposite directions.
                 if (a < b) == (self.sign(placed) > 0) {
                     forward.push(placed);
                 } else {
@@ -352,7 +367,7 @@ impl<'a> Builder<'a> {
                 self.marry(pair[0], pair[1], true);
             }
         }
-        // Cells use sound points alone; the others stay as a place that nobody looks at.
+        // Cells use valid points alone, so the others are placeholders that nothing reads.
         let nowhere = Point {
             x: f64::NAN,
             y: f64::NAN,

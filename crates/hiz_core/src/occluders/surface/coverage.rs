@@ -1,43 +1,43 @@
-//! How far every ray through a square of the image is blocked: sheets of neighbouring cells that
-//! leave no gap in the square.
-//! The proof stands in the module above.
+//! How far every ray through a square of the image can get.
+//!
+//! A square is covered by sheets of neighbouring cells that leave no gap in it.
+//! The proof is in the documentation of the module above.
 
 use crate::input::image::ImageSize;
 use crate::occluders::surface::cells::{Cells, FOLD, NO_MATE};
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
 use crate::occluders::surface::square::{Side, Square, farthest, side};
 
-/// Pixels a side of a block that is looked at as a whole first.
+/// The side in pixels of the blocks that are tested as a whole first.
 const BLOCK: u32 = 8;
 
 /// A cell that touches the square, as a member of a sheet.
 #[derive(Debug, Clone, Copy)]
 struct Member {
     cell: u32,
-    /// In the list of members; itself for a sheet's head.
-    /// (Union-find.)
+    /// Index of the parent among the members, for union-find; a head is its own parent.
     parent: u32,
     sides: [Side; 3],
     sums: Sums,
 }
 
-/// What decides about a sheet; of one member, or added up.
+/// What decides about a sheet, for one member or summed over all of them.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     /// How often the borders that miss the square wind about it.
     winding: i32,
-    /// Whether a border may meet the square: cells may be missing there.
+    /// Whether a border may meet the square, where cells may be missing.
     open: bool,
-    /// Whether a fold may meet it.
+    /// Whether a fold may meet the square.
     folded: bool,
-    /// The farthest that the members reach in the square.
+    /// The farthest depth that the members reach in the square.
     far: f64,
 }
 
-/// The state of one image's search.
+/// The state of the search in one image.
 pub(super) struct Coverage<'a> {
     cells: &'a Cells,
-    /// By cell: its place in the list of members, if `stamps` has the current number.
+    /// By cell: its index in the list of members, valid where `stamps` has the current stamp.
     places: Vec<u32>,
     stamps: Vec<u64>,
     stamp: u64,
@@ -50,13 +50,15 @@ impl<'a> Coverage<'a> {
         Self { cells, places: vec![0; count], stamps: vec![0; count], stamp: 0, fault }
     }
 
-    /// For every pixel of the image, row 0 on top, the value of `far` that every ray through its
-    /// closed square is blocked at or before; `beyond` where that cannot be shown.
-    /// `refinement`: how often a pixel is quartered where it cannot be shown for the whole.
+    /// For every pixel, rows from top to bottom: every ray through its closed square is blocked at
+    /// this value of `far` or before.
+    ///
+    /// `beyond` where that cannot be shown.
+    /// `refinement` is how often a pixel is quartered where it cannot be shown for the whole pixel.
     pub(super) fn image(&mut self, size: ImageSize, beyond: f64, refinement: u32) -> Vec<f64> {
         let mut best = vec![beyond; size.pixels() as usize];
         let touched = self.scatter(size, &mut best);
-        // Cells by pixel: count, sum up, fill.
+        // The lists of cells by pixel are made in three steps: count, sum up, fill.
         let still = |best: &[f64], pixel: u32, cell: u32| {
             self.cells.nearest[cell as usize] < best[pixel as usize]
         };
@@ -86,10 +88,11 @@ impl<'a> Coverage<'a> {
         best
     }
 
-    /// Lowers `best` where a single cell covers a pixel; returns the other cells that touch one, as
-    /// (pixel, cell).
+    /// Lowers `best` where a single cell covers a pixel.
+    ///
+    /// Returns the other cells that touch a pixel, as (pixel, cell).
     fn scatter(&self, size: ImageSize, best: &mut [f64]) -> Vec<(u32, u32)> {
-        // The nearest first: they leave little to do for the others.
+        // The nearest cells come first, since they leave little to do for the others.
         let nearest = &self.cells.nearest;
         let mut order: Vec<u32> = (0..nearest.len() as u32).collect();
         order.sort_unstable_by(|a, b| nearest[*a as usize].total_cmp(&nearest[*b as usize]));
@@ -130,7 +133,7 @@ impl<'a> Coverage<'a> {
         touched
     }
 
-    /// The columns (axis 0) or rows (2) of the image that a cell's bounds meet.
+    /// The columns (axis 0) or rows (axis 2) of the image that the bounds of a cell meet.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -138,7 +141,7 @@ impl<'a> Coverage<'a> {
     )]
     fn reach(&self, cell: u32, axis: usize, side: u32) -> std::ops::Range<u32> {
         let bounds = self.cells.bounds[cell as usize];
-        // Closed pixels: a bound on a border reaches the pixel before it, too.
+        // Pixels are closed: a bound on a border reaches the pixel before it, too.
         let first = (bounds[axis].ceil() - 1.0).clamp(0.0, f64::from(side)) as u32;
         let end = (bounds[axis + 1].floor() + 1.0).clamp(0.0, f64::from(side)) as u32;
         first..end.max(first)
@@ -162,8 +165,9 @@ impl<'a> Coverage<'a> {
         farthest(self.cells.corners_of(cell), &Square { half, ..square }, self.fault)
     }
 
-    /// At most `bound`, which is known to hold already: the depth that every ray through `square`
-    /// is blocked at or before.
+    /// The value of `far` at or before which every ray through `square` is blocked.
+    ///
+    /// It is at most `bound`, which the caller knows to hold.
     fn blocked(&mut self, candidates: &[u32], square: Square, bound: f64, refinement: u32) -> f64 {
         let mut best = bound;
         let mut members: Vec<Member> = Vec::with_capacity(candidates.len());
@@ -195,8 +199,7 @@ impl<'a> Coverage<'a> {
             for (a, b) in folds {
                 unite(&mut members, a, b);
             }
-            // Across folds the senses of rotation disagree, and only whether the winding is odd is
-            // constant.
+            // Across folds orientations disagree, so only the winding's parity is constant.
             best =
                 best.min(nearest_sheet(&members, &mut covering, |s| !s.open && s.winding % 2 != 0));
         }
@@ -221,8 +224,9 @@ impl<'a> Coverage<'a> {
         most
     }
 
-    /// Unites members that share an edge which may meet the square and lie on different sides of
-    /// it; notes borders and folds.
+    /// Unites members on different sides of a shared edge, if the edge may meet the square.
+    ///
+    /// Notes borders and folds in their sums.
     fn link(&mut self, members: &mut [Member], square: Square) {
         self.stamp += 1;
         for (i, member) in members.iter().enumerate() {
@@ -249,8 +253,7 @@ impl<'a> Coverage<'a> {
         }
     }
 
-    /// The member across a half-edge and whether it lies on the same side, if it is in the current
-    /// list.
+    /// The member across a half-edge, if it is listed, and whether it lies on the same side.
     fn mate(&self, half: u32) -> Option<(u32, bool)> {
         let mate = self.cells.mates[half as usize];
         let other = ((mate & !FOLD) / 3) as usize;
@@ -274,13 +277,13 @@ impl<'a> Coverage<'a> {
     }
 }
 
-/// How a cell lies to a square.
+/// Where a cell lies relative to a square.
 enum Relation {
-    /// It certainly misses it.
+    /// The cell certainly misses the square.
     Apart,
-    /// It certainly covers all of it.
+    /// The cell certainly covers all of the square.
     Covers,
-    /// Anything else.
+    /// Neither is certain.
     Touches,
 }
 
@@ -297,12 +300,13 @@ fn head(members: &[Member], mut i: u32) -> u32 {
 
 fn unite(members: &mut [Member], a: u32, b: u32) {
     let (a, b) = (head(members, a), head(members, b));
-    // The lower index becomes the head: lists are short, so no ranks.
+    // The lower index becomes the head; lists are too short to need ranks.
     members[a.max(b) as usize].parent = a.min(b);
 }
 
-/// The least depth among the sheets that cover the square, infinity without one; marks their
-/// members.
+/// The least depth among the sheets that cover the square; infinity without one.
+///
+/// Marks the members of those sheets in `covering`.
 fn nearest_sheet(members: &[Member], covering: &mut [bool], covers: impl Fn(&Sums) -> bool) -> f64 {
     let mut total = vec![Sums { far: f64::NEG_INFINITY, ..Sums::default() }; members.len()];
     let heads: Vec<usize> = (0..members.len() as u32).map(|i| head(members, i) as usize).collect();

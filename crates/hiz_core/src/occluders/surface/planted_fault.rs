@@ -1,5 +1,6 @@
-//! Faults that tests plant into conservative depth: nothing of them is there without the feature
-//! `testing`.
+//! Faults that tests plant into conservative depth.
+//!
+//! Without the feature `testing` nothing of them is compiled.
 
 /// The fault that is planted, if any.
 #[derive(Debug, Clone, Copy, Default)]
@@ -13,7 +14,7 @@ macro_rules! is_planted {
     };
 }
 
-/// None is planted in a product.
+/// False: without the feature no fault can be planted.
 #[cfg(not(feature = "testing"))]
 macro_rules! is_planted {
     ($planted:expr, $fault:ident) => {{
@@ -23,33 +24,35 @@ macro_rules! is_planted {
 }
 pub(super) use is_planted;
 
-/// A way to make [`OccluderSurface::conservative_depth`](crate::OccluderSurface::conservative_depth) wrong.
-/// A suite is trusted once a planted fault turns it red.
+/// A way to make conservative depth wrong.
+///
+/// See [`conservative_depth`](crate::OccluderSurface::conservative_depth).
+/// A test suite is trusted once a planted fault makes it fail.
 #[cfg(feature = "testing")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PlantedFault {
-    /// Borders within a pixel do not spoil a sheet.
+    /// A border that meets a pixel does not spoil its sheet.
     ContoursIgnored,
     /// A triangle's depth at the pixel's centre counts for the whole pixel.
     DepthAtCentre,
     /// Projected vertices count as exact.
     NoWidening,
-    /// Triangles on the same side of their edge count as neighbours on different ones.
+    /// Triangles on the same side of their edge count as if they were on different sides.
     FoldsIgnored,
-    /// Depths become the nearest float32.
+    /// Depths are rounded to the nearest float32.
     RoundedToNearest,
-    /// What lies a little before the near plane counts, too.
+    /// Triangles slightly in front of the near plane count, too.
     BeforeNear,
-    /// A point is behind the near plane if float64 says so.
+    /// A point counts as behind the near plane if float64 says so, without a proof.
     NearPointsUnproved,
     /// Projected depths count as exact.
     DepthsExact,
-    /// A triangle's corners have no error of their depth; its plane has.
+    /// The depths of a triangle's corners count as exact, but not those of its plane.
     CornerDepthsExact,
     /// Points where edges are cut at the near plane count as exact.
     CutPointsExact,
-    /// The side along the near plane counts as the edge that it was cut from.
+    /// The side along the near plane counts as the edge that was cut.
     CutSidesJoined,
-    /// A triangle faces as float64 says.
+    /// A triangle faces the camera if float64 says so, without a proof.
     FacingUnproved,
 }

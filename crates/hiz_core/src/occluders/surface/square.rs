@@ -1,31 +1,34 @@
-//! The two questions about a square of the image that everything rests on: does an edge surely miss
-//! it, and how far does a triangle reach within it.
-//! Both allow for the error of the points and for every rounding here.
+//! The two questions about a square of the image on which everything else rests.
+//!
+//! - Does an edge certainly miss the square?
+//! - How far does a triangle reach within the square?
+//!
+//! Both answers allow for the errors of the points and for every rounding here.
 
 use crate::host::rounding::ROUNDING;
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
 
-/// Covers a handful of relative roundings in the bounds themselves.
+/// A factor that covers the few relative roundings in the bounds themselves.
 pub(super) const UP: f64 = 1.0 + 64.0 * ROUNDING;
 
 /// A vertex in the image.
-/// The exact one lies within `margin` of `(x, y)` in both coordinates and within `far_error` of
-/// `far`.
+///
+/// The exact one is within `margin` of `(x, y)` in both coordinates, and `far_error` of `far`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Point {
-    /// Pixels from the left.
+    /// Pixels from the left border.
     pub(super) x: f64,
-    /// Pixels from the top.
+    /// Pixels from the top border.
     pub(super) y: f64,
-    /// Depth, so signed that more is farther: NDC depth, in reversed Z its negative.
+    /// Depth with more for farther: NDC depth, or its negative in reversed Z.
     pub(super) far: f64,
-    /// Pixels.
+    /// Error bound of `x` and of `y`, in pixels.
     pub(super) margin: f64,
-    /// Of `far`.
+    /// Error bound of `far`.
     pub(super) far_error: f64,
 }
 
-/// The closed square of half side `half` about `(x, y)`; all three are exact.
+/// The closed square with half side `half` about `(x, y)`, in pixels; all three are exact.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Square {
     pub(super) x: f64,
@@ -34,7 +37,7 @@ pub(super) struct Square {
 }
 
 impl Square {
-    /// The four squares of half the side, which cover this one.
+    /// The four squares of half the side that cover this one.
     pub(super) fn quarters(self) -> [Square; 4] {
         let half = self.half / 2.0;
         let at = |sx: f64, sy: f64| Square { x: self.x + sx * half, y: self.y + sy * half, half };
@@ -42,37 +45,39 @@ impl Square {
     }
 }
 
-/// How an edge from a to b lies to a square.
+/// Where an edge from a to b lies relative to a square.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Side {
-    /// Whether the exact edge may meet the square.
-    /// False is certain.
+    /// Whether the exact edge may meet the square; false is certain.
     pub(super) meets: bool,
-    /// +1 or -1 if the edge crosses the ray from the square's centre to the right, downwards or
-    /// upwards; 0 if not.
-    /// Certain where `meets` is false, and exactly the opposite for the edge from b to a.
+    /// Whether the edge crosses the ray from the square's centre to the right.
+    ///
+    /// +1 if it crosses downwards, -1 if it crosses upwards, 0 if it does not cross.
+    /// This is certain where `meets` is false.
+    /// The edge from b to a has exactly the opposite value.
     pub(super) crossing: i32,
 }
 
-/// The separating axes of a segment and a square are x, y and the segment's normal (Akenine-Moller
-/// and Aila, "Conservative and tiled rasterization using a modified triangle set-up", 2005, for the
-/// half-plane form).
-/// An exact edge lies within the larger of its ends' margins of the one between the points, so the
-/// square is grown by that.
+/// Tests an edge against a square with three separating axes: x, y and the edge's normal.
+///
+/// For the normal this is the test of Akenine-Moller and Aila, "Conservative and tiled
+/// rasterization using a modified triangle set-up", 2005.
+/// The exact edge lies within the larger margin of its ends from the computed one.
+/// The square is therefore grown by that margin.
 pub(super) fn side(a: &Point, b: &Point, square: &Square) -> Side {
     let half = (square.half + a.margin.max(b.margin)) * UP;
-    // Each is one rounding off, relative to itself: the square's centre is exact.
+    // Each difference has one relative rounding, since the square's centre is exact.
     let (ax, ay, bx, by) = (a.x - square.x, a.y - square.y, b.x - square.x, b.y - square.y);
     let (down, up) = (ax * by, ay * bx);
     let cross = down - up;
-    // Two inputs and a product each, then the difference: 4 roundings of either product.
+    // Two differences and one product each, then the difference: 4 roundings of either product.
     let error = 8.0 * ROUNDING * (down.abs() + up.abs());
     let beside = |u: f64, v: f64| u.min(v) > half || u.max(v) < -half;
     let left_or_right = beside(ax, bx);
     let beyond = cross.abs() > half * ((b.x - a.x).abs() + (b.y - a.y).abs()) * UP + error;
     let meets = !(left_or_right || beside(ay, by) || beyond);
-    // Where the edge passes the height of the centre, its side is that of both ends or, if they
-    // disagree, of the cross product.
+    // Where the edge passes the height of the centre, its side is the one that both ends are on.
+    // If the ends disagree, the cross product tells the side.
     let crossing = match (ay > 0.0, by > 0.0) {
         (false, true) if (left_or_right && ax > 0.0) || (!left_or_right && cross > 0.0) => 1,
         (true, false) if (left_or_right && ax > 0.0) || (!left_or_right && cross < 0.0) => -1,
@@ -81,14 +86,13 @@ pub(super) fn side(a: &Point, b: &Point, square: &Square) -> Side {
     Side { meets, crossing }
 }
 
-/// A bound of the exact triangle's depth over the square: no point of it in there is farther.
+/// A bound of the exact triangle's depth over the square: none of its points there is farther.
 ///
-/// Points of the exact triangle and of the one between the points correspond by their barycentric
-/// coordinates.
-/// Corresponding points are at most the largest margin apart, and their depths the largest depth
-/// error; so it is enough to bound the plane through the points over the square grown by that
-/// margin.
-/// A triangle too thin for its plane is bounded by its corners.
+/// Points of the exact and of the computed triangle correspond by barycentric coordinates.
+/// Corresponding points are at most the largest margin apart.
+/// Their depths differ by at most the largest depth error.
+/// It is therefore enough to bound the computed plane over the square grown by that margin.
+/// A triangle that is too thin for its plane is bounded by its corners.
 pub(super) fn farthest(corners: [&Point; 3], square: &Square, fault: Planted) -> f64 {
     let [a, b, c] = corners;
     let corner_error =
@@ -104,7 +108,7 @@ pub(super) fn farthest(corners: [&Point; 3], square: &Square, fault: Planted) ->
     }
     let (qx, qy) = (square.x - a.x, square.y - a.y);
     let (fb, fc) = (b.far - a.far, c.far - a.far);
-    // The plane is a.far + value / area, its value linear in the place.
+    // The plane is a.far + value / area, where `value` is linear in the position.
     let value = fb * (qx * vy - qy * vx) + fc * (ux * qy - uy * qx);
     let value_error = 16.0
         * ROUNDING
@@ -114,7 +118,7 @@ pub(super) fn farthest(corners: [&Point; 3], square: &Square, fault: Planted) ->
     let spread_error =
         8.0 * ROUNDING * ((fb * vy).abs() + (fc * uy).abs() + (fc * ux).abs() + (fb * vx).abs());
     let most = value * area.signum() + value_error + half * (spread + spread_error) * UP;
-    // The area is certain to 1 part in 1024, so its error counts at most twice.
+    // The area's relative error is below 1/1024, so it counts at most twice.
     let rise = most / area.abs();
     let rise = rise + rise.abs() * (2.0 * area_error / area.abs() + 4.0 * ROUNDING);
     let far_error = a.far_error.max(b.far_error).max(c.far_error);
@@ -162,8 +166,8 @@ mod tests {
 
     #[test]
     fn planes_are_bounded_by_their_far_corner_of_the_square() {
-        // far = x / 8 + y / 16 over a large triangle: over the unit square about (2.5, 1.5) that is
-        // at most 3/8 + 2/16.
+        // far = x / 8 + y / 16 over a large triangle.
+        // Over the unit square about (2.5, 1.5) that is at most 3/8 + 2/16.
         let corners = [point(0.0, 0.0, 0.0), point(16.0, 0.0, 2.0), point(0.0, 16.0, 1.0)];
         let bound = farthest(
             [&corners[0], &corners[2], &corners[1]],
@@ -171,7 +175,7 @@ mod tests {
             Planted::default(),
         );
         assert!((0.5..0.5 + 1e-12).contains(&bound), "{bound}");
-        // Past the triangle's own reach its corners decide.
+        // Where the plane goes farther than the triangle, its corners decide.
         assert!((2.0..2.0 + 1e-12).contains(&farthest(
             [&corners[0], &corners[1], &corners[2]],
             &Square { x: 40.0, y: 1.0, half: 0.5 },

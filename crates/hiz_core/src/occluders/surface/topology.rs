@@ -3,29 +3,34 @@
 use crate::error::{Error, Result};
 use crate::host::linear::Vec3;
 
-/// The half-edges of all triangles have to fit 31 bits, twice: clipping may make two cells of a
-/// triangle.
+/// The half-edges of all cells have to fit 31 bits.
+/// Clipping may make two cells of a triangle, so there may be six half-edges per triangle.
 const MAX_TRIANGLES: usize = (1 << 31) / 6 - 1;
 
-/// Triangles with vertices welded by equal position.
-/// Half-edge `3 t + k` runs from corner k of triangle t to the next.
+/// Triangles whose vertices are welded where their positions are equal.
+///
+/// Half-edge `3 t + k` runs from corner k of triangle t to its next corner.
 #[derive(Debug)]
 pub(super) struct Topology {
-    /// World positions, no two equal.
+    /// World positions, no two of them equal.
     pub(super) positions: Vec<Vec3>,
-    /// Three different vertices each.
+    /// Three different vertices per triangle.
     pub(super) triangles: Vec<[u32; 3]>,
-    /// The undirected edge that a half-edge runs along.
+    /// By half-edge: the undirected edge that it runs along.
     pub(super) edges: Vec<u32>,
-    /// Where an edge's half-edges begin in `incident`; one more than there are edges.
+    /// By edge: where its half-edges begin in `incident`; one more entry marks the end.
     pub(super) first: Vec<u32>,
-    /// Half-edges, edge by edge.
+    /// Half-edges, sorted by edge.
     pub(super) incident: Vec<u32>,
 }
 
 impl Topology {
-    /// Welds positions that are equal as numbers, across meshes too, and drops triangles that have
-    /// two equal corners: they cover nothing.
+    /// Welds positions that are equal as numbers, across meshes too.
+    ///
+    /// Triangles with two equal corners are dropped, since they cover nothing.
+    ///
+    /// # Errors
+    /// [`Error::Limit`] for more than [`MAX_TRIANGLES`] triangles.
     pub(super) fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self> {
         if triangles.len() > MAX_TRIANGLES {
             return Err(Error::limit(
@@ -69,7 +74,7 @@ impl Topology {
         self.first.len() - 1
     }
 
-    /// The half-edges along an edge; never empty.
+    /// The half-edges along an edge; at least one.
     pub(super) fn around(&self, edge: usize) -> &[u32] {
         &self.incident[self.first[edge] as usize..self.first[edge + 1] as usize]
     }
@@ -94,9 +99,9 @@ fn ends(triangles: &[[u32; 3]], half: u32) -> [u32; 2] {
     [triangles[t][k], triangles[t][(k + 1) % 3]]
 }
 
-/// The different positions, and where each one went.
+/// The distinct positions, and the index among them of each given one.
 fn weld(positions: &[Vec3]) -> (Vec<Vec3>, Vec<u32>) {
-    // -0 and 0 are the same place.
+    // -0 and 0 are the same position.
     let plain = |p: Vec3| p.map(|x| x + 0.0);
     let key = |p: Vec3| plain(p).map(f64::to_bits);
     let mut order: Vec<u32> = (0..positions.len() as u32).collect();
@@ -119,8 +124,8 @@ mod tests {
 
     #[test]
     fn equal_places_are_one_vertex_and_edges_know_their_triangles() {
-        // A square of two triangles with six vertices of their own, one corner at -0, and a
-        // triangle without area.
+        // A square of two triangles with six vertices of their own, one corner at -0.
+        // A third triangle has no area.
         let positions = [
             [0.0; 3],
             [1.0, 0.0, 0.0],
