@@ -77,7 +77,7 @@ impl Camera {
 
     /// A camera from one float64 matrix `clip_from_world`, row-major: `clip = m * (x, y, z, 1)`.
     ///
-    /// A bare matrix does not tell where the camera stands; see [`Camera::is_posed`].
+    /// A bare matrix does not say where the camera stands; see [`Camera::is_posed`].
     ///
     /// # Errors
     /// As [`Camera::from_rows`].
@@ -167,7 +167,7 @@ impl Camera {
         self.origin
     }
 
-    /// Whether [`Camera::origin`] is where the camera stands; a bare matrix does not tell that.
+    /// Whether [`Camera::origin`] is where the camera stands; a bare matrix does not say that.
     pub fn is_posed(&self) -> bool {
         self.posed
     }

@@ -52,7 +52,7 @@ pub enum DepthKind {
 /// - a kind that contradicts the camera's convention;
 /// - a scale that is not positive and finite, or not 1 for NDC depth;
 /// - for the kinds `Z` and `Distance`: a singular camera, or an orthographic one that was made from
-///   a bare matrix, which does not tell where depth starts, or whose depth does not grow along its
+///   a bare matrix, which does not say where depth starts, or whose depth does not grow along its
 ///   rays.
 ///
 /// [`Error::OutOfMemory`](crate::Error::OutOfMemory) if the host has no room for the result.
@@ -346,7 +346,7 @@ pub(crate) enum ViewDepth {
 }
 
 impl ViewDepth {
-    /// `None` for a parallel camera if it does not tell where its depth starts, or if its depth
+    /// `None` for a parallel camera if it does not say where its depth starts, or if its depth
     /// does not grow along its rays.
     pub(crate) fn new(camera: &Camera) -> Option<Self> {
         let rows = camera.rows_near_one();
@@ -432,7 +432,7 @@ fn starts_behind_the_eye(rows: &Mat4, origin: Vec3, reversed: bool) -> bool {
 /// The rays of an orthographic camera.
 ///
 /// # Errors
-/// [`Error::Invalid`] where the camera does not tell where depth starts, or depth does not grow
+/// [`Error::Invalid`] where the camera does not say where depth starts, or depth does not grow
 /// along the rays.
 fn parallel(camera: &Camera, rows: &Mat4) -> Result<Rays> {
     if !camera.is_posed() {
@@ -646,7 +646,7 @@ mod tests {
             near(view.of_ndc(at_3), 5.0);
             assert_eq!(view.of_w(1.0), None);
         }
-        // A bare orthographic matrix does not tell where depth starts.
+        // A bare orthographic matrix does not say where depth starts.
         // With an oblique near plane NDC depth depends on the pixel.
         let size = ImageSize::new(2, 2);
         let bare = |z, w| {
@@ -810,7 +810,7 @@ mod tests {
     }
 
     /// A number in front of the near plane is far, however little it is in front.
-    /// So is a number on the plane where float64 cannot tell.
+    /// So is a number on the plane where float64 cannot decide.
     #[test]
     fn at_the_near_plane_nothing_is_nearer() {
         for (convention, far) in

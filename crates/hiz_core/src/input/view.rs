@@ -221,7 +221,7 @@ fn near_of_thin_range(at_eye: f64, slope: f64, reversed: bool) -> Option<f64> {
 /// The z around which a camera with parallel rays is likely to see most.
 ///
 /// With a known eye this is the depth of the eye, clamped to the camera's range.
-/// A bare matrix does not tell where the eye is.
+/// A bare matrix does not say where the eye is.
 /// It gives the depth of the world's origin if that is in view, and the near plane otherwise.
 fn depth_of_interest(camera: &Camera, rows: &Mat4) -> f64 {
     let [x, y, z, w] = rows.map(|row| row[3]);

@@ -80,7 +80,7 @@ fn pipeline(gpu: &Gpu, reversed: bool, faces: FaceCull) -> Result<wgpu::RenderPi
     })
 }
 
-/// Checks what a texture tells: size, format, dimension, mip levels, samples and usage.
+/// Checks what a texture reports: size, format, dimension, mip levels, samples and usage.
 fn check_target(camera: &Camera, target: &wgpu::TextureView) -> Result<()> {
     let texture = target.texture();
     let (want, have) = (camera.size(), (texture.width(), texture.height()));

@@ -35,7 +35,7 @@ const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 pub enum AtlasUse {
     /// Where a cull has enough instances for the copy to pay.
     ///
-    /// That is a quarter of the number of texels in the depth image and the stored levels.
+    /// That takes a quarter as many instances as the depth image and the stored levels have texels.
     #[default]
     Auto,
     /// Whatever the number of instances.

@@ -60,7 +60,7 @@ pub(crate) const PYRAMID_CHUNKS: usize = 3;
 /// Columns of blocks come in multiples of this, so that the reduction loads and stores vectors.
 const BLOCK_ALIGNMENT: u32 = 4;
 
-/// Texels to which the rows of every level are aligned, as copies into a texture require.
+/// Rows of every level start at multiples of this many texels, as copies into a texture require.
 const ROW_ALIGNMENT: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT / 4;
 
 /// Texels before level 1.

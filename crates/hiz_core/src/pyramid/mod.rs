@@ -256,7 +256,9 @@ impl Pyramid {
         });
     }
 
-    /// The camera of the depth image that the pyramid was last built from; `None` before the first.
+    /// The camera of the depth image that the pyramid was last built from.
+    ///
+    /// `None` before the first reduction.
     pub fn camera(&self) -> Option<Camera> {
         self.built().map(|b| b.camera)
     }

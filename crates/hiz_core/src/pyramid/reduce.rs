@@ -1,7 +1,7 @@
 //! The reduction: the passes that fill a pyramid from a depth image.
 //!
 //! Each pass reads one level, and writes up to three coarser ones, or all of the rest.
-//! The passes follow AMD's Single Pass Downsampler (FidelityFX SPD, 2020).
+//! The passes follow AMD's Single Pass Downsampler (SPD, 2020).
 //! `shaders/pyramid/reduce.wgsl` says where they differ from it.
 
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -165,7 +165,7 @@ pub(crate) fn record_reduce(
             format!("expected the depth image's size {size}, got {}", camera.size()),
         ));
     }
-    // A view does not tell which part of its texture it shows, so only one may exist.
+    // A view does not say which part of its texture it shows, so only one may exist.
     let parts =
         (texture.mip_level_count(), texture.sample_count(), texture.depth_or_array_layers());
     if parts != (1, 1, 1) || texture.dimension() != wgpu::TextureDimension::D2 {

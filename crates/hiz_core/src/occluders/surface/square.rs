@@ -77,7 +77,7 @@ pub(super) fn side(a: &Point, b: &Point, square: &Square) -> Side {
     let beyond = cross.abs() > half * ((b.x - a.x).abs() + (b.y - a.y).abs()) * UP + error;
     let meets = !(left_or_right || beside(ay, by) || beyond);
     // Where the edge passes the height of the centre, its side is the one that both ends are on.
-    // If the ends disagree, the cross product tells the side.
+    // If the ends disagree, the cross product decides.
     let crossing = match (ay > 0.0, by > 0.0) {
         (false, true) if (left_or_right && ax > 0.0) || (!left_or_right && cross > 0.0) => 1,
         (true, false) if (left_or_right && ax > 0.0) || (!left_or_right && cross < 0.0) => -1,
