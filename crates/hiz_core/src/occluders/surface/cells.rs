@@ -50,7 +50,7 @@ struct Clip {
 }
 
 /// The camera's part of the projection.
-struct Lens {
+struct Projector {
     rows: [[f64; 4]; 4],
     origin: Vec3,
     half: [f64; 2],
@@ -60,7 +60,7 @@ struct Lens {
     fault: Planted,
 }
 
-impl Lens {
+impl Projector {
     fn new(camera: &Camera, fault: Planted) -> Self {
         let mut rows = camera.rows_near_one();
         let reversed = camera.convention().is_reversed();
@@ -160,7 +160,7 @@ impl Cells {
         culled: FaceCull,
         fault: Planted,
     ) -> Self {
-        let mut builder = Builder::new(topology, Lens::new(camera, fault));
+        let mut builder = Builder::new(topology, Projector::new(camera, fault));
         let size = camera.size();
         let image = [f64::from(size.width), f64::from(size.height)];
         for t in 0..topology.triangles.len() as u32 {
@@ -176,7 +176,7 @@ impl Cells {
 
 struct Builder<'a> {
     topology: &'a Topology,
-    lens: Lens,
+    projector: Projector,
     clips: Vec<Clip>,
     inside: Vec<bool>,
     /// Points of vertices, then those of cut edges.
@@ -189,16 +189,16 @@ struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    fn new(topology: &'a Topology, lens: Lens) -> Self {
-        let clips: Vec<Clip> = topology.positions.iter().map(|p| lens.clip(*p)).collect();
-        let inside: Vec<bool> = clips.iter().map(|c| lens.depth_in(c) > 0.0).collect();
+    fn new(topology: &'a Topology, projector: Projector) -> Self {
+        let clips: Vec<Clip> = topology.positions.iter().map(|p| projector.clip(*p)).collect();
+        let inside: Vec<bool> = clips.iter().map(|c| projector.depth_in(c) > 0.0).collect();
         let points = clips
             .iter()
             .zip(&inside)
-            .map(|(c, inside)| lens.point(c).filter(|_| *inside))
+            .map(|(c, inside)| projector.point(c).filter(|_| *inside))
             .collect();
         Self {
-            lens,
+            projector,
             clips,
             inside,
             points,
@@ -217,13 +217,13 @@ impl<'a> Builder<'a> {
         if self.cuts[edge] == NO_MATE {
             let [a, b] = self.topology.ends(self.topology.around(edge)[0]);
             let (a, b) = (&self.clips[a.min(b) as usize], &self.clips[a.max(b) as usize]);
-            let (na, nb) = (self.lens.depth_in(a), self.lens.depth_in(b));
+            let (na, nb) = (self.projector.depth_in(a), self.projector.depth_in(b));
             let t = (na / (na - nb)).clamp(0.0, 1.0);
             let mut cut = between(a, b, t);
-            if is_planted!(self.lens.fault, CutPointsExact) {
+            if is_planted!(self.projector.fault, CutPointsExact) {
                 cut.error = [0.0; 4];
             }
-            let point = self.lens.point(&cut);
+            let point = self.projector.point(&cut);
             self.cuts[edge] = self.points.len() as u32;
             self.points.push(point);
         }
@@ -249,7 +249,7 @@ impl<'a> Builder<'a> {
             }
             if inside[k] != inside[next] {
                 // Leaving: the next side runs along the clipping plane and has no neighbour.
-                let joined = is_planted!(self.lens.fault, CutSidesJoined);
+                let joined = is_planted!(self.projector.fault, CutSidesJoined);
                 push((self.cut(half), if inside[k] && !joined { NO_MATE } else { half }));
             }
         }
@@ -300,7 +300,7 @@ impl<'a> Builder<'a> {
             + (2.0 * margin * (ux.abs() + uy.abs() + vx.abs() + vy.abs()) + 8.0 * margin * margin)
                 * UP;
         let area_error =
-            if is_planted!(self.lens.fault, FacingUnproved) { 0.0 } else { area_error };
+            if is_planted!(self.projector.fault, FacingUnproved) { 0.0 } else { area_error };
         // Rows run downwards, so what is counter-clockwise with y up has a negative area here.
         let occludes = match culled {
             FaceCull::None => true,

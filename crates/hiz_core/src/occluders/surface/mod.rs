@@ -42,7 +42,7 @@
 //! Every choice of G gives a valid depth.
 //!
 //! **Which sheets.**
-//! `coverage` links the triangles that touch P across shared edges that meet P.
+//! `sheets` links the triangles that touch P across shared edges that meet P.
 //! Each connected component is a sheet.
 //! If a triangle is missing, its neighbour's edge stays unpaired, which spoils that sheet alone.
 //! The nearest of all sheets that cover P counts.
@@ -78,8 +78,8 @@
 //! Beyond the far plane nothing is hidden: such depths become far.
 
 mod cells;
-mod coverage;
 pub(crate) mod planted_fault;
+mod sheets;
 mod square;
 mod topology;
 
@@ -91,8 +91,8 @@ use crate::host::rounding::round_up;
 use crate::input::camera::Camera;
 use crate::input::mesh::FaceCull;
 use crate::occluders::surface::cells::Cells;
-use crate::occluders::surface::coverage::Coverage;
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
+use crate::occluders::surface::sheets::Sheets;
 use crate::occluders::surface::topology::Topology;
 
 /// The least normal float32.
@@ -182,7 +182,7 @@ impl OccluderSurface {
         // The value of `far` at the far plane; reversed Z counts its depths negative.
         let beyond = if convention.is_reversed() { 0.0 } else { 1.0 };
         let far =
-            Coverage::new(&cells, fault).image(camera.size(), beyond, options.refinement.min(8));
+            Sheets::new(&cells, fault).image(camera.size(), beyond, options.refinement.min(8));
         #[expect(clippy::cast_possible_truncation, reason = "the fault that is planted")]
         let rounded =
             if is_planted!(fault, RoundedToNearest) { |far| far as f32 } else { round_up };

@@ -35,7 +35,7 @@ struct Sums {
 }
 
 /// The state of the search in one image.
-pub(super) struct Coverage<'a> {
+pub(super) struct Sheets<'a> {
     cells: &'a Cells,
     /// By cell: its index in the list of members, valid where `stamps` has the current stamp.
     places: Vec<u32>,
@@ -44,7 +44,7 @@ pub(super) struct Coverage<'a> {
     fault: Planted,
 }
 
-impl<'a> Coverage<'a> {
+impl<'a> Sheets<'a> {
     pub(super) fn new(cells: &'a Cells, fault: Planted) -> Self {
         let count = cells.corners.len();
         Self { cells, places: vec![0; count], stamps: vec![0; count], stamp: 0, fault }
