@@ -23,11 +23,11 @@ soak: ## The tests that take minutes: millions of adversarial cases against the 
 lint: ## Format, clippy, ruff, mypy --strict, stubtest, shellcheck
 	@scripts/lint.sh
 
-bench: ## Measure speed and error of every configuration on scenes with known truth; report and plots land in out/bench
+bench: ## Measure speed and error of every configuration; report and plots land in out/bench
 	@scripts/bench.sh
 
 bench-speed: ## Measure times against yardsticks and targets; report and plot land in out/speed
-	@scripts/bench.sh --speed
+	@scripts/bench_speed.sh
 
 docs: ## The HTML documentation, in docs/_build/html
 	@scripts/docs.sh

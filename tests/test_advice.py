@@ -14,10 +14,13 @@ import numpy as np
 import pytest
 
 import hizvk
-from hizvk import scenes, truth
-from hizvk.bench import recommend as advice
-from hizvk.bench.clear import Blockers, points_of
-from hizvk.bench.configurations import Configuration, DepthVariant, promised
+from hizvk import scenes
+from hizvk.measuring.configuration import Configuration, DepthVariant
+from hizvk.measuring.spread import spread
+from hizvk.recommendation import Candidate, choose, entry, timing
+from hizvk.recommendation.blockers import Blockers, points_of
+from hizvk.recommendation.tried import promised
+from hizvk.scenes import truth
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -282,7 +285,7 @@ def test_best_for_points_on_their_own_mesh_is_conservative_and_loses_none(
     assert "pixels' centres alone" in str(found)
     # A budget that plain depth alone keeps does not bring it back.
     safe = [one for one in found.candidates if one.safe]
-    assert advice.choose(found.candidates, max_ms=1e-9) == (
+    assert choose(found.candidates, max_ms=1e-9) == (
         min(safe, key=lambda one: one.ms.median),
         False,
     )
@@ -319,7 +322,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
             if one.footprint < 8 and one.fit == "rectangle"
         ]
 
-    monkeypatch.setattr(advice, "promised", some)
+    monkeypatch.setattr(entry, "promised", some)
 
 
 @pytest.mark.usefixtures("few")
@@ -380,7 +383,7 @@ def test_a_candidate_that_hides_what_is_visible_is_never_chosen(
     device: hizvk.Device, monkeypatch: pytest.MonkeyPatch, coverage: str, victim: int
 ) -> None:
     """A planted liar is the fastest, keeps least, and may even be one of those that are proven."""
-    honest = advice.cull
+    honest = timing.cull
 
     def lying(
         device: hizvk.Device, instances: Any, pyramid: Any, one: Configuration
@@ -391,7 +394,7 @@ def test_a_candidate_that_hides_what_is_visible_is_never_chosen(
             mask[victim] = False
         return mask, took[0], took[1]
 
-    monkeypatch.setattr(advice, "cull", lying)
+    monkeypatch.setattr(timing, "cull", lying)
     found = hizvk.recommend(
         BALLS,
         CAMERA,
@@ -413,7 +416,7 @@ def test_a_smaller_plain_image_is_found_out(
 ) -> None:
     small = Configuration("spheres", depth=DepthVariant(8))
     monkeypatch.setattr(
-        advice,
+        entry,
         "promised",
         lambda *_, **__: [small, Configuration("spheres", depth=DepthVariant(1, True))],
     )
@@ -425,15 +428,15 @@ def test_a_smaller_plain_image_is_found_out(
 
 
 def test_choose_refuses_where_nothing_is_safe() -> None:
-    ms = advice.spread(np.ones((1, 1)))
-    liar = advice.Candidate(Configuration(), ms, ms, 3, False, hides=1)
-    unclear = advice.Candidate(Configuration(), ms, ms, 3, False, unclear=1)
-    beside = advice.Candidate(Configuration(), ms, ms, 3, False, asked=False)
+    ms = spread(np.ones((1, 1)))
+    liar = Candidate(Configuration(), ms, ms, 3, False, hides=1)
+    unclear = Candidate(Configuration(), ms, ms, 3, False, unclear=1)
+    beside = Candidate(Configuration(), ms, ms, 3, False, asked=False)
     with pytest.raises(ValueError, match="candidates: expected one that hides nothing"):
-        advice.choose([liar, unclear, beside])
-    honest = advice.Candidate(Configuration(), advice.spread(np.full((1, 1), 9.0)), ms, 300, False)
-    assert advice.choose([liar, unclear, beside, honest]) == (honest, True)
-    assert advice.choose([liar, honest], max_ms=2.0) == (honest, False)
+        choose([liar, unclear, beside])
+    honest = Candidate(Configuration(), spread(np.full((1, 1), 9.0)), ms, 300, False)
+    assert choose([liar, unclear, beside, honest]) == (honest, True)
+    assert choose([liar, honest], max_ms=2.0) == (honest, False)
 
 
 @pytest.mark.usefixtures("few")
@@ -479,9 +482,9 @@ def test_points_before_a_depth_image_get_a_guard(device: hizvk.Device) -> None:
 
 
 def test_candidate_makes_the_whole_call(device: hizvk.Device) -> None:
-    ms = advice.spread(np.ones((1, 1)))
+    ms = spread(np.ones((1, 1)))
     one = Configuration("spheres", descent=64, depth=DepthVariant(2, True, levels=(1, 2)))
-    candidate = advice.Candidate(one, ms, ms, 2, False)
+    candidate = Candidate(one, ms, ms, 2, False)
     balls, walls = device.instances(BALLS), device.occluders(GAP)
     options = candidate.render_options(CAMERA.size)
     assert (options, candidate.pyramid_options) == (
@@ -503,7 +506,7 @@ def test_candidate_makes_the_whole_call(device: hizvk.Device) -> None:
         assert text in str(caught.value)
 
     boxes = device.instances(hizvk.Boxes(MIDDLES, MIDDLES))
-    plain = advice.Candidate(Configuration("spheres"), ms, ms, 2, False)
+    plain = Candidate(Configuration("spheres"), ms, ms, 2, False)
     image = device.render_depth(walls, CAMERA)
     refused(
         ValueError,

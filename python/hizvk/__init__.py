@@ -44,7 +44,6 @@ device refuses is a `HizError`.
 
 from . import reference
 from ._core import __version__
-from .bench.recommend import Recommendation, recommend
 from .bounds import Boxes, OrientedBoxes, Spheres
 from .camera import Camera
 from .comparison import Comparison, compare
@@ -59,6 +58,7 @@ from .errors import (
     OutOfMemoryError,
 )
 from .oneline import visible
+from .recommendation import Recommendation, recommend
 from .resources import DepthImage, Instances, Mesh, Occluders, Pyramid
 from .result import DRAW_DTYPE, CullResult, CullStats, DrawTemplate, Explanation, Verdict
 
