@@ -176,6 +176,7 @@ def _errors(page: Page, found: Found) -> None:
         "The columns after *sample* are of a sample, by the float64 oracle: hidden, hidden and "
         "still kept, visible and culled.",
         "*Italic*: without the promise.",
+        "`hizvk bench` has scenes with ray-cast truth.",
     )
     page.table(
         " | | instances | kept | sample | hidden | of these kept | false culls", rows, left=2

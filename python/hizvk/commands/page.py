@@ -42,7 +42,7 @@ def table(head: str, rows: Iterable[Sequence[str]], *, left: int = 1) -> list[st
     """
     titles = [title.strip() for title in head.split("|")]
     marks = ["---" if number < left else "---:" for number in range(len(titles))]
-    lines = [f"| {' | '.join(titles)} |", f"|{'|'.join(marks)}|"]
+    lines = [f"| {' | '.join(titles)} |".replace("  ", " "), f"|{'|'.join(marks)}|"]
     return [*lines, *(f"| {' | '.join(cells)} |" for cells in rows)]
 
 
