@@ -1,4 +1,4 @@
-"""The bench: its report, its truth, its yardsticks and its front, each against what is worked out by hand."""
+"""The bench: its report, truth, yardsticks and front, each against results worked out by hand."""
 
 import dataclasses
 import json
@@ -43,7 +43,7 @@ def device() -> hizvk.Device:
     return hizvk.Device()
 
 
-# -- command -----------------------------------------------------------------------------------------
+# -- command ---------------------------------------------------------------------------------------
 
 
 def run_quick(out: Path, *more: str) -> int:
@@ -170,7 +170,7 @@ def test_recommend_is_a_function_of_the_package() -> None:
     assert hizvk.recommend.__module__ == "hizvk.recommendation.entry"
 
 
-# -- configurations ----------------------------------------------------------------------------------
+# -- configurations --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("extent", ["quick", "default", "full"])
@@ -207,7 +207,7 @@ def test_which_depth_promises_for_the_view() -> None:
     }
 
 
-# -- front -------------------------------------------------------------------------------------------
+# -- front -----------------------------------------------------------------------------------------
 
 
 def test_the_front_of_points_by_hand() -> None:
@@ -277,10 +277,23 @@ def test_a_spread_is_over_the_repetitions_of_each_view() -> None:
 def test_a_broken_promise_fails_the_report() -> None:
     adapter = hizvk.Adapter(0, "a", "b", "c", "vulkan", "cpu")
     scene = SceneResult(
-        key="x", name="x", instances=1, occluder_triangles=0, instance_triangles=0, views=1, size=(1, 1),
-        repetitions=1, truth="", visible=1, hidden=0, inside=1, one_instance_ms=0.0, upload_ms=0.0, warm_up_ms=0.0,
+        key="x",
+        name="x",
+        instances=1,
+        occluder_triangles=0,
+        instance_triangles=0,
+        views=1,
+        size=(1, 1),
+        repetitions=1,
+        truth="",
+        visible=1,
+        hidden=0,
+        inside=1,
+        one_instance_ms=0.0,
+        upload_ms=0.0,
+        warm_up_ms=0.0,
         rows=[row_of(1.0, 0.0, Configuration(depth=DepthVariant(2)), 7), row_of(1.0, 0.0, None, 7)],
-    )  # fmt: skip
+    )
     found = report.Report("hizvk bench", 1, "quick", adapter)
     assert not found.passed
     found.scenes.append(scene)
@@ -290,20 +303,30 @@ def test_a_broken_promise_fails_the_report() -> None:
     assert found.broken() == ["x: : 1 visible instances culled"]
 
 
-# -- truth -------------------------------------------------------------------------------------------
+# -- truth -----------------------------------------------------------------------------------------
 
 
 def two_boxes() -> scenes.Scene:
-    """A wall at distance 10 over the left half; boxes behind it, beside it, in front of it, and behind the eye."""
+    """A wall at distance 10 over the left half, and four boxes.
+
+    They are behind it, beside it, in front of it, and behind the eye.
+    """
     wall, sides = scenes.box_mesh([[-40.0, 10.0, -40.0]], [[0.0, 10.5, 40.0]])
     low = np.array([[-6.0, 20.0, -1.0], [5.0, 20.0, -1.0], [-2.0, 4.0, -1.0], [-1.0, -9.0, -1.0]])
     vertices, triangles = scenes.box_mesh(low, low + 2.0)
     view = scenes.View("ahead", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 90.0, 0.25)
     return scenes.Scene(
-        name="a wall", origin=(0.0, 0.0, 0.0), vertices=wall, triangles=sides, instance_vertices=vertices,
-        instance_triangles=triangles, owner=np.repeat(np.arange(4, dtype=np.int32), 12), box_min=low,
-        box_max=low + 2.0, views=(view,),
-    )  # fmt: skip
+        name="a wall",
+        origin=(0.0, 0.0, 0.0),
+        vertices=wall,
+        triangles=sides,
+        instance_vertices=vertices,
+        instance_triangles=triangles,
+        owner=np.repeat(np.arange(4, dtype=np.int32), 12),
+        box_min=low,
+        box_max=low + 2.0,
+        views=(view,),
+    )
 
 
 def test_planted_false_culls_and_false_keeps_are_counted(device: hizvk.Device) -> None:
@@ -360,7 +383,7 @@ def test_far_planes_cut_what_rays_see() -> None:
     assert (caster.look(far, (64, 64)).pixels(4) > 0).tolist() == [True, True, False, False]
 
 
-# -- yardsticks --------------------------------------------------------------------------------------
+# -- yardsticks ------------------------------------------------------------------------------------
 
 
 def test_the_numpy_pyramid_by_hand() -> None:
@@ -423,7 +446,7 @@ def test_rays_see_what_the_truth_sees() -> None:
     assert rays.image(clipped, size).tolist() == [False, False, True, False]
 
 
-# -- scenes ------------------------------------------------------------------------------------------
+# -- scenes ----------------------------------------------------------------------------------------
 
 
 def test_the_city_repeats_and_can_stand_far_away() -> None:
@@ -463,9 +486,10 @@ def test_bounds_contain_their_vertices(kind: str, known: bool) -> None:
         local = np.einsum("ni,nik->nk", point - bounds.centers[owner], bounds.rotations[owner])
         assert (np.abs(local) <= bounds.half_sizes[owner]).all()
         np.testing.assert_allclose(
-            np.einsum("nki,nkl->nil", bounds.rotations, bounds.rotations), np.broadcast_to(np.eye(3), (120, 3, 3)),
+            np.einsum("nki,nkl->nil", bounds.rotations, bounds.rotations),
+            np.broadcast_to(np.eye(3), (120, 3, 3)),
             atol=1e-12,
-        )  # fmt: skip
+        )
         turned = np.prod(2.0 * bounds.half_sizes, axis=1)
         straight = np.prod(scene.box_max - scene.box_min, axis=1)
         assert np.median(turned / straight) < 0.95
@@ -477,16 +501,26 @@ def castle_file(path: Path, **changes: Any) -> Path:
     turn = [0, 2, 1]  # z up to y up; mirrored, which no test minds
     first = np.arange(5) * 12
     data = {
-        "name": "two boxes", "source": "a test", "license": "none", "up": np.array([0.0, 1.0, 0.0]),
-        "occluder_vertices": scene.vertices[:, turn].astype(np.float32), "occluder_triangles": scene.triangles,
-        "occluder_instance": np.full(12, -1, np.int32), "instance_aabb_min": scene.box_min[:, turn],
-        "instance_aabb_max": scene.box_max[:, turn], "instance_vertices": scene.instance_vertices[:, turn],
-        "instance_triangles": scene.instance_triangles, "instance_first_triangle": first,
-        "camera_name": np.array(["a", "b", "c"]), "camera_eye": np.zeros((3, 3)),
-        "camera_target": np.array([[0.0, 0.0, 1.0]] * 3), "camera_up": np.array([[0.0, 1.0, 0.0]] * 3),
-        "camera_fov_y": np.full(3, np.pi / 2.0), "camera_near": np.full(3, 0.25),
+        "name": "two boxes",
+        "source": "a test",
+        "license": "none",
+        "up": np.array([0.0, 1.0, 0.0]),
+        "occluder_vertices": scene.vertices[:, turn].astype(np.float32),
+        "occluder_triangles": scene.triangles,
+        "occluder_instance": np.full(12, -1, np.int32),
+        "instance_aabb_min": scene.box_min[:, turn],
+        "instance_aabb_max": scene.box_max[:, turn],
+        "instance_vertices": scene.instance_vertices[:, turn],
+        "instance_triangles": scene.instance_triangles,
+        "instance_first_triangle": first,
+        "camera_name": np.array(["a", "b", "c"]),
+        "camera_eye": np.zeros((3, 3)),
+        "camera_target": np.array([[0.0, 0.0, 1.0]] * 3),
+        "camera_up": np.array([[0.0, 1.0, 0.0]] * 3),
+        "camera_fov_y": np.full(3, np.pi / 2.0),
+        "camera_near": np.full(3, 0.25),
         "camera_far": np.array([15.0, 50.0, 60.0]),
-    } | changes  # fmt: skip
+    } | changes
     np.savez(path, **{key: value for key, value in data.items() if value is not None})
     return path
 
@@ -514,7 +548,7 @@ def test_a_castle_is_read(tmp_path: Path) -> None:
         )
 
 
-# -- recommend ---------------------------------------------------------------------------------------
+# -- recommend -------------------------------------------------------------------------------------
 
 
 def candidate(ms: float, kept: int) -> Candidate:
@@ -564,9 +598,15 @@ def test_recommend_on_a_scene(device: hizvk.Device) -> None:
 
     image = device.render_depth(device.occluders([wall]), cameras[0]).numpy()
     by_image = hizvk.recommend(
-        boxes, cameras[0], depths=[image], kind="reversed_ndc", device=device, repetitions=1, max_ms=1e-6,
+        boxes,
+        cameras[0],
+        depths=[image],
+        kind="reversed_ndc",
+        device=device,
+        repetitions=1,
+        max_ms=1e-6,
         coverage="sample",
-    )  # fmt: skip
+    )
     assert not by_image.within_budget
     assert "over the budget" in str(by_image)
     assert by_image.best is by_image.candidates[0]
@@ -607,8 +647,17 @@ def test_recommend_refuses_what_does_not_fit(device: hizvk.Device) -> None:
     )
     refused(ValueError, "bounds: expected Instances of this device", foreign, view, occluders=wall)
     refused(
-        ValueError, "occluders: expected Occluders of this device", spheres, view,
+        ValueError,
+        "occluders: expected Occluders of this device",
+        spheres,
+        view,
         occluders=hizvk.Device().occluders([wall]),
-    )  # fmt: skip
-    refused(ValueError, "depths: expected 1 images, one for each camera, got 2", spheres, view, depths=[image, image],
-            kind="z")  # fmt: skip
+    )
+    refused(
+        ValueError,
+        "depths: expected 1 images, one for each camera, got 2",
+        spheres,
+        view,
+        depths=[image, image],
+        kind="z",
+    )
