@@ -27,7 +27,7 @@ html_title = f"hizvk {release}"
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
-# Defaults are shown as they are written (`2**-23`), not as what they evaluate to.
+# Defaults are shown as they are written (`2**-23`), not as values.
 autodoc_preserve_defaults = True
 myst_heading_anchors = 3
 

@@ -7,7 +7,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 scripts/setup.sh docs
 sphinx=("$VENV_PYTHON" -m sphinx --fail-on-warning --keep-going -q -b html)
 step "Python documentation" "${sphinx[@]}" docs docs/_build/html
-# rustdoc's own dependencies are not documented: that would take minutes.
+# Dependencies are not documented, because that would take minutes.
 export RUSTDOCFLAGS="-D warnings"
 step "Rust documentation" cargo doc --workspace "${LOCKED[@]}" --no-deps
 printf 'open docs/_build/html/index.html and target/doc/hiz_core/index.html\n'
