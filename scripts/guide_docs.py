@@ -107,7 +107,11 @@ def tables(found: Rows) -> dict[str, str]:
         "2x2 and descent": DESCENT,
     }
     fits = ("boxes, 2x2, descent", "oriented, 2x2, descent")
-    others = ("numpy Hi-Z, float32", "Embree, one ray a pixel", "Embree, rays to 9 points of a box")
+    others = (
+        "numpy Hi-Z, float32",
+        "Embree, one ray per pixel",
+        "Embree, rays to 9 points of a box",
+    )
     return {
         "overview": _table(
             [

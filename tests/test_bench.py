@@ -107,7 +107,7 @@ def test_a_quick_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         assert by_label["numpy Hi-Z, float64"]["ms"]["render"] is not None
         assert by_label["numpy Hi-Z, float64"]["texels_per_instance"] is None
         if can_cast():
-            rays = by_label["Embree, one ray a pixel"]
+            rays = by_label["Embree, one ray per pixel"]
             assert rays["false_culls"] == rays["hairs"] == 0
             assert rays["hidden_kept"] == 0.0
     page = (out / "report.md").read_text()

@@ -261,7 +261,7 @@ def test_cliffs_by_hand(run: Run) -> None:
             instances, 1, instances / 1e5, flat_ms, instances / 1e6, 1, 1.0, 1
         )
 
-    # 10, 10, 20 ns an instance; the first is too small to tell.
+    # 10, 10, 20 ns per instance; the first is too small to tell.
     run.found.instance_counts = [
         count(1_000, 9.0),
         count(100_000, 1.0),

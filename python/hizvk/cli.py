@@ -145,7 +145,7 @@ def checks() -> list[Check]:
         )
         return [*found, Check("device", False, str(error), advice)]
     found.append(
-        Check("device", True, f"{device.adapter}, images up to {device.max_image_side} a side")
+        Check("device", True, f"{device.adapter}, images up to {device.max_image_side} per side")
     )
     return [*found, *(_try_culling(device, reversed_z) for reversed_z in (True, False))]
 

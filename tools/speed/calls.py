@@ -137,7 +137,7 @@ def _others(run: Run, scene: Town, depth: DepthImage, pyramid: Pyramid) -> None:
             masks["Embree, rays to 9 points of a box"] = rays.points(view, depth.size)
             return 1e3 * (time.perf_counter() - start)
 
-        ways |= {"Embree, one ray a pixel": pixels, "Embree, rays to 9 points of a box": points}
+        ways |= {"Embree, one ray per pixel": pixels, "Embree, rays to 9 points of a box": points}
     else:
         run.found.notes.append(f"left out: {embree.MISSING}")
     ms = in_turns(ways, SLOW_ROUNDS)

@@ -1,16 +1,14 @@
 """``hizvk bench``: what culling costs and what it leaves, on scenes with known truth.
 
-===================  =====================================================================
-`command`            the command line
-`catalogue`          the scenes; `volumes` has the bounds of their instances
-`configurations`     what is compared
-`measure`            times and counts
-`numpy_hiz`, `rays`  what a Python user would do without this library
-`rectangle`          the best rectangle test
-`score`              false culls and hidden instances kept
-`results`            the numbers as plain objects
-`report`, `plots`    report.json (its schema stands there), report.md, a picture per scene
-===================  =====================================================================
+- `command`: the command line
+- `catalogue`: the scenes; `volumes` has the bounds of their instances
+- `configurations`: what is compared
+- `measure`: times and counts
+- `numpy_hiz`, `rays`: what a Python user would do without this library
+- `rectangle`: the best rectangle test
+- `score`: false culls and hidden instances kept
+- `results`: the numbers as plain objects
+- `report`, `plots`: report.json (its schema stands there), report.md, a picture per scene
 """
 
 from __future__ import annotations

@@ -221,7 +221,7 @@ def _tell(found: Report, out: Path) -> None:
         for row in sorted(best, key=lambda row: -row.hidden_kept):
             total = row.total_ms.median if row.total_ms else float("nan")
             print(
-                f"  {total:8.2f} ms a view, {row.ns_per_instance or 0.0:6.0f} ns an instance, "
+                f"  {total:8.2f} ms per view, {row.ns_per_instance or 0.0:6.0f} ns per instance, "
                 f"{100.0 * row.hidden_kept:6.2f} % of the hidden kept: {row.label}"
             )
     for each in found.missing:

@@ -91,7 +91,7 @@ class _Run:
         }
         if self.rays is not None:
             rays, small = self.rays, DepthVariant(4).size(self.size)
-            found["Embree, one ray a pixel"] = lambda k, _: _timed(
+            found["Embree, one ray per pixel"] = lambda k, _: _timed(
                 lambda: rays.image(self.scene.views[k], self.size)
             )
             found["Embree, one ray for 4x4 pixels"] = lambda k, _: _timed(

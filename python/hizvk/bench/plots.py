@@ -51,7 +51,7 @@ def draw(path: Path, scene: SceneResult) -> None:
     floor = max(min(errors) - margin, 0.0)
     left.set_ylim(floor, max(_error(row) for _, row in rows) + margin)
     _panel(left, rows, {number: row.total_ms.median for number, row in rows if row.total_ms}, floor)
-    left.set_xlabel("ms a view: render, reduce, cull and read")
+    left.set_xlabel("ms per view: render, reduce, cull and read")
     left.set_ylabel("hidden instances kept, % of the hidden in the view volume")
     own = [
         (number, row)
@@ -59,7 +59,7 @@ def draw(path: Path, scene: SceneResult) -> None:
         if row.configuration is None or row.configuration.depth.divisor == 1
     ]
     _panel(right, own, {number: row.ns_per_instance or np.nan for number, row in own}, floor)
-    right.set_xlabel("ns an instance: the cull alone, depth at full resolution")
+    right.set_xlabel("ns per instance: the cull alone, depth at full resolution")
     best = next((row for row in scene.rows if row.label.startswith("best rectangle")), None)
     for axis in (left, right):
         if best is not None:

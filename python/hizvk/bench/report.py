@@ -258,7 +258,7 @@ def _legend(page: Page) -> None:
         "culls there.\n"
         "That test takes boxes in float64 and all pixels; tighter bounds and a volume fit can "
         "exceed 100 %.",
-        "*Embree, one ray a pixel* is how the truth is found, hence its zeros.\n"
+        "*Embree, one ray per pixel* is how the truth is found, hence its zeros.\n"
         "It casts on one thread here, and the first ray builds its trees (`first_ms` in "
         "report.json).\n"
         "It needs the triangles of all instances, where hizvk needs their bounds.",

@@ -5,12 +5,10 @@ and `Device.cull` of the trees' boxes.
 Then the truth is found without the library (`hizvk.scenes.truth`).
 The exit code is 1 if a visible tree was culled.
 
-==========  ================================================================
-`command`   the command line
-`run`       all views: cull, check, pictures, report
-`report`    the numbers, and the page that tells them
-`pictures`  the pictures of a view; `shading` colours what the rays have seen
-==========  ================================================================
+- `command`: the command line
+- `run`: all views: cull, check, pictures, report
+- `report`: the numbers, and the page that tells them
+- `pictures`: the pictures of a view; `shading` colours what the rays have seen
 """
 
 from __future__ import annotations

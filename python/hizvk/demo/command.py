@@ -74,7 +74,7 @@ def _tell(found: Report, out: Path) -> None:
             "`make wheel` makes a release build"
         )
     print(f"culled   {culled} in {len(found.views)} views")
-    print(f"median   {times} ms a view")
+    print(f"median   {times} ms per view")
     print(f"hidden   {found.total('false_keeps'):,} kept in vain ({share})")
     print(f"check    {found.verdict()}")
     print(f"look at  {out / 'overview.png'} and {out / 'report.md'}  ({found.seconds:.0f} s)")

@@ -5,15 +5,13 @@ So each candidate is checked against what can be seen, and one that hides someth
 recommended.
 Of the others, the one that keeps fewer instances is right more often.
 
-=============  ====================================================================
-`entry`        `recommend`: its arguments, and the run from them to the answer
-`candidate`    one measured configuration, and the choice among several
-`tried`        which configurations are tried
-`timing`       times every candidate on every camera, in turns
-`checking`     what the candidates hide: by rays at the triangles, or by the oracle
-`blockers`     the rays: float64, at the occluders' triangles
-`answer`       `Recommendation`, and its notes in words
-=============  ====================================================================
+- `entry`: `recommend`: its arguments, and the run from them to the answer
+- `candidate`: one measured configuration, and the choice among several
+- `tried`: which configurations are tried
+- `timing`: times every candidate on every camera, in turns
+- `checking`: what the candidates hide: by rays at the triangles, or by the oracle
+- `blockers`: the rays: float64, at the occluders' triangles
+- `answer`: `Recommendation`, and its notes in words
 """
 
 from __future__ import annotations

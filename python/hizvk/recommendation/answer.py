@@ -44,7 +44,7 @@ class Recommendation:
         )
         lines = [
             f"on {self.adapter}: {self.best}{over}",
-            "    ms a camera        kept     hides   unclear"
+            "    ms per camera      kept     hides   unclear"
             "   (* the Pareto front; - not for what was asked)",
         ]
         for one in self.candidates:
@@ -102,7 +102,7 @@ def notes_on(
         )
     if rendered and coverage == "area" and not points:  # points cover no pixel's centre
         notes.append(
-            "If your image has one sample a pixel, at its centre and without jitter, ask with "
+            "If your image has one sample per pixel, at its centre and without jitter, ask with "
             'coverage="sample": plain depth of the full size is proven for that.'
         )
     if not rendered and coverage == "area":

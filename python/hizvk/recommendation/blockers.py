@@ -36,7 +36,7 @@ POINTS: Final = 27
 #: Part of a distance, or of a triangle's size, below which two things count as touching.
 #: float64 rounds by about 1e-12 here.
 HAIR: Final = 1e-9
-#: Tiles a side into which triangles are sorted: small ones, larger ones, and the rest.
+#: Tiles per side into which triangles are sorted: small ones, larger ones, and the rest.
 TILES: Final = (256, 32, 1)
 #: Tiles that a triangle may meet before it goes to the coarser ones.
 MOST_TILES: Final = 64

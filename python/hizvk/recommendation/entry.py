@@ -105,7 +105,7 @@ def recommend(
         It is right for multisampling, jitter, larger images, and points.
         Then candidates of sample coverage are shown for comparison and never recommended.
         ``"sample"``: what covers a pixel's centre.
-        It is right for a renderer with one sample a pixel, the same viewport and no jitter.
+        It is right for a renderer with one sample per pixel, the same viewport and no jitter.
         Plain depth is proven for that.
     max_ms : float, optional
         Budget for each camera in milliseconds.
@@ -148,7 +148,7 @@ def recommend(
     if (occluders is None) == (depths is None):
         got = "neither" if occluders is None else "both"
         raise TypeError(f"occluders, depths: expected exactly one of them, got {got}")
-    coverage = _arguments.choice("coverage", coverage, ("area", "sample"))  # type: ignore[assignment]
+    _arguments.choice("coverage", coverage, ("area", "sample"))
     if max_ms is not None:
         max_ms = _arguments.number("max_ms", max_ms, above=0.0)
     kept_within = _arguments.number("kept_within", kept_within, at_least=1.0)

@@ -6,16 +6,14 @@ at map coordinates, millions of metres out.
 All positions are multiples of 1/64 m, so ``scene.vertices - scene.origin`` is exact in float32.
 The ray caster that checks a cull therefore starts from the same numbers as the cull.
 
-===========  ===============================================================
-`scene`      `Scene` and `View`, and boxes as triangles
-`grid`       the multiples of 1/64 m
-`terrain`    height fields
-`massif`     `mountains`, the demo's scene: a real elevation model and trees
-`storeroom`  `room`: crates behind walls
-`city`       a street-level city from a seed
-`embree`     Embree's ray caster
-`truth`      what is seen in a view, and the check of a cull against it
-===========  ===============================================================
+- `scene`: `Scene` and `View`, and boxes as triangles
+- `grid`: the multiples of 1/64 m
+- `terrain`: height fields
+- `massif`: `mountains`, the demo's scene: a real elevation model and trees
+- `storeroom`: `room`: crates behind walls
+- `city`: a street-level city from a seed
+- `embree`: Embree's ray caster
+- `truth`: what is seen in a view, and the check of a cull against it
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["city"]
 
-#: Blocks a side, metres from street to street, and the width of a street.
+#: Blocks per side, metres from street to street, and the width of a street.
 BLOCKS: Final = 10
 PITCH: Final = 80.0
 STREET: Final = 16.0
@@ -139,7 +139,7 @@ def city(
 
 
 def _buildings(rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Corners of the buildings: each block has two or three lots a side, some with a gap after."""
+    """Corners of the buildings: each block has two or three lots per side, some with a gap."""
     low, high = [], []
     for block in np.ndindex(BLOCKS, BLOCKS):
         start = np.array(block) * PITCH + STREET

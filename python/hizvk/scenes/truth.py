@@ -360,4 +360,5 @@ def _pixel_rectangles(
         for whole, edge in ((0, x0), (0, y0), (width, x1), (height, y1))
     )
     boxes = np.flatnonzero((x1 > x0) & (y1 > y0) & (z.max(axis=1) > view.near))
-    return boxes, *(edge[boxes].astype(np.intp) for edge in (x0, y0, x1, y1))  # type: ignore[return-value]
+    left, top, right, bottom = (edge[boxes].astype(np.intp) for edge in (x0, y0, x1, y1))
+    return boxes, left, top, right, bottom
