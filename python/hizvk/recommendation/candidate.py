@@ -134,8 +134,8 @@ class Candidate:
         if isinstance(depth, DepthImage):
             pyramid = device.pyramid(depth, **self.pyramid_options)
         else:
-            own: dict[str, Any] = self.pyramid_options
-            pyramid = device.pyramid(depth, camera, **depth_options, **own)  # type: ignore[arg-type]
+            array: Any = depth
+            pyramid = device.pyramid(array, camera, **depth_options, **self.pyramid_options)
         return device.cull(instances, pyramid.camera, pyramid, **self.cull_options)
 
     def __str__(self) -> str:
