@@ -1,28 +1,50 @@
 //! Certified hierarchical-Z occlusion culling on wgpu.
 //!
-//! Data flows one way:
+//! The data flows one way, and the steps in this crate are folders of the same names:
 //!
-//! 1. [`Camera`] says, in float64, what is seen; [`DepthKind`] what a depth image's numbers mean;
-//!    [`Bounds`] where the instances are.
-//! 2. [`Occluders`] are drawn into a depth texture, or the caller brings one; their
-//!    [`OccluderSurface`] gives a small depth image that holds for larger ones.
-//! 3. [`HizContext::record_reduce`] builds the [`Pyramid`]: the farthest depth of every block of
-//!    pixels.
-//! 4. [`HizContext::record_cull`] decides for each of the [`Instances`], whole groups first where
-//!    they are many, and lists the kept ones in [`Visible`]; the list's length is the
-//!    `instance_count` of a [`DrawIndexedIndirect`] record on the device.
-//! 5. The caller draws with [`Visible::draw_arguments`]; nothing visits the CPU.
+//! 1. **Input** (`input`).
+//!    A [`Camera`] describes in float64 what is seen.
+//!    A [`DepthKind`] says what the numbers of a depth image mean, and [`Bounds`] say where the
+//!    instances are.
+//! 2. **Occluders** (`occluders`).
+//!    [`Occluders`] are drawn into a depth texture, or the caller brings a depth texture.
+//!    Their [`OccluderSurface`] makes a small depth image that also holds for larger images.
+//! 3. **Pyramid** (`pyramid`).
+//!    [`HizContext::record_reduce`] builds the [`Pyramid`]: for each level, the farthest depth of
+//!    every block of pixels.
+//! 4. **Instances** (`instances`).
+//!    [`HizContext::record_instances`] uploads the bounds as [`Instances`], in groups of 64
+//!    neighbours.
+//! 5. **Output** (`output`).
+//!    [`HizContext::create_visible`] makes the buffers of a [`Visible`], which take what a cull
+//!    finds.
+//! 6. **Cull** (`cull`).
+//!    [`HizContext::record_cull`] tests the instances against the pyramid; if there are many, it
+//!    tests whole groups first.
+//!    The list of kept instances goes to [`Visible`].
+//!    Its length is the `instance_count` of a [`DrawIndexedIndirect`] record on the device.
+//! 7. **Draw**.
+//!    The caller draws with [`Visible::draw_arguments`], and no number visits the CPU.
 //!
-//! The promise: an instance is culled only if, for the exact real numbers that the inputs denote,
-//! every pixel that its bounds can touch holds a depth nearer than all of the bounds.
-//! It is kept by *certificates* computed in float32 with margins that cover every rounding
-//! (`shaders/cull/certificate.wgsl`); whatever is uncertain stays visible.
+//! [`HizContext`] in `context` is the face of these steps, and a Rust renderer starts there.
+//! It only records into the caller's encoder on the caller's device: it never submits, polls or
+//! maps.
+//! [`headless`] is for programs without a renderer: it owns a device, submits, waits and reads
+//! back.
 //!
-//! Everything up to here records into the caller's encoder on the caller's device: nothing submits,
-//! polls or maps.
-//! The [`headless`] module owns a device, submits and reads back.
+//! Two folders serve the others: `host` has arithmetic, memory and threads, and `gpu` makes objects
+//! on the device.
+//!
+//! # The promise
+//!
+//! An instance is culled only if every pixel that its bounds can touch holds a depth nearer than
+//! all of the bounds.
+//! This holds for the exact real numbers that the inputs denote.
+//! The cull proves it with *certificates*: float32 comparisons whose margins cover every rounding
+//! (`shaders/cull/certificate.wgsl`).
+//! Whatever they cannot prove stays visible.
 
-// What only a readback asks for is idle in an embedder's build.
+// Some items serve only a readback, so a build without `headless` never uses them.
 #![cfg_attr(not(feature = "headless"), allow(dead_code))]
 
 // The rooms, in the order of the data: each imports only what stands above it here
@@ -83,12 +105,12 @@ pub use pyramid::atlas::AtlasUse;
 pub use pyramid::levels::{MAX_LEVELS, StoredLevels};
 pub use pyramid::{Pyramid, PyramidOptions};
 
-/// The README's program is compiled and run with the tests.
+/// Compiles and runs the program in the README with the tests.
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
 mod readme {}
 
-/// And so are those of the page for Rust.
+/// Compiles and runs the programs in the page for Rust with the tests.
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/rust.md")]
 mod rust_page {}
