@@ -1,9 +1,9 @@
-//! Axis-aligned boxes in float64 that contain given volumes for the exact real numbers: every sum
-//! is rounded outwards.
+//! Axis-aligned boxes in float64 that contain the given volumes for the exact real numbers.
+//! Every sum is rounded outwards.
 
 use crate::input::bounds::{Bounds, Floats};
 
-/// An axis-aligned box.
+/// An axis-aligned box in world units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Extent {
     pub(crate) min: [f64; 3],
@@ -11,7 +11,7 @@ pub(crate) struct Extent {
 }
 
 impl Extent {
-    /// What contains nothing and adds nothing to a union.
+    /// The box that contains nothing and adds nothing to a union.
     pub(crate) const EMPTY: Self = Self { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
 
     pub(crate) fn union(&self, other: &Self) -> Self {
@@ -21,7 +21,7 @@ impl Extent {
         }
     }
 
-    /// Halved first: the sum may overflow.
+    /// The middle; each corner is halved before the sum, because the sum of both may overflow.
     pub(crate) fn center(&self) -> [f64; 3] {
         std::array::from_fn(|k| 0.5 * self.min[k] + 0.5 * self.max[k])
     }
@@ -38,7 +38,7 @@ impl Extent {
         }
     }
 
-    /// Ordered, and neither NaN nor infinite.
+    /// Whether the corners are finite and ordered.
     fn is_box(&self) -> bool {
         (0..3).all(|k| {
             self.min[k].is_finite() && self.max[k].is_finite() && self.min[k] <= self.max[k]
@@ -47,8 +47,8 @@ impl Extent {
 }
 
 impl Bounds<'_> {
-    /// The box around volume `i`; `None` where it is no volume: a number that is not finite, a
-    /// negative size, min > max.
+    /// The box around volume `i`.
+    /// `None` for invalid bounds: a number that is not finite, a negative size, or min > max.
     pub(crate) fn extent(&self, i: usize) -> Option<Extent> {
         let extent = match *self {
             Self::Spheres { centers, radii } => sphere(centers.array(i), radii.get(i))?,
@@ -65,7 +65,7 @@ fn sphere(center: [f64; 3], radius: f64) -> Option<Extent> {
     (radius >= 0.0).then(|| Extent::about(center, [radius; 3]))
 }
 
-/// Along each axis of the world the box reaches `sum over k of |A_ik| h_k`.
+/// Along each world axis, the box reaches `sum over k of |A_ik| h_k` from its centre.
 fn oriented_box(
     centers: Floats<'_>,
     half_sizes: Floats<'_>,
@@ -86,7 +86,7 @@ fn oriented_box(
 }
 
 /// A float64 that is not below the exact product of two numbers >= 0.
-/// A product that vanishes for its smallness alone does not.
+/// A product that underflows to 0 is rounded up as well; only a factor of 0 gives 0.
 fn product_up(a: f64, b: f64) -> f64 {
     let product = a * b;
     if a == 0.0 || b == 0.0 { product } else { product.next_up() }

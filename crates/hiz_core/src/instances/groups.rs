@@ -1,18 +1,19 @@
 //! Groups: 64 instances that are stored one after the other, with a box around all of them.
-//! What hides the box hides every member.
+//! Whatever hides the box hides every member.
 //!
-//! A box contains the *given* volumes of its members for the exact real numbers, in float64; its
-//! record on the device contains the box.
-//! A group with a member that is no volume has a record that is none either, so that it is never
-//! culled as a whole.
+//! For the exact real numbers, a box contains the *given* volumes of its members.
+//! It is computed in float64 and rounded outwards, and its record on the device contains it.
+//! A group with an invalid member gets an invalid record, so it is never culled as a whole.
 //!
-//! An update moves some members and says nothing of the others, and the host keeps no bounds.
-//! It keeps a box for each group, and for a group of which a *part* was moved the boxes of the
-//! moved members: the new box is the union of those and of the box that held the others from the
-//! start.
-//! So a group does not grow along the path of a moving member; it is as tight as a new one once all
-//! members were moved at least once; and what never moves, or moves as a whole, costs 88 bytes a
-//! group.
+//! An update moves some members, and the host keeps no bounds of the others.
+//! For each group the host keeps one box.
+//! If only *part* of a group was moved, it also keeps the boxes of the moved members.
+//! The new box is then the union of these boxes and of the box that held the others from the start.
+//! This has three effects:
+//!
+//! - A group does not grow along the path of a moving member.
+//! - Once every member was moved at least once, the group is as tight as a new one.
+//! - A group that never moves, or moves as a whole, costs 88 bytes on the host.
 
 use wgpu::WriteOnly;
 
@@ -24,23 +25,23 @@ use crate::input::bounds::{Bounds, Floats};
 use crate::instances::extent::Extent;
 use crate::instances::volume_record::{BoxRecord, OrientedBoxRecord};
 
-/// Instances of a group, as many as a `u64` has bits.
+/// Members of a full group: as many as a `u64` has bits.
 pub(crate) const GROUP: usize = 64;
 
-/// From how many instances on a second thread packs: it takes tens of microseconds to start, they
-/// take hundreds.
+/// From this many instances on, a second thread helps to pack.
+/// It takes tens of microseconds to start, and packing them takes hundreds.
 const PARALLEL_FROM: usize = 1 << 13;
 
 #[derive(Debug)]
 struct Group {
-    /// Holds every member that no later update has moved.
+    /// A box around every member that no later update has moved.
     around: Extent,
-    /// Bit k: member k is no volume, now.
+    /// Bit k: the bounds of member k are invalid now.
     invalid: u64,
     /// Bit k: member k was moved since `around` was formed.
     moved: u64,
-    /// The boxes of the moved members, each at its number, empty for what is no volume.
-    /// No element before a part was moved.
+    /// The box of member k at position k: filled for moved members, empty for invalid bounds.
+    /// The list has no elements until a part of the group is moved.
     extents: Vec<Extent>,
 }
 
@@ -51,18 +52,20 @@ pub(crate) struct Groups {
     groups: Vec<Group>,
 }
 
-/// Where what is stored at a place comes from.
+/// Where the instance at a place comes from.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Origin {
-    /// Which of the given bounds.
+    /// Its position in the given bounds.
     pub(crate) bounds: usize,
     /// The caller's index of the instance, relative to the piece's first.
     pub(crate) index: u32,
 }
 
-/// Some members of one group: first their numbers, fetched one after the other from wherever the
-/// caller has them, so that the processor waits for many at once; then their records, before they
-/// are copied to where the device finds them.
+/// Scratch memory for packing some members of one group.
+///
+/// First the given numbers are fetched from wherever the caller has them, one after the other, so
+/// that the processor can wait for many loads at once.
+/// The records are made here too, before they are copied to the memory that the device reads.
 struct Part {
     indices: [u32; GROUP],
     threes: [[f64; 3 * GROUP]; 2],
@@ -84,9 +87,10 @@ impl Part {
         }
     }
 
-    /// Packs the volumes `sources` of `bounds` into the beginning of `target`, and tells `each` of
-    /// them the box around it, if it is a volume.
-    /// What is left of the target.
+    /// Packs the volumes `sources` of `bounds` into the beginning of `target`.
+    /// Calls `each` with the number of each volume and the box around it; `None` if its bounds are
+    /// invalid.
+    /// Returns the rest of `target`.
     fn pack<'a>(
         &mut self,
         bounds: &Bounds<'_>,
@@ -140,7 +144,7 @@ impl Group {
         Self { around: Extent::EMPTY, invalid: 0, moved: 0, extents: Vec::new() }
     }
 
-    /// The box around all members, of which `all` has a bit each; `None` if one is no volume.
+    /// The box around all members, given as the bits of `all`; `None` if a member is invalid.
     fn extent(&self, all: u64) -> Option<Extent> {
         if self.invalid != 0 {
             return None;
@@ -149,7 +153,7 @@ impl Group {
         Some(bits(self.moved).fold(others, |sum, k| sum.union(&self.extents[k])))
     }
 
-    /// Takes the boxes of `members`, of which those of `invalid` are no volume.
+    /// Takes new boxes for `members`; those in `invalid` have invalid bounds.
     fn replace(
         &mut self,
         all: u64,
@@ -174,16 +178,16 @@ impl Group {
     }
 }
 
-/// One bit for each member of group `group` of a piece of `count` instances.
+/// One bit per member of group `group` in a piece of `count` instances.
 fn all_members(count: usize, group: usize) -> u64 {
     let n = (count - group * GROUP).min(GROUP);
     if n == GROUP { u64::MAX } else { (1 << n) - 1 }
 }
 
 impl Groups {
-    /// Writes the records of a piece's instances to `records` in their stored order and forms their
+    /// Writes the records of a piece's instances to `records` in stored order, and forms their
     /// groups.
-    /// `source` says what is stored at a place of the piece.
+    /// `source` says which instance is stored at a place of the piece.
     pub(crate) fn packed(
         bounds: &Bounds<'_>,
         count: usize,
@@ -221,7 +225,7 @@ impl Groups {
         self.groups.len()
     }
 
-    /// Places of the members that are no volume, ascending.
+    /// Places of the members with invalid bounds, ascending.
     pub(crate) fn invalid(&self) -> impl Iterator<Item = usize> {
         self.groups
             .iter()
@@ -229,12 +233,12 @@ impl Groups {
             .flat_map(|(g, group)| bits(group.invalid).map(move |k| g * GROUP + k))
     }
 
-    /// The box around a group; `None` if a member is no volume.
+    /// The box around a group; `None` if a member is invalid.
     pub(crate) fn extent(&self, group: usize) -> Option<Extent> {
         self.groups[group].extent(all_members(self.count, group))
     }
 
-    /// A group's record for the device.
+    /// The record of a group for the device.
     pub(crate) fn record(&self, group: usize) -> BoxRecord {
         BoxRecord::valid_or_none(self.extent(group).map(|extent| [extent.min, extent.max]))
     }
@@ -245,9 +249,10 @@ impl Groups {
         (self.groups.capacity() * size_of::<Group>() + extents * size_of::<Extent>()) as u64
     }
 
-    /// Takes new bounds for the instances at `places` (ascending, each once), `source(places[k])`,
-    /// and writes their records, one after the other, to `records`.
-    /// The groups that they are in, ascending.
+    /// Takes new bounds for the instances at `places`, which ascend without repetition.
+    /// The bounds of `places[k]` are at `source(places[k])`.
+    /// Writes their records to `records`, one after the other.
+    /// Returns the groups that contain these places, ascending.
     pub(crate) fn replace(
         &mut self,
         bounds: &Bounds<'_>,
@@ -258,7 +263,8 @@ impl Groups {
         let group_of = |place: u32| place as usize / GROUP;
         let record_bytes = bounds.kind().record_bytes();
         let count = self.count;
-        // Places `begin` and on of the list, and the groups from `first_group` on.
+        // Packs `places`, which begin at position `begin` of the list, into `groups`, the first of
+        // which is `first_group`.
         let work = |(begin, places, first_group, groups): (usize, &[u32], usize, &mut [Group])| -> Result<()> {
             let mut view = records.range(begin as u64 * record_bytes..(begin + places.len()) as u64 * record_bytes)?;
             let mut rest = view.slice(..);
@@ -279,7 +285,7 @@ impl Groups {
             }
             Ok(())
         };
-        // The second half begins with a group, and is never empty.
+        // The second half begins with a whole group, and it is never empty.
         let half_group =
             if places.len() < PARALLEL_FROM { 0 } else { group_of(places[places.len() / 2]) };
         let half = places.partition_point(|place| group_of(*place) < half_group);
@@ -297,7 +303,7 @@ impl Groups {
     }
 }
 
-/// The numbers of the bits that are set, ascending.
+/// The positions of the bits that are set, ascending.
 fn bits(mut word: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let k = word.trailing_zeros();

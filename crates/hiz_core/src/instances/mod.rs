@@ -1,8 +1,18 @@
-//! Instances on the device: the bounding volumes of one call, cut into pieces that fit a binding
-//! and a dispatch, each stored along a curve through space (`morton`) and in groups (`groups`).
+//! Instances: bounding volumes on the device.
 //!
-//! A *place* is where an instance is stored in its piece; its *index* is the caller's number, which
-//! everything public speaks of.
+//! The data goes through these files:
+//!
+//! 1. `piece` cuts the instances of one call into pieces that fit a binding and a dispatch.
+//! 2. `order` and `morton` choose where each instance is stored: along a curve through space.
+//! 3. `groups` and `extent` form groups of 64 neighbours with a box around each.
+//! 4. `volume_record` and `records` write the records that the cull reads.
+//! 5. `update` replaces bounds later, and `watch` connects submitted culls with later updates.
+//!
+//! An instance has two numbers.
+//! Its *index* is the caller's number, and everything public uses it.
+//! Its *place* is where its piece stores it.
+//!
+//! This room records copies and dispatches; it never submits or waits.
 
 pub(crate) mod extent;
 pub(crate) mod groups;
@@ -31,18 +41,19 @@ use crate::instances::watch::Watches;
 /// How instances are uploaded.
 #[derive(Debug, Clone, Default)]
 pub struct InstanceOptions {
-    /// Refuse bad bounds (NaN, infinite, negative radius, min > max) instead of keeping them
-    /// visible.
+    /// Whether to refuse invalid bounds (NaN, infinite, negative radius, min > max).
+    /// Otherwise they are kept visible.
     pub strict: bool,
-    /// The order in which they are stored, piece by piece.
+    /// The order in which the instances of each piece are stored.
     pub order: StoredOrder,
-    /// Instances of one piece, at most; `None`: what the device allows.
+    /// The most instances of one piece, a multiple of 128.
+    /// `None`: as many as the device allows.
     #[cfg(feature = "testing")]
     pub piece_capacity: Option<u32>,
 }
 
 impl InstanceOptions {
-    /// Instances of one piece, at most `most`.
+    /// The most instances of one piece, at most `most`.
     #[cfg(feature = "testing")]
     fn checked_piece_capacity(&self, most: u32) -> Result<u32> {
         match self.piece_capacity {
@@ -64,12 +75,12 @@ impl InstanceOptions {
     }
 }
 
-/// What updates change on the host.
+/// The state on the host that updates change.
 #[derive(Debug)]
 pub(crate) struct Changing {
-    /// Of each piece.
+    /// One per piece.
     pub(crate) groups: Vec<Groups>,
-    /// The number of the next update; `update` tells what for.
+    /// The number of the next update; the docs of `update` say what it is for.
     pub(crate) next_update: u32,
 }
 
@@ -78,20 +89,24 @@ pub(crate) struct Changing {
 pub struct Instances {
     pub(crate) context: ContextId,
     pub(crate) kind: BoundsKind,
-    /// At least one, so that there is always a draw to consume; an empty one for no instances.
+    /// At least one piece, so that there is always a draw to consume.
+    /// Without instances it is empty.
     pub(crate) pieces: Vec<Piece>,
     /// `shaders/instances/update.wgsl`, `Sequence`.
     pub(crate) sequence: wgpu::Buffer,
     changing: Locked<Changing>,
-    /// Held by whoever records *and* submits an update, so that both happen in one order.
+    /// A thread holds it while it records *and* submits an update, so that both happen in one
+    /// order.
     pub(crate) submitting: Locked<()>,
     watches: Locked<Watches>,
 }
 
 impl Instances {
-    /// `copy` records the copies of one piece, into an encoder that it is given or has; it is told
-    /// whether more pieces follow, so that who owns the queue may let go of this one's staging
-    /// area.
+    /// Packs the pieces one by one, and calls `copy` for each.
+    ///
+    /// `copy` gets a function that records the copies of the piece into an encoder.
+    /// It also learns whether more pieces follow.
+    /// A caller with a queue can submit then, and release the piece's staging buffers.
     pub(crate) fn new(
         gpu: &Gpu,
         bounds: &Bounds<'_>,
@@ -141,25 +156,26 @@ impl Instances {
         self.pieces.last().map_or(0, |p| p.range.end)
     }
 
-    /// Whether there is none.
+    /// Whether there are no instances.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Which kind of volume.
+    /// The kind of the bounding volumes.
     pub fn kind(&self) -> BoundsKind {
         self.kind
     }
 
-    /// The number of pieces, that is of lists and draws; at least 1.
+    /// The number of pieces, which is also the number of lists and draws; at least 1.
     pub fn num_pieces(&self) -> usize {
         self.pieces.len()
     }
 
-    /// The indices of bad bounds, ascending, as of the last update; they are always kept.
+    /// The indices of instances with invalid bounds, ascending, after the last update.
+    /// A cull always keeps them.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`] without memory for the list.
+    /// [`Error::OutOfMemory`] if the host has no memory for the list.
     pub fn invalid(&self) -> Result<Vec<u64>> {
         let changing = self.changing();
         let mut invalid =
@@ -173,21 +189,25 @@ impl Instances {
         Ok(invalid)
     }
 
-    /// Bytes on the device: a record for each instance, and a box for each 64 of them.
+    /// Bytes on the device: one record per instance, and one box per 64 instances.
     pub fn device_bytes(&self) -> u64 {
         self.pieces.iter().map(|p| p.records.size() + p.group_records.size()).sum()
     }
 
-    /// Bytes on the host: 8 an instance for its place and its index (none with
-    /// [`StoredOrder::Given`]), 88 for each 64 of them, and 48 an instance in such groups of 64 of
-    /// which a part was updated.
+    /// Bytes on the host.
+    ///
+    /// - 8 per instance for its place and its index; none with [`StoredOrder::Given`].
+    /// - 88 per group of 64 instances.
+    /// - 48 per instance in those groups of which a part was updated.
     pub fn host_bytes(&self) -> u64 {
         let groups = self.changing().groups.iter().map(Groups::host_bytes).sum::<u64>();
         self.pieces.iter().map(|p| p.order.host_bytes()).sum::<u64>() + groups
     }
 
     /// The culls that were submitted.
-    /// Held while one is submitted and added, and while an update is submitted and noted.
+    ///
+    /// The lock is held while a cull is submitted and added, and while an update is submitted and
+    /// noted.
     pub(crate) fn watches(&self) -> MutexGuard<'_, Watches> {
         self.watches.lock()
     }
@@ -197,7 +217,8 @@ impl Instances {
     }
 }
 
-/// The error of `strict` for `bad` bad bounds of `n`.
+/// The error that `strict` gives if `bad` of `n` bounds are invalid.
+/// `first` is the index of the first of them.
 pub(crate) fn refuse_bad(n: usize, bad: usize, first: Option<u64>) -> Result<()> {
     match first {
         None => Ok(()),

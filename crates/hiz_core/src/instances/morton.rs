@@ -1,11 +1,15 @@
-//! The order in which instances are stored: along the curve of Morton ("A computer oriented
-//! geodetic data base and a new technique in file sequencing", IBM, 1966), so that instances that
-//! lie together in space lie together in memory.
+//! The Morton order, in which instances are stored.
+//! Instances that lie together in space then lie together in memory.
 //!
-//! The curve runs through the smallest of a row of nested cubes that holds an instance's centre.
-//! The innermost holds what a sample calls usual, and each cube is 8 times as large as the one
-//! inside it: an instance a million times as far away as all others gets a cube of its own and
-//! leaves their cells as fine as they were.
+//! Source: Morton, "A computer oriented geodetic data base and a new technique in file sequencing",
+//! IBM, 1966.
+//!
+//! The curve runs through cubes that are nested in one another.
+//! Each instance has its key in the smallest cube that holds its centre.
+//! The innermost cube comes from a sample of the centres, and each cube is 8 times as large as the
+//! one inside it.
+//! So an outlier does not coarsen the cells of the others.
+//! An instance a million times as far away as all others lies in an outer cube of its own.
 
 use std::ops::Range;
 
@@ -17,23 +21,24 @@ use crate::input::bounds::Bounds;
 /// Bits of a cell's number along each axis.
 const AXIS_BITS: u32 = 19;
 
-/// The cube's number stands above the cell's three numbers: 63 bits together.
+/// The bits above the cell's three numbers hold the number of the cube: 63 bits in all.
 const CUBE_SHIFT: u32 = 3 * AXIS_BITS;
 
-/// The last cube takes whatever lies outside it: numbers beyond 2^60, which no record holds.
+/// The last cube also takes whatever lies outside it: coordinates beyond 2^60, which no record
+/// holds.
 const LAST_CUBE: u64 = 63;
 
-/// Behind every cell of every cube: what is no volume.
+/// The key of invalid bounds: after every cell of every cube.
 const NO_VOLUME: u64 = u64::MAX;
 
-/// How many centres tell where the innermost cube lies.
+/// The most centres that are sampled to place the innermost cube.
 const SAMPLES: usize = 4096;
 
-/// From how many instances on a second thread sorts: it takes tens of microseconds to start, they
-/// take milliseconds.
+/// From this many instances on, a second thread helps to sort.
+/// It takes tens of microseconds to start, and sorting them takes milliseconds.
 const PARALLEL_FROM: usize = 1 << 15;
 
-/// A cell's key, and whose it is.
+/// The key of a cell, and the index of an instance in it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 struct Keyed {
     key: u64,
@@ -48,9 +53,13 @@ struct Cube {
 }
 
 impl Cube {
-    /// About the medians of a sample, reaching as far as its middle eight tenths are wide along the
-    /// widest axis: of evenly spread centres it holds all, and a tenth of outliers to a side cannot
-    /// move it.
+    /// Places the innermost cube by a sample of the centres.
+    ///
+    /// The cube's centre is the median along each axis.
+    /// Its half size is the width of the middle eight tenths of the sample, along the widest axis;
+    /// if that is 0, the width of the whole sample.
+    /// If the centres are spread evenly, the cube holds all of them.
+    /// A tenth of outliers on each side cannot move it.
     fn new(bounds: &Bounds<'_>, range: &Range<usize>) -> Result<Self> {
         let step = range.len().div_ceil(SAMPLES).max(1);
         let mut axes: [Vec<f64>; 3] = [
@@ -76,7 +85,7 @@ impl Cube {
         let width = [widest(tenth, samples - 1 - tenth), widest(0, samples - 1)]
             .into_iter()
             .find(|w| *w > 0.0);
-        // 2^-100: nothing between a point and this is told apart, and 63 cubes reach past 2^60.
+        // An extent below 2^-100 counts as a point; from there 63 cubes still reach past 2^60.
         let half_size = width.unwrap_or(0.0).clamp(1.0 / 2.0_f64.powi(100), 2.0_f64.powi(60));
         Ok(Self { center: axes.map(|a| a[samples / 2]), half_size })
     }
@@ -86,7 +95,8 @@ impl Cube {
             std::array::from_fn(|k| (center[k] - self.center[k]) / self.half_size);
         let distance = from_center.iter().fold(0.0, |d: f64, v| d.max(v.abs()));
         let cube = if distance < 1.0 { 0 } else { (exponent(distance) / 3 + 1).min(LAST_CUBE) };
-        // Cells of half the cube's size over 2^18; casting clamps what lies outside the last cube.
+        // The cube has 2^18 cells on each side of its centre.
+        // The clamp takes what lies outside the last cube.
         let cells = f64::from(1_u32 << (AXIS_BITS - 1));
         let scale = cells / power_of_8(cube);
         let last = f64::from((1_u32 << AXIS_BITS) - 1);
@@ -105,7 +115,7 @@ fn power_of_8(power: u64) -> f64 {
     f64::from_bits((1023 + 3 * power) << 52)
 }
 
-/// The 21 lowest bits, each followed by two zeros.
+/// Spreads the 21 lowest bits: each is followed by two zeros.
 fn spread(v: u64) -> u64 {
     let v = (v | v << 32) & 0x001F_0000_0000_FFFF;
     let v = (v | v << 16) & 0x001F_0000_FF00_00FF;
@@ -115,8 +125,9 @@ fn spread(v: u64) -> u64 {
 }
 
 /// The instances of `range` along the curve, as indices relative to its start.
-/// Equal cells keep the caller's order, and what is no volume comes last: the order is the same on
-/// every machine.
+///
+/// Instances with equal keys keep the caller's order, and invalid bounds come last.
+/// So the order is the same on every machine.
 pub(crate) fn order(bounds: &Bounds<'_>, range: Range<usize>) -> Result<Vec<u32>> {
     let cube = Cube::new(bounds, &range)?;
     let mut keyed = memory::list(range.len(), "order")?;
@@ -145,8 +156,8 @@ pub(crate) fn order(bounds: &Bounds<'_>, range: Range<usize>) -> Result<Vec<u32>
     Ok(order)
 }
 
-/// Indices of two sorted lists in the order of their keys; of equal keys the first list's come
-/// first.
+/// Merges the indices of two sorted lists in the order of their keys.
+/// Of equal keys, those of the first list come first.
 fn merge(first: &[Keyed], second: &[Keyed], order: &mut Vec<u32>) {
     let (mut i, mut j) = (0, 0);
     while i < first.len() && j < second.len() {
@@ -165,8 +176,8 @@ fn digit(key: u64, place: usize) -> usize {
     (key >> (place as u32 * DIGIT_BITS) & ((1 << DIGIT_BITS) - 1)) as usize
 }
 
-/// Sorts by key, least digit first; stable.
-/// Digits that all keys share are passed over.
+/// Sorts by key, least significant digit first; the sort is stable.
+/// Digits in which all keys agree are skipped.
 fn radix_sort(keyed: &mut [Keyed], spare: &mut [Keyed]) {
     let mut counts = [[0_u32; 1 << DIGIT_BITS]; DIGITS];
     for k in keyed.iter() {
@@ -236,7 +247,7 @@ mod tests {
             [0.0, 1.0, f64::NAN, f64::INFINITY, -1e300, f64::MAX, 1e30, -5e-324, 2.0_f64.powi(60)]
         {
             for n in [2, 63, 64, 1000, PARALLEL_FROM + 1] {
-                // All the same, then every seventh.
+                // All instances have the special centre, then every seventh.
                 let same = vec![special; 3 * n];
                 assert_eq!(
                     order_of(&same),
@@ -277,7 +288,7 @@ mod tests {
         assert_eq!(order, expected);
     }
 
-    /// The neighbours of a curve through 8 cells, written out.
+    /// The order of a curve through 8 cells, written out.
     #[test]
     fn keys_follow_the_z_of_morton() {
         let cube = Cube { center: [0.0; 3], half_size: 1.0 };
@@ -293,7 +304,8 @@ mod tests {
         assert!(cube.key([0.9; 3]) < cube.key([-1.5; 3]), "the inner cube comes first");
     }
 
-    /// The mean over groups of 64 of the volume's cube root, the box around centres.
+    /// The cube root of the volume of the box around a group's centres.
+    /// Returns the median over all groups of 64.
     fn mean_size(centers: &[f64], order: &[u32]) -> f64 {
         let sizes = order.chunks(64).map(|group| {
             let axis = |k: usize| {
@@ -303,13 +315,14 @@ mod tests {
             (axis(0) * axis(1) * axis(2)).cbrt()
         });
         let sizes: Vec<_> = sizes.collect();
-        // The median group: one with an outlier in it is as large as the outlier is far.
+        // The median, because a group with an outlier is as large as the outlier is far.
         let mut sorted = sizes;
         sorted.sort_by(f64::total_cmp);
         sorted[sorted.len() / 2]
     }
 
-    /// Clusters, some outliers among them; random order is that in which they were made.
+    /// Clusters, first without and then with outliers.
+    /// The instances were made in random order.
     #[test]
     fn groups_are_small_with_and_without_outliers() {
         let mut random = Random(77);

@@ -1,4 +1,4 @@
-//! In which order the instances of a piece are stored.
+//! The order in which the instances of a piece are stored, and the maps between places and indices.
 
 use std::ops::Range;
 
@@ -7,19 +7,21 @@ use crate::host::memory;
 use crate::input::bounds::Bounds;
 use crate::instances::morton;
 
-/// In which order instances are stored.
-/// The indices that come out are the caller's in either.
+/// The order in which instances are stored.
+/// The indices that come out are the caller's in either order.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum StoredOrder {
-    /// Neighbours in space together (Morton order), sorted once when they are uploaded.
+    /// Neighbours in space are stored together (Morton order).
+    /// The instances are sorted once, when they are uploaded.
     #[default]
     Morton,
-    /// As they came: no sort, and 8 bytes an instance less on the host.
-    /// For what is in such an order already.
+    /// As given: no sort, and 8 bytes less per instance on the host.
+    /// Use it for instances that are already in such an order.
     Given,
 }
 
-/// Which instance of a piece is stored where; nothing of it where the order is the caller's.
+/// Which instance of a piece is stored where.
+/// Both maps are empty if the order is the caller's.
 #[derive(Debug, Default)]
 pub(crate) struct PieceOrder {
     indices: Vec<u32>,
@@ -48,24 +50,24 @@ impl PieceOrder {
         self.indices.is_empty()
     }
 
-    /// Which instance is stored at `place`, relative to the piece's first.
+    /// The index of the instance that is stored at `place`, relative to the piece's first.
     pub(crate) fn index(&self, place: usize) -> usize {
         self.indices.get(place).map_or(place, |index| *index as usize)
     }
 
-    /// Where the instance `index`, relative to the piece's first, is stored.
+    /// The place of the instance `index`, which is relative to the piece's first.
     pub(crate) fn place(&self, index: usize) -> usize {
         self.places.get(index).map_or(index, |place| *place as usize)
     }
 
-    /// Where the instances `range` are stored, ascending.
+    /// The places of the instances `range`, ascending.
     pub(crate) fn places(&self, range: Range<usize>) -> Result<Vec<u32>> {
         if self.is_given() {
             return memory::collected(range.start as u32..range.end as u32, "update");
         }
         let mut places = memory::list(range.len(), "update")?;
         if range.len() > self.indices.len() / 16 {
-            // A look at every place is cheaper than a sort.
+            // Scanning every place is cheaper than a sort.
             let here = |(place, index): (usize, &u32)| {
                 range.contains(&(*index as usize)).then_some(place as u32)
             };

@@ -12,26 +12,28 @@ use crate::instances::order::{PieceOrder, StoredOrder};
 use crate::instances::records::{RECORDS_PER_ROW, Records, Upload};
 use crate::instances::volume_record::BoxRecord;
 
-/// Invocations of one workgroup of the cull of groups and of updates; `shaders/cull/cull_groups.wgsl`,
-/// `WORKGROUP`, and `update.wgsl`.
+/// Invocations of one workgroup of the cull of groups, and of updates.
+/// Twins: `shaders/cull/cull_groups.wgsl`, `WORKGROUP`; `shaders/instances/update.wgsl`.
 pub(crate) const CULL_WORKGROUP: u32 = 128;
 
-/// How many instances one piece may hold: its records in one texture and one staging buffer, its
-/// verdicts in one binding, its workgroups in one dimension of a dispatch.
+/// How many instances one piece may hold.
+///
+/// Its records must fit one texture and one staging buffer.
+/// Its verdicts must fit one binding, and its workgroups one dimension of a dispatch.
 pub(crate) fn piece_capacity(record_bytes: u64, limits: &wgpu::Limits) -> u32 {
     let rows = u64::from(limits.max_texture_dimension_2d) * u64::from(RECORDS_PER_ROW);
     let staging = limits.max_buffer_size / record_bytes;
-    // A word of a verdict, and a bit of the mask.
+    // Per instance: a verdict of 4 bytes, and a bit of the mask.
     let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) / 5;
     let dispatch =
         u64::from(limits.max_compute_workgroups_per_dimension) * u64::from(CULL_WORKGROUP);
-    // Whole rows, so that a staging area is not padded past the limit.
+    // Whole rows, so that the padding of a staging buffer cannot exceed the limit.
     let whole =
         rows.min(staging).min(binding).min(dispatch).min(1 << 24) / u64::from(RECORDS_PER_ROW);
     u32::try_from(whole * u64::from(RECORDS_PER_ROW)).unwrap_or(1 << 24)
 }
 
-/// `shaders/instances/piece.wgsl`, `Piece`.
+/// Twin: `shaders/instances/piece.wgsl`, `Piece`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct PieceUniform {
@@ -44,14 +46,15 @@ pub(crate) struct PieceUniform {
 #[derive(Debug)]
 pub(crate) struct Piece {
     pub(crate) range: Range<u32>,
-    /// In stored order; each knows its index, relative to the piece's first.
+    /// The records in stored order.
+    /// Each holds its instance's index relative to the piece's first.
     pub(crate) records: Records,
-    /// One `BoxRecord` a group.
+    /// One `BoxRecord` per group.
     pub(crate) group_records: Records,
     pub(crate) uniform: wgpu::Buffer,
-    /// What a cull of the instances reads.
+    /// What the cull of instances binds.
     pub(crate) bindings: wgpu::BindGroup,
-    /// What a cull of the groups reads: a piece of boxes.
+    /// What the cull of groups binds: its boxes, as if they were a piece of instances.
     pub(crate) group_bindings: wgpu::BindGroup,
     pub(crate) order: PieceOrder,
 }
@@ -72,11 +75,11 @@ impl Piece {
     }
 }
 
-/// A piece and its records, as every cull reads them.
+/// The bindings of a piece's uniform and records in every cull.
 pub(crate) const RECORD_BINDINGS: &[(u32, Binding)] =
     &[(0, Binding::Uniform), (1, Binding::ReadQuads)];
 
-/// A piece, its groups, and the copies that bring both to the device.
+/// Makes a piece, its groups, and the uploads that bring both to the device.
 pub(super) fn packed(
     gpu: &Gpu,
     bounds: &Bounds<'_>,
@@ -113,7 +116,7 @@ pub(super) fn packed(
     Ok((piece, groups, [upload, groups_upload]))
 }
 
-/// A piece's uniform and records as a cull reads them.
+/// Binds a piece's uniform and records for a cull.
 pub(crate) fn bind_records(
     gpu: &Gpu,
     uniform: &wgpu::Buffer,
@@ -144,7 +147,8 @@ pub(crate) fn write_boxes(
 mod tests {
     use super::*;
 
-    /// Each limit alone, worked out by hand: what only twenty million instances meet on a device.
+    /// Checks each limit alone against values worked out by hand.
+    /// On a device only twenty million instances would reach these limits.
     #[test]
     fn every_limit_makes_pieces_smaller() {
         let large = wgpu::Limits {
@@ -154,18 +158,18 @@ mod tests {
             max_compute_workgroups_per_dimension: 1 << 30,
             ..wgpu::Limits::default()
         };
-        // Indices of a piece are exact as float32.
+        // float32 holds every index of a piece exactly.
         assert_eq!(piece_capacity(64, &large), 1 << 24);
         let rows = wgpu::Limits { max_texture_dimension_2d: 8, ..large.clone() };
         assert_eq!(piece_capacity(64, &rows), 8 * 1024);
-        // 2^20 bytes are 16384 records of 64 bytes.
-        // Of 32 bytes they would be 32768.
+        // 2^20 bytes hold 16384 records of 64 bytes, or 32768 records of 32 bytes.
         let buffer = wgpu::Limits { max_buffer_size: 1 << 20, ..large.clone() };
         assert_eq!((piece_capacity(64, &buffer), piece_capacity(32, &buffer)), (16_384, 32_768));
-        // A word of a verdict and a bit of the mask, 5 bytes with room: 209715, in whole rows.
+        // A verdict and a bit of the mask take at most 5 bytes: 209715 instances, cut to whole
+        // rows.
         let binding = wgpu::Limits { max_storage_buffer_binding_size: 1 << 20, ..large.clone() };
         assert_eq!(piece_capacity(64, &binding), 204 * 1024);
-        // Workgroups of 128.
+        // 100 workgroups of 128 invocations.
         let dispatch = wgpu::Limits { max_compute_workgroups_per_dimension: 100, ..large };
         assert_eq!(piece_capacity(64, &dispatch), 12 * 1024);
     }

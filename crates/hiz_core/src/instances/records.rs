@@ -1,5 +1,7 @@
-//! Records of volumes on the device: a texture, because a software driver fetches a texel of 16
-//! bytes whole where it picks the words of a buffer one by one (`docs/performance.md`).
+//! Records of volumes on the device.
+//!
+//! They lie in a texture, because a software driver fetches a texel of 16 bytes whole.
+//! From a buffer it would fetch the words one by one (`docs/performance.md`).
 //! Twin: `shaders/instances/record_layout.wgsl`.
 
 use crate::error::Result;
@@ -9,11 +11,11 @@ use crate::gpu::device::Gpu;
 /// Records in a row of the texture.
 pub(crate) const RECORDS_PER_ROW: u32 = 1024;
 
-/// Bytes of a texel: `Rgba32Uint`.
+/// Bytes of a texel of `Rgba32Uint`.
 pub(crate) const TEXEL_BYTES: u64 = 16;
 
-/// A short row is padded to this many records, so that it keeps to the alignment of copies whatever
-/// a record takes.
+/// A short row is padded to a multiple of this many records.
+/// Then every size of record meets the alignment that copies need.
 const ROW_MULTIPLE: u32 = 16;
 
 /// The format of the texture.
@@ -27,15 +29,15 @@ pub(crate) struct Records {
     record_bytes: u64,
 }
 
-/// Records that wait to be copied to where the cull finds them.
+/// Records in a staging buffer, to be copied to the texture that the cull reads.
 pub(crate) struct Upload {
     staging: wgpu::Buffer,
     texture: wgpu::Texture,
 }
 
 impl Records {
-    /// Makes room for `count` records, which `fill` writes where they are mapped.
-    /// They are on the device once the upload is recorded and has run.
+    /// Makes room for `count` records; `fill` writes them into mapped memory.
+    /// They are on the device once the upload was recorded and has run.
     pub(crate) fn new<T>(
         gpu: &Gpu,
         label: &str,
@@ -46,7 +48,7 @@ impl Records {
         let columns = count.clamp(1, RECORDS_PER_ROW).next_multiple_of(ROW_MULTIPLE);
         let rows = count.div_ceil(RECORDS_PER_ROW).max(1);
         let size = u64::from(columns) * u64::from(rows) * record_bytes;
-        // Without MAP_WRITE wgpu maps a staging area of its own, and copies that into this one.
+        // Without MAP_WRITE, wgpu would map a staging buffer of its own and copy it into this one.
         let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::MAP_WRITE;
         let (staging, filled) = gpu.written(label, size, usage, fill)?;
         let texture = gpu.texture(
@@ -62,12 +64,13 @@ impl Records {
         Ok((records, Upload { staging, texture }, filled))
     }
 
-    /// Texels of one record.
+    /// Texels per record.
     pub(crate) fn texels(&self) -> u32 {
         (self.record_bytes / TEXEL_BYTES) as u32
     }
 
-    /// The texture; rows without padding, but for the last one's end.
+    /// The texture.
+    /// Its rows have no padding except after the last record.
     #[cfg(feature = "testing")]
     pub(crate) fn texture(&self) -> &wgpu::Texture {
         &self.texture

@@ -1,12 +1,15 @@
-//! New bounds for some of the instances, which keep their places: records are replaced, the boxes
-//! of their groups follow.
+//! Updates: they replace the bounds of some instances.
 //!
-//! Recording is not running: an update that is dropped, or that runs in another order than it was
-//! recorded in, would leave the device with other volumes than the host formed the next boxes for,
-//! and a box must contain its members.
-//! So updates are numbered: the device counts those that ran, and where the numbers part the boxes
-//! of all groups that are touched from then on become no volume (their members are always tested
-//! one by one).
+//! The instances keep their places.
+//! Their records are replaced, and the boxes of their groups follow.
+//!
+//! A group's box must contain its members, and the host forms it without knowing all of their
+//! bounds.
+//! If a recorded update is dropped or reordered, the host's group boxes may no longer contain their
+//! members.
+//! So updates are numbered, and the device counts those that ran.
+//! On a mismatch the device invalidates every group box that is written afterwards.
+//! The members of such a group are always tested one by one.
 
 use std::ops::Range;
 
@@ -24,10 +27,10 @@ use crate::instances::volume_record::BoxRecord;
 use crate::instances::{Instances, refuse_bad};
 
 /// Invocations of one workgroup; `shaders/instances/update.wgsl`.
-/// As many as those of the cull, whose pieces fit one dispatch.
+/// It equals the cull's, whose pieces fit one dispatch.
 const WORKGROUP: u32 = CULL_WORKGROUP;
 
-/// `shaders/instances/update.wgsl`, `Update`.
+/// Twin: `shaders/instances/update.wgsl`, `Update`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct UpdateUniform {
@@ -37,7 +40,7 @@ pub(crate) struct UpdateUniform {
     pub(crate) padding: u32,
 }
 
-/// What a replacement reads and writes.
+/// The bindings of a replacement.
 const BINDINGS: &[(u32, Binding)] = &[
     (0, Binding::Uniform),
     (1, Binding::Read),
@@ -46,7 +49,7 @@ const BINDINGS: &[(u32, Binding)] = &[
     (4, Binding::Write),
 ];
 
-/// The update of records and groups.
+/// The shader that replaces records and group boxes.
 pub(crate) fn module() -> Source {
     Source::of(&[&[wgsl!("instances/record_layout"), wgsl!("instances/update")]])
 }
@@ -61,15 +64,17 @@ fn pipeline(gpu: &Gpu, entry_point: &'static str) -> Result<wgpu::ComputePipelin
     })
 }
 
-/// Records that go to places of one buffer.
+/// Records that replace those at `places` of one texture.
 struct Replacement<'a> {
     places: &'a [u32],
     fresh: wgpu::Buffer,
     target: &'a Records,
 }
 
-/// `before` records what has to read the old bounds; it is told which instances will have new ones,
-/// and asked if there are any.
+/// Records an update.
+///
+/// `before` is called if any instances are updated.
+/// It learns which ones, and records the work that has to read their old bounds.
 pub(crate) fn record_update(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
@@ -173,16 +178,17 @@ pub(crate) fn record_update(
         })
     });
     if result.is_err() {
-        // The host may have taken a part.
-        // No number of the device will agree with it any more.
+        // The host may have taken part of the update.
+        // A number that is skipped makes the device find a mismatch from now on.
         changing.next_update = changing.next_update.wrapping_add(1);
     }
     result
 }
 
-/// `places`, ascending, in bands whose new records one storage binding holds.
-/// (A piece may hold more: its own records lie in a texture.)
-/// No group is in two of them.
+/// Splits ascending `places` into bands whose new records fit one storage binding.
+///
+/// A piece may be larger than that, because its own records lie in a texture.
+/// No group is in two bands.
 fn bands<'a>(
     places: &'a [u32],
     record_bytes: u64,

@@ -1,19 +1,19 @@
-//! Bounding volumes: from the caller's arrays (float32 or float64) to the records that the cull
-//! shader reads.
+//! Records of bounding volumes: from the caller's float32 or float64 arrays to what the cull reads.
 //!
 //! A position becomes two float32, `hi + lo`, so that the shader can subtract the eye before it
 //! rounds.
-//! Radii and half sizes are rounded up, with what the position cannot hold added: the stored volume
-//! contains the given one.
-//! Bad bounds (NaN, infinite, negative radius, min > max) are not repaired: their record fails the
-//! shader's test of its bits, the instance is kept visible and counted as invalid.
+//! Radii and half sizes are rounded up, and what the position cannot hold is added to them.
+//! So the stored volume contains the given one.
+//!
+//! Invalid bounds (NaN, infinite, negative radius, min > max) are not repaired.
+//! Their record fails a test in the shader; the instance is kept visible and counted as invalid.
 
 use crate::error::{Error, Result};
 use crate::host::rounding::{round_up, split, sum_up, sum_up_difference};
 use crate::input::bounds::{Bounds, BoundsKind, Floats};
 
 impl BoundsKind {
-    /// Bytes of one record on the device.
+    /// Bytes of one record on the device: 32 for a sphere, 48 for a box, 64 for an oriented box.
     pub fn record_bytes(self) -> u64 {
         (match self {
             Self::Sphere => size_of::<SphereRecord>(),
@@ -24,7 +24,7 @@ impl BoundsKind {
 }
 
 impl Bounds<'_> {
-    /// Which kind of volume.
+    /// The kind of these volumes.
     pub fn kind(&self) -> BoundsKind {
         match self {
             Self::Spheres { .. } => BoundsKind::Sphere,
@@ -36,7 +36,7 @@ impl Bounds<'_> {
     /// The number of instances.
     ///
     /// # Errors
-    /// [`Error::Invalid`] where the arrays' lengths do not agree.
+    /// [`Error::Invalid`] if the lengths of the arrays disagree.
     pub fn len(&self) -> Result<usize> {
         let (columns, first): (_, Floats<'_>) = match *self {
             Self::Spheres { centers, radii } => {
@@ -64,16 +64,16 @@ impl Bounds<'_> {
         Ok(n)
     }
 
-    /// Whether there is no instance.
+    /// Whether there are no instances.
     ///
     /// # Errors
-    /// As [`Bounds::len`].
+    /// Those of [`Bounds::len`].
     pub fn is_empty(&self) -> Result<bool> {
         Ok(self.len()? == 0)
     }
 
-    /// Writes the record of instance `i` (`record_bytes()` bytes), which says that the caller's
-    /// number is `index`; false for bad bounds.
+    /// Writes the record of instance `i`, `record_bytes()` bytes, with the caller's `index`.
+    /// Returns false for invalid bounds.
     pub(crate) fn write_record(&self, i: usize, index: u32, out: &mut [u8]) -> bool {
         match *self {
             Self::Spheres { centers, radii } => {
@@ -98,23 +98,24 @@ fn write<R: Record>(out: &mut [u8], index: u32, record: R) -> bool {
     is_valid
 }
 
-/// Sizes and coordinates from here on are no volume: with those below, no product of the shader
-/// overflows.
+/// Sizes and coordinates must stay below this, or the bounds are invalid.
+/// Then no product in the shader overflows.
 const LARGEST: f32 = 1_152_921_504_606_846_976.0;
 
-/// What bad bounds become: beyond every camera's coordinate limit, so that the shader keeps the
-/// instance and says that it is invalid.
-/// It need not know NaN or infinity, which a compiler may take for absent.
+/// The size in the record of invalid bounds.
+///
+/// It exceeds every camera's coordinate limit, so the shader keeps the instance as invalid.
+/// The shader need not recognise NaN or infinity, which a compiler may assume to be absent.
 const BEYOND_LIMITS: f32 = 4.0 * LARGEST;
 
 trait Record: bytemuck::Pod {
-    /// What stands for bad bounds.
+    /// The record that is stored for invalid bounds.
     const NO_VOLUME: Self;
 
-    /// Everything below 2^60 in size, lengths not negative.
+    /// Whether all numbers are below 2^60 in magnitude, and no length is negative.
     fn is_valid(&self) -> bool;
 
-    /// The same with the caller's index.
+    /// The same record with the caller's index.
     fn numbered(self, index: u32) -> Self;
 }
 
@@ -122,7 +123,7 @@ fn all_small<const N: usize>(values: [f32; N]) -> bool {
     values.iter().all(|v| v.abs() < LARGEST)
 }
 
-/// `shaders/instances/bounds_sphere.wgsl`, `SphereRecord`.
+/// Twin: `shaders/instances/bounds_sphere.wgsl`, `SphereRecord`.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct SphereRecord {
@@ -132,7 +133,7 @@ pub(crate) struct SphereRecord {
     index: u32,
 }
 
-/// `shaders/instances/bounds_box.wgsl`, `BoxRecord`.
+/// Twin: `shaders/instances/bounds_box.wgsl`, `BoxRecord`.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct BoxRecord {
@@ -144,8 +145,8 @@ pub(crate) struct BoxRecord {
     padding_2: f32,
 }
 
-/// `shaders/instances/bounds_oriented_box.wgsl`, `OrientedBoxRecord`: the third half axis fills the
-/// fourth lanes.
+/// Twin: `shaders/instances/bounds_oriented_box.wgsl`, `OrientedBoxRecord`.
+/// The third half axis fills the fourth lanes.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct OrientedBoxRecord {
@@ -165,7 +166,8 @@ const _: () = assert!(
         && size_of::<OrientedBoxRecord>() == 64
 );
 
-/// A position as two halves, and what they cannot hold, axis by axis (0 for float32 input).
+/// A position as two float32 halves.
+/// `rest` is what they cannot hold, axis by axis; it is 0 for float32 input.
 struct Position {
     hi: [f32; 3],
     lo: [f32; 3],
@@ -175,8 +177,8 @@ struct Position {
 impl Position {
     fn new(p: [f64; 3]) -> Self {
         let halves = p.map(split);
-        // Exact: `p - hi` is (both are float64 within a factor of two or hi is 0), and so is taking
-        // `lo` from it.
+        // Exact: `p - hi` is, because both are float64 within a factor of two or hi is 0.
+        // Subtracting `lo` is exact, too.
         let rest =
             std::array::from_fn(|k| (p[k] - f64::from(halves[k].0) - f64::from(halves[k].1)).abs());
         Self { hi: halves.map(|h| h.0), lo: halves.map(|h| h.1), rest }
@@ -186,9 +188,9 @@ impl Position {
 impl SphereRecord {
     fn new(center: [f64; 3], radius: f64) -> Self {
         let p = Position::new(center);
-        // The 1-norm bounds the distance by which the stored centre is off.
+        // The stored centre is off by at most the 1-norm of the rests.
         let moved = p.rest.iter().fold(0.0, |sum, r| sum_up(sum, *r));
-        // A negative radius stays negative, however small.
+        // A negative radius stays negative, however small it is.
         let radius = if radius < 0.0 { -1.0 } else { round_up(sum_up(radius, moved)) };
         Self { center_hi: p.hi, radius, center_lo: p.lo, index: 0 }
     }
@@ -211,14 +213,14 @@ impl Record for SphereRecord {
 }
 
 impl BoxRecord {
-    /// The record of a box, or of no volume where it is none.
+    /// The record of a box, or an invalid record for `None` and for invalid bounds.
     pub(crate) fn valid_or_none(corners: Option<[[f64; 3]; 2]>) -> Self {
         let record = corners.map(|[min, max]| Self::new(min, max));
         record.filter(Self::is_valid).unwrap_or(Self::NO_VOLUME)
     }
 
     fn new(min: [f64; 3], max: [f64; 3]) -> Self {
-        // Halved first: min + max may overflow.
+        // Halved first, because min + max may overflow.
         let center: [f64; 3] = std::array::from_fn(|k| 0.5 * min[k] + 0.5 * max[k]);
         let p = Position::new(center);
         let half_size = std::array::from_fn(|k| {
@@ -229,7 +231,7 @@ impl BoxRecord {
                 sum_up_difference(max[k], center[k]).max(sum_up_difference(center[k], min[k]));
             round_up(sum_up(half, p.rest[k]))
         });
-        // A NaN corner makes a NaN centre, so that it cannot hide in the maximum above.
+        // A NaN corner makes a NaN centre, so the maximum above cannot hide it.
         Self {
             center_hi: p.hi,
             padding_0: 0.0,
@@ -264,9 +266,11 @@ impl Record for BoxRecord {
 }
 
 impl OrientedBoxRecord {
-    /// The half axes `A_k h_k` are formed in float64 and rounded to nearest.
-    /// Neither that nor what the centre's two halves cannot hold is added to the sizes, for a flat
-    /// box has no size that could take it: the error bound does, `docs/accuracy.md`.
+    /// Forms the half axes `A_k h_k` in float64, and rounds them to nearest.
+    ///
+    /// Neither this rounding nor the rest of the centre is added to the sizes.
+    /// A flat box has no size that could take it, so the error bound covers both
+    /// (`docs/accuracy.md`).
     fn new(center: [f64; 3], half_size: [f64; 3], rotation: [f64; 9]) -> Self {
         let p = Position::new(center);
         #[expect(
@@ -279,8 +283,8 @@ impl OrientedBoxRecord {
                 if v.is_subnormal() { 0.0 } else { v }
             })
         };
-        // The half axes alone could not tell a negative size.
-        // An infinite entry times a zero size is NaN and fails by its bits.
+        // The half axes alone would not show a negative size, so this check does.
+        // An infinite entry times a size of 0 is NaN, which is found in the half axes.
         let negative = !half_size.iter().all(|h| *h >= 0.0);
         let last = half_axis(2);
         Self {
@@ -329,7 +333,7 @@ mod tests {
 
     #[test]
     fn a_stored_sphere_contains_the_given_one() {
-        // 1 + 2^-53 * k needs more bits than two float32 of this pair hold exactly.
+        // 1 + 2^-53 * k needs more bits than these two float32 can hold exactly.
         let center = [1.0 + 4.0 * TINY + 1.0e-9, 1.0e7 + 1.0 / 3.0, -1.0e-30];
         let record = SphereRecord::new(center, 0.1);
         let off: f64 = (0..3)
@@ -354,11 +358,11 @@ mod tests {
         assert_eq!(record.half_size[2], 0.0);
     }
 
-    /// Far from the origin, where two halves cannot hold a centre: what they leave over is added,
-    /// and rounded up.
+    /// Far from the origin, two float32 cannot hold a centre.
+    /// The rest is added to the half size and rounded up.
     #[test]
     fn stored_boxes_contain_what_their_centres_cannot_hold() {
-        // Multiples of 2^-23 about 1e9, so that float64 takes these differences exactly.
+        // Multiples of 2^-23 near 1e9, so that these differences are exact in float64.
         let unit = 1.0 / 8_388_608.0;
         for k in 0..500_u32 {
             let middle = 1.0e9 + f64::from(k.wrapping_mul(2_654_435_761) >> 4) * unit;

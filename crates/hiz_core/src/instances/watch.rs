@@ -1,10 +1,12 @@
-//! What a submitted cull has to know of later updates of its instances, and they of it.
+//! Watches: they connect a submitted cull with later updates of its instances.
 //!
-//! Verdicts of the members of hidden groups are refined when they are first read
-//! (`cull::Refinement`), from the bounds that were culled.
-//! So an update refines those of all submitted culls first; and notes which instances it changed,
-//! so that an explanation, which tests the bounds as they are now, can say that they are not the
-//! ones that were culled.
+//! A cull writes no verdicts for the members of hidden groups.
+//! They are refined when they are first read (`cull/refine.rs`), from the bounds that were culled.
+//! An update would overwrite these bounds, so it first refines the verdicts of all submitted culls.
+//!
+//! The update also notes which instances it changed.
+//! An explanation tests the bounds as they are now, so it must say if they are not those that were
+//! culled.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -14,10 +16,10 @@ use crate::error::Result;
 use crate::gpu::device::Gpu;
 use crate::host::threads::Locked;
 
-/// What is left to be done of a cull before its instances change.
+/// Work that a cull leaves undone, and that must run before its instances change.
 pub(crate) trait Refine: std::fmt::Debug + Send + Sync {
-    /// Records it.
-    /// It may run more than once, and the first time counts.
+    /// Records the work.
+    /// It may run more than once; only the first run has an effect.
     fn record(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder) -> Result<()>;
 }
 
@@ -30,16 +32,16 @@ pub(crate) struct Watch {
 
 #[derive(Debug)]
 struct State {
-    /// Until the commands that refine the verdicts were submitted, behind the cull and before any
-    /// update.
+    /// The refinement of the verdicts, until its commands are submitted.
+    /// They run after the cull and before any update.
     refinement: Option<Box<dyn Refine>>,
-    /// The instances that were updated since: from the first to before the last, apart and not
-    /// touching.
+    /// The instances that were updated since: each first instance with the end of its range.
+    /// The ranges neither overlap nor touch.
     updated: BTreeMap<u32, u32>,
 }
 
 impl Watch {
-    /// Of a cull that leaves `refinement` to be done, if any.
+    /// A watch on a cull that leaves `refinement` undone, if any.
     pub(crate) fn new(refinement: Option<Box<dyn Refine>>) -> Arc<Self> {
         Arc::new(Self { state: Locked::new(State { refinement, updated: BTreeMap::new() }) })
     }
@@ -65,7 +67,7 @@ impl State {
             return;
         }
         let Range { mut start, mut end } = *range;
-        // All that overlap or touch it become one with it.
+        // Merges all ranges that overlap or touch the new one.
         while let Some((first, last)) =
             self.updated.range(..=end).next_back().map(|(first, last)| (*first, *last))
         {
@@ -83,12 +85,12 @@ impl State {
 #[derive(Debug, Default)]
 pub(crate) struct Watches {
     all: Vec<Weak<Watch>>,
-    /// From how many on those that are gone are looked for.
+    /// The length at which `add` next removes the watches that are no longer alive.
     full: usize,
 }
 
 impl Watches {
-    /// A cull, submitted just now.
+    /// Adds a cull that was just submitted.
     pub(crate) fn add(&mut self, watch: &Arc<Watch>) {
         if self.all.len() >= self.full {
             self.all.retain(|watch| watch.strong_count() > 0);
@@ -101,7 +103,8 @@ impl Watches {
         self.all.iter().filter_map(Weak::upgrade)
     }
 
-    /// Records the refinements that are still to be done, of all culls; whether there was one.
+    /// Records the outstanding refinements of all culls.
+    /// Returns whether there was one.
     pub(crate) fn record_refinements(
         &self,
         gpu: &Gpu,
@@ -114,7 +117,8 @@ impl Watches {
         Ok(any)
     }
 
-    /// Records the refinement of one cull, if it is still to be done; whether it is.
+    /// Records the refinement of one cull if it is outstanding.
+    /// Returns whether it was.
     pub(crate) fn record_refinement(
         &self,
         gpu: &Gpu,
@@ -124,17 +128,17 @@ impl Watches {
         record(gpu, encoder, watch)
     }
 
-    /// What was recorded for a cull was submitted.
+    /// Notes that the recorded refinement of a cull was submitted.
     pub(crate) fn refined(&self, watch: &Watch) {
         watch.state().refinement = None;
     }
 
-    /// What was recorded for all culls was submitted.
+    /// Notes that the recorded refinements of all culls were submitted.
     pub(crate) fn all_refined(&self) {
         self.living().for_each(|watch| self.refined(&watch));
     }
 
-    /// Instances `range` have new bounds from now on.
+    /// Notes that the instances `range` have new bounds from now on.
     pub(crate) fn note(&self, range: &Range<u32>) {
         self.living().for_each(|watch| watch.state().note(range));
     }
