@@ -1,4 +1,4 @@
-//! The count of verdicts: how many instances met which end.
+//! The count of verdicts: how many instances got which verdict.
 
 use crate::error::Result;
 use crate::gpu::buffers::entry;
@@ -9,20 +9,20 @@ use crate::gpu::shader::{Source, wgsl};
 use crate::instances::Instances;
 use crate::output::visible::Visible;
 
-/// Places that one workgroup counts; `shaders/cull/count.wgsl`.
+/// Places that one workgroup counts: 64 invocations of 16 each; `shaders/cull/count.wgsl`.
 const COUNT_WORKGROUP: u32 = 64 * 16;
 
-/// What a count reads and writes.
+/// The bindings of a count.
 const BINDINGS: &[(u32, Binding)] =
     &[(0, Binding::Uniform), (1, Binding::Read), (2, Binding::Write)];
 
-/// The count of verdicts.
+/// The shader that counts verdicts.
 pub(crate) fn module() -> Source {
     Source::of(&[&[wgsl!("output/verdict"), wgsl!("instances/piece"), wgsl!("cull/count")]])
 }
 
-/// Adds the verdicts in `visible`, each place's own (`cull::Refinement`), to `counters`, a
-/// `CounterRecord` of zeros.
+/// Adds the verdicts in `visible` to `counters`, a `CounterRecord` of zeros.
+/// Every place must have a verdict of its own by then (`cull/refine.rs`).
 pub(crate) fn record_count(
     gpu: &Gpu,
     pass: &mut wgpu::ComputePass<'_>,

@@ -1,4 +1,4 @@
-//! The explanation of a single verdict: the cull's own steps for one instance.
+//! The explanation of a single verdict: the cull's own steps, repeated for one instance.
 
 use crate::cull::groups::group_key;
 use crate::cull::inputs::{CullInputs, Seen};
@@ -14,7 +14,7 @@ use crate::input::bounds::BoundsKind;
 use crate::instances::groups::GROUP;
 use crate::instances::piece::bind_records;
 
-/// `shaders/cull/explain.wgsl`, `Explanation`.
+/// Twin: `shaders/cull/explain.wgsl`, `Explanation`, which documents the fields.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct ExplanationRecord {
@@ -31,19 +31,19 @@ pub(crate) struct ExplanationRecord {
     pub(crate) any_before: u32,
 }
 
-/// Where a test stopped; `shaders/cull/outcome.wgsl`.
+/// The step at which a test stopped; twin: `shaders/cull/outcome.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u32)]
 pub(crate) enum Stage {
     /// The bounds are invalid.
     Validity = 0,
-    /// Outside a plane of the frustum.
+    /// The volume is outside a plane of the frustum.
     Frustum = 1,
-    /// Crosses the plane of the eye.
+    /// The volume crosses the plane of the eye.
     EyePlane = 2,
     /// At the rectangle of pixels.
     Rectangle = 3,
-    /// At the comparison with the footprint's depth.
+    /// At the comparison with the farthest depth of the footprint.
     Depth = 4,
     /// At the certificate that the texels cover the projection.
     Block = 5,
@@ -54,7 +54,7 @@ pub(crate) enum Stage {
 }
 
 impl Stage {
-    /// All, in the order of their codes.
+    /// All stages, in the order of their codes.
     pub(crate) const ALL: [Self; 8] = [
         Self::Validity,
         Self::Frustum,
@@ -68,7 +68,7 @@ impl Stage {
 }
 
 impl ExplanationRecord {
-    /// Where the test stopped.
+    /// The stage at which the test stopped.
     pub(crate) fn stage(&self) -> Stage {
         Stage::ALL.get(self.stage as usize).copied().unwrap_or(Stage::Validity)
     }
@@ -77,21 +77,22 @@ impl ExplanationRecord {
 /// A texel that was read: its level and flags, column, row, and the bits of its depth.
 pub(crate) type Reading = [u32; 4];
 
-/// Of a reading's first word, what is the level; and its flags (`shaders/cull/explain.wgsl`).
+/// The bits of a reading's first word that hold the level.
+/// The others are flags (`shaders/cull/explain.wgsl`).
 pub(crate) const LEVEL_MASK: u32 = 0xFF;
 pub(crate) const BEHIND: u32 = 0x100;
 pub(crate) const CLEAR: u32 = 0x200;
 
-/// How many readings an explanation tells at most.
-/// A descent may read 65,536 texels; what comes after these is counted.
+/// How many readings an explanation holds at most.
+/// A descent may read 65,536 texels; those past this number are only counted.
 pub(crate) const TEXELS_TOLD: usize = 4096;
 
-/// The explanation of one instance's verdict.
+/// The shader that explains one instance's verdict.
 pub(crate) fn explain_module(store: DepthStore, kind: BoundsKind) -> Source {
     module(store, kind, CERTIFIED, &[wgsl!("cull/explain")])
 }
 
-/// The explanation.
+/// The pipeline of the explanation.
 fn explain_pipeline(gpu: &Gpu, key: &CullKey) -> Result<wgpu::ComputePipeline> {
     gpu.compute_pipeline(&Compute {
         label: "hiz.explain.pipeline",
@@ -102,8 +103,10 @@ fn explain_pipeline(gpu: &Gpu, key: &CullKey) -> Result<wgpu::ComputePipeline> {
     })
 }
 
-/// Records the explanation of instance `index`, or of the box around its group, into `target`, an
-/// `ExplanationRecord`, and `readings`, as many [`Reading`]s as there is room for: both storage.
+/// Records the explanation of instance `index`, or of the box around its group.
+///
+/// It goes into two storage buffers: `target`, an `ExplanationRecord`, and `readings`, as many
+/// [`Reading`]s as fit.
 pub(crate) fn record_explain(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,

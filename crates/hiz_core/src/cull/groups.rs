@@ -1,4 +1,4 @@
-//! Whole groups first: the test of their boxes, and of the members of those that are left.
+//! The cull in groups: first the boxes of whole groups, then the members of the surviving groups.
 
 use crate::cull::options::{CullOptions, Hierarchy};
 use crate::cull::pipelines::{
@@ -13,18 +13,19 @@ use crate::instances::piece::Piece;
 use crate::output::survivors::GroupOutput;
 use crate::output::visible::PieceOutput;
 
-/// The label of what stands in for the counts of levels.
+/// The label of the buffer that is bound if levels are not counted.
 pub(super) const NO_STATISTICS: &str = "hiz.no_statistics";
 
 /// Groups whose members one workgroup tests; `shaders/instances/groups.wgsl`, `RUN`.
 pub(crate) const GROUPS_OF_RUN: u32 = 8;
 
-/// Texels of finer levels that a group's test may read: a box around 64 instances is large, so its
-/// footprint is coarse (`docs/performance.md`).
+/// The fewest texels of finer levels that a group's test may read.
+/// A box around 64 instances is large, so its footprint is coarse (`docs/performance.md`).
 pub(super) const GROUP_DESCENT: u32 = 16;
 
-/// From how many instances on groups are culled first: fewer are tested one by one before the
-/// groups' own dispatches have begun (`docs/performance.md`).
+/// From this many instances on, groups are culled first.
+/// Fewer are tested one by one before the dispatches for groups would have begun
+/// (`docs/performance.md`).
 const GROUPS_PAY_FROM: u32 = 16_384;
 
 /// The options of a group's test.
@@ -32,7 +33,7 @@ pub(crate) fn group_options(options: &CullOptions) -> CullOptions {
     CullOptions { descent: options.descent.max(GROUP_DESCENT), ..options.clone() }
 }
 
-/// The pipeline of a group's test.
+/// The key of the pipeline of a group's test.
 pub(super) fn group_key(key: CullKey) -> CullKey {
     CullKey { kind: BoundsKind::Box, descent: true, ..key }
 }
@@ -46,17 +47,17 @@ pub(crate) fn is_grouped(piece: &Piece, options: &CullOptions) -> bool {
     }
 }
 
-/// What the cull of a piece in groups binds and runs.
+/// The pipelines and bindings of the cull of a piece in groups.
 pub(super) struct GroupCull<'a> {
     output: &'a GroupOutput,
-    /// The boxes of the groups, and what is left of them.
+    /// The test of the boxes of the groups.
     boxes: (wgpu::ComputePipeline, wgpu::BindGroup),
-    /// The members of the groups that are left.
+    /// The test of the members of the surviving groups.
     members: (wgpu::ComputePipeline, wgpu::BindGroup),
 }
 
 impl<'a> GroupCull<'a> {
-    /// `statistics`: where levels are counted, if they are.
+    /// `statistics`: the buffer in which levels are counted, if they are.
     pub(super) fn new(
         gpu: &Gpu,
         (key, report): (CullKey, ReportKey),
@@ -94,7 +95,7 @@ impl<'a> GroupCull<'a> {
         })
     }
 
-    /// `workgroups`: of the tests of boxes.
+    /// Records the test of the boxes, in so many `workgroups`.
     pub(super) fn record_boxes(
         &self,
         pass: &mut wgpu::ComputePass<'_>,

@@ -1,4 +1,4 @@
-//! What a cull reads, and the view that its shaders are told.
+//! The inputs of a cull, and the view that its shaders see.
 
 use crate::cull::groups::GROUP_DESCENT;
 use crate::cull::options::{Coverage, CullOptions, Fit};
@@ -19,8 +19,8 @@ pub(crate) struct CullInputs<'a> {
     pub(crate) camera: &'a Camera,
     pub(crate) pyramid: &'a Pyramid,
     pub(crate) options: &'a CullOptions,
-    /// All dispatches are of no workgroups: nothing is culled, but a driver that compiles at the
-    /// first dispatch does it.
+    /// Whether every dispatch has zero workgroups.
+    /// Nothing is culled then, but a driver that compiles at the first dispatch does so.
     pub(crate) idle: bool,
 }
 
@@ -29,19 +29,20 @@ pub(super) fn check_contexts(gpu: &Gpu, inputs: &CullInputs<'_>) -> Result<()> {
     gpu.check_context("pyramid", inputs.pyramid.context)
 }
 
-/// What the shader knows of camera and pyramid, and the pipeline that asks for it.
+/// What the shaders know of camera and pyramid, and the key of the pipelines that read it.
 #[derive(Debug)]
 pub(super) struct Seen {
     built: Built,
-    /// All levels in one texture, where that pays.
+    /// All levels in one texture, if that pays.
     atlas: Option<wgpu::TextureView>,
     view: ViewUniform,
     pub(super) key: CullKey,
 }
 
 impl Seen {
-    /// For `encoder`, which takes the copies into an atlas where one is needed; without it there is
-    /// none.
+    /// Prepares the view of a cull.
+    ///
+    /// `encoder` takes the copies into an atlas if one is wanted; without it no atlas is used.
     pub(super) fn new(
         gpu: &Gpu,
         inputs: &CullInputs<'_>,
@@ -50,7 +51,7 @@ impl Seen {
         let CullInputs { instances, camera, pyramid, options, .. } = *inputs;
         check_contexts(gpu, inputs)?;
         let built = pyramid.built_for(camera)?;
-        // Refused before anything is recorded.
+        // Bad options are refused before anything is recorded.
         let view = ViewUniform::new(camera, built.reduction, options, built.tolerance)?;
         Pyramid::check_source(gpu, &built)?;
         let atlas = match encoder.filter(|_| pyramid.wants_atlas(gpu, &built, instances.len())) {
@@ -74,12 +75,13 @@ impl Seen {
         Ok(Self { built, atlas, view, key })
     }
 
-    /// The bindings for a test of instances; those of the last cull, if it asked for the same.
+    /// The bindings for a test of instances.
+    /// They are those of the last cull if it asked for the same.
     pub(super) fn bind(&self, gpu: &Gpu, pyramid: &Pyramid) -> Result<wgpu::BindGroup> {
         self.bind_view(gpu, pyramid, self.view)
     }
 
-    /// Those for a test of groups.
+    /// The bindings for a test of groups.
     pub(super) fn bind_for_groups(&self, gpu: &Gpu, pyramid: &Pyramid) -> Result<wgpu::BindGroup> {
         let descent_budget = self.view.descent_budget.max(GROUP_DESCENT);
         self.bind_view(gpu, pyramid, ViewUniform { descent_budget, ..self.view })

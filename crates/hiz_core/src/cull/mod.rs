@@ -1,4 +1,16 @@
-//! The cull: one camera, one pyramid, one set of instances.
+//! The cull: it tests one set of instances against one pyramid, for one camera.
+//!
+//! The data goes through these files:
+//!
+//! 1. `options` has the caller's choices, and `inputs` gathers instances, camera, pyramid and
+//!    options.
+//! 2. `view_uniform` turns the camera and the options into the numbers that the shaders read.
+//! 3. `pipelines` picks the pipeline that fits the options.
+//! 4. `record` records the pass; `groups` adds the test of whole groups before their members.
+//! 5. Later, and only if they are read: `refine` completes the verdicts, `count` counts them, and
+//!    `explain` repeats one test.
+//!
+//! This room records commands into an encoder; it never submits or waits.
 
 #[cfg(feature = "headless")]
 pub(crate) mod count;

@@ -1,4 +1,4 @@
-//! The pipelines of the cull: which files make a module, and what makes one pipeline differ from
+//! The pipelines of the cull: which shader files make a module, and how one pipeline differs from
 //! another.
 
 use crate::error::Result;
@@ -10,8 +10,8 @@ use crate::gpu::shader::{File, Source, wgsl};
 use crate::input::bounds::BoundsKind;
 use crate::instances::piece::RECORD_BINDINGS;
 
-/// What makes one cull pipeline differ from another; each is compiled without the branches that it
-/// does not take.
+/// Everything in which one cull pipeline differs from another.
+/// Each is compiled without the branches that it does not take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct CullKey {
     pub(crate) store: DepthStore,
@@ -24,7 +24,7 @@ pub(crate) struct CullKey {
     pub(crate) fit_volume: bool,
 }
 
-/// What a cull leaves behind; `shaders/output/report.wgsl`.
+/// What a cull writes; `shaders/output/report.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct ReportKey {
     pub(crate) mask: bool,
@@ -60,17 +60,17 @@ pub(crate) fn report_constants(key: &ReportKey) -> [(&'static str, f64); 6] {
 /// Where a cull reads depth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum DepthStore {
-    /// Level 0 in the depth image, the others in the buffers that the reduction fills.
+    /// Level 0 from the depth image, and the others from the buffers that the reduction fills.
     Apart(SourceKind),
-    /// All of them in one texture.
+    /// All levels from one texture.
     Atlas,
-    /// Nowhere: it finds what is outside.
+    /// No depth is read: such a pass only finds what is outside.
     #[cfg(feature = "headless")]
     Nowhere,
 }
 
 impl DepthStore {
-    /// The files that read it.
+    /// The shader files that read it.
     pub(crate) fn files(self) -> Vec<File> {
         match self {
             Self::Apart(source) => [source.files(), &[wgsl!("pyramid/texels_apart")]].concat(),
@@ -80,7 +80,7 @@ impl DepthStore {
         }
     }
 
-    /// Tells one store from another among the words of a view's bindings.
+    /// A number that distinguishes the stores in the key of a view's bindings.
     pub(crate) fn code(self) -> u32 {
         match self {
             Self::Apart(source) => source as u32,
@@ -90,7 +90,7 @@ impl DepthStore {
         }
     }
 
-    /// The view of a cull: pyramid, camera and options.
+    /// The layout of a cull's view: pyramid, camera and options.
     pub(crate) fn layout(self, gpu: &Gpu) -> Result<wgpu::BindGroupLayout> {
         use Binding::{Depth, Read, ReadQuads, Sampler, Uniform};
         match self {
@@ -115,7 +115,7 @@ impl DepthStore {
     }
 }
 
-/// What a cull writes.
+/// The bindings of what a cull writes.
 pub(crate) const VISIBLE_BINDINGS: &[(u32, Binding)] = &[
     (0, Binding::Write),
     (1, Binding::Write),
@@ -124,19 +124,20 @@ pub(crate) const VISIBLE_BINDINGS: &[(u32, Binding)] = &[
     (4, Binding::Uniform),
 ];
 
-/// What a cull of groups writes.
+/// The bindings of what a cull of groups writes.
 pub(crate) const SURVIVOR_BINDINGS: &[(u32, Binding)] =
     &[(0, Binding::Write), (1, Binding::Write), (2, Binding::WriteTexels), (3, Binding::Write)];
 
-/// What a cull of members reads of it.
+/// The bindings of the survivors, which a cull of members reads.
 pub(crate) const MEMBER_BINDINGS: &[(u32, Binding)] =
     &[(0, Binding::Read), (1, Binding::ReadTexels)];
 
-/// What an explanation and a refinement write.
+/// The bindings of what an explanation and a refinement write.
 #[cfg(feature = "headless")]
 pub(crate) const TWO_STORAGES: &[(u32, Binding)] = &[(0, Binding::Write), (1, Binding::Write)];
 
-/// The frame of a decision about one instance: `classify` decides, `entry` asks.
+/// The module of a decision about one instance: `classify` decides, and `entry` has the entry
+/// point.
 pub(crate) fn module(
     store: DepthStore,
     kind: BoundsKind,
@@ -172,15 +173,15 @@ pub(crate) fn module(
     ])
 }
 
-/// The certified decision.
+/// The files of the certified decision.
 pub(super) const CERTIFIED: &[File] = &[wgsl!("cull/supporting_planes"), wgsl!("cull/classify")];
 
-/// The module of an entry that does not tell what was read.
+/// The module of an entry point that does not record which texels were read.
 pub(super) fn untold(store: DepthStore, kind: BoundsKind, entry: &[File]) -> Source {
     module(store, kind, CERTIFIED, &[&[wgsl!("cull/untold")], entry].concat())
 }
 
-/// The files of the flat cull but for the decision.
+/// The files of the flat cull, without the decision.
 pub(crate) const FLAT: &[File] = &[
     wgsl!("cull/untold"),
     wgsl!("instances/piece"),
@@ -190,12 +191,12 @@ pub(crate) const FLAT: &[File] = &[
     wgsl!("cull/cull"),
 ];
 
-/// The cull of instances of one kind.
+/// The shader of the flat cull, for instances of one kind.
 pub(crate) fn cull_module(store: DepthStore, kind: BoundsKind) -> Source {
     module(store, kind, CERTIFIED, FLAT)
 }
 
-/// The cull of groups.
+/// The shader of the cull of groups.
 pub(crate) fn cull_groups_module(store: DepthStore) -> Source {
     let entry = [
         wgsl!("instances/piece"),
@@ -206,7 +207,7 @@ pub(crate) fn cull_groups_module(store: DepthStore) -> Source {
     untold(store, BoundsKind::Box, &entry)
 }
 
-/// The cull of the members of the groups that are left.
+/// The shader of the cull of the surviving groups' members.
 pub(crate) fn cull_members_module(store: DepthStore, kind: BoundsKind) -> Source {
     let entry = [
         wgsl!("instances/piece"),
@@ -218,7 +219,7 @@ pub(crate) fn cull_members_module(store: DepthStore, kind: BoundsKind) -> Source
     untold(store, kind, &entry)
 }
 
-/// The layouts of a cull's view, of records and of what is written.
+/// The layouts of a cull's view, of its records and of what it writes.
 pub(super) fn layouts(
     gpu: &Gpu,
     store: DepthStore,
@@ -229,7 +230,7 @@ pub(super) fn layouts(
     Ok([store.layout(gpu)?, records, gpu.layout(label, written)?])
 }
 
-/// A flat cull by `source`, which [`module`] makes.
+/// A flat cull that runs `source`, a module made by [`module`].
 pub(crate) fn flat_pipeline(
     gpu: &Gpu,
     label: &'static str,
@@ -246,7 +247,7 @@ pub(crate) fn flat_pipeline(
     })
 }
 
-/// The flat cull.
+/// The flat cull, which tests each instance by itself.
 pub(crate) fn cull_pipeline(
     gpu: &Gpu,
     key: &CullKey,
@@ -255,7 +256,7 @@ pub(crate) fn cull_pipeline(
     flat_pipeline(gpu, "hiz.cull.pipeline", cull_module(key.store, key.kind), key, report)
 }
 
-/// The cull of groups; `statistics`: levels are counted.
+/// The cull of groups; with `statistics` it counts levels.
 pub(crate) fn cull_groups_pipeline(
     gpu: &Gpu,
     key: &CullKey,
@@ -270,7 +271,7 @@ pub(crate) fn cull_groups_pipeline(
     })
 }
 
-/// The cull of the members of the groups that are left.
+/// The cull of the surviving groups' members.
 pub(crate) fn cull_members_pipeline(
     gpu: &Gpu,
     key: &CullKey,

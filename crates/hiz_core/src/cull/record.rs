@@ -1,4 +1,4 @@
-//! The pass of a cull.
+//! The pass of a cull: it clears the buffers, tests, and compacts.
 
 use crate::cull::groups::{GROUPS_OF_RUN, GroupCull, NO_STATISTICS, is_grouped};
 use crate::cull::inputs::{CullInputs, Seen, check_contexts};
@@ -28,7 +28,7 @@ fn bind_output(
         Some(lists) => lists.draws.clone(),
         None => gpu.stand_in("hiz.no_draws")?,
     };
-    // Any uniform will do where nothing is listed.
+    // If nothing is listed, any uniform can be bound.
     let capacity = lists.map_or(&piece.uniform, |lists| &lists.capacity_uniform);
     let statistics = if statistics {
         visible.statistics_or_new(gpu)?.clone()
@@ -55,7 +55,7 @@ fn bind_output(
     })
 }
 
-/// Makes the pipeline of the flat cull.
+/// A function that makes the pipeline of the flat cull.
 pub(crate) type FlatPipeline = fn(&Gpu, &CullKey, &ReportKey) -> Result<wgpu::ComputePipeline>;
 
 /// Records the cull of `inputs` into `visible`.
@@ -68,7 +68,7 @@ pub(crate) fn record_cull(
     record_cull_by(gpu, encoder, inputs, visible, cull_pipeline)
 }
 
-/// The same with another flat cull in the same frame.
+/// [`record_cull`] with another flat cull.
 pub(crate) fn record_cull_by(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
@@ -97,7 +97,7 @@ fn record_all(
     }
     let report = report_key(visible, options);
     let pieces = || instances.pieces.iter().zip(&visible.pieces);
-    // Everything is there before anything is recorded: what could not be made would end the
+    // Make everything before recording anything: an object that cannot be made would invalidate the
     // caller's encoder.
     let outputs = pieces()
         .enumerate()
@@ -153,7 +153,8 @@ fn record_all(
     Ok(())
 }
 
-/// What the cull itself writes; an ordered list is made from the mask.
+/// What the cull's own pass writes.
+/// An ordered list is made from the mask instead.
 fn report_key(visible: &Visible, options: &CullOptions) -> ReportKey {
     let outputs = visible.outputs();
     let listed = outputs.indices || outputs.draws;
@@ -168,7 +169,7 @@ fn report_key(visible: &Visible, options: &CullOptions) -> ReportKey {
     }
 }
 
-/// Whatever is counted, appended to or set bit by bit begins at nothing.
+/// Clears whatever is counted, appended to or set bit by bit.
 fn record_clears(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,

@@ -1,5 +1,6 @@
-//! The verdicts of the members of groups that were hidden as a whole, which a cull leaves to
-//! whoever reads them.
+//! The refinement: verdicts for the members of groups that were hidden as a whole.
+//!
+//! A cull does not write them; they are written before verdicts or counts are first read.
 
 use std::sync::Arc;
 
@@ -22,22 +23,22 @@ use crate::instances::watch::Refine;
 use crate::output::visible::Visible;
 use crate::pyramid::Pyramid;
 
-/// Groups that one workgroup tells; `shaders/cull/refine.wgsl`.
+/// Groups whose members one workgroup refines; `shaders/cull/refine.wgsl`.
 const WORKGROUP: u32 = 64;
 
-/// The verdicts of the members of groups that were hidden as a whole.
+/// The shader that writes the verdicts of the members of hidden groups.
 pub(crate) fn refine_module(kind: BoundsKind) -> Source {
     let entry = [wgsl!("instances/piece"), wgsl!("instances/groups"), wgsl!("cull/refine")];
     untold(DepthStore::Nowhere, kind, &entry)
 }
 
-/// The groups that lie within the view.
+/// The shader that finds the groups that lie within the view.
 pub(crate) fn refine_groups_module() -> Source {
     let entry = [wgsl!("instances/piece"), wgsl!("cull/refine_groups")];
     untold(DepthStore::Nowhere, BoundsKind::Box, &entry)
 }
 
-/// The refinement of members.
+/// The pipeline that refines members.
 fn refine_pipeline(
     gpu: &Gpu,
     kind: BoundsKind,
@@ -47,7 +48,8 @@ fn refine_pipeline(
     without_depth(gpu, "hiz.refine.pipeline", source, "refine", (kind, sample_coverage))
 }
 
-/// The refinement of groups, for area coverage alone.
+/// The pipeline that refines groups.
+/// It is only valid for area coverage.
 fn refine_groups_pipeline(gpu: &Gpu) -> Result<wgpu::ComputePipeline> {
     let label = "hiz.refine_groups.pipeline";
     let kind = BoundsKind::Box;
@@ -65,7 +67,7 @@ fn without_depth(
         store: DepthStore::Nowhere,
         kind,
         sample_coverage,
-        // No depth is read, so what is said of it does not count.
+        // These have no effect, because no depth is read.
         reversed: false,
         chunks: 1,
         footprint_log2: 1,
@@ -81,20 +83,20 @@ fn without_depth(
     })
 }
 
-/// What is left to be done of a cull that tested groups.
+/// What a cull that tested groups leaves undone.
 #[derive(Debug)]
 pub(crate) struct Refinement {
     view: ViewUniform,
     options: CullOptions,
     instances: Arc<Instances>,
-    /// Its levels are asked which one would be read.
+    /// The shader asks its layout which level a test would read.
     pyramid: Arc<Pyramid>,
     visible: Arc<Visible>,
 }
 
 impl Refinement {
-    /// Of a cull that was recorded; nothing where every place has a verdict of its own, or none was
-    /// asked for.
+    /// The refinement of a cull that was recorded.
+    /// `None` if every place has a verdict of its own already, or if no verdicts were asked for.
     pub(crate) fn new(
         instances: &Arc<Instances>,
         camera: &Camera,
@@ -107,7 +109,7 @@ impl Refinement {
         if !is_needed {
             return Ok(None);
         }
-        // Of no reduction in particular: no depth is read.
+        // The number of the reduction does not matter, because no depth is read.
         let view = ViewUniform::new(camera, 1, options, DepthTolerance::NONE)?;
         Ok(Some(Self {
             view,

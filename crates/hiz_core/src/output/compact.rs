@@ -10,12 +10,13 @@ use crate::instances::Instances;
 use crate::output::lists::Lists;
 use crate::output::visible::Visible;
 
-/// Words that one workgroup of `scatter` turns into indices; `shaders/output/compact.wgsl`.
+/// Words of the mask that one workgroup of `scatter` turns into indices;
+/// `shaders/output/compact.wgsl`.
 const SCATTER_WORKGROUP: u32 = 64;
 
 const LAYOUT: &str = "hiz.compact.layout";
 
-/// What the compaction of a piece reads and writes.
+/// The bindings of the compaction of a piece.
 const BINDINGS: &[(u32, Binding)] = &[
     (0, Binding::Uniform),
     (1, Binding::Read),
@@ -25,7 +26,7 @@ const BINDINGS: &[(u32, Binding)] = &[
     (5, Binding::Uniform),
 ];
 
-/// The ordered compaction.
+/// The shader of the ordered compaction.
 pub(crate) fn module() -> Source {
     Source::of(&[&[wgsl!("instances/piece"), wgsl!("output/compact")]])
 }
@@ -40,11 +41,11 @@ fn pipeline(gpu: &Gpu, entry_point: &'static str) -> Result<wgpu::ComputePipelin
     })
 }
 
-/// What the compaction of the pieces that have instances binds and runs.
+/// The pipelines and bindings of the compaction of all pieces that have instances.
 pub(crate) struct Compaction {
     scan: wgpu::ComputePipeline,
     scatter: wgpu::ComputePipeline,
-    /// Of each piece: the bindings, and how many workgroups scatter its indices, if it has a list.
+    /// Per piece: its bindings and, if it has a list, how many workgroups scatter its indices.
     pieces: Vec<(wgpu::BindGroup, Option<u32>)>,
 }
 
@@ -83,8 +84,9 @@ impl Compaction {
         })
     }
 
-    /// Records the compaction of every piece, in order: a later one needs to know what earlier ones
-    /// left of the capacity.
+    /// Records the compaction of every piece.
+    ///
+    /// The pieces go in order, because each needs the capacity that earlier pieces have left.
     /// `idle`: as `CullInputs::idle`.
     pub(crate) fn record(&self, pass: &mut wgpu::ComputePass<'_>, idle: bool) {
         let workgroups = |count: u32| if idle { 0 } else { count };

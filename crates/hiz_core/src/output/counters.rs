@@ -1,6 +1,7 @@
-//! Counters on the device.
+//! Layouts of the counters on the device.
 
-/// `shaders/cull/count.wgsl`, `Counters`.
+/// Numbers of instances per verdict.
+/// Twin: `shaders/cull/count.wgsl`, `Counters`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct CounterRecord {
@@ -10,7 +11,8 @@ pub(crate) struct CounterRecord {
     pub(crate) invalid: u32,
 }
 
-/// `shaders/output/report.wgsl`, `Statistics`.
+/// Tests per level, and texels read as a 64-bit number in two halves.
+/// Twin: `shaders/output/statistics.wgsl`, `Statistics`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct StatisticsRecord {

@@ -1,24 +1,25 @@
-//! Draw arguments.
+//! Draw arguments: the record that an indirect draw consumes, and its constant part.
 
-/// The arguments of `draw_indexed_indirect`, as the device reads them.
+/// The arguments of `draw_indexed_indirect`, 20 bytes, as the device reads them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct DrawIndexedIndirect {
-    /// Indices of the mesh.
+    /// How many indices the mesh has.
     pub index_count: u32,
-    /// Instances to draw: what the cull wrote.
+    /// How many instances to draw; the cull writes it.
     pub instance_count: u32,
-    /// First index in the index buffer.
+    /// The first index in the index buffer.
     pub first_index: u32,
-    /// Added to each index.
+    /// The number that is added to each index.
     pub base_vertex: i32,
-    /// First instance; other than 0 needs the feature `INDIRECT_FIRST_INSTANCE`.
+    /// The first instance.
+    /// A number other than 0 needs the feature `INDIRECT_FIRST_INSTANCE`.
     pub first_instance: u32,
 }
 
 const _: () = assert!(size_of::<DrawIndexedIndirect>() == 20);
 
-/// What the draw arguments say beside the instance count.
+/// The constant part of the draw arguments: everything except the instance count.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub struct DrawTemplate {
     /// See [`DrawIndexedIndirect::index_count`].

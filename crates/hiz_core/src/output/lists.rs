@@ -6,24 +6,24 @@ use crate::gpu::device::Gpu;
 use crate::instances::Instances;
 use crate::output::draw::{DrawIndexedIndirect, DrawTemplate};
 
-/// Words behind each list that stay 0xFFFFFFFF: whoever writes past the capacity shows.
+/// Words behind each list that stay 0xFFFFFFFF, so that a write past the capacity shows.
 #[cfg_attr(not(feature = "testing"), expect(unreachable_pub, reason = "tests read it"))]
 pub const CANARY_WORDS: u64 = 16;
 
 /// The list of one piece.
 #[derive(Debug)]
 pub(crate) struct PieceList {
-    /// `None` where it was not asked for.
+    /// `None` if no list was asked for.
     pub(crate) indices: Option<wgpu::Buffer>,
-    /// Indices that fit, the canary not counted.
+    /// How many indices fit, without the canary.
     pub(crate) capacity: u32,
-    /// Scratch of the compaction: kept bits before each word of the mask.
-    /// It also stands in for a list that there is none of.
+    /// Scratch of the compaction: the number of kept bits before each word of the mask.
+    /// It is also bound in place of a list if there is none.
     pub(crate) before: wgpu::Buffer,
 }
 
 impl PieceList {
-    /// What is bound as the list.
+    /// The buffer that is bound as the list.
     pub(crate) fn bound(&self) -> &wgpu::Buffer {
         self.indices.as_ref().unwrap_or(&self.before)
     }
@@ -39,8 +39,8 @@ pub(crate) struct Lists {
 }
 
 impl Lists {
-    /// With room for `capacity` indices in all lists together; `listed`: with lists, not only their
-    /// lengths.
+    /// Makes room for `capacity` indices in all lists together; `None`: for all instances.
+    /// Without `listed`, only the lengths of the lists are kept.
     pub(crate) fn new(
         gpu: &Gpu,
         instances: &Instances,
@@ -88,7 +88,7 @@ impl Lists {
         })
     }
 
-    /// Nothing is listed any more.
+    /// Records the reset of the draw arguments, so that nothing is listed.
     pub(crate) fn record_clear(&self, encoder: &mut wgpu::CommandEncoder) {
         encoder.copy_buffer_to_buffer(&self.template, 0, &self.draws, 0, self.draws.size());
     }

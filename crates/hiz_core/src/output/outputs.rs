@@ -1,22 +1,24 @@
-//! What a cull is to leave behind.
+//! Outputs: what a cull is asked to leave behind.
 
 use crate::output::draw::DrawTemplate;
 
-/// What a cull is to leave behind.
-/// What is not asked for is neither computed nor stored.
+/// What a cull leaves behind.
+/// Anything that is not asked for is neither computed nor stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Outputs {
-    /// A bit for each instance, kept or not.
+    /// One bit per instance: kept or not.
     pub mask: bool,
-    /// Why, for each instance: [`Counts`](crate::headless::Counts) and
-    /// [`verdicts`](crate::headless::Culling::verdicts) come from it, where it is said what they
-    /// mean.
+    /// The verdict of each instance.
+    /// [`Counts`](crate::headless::Counts) come from it, and
+    /// [`verdicts`](crate::headless::Culling::verdicts) says what each verdict means.
     pub verdicts: bool,
-    /// The packed list of the kept instances.
+    /// The packed list of the indices of the kept instances.
     pub indices: bool,
-    /// The draw arguments, whose instance count is the list's length, with or without a list.
+    /// The draw arguments.
+    /// Their instance count is the length of the list, whether or not there is a list.
     pub draws: bool,
-    /// How many indices are written at most, all pieces together; `None`: all instances.
+    /// How many indices are written at most, in all pieces together.
+    /// `None`: as many as there are instances.
     pub capacity: Option<u32>,
     /// The constant part of the draw arguments.
     pub draw: DrawTemplate,
@@ -32,7 +34,7 @@ impl Outputs {
         capacity: None,
         draw: DrawTemplate { index_count: 0, first_index: 0, base_vertex: 0, first_instance: 0 },
     };
-    /// Everything, in full.
+    /// Everything, for all instances.
     pub const ALL: Self =
         Self { mask: true, verdicts: true, indices: true, draws: true, ..Self::NONE };
 }

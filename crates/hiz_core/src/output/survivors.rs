@@ -1,11 +1,11 @@
-//! What a cull of groups leaves: a verdict for each group, and the groups that are left.
+//! What a cull of groups leaves: a verdict per group, and the list of surviving groups.
 
 use crate::error::Result;
 use crate::gpu::buffers::STORAGE;
 use crate::gpu::device::Gpu;
 use crate::instances::piece::Piece;
 
-/// `shaders/cull/cull_groups.wgsl`, `Survivors`.
+/// Twin: `shaders/cull/cull_groups.wgsl`, `Survivors`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct SurvivorsRecord {
@@ -13,20 +13,21 @@ pub(crate) struct SurvivorsRecord {
     pub(crate) count: u32,
 }
 
-/// Before the groups are tested.
+/// The record before the groups are tested.
 pub(crate) const NO_SURVIVORS: SurvivorsRecord =
     SurvivorsRecord { workgroups: [0, 1, 1], count: 0 };
 
-/// Groups in a row of the survivors' list; `shaders/instances/groups.wgsl`.
+/// Groups in a row of the list of survivors; `shaders/instances/groups.wgsl`.
 pub(crate) const SURVIVORS_PER_ROW: u32 = 4096;
 
-/// What the cull of a piece's groups leaves.
+/// The buffers that the cull of a piece's groups fills.
 #[derive(Debug)]
 pub(crate) struct GroupOutput {
-    /// A word for each group: its verdict, and whether its members have theirs
+    /// One word per group: its verdict, and whether its members have verdicts of their own
     /// (`shaders/cull/refine.wgsl`).
     pub(crate) verdicts: wgpu::Buffer,
-    /// How many groups are left, as the arguments of a dispatch; and which.
+    /// The number of surviving groups, as the arguments of a dispatch.
+    /// `survivor_list` says which groups they are.
     pub(crate) survivors: wgpu::Buffer,
     pub(crate) survivor_list: wgpu::TextureView,
 }

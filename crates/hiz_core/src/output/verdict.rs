@@ -1,16 +1,16 @@
-//! Verdicts.
+//! The verdict of a cull on one instance.
 
-/// What a cull says of an instance; `shaders/output/verdict.wgsl`.
+/// The verdict of a cull on an instance; twin: `shaders/output/verdict.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, bytemuck::NoUninit)]
 #[repr(u8)]
 pub enum Verdict {
-    /// Outside the frustum, or between all pixel centres in sample coverage: not kept.
+    /// Not kept: outside the frustum, or in sample coverage between all pixel centres.
     Outside = 0,
-    /// Hidden by the depth image, and not outside: not kept.
+    /// Not kept: hidden by the depth image, and not outside.
     Occluded = 1,
-    /// Possibly visible: kept.
+    /// Kept: possibly visible.
     Visible = 2,
-    /// Invalid bounds (NaN, infinite, negative radius, min > max): kept.
+    /// Kept: invalid bounds (NaN, infinite, negative radius, min > max).
     Invalid = 3,
 }
 
@@ -20,7 +20,7 @@ impl Verdict {
         self >= Self::Visible
     }
 
-    /// The verdict in the low bits of a word of the device.
+    /// The verdict in the two lowest bits of a word from the device.
     pub(crate) fn of_word(word: u32) -> Self {
         match word & 3 {
             0 => Self::Outside,

@@ -1,5 +1,4 @@
-//! What a cull finds, on the device: the mask, verdicts, and the packed list with its draw
-//! arguments.
+//! The buffers on the device that take what a cull finds.
 
 use std::sync::OnceLock;
 
@@ -14,27 +13,30 @@ use crate::output::lists::Lists;
 use crate::output::outputs::Outputs;
 use crate::output::survivors::GroupOutput;
 
-/// Places that `shaders/cull/count.wgsl` reads at once.
+/// Places whose verdicts `shaders/cull/count.wgsl` reads at once.
 const VERDICT_MULTIPLE: u32 = 4;
 
 /// The buffers of one piece.
 #[derive(Debug)]
 pub(crate) struct PieceOutput {
-    /// A bit for each of the caller's instances; behind them, at `verdicts_offset`, a word for each
-    /// place.
+    /// One bit per instance, in the caller's order.
+    /// From `verdicts_offset` on follows one word per place: its verdict.
     pub(crate) mask: wgpu::Buffer,
     /// Made by the first cull that tests groups.
     groups: OnceLock<GroupOutput>,
 }
 
-/// What a cull finds: per piece a bit mask of the kept instances, a packed list of their indices
-/// and a record of draw arguments; of these what the [`Outputs`] say.
-/// The lists hold the caller's indices and begin as 0xFFFFFFFF.
+/// What a cull finds, on the device.
+///
+/// Per piece there is a bit mask of the kept instances, a packed list of their indices and one
+/// record of draw arguments.
+/// Only what the [`Outputs`] ask for can be read.
+/// The lists hold the caller's indices, and every word is 0xFFFFFFFF at first.
 #[derive(Debug)]
 pub struct Visible {
     pub(crate) context: ContextId,
     pub(crate) pieces: Vec<PieceOutput>,
-    /// `None` where neither indices nor draws are asked for.
+    /// `None` if neither indices nor draws are asked for.
     pub(crate) lists: Option<Lists>,
     /// Made by the first cull that counts levels.
     statistics: OnceLock<wgpu::Buffer>,
@@ -75,49 +77,50 @@ impl Visible {
         })
     }
 
-    /// What culls leave here.
+    /// What culls leave in these buffers.
     pub fn outputs(&self) -> Outputs {
         self.outputs
     }
 
-    /// The draw arguments, one [`DrawIndexedIndirect`] a piece, for `draw_indexed_indirect` at
-    /// [`Visible::draw_offset`].
-    /// `None` without [`Outputs::draws`] and [`Outputs::indices`].
+    /// The draw arguments, one [`DrawIndexedIndirect`] per piece.
+    /// Pass the buffer and [`Visible::draw_offset`] to `draw_indexed_indirect`.
+    /// `None` if neither [`Outputs::draws`] nor [`Outputs::indices`] was asked for.
     pub fn draw_arguments(&self) -> Option<&wgpu::Buffer> {
         self.lists.as_ref().map(|lists| &lists.draws)
     }
 
-    /// The offset in bytes of a piece's draw arguments.
+    /// The offset of a piece's draw arguments in bytes.
     pub fn draw_offset(&self, piece: usize) -> u64 {
         (piece * size_of::<DrawIndexedIndirect>()) as u64
     }
 
-    /// The number of pieces: of lists, masks and draws.
+    /// The number of pieces, which is also the number of lists, masks and draws.
     pub fn num_pieces(&self) -> usize {
         self.pieces.len()
     }
 
-    /// A piece's packed list of indices (u32, the caller's numbering); usable as storage and as an
-    /// instance vertex buffer.
+    /// A piece's packed list of kept instances: u32 indices in the caller's numbering.
+    /// The buffer can be used as storage and as an instance vertex buffer.
     /// `None` without [`Outputs::indices`].
     ///
     /// # Panics
-    /// For a piece that is not below [`Visible::num_pieces`].
+    /// If `piece` is not below [`Visible::num_pieces`].
     pub fn list(&self, piece: usize) -> Option<&wgpu::Buffer> {
         self.lists.as_ref()?.pieces[piece].indices.as_ref()
     }
 
-    /// A piece's mask: one bit an instance, kept or not, 32 a word, lowest first, in the caller's
-    /// numbering; what lies behind is not for the caller.
+    /// A piece's mask: one bit per instance in the caller's numbering, 1 if kept.
+    /// Each u32 word holds 32 instances, lowest bit first.
+    /// What lies behind these words is internal.
     /// `None` without [`Outputs::mask`].
     ///
     /// # Panics
-    /// For a piece that is not below [`Visible::num_pieces`].
+    /// If `piece` is not below [`Visible::num_pieces`].
     pub fn mask(&self, piece: usize) -> Option<&wgpu::Buffer> {
         self.outputs.mask.then_some(&self.pieces[piece].mask)
     }
 
-    /// How many indices are written at most, all pieces together.
+    /// How many indices are written at most, in all pieces together.
     pub fn capacity(&self) -> u32 {
         self.capacity
     }
@@ -129,23 +132,23 @@ impl Visible {
             + self.statistics.get().map_or(0, wgpu::Buffer::size)
     }
 
-    /// Instances of each piece.
+    /// The number of instances of each piece.
     pub(crate) fn counts(&self) -> &[u32] {
         &self.counts
     }
 
-    /// Where levels are counted.
+    /// The buffer in which levels are counted, made if there is none.
     pub(crate) fn statistics_or_new(&self, gpu: &Gpu) -> Result<&wgpu::Buffer> {
         let size = size_of::<StatisticsRecord>() as u64;
         made(&self.statistics, || gpu.empty("hiz.visible.statistics", size, STORAGE))
     }
 
-    /// Where levels were counted, if they were.
+    /// The buffer in which levels were counted, if a cull did so.
     pub(crate) fn statistics(&self) -> Option<&wgpu::Buffer> {
         self.statistics.get()
     }
 
-    /// Whether more instances may be kept than the lists hold.
+    /// Whether more instances may be kept than the lists can hold.
     pub(crate) fn is_capped(&self) -> bool {
         self.counts.iter().map(|n| u64::from(*n)).sum::<u64>() > u64::from(self.capacity)
     }
@@ -159,7 +162,7 @@ impl PieceOutput {
         Ok(Self { mask: gpu.empty("hiz.visible.mask", size, STORAGE)?, groups: OnceLock::new() })
     }
 
-    /// For a cull that tests groups.
+    /// The buffers for a cull that tests groups, made if there are none.
     pub(crate) fn groups_or_new(&self, gpu: &Gpu, piece: &Piece) -> Result<&GroupOutput> {
         made(&self.groups, || GroupOutput::new(gpu, piece))
     }
@@ -175,7 +178,8 @@ impl PieceOutput {
     }
 }
 
-/// Where the verdicts begin behind a piece's mask; `shaders/instances/piece.wgsl`, `verdicts_begin`.
+/// Where the verdicts begin behind a piece's mask, in bytes; `shaders/instances/piece.wgsl`,
+/// `verdicts_begin`.
 pub(crate) fn verdicts_offset(piece: &Piece) -> u64 {
     4 * u64::from(piece.words().next_multiple_of(VERDICT_MULTIPLE))
 }
