@@ -1,20 +1,20 @@
-//! Which Vulkan adapters there are.
+//! The adapters of this machine, and how one is chosen.
 
 use crate::error::Error;
 
-/// The environment variable that chooses an adapter.
+/// The environment variable that chooses an adapter: an index, or part of a name or driver.
 pub const ADAPTER_VARIABLE: &str = "HIZVK_ADAPTER";
 
-/// How to install a software driver: the advice where there is no adapter at all.
+/// How to install a software driver: the advice if there is no adapter at all.
 pub const INSTALL_HINT: &str =
     "A software Vulkan driver: apt install libvulkan1 mesa-vulkan-drivers";
 
-/// A Vulkan adapter, as text.
+/// An adapter, described as text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AdapterSummary {
-    /// Its place in [`adapters`].
+    /// Its index in [`adapters`].
     pub index: usize,
-    /// The device's name.
+    /// The name of the GPU.
     pub name: String,
     /// The driver's name.
     pub driver: String,
@@ -45,14 +45,14 @@ impl AdapterSummary {
         }
     }
 
-    /// Lower is better: real GPUs first.
+    /// The rank of the adapter; lower is better, and real GPUs come first.
     pub(super) fn rank(&self) -> usize {
         let order = ["discrete_gpu", "integrated_gpu", "virtual_gpu", "cpu"];
         order.iter().position(|t| *t == self.device_type).unwrap_or(order.len())
     }
 
     pub(super) fn matches(&self, request: &str) -> bool {
-        // Digits are an index and nothing else: "1" is also part of many a version.
+        // Digits are an index and nothing else, because "1" is also part of many versions.
         if let Ok(index) = request.parse::<usize>() {
             return index == self.index;
         }
@@ -69,8 +69,8 @@ impl std::fmt::Display for AdapterSummary {
     }
 }
 
-/// The error of a request that no adapter answers to: with how to choose one of those that are
-/// there, or how to get one.
+/// The error of a request that no adapter fits.
+/// Its hint says how to choose one of the adapters `seen`, or how to get one.
 pub(super) fn no_adapter(request: String, seen: &[AdapterSummary]) -> Error {
     let hint = if seen.is_empty() {
         INSTALL_HINT.to_owned()
@@ -84,8 +84,8 @@ pub(super) fn no_adapter(request: String, seen: &[AdapterSummary]) -> Error {
     Error::NoAdapter { request, seen, hint }
 }
 
-/// Those that this crate was built with: one more would silently take over where a driver is
-/// missing.
+/// The backends that this crate was built with.
+/// Any other would silently take over if a driver is missing.
 fn backends() -> wgpu::Backends {
     let built = [
         (cfg!(feature = "vulkan"), wgpu::Backends::VULKAN),
@@ -109,7 +109,7 @@ pub(super) fn enumerate() -> Vec<(AdapterSummary, wgpu::Adapter)> {
         .collect()
 }
 
-/// The adapters of this machine that the built backends see; none without a driver.
+/// The adapters of this machine that the built backends find; an empty list without a driver.
 pub fn adapters() -> Vec<AdapterSummary> {
     enumerate().into_iter().map(|(summary, _)| summary).collect()
 }

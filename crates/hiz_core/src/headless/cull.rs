@@ -1,4 +1,4 @@
-//! A cull, recorded and submitted.
+//! Records and submits a cull.
 
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
@@ -22,12 +22,14 @@ use crate::output::visible::Visible;
 use crate::pyramid::Pyramid;
 
 impl Engine {
-    /// Culls: records and submits; reading the answer waits.
-    /// A cull that needs a pipeline that was not made before makes it, and waits until the driver
-    /// has compiled it ([`Timings::compile_ms`]).
+    /// Culls: it records and submits, and reading an answer waits.
+    ///
+    /// If the cull needs a pipeline that was not made before, this call makes it.
+    /// It then waits until the driver has compiled the pipeline ([`Timings::compile_ms`]).
     ///
     /// # Errors
-    /// As [`HizContext::record_cull`](crate::HizContext::record_cull), and [`Error::OutOfMemory`].
+    /// Those of [`HizContext::record_cull`](crate::HizContext::record_cull), [`Error::OutOfMemory`]
+    /// and [`Error::DeviceLost`].
     pub fn cull(
         &self,
         instances: &Arc<Instances>,
@@ -85,16 +87,17 @@ impl Engine {
         let Err(error) = &culling else { return culling };
         let had_atlas = pyramid.forget();
         if had_atlas && matches!(error, Error::OutOfMemory(_)) {
-            // The depth image and the levels can be read where they are.
+            // Without the atlas, the depth image and the levels are read in place.
             pyramid.do_without_atlas();
             return self.scoped(attempt);
         }
         culling
     }
 
-    /// Lets the driver compile what it leaves to the first dispatch of a pipeline: submits the same
-    /// work of no workgroups, and waits.
-    /// How many milliseconds that took, what was submitted before not counted.
+    /// Makes the driver compile what it would leave to the first dispatch of a pipeline.
+    ///
+    /// Submits the same work with no workgroups, and waits.
+    /// Returns the milliseconds that this took, without the wait for earlier submissions.
     fn compile(&self, inputs: &CullInputs<'_>, visible: &Visible) -> Result<f64> {
         readback::wait(self.device(), None)?;
         let start = Instant::now();

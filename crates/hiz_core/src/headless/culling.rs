@@ -1,4 +1,4 @@
-//! A cull that was submitted, and what can be read of it.
+//! A submitted cull, and everything that can be read from it.
 
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
@@ -31,12 +31,12 @@ use crate::output::verdict::Verdict;
 use crate::output::visible::{PieceOutput, Visible, verdicts_offset};
 use crate::pyramid::Pyramid;
 
-/// Up to this size, of 131,072 instances, a mask is copied to where it can be read by the submit of
-/// its cull.
+/// The largest mask that the cull's own submit copies to a staging buffer: that of 131,072
+/// instances.
 const STAGED_MASK_BYTES: u64 = 1 << 14;
 
 /// A cull that was submitted.
-/// Reading waits for it.
+/// Every read waits for it.
 #[derive(Debug)]
 pub struct Culling {
     pub(super) engine: Engine,
@@ -45,20 +45,20 @@ pub struct Culling {
     pub(super) camera: Camera,
     pub(super) options: CullOptions,
     pub(super) visible: Arc<Visible>,
-    /// A small mask, copied by the cull's own submit.
+    /// The copy of a small mask, made by the cull's own submit.
     pub(super) staged_mask: Locked<Option<Staged>>,
     pub(super) later: OnceLock<Lists>,
-    /// What later updates leave here, and do first.
+    /// Where updates note what they changed, and find the refinement that must run before them.
     pub(super) watch: Arc<Watch>,
     pub(super) submission: wgpu::SubmissionIndex,
     pub(super) submitted: Instant,
-    /// When the device was seen to be done.
+    /// When the device was first seen to be done.
     pub(super) done: Arc<OnceLock<Instant>>,
     pub(super) timings: Locked<Timings>,
 }
 
 impl Culling {
-    /// The buffers on the device.
+    /// The buffers on the device that the cull fills.
     pub fn visible(&self) -> &Visible {
         &self.visible
     }
@@ -68,26 +68,26 @@ impl Culling {
         &self.instances
     }
 
-    /// Waits until the device is done.
+    /// Waits until the device has run the cull.
     ///
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost).
     pub fn wait(&self) -> Result<()> {
         self.engine
             .scoped(|| readback::wait(self.engine.device(), Some(self.submission.clone())))?;
-        // The wait itself has called back, unless another thread's is about to.
+        // The wait itself has called back, unless another thread is about to.
         self.done.get_or_init(Instant::now);
         Ok(())
     }
 
-    /// Times so far.
+    /// The times of this cull so far.
     pub fn timings(&self) -> Timings {
         let wall_ms = self.done.get().map_or(0.0, |done| milliseconds(self.submitted, *done));
         Timings { wall_ms, ..*self.timings.lock() }
     }
 
-    /// Records the copy of a mask that is asked for and so small that a submit of its own would
-    /// cost more.
+    /// Records the copy of the mask if it was asked for and is small.
+    /// For a small mask, a submit of its own would cost more than the copy.
     pub(super) fn stage_mask(
         device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
@@ -102,7 +102,7 @@ impl Culling {
     /// The words of the masks of all pieces.
     fn mask_words(&self) -> Result<Vec<Vec<u8>>> {
         self.engine.check_process()?;
-        // Whoever comes first takes it; a second reader copies again.
+        // The first reader takes the staged copy, and later readers copy again.
         let Some(staged) = self.staged_mask.lock().take() else {
             return self.read(&mask_ranges(&self.instances, &self.visible));
         };
@@ -124,11 +124,11 @@ impl Culling {
         Ok(bytes)
     }
 
-    /// Whether each instance is kept.
+    /// Whether each instance is kept, by its index.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without [`Outputs::mask`](crate::Outputs::mask),
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// - [`Error::Mismatch`] for a cull without [`Outputs::mask`](crate::Outputs::mask).
+    /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn mask(&self) -> Result<Vec<bool>> {
         self.require("mask", self.visible.outputs().mask)?;
         let planes = self.mask_words()?;
@@ -140,19 +140,22 @@ impl Culling {
         Ok(mask)
     }
 
-    /// Each instance's verdict.
+    /// The verdict of each instance, by its index.
     ///
-    /// Outside is what lies outside the frustum by a certificate of its own or of its group's box
-    /// (in sample coverage also what lies between all pixel centres).
-    /// Occluded is every other instance that is hidden.
-    /// So a verdict does not depend on whether groups were tested, but for the few instances that a
-    /// group's test hides and their own would keep: they are occluded.
-    /// Members of hidden groups get theirs by a pass of its own, when verdicts or counts are first
-    /// read, or before the next update.
+    /// - **Outside**: outside the frustum, by a certificate of its own or of its group's box.
+    ///   In sample coverage also: between all pixel centres.
+    /// - **Occluded**: every other instance that is hidden.
+    /// - **Visible** and **invalid**: every instance that is kept.
+    ///
+    /// So a verdict does not depend on whether groups were tested, except for a few instances.
+    /// A group's test hides these, and their own tests would keep them: they are occluded.
+    ///
+    /// The members of hidden groups get their verdicts in a pass of their own.
+    /// It runs when verdicts or counts are first read, or before the next update.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without [`Outputs::verdicts`](crate::Outputs::verdicts),
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// - [`Error::Mismatch`] for a cull without [`Outputs::verdicts`](crate::Outputs::verdicts).
+    /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn verdicts(&self) -> Result<Vec<Verdict>> {
         self.require("verdicts", self.visible.outputs().verdicts)?;
         self.refine()?;
@@ -172,12 +175,12 @@ impl Culling {
         Ok(verdicts)
     }
 
-    /// The draw arguments, one record a piece.
-    /// Where the cull left none they are made from its mask.
+    /// The draw arguments, one record per piece.
+    /// If the cull did not write them, they are made from its mask.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without draws, indices and mask, [`Error::DeviceLost`],
-    /// [`Error::OutOfMemory`].
+    /// - [`Error::Mismatch`] for a cull without draws, indices and mask.
+    /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn draws(&self) -> Result<Vec<DrawIndexedIndirect>> {
         let draws = match &self.visible.lists {
             Some(lists) => &lists.draws,
@@ -187,12 +190,12 @@ impl Culling {
         Ok(bytemuck::pod_collect_to_vec(&bytes[0]))
     }
 
-    /// The packed list, the pieces joined.
-    /// Where the cull left none it is made from its mask, ascending.
+    /// The packed list of the kept instances' indices, all pieces joined.
+    /// If the cull did not write it, it is made from its mask, ascending.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without indices and mask, [`Error::DeviceLost`],
-    /// [`Error::OutOfMemory`].
+    /// - [`Error::Mismatch`] for a cull without indices and mask.
+    /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn indices(&self) -> Result<Vec<u32>> {
         let lists = match &self.visible.lists {
             Some(lists) if self.visible.outputs().indices => lists,
@@ -216,11 +219,11 @@ impl Culling {
         Ok(indices)
     }
 
-    /// How many instances met which end.
+    /// How many instances got which verdict, and how many were tested.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without [`Outputs::verdicts`](crate::Outputs::verdicts),
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// - [`Error::Mismatch`] for a cull without [`Outputs::verdicts`](crate::Outputs::verdicts).
+    /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn counts(&self) -> Result<Counts> {
         self.require("verdicts", self.visible.outputs().verdicts)?;
         self.refine()?;
@@ -241,7 +244,7 @@ impl Culling {
             Some(groups) => BufferRange::first(&groups.survivors, groups.survivors.size()),
             None => BufferRange::first(&output.mask, 0),
         }));
-        // The last group may have fewer members.
+        // The last group may have fewer members than 64.
         ranges.extend(self.ranges(|piece, output| match self.groups(piece, output) {
             Some(groups) => BufferRange {
                 buffer: &groups.verdicts,
@@ -291,12 +294,13 @@ impl Culling {
         })
     }
 
-    /// How many instances are kept, and how many of them the lists hold.
-    /// The first is unknown to a cull that was asked for full lists alone.
+    /// How many instances are kept (the demand), and how many of them the lists hold.
+    /// The demand is `None` if the cull was asked for lists alone, and they are full but too short
+    /// for all instances.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull that left nothing that tells, [`Error::DeviceLost`],
-    /// [`Error::OutOfMemory`].
+    /// - [`Error::Mismatch`] for a cull without mask, verdicts, indices and draws.
+    /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn demand_and_written(&self) -> Result<(Option<u64>, u64)> {
         let capacity = u64::from(self.visible.capacity());
         let outputs = self.visible.outputs();
@@ -314,11 +318,11 @@ impl Culling {
             return Ok((Some(counts.demand), counts.written));
         }
         let written = self.draws()?.iter().map(|draw| u64::from(draw.instance_count)).sum();
-        // Where there was room for all, the lists' lengths tell.
+        // Lists that had room for all hold as many as are kept.
         Ok(((written < capacity || !self.visible.is_capped()).then_some(written), written))
     }
 
-    /// Lists that the cull did not leave, made from its mask when they are first asked for.
+    /// The lists that the cull did not write, made from its mask when they are first asked for.
     fn later_lists(&self, what: &str) -> Result<&Lists> {
         self.require(what, self.visible.outputs().mask)?;
         if let Some(lists) = self.later.get() {
@@ -341,13 +345,14 @@ impl Culling {
         Ok(self.later.get_or_init(|| lists))
     }
 
-    /// Submits what makes an answer, and waits: only the copy that follows counts as one.
+    /// Submits the commands that make an answer, and waits.
+    /// So the read-back time counts only the copy that follows.
     fn finish(&self, encoder: wgpu::CommandEncoder) -> Result<()> {
         let submission = self.engine.queue().submit([encoder.finish()]);
         readback::wait(self.engine.device(), Some(submission))
     }
 
-    /// Sees to it that each place has a verdict of its own.
+    /// Makes sure that each place has a verdict of its own.
     fn refine(&self) -> Result<()> {
         let engine = &self.engine;
         let submission = engine.scoped(|| {
@@ -396,11 +401,14 @@ impl Culling {
     }
 
     /// Why instance `index` got its verdict: the cull's own steps, run for it once more.
-    /// They read the bounds as they are now: those of an instance that was updated since make an
-    /// explanation that is [`stale`](Explanation::stale).
+    ///
+    /// The test reads the bounds as they are now.
+    /// If the instance was updated since the cull, the explanation is
+    /// [`stale`](Explanation::stale).
     ///
     /// # Errors
-    /// [`Error::Invalid`](crate::Error::Invalid) for an index past the end.
+    /// - [`Error::Invalid`](crate::Error::Invalid) for an index past the end.
+    /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn explain(&self, index: u64) -> Result<Explanation> {
         let index = u32::try_from(index).unwrap_or(u32::MAX);
         let mut told = self.test(index, false)?;
@@ -424,7 +432,7 @@ impl Culling {
         Ok(told)
     }
 
-    /// The test of an instance, or of the box around its group.
+    /// Repeats the test of an instance, or of the box around its group.
     fn test(&self, index: u32, whole_group: bool) -> Result<Explanation> {
         let engine = &self.engine;
         let bytes = engine.scoped(|| {
@@ -458,8 +466,8 @@ impl Culling {
         Ok(Told { record, readings, camera: &self.camera, options }.explanation())
     }
 
-    /// Where this cull hid the group of an instance: the group's verdict, and whether any of its
-    /// members was updated since.
+    /// If this cull hid the group of an instance: the group's verdict, and whether any member was
+    /// updated since.
     fn hidden_group(&self, index: u32) -> Result<Option<(Verdict, bool)>> {
         let pieces = self.instances.pieces.iter().zip(&self.visible.pieces);
         let Some((piece, output)) =

@@ -1,4 +1,4 @@
-//! The device, its queue and its errors.
+//! The engine: a device, its queue and its errors.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use crate::host::threads::Locked;
 use crate::input::image::MAX_IMAGE_SIDE;
 
 /// A device, its queue and the pipelines on it.
-/// The last clone waits until the device is idle, and lets go of it.
+/// The last clone waits until the device is idle, and releases it.
 #[derive(Debug, Clone)]
 pub struct Engine {
     shared: Arc<Shared>,
@@ -21,7 +21,7 @@ impl Drop for Engine {
     fn drop(&mut self) {
         if self.shared.process.check().is_err() {
             // Destroying the device would join threads that a fork does not have.
-            // One more owner keeps it for good.
+            // So one more owner keeps it alive for good.
             std::mem::forget(Arc::clone(&self.shared));
         }
     }
@@ -34,34 +34,40 @@ struct Shared {
     device: wgpu::Device,
     queue: wgpu::Queue,
     adapter: AdapterSummary,
-    /// Why the device was lost, once it is; and errors that no scope caught.
+    /// Why the device was lost, once it was.
+    /// `uncaught`: an error that no scope caught.
     lost: Arc<Locked<Option<String>>>,
     uncaught: Arc<Locked<Option<String>>>,
 }
 
 impl Drop for Shared {
     fn drop(&mut self) {
-        // A lost device has nothing to wait for.
+        // A lost device has nothing to wait for, so an error here is ignored.
         drop(self.device.poll(wgpu::PollType::wait_indefinitely()));
     }
 }
 
 impl Engine {
-    /// Opens a Vulkan device: the adapter whose index is, or whose name or driver contains,
-    /// `adapter`; without it what the environment variable [`ADAPTER_VARIABLE`] says; without that
-    /// the best one, real GPUs first.
+    /// Opens a device on an adapter.
+    ///
+    /// `adapter` is an index, or a part of a name or driver in any case, as [`AdapterSummary`]
+    /// lists them.
+    /// Without it, the environment variable [`ADAPTER_VARIABLE`] says which adapter to take.
+    /// Without both, the best adapter is taken: discrete GPUs first, software drivers last.
     ///
     /// # Errors
-    /// [`Error::NoAdapter`] where none fits, with the adapters that were seen and how to choose one
-    /// of them; where there are none, with the line that installs a software driver.
+    /// [`Error::NoAdapter`] if no adapter fits.
+    /// It lists the adapters that were found and says how to choose one of them.
+    /// If there are none, it names the command that installs a software driver.
     pub fn new(adapter: Option<&str>) -> Result<Self> {
         Self::open(adapter, HizContext::new)
     }
 
-    /// One whose shaders have planted faults, for tests: see [`HizContext::with_planted_faults`].
+    /// Opens a device whose shaders have planted faults, for tests; see
+    /// [`HizContext::with_planted_faults`].
     ///
     /// # Errors
-    /// As [`Engine::new`].
+    /// Those of [`Engine::new`].
     #[cfg(feature = "testing")]
     pub fn with_planted_faults(adapter: Option<&str>, faults: &[(&str, &str)]) -> Result<Self> {
         Self::open(adapter, |device| HizContext::with_planted_faults(device, faults))
@@ -99,7 +105,8 @@ impl Engine {
         device.set_device_lost_callback(move |reason, message| {
             lost_to.lock().get_or_insert(format!("{reason:?}: {message}"));
         });
-        // The default handler panics; every call below asks for what was left here instead.
+        // The default handler panics.
+        // Every call through `scoped` reports what this handler stores.
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             uncaught_to.lock().get_or_insert(error.to_string());
         }));
@@ -119,13 +126,14 @@ impl Engine {
     }
 
     /// Refuses to go on in a fork of the process that made the device.
-    /// To be asked before any lock is taken: one that another thread held at the fork is never
-    /// released there.
+    ///
+    /// Call it before taking any lock.
+    /// If another thread held a lock at the fork, nobody ever releases it in the fork.
     pub(super) fn check_process(&self) -> Result<()> {
         self.shared.process.check()
     }
 
-    /// The adapter.
+    /// The adapter of the device.
     pub fn adapter(&self) -> &AdapterSummary {
         &self.shared.adapter
     }
@@ -140,20 +148,21 @@ impl Engine {
         &self.shared.queue
     }
 
-    /// The pipelines on the device.
+    /// The context that records on this device.
     pub fn context(&self) -> &HizContext {
         &self.shared.context
     }
 
-    /// The largest side of a depth image.
+    /// The largest width or height of a depth image, in pixels.
     pub fn max_image_side(&self) -> u32 {
         self.device().limits().max_texture_dimension_2d.min(MAX_IMAGE_SIDE)
     }
 
-    /// Waits for everything that was submitted.
+    /// Waits until everything that was submitted has run.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`].
+    /// - [`Error::DeviceLost`].
+    /// - [`Error::OtherProcess`] in a fork.
     pub fn wait(&self) -> Result<()> {
         self.scoped(|| readback::wait(self.device(), None))
     }
@@ -162,7 +171,7 @@ impl Engine {
         self.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) })
     }
 
-    /// Runs `work` so that what the device finds wrong comes back as an error and nothing panics.
+    /// Runs `work`, and returns what the device finds wrong as an error instead of panicking.
     pub(super) fn scoped<T>(&self, work: impl FnOnce() -> Result<T>) -> Result<T> {
         self.check_process()?;
         let device = self.device();
@@ -174,11 +183,11 @@ impl Engine {
         let internal = device.push_error_scope(wgpu::ErrorFilter::Internal);
         let result = work();
         if result.is_err() {
-            // A loss is told by a callback, which runs when the device is polled; what it broke may
-            // be reported as anything.
+            // A callback reports a lost device, and it runs when the device is polled.
+            // What the loss broke may appear as any error, so poll before looking.
             drop(device.poll(wgpu::PollType::wait_indefinitely()));
         }
-        // The innermost scope goes first.
+        // Scopes are popped from the innermost to the outermost.
         let internal = pollster::block_on(internal.pop());
         let validation = pollster::block_on(validation.pop());
         let memory = pollster::block_on(memory.pop());

@@ -1,4 +1,4 @@
-//! Pyramids, and their levels as arrays.
+//! Pyramids of uploaded depth images, and their levels as arrays.
 
 use std::sync::Arc;
 
@@ -14,10 +14,11 @@ use crate::pyramid::reduce::record_reduce;
 use crate::pyramid::{Pyramid, PyramidOptions};
 
 impl Engine {
-    /// Builds the depth pyramid of an image.
+    /// Builds the depth pyramid of an image, with default options.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for an image of another device, [`Error::OutOfMemory`].
+    /// - [`Error::Mismatch`] for an image of another device.
+    /// - [`Error::OutOfMemory`].
     pub fn pyramid(&self, depth: &DepthImage) -> Result<Arc<Pyramid>> {
         self.pyramid_with(depth, &PyramidOptions::default())
     }
@@ -25,7 +26,8 @@ impl Engine {
     /// [`Engine::pyramid`] with options.
     ///
     /// # Errors
-    /// As [`Engine::pyramid`].
+    /// Those of [`Engine::pyramid`] and of
+    /// [`HizContext::create_pyramid`](crate::HizContext::create_pyramid).
     pub fn pyramid_with(
         &self,
         depth: &DepthImage,
@@ -42,11 +44,14 @@ impl Engine {
         })
     }
 
-    /// Reads a level of a pyramid: sanitised depth, row 0 on top.
+    /// Reads a level of a pyramid: one float32 per texel, sanitised NDC depth, row 0 on top.
+    /// The array has as many rows and columns as the level.
     ///
     /// # Errors
-    /// [`Error::Invalid`] past the last level and for one that is not stored, [`Error::Mismatch`]
-    /// for a pyramid that was never built.
+    /// - [`Error::Invalid`] past the last level, for a level that is not stored, and for level 0 of
+    ///   a format that is not read as float32.
+    /// - [`Error::Mismatch`] for a pyramid that was never built.
+    /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn read_level(&self, pyramid: &Pyramid, level: u32) -> Result<Vec<f32>> {
         self.check_process()?;
         self.context().gpu.check_context("pyramid", pyramid.context)?;

@@ -1,26 +1,43 @@
-//! A device of its own: for scripts and tests that have no renderer.
-//! This is what the Python package drives.
+//! A device of its own, for scripts and tests that have no renderer.
+//! The Python package uses this module.
 //!
-//! Everything here is `Send + Sync`; an [`Engine`] is cheap to clone and may be used from any
-//! thread.
+//! The data goes through these files:
+//!
+//! 1. `adapter` lists the adapters, and `engine` opens a device on one.
+//! 2. `uploads` brings instances, updates and occluders to it, and `depth_image` depth images.
+//! 3. `levels` builds pyramids and reads their levels.
+//! 4. `cull` submits a cull; `culling` reads its answers, through `counts`, `explanation` and
+//!    `readback`.
+//!
+//! `process` guards all of them against forks.
+//! This is the only room that submits, waits and maps buffers for reading; it decides no geometry.
+//!
+//! Everything here is `Send + Sync`.
+//! An [`Engine`] is cheap to clone and may be used from any thread.
 //!
 //! # The end of a process
-//! A driver may still be at work when the last wait for it has returned: Mesa's lavapipe frees
-//! pipelines on a thread of its own, which only the destruction of the device joins.
-//! A process that ends meanwhile may crash in the driver.
-//! So **let go of every device before the process ends**: the last clone of an [`Engine`] waits
-//! until its device is idle, and the device is destroyed with the last object on it (instances,
-//! pyramids, results, and whatever was made on [`Engine::device`]).
-//! Keep none of them in a `static`, which is never dropped; a local of `main` and a `thread_local!`
-//! are.
-//! The same goes for a device of your own under a [`HizContext`].
-//! `std::process::exit` drops nothing: return from `main` instead.
+//! **Let go of every device before the process ends.**
+//!
+//! A driver may still be at work when the last wait for it has returned.
+//! Mesa's lavapipe frees pipelines on a thread of its own, and only the destruction of the device
+//! joins that thread.
+//! A process that ends before that may crash in the driver.
+//!
+//! The last clone of an [`Engine`] waits until its device is idle.
+//! The device is destroyed with the last object on it: instances, pyramids, results, and whatever
+//! was made on [`Engine::device`].
+//! So follow these rules, also for a device of your own under a [`HizContext`]:
+//!
+//! - Keep none of these objects in a `static`, which is never dropped.
+//!   A local of `main` or a `thread_local!` is dropped.
+//! - Return from `main` instead of calling `std::process::exit`, which drops nothing.
 //!
 //! # Forks
 //! No device works in a fork of the process that made it.
-//! There every call of an [`Engine`], [`DepthImage`] or [`Culling`] is [`Error::OtherProcess`],
-//! before it takes any lock; dropping an [`Engine`] there lets go of nothing.
-//! Other objects on the device (instances, pyramids) are better forgotten in the fork than dropped.
+//! In a fork, every call of an [`Engine`], [`DepthImage`] or [`Culling`] returns
+//! [`Error::OtherProcess`] before it takes any lock.
+//! Dropping an [`Engine`] there releases nothing.
+//! Forget other objects on the device (instances, pyramids) in the fork instead of dropping them.
 //!
 //! [`HizContext`]: crate::HizContext
 //! [`Error::OtherProcess`]: crate::Error::OtherProcess

@@ -1,9 +1,9 @@
-//! From the device to the host: the only place that submits a copy, maps and waits.
+//! Readback, from the device to the host: copies into staging buffers, waits, and maps them.
 
 use crate::error::{Error, Result};
 use crate::host::memory;
 
-/// What to copy.
+/// The part of a buffer to copy.
 pub(crate) struct BufferRange<'a> {
     pub(crate) buffer: &'a wgpu::Buffer,
     pub(crate) offset: u64,
@@ -17,10 +17,11 @@ impl<'a> BufferRange<'a> {
     }
 }
 
-/// Bytes of a staging buffer at most: larger reads come in several.
+/// Bytes of a staging buffer at most.
+/// Larger ranges are read in bands.
 const STAGING_BYTES: u64 = 1 << 28;
 
-/// Reads ranges of buffers, in their order.
+/// Reads ranges of buffers and returns their bytes in the same order.
 pub(crate) fn read_buffers(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
@@ -41,8 +42,8 @@ pub(crate) fn read_buffers(
     staged.read(device, submission)
 }
 
-/// Ranges of buffers that wait in a staging area: recorded with what fills them, they take no
-/// submit of their own.
+/// Copies of buffer ranges in a staging buffer.
+/// Record them with the commands that fill the ranges, and they need no submit of their own.
 #[derive(Debug)]
 pub(crate) struct Staged {
     staging: wgpu::Buffer,
@@ -50,7 +51,7 @@ pub(crate) struct Staged {
 }
 
 impl Staged {
-    /// Records the copies of ranges that are not empty in all.
+    /// Records the copies; at least one range must not be empty.
     pub(crate) fn record(
         device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
@@ -66,7 +67,8 @@ impl Staged {
         Self { staging, sizes }
     }
 
-    /// Waits for the submission of the copies; the ranges, in their order.
+    /// Waits for the submission of the copies.
+    /// Returns the bytes of the ranges in their order.
     pub(crate) fn read(
         &self,
         device: &wgpu::Device,
@@ -100,8 +102,8 @@ fn read_in_bands(
     Ok(out)
 }
 
-/// Reads the first `row` bytes of each row of a texture: all of a row, but for what pads it to a
-/// whole texel of up to 16 bytes.
+/// Reads the first `row` bytes of each row of a texture.
+/// That is the whole row, except the padding to a whole texel of up to 16 bytes.
 pub(crate) fn read_texture(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
@@ -139,7 +141,7 @@ pub(crate) fn read_texture(
     })?
 }
 
-/// Waits for a submission.
+/// Waits for a submission; `None`: for all of them.
 pub(crate) fn wait(device: &wgpu::Device, submission: Option<wgpu::SubmissionIndex>) -> Result<()> {
     device
         .poll(wgpu::PollType::Wait { submission_index: submission, timeout: None })
@@ -164,7 +166,7 @@ fn with_mapped<T>(
 ) -> Result<T> {
     let (sender, receiver) = std::sync::mpsc::channel();
     staging.map_async(wgpu::MapMode::Read, .., move |result| {
-        // The receiver lives until the end of this function; if it is gone nobody asks any more.
+        // The receiver lives until the end of this function, so a failed send has no reader.
         let _ = sender.send(result);
     });
     wait(device, Some(submission))?;
@@ -192,7 +194,7 @@ fn with_mapped<T>(
     Ok(out)
 }
 
-/// The words of bytes.
+/// The little-endian u32 words in `bytes`.
 pub(crate) fn to_u32(bytes: &[u8]) -> impl ExactSizeIterator<Item = u32> {
     bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
 }

@@ -1,4 +1,4 @@
-//! What is uploaded: instances and their updates, and occluders.
+//! Uploads: instances with their updates, and occluders.
 
 use std::sync::Arc;
 
@@ -15,13 +15,14 @@ impl Engine {
     /// Uploads bounding volumes.
     ///
     /// # Errors
-    /// As [`HizContext::record_instances`](crate::HizContext::record_instances), and [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// Those of [`HizContext::record_instances`](crate::HizContext::record_instances), and
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost).
     pub fn instances(
         &self,
         bounds: &Bounds<'_>,
         options: &InstanceOptions,
     ) -> Result<Arc<Instances>> {
-        // One piece at a time, so that only one has its copy in a staging area.
+        // Waits after each piece, so that only one piece has a staging buffer at a time.
         let copy = |copies: &dyn Fn(&mut wgpu::CommandEncoder), more: bool| {
             let mut encoder = self.encoder("hiz.instances.encoder");
             copies(&mut encoder);
@@ -31,13 +32,15 @@ impl Engine {
         self.scoped(|| Instances::new(&self.context().gpu, bounds, options, copy)).map(Arc::new)
     }
 
-    /// Replaces instances `first..first + n`: records and submits.
+    /// Replaces the bounds of instances `first..first + n`: it records and submits.
+    ///
     /// A cull that was submitted before sees the old bounds, whenever its answer is read.
-    /// May be called from any thread; updates of the same instances run in the order in which they
-    /// come here.
+    /// Any thread may call this.
+    /// Updates of the same instances run in the order of the calls.
     ///
     /// # Errors
-    /// As [`HizContext::record_update`](crate::HizContext::record_update).
+    /// Those of [`HizContext::record_update`](crate::HizContext::record_update), and
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost).
     pub fn update(
         &self,
         instances: &Instances,
@@ -54,7 +57,7 @@ impl Engine {
                 updated = range;
                 Ok(())
             })?;
-            // Short, so that culls on other threads do not wait for the packing above.
+            // Taken late, so that culls on other threads need not wait for the packing above.
             let watches = instances.watches();
             let mut before = self.encoder("hiz.refine.encoder");
             let before = watches.record_refinements(gpu, &mut before)?.then(|| before.finish());
@@ -65,10 +68,11 @@ impl Engine {
         })
     }
 
-    /// Uploads triangle meshes.
+    /// Uploads triangle meshes as occluders.
     ///
     /// # Errors
-    /// As [`HizContext::create_occluders`](crate::HizContext::create_occluders), and [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// Those of [`HizContext::create_occluders`](crate::HizContext::create_occluders), and
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost).
     pub fn occluders(
         &self,
         meshes: &[MeshData<'_>],

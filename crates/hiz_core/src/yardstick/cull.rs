@@ -1,4 +1,4 @@
-//! The flat cull of boxes without certificates, in the same frame.
+//! A flat cull of boxes without certificates, recorded in the same pass as the library's own.
 
 use crate::cull::inputs::CullInputs;
 use crate::cull::options::{CullOptions, Hierarchy};
@@ -15,9 +15,9 @@ use crate::instances::Instances;
 use crate::output::visible::Visible;
 use crate::pyramid::Pyramid;
 
-/// The flat cull of boxes without certificates.
+/// The shader of the flat cull of boxes without certificates.
 pub(crate) fn cull_module(store: DepthStore) -> Source {
-    // The kinds of bounds speak of supporting planes, which nobody asks for here.
+    // The bounds' shader files use the types of the supporting planes, which this cull never tests.
     let classify = [wgsl!("cull/supporting_planes"), wgsl!("yardstick/classify_uncertified")];
     module(store, BoundsKind::Box, &classify, FLAT)
 }
@@ -26,13 +26,13 @@ fn pipeline(gpu: &Gpu, key: &CullKey, report: &ReportKey) -> Result<wgpu::Comput
     flat_pipeline(gpu, "hiz.yardstick.cull", cull_module(key.store), key, report)
 }
 
-/// Records the cull of `instances`, boxes, as one would write it who trusts float32: it hides what
-/// can be seen.
-/// Of the options order and footprint count.
+/// Records a cull of `instances`, which must be boxes, that trusts float32.
+/// It has no margins, so it hides some instances that can be seen.
+/// Of the options, only order and footprint have an effect.
 ///
 /// # Errors
-/// As [`HizContext::record_cull`](crate::HizContext::record_cull), and [`Error::Invalid`] for other
-/// volumes.
+/// Those of [`HizContext::record_cull`](crate::HizContext::record_cull), and [`Error::Invalid`] for
+/// other bounds than boxes.
 pub fn record_uncertified_cull(
     engine: &Engine,
     encoder: &mut wgpu::CommandEncoder,
@@ -54,11 +54,12 @@ pub fn record_uncertified_cull(
     record_cull_by(&engine.context().gpu, encoder, &inputs, visible, pipeline)
 }
 
-/// Whether each instance is kept, by the mask of the last cull into `visible`: what a yardstick
-/// hides is counted beside its time.
+/// Whether each instance is kept, by the mask of the last cull into `visible`.
+/// A benchmark counts what a yardstick hides beside its time.
 ///
 /// # Errors
-/// [`Error::Mismatch`] where there is no mask, [`Error::DeviceLost`].
+/// - [`Error::Mismatch`] for a cull without a mask.
+/// - [`Error::DeviceLost`].
 pub fn read_mask(engine: &Engine, visible: &Visible) -> Result<Vec<bool>> {
     if !visible.outputs().mask {
         let got = visible.outputs();

@@ -1,4 +1,4 @@
-//! The reduction as one dispatch a level, on a flat buffer or on a texture's mip levels.
+//! The reduction with one dispatch per level, into a flat buffer or a texture's mip levels.
 
 use crate::error::Result;
 use crate::gpu::buffers::entry;
@@ -28,7 +28,7 @@ pub(crate) fn modules(source: SourceKind) -> [(&'static str, Source); 2] {
     ]
 }
 
-/// What one dispatch a level writes into.
+/// What each dispatch writes into.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReductionShape {
     /// A storage buffer, by vectors of four texels.
@@ -37,8 +37,8 @@ pub enum ReductionShape {
     Textures,
 }
 
-/// `shaders/yardstick/reduce_buffer.wgsl`, `YardstickLevel`: offset and stride in vectors of four
-/// texels.
+/// Twin: `shaders/yardstick/reduce_buffer.wgsl`, `YardstickLevel`.
+/// Offset and stride are in vectors of four texels.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct Level {
@@ -61,8 +61,8 @@ enum Storage {
     Textures(wgpu::Texture),
 }
 
-/// All levels of a depth image's pyramid, reduced by one dispatch each; everything that can be made
-/// beforehand is.
+/// All levels of a depth image's pyramid, reduced by one dispatch each.
+/// Everything that can be made beforehand is made beforehand.
 #[derive(Debug)]
 pub struct PerLevelReduction {
     levels: Vec<Level>,
@@ -71,10 +71,10 @@ pub struct PerLevelReduction {
 }
 
 impl PerLevelReduction {
-    /// For an image of `depth`, which has more than one pixel.
+    /// Prepares the reduction of `depth`, which must have more than one pixel.
     ///
     /// # Errors
-    /// [`Error::Device`](crate::Error::Device) where the device has no memory for it.
+    /// [`Error::Device`](crate::Error::Device) if the device has no memory for it.
     pub fn new(engine: &Engine, depth: &DepthImage, shape: ReductionShape) -> Result<Self> {
         let gpu = &*engine.context().gpu;
         let levels = levels(depth.size());
@@ -109,7 +109,7 @@ impl PerLevelReduction {
         }
     }
 
-    /// Level `k`, 1 or more, row by row.
+    /// The texels of level `k`, which is at least 1, in row order.
     ///
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost).
@@ -169,7 +169,7 @@ impl PerLevelReduction {
 /// Records the library's own reduction of `depth` into `pyramid`.
 ///
 /// # Errors
-/// As [`HizContext::record_reduce`](crate::HizContext::record_reduce).
+/// Those of [`HizContext::record_reduce`](crate::HizContext::record_reduce).
 pub fn reduce(
     engine: &Engine,
     encoder: &mut wgpu::CommandEncoder,
@@ -194,8 +194,8 @@ fn levels(size: ImageSize) -> Vec<Level> {
     levels
 }
 
-/// A texture halves its mip levels downwards, a pyramid upwards: sides that are powers of two hold
-/// both.
+/// A texture's mip levels round odd sizes down, and a pyramid's levels round them up.
+/// Sides that are powers of two are large enough for both.
 fn mip_levels(gpu: &Gpu, levels: &[Level]) -> wgpu::Texture {
     gpu.device().create_texture(&wgpu::TextureDescriptor {
         label: Some("hiz.yardstick.mips"),
@@ -215,7 +215,7 @@ fn mip_levels(gpu: &Gpu, levels: &[Level]) -> wgpu::Texture {
     })
 }
 
-/// The dispatch that makes level `k` out of the one before.
+/// The dispatch that makes level `k` from the level before.
 fn step(
     gpu: &Gpu,
     depth: &DepthImage,
@@ -279,7 +279,8 @@ fn step(
     match storage {
         Storage::Buffer(buffer) => bound.push(entry(3, buffer.as_entire_binding())),
         Storage::Textures(mips) => {
-            // The first dispatch reads the source and binds any other level as the one before.
+            // The first dispatch reads the depth image, so any level can be bound as the level
+            // before.
             let finer = if k == 1 { idle_texture(gpu) } else { mips.clone() };
             views = [mip(&finer, if k == 1 { 1 } else { k - 1 }), mip(mips, k)];
             bound.push(entry(3, wgpu::BindingResource::TextureView(&views[0])));
@@ -290,7 +291,7 @@ fn step(
     Ok(Step { pipeline, bindings, workgroups })
 }
 
-/// Something to bind where nothing is read.
+/// A texture that is bound but never read.
 fn idle_texture(gpu: &Gpu) -> wgpu::Texture {
     gpu.device().create_texture(&wgpu::TextureDescriptor {
         label: Some("hiz.yardstick.idle"),
