@@ -47,8 +47,8 @@ pub enum Error {
     /// The device belongs to the process that this one was forked from.
     /// A fork has none of the driver's threads, so a call would wait forever.
     #[error(
-        "this device was made by process {made_by}, and process {here} is a fork of it: no device works after a fork. Make one in \
-         this process, or start processes without a fork"
+        "this device was made by process {made_by}, and process {here} is a fork of it: no device \
+         works after a fork. Make one in this process, or start processes without a fork"
     )]
     OtherProcess {
         /// The id of the process that made the device.

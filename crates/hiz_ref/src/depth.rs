@@ -99,7 +99,8 @@ pub fn depth_bounds(
     }
     if metric && !origin_is_eye && view.rows[3][..3] == [0.0; 3] {
         return Err(Error::DepthMeaning(
-            "kind: expected NDC depth for a parallel projection that does not say where view depth starts",
+            "kind: expected NDC depth for a parallel projection that does not say where view depth \
+             starts",
         ));
     }
     let rays = if metric { Some(Rays::new(view, kind)?) } else { None };

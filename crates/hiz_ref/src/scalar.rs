@@ -34,12 +34,12 @@ pub(crate) trait Scalar: Clone {
 
 /// Half an ulp of a number in [1, 2): the relative error of one rounded operation.
 const UNIT: f64 = f64::EPSILON / 2.0;
-/// Covers the at most nine roundings in the computation of an error bound: `(1 - UNIT)^9 * GROW >
-/// 1`.
+/// Covers the at most nine roundings in the computation of an error bound.
+/// That is, `(1 - UNIT)^9 * GROW > 1`.
 const GROW: f64 = 1.0 + 8.0 * f64::EPSILON;
 
-/// A float64 and a bound of its distance from the true value, which lies in `[mid - err, mid +
-/// err]`.
+/// A float64 and a bound of its distance from the true value.
+/// The true value lies in `[mid - err, mid + err]`.
 ///
 /// Overflow gives an infinite or NaN bound, which decides nothing.
 /// A bound of 0 means that `mid` is the true value.

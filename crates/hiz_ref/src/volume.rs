@@ -66,8 +66,8 @@ impl Volume {
 
 /// Local coordinates of a volume.
 ///
-/// The volume is the image of the unit ball, or of the cube `[-1, 1]^3`, under `s -> center + sum_k
-/// axes[k] s_k`.
+/// The volume is the image of the unit ball, or of the cube `[-1, 1]^3`.
+/// The map is `s -> center + sum_k axes[k] s_k`.
 pub(crate) struct Frame<S> {
     /// Centre relative to the view's origin.
     center: [S; 3],

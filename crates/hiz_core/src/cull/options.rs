@@ -93,8 +93,8 @@ pub struct CullOptions {
     /// Use it for orthographic cameras, where a rasteriser errs by the same amount near and far.
     /// Any value above 0 counts as 2^-23 more.
     pub depth_slack_abs: f64,
-    /// kappa, 0..=1e6: how much the transform of the depth image's renderer may err, in eps of `sum
-    /// |M| |p|`.
+    /// kappa, 0..=1e6: how much the transform of the depth image's renderer may err.
+    /// Its unit is an eps of `sum |M| |p|`.
     /// 0 is for depth that is exact for the camera's matrices.
     /// About 4 is for a renderer that transforms world coordinates in float32.
     pub transform_slack: f64,

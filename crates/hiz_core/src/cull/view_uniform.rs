@@ -38,7 +38,8 @@ const _: () = assert!(size_of::<ViewUniform>() == 176);
 impl ViewUniform {
     #[expect(
         clippy::cast_possible_truncation,
-        reason = "multiples of 2^-8 and sizes below 2^15 are exact, the factor is rounded towards far"
+        reason = "multiples of 2^-8 and sizes below 2^15 are exact, the factor is rounded towards \
+                  far"
     )]
     /// Rounds a camera and the options to the numbers of a cull.
     ///
@@ -210,7 +211,8 @@ mod tests {
                     };
                     let of_both = (1.0 + relative) * (1.0 + depth_slack) - 1.0;
                     let what = format!(
-                        "{convention:?} {format:?} {depth_slack} {depth_slack_abs}: {moved} {offset}"
+                        "{convention:?} {format:?} {depth_slack} {depth_slack_abs}: {moved} \
+                         {offset}"
                     );
                     assert!(moved >= of_both && moved <= of_both + 1.01 * EPS, "{what}");
                     let of_both = step * (1.0 + depth_slack) + depth_slack_abs + EPS;

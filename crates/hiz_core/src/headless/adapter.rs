@@ -76,8 +76,9 @@ pub(super) fn no_adapter(request: String, seen: &[AdapterSummary]) -> Error {
         INSTALL_HINT.to_owned()
     } else {
         format!(
-            "Choose one of these by its number, or by a part of its name or driver, as an argument or in {ADAPTER_VARIABLE}; \
-             without both the best one is taken. One that is missing has no Vulkan driver here that the loader finds"
+            "Choose one of these by its number, or by a part of its name or driver, as an argument \
+             or in {ADAPTER_VARIABLE}; without both the best one is taken. One that is missing has \
+             no Vulkan driver here that the loader finds"
         )
     };
     let seen = seen.iter().map(|summary| format!("{}: {summary}", summary.index)).collect();

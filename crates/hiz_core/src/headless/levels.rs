@@ -80,7 +80,8 @@ impl Engine {
                 return Err(Error::invalid(
                     "level",
                     format!(
-                        "expected a level above 0 of a pyramid of {format:?}, which is not read as float32, got 0"
+                        "expected a level above 0 of a pyramid of {format:?}, which is not read as \
+                         float32, got 0"
                     ),
                 ));
             }

@@ -37,8 +37,9 @@ mod tests {
         assert_eq!(
             text,
             format!(
-                "this device was made by process 4294967295, and process {here} is a fork of it: no device works after a fork. Make \
-                 one in this process, or start processes without a fork"
+                "this device was made by process 4294967295, and process {here} is a fork of it: \
+                 no device works after a fork. Make one in this process, or start processes \
+                 without a fork"
             )
         );
     }

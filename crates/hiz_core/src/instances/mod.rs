@@ -62,7 +62,8 @@ impl InstanceOptions {
             Some(c) => Err(Error::invalid(
                 "piece_capacity",
                 format!(
-                    "expected a multiple of {CULL_WORKGROUP} from {CULL_WORKGROUP} to {most}, got {c}"
+                    "expected a multiple of {CULL_WORKGROUP} from {CULL_WORKGROUP} to {most}, got \
+                     {c}"
                 ),
             )),
         }
@@ -225,7 +226,8 @@ pub(crate) fn refuse_bad(n: usize, bad: usize, first: Option<u64>) -> Result<()>
         Some(first) => Err(Error::invalid(
             "bounds",
             format!(
-                "expected finite numbers below 2^60, lengths >= 0 and min <= max, got {bad} bad of {n}, the first at index {first}"
+                "expected finite numbers below 2^60, lengths >= 0 and min <= max, got {bad} bad of \
+                 {n}, the first at index {first}"
             ),
         )),
     }

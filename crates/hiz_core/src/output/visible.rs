@@ -55,8 +55,8 @@ impl Visible {
             return Err(Error::invalid(
                 "first_instance",
                 format!(
-                    "expected 0 on a device without the feature INDIRECT_FIRST_INSTANCE, got {}; ask for the feature where the \
-                     device is requested",
+                    "expected 0 on a device without the feature INDIRECT_FIRST_INSTANCE, got {}; \
+                     ask for the feature where the device is requested",
                     draw.first_instance
                 ),
             ));

@@ -51,8 +51,9 @@ pub enum MeshError {
     },
     /// The mesh is not closed: some edges do not cancel.
     #[error(
-        "expected a closed mesh whose triangles run consistently around, got {edges} edges that run more often in one direction \
-         than in the other (the first in triangle {triangle}); equal positions count as one vertex"
+        "expected a closed mesh whose triangles run consistently around, got {edges} edges that \
+         run more often in one direction than in the other (the first in triangle {triangle}); \
+         equal positions count as one vertex"
     )]
     Open {
         /// How many such edges there are.
