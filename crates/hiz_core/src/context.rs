@@ -40,14 +40,13 @@ use crate::pyramid::{Pyramid, PyramidOptions, PyramidUniform};
 ///
 /// Three mistakes cannot be detected here:
 ///
-/// - An encoder of another device, or one with an open pass whose lifetime was forgotten. wgpu
-///   reports it when the encoder is finished.
-///   It sometimes reports an open pass at once; then the error is an [`Error::Invalid`] that names
-///   the encoder.
-/// - An object that is destroyed between the recording and the submit. wgpu reports it at the
-///   submit.
-/// - Views, encoders and buffers of another `wgpu::Instance`. wgpu mistakes them for objects of
-///   this instance, because every instance numbers its handles anew.
+/// - An encoder of another device, or one with an open pass whose lifetime was forgotten.
+///   The error appears when the encoder is finished.
+///   An open pass sometimes gives an error at once: an [`Error::Invalid`] that names the encoder.
+/// - An object that is destroyed between the recording and the submit.
+///   The error appears at the submit.
+/// - Views, encoders and buffers of another `wgpu::Instance`.
+///   Every instance numbers its handles anew, so wgpu mistakes them for objects of this one.
 #[derive(Debug, Clone)]
 pub struct HizContext {
     pub(crate) gpu: Arc<Gpu>,

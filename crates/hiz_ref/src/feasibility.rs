@@ -14,8 +14,12 @@
 //!
 //! # Cube
 //!
-//! Let `g(lambda)` be the maximum of the combination over the cube:
-//! `g(lambda) = sum lambda_i m_i + sum_k |sum lambda_i v_ik|`.
+//! Let g be the maximum of the combination over the cube:
+//!
+//! ```text
+//! g(lambda) = sum lambda_i m_i + sum_k |sum lambda_i v_ik|
+//! ```
+//!
 //! The hyperplanes `sum lambda_i v_ik = 0` cut the cone of weights into cells, and `g` is linear on
 //! each cell.
 //! So if `g` is negative anywhere, it is negative on an edge of a cell.
