@@ -1,4 +1,4 @@
-//! Tables of docs/accuracy_log.md that are counts: the tests that print them hold them against the
+//! Tables of `docs/accuracy_log.md` that are counts: the tests that print them hold them against the
 //! page.
 
 /// Nothing is compared on another driver than the one that the page names: its guesses are others,
