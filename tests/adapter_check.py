@@ -1,19 +1,19 @@
-"""Which Vulkan adapter the tests run on, and whether it is the one that they expect.
+"""Which Vulkan adapter the tests run on, and whether it is the expected one.
 
-`python tests/adapter_check.py` prints it and fails on a wrong one; conftest.py does so when pytest
-starts.
+`python tests/adapter_check.py` prints it and fails on a wrong one.
+conftest.py does the same when pytest starts.
 """
 
 import os
 import sys
 
-# lavapipe calls its driver so.
+# lavapipe gives its driver this name.
 # `HIZVK_EXPECT_ADAPTER=...` names another one: any part of its name or driver.
 DEFAULT_EXPECTATION = "llvmpipe"
 
 
 def check() -> tuple[str, str | None]:
-    """-> a line that describes the adapter, and why it is wrong (None: it is the right one)."""
+    """A line that describes the adapter, and why it is wrong, or None if it is the right one."""
     import hizvk
 
     expected = os.environ.get("HIZVK_EXPECT_ADAPTER") or DEFAULT_EXPECTATION
