@@ -47,6 +47,63 @@ use crate::pyramid::{Pyramid, PyramidOptions, PyramidUniform};
 ///   The error appears at the submit.
 /// - Views, encoders and buffers of another `wgpu::Instance`.
 ///   Every instance numbers its handles anew, so wgpu mistakes them for objects of this one.
+///
+/// # Examples
+/// A renderer's frame: depth, pyramid, cull.
+///
+/// ```
+/// # use hiz_core::headless::Engine;
+/// use hiz_core::{Bounds, CullOptions, Floats, HizContext, InstanceOptions, MeshData};
+/// use hiz_core::{OccluderOptions, Outputs, PyramidOptions};
+/// # use hiz_core::{Camera, DepthConvention, ImageSize, OCCLUDER_DEPTH_FORMAT, Pose, Projection};
+/// # use hiz_core::wgpu;
+/// # let engine = Engine::new(None)?;
+/// # let (device, queue) = (engine.device(), engine.queue());
+/// # let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
+/// # let (fov_y, convention) = (std::f64::consts::FRAC_PI_2, DepthConvention::Reversed);
+/// # let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
+/// # let camera = Camera::look_at(&pose, &projection, ImageSize::new(64, 64))?;
+/// # let depth = device.create_texture(&wgpu::TextureDescriptor {
+/// #     label: None,
+/// #     size: wgpu::Extent3d { width: 64, height: 64, depth_or_array_layers: 1 },
+/// #     mip_level_count: 1,
+/// #     sample_count: 1,
+/// #     dimension: wgpu::TextureDimension::D2,
+/// #     format: OCCLUDER_DEPTH_FORMAT,
+/// #     usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+/// #     view_formats: &[],
+/// # });
+/// # let depth_view = depth.create_view(&wgpu::TextureViewDescriptor::default());
+/// # let (centers, radii) = ([0.0, 0.0, -5.0, 0.0, 0.0, -20.0], [0.5, 0.5]);
+/// # let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
+/// # let corners = [-20.0, -20.0, -10.0, 20.0, -20.0, -10.0, 0.0, 40.0, -10.0];
+/// # let (vertices, triangles) = (Floats::F32(&corners), &[0, 1, 2]);
+/// # let wall = MeshData { vertices, triangles, transforms: None };
+/// # let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+///
+/// // Once:
+/// let hiz = HizContext::new(device)?;
+/// let occluders = hiz.create_occluders(&[wall], &OccluderOptions::default())?;
+/// let pyramid = hiz.create_pyramid(camera.size(), &PyramidOptions::default())?;
+/// let instances = hiz.record_instances(&mut encoder, &bounds, &InstanceOptions::default())?;
+/// let visible = hiz.create_visible(&instances, &Outputs::default())?;
+///
+/// // Each frame:
+/// hiz.record_occluders(&mut encoder, &occluders, &camera, &depth_view)?;
+/// hiz.record_reduce(&mut encoder, &depth_view, &camera, &pyramid)?;
+/// let options = CullOptions::default();
+/// hiz.record_cull(&mut encoder, &instances, &camera, &pyramid, &visible, &options)?;
+/// queue.submit([encoder.finish()]);
+/// # let (told, answer) = std::sync::mpsc::channel();
+/// # let mask = visible.mask(0).unwrap().slice(..);
+/// # wgpu::util::DownloadBuffer::read_buffer(device, queue, &mask, move |bytes| {
+/// #     told.send(bytes.unwrap().to_vec()).unwrap();
+/// # });
+/// # engine.wait()?;
+/// # // The first sphere stands before the wall, the second behind it.
+/// # assert_eq!(answer.recv().unwrap()[0] & 3, 0b01);
+/// # Ok::<(), hiz_core::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct HizContext {
     pub(crate) gpu: Arc<Gpu>,

@@ -43,6 +43,92 @@
 //! The cull proves it with *certificates*: float32 comparisons whose margins cover every rounding
 //! (`shaders/cull/certificate.wgsl`).
 //! Whatever they cannot prove stays visible.
+//!
+//! # Examples
+//!
+//! In a renderer, on its own device:
+//!
+//! ```
+//! # use hiz_core::headless::Engine;
+//! # use hiz_core::{Camera, DepthConvention, DrawIndexedIndirect, DrawTemplate, Floats, ImageSize};
+//! # use hiz_core::{Bounds, Pose, Projection};
+//! use hiz_core::{
+//!     CullOptions, HizContext, InstanceOptions, Outputs, PyramidOptions, wgpu,
+//! };
+//! # let engine = Engine::new(None)?;
+//! # let (device, queue) = (engine.device(), engine.queue());
+//! # let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
+//! # let (fov_y, convention) = (std::f64::consts::FRAC_PI_2, DepthConvention::Reversed);
+//! # let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
+//! # let camera = Camera::look_at(&pose, &projection, ImageSize::new(64, 64))?;
+//! # let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
+//! # let depth = device.create_texture(&wgpu::TextureDescriptor {
+//! #     label: None,
+//! #     size: wgpu::Extent3d { width: 64, height: 64, depth_or_array_layers: 1 },
+//! #     mip_level_count: 1,
+//! #     sample_count: 1,
+//! #     dimension: wgpu::TextureDimension::D2,
+//! #     format: wgpu::TextureFormat::Depth32Float,
+//! #     usage,
+//! #     view_formats: &[],
+//! # });
+//! # let depth_view = depth.create_view(&wgpu::TextureViewDescriptor::default());
+//! # let (centers, radii) = ([0.0, 0.0, -5.0, 0.0, 0.0, 5.0], [0.5, 0.5]);
+//! # let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
+//! # let draw = DrawTemplate { index_count: 36, ..DrawTemplate::default() };
+//! # let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+//!
+//! // Once:
+//! let hiz = HizContext::new(device)?;
+//! let pyramid = hiz.create_pyramid(camera.size(), &PyramidOptions::default())?;
+//! let instances = hiz.record_instances(&mut encoder, &bounds, &InstanceOptions::default())?;
+//! let visible = hiz.create_visible(&instances, &Outputs { draw, ..Outputs::default() })?;
+//!
+//! // Each frame, after the depth buffer was drawn:
+//! hiz.record_reduce(&mut encoder, &depth_view, &camera, &pyramid)?;
+//! let options = CullOptions::default();
+//! hiz.record_cull(&mut encoder, &instances, &camera, &pyramid, &visible, &options)?;
+//! // Now the renderer's own pass calls draw_indexed_indirect, and submits.
+//! # queue.submit([encoder.finish()]);
+//! # let (told, answer) = std::sync::mpsc::channel();
+//! # let draws = visible.draw_arguments().unwrap().slice(..);
+//! # wgpu::util::DownloadBuffer::read_buffer(device, queue, &draws, move |bytes| {
+//! #     told.send(bytes.unwrap().to_vec()).unwrap();
+//! # });
+//! # engine.wait()?;
+//! # // The depth buffer is empty: the sphere in front of the eye is kept, not the one behind it.
+//! # let drawn = u32::from_ne_bytes(answer.recv().unwrap()[4..8].try_into().unwrap());
+//! # assert_eq!(drawn, 1);
+//! # Ok::<(), hiz_core::Error>(())
+//! ```
+//!
+//! Without a renderer, on a device that the crate opens:
+//!
+//! ```
+//! use hiz_core::headless::Engine;
+//! use hiz_core::{Bounds, Camera, CullOptions, DepthConvention, Floats, ImageSize};
+//! use hiz_core::{InstanceOptions, Outputs, Pose, Projection};
+//!
+//! let engine = Engine::new(None)?; // the best Vulkan adapter
+//! let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
+//! let convention = DepthConvention::Reversed;
+//! let projection = Projection::Perspective { fov_y: 1.0, near: 0.1, far: None, convention };
+//! let camera = Camera::look_at(&pose, &projection, ImageSize::new(64, 48))?;
+//!
+//! // A wall at view depth 10: with reversed Z and no far plane, NDC depth is near / view depth.
+//! let pyramid = engine.pyramid(&engine.upload_depth(&[0.01; 64 * 48], &camera)?)?;
+//!
+//! // One sphere in front of the wall, one behind it.
+//! let (centers, radii) = ([0.0, 0.0, -5.0, 0.0, 0.0, -20.0], [0.5, 0.5]);
+//! let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
+//! let instances = engine.instances(&bounds, &InstanceOptions::default())?;
+//! let (options, outputs) = (CullOptions::default(), Outputs::default());
+//! let culling = engine.cull(&instances, &camera, &pyramid, &options, &outputs)?;
+//! assert_eq!(culling.mask()?, [true, false]);
+//! # Ok::<(), hiz_core::Error>(())
+//! ```
+//!
+//! The folder `examples` of the repository has two renderers, `simple` and `renderer`.
 
 // Some items serve only a readback, so a build without `headless` never uses them.
 #![cfg_attr(not(feature = "headless"), allow(dead_code))]

@@ -72,6 +72,37 @@ pub enum Hierarchy {
 }
 
 /// The options of a cull.
+///
+/// # Examples
+/// A wall covers the columns below 38, and a box behind it reaches over columns 30 to 37.
+/// The default test reads two texels a side, each 8 pixels wide, so it also reads column 39.
+/// A descent goes on to finer levels, and culls the box.
+///
+/// ```
+/// # use hiz_core::headless::Engine;
+/// # use hiz_core::{Bounds, Camera, DepthConvention, Floats, ImageSize, InstanceOptions, Outputs};
+/// # use hiz_core::{Pose, Projection};
+/// use hiz_core::CullOptions;
+/// # let engine = Engine::new(None)?;
+/// # let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
+/// # let (fov_y, convention) = (std::f64::consts::FRAC_PI_2, DepthConvention::Reversed);
+/// # let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
+/// # let camera = Camera::look_at(&pose, &projection, ImageSize::new(64, 64))?;
+/// # let image: Vec<f32> = (0..64 * 64).map(|i| if i % 64 < 38 { 0.0125 } else { 0.0 }).collect();
+/// # let pyramid = engine.pyramid(&engine.upload_depth(&image, &camera)?)?;
+/// # let (min, max) = (Floats::F32(&[-0.75, -0.75, -16.5]), Floats::F32(&[2.75, 2.75, -16.0]));
+/// # let instances = engine.instances(&Bounds::Boxes { min, max }, &InstanceOptions::default())?;
+/// # let outputs = Outputs::default();
+///
+/// let options = CullOptions::default();
+/// let culling = engine.cull(&instances, &camera, &pyramid, &options, &outputs)?;
+/// assert_eq!(culling.mask()?, [true]);
+///
+/// let options = CullOptions { descent: 64, ..CullOptions::default() };
+/// let culling = engine.cull(&instances, &camera, &pyramid, &options, &outputs)?;
+/// assert_eq!(culling.mask()?, [false]);
+/// # Ok::<(), hiz_core::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct CullOptions {
     /// The order of the packed list.

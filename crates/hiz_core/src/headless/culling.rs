@@ -37,6 +37,37 @@ const STAGED_MASK_BYTES: u64 = 1 << 14;
 
 /// A cull that was submitted.
 /// Every read waits for it.
+///
+/// # Examples
+/// A wall 10 m away, and spheres in front of it, behind it and behind the camera:
+///
+/// ```
+/// # use hiz_core::headless::Engine;
+/// # use hiz_core::{Bounds, Camera, CullOptions, DepthConvention, Floats, ImageSize};
+/// # use hiz_core::{InstanceOptions, Outputs, Pose, Projection};
+/// use hiz_core::Verdict::{Occluded, Outside, Visible};
+/// # let engine = Engine::new(None)?;
+/// # let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
+/// # let (fov_y, convention) = (std::f64::consts::FRAC_PI_2, DepthConvention::Reversed);
+/// # let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
+/// # let camera = Camera::look_at(&pose, &projection, ImageSize::new(64, 64))?;
+/// # let pyramid = engine.pyramid(&engine.upload_depth(&[0.01; 64 * 64], &camera)?)?;
+/// # let centers = [0.0, 0.0, -5.0, 0.0, 0.0, -20.0, 0.0, 0.0, 5.0];
+/// # let (centers, radii) = (Floats::F32(&centers), Floats::F32(&[0.5; 3]));
+/// # let bounds = Bounds::Spheres { centers, radii };
+/// # let instances = engine.instances(&bounds, &InstanceOptions::default())?;
+/// # let (options, outputs) = (CullOptions::default(), Outputs::default());
+/// let culling = engine.cull(&instances, &camera, &pyramid, &options, &outputs)?;
+/// assert_eq!(culling.mask()?, [true, false, false]);
+/// assert_eq!(culling.verdicts()?, [Visible, Occluded, Outside]);
+/// assert_eq!(culling.indices()?, [0]);
+/// assert_eq!(culling.draws()?[0].instance_count, 1);
+///
+/// let counts = culling.counts()?;
+/// assert_eq!((counts.visible, counts.occluded, counts.outside), (1, 1, 1));
+/// println!("{}", culling.explain(1)?.reason);
+/// # Ok::<(), hiz_core::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Culling {
     pub(super) engine: Engine,

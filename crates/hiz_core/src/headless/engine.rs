@@ -12,6 +12,34 @@ use crate::input::image::MAX_IMAGE_SIDE;
 
 /// A device, its queue and the pipelines on it.
 /// The last clone waits until the device is idle, and releases it.
+///
+/// # Examples
+/// ```
+/// use hiz_core::headless::Engine;
+/// use hiz_core::{
+///     Bounds, CullOptions, Floats, InstanceOptions, MeshData, OccluderOptions, Outputs,
+/// };
+/// # use hiz_core::{Camera, DepthConvention, ImageSize, Pose, Projection};
+/// # let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
+/// # let (fov_y, convention) = (std::f64::consts::FRAC_PI_2, DepthConvention::Reversed);
+/// # let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
+/// # let camera = Camera::look_at(&pose, &projection, ImageSize::new(64, 64))?;
+///
+/// let engine = Engine::new(None)?;
+/// let corners = [-20.0, -20.0, -10.0, 20.0, -20.0, -10.0, 0.0, 40.0, -10.0];
+/// let (vertices, triangles) = (Floats::F32(&corners), &[0, 1, 2]);
+/// let wall = MeshData { vertices, triangles, transforms: None };
+/// let walls = engine.occluders(&[wall], &OccluderOptions::default())?;
+/// let pyramid = engine.pyramid(&engine.render_depth(&walls, &camera)?)?;
+///
+/// let (centers, radii) = ([0.0, 0.0, -5.0, 0.0, 0.0, -20.0], [0.5, 0.5]);
+/// let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
+/// let instances = engine.instances(&bounds, &InstanceOptions::default())?;
+/// let (options, outputs) = (CullOptions::default(), Outputs::default());
+/// let culling = engine.cull(&instances, &camera, &pyramid, &options, &outputs)?;
+/// assert_eq!(culling.mask()?, [true, false]);
+/// # Ok::<(), hiz_core::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Engine {
     shared: Arc<Shared>,

@@ -52,6 +52,32 @@ impl Floats<'_> {
 }
 
 /// The bounds of N instances in world coordinates, borrowed from the caller.
+///
+/// # Examples
+/// ```
+/// use hiz_core::{Bounds, BoundsKind, Floats, InstanceOptions, headless::Engine};
+///
+/// // Two spheres, an axis-aligned box, and a box that is turned by 45 degrees about y.
+/// let spheres = Bounds::Spheres {
+///     centers: Floats::F32(&[0.0, 0.0, -5.0, 1.0, 0.0, -20.0]),
+///     radii: Floats::F32(&[0.5, 2.0]),
+/// };
+/// let (min, max) = (Floats::F64(&[-1.0, 0.0, -9.0]), Floats::F64(&[1.0, 3.0, -8.0]));
+/// let boxes = Bounds::Boxes { min, max };
+/// let h = std::f64::consts::FRAC_1_SQRT_2;
+/// let turned = Bounds::OrientedBoxes {
+///     centers: Floats::F64(&[0.0, 1.0, -7.0]),
+///     half_sizes: Floats::F64(&[1.0, 1.0, 0.1]),
+///     rotations: Floats::F64(&[h, 0.0, h, 0.0, 1.0, 0.0, -h, 0.0, h]),
+/// };
+///
+/// # let engine = Engine::new(None)?;
+/// let options = InstanceOptions::default();
+/// assert_eq!(engine.instances(&spheres, &options)?.len(), 2);
+/// assert_eq!(engine.instances(&boxes, &options)?.kind(), BoundsKind::Box);
+/// assert_eq!(engine.instances(&turned, &options)?.kind(), BoundsKind::OrientedBox);
+/// # Ok::<(), hiz_core::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub enum Bounds<'a> {
     /// Spheres.

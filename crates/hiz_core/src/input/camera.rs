@@ -16,6 +16,30 @@ use crate::input::projection::{Pose, Projection};
 ///
 /// The camera denotes exactly these float64 numbers.
 /// Everything that a cull promises is promised about them.
+///
+/// # Examples
+/// ```
+/// use hiz_core::{Camera, DepthConvention, ImageSize, Pose, Projection};
+///
+/// // By name: a million metres from the world's origin, along -z.
+/// let eye = [1e6, 2.0, 0.0];
+/// let pose = Pose { eye, target: [1e6, 2.0, -1.0], up: [0.0, 1.0, 0.0] };
+/// let convention = DepthConvention::Reversed;
+/// let projection = Projection::Perspective { fov_y: 1.0, near: 0.1, far: None, convention };
+/// let named = Camera::look_at(&pose, &projection, ImageSize::new(640, 360))?;
+/// assert_eq!(named.origin(), eye);
+///
+/// // By a renderer's own matrix, row by row: clip = m * (x, y, z, 1).
+/// let m = [
+///     [1.0, 0.0, 0.0, 0.0],
+///     [0.0, 1.0, 0.0, 0.0],
+///     [0.0, 0.0, 0.0, 0.1], // reversed Z with the near plane at 0.1
+///     [0.0, 0.0, -1.0, 0.0], // w is the view depth along -z
+/// ];
+/// let camera = Camera::from_clip_from_world(m, ImageSize::new(64, 64), convention)?;
+/// assert_eq!(camera.clip_from_world(), m);
+/// # Ok::<(), hiz_core::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Camera {
     rows: Mat4,

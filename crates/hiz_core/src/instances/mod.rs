@@ -86,6 +86,28 @@ pub(crate) struct Changing {
 }
 
 /// Bounding volumes on the device.
+///
+/// # Examples
+/// ```
+/// use hiz_core::{Bounds, Floats, InstanceOptions, headless::Engine};
+///
+/// # let engine = Engine::new(None)?;
+/// let bounds = Bounds::Spheres {
+///     centers: Floats::F32(&[0.0, 0.0, -5.0, 0.0, 0.0, f32::NAN]),
+///     radii: Floats::F32(&[0.5, 0.5]),
+/// };
+/// let instances = engine.instances(&bounds, &InstanceOptions::default())?;
+/// assert_eq!(instances.invalid()?, [1]); // kept by every cull
+///
+/// // Only the second one moves; the first stays as it is.
+/// let moved = Bounds::Spheres {
+///     centers: Floats::F32(&[3.0, 0.0, -5.0]),
+///     radii: Floats::F32(&[0.5]),
+/// };
+/// engine.update(&instances, 1, &moved, false)?;
+/// assert_eq!(instances.invalid()?, []);
+/// # Ok::<(), hiz_core::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Instances {
     pub(crate) context: ContextId,

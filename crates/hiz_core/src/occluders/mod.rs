@@ -27,6 +27,36 @@ pub struct OccluderOptions {
 /// Triangle meshes on the device, in world coordinates.
 ///
 /// Each mesh is stored once per transform, 24 bytes per vertex and 4 bytes per index.
+///
+/// # Examples
+/// ```
+/// use hiz_core::{Floats, MeshData, OccluderOptions, headless::Engine};
+/// # use hiz_core::{Camera, DepthConvention, ImageSize, Pose, Projection};
+/// # let engine = Engine::new(None)?;
+/// # let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
+/// # let (fov_y, convention) = (std::f64::consts::FRAC_PI_2, DepthConvention::Reversed);
+/// # let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
+/// # let camera = Camera::look_at(&pose, &projection, ImageSize::new(64, 64))?;
+///
+/// // A square of two triangles in two places: 10 m away, and 10 m farther.
+/// let corners = [-20.0, -20.0, 0.0, 20.0, -20.0, 0.0, -20.0, 20.0, 0.0, 20.0, 20.0, 0.0];
+/// let mut transforms = [0.0; 32];
+/// for (matrix, z) in transforms.chunks_exact_mut(16).zip([-10.0, -20.0]) {
+///     for k in [0, 5, 10, 15] {
+///         matrix[k] = 1.0;
+///     }
+///     matrix[11] = z;
+/// }
+/// let (vertices, transforms) = (Floats::F32(&corners), Some(Floats::F64(&transforms)));
+/// let mesh = MeshData { vertices, triangles: &[0, 1, 2, 2, 1, 3], transforms };
+/// let walls = engine.occluders(&[mesh], &OccluderOptions::default())?;
+/// assert_eq!((walls.num_parts(), walls.num_triangles()), (2, 4));
+///
+/// // NDC depth is near / view depth: 0.1 / 10, up to the rasteriser's rounding.
+/// let depth = engine.render_depth(&walls, &camera)?.read()?;
+/// assert!(depth.iter().all(|d| (d - 0.01).abs() < 1e-6));
+/// # Ok::<(), hiz_core::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Occluders {
     pub(crate) context: ContextId,

@@ -4,6 +4,41 @@ use crate::output::draw::DrawTemplate;
 
 /// What a cull leaves behind.
 /// Anything that is not asked for is neither computed nor stored.
+///
+/// # Examples
+/// Room for one of two visible instances: the list ends there, and the mask is complete.
+///
+/// ```
+/// # use hiz_core::headless::Engine;
+/// # use hiz_core::{Bounds, Camera, CullOptions, DepthConvention, Floats, ImageSize};
+/// # use hiz_core::{InstanceOptions, Pose, Projection};
+/// use hiz_core::{DrawIndexedIndirect, DrawTemplate, Outputs};
+/// # let engine = Engine::new(None)?;
+/// # let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
+/// # let (fov_y, convention) = (std::f64::consts::FRAC_PI_2, DepthConvention::Reversed);
+/// # let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
+/// # let camera = Camera::look_at(&pose, &projection, ImageSize::new(64, 64))?;
+/// # let pyramid = engine.pyramid(&engine.upload_depth(&[0.0; 64 * 64], &camera)?)?;
+/// # let (centers, radii) = ([0.0, 0.0, -5.0, 1.0, 0.0, -5.0], [0.5, 0.5]);
+/// # let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
+/// # let instances = engine.instances(&bounds, &InstanceOptions::default())?;
+/// # let options = CullOptions::default();
+///
+/// let outputs = Outputs {
+///     mask: true,
+///     indices: true,
+///     draws: true,
+///     capacity: Some(1),
+///     draw: DrawTemplate { index_count: 36, ..DrawTemplate::default() },
+///     ..Outputs::NONE
+/// };
+/// let culling = engine.cull(&instances, &camera, &pyramid, &options, &outputs)?;
+/// assert_eq!(culling.mask()?, [true, true]);
+/// assert_eq!(culling.indices()?, [0]);
+/// let draw = DrawIndexedIndirect { index_count: 36, instance_count: 1, ..Default::default() };
+/// assert_eq!(culling.draws()?, [draw]);
+/// # Ok::<(), hiz_core::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Outputs {
     /// One bit per instance: kept or not.

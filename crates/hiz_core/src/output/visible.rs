@@ -32,6 +32,34 @@ pub(crate) struct PieceOutput {
 /// record of draw arguments.
 /// Only what the [`Outputs`] ask for can be read.
 /// The lists hold the caller's indices, and every word is 0xFFFFFFFF at first.
+///
+/// # Examples
+/// Draws what a cull left here, in the caller's own pass.
+/// The pipeline reads the list as an instance buffer of u32.
+///
+/// ```
+/// use hiz_core::{Visible, wgpu};
+/// # use hiz_core::{Bounds, Floats, InstanceOptions, Outputs, headless::Engine};
+///
+/// fn draw(pass: &mut wgpu::RenderPass<'_>, visible: &Visible) {
+///     let draws = visible.draw_arguments().expect("asked for");
+///     for piece in 0..visible.num_pieces() {
+///         pass.set_vertex_buffer(0, visible.list(piece).expect("asked for").slice(..));
+///         pass.draw_indexed_indirect(draws, visible.draw_offset(piece));
+///     }
+/// }
+/// # let engine = Engine::new(None)?;
+/// # let (device, hiz) = (engine.device(), engine.context());
+/// # let (centers, radii) = (Floats::F32(&[0.0, 0.0, -5.0]), Floats::F32(&[0.5]));
+/// # let bounds = Bounds::Spheres { centers, radii };
+/// # let instances = engine.instances(&bounds, &InstanceOptions::default())?;
+///
+/// let outputs = Outputs { indices: true, draws: true, ..Outputs::NONE };
+/// let visible = hiz.create_visible(&instances, &outputs)?;
+/// assert_eq!((visible.num_pieces(), visible.capacity()), (1, 1));
+/// assert!(visible.mask(0).is_none()); // not among the outputs
+/// # Ok::<(), hiz_core::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Visible {
     pub(crate) context: ContextId,

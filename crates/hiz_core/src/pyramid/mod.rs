@@ -83,6 +83,32 @@ impl PyramidOptions {
 ///
 /// Level 0 is the depth texture itself, which the pyramid keeps alive but does not copy.
 /// **Do not write to that texture between the reduction and the culls that use it.**
+///
+/// # Examples
+/// ```
+/// use hiz_core::{ImageSize, PyramidOptions, StoredLevels, headless::Engine};
+/// # use hiz_core::{Camera, DepthConvention, Pose, Projection};
+/// # let engine = Engine::new(None)?;
+/// # let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
+/// # let (fov_y, convention) = (std::f64::consts::FRAC_PI_2, DepthConvention::Reversed);
+/// # let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
+/// # let camera = Camera::look_at(&pose, &projection, ImageSize::new(64, 64))?;
+/// # let camera = camera.with_size(ImageSize::new(4, 2))?;
+///
+/// // Reversed Z, so the farthest depth is the least; level 0 is the image itself.
+/// let image = [0.9, 0.8, 0.1, 0.2, 0.7, 0.6, 0.3, 0.4];
+/// let depth = engine.upload_depth(&image, &camera)?; // 4 x 2 pixels
+/// let pyramid = engine.pyramid(&depth)?;
+/// assert_eq!(pyramid.num_levels(), 3);
+/// assert_eq!(engine.read_level(&pyramid, 1)?, [0.6, 0.1]);
+/// assert_eq!(engine.read_level(&pyramid, 2)?, [0.1]);
+///
+/// // Without level 1: built faster, and culls keep more.
+/// let options = PyramidOptions { levels: StoredLevels::from(2), ..PyramidOptions::default() };
+/// let coarse = engine.pyramid_with(&depth, &options)?;
+/// assert_eq!(coarse.level_size(2), Some(ImageSize::new(1, 1)));
+/// # Ok::<(), hiz_core::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Pyramid {
     pub(crate) context: ContextId,

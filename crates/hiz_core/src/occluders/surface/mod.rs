@@ -122,6 +122,31 @@ impl Default for ConservativeDepthOptions {
 /// | always | 24 | 12 |
 /// | from the first conservative depth image on, besides | 24 | about 42 |
 /// | while a conservative depth image is made, besides | about 110 | about 110 |
+///
+/// # Examples
+/// ```
+/// use hiz_core::{ConservativeDepthOptions, Floats, MeshData, OccluderOptions, OccluderSurface};
+/// # use hiz_core::{Camera, DepthConvention, ImageSize, Pose, Projection};
+/// # let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
+/// # let (fov_y, convention) = (std::f64::consts::FRAC_PI_2, DepthConvention::Reversed);
+/// # let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
+/// # let camera = Camera::look_at(&pose, &projection, ImageSize::new(64, 64))?;
+///
+/// // 10 m away, from the left of the view to 1.4 pixels right of its middle; no device is needed.
+/// let right = 1.4 * 10.0 / 32.0;
+/// let (left, low, high, z) = (-20.0, -20.0, 20.0, -10.0);
+/// let corners = [left, low, z, right, low, z, left, high, z, right, high, z];
+/// let (vertices, triangles) = (Floats::F64(&corners), &[0, 1, 2, 2, 1, 3]);
+/// let wall = MeshData { vertices, triangles, transforms: None };
+/// let surface = OccluderSurface::from_meshes(&[wall], &OccluderOptions::default())?;
+/// let depth = surface.conservative_depth(&camera, &ConservativeDepthOptions::default())?;
+///
+/// // Pixel 32 is covered as a whole: 0.1 / 10, or a little farther.
+/// assert!((0.0099..=0.01).contains(&depth[32]));
+/// // Pixel 33 is covered up to 40 %, so something may show beside the wall.
+/// assert_eq!(depth[33], 0.0);
+/// # Ok::<(), hiz_core::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct OccluderSurface {
     positions: Vec<Vec3>,
