@@ -5,7 +5,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 scripts/setup.sh
 export PATH="$VENV/bin:$PATH" MYPYPATH=python
-python_files=(python tools tests scripts docs)
+python_files=(python tools tests scripts docs examples)
 
 check "cargo fmt" cargo fmt --all -- --check -l
 check "clippy" cargo clippy --workspace --all-targets "${LOCKED[@]}" -- -D warnings
@@ -14,7 +14,7 @@ rust_links() { RUSTDOCFLAGS="-D warnings" cargo doc --workspace "${LOCKED[@]}" -
 check "rustdoc links" rust_links
 check "ruff check" ruff check "${python_files[@]}"
 check "ruff format" ruff format --check "${python_files[@]}"
-check "mypy" mypy --strict python/hizvk tools
+check "mypy" mypy --strict python/hizvk tools examples
 # The stubs are written by hand; this compares them with the built module.
 check "stubtest" python -m mypy.stubtest hizvk --concise --mypy-config-file pyproject.toml
 if have shellcheck; then

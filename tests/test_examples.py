@@ -1,0 +1,64 @@
+"""Every script in examples/ runs as a user runs it, and its last line is what was worked out."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+SCRIPTS = sorted(path.name for path in ROOT.glob("examples/*.py"))
+#: Against a script that hangs; one takes a second.
+GUARD_S = 120
+
+#: The last line of each, as a pattern; how the numbers come about is said beside them.
+LAST_LINES = {
+    # An exact oracle has the last word, and how much a way keeps in vain is no promise.
+    "check_against_truth.py": r"0 false culls; false keeps: \d+, \d+, \d+",
+    # A small pixel is 13 cm wide at 10 m, and its centre 6 cm off the middle of the 2 cm gap.
+    # A large pixel is 1 cm wide.
+    "conservative.py": "the ball behind the gap: "
+    "large keeps, small hides, small and conservative keeps",
+    # Ten boxes each.
+    "depth_image.py": "kept 10 before the wall, 0 behind it, 10 without data",
+    # Half of the balls in front of the wall, the others in its shadow.
+    "first_cull.py": "kept 5,000 of 5,000 in front and 0 behind the wall",
+    # 600 balls in front of the wall; the other four numbers are the script's own.
+    "indirect_draws.py": "draw 600 instances from 0 on, 36 indices from 12 on, base vertex -4",
+    # A closed house; each ball of the ring is nearer to some camera than the house.
+    "many_views.py": "seen from 24 views: 0 inside, 60 around",
+    # x is -9, -7, ... 9: a ball of 0.5 m is hidden up to 3.5 m from the middle.
+    "updates.py": "the walker is hidden in frames 3, 4, 5, 6",
+}
+
+
+def test_every_script_has_an_expectation() -> None:
+    assert sorted(LAST_LINES) == SCRIPTS
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_script_runs(name: str, tmp_path: Path) -> None:
+    # From a folder elsewhere, as a copy of the script would be; a warning is an error.
+    run = subprocess.run(
+        [sys.executable, "-W", "error", str(ROOT / "examples" / name)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=GUARD_S,
+        check=False,
+    )
+    assert run.returncode == 0, run.stdout + run.stderr
+    last = run.stdout.splitlines()[-1]
+    assert re.fullmatch(LAST_LINES[name], last), run.stdout
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_script_needs_numpy_alone(name: str) -> None:
+    text = (ROOT / "examples" / name).read_text(encoding="utf-8")
+    assert 30 <= len(text.splitlines()) <= 80
+    modules = set(re.findall(r"^(?:import|from) (\w+)", text, re.MULTILINE))
+    assert modules <= {"hizvk", "numpy", *sys.stdlib_module_names}
