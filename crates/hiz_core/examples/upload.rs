@@ -1,6 +1,11 @@
-//! What uploads and updates take by the number of instances: `cargo run --release --workspace
-//! --example upload -- 10000000`, the argument being the largest.
-//! Positions are random, which is the worst that a sort can meet.
+//! Measures the time of uploads and updates by the number of instances.
+//!
+//! ```text
+//! cargo run --release --example upload -- 10000000
+//! ```
+//!
+//! The argument is the largest number of instances, by default a million.
+//! Positions are random, which is the worst case for the sort.
 
 use std::time::Instant;
 
@@ -31,7 +36,8 @@ fn median_ms(rounds: usize, mut work: impl FnMut()) -> f64 {
     times[rounds / 2]
 }
 
-/// Of this process, in MiB: resident now, and at most so far (Linux; elsewhere 0).
+/// The memory of this process in MiB: resident now, and at most so far.
+/// Both are 0 on systems other than Linux.
 fn memory() -> [u64; 2] {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     ["VmRSS:", "VmHWM:"].map(|name| {
@@ -45,7 +51,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("{}", engine.adapter());
     let largest: usize = std::env::args().nth(1).map_or(Ok(1_000_000), |n| n.parse())?;
     println!(
-        "instances  kind    morton ms  given ms  update all ms  update 1000 ms  device MiB  host MiB  resident/peak MiB"
+        "instances  kind    morton ms  given ms  update all ms  update 1000 ms  device MiB  \
+         host MiB  resident/peak MiB"
     );
     let powers = (3..).map(|p| 10_usize.pow(p)).take_while(|n| *n < largest);
     for n in powers.chain([largest]) {
@@ -93,7 +100,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let (device, host) = (instances.device_bytes() >> 20, instances.host_bytes() >> 20);
             let [resident, peak] = memory();
             println!(
-                "{n:>9}  {name:<6} {morton:>10.2} {given:>9.2} {all:>14.2} {some:>15.2} {device:>11} {host:>9}  {resident}/{peak}"
+                "{n:>9}  {name:<6} {morton:>10.2} {given:>9.2} {all:>14.2} {some:>15.2} \
+                 {device:>11} {host:>9}  {resident}/{peak}"
             );
         }
     }

@@ -1,6 +1,7 @@
-// Bodies drawn through a list of their numbers: the packed list of a cull, or simply 0, 1, 2, ...
-// Positions are eye-relative, as in hiz_core's occluder pass: two float32 halves, the eye
-// subtracted half by half.
+// Draws bodies by a list of their numbers: the packed list of a cull, or 0, 1, 2, ...
+//
+// Positions are relative to the eye, as in hiz_core's occluder pass.
+// Each position is two float32 halves, and the eye is subtracted half by half.
 
 struct View {
     // Clip-space rows about the eye.
@@ -11,7 +12,8 @@ struct View {
     padding: u32,
 }
 
-// Every vertex is stored, none is made out of a body's size: the prepass has exactly the same.
+// Every vertex is stored, and none is computed from a body's size.
+// So this pass has exactly the vertices of the prepass.
 struct Vertex {
     hi: vec3<f32>,
     // RGBA, 8 bits each.
@@ -30,7 +32,7 @@ struct Corner {
     @location(1) @interpolate(flat) colour: u32,
 }
 
-// The walls are drawn as body 0, with indices past the vertices of all bodies.
+// The walls are drawn as body 0, with indices that begin behind the vertices of all bodies.
 @vertex
 fn body_vertex(@builtin(vertex_index) v: u32, @location(0) body: u32) -> Corner {
     let vertex = vertices[body * view.vertices_per_body + v];
@@ -42,7 +44,7 @@ fn body_vertex(@builtin(vertex_index) v: u32, @location(0) body: u32) -> Corner 
 
 struct Pixel {
     @location(0) colour: vec4<f32>,
-    // The body's number + 1; 0 is the sky.
+    // The body's number + 1, or 0 for the sky.
     @location(1) id: u32,
 }
 

@@ -1,13 +1,15 @@
-//! Hills with hexagonal columns on them, and balls in all heights: nothing is parallel to an axis,
-//! and what is culled (spheres) is not what is drawn (facets inside of them).
+//! Hills with hexagonal columns, and balls at all heights.
+//!
+//! Nothing is parallel to an axis.
+//! The cull tests spheres, and the renderer draws facets inside of them.
 
 use hiz_core::{Camera, DepthConvention, ImageSize, Pose, Projection, Vec3};
 
 use crate::scene::{Body, Mesh, Random, Scene, Shape, Shot};
 
-/// Half the field's side, metres.
+/// Half of the field's side, in metres.
 const HALF_SIDE: f64 = 60.0;
-/// Quads of the ground a side.
+/// Quads of the ground per side.
 const QUADS: usize = 40;
 
 /// The field around `origin`.
@@ -37,7 +39,7 @@ pub(crate) fn scene(origin: Vec3) -> Scene {
         .map(|_| {
             let [x, z] = [0; 2].map(|_| random.range(-HALF_SIDE, HALF_SIDE));
             let radius = random.range(0.15, 0.3) * random.pick(&[1.0, 1.0, 3.0]);
-            // Some are below the ground, most just above it.
+            // Some are below the ground, and most are just above it.
             let center =
                 [x, height(x, z) + random.range(-1.0, 2.0) * random.pick(&[1.0, 1.0, 4.0]), z];
             Body { shape: Shape::Ball { center, radius }, colour: random.colour() }
@@ -46,7 +48,7 @@ pub(crate) fn scene(origin: Vec3) -> Scene {
     Scene::at(origin, "field", &crowd, walls, [HALF_SIDE, 14.0, HALF_SIDE])
 }
 
-/// Of the hills.
+/// The height of the hills at a place.
 fn height(x: f64, z: f64) -> f64 {
     5.0 * (x / 13.0).sin() * (z / 17.0).cos()
         + 3.0 * ((x + 2.0 * z) / 23.0).sin()
@@ -60,7 +62,7 @@ fn add_column(walls: &mut Mesh, [x, z]: [f64; 2], radius: f64, top: f64, turn: f
         [x + radius * c, foot + y, z + radius * s]
     };
     for k in 0..6 {
-        // Deep enough that no slope shows its lower end.
+        // The columns reach so deep that no slope shows their lower ends.
         let [a, b, c, d] =
             [corner(k, -4.0), corner(k + 1, -4.0), corner(k, top), corner(k + 1, top)];
         walls.push_triangle([a, b, c], [0.7, 0.62, 0.5]);

@@ -1,15 +1,19 @@
-//! A renderer with a device of its own draws three scenes twice, with and without culling, and
-//! compares the pictures:
+//! A renderer with its own device draws three scenes, with culling and without, and compares the
+//! pictures.
 //!
 //! ```text
 //! cargo run --example renderer [FOLDER]
 //! ```
 //!
-//! The pictures land in FOLDER (`out/renderer`): what was drawn with culling, and which body each
-//! pixel shows.
-//! `renderer.rs` shows how the crate is embedded; `scene.rs` says what a scene is, `town.rs`,
-//! `rooms.rs` and `field.rs` are three.
+//! The pictures land in FOLDER, by default `out/renderer`.
+//! They show what was drawn with culling, and the body at each pixel.
+//!
+//! - `renderer.rs` shows how the crate is embedded.
+//! - `scene.rs` says what a scene is.
+//! - `town.rs`, `rooms.rs` and `field.rs` are the three scenes.
+//!
 //! `tests/renderer.rs` runs the same code.
+//! `examples/simple.rs` is shorter, and draws one frame.
 
 mod field;
 #[allow(dead_code, reason = "its test reads more of it")]
@@ -81,7 +85,7 @@ fn scenes_and_shots(size: ImageSize) -> hiz_core::Result<[(Scene, Vec<Shot>); 3]
     ])
 }
 
-/// Numbers as colours that neighbours do not share.
+/// Turns numbers into colours that differ between neighbours.
 fn id_colours(picture: &Picture) -> Vec<u8> {
     let colour = |id: u32| (id.wrapping_mul(0x9E37_79B1) | 0xFF).to_be_bytes();
     picture.ids.iter().flat_map(|id| colour(*id)).collect()

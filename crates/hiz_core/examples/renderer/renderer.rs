@@ -1,5 +1,7 @@
-//! A renderer that owns its device and lets `hiz_core` record into its encoder: depth prepass,
-//! pyramid, cull, then a draw whose instance count only the device knows.
+//! A renderer that owns its device, and lets `hiz_core` record into its encoder.
+//!
+//! A frame is a depth prepass, the pyramid, the cull and a draw.
+//! Only the device knows the instance count of the draw.
 
 use std::error::Error;
 
@@ -15,26 +17,29 @@ use crate::scene::{Mesh, Scene, Shot};
 const COLOUR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const ID_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 
-/// Crowds are small here; real ones may be cut into pieces by the device's limits.
-/// So is this one, to show the loop.
+/// The limits of a device cut very large crowds into pieces.
+/// This small crowd is cut too, to show the loop over the pieces.
 const PIECE_CAPACITY: u32 = 2048;
 
-/// How much nearer than its bounds a body may be rasterised: the cull reasons about bounds, a
-/// picture is made of fragments.
+/// How much nearer than its bounds a body may be rasterised.
+/// The cull reasons about bounds, but a picture is made of fragments.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Slack {
-    /// Of its depth; for perspective cameras.
+    /// In proportion to the depth, for perspective cameras.
     pub(crate) relative: f64,
-    /// For orthographic cameras, where a rasteriser errs by the same amount near and far.
+    /// In NDC depth, for orthographic cameras: there a rasteriser errs by the same amount near and
+    /// far.
     pub(crate) absolute: f64,
 }
 
-/// Beyond the worst that `tests/renderer.rs` measures, and all but a few fragments of millions that
-/// its long form does.
-/// Nothing bounds how edge-on a face can be seen: `docs/accuracy.md` has the numbers.
+/// The slack that this renderer gives to a cull.
+///
+/// It is more than the worst error that `tests/renderer.rs` measures.
+/// In its long form, only a few of millions of fragments err by more.
+/// No slack covers every face that is seen edge-on; `docs/accuracy.md` has the numbers.
 pub(crate) fn slack(adapter: &wgpu::AdapterInfo, camera: &Camera) -> Slack {
-    // A driver that nobody has measured gets the larger numbers; the test says whether they
-    // suffice.
+    // A driver that was never measured gets the larger numbers.
+    // The test says whether they suffice.
     let swiftshader = adapter.name.contains("SwiftShader");
     if camera.rows()[3][..3] == [0.0; 3] {
         return Slack { relative: 0.0, absolute: 1e-4 };
@@ -48,49 +53,49 @@ pub(crate) fn slack(adapter: &wgpu::AdapterInfo, camera: &Camera) -> Slack {
     Slack { relative, absolute: 0.0 }
 }
 
-/// A device, a queue, and what draws bodies.
+/// A device, its queue and the pipelines that draw bodies.
 pub(crate) struct Renderer {
     pub(crate) adapter: wgpu::AdapterInfo,
     device: wgpu::Device,
     queue: wgpu::Queue,
     hiz: HizContext,
-    /// For standard and reversed depth.
+    /// One for standard and one for reversed depth.
     pipelines: [wgpu::RenderPipeline; 2],
 }
 
 /// A scene on the device.
 pub(crate) struct Stage {
-    /// Of the bodies, one after another, then of the walls.
+    /// The vertices of the bodies, one body after another, then those of the walls.
     vertices: wgpu::Buffer,
     vertices_per_body: u32,
-    /// Of one body.
+    /// The indices of one body.
     body_indices: wgpu::Buffer,
     wall_indices: wgpu::Buffer,
-    /// 0, 1, 2, ...: the list that draws everybody.
+    /// The list 0, 1, 2, ..., which draws all bodies.
     everybody: wgpu::Buffer,
     num_crowd: u32,
     crowd: Instances,
     visible: Visible,
-    /// Who is inside the frustum: to tell what is hidden from what is outside.
+    /// Which bodies are inside the frustum, to tell the hidden ones from those outside.
     in_view: Visible,
-    /// The walls alone, and with the crowd.
+    /// The walls alone, and the walls with the crowd.
     occluders: [Occluders; 2],
     nothing: Occluders,
 }
 
-/// What was drawn, row 0 on top.
+/// A picture, with row 0 on top.
 #[derive(Debug)]
 pub(crate) struct Picture {
     pub(crate) size: ImageSize,
-    /// RGBA, 8 bits each.
+    /// RGBA, with 8 bits per channel.
     pub(crate) colour: Vec<u8>,
-    /// Numbers of bodies + 1; the walls come after the last.
+    /// A body's number + 1 per pixel; the walls have the number after the last body's.
     pub(crate) ids: Vec<u32>,
     pub(crate) depth: Vec<f32>,
 }
 
 impl Picture {
-    /// How many pixels differ in colour or number.
+    /// How many pixels differ in colour or in the body's number.
     pub(crate) fn differing_pixels(&self, other: &Self) -> usize {
         assert_eq!(self.size, other.size);
         let colours = self.colour.chunks_exact(4).zip(other.colour.chunks_exact(4));
@@ -99,17 +104,18 @@ impl Picture {
     }
 }
 
-/// What became of the crowd; read for the report, long after it was drawn.
+/// What became of the crowd.
+/// It is read for the report, after the picture was drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Counts {
     pub(crate) kept: u32,
     pub(crate) occluded: u32,
     pub(crate) outside: u32,
-    /// What the draw arguments held.
+    /// The sum of the instance counts in the draw arguments.
     pub(crate) drawn: u32,
 }
 
-/// A culled picture, how it came about, and the depth that it was culled against.
+/// A picture with culling, its counts, and the depth that the cull read.
 pub(crate) struct Culled {
     pub(crate) picture: Picture,
     pub(crate) counts: Counts,
@@ -135,14 +141,15 @@ struct VertexRecord {
     body: u32,
 }
 
-/// A position as two float32 that add up to it (to 2^-48): the shader subtracts the eye before
-/// anything large is rounded.
+/// A position as two float32 whose sum is the position, up to 2^-48 of it.
+/// So the shader can subtract the eye before a large number is rounded.
 fn halves(p: [f64; 3]) -> [[f32; 3]; 2] {
     let hi = p.map(|v| v as f32);
     [hi, [0, 1, 2].map(|k| (p[k] - f64::from(hi[k])) as f32)]
 }
 
-/// The vertices of a mesh; the body numbers count up every `vertices_per_body`.
+/// The vertices of a mesh.
+/// The body's number goes up by one every `vertices_per_body` vertices.
 fn records(mesh: &Mesh, first_body: u32, vertices_per_body: u32) -> Vec<VertexRecord> {
     let vertices = mesh.vertices.iter().zip(&mesh.colours).enumerate();
     let record = |(i, (position, colour)): (usize, (&[f64; 3], &[f32; 3]))| {
@@ -159,8 +166,10 @@ fn records(mesh: &Mesh, first_body: u32, vertices_per_body: u32) -> Vec<VertexRe
 }
 
 impl Renderer {
-    /// Opens a Vulkan device: the adapter whose index `$HIZVK_ADAPTER` is, or whose description
-    /// contains it, or the first.
+    /// Opens a Vulkan device.
+    ///
+    /// `$HIZVK_ADAPTER` chooses the adapter by its index or by a part of its description.
+    /// Without it the first adapter is taken.
     /// `faults` is for tests.
     pub(crate) fn open(faults: &[(&str, &str)]) -> Result<Self, Box<dyn Error>> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
@@ -181,7 +190,7 @@ impl Renderer {
         let (device, queue) =
             pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
                 label: Some("renderer.device"),
-                // A renderer adds what it needs itself.
+                // A real renderer adds its own features and limits.
                 required_features: HizContext::required_features(),
                 required_limits: HizContext::required_limits(),
                 ..Default::default()
@@ -196,7 +205,7 @@ impl Renderer {
         })
     }
 
-    /// Uploads a scene, once for all its pictures.
+    /// Uploads a scene once, for all of its pictures.
     pub(crate) fn build(&self, scene: &Scene) -> Result<Stage, Box<dyn Error>> {
         let num_crowd = scene.crowd.len() as u32;
         let one = scene.crowd[0].mesh();
@@ -220,7 +229,7 @@ impl Renderer {
         let crowd = scene
             .with_bounds(|bounds| self.hiz.record_instances(&mut encoder, bounds, &options))?;
         self.queue.submit([encoder.finish()]);
-        // What the draw arguments say beside the count: how many indices one body has.
+        // The constant part of the draw arguments: the number of indices of one body.
         let index_count = 3 * one.triangles.len() as u32;
         let draw = DrawTemplate { index_count, ..DrawTemplate::default() };
         let listed = Outputs { mask: true, indices: true, draws: true, draw, ..Outputs::NONE };
@@ -266,8 +275,11 @@ impl Renderer {
         })
     }
 
-    /// How this renderer culls: with the slack that its driver needs, in ascending order.
-    /// Where two bodies share a face the first drawn wins, in both pictures the same.
+    /// The options of this renderer's culls: the slack that the driver needs, and a list in
+    /// ascending order.
+    ///
+    /// Where two bodies share a face, the one that is drawn first wins.
+    /// With ascending lists that is the same body in both pictures.
     pub(crate) fn cull_options(&self, camera: &Camera) -> CullOptions {
         let Slack { relative, absolute } = slack(&self.adapter, camera);
         CullOptions {
@@ -278,7 +290,7 @@ impl Renderer {
         }
     }
 
-    /// Draws everything.
+    /// Draws all bodies.
     pub(crate) fn draw_all(&self, stage: &Stage, shot: &Shot) -> Picture {
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
             label: Some("renderer.all"),
@@ -291,8 +303,8 @@ impl Renderer {
         self.read_picture(&targets)
     }
 
-    /// Draws what the cull keeps.
-    /// From the first pass to the last it is one command buffer: the count never leaves the device.
+    /// Draws the bodies that the cull keeps.
+    /// All passes are in one command buffer, and the count never leaves the device.
     pub(crate) fn draw_culled(
         &self,
         stage: &Stage,
@@ -340,8 +352,8 @@ impl Renderer {
         })
     }
 
-    /// Begins the pass that makes a picture: walls are drawn, the bodies' indices and the list of
-    /// everybody are bound.
+    /// Begins the pass that makes a picture.
+    /// It has drawn the walls, and bound the indices of a body and the list of all bodies.
     fn begin_picture<'e>(
         &self,
         encoder: &'e mut wgpu::CommandEncoder,
@@ -350,9 +362,9 @@ impl Renderer {
         targets: &Targets,
     ) -> wgpu::RenderPass<'e> {
         let [eye_hi, eye_lo] = halves(camera.origin());
-        // The rows stand about the camera's origin, the shader subtracts the two halves of it.
-        // What those leave over goes into the constants, as in the engine's prepass: where a face
-        // is seen edge-on its last bit decides what is drawn.
+        // The rows are about the camera's origin, and the shader subtracts the two halves of it.
+        // The remainder of the halves goes into the constants, as in the engine's prepass.
+        // It matters where a face is seen edge-on: there the last bit decides what is drawn.
         let left_over =
             [0, 1, 2].map(|k| f64::from(eye_hi[k]) + f64::from(eye_lo[k]) - camera.origin()[k]);
         let about_eye = |[x, y, z, constant]: [f64; 4]| {
@@ -426,8 +438,8 @@ impl Renderer {
         }
     }
 
-    /// How many are kept, and how many of the others are inside the frustum: a cull against nothing
-    /// keeps those.
+    /// How many bodies are kept, and how many of the others are inside the frustum.
+    /// A cull by an empty depth image keeps all that are inside.
     fn counts(
         &self,
         stage: &Stage,
@@ -472,7 +484,7 @@ impl Renderer {
         (0..visible.num_pieces()).flat_map(words).map(u32::count_ones).sum()
     }
 
-    /// The bytes of a texture of 4 bytes a texel.
+    /// The bytes of a texture with 4 bytes per texel.
     fn read_texture(&self, texture: &wgpu::Texture) -> Vec<u8> {
         let row = 4 * texture.width();
         let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
@@ -499,7 +511,7 @@ impl Renderer {
         })
     }
 
-    /// Copies into a staging buffer, waits and maps it.
+    /// Copies into a staging buffer, waits, and maps the buffer.
     fn read(
         &self,
         size: u64,
@@ -525,8 +537,8 @@ impl Renderer {
     }
 }
 
-/// What a picture is drawn into.
-/// The depth is the picture's own, not the prepass.
+/// The textures that a picture is drawn into.
+/// The depth is the picture's own, and not the prepass.
 struct Targets {
     colour: wgpu::Texture,
     ids: wgpu::Texture,
@@ -591,7 +603,7 @@ fn pipeline(device: &wgpu::Device, nearer: wgpu::CompareFunction) -> wgpu::Rende
             module: &module,
             entry_point: Some("body_vertex"),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
-            // One body's number an instance, out of the packed list.
+            // One number of a body per instance, from the packed list.
             buffers: &[Some(wgpu::VertexBufferLayout {
                 array_stride: 4,
                 step_mode: wgpu::VertexStepMode::Instance,

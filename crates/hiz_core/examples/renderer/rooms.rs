@@ -1,5 +1,6 @@
-//! A floor of rooms with doors, seen from inside: walls on all sides, cameras that touch them, and
-//! furniture of turned boxes.
+//! A floor of rooms with doors, seen from inside.
+//!
+//! There are walls on all sides, cameras that touch them, and furniture of rotated boxes.
 
 use std::f64::consts::PI;
 
@@ -8,14 +9,14 @@ use hiz_core::{Camera, DepthConvention, ImageSize, Pose, Projection, Vec3};
 use crate::scene::{Body, Mesh, Random, Scene, Shape, Shot, block};
 
 const ROOMS: [usize; 2] = [6, 5];
-/// Length and depth of a room, metres.
+/// The length and depth of a room, in metres.
 const ROOM: [f64; 2] = [5.0, 4.0];
 const CEILING: f64 = 2.8;
 const HALF_WALL: f64 = 0.075;
 const HALF_DOOR: f64 = 0.45;
 const DOOR_TOP: f64 = 2.1;
 
-/// The floor around `origin`, at its height.
+/// The floor around `origin`, at the height of `origin`.
 pub(crate) fn scene(origin: Vec3) -> Scene {
     let mut random = Random(11);
     let size = [0, 1].map(|k| ROOMS[k] as f64 * ROOM[k]);
@@ -52,7 +53,8 @@ pub(crate) fn scene(origin: Vec3) -> Scene {
     Scene::at(origin, "rooms", &crowd, Mesh::of_bodies(&walls), reach)
 }
 
-/// A wall at `at` on `axis` (0: x, 1: z), from `ends[0]` to `ends[1]`, with a door around `door`.
+/// Adds a wall at `at` on `axis` (0: x, 1: z), from `ends[0]` to `ends[1]`.
+/// If `door` is given, the wall has a door around it.
 fn add_wall(walls: &mut Vec<Body>, axis: usize, at: f64, ends: [f64; 2], door: Option<f64>) {
     let mut part = |from: f64, to: f64, bottom: f64| {
         let (mut min, mut max) = ([0.0, bottom, 0.0], [0.0, CEILING, 0.0]);
@@ -71,7 +73,7 @@ fn add_wall(walls: &mut Vec<Body>, axis: usize, at: f64, ends: [f64; 2], door: O
     }
 }
 
-/// Things on the floor, under the ceiling, or as pictures that touch a wall.
+/// Furniture: on the floor, in the air, or like a picture that touches a wall.
 fn furniture(i: usize, random: &mut Random) -> Body {
     let room = [random.below(ROOMS[0]) as f64 * ROOM[0], random.below(ROOMS[1]) as f64 * ROOM[1]];
     let mut half: Vec3 = [0; 3].map(|_| random.range(0.02, 0.35));
@@ -83,7 +85,7 @@ fn furniture(i: usize, random: &mut Random) -> Body {
     match i % 6 {
         0 => center[1] = random.range(0.5, CEILING - 0.5),
         1 => rotation = tumbled(random),
-        // Flat on a wall: in its plane, or up to a tenth of a millimetre before or behind it.
+        // Flat on a wall: in its plane, or a tenth of a millimetre in front of it or behind it.
         2 => {
             rotation = turned_about_y(0.0);
             half[0] = 0.01;
@@ -101,7 +103,7 @@ fn turned_about_y(angle: f64) -> [f64; 9] {
     [c, 0.0, s, 0.0, 1.0, 0.0, -s, 0.0, c]
 }
 
-/// Turned about y, then about x.
+/// A rotation about y, then about x.
 fn tumbled(random: &mut Random) -> [f64; 9] {
     let [(s, c), (t, d)] = [random.range(0.0, 2.0 * PI), random.range(0.0, PI)].map(f64::sin_cos);
     [c, 0.0, s, t * s, d, -t * c, -d * s, t, d * c]

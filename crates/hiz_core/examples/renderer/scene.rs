@@ -1,37 +1,29 @@
-//! What is drawn, as data: bodies that are culled, walls that hide them, cameras.
-//! No GPU here.
+//! A scene as data: bodies that are culled, walls that hide them, and cameras.
+//! Nothing here needs a GPU.
 
 use hiz_core::{Bounds, Camera, Floats, Vec3};
 
 /// A convex body in world coordinates.
-/// Its bounds are exactly what is drawn, but for balls, which are drawn inside of theirs.
+/// Its bounds are exactly what is drawn, except that a ball is drawn inside its sphere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Shape {
-    /// Axis-aligned.
-    Box {
-        min: Vec3,
-        max: Vec3,
-    },
-    /// Turned by a matrix in C order.
-    Turned {
-        center: Vec3,
-        half: Vec3,
-        rotation: [f64; 9],
-    },
-    Ball {
-        center: Vec3,
-        radius: f64,
-    },
+    /// An axis-aligned box.
+    Box { min: Vec3, max: Vec3 },
+    /// A box that is rotated by a matrix in C order.
+    Turned { center: Vec3, half: Vec3, rotation: [f64; 9] },
+    /// A sphere.
+    Ball { center: Vec3, radius: f64 },
 }
 
-/// What is culled, drawn or both.
+/// A shape and its colour.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Body {
     pub(crate) shape: Shape,
     pub(crate) colour: [f32; 3],
 }
 
-/// Triangles of any kind, a colour for each vertex; flat faces have vertices of their own.
+/// Triangles with a colour per vertex.
+/// Each flat face has its own vertices.
 #[derive(Debug, Default, Clone)]
 pub(crate) struct Mesh {
     pub(crate) vertices: Vec<Vec3>,
@@ -47,7 +39,7 @@ impl Mesh {
         self.triangles.extend(other.triangles.iter().map(|t| t.map(|v| first + v)));
     }
 
-    /// The bodies one after another, each with as many vertices.
+    /// The bodies one after another, all with the same number of vertices.
     pub(crate) fn of_bodies<'a>(bodies: impl IntoIterator<Item = &'a Body>) -> Self {
         let mut all = Self::default();
         for body in bodies {
@@ -56,7 +48,7 @@ impl Mesh {
         all
     }
 
-    /// A triangle whose light comes from its normal.
+    /// Appends a triangle that is lit by its normal.
     pub(crate) fn push_triangle(&mut self, corners: [Vec3; 3], colour: [f32; 3]) {
         let first = self.vertices.len() as u32;
         let lit = colour.map(|c| c * light(normal(corners)));
@@ -66,7 +58,7 @@ impl Mesh {
     }
 }
 
-/// The unit normal of a triangle; up where it has none.
+/// The unit normal of a triangle, or up for a triangle without area.
 pub(crate) fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
     let [u, v] = [b, c].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
     let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
@@ -74,12 +66,14 @@ pub(crate) fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
     if length > 0.0 { n.map(|x| x / length) } else { [0.0, 1.0, 0.0] }
 }
 
-/// Faces along x, y and z: 0.7, 1 and 0.85, both sides alike.
+/// The light on a face: 0.7 if it faces along x, 1 along y and 0.85 along z.
+/// Both sides have the same light.
 fn light(normal: Vec3) -> f32 {
     [0.7, 1.0, 0.85].iter().zip(normal).map(|(l, n)| l * n * n).sum::<f64>() as f32
 }
 
-/// Which of its two sides vertex `v` of a box takes on each axis: four vertices a face.
+/// On which of the two sides of a box vertex `v` lies, for each axis.
+/// Each face has four vertices of its own.
 fn corner(v: usize) -> [usize; 3] {
     let axis = v / 8;
     let mut sides = [0; 3];
@@ -89,8 +83,8 @@ fn corner(v: usize) -> [usize; 3] {
     sides
 }
 
-/// An octahedron whose edges are cut in half and pushed out to the sphere: 18 unit vectors, 32
-/// triangles.
+/// An octahedron whose edges are halved, with the new vertices moved out to the unit sphere.
+/// It has 18 vertices and 32 triangles.
 fn octasphere() -> (Vec<Vec3>, Vec<[u32; 3]>) {
     const TIPS: [Vec3; 6] = [
         [1.0, 0.0, 0.0],
@@ -134,7 +128,7 @@ impl Body {
         };
         if let Shape::Ball { center, radius } = self.shape {
             let (points, triangles) = octasphere();
-            // A millionth inside, so that no rounding puts a vertex outside.
+            // A millionth smaller, so that no rounding puts a vertex outside of the sphere.
             let vertices = points
                 .iter()
                 .map(|u| [0, 1, 2].map(|k| center[k] + 0.999_999 * radius * u[k]))
@@ -156,7 +150,7 @@ impl Body {
         Mesh { vertices, colours, triangles }
     }
 
-    /// Moved by `shift`.
+    /// The body, moved by `shift`.
     pub(crate) fn moved(self, shift: Vec3) -> Self {
         let at = |p: Vec3| [0, 1, 2].map(|k| p[k] + shift[k]);
         let shape = match self.shape {
@@ -175,20 +169,21 @@ pub(crate) fn block(min: Vec3, max: Vec3, colour: [f32; 3]) -> Body {
     Body { shape: Shape::Box { min, max }, colour }
 }
 
-/// The crowd may be culled, the walls are always drawn.
+/// A scene: the crowd may be culled, and the walls are always drawn.
 #[derive(Debug)]
 pub(crate) struct Scene {
     pub(crate) name: &'static str,
-    /// All of one shape.
+    /// All bodies have the same kind of shape.
     pub(crate) crowd: Vec<Body>,
     pub(crate) walls: Mesh,
-    /// Where it stands, and how far from there the crowd spreads.
+    /// Where the scene stands.
     pub(crate) origin: Vec3,
+    /// How far from there the crowd spreads.
     pub(crate) reach: Vec3,
 }
 
 impl Scene {
-    /// The scene about `origin`, of bodies about 0.
+    /// Moves bodies and walls that stand about 0 to `origin`.
     pub(crate) fn at(
         origin: Vec3,
         name: &'static str,
@@ -203,7 +198,7 @@ impl Scene {
         Self { name, crowd, walls, origin, reach }
     }
 
-    /// Hands over the crowd's bounds.
+    /// Calls `take` with the crowd's bounds.
     pub(crate) fn with_bounds<T>(&self, take: impl FnOnce(&Bounds<'_>) -> T) -> T {
         let mut arrays: [Vec<f64>; 3] = Default::default();
         for body in &self.crowd {
@@ -232,17 +227,18 @@ impl Scene {
     }
 }
 
-/// A camera, and who hides whom.
+/// A camera, and what hides the crowd.
 #[derive(Debug)]
 pub(crate) struct Shot {
     pub(crate) name: &'static str,
     pub(crate) camera: Camera,
-    /// Whether the crowd is drawn into the depth prepass, too, so that it hides itself: nobody may
-    /// be hidden by his own depth.
+    /// Whether the crowd is also drawn into the depth prepass, so that it hides itself.
+    /// A body must not be hidden by its own depth.
     pub(crate) crowd_occludes: bool,
 }
 
-/// `SplitMix64` (Steele, Lea, Flood, OOPSLA 2014): the same scenes everywhere.
+/// `SplitMix64` (Steele, Lea, Flood, OOPSLA 2014).
+/// It makes the same scenes on every machine.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {

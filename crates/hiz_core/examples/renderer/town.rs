@@ -1,5 +1,6 @@
-//! A small town: ground and houses are the occluders, thousands of boxes in its streets the crowd.
-//! Faces that lie in one plane, twins at one place.
+//! A small town: ground and houses are the occluders, and the crowd is thousands of boxes.
+//!
+//! Some faces lie in one plane, and some boxes have a twin at the same place.
 
 use hiz_core::{Camera, DepthConvention, ImageSize, Pose, Projection, Vec3};
 
@@ -15,11 +16,11 @@ pub(crate) fn scene(origin: Vec3) -> Scene {
         let half: Vec3 = std::array::from_fn(|_| random.range(0.1, 0.7));
         let mut at = [random.range(-62.0, 62.0), half[1], random.range(-62.0, 62.0)];
         match i % 10 {
-            // Most stand on the ground, in the streets and, never seen, in the houses.
+            // Most boxes stand on the ground: in the streets, or inside of houses.
             // Some hover.
             0..7 => {}
             7 => at[1] = random.range(1.0, 25.0),
-            // A crowd around the crossing at the origin, for the camera inside of it.
+            // Boxes around the crossing at the origin, for the camera that stands among them.
             8 => at = [random.range(-4.0, 4.0), random.range(0.2, 3.5), random.range(-4.0, 4.0)],
             _ => {
                 crowd.push(near_a_face(houses[random.below(houses.len())], &mut random));
@@ -29,8 +30,8 @@ pub(crate) fn scene(origin: Vec3) -> Scene {
         let corner = |side: f64| [0, 1, 2].map(|k| at[k] + side * half[k]);
         crowd.push(block(corner(-1.0), corner(1.0), random.colour()));
     }
-    // Twins of another colour at the same place: which one is seen is a matter of the order of
-    // drawing alone.
+    // Twins of another colour at the same place.
+    // Only the order of drawing decides which one is seen.
     for i in (0..5000).step_by(20) {
         let colour = crowd[i].colour.map(|c| 1.15 - c);
         crowd.push(Body { colour, ..crowd[i] });
@@ -42,7 +43,7 @@ pub(crate) fn scene(origin: Vec3) -> Scene {
 
 type Block = (Vec3, Vec3, [f32; 3]);
 
-/// The ground and 6 x 6 houses of 12 m, 8 m apart.
+/// The ground and 6 x 6 houses, each 12 m wide, 8 m apart.
 fn walls(random: &mut Random) -> Vec<Block> {
     let mut walls = vec![([-70.0, -12.0, -70.0], [70.0, 0.0, 70.0], [0.42, 0.44, 0.40])];
     for house in 0..36 {
@@ -54,8 +55,10 @@ fn walls(random: &mut Random) -> Vec<Block> {
     walls
 }
 
-/// A box whose face lies in the plane of a house's face (a tie, which must stay) or a hair behind
-/// it (which may go).
+/// A box with a face in the plane of a house's face, or up to 10 cm behind it.
+///
+/// - In the plane it is a tie, and the box must be kept.
+/// - Behind it the box may be culled.
 fn near_a_face(house: Block, random: &mut Random) -> Body {
     let axis = 2 * random.below(2);
     let along = 2 - axis;
@@ -127,8 +130,8 @@ pub(crate) fn shots(origin: Vec3, size: ImageSize) -> hiz_core::Result<Vec<Shot>
             walls_occlude,
         )?,
         shot("hill", hill.0, hill.1, perspective(50.0, 0.1, None, Reversed), walls_occlude)?,
-        // Straight along an axis: faces towards the eye have one depth, those beside it are seen
-        // edge-on.
+        // The view is along an axis.
+        // Faces towards the eye have one depth, and the others are seen edge-on.
         shot(
             "off_centre",
             [-41.0, 3.0, 62.0],
@@ -150,7 +153,7 @@ pub(crate) fn shots(origin: Vec3, size: ImageSize) -> hiz_core::Result<Vec<Shot>
             parallel(24.0, 250.0, Reversed),
             walls_occlude,
         )?,
-        // The eye is 3 cm off a wall and looks into it at less than a degree.
+        // The eye is 3 cm from a wall, and looks into it at less than a degree.
         shot(
             "along_a_wall",
             [3.97, 2.0, 34.0],
@@ -158,7 +161,7 @@ pub(crate) fn shots(origin: Vec3, size: ImageSize) -> hiz_core::Result<Vec<Shot>
             perspective(70.0, 0.01, None, Reversed),
             walls_occlude,
         )?,
-        // Boxes in front of the eye, around it and through the near plane.
+        // Boxes are in front of the eye, around it, and across the near plane.
         shot(
             "in_the_crowd",
             [0.0, 1.7, 0.0],
@@ -180,7 +183,8 @@ pub(crate) fn shots(origin: Vec3, size: ImageSize) -> hiz_core::Result<Vec<Shot>
             perspective(60.0, 0.1, None, Reversed),
             crowd_occludes,
         )?,
-        // Faces parallel to the image: all of a box's pixels hold the depth of its nearest point.
+        // The faces are parallel to the image.
+        // So all pixels of a box hold the depth of its nearest point.
         shot(
             "parallel_hides_crowd",
             [3.0, 9.0, 90.0],
