@@ -6,7 +6,7 @@
 //!
 //! A wall hides the left half of a grid of boxes.
 //! The device culls them, and draws those that are left as squares.
-//! The folder `renderer` draws larger scenes, and compares pictures with and without culling.
+//! The example `renderer` draws larger scenes, and compares pictures with and without culling.
 //! `tests/examples.rs` runs this file.
 
 use std::error::Error;
