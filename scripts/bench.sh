@@ -10,6 +10,7 @@ if [[ " $* " == *" --speed "* ]]; then
   # Whatever module is left behind, the next set-up makes the tests' own again.
   rm -f "$STAMPS/module"
   step "building the Python module for release (the first time takes some minutes)" \
-    env VIRTUAL_ENV="$VENV" PATH="$VENV/bin:$PATH" maturin develop --release --extras viz,scene "${LOCKED[@]}"
+    env VIRTUAL_ENV="$VENV" PATH="$VENV/bin:$PATH" \
+    maturin develop --release --extras viz,scene --features testing,yardstick "${LOCKED[@]}"
 fi
 step "bench" "$VENV/bin/hizvk" bench "$@"

@@ -411,6 +411,37 @@ def cull_arguments(device: hizvk.Device) -> dict[str, Any]:
     return {"instances": device.instances(spheres()), "camera": view, "pyramid": pyramid}
 
 
+FLAG_OR_NONE: list[Bad] = [
+    (1, TypeError, "expected True, False or None, got int 1"),
+    ("auto", TypeError, "got str"),
+]
+CAPACITY: list[Bad] = [
+    (-1, ValueError, "in 0..4294967295"),
+    (1.5, TypeError, "got float 1.5"),
+]
+DRAW: list[Bad] = [((36,), TypeError, "expected a DrawTemplate or None, got tuple (36,)")]
+OPTIONS_OBJECT: list[Bad] = [
+    ({"order": "any"}, TypeError, "expected a CullOptions or None, got dict {'order': 'any'}"),
+    ("any", TypeError, "got str 'any'"),
+]
+#: The fields of `CullOptions`, which are keywords of functions, too.
+OPTIONS: dict[str, list[Bad]] = {
+    "order": [
+        ("fast", ValueError, 'expected one of "stable", "any"'),
+        (None, TypeError, "got None"),
+    ],
+    "coverage": COVERAGE,
+    "guard_px": GUARD,
+    "depth_slack": DEPTH_SLACK,
+    "depth_slack_abs": DEPTH_SLACK,
+    "transform_slack": TRANSFORM_SLACK,
+    "footprint": FOOTPRINT,
+    "descent": DESCENT,
+    "fit": FIT,
+    "hierarchy": FLAG_OR_NONE,
+    "statistics": FLAG,
+}
+
 TABLES: dict[str, Table] = {
     "Spheres": Table(
         lambda _: (hizvk.Spheres, {"centers": np.zeros((2, 3)), "radii": np.ones(2)}),
@@ -824,30 +855,28 @@ TABLES: dict[str, Table] = {
                     "expected a Pyramid of Device.pyramid, got (6, 8) float64",
                 )
             ],
-            "order": [
-                ("fast", ValueError, 'expected one of "stable", "any"'),
-                (None, TypeError, "got None"),
-            ],
-            "coverage": COVERAGE,
-            "guard_px": GUARD,
-            "depth_slack": DEPTH_SLACK,
-            "depth_slack_abs": DEPTH_SLACK,
-            "transform_slack": TRANSFORM_SLACK,
-            "footprint": FOOTPRINT,
-            "descent": DESCENT,
-            "fit": FIT,
-            "hierarchy": [
-                (1, TypeError, "expected True, False or None, got int 1"),
-                ("auto", TypeError, "got str"),
-            ],
+            "options": OPTIONS_OBJECT,
             "outputs": [
                 ("mask", TypeError, "expected None or a collection of"),
                 (["masks"], ValueError, 'expected one of "mask", "verdicts", "indices", "draws"'),
                 ([1], TypeError, "got int 1"),
+                (hizvk.CullOptions(), TypeError, "'draws', or an Outputs, got CullOptions"),
             ],
-            "capacity": [(-1, ValueError, "in 0..4294967295"), (1.5, TypeError, "got float 1.5")],
-            "draw": [((36,), TypeError, "expected a DrawTemplate or None, got tuple (36,)")],
-            "statistics": FLAG,
+            **OPTIONS,
+            "capacity": CAPACITY,
+            "draw": DRAW,
+        },
+    ),
+    "CullOptions": Table(lambda _: (hizvk.CullOptions, {}), OPTIONS),
+    "Outputs": Table(
+        lambda _: (hizvk.Outputs, {}),
+        {
+            "mask": FLAG,
+            "verdicts": FLAG,
+            "indices": FLAG_OR_NONE,
+            "draws": FLAG_OR_NONE,
+            "capacity": CAPACITY,
+            "draw": DRAW,
         },
     ),
     "check_proxy": Table(
@@ -931,14 +960,8 @@ TABLES: dict[str, Table] = {
             "scale": SCALE,
             "invalid": INVALID,
             "device": [("lavapipe", TypeError, "expected a Device or None, got str 'lavapipe'")],
-            "coverage": COVERAGE,
-            "guard_px": GUARD,
-            "depth_slack": DEPTH_SLACK,
-            "depth_slack_abs": DEPTH_SLACK,
-            "transform_slack": TRANSFORM_SLACK,
-            "footprint": FOOTPRINT,
-            "descent": DESCENT,
-            "fit": FIT,
+            "options": OPTIONS_OBJECT,
+            **OPTIONS,
         },
     ),
     "recommend": Table(
@@ -993,7 +1016,8 @@ TABLES: dict[str, Table] = {
             "scale": SCALE,
             "invalid": INVALID,
             "device": [("lavapipe", TypeError, "expected a Device or None, got str 'lavapipe'")],
-            "coverage": COVERAGE,
+            "options": OPTIONS_OBJECT,
+            **OPTIONS,
             "max_ms": [(0, ValueError, "above 0, got int 0"), ("2", TypeError, "got str '2'")],
             "kept_within": [
                 (0.9, ValueError, "at least 1, got float 0.9"),

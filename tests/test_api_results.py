@@ -133,7 +133,7 @@ def test_groups_are_tested_first(device: hizvk.Device, camera: hizvk.Camera) -> 
 @pytest.mark.parametrize("order", ["stable", "any"])
 @pytest.mark.parametrize("hierarchy", [False, True])
 def test_what_was_not_asked_for_is_not_there(
-    device: hizvk.Device, camera: hizvk.Camera, order: hizvk.device.Order, hierarchy: bool
+    device: hizvk.Device, camera: hizvk.Camera, order: hizvk.options.Order, hierarchy: bool
 ) -> None:
     parts = {
         "mask": lambda seen: np.flatnonzero(seen.mask).tolist(),

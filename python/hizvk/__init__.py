@@ -42,14 +42,15 @@ Bad arguments raise `TypeError` or `ValueError` with the parameter's name; every
 device refuses is a `HizError`.
 """
 
+from typing import TYPE_CHECKING, Any
+
 from . import reference
 from ._core import __version__
-from .bench.recommend import Recommendation, recommend
+from .adapter import Adapter, adapters
 from .bounds import Boxes, OrientedBoxes, Spheres
 from .camera import Camera
-from .comparison import Comparison, compare
-from .containment import BoundsCheck, ProxyCheck, check_bounds, check_proxy
-from .device import Adapter, Device, adapters
+from .check import BoundsCheck, Comparison, ProxyCheck, check_bounds, check_proxy, compare
+from .device import Device
 from .errors import (
     DeviceLostError,
     HizError,
@@ -58,9 +59,16 @@ from .errors import (
     NoAdapterError,
     OutOfMemoryError,
 )
+from .explanation import Explanation, Verdict
+from .mesh import Mesh
 from .oneline import visible
-from .resources import DepthImage, Instances, Mesh, Occluders, Pyramid
-from .result import DRAW_DTYPE, CullResult, CullStats, DrawTemplate, Explanation, Verdict
+from .options import CullOptions, DrawTemplate, Outputs
+from .resources import DepthImage, Instances, Occluders, Pyramid
+from .result import DRAW_DTYPE, CullResult
+from .stats import CullStats
+
+if TYPE_CHECKING:
+    from .bench.recommend import Recommendation, recommend
 
 __all__ = [
     "DRAW_DTYPE",
@@ -69,6 +77,7 @@ __all__ = [
     "Boxes",
     "Camera",
     "Comparison",
+    "CullOptions",
     "CullResult",
     "CullStats",
     "DepthImage",
@@ -85,6 +94,7 @@ __all__ = [
     "Occluders",
     "OrientedBoxes",
     "OutOfMemoryError",
+    "Outputs",
     "ProxyCheck",
     "Pyramid",
     "Recommendation",
@@ -99,3 +109,17 @@ __all__ = [
     "reference",
     "visible",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """`recommend` and `Recommendation` at their first use: culling needs nothing of what they load."""
+    if name in ("recommend", "Recommendation"):
+        from .bench import recommend as module
+
+        globals()[name] = getattr(module, name)
+        return globals()[name]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -14,7 +14,7 @@ import math
 import numbers
 import operator
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
@@ -31,6 +31,8 @@ P = ParamSpec("P")
 LARGEST_SIDE = 32768
 #: Whole numbers up to here are exact in float64.
 LARGEST_EXACT_INTEGER = 2**53
+#: The coarsest level of the largest image.
+COARSEST_LEVEL = 15
 #: Rows that are checked at once.
 BLOCK = 2**16
 
@@ -80,6 +82,20 @@ def explained(texts: Mapping[str, str]) -> Callable[[Callable[P, T]], Callable[P
         return checked
 
     return decorate
+
+
+def refuse_unknown(keywords: Iterable[str], known: Collection[str]) -> None:
+    """A `TypeError` for the first keyword that is not known; it names the closest one that is."""
+    for name in keywords:
+        if name not in known:
+            # Loaded here: only this error needs it.
+            from difflib import get_close_matches
+
+            closest = get_close_matches(name, known, 1, cutoff=0.0)[0]
+            raise TypeError(
+                f"{name}: expected no such parameter; the closest is {closest}, "
+                f"and all are {', '.join(known)}"
+            )
 
 
 def _wrong_type(name: str, expected: str, value: object) -> TypeError:
@@ -399,6 +415,21 @@ def size(name: str, value: object) -> Size:
     if not all(1 <= side <= LARGEST_SIDE for side in sides):
         raise _wrong_value(name, expected, value)
     return (sides[0], sides[1])
+
+
+def stored_levels(name: str, value: object) -> tuple[int, int]:
+    """The first and the last level that a pyramid stores, of 1 to 15; None stores all of them."""
+    if value is None:
+        return 1, COARSEST_LEVEL
+    if isinstance(value, (tuple, list)):
+        if len(value) != 2:
+            expected = "None, a level or a pair (first, last)"
+            raise ValueError(f"{name}: expected {expected}, got {describe(value)}")
+        first, last = (integer(name, k, low=1, high=COARSEST_LEVEL) for k in value)
+        if first > last:
+            raise ValueError(f"{name}: expected first <= last, got ({first}, {last})")
+        return first, last
+    return integer(name, value, low=1, high=COARSEST_LEVEL), COARSEST_LEVEL
 
 
 def flag(name: str, value: object) -> bool:

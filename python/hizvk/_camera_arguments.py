@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, Literal, TypeAlias
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
+    from ._types import PixelCenter
+
 Vector = tuple[float, float, float]
 #: A pose: the parameter's name, which says its direction, and the (4, 4) matrix.
 Pose = tuple[str, "npt.NDArray[np.float64]"]
-# A union of words: stubtest takes Literal["a", "b"] for something else at run time.
-PixelCenter: TypeAlias = Literal["integer"] | Literal["half"]
 
 #: OpenCV's longest list of distortion coefficients.
 MOST_COEFFICIENTS = 14

@@ -10,7 +10,7 @@ keeps them visible and counts them, or `Device.instances(..., strict=True)` refu
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 
@@ -22,12 +22,10 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from ._arguments import FloatArray
+    from ._types import QuaternionOrder
 
 __all__ = ["Boxes", "OrientedBoxes", "Spheres"]
 
-
-# A union of words: stubtest takes Literal["a", "b"] for something else at run time.
-QuaternionOrder: TypeAlias = Literal["wxyz"] | Literal["xyzw"]
 
 _ORDERS = (
     '"wxyz" (nuScenes, COLMAP, Blender, trimesh, MuJoCo) or "xyzw" (SciPy, ROS, glTF, PyBullet, '

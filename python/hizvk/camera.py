@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from ._arguments import Size
-    from ._camera_arguments import PixelCenter
-    from .depth import DepthKind
+    from ._types import DepthKind, PixelCenter
 
 __all__ = ["Camera"]
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numbers
 from collections.abc import Collection
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from . import _arguments
+from ._types import DepthKind, Rounding, words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,17 +19,12 @@ if TYPE_CHECKING:
     from ._arguments import FloatArray
     from .camera import Camera
 
-__all__ = ["DEPTH_KINDS", "DepthArray", "DepthKind"]
-
-# Unions of words: stubtest takes Literal["a", "b"] for something else at run time.
-DepthKind: TypeAlias = Literal["ndc"] | Literal["reversed_ndc"] | Literal["z"] | Literal["distance"]
+__all__ = ["DEPTH_KINDS", "DepthArray", "DepthKind", "checked_image"]
 
 #: The kinds of depth that an array can hold; see `Device.pyramid`.
-DEPTH_KINDS: tuple[DepthKind, ...] = ("ndc", "reversed_ndc", "z", "distance")
+DEPTH_KINDS = words(DepthKind)
 
 _METRIC = ("z", "distance")
-
-Rounding: TypeAlias = Literal["none"] | Literal["single"] | Literal["half"]
 
 #: What sensors and their files write where they saw nothing, by dtype: the ends of what it can hold.
 NO_DATA: dict[str, tuple[float, ...]] = {"uint16": (0.0, 65535.0), "float16": (65504.0,)}

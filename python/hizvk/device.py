@@ -8,69 +8,39 @@ also at the same time.
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
 from . import _arguments, _core
+from ._on_device import check_owner
 from ._processes import driver_is_asked
+from ._types import FaceCull, StoredOrder, words
+from .adapter import Adapter
 from .bounds import Bounds, are_points, as_arrays
 from .camera import Camera
 from .depth import checked_image
 from .errors import LimitError
 from .hints import Question
-from .resources import DepthImage, Instances, Occluders, Pyramid, as_meshes
-from .result import CullResult, DrawTemplate
+from .mesh import as_meshes
+from .options import cull_request
+from .resources import DepthImage, Instances, Occluders, Pyramid
+from .result import CullResult
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
+    from typing import Unpack
 
     import numpy.typing as npt
 
     from ._arguments import Size
-    from .depth import DepthArray, DepthKind
-    from .resources import MeshLike
+    from ._on_device import OnDevice
+    from ._types import DepthKind, Levels, Output
+    from .depth import DepthArray
+    from .mesh import MeshLike
+    from .options import CullKeywords, CullOptions, Outputs
 
-__all__ = ["Adapter", "Device", "adapters"]
-
-# Unions of words: stubtest takes Literal["a", "b"] for something else at run time.
-Order: TypeAlias = Literal["stable"] | Literal["any"]
-Coverage: TypeAlias = Literal["area"] | Literal["sample"]
-Fit: TypeAlias = Literal["rectangle"] | Literal["volume"]
-StoredOrder: TypeAlias = Literal["morton"] | Literal["given"]
-Output: TypeAlias = Literal["mask"] | Literal["verdicts"] | Literal["indices"] | Literal["draws"]
-FaceCull: TypeAlias = Literal["none"] | Literal["back"] | Literal["front"]
-Levels: TypeAlias = int | tuple[int, int] | None
-
-
-@dataclass(frozen=True)
-class Adapter:
-    """A Vulkan adapter (a GPU, or a software driver)."""
-
-    index: int
-    """Its place in the list of `adapters`."""
-    name: str
-    """The adapter's name."""
-    driver: str
-    """The driver's name."""
-    driver_info: str
-    """The driver's version."""
-    backend: str
-    """The graphics interface, ``"vulkan"``."""
-    device_type: str
-    """``"discrete_gpu"``, ``"integrated_gpu"``, ``"virtual_gpu"``, ``"cpu"`` or ``"other"``."""
-
-    def __str__(self) -> str:
-        driver = " ".join(part for part in (self.driver, self.driver_info) if part)
-        return f"{self.index}: {self.name} [{self.device_type}, {driver}]"
-
-
-def adapters() -> list[Adapter]:
-    """The Vulkan adapters of this machine; an empty list without a Vulkan driver."""
-    with driver_is_asked():
-        return [Adapter(*summary) for summary in _core.adapters()]
+__all__ = ["Device"]
 
 
 class Device:
@@ -171,7 +141,7 @@ class Device:
         """
         kind, arrays = as_arrays("bounds", bounds)
         strict = _arguments.flag("strict", strict)
-        stored_order = _arguments.choice("order", order, ("morton", "given"))
+        stored_order = _arguments.choice("order", order, words(StoredOrder))
         uploaded = self._engine.instances(kind, arrays, strict, stored_order, None)
         return Instances(self, uploaded, points=are_points(bounds))
 
@@ -230,7 +200,7 @@ class Device:
             If the device cannot hold them.
         """
         meshes = as_meshes(vertices, triangles, transforms)
-        cull_mode = _arguments.choice("cull", cull, ("none", "back", "front"))
+        cull_mode = _arguments.choice("cull", cull, words(FaceCull))
         raw = [(mesh.vertices, mesh.triangles, mesh.transforms) for mesh in meshes]
         return Occluders(self, self._engine.occluders(raw, cull_mode))
 
@@ -299,7 +269,7 @@ class Device:
         The step to whole surfaces is this library's own.
         """
         _arguments.instance("occluders", occluders, Occluders, "Occluders of Device.occluders")
-        self._own("occluders", occluders)
+        check_owner("occluders", occluders, self)
         _arguments.instance("camera", camera, Camera, "a Camera")
         conservative = _arguments.flag("conservative", conservative)
         refinement = _arguments.integer("refinement", refinement, low=0, high=8)
@@ -403,7 +373,7 @@ class Device:
         LimitError, OutOfMemoryError
             If the image is larger than the device allows.
         """
-        stored = stored_levels(levels)
+        stored = _arguments.stored_levels("levels", levels)
         if isinstance(depth, DepthImage):
             for name, value in (("camera", camera), ("kind", kind), ("invalid", invalid)):
                 if value is not None:
@@ -415,7 +385,7 @@ class Device:
                 raise ValueError(
                     f"scale: expected 1 beside a DepthImage, whose depth is NDC, got {scale:g}"
                 )
-            self._own("depth", depth)
+            check_owner("depth", depth, self)
             return Pyramid(
                 self, self._engine.pyramid(depth._inner, stored), depth.camera, is_rendered=True
             )
@@ -435,21 +405,9 @@ class Device:
         instances: Instances,
         camera: Camera,
         pyramid: Pyramid,
-        *,
-        order: Order = "stable",
-        coverage: Coverage = "area",
-        guard_px: float | None = None,
-        depth_slack: float = 2.0**-23,
-        depth_slack_abs: float = 0.0,
-        transform_slack: float = 0.0,
-        footprint: int = 2,
-        descent: int = 0,
-        fit: Fit = "rectangle",
-        hierarchy: bool | None = None,
-        outputs: Collection[Output] | None = None,
-        capacity: int | None = None,
-        draw: DrawTemplate | None = None,
-        statistics: bool = False,
+        options: CullOptions | None = None,
+        outputs: Outputs | Collection[Output] | None = None,
+        **keywords: Unpack[CullKeywords],
     ) -> CullResult:
         """Tests instances against a pyramid. What could be seen in the depth image is never culled.
 
@@ -458,66 +416,25 @@ class Device:
         instances : Instances
             Of this device.
         camera : Camera
-            The camera of the pyramid (`Pyramid.camera` or one equal to it).
+            The camera of the pyramid: `Pyramid.camera`, or one equal to it.
         pyramid : Pyramid
             Of this device.
-        order : "stable" or "any"
-            Whether the list of the visible ascends, or comes as the device finished (faster).
-        coverage : "area" or "sample"
-            ``"area"``: visible is what meets any part of a pixel.
-            ``"sample"``: what covers no pixel centre counts as hidden; right for an image of one
-            sample a pixel, the same viewport and no jitter.
-            A plain depth image answers for its pixels' centres in either case: multisampling and
-            jitter need ``"area"`` and conservative depth (`render_depth`).
-        guard_px : float, optional
-            Pixels by which bounds grow in the image, a multiple of 1/256 up to 16.
-            None: 0 for area, 1/64 for sample.
-        depth_slack : float
-            Relative error of the depth image, up to 0.5; by default one ulp, for depth that was
-            rounded to float32.
-        depth_slack_abs : float
-            Absolute error of the depth image beside that, up to 0.5, in NDC depth: a rasteriser
-            errs by the same amount near and far in an orthographic view.
-            Anything above 0 counts 2^-23 more.
-        transform_slack : float
-            For depth images of a renderer that transforms in float32: ulps that its matrix product
-            may have cost (about 4), up to 1e6.
-        footprint : 2, 4 or 8
-            How many texels a side a test may read of one level: more mean a finer level, so less is
-            kept and more read.
-        descent : int
-            How many texels of finer levels a test may read where the footprint cannot decide, up to
-            65536; 0: none.
-            With enough of them the answer is that of a test at full resolution.
-        fit : "rectangle" or "volume"
-            What stands for the bounds: ``"rectangle"``, the rectangle around their projection at
-            their nearest depth; or, where that cannot decide, ``"volume"``: their own outline, and
-            in each texel their own depth there.
-            Keeps less and computes more; with a descent it comes down to single pixels.
-        hierarchy : bool, optional
-            Whether whole groups of 64 instances that lie together are tested first, and one by one
-            only instances of the groups that are left.
-            None: where there are enough of them for it to pay.
-            What is kept differs by next to nothing (a group's test may read other texels);
-            ``stats`` says how many tests were spent.
-        outputs : collection of "mask", "verdicts", "indices", "draws"; optional
-            What is computed: ask for less, pay less.
-            None: all of it, where an ordered list is made when it is first asked for.
-            Asking a result for what it was not asked to compute is a `ValueError`, but for indices
-            and draws, which can be made from a mask.
-        capacity : int, optional
-            Most instances in the list.
-            None: enough for all.
-            Too small a capacity shows as ``count < demand``; mask and verdicts stay complete.
-        draw : DrawTemplate, optional
-            The other numbers of the draw arguments; None leaves them 0.
-        statistics : bool
-            Whether to count the tests by level and the texels that they read (slower).
+        options : CullOptions, optional
+            How the cull decides; None takes the defaults.
+        outputs : Outputs, or a collection of "mask", "verdicts", "indices", "draws"; optional
+            What the cull makes: less costs less.
+            A collection names all that is made.
+            None makes mask and verdicts, and the list and the draw arguments by the time that they
+            are read.
+        **keywords
+            Any field of `CullOptions`, and `capacity` and `draw` of `Outputs`.
+            They take the place of those fields of `options` and `outputs`:
+            ``cull(crowd, camera, hiz, order="any", capacity=1000)``.
 
         Returns
         -------
         CullResult
-            Recorded and submitted; reading it waits.
+            The cull is recorded and submitted; reading the result waits for it.
 
         Raises
         ------
@@ -528,27 +445,17 @@ class Device:
             If the device cannot hold the outputs.
         """
         _arguments.instance("instances", instances, Instances, "Instances of Device.instances")
-        self._own("instances", instances)
-        of_one = "a Camera (one a call: each camera culls with the pyramid of its own depth, Device.pyramid)"
-        _arguments.instance("camera", camera, Camera, of_one)
+        check_owner("instances", instances, self)
+        _arguments.instance("camera", camera, Camera, _ONE_CAMERA)
         _arguments.instance("pyramid", pyramid, Pyramid, "a Pyramid of Device.pyramid")
-        self._own("pyramid", pyramid)
+        check_owner("pyramid", pyramid, self)
         if camera != pyramid.camera:
-            same_view = camera.resized(pyramid.size) == pyramid.camera
-            way = "depth of one camera says nothing about another one"
-            if same_view:
-                way = f"pass camera.resized({pyramid.size}), the same view; the promise is about an image of that size"
-            raise ValueError(
-                f"camera: expected the camera of the pyramid, {pyramid.camera!r}, got {camera!r}; {way}"
-            )
-        options = cull_options(
-            order=order, coverage=coverage, guard_px=guard_px, depth_slack=depth_slack,
-            depth_slack_abs=depth_slack_abs, transform_slack=transform_slack, footprint=footprint, descent=descent,
-            fit=fit, hierarchy=hierarchy, outputs=outputs, capacity=capacity, draw=draw, statistics=statistics,
-        )  # fmt: skip
-        culling = self._engine.cull(instances._inner, camera._inner, pyramid._inner, *options)
-        question = Question(camera, pyramid, options[1], instances._points)
-        return CullResult(culling, statistics=options[-1], question=question)
+            raise ValueError(_other_camera(camera, pyramid))
+        options, outputs = cull_request(options, outputs, keywords)
+        culling = self._engine.cull(
+            instances._inner, camera._inner, pyramid._inner, options, outputs
+        )
+        return CullResult(self, culling, Question(camera, pyramid, options, instances._points))
 
     def _check_side(self, camera: Camera) -> None:
         """An image that the device cannot hold is refused before its array is converted."""
@@ -560,130 +467,28 @@ class Device:
         """Waits until everything that was submitted is done."""
         self._engine.wait()
 
-    def _own(self, name: str, thing: Instances | Occluders | DepthImage | Pyramid) -> None:
-        if thing.device is not self:
-            raise ValueError(
-                f"{name}: expected {type(thing).__name__} of this device, got one of another Device"
-            )
-
     def __repr__(self) -> str:
         return f"<Device {self.adapter}>"
 
 
-CullOptions: TypeAlias = tuple[
-    str,
-    str,
-    float | None,
-    float,
-    float,
-    float,
-    int,
-    int,
-    str,
-    bool | None,
-    tuple[bool, bool, bool, bool],
-    int | None,
-    tuple[int, int, int, int],
-    bool,
-]
-
-#: What a cull can compute, in the engine's order.
-OUTPUTS = ("mask", "verdicts", "indices", "draws")
+def maker_of(thing: OnDevice[Any]) -> Device:
+    """The device that made an object, by its full type."""
+    device = thing.device
+    assert isinstance(device, Device)
+    return device
 
 
-def _outputs(
-    value: object, default: tuple[bool, bool, bool, bool]
-) -> tuple[bool, bool, bool, bool]:
-    """Which of `OUTPUTS` are asked for."""
-    if value is None:
-        return default
-    if isinstance(value, str) or not isinstance(value, Collection):
-        got = _arguments.describe(value)
-        raise TypeError(
-            f"outputs: expected None or a collection of {', '.join(map(repr, OUTPUTS))}, got {got}"
+_ONE_CAMERA = (
+    "a Camera (one a call: each camera culls with the pyramid of its own depth, Device.pyramid)"
+)
+
+
+def _other_camera(camera: Camera, pyramid: Pyramid) -> str:
+    """Why a camera cannot cull with the pyramid of another one, and the way out."""
+    way = "depth of one camera says nothing about another one"
+    if camera.resized(pyramid.size) == pyramid.camera:
+        way = (
+            f"pass camera.resized({pyramid.size}), the same view; "
+            "the promise is about an image of that size"
         )
-    asked = {_arguments.choice("outputs", name, OUTPUTS) for name in value}
-    mask, verdicts, indices, draws = (name in asked for name in OUTPUTS)
-    return mask, verdicts, indices, draws
-
-
-#: The coarsest level that the largest image has.
-COARSEST = 15
-
-
-def stored_levels(levels: object) -> tuple[int, int]:
-    """The first and last level of ``levels=``."""
-    if levels is None:
-        return 1, COARSEST
-    if isinstance(levels, (tuple, list)):
-        if len(levels) != 2:
-            raise ValueError(
-                f"levels: expected None, a level or a pair (first, last), got {_arguments.describe(levels)}"
-            )
-        first, last = (_arguments.integer("levels", k, low=1, high=COARSEST) for k in levels)
-        if first > last:
-            raise ValueError(f"levels: expected first <= last, got ({first}, {last})")
-        return first, last
-    return _arguments.integer("levels", levels, low=1, high=COARSEST), COARSEST
-
-
-#: Texels a side that a test may read of one level.
-FOOTPRINTS = (2, 4, 8)
-
-
-def cull_options(
-    *,
-    order: object,
-    coverage: object,
-    guard_px: object,
-    depth_slack: object,
-    depth_slack_abs: object,
-    transform_slack: object,
-    footprint: object,
-    descent: object,
-    fit: object,
-    hierarchy: object = None,
-    outputs: object = None,
-    capacity: object = None,
-    draw: object = None,
-    statistics: object = False,
-) -> CullOptions:
-    """The checked options of a cull, in the engine's order."""
-    order = _arguments.choice("order", order, ("stable", "any"))
-    if hierarchy is not None and not isinstance(hierarchy, (bool, np.bool_)):
-        raise TypeError(
-            f"hierarchy: expected True, False or None, got {_arguments.describe(hierarchy)}"
-        )
-    hierarchy = None if hierarchy is None else bool(hierarchy)
-    # An ordered list can be made later, one in the order of the device cannot.
-    computed = _outputs(outputs, (True, True, order == "any", order == "any"))
-    if guard_px is not None:
-        guard_px = _arguments.number("guard_px", guard_px, at_least=0.0, at_most=16.0)
-        if guard_px * 256.0 != round(guard_px * 256.0):
-            raise ValueError(f"guard_px: expected a multiple of 1/256, got {guard_px}")
-    footprint = _arguments.integer("footprint", footprint, low=2, high=8)
-    if footprint not in FOOTPRINTS:
-        raise ValueError(f"footprint: expected one of 2, 4, 8, got {footprint}")
-    if capacity is not None:
-        capacity = _arguments.integer("capacity", capacity, low=0, high=2**32 - 1)
-    if draw is None:
-        template = (0, 0, 0, 0)
-    else:
-        draw = _arguments.instance("draw", draw, DrawTemplate, "a DrawTemplate or None")
-        template = (draw.index_count, draw.first_index, draw.base_vertex, draw.first_instance)
-    return (
-        order,
-        _arguments.choice("coverage", coverage, ("area", "sample")),
-        guard_px,
-        _arguments.number("depth_slack", depth_slack, at_least=0.0, at_most=0.5),
-        _arguments.number("depth_slack_abs", depth_slack_abs, at_least=0.0, at_most=0.5),
-        _arguments.number("transform_slack", transform_slack, at_least=0.0, at_most=1e6),
-        footprint,
-        _arguments.integer("descent", descent, low=0, high=65536),
-        _arguments.choice("fit", fit, ("rectangle", "volume")),
-        hierarchy,
-        computed,
-        capacity,
-        template,
-        _arguments.flag("statistics", statistics),
-    )
+    return f"camera: expected the camera of the pyramid, {pyramid.camera!r}, got {camera!r}; {way}"

@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from .bounds import Bounds
+    from .options import CullOptions
     from .resources import Pyramid
-    from .result import CullStats
+    from .stats import CullStats
 
 __all__ = ["Question", "posed_otherwise"]
 
@@ -41,7 +42,7 @@ class Question:
 
     camera: Camera
     pyramid: Pyramid
-    coverage: str
+    options: CullOptions
     points: bool
     """Whether all bounds have size zero."""
 
@@ -57,14 +58,16 @@ class Question:
         """
         if not stats.tested:
             return ()
-        if self.coverage == "sample" and self.points:
+        if self.options.coverage == "sample" and self.points:
             return (
                 "bounds, coverage: all sizes are zero, and a point covers no pixel's centre, so what can be seen is "
                 'culled; use coverage="area"',
             )
         if stats.outside == stats.tested:
             # By sample coverage, what lies between the pixels' centres counts as outside, too.
-            if self.coverage == "sample" and (bounds is None or _in_view(self.camera, bounds)):
+            if self.options.coverage == "sample" and (
+                bounds is None or _in_view(self.camera, bounds)
+            ):
                 return (
                     "bounds, coverage: nothing covers a pixel's centre: all are too small, or outside of the view; "
                     'coverage="area" keeps small ones',

@@ -8,22 +8,23 @@ from typing import TYPE_CHECKING
 
 from . import _arguments
 from ._processes import per_process
-from .bounds import Bounds, are_points, as_arrays
+from .bounds import Bounds, as_arrays
 from .camera import Camera
 from .depth import checked_image
-from .device import Device, cull_options, stored_levels
+from .device import Device, maker_of
 from .errors import HizWarning
-from .hints import Question
+from .options import Outputs, cull_options
 from .resources import DepthImage
 
 if TYPE_CHECKING:
     from collections.abc import Collection
+    from typing import Unpack
 
     import numpy as np
     import numpy.typing as npt
 
-    from .depth import DepthKind
-    from .device import Coverage, Fit
+    from ._types import DepthKind
+    from .options import CullOptions, OptionKeywords
 
 __all__ = ["visible"]
 
@@ -42,6 +43,9 @@ class _Default:
             return self.device
 
 
+#: The answer, and the counts that hints look at.
+_MASK_AND_COUNTS = Outputs(mask=True, verdicts=True, indices=False, draws=False)
+
 _defaults: dict[int, _Default] = {}
 
 
@@ -59,14 +63,8 @@ def visible(
     scale: float = 1.0,
     invalid: Collection[float] | None = None,
     device: Device | None = None,
-    coverage: Coverage = "area",
-    guard_px: float | None = None,
-    depth_slack: float = 2.0**-23,
-    depth_slack_abs: float = 0.0,
-    transform_slack: float = 0.0,
-    footprint: int = 2,
-    descent: int = 0,
-    fit: Fit = "rectangle",
+    options: CullOptions | None = None,
+    **keywords: Unpack[OptionKeywords],
 ) -> npt.NDArray[np.bool_]:
     """Which bounds can be seen: False only for what is surely outside the view or surely behind the depth image.
 
@@ -90,8 +88,10 @@ def visible(
         dtype is written with, 0 and 65535 for uint16, 65504 for float16 (see `Device.pyramid`).
     device : Device, optional
         None: one that is made at the first call and kept.
-    coverage, guard_px, depth_slack, depth_slack_abs, transform_slack, footprint, descent, fit
-        As in `Device.cull`.
+    options : CullOptions, optional
+        How the cull decides; None takes the defaults.
+    **keywords
+        Any field of `CullOptions`, in the place of that of `options`.
 
     Returns
     -------
@@ -123,15 +123,11 @@ def visible(
     """
     as_arrays("bounds", bounds)
     _arguments.instance("camera", camera, Camera, "a Camera")
-    options = cull_options(
-        order="any", coverage=coverage, guard_px=guard_px, depth_slack=depth_slack, depth_slack_abs=depth_slack_abs,
-        transform_slack=transform_slack, footprint=footprint, descent=descent, fit=fit, capacity=None, draw=None,
-        statistics=False,
-    )  # fmt: skip
+    options = cull_options(options, keywords)
     if device is not None:
         _arguments.instance("device", device, Device, "a Device or None")
     if isinstance(depth, DepthImage):
-        device = depth.device if device is None else device
+        device = maker_of(depth) if device is None else device
         if camera != depth.camera:
             raise ValueError(
                 f"camera: expected the camera of depth, {depth.camera!r}, got {camera!r}"
@@ -147,15 +143,8 @@ def visible(
             device._check_side(camera)
         image = checked_image("depth", depth, camera, kind, scale, invalid)
         device = default_device() if device is None else device
-        pyramid = device._pyramid_of(image, camera, stored_levels(None))
-    _, coverage_, guard, slack, slack_abs, transform, side, budget, fit_, *_ = options
-    result = device.cull(
-        device.instances(bounds), camera, pyramid, order="any", coverage=coverage_,  # type: ignore[arg-type]
-        guard_px=guard, depth_slack=slack, depth_slack_abs=slack_abs, transform_slack=transform, footprint=side,
-        descent=budget, fit=fit_, statistics=False,  # type: ignore[arg-type]
-    )  # fmt: skip
-    for hint in Question(camera, pyramid, coverage_, are_points(bounds)).hints(
-        result.stats, bounds
-    ):
+        pyramid = device._pyramid_of(image, camera, _arguments.stored_levels("levels", None))
+    result = device.cull(device.instances(bounds), camera, pyramid, options, _MASK_AND_COUNTS)
+    for hint in result._question.hints(result.stats, bounds):
         warnings.warn(hint, HizWarning, stacklevel=2)
     return result.mask.copy()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from .result import Verdict
+from .explanation import Verdict
 from .scenes import MAP_CORNER
 from .truth import OCCLUDER, SKY, RayCaster, linear_depth
 

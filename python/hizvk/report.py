@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ._arguments import Size
-    from .device import Adapter
-    from .result import CullStats
+    from .adapter import Adapter
+    from .stats import CullStats
     from .truth import Check
 
 __all__ = ["STAGES", "Report", "ViewReport", "write"]

@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from . import reference
 from .bounds import Boxes
-from .comparison import Comparison, compare
+from .check import Comparison, compare
 
 if TYPE_CHECKING:
     from ._arguments import Size

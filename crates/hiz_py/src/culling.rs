@@ -1,88 +1,11 @@
 //! The answer of a cull, read on request.
 
-use hiz_core::{
-    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, Order, Outputs, VisibleOptions,
-    headless,
-};
+use hiz_core::headless;
 use numpy::PyArray1;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::held::{Held, OnDevice};
-
-/// The options of a cull as Python words them.
-pub(crate) struct CullArguments<'a> {
-    pub(crate) order: &'a str,
-    pub(crate) coverage: &'a str,
-    pub(crate) guard_px: Option<f64>,
-    pub(crate) depth_slack: f64,
-    pub(crate) depth_slack_abs: f64,
-    pub(crate) transform_slack: f64,
-    pub(crate) footprint: u32,
-    pub(crate) descent: u32,
-    pub(crate) fit: &'a str,
-    pub(crate) hierarchy: Option<bool>,
-    /// Mask, verdicts, indices, draws.
-    pub(crate) outputs: (bool, bool, bool, bool),
-    pub(crate) capacity: Option<u32>,
-    /// Index count, first index, base vertex, first instance.
-    pub(crate) draw: (u32, u32, i32, u32),
-    pub(crate) statistics: bool,
-}
-
-impl CullArguments<'_> {
-    /// The engine's options.
-    pub(crate) fn options(&self) -> PyResult<CullOptions> {
-        let order = match self.order {
-            "stable" => Order::Stable,
-            "any" => Order::Any,
-            other => return Err(PyValueError::new_err(format!("order: no order {other:?}"))),
-        };
-        let coverage = match self.coverage {
-            "area" => Coverage::Area,
-            "sample" => Coverage::Sample,
-            other => return Err(PyValueError::new_err(format!("coverage: no coverage {other:?}"))),
-        };
-        let footprint = match self.footprint {
-            2 => Footprint::Two,
-            4 => Footprint::Four,
-            8 => Footprint::Eight,
-            other => return Err(PyValueError::new_err(format!("footprint: no footprint {other}"))),
-        };
-        let fit = match self.fit {
-            "rectangle" => Fit::Rectangle,
-            "volume" => Fit::Volume,
-            other => return Err(PyValueError::new_err(format!("fit: no fit {other:?}"))),
-        };
-        Ok(CullOptions {
-            order,
-            coverage,
-            guard_px: self.guard_px,
-            depth_slack: self.depth_slack,
-            depth_slack_abs: self.depth_slack_abs,
-            transform_slack: self.transform_slack,
-            footprint,
-            descent: self.descent,
-            fit,
-            hierarchy: match self.hierarchy {
-                None => Hierarchy::Auto,
-                Some(true) => Hierarchy::Always,
-                Some(false) => Hierarchy::Never,
-            },
-            statistics: self.statistics,
-        })
-    }
-
-    /// The room for the list, and what is drawn.
-    pub(crate) fn output(&self) -> VisibleOptions {
-        let (index_count, first_index, base_vertex, first_instance) = self.draw;
-        let draw = DrawTemplate { index_count, first_index, base_vertex, first_instance };
-        let (mask, verdicts, indices, draws) = self.outputs;
-        let outputs = Outputs { mask, verdicts, indices, draws };
-        VisibleOptions { outputs, capacity: self.capacity, draw }
-    }
-}
 
 /// A submitted cull.
 #[pyclass(frozen, module = "hizvk._core")]

@@ -13,8 +13,9 @@ use pyo3::prelude::*;
 
 use crate::arguments::{FloatArray, LevelArray, bounds, depth_kind, in_c_order};
 use crate::camera::Camera;
-use crate::culling::{CullArguments, Culling};
+use crate::culling::Culling;
 use crate::held::{Held, OnDevice, detached};
+use crate::options::Request;
 
 /// Index, name, driver, its version, backend, type.
 type Summary = (usize, String, String, String, String, String);
@@ -30,19 +31,15 @@ pub(crate) fn adapters(py: Python<'_>) -> PyResult<Vec<Summary>> {
     Ok(detached(py, || Ok(headless::adapters()))?.iter().map(summary).collect())
 }
 
-/// Whether faults can be planted into the shaders of this build by an environment variable:
-/// development builds alone take it.
-pub(crate) const TAKES_PLANTED_FAULTS: bool = cfg!(debug_assertions);
-
-#[cfg(not(debug_assertions))]
+#[cfg(not(feature = "testing"))]
 fn open(adapter: Option<&str>) -> hiz_core::Result<headless::Engine> {
     headless::Engine::new(adapter)
 }
 
 /// `HIZVK_PLANTED_FAULT` (`what => by what`, one a line) replaces texts in the shaders, as for the
 /// Rust tests: does a Python test turn red?
-/// A release has no word of it.
-#[cfg(debug_assertions)]
+/// A build without the feature `testing` has no word of it.
+#[cfg(feature = "testing")]
 fn open(adapter: Option<&str>) -> hiz_core::Result<headless::Engine> {
     let planted = std::env::var("HIZVK_PLANTED_FAULT").unwrap_or_default();
     let planted: Vec<String> = planted.lines().map(|line| line.replace("\\n", "\n")).collect();
@@ -207,48 +204,20 @@ impl Engine {
         self.0.run(py, reduce).map(|built| Pyramid(Held::new(py, built)))
     }
 
-    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
+    /// `options` is a `hizvk.CullOptions`, `outputs` a `hizvk.Outputs`.
     fn cull(
         &self,
         py: Python<'_>,
         instances: &Instances,
         camera: &Camera,
         pyramid: &Pyramid,
-        order: &str,
-        coverage: &str,
-        guard_px: Option<f64>,
-        depth_slack: f64,
-        depth_slack_abs: f64,
-        transform_slack: f64,
-        footprint: u32,
-        descent: u32,
-        fit: &str,
-        hierarchy: Option<bool>,
-        outputs: (bool, bool, bool, bool),
-        capacity: Option<u32>,
-        draw: (u32, u32, i32, u32),
-        statistics: bool,
+        options: &Bound<'_, PyAny>,
+        outputs: &Bound<'_, PyAny>,
     ) -> PyResult<Culling> {
-        let arguments = CullArguments {
-            order,
-            coverage,
-            guard_px,
-            depth_slack,
-            depth_slack_abs,
-            transform_slack,
-            footprint,
-            descent,
-            fit,
-            hierarchy,
-            outputs,
-            capacity,
-            draw,
-            statistics,
-        };
-        let (options, output) = (arguments.options()?, arguments.output());
+        let Request { options, outputs } = Request::new(options, outputs)?;
         let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
         self.0
-            .run(py, |engine| engine.cull(&instances, &camera.0, &pyramid.1, &options, &output))
+            .run(py, |engine| engine.cull(&instances, &camera.0, &pyramid.1, &options, &outputs))
             .map(|culling| Culling(Held::new(py, culling)))
     }
 

@@ -12,7 +12,9 @@ mod culling;
 mod device;
 mod errors;
 mod held;
+mod options;
 mod reference;
+#[cfg(feature = "yardstick")]
 mod yardstick;
 
 /// The compiled engine of `hizvk`.
@@ -31,6 +33,14 @@ mod _core {
     use crate::held::{after_fork, before_fork, let_go};
     #[pymodule_export]
     use crate::reference::{reference_classify, reference_pyramid};
+
+    /// For tests.
+    #[cfg(feature = "testing")]
+    #[pymodule_export]
+    use crate::options::options_text;
+
+    /// For benchmarks of single submits.
+    #[cfg(feature = "yardstick")]
     #[pymodule_export]
     use crate::yardstick::{Yardstick, YardstickCull, YardstickReduction};
 
@@ -43,9 +53,10 @@ mod _core {
     #[expect(non_upper_case_globals, reason = "the name is Python's")]
     const __build__: &str = if cfg!(debug_assertions) { "development" } else { "release" };
 
+    /// Whether `HIZVK_PLANTED_FAULT` replaces texts in the shaders.
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "the name is Python's")]
-    const takes_planted_faults: bool = crate::device::TAKES_PLANTED_FAULTS;
+    const takes_planted_faults: bool = cfg!(feature = "testing");
 
     #[pymodule_init]
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {

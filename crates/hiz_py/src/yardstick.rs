@@ -13,9 +13,9 @@ use pyo3::prelude::*;
 
 use crate::arguments::in_c_order;
 use crate::camera::Camera;
-use crate::culling::CullArguments;
 use crate::device::{DepthImage, Engine};
 use crate::held::{Held, OnDevice, detached};
+use crate::options::Request;
 
 /// Milliseconds on the wall of single submits on one device.
 #[pyclass(frozen, module = "hizvk._core")]
@@ -97,34 +97,16 @@ impl Yardstick {
         camera: &Camera,
         pyramid: &crate::device::Pyramid,
         certified: bool,
-        hierarchy: Option<bool>,
-        order: &str,
-        outputs: (bool, bool, bool, bool),
+        options: &Bound<'_, PyAny>,
+        outputs: &Bound<'_, PyAny>,
         depth: Option<&DepthImage>,
     ) -> PyResult<YardstickCull> {
-        let defaults = CullOptions::default();
-        let arguments = CullArguments {
-            order,
-            coverage: "area",
-            guard_px: None,
-            depth_slack: defaults.depth_slack,
-            depth_slack_abs: defaults.depth_slack_abs,
-            transform_slack: defaults.transform_slack,
-            footprint: 2,
-            descent: defaults.descent,
-            fit: "rectangle",
-            hierarchy,
-            outputs,
-            capacity: None,
-            draw: (0, 0, 0, 0),
-            statistics: false,
-        };
-        let (options, output) = (arguments.options()?, arguments.output());
+        let Request { options, outputs } = Request::new(options, outputs)?;
         let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
         let depth = depth.map(|depth| depth.0.get(py)).transpose()?;
         let prepare = |engine: &headless::Engine| {
             Ok(Cull {
-                visible: engine.context().create_visible(&instances, &output)?,
+                visible: engine.context().create_visible(&instances, &outputs)?,
                 engine: engine.clone(),
                 instances: Arc::clone(&instances),
                 camera: camera.0.clone(),

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from .._arguments import Size
-    from ..device import Levels
+    from .._types import Levels
+    from ..options import CullOptions
 
 __all__ = ["DESCENT", "Configuration", "DepthVariant", "matrix", "promised", "render_options"]
 
@@ -116,6 +117,10 @@ class Configuration:
             for name in ("footprint", "descent", "fit", "coverage", "order")
         }
         return options | ({} if self.guard_px is None else {"guard_px": self.guard_px})
+
+    def options(self, base: CullOptions) -> CullOptions:
+        """`base`, with what this configuration says in the place of its fields."""
+        return replace(base, **self.cull_options())
 
     def render_options(self, full: Size) -> dict[str, Any]:
         """The keyword arguments of `Device.render_depth` for a view of `full` pixels."""

@@ -9,7 +9,7 @@ Of the others, the one that keeps less is right more often.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -18,9 +18,11 @@ from .. import _arguments
 from ..bounds import Boxes, OrientedBoxes, Spheres, are_points
 from ..camera import Camera
 from ..depth import DepthArray, checked_image
-from ..device import Device, stored_levels
+from ..device import Device, maker_of
+from ..mesh import A_MESH, meshes_of
 from ..oneline import default_device
-from ..resources import A_MESH, DepthImage, Instances, Occluders, meshes_of
+from ..options import CullOptions, cull_options
+from ..resources import DepthImage, Instances, Occluders
 from . import checking
 from .configurations import Configuration, DepthVariant, promised, render_options
 from .pareto import front
@@ -28,13 +30,16 @@ from .results import Spread, spread
 from .stages import Stopwatch, cull
 
 if TYPE_CHECKING:
+    from typing import Unpack
+
     import numpy.typing as npt
 
     from .._arguments import Size
+    from .._types import DepthKind
     from ..bounds import Bounds
-    from ..depth import DepthKind
-    from ..device import Coverage
-    from ..resources import MeshLike, Pyramid
+    from ..mesh import MeshLike
+    from ..options import OptionKeywords
+    from ..resources import Pyramid
     from ..result import CullResult
 
 __all__ = ["Candidate", "Recommendation", "choose", "recommend"]
@@ -74,6 +79,8 @@ class Candidate:
     """False for what is shown for comparison alone: sample coverage, where every ray counts."""
     bounds: Bounds | Instances | None = field(default=None, repr=False, compare=False)
     """What `recommend` was given of this kind: pass it to `Device.instances`, if it is not uploaded already."""
+    options: CullOptions = field(default=CullOptions(), repr=False)
+    """How it culls: pass it to `Device.cull`."""
 
     @property
     def safe(self) -> bool:
@@ -87,8 +94,8 @@ class Candidate:
 
     @property
     def cull_options(self) -> dict[str, Any]:
-        """Keyword arguments for `Device.cull`."""
-        return self.configuration.cull_options()
+        """`options` as keyword arguments for `Device.cull`."""
+        return asdict(self.options)
 
     @property
     def pyramid_options(self) -> dict[str, Any]:
@@ -135,7 +142,7 @@ class Candidate:
         if (occluders is None) == (depth is None):
             got = "neither" if occluders is None else "both"
             raise TypeError(f"occluders, depth: expected exactly one of them, got {got}")
-        device = instances.device
+        device = maker_of(instances)
         if occluders is not None:
             depth = device.render_depth(occluders, camera, **self.render_options(camera.size))
         elif render_options(self.configuration.depth, camera.size):
@@ -147,7 +154,7 @@ class Candidate:
             pyramid = device.pyramid(depth, **self.pyramid_options)
         else:
             pyramid = device.pyramid(depth, camera, **depth_options, **self.pyramid_options)  # type: ignore[arg-type]
-        return device.cull(instances, pyramid.camera, pyramid, **self.cull_options)
+        return device.cull(instances, pyramid.camera, pyramid, self.options)
 
     def __str__(self) -> str:
         return str(self.configuration)
@@ -232,10 +239,11 @@ def recommend(
     scale: float = 1.0,
     invalid: Collection[float] | None = None,
     device: Device | None = None,
-    coverage: Coverage = "area",
+    options: CullOptions | None = None,
     max_ms: float | None = None,
     kept_within: float = 1.05,
     repetitions: int = 5,
+    **keywords: Unpack[OptionKeywords],
 ) -> Recommendation:
     """Measures configurations on a scene of one's own, checks them there, and recommends one.
 
@@ -283,13 +291,17 @@ def recommend(
         What the numbers of `depths` are, as in `Device.pyramid`.
     device : Device, optional
         None: that of the occluders or instances, else one that is made at the first call and kept.
-    coverage : "area" or "sample"
-        What counts as seen.
-        ``"area"``: what any ray of the view meets, as for multisampling, jitter, larger images, and
-        points.
-        Candidates of sample coverage are shown beside the others then, and never recommended.
-        ``"sample"``: what covers a pixel's centre; right for a renderer with one sample a pixel,
-        the same viewport and no jitter.
+    options : CullOptions, optional
+        What every candidate has in common; None takes the defaults.
+        ``footprint``, ``descent``, ``fit`` and ``order`` are what candidates differ in, so theirs
+        take the place of those given.
+
+        ``coverage`` says what counts as seen.
+        With ``"area"`` it is what any ray of the view meets, as for multisampling, jitter, larger
+        images, and points.
+        Candidates of sample coverage are then shown for comparison, and never recommended.
+        With ``"sample"`` it is what covers the centre of a pixel: right for a renderer with one
+        sample per pixel, the same viewport and no jitter.
         Plain depth is proven for that.
     max_ms : float, optional
         Budget for each camera in milliseconds.
@@ -298,6 +310,8 @@ def recommend(
         keeps least.
     repetitions : int
         How often each is timed, beside the first call.
+    **keywords
+        Any field of `CullOptions`, in the place of that of `options`.
 
     Returns
     -------
@@ -332,7 +346,8 @@ def recommend(
     if (occluders is None) == (depths is None):
         got = "neither" if occluders is None else "both"
         raise TypeError(f"occluders, depths: expected exactly one of them, got {got}")
-    coverage = _arguments.choice("coverage", coverage, ("area", "sample"))  # type: ignore[assignment]
+    options = cull_options(options, keywords)
+    coverage = options.coverage
     if max_ms is not None:
         max_ms = _arguments.number("max_ms", max_ms, above=0.0)
     kept_within = _arguments.number("kept_within", kept_within, at_least=1.0)
@@ -370,7 +385,7 @@ def recommend(
             for turn in range(len(chosen)):
                 number = (turn + repetition * len(chosen) // (repetitions + 1) + k) % len(chosen)
                 one = chosen[number]
-                mask, *both = cull(device, volumes[one.volume], made[one.depth][0], one)
+                mask, *both = cull(device, volumes[one.volume], made[one.depth][0], one, options)
                 culling[number, repetition, k], reading[number, repetition, k] = both
                 if repetition == 0:
                     masks[number].append(mask)
@@ -391,7 +406,7 @@ def recommend(
         Candidate(
             one, total[k], spread(culling[k, 1:]), kept[k], False, check.hides[k], check.unclear[k],
             proven=one.promises_rays or not every_ray, asked=coverage == "sample" or one.coverage == "area",
-            bounds=alternatives[one.volume],
+            bounds=alternatives[one.volume], options=one.options(options),
         )
         for k, one in enumerate(chosen)
     ]  # fmt: skip
@@ -442,7 +457,7 @@ class _Source:
         if self._images is not None:
             watch = Stopwatch(self._device)
             pyramid = self._device._pyramid_of(
-                self._images[k], self._views[k], stored_levels(variant.levels)
+                self._images[k], self._views[k], _arguments.stored_levels("levels", variant.levels)
             )
             return pyramid, watch.lap()
         depth, took = self._depth(variant, k)
@@ -579,7 +594,7 @@ def _device_of(occluders: object, alternatives: dict[str, Any]) -> Device | None
     """The device on which something lies already."""
     for thing in (occluders, *alternatives.values()):
         if isinstance(thing, (Occluders, Instances)):
-            return thing.device
+            return maker_of(thing)
     return None
 
 

@@ -47,7 +47,7 @@ from .results import STAGES
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from ..device import Adapter
+    from ..adapter import Adapter
     from .results import Row, SceneResult
 
 __all__ = ["Report", "versions", "write"]

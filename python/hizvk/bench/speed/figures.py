@@ -12,7 +12,7 @@ from .rounds import quartiles
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from ...device import Adapter
+    from ...adapter import Adapter
     from ...scenes import Floats
     from ..results import Spread
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import _arguments, reference
+from .. import _arguments
+from . import reference
 
 if TYPE_CHECKING:
     import numpy.typing as npt

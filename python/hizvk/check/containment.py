@@ -15,15 +15,15 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from . import _core
-from .bounds import Bounds, as_arrays
-from .resources import A_MESH, as_mesh, meshes_of
+from .. import _core
+from ..bounds import Bounds, as_arrays
+from ..mesh import A_MESH, as_mesh, meshes_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
-    from .resources import Mesh, MeshLike
+    from ..mesh import Mesh, MeshLike
 
 __all__ = ["BoundsCheck", "ProxyCheck", "check_bounds", "check_proxy"]
 
