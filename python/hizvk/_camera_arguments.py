@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypedDict
 
 import numpy as np
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
+    from ._arguments import Size
     from ._types import PixelCenter
 
 Vector = tuple[float, float, float]
@@ -76,21 +77,45 @@ _UNDISTORT = "run COLMAP's image_undistorter, and pass the PINHOLE camera that i
 UNIT_TOLERANCE = 1e-2
 
 
-def view(eye: object, target: object, up: object) -> tuple[Vector, Vector, Vector]:
+class View(TypedDict):
+    """From where a camera looks, and which way."""
+
+    eye: Vector
+    target: Vector
+    up: Vector
+
+
+class Image(TypedDict):
+    """The image of a perspective camera, and the planes of its depth."""
+
+    size: Size
+    near: float
+    far: float | None
+    reversed_z: bool
+
+
+def view(eye: object, target: object, up: object) -> View:
     """The three vectors of a view; the engine refuses those that leave it without a direction."""
-    return (
-        _arguments.vector("eye", eye),
-        _arguments.vector("target", target),
-        _arguments.vector("up", up),
-    )
+    return {
+        "eye": _arguments.vector("eye", eye),
+        "target": _arguments.vector("target", target),
+        "up": _arguments.vector("up", up),
+    }
 
 
-def near_far(near: object, far: object) -> tuple[float, float | None]:
-    """The planes of a perspective camera."""
-    near_ = _arguments.number("near", near, above=0.0)
-    if far is None or (isinstance(far, float) and far == math.inf):
-        return near_, None
-    return near_, _arguments.number("far", far, above=near_)
+def perspective_image(size: object, near: object, far: object, reversed_z: object) -> Image:
+    """The arguments that all perspective constructors end with."""
+    sides = _arguments.size("size", size)
+    nearest = _arguments.number("near", near, above=0.0)
+    farthest = None
+    if far is not None and not (isinstance(far, float) and far == math.inf):
+        farthest = _arguments.number("far", far, above=nearest)
+    return {
+        "size": sides,
+        "near": nearest,
+        "far": farthest,
+        "reversed_z": _arguments.flag("reversed_z", reversed_z),
+    }
 
 
 def pixel_center(value: object) -> PixelCenter:
