@@ -412,7 +412,7 @@ class Camera:
             ``clip_from_camera`` for column vectors.
             OpenGL's and glm's memory is column by column: transpose it.
         k : (3, 3)
-            ``[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]`` in pixels from the top-left corner, as
+            ``[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]`` in pixels from the top-left corner.
             nerfstudio writes it beside poses of this kind.
         pixel_center : {"integer", "half"}
             As in `from_opencv`; needed with `k`, and with nothing else.

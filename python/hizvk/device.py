@@ -1,9 +1,10 @@
 """The device: it uploads, renders depth, builds pyramids and culls.
 
-Its methods keep to the order of the data: a depth image (rendered from occluders, or an array)
-becomes a pyramid, and a cull tests instances against the pyramid.
-The interpreter lock is released while the device works; all objects may be used from any thread,
-also at the same time.
+Its methods stand in the order of the data.
+A depth image, rendered from occluders or an array, becomes a pyramid, and a cull tests instances
+against the pyramid.
+The interpreter lock is released while the device works.
+All objects may be used from any thread, also at the same time.
 """
 
 from __future__ import annotations
@@ -49,37 +50,39 @@ class Device:
     Parameters
     ----------
     adapter : str or int, optional
-        Which adapter: its index in `adapters`, or a part of its or its driver's name
+        Which adapter: its index in `adapters`, or a part of its name or of its driver's
         (``"lavapipe"``).
-        None takes what the environment variable ``HIZVK_ADAPTER`` says in the same words, else the
-        best one, GPUs first.
+        None takes the environment variable ``HIZVK_ADAPTER``, which says it in the same way.
+        Without the variable it is the best adapter, GPUs first.
 
     Raises
     ------
     NoAdapterError
-        Without such an adapter; the error lists those there are and how to choose one, or where
-        there is none the line that installs a software driver.
-    TypeError
-        If `adapter` is neither.
+        Without such an adapter.
+        The error lists the adapters and says how to choose one.
+        If there is none, it has the line that installs a software driver.
+    TypeError, ValueError
+        They name the parameter, what it expects and what came.
 
     Notes
     -----
-    Processes: when the interpreter ends, every device is waited for and destroyed, also where
-    modules still name results or where daemon threads cull.
-    What asks a device after that (a function of `atexit` that was registered before this package
-    was imported) gets a `HizError`.
+    **Processes.** When the interpreter ends, every device is waited for and destroyed.
+    That holds also where modules still hold results, or where daemon threads cull.
+    A later call gets a `HizError`, such as one in a function of `atexit` that was registered before
+    this package was imported.
 
-    Forks: no device works in a forked child.
-    There every object of the parent's devices raises a `HizError` when the device is needed;
-    lengths, ``repr`` and arrays that were read before still work.
-    Make a `Device` in the child (a call of `visible` without ``device=`` does), or use
+    **Forks.** No device works in a forked child.
+    There every object of the parent's devices raises a `HizError` when it needs the device.
+    Lengths, ``repr`` and arrays that were read before still work.
+    Make a `Device` in the child, as `visible` without ``device=`` does, or use
     ``multiprocessing.get_context("spawn")``.
-    A fork waits until the calls of other threads are done, so that the child finds no lock of the
-    driver held.
-    A forked child ends without its parent's C exit handlers: those of drivers would wait for
-    threads that the child does not have.
 
-    Threads: any number may use one device, or devices of their own.
+    A fork waits until the calls of other threads are done, so that no lock of the driver is held in
+    the child.
+    A forked child ends without its parent's C exit handlers, because those of drivers would wait
+    for threads that the child does not have.
+
+    **Threads.** Any number may use one device, or devices of their own.
     """
 
     def __init__(self, adapter: str | int | None = None) -> None:
@@ -110,31 +113,31 @@ class Device:
     ) -> Instances:
         """Uploads bounds, once for any number of culls.
 
-        They are stored so that neighbours in space lie together, in groups of 64 with a box around
-        each: neighbours meet the same pixels, and what hides the box hides the group.
-        Masks, indices and `explain` speak of instances by the order in which they came, whatever
-        the stored one.
-        On the device an instance takes its record, 4 bytes for its index and its share of a group's
-        box (`Instances.device_bytes`).
+        Neighbours in space are stored together, in groups of 64 with a box around each.
+        Neighbours meet the same pixels, and what hides the box hides the group.
+        Masks, indices and `CullResult.explain` number the instances as they came, whatever the
+        stored order.
+        On the device an instance takes its record, 4 bytes for its index, and its share of the box
+        of its group (`Instances.device_bytes`).
 
         Parameters
         ----------
         bounds : Spheres, Boxes or OrientedBoxes
-            The volumes.
+            The bounds of the instances.
             Positions may be float64; they are split so that nothing is lost far from the origin.
         strict : bool
-            True refuses bounds that are no volume (NaN, infinite, a negative size, min > max).
-            False keeps them visible, and `Instances.invalid` and `CullStats.invalid` tell of them.
+            True refuses invalid bounds (NaN, infinite, a negative size, min > max).
+            False keeps them visible; `Instances.invalid` lists and `CullStats.invalid` counts them.
         order : "morton" or "given"
             How they are stored.
-            ``"morton"``: sorted along a curve through space (Morton 1966), once, here.
-            ``"given"``: as they come, for arrays that are in such an order already; no sort, and 8
-            bytes an instance less on the host.
+            ``"morton"``: sorted along a curve through space (Morton 1966); the upload sorts once.
+            ``"given"``: as they come, for arrays that are in such an order already.
+            This needs no sort, and 8 bytes less per instance on the host.
 
         Raises
         ------
         TypeError, ValueError
-            For other bounds, or bad ones with ``strict=True``.
+            For other objects, or invalid bounds with ``strict=True``.
             They name the parameter, what it expects and what came.
         LimitError, OutOfMemoryError
             If the device cannot hold them.
@@ -178,19 +181,19 @@ class Device:
         Parameters
         ----------
         vertices : (V, 3) float array; or a Mesh, a mesh of trimesh or Open3D, or a list of them
-            World positions (or the mesh's own, with `transforms`).
-            Objects of other libraries are told by their ``vertices`` and ``faces`` (trimesh) or
+            World positions, or with `transforms` those of the mesh's own space.
+            Objects of other libraries are known by their ``vertices`` and ``faces`` (trimesh) or
             ``triangles`` (Open3D).
-            A list may also hold plain tuples ``(vertices, triangles)`` or ``(vertices, triangles,
-            transforms)``.
+            A list may also hold tuples ``(vertices, triangles)`` or
+            ``(vertices, triangles, transforms)``.
         triangles : (T, 3) integer array
-            Indices of vertices; left out when ``vertices`` is a mesh or a list.
+            Indices of vertices; left out when `vertices` is a mesh or a list.
         transforms : (K, 4, 4) or (4, 4) float array, optional
             ``world_from_mesh`` of each copy; not beside a Mesh or a list, which have their own.
         cull : "none", "back" or "front"
-            Faces that are left out; the front is where the triangle runs counter-clockwise.
-            For closed meshes that are wound so, ``"back"`` draws the same depth for less: a ray
-            enters one by a front face.
+            Which faces are left out; a front face runs counter-clockwise in the image.
+            For closed meshes that are wound so, ``"back"`` draws the same depth for less, because a
+            ray enters such a mesh by a front face.
 
         Raises
         ------
@@ -215,24 +218,27 @@ class Device:
     ) -> DepthImage:
         """Renders occluders into a depth image that stays on the device.
 
-        The plain image is rasterised: it knows the depth at the pixels' centres, up to the grid to
-        which the driver moves corners (1/256 pixel on lavapipe, 1/16 at most), and a cull by it
-        promises for an image of that size and those samples.
-        In a larger image of the same view, or at other samples (multisampling, jitter), a gap may
-        show that no centre hit, with something behind it that was culled.
-        And it hides points that lie on their own occluder: of a mesh's own visible vertices nearly
-        half (44 to 47 % of the meshes in ``docs/guide.md``), for between two centres the surface is
-        farther than at one of them.
+        **The plain image** is rasterised: it knows the depth at the pixels' centres.
+        The driver moves corners to a grid, of 1/256 pixel on lavapipe and at most 1/16.
+        A cull by it promises for an image of that size and those samples, with two limits:
 
-        The conservative image promises for every image of the same view, whatever its size, sample
-        positions and jitter, and hides none of a mesh's own visible vertices: **every ray through
-        the closed square of a pixel meets an occluder at the pixel's depth or nearer**; where that
-        cannot be shown the pixel is far.
-        So render it small, and a cull by it (``coverage="area"``, the default) never hides what can
+        - A larger image of the same view, multisampling or jitter may show a gap that no centre
+          hit, with something behind it that was culled.
+        - It hides points that lie on their own occluder, because between two centres the surface
+          may be farther than at one of them: of the visible vertices of the meshes in
+          ``docs/guide.md``, 44 to 47 %.
+
+        **The conservative image** promises for every image of the same view, whatever its size,
+        sample positions and jitter, and hides none of a mesh's own visible vertices.
+        Every ray through the closed square of a pixel meets an occluder at the pixel's depth or
+        nearer.
+        Where that cannot be shown, the pixel is far.
+
+        So it can be small: a cull by it with ``coverage="area"``, the default, never hides what can
         be seen in a large image.
-        It is a proof about the exact triangles, given float64 positions included, whatever the
-        mesh: open, folded, intersecting itself or wrong way round.
-        Cracks between triangles that do not share their vertices' exact positions count as gaps.
+        The proof is about the exact triangles, float64 positions included, for any mesh: open,
+        folded, intersecting itself or wound the wrong way.
+        Cracks between triangles that do not share exact positions of vertices count as gaps.
 
         Parameters
         ----------
@@ -241,19 +247,19 @@ class Device:
         camera : Camera
             The view.
         size : (height, width), optional
-            Another image size for the same view; the image's camera is then
-            ``camera.resized(size)``, and the cull promises for that image, or with `conservative`
-            for every image of the view.
+            Another image size for the same view.
+            The image's camera is then ``camera.resized(size)``.
+            The cull promises for that image, or with `conservative` for every image of the view.
         conservative : bool
             True makes the conservative image, on the host in float64, and uploads it.
-            Its price is time (tens of milliseconds for tens of thousands of triangles in 256x144
-            pixels, and more in larger images), and that pixels at silhouettes have the depth of
-            what is behind.
-            ``docs/occluders.md`` has the proof and what was measured.
+            It takes time: tens of milliseconds for tens of thousands of triangles in 256x144
+            pixels, and more in larger images.
+            Pixels at silhouettes have the depth of what is behind.
+            ``docs/occluders.md`` has the proof and measurements.
         refinement : int
             For `conservative`, 0..8: how often a pixel is quartered where no surface covers all of
             it.
-            Each step finds a little more and costs time at silhouettes; any number is right.
+            Each step finds a little more and costs time at silhouettes; any number is safe.
 
         Raises
         ------
@@ -265,7 +271,7 @@ class Device:
         References
         ----------
         Akenine-Moller and Aila, "Conservative and tiled rasterization using a modified triangle
-        set-up" (2005): what a pixel needs to be covered by one triangle.
+        set-up" (2005): when one triangle covers a pixel.
         The step to whole surfaces is this library's own.
         """
         _arguments.instance("occluders", occluders, Occluders, "Occluders of Device.occluders")
@@ -322,49 +328,56 @@ class Device:
         ----------
         depth : DepthImage or (height, width) array
             A rendered image of this device, alone; or an array, with `camera` and `kind`.
-            Arrays are float, or uint16 for the kinds ``"z"`` and ``"distance"``; row 0 is the top
-            of the image.
-            What rounding to float16 may have cost (2^-10 of each number, and 2^-24) is counted, and
-            of the kinds ``"z"`` and ``"distance"`` what rounding to float32 may have (2^-24 of each
-            number).
-            Whole numbers and float64 count as exact.
+            Arrays are float, or uint16 for the kinds ``"z"`` and ``"distance"``.
+            Row 0 is the top of the image.
             What is masked in a masked array is "no data".
+
+            A cull allows for what the dtype may have rounded:
+
+            - float16: 2^-10 of each number, and 2^-24.
+            - float32 of the kinds ``"z"`` and ``"distance"``: 2^-24 of each number.
+            - Whole numbers and float64 count as exact.
         camera : Camera
             The camera that saw the array; its size is the array's shape.
         kind : {"ndc", "reversed_ndc", "z", "distance"}
             What the array's numbers are; there is no default, because a wrong guess hides things.
 
-            ``"ndc"``: depth buffer values, 0 near and 1 far (a camera with ``reversed_z=False``);
-            ``"reversed_ndc"``: 1 near and 0 far (``reversed_z=True``); ``"z"``: depth along the
-            view direction in world units; ``"distance"``: distance to the eye along the pixel's ray
-            in world units.
+            - ``"ndc"``: depth buffer values, 0 near and 1 far (a camera with ``reversed_z=False``).
+            - ``"reversed_ndc"``: depth buffer values, 1 near and 0 far (``reversed_z=True``).
+            - ``"z"``: depth along the view direction in world units.
+            - ``"distance"``: distance to the eye along the pixel's ray in world units.
 
-            "No data" is as far as can be: NaN, infinity, `invalid`, and what lies outside the
-            camera's planes.
-            For z and distance zero and negative numbers are "no data", too, but for an orthographic
-            camera with ``near < 0``: it sees behind its eye, so depth of either sign is depth, and
-            so is a float zero.
+            "No data" counts as infinitely far.
+            It is NaN, infinity, the numbers of `invalid`, and what lies outside the camera's
+            planes.
+            For ``"z"`` and ``"distance"`` it is zero and negative numbers, too.
+            An orthographic camera with ``near < 0`` is the exception: it sees behind its eye, so
+            negative numbers and a float zero are depth.
         scale : float
-            World units of one step, for the kinds ``"z"`` and ``"distance"`` (0.001 for
-            millimetres).
+            World units of one step, for the kinds ``"z"`` and ``"distance"``: 0.001 for
+            millimetres.
         invalid : collection of float, optional
-            Which numbers of the array mean "no data", in its own units (before `scale`).
-            None: what its dtype is written with, 0 and 65535 for uint16, 65504 (the greatest) for
-            float16, no number for float32 and float64.
-            ``()``: no number but those that never are depth.
+            Which numbers of the array mean "no data", in its own units, before `scale`.
+            None: those that are usual for its dtype, which are 0 and 65535 for uint16, 65504 (the
+            greatest) for float16, and none for float32 and float64.
+            ``()``: none beside those that never are depth.
         levels : int or pair of int, optional
             Which levels are built, of 1 to 15; level 0, the image itself, is always there.
-            None: all.
-            ``2``: level 2 and all coarser ones.
-            ``(2, 5)``: levels 2 to 5; ``(4, 4)``: level 4 alone, made in one pass.
-            Numbers past the coarsest level, which is one texel, mean that one.
 
-            Fewer levels are built faster and take less memory, and nothing is hidden wrongly, but
-            more is kept: a test reads the next coarser level that there is, and bounds that span
-            more texels of the coarsest one than the footprint has are kept, unless a descent may
-            read that many.
-            Level 1 is the dearest to build; bounds of one or two pixels read the image itself.
-            ``hizvk bench`` measures both sides of the price.
+            - None: all.
+            - ``2``: level 2 and all coarser ones.
+            - ``(2, 5)``: levels 2 to 5.
+            - ``(4, 4)``: level 4 alone, made in one pass.
+
+            Numbers past the coarsest level, which is one texel, mean that level.
+
+            Fewer levels are built faster and take less memory.
+            Nothing is hidden wrongly, but more is kept, because a test reads the next coarser level
+            that is stored.
+            Bounds that span more texels of the coarsest level than the footprint has are kept,
+            unless a descent may read that many.
+            Level 1 costs most to build; bounds of one or two pixels read the image itself.
+            ``hizvk bench`` measures both sides.
 
         Raises
         ------
@@ -378,9 +391,8 @@ class Device:
             for name, value in (("camera", camera), ("kind", kind), ("invalid", invalid)):
                 if value is not None:
                     got = _arguments.describe(value)
-                    raise TypeError(
-                        f"{name}: expected nothing beside a DepthImage, which has its own, got {got}"
-                    )
+                    expected = "nothing beside a DepthImage, which has its own"
+                    raise TypeError(f"{name}: expected {expected}, got {got}")
             if _arguments.number("scale", scale, above=0.0) != 1.0:
                 raise ValueError(
                     f"scale: expected 1 beside a DepthImage, whose depth is NDC, got {scale:g}"
@@ -396,7 +408,7 @@ class Device:
         )
 
     def _pyramid_of(self, image: DepthArray, camera: Camera, stored: tuple[int, int]) -> Pyramid:
-        """The pyramid of an image that was checked before."""
+        """The pyramid of an image that was checked, with the levels `stored`."""
         uploaded = self._engine.upload_depth(*image, camera._inner)
         return Pyramid(self, self._engine.pyramid(uploaded, stored), camera)
 
@@ -458,7 +470,7 @@ class Device:
         return CullResult(self, culling, Question(camera, pyramid, options, instances._points))
 
     def _check_side(self, camera: Camera) -> None:
-        """An image that the device cannot hold is refused before its array is converted."""
+        """Refuses an image that the device cannot hold, before its array is converted."""
         side = max(camera.size)
         if side > self.max_image_side:
             raise LimitError("image side in pixels", side, self.max_image_side)

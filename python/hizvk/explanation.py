@@ -1,4 +1,4 @@
-"""What a cull decides about an instance, and how it came to that."""
+"""What a cull decides about an instance, and how it came to that verdict."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ __all__ = ["Explanation", "Verdict", "explanation_of"]
 class Verdict(enum.IntEnum):
     """What a cull decides about one instance; the codes of `CullResult.verdicts`.
 
-    What is outside and hidden by the depth image as well is `OUTSIDE`, also as a member of a group
-    of 64 that was hidden as a whole.
-    So verdicts do not depend on ``hierarchy=``, but for the few instances that a group's test hides
-    and their own would keep: those are `OCCLUDED`.
+    An instance that is both outside and hidden by the depth image is `OUTSIDE`, also if its group
+    of 64 was hidden as a whole.
+    So verdicts do not depend on ``hierarchy=``, with one exception: the few instances that only the
+    test of their group hides are `OCCLUDED`.
     """
 
     OUTSIDE = 0
-    """Surely outside the view volume, or for ``coverage="sample"`` between all pixel centres:
-    culled."""
+    """Culled: surely outside the view volume, or for ``coverage="sample"`` between all pixel
+    centres."""
     OCCLUDED = 1
-    """Surely behind what the depth image shows, and not surely outside: culled."""
+    """Culled: surely behind what the depth image shows, and not surely outside."""
     VISIBLE = 2
     """Kept: visible, or not provably hidden."""
     INVALID = 3
-    """Kept: its bounds are no volume (NaN, infinite, negative size, min > max, or too large to
+    """Kept: its bounds are invalid (NaN, infinite, a negative size, min > max, or too large to
     compute with)."""
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """How the verdict of one instance came about: the cull's own test of it, run once more.
+    """How the verdict of one instance came about: the cull's test of it, run once more.
 
     A member of a group of 64 that was hidden as a whole was never tested by itself.
-    Its verdict is the group's (see `group`), or `Verdict.OUTSIDE` where its own test says so.
-    Everything else here is its own test, which may have kept it.
+    Its verdict is that of the group (see `group`), or `Verdict.OUTSIDE` where its own test says so.
+    Everything else here is from its own test, which may have kept it.
     """
 
     index: int
@@ -49,36 +49,35 @@ class Explanation:
     reason: str
     """Which step decided, in words."""
     rectangle: tuple[int, int, int, int] | None
-    """Pixels ``(x0, y0, x1, y1)`` that its bounds can meet, both ends included, row 0 on top; None
-    if it never came to that."""
+    """Pixels ``(x0, y0, x1, y1)`` that its bounds can meet, both ends included, row 0 on top.
+    None if the test ended before."""
     level: int | None
     """The level of the pyramid that the footprint was read from."""
     texels: tuple[tuple[int, int], ...]
     """The texels ``(x, y)`` that were read, in order: those of the footprint, then those of a
-    descent; at most the first 4,096."""
+    descent. At most the first 4,096 are listed."""
     texel_depths: tuple[float, ...]
     """Their depths (NDC)."""
     texel_levels: tuple[int, ...]
     """Their levels."""
     texels_read: int
-    """How many were read, those that are not listed included."""
+    """How many texels were read, listed or not."""
     decisive: int | None
-    """Which of the listed texels decided: the farthest one that hides it, or the one that does not.
-    None where no single one did or it is not listed."""
+    """The place in the list of the texel that decided: the farthest one that hides the instance, or
+    the one that does not hide it. None where no single texel did, or it is not listed."""
     farthest: float | None
-    """The farthest depth (NDC) of those that hide it, or the depth that does not."""
+    """The farthest depth (NDC) of the texels that hide it, or the depth that does not hide it."""
     nearest: float | None
     """The nearest depth (NDC) that the bounds can have, an estimate."""
     farthest_z: float | None
-    """`farthest` as view depth in world units, infinite for far. None where the camera's NDC depth
-    alone does not tell it: an orthographic camera made from a bare matrix, an oblique near
-    plane."""
+    """`farthest` as view depth in world units, infinite for far. None where NDC depth alone does
+    not tell it: for an orthographic camera made from a bare matrix, or an oblique near plane."""
     nearest_z: float | None
     """`nearest` as view depth in world units. None for an orthographic camera made from a bare
     matrix."""
     stale: bool
-    """Whether the instance was updated since the cull. Then all this is of its new bounds, and the
-    cull's verdict may be another."""
+    """Whether the instance was updated since the cull. Then all of this is about its new bounds,
+    and the verdict of the cull may be another."""
     group: Explanation | None
     """For a member of a group that was hidden as a whole: the test of the box around the group.
     None for all others."""
@@ -110,7 +109,7 @@ class Explanation:
         return lines
 
     def _reads(self) -> list[str]:
-        """A line for each run of texels of one level, and one for the decisive one; of many, some."""
+        """A line for each of the first runs of texels of one level, and one for the decisive."""
         lines = []
         count = len(self.texels)
         levels = self.texel_levels
@@ -132,8 +131,9 @@ class Explanation:
         return lines
 
 
-#: What the text of an explanation shows: runs of texels of one level, and texels of a run.
+#: How many runs of texels of one level the text of an explanation shows.
 SHOWN_RUNS: Final = 12
+#: How many texels of a run it shows.
 SHOWN_TEXELS: Final = 16
 
 

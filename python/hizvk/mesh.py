@@ -1,4 +1,4 @@
-"""Triangle meshes that hide things: `Mesh`, and meshes of other libraries taken for one."""
+"""Triangle meshes that hide things: `Mesh`, and meshes of trimesh and Open3D taken as one."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class Mesh:
     vertices : (V, 3) float array
         Positions, finite.
     triangles : (T, 3) integer array
-        Indices of vertices; seen from the front they run counter-clockwise.
+        Indices of vertices, counter-clockwise as seen from the front.
     transforms : (K, 4, 4) or (4, 4) float array, optional
-        ``world_from_mesh`` of each copy, last row 0, 0, 0, 1.
-        None: one copy, where the vertices are.
+        ``world_from_mesh`` of each copy; the last row is 0, 0, 0, 1.
+        None: one copy, whose vertices are world positions.
 
     Raises
     ------
@@ -71,7 +71,7 @@ class Mesh:
 
 
 class _HasFaces(Protocol):
-    """A mesh of trimesh."""
+    """What a mesh of trimesh has."""
 
     @property
     def vertices(self) -> Any: ...
@@ -80,7 +80,7 @@ class _HasFaces(Protocol):
 
 
 class _HasTriangles(Protocol):
-    """A mesh of Open3D; `Mesh` is one, too."""
+    """What a mesh of Open3D has, and a `Mesh`."""
 
     @property
     def vertices(self) -> Any: ...
@@ -88,7 +88,7 @@ class _HasTriangles(Protocol):
     def triangles(self) -> Any: ...
 
 
-#: A `Mesh`, or a mesh of another library: told by what it has, so that none needs to be there.
+#: A `Mesh`, or a mesh of another library, known by its attributes: no library has to be there.
 MeshLike: TypeAlias = _HasFaces | _HasTriangles
 
 
@@ -98,7 +98,7 @@ def as_mesh(name: str, value: object, expected: str) -> Mesh:
         return value
     parts = value if isinstance(value, tuple) and 2 <= len(value) <= 3 else _parts(value)
     if parts is None:
-        # A scene of trimesh's holds meshes by name; it has none of its own.
+        # A scene of trimesh holds meshes by name, and is not one itself.
         is_scene = hasattr(value, "geometry") and hasattr(value, "dump")
         hint = (
             "; of a trimesh scene pass scene.to_mesh(), or scene.dump(concatenate=True)"
@@ -113,7 +113,7 @@ def as_mesh(name: str, value: object, expected: str) -> Mesh:
 
 
 def _parts(value: Any) -> tuple[Any, Any] | None:
-    """Vertices and triangles of a mesh of trimesh (`faces`) or Open3D (`triangles`), told by what it has."""
+    """Vertices and triangles of a mesh of trimesh (`faces`) or Open3D (`triangles`), or None."""
     vertices = getattr(value, "vertices", None)
     for name in ("faces", "triangles"):
         triangles = getattr(value, name, None)
@@ -122,12 +122,12 @@ def _parts(value: Any) -> tuple[Any, Any] | None:
     return None
 
 
-#: What `as_mesh` takes, in words.
+#: What `as_mesh` takes, for messages.
 A_MESH: Final = "a Mesh, a mesh of trimesh or Open3D"
 
 
 def meshes_of(name: str, value: object, expected: str) -> list[Mesh]:
-    """One mesh, or a list of them in which plain tuples are welcome, too."""
+    """The meshes of a list, in which plain tuples are welcome, too; or the one mesh that came."""
     if isinstance(value, Mesh) or _parts(value) is not None:
         return [as_mesh(name, value, expected)]
     if not isinstance(value, Sequence) or isinstance(value, (str, bytes)):
@@ -140,12 +140,11 @@ def as_meshes(vertices: Any, triangles: Any, transforms: Any) -> list[Mesh]:
     if triangles is not None:
         return [Mesh(vertices, triangles, transforms)]
     parts = None if isinstance(vertices, Mesh) else _parts(vertices)
-    if transforms is not None and parts is not None:  # it has none of its own
+    if transforms is not None and parts is not None:  # a mesh of another library has none
         return [Mesh(*parts, transforms)]
     if transforms is not None:
         raise TypeError(
             "transforms: expected nothing beside a list of meshes, which have their own"
         )
-    return meshes_of(
-        "vertices", vertices, f"{A_MESH}, or a list of them when triangles is left out"
-    )
+    expected = f"{A_MESH}, or a list of them when triangles is left out"
+    return meshes_of("vertices", vertices, expected)

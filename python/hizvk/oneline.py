@@ -1,4 +1,4 @@
-"""The whole way in one call: bounds and a depth image in, a mask out."""
+"""One call from bounds and a depth image to a mask."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ __all__ = ["visible"]
 
 
 class _Default:
-    """A device that is made at its first use, once."""
+    """A device that is made once, at its first use."""
 
     def __init__(self) -> None:
         self.lock = threading.RLock()
@@ -50,7 +50,7 @@ _defaults: dict[int, _Default] = {}
 
 
 def default_device() -> Device:
-    """The device of callers who bring none; made at the first use, once a process: a forked child has its own."""
+    """The device of callers who bring none: one per process, made at its first use."""
     return per_process(_defaults, _Default).get()
 
 
@@ -66,28 +66,30 @@ def visible(
     options: CullOptions | None = None,
     **keywords: Unpack[OptionKeywords],
 ) -> npt.NDArray[np.bool_]:
-    """Which bounds can be seen: False only for what is surely outside the view or surely behind the depth image.
+    """Which bounds can be seen.
 
+    False is only what is surely outside the view or surely behind the depth image.
     For many calls with the same bounds, upload them once (`Device.instances`) and use
     `Device.cull`.
 
     Parameters
     ----------
     bounds : Spheres, Boxes or OrientedBoxes
-        The N volumes.
+        The N instances.
     camera : Camera
         The camera that saw `depth`.
     depth : (height, width) array or DepthImage
         The depth image, row 0 on top; its shape is the camera's size.
     kind : {"ndc", "reversed_ndc", "z", "distance"}
-        What an array's numbers are (see `Device.pyramid`); left out for a `DepthImage`.
+        What an array's numbers are (see `Device.pyramid`).
+        Left out for a `DepthImage`.
     scale : float
         World units of one step of `depth`, for the kinds ``"z"`` and ``"distance"``.
     invalid : collection of float, optional
-        Which numbers of an array mean "no data", in its own units (before `scale`); None: what its
-        dtype is written with, 0 and 65535 for uint16, 65504 for float16 (see `Device.pyramid`).
+        Which numbers of an array mean "no data", before `scale`.
+        None: those that are usual for its dtype, as in `Device.pyramid`.
     device : Device, optional
-        None: one that is made at the first call and kept.
+        None: the device of `depth`, else one that is made at the first call and kept.
     options : CullOptions, optional
         How the cull decides; None takes the defaults.
     **keywords
@@ -96,7 +98,7 @@ def visible(
     Returns
     -------
     (N,) bool array
-        True for what is kept; bad bounds (NaN, negative sizes) are kept.
+        True for what is kept; invalid bounds (NaN, negative sizes) are kept.
 
     Raises
     ------
@@ -108,9 +110,9 @@ def visible(
     Warns
     -----
     HizWarning
-        Of what is right as it was asked and looks like a mistake: all bounds outside of the view,
-        points of size zero with ``coverage="sample"``, depth that is far everywhere or sparse (see
-        `CullResult.hints`).
+        If the call looks like a mistake, as in `CullResult.hints`: all bounds are outside of the
+        view, points of size zero with ``coverage="sample"``, depth that is far everywhere or
+        sparse.
 
     Examples
     --------
@@ -118,7 +120,8 @@ def visible(
     >>> camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(90, 160), near=0.1)
     >>> image = np.full(camera.size, 12.0)  # a wall
     >>> centers = np.array([[0.0, 0.0, -5.0], [0.0, 0.0, -20.0]])
-    >>> hizvk.visible(hizvk.Boxes(centers - 0.5, centers + 0.5), camera, depth=image, kind="z").tolist()
+    >>> boxes = hizvk.Boxes(centers - 0.5, centers + 0.5)
+    >>> hizvk.visible(boxes, camera, depth=image, kind="z").tolist()
     [True, False]
     """
     as_arrays("bounds", bounds)
@@ -134,9 +137,8 @@ def visible(
             )
         for name, value in (("kind", kind), ("invalid", invalid)):
             if value is not None:
-                raise TypeError(
-                    f"{name}: expected nothing beside a DepthImage, got {_arguments.describe(value)}"
-                )
+                got = _arguments.describe(value)
+                raise TypeError(f"{name}: expected nothing beside a DepthImage, got {got}")
         pyramid = device.pyramid(depth, scale=scale)
     else:
         if device is not None:

@@ -200,7 +200,7 @@ class Pyramid(_Seen, Stored[_core.Pyramid]):
 
     @property
     def levels(self) -> range:
-        """The stored levels, which ``levels=`` asked for; level 0, the image, can always be read."""
+        """The stored levels, as ``levels=`` asked for; level 0, the image, can always be read."""
         stored = self._inner.stored_levels()
         return range(0) if stored is None else range(stored[0], stored[1] + 1)
 

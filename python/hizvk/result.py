@@ -1,8 +1,8 @@
-"""What a cull answers: who is visible, in a mask, a list and draw arguments, and how each verdict came about.
+"""What a cull answers: a mask, a list, draw arguments and counts, and how each verdict came about.
 
-Nothing is read from the device before it is asked for; what was read is kept.
-The arrays are shared with the next one who asks, so they are read-only: ``.copy()`` gives one to
-write to, and DLPack (``torch.from_dlpack``) gets a copy.
+Nothing is read from the device before it is asked for, and what was read is kept.
+Later reads get the same arrays, so they are read-only.
+``.copy()`` makes one that can be written to, and DLPack (``torch.from_dlpack``) gets a copy.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 __all__ = ["DRAW_DTYPE", "CullResult"]
 
-#: One record of Vulkan's ``VkDrawIndexedIndirectCommand`` (WebGPU's ``DrawIndexedIndirect``): 20 bytes.
+#: One record of Vulkan's ``VkDrawIndexedIndirectCommand`` (``DrawIndexedIndirect`` of WebGPU).
+#: It has 20 bytes.
 DRAW_DTYPE: np.dtype[np.void] = np.dtype(
     [
         ("index_count", "<u4"),
@@ -39,21 +40,22 @@ DRAW_DTYPE: np.dtype[np.void] = np.dtype(
 
 
 class SharedArray(np.ndarray):
-    """A read-only array that all who ask for it share.
+    """A read-only array that every read returns.
 
-    What is computed from it is a plain array, and whoever imports it by DLPack gets a copy.
-    An older DLPack cannot say that memory is read-only, so NumPy refuses to export such arrays, and
-    consumers of the newer one need not heed it.
+    What is computed from it is a plain array, and an import by DLPack gets a copy.
+    Older versions of DLPack cannot say that memory is read-only, so NumPy refuses to export such
+    arrays.
+    Newer versions can say it, but consumers need not heed it.
     """
 
     def __dlpack__(self, **options: Any) -> Any:
-        """A capsule of a copy, to be written to; ``copy=False`` is refused as by NumPy."""
+        """A capsule of a copy that can be written to; ``copy=False`` is refused as by NumPy."""
         if self.flags.writeable or options.get("copy") is False:
             return super().__dlpack__(**options)
         return np.array(self, copy=True, subok=False).__dlpack__(**options)
 
     def __array_wrap__(self, array: Any, context: Any = None, return_scalar: bool = False) -> Any:
-        """What a ufunc makes of it is no shared array."""
+        """The result of a ufunc is a plain array."""
         return array[()] if return_scalar or array.ndim == 0 else array.view(np.ndarray)
 
     def __reduce__(self) -> Any:
@@ -72,8 +74,7 @@ def _shared(array: npt.NDArray[np.generic]) -> Any:
 class CullResult(OnDevice[_core.Culling]):
     """The answer of `Device.cull`; reading any part of it waits for the device.
 
-    Not made by hand.
-    May be read from any thread.
+    It is made by `Device.cull` alone, and may be read from any thread.
     """
 
     def __init__(self, device: Maker, culling: _core.Culling, question: Question) -> None:
@@ -88,23 +89,26 @@ class CullResult(OnDevice[_core.Culling]):
     def verdicts(self) -> npt.NDArray[np.uint8]:
         """``(N,)`` uint8: the `Verdict` of each instance.
 
-        It is of the bounds that were culled, also where they were updated before it is read.
+        They are about the bounds that were tested, also if these were updated before the read.
         """
         return _shared(self._inner.verdicts())  # type: ignore[no-any-return]
 
     @cached_property
     def mask(self) -> npt.NDArray[np.bool_]:
-        """``(N,)`` bool: True for what is kept. It holds every instance, whatever the capacity."""
+        """``(N,)`` bool: True for what is kept; complete, whatever the capacity of the list."""
         return _shared(self._inner.mask())  # type: ignore[no-any-return]
 
     @cached_property
     def indices(self) -> npt.NDArray[np.uint32]:
-        """``(count,)`` uint32: the instances in the draw's list; ascending for ``order="stable"``."""
+        """``(count,)`` uint32: the list of kept instances; ascending for ``order="stable"``."""
         return _shared(self._inner.indices())  # type: ignore[no-any-return]
 
     @cached_property
     def draws(self) -> npt.NDArray[np.void]:
-        """``(D,)`` of `DRAW_DTYPE`: the indirect draw arguments, one record for each piece of the instances."""
+        """``(D,)`` of `DRAW_DTYPE`: the indirect draw arguments.
+
+        There is one record for each piece of the instances (`Instances.num_pieces`).
+        """
         return np.frombuffer(self._inner.draws(), dtype=DRAW_DTYPE)
 
     @cached_property
@@ -117,18 +121,17 @@ class CullResult(OnDevice[_core.Culling]):
 
     @property
     def count(self) -> int:
-        """Instances in the draw's list: `demand`, or less where the capacity was too small."""
+        """Instances in the list: `demand`, or fewer if the capacity was too small."""
         return self._demand_and_written[1]
 
     @property
     def demand(self) -> int:
-        """Instances that were kept and belong into the list; more than `count` if the capacity was too small.
+        """Instances that were kept; more than `count` if the capacity was too small.
 
         Raises
         ------
         ValueError
-            For a full list of a cull that was asked for nothing else: ask for ``"mask"`` or
-            ``"verdicts"`` as well.
+            If the list is full and the cull made neither mask nor verdicts, which would tell.
         """
         demand = self._demand_and_written[0]
         if demand is None:
@@ -144,7 +147,7 @@ class CullResult(OnDevice[_core.Culling]):
         Raises
         ------
         ValueError
-            Of a cull that was not asked for verdicts.
+            If the cull was not asked for verdicts.
         """
         counts = self._counts
         counted = self._question.options.statistics
@@ -166,24 +169,26 @@ class CullResult(OnDevice[_core.Culling]):
         )
 
     def hints(self) -> tuple[str, ...]:
-        """What looks like a mistake, in sentences; empty where nothing does.
+        """What looks like a mistake, in sentences; empty if nothing does.
 
-        Everything outside of the view, points of size zero with ``coverage="sample"``, depth that
-        is far everywhere or sparse.
-        It is cheap beside a cull, but for an image that hides nothing, which may be read back.
+        - Everything is outside of the view.
+        - The bounds are points of size zero, with ``coverage="sample"``.
+        - Depth is far everywhere, or sparse.
+
+        It is cheap beside a cull, except for an image that hides nothing, which may be read back.
 
         Raises
         ------
         ValueError
-            As `stats`, where the cull was not asked for verdicts.
+            If the cull was not asked for verdicts, as for `stats`.
         """
         return self._question.hints(self.stats)
 
     def explain(self, index: int) -> Explanation:
         """Pixel rectangle, level, texels, depths and verdict of one instance.
 
-        The test is run again, of the bounds as they are now; `Explanation.stale` says where those
-        are not the ones that were culled.
+        The test is run again, on the current bounds.
+        `Explanation.stale` says whether these are others than the cull tested.
 
         Parameters
         ----------

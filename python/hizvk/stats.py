@@ -11,10 +11,9 @@ __all__ = ["CullStats"]
 class CullStats:
     """The numbers of one cull.
 
-    ``tested = outside + occluded + kept``, and `invalid` of those that were kept have no valid
-    bounds.
-    They are the counts of `CullResult.verdicts`.
-    The four times are told by the clock on the wall.
+    ``tested = outside + occluded + kept``, and `invalid` of the kept ones have invalid bounds.
+    These are the counts of `CullResult.verdicts`.
+    The four times are wall-clock times.
     """
 
     tested: int
@@ -24,13 +23,13 @@ class CullStats:
     occluded: int
     """Culled: `Verdict.OCCLUDED`."""
     kept: int
-    """Not culled, `invalid` ones included (also those for which `capacity` left no place)."""
+    """Not culled, `invalid` ones included, and those for which `capacity` left no place."""
     invalid: int
-    """Kept because their bounds are no volume."""
+    """Kept because their bounds are invalid."""
     tested_groups: int
     """Groups of 64 that were tested as a whole."""
     tested_instances: int
-    """Instances that were tested by themselves: all, or those of the groups that were left."""
+    """Instances that were tested by themselves: all, or those of the groups that remained."""
     levels: tuple[int, ...] | None
     """How many groups and instances were compared with the pyramid on each level; None without
     ``statistics=True``."""
@@ -39,25 +38,26 @@ class CullStats:
     record_ms: float
     """Milliseconds to make buffers and record the commands."""
     compile_ms: float
-    """Milliseconds to make the pipelines that were not there yet, the driver's own compiling
-    included; 0 for a cull like an earlier one."""
+    """Milliseconds to make pipelines that did not exist yet, compiling by the driver included; 0
+    for a cull like an earlier one."""
     wall_ms: float
-    """Milliseconds from the submission until the device was seen to be done. What was submitted
-    before it and was not done yet comes first, so it counts. The device tells when it is asked: by
-    each read, wait and submission. Who does something else before the first of them finds more than
-    the device took."""
+    """Milliseconds from the submission until the device was seen to be done.
+
+    Work that was submitted before and was not done yet counts, because it comes first.
+    The device is asked by each read, wait and submission.
+    So time that passes before the first of these counts, too."""
     readback_ms: float
     """Milliseconds spent so far on copying results to the host."""
 
     @property
     def comparisons(self) -> int:
-        """Tests spent, of groups and of instances; a flat cull spends `tested`."""
+        """Tests of groups and of instances together; a cull without groups spends `tested`."""
         return self.tested_groups + self.tested_instances
 
     def __str__(self) -> str:
         culled = self.outside + self.occluded
         return (
-            f"{self.tested:,} tested: {self.kept:,} kept ({self.invalid:,} invalid), {culled:,} culled "
-            f"({self.outside:,} outside, {self.occluded:,} occluded); "
+            f"{self.tested:,} tested: {self.kept:,} kept ({self.invalid:,} invalid), "
+            f"{culled:,} culled ({self.outside:,} outside, {self.occluded:,} occluded); "
             f"{self.wall_ms:.2f} ms until the device was done"
         )

@@ -1,10 +1,10 @@
-"""Checks that need no device: what a cull should answer, and whether its inputs are what they claim.
+"""Checks that need no device, of what a cull answers and of what it is given.
 
-===============  ==================================================================================
+===============  ================================================================================
 `reference`      the oracle: which instances are hidden, in float64 and exact arithmetic
 `comparison`     a mask beside the truth: false culls and false keeps
 `containment`    whether occluder proxies lie inside their mesh, and meshes inside their bounds
-===============  ==================================================================================
+===============  ================================================================================
 """
 
 from __future__ import annotations

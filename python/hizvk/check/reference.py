@@ -1,8 +1,8 @@
-"""The oracle: what a cull may and may not hide, in float64 and exact arithmetic, by brute force and without a GPU.
+"""The oracle: what a cull may and may not hide, by brute force and without a GPU.
 
-It shares no code with the engine.
-It is slow (it looks at every pixel that an instance can meet), so it is for tests and for the last
-word about single instances.
+It decides in float64 and exact arithmetic, and shares no code with the engine.
+It looks at every pixel that an instance can meet, so it is slow.
+Use it in tests, and for the last word about single instances.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 __all__ = ["HIDDEN", "INVALID", "UNDECIDED", "VISIBLE", "classify", "pyramid"]
 
 HIDDEN: Final = 1
-"""Surely hidden: outside the view, or every pixel that the bounds can meet shows something nearer."""
+"""Surely hidden: outside the view, or every pixel that it can meet shows something nearer."""
 VISIBLE: Final = 2
 """Surely visible: some pixel meets the bounds and shows nothing nearer."""
 INVALID: Final = 3
-"""The bounds are no volume; a cull has to keep them."""
+"""The bounds are invalid; a cull has to keep them."""
 UNDECIDED: Final = 4
-"""Too close to call: hidden or not by which of the two float32 next to a converted depth is taken."""
+"""Too close to call: it depends on which of the two float32 around a converted depth is taken."""
 
 
 def classify(
@@ -59,14 +59,15 @@ def classify(
         The depth image, row 0 on top.
     kind, scale, invalid
         What its numbers are, as in `Device.pyramid`.
-        The oracle finds the NDC depth of ``"z"`` and ``"distance"`` by itself, exactly, between two
-        neighbouring float32.
+        For ``"z"`` and ``"distance"`` the oracle finds the NDC depth by itself, exactly, between
+        two neighbouring float32.
     coverage : "area" or "sample"
-        What of a pixel counts: its closed square, or its centre.
+        Which part of a pixel counts: its closed square, or its centre.
     own_depth : "nearest" or "pixel"
-        A pixel hides the bounds if it is nearer than all of them (``"nearest"``: what
-        ``fit="rectangle"`` may cull at most), or than the part of them that it can show
-        (``"pixel"``, for ``fit="volume"``).
+        When a pixel hides the bounds.
+        ``"nearest"``: if it is nearer than all of them; ``fit="rectangle"`` culls no more than
+        that.
+        ``"pixel"``: if it is nearer than the part of them that it can show; for ``fit="volume"``.
 
     Returns
     -------
@@ -85,7 +86,7 @@ def classify(
         _arguments.choice("coverage", coverage, words(Coverage)),
         _arguments.choice("own_depth", own_depth, words(OwnDepth)),
     )
-    # The image as given: what half floats have rounded is no part of it.
+    # The image as given: the tolerance for half floats is not part of the truth.
     image = (checked.image, checked.kind, checked.scale, checked.invalid)
     return _core.reference_classify(bounds_kind, arrays, camera._inner, *image, *asked)
 
@@ -103,7 +104,7 @@ def pyramid(depth: npt.ArrayLike, *, reversed_z: bool) -> list[npt.NDArray[np.fl
     Returns
     -------
     list of (height, width) float32 arrays
-        Level ``k`` has ``ceil(side / 2^k)`` texels a side; the last is 1x1.
+        Level ``k`` has ``ceil(side / 2^k)`` texels per side; the last is 1x1.
 
     Raises
     ------
