@@ -1,4 +1,4 @@
-//! The answer of a cull, read on request.
+//! The answer of a cull, which is read on request.
 
 use hiz_core::headless;
 use numpy::PyArray1;
@@ -55,12 +55,12 @@ impl Culling {
         })
     }
 
-    /// How many instances are kept, and how many of them are listed.
+    /// How many instances were kept, if that is known, and how many of them are listed.
     fn demand_and_written(&self, py: Python<'_>) -> PyResult<(Option<u64>, u64)> {
         self.0.run(py, headless::Culling::demand_and_written)
     }
 
-    /// Milliseconds to record, to compile, until the device was done, and to read back.
+    /// Milliseconds for recording, for compiling, until the device was done, and for readback.
     fn timings(&self, py: Python<'_>) -> PyResult<(f64, f64, f64, f64)> {
         let timings = self.0.get(py)?.timings();
         Ok((timings.record_ms, timings.compile_ms, timings.wall_ms, timings.readback_ms))
@@ -71,7 +71,7 @@ impl Culling {
     }
 }
 
-/// How many instances met which fate.
+/// How many instances got which verdict, and how many tests that took.
 #[pyclass(frozen, get_all, module = "hizvk._core")]
 pub(crate) struct Counts {
     tested: u64,
@@ -113,7 +113,7 @@ impl Explanation {
         self.0.level
     }
 
-    /// Level, column, row and depth of each.
+    /// Level, column, row and depth of each texel.
     #[getter]
     fn texels(&self) -> Vec<(u32, u32, u32, f32)> {
         let told = &self.0;

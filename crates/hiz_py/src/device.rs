@@ -1,4 +1,4 @@
-//! The device and what lives on it.
+//! The device, and the objects on it.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::culling::Culling;
 use crate::held::{Held, OnDevice, detached};
 use crate::options::Request;
 
-/// Index, name, driver, its version, backend, type.
+/// Index, name, driver, version of the driver, backend, device type.
 type Summary = (usize, String, String, String, String, String);
 
 fn summary(adapter: &AdapterSummary) -> Summary {
@@ -36,9 +36,10 @@ fn open(adapter: Option<&str>) -> hiz_core::Result<headless::Engine> {
     headless::Engine::new(adapter)
 }
 
-/// `HIZVK_PLANTED_FAULT` (`what => by what`, one a line) replaces texts in the shaders, as for the
-/// Rust tests: does a Python test turn red?
-/// A build without the feature `testing` has no word of it.
+/// Opens a device whose shaders may have planted faults, so that a Python test can be seen to fail.
+/// `HIZVK_PLANTED_FAULT` replaces texts in the shaders, as for the Rust tests: `what => by what` on
+/// each line.
+/// A build without the feature `testing` does not read it.
 #[cfg(feature = "testing")]
 fn open(adapter: Option<&str>) -> hiz_core::Result<headless::Engine> {
     let planted = std::env::var("HIZVK_PLANTED_FAULT").unwrap_or_default();
@@ -154,8 +155,7 @@ impl Engine {
             .map(|depth| DepthImage(Held::new(py, depth)))
     }
 
-    /// `rounding`: to which floats the numbers had been rounded before they came, "none", "single"
-    /// or "half".
+    /// `rounding` says to which floats the numbers were rounded before: "none", "single" or "half".
     #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn upload_depth(
         &self,
@@ -180,7 +180,7 @@ impl Engine {
         };
         let camera = &camera.0;
         let upload = |engine: &headless::Engine| match image {
-            // Already what is uploaded: no copy in between.
+            // The numbers already are what is uploaded, so they are not copied.
             Floats::F32(ndc) if kind == own_kind && scale == 1.0 && invalid.is_empty() => {
                 engine.upload_depth_within(ndc, camera, tolerance)
             }
@@ -225,8 +225,8 @@ impl Engine {
         self.0.run(py, headless::Engine::wait)
     }
 
-    /// For tests: what the engine itself says in a fork, where [`Held::get`] speaks first; and a
-    /// clone of it is dropped.
+    /// For tests: the engine's own error in a fork, which the error of [`Held::get`] usually hides.
+    /// It also drops a clone of the engine there.
     fn wait_without_guard(&self, py: Python<'_>) -> PyResult<()> {
         let engine = headless::Engine::clone(&*self.0.look(py)?);
         detached(py, move || engine.wait())
@@ -270,7 +270,7 @@ impl Instances {
     }
 }
 
-/// Positions and triangles, flat, and a word about the faces.
+/// Flat positions and triangles, and which faces do not occlude.
 type SurfaceArrays<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u32>>, &'static str);
 
 /// Triangle meshes on the device.
@@ -283,8 +283,8 @@ impl Occluders {
         Ok(self.0.look(py)?.surface().host_bytes())
     }
 
-    /// World positions, 3 a vertex; vertices, 3 a triangle; and the faces that do not occlude.
-    /// Copies.
+    /// Copies of the world positions, 3 per vertex, and of the vertices, 3 per triangle; and the
+    /// faces that do not occlude.
     fn surface<'py>(&self, py: Python<'py>) -> PyResult<SurfaceArrays<'py>> {
         let occluders = self.0.look(py)?;
         let surface = occluders.surface();
@@ -342,7 +342,7 @@ impl Pyramid {
         Ok(self.0.look(py)?.1.num_levels())
     }
 
-    /// The first and the last stored level above 0; nothing for an image of one pixel.
+    /// The first and the last stored level above 0; none for an image of one pixel.
     fn stored_levels(&self, py: Python<'_>) -> PyResult<Option<(u32, u32)>> {
         Ok(self.0.look(py)?.1.stored_levels().map(|levels| (levels.first, levels.last)))
     }
