@@ -132,7 +132,8 @@ build_module() {
   fi
   # The profile of the tests (its dependencies are optimised): wgpu is then compiled once for `cargo test` and for Python.
   step "building the Python module (the first time takes some minutes)" \
-    env VIRTUAL_ENV="$VENV" PATH="$VENV/bin:$PATH" maturin develop --extras viz,scene --features testing,yardstick "${LOCKED[@]}"
+    env VIRTUAL_ENV="$VENV" PATH="$VENV/bin:$PATH" \
+    maturin develop --extras viz,scene --features testing,yardstick "${LOCKED[@]}"
   # The key from before: what was edited meanwhile is built next time.
   printf '%s\n' "$key" >"$STAMPS/module"
 }

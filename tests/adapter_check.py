@@ -7,13 +7,13 @@ starts.
 import os
 import sys
 
-# lavapipe calls its driver so.
+# The name of lavapipe's driver.
 # `HIZVK_EXPECT_ADAPTER=...` names another one: any part of its name or driver.
 DEFAULT_EXPECTATION = "llvmpipe"
 
 
 def check() -> tuple[str, str | None]:
-    """-> a line that describes the adapter, and why it is wrong (None: it is the right one)."""
+    """A line that describes the adapter, and why it is wrong, or None if it is the right one."""
     import hizvk
 
     expected = os.environ.get("HIZVK_EXPECT_ADAPTER") or DEFAULT_EXPECTATION

@@ -1,7 +1,7 @@
 """Bad arguments of every public function: the tables behind test_api_errors.py.
 
-One table a function: valid arguments, and for each parameter bad values with the exception and a
-part of its text.
+Each function has a table: valid arguments, and for each parameter bad values with the exception and
+a part of its text.
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ EYE4 = np.eye(4)
 SINGULAR = np.diag([1.0, 1.0, 0.0, 1.0])
 TRANSPOSED_POSE = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [5, 6, 7, 1]])
 K = np.array([[100.0, 0, 32], [0, 100, 24], [0, 0, 1]])
-# OpenGL's own: near 1, far 3, 90 degrees.
+# The projection of OpenGL: near 1, far 3, 90 degrees.
 GL = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, -2, -3], [0, 0, -1, 0]])
 
 Bad = tuple[Any, type[Exception], str]
@@ -25,7 +25,7 @@ BadValues = dict[str, list[Bad]]
 
 
 class Table(NamedTuple):
-    """`make(device)` gives the function and valid arguments; `bad` has the bad values by parameter."""
+    """A function's arguments: `make(device)` gives it with valid ones, and `bad` the bad values."""
 
     make: Callable[[hizvk.Device], tuple[Callable[..., Any], dict[str, Any]]]
     bad: BadValues
@@ -39,8 +39,7 @@ def camera(size: tuple[int, int] = (6, 8), **more: Any) -> hizvk.Camera:
 TETRAHEDRON = hizvk.Mesh(np.eye(4)[:, :3] / 4, [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]])
 
 
-# -- bad values that several functions
-# share -----------------------------------------------------------------
+# --- bad values that several functions share ---
 
 LEVELS: list[Bad] = [
     (0, ValueError, "expected an integer in 1..15, got int 0"),
@@ -103,7 +102,8 @@ POSE: list[Bad] = [
     (
         np.eye(3),
         ValueError,
-        "expected (3, 4) or (4, 4) finite numbers, got (3, 3) float64; pass a rotation and a translation as a pair",
+        "expected (3, 4) or (4, 4) finite numbers, got (3, 3) float64; "
+        "pass a rotation and a translation as a pair",
     ),
     (np.eye(4)[:, :3], ValueError, "got (4, 3) float64"),
     (
@@ -149,7 +149,8 @@ PIXEL_CENTER: list[Bad] = [
     (
         None,
         TypeError,
-        '"integer" (the first pixel\'s centre is (0, 0): OpenCV, KITTI, ROS) or "half" (it is (0.5, 0.5)',
+        '"integer" (the first pixel\'s centre is (0, 0): OpenCV, KITTI, ROS) or '
+        '"half" (it is (0.5, 0.5)',
     ),
     ("center", ValueError, "COLMAP, nerfstudio, gsplat, pyrender, CARLA), got str 'center'"),
     (0.5, TypeError, "got float 0.5; there is no default"),
@@ -346,8 +347,7 @@ def unsigned(name: str) -> list[Bad]:
     ]
 
 
-# -- the
-# tables ----------------------------------------------------------------------------------------------
+# --- the tables ---
 
 VIEW: BadValues = {
     "eye": VECTOR,
@@ -424,7 +424,7 @@ OPTIONS_OBJECT: list[Bad] = [
     ({"order": "any"}, TypeError, "expected a CullOptions or None, got dict {'order': 'any'}"),
     ("any", TypeError, "got str 'any'"),
 ]
-#: The fields of `CullOptions`, which are keywords of functions, too.
+#: The fields of `CullOptions`, which are also keywords of functions.
 OPTIONS: dict[str, list[Bad]] = {
     "order": [
         ("fast", ValueError, 'expected one of "stable", "any"'),
@@ -1084,7 +1084,7 @@ TABLES: dict[str, Table] = {
     ),
 }
 
-#: What the package makes and callers only read; nothing to get wrong.
+#: Classes that only the package makes, so no argument can be bad.
 MADE_BY_THE_PACKAGE = {
     "Adapter",
     "Comparison",

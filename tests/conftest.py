@@ -11,7 +11,7 @@ from hypothesis import settings
 
 import adapter_check
 
-# The same examples in every run: a change is red for its own sake.
+# Every run has the same examples, so that a failure comes from a change of the code.
 # `make soak` tries others (HIZVK_FUZZ=random).
 settings.register_profile(
     "hizvk", derandomize=os.environ.get("HIZVK_FUZZ") != "random", database=None
@@ -27,14 +27,14 @@ def pytest_report_header() -> str:
 
 
 def pytest_sessionstart() -> None:
-    """Results of another driver than the expected one are worth nothing."""
+    """Stops the run on another driver than the expected one."""
     if _wrong:
         pytest.exit(_wrong, returncode=1)
 
 
 @pytest.fixture(scope="session")
 def judge() -> Any:
-    """The judge of Intel's castle (`castle.npz` lies beside its file); neither is part of the repository."""
+    """The judge of Intel's castle, which lies beside `castle.npz`, outside of the repository."""
     folder = Path(__file__).resolve().parents[2] / "shared" / "judge"
     if not (folder / "castle.npz").exists():
         pytest.skip("the castle and its judge are not beside this checkout (../shared/judge)")

@@ -37,6 +37,9 @@ def table(text: str, *head: str) -> list[dict[str, str]]:
 
 
 def is_of_this_driver(text: str) -> bool:
-    """Whether the page names the adapter of this run: on another one rasterised depth has other last bits."""
+    """Whether the page names the adapter of this run.
+
+    On another adapter, rasterised depth has other last bits.
+    """
     adapter = hizvk.Device().adapter
     return all(part in text for part in (adapter.name, adapter.driver, adapter.driver_info))

@@ -71,7 +71,7 @@ def prepared(device: hizvk.Device, call: str) -> Callable[[], object]:
 
 
 def main(call: str, mebibytes: int) -> None:
-    """See the top."""
+    """Runs the call that the command line names."""
     device = hizvk.Device()
     works(device)
     run = prepared(device, call)

@@ -1,6 +1,7 @@
-"""What a process does with a device before it ends or forks; test_processes.py runs each scene in a process of its own.
+"""Scenes of processes that use a device before they end or fork.
 
-``processes.py SCENE``: it prints what the test compares, and ends as the scene says.
+``test_processes.py`` runs each as ``processes.py SCENE`` in a process of its own.
+The scene prints what the test compares, and ends the process in its way.
 """
 
 import atexit
@@ -16,26 +17,26 @@ from concurrent.futures import ProcessPoolExecutor
 
 
 def threads() -> int:
-    """Of this process; a driver's among them."""
+    """The threads of this process, those of a driver included."""
     return len(os.listdir("/proc/self/task"))
 
 
 def early() -> None:
-    """Registered before hizvk is imported, so it runs when every device has been let go of."""
+    """Is registered before hizvk is imported, so it runs after every device was dropped."""
     if "after_the_end" in sys.argv:
         try:
             print(cull(KEPT[0]))
         except hizvk.HizError as error:
             print(f"HizError: {error}")
-        # The system strikes a joined thread off its list a moment after it has let the joiner go.
+        # The system removes a joined thread from its list a moment after the join returns.
         until = time.monotonic() + 30
         while threads() > THREADS and time.monotonic() < until:
             time.sleep(0.001)
-        # A GPU's driver may have its reasons.
+        # The driver of a GPU may keep threads.
         print("threads left:", threads() - THREADS if SOFTWARE else 0)
 
     if "after_the_end_for_many" in sys.argv:
-        # They meet while the first error is made.
+        # The threads meet while the first error is made.
         sys.setswitchinterval(1e-6)
         GO.set()
         for thread in MANY:
@@ -58,7 +59,7 @@ WALL = np.full(CAMERA.size, 10.0)
 #: One before the wall, one behind it.
 SPHERES = hizvk.Spheres(np.array([[0.0, 0, -5], [0, 0, -20]]), 1.0)
 SEEN = [True, False]
-#: What the module still names when it ends.
+#: What the module still refers to when it ends.
 KEPT: list[hizvk.Device] = []
 OBJECTS: list[object] = []
 FORK = multiprocessing.get_context("fork")
@@ -81,7 +82,7 @@ def used() -> hizvk.Device:
 
 
 def by_default(_: int = 0) -> list[bool]:
-    """The same with the device of those who bring none."""
+    """The same with the default device."""
     seen: list[bool] = hizvk.visible(SPHERES, CAMERA, depth=WALL, kind="z").tolist()
     return seen
 
@@ -120,7 +121,7 @@ def forked(work: Callable[[], object], *, ends: str = "_exit") -> None:
 
 
 def refused() -> list[str]:
-    """What each object of the parent says."""
+    """The error of each object of the parent."""
     device, (pyramid, instances, result) = KEPT[0], OBJECTS[:3]
     assert isinstance(pyramid, hizvk.Pyramid)
     assert isinstance(instances, hizvk.Instances)
@@ -154,10 +155,13 @@ def refused() -> list[str]:
         device._engine.wait_without_guard()
         wrong.append("the engine in Rust: no error")
     except hizvk.HizError as error:
-        expected = f"this device was made by process {os.getppid()}, and process {os.getpid()} is a fork of it: no device"
+        expected = (
+            f"this device was made by process {os.getppid()}, "
+            f"and process {os.getpid()} is a fork of it: no device"
+        )
         if not str(error).startswith(expected):
             wrong.append(f"the engine in Rust: {error}")
-    # What needs no device.
+    # These calls need no device.
     texts = [repr(thing) for thing in (device, pyramid, instances, result)]
     assert len(texts[0]) > 0
     assert (len(result), result.mask.tolist(), pyramid.size, pyramid.num_levels) == (
@@ -193,7 +197,7 @@ def collect() -> str:
 
 
 def with_threads() -> list[bool]:
-    """New threads take the memory of those that stayed in the parent."""
+    """New threads take the memory of the threads that exist only in the parent."""
     for _ in range(4):
         threads = [threading.Thread(target=time.sleep, args=(0.001,)) for _ in range(8)]
         for thread in threads:
@@ -204,7 +208,7 @@ def with_threads() -> list[bool]:
 
 
 def end(how: str) -> None:
-    """Ends a process whose module still names everything."""
+    """Ends a process whose module still refers to every object."""
     used()
     by_default()
     if how == "daemons":
@@ -226,7 +230,7 @@ def end(how: str) -> None:
 
 
 def waits_for_the_end() -> None:
-    """Daemons that ask a device once every one has been let go of."""
+    """Daemons that use a device after every device was dropped."""
     device = used()
 
     def ask() -> None:
@@ -241,7 +245,7 @@ def waits_for_the_end() -> None:
 
 
 def while_threads_cull() -> None:
-    """Forks while others are in the middle of everything."""
+    """Forks while other threads upload, render and cull."""
 
     def work() -> None:
         device = hizvk.Device()
@@ -275,7 +279,7 @@ def pool_in_a_worker() -> None:
 
 
 def main(scene: str) -> None:
-    """See the top."""
+    """Runs the scene that the command line names."""
     if scene.startswith("end_") or scene == "after_the_end":
         end(scene.removeprefix("end_"))
         return

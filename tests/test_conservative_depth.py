@@ -315,8 +315,7 @@ def test_refinement_keeps_no_more(device: hizvk.Device, judge: Any, size: tuple[
         assert [int(cell.split(",")[0]) for cell in list(row.values())[1:]] == kept, row
 
 
-# -- by
-# hand ---------------------------------------------------------------------------------------------------------
+# --- by hand ---
 
 
 def wall(left: float, right: float) -> tuple[np.ndarray, np.ndarray]:

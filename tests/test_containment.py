@@ -1,4 +1,7 @@
-"""`check_proxy` and `check_bounds` from Python; the geometry is tested in crates/hiz_ref/tests/containment.rs."""
+"""`check_proxy` and `check_bounds` from Python.
+
+The geometry is tested in crates/hiz_ref/tests/containment.rs.
+"""
 
 from __future__ import annotations
 

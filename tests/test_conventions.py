@@ -55,7 +55,10 @@ class Tool(NamedTuple):
     """1: the camera looks along +z, y down; -1: along -z, y up."""
 
     def world(self, column: Any, row: Any, depth: Any) -> Floats:
-        """World positions at `depth` that the tool shows at a distance of columns and rows from the image's corner."""
+        """World positions at `depth` that the tool shows at these columns and rows.
+
+        They are counted from the corner of the image.
+        """
         u = np.asarray(column) - 0.5 + self.first_center
         v = np.asarray(row) - 0.5 + self.first_center
         x = (u - self.principal[0]) / self.focal[0] * depth
@@ -73,11 +76,15 @@ GL = {"world_from_camera": WORLD_FROM_CAMERA @ TURNED, **GIVEN}
 
 TOOLS = {
     "OpenCV": Tool(
-        hizvk.Camera.from_opencv(K, pixel_center="integer", camera_from_world=CAMERA_FROM_WORLD, **GIVEN),
+        hizvk.Camera.from_opencv(
+            K, pixel_center="integer", camera_from_world=CAMERA_FROM_WORLD, **GIVEN
+        ),
         (FX, FY), (CX, CY), 0.0, 1.0,
     ),
     "gsplat": Tool(
-        hizvk.Camera.from_opencv(K, pixel_center="half", camera_from_world=CAMERA_FROM_WORLD, **GIVEN),
+        hizvk.Camera.from_opencv(
+            K, pixel_center="half", camera_from_world=CAMERA_FROM_WORLD, **GIVEN
+        ),
         (FX, FY), (CX, CY), 0.5, 1.0,
     ),
     "COLMAP": Tool(
@@ -85,10 +92,14 @@ TOOLS = {
         (FX, FY), (CX, CY), 0.5, 1.0,
     ),
     "pycolmap": Tool(
-        hizvk.Camera.from_colmap("SIMPLE_RADIAL", [FX, CX, CY, 0], camera_from_world=CAMERA_FROM_WORLD[:3], **GIVEN),
+        hizvk.Camera.from_colmap(
+            "SIMPLE_RADIAL", [FX, CX, CY, 0], camera_from_world=CAMERA_FROM_WORLD[:3], **GIVEN
+        ),
         (FX, FX), (CX, CY), 0.5, 1.0,
     ),
-    "nerfstudio": Tool(hizvk.Camera.from_opengl(k=K, pixel_center="half", **GL), (FX, FY), (CX, CY), 0.5, -1.0),
+    "nerfstudio": Tool(
+        hizvk.Camera.from_opengl(k=K, pixel_center="half", **GL), (FX, FY), (CX, CY), 0.5, -1.0
+    ),
     "OpenGL axes, integer": Tool(
         hizvk.Camera.from_opengl(k=K, pixel_center="integer", **GL), (FX, FY), (CX, CY), 0.0, -1.0
     ),
@@ -109,8 +120,7 @@ def device() -> hizvk.Device:
     return hizvk.Device()
 
 
-# -- pixel
-# centres -------------------------------------------------------------------------------------------
+# --- pixel centres ---
 
 
 @pytest.mark.parametrize("name", TOOLS)
@@ -124,7 +134,7 @@ def test_a_pixels_centre_lands_on_it(name: str) -> None:
 
 
 def scene(tool: Tool) -> tuple[hizvk.Spheres, Floats]:
-    """Points that each lie just before the wall that the tool shows in their pixel, and the walls' depth."""
+    """Points just before the wall that the tool shows in their pixel, and the walls' depth."""
     rng = np.random.default_rng(7)
     walls = rng.uniform(4.0, 40.0, SIZE)
     row, column = (side.ravel() for side in np.mgrid[: SIZE[0], : SIZE[1]])
@@ -144,8 +154,15 @@ def test_what_a_tool_shows_is_not_culled(device: hizvk.Device, name: str) -> Non
         assert seen.all()
 
 
-@pytest.mark.parametrize(("right", "wrong"), [("OpenCV", "gsplat"), ("gsplat", "OpenCV"), ("COLMAP", "OpenCV"),
-                                              ("nerfstudio", "OpenGL axes, integer")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("OpenCV", "gsplat"),
+        ("gsplat", "OpenCV"),
+        ("COLMAP", "OpenCV"),
+        ("nerfstudio", "OpenGL axes, integer"),
+    ],
+)
 def test_half_a_pixel_off_hides_what_shows(device: hizvk.Device, right: str, wrong: str) -> None:
     """Why there is no default: of 768 points that show, the other choice culls about 300."""
     points, walls = scene(TOOLS[right])
@@ -167,8 +184,10 @@ def test_a_missing_or_unknown_word_is_told_the_way() -> None:
     )
     sees = {"pixel_center": "half", **GIVEN}
     for maker, arguments in (
-        (hizvk.Camera.from_opencv, sees), (hizvk.Camera.from_opengl, sees), (hizvk.Camera.from_matrices, {}),
-    ):  # fmt: skip
+        (hizvk.Camera.from_opencv, sees),
+        (hizvk.Camera.from_opengl, sees),
+        (hizvk.Camera.from_matrices, {}),
+    ):
         for word in ("R", "t", "rotation", "tvec", "viewmat", "c2w"):
             with pytest.raises(
                 TypeError,
@@ -192,8 +211,7 @@ def test_a_missing_or_unknown_word_is_told_the_way() -> None:
         hizvk.OrientedBoxes.from_yaw(yaw=0.0, up=(0, 0, 1), **boxes)  # type: ignore[call-arg]
 
 
-# --
-# poses ---------------------------------------------------------------------------------------------------
+# --- poses ---
 
 
 @pytest.mark.parametrize("name", ["camera_from_world", "world_from_camera"])
@@ -226,7 +244,7 @@ def test_every_form_of_a_pose(name: str) -> None:
 
 
 def turned_by(quaternion: tuple[float, ...], point: Floats) -> Floats:
-    """The point turned by a unit quaternion (w, x, y, z): q p q*, by Hamilton's products, no matrix."""
+    """The point turned by a unit quaternion (w, x, y, z): q p q*, by products of Hamilton's."""
 
     def times(a: Any, b: Any) -> tuple[float, ...]:
         w, x, y, z = a
@@ -266,8 +284,9 @@ def test_colmaps_own_example() -> None:
 
 
 COLMAP_ZEROS = {
-    "SIMPLE_PINHOLE": (1, 0), "PINHOLE": (2, 0), "SIMPLE_RADIAL": (1, 1), "RADIAL": (1, 2), "OPENCV": (2, 4),
-    "FULL_OPENCV": (2, 8), "FOV": (2, 1), "SIMPLE_DIVISION": (1, 1), "DIVISION": (2, 1),
+    "SIMPLE_PINHOLE": (1, 0), "PINHOLE": (2, 0), "SIMPLE_RADIAL": (1, 1), "RADIAL": (1, 2),
+    "OPENCV": (2, 4), "FULL_OPENCV": (2, 8), "FOV": (2, 1), "SIMPLE_DIVISION": (1, 1),
+    "DIVISION": (2, 1),
 }  # fmt: skip
 
 
@@ -297,7 +316,7 @@ def test_a_colmap_model_is_a_pinhole_if_nothing_is_bent(model: str) -> None:
     "model", ["OPENCV_FISHEYE", "SIMPLE_FISHEYE", "RADIAL_FISHEYE", "EQUIRECTANGULAR"]
 )
 def test_a_fisheye_is_no_pinhole_with_zeros_either(model: str) -> None:
-    """At 45 degrees an equidistant fisheye shows a point at f pi / 4, a pinhole at f: zeros would hide what shows."""
+    """With zeros it would hide what shows: at 45 degrees it shows a point at f pi / 4, not at f."""
     with pytest.raises(
         ValueError, match=r"^model: .*no pinhole with any numbers; run COLMAP's image_undistorter"
     ):
@@ -326,8 +345,7 @@ def test_one_pose_of_a_colmap_image() -> None:
         make(world_from_camera=np.eye(4), camera_from_world=np.eye(4))
 
 
-# -- OpenGL's
-# axes -------------------------------------------------------------------------------------------
+# --- OpenGL's axes ---
 
 
 def test_a_camera_matrix_is_pyrenders_projection() -> None:
@@ -395,7 +413,7 @@ def test_one_way_to_say_what_an_opengl_camera_sees() -> None:
 
 
 def test_what_pyrenders_depth_costs() -> None:
-    """What docs/conventions.md calls less than 2^-20: a buffer of 24 bits, and pyrender's way back in float32."""
+    """docs/conventions.md says less than 2^-20, for 24-bit buffers and pyrender's float32."""
     rng = np.random.default_rng(5)
     exact = rng.random(200_000)
     for near, far in ((1.0, 2.0), (0.05, 100.0), (1e-3, 1e4), (0.01, 1e5), (3.0, 7.0)):
@@ -408,8 +426,7 @@ def test_what_pyrenders_depth_costs() -> None:
             assert np.abs(again - exact[stored < 1.0]).max() < 2.0**-20
 
 
-# --
-# boxes ---------------------------------------------------------------------------------------------------
+# --- boxes ---
 
 
 def test_yaw_turns_from_x_to_y_where_z_is_up() -> None:
@@ -501,8 +518,7 @@ def test_boxes_that_are_none_are_kept_and_counted(device: hizvk.Device) -> None:
         assert device.cull(uploaded, camera, near_wall).mask.tolist() == [False, True, True]
 
 
-# -- meshes of other
-# libraries -------------------------------------------------------------------------------
+# --- meshes of other libraries ---
 
 
 class Trimesh:
@@ -577,7 +593,7 @@ def test_what_is_no_mesh_is_told_so(device: hizvk.Device) -> None:
     for value, text in (
         (
             Points(),
-            r"^vertices: expected a Mesh, a mesh of trimesh or Open3D, or a list of them .*got Points",
+            r"^vertices: expected a Mesh, a mesh of trimesh or Open3D, or a list .*got Points",
         ),
         ([Points()], r"^vertices\[0\]: expected a Mesh"),
         (
@@ -593,8 +609,7 @@ def test_what_is_no_mesh_is_told_so(device: hizvk.Device) -> None:
         device.occluders([Trimesh(CORNERS, FACES), Trimesh(CORNERS, [[0, 1, 2, 3]])])
 
 
-# -- hints that
-# work -----------------------------------------------------------------------------------------
+# --- hints that work ---
 
 
 def test_the_hint_for_a_masked_array_works() -> None:
@@ -624,8 +639,7 @@ def test_what_is_advised_to_install_can_be_installed() -> None:
     assert advised == extras
 
 
-# -- the
-# page ------------------------------------------------------------------------------------------------
+# --- the page ---
 
 
 def blocks() -> list[str]:

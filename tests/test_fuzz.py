@@ -1,4 +1,4 @@
-"""Arrays of every make: an answer, or an error that names the parameter; never a crash, never another answer."""
+"""Arrays of every kind get an answer, or an error that names the parameter, and never a crash."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Arrays of every make for every parameter that takes one: an answer or a named error, no crash and no huge copy.
+"""Arrays of every kind for every parameter that takes one.
+
+Each gets an answer or a named error, and there is no crash and no huge copy.
 
 The parameters and valid arguments beside them are those of api_bad_values.py.
 """
@@ -66,12 +68,19 @@ ARRAYS = [
     ("Camera.resized", "size"),
 ]
 
-DTYPES = ["<f4", ">f4", "<f8", ">f8", "<f2", ">f2", "g", "i1", ">i4", "i8", "u1", ">u2", "u8", "?", "c8", "c16", "O",
-          "U3", "S2", "M8[s]", "m8[s]", "V4", [("x", "f4"), ("y", "f4")]]  # fmt: skip
+DTYPES = [
+    "<f4", ">f4", "<f8", ">f8", "<f2", ">f2", "g", "i1", ">i4", "i8", "u1", ">u2", "u8", "?", "c8",
+    "c16", "O", "U3", "S2", "M8[s]", "m8[s]", "V4", [("x", "f4"), ("y", "f4")],
+]  # fmt: skip
+
+LAYOUTS = [
+    "plain", "fortran", "strided", "reversed", "readonly", "misaligned", "list", "tuple",
+    "memoryview", "subclass", "masked", "scalar", "broadcast", "transposed",
+]  # fmt: skip
 
 SHAPES: list[tuple[int, ...]] = [
-    (), (0,), (1,), (2,), (3,), (4,), (0, 3), (1, 3), (2, 3), (3, 2), (3, 3), (4, 4), (6, 8), (8, 6), (0, 0), (48, 64),
-    (2, 4, 4), (0, 4, 4), (2, 3, 3), (1, 2, 3, 3), (6, 8, 1), (1, 6, 8),
+    (), (0,), (1,), (2,), (3,), (4,), (0, 3), (1, 3), (2, 3), (3, 2), (3, 3), (4, 4), (6, 8),
+    (8, 6), (0, 0), (48, 64), (2, 4, 4), (0, 4, 4), (2, 3, 3), (1, 2, 3, 3), (6, 8, 1), (1, 6, 8),
 ]  # fmt: skip
 
 #: Views of one number that claim far more than any machine has.
@@ -121,8 +130,7 @@ def filled(draw: Callable[..., Any], shape: tuple[int, ...], dtype: Any) -> Any:
 
 def dressed(draw: Callable[..., Any], array: Any) -> Any:
     """The array in another layout or class."""
-    how = draw(st.sampled_from(["plain", "fortran", "strided", "reversed", "readonly", "misaligned", "list", "tuple",
-                                "memoryview", "subclass", "masked", "scalar", "broadcast", "transposed"]))  # fmt: skip
+    how = draw(st.sampled_from(LAYOUTS))
     if how == "fortran":
         return np.asfortranarray(array)
     if how == "strided" and array.ndim:
@@ -205,7 +213,7 @@ def address_space() -> int:
 def test_views_that_claim_more_than_there_is_are_refused(
     device: hizvk.Device, function: str, parameter: str, claim: tuple[int, ...]
 ) -> None:
-    """Strides of 0: one number in memory, terabytes by their shape. Refused at once, and not copied before."""
+    """With strides of 0, one number in memory has a shape of terabytes: it is refused uncopied."""
     before = address_space()
     for dtype in ("f4", "f8", "f2", "i8", "?", "u2", "u1"):
         value = np.broadcast_to(np.zeros((), dtype), claim)

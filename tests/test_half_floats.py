@@ -1,4 +1,4 @@
-"""Depth in half floats and in float32: what rounding to them may have cost is counted, in every kind.
+"""Depth in half floats and in float32: a cull allows for what rounding to them may have cost.
 
 Every expectation is worked out by hand.
 """
@@ -64,7 +64,10 @@ def test_what_a_half_float_rounds_is_counted(
 def test_what_float32_rounds_of_a_metric_depth_is_counted(
     device: hizvk.Device, kind: Any, reversed_z: bool
 ) -> None:
-    """Just behind a near plane 1024 units away, where no share of the NDC depth covers a share of the metric one."""
+    """Just behind a near plane 1024 units away.
+
+    There no share of the NDC depth covers a share of the metric depth.
+    """
     camera = hizvk.Camera.orthographic(
         (0, 0, 0), (0, 0, -1), height=2, size=(1, 1), near=1024, far=1056, reversed_z=reversed_z
     )
@@ -114,7 +117,7 @@ def test_listed_rows_are_refused_where_their_array_is(device: hizvk.Device) -> N
 
 @pytest.mark.parametrize("dtype", [np.float16, np.float32, np.dtype(">f2")])
 def test_lists_of_several_dtypes_are_refused(device: hizvk.Device, dtype: Any) -> None:
-    """Promoted to float64 they would count as exact, and what the half floats had rounded would hide things."""
+    """Promoted to float64 they would count as exact, and the rounding would hide things."""
     camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(2, 2), near=0.1)
     row = np.full(2, 10, dtype)
     mixtures: list[list[object]] = [

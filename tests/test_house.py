@@ -1,7 +1,7 @@
-"""The package's modules import one another in one direction, and `import hizvk` loads what it needs.
+"""Modules of the package import in one direction, and `import hizvk` loads only what it needs.
 
-The graph is drawn from the source text (`ast`), so imports for type checkers and those within
-functions count, too.
+The graph is drawn from the source text (`ast`), so it includes imports for type checkers and those
+within functions.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def module_of(path: Path, root: Path) -> str:
 
 
 def imports(tree: ast.Module, module: str, is_package: bool, known: set[str]) -> set[str]:
-    """The known modules that a module names in its imports, those in functions included."""
+    """The known modules that a module imports, within functions too."""
     found: set[str] = set()
     package = module if is_package else module.rpartition(".")[0]
     for node in ast.walk(tree):
@@ -113,7 +113,7 @@ def test_the_graph_sees_a_circle(
 
 
 def test_import_loads_no_tools() -> None:
-    """Who culls needs no benchmark, no scenes and no pictures."""
+    """A cull needs no benchmark, no scenes and no pictures."""
     code = "import sys, hizvk; print(*sorted(sys.modules))"
     done = subprocess.run(
         [sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60
@@ -143,7 +143,10 @@ def test_recommend_comes_when_it_is_asked_for() -> None:
 
 
 def test_the_oracle_has_its_public_name() -> None:
-    code = "import hizvk.reference as r; from hizvk.check import reference as s; print(r.classify is s.classify)"
+    code = (
+        "import hizvk.reference as r; from hizvk.check import reference as s; "
+        "print(r.classify is s.classify)"
+    )
     done = subprocess.run(
         [sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60
     )

@@ -1,7 +1,7 @@
-"""Every option changes an answer: one scene an option, in which what it says is worked out by hand.
+"""Every option changes an answer: each has a scene whose answers are worked out by hand.
 
-The camera looks along -z from the origin, 90 degrees wide, near plane at 1, 16x16 pixels: at depth
-8 a pixel is a unit wide, column 8 begins at x = 0 and row 8 ends there, rows running downwards.
+The camera looks along -z from the origin, 90 degrees wide, near plane at 1, with 16x16 pixels.
+At depth 8 a pixel is a unit wide; column 8 begins at x = 0, and row 8 at y = 0, downwards.
 The wall stands at depth 4.
 """
 
@@ -153,14 +153,14 @@ def by_groups(device: hizvk.Device, bounds: Any, depth: Any, options: dict[str, 
 def test_each_option_of_a_cull(device: hizvk.Device, name: str, face: Any) -> None:
     bounds, depth, hiding, keeping = CULLS[name]
     assert not face(device, bounds, depth, hiding), "hidden"
-    # A group's test descends anyway, by 16 texels: what its footprint keeps, that hides.
+    # The test of a group always descends by 16 texels, which hides what its footprint keeps.
     if face is not by_groups or not name.startswith(("descent", "footprint")):
         assert face(device, bounds, depth, keeping), "kept"
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32, np.uint16])
 def test_kind_and_scale(device: hizvk.Device, dtype: Any) -> None:
-    """A distance of 4 in the image's corner is a view depth of 2.4; steps of 2 make a wall at depth 8."""
+    """A distance of 4 in the corner is a view depth of 2.4; steps of 2 put the wall at 8."""
     corner = sphere((3.0 * 14 / 16, 3.0 * 14 / 16, -3.0), 0.05)
     depth = wall().astype(dtype)
 
@@ -181,7 +181,7 @@ def test_kind_and_scale(device: hizvk.Device, dtype: Any) -> None:
 
 
 def test_levels(device: hizvk.Device) -> None:
-    """Three pixels far from an open column: a texel of level 3 has both, and is the finest if level 3 is."""
+    """Three pixels far from an open column: a texel of level 3 has both, one of level 1 has not."""
     three = box((1.1, 0.1, -8), (3.9, 0.9, -8))
     depth = wall((slice(None), 15))
     for levels, kept in ((None, False), (1, False), ((1, 1), False), (3, True), ((3, 3), True)):
@@ -265,7 +265,7 @@ def test_outputs_capacity_and_draws(device: hizvk.Device) -> None:
     for name, of in asked.items():
         result = device.cull(instances, CAMERA, pyramid, order="any", outputs=[name])
         assert len(of(result)) > 0
-        # A mask tells lists, too, and a list its draw.
+        # Lists can be made from a mask, and a draw from a list.
         refused = {
             "mask": ["verdicts"],
             "verdicts": ["mask", "indices"],
@@ -332,7 +332,10 @@ def test_faces_and_transforms_of_occluders(device: hizvk.Device, conservative: b
 
 
 def test_size_conservative_and_refinement(device: hizvk.Device) -> None:
-    """A wall whose right edge crosses column 8 beyond its centre: the centre is covered, the pixel is not."""
+    """The right edge of a wall crosses column 8 beyond its centre.
+
+    So the centre is covered, and the pixel is not.
+    """
     right = 4.0 * 0.8 / 8
     wide = np.array([[-9.0, -9, -4], [right, -9, -4], [right, 9, -4], [-9, 9, -4]])
     occluders = device.occluders(wide, FRONT)
@@ -359,7 +362,7 @@ def test_size_conservative_and_refinement(device: hizvk.Device) -> None:
 def test_a_resized_orthographic_camera_and_depth_along_z(
     device: hizvk.Device, size: tuple[int, int], reversed_z: bool
 ) -> None:
-    """8 wide, 4 high, from 1 to 9 away; what stands in the image's quarters is 3, 5, 7 and 8 away."""
+    """The view is 8 wide and 4 high, from 1 to 9 away; the four quarters are 3, 5, 7 and 8 away."""
     first = hizvk.Camera.orthographic(
         (1, 2, 3),
         (1, 2, 2),

@@ -39,7 +39,7 @@ def test_out_of_memory_is_an_error_and_the_next_device_works(call: str, mebibyte
 
 
 def test_a_cull_without_memory_for_all_levels_in_one_texture_goes_on() -> None:
-    """It reads the depth image and the levels where they are."""
+    """A cull without the copy reads the depth image and the levels where they are."""
     run = subprocess.run(
         [sys.executable, str(SCRIPT), "cull", "70"],
         capture_output=True,

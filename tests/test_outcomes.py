@@ -128,7 +128,8 @@ def of_bits(bits: int) -> np.float32:
     return np.array([bits], np.uint32).view(np.float32)[0]
 
 
-#: Bits of a depth image's pixel, and what it means: the number itself (None), the near end 0, or no depth (far).
+#: The bits of a pixel of a depth image, and their meaning.
+#: None is the number itself; else it is the near end, 0, or no depth, which is far.
 BITS: list[tuple[int, str | None]] = [
     (0x3F000000, None),  # 1/2
     (0x00800000, None),  # the least normal number
@@ -203,7 +204,7 @@ def test_what_is_no_depth_is_a_hole(device: hizvk.Device, bits: int, reversed_z:
 def test_view_depth_and_distance_that_are_none_are_far(
     device: hizvk.Device, bad: float, far_plane: float | None, reversed_z: bool
 ) -> None:
-    """Zero, negative, NaN, infinite and what lies outside near..far (1 to 100) say nothing: as far as can be.
+    """Zero, negative, NaN, infinite and numbers outside near..far (1 to 100) count as far.
 
     A distance of 180 is a view depth above 100 in every corner of the image.
     """

@@ -1,4 +1,7 @@
-"""Faults that an environment variable plants into the shaders reach Python; and no release takes them."""
+"""Faults that an environment variable plants into the shaders reach Python.
+
+A module without the feature `testing` does not take them.
+"""
 
 from __future__ import annotations
 
@@ -11,15 +14,16 @@ import pytest
 
 from hizvk import _core
 
-#: A wall at depth 4 with a hole of one pixel, and a box at depth 8 that is seen through it. Printed: whether the
-#: box is kept, and the depth in the middle of an occluder at depth 2.
+#: A wall at depth 4 with a hole of one pixel, and a box at depth 8 that is seen through it.
+#: It prints whether the box is kept, and the depth in the middle of an occluder at depth 2.
 SCRIPT = textwrap.dedent("""
     import numpy as np, hizvk
-    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(16, 16), near=1.0, reversed_z=True)
+    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(16, 16), near=1.0)
     depth = np.full((16, 16), 4.0)
     depth[8, 7] = 100.0
     device = hizvk.Device()
-    kept = hizvk.visible(hizvk.Boxes([[-2.0, -2, -9]], [[2.0, 2, -8]]), camera, depth=depth, kind="z", device=device)
+    box = hizvk.Boxes([[-2.0, -2, -9]], [[2.0, 2, -8]])
+    kept = hizvk.visible(box, camera, depth=depth, kind="z", device=device)
     wall = np.array([[-9.0, -9, -2], [9, -9, -2], [0, 30, -2]])
     drawn = device.render_depth(device.occluders(wall, np.array([[0, 1, 2]])), camera)
     print(bool(kept[0]), float(device.pyramid(drawn).level(0)[8, 8]))

@@ -1,4 +1,7 @@
-"""Processes that end, and that fork, after they have used a device: none aborts or hangs, and errors say what to do."""
+"""Processes that end or fork after they have used a device.
+
+None aborts or hangs, and errors say what to do.
+"""
 
 import os
 import subprocess
@@ -8,7 +11,7 @@ from pathlib import Path
 import pytest
 
 SCRIPT = Path(__file__).with_name("processes.py")
-#: A guard against hanging, no test of speed: scenes take a second or two.
+#: A guard against hanging, not a test of speed: a scene takes a second or two.
 GUARD_S = 120
 
 
@@ -23,7 +26,7 @@ def run(scene: str) -> "subprocess.CompletedProcess[str]":
     try:
         out, err = process.communicate(timeout=GUARD_S)
     except subprocess.TimeoutExpired:
-        # Its forks, too.
+        # This ends its forks, too.
         os.killpg(process.pid, 9)
         out, err = process.communicate()
         pytest.fail(f"{scene}: a process hangs (ended after {GUARD_S} s)\n{out}{err}")

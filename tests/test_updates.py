@@ -1,4 +1,7 @@
-"""The stored order of instances, and their update: the answers are those of fresh instances stored as they came."""
+"""The stored order of instances, and their update.
+
+The answers equal those of a fresh upload in the given order.
+"""
 
 import threading
 from collections.abc import Callable
@@ -51,7 +54,10 @@ def pyramid(device: hizvk.Device) -> hizvk.Pyramid:
 def test_a_cull_sees_the_bounds_that_were_there(
     device: hizvk.Device, pyramid: hizvk.Pyramid, make: Callable[..., Bounds]
 ) -> None:
-    """Verdicts of the members of hidden groups are told when they are read; an update in between changes nothing."""
+    """Verdicts of members of hidden groups are found when they are read.
+
+    An update in between changes nothing.
+    """
     (centers, sizes), (elsewhere, _) = crowd(3000, 1), crowd(3000, 2)
     instances = device.instances(make(centers, sizes))
     flat = verdicts(device, instances, pyramid)

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from . import _core
     from .adapter import Adapter
 
-__all__ = ["Maker", "OnDevice", "Stored", "check_owner"]
+__all__ = ["Maker", "OnDevice", "Allocated", "check_owner"]
 
 
 class Maker(Protocol):
@@ -66,7 +66,7 @@ class OnDevice(Generic[_Inner]):
         return f"<{type(self).__name__}{self._summary()}>"
 
 
-class Stored(OnDevice[_InnerWithBytes]):
+class Allocated(OnDevice[_InnerWithBytes]):
     """An object whose memory on the device can be asked for."""
 
     @property

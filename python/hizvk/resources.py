@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from . import _arguments, _core
-from ._on_device import OnDevice, Stored
+from ._on_device import OnDevice, Allocated
 from .bounds import Bounds, are_points, as_arrays
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["DepthImage", "Instances", "Occluders", "Pyramid"]
 
 
-class Instances(Stored[_core.Instances]):
+class Instances(Allocated[_core.Instances]):
     """Bounds on the device, ready to be tested; made by `Device.instances`."""
 
     def __init__(self, device: Maker, inner: _core.Instances, *, points: bool) -> None:
@@ -117,7 +117,7 @@ class Instances(Stored[_core.Instances]):
         return f": {len(self)} {self.kind}"
 
 
-class Occluders(Stored[_core.Occluders]):
+class Occluders(Allocated[_core.Occluders]):
     """Triangle meshes on the device, ready to be rendered; made by `Device.occluders`."""
 
     @property
@@ -180,7 +180,7 @@ class DepthImage(_Seen, OnDevice[_core.DepthImage]):
         return f" {self.size[0]}x{self.size[1]} of kind {self.kind}"
 
 
-class Pyramid(_Seen, Stored[_core.Pyramid]):
+class Pyramid(_Seen, Allocated[_core.Pyramid]):
     """A depth pyramid on the device; made by `Device.pyramid`.
 
     On level ``k`` a texel holds the farthest depth of a block of ``2^k x 2^k`` pixels.
