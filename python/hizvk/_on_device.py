@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from . import _core
     from .adapter import Adapter
 
-__all__ = ["Maker", "OnDevice", "Allocated", "check_owner"]
+__all__ = ["Allocated", "Maker", "OnDevice", "check_owner"]
 
 
 class Maker(Protocol):

@@ -8,9 +8,9 @@ objects whole (``crates/hiz_py/src/options.rs``).
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final, TypedDict
+from typing import TYPE_CHECKING, Any, Final, TypedDict, TypeVar
 
 import numpy as np
 
@@ -36,17 +36,32 @@ __all__ = [
 FOOTPRINTS: Final = (2, 4, 8)
 _LARGEST_U32: Final = 2**32 - 1
 
+_T = TypeVar("_T")
+
 
 def _by(check: Callable[..., Any], **limits: Any) -> dict[str, Any]:
     """The metadata of a field that `check` takes, with the field's name, when an object is made."""
     return {"check": partial(check, **limits)}
 
 
-def _check_fields(checked: Any) -> None:
-    """Puts every field through its check."""
-    for one in fields(checked):
-        value = one.metadata["check"](one.name, getattr(checked, one.name))
-        object.__setattr__(checked, one.name, value)
+def _check_fields(made: Any) -> None:
+    """Puts every field of a new object through its check."""
+    for one in fields(made):
+        value = one.metadata["check"](one.name, getattr(made, one.name))
+        object.__setattr__(made, one.name, value)
+
+
+def _replaced(given: _T, values: Mapping[str, Any]) -> _T:
+    """`dataclasses.replace`, but only the new values are checked.
+
+    Each cull with keywords comes here, and a cull may take less than a millisecond.
+    """
+    made = object.__new__(type(given))
+    made.__dict__.update(given.__dict__)
+    for name, value in values.items():
+        check = type(given).__dataclass_fields__[name].metadata["check"]  # type: ignore[attr-defined]
+        made.__dict__[name] = check(name, value)
+    return made
 
 
 def _guard(name: str, value: object) -> float | None:
@@ -268,8 +283,7 @@ def _outputs_of(names: object) -> Outputs:
         expected = f"None or a collection of {', '.join(map(repr, known))}, or an Outputs"
         raise TypeError(f"outputs: expected {expected}, got {_arguments.describe(names)}")
     asked = {_arguments.choice("outputs", name, known) for name in names}
-    made: dict[str, Any] = {name: name in asked for name in known}
-    return Outputs(**made)
+    return _replaced(_OUTPUTS, {name: name in asked for name in known})
 
 
 class OptionKeywords(TypedDict, total=False):
@@ -305,7 +319,7 @@ def cull_options(options: object, keywords: Mapping[str, Any]) -> CullOptions:
     if options is not None:
         chosen = _arguments.instance("options", options, CullOptions, "a CullOptions or None")
     _arguments.refuse_unknown(keywords, OptionKeywords.__annotations__)
-    return replace(chosen, **keywords) if keywords else chosen
+    return _replaced(chosen, keywords) if keywords else chosen
 
 
 def cull_request(
@@ -318,4 +332,4 @@ def cull_request(
     if outputs is None:
         outputs = _OUTPUTS
     made = outputs if isinstance(outputs, Outputs) else _outputs_of(outputs)
-    return cull_options(options, of_options), replace(made, **of_outputs) if of_outputs else made
+    return cull_options(options, of_options), _replaced(made, of_outputs) if of_outputs else made

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from . import _arguments, _core
-from ._on_device import OnDevice, Allocated
+from ._on_device import Allocated, OnDevice
 from .bounds import Bounds, are_points, as_arrays
 
 if TYPE_CHECKING:
