@@ -5,7 +5,6 @@ They stand below every other module, so that an alias never makes two modules im
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any, Literal, TypeAlias, get_args
 
 # These are unions of single words because stubtest, at run time, takes Literal["a", "b"] for
@@ -37,7 +36,6 @@ Output: TypeAlias = Literal["mask"] | Literal["verdicts"] | Literal["indices"] |
 OwnDepth: TypeAlias = Literal["nearest"] | Literal["pixel"]
 
 
-@cache
 def words(alias: Any) -> tuple[str, ...]:
     """The words of one of the aliases above, in their order."""
     return tuple(get_args(word)[0] for word in get_args(alias))

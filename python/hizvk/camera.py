@@ -412,11 +412,11 @@ class Camera:
             ``clip_from_camera`` for column vectors.
             OpenGL's and glm's memory is column by column: transpose it.
         k : (3, 3)
-            ``[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]`` in pixels from the top-left corner.
-            nerfstudio writes it beside poses of this kind.
+            As in `from_opencv`, in pixels from the top-left corner.
+            Nerfstudio writes it beside poses of this kind.
         pixel_center : {"integer", "half"}
             As in `from_opencv`; needed with `k`, and with nothing else.
-            nerfstudio, pyrender and trimesh: ``"half"``.
+            Nerfstudio, pyrender and trimesh: ``"half"``.
         fov_x_deg, fov_y_deg : float
             The full horizontal or vertical angle of view in degrees, above 0 and below 180.
             The pixels are square, and the axis is in the middle of the image.

@@ -34,9 +34,11 @@ __all__ = [
 
 #: How many texels per side a test may read of one level.
 FOOTPRINTS: Final = (2, 4, 8)
+#: What a cull can make, by name.
+OUTPUTS: Final = words(Output)
 _LARGEST_U32: Final = 2**32 - 1
 
-_T = TypeVar("_T")
+_Given = TypeVar("_Given", "CullOptions", "Outputs")
 
 
 def _by(check: Callable[..., Any], **limits: Any) -> dict[str, Any]:
@@ -51,7 +53,7 @@ def _check_fields(made: Any) -> None:
         object.__setattr__(made, one.name, value)
 
 
-def _replaced(given: _T, values: Mapping[str, Any]) -> _T:
+def _replaced(given: _Given, values: Mapping[str, Any]) -> _Given:
     """`dataclasses.replace`, but only the new values are checked.
 
     Each cull with keywords comes here, and a cull may take less than a millisecond.
@@ -59,8 +61,7 @@ def _replaced(given: _T, values: Mapping[str, Any]) -> _T:
     made = object.__new__(type(given))
     made.__dict__.update(given.__dict__)
     for name, value in values.items():
-        check = type(given).__dataclass_fields__[name].metadata["check"]  # type: ignore[attr-defined]
-        made.__dict__[name] = check(name, value)
+        made.__dict__[name] = given.__dataclass_fields__[name].metadata["check"](name, value)
     return made
 
 
@@ -278,12 +279,11 @@ class Outputs:
 
 def _outputs_of(names: object) -> Outputs:
     """The outputs of these names, and no others."""
-    known = words(Output)
     if isinstance(names, str) or not isinstance(names, Collection):
-        expected = f"None or a collection of {', '.join(map(repr, known))}, or an Outputs"
+        expected = f"None or a collection of {', '.join(map(repr, OUTPUTS))}, or an Outputs"
         raise TypeError(f"outputs: expected {expected}, got {_arguments.describe(names)}")
-    asked = {_arguments.choice("outputs", name, known) for name in names}
-    return _replaced(_OUTPUTS, {name: name in asked for name in known})
+    asked = {_arguments.choice("outputs", name, OUTPUTS) for name in names}
+    return _replaced(_OUTPUTS, {name: name in asked for name in OUTPUTS})
 
 
 class OptionKeywords(TypedDict, total=False):
