@@ -95,8 +95,8 @@ class Question:
         if not known.any():
             return (
                 "depth: every pixel is far, so nothing can be hidden; if something should be "
-                "there, check kind and scale: numbers that do not lie between the camera's near and "
-                "far planes count as no data",
+                "there, check kind and scale: numbers that do not lie between the camera's near "
+                "and far planes count as no data",
             )
         full = known[:-1, :-1] & known[1:, :-1] & known[:-1, 1:] & known[1:, 1:]
         if self.pyramid._is_rendered:
