@@ -1,14 +1,15 @@
-# Every recipe is one script: what it does and why stands there, in scripts/.
+# Every recipe is one script in scripts/, which says what it does and why.
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-swiftshader soak lint bench bench-speed docs wheel
 
 help: ## This list
-	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | \
+	  awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
 
 setup: ## Install what is missing (system packages, .venv) and build the Python module
 	@scripts/setup.sh
 
-demo: ## Cull a real mountain scene on the GPU; pictures and a report land in out/
+demo: ## Cull a real mountain scene on the GPU; leaves pictures and a report in out/
 	@scripts/demo.sh
 
 test: ## All tests on Mesa's lavapipe (or on the driver that HIZVK_EXPECT_ADAPTER names)
@@ -23,14 +24,14 @@ soak: ## The tests that take minutes: millions of adversarial cases against the 
 lint: ## Format, clippy, ruff, mypy --strict, stubtest, shellcheck
 	@scripts/lint.sh
 
-bench: ## Measure speed and error of every configuration on scenes with known truth; report and plots land in out/bench
+bench: ## Measure speed and error of every configuration; leaves report and plots in out/bench
 	@scripts/bench.sh
 
-bench-speed: ## Measure times against yardsticks and targets; report and plot land in out/speed
-	@scripts/bench.sh --speed
+bench-speed: ## Measure times against yardsticks and targets; leaves report and plot in out/speed
+	@scripts/bench_speed.sh
 
 docs: ## The HTML documentation, in docs/_build/html
 	@scripts/docs.sh
 
-wheel: ## sdist and manylinux wheel in dist/, proven in an empty virtual environment
+wheel: ## sdist and manylinux wheel in dist/, tried in an empty virtual environment
 	@scripts/wheel.sh

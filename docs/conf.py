@@ -1,7 +1,16 @@
-"""Sphinx: the README and the Python interface. `make docs` builds it."""
+"""Sphinx: the pages of this folder, the documents beside it and the Python interface.
+
+`make docs` builds it; a dead link or reference fails the build.
+"""
+
+from __future__ import annotations
 
 import tomllib
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
 
 _root = Path(__file__).parent.parent
 _cargo = tomllib.loads((_root / "Cargo.toml").read_text(encoding="utf-8"))
@@ -18,9 +27,27 @@ html_title = f"hizvk {release}"
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
-# Defaults are shown as they are written (`2**-23`), not as what they evaluate to.
+# Defaults are shown as they are written (`2**-23`), not as values.
 autodoc_preserve_defaults = True
 myst_heading_anchors = 3
-# The README links to files that are no pages here, and its Rust blocks are marked as rustdoc wants
-# them.
-suppress_warnings = ["myst.xref_missing", "misc.highlighting_failure"]
+
+#: Documents beside this folder that are pages here, under their name in lower case.
+_BESIDE = ("ARCHITECTURE", "CHANGELOG", "CONTRIBUTING", "STYLE")
+
+
+def _read_beside(app: Sphinx, page: str, source: list[str]) -> None:
+    """The text of a document beside this folder, with its links as they are from here."""
+    if page.upper() not in _BESIDE:
+        return
+    path = _root / f"{page.upper()}.md"
+    app.env.note_dependency(str(path))
+    text = path.read_text(encoding="utf-8")
+    text = text.replace("](docs/", "](")
+    for name in _BESIDE:
+        text = text.replace(f"]({name}.md", f"]({name.lower()}.md")
+    source[0] = text
+
+
+def setup(app: Sphinx) -> None:
+    """Called by Sphinx."""
+    app.connect("source-read", _read_beside)

@@ -1,4 +1,7 @@
-"""Renews the tables and the plot of docs/bench.md: `bench_docs.py [REPORT]` (out/bench/report.md)."""
+"""Renews the tables and the plot of docs/bench.md: `bench_docs.py [REPORT]`.
+
+REPORT is out/bench/report.md unless it is given.
+"""
 
 import shutil
 import sys
@@ -11,7 +14,7 @@ PLOT = "castle.png"
 
 
 def main(report: Path) -> None:
-    """Replaces what stands below the mark by the report without its title, its pictures and its legend."""
+    """Puts the report, without title, pictures and legend, in place of what is below the mark."""
     lines = report.read_text(encoding="utf-8").splitlines()
     first = next(k for k, line in enumerate(lines) if line.startswith("- Command"))
     last = lines.index("## What the columns mean")

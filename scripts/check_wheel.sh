@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# check_wheel.sh WHEEL: tag, contents and dependencies are as promised, and it works in an empty virtual environment outside the checkout.
+# check_wheel.sh WHEEL: checks the tag, the contents and the dependencies of a wheel.
+# Then it runs the wheel in an empty virtual environment outside the checkout.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
@@ -9,7 +10,8 @@ trap 'rm -rf "$work"' EXIT
 
 "$VENV_PYTHON" scripts/inspect_wheel.py "$wheel"
 
-"$VENV_PYTHON" -m venv "$work/venv" 2>/dev/null || "$VENV_PYTHON" -m virtualenv --quiet "$work/venv"
+"$VENV_PYTHON" -m venv "$work/venv" 2>/dev/null ||
+  "$VENV_PYTHON" -m virtualenv --quiet "$work/venv"
 "$work/venv/bin/python" -m pip install "$wheel"
 cp scripts/wheel_smoke.py "$work/"
 cd "$work"

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# The demo on the best adapter of this machine (a GPU before a software driver); what it leaves is in out/.
+# The demo on the best adapter of this machine: a GPU comes before a software driver.
+# Pictures and report are in out/.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 

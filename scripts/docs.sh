@@ -1,10 +1,13 @@
 #!/usr/bin/env bash
-# The documentation: README and the Python interface by Sphinx, the Rust interface by rustdoc.
+# The documentation: all pages and the Python interface by Sphinx, the Rust interface by rustdoc.
+# A dead link fails the build.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 scripts/setup.sh docs
-step "Python documentation" "$VENV_PYTHON" -m sphinx --fail-on-warning --keep-going -q -b html docs docs/_build/html
-# rustdoc's own dependencies are not documented: that would take minutes.
-RUSTDOCFLAGS="-D warnings" step "Rust documentation" cargo doc --workspace "${LOCKED[@]}" --no-deps
+sphinx=("$VENV_PYTHON" -m sphinx --fail-on-warning --keep-going -q -b html)
+step "Python documentation" "${sphinx[@]}" docs docs/_build/html
+# Dependencies are not documented, because that would take minutes.
+export RUSTDOCFLAGS="-D warnings"
+step "Rust documentation" cargo doc --workspace "${LOCKED[@]}" --no-deps
 printf 'open docs/_build/html/index.html and target/doc/hiz_core/index.html\n'

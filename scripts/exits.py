@@ -1,10 +1,10 @@
 """Ends processes that use a device, four at once, and counts those that abort.
 
-A driver in software frees memory on threads of its own; where nobody joins them, a process may
-crash while it ends.
-Half of the processes here are a Rust test binary (`crates/hiz_core/tests/ends.rs`), half are Python
-scripts (`tests/processes.py`: modules that still name everything, results that nobody read, daemons
-that cull).
+A software driver frees memory on its own threads.
+If nobody joins them, a process may crash while it ends.
+Half of the processes here run a Rust test binary (`crates/hiz_core/tests/ends.rs`).
+The others run the Python script `tests/processes.py`, with modules that still name everything,
+results that nobody read, and daemons that cull.
 
     exits.py                     # 2000 of each
     exits.py --rust 80 --python 20
@@ -25,12 +25,12 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 AT_ONCE = 4
 SCENES = ("end_plain", "end_unread", "end_cycle", "end_daemons", "end_daemons_open")
-#: Against a process that hangs; one takes a second.
+#: Seconds after which a process counts as hung; it takes about one.
 GUARD_S = 300
 
 
 def rust_binary() -> str:
-    """The path of the test binary `ends`, built where it is not."""
+    """The path of the test binary `ends`, which is built if necessary."""
     command = [
         "cargo",
         "test",
@@ -49,7 +49,7 @@ def rust_binary() -> str:
 
 
 def ended(command: list[str]) -> tuple[str, str]:
-    """How a process ended, and its last words where not in peace."""
+    """How a process ended, and the last line of its stderr if that was not in peace."""
     try:
         run = subprocess.run(
             command, cwd=ROOT, capture_output=True, text=True, errors="replace", timeout=GUARD_S
@@ -64,7 +64,7 @@ def ended(command: list[str]) -> tuple[str, str]:
 
 
 def main() -> int:
-    """Runs all, prints a line for each kind, and returns 1 where a process did not end in peace."""
+    """Runs all, prints a line for each kind, and returns 1 if any did not end in peace."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rust", type=int, default=2000, help="runs of the Rust binary")
     parser.add_argument("--python", type=int, default=2000, help="runs of the Python script")
@@ -83,7 +83,7 @@ def main() -> int:
         jobs["Python"] = [
             [sys.executable, str(ROOT / "tests" / "processes.py"), scene] for scene in scenes
         ]
-    # In turns, so that both kinds meet each other's load.
+    # In turns, so that both kinds run under each other's load.
     mixed = [
         (kind, job)
         for row in itertools.zip_longest(*jobs.values())

@@ -1,8 +1,9 @@
-"""Renews the tables of docs/guide.md out of those of docs/bench.md: `guide_docs.py` (after `bench_docs.py`).
+"""Renews the tables of docs/guide.md from those of docs/bench.md: `guide_docs.py`.
 
-A table stands between two marks, the first of which names it.
-Everything in it is a count or a ratio of two cells of one of the bench's tables, so that the two
-pages cannot disagree; a test compares them.
+Run it after `bench_docs.py`.
+A table stands between two marks, and the first mark names it.
+Every cell is a count, or a ratio of two cells, of one of the bench's tables.
+So the two pages cannot disagree, and a test compares them.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ Rows = dict[str, dict[str, dict[str, str]]]
 
 DESCENT = "boxes, 2x2, descent"
 BEST = "best rectangle test (float64, all pixels)"
-#: Which levels of the pyramid are stored, as the bench's labels say it; all, without a word.
+#: Which levels of the pyramid are stored, as in the bench's labels; nothing stands for all.
 LEVELS = {
     "all levels": "",
     "levels >= 2": ", levels >= 2",
@@ -40,22 +41,33 @@ IMAGES = {
 
 
 def rows(bench: str) -> Rows:
-    """The cells of the bench's tables, marks of emphasis and of the Pareto front left out."""
+    """The cells of the bench's tables, without the marks of emphasis and of the Pareto front.
+
+    A scene has several tables with the same labels; their columns are joined.
+
+    Raises
+    ------
+    KeyError
+        If a label is not in all tables of its scene.
+    """
     found: Rows = {}
     for title, text in re.findall(
         r"^### ([\w-]+)\n(.*?)(?=^### |\Z)", bench, re.DOTALL | re.MULTILINE
     ):
-        lines = [
-            [cell.strip() for cell in line.strip("|").split("|")]
-            for line in text.splitlines()
-            if line[:1] == "|"
-        ]
-        if not lines or lines[0][0] != "#":
-            continue
-        head = lines[0]
-        for cells in lines[2:]:
-            by_column = dict(zip(head, cells, strict=True))
-            found.setdefault(title, {})[cells[1].strip("*")] = by_column
+        for block in re.findall(r"(?:^\|.*\n)+", text + "\n", re.MULTILINE):
+            lines = [
+                [cell.strip() for cell in line.strip().strip("|").split("|")]
+                for line in block.splitlines()
+            ]
+            head = lines[0]
+            if head[0] != "#":
+                continue
+            table = {cells[1].strip("*"): cells for cells in lines[2:]}
+            scene = found.setdefault(title, {label: {} for label in table})
+            for label in scene.keys() ^ table.keys():
+                raise KeyError(label)
+            for label, cells in table.items():
+                scene[label] |= dict(zip(head, cells, strict=True))
     return found
 
 
@@ -64,22 +76,30 @@ def _number(cell: str) -> float:
 
 
 def _ratio(scene: dict[str, dict[str, str]], label: str, other: str, column: str = "cull") -> str:
-    """One cell of a column over another one."""
+    """One cell of a column divided by another one."""
     return f"{_number(scene[label][column]) / _number(scene[other][column]):.2f}"
 
 
 def _table(
-    head: list[str], found: Rows, cells: Callable[[dict[str, dict[str, str]]], Iterable[str]]
+    head: list[str],
+    found: Rows,
+    cells: Callable[[dict[str, dict[str, str]]], Iterable[str]],
+    *,
+    turned: bool = False,
 ) -> str:
-    lines = [f"| {' | '.join(head)} |", "|---|" + "---:|" * (len(head) - 1)]
-    lines += [f"| {' | '.join([name, *cells(scene)])} |" for name, scene in found.items()]
-    return "\n".join(lines)
+    """A table with a row for each scene; `turned`: with a column for each scene."""
+    grid = [head, *([name, *cells(scene)] for name, scene in found.items())]
+    if turned:
+        grid = [list(column) for column in zip(*grid, strict=True)]
+    marks = "|---|" + "---:|" * (len(grid[0]) - 1)
+    first, *others = (f"| {' | '.join(row)} |" for row in grid)
+    return "\n".join([first, marks, *others])
 
 
 def tables(found: Rows) -> dict[str, str]:
-    """Every table of the guide that is made of the bench's, by name."""
+    """Every table of the guide that is made from the bench's, by name."""
     kept, of_best = "of those in view", "of best rect."
-    volumes = {"spheres": "spheres", "boxes": "boxes", "oriented boxes": "oriented"}
+    volumes = ("spheres", "boxes", "oriented")
     reads = {
         "2x2": "boxes, 2x2",
         "4x4": "boxes, 4x4",
@@ -87,7 +107,11 @@ def tables(found: Rows) -> dict[str, str]:
         "2x2 and descent": DESCENT,
     }
     fits = ("boxes, 2x2, descent", "oriented, 2x2, descent")
-    others = ("numpy Hi-Z, float32", "Embree, one ray a pixel", "Embree, rays to 9 points of a box")
+    others = (
+        "numpy Hi-Z, float32",
+        "Embree, one ray per pixel",
+        "Embree, rays to 9 points of a box",
+    )
     return {
         "overview": _table(
             [
@@ -95,7 +119,7 @@ def tables(found: Rows) -> dict[str, str]:
                 *(f"boxes, {name}" for name in reads),
                 "spheres, 2x2 and descent",
                 "oriented boxes, 2x2 and descent",
-                'oriented, that and `fit="volume"`',
+                'oriented boxes, 2x2 and descent, `fit="volume"`',
             ],
             found,
             lambda scene: [
@@ -107,17 +131,18 @@ def tables(found: Rows) -> dict[str, str]:
                     "oriented, 2x2, descent, volume fit",
                 ]
             ],
+            turned=True,
         ),
         "volumes": _table(
             [
                 "footprint 2x2",
                 *(f"{name}: kept" for name in volumes),
-                "spheres: time, over boxes",
-                "oriented boxes: time",
+                "spheres: time / boxes",
+                "oriented: time / boxes",
             ],
             found,
             lambda scene: [
-                *(scene[f"{label}, 2x2"][kept] for label in volumes.values()),
+                *(scene[f"{label}, 2x2"][kept] for label in volumes),
                 _ratio(scene, "spheres, 2x2", "boxes, 2x2"),
                 _ratio(scene, "oriented, 2x2", "boxes, 2x2"),
             ],
@@ -136,13 +161,13 @@ def tables(found: Rows) -> dict[str, str]:
         ),
         "fits": _table(
             [
-                "kept, 2x2 and descent",
+                "kept, descent",
                 "boxes: rectangle",
                 "volume",
-                "time, over rectangle",
-                "oriented boxes: rectangle",
+                "time ratio",
+                "oriented: rectangle",
                 "volume",
-                "time",
+                "time ratio",
             ],
             found,
             lambda scene: [
@@ -156,7 +181,7 @@ def tables(found: Rows) -> dict[str, str]:
             ],
         ),
         "images": _table(
-            ["boxes 2x2: kept (visible ones culled)", *IMAGES],
+            ["2x2: kept (false culls)", *IMAGES],
             found,
             lambda scene: [
                 f"{row[kept]} ({row['false culls']})"
@@ -207,6 +232,7 @@ def tables(found: Rows) -> dict[str, str]:
                 *(_ratio(scene, label, "boxes, 2x2", "sum") for label in others),
                 *(scene[label]["false culls"] for label in others),
             ],
+            turned=True,
         ),
     }
 

@@ -1,4 +1,4 @@
-"""Asserts what a wheel of hizvk says about itself and what it holds: `inspect_wheel.py WHEEL`."""
+"""Checks what a wheel of hizvk says about itself and what it holds: `inspect_wheel.py WHEEL`."""
 
 import re
 import struct
@@ -7,13 +7,14 @@ import zipfile
 from email.parser import HeaderParser
 from pathlib import PurePosixPath
 
-# The newest C library that the wheel may ask for: Debian 10, RHEL 8.
+# The newest glibc that the wheel may need: that of Debian 10 and RHEL 8.
 NEWEST_GLIBC = (2, 28)
 ALIASES = {"manylinux1": (2, 5), "manylinux2010": (2, 12), "manylinux2014": (2, 17)}
 EXPECTED = {"hizvk/__init__.py", "hizvk/_core.pyi", "hizvk/py.typed"}
 # The features of crates/hiz_py that a wheel is built without, and what only they put into a module.
 DEVELOPERS_WORDS = {"testing": b"HIZVK_PLANTED_FAULT", "yardstick": b"Yardstick"}
-# What every Linux system has; Vulkan's loader is opened at run time and must not be here.
+# Libraries that every Linux system has.
+# Vulkan's loader is opened at run time and must not be linked.
 SYSTEM_LIBRARIES = {
     "libc.so.6",
     "libm.so.6",
@@ -52,7 +53,7 @@ def needed_libraries(elf: bytes) -> list[str]:
 
 
 def main(path: str) -> None:
-    """Asserts, and prints what was found."""
+    """Checks the wheel, and prints what was found."""
     with zipfile.ZipFile(path) as wheel:
         names = set(wheel.namelist())
         info = next(name for name in names if name.endswith(".dist-info/WHEEL")).removesuffix(

@@ -1,21 +1,21 @@
 #!/usr/bin/env bash
-# Everything that a machine can say about style and types; runs to the end and fails if any part did.
+# All checks of style and types by machine; runs to the end and fails if any check failed.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 scripts/setup.sh
 export PATH="$VENV/bin:$PATH" MYPYPATH=python
-python_files=(python tests scripts docs)
+python_files=(python tools tests scripts docs)
 
 check "cargo fmt" cargo fmt --all -- --check -l
 check "clippy" cargo clippy --workspace --all-targets "${LOCKED[@]}" -- -D warnings
-# Links in documentation break silently otherwise.
+# Without this, links in documentation break silently.
 rust_links() { RUSTDOCFLAGS="-D warnings" cargo doc --workspace "${LOCKED[@]}" --no-deps; }
 check "rustdoc links" rust_links
 check "ruff check" ruff check "${python_files[@]}"
 check "ruff format" ruff format --check "${python_files[@]}"
-check "mypy" mypy --strict python/hizvk
-# The stubs are written by hand: this compares them with the module as it was built.
+check "mypy" mypy --strict python/hizvk tools
+# The stubs are written by hand; this compares them with the built module.
 check "stubtest" python -m mypy.stubtest hizvk --concise --mypy-config-file pyproject.toml
 if have shellcheck; then
   check "shellcheck" shellcheck scripts/*.sh .ci/run

@@ -1,16 +1,19 @@
 #!/usr/bin/env bash
-# Everything that `make demo` and `make test` need, from a fresh Debian or Ubuntu with Rust and Python on. Idempotent, and quick when all
-# is there. `setup.sh GROUP...` also installs those dependency groups of pyproject.toml (docs, wheel).
+# Installs and builds what `make demo` and `make test` need, on a Debian or Ubuntu with Rust and
+# Python.
+# It is idempotent, and quick when all is there.
+# `setup.sh GROUP...` also installs those dependency groups of pyproject.toml (docs, wheel).
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
-# ------------------------------------------------------------------------------------------------------------ system packages
+# -- system packages -------------------------------------------------------------------------------
 
 # Prints the first interpreter that is new enough.
 find_python() {
-  local candidate
-  for candidate in ${PYTHON:+"$PYTHON"} python3 python3.14 python3.13 python3.12 python3.11 /usr/bin/python3; do
-    if have "$candidate" && "$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
+  local candidate new_enough='import sys; sys.exit(sys.version_info < (3, 11))'
+  for candidate in ${PYTHON:+"$PYTHON"} \
+    python3 python3.14 python3.13 python3.12 python3.11 /usr/bin/python3; do
+    if have "$candidate" && "$candidate" -c "$new_enough" 2>/dev/null; then
       command -v "$candidate"
       return
     fi
@@ -21,30 +24,36 @@ can_make_venv() { "$1" -c 'import ensurepip, venv' 2>/dev/null; }
 
 has_vulkan_loader() {
   local file
-  for file in /usr/lib/*/libvulkan.so.1 /usr/lib64/libvulkan.so.1 /usr/lib/libvulkan.so.1 /usr/local/lib/libvulkan.so.1; do
+  for file in /usr/lib{/*,64,}/libvulkan.so.1 /usr/local/lib/libvulkan.so.1; do
     [ -e "$file" ] && return
   done
   return 1
 }
 
-has_vulkan_driver() { compgen -G '/usr/share/vulkan/icd.d/*.json' >/dev/null || compgen -G '/etc/vulkan/icd.d/*.json' >/dev/null; }
+has_vulkan_driver() {
+  compgen -G '/usr/share/vulkan/icd.d/*.json' >/dev/null ||
+    compgen -G '/etc/vulkan/icd.d/*.json' >/dev/null
+}
 
-# What precedes a command to run it as root, and whether there is such a thing; asks for no password.
+# Whether commands can be run as root without a password; as_root then precedes them.
 as_root=()
 can_be_root() {
   [ "$(id -u)" != 0 ] || return 0
   have sudo && sudo -n true 2>/dev/null && as_root=(sudo -n)
 }
 
-# apt_install PACKAGE...: or, where that cannot be, the exact line to run, and the end.
+# apt_install PACKAGE...: installs them, or names the exact line to run and ends.
 apt_install() {
   local line="apt-get update && apt-get install -y $*"
   have apt-get || die "these Debian packages, or what your system calls them, are missing: $*"
-  can_be_root || die "system packages are missing and this user may not install them; run:" "sudo sh -c '$line'" "and then make again"
+  can_be_root || die "system packages are missing and this user may not install them; run:" \
+    "sudo sh -c '$line'" "and then make again"
   say "installing system packages: $*"
-  # An unreachable third-party source fails the update; the packages may be had all the same.
-  "${as_root[@]}" apt-get update -qq </dev/null || printf 'warning: apt-get update failed; trying with the lists at hand\n' >&2
-  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" </dev/null ||
+  # An unreachable third-party source fails the update, but the packages may still be available.
+  "${as_root[@]}" apt-get update -qq </dev/null ||
+    printf 'warning: apt-get update failed; trying with the lists at hand\n' >&2
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+    apt-get install -y -qq --no-install-recommends "$@" </dev/null ||
     die "apt-get could not install: $*" "run it by hand to see why: $line"
 }
 
@@ -57,16 +66,21 @@ system_packages() {
   python=$(find_python)
   if [ -z "$python" ]; then
     missing+=(python3 python3-venv)
-  elif ! [ -x "$VENV_PYTHON" ] && ! can_make_venv "$python" && ! "$python" -c 'import virtualenv' 2>/dev/null; then
+  elif ! [ -x "$VENV_PYTHON" ] && ! can_make_venv "$python" &&
+    ! "$python" -c 'import virtualenv' 2>/dev/null; then
     version=$("$python" -c 'import sys; print("python%d.%d" % sys.version_info[:2])')
     case $(readlink -f "$python") in
       /usr/bin/*) missing+=("$version-venv") ;;
-      *) die "$python has neither ensurepip nor virtualenv" "run: $python -m pip install virtualenv, or name another one with PYTHON=" ;;
+      *)
+        die "$python has neither ensurepip nor virtualenv" \
+          "run: $python -m pip install virtualenv, or name another one with PYTHON="
+        ;;
     esac
   fi
   # The tests want lavapipe, the demo wants any driver.
   if [ "${missing[*]}" = mesa-vulkan-drivers ] && ! can_be_root && has_vulkan_driver; then
-    printf 'note: no lavapipe (mesa-vulkan-drivers), which the tests run on; going on with the Vulkan driver that is there\n' >&2
+    printf 'note: no lavapipe (mesa-vulkan-drivers), which the tests run on; %s\n' \
+      'going on with the Vulkan driver that is there' >&2
     return
   fi
   [ ${#missing[@]} -eq 0 ] || apt_install "${missing[@]}"
@@ -76,19 +90,21 @@ check_rust() {
   local wanted found
   wanted=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
   if ! have cargo || ! have rustc; then
-    die "Rust $wanted or newer is needed and cargo or rustc is not on PATH" "install it with rustup: https://rustup.rs"
+    die "Rust $wanted or newer is needed and cargo or rustc is not on PATH" \
+      "install it with rustup: https://rustup.rs"
   fi
   found=$(rustc --version | awk '{print $2}')
   if [ "$(printf '%s\n' "$wanted" "${found%%-*}" | sort -V | head -n 1)" != "$wanted" ]; then
-    die "Rust $wanted or newer is needed, $(command -v rustc) is $found" "a distribution's own Rust is often too old; install one with rustup: https://rustup.rs"
+    die "Rust $wanted or newer is needed, $(command -v rustc) is $found" \
+      "a distribution's own Rust is often too old; install one with rustup: https://rustup.rs"
   fi
 }
 
-# ------------------------------------------------------------------------------------------------------------ virtual environment
+# -- virtual environment ---------------------------------------------------------------------------
 
 make_venv() {
   local python
-  # A new interpreter behind an old environment leaves dead links: such an environment is made anew.
+  # An environment whose interpreter was replaced has dead links, and is made anew.
   if [ -x "$VENV_PYTHON" ] && "$VENV_PYTHON" -m pip --version >/dev/null 2>&1; then
     return
   fi
@@ -105,7 +121,7 @@ make_venv() {
   "$VENV_PYTHON" -m pip install 'pip>=25.1'
 }
 
-# install_group GROUP: a dependency group of pyproject.toml, when that file is not as it was last time.
+# install_group GROUP: installs a dependency group of pyproject.toml if that file has changed.
 install_group() {
   local group=$1 key
   key=$(sha256sum <pyproject.toml)
@@ -115,9 +131,9 @@ install_group() {
   fi
 }
 
-# ------------------------------------------------------------------------------------------------------------ the module
+# -- module ----------------------------------------------------------------------------------------
 
-# The Python sources need no build: the installation is editable and points at python/.
+# The Python sources need no build, because the installation is editable and points at python/.
 module_inputs() {
   find Cargo.toml Cargo.lock pyproject.toml shaders crates -type f -printf '%p %s %T@\n' | sort
   rustc --version
@@ -127,14 +143,16 @@ module_inputs() {
 build_module() {
   local key
   key=$(module_inputs | sha256sum)
-  if [ "$key" = "$(cat "$STAMPS/module" 2>/dev/null)" ] && "$VENV_PYTHON" -c 'import hizvk._core' 2>/dev/null; then
+  if [ "$key" = "$(cat "$STAMPS/module" 2>/dev/null)" ] &&
+    "$VENV_PYTHON" -c 'import hizvk._core' 2>/dev/null; then
     return
   fi
-  # The profile of the tests (its dependencies are optimised): wgpu is then compiled once for `cargo test` and for Python.
+  # With the profile of the tests, in which dependencies are optimised, wgpu is compiled once for
+  # `cargo test` and for Python.
   step "building the Python module (the first time takes some minutes)" \
     env VIRTUAL_ENV="$VENV" PATH="$VENV/bin:$PATH" \
     maturin develop --extras viz,scene --features testing,yardstick "${LOCKED[@]}"
-  # The key from before: what was edited meanwhile is built next time.
+  # The key is the one from before the build, so what was edited meanwhile is built next time.
   printf '%s\n' "$key" >"$STAMPS/module"
 }
 

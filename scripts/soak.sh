@@ -1,8 +1,12 @@
 #!/usr/bin/env bash
-# The tests that take minutes: the campaign of adversarial cases against the exact oracle, a million for each kind of volume
-# (HIZVK_SOAK_CASES), from seed HIZVK_SOAK_SEED on, and the certificates in every arithmetic that WGSL permits. The campaign may be
-# stopped at any time: the next run with the same settings goes on where it was. And the example's scenes, with and without culling,
-# by 1000 random cameras each (HIZVK_SOAK_CAMERAS). And 2000 processes each of Rust and Python that use a device and end.
+# The tests that take minutes:
+# - adversarial cases against the exact oracle, a million (HIZVK_SOAK_CASES) for each kind of
+#   bounds, from seed HIZVK_SOAK_SEED on;
+# - the certificates in every arithmetic that WGSL permits;
+# - the example's scenes with and without culling, by 1000 random cameras (HIZVK_SOAK_CAMERAS) each;
+# - 2000 processes each of Rust and Python that use a device and end.
+# The adversarial cases may be stopped at any time.
+# The next run with the same settings continues there.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
@@ -21,7 +25,9 @@ slow_python_tests() {
   # 5: no test is marked slow
   [ "$status" = 5 ] || return "$status"
 }
-random_arrays() { HIZVK_FUZZ=random "$VENV_PYTHON" -m pytest tests/test_fuzz.py tests/test_fuzz_arrays.py; }
+random_arrays() {
+  HIZVK_FUZZ=random "$VENV_PYTHON" -m pytest tests/test_fuzz.py tests/test_fuzz_arrays.py
+}
 step "slow Rust tests" slow_rust_tests
 step "processes that end" "$VENV_PYTHON" scripts/exits.py
 step "fuzzing with new examples" random_arrays

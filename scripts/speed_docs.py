@@ -1,8 +1,9 @@
-"""Renews what docs/performance.md and guide.md quote of a run: `speed_docs.py [REPORT]` (out/speed/report.md).
+"""Renews what docs/performance.md and guide.md quote of a run: `speed_docs.py [REPORT]`.
 
-Each quotation stands between two marks that name the report's sections, and may name the rows of
-its tables that are wanted: `<!-- speed: Section; Other section | part of a label | part of another
--->`.
+REPORT is out/speed/report.md unless it is given.
+Each quotation stands between two marks.
+The first mark names the report's sections, and may name which rows of their tables are wanted:
+`<!-- speed: Section; Other section | part of a label | part of another -->`.
 """
 
 import re
@@ -16,7 +17,7 @@ QUOTATION = re.compile(r"(<!-- speed: (.*?) -->\n).*?(<!-- speed: end -->)", re.
 
 
 def sections(report: str) -> dict[str, str]:
-    """What stands below each heading, without pictures; below "head", what stands before the first one."""
+    """The text below each heading, without pictures; "head" is the text before the first one."""
     head, *parts = re.split(r"^## ", report, flags=re.MULTILINE)
     found = {"head": head[head.index("- Command") :]}
     for part in parts:
@@ -26,7 +27,7 @@ def sections(report: str) -> dict[str, str]:
 
 
 def quoted(found: dict[str, str], wanted: str) -> str:
-    """A section, or those rows of its tables whose label holds one of the words."""
+    """A section, or the rows of its tables whose label contains one of the words."""
     name, *words = (part.strip() for part in wanted.split("|"))
     if not words:
         return found[name]

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Puts SwiftShader, the software Vulkan driver of Chromium, into target/swiftshader/. Needs no root: the package is unpacked, not installed.
+# Puts SwiftShader, the software Vulkan driver of Chromium, into target/swiftshader/.
+# It needs no root: the package is unpacked, not installed.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
@@ -10,7 +11,8 @@ if [ -e "$dir/${files[0]}" ] && [ -e "$dir/${files[1]}" ]; then
 fi
 
 if ! have apt-get || ! have dpkg-deb; then
-  die "SwiftShader is taken from Debian's package chromium-common, and this system has no apt-get or dpkg-deb" \
+  die "SwiftShader is taken from Debian's package chromium-common" \
+    "this system has no apt-get or dpkg-deb" \
     "elsewhere: put ${files[*]} (Chromium ships them) into $dir"
 fi
 
@@ -18,7 +20,8 @@ say "SwiftShader, out of Debian's chromium-common"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work"
-# The lists of packages may be missing or old, on a container image for instance; only root can bring them.
+# The lists of packages may be missing or old, for instance on a container image.
+# Only root can update them.
 if ! apt-get download -qq chromium-common 2>"$work/why"; then
   if [ "$(id -u)" = 0 ]; then
     apt-get update -qq </dev/null || true
@@ -32,7 +35,8 @@ if ! apt-get download -qq chromium-common 2>"$work/why"; then
       "if the lists of packages are old: apt-get update"
   }
 fi
-dpkg-deb --fsys-tarfile chromium-common_*.deb | tar x --strip-components=4 "${files[@]/#/./usr/lib/chromium/}"
+dpkg-deb --fsys-tarfile chromium-common_*.deb |
+  tar x --strip-components=4 "${files[@]/#/./usr/lib/chromium/}"
 # The manifest names the library by a path relative to itself, so the two stay together.
 mkdir -p "$dir"
 mv "${files[@]}" "$dir/"

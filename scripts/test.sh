@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# test.sh [lavapipe | swiftshader]: the Rust and the Python tests on one software driver, whose name is printed and checked first.
+# test.sh [lavapipe | swiftshader]: the Rust and the Python tests on one software driver.
+# The driver's name is printed and checked first.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
@@ -20,7 +21,8 @@ esac
 say "the adapter under test"
 "$VENV_PYTHON" tests/adapter_check.py
 
-# Always the whole workspace: a smaller selection has other features in some dependencies, and wgpu would be compiled again.
+# Always the whole workspace: a smaller selection has other features in some dependencies, so wgpu
+# would be compiled again.
 rust_tests() {
   if have cargo-nextest; then
     cargo nextest run --workspace "${LOCKED[@]}" --no-fail-fast

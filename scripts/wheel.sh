@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# dist/: the sdist, and the wheel that it builds. The wheel is made from the unpacked sdist alone, which proves that nothing is missing in it.
+# Makes the sdist and the wheel in dist/.
+# The wheel is built from the unpacked sdist alone, which proves that the sdist is complete.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
@@ -14,11 +15,12 @@ trap 'rm -rf "$work"' EXIT
 rm -rf dist
 step "sdist" maturin sdist --out dist
 sdists=(dist/hizvk-*.tar.gz)
-# Touched: the times in an sdist are long past, and cargo would take the crates for those that it has compiled before.
+# --touch: the times in an sdist are long past, so cargo would take the crates for those that it
+# has compiled before.
 tar xzf "${sdists[0]}" --touch -C "$work"
 
 build_wheel() {
-  # The crates of the registry are compiled once, wherever the unpacked sources lie.
+  # With this target folder the registry's crates are compiled only once.
   (cd "$work"/hizvk-* && CARGO_TARGET_DIR="$ROOT/target/wheel" \
     maturin build --release --locked --zig --compatibility "$compatibility" --out "$ROOT/dist")
 }

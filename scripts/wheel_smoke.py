@@ -1,6 +1,6 @@
-"""A few seconds with an installed wheel: `wheel_smoke.py`.
+"""Tries an installed wheel for a few seconds: `wheel_smoke.py`.
 
-Where there is no device: `wheel_smoke.py --no-driver`.
+`wheel_smoke.py --no-driver` is for a machine without a device.
 """
 
 import sys
@@ -14,7 +14,7 @@ INSTALL_LINE = "apt install libvulkan1 mesa-vulkan-drivers"
 
 
 def without_driver() -> None:
-    """The import has worked; `Device` must say what to install."""
+    """The import has worked; opening a device must say what to install."""
     try:
         hizvk.Device()
     except hizvk.NoAdapterError as error:
@@ -27,7 +27,7 @@ def without_driver() -> None:
 
 
 def with_driver() -> None:
-    """One cull: of two spheres, behind and before a wall that fills the view, one is hidden."""
+    """Culls two spheres, one behind and one before a wall that fills the view."""
     camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(90, 160), near=0.1)
     wall = np.full((90, 160), 10.0)
     spheres = hizvk.Spheres(np.array([[0.0, 0.0, -20.0], [0.0, 0.0, -5.0]]), np.array([1.0, 1.0]))

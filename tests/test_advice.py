@@ -1,7 +1,7 @@
-"""What the library advises: which depth hides a mesh's own vertices, what `recommend` picks, and the hints.
+"""What the library advises: depth for a mesh's own vertices, the picks of `recommend`, and hints.
 
-What is visible is found by hand, or by rays at every triangle (Moller and Trumbore 1997), written
-once more here.
+What is visible is found by hand, or by rays at every triangle (Moller and Trumbore 1997), which are
+implemented here again.
 """
 
 from __future__ import annotations
@@ -14,10 +14,13 @@ import numpy as np
 import pytest
 
 import hizvk
-from hizvk import scenes, truth
-from hizvk.bench import recommend as advice
-from hizvk.bench.clear import Blockers, points_of
-from hizvk.bench.configurations import Configuration, DepthVariant, promised
+from hizvk import scenes
+from hizvk.measuring.configuration import Configuration, DepthVariant
+from hizvk.measuring.spread import spread
+from hizvk.recommendation import Candidate, choose, entry, timing
+from hizvk.recommendation.blockers import Blockers, points_of
+from hizvk.recommendation.tried import promised
+from hizvk.scenes import truth
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -86,7 +89,7 @@ def looking_at(size: tuple[int, int], **more: Any) -> hizvk.Camera:
 def seen_from(
     start: np.ndarray, points: np.ndarray, vertices: np.ndarray, triangles: np.ndarray
 ) -> Mask:
-    """Whether the way from `start` (one, or one a point) to each point is free, but for what touches the point."""
+    """Whether nothing blocks the way from `start` to each point, except what touches the point."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     free = np.ones(len(points), dtype=bool)
     for number, (point, begin) in enumerate(
@@ -114,8 +117,7 @@ def in_view(camera: hizvk.Camera, points: np.ndarray) -> Mask:
     )
 
 
-# -- points that lie on their own
-# occluder ---------------------------------------------------------------------------
+# -- points that lie on their own occluder ---------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", MESHES)
@@ -140,7 +142,8 @@ def test_plain_depth_hides_a_mesh_s_own_vertices_and_conservative_depth_none(
     proven = [lost(0.0, conservative=True, size=size) for size in (None, (180, 240), (37, 41))]
     print(
         f"{name}: {len(vertices)} vertices, {visible.sum()} visible; culled by plain depth {plain} "
-        f"({100 * plain / visible.sum():.0f} %), with guard_px=0.5 {guarded}, by conservative depth {proven[0]}"
+        f"({100 * plain / visible.sum():.0f} %), with guard_px=0.5 {guarded}, "
+        f"by conservative depth {proven[0]}"
     )
     assert proven == [0, 0, 0]
     row = f"| {name} | {len(vertices):,} | {visible.sum()} | "
@@ -150,8 +153,7 @@ def test_plain_depth_hides_a_mesh_s_own_vertices_and_conservative_depth_none(
     assert plain > 0.2 * visible.sum()
 
 
-# -- the
-# check -------------------------------------------------------------------------------------------------------
+# -- check -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -171,9 +173,16 @@ def test_clear_rays_are_those_of_every_triangle(kind: str, faces: str) -> None:
     )
     if kind.startswith("orthographic"):
         camera = hizvk.Camera.orthographic(
-            EYE, (0, 0, 0), up=(0, 0, 1), height=6.5, width=9.0, size=(60, 80), near=0.1, far=30,
+            EYE,
+            (0, 0, 0),
+            up=(0, 0, 1),
+            height=6.5,
+            width=9.0,
+            size=(60, 80),
+            near=0.1,
+            far=30,
             reversed_z="standard" not in kind,
-        )  # fmt: skip
+        )
         forward = -EYE / np.linalg.norm(EYE)
         start = points - ((points - EYE) @ forward)[:, None] * forward
     else:
@@ -191,7 +200,7 @@ def test_clear_rays_are_those_of_every_triangle(kind: str, faces: str) -> None:
 
 
 def test_clear_rays_know_triangles_that_cross_the_eye_s_plane() -> None:
-    """A floor one below the eye, from behind it to far ahead; and a wall before the near plane hides nothing."""
+    """A floor one unit below the eye hides; a wall before the near plane hides nothing."""
     floor = np.array([[-50.0, -1.0, 50.0], [50.0, -1.0, 50.0], [0.0, -1.0, -500.0]])
     near = np.array([[-9.0, -9.0, -0.05], [9.0, -9.0, -0.05], [0.0, 9.0, -0.05]])
     camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(8, 8), near=0.1)
@@ -246,8 +255,7 @@ def test_points_of_bounds_lie_in_them() -> None:
     )
 
 
-# -- what is
-# recommended ---------------------------------------------------------------------------------------------
+# -- what is recommended ---------------------------------------------------------------------------
 
 
 def test_best_for_points_on_their_own_mesh_is_conservative_and_loses_none(
@@ -282,7 +290,7 @@ def test_best_for_points_on_their_own_mesh_is_conservative_and_loses_none(
     assert "pixels' centres alone" in str(found)
     # A budget that plain depth alone keeps does not bring it back.
     safe = [one for one in found.candidates if one.safe]
-    assert advice.choose(found.candidates, max_ms=1e-9) == (
+    assert choose(found.candidates, max_ms=1e-9) == (
         min(safe, key=lambda one: one.ms.median),
         False,
     )
@@ -302,7 +310,8 @@ def wall(left: float, right: float, depth: float = 4.0) -> hizvk.Mesh:
     return hizvk.Mesh(np.array(corners), np.array([[0, 1, 2], [0, 2, 3]]))
 
 
-#: A gap between pixel centres; and a ball behind it whose middle shows, one that the wall hides, one before the wall.
+#: A gap between pixel centres.
+#: The balls: one behind the gap, whose middle shows; one that the wall hides; one before the wall.
 GAP = [wall(-9.0, 0.95), wall(0.99, 9.0)]
 MIDDLES = np.array([[0.97 * 5.5 / 4.0, 0.0, -5.5], [-3.5, 0.0, -5.5], [-0.5, 0.0, -2.5]])
 BALLS = hizvk.Spheres(MIDDLES, 0.5)
@@ -310,7 +319,7 @@ BALLS = hizvk.Spheres(MIDDLES, 0.5)
 
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fewer candidates, of every sort: each needs a pipeline of its own, and compiling is what takes the time."""
+    """Fewer candidates of every sort: each needs its own pipeline, and compiling takes the time."""
 
     def some(*arguments: Any, **more: Any) -> list[Configuration]:
         return [
@@ -319,7 +328,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
             if one.footprint < 8 and one.fit == "rectangle"
         ]
 
-    monkeypatch.setattr(advice, "promised", some)
+    monkeypatch.setattr(entry, "promised", some)
 
 
 @pytest.mark.usefixtures("few")
@@ -354,7 +363,7 @@ def test_pixel_centres_alone_are_plain_depth_s(device: hizvk.Device) -> None:
 
 @pytest.mark.usefixtures("few")
 def test_plain_depth_that_culls_what_is_proven_hidden_is_recommended(device: hizvk.Device) -> None:
-    """Without the gap all is proven; plain depth is the cheaper here, and what it says is right before this camera."""
+    """Without the gap all is proven; plain depth is cheaper here, and right before this camera."""
     whole = [wall(-9.0, 0.95), wall(0.95, 9.0)]
     for bounds in (BALLS, device.instances(BALLS)):
         found = hizvk.recommend(bounds, CAMERA, occluders=whole, device=device, repetitions=1)
@@ -380,7 +389,7 @@ def test_a_candidate_that_hides_what_is_visible_is_never_chosen(
     device: hizvk.Device, monkeypatch: pytest.MonkeyPatch, coverage: str, victim: int
 ) -> None:
     """A planted liar is the fastest, keeps least, and may even be one of those that are proven."""
-    honest = advice.cull
+    honest = timing.cull
 
     def lying(
         device: hizvk.Device, instances: Any, pyramid: Any, one: Configuration, base: Any
@@ -391,7 +400,7 @@ def test_a_candidate_that_hides_what_is_visible_is_never_chosen(
             mask[victim] = False
         return mask, took[0], took[1]
 
-    monkeypatch.setattr(advice, "cull", lying)
+    monkeypatch.setattr(timing, "cull", lying)
     found = hizvk.recommend(
         BALLS,
         CAMERA,
@@ -413,7 +422,7 @@ def test_a_smaller_plain_image_is_found_out(
 ) -> None:
     small = Configuration("spheres", depth=DepthVariant(8))
     monkeypatch.setattr(
-        advice,
+        entry,
         "promised",
         lambda *_, **__: [small, Configuration("spheres", depth=DepthVariant(1, True))],
     )
@@ -425,15 +434,15 @@ def test_a_smaller_plain_image_is_found_out(
 
 
 def test_choose_refuses_where_nothing_is_safe() -> None:
-    ms = advice.spread(np.ones((1, 1)))
-    liar = advice.Candidate(Configuration(), ms, ms, 3, False, hides=1)
-    unclear = advice.Candidate(Configuration(), ms, ms, 3, False, unclear=1)
-    beside = advice.Candidate(Configuration(), ms, ms, 3, False, asked=False)
+    ms = spread(np.ones((1, 1)))
+    liar = Candidate(Configuration(), ms, ms, 3, False, hides=1)
+    unclear = Candidate(Configuration(), ms, ms, 3, False, unclear=1)
+    beside = Candidate(Configuration(), ms, ms, 3, False, asked=False)
     with pytest.raises(ValueError, match="candidates: expected one that hides nothing"):
-        advice.choose([liar, unclear, beside])
-    honest = advice.Candidate(Configuration(), advice.spread(np.full((1, 1), 9.0)), ms, 300, False)
-    assert advice.choose([liar, unclear, beside, honest]) == (honest, True)
-    assert advice.choose([liar, honest], max_ms=2.0) == (honest, False)
+        choose([liar, unclear, beside])
+    honest = Candidate(Configuration(), spread(np.full((1, 1), 9.0)), ms, 300, False)
+    assert choose([liar, unclear, beside, honest]) == (honest, True)
+    assert choose([liar, honest], max_ms=2.0) == (honest, False)
 
 
 @pytest.mark.usefixtures("few")
@@ -462,7 +471,8 @@ def test_points_before_a_depth_image_get_a_guard(device: hizvk.Device) -> None:
     assert all(one.hides > 0.2 * visible.sum() for one in bare)
     seen = found.best.cull(device.instances(points), camera, depth=image, kind="reversed_ndc")
     print(
-        f"with the guard {int((visible & ~seen.mask).sum())} of {visible.sum()} visible ones are culled"
+        f"with the guard {int((visible & ~seen.mask).sum())} of {visible.sum()} visible ones "
+        "are culled"
     )
     assert (visible & ~seen.mask).sum() < 0.05 * visible.sum()
     # Volumes promise for the image as it is, and the oracle agrees.
@@ -479,9 +489,9 @@ def test_points_before_a_depth_image_get_a_guard(device: hizvk.Device) -> None:
 
 
 def test_candidate_makes_the_whole_call(device: hizvk.Device) -> None:
-    ms = advice.spread(np.ones((1, 1)))
+    ms = spread(np.ones((1, 1)))
     one = Configuration("spheres", descent=64, depth=DepthVariant(2, True, levels=(1, 2)))
-    candidate = advice.Candidate(one, ms, ms, 2, False)
+    candidate = Candidate(one, ms, ms, 2, False)
     balls, walls = device.instances(BALLS), device.occluders(GAP)
     options = candidate.render_options(CAMERA.size)
     assert (options, candidate.pyramid_options) == (
@@ -503,7 +513,7 @@ def test_candidate_makes_the_whole_call(device: hizvk.Device) -> None:
         assert text in str(caught.value)
 
     boxes = device.instances(hizvk.Boxes(MIDDLES, MIDDLES))
-    plain = advice.Candidate(Configuration("spheres"), ms, ms, 2, False)
+    plain = Candidate(Configuration("spheres"), ms, ms, 2, False)
     image = device.render_depth(walls, CAMERA)
     refused(
         ValueError,
@@ -523,7 +533,7 @@ def test_candidate_makes_the_whole_call(device: hizvk.Device) -> None:
 def test_a_rasteriser_knows_the_centres_up_to_the_grid_that_it_snaps_to(
     device: hizvk.Device,
 ) -> None:
-    """Prints how far beside a pixel's centre a wall may end and still be drawn there (docs/guide.md)."""
+    """Prints how far beside a pixel's centre a wall may end and still be drawn (docs/guide.md)."""
     steps = np.arange(1, 513) / 4096.0  # pixels; one is one world unit at depth 4
 
     def drawn(gap: float, **options: Any) -> bool:
@@ -534,7 +544,8 @@ def test_a_rasteriser_knows_the_centres_up_to_the_grid_that_it_snaps_to(
 
     last = max((step for step in steps if drawn(step)), default=0.0)
     print(
-        f"drawn at a centre that the wall misses by up to {last:g} of a pixel (1/{1 / last if last else 0:g})"
+        f"drawn at a centre that the wall misses by up to {last:g} of a pixel "
+        f"(1/{1 / last if last else 0:g})"
     )
     # Vulkan: at least 4 bits below the pixel, so that a corner moves by half a sixteenth; or all of
     # it, cut off.
@@ -544,8 +555,7 @@ def test_a_rasteriser_knows_the_centres_up_to_the_grid_that_it_snaps_to(
     assert not drawn(steps[0], conservative=True)
 
 
-# -- sparse
-# depth ----------------------------------------------------------------------------------------------------
+# -- sparse depth ----------------------------------------------------------------------------------
 
 
 def farthest_of_neighbours(depth: np.ndarray, reach: int) -> np.ndarray:
@@ -577,14 +587,15 @@ def test_sparse_depth_hides_once_it_is_filled(device: hizvk.Device) -> None:
         kept += int(found[0].mask.sum())
         lost += int((found[0].mask & ~found[2].mask).sum())
     print(
-        f"the full image hides {hidden[0]}, 4 % of its pixels {hidden[1]}, filled {hidden[2]}; of the {kept} that the "
+        f"the full image hides {hidden[0]}, 4 % of its pixels {hidden[1]}, filled {hidden[2]}; "
+        f"of the {kept} that the "
         f"full image keeps, the filled one culls {lost}"
     )
     assert hidden[1] < 0.01 * hidden[0] < 0.9 * hidden[0] < hidden[2]
 
 
 def test_filled_depth_closes_a_gap_that_no_pixel_shows(device: hizvk.Device) -> None:
-    """What filling costs: a wall at 4 with a gap three pixels wide, and known pixels beside it only."""
+    """The cost of filling: a wall at 4 has a gap of three pixels, all known pixels beside it."""
     camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(32, 32), near=1.0)
     full = np.full((32, 32), 4.0)
     full[:, 15:18] = 50.0
@@ -600,8 +611,7 @@ def test_filled_depth_closes_a_gap_that_no_pixel_shows(device: hizvk.Device) -> 
     assert seen == [True, True, False]
 
 
-# --
-# hints -----------------------------------------------------------------------------------------------------------
+# -- hints -----------------------------------------------------------------------------------------
 
 IMAGE = np.full(CAMERA.size, 4.0)
 
@@ -609,7 +619,7 @@ IMAGE = np.full(CAMERA.size, 4.0)
 def hinted(
     bounds: hizvk.Spheres, camera: hizvk.Camera = CAMERA, depth: Any = IMAGE, **more: Any
 ) -> list[str]:
-    """What `visible` warns of, all of it in this file's name, and what the result hints at when asked."""
+    """The warnings of `visible`, all of them for this file, and the hints of the result."""
     kind = None if isinstance(depth, hizvk.DepthImage) else "z"
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -675,7 +685,7 @@ def test_a_rendered_image_lacks_nothing(device: hizvk.Device) -> None:
 
 @pytest.mark.parametrize("resized", [False, True])
 def test_a_pose_that_was_mistaken_is_named(device: hizvk.Device, resized: bool) -> None:
-    """`CAMERA` looks along -z with y up: its pose is OpenGL's unit matrix. Given to OpenCV's rows it looks away."""
+    """`CAMERA` looks along -z with y up, OpenGL's unit pose; as a pose of OpenCV it looks away."""
     projection = np.array(
         [[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1], [0, 0, 1, 0]]
     )  # z forward, reversed, infinite
@@ -741,7 +751,8 @@ def test_depth_that_cannot_hide_is_hinted_at(device: hizvk.Device, reversed_z: b
     for empty in (np.zeros((64, 64)), metres * 1000.0, np.full((64, 64), np.nan)):
         (text,) = hinted(balls, camera, empty, device=device)
         assert text.startswith(
-            "depth: every pixel is far, so nothing can be hidden; if something should be there, check"
+            "depth: every pixel is far, so nothing can be hidden; "
+            "if something should be there, check"
         )
     sparse = np.zeros((64, 64))
     sparse[::5, ::5] = 4.0  # 13 x 13 of 4,096

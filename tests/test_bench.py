@@ -1,4 +1,4 @@
-"""The bench: its report, its truth, its yardsticks and its front, each against what is worked out by hand."""
+"""The bench: its report, truth, yardsticks and front, each against results worked out by hand."""
 
 import dataclasses
 import json
@@ -11,24 +11,28 @@ import numpy as np
 import pytest
 
 import hizvk
-from hizvk import cli, truth
-from hizvk import scenes as shared_scenes
+from hizvk import cli, scenes
 from hizvk.bench import (
+    catalogue,
     command,
     configurations,
     numpy_hiz,
-    pareto,
-    recommend,
     report,
     results,
-    scenes,
     score,
     volumes,
 )
-from hizvk.bench.city import city
-from hizvk.bench.configurations import Configuration, DepthVariant
 from hizvk.bench.rectangle import project, rectangle_test
-from hizvk.bench.results import Row, SceneResult, Spread
+from hizvk.bench.results import Row, SceneResult
+from hizvk.commands.figure import can_draw
+from hizvk.measuring import pareto
+from hizvk.measuring.configuration import Configuration, DepthVariant
+from hizvk.measuring.spread import Spread, spread
+from hizvk.measuring.volumes import KINDS
+from hizvk.recommendation import Candidate, choose
+from hizvk.scenes import truth
+from hizvk.scenes.city import city
+from hizvk.scenes.embree import can_cast
 
 ROW = {field.name for field in dataclasses.fields(Row)}
 SCENE = {field.name for field in dataclasses.fields(SceneResult)}
@@ -39,8 +43,7 @@ def device() -> hizvk.Device:
     return hizvk.Device()
 
 
-# -- the
-# command -----------------------------------------------------------------------------------------------------
+# -- command ---------------------------------------------------------------------------------------
 
 
 def run_quick(out: Path, *more: str) -> int:
@@ -103,8 +106,8 @@ def test_a_quick_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         assert by_label["boxes, 2x2, descent"]["share_of_rectangle"] == pytest.approx(1.0, abs=0.02)
         assert by_label["numpy Hi-Z, float64"]["ms"]["render"] is not None
         assert by_label["numpy Hi-Z, float64"]["texels_per_instance"] is None
-        if truth.importlib.util.find_spec("embreex"):
-            rays = by_label["Embree, one ray a pixel"]
+        if can_cast():
+            rays = by_label["Embree, one ray per pixel"]
             assert rays["false_culls"] == rays["hairs"] == 0
             assert rays["hidden_kept"] == 0.0
     page = (out / "report.md").read_text()
@@ -112,7 +115,7 @@ def test_a_quick_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         assert f" {row} |" in page or f" **{row}** |" in page
     assert "What the columns mean" in page
     assert told["command"] in page
-    if truth.importlib.util.find_spec("matplotlib"):
+    if can_draw():
         assert (out / "city.png").read_bytes().startswith(b"\x89PNG\r\n")
         assert "(city.png)" in page
 
@@ -123,11 +126,12 @@ def test_an_absent_castle_is_told_of(
     monkeypatch.setenv("HIZVK_CASTLE", str(tmp_path / "nowhere.npz"))
     assert run_quick(tmp_path, "--scene", "castle") == 1  # nothing was measured
     assert "left out the castle is left out" in capsys.readouterr().out
-    assert "nowhere.npz is no file" in (tmp_path / "report.md").read_text()
+    page = " ".join((tmp_path / "report.md").read_text().split())
+    assert "nowhere.npz is no file" in page
     with pytest.raises(
-        scenes.Missing, match=r"here\.npz is no file; name a castle\.npz with --castle PATH"
+        catalogue.Missing, match=r"here\.npz is no file; name a castle\.npz with --castle PATH"
     ):
-        scenes.find_castle(tmp_path / "here.npz")
+        catalogue.find_castle(tmp_path / "here.npz")
 
 
 def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
@@ -143,18 +147,37 @@ def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
     assert "usage: hizvk bench" in capsys.readouterr().err
 
 
-def test_importing_hizvk_loads_no_scene_and_no_plot() -> None:
-    code = "import sys, hizvk; print([n for n in sys.modules if n.startswith(('hizvk.bench.', 'matplotlib'))])"
+def test_speed_says_where_it_went(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        command.main(["--speed", "--quick"])
+    assert caught.value.code == 2
+    assert "make bench-speed" in capsys.readouterr().err
+
+
+def test_importing_hizvk_loads_no_command_no_scene_and_no_plot() -> None:
+    code = "import sys, hizvk; print(*sys.modules)"
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    ).stdout
-    for name in ("scenes", "city", "plots", "command", "matplotlib"):
-        assert f".{name}'" not in loaded
-        assert f"'{name}'" not in loaded
+    ).stdout.split()
+    assert "hizvk.device" in loaded
+    strangers = (
+        "hizvk.recommendation",
+        "hizvk.bench",
+        "hizvk.demo",
+        "hizvk.scenes",
+        "hizvk.commands",
+        "hizvk.cli",
+    )
+    unwanted = [one for one in loaded if one.startswith((*strangers, "matplotlib", "embreex"))]
+    assert not unwanted
 
 
-# --
-# configurations --------------------------------------------------------------------------------------------------
+def test_recommend_is_a_function_of_the_package() -> None:
+    assert callable(hizvk.recommend)
+    assert hizvk.recommend.__module__ == "hizvk.recommendation.entry"
+
+
+# -- configurations --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("extent", ["quick", "default", "full"])
@@ -183,16 +206,15 @@ def test_which_depth_promises_for_the_view() -> None:
     ]
     assert DepthVariant(4).size((90, 161)) == (22, 40)
     assert DepthVariant(4).size((2, 1)) == (1, 1)
-    assert configurations.render_options(DepthVariant(), (90, 160)) == {}
-    assert configurations.render_options(DepthVariant(2), (90, 160)) == {"size": (45, 80)}
-    assert configurations.render_options(DepthVariant(2, True), (90, 160)) == {
+    assert DepthVariant().render_options((90, 160)) == {}
+    assert DepthVariant(2).render_options((90, 160)) == {"size": (45, 80)}
+    assert DepthVariant(2, True).render_options((90, 160)) == {
         "size": (45, 80),
         "conservative": True,
     }
 
 
-# -- the
-# front -------------------------------------------------------------------------------------------------------
+# -- front -----------------------------------------------------------------------------------------
 
 
 def test_the_front_of_points_by_hand() -> None:
@@ -255,17 +277,30 @@ def test_a_spread_is_over_the_repetitions_of_each_view() -> None:
     ms = np.array(
         [[1.0, 30.0], [20.0, 4.0], [2.0, 5.0]]
     )  # medians 2 and 5; the means of the repetitions are 15.5, 12, 3.5
-    assert results.spread(ms) == Spread(3.5, 3.0, 14.25)
-    assert results.spread(ms, plus=1.0) == Spread(4.5, 4.0, 15.25)
+    assert spread(ms) == Spread(3.5, 3.0, 14.25)
+    assert spread(ms, plus=1.0) == Spread(4.5, 4.0, 15.25)
 
 
 def test_a_broken_promise_fails_the_report() -> None:
     adapter = hizvk.Adapter(0, "a", "b", "c", "vulkan", "cpu")
     scene = SceneResult(
-        key="x", name="x", instances=1, occluder_triangles=0, instance_triangles=0, views=1, size=(1, 1),
-        repetitions=1, truth="", visible=1, hidden=0, inside=1, one_instance_ms=0.0, upload_ms=0.0, warm_up_ms=0.0,
+        key="x",
+        name="x",
+        instances=1,
+        occluder_triangles=0,
+        instance_triangles=0,
+        views=1,
+        size=(1, 1),
+        repetitions=1,
+        truth="",
+        visible=1,
+        hidden=0,
+        inside=1,
+        one_instance_ms=0.0,
+        upload_ms=0.0,
+        warm_up_ms=0.0,
         rows=[row_of(1.0, 0.0, Configuration(depth=DepthVariant(2)), 7), row_of(1.0, 0.0, None, 7)],
-    )  # fmt: skip
+    )
     found = report.Report("hizvk bench", 1, "quick", adapter)
     assert not found.passed
     found.scenes.append(scene)
@@ -275,21 +310,30 @@ def test_a_broken_promise_fails_the_report() -> None:
     assert found.broken() == ["x: : 1 visible instances culled"]
 
 
-# --
-# truth -----------------------------------------------------------------------------------------------------------
+# -- truth -----------------------------------------------------------------------------------------
 
 
-def two_boxes() -> shared_scenes.Scene:
-    """A wall at distance 10 over the left half; boxes behind it, beside it, in front of it, and behind the eye."""
-    wall, sides = shared_scenes.box_mesh([[-40.0, 10.0, -40.0]], [[0.0, 10.5, 40.0]])
+def two_boxes() -> scenes.Scene:
+    """A wall at distance 10 over the left half, and four boxes.
+
+    They are behind it, beside it, in front of it, and behind the eye.
+    """
+    wall, sides = scenes.box_mesh([[-40.0, 10.0, -40.0]], [[0.0, 10.5, 40.0]])
     low = np.array([[-6.0, 20.0, -1.0], [5.0, 20.0, -1.0], [-2.0, 4.0, -1.0], [-1.0, -9.0, -1.0]])
-    vertices, triangles = shared_scenes.box_mesh(low, low + 2.0)
-    view = shared_scenes.View("ahead", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 90.0, 0.25)
-    return shared_scenes.Scene(
-        name="a wall", origin=(0.0, 0.0, 0.0), vertices=wall, triangles=sides, instance_vertices=vertices,
-        instance_triangles=triangles, owner=np.repeat(np.arange(4, dtype=np.int32), 12), box_min=low,
-        box_max=low + 2.0, views=(view,),
-    )  # fmt: skip
+    vertices, triangles = scenes.box_mesh(low, low + 2.0)
+    view = scenes.View("ahead", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 90.0, 0.25)
+    return scenes.Scene(
+        name="a wall",
+        origin=(0.0, 0.0, 0.0),
+        vertices=wall,
+        triangles=sides,
+        instance_vertices=vertices,
+        instance_triangles=triangles,
+        owner=np.repeat(np.arange(4, dtype=np.int32), 12),
+        box_min=low,
+        box_max=low + 2.0,
+        views=(view,),
+    )
 
 
 def test_planted_false_culls_and_false_keeps_are_counted(device: hizvk.Device) -> None:
@@ -346,8 +390,7 @@ def test_far_planes_cut_what_rays_see() -> None:
     assert (caster.look(far, (64, 64)).pixels(4) > 0).tolist() == [True, True, False, False]
 
 
-# --
-# yardsticks ------------------------------------------------------------------------------------------------------
+# -- yardsticks ------------------------------------------------------------------------------------
 
 
 def test_the_numpy_pyramid_by_hand() -> None:
@@ -410,17 +453,16 @@ def test_rays_see_what_the_truth_sees() -> None:
     assert rays.image(clipped, size).tolist() == [False, False, True, False]
 
 
-# --
-# scenes ----------------------------------------------------------------------------------------------------------
+# -- scenes ----------------------------------------------------------------------------------------
 
 
 def test_the_city_repeats_and_can_stand_far_away() -> None:
     near, again, other = city(200, 4, seed=1), city(200, 4, seed=1), city(200, 4, seed=2)
-    far = city(200, 4, seed=1, corner=scenes.FAR_CORNER)
+    far = city(200, 4, seed=1, corner=catalogue.FAR_CORNER)
     np.testing.assert_array_equal(near.scene.box_min, again.scene.box_min)
     assert not np.array_equal(near.scene.box_min, other.scene.box_min)
-    np.testing.assert_array_equal(near.scene.box_min + scenes.FAR_CORNER, far.scene.box_min)
-    np.testing.assert_array_equal(near.scene.vertices + scenes.FAR_CORNER, far.scene.vertices)
+    np.testing.assert_array_equal(near.scene.box_min + catalogue.FAR_CORNER, far.scene.box_min)
+    np.testing.assert_array_equal(near.scene.vertices + catalogue.FAR_CORNER, far.scene.vertices)
     for one in (near, far):
         assert len(one.scene) == 200 == len(one.yaw)
         assert np.array_equal(np.unique(one.scene.owner), np.arange(200))
@@ -432,10 +474,10 @@ def test_the_city_repeats_and_can_stand_far_away() -> None:
             assert 1.6 < view.eye[2] - corner[2] - 1.0 < 1.8  # the ground is a slab of one metre
 
 
-@pytest.mark.parametrize("kind", volumes.VOLUMES)
+@pytest.mark.parametrize("kind", tuple(KINDS))
 @pytest.mark.parametrize("known", [True, False])
 def test_bounds_contain_their_vertices(kind: str, known: bool) -> None:
-    made = city(120, 1, corner=scenes.FAR_CORNER)
+    made = city(120, 1, corner=catalogue.FAR_CORNER)
     scene = made.scene
     bounds = volumes.bounds_of(scene, kind, yaw=made.yaw if known else None)
     corner = scene.instance_vertices[scene.instance_triangles]
@@ -451,9 +493,10 @@ def test_bounds_contain_their_vertices(kind: str, known: bool) -> None:
         local = np.einsum("ni,nik->nk", point - bounds.centers[owner], bounds.rotations[owner])
         assert (np.abs(local) <= bounds.half_sizes[owner]).all()
         np.testing.assert_allclose(
-            np.einsum("nki,nkl->nil", bounds.rotations, bounds.rotations), np.broadcast_to(np.eye(3), (120, 3, 3)),
+            np.einsum("nki,nkl->nil", bounds.rotations, bounds.rotations),
+            np.broadcast_to(np.eye(3), (120, 3, 3)),
             atol=1e-12,
-        )  # fmt: skip
+        )
         turned = np.prod(2.0 * bounds.half_sizes, axis=1)
         straight = np.prod(scene.box_max - scene.box_min, axis=1)
         assert np.median(turned / straight) < 0.95
@@ -465,22 +508,32 @@ def castle_file(path: Path, **changes: Any) -> Path:
     turn = [0, 2, 1]  # z up to y up; mirrored, which no test minds
     first = np.arange(5) * 12
     data = {
-        "name": "two boxes", "source": "a test", "license": "none", "up": np.array([0.0, 1.0, 0.0]),
-        "occluder_vertices": scene.vertices[:, turn].astype(np.float32), "occluder_triangles": scene.triangles,
-        "occluder_instance": np.full(12, -1, np.int32), "instance_aabb_min": scene.box_min[:, turn],
-        "instance_aabb_max": scene.box_max[:, turn], "instance_vertices": scene.instance_vertices[:, turn],
-        "instance_triangles": scene.instance_triangles, "instance_first_triangle": first,
-        "camera_name": np.array(["a", "b", "c"]), "camera_eye": np.zeros((3, 3)),
-        "camera_target": np.array([[0.0, 0.0, 1.0]] * 3), "camera_up": np.array([[0.0, 1.0, 0.0]] * 3),
-        "camera_fov_y": np.full(3, np.pi / 2.0), "camera_near": np.full(3, 0.25),
+        "name": "two boxes",
+        "source": "a test",
+        "license": "none",
+        "up": np.array([0.0, 1.0, 0.0]),
+        "occluder_vertices": scene.vertices[:, turn].astype(np.float32),
+        "occluder_triangles": scene.triangles,
+        "occluder_instance": np.full(12, -1, np.int32),
+        "instance_aabb_min": scene.box_min[:, turn],
+        "instance_aabb_max": scene.box_max[:, turn],
+        "instance_vertices": scene.instance_vertices[:, turn],
+        "instance_triangles": scene.instance_triangles,
+        "instance_first_triangle": first,
+        "camera_name": np.array(["a", "b", "c"]),
+        "camera_eye": np.zeros((3, 3)),
+        "camera_target": np.array([[0.0, 0.0, 1.0]] * 3),
+        "camera_up": np.array([[0.0, 1.0, 0.0]] * 3),
+        "camera_fov_y": np.full(3, np.pi / 2.0),
+        "camera_near": np.full(3, 0.25),
         "camera_far": np.array([15.0, 50.0, 60.0]),
-    } | changes  # fmt: skip
+    } | changes
     np.savez(path, **{key: value for key, value in data.items() if value is not None})
     return path
 
 
 def test_a_castle_is_read(tmp_path: Path) -> None:
-    bench = scenes.load_castle(castle_file(tmp_path / "castle.npz"), 2)
+    bench = catalogue.load_castle(castle_file(tmp_path / "castle.npz"), 2)
     assert bench.up == 1
     assert [view.name for view in bench.scene.views] == ["a", "c"]
     assert [view.far for view in bench.scene.views] == [15.0, 60.0]
@@ -494,31 +547,30 @@ def test_a_castle_is_read(tmp_path: Path) -> None:
         for view in bench.scene.views
     ]
     assert seen[0] < seen[1], "the near far plane cuts the boxes behind it away"
-    with pytest.raises(scenes.Missing, match="camera_near"):
-        scenes.load_castle(castle_file(tmp_path / "b.npz", camera_near=None), 2)
-    with pytest.raises(scenes.Missing, match="occluders that are instances as well"):
-        scenes.load_castle(
+    with pytest.raises(catalogue.Missing, match="camera_near"):
+        catalogue.load_castle(castle_file(tmp_path / "b.npz", camera_near=None), 2)
+    with pytest.raises(catalogue.Missing, match="occluders that are instances as well"):
+        catalogue.load_castle(
             castle_file(tmp_path / "c.npz", occluder_instance=np.zeros(12, np.int32)), 2
         )
 
 
-# --
-# recommend -------------------------------------------------------------------------------------------------------
+# -- recommend -------------------------------------------------------------------------------------
 
 
-def candidate(ms: float, kept: int) -> recommend.Candidate:
-    return recommend.Candidate(Configuration(), Spread(ms, ms, ms), Spread(ms, ms, ms), kept, False)
+def candidate(ms: float, kept: int) -> Candidate:
+    return Candidate(Configuration(), Spread(ms, ms, ms), Spread(ms, ms, ms), kept, False)
 
 
 def test_choosing_by_hand() -> None:
     fast, middle, slow = candidate(1.0, 200), candidate(2.0, 104), candidate(3.0, 100)
     several = [slow, fast, middle]
-    assert recommend.choose(several) == (middle, True)  # 104 is within 5 % of 100
-    assert recommend.choose(several, kept_within=1.0) == (slow, True)
-    assert recommend.choose(several, kept_within=2.0) == (fast, True)
-    assert recommend.choose(several, max_ms=2.5, kept_within=1.0) == (middle, True)
-    assert recommend.choose(several, max_ms=1.5) == (fast, True)
-    assert recommend.choose(several, max_ms=0.5) == (fast, False)
+    assert choose(several) == (middle, True)  # 104 is within 5 % of 100
+    assert choose(several, kept_within=1.0) == (slow, True)
+    assert choose(several, kept_within=2.0) == (fast, True)
+    assert choose(several, max_ms=2.5, kept_within=1.0) == (middle, True)
+    assert choose(several, max_ms=1.5) == (fast, True)
+    assert choose(several, max_ms=0.5) == (fast, False)
 
 
 def test_recommend_on_a_scene(device: hizvk.Device) -> None:
@@ -553,9 +605,15 @@ def test_recommend_on_a_scene(device: hizvk.Device) -> None:
 
     image = device.render_depth(device.occluders([wall]), cameras[0]).numpy()
     by_image = hizvk.recommend(
-        boxes, cameras[0], depths=[image], kind="reversed_ndc", device=device, repetitions=1, max_ms=1e-6,
+        boxes,
+        cameras[0],
+        depths=[image],
+        kind="reversed_ndc",
+        device=device,
+        repetitions=1,
+        max_ms=1e-6,
         coverage="sample",
-    )  # fmt: skip
+    )
     assert not by_image.within_budget
     assert "over the budget" in str(by_image)
     assert by_image.best is by_image.candidates[0]
@@ -596,8 +654,17 @@ def test_recommend_refuses_what_does_not_fit(device: hizvk.Device) -> None:
     )
     refused(ValueError, "bounds: expected Instances of this device", foreign, view, occluders=wall)
     refused(
-        ValueError, "occluders: expected Occluders of this device", spheres, view,
+        ValueError,
+        "occluders: expected Occluders of this device",
+        spheres,
+        view,
         occluders=hizvk.Device().occluders([wall]),
-    )  # fmt: skip
-    refused(ValueError, "depths: expected 1 images, one for each camera, got 2", spheres, view, depths=[image, image],
-            kind="z")  # fmt: skip
+    )
+    refused(
+        ValueError,
+        "depths: expected 1 images, one for each camera, got 2",
+        spheres,
+        view,
+        depths=[image, image],
+        kind="z",
+    )

@@ -1,4 +1,4 @@
-"""``hizvk bench --speed``: all figures are there, and how they come from times and counts, by hand. No time fails."""
+"""The speed tool: all figures are there, and some are worked out by hand. No time fails a test."""
 
 import json
 import os
@@ -9,9 +9,21 @@ import numpy as np
 import pytest
 
 import hizvk
-from hizvk import _core, cli, truth
-from hizvk.bench.speed import command, errors, figures, first_call, report, rounds, scale, town
-from hizvk.bench.speed.run import EXTENTS, Extent, Run
+from hizvk import _core
+from hizvk.commands.figure import can_draw
+from tools.speed import (
+    command,
+    errors,
+    figures,
+    first_call,
+    host_peak,
+    memory,
+    report,
+    rounds,
+    scale,
+    town,
+)
+from tools.speed.run import EXTENTS, Extent, Run
 
 #: As large as it has to be for every part to run.
 TINY = Extent(
@@ -47,25 +59,37 @@ TARGETS = {
 }
 #: What is told beside them.
 TOLD = (
-    "reduction.1080p.uploaded.levels >= 3", "reduction.1080p.uploaded.level 5 alone", "cull.hidden95.share",
+    "reduction.1080p.uploaded.levels >= 3",
+    "reduction.1080p.uploaded.level 5 alone",
+    "cull.hidden95.share",
     "cull.hidden50.groups_over_flat",
-    "cull.hidden95.ns.boxes, flat", "cull.hidden95.ns.spheres, flat", "cull.hidden95.ns.oriented boxes, groups",
-    "cull.hidden95.tests", "outputs.flat.mask", "outputs.groups.draws", "outputs.flat.indices, any order",
-    "calls.small_unread", "others.numpy, cull", "transfers.upload.Morton", "transfers.upload.given",
-    "transfers.update.1", "transfers.update.100", "moved.10 % gone elsewhere", "moved.tests.all moved by up to 1 m",
+    "cull.hidden95.ns.boxes, flat",
+    "cull.hidden95.ns.spheres, flat",
+    "cull.hidden95.ns.oriented boxes, groups",
+    "cull.hidden95.tests",
+    "outputs.flat.mask",
+    "outputs.groups.draws",
+    "outputs.flat.indices, any order",
+    "calls.small_unread",
+    "others.numpy, cull",
+    "transfers.upload.Morton",
+    "transfers.upload.given",
+    "transfers.update.1",
+    "transfers.update.100",
+    "moved.10 % gone elsewhere",
+    "moved.tests.all moved by up to 1 m",
     "memory.host_input.given",
-)  # fmt: skip
+)
 
 
 @pytest.fixture
 def run() -> Run:
     device = hizvk.Device()
-    found = figures.Found("hizvk bench --speed", 7, "quick", device.adapter)
+    found = figures.Found(command.PROG, 7, "quick", device.adapter)
     return Run(device, TINY, 7, found, lambda _: None)
 
 
-# -- the
-# command -----------------------------------------------------------------------------------------------------
+# -- command ---------------------------------------------------------------------------------------
 
 
 def test_a_run_has_every_target(
@@ -73,13 +97,11 @@ def test_a_run_has_every_target(
 ) -> None:
     monkeypatch.setitem(EXTENTS, "quick", TINY)
     out = tmp_path / "a" / "b"
-    assert (
-        cli.main(["bench", "--speed", "--quick", "--seed", "7", "--out", str(out), "--json"]) == 0
-    )
+    assert command.main(["--quick", "--seed", "7", "--out", str(out), "--json"]) == 0
     printed = capsys.readouterr()
     told = json.loads(printed.out)
     assert told == json.loads((out / "report.json").read_text())
-    assert "hizvk bench --speed, quick" in printed.err
+    assert f"{command.PROG}, quick" in printed.err
     assert told["passed"] is True
     assert told["seed"] == 7
     assert len(told["load"]) in (0, len(command.PARTS) + 1)
@@ -132,7 +154,7 @@ def test_a_run_has_every_target(
     assert by_key["calls.small"]["label"] in page
     assert told["command"] in page
     assert "the first calls of fresh processes were left out" in page
-    if truth.importlib.util.find_spec("matplotlib"):
+    if can_draw():
         assert (out / "scale.png").read_bytes().startswith(b"\x89PNG\r\n")
         assert "(scale.png)" in page
 
@@ -151,9 +173,9 @@ def test_one_part_prints_its_targets(
 def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
     for arguments in (["--part", "moon"], ["--quick", "--full"], ["--scene", "city"]):
         with pytest.raises(SystemExit) as caught:
-            cli.main(["bench", "--speed", *arguments])
+            command.main(arguments)
         assert caught.value.code == 2
-    assert "usage: hizvk bench --speed" in capsys.readouterr().err
+    assert f"usage: {command.PROG}" in capsys.readouterr().err
 
 
 def test_every_extent_has_what_the_parts_need() -> None:
@@ -167,14 +189,11 @@ def test_every_extent_has_what_the_parts_need() -> None:
     assert max(EXTENTS["quick"].counts) == 100_000
 
 
-# -- figures, by
-# hand ------------------------------------------------------------------------------------------------
+# -- figures, by hand ------------------------------------------------------------------------------
 
 
 def found() -> figures.Found:
-    return figures.Found(
-        "hizvk bench --speed", 1, "quick", hizvk.Adapter(0, "a", "b", "c", "vulkan", "cpu")
-    )
+    return figures.Found(command.PROG, 1, "quick", hizvk.Adapter(0, "a", "b", "c", "vulkan", "cpu"))
 
 
 def test_a_ratio_is_that_of_medians() -> None:
@@ -198,8 +217,11 @@ def test_a_ratio_is_that_of_medians() -> None:
 
 def test_values_have_units() -> None:
     for number, unit, expected in (
-        (0.001, "share", "0.1 %"), (1234.5, "ns", "1234 ns"), (1.25, "x", "1.25"), (0.0312, "ms", "0.0312 ms"),
-    ):  # fmt: skip
+        (0.001, "share", "0.1 %"),
+        (1234.5, "ns", "1234 ns"),
+        (1.25, "x", "1.25"),
+        (0.0312, "ms", "0.0312 ms"),
+    ):
         assert report.value(figures.Figure("a.b", "x", number, unit)) == expected
 
 
@@ -239,7 +261,7 @@ def test_cliffs_by_hand(run: Run) -> None:
             instances, 1, instances / 1e5, flat_ms, instances / 1e6, 1, 1.0, 1
         )
 
-    # 10, 10, 20 ns an instance; the first is too small to tell.
+    # 10, 10, 20 ns per instance; the first is too small to tell.
     run.found.instance_counts = [
         count(1_000, 9.0),
         count(100_000, 1.0),
@@ -251,12 +273,12 @@ def test_cliffs_by_hand(run: Run) -> None:
     ]
     assert scale.cliffs(run) == [
         "cliff: flat, an instance of 400,000 (1 pieces) costs 2.00 times one of 200,000 (1)",
-        "cliff: the reduction, a pixel of 1024x1024 costs 1.50 times one of 512x512 (a memcpy 0.25 times)",
+        "cliff: the reduction, a pixel of 1024x1024 costs 1.50 times one of 512x512 "
+        "(a memcpy 0.25 times)",
     ]
 
 
-# -- the town and its
-# judge ------------------------------------------------------------------------------------------
+# -- the town and its judge ------------------------------------------------------------------------
 
 
 def test_the_town_hides_about_what_was_asked_for(run: Run) -> None:
@@ -293,8 +315,7 @@ def test_planted_errors_are_counted(run: Run) -> None:
     assert run.found.errors == [nothing, everything]
 
 
-# -- the yardsticks of the
-# engine ------------------------------------------------------------------------------------
+# -- the yardsticks of the engine ------------------------------------------------------------------
 
 
 def test_a_timed_cull_is_that_of_the_device(run: Run) -> None:
@@ -327,6 +348,22 @@ def test_what_the_yardsticks_refuse(run: Run) -> None:
     unmasked = run.cull(spheres, depth.camera, pyramid, outputs=(False, True, False, False))
     with pytest.raises(ValueError, match="outputs: expected a cull that was asked for mask"):
         unmasked.mask()
+
+
+def test_without_proc_the_peak_is_left_out(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(host_peak, "RESET", tmp_path / "clear_refs")
+    with pytest.raises(SystemExit, match="this system has no"):
+        host_peak.main(10, 1, "given")
+
+
+def test_a_peak_that_cannot_be_had_is_noted(
+    run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(memory, "ROOT", tmp_path)  # the child does not find its module there
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    memory._host(run)
+    assert not run.found.figures
+    assert "the peak of the host's memory was left out: " in run.found.notes[0]
 
 
 def test_a_fresh_process_reaches_a_mask(tmp_path: Path) -> None:

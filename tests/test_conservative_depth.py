@@ -19,7 +19,8 @@ import pytest
 
 import documented
 import hizvk
-from hizvk import scenes, truth
+from hizvk import scenes
+from hizvk.scenes import truth
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -1,4 +1,7 @@
-"""What README and docs show runs as it stands: code and commands. (Faults that they plant: `planted_texts.rs`.)"""
+"""What README and docs show runs as it stands: code and commands.
+
+Faults that they plant are tested by `planted_texts.rs`.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,10 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("crates/*/README.md")])
 FENCE = re.compile(r"^```(?P<language>[^\n]*)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
-#: Languages that are shown and not run here; `rust` is, by rustdoc (`crates/hiz_core/src/lib.rs`, `readme`).
-NOT_RUN = {"sh", "text", "rust", "wgsl", "json", "{eval-rst}", "{include}", "{toctree}"}
+#: Languages that are shown and not run here. rustdoc runs `rust` (`crates/hiz_core/src/lib.rs`).
+NOT_RUN = {"sh", "text", "rust", "toml", "wgsl", "json", "{eval-rst}", "{toctree}"}
+#: The pages whose Rust blocks rustdoc compiles and runs.
+BY_RUSTDOC = ("README.md", "docs/rust.md")
 
 
 def blocks() -> list[tuple[str, str, str]]:
@@ -41,22 +46,24 @@ def test_every_block_says_what_it_is() -> None:
     """A block of no or another language would be run by nobody."""
     strange = [place for place, language, _ in BLOCKS if language not in {*NOT_RUN, "python"}]
     assert not strange
-    # rustdoc runs README's alone, and passes over what is marked so.
+    # rustdoc runs those of some pages alone, and passes over what is marked so.
     unrun = [
         place
         for place, language, _ in BLOCKS
-        if language == "rust" and not place.startswith("README.md")
+        if language == "rust" and place.partition(":")[0] not in BY_RUSTDOC
     ]
     assert not unrun
     assert PYTHON
-    assert any(language == "rust" for _, language, _ in BLOCKS)
+    for page in BY_RUSTDOC:
+        assert any(p.startswith(page) for p, language, _ in BLOCKS if language == "rust"), page
 
 
-def test_rustdoc_runs_the_readme() -> None:
+@pytest.mark.parametrize("page", BY_RUSTDOC)
+def test_rustdoc_runs_the_page(page: str) -> None:
     source = (ROOT / "crates" / "hiz_core" / "src" / "lib.rs").read_text(encoding="utf-8")
-    assert '#[doc = include_str!("../../../README.md")]' in source
+    assert f'#[doc = include_str!("../../../{page}")]' in source
     # To rustdoc, indented lines outside of a fence are Rust.
-    outside = FENCE.sub("", (ROOT / "README.md").read_text(encoding="utf-8"))
+    outside = FENCE.sub("", (ROOT / page).read_text(encoding="utf-8"))
     assert not re.search(r"^(    |\t)\S", outside, re.MULTILINE)
 
 

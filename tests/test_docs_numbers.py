@@ -1,8 +1,9 @@
-"""Tables of README and docs that are counts say what their command prints today; what is made of another table, too.
+"""Tables of counts in README and docs say what their command prints today.
 
+Tables made from other tables agree with them.
 Counts repeat with the seed on one driver.
-On another one rasterised depth differs in its last bits, and a few counts with it: there the
-comparison is skipped.
+On another driver, rasterised depth differs in its last bits, and a few counts with it.
+There the comparison is skipped.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ guide_docs = script("guide_docs")
 
 
 def test_the_guide_quotes_the_bench() -> None:
-    """Run scripts/guide_docs.py where this is red."""
+    """If this fails, run scripts/guide_docs.py."""
     guide = page("guide.md")
     assert guide_docs.QUOTATION.search(guide)
     assert guide_docs.renewed(guide, page("bench.md")) == guide
@@ -68,7 +69,7 @@ def test_a_table_that_was_edited_is_seen() -> None:
     ],
 )
 def test_the_bench_still_counts_so(tmp_path: Path, scene: str) -> None:
-    """Run `make bench` and scripts/bench_docs.py where this is red, and say in the log what has changed the counts."""
+    """If this fails: `make bench`, scripts/bench_docs.py, and say why the counts have changed."""
     if not documented.is_of_this_driver(page("bench.md")):
         pytest.skip(f"docs/bench.md was printed on another driver than {hizvk.Device().adapter}")
     if scene == "castle" and not CASTLE.exists():

@@ -82,7 +82,7 @@ from .result import DRAW_DTYPE, CullResult
 from .stats import CullStats
 
 if TYPE_CHECKING:
-    from .bench.recommend import Recommendation, recommend
+    from .recommendation import Recommendation, recommend
 
 __all__ = [
     "DRAW_DTYPE",
@@ -128,7 +128,7 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """`recommend` and `Recommendation`, loaded at their first use: culling does not need them."""
     if name in ("recommend", "Recommendation"):
-        from .bench import recommend as module
+        from . import recommendation as module
 
         globals()[name] = getattr(module, name)
         return globals()[name]

@@ -12,7 +12,7 @@ import os
 import platform
 import sys
 from glob import glob
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -25,21 +25,31 @@ if TYPE_CHECKING:
 
 __all__ = ["main"]
 
+#: The library that the Vulkan loader is, by `sys.platform`.
+LOADERS: Final = {"win32": "vulkan-1.dll", "darwin": "libvulkan.1.dylib"}
+LINUX_LOADER: Final = "libvulkan.so.1"
 #: Where the Vulkan loader looks for drivers on Linux, beside what the environment adds.
-DRIVER_FOLDERS = ("/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/usr/share/vulkan/icd.d")
+DRIVER_FOLDERS: Final = (
+    "/etc/vulkan/icd.d",
+    "/usr/local/share/vulkan/icd.d",
+    "/usr/share/vulkan/icd.d",
+)
 #: Variables that choose drivers and adapters.
-VARIABLES = ("HIZVK_ADAPTER", "VK_DRIVER_FILES", "VK_ICD_FILENAMES", "VK_ADD_DRIVER_FILES")
-#: The commands that live in modules of their own: ``main(arguments) -> exit code``.
-DELEGATED = {
+VARIABLES: Final = ("HIZVK_ADAPTER", "VK_DRIVER_FILES", "VK_ICD_FILENAMES", "VK_ADD_DRIVER_FILES")
+#: The commands that are packages of their own; each has ``main(arguments) -> exit code``.
+DELEGATED: Final = {
     "demo": "the demo scene: culls it, draws it, checks it",
-    "bench": "measures this machine",
+    "bench": "measures speed and error on this machine",
 }
 
-INSTALL_HINT = "apt install libvulkan1 mesa-vulkan-drivers"
+INSTALL_HINT: Final = "apt install libvulkan1 mesa-vulkan-drivers"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs one command and returns the exit code: 0 good, 1 something is wrong, 2 wrong usage."""
+    """Runs one command and returns the exit code.
+
+    0: good; 1: something is wrong; 2: wrong usage.
+    """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     parser = argparse.ArgumentParser(
         prog="hizvk", description="Occlusion culling that never hides what can be seen."
@@ -54,9 +64,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         command.add_argument("--json", action="store_true", help="print one JSON object")
     for name, help_text in DELEGATED.items():
         commands.add_parser(name, help=help_text, add_help=False)
-    if (
-        arguments and arguments[0] in DELEGATED
-    ):  # its own module parses the rest, --help and --json among it
+    if arguments and arguments[0] in DELEGATED:
+        # Its own package parses the rest, --help and --json included.
         return _delegate(arguments[0], arguments[1:])
     parsed = parser.parse_args(arguments)
     return _info(parsed.json) if parsed.command == "info" else _doctor(parsed.json)
@@ -72,7 +81,7 @@ def _delegate(name: str, arguments: list[str]) -> int:
 
 
 def information() -> dict[str, Any]:
-    """What `info` prints, as plain data."""
+    """The output of `info` as plain data."""
     return {
         "hizvk": hizvk.__version__,
         "build": _core.__build__,
@@ -112,16 +121,18 @@ class Check:
 
 
 def checks() -> list[Check]:
-    """Everything that culling needs, from the bottom up; it stops where the rest cannot work."""
+    """Checks what culling needs, from the bottom up, and stops where the rest cannot work."""
     found = [
         Check("package", True, f"hizvk {hizvk.__version__}, Python {platform.python_version()}")
     ]
+    loader = LOADERS.get(sys.platform, LINUX_LOADER)
     try:
-        ctypes.CDLL("libvulkan.so.1")
-        found.append(Check("vulkan loader", True, "libvulkan.so.1"))
+        ctypes.CDLL(loader)
+        found.append(Check("vulkan loader", True, loader))
     except OSError as error:
         return [*found, Check("vulkan loader", False, str(error), INSTALL_HINT)]
-    found.append(_drivers())
+    if sys.platform not in LOADERS:  # elsewhere drivers are not registered by files alone
+        found.append(_drivers())
     adapters = hizvk.adapters()
     if not adapters:
         return [*found, Check("adapters", False, "none", INSTALL_HINT)]
@@ -134,13 +145,13 @@ def checks() -> list[Check]:
         )
         return [*found, Check("device", False, str(error), advice)]
     found.append(
-        Check("device", True, f"{device.adapter}, images up to {device.max_image_side} a side")
+        Check("device", True, f"{device.adapter}, images up to {device.max_image_side} per side")
     )
     return [*found, *(_try_culling(device, reversed_z) for reversed_z in (True, False))]
 
 
 def _drivers() -> Check:
-    """The driver descriptions that the loader will read."""
+    """The driver descriptions that the loader reads on Linux."""
     chosen = os.environ.get("VK_DRIVER_FILES") or os.environ.get("VK_ICD_FILENAMES")
     files = chosen.split(os.pathsep) if chosen else []
     if not chosen:

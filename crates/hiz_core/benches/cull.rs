@@ -16,7 +16,6 @@ use hiz_core::yardstick::{empty_submit_ms, record_uncertified_cull, submitted_ms
 use hiz_core::{
     Bounds, Camera, CullOptions, DepthConvention, Floats, Hierarchy, ImageSize, InstanceOptions,
     Instances, MeshData, OccluderOptions, Order, Outputs, Pose, Projection, Pyramid,
-    VisibleOptions,
 };
 
 /// Half the width of the crowd by its distance, well inside the view.
@@ -120,7 +119,7 @@ fn way<'a>(
     outputs: Outputs,
     certified: bool,
 ) -> Way<'a> {
-    let output = VisibleOptions { outputs, ..VisibleOptions::default() };
+    let output = outputs;
     let visible = engine.context().create_visible(instances, &output).expect("buffers");
     let instances = Arc::clone(instances);
     let run = move || {

@@ -1,84 +1,80 @@
 //! The crate's face: what a renderer calls on its own device and encoder.
+//!
+//! Each method delegates to one of the rooms below.
+//! This file only adds the documentation, and the check of what the device offers.
 
 use std::sync::Arc;
 
-use crate::bounds::Bounds;
-use crate::camera::{Camera, ImageSize};
-use crate::cull::{self, CullInputs, CullOptions};
+use crate::cull::inputs::CullInputs;
+use crate::cull::options::CullOptions;
+use crate::cull::record::record_cull;
 use crate::error::{Error, Result};
-use crate::gpu::Gpu;
+use crate::gpu::device::Gpu;
+use crate::input::bounds::Bounds;
+use crate::input::camera::Camera;
+use crate::input::image::ImageSize;
+use crate::input::mesh::MeshData;
+use crate::input::tolerance::DepthTolerance;
+use crate::instances::piece::CULL_WORKGROUP;
+use crate::instances::update::record_update;
 use crate::instances::{InstanceOptions, Instances};
-use crate::layout::CULL_WORKGROUP;
-use crate::occluders::{self, MeshData, OccluderOptions, Occluders};
-use crate::pyramid::{self, Pyramid, PyramidOptions, PyramidUniform};
-use crate::tolerance::DepthTolerance;
-use crate::update;
-use crate::visible::{Visible, VisibleOptions};
+use crate::occluders::raster::record_occluders;
+use crate::occluders::{OccluderOptions, Occluders};
+use crate::output::outputs::Outputs;
+use crate::output::visible::Visible;
+use crate::pyramid::reduce::record_reduce;
+use crate::pyramid::{Pyramid, PyramidOptions, PyramidUniform};
 
-/// Everything that is made once a device.
+/// Everything that is made once per device.
 /// Cheap to clone.
 ///
-/// Nothing here submits, polls or maps: `record_*` writes into the caller's encoder, `create_*`
-/// makes buffers.
+/// `create_*` makes buffers, and `record_*` writes commands into the caller's encoder.
+/// No method submits, polls or maps.
 ///
 /// # Errors
-/// What wgpu finds wrong with what is made here comes back as an [`Error`], and never at the
-/// device's own error handler, which ends the process by default.
-/// After an error the caller's encoder and device can be used on: nothing that is invalid was
+/// Every method returns what wgpu finds wrong as an [`Error`].
+/// It never reaches the device's own error handler, which by default ends the process.
+/// After an error the caller can go on with the encoder and the device, because nothing invalid was
 /// recorded.
-/// (What was recorded before the error came up may be part of the work.)
+/// Commands that were recorded before the error may remain in the encoder.
 ///
-/// Three things cannot be known here:
+/// Three mistakes cannot be detected here:
 ///
-/// - An encoder of another device, or one with an open pass (whose lifetime was forgotten). wgpu
-///   tells of it when the encoder is finished; of an open pass sometimes at once, which is an
-///   [`Error::Invalid`] that names the encoder.
-/// - What is destroyed between the recording and the submit. wgpu tells of it then.
-/// - Views, encoders and buffers of another `wgpu::Instance`. wgpu takes them for others, for its
-///   handles are numbers that each instance gives out anew.
+/// - An encoder of another device, or one with an open pass whose lifetime was forgotten.
+///   The error appears when the encoder is finished.
+///   An open pass sometimes gives an error at once: an [`Error::Invalid`] that names the encoder.
+/// - An object that is destroyed between the recording and the submit.
+///   The error appears at the submit.
+/// - Views, encoders and buffers of another `wgpu::Instance`.
+///   Every instance numbers its handles anew, so wgpu mistakes them for objects of this one.
 #[derive(Debug, Clone)]
 pub struct HizContext {
     pub(crate) gpu: Arc<Gpu>,
 }
 
 impl HizContext {
-    /// A context on the caller's device.
+    /// Makes a context on the caller's device.
     ///
     /// # Errors
-    /// [`Error::Limit`] where the device offers less than the shaders need;
-    /// [`HizContext::required_limits`] are enough.
+    /// [`Error::Limit`] if the device offers less than the shaders need.
+    /// [`HizContext::required_limits`] are always enough.
     pub fn new(device: &wgpu::Device) -> Result<Self> {
         Self::with_pipeline_cache(device, None)
     }
 
-    /// The same, with a cache that pipelines are compiled into and taken from: of a device with the
-    /// feature `PIPELINE_CACHE`, whose data the caller keeps from run to run.
-    /// Pipelines are made when they are first used, each once; drivers that have a shader cache of
-    /// their own on the disk, as Mesa's have, need nothing more.
+    /// [`HizContext::new`] with a cache from which pipelines are taken and into which they are
+    /// compiled.
+    ///
+    /// The cache needs a device with the feature `PIPELINE_CACHE`, and the caller keeps its data
+    /// between runs.
+    /// Drivers that keep a shader cache on disk do not need one; Mesa's drivers do so.
+    /// Each pipeline is made once, when it is first used.
     ///
     /// # Errors
-    /// As [`HizContext::new`].
+    /// Those of [`HizContext::new`].
     pub fn with_pipeline_cache(
         device: &wgpu::Device,
         cache: Option<wgpu::PipelineCache>,
-    ) -> Result<Self> {
-        Self::make(device, cache, &[])
-    }
-
-    /// For tests: a context whose shaders have texts replaced, `(what, by what)`.
-    /// A suite is trusted once a planted fault turns it red.
-    ///
-    /// # Panics
-    /// If no shader holds such a text: a fault that was never planted proves nothing.
-    #[doc(hidden)]
-    pub fn with_planted_faults(device: &wgpu::Device, faults: &[(&str, &str)]) -> Result<Self> {
-        Self::make(device, None, faults)
-    }
-
-    fn make(
-        device: &wgpu::Device,
-        cache: Option<wgpu::PipelineCache>,
-        faults: &[(&str, &str)],
     ) -> Result<Self> {
         let have = device.limits();
         for (name, need, have) in needed(&have) {
@@ -86,41 +82,65 @@ impl HizContext {
                 return Err(Error::limit(name, need, have));
             }
         }
-        Ok(Self { gpu: Arc::new(Gpu::new(device, cache, faults)?) })
+        Ok(Self { gpu: Arc::new(Gpu::new(device, cache)?) })
     }
 
-    /// Limits that are enough for a device: WebGPU's defaults.
-    /// [`HizContext::new`] takes less where the shaders, their bindings and one row of records fit
-    /// into it, and names the first limit that is too low.
+    /// Makes a context whose shaders have pieces of text replaced, for tests.
+    /// Each fault is a pair: the text and its replacement.
+    /// A test suite is trusted once a planted fault makes it fail.
+    ///
+    /// # Errors
+    /// Those of [`HizContext::new`].
+    ///
+    /// # Panics
+    /// If no shader contains one of the texts: such a fault would never be planted, so it would
+    /// prove nothing.
+    #[cfg(feature = "testing")]
+    pub fn with_planted_faults(device: &wgpu::Device, faults: &[(&str, &str)]) -> Result<Self> {
+        Self::new(device)?;
+        Ok(Self { gpu: Arc::new(Gpu::new(device, None)?.with_planted_faults(faults)) })
+    }
+
+    /// Limits that are always enough for a device: the defaults of WebGPU.
+    ///
+    /// [`HizContext::new`] also accepts lower limits if the shaders, their bindings and one row of
+    /// records fit.
+    /// Otherwise it names the first limit that is too low.
     pub fn required_limits() -> wgpu::Limits {
         wgpu::Limits::default()
     }
 
     /// The features that a device needs: none.
-    /// (A [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0 needs
-    /// `INDIRECT_FIRST_INSTANCE`.)
+    ///
+    /// A [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0 needs
+    /// `INDIRECT_FIRST_INSTANCE`.
     pub fn required_features() -> wgpu::Features {
         wgpu::Features::empty()
     }
 
-    /// The device that everything of this context lives on.
+    /// The device on which this context makes everything.
     pub fn device(&self) -> &wgpu::Device {
         self.gpu.device()
     }
 
-    /// An empty pyramid for depth images of `size`.
+    /// Makes an empty pyramid for depth images of `size` pixels.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for a size of 0 and options out of range, [`Error::Limit`] past the
-    /// device's textures or bindings, [`Error::OutOfMemory`].
+    /// - [`Error::Invalid`] for a size of 0 and for options out of range.
+    /// - [`Error::Limit`] for a size beyond the device's textures or bindings.
+    /// - [`Error::OutOfMemory`].
     pub fn create_pyramid(&self, size: ImageSize, options: &PyramidOptions) -> Result<Pyramid> {
         Pyramid::new(&self.gpu, size, options)
     }
 
-    /// Uploads bounding volumes; records their copies, which run before what is recorded later.
+    /// Makes instances from bounding volumes, and records the copies that bring them to the device.
+    /// Commands that are recorded later see the bounds.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for arrays that do not agree and, with `strict`, for bad bounds.
+    /// - [`Error::Invalid`] for arrays whose lengths disagree and, with `strict`, for invalid
+    ///   bounds.
+    /// - [`Error::Limit`] for more than 2^32 - 1 instances.
+    /// - [`Error::OutOfMemory`].
     pub fn record_instances(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -135,25 +155,34 @@ impl HizContext {
         })
     }
 
-    /// Records the replacement of instances `first..first + n` by the `n` new bounds, of the same
-    /// kind.
-    /// They keep their places in the stored order, and the boxes of their groups of 64 follow:
-    /// where instances have moved far, groups have grown, and new [`Instances`] are faster to cull.
-    /// `strict` refuses bad bounds, and then nothing has changed.
+    /// Records the replacement of instances `first..first + n` by the `n` given bounds.
     ///
-    /// What was submitted before sees the old bounds, what is submitted later the new ones.
-    /// (The verdicts of an [`Engine`](crate::headless::Engine)'s culls are refined here, from the
-    /// old bounds. Of a cull that is submitted between this recording and its submit, read them
-    /// before.)
-    /// Submit updates of the same instances in the order in which they were recorded, each one:
-    /// after one that was left out or overtaken, groups that are touched are never culled as a
-    /// whole any more.
-    /// (Nothing visible is culled for it.)
-    /// The new records wait in memory of the device until then.
+    /// The bounds must be of the same kind as before.
+    /// The instances keep their places in the stored order, and the boxes of their groups of 64
+    /// follow.
+    /// As members drift apart, group boxes grow and cull less.
+    /// New [`Instances`] are faster to cull once most instances have moved farther than their
+    /// spacing.
+    /// With `strict`, invalid bounds are refused, and then nothing has changed.
+    ///
+    /// Commands that were submitted before see the old bounds; commands that are submitted later
+    /// see the new ones.
+    /// Submit every update of the same instances, in the order in which they were recorded.
+    /// If one is dropped or overtaken, each group that a later update touches is never culled as a
+    /// whole again.
+    /// This costs time, but nothing visible is culled.
+    /// The new records occupy device memory until the submit.
+    ///
+    /// This call also refines the verdicts of an [`Engine`](crate::headless::Engine)'s earlier
+    /// culls from the old bounds.
+    /// A cull that is submitted between this call and the submit of its commands is not among them.
+    /// Read the verdicts of such a cull before you submit the update.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for another kind of bounds or context, [`Error::Invalid`] for instances
-    /// that there are not and, with `strict`, for bad bounds, [`Error::OutOfMemory`].
+    /// - [`Error::Mismatch`] for another kind of bounds and for instances of another context.
+    /// - [`Error::Invalid`] for instances that do not exist, for arrays whose lengths disagree and,
+    ///   with `strict`, for invalid bounds.
+    /// - [`Error::OutOfMemory`].
     pub fn record_update(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -162,36 +191,36 @@ impl HizContext {
         bounds: &Bounds<'_>,
         strict: bool,
     ) -> Result<()> {
-        update::record(&self.gpu, encoder, instances, first, bounds, strict, |encoder, range| {
-            // Recording is not running: the verdicts stay to be refined, which a second time
-            // changes nothing.
+        record_update(&self.gpu, encoder, instances, first, bounds, strict, |encoder, range| {
+            // A recorded command may never run, so the verdicts still count as unrefined.
+            // Refining them twice changes nothing.
             let watches = instances.watches();
-            watches.record_refinements(&self.gpu, encoder, instances)?;
+            watches.record_refinements(&self.gpu, encoder)?;
             watches.note(&range);
             Ok(())
         })
     }
 
-    /// Buffers for what a cull of `instances` finds.
+    /// Makes the buffers that take what a cull of `instances` finds.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for instances of another context, [`Error::Invalid`] for a
-    /// [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0 on a
-    /// device without the feature `INDIRECT_FIRST_INSTANCE`, [`Error::OutOfMemory`],
-    /// [`Error::Device`] where the device is lost.
-    pub fn create_visible(
-        &self,
-        instances: &Instances,
-        options: &VisibleOptions,
-    ) -> Result<Visible> {
-        Visible::new(&self.gpu, instances, options)
+    /// - [`Error::Mismatch`] for instances of another context.
+    /// - [`Error::Invalid`] for a
+    ///   [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0 on a
+    ///   device without the feature `INDIRECT_FIRST_INSTANCE`.
+    /// - [`Error::OutOfMemory`].
+    /// - [`Error::Device`] if the device is lost.
+    pub fn create_visible(&self, instances: &Instances, outputs: &Outputs) -> Result<Visible> {
+        Visible::new(&self.gpu, instances, outputs)
     }
 
-    /// Uploads triangle meshes.
+    /// Makes occluders from triangle meshes.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for arrays that do not fit and indices out of range, [`Error::Limit`]
-    /// past the device's buffers, [`Error::OutOfMemory`].
+    /// - [`Error::Invalid`] for arrays of the wrong length, indices out of range and unusable
+    ///   transforms or positions.
+    /// - [`Error::Limit`] for meshes larger than the device's buffers.
+    /// - [`Error::OutOfMemory`].
     pub fn create_occluders(
         &self,
         meshes: &[MeshData<'_>],
@@ -200,14 +229,16 @@ impl HizContext {
         Occluders::new(&self.gpu, meshes, options)
     }
 
-    /// Records the drawing of `occluders` into `target`, which is cleared first: a view of one
-    /// layer of a 2D `Depth32Float` texture of the camera's size, with one mip level, one sample a
-    /// pixel and the usage `RENDER_ATTACHMENT`.
+    /// Records the drawing of `occluders` into `target`, which is cleared to the far plane first.
+    ///
+    /// `target` is a view of one layer of a 2D `Depth32Float` texture of the camera's size.
+    /// The texture has one mip level, one sample per pixel and the usage `RENDER_ATTACHMENT`.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a target of another size, format or device and for a destroyed one,
-    /// [`Error::Invalid`] for one of other usages, samples or mip levels and for a camera that
-    /// float32 cannot hold.
+    /// - [`Error::Mismatch`] for a target of another size, format or device, for a destroyed target
+    ///   and for occluders of another context.
+    /// - [`Error::Invalid`] for a target with other usages, samples or mip levels, and for a camera
+    ///   that float32 cannot hold.
     pub fn record_occluders(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -215,32 +246,37 @@ impl HizContext {
         camera: &Camera,
         target: &wgpu::TextureView,
     ) -> Result<()> {
-        occluders::record(&self.gpu, encoder, occluders, camera, target)
+        record_occluders(&self.gpu, encoder, occluders, camera, target)
     }
 
     /// Records the reduction of a depth image of `camera` into `pyramid`.
     ///
-    /// `depth` is a view of a 2D texture of one mip level, sample and layer, whose whole depth is
-    /// read, whatever part of it the view shows: the default view of a texture with a stencil will
-    /// do.
-    /// Formats and usages:
+    /// `depth` is a view of a 2D texture with one mip level, one sample per pixel and one layer.
+    /// The whole depth of the texture is read, whatever part of it the view shows.
+    /// So the default view of a texture with a stencil will do.
+    /// These formats and usages are accepted:
     ///
-    /// - any depth format, `R32Float` or `R16Float`, with `TEXTURE_BINDING`;
-    /// - `Rgba32Uint` with `STORAGE_BINDING`: the float bits of four pixels of a row in a texel.
-    ///   It is `width.div_ceil(4)` texels wide; pixels past the width count as depth of the row's
-    ///   last ones, so repeat the last.
+    /// - Any depth format, `R32Float` or `R16Float`, with `TEXTURE_BINDING`.
+    /// - `Rgba32Uint` with `STORAGE_BINDING`.
+    ///   Each texel holds the float bits of four neighbouring pixels of a row.
+    ///   The texture is `width.div_ceil(4)` texels wide.
+    ///   Pixels past the width count as depth at the end of the row, so repeat the last pixel
+    ///   there.
     ///
-    /// Give it `COPY_SRC` as well, and large culls read faster ([`AtlasUse`](crate::AtlasUse)).
+    /// Add the usage `COPY_SRC`, and large culls read faster ([`AtlasUse`](crate::AtlasUse)).
     /// The texture must neither change nor be destroyed before the culls that use it have run.
-    /// Submit the reduction before them or with them: a cull that runs before it keeps everything.
+    /// Submit the reduction before these culls or with them.
+    /// A cull that runs before its reduction keeps everything.
     ///
-    /// What the format rounds is slack that the pyramid keeps ([`Pyramid::tolerance`]), and every
-    /// cull counts it beside the slack of its [`CullOptions`]: a step of `Depth16Unorm`,
-    /// `Depth24Plus`, `Depth24PlusStencil8` and `R16Float`, nothing of float32.
+    /// Some formats round depth, and the pyramid keeps this slack ([`Pyramid::tolerance`]).
+    /// Every cull counts it in addition to the slack of its [`CullOptions`].
+    /// It is one step of `Depth16Unorm`, `Depth24Plus`, `Depth24PlusStencil8` and `R16Float`, and
+    /// nothing for float32.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for sizes or devices that do not agree and for a destroyed texture,
-    /// [`Error::Invalid`] for other formats and usages, [`Error::OutOfMemory`].
+    /// - [`Error::Mismatch`] for sizes or devices that disagree and for a destroyed texture.
+    /// - [`Error::Invalid`] for other formats and usages.
+    /// - [`Error::OutOfMemory`].
     pub fn record_reduce(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -248,19 +284,22 @@ impl HizContext {
         camera: &Camera,
         pyramid: &Pyramid,
     ) -> Result<()> {
-        pyramid::record_reduce(&self.gpu, encoder, depth, camera, pyramid, DepthTolerance::NONE)
+        record_reduce(&self.gpu, encoder, depth, camera, pyramid, DepthTolerance::NONE)
     }
 
-    /// Records the cull of `instances` against `pyramid`, whose depth image must be `camera`'s;
-    /// `visible` takes what is found.
+    /// Records the cull of `instances` against `pyramid`; the buffers of `visible` take what it
+    /// finds.
     ///
-    /// A cull of a quarter as many instances as depth image and stored levels have texels copies
-    /// them into one texture first, which costs less than it saves ([`AtlasUse`](crate::AtlasUse)).
+    /// The pyramid must have been built from a depth image of `camera`.
+    /// Large culls first copy the depth image and the stored levels into one atlas texture
+    /// ([`AtlasUse`](crate::AtlasUse)).
+    /// This pays once instances number at least a quarter of the texels copied.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for objects that do not belong together, for a depth image that was
-    /// destroyed since it was reduced and for destroyed buffers of `visible`; [`Error::Invalid`]
-    /// for unusable options or cameras; [`Error::OutOfMemory`].
+    /// - [`Error::Mismatch`] for objects that do not belong together, for a depth image that was
+    ///   destroyed since its reduction and for destroyed buffers of `visible`.
+    /// - [`Error::Invalid`] for unusable options or cameras.
+    /// - [`Error::OutOfMemory`].
     pub fn record_cull(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -270,15 +309,15 @@ impl HizContext {
         visible: &Visible,
         options: &CullOptions,
     ) -> Result<()> {
-        let inputs =
-            CullInputs { instances, camera, pyramid, options, certified: true, idle: false };
-        cull::record(&self.gpu, encoder, &inputs, visible)
+        let inputs = CullInputs { instances, camera, pyramid, options, idle: false };
+        record_cull(&self.gpu, encoder, &inputs, visible)
     }
 }
 
-/// What the shaders and their bindings need of a device, and what it has.
-/// `tests/validation.rs` runs everything on a device that has just this, and on devices with one
-/// less.
+/// The limits that the shaders and their bindings need, each with what the device has.
+///
+/// `tests/validation.rs` runs everything on a device with exactly these limits.
+/// It also tries devices where one limit is lower by one.
 fn needed(have: &wgpu::Limits) -> Vec<(&'static str, u64, u64)> {
     macro_rules! limits {
         ($($name:ident >= $need:expr,)*) => {
@@ -286,40 +325,42 @@ fn needed(have: &wgpu::Limits) -> Vec<(&'static str, u64, u64)> {
         };
     }
     limits! {
-        // A row of records of oriented boxes, 4 texels each (`records`), and a row of surviving
-        // groups.
+        // A row of oriented box records, which take 4 texels each (`instances/records.rs`).
+        // It is also a row of the list of surviving groups.
         max_texture_dimension_2d >= 4096,
         // The cull of members: view, records, outputs, survivors.
         max_bind_groups >= 4,
         max_bind_groups_plus_vertex_buffers >= 4,
-        // The view of a cull (`gpu/layouts`).
+        // The view of a cull (`cull/pipelines.rs`, `DepthStore::layout`).
         max_bindings_per_bind_group >= 7,
         // A depth image.
         max_sampled_textures_per_shader_stage >= 1,
         max_samplers_per_shader_stage >= 1,
-        // Of the cull of members: three chunks, mask, list, draws, statistics, survivors.
+        // The cull of members: three chunks, mask, list, draws, statistics, survivors.
         max_storage_buffers_per_shader_stage >= 8,
-        // An atlas, or an image of bits; records; the list of survivors.
+        // An atlas or an image of depth bits; records; the list of survivors.
         max_storage_textures_per_shader_stage >= 3,
         // Pyramid, view, piece, capacity.
         max_uniform_buffers_per_shader_stage >= 4,
         max_uniform_buffer_binding_size >= size_of::<PyramidUniform>() as u64,
-        // The words of the verdicts of a row of records; and the row itself on its way.
+        // The verdicts of a row of records, and the row itself in its staging buffer.
         max_storage_buffer_binding_size >= 8192,
         max_buffer_size >= 65_536,
         // Occluders.
         max_vertex_buffers >= 1,
         max_vertex_attributes >= 2,
         max_vertex_buffer_array_stride >= 24,
-        // None, but wgpu 30 counts down from it.
+        // No shader needs it, but wgpu 30 counts down from it.
         max_inter_stage_shader_variables >= 1,
-        // Prefix sums of 256 words (`compact`), 64 vectors of four (`count`).
+        // Prefix sums of 256 words (`output/compact.wgsl`); 64 vectors of four words
+        // (`cull/count.wgsl`).
         max_compute_workgroup_storage_size >= 1024,
         max_compute_invocations_per_workgroup >= 256,
         max_compute_workgroup_size_x >= 256,
         max_compute_workgroup_size_y >= 1,
         max_compute_workgroup_size_z >= 1,
-        // What WebGPU promises everywhere: a column of blocks of the largest image, the pieces.
+        // The least that WebGPU guarantees.
+        // A column of blocks of the largest image and every piece fit into it.
         max_compute_workgroups_per_dimension >= 65_535,
     }
 }

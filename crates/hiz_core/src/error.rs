@@ -1,68 +1,71 @@
-//! What can go wrong, each with a message that names the parameter, what was expected and what
-//! came.
+//! Errors: what can go wrong in a call.
+//!
+//! Each message names the parameter, what was expected and what was given.
 
-/// The errors of this crate.
+/// An error of this crate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// No Vulkan adapter fits the request.
+    /// No adapter of the built backends fits the request.
     #[error("no Vulkan adapter {request}; seen: {}. {hint}", if seen.is_empty() { "none".to_owned() } else { seen.join(", ") })]
     NoAdapter {
         /// What was asked for, in words.
         request: String,
-        /// The adapters that were there.
+        /// The adapters that were found.
         seen: Vec<String>,
-        /// The exact line that installs a software driver.
+        /// What to do: how to choose one of these adapters, or the command that installs a software
+        /// driver.
         hint: String,
     },
-    /// A request goes past a limit of the device.
+    /// A request exceeds a limit of the device.
     #[error("{name}: requested {requested}, the device allows {allowed}")]
     Limit {
-        /// The limit, in the words of the WebGPU specification.
+        /// The name of the limit; for limits of WebGPU, the specification's name.
         name: String,
-        /// What the request would need.
+        /// How much the request needs.
         requested: u64,
-        /// What the device has.
+        /// How much the device allows.
         allowed: u64,
     },
-    /// A parameter cannot be used.
+    /// The value of a parameter cannot be used.
     #[error("{parameter}: {message}")]
     Invalid {
         /// The parameter's name.
         parameter: String,
-        /// What was expected and what came.
+        /// What was expected and what was given.
         message: String,
     },
-    /// Objects that do not belong together: another camera, size, device, or a pyramid that was
-    /// never built.
+    /// The objects do not belong together.
+    /// They differ in camera, size or device, or the pyramid was never built.
     #[error("{parameter}: {message}")]
     Mismatch {
         /// The parameter's name.
         parameter: String,
-        /// What was expected and what came.
+        /// What was expected and what was given.
         message: String,
     },
-    /// The device belongs to another process, of which this one is a fork.
-    /// What a driver keeps beside it, threads above all, stays behind in a fork: a call would wait
-    /// for ever.
+    /// The device belongs to the process that this one was forked from.
+    /// A fork has none of the driver's threads, so a call would wait forever.
     #[error(
-        "this device was made by process {made_by}, and process {here} is a fork of it: no device works after a fork. Make one in \
-         this process, or start processes without a fork"
+        "this device was made by process {made_by}, and process {here} is a fork of it: no device \
+         works after a fork. Make one in this process, or start processes without a fork"
     )]
     OtherProcess {
-        /// The process that made the device.
+        /// The id of the process that made the device.
         made_by: u32,
-        /// This process.
+        /// The id of this process.
         here: u32,
     },
-    /// The device was lost; everything that lives on it is gone.
+    /// The device was lost, and everything on it is gone.
+    /// The text gives the reason.
     #[error("the device was lost: {0}")]
     DeviceLost(String),
-    /// The device ran out of memory, or the host did.
+    /// The device or the host ran out of memory.
+    /// The text says for what.
     #[error("out of memory: {0}")]
     OutOfMemory(String),
-    /// The driver or wgpu refused something that this crate believes to be right: a bug worth
-    /// reporting.
+    /// The driver or wgpu refused something that this crate believes to be valid.
+    /// This is a bug; please report it.
     #[error("the device reported an error: {0}")]
     Device(String),
 }
@@ -81,5 +84,5 @@ impl Error {
     }
 }
 
-/// This crate's results.
+/// The result of a fallible call of this crate.
 pub type Result<T> = std::result::Result<T, Error>;

@@ -1,88 +1,116 @@
 //! Certified hierarchical-Z occlusion culling on wgpu.
 //!
-//! Data flows one way:
+//! The data flows one way, and the steps in this crate are folders of the same names:
 //!
-//! 1. [`Camera`] says, in float64, what is seen; [`DepthKind`] what a depth image's numbers mean;
-//!    [`Bounds`] where the instances are.
-//! 2. [`Occluders`] are drawn into a depth texture, or the caller brings one; their
-//!    [`OccluderSurface`] gives a small depth image that holds for larger ones.
-//! 3. [`HizContext::record_reduce`] builds the [`Pyramid`]: the farthest depth of every block of
-//!    pixels.
-//! 4. [`HizContext::record_cull`] decides for each of the [`Instances`], whole groups first where
-//!    they are many, and lists the kept ones in [`Visible`]; the list's length is the
-//!    `instance_count` of a [`DrawIndexedIndirect`] record on the device.
-//! 5. The caller draws with [`Visible::draw_arguments`]; nothing visits the CPU.
+//! 1. **Input** (`input`).
+//!    A [`Camera`] describes in float64 what is seen.
+//!    A [`DepthKind`] says what the numbers of a depth image mean, and [`Bounds`] say where the
+//!    instances are.
+//! 2. **Occluders** (`occluders`).
+//!    [`Occluders`] are drawn into a depth texture, or the caller brings a depth texture.
+//!    Their [`OccluderSurface`] makes a small depth image that also holds for larger images.
+//! 3. **Pyramid** (`pyramid`).
+//!    [`HizContext::record_reduce`] builds the [`Pyramid`]: for each level, the farthest depth of
+//!    every block of pixels.
+//! 4. **Instances** (`instances`).
+//!    [`HizContext::record_instances`] uploads the bounds as [`Instances`], in groups of 64
+//!    neighbours.
+//! 5. **Output** (`output`).
+//!    [`HizContext::create_visible`] makes the buffers of a [`Visible`], which take what a cull
+//!    finds.
+//! 6. **Cull** (`cull`).
+//!    [`HizContext::record_cull`] tests the instances against the pyramid; if there are many, it
+//!    tests whole groups first.
+//!    The list of kept instances goes to [`Visible`].
+//!    Its length is the `instance_count` of a [`DrawIndexedIndirect`] record on the device.
+//! 7. **Draw**.
+//!    The caller draws with [`Visible::draw_arguments`], and no number visits the CPU.
 //!
-//! The promise: an instance is culled only if, for the exact real numbers that the inputs denote,
-//! every pixel that its bounds can touch holds a depth nearer than all of the bounds.
-//! It is kept by *certificates* computed in float32 with margins that cover every rounding
-//! (`shaders/shared/certificate.wgsl`); whatever is uncertain stays visible.
+//! [`HizContext`] in `context` is the face of these steps, and a Rust renderer starts there.
+//! It only records into the caller's encoder on the caller's device: it never submits, polls or
+//! maps.
+//! [`headless`] is for programs without a renderer: it owns a device, submits, waits and reads
+//! back.
 //!
-//! Everything up to here records into the caller's encoder on the caller's device: nothing submits,
-//! polls or maps.
-//! The [`headless`] module owns a device, submits and reads back.
+//! Two folders serve the others: `host` has arithmetic, memory and threads, and `gpu` makes objects
+//! on the device.
+//!
+//! # The promise
+//!
+//! An instance is culled only if every pixel that its bounds can touch holds a depth nearer than
+//! all of the bounds.
+//! This holds for the exact real numbers that the inputs denote.
+//! The cull proves it with *certificates*: float32 comparisons whose margins cover every rounding
+//! (`shaders/cull/certificate.wgsl`).
+//! Whatever they cannot prove stays visible.
 
+// Some items serve only a readback, so a build without `headless` never uses them.
+#![cfg_attr(not(feature = "headless"), allow(dead_code))]
+
+// The rooms, in the order of the data: each imports only what stands above it here
+// (`tests/rooms.rs`). Empty lines keep rustfmt from sorting them.
+mod error;
+
+mod host;
+
+mod input;
+
+mod gpu;
+
+mod pyramid;
+
+mod occluders;
+
+mod instances;
+
+mod output;
+
+mod cull;
+
+mod context;
+
+#[cfg(feature = "headless")]
 pub mod headless;
 
-mod atlas;
-mod bounds;
-mod camera;
-mod compact;
-mod context;
-mod count;
-mod cull;
-mod depth;
-mod error;
-mod extent;
-mod gpu;
-mod groups;
-mod host;
-mod instances;
-mod inverse;
-mod layout;
-mod lists;
-mod morton;
-mod occluder_surface;
-mod occluders;
-mod pyramid;
-mod readback;
-mod records;
-mod shader;
-mod threads;
-mod tolerance;
-mod update;
-mod view;
-mod visible;
-mod watch;
-#[doc(hidden)]
-pub mod words;
-#[doc(hidden)]
+#[cfg(feature = "yardstick")]
 pub mod yardstick;
+
+#[cfg(feature = "testing")]
+pub mod testing;
 
 pub use wgpu;
 
-pub use atlas::AtlasUse;
-pub use bounds::{Bounds, BoundsKind, Floats};
-pub use camera::{
-    Camera, DepthConvention, ImageSize, MAX_IMAGE_SIDE, Mat3, Mat4, Pose, Projection, Vec3,
-};
 pub use context::HizContext;
-pub use cull::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
-pub use depth::{DepthKind, ndc_from_kind, ndc_from_kind_within};
+pub use cull::options::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
 pub use error::{Error, Result};
-pub use instances::{InstanceOptions, Instances, StoredOrder};
-pub use layout::{MAX_LEVELS, StoredLevels};
-pub use lists::{CANARY_WORDS, DrawIndexedIndirect, DrawTemplate};
-#[doc(hidden)]
-pub use occluder_surface::PlantedFault;
-pub use occluder_surface::{ConservativeDepthOptions, OccluderSurface};
-pub use occluders::{FaceCull, MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders};
+pub use host::linear::{Mat3, Mat4, Vec3};
+pub use input::bounds::{Bounds, BoundsKind, Floats};
+pub use input::camera::Camera;
+pub use input::depth::{DepthKind, ndc_from_kind, ndc_from_kind_within};
+pub use input::image::{DepthConvention, ImageSize, MAX_IMAGE_SIDE};
+pub use input::mesh::{FaceCull, MeshData};
+pub use input::projection::{Pose, Projection};
+pub use input::tolerance::DepthTolerance;
+pub use input::view::ERROR_ULPS;
+pub use instances::order::StoredOrder;
+pub use instances::{InstanceOptions, Instances};
+pub use occluders::raster::OCCLUDER_DEPTH_FORMAT;
+pub use occluders::surface::{ConservativeDepthOptions, OccluderSurface};
+pub use occluders::{OccluderOptions, Occluders};
+pub use output::draw::{DrawIndexedIndirect, DrawTemplate};
+pub use output::outputs::Outputs;
+pub use output::verdict::Verdict;
+pub use output::visible::Visible;
+pub use pyramid::atlas::AtlasUse;
+pub use pyramid::levels::{MAX_LEVELS, StoredLevels};
 pub use pyramid::{Pyramid, PyramidOptions};
-pub use tolerance::DepthTolerance;
-pub use view::ERROR_ULPS;
-pub use visible::{Outputs, Visible, VisibleOptions};
 
-/// The README's program is compiled and run with the tests.
+/// Compiles and runs the program in the README with the tests.
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
 mod readme {}
+
+/// Compiles and runs the programs in the page for Rust with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/rust.md")]
+mod rust_page {}

@@ -10,7 +10,7 @@ use common::{CONVENTIONS, Random, camera_along_z, engine, ndc};
 use hiz_core::headless::{DepthImage, Engine};
 use hiz_core::{
     AtlasUse, Bounds, Camera, CullOptions, DepthConvention, Floats, HizContext, InstanceOptions,
-    Instances, Pyramid, PyramidOptions, StoredLevels, Visible, VisibleOptions, wgpu,
+    Instances, Outputs, Pyramid, PyramidOptions, StoredLevels, Visible, wgpu,
 };
 
 const WIDTH: u32 = 37;
@@ -80,7 +80,7 @@ fn mask(
     pyramid: &Arc<Pyramid>,
 ) -> Vec<bool> {
     engine
-        .cull(instances, camera, pyramid, &CullOptions::default(), &VisibleOptions::default())
+        .cull(instances, camera, pyramid, &CullOptions::default(), &Outputs::default())
         .unwrap()
         .mask()
         .unwrap()
@@ -120,8 +120,7 @@ fn lost_to_a_late_copy(engine: &Engine) -> usize {
         engine.queue().submit([encoder.finish()]);
     };
     let recorded = || {
-        let visible =
-            engine.context().create_visible(&instances, &VisibleOptions::default()).unwrap();
+        let visible = engine.context().create_visible(&instances, &Outputs::default()).unwrap();
         let (mut encoder, options) = (encoder(engine), CullOptions::default());
         engine
             .context()
@@ -201,10 +200,8 @@ fn culls_in_any_order_answer_for_their_image_or_keep_everything() {
                     // In an encoder of its own, or behind what another one has.
                     let mut encoder = if random.below(3) == 0 { waiting.pop_back() } else { None }
                         .unwrap_or_else(|| encoder(engine));
-                    let visible = engine
-                        .context()
-                        .create_visible(&instances, &VisibleOptions::default())
-                        .unwrap();
+                    let visible =
+                        engine.context().create_visible(&instances, &Outputs::default()).unwrap();
                     let options = CullOptions::default();
                     let context = engine.context();
                     context
@@ -294,7 +291,7 @@ fn an_image_that_no_buffer_holds_is_read_where_it_is() {
         Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0]), radii: Floats::F32(&[0.1]) };
     let instances =
         context.record_instances(&mut encoder, &bounds, &InstanceOptions::default()).unwrap();
-    let visible = context.create_visible(&instances, &VisibleOptions::default()).unwrap();
+    let visible = context.create_visible(&instances, &Outputs::default()).unwrap();
     context
         .record_cull(&mut encoder, &instances, &camera, &pyramid, &visible, &CullOptions::default())
         .unwrap();

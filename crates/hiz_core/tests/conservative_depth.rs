@@ -10,7 +10,7 @@ use common::{CONVENTIONS, Random};
 use exact_rays::{ExactScene, Facing};
 use hiz_core::{
     Camera, ConservativeDepthOptions, FaceCull, Floats, ImageSize, MeshData, OccluderOptions,
-    OccluderSurface, PlantedFault, Pose, Projection,
+    OccluderSurface, Pose, Projection, testing::PlantedFault,
 };
 
 type Vec3 = [f64; 3];

@@ -103,7 +103,7 @@ fn stressed(
     match stress {
         Stress::Skew => rows[0] = std::array::from_fn(|k| rows[0][k] + size * rows[1][k]),
         Stress::ObliqueNearPlane => {
-            rows[2] = std::array::from_fn(|k| rows[2][k] + 0.3 * size * rows[0][k])
+            rows[2] = std::array::from_fn(|k| rows[2][k] + 0.3 * size * rows[0][k]);
         }
         _ => {}
     }

@@ -13,11 +13,11 @@ use hiz_core::headless::Engine;
 use hiz_core::wgpu::TextureFormat as Format;
 use hiz_core::{
     AtlasUse, Bounds, Camera, CullOptions, DepthConvention, DepthTolerance, Fit, Floats, Hierarchy,
-    ImageSize, InstanceOptions, Pose, Projection, Pyramid, PyramidOptions, VisibleOptions, wgpu,
+    ImageSize, InstanceOptions, Outputs, Pose, Projection, Pyramid, PyramidOptions, Verdict, wgpu,
 };
 
-const OCCLUDED: u8 = 1;
-const VISIBLE: u8 = 2;
+const OCCLUDED: Verdict = Verdict::Occluded;
+const VISIBLE: Verdict = Verdict::Visible;
 const SIDE: u32 = 16;
 
 fn texture(engine: &Engine, format: Format, usage: wgpu::TextureUsages) -> wgpu::Texture {
@@ -188,7 +188,7 @@ fn verdicts(
     camera: &Camera,
     (pyramid, atlas): (&Arc<Pyramid>, AtlasUse),
     options: &CullOptions,
-) -> Vec<u8> {
+) -> Vec<Verdict> {
     let (mut min, mut max) = (Vec::new(), Vec::new());
     let half = if atlas == AtlasUse::Always { 0.02 } else { 0.3 };
     for z in depths {
@@ -202,7 +202,7 @@ fn verdicts(
     let list = engine
         .instances(&bounds, &InstanceOptions { order, ..InstanceOptions::default() })
         .unwrap();
-    let culling = engine.cull(&list, camera, pyramid, options, &VisibleOptions::default()).unwrap();
+    let culling = engine.cull(&list, camera, pyramid, options, &Outputs::default()).unwrap();
     let all = culling.verdicts().unwrap();
     for (i, verdict) in all.iter().enumerate().step_by(64) {
         assert!(all[i..i + 64].iter().all(|v| v == verdict), "one depth, one verdict");
@@ -366,7 +366,7 @@ fn nothing_that_stands_before_a_wall_is_hidden() {
                 for hierarchy in [Hierarchy::Never, Hierarchy::Always] {
                     let options = CullOptions { hierarchy, ..CullOptions::default() };
                     let culling = engine
-                        .cull(&list, &camera, &pyramid, &options, &VisibleOptions::default())
+                        .cull(&list, &camera, &pyramid, &options, &Outputs::default())
                         .unwrap();
                     let got = culling.verdicts().unwrap();
                     hidden += got[..125].iter().filter(|v| **v != VISIBLE).count();

@@ -5,7 +5,7 @@ mod common;
 
 use common::{camera_along_z, engine};
 use hiz_core::yardstick::{PerLevelReduction, ReductionShape, submitted_ms};
-use hiz_core::{Bounds, CullOptions, DepthConvention, Floats, InstanceOptions, VisibleOptions};
+use hiz_core::{Bounds, CullOptions, DepthConvention, Floats, InstanceOptions, Outputs};
 
 /// Pipelines are dropped before the last submit.
 /// A driver in software frees them on a thread of its own, after it has told that the submit is
@@ -20,7 +20,7 @@ fn a_process_ends_while_the_driver_frees() {
     let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
     let pyramid = engine.pyramid(&depth).unwrap();
     let kept = || {
-        let (options, output) = (CullOptions::default(), VisibleOptions::default());
+        let (options, output) = (CullOptions::default(), Outputs::default());
         engine.cull(&instances, &camera, &pyramid, &options, &output).unwrap().mask().unwrap()
     };
     assert_eq!(kept(), [false]);

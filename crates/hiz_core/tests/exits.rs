@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use common::{camera_along_z, engine};
 use hiz_core::headless::{Culling, Engine};
-use hiz_core::{Bounds, CullOptions, DepthConvention, Floats, InstanceOptions, VisibleOptions};
+use hiz_core::{Bounds, CullOptions, DepthConvention, Floats, InstanceOptions, Outputs};
 
 /// A cull that nobody waits for.
 fn submitted(engine: &Engine) -> Culling {
@@ -18,7 +18,7 @@ fn submitted(engine: &Engine) -> Culling {
         Bounds::Spheres { centers: Floats::F32(&[0.0, 0.0, 8.0]), radii: Floats::F32(&[0.1]) };
     let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
     engine
-        .cull(&instances, &camera, &pyramid, &CullOptions::default(), &VisibleOptions::default())
+        .cull(&instances, &camera, &pyramid, &CullOptions::default(), &Outputs::default())
         .unwrap()
 }
 

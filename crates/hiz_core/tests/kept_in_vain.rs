@@ -4,7 +4,7 @@
 //! A wall of one depth fills the image.
 //! The boxes lie behind it, by 1e-4 of its distance and more.
 //! That of some the oracle sees something is the depth image's own rounding.
-//! `docs/accuracy.md` has the table.
+//! `docs/accuracy_log.md` has the table.
 
 mod common;
 
@@ -14,8 +14,8 @@ mod documented;
 use common::{CONVENTIONS, Random, engine};
 use documented::{assert_said, is_of_this_driver};
 use hiz_core::{
-    Bounds, Camera, CullOptions, DepthConvention, Floats, ImageSize, InstanceOptions, Mat4, Pose,
-    Projection, Vec3, VisibleOptions,
+    Bounds, Camera, CullOptions, DepthConvention, Floats, ImageSize, InstanceOptions, Mat4,
+    Outputs, Pose, Projection, Vec3,
 };
 use hiz_ref::{Verdict, View, Volume};
 
@@ -236,8 +236,7 @@ fn counts(
     let pyramid = engine().pyramid(&engine().upload_depth(&depth, &camera).unwrap()).unwrap();
     // The wall's depth is not nearer than the wall: no slack.
     let options = CullOptions { depth_slack: 0.0, ..CullOptions::default() };
-    let culling =
-        engine().cull(&boxes, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap();
+    let culling = engine().cull(&boxes, &camera, &pyramid, &options, &Outputs::default()).unwrap();
     let kept = culling.mask().unwrap().iter().filter(|kept| **kept).count();
     [seen, kept]
 }

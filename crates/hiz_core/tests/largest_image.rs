@@ -4,7 +4,7 @@
 mod common;
 
 use common::{camera_along_z, engine};
-use hiz_core::{Bounds, CullOptions, DepthConvention, Floats, InstanceOptions, VisibleOptions};
+use hiz_core::{Bounds, CullOptions, DepthConvention, Floats, InstanceOptions, Outputs};
 
 #[test]
 fn the_largest_image_is_reduced_and_culled_against() {
@@ -44,7 +44,7 @@ fn the_largest_image_is_reduced_and_culled_against() {
     let bounds = Bounds::Spheres { centers: Floats::F64(&centers), radii: Floats::F64(&radii) };
     let instances = engine().instances(&bounds, &InstanceOptions::default()).unwrap();
     let culling = engine()
-        .cull(&instances, &camera, &pyramid, &CullOptions::default(), &VisibleOptions::default())
+        .cull(&instances, &camera, &pyramid, &CullOptions::default(), &Outputs::default())
         .unwrap();
     let expected: Vec<bool> = (0..radii.len()).map(|i| i % 2 == 0).collect();
     assert_eq!(culling.mask().unwrap(), expected);

@@ -8,8 +8,8 @@ use std::sync::Arc;
 use common::{Random, camera_along_z, engine, ndc};
 use hiz_core::headless::Culling;
 use hiz_core::{
-    Bounds, CANARY_WORDS, Camera, Coverage, CullOptions, DepthConvention, DrawIndexedIndirect,
-    DrawTemplate, Floats, Hierarchy, InstanceOptions, Instances, Order, Pyramid, VisibleOptions,
+    Bounds, Camera, Coverage, CullOptions, DepthConvention, DrawIndexedIndirect, DrawTemplate,
+    Floats, Hierarchy, InstanceOptions, Instances, Order, Outputs, Pyramid, testing::CANARY_WORDS,
     wgpu,
 };
 
@@ -43,7 +43,7 @@ fn specks(n: usize, share: f64, piece: Option<u32>, seed: u64) -> (Arc<Instances
 fn cull(instances: &Arc<Instances>, order: Order, capacity: Option<u32>) -> Culling {
     let (camera, pyramid) = scene();
     let options = CullOptions { order, statistics: true, ..CullOptions::default() };
-    let output = VisibleOptions { capacity, draw: DRAW, ..VisibleOptions::default() };
+    let output = Outputs { capacity, draw: DRAW, ..Outputs::default() };
     engine().cull(instances, &camera, &pyramid, &options, &output).unwrap()
 }
 
@@ -69,9 +69,8 @@ fn statistics_say_which_level_was_read() {
     let instances = engine().instances(&bounds, &InstanceOptions::default()).unwrap();
     for hierarchy in [Hierarchy::Never, Hierarchy::Auto] {
         let options = CullOptions { statistics: true, hierarchy, ..CullOptions::default() };
-        let culling = engine()
-            .cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default())
-            .unwrap();
+        let culling =
+            engine().cull(&instances, &camera, &pyramid, &options, &Outputs::default()).unwrap();
         let counts = culling.counts().unwrap();
         // 1 pixel and 2 x 2 of level 0, then 2 x 2 texels each.
         let mut levels = [0; 16];
@@ -121,8 +120,7 @@ fn buffers_and_bindings_that_are_used_again_answer_for_the_last_cull() {
         (Order::Stable, Hierarchy::Always),
         (Order::Any, Hierarchy::Always),
     ] {
-        let visible =
-            engine().context().create_visible(&instances, &VisibleOptions::default()).unwrap();
+        let visible = engine().context().create_visible(&instances, &Outputs::default()).unwrap();
         let cull = |pyramid: &Pyramid, options: &CullOptions| {
             let mut encoder = engine()
                 .device()
@@ -188,9 +186,8 @@ fn buffers_and_bindings_that_are_used_again_answer_for_the_last_cull() {
         (CullOptions { transform_slack: 1e6, ..plain() }, [true, true]),
         (plain(), [false, true]),
     ] {
-        let culling = engine()
-            .cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default())
-            .unwrap();
+        let culling =
+            engine().cull(&instances, &camera, &pyramid, &options, &Outputs::default()).unwrap();
         assert_eq!(culling.mask().unwrap(), expected, "{options:?}");
     }
 }

@@ -13,11 +13,11 @@ use std::sync::Arc;
 use common::{CONVENTIONS, camera_along_z, engine, ndc};
 use hiz_core::{
     Bounds, BoundsKind, Camera, Coverage, CullOptions, DepthConvention, Fit, Floats, Hierarchy,
-    ImageSize, InstanceOptions, Instances, StoredOrder, VisibleOptions,
+    ImageSize, InstanceOptions, Instances, Outputs, StoredOrder, Verdict,
 };
 
 const SIDE: u32 = 16;
-const VISIBLE: u8 = 2;
+const VISIBLE: Verdict = Verdict::Visible;
 const EPS: f64 = 1.0 / 8_388_608.0;
 const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
 
@@ -72,10 +72,11 @@ fn assert_between(
         let culling = |hierarchy, things: &[Thing]| {
             let options = CullOptions { hierarchy, ..options.clone() };
             let list = instances(things, *kind);
-            engine().cull(&list, camera, &pyramid, &options, &VisibleOptions::default()).unwrap()
+            engine().cull(&list, camera, &pyramid, &options, &Outputs::default()).unwrap()
         };
-        let is_kept =
-            |verdicts: Vec<u8>| verdicts.into_iter().map(|v| v == VISIBLE).collect::<Vec<bool>>();
+        let is_kept = |verdicts: Vec<Verdict>| {
+            verdicts.into_iter().map(|v| v == VISIBLE).collect::<Vec<bool>>()
+        };
         let alone = is_kept(culling(Hierarchy::Never, &things).verdicts().unwrap());
         assert_eq!(alone, expected, "{what}, {kind:?}: {things:?}");
         let crowd: Vec<Thing> = things.iter().flat_map(|thing| [*thing; 64]).collect();
@@ -199,7 +200,7 @@ fn the_margin_of_depth_is_as_large_as_it_is_derived() {
                 engine().pyramid(&engine().upload_depth(&wall, &camera).unwrap()).unwrap();
             let list = instances(&ball(r), BoundsKind::Sphere);
             engine()
-                .cull(&list, &camera, &pyramid, &plain(), &VisibleOptions::default())
+                .cull(&list, &camera, &pyramid, &plain(), &Outputs::default())
                 .unwrap()
                 .mask()
                 .unwrap()[0]

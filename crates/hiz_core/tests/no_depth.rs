@@ -12,7 +12,7 @@ use common::{CONVENTIONS, camera_along_z, engine, ndc};
 use hiz_core::headless::Engine;
 use hiz_core::{
     AtlasUse, Bounds, Camera, CullOptions, DepthConvention, Fit, Floats, Footprint, Hierarchy,
-    InstanceOptions, Instances, Pyramid, PyramidOptions, StoredOrder, VisibleOptions,
+    InstanceOptions, Instances, Outputs, Pyramid, PyramidOptions, StoredOrder,
 };
 use sources::{SOURCES, Source, pyramid_from};
 
@@ -107,8 +107,7 @@ fn kept(
 ) -> (Vec<bool>, u64) {
     let Way { footprint, descent, fit, .. } = way;
     let options = CullOptions { footprint, descent, fit, hierarchy, ..CullOptions::default() };
-    let culling =
-        engine.cull(things, camera, pyramid, &options, &VisibleOptions::default()).unwrap();
+    let culling = engine.cull(things, camera, pyramid, &options, &Outputs::default()).unwrap();
     (culling.mask().unwrap(), culling.counts().unwrap().tested_instances)
 }
 

@@ -13,13 +13,13 @@ use hiz_core::headless::{Culling, Engine};
 use hiz_core::wgpu;
 use hiz_core::{
     Bounds, Camera, Coverage, CullOptions, DepthConvention, Error, Floats, ImageSize,
-    InstanceOptions, Instances, Pyramid, PyramidOptions, VisibleOptions,
+    InstanceOptions, Instances, Outputs, Pyramid, PyramidOptions, Verdict,
 };
 
-const OUTSIDE: u8 = 0;
-const OCCLUDED: u8 = 1;
-const VISIBLE: u8 = 2;
-const INVALID: u8 = 3;
+const OUTSIDE: Verdict = Verdict::Outside;
+const OCCLUDED: Verdict = Verdict::Occluded;
+const VISIBLE: Verdict = Verdict::Visible;
+const INVALID: Verdict = Verdict::Invalid;
 
 const SIDE: u32 = 16;
 
@@ -62,13 +62,13 @@ fn cull_with(
     options: &CullOptions,
 ) -> Culling {
     engine()
-        .cull(instances, camera, &pyramid_of(depth, camera), options, &VisibleOptions::default())
+        .cull(instances, camera, &pyramid_of(depth, camera), options, &Outputs::default())
         .unwrap()
 }
 
 /// Verdicts before a wall at depth 4, the same in both conventions.
-fn before_a_wall(instances: &Arc<Instances>) -> Vec<u8> {
-    let mut seen: Vec<Vec<u8>> = CONVENTIONS
+fn before_a_wall(instances: &Arc<Instances>) -> Vec<Verdict> {
+    let mut seen: Vec<Vec<Verdict>> = CONVENTIONS
         .iter()
         .map(|convention| {
             let camera = camera_along_z(SIDE, SIDE, *convention);
@@ -364,7 +364,7 @@ fn pyramids_that_do_not_belong_are_refused() {
     let camera = camera_along_z(SIDE, SIDE, DepthConvention::Standard);
     let message = |camera: &Camera, pyramid: &Arc<Pyramid>| {
         engine()
-            .cull(&list, camera, pyramid, &CullOptions::default(), &VisibleOptions::default())
+            .cull(&list, camera, pyramid, &CullOptions::default(), &Outputs::default())
             .unwrap_err()
             .to_string()
     };
@@ -414,9 +414,8 @@ fn a_reduction_that_never_ran_hides_nothing() {
             };
             let verdicts = || {
                 let options = CullOptions::default();
-                let culling = engine()
-                    .cull(&list, &camera, &pyramid, &options, &VisibleOptions::default())
-                    .unwrap();
+                let culling =
+                    engine().cull(&list, &camera, &pyramid, &options, &Outputs::default()).unwrap();
                 culling.verdicts().unwrap()
             };
             drop(record());
@@ -507,7 +506,7 @@ fn a_lost_device_is_an_error_and_the_next_one_works() {
             0 => doomed.pyramid(&image).unwrap_err(),
             1 => doomed.instances(&bounds, &InstanceOptions::default()).unwrap_err(),
             _ => doomed
-                .cull(&list, &camera, &pyramid, &CullOptions::default(), &VisibleOptions::default())
+                .cull(&list, &camera, &pyramid, &CullOptions::default(), &Outputs::default())
                 .and_then(|c| c.mask())
                 .unwrap_err(),
         };
@@ -524,7 +523,7 @@ fn objects_of_another_device_are_refused() {
     let list = spheres(&[([0.0, 0.0, 8.0], 1.0)]);
     let theirs = other.pyramid(&other.upload_depth(&[0.5; 256], &camera).unwrap()).unwrap();
     let error = engine()
-        .cull(&list, &camera, &theirs, &CullOptions::default(), &VisibleOptions::default())
+        .cull(&list, &camera, &theirs, &CullOptions::default(), &Outputs::default())
         .unwrap_err();
     assert!(
         matches!(error, Error::Mismatch { .. }) && error.to_string().contains("got one of another"),
@@ -541,7 +540,7 @@ fn options_out_of_range_are_refused_by_name() {
     let pyramid = pyramid_of(&[0.5; 256], &camera);
     let message = |options: CullOptions| {
         engine()
-            .cull(&list, &camera, &pyramid, &options, &VisibleOptions::default())
+            .cull(&list, &camera, &pyramid, &options, &Outputs::default())
             .unwrap_err()
             .to_string()
     };

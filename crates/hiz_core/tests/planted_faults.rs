@@ -15,7 +15,7 @@ use documented::{assert_said, is_of_this_driver};
 use hiz_core::headless::Engine;
 use hiz_core::{
     Bounds, BoundsKind, Coverage, CullOptions, DepthConvention, Fit, Floats, Footprint,
-    InstanceOptions, VisibleOptions,
+    InstanceOptions, Outputs,
 };
 
 fn faulty(faults: &[(&str, &str)]) -> Engine {
@@ -173,16 +173,15 @@ fn culled_slanted_plates(faults: &[(&str, &str)]) -> [bool; 4] {
             rotations: Floats::F64(&rotation),
         };
         let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
-        let culling = engine
-            .cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default())
-            .unwrap();
+        let culling =
+            engine.cull(&instances, &camera, &pyramid, &options, &Outputs::default()).unwrap();
         !culling.mask().unwrap()[0]
     })
 }
 
 /// The sides of a volume fit's rectangle: guesses that are a fifth of a pixel too far inside are
 /// harmless, for certificates refuse them; without those they cut off what is seen.
-/// (`shaders/shared/supporting_planes.wgsl`, `proved_interval`.)
+/// (`shaders/cull/supporting_planes.wgsl`, `proved_interval`.)
 #[test]
 fn sides_of_a_volumes_rectangle_are_proved() {
     let low = ("guess.x - widened", "guess.x - widened + 0.2");
@@ -290,7 +289,7 @@ fn culls_within_the_guard(engine: &Engine) -> bool {
             let bounds = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };
             let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
             !engine
-                .cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default())
+                .cull(&instances, &camera, &pyramid, &options, &Outputs::default())
                 .unwrap()
                 .mask()
                 .unwrap()[0]

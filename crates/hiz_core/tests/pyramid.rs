@@ -10,7 +10,7 @@ use hiz_core::headless::DepthImage;
 use hiz_core::yardstick::{PerLevelReduction, ReductionShape, submitted_ms};
 use hiz_core::{
     AtlasUse, Bounds, CullOptions, DepthConvention, Floats, Footprint, ImageSize, InstanceOptions,
-    MeshData, OccluderOptions, Pyramid, PyramidOptions, StoredLevels, VisibleOptions, wgpu,
+    MeshData, OccluderOptions, Outputs, Pyramid, PyramidOptions, StoredLevels, wgpu,
 };
 
 /// Every size class that has broken somebody's reduction: single pixels, rows, columns, odd in one
@@ -413,7 +413,7 @@ fn an_atlas_culls_alike_and_follows_the_next_reduction() {
                         .unwrap();
                     engine().queue().submit([encoder.finish()]);
                     let cull = |options: &CullOptions| {
-                        let output = VisibleOptions::default();
+                        let output = Outputs::default();
                         engine()
                             .cull(&instances, &camera, pyramid, options, &output)
                             .unwrap()
@@ -470,7 +470,7 @@ fn without_an_atlas_culls_go_on() {
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         engine().context().record_reduce(&mut encoder, &view, &camera, &pyramid).unwrap();
         engine().queue().submit([encoder.finish()]);
-        let (options, output) = (CullOptions::default(), VisibleOptions::default());
+        let (options, output) = (CullOptions::default(), Outputs::default());
         let mask = engine()
             .cull(&instances, &camera, &pyramid, &options, &output)
             .unwrap()
@@ -500,13 +500,13 @@ fn a_copy_that_never_ran_is_made_again() {
     let encoder =
         || engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     let kept = |pyramid: &Arc<Pyramid>| {
-        let (options, output) = (CullOptions::default(), VisibleOptions::default());
+        let (options, output) = (CullOptions::default(), Outputs::default());
         let culling = engine().cull(&instances, &camera, pyramid, &options, &output).unwrap();
         culling.mask().unwrap().iter().filter(|kept| **kept).count()
     };
     // A cull whose encoder was dropped.
     let pyramid = engine().pyramid(&wall).unwrap();
-    let visible = context.create_visible(&instances, &VisibleOptions::default()).unwrap();
+    let visible = context.create_visible(&instances, &Outputs::default()).unwrap();
     context
         .record_cull(
             &mut encoder(),
@@ -530,8 +530,6 @@ fn a_copy_that_never_ran_is_made_again() {
     let refused =
         CullOptions { transform_slack: 1e6, guard_px: Some(0.3), ..CullOptions::default() };
     let fresh = engine().pyramid(&wall).unwrap();
-    assert!(
-        engine().cull(&instances, &camera, &fresh, &refused, &VisibleOptions::default()).is_err()
-    );
+    assert!(engine().cull(&instances, &camera, &fresh, &refused, &Outputs::default()).is_err());
     assert_eq!(kept(&fresh), 0);
 }

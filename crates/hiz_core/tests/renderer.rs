@@ -270,7 +270,7 @@ fn red(faults: &[(&str, &str)], way: Way) -> Vec<(String, usize)> {
         let scene = make.0(make.2);
         shots.extend(random_shots(&scene, 8, 5));
         draw_each(&renderer, &scene, &shots, &[way], |seen| {
-            differing.push((seen.label(), seen.differing()))
+            differing.push((seen.label(), seen.differing()));
         });
     }
     differing.retain(|(_, pixels)| *pixels > 0);

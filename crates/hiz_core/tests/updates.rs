@@ -7,10 +7,10 @@ use std::sync::Arc;
 
 use common::{Random, camera_along_z, engine, ndc};
 use hiz_core::headless::Culling;
-use hiz_core::words::GroupWords;
+use hiz_core::testing::words::GroupWords;
 use hiz_core::{
     Bounds, BoundsKind, CullOptions, DepthConvention, Floats, InstanceOptions, Instances, Order,
-    StoredOrder, VisibleOptions, words,
+    Outputs, StoredOrder, testing::words,
 };
 use num_bigint::BigInt;
 
@@ -154,7 +154,7 @@ fn cull(instances: &Arc<Instances>, order: Order) -> Culling {
         (0..64 * 64).map(|i| if i % 64 < 40 { ndc(4.0, CONVENTION) } else { 0.0 }).collect();
     let pyramid = engine().pyramid(&engine().upload_depth(&depth, &camera).unwrap()).unwrap();
     let options = CullOptions { order, ..CullOptions::default() };
-    engine().cull(instances, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap()
+    engine().cull(instances, &camera, &pyramid, &options, &Outputs::default()).unwrap()
 }
 
 /// What is wrong with the groups: members missing or twice, a box that does not contain its members

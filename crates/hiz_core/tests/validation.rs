@@ -12,8 +12,8 @@ use hiz_core::wgpu::{self, TextureFormat as Format, TextureUsages as Usages};
 use hiz_core::{
     AtlasUse, Bounds, BoundsKind, Camera, CullOptions, DepthConvention, DrawTemplate, Error,
     FaceCull, Floats, Footprint, Hierarchy, HizContext, ImageSize, InstanceOptions, Instances,
-    MeshData, OccluderOptions, Occluders, Order, Pyramid, PyramidOptions, Result, StoredLevels,
-    StoredOrder, Visible, VisibleOptions,
+    MeshData, OccluderOptions, Occluders, Order, Outputs, Pyramid, PyramidOptions, Result,
+    StoredLevels, StoredOrder, Visible,
 };
 
 const SIDE: u32 = 16;
@@ -89,7 +89,7 @@ impl World {
             .create_occluders(&[WALL], &OccluderOptions { cull_mode: FaceCull::None })
             .unwrap();
         let pyramid = context.create_pyramid(camera.size(), &PyramidOptions::default()).unwrap();
-        let visible = context.create_visible(&instances, &VisibleOptions::default()).unwrap();
+        let visible = context.create_visible(&instances, &Outputs::default()).unwrap();
         queue.submit([encoder.finish()]);
         Self { device, queue, context, camera, instances, occluders, pyramid, visible }
     }
@@ -163,8 +163,7 @@ impl World {
         let wall = self.wall(&mut encoder);
         let pyramid =
             self.context.create_pyramid(self.camera.size(), &PyramidOptions::default()).unwrap();
-        let visible =
-            self.context.create_visible(&self.instances, &VisibleOptions::default()).unwrap();
+        let visible = self.context.create_visible(&self.instances, &Outputs::default()).unwrap();
         self.context.record_reduce(&mut encoder, &plain(&wall), &self.camera, &pyramid).unwrap();
         let options = CullOptions::default();
         self.context
@@ -477,7 +476,7 @@ fn a_cull_of_what_was_destroyed_is_refused_by_name() {
         let options = CullOptions { order, ..CullOptions::default() };
         for part in 0..3 {
             let visible =
-                world.context.create_visible(&world.instances, &VisibleOptions::default()).unwrap();
+                world.context.create_visible(&world.instances, &Outputs::default()).unwrap();
             let buffers = [visible.draw_arguments(), visible.list(0), visible.mask(0)];
             buffers[part].expect("all outputs").destroy();
             let World { context, instances, camera, pyramid, .. } = &world;
@@ -502,7 +501,7 @@ fn culls_of_what_does_not_belong_are_refused_by_name() {
     let single =
         world.context.record_instances(&mut encoder, &single, &InstanceOptions::default()).unwrap();
     world.works(encoder, "an upload");
-    let of_single = world.context.create_visible(&single, &VisibleOptions::default()).unwrap();
+    let of_single = world.context.create_visible(&single, &Outputs::default()).unwrap();
     let cull = |instances, camera, pyramid, visible| {
         let context = &world.context;
         Box::new(move |encoder: &mut wgpu::CommandEncoder| {
@@ -641,9 +640,7 @@ fn what_cannot_be_made_is_refused_by_name() {
     };
     let visible = |instances, draw| {
         Box::new(move |_: &mut wgpu::CommandEncoder| {
-            context
-                .create_visible(instances, &VisibleOptions { draw, ..VisibleOptions::default() })
-                .map(drop)
+            context.create_visible(instances, &Outputs { draw, ..Outputs::default() }).map(drop)
         }) as Box<_>
     };
     let occluders = |mesh: MeshData<'static>| {
@@ -738,10 +735,7 @@ fn what_cannot_be_made_is_refused_by_name() {
     let world = World::on(open(&adapter(), features, &HizContext::required_limits()));
     world
         .context
-        .create_visible(
-            &world.instances,
-            &VisibleOptions { draw: first, ..VisibleOptions::default() },
-        )
+        .create_visible(&world.instances, &Outputs { draw: first, ..Outputs::default() })
         .unwrap();
 }
 
@@ -758,8 +752,7 @@ fn nothing_at_all_is_drawn_reduced_and_culled() {
         .context
         .record_instances(&mut encoder, &nothing, &InstanceOptions::default())
         .unwrap();
-    world.visible =
-        world.context.create_visible(&world.instances, &VisibleOptions::default()).unwrap();
+    world.visible = world.context.create_visible(&world.instances, &Outputs::default()).unwrap();
     world.context.record_update(&mut encoder, &world.instances, 0, &nothing, true).unwrap();
     let no_mesh = world.context.create_occluders(&[], &OccluderOptions::default()).unwrap();
     let target =
@@ -793,7 +786,7 @@ fn a_lost_device_ends_nothing() {
         context.record_instances(&mut encoder, &TWO_BOXES, &InstanceOptions::default()).map(drop),
         context.create_occluders(&[WALL], &OccluderOptions::default()).map(drop),
         context.create_pyramid(camera.size(), &PyramidOptions::default()).map(drop),
-        context.create_visible(instances, &VisibleOptions::default()).map(drop),
+        context.create_visible(instances, &Outputs::default()).map(drop),
         HizContext::new(&world.device).map(drop),
     ];
     for (i, outcome) in outcomes.into_iter().enumerate() {
@@ -971,7 +964,7 @@ fn the_least_limits_are_enough_for_everything() {
         let instances =
             context.record_instances(&mut encoder, &bounds, &InstanceOptions::default()).unwrap();
         context.record_update(&mut encoder, &instances, 0, &bounds, false).unwrap();
-        let visible = context.create_visible(&instances, &VisibleOptions::default()).unwrap();
+        let visible = context.create_visible(&instances, &Outputs::default()).unwrap();
         for atlas in [AtlasUse::Never, AtlasUse::Always] {
             let options = PyramidOptions { atlas, ..PyramidOptions::default() };
             let pyramid = context.create_pyramid(world.camera.size(), &options).unwrap();
@@ -1043,7 +1036,7 @@ fn an_update_larger_than_a_binding_reaches_every_instance() {
         let wall = world.wall(&mut encoder);
         world.reduce(&mut encoder, &plain(&wall)).unwrap();
         for hierarchy in [Hierarchy::Never, Hierarchy::Always] {
-            let visible = context.create_visible(&instances, &VisibleOptions::default()).unwrap();
+            let visible = context.create_visible(&instances, &Outputs::default()).unwrap();
             let mut encoder = std::mem::replace(&mut encoder, world.encoder());
             let options = CullOptions { hierarchy, ..CullOptions::default() };
             context

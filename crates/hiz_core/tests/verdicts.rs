@@ -10,14 +10,14 @@ use common::{CONVENTIONS, Random, camera_along_z, engine, ndc};
 use hiz_core::headless::{Culling, Engine, Explanation};
 use hiz_core::{
     AtlasUse, Bounds, BoundsKind, Camera, Coverage, CullOptions, DepthConvention, Fit, Floats,
-    Footprint, Hierarchy, InstanceOptions, Instances, Pyramid, PyramidOptions, VisibleOptions,
+    Footprint, Hierarchy, InstanceOptions, Instances, Outputs, Pyramid, PyramidOptions, Verdict,
     wgpu,
 };
 
 const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
-const OUTSIDE: u8 = 0;
-const OCCLUDED: u8 = 1;
-const VISIBLE: u8 = 2;
+const OUTSIDE: Verdict = Verdict::Outside;
+const OCCLUDED: Verdict = Verdict::Occluded;
+const VISIBLE: Verdict = Verdict::Visible;
 const SIDE: u32 = 64;
 
 /// Volumes behind the wall at depth 4, a good part of them beside what the camera sees: |x| and |y|
@@ -96,14 +96,14 @@ fn cull(
     (instances, camera, pyramid): (&Arc<Instances>, &Camera, &Arc<Pyramid>),
     options: &CullOptions,
 ) -> Culling {
-    engine.cull(instances, camera, pyramid, options, &VisibleOptions::default()).unwrap()
+    engine.cull(instances, camera, pyramid, options, &Outputs::default()).unwrap()
 }
 
-fn counted(verdicts: &[u8], culling: &Culling) -> bool {
+fn counted(verdicts: &[Verdict], culling: &Culling) -> bool {
     let counts = culling.counts().unwrap();
     let told = [counts.outside, counts.occluded, counts.visible, counts.invalid];
-    let of = |verdict: u8| verdicts.iter().filter(|v| **v == verdict).count() as u64;
-    told == [0, 1, 2, 3].map(of)
+    let of = |verdict: Verdict| verdicts.iter().filter(|v| **v == verdict).count() as u64;
+    told == [OUTSIDE, OCCLUDED, VISIBLE, Verdict::Invalid].map(of)
         && counts.demand == counts.visible
         && counts.tested == verdicts.len() as u64
 }
@@ -146,7 +146,7 @@ fn verdicts_are_the_same_with_groups_and_without() {
                 for (i, (flat, verdict)) in flat_verdicts.iter().zip(&verdicts).enumerate() {
                     assert!(
                         flat == verdict || (*flat, *verdict) == (VISIBLE, OCCLUDED),
-                        "{what} {i}: {flat} {verdict}"
+                        "{what} {i}: {flat:?} {verdict:?}"
                     );
                     assert_eq!(*verdict >= VISIBLE, mask[i], "{what} {i}");
                     let [of_sphere, of_box] = crowd.beside(i);
@@ -380,7 +380,7 @@ fn explain_tells_what_was_read() {
                         "{what} {more}"
                     );
                 }
-                *ends.entry(format!("{} {}", told.verdict, told.reason)).or_default() += 1;
+                *ends.entry(format!("{:?} {}", told.verdict, told.reason)).or_default() += 1;
             }
         }
     }

@@ -12,7 +12,7 @@ use common::{Random, camera_along_z, engine, ndc};
 use hiz_core::headless::Engine;
 use hiz_core::{
     Bounds, CullOptions, DepthConvention, Floats, Footprint, Hierarchy, InstanceOptions, Order,
-    StoredOrder, VisibleOptions,
+    Outputs, StoredOrder,
 };
 
 const WIDE: &[(u32, u32)] = &[(1920, 1080), (1031, 7), (3, 2053), (641, 1025), (4099, 2)];
@@ -114,7 +114,7 @@ fn crowd(engine: &Engine, piece: Option<u32>, hierarchy: Hierarchy, order: Order
         .unwrap();
     let options = CullOptions { hierarchy, order, ..CullOptions::default() };
     let culling =
-        engine.cull(&instances, &camera, &pyramid, &options, &VisibleOptions::default()).unwrap();
+        engine.cull(&instances, &camera, &pyramid, &options, &Outputs::default()).unwrap();
     let expected: Vec<u32> = (0..count as u32).filter(|i| kept[*i as usize]).collect();
     let mut indices = culling.indices().unwrap();
     indices.sort_unstable();

@@ -1,6 +1,6 @@
 //! The answer of a cull, which is read on request.
 
-use hiz_core::headless;
+use hiz_core::{Verdict, headless};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -24,7 +24,9 @@ impl Culling {
     }
 
     fn verdicts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
-        self.0.run(py, headless::Culling::verdicts).map(|verdicts| PyArray1::from_vec(py, verdicts))
+        let codes =
+            |culling: &headless::Culling| culling.verdicts().map(bytemuck::cast_vec::<Verdict, u8>);
+        self.0.run(py, codes).map(|verdicts| PyArray1::from_vec(py, verdicts))
     }
 
     fn indices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
@@ -95,7 +97,7 @@ pub(crate) struct Explanation(headless::Explanation);
 impl Explanation {
     #[getter]
     fn verdict(&self) -> u8 {
-        self.0.verdict
+        self.0.verdict as u8
     }
 
     #[getter]

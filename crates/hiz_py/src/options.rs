@@ -3,7 +3,7 @@
 //! The struct expressions name every field, so that an option without its line does not compile.
 
 use hiz_core::{
-    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, Order, Outputs, VisibleOptions,
+    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, Order, Outputs,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -12,7 +12,7 @@ use pyo3::types::PyAny;
 /// What a cull is asked, taken whole from the two Python objects.
 pub(crate) struct Request {
     pub(crate) options: CullOptions,
-    pub(crate) outputs: VisibleOptions,
+    pub(crate) outputs: Outputs,
 }
 
 impl Request {
@@ -60,19 +60,17 @@ fn cull_options(given: &Bound<'_, PyAny>) -> PyResult<CullOptions> {
     })
 }
 
-fn outputs(given: &Bound<'_, PyAny>, order: Order) -> PyResult<VisibleOptions> {
+fn outputs(given: &Bound<'_, PyAny>, order: Order) -> PyResult<Outputs> {
     // An ordered list can be made from the mask later; one in the order of the device cannot.
     let by_default = order == Order::Any;
     let listed = |name| -> PyResult<bool> {
         Ok(given.getattr(name)?.extract::<Option<bool>>()?.unwrap_or(by_default))
     };
-    Ok(VisibleOptions {
-        outputs: Outputs {
-            mask: given.getattr("mask")?.extract()?,
-            verdicts: given.getattr("verdicts")?.extract()?,
-            indices: listed("indices")?,
-            draws: listed("draws")?,
-        },
+    Ok(Outputs {
+        mask: given.getattr("mask")?.extract()?,
+        verdicts: given.getattr("verdicts")?.extract()?,
+        indices: listed("indices")?,
+        draws: listed("draws")?,
         capacity: given.getattr("capacity")?.extract()?,
         draw: draw_template(&given.getattr("draw")?)?,
     })
@@ -108,7 +106,7 @@ pub(crate) fn options_text(
 ) -> PyResult<(String, String)> {
     let options = options.map_or_else(|| Ok(CullOptions::default()), cull_options)?;
     let outputs = outputs.map_or_else(
-        || Ok(VisibleOptions::default()),
+        || Ok(Outputs::default()),
         |given| self::outputs(given, options.order),
     )?;
     Ok((format!("{options:?}"), format!("{outputs:?}")))

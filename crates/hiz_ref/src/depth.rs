@@ -1,11 +1,13 @@
-//! What the numbers of a depth image mean: the NDC depth of each pixel, exactly, between two
-//! neighbouring float32.
+//! Depth kinds: the NDC depth that the numbers of a depth image mean, between two neighbouring
+//! float32.
 //!
-//! Every depth here has the form `(a + b sqrt(q)) / n` with a, b, q and n polynomials in the
-//! inputs: a ray's length is the only root.
-//! Whether it lies above a float32 is the sign of a polynomial again (`a - f n` against `b
-//! sqrt(q)`, squared), so the two float32 around it are found by float64 with an error bound, and
-//! by exact arithmetic where that leaves more than two.
+//! Every depth here has the form `(a + b sqrt(q)) / n`, where a, b, q and n are polynomials in the
+//! inputs.
+//! The only root is the length of a ray.
+//! Whether such a depth lies above a float32 f is the sign of a polynomial again.
+//! It compares `a - f n` with `b sqrt(q)`, squared.
+//! Float64 with an error bound finds the two float32 around the depth.
+//! If the bound leaves more than two, exact arithmetic decides.
 
 use crate::Error;
 use crate::dyadic::Dyadic;
@@ -22,8 +24,8 @@ pub enum DepthKind {
     Ndc,
     /// NDC depth, near 1, far 0.
     ReversedNdc,
-    /// World units along the viewing direction: the normal of the planes of equal w; of a parallel
-    /// projection, the rays.
+    /// World units along the viewing direction, which is the normal of the planes of equal w.
+    /// In a parallel projection: world units along the rays.
     Z,
     /// World units along the ray through the pixel's centre.
     Distance,
@@ -32,39 +34,47 @@ pub enum DepthKind {
 /// How the numbers of a depth image become depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthMeaning<'a> {
-    /// What they are.
+    /// What they mean.
     pub kind: DepthKind,
-    /// World units of one step, above 0; 1 for NDC depth.
+    /// World units per unit of the image, above 0; 1 for NDC depth.
     pub scale: f64,
     /// Numbers of the image, before `scale`, that mean "no data".
     pub invalid: &'a [f64],
-    /// Whether `view.origin` is where the camera stands.
-    /// View depth of a parallel projection starts there, or nobody knows where.
+    /// Whether the camera stands at `view.origin`.
+    /// View depth of a parallel projection is measured from there; otherwise its start is unknown.
     pub origin_is_eye: bool,
 }
 
-/// An NDC depth image between two images of float32 that are equal or neighbours.
+/// An NDC depth image, enclosed by two float32 images.
+/// In each pixel the two are equal or neighbours.
 ///
-/// What the nearer one lets show can be seen, and what the farther one hides is hidden.
+/// Whatever is visible by the nearer one can be seen, and whatever the farther one hides is hidden.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthBounds {
-    /// Nowhere farther than the depth.
+    /// One NDC depth per pixel, nowhere farther than the true depth.
     pub nearer: Vec<f32>,
-    /// Nowhere nearer than the depth.
+    /// One NDC depth per pixel, nowhere nearer than the true depth.
     pub farther: Vec<f32>,
 }
 
-/// The NDC depth of each pixel of `image` (row order, row 0 on top).
+/// The NDC depth of each pixel of `image`.
 ///
-/// "No data", which is as far as can be: NaN, infinite and `invalid` numbers; what lies outside
-/// `0..=1` of NDC depth; of kinds `Z` and `Distance` zero and negative numbers too, unless the view
-/// is a parallel projection whose near plane lies behind `view.origin` (by more than 2^-40 of the
-/// depth range and 2^-48 of what `origin` moves depth by).
+/// `image` has `view.width * view.height` numbers in row order, row 0 on top.
+/// Numbers without meaning count as "no data", which is the far plane:
+///
+/// - NaN, infinite and `invalid` numbers;
+/// - NDC depth outside `0..=1`;
+/// - zero and negative numbers of kinds `Z` and `Distance`.
+///
 /// View depth 0 of a parallel projection is at `view.origin`.
+/// If its near plane lies behind `view.origin`, zero and negative numbers are depths too.
+/// Behind means: by more than 2^-40 of the depth range, plus 2^-48 of the depth by which `origin`
+/// moves a point.
 ///
 /// # Errors
 ///
-/// If the view is not finite, of another size or singular, or if kind or scale contradict it.
+/// [`Error::NonFiniteView`], [`Error::Size`] or [`Error::DepthLength`] for a wrong view or image.
+/// [`Error::DepthMeaning`] if the view is singular, or if kind or scale contradict it.
 pub fn depth_bounds(
     view: &View,
     image: &[f64],
@@ -89,7 +99,8 @@ pub fn depth_bounds(
     }
     if metric && !origin_is_eye && view.rows[3][..3] == [0.0; 3] {
         return Err(Error::DepthMeaning(
-            "kind: expected NDC depth for a parallel projection that does not say where view depth starts",
+            "kind: expected NDC depth for a parallel projection that does not say where view depth \
+             starts",
         ));
     }
     let rays = if metric { Some(Rays::new(view, kind)?) } else { None };
@@ -144,8 +155,8 @@ impl<'a> Rays<'a> {
         Ok(Rays { view, kind, signed, float, exact })
     }
 
-    /// The float32 next to the depth of `number * scale` in a pixel; `None` where it is outside
-    /// `0..=1`.
+    /// The two float32 next to the depth of `number * scale` in a pixel.
+    /// `None` if the depth is outside `0..=1`.
     fn around(&self, pixel: [u32; 2], number: f64, scale: f64) -> Option<[f32; 2]> {
         let quick = self.float.depth(self.view, self.kind, pixel, number, scale).rounded();
         let exact = OnceCell::new();
@@ -157,12 +168,13 @@ impl<'a> Rays<'a> {
     }
 }
 
-/// The float32 next to a number of `0..=1` that lies in `low..=high` and compares to a float32 as
-/// told; both are it where it is one.
-/// `None` where the number is outside.
-/// Below the least normal float32 stand 0 and that one.
+/// The two float32 next to a number in `0..=1`; both are the number if it is a float32.
+///
+/// The number lies in `low..=high`, and `compare` gives its order relative to a float32.
+/// `None` if it is outside `0..=1`.
+/// Below the least normal float32, the two are 0 and that float32.
 fn bracket(low: f64, high: f64, compare: impl Fn(f32) -> Ordering) -> Option<[f32; 2]> {
-    // Outwards once more, for the rounding of the ends; NaN is no end.
+    // Outwards once more, to cover the rounding of the ends; a NaN gives no bound.
     let low = if low.is_nan() { f64::NEG_INFINITY } else { low.next_down() };
     let high = if high.is_nan() { f64::INFINITY } else { high.next_up() };
     if low > 1.0 || high < 0.0 {
@@ -179,7 +191,7 @@ fn bracket(low: f64, high: f64, compare: impl Fn(f32) -> Ordering) -> Option<[f3
             }
         }
     }
-    // In steps of float32, which order like the numbers.
+    // Bisection over the bits, because float32 bits order like the numbers.
     let (mut below, mut above) = (floor(low.max(0.0)), ceiling(high.min(1.0)));
     while above - below > 1 {
         let middle = below.midpoint(above);
@@ -206,7 +218,7 @@ fn ceiling(x: f64) -> u32 {
     if f64::from(nearest) < x { (nearest.to_bits() + 1).min(ONE) } else { nearest.to_bits() }
 }
 
-/// `(a + b sqrt(q)) / n` with `q >= 0`.
+/// The number `(a + b sqrt(q)) / n`, with `q >= 0`.
 struct Root<S> {
     a: S,
     b: S,
@@ -221,7 +233,7 @@ impl Root<Ball> {
 }
 
 impl Root<Dyadic> {
-    /// How the number compares to `f`: the sign of `a - f n + b sqrt(q)`, times that of n.
+    /// How the number compares to `f`: the sign of `a - f n + b sqrt(q)`, times the sign of n.
     fn compare(&self, f: f32) -> Ordering {
         let sign = |x: &Dyadic| x.sign().expect("exact");
         let rest = self.a.minus(&self.n.times(&Dyadic::exact(f64::from(f))));
@@ -230,7 +242,7 @@ impl Root<Dyadic> {
             (x, Ordering::Equal) => x,
             (Ordering::Equal, y) => y,
             (x, y) if x == y => x,
-            // Of different signs: the larger magnitude decides.
+            // The signs differ, so the larger magnitude decides.
             (x, y) => match sign(&rest.times(&rest).minus(&self.b.times(&self.b).times(&self.q))) {
                 Ordering::Greater => x,
                 Ordering::Less => y,
@@ -252,11 +264,12 @@ fn cross<S: Scalar>(a: &Vector<S>, b: &Vector<S>) -> Vector<S> {
     [part(1, 2), part(2, 0), part(0, 1)]
 }
 
-/// What all pixels share.
+/// What all pixels of a view share.
 ///
-/// Through an eye: the matrix M of the linear rows x, y, w, by its adjugate.
-/// A point p whose clip coordinates are `w (x, y, 1)` is `M^-1 (w (x, y, 1) - constants)`.
-/// Parallel: M has the rows x, y and the rays' direction `x times y` instead.
+/// Perspective: M has the linear rows x, y and w, and its inverse is given by the adjugate.
+/// A point p with clip coordinates `w (x, y, 1)` is `M^-1 (w (x, y, 1) - constants)`.
+///
+/// Parallel: M has the rows x and y, and as its third row the rays' direction `x times y`.
 struct Geometry<S> {
     parallel: bool,
     /// Columns of the adjugate: `M^-1 = adjugate / determinant`.
@@ -264,16 +277,16 @@ struct Geometry<S> {
     determinant: S,
     /// The linear part of z.
     z: Vector<S>,
-    /// The linear part of w, squared.
+    /// The squared length of the linear part of w.
     w_square: S,
-    /// Through an eye: determinant times z at the eye.
-    /// Parallel: determinant times z where clip x and y are 0, on the plane through the origin
-    /// across the rays.
+    /// Perspective: determinant times z at the eye.
+    /// Parallel: determinant times z at the point with clip x = y = 0 on the plane through the
+    /// origin across the rays.
     constant: S,
-    /// Parallel: how z grows along the direction, and the constant w.
+    /// Parallel: how z grows along the direction; `w` is the constant w.
     along: S,
     w: S,
-    /// Parallel: 1 or -1, whichever way is away from the viewer.
+    /// Parallel: 1 if the direction points away from the viewer, otherwise -1.
     away: f64,
 }
 
@@ -320,7 +333,7 @@ impl<S: Scalar> Geometry<S> {
         scale: f64,
     ) -> Root<S> {
         let (width, height) = (f64::from(view.width), f64::from(view.height));
-        // The pixel's centre in NDC, times width and height: whole numbers.
+        // The pixel's centre in NDC, times width and height, which makes whole numbers.
         let area = S::exact(width * height);
         let x = S::exact((2.0 * f64::from(column) + 1.0 - width) * height);
         let y = S::exact((height - 1.0 - 2.0 * f64::from(row)) * width);
@@ -330,11 +343,11 @@ impl<S: Scalar> Geometry<S> {
             let sum = a.times(&x).plus(&b.times(&y));
             if self.parallel { sum } else { sum.plus(&c.times(&area)) }
         };
-        // Times determinant and area: the ray along which w grows by 1.
-        // Parallel: the pixel's place beside that of x = y = 0.
+        // Perspective: the ray along which w grows by 1, times determinant and area.
+        // Parallel: the pixel's position relative to that of x = y = 0, with the same factor.
         let ray = [at(0), at(1), at(2)];
         if self.parallel {
-            // z = (constant + w z.ray / area) / determinant + along value / |direction|, and
+            // z = (constant + w z.ray / area) / determinant + along value / |direction|.
             // |direction|^2 is the determinant.
             let place = self.constant.times(&area).plus(&dot(&self.z, &ray).times(&self.w));
             let grown = self.along.times(&value).times(&area).times(&S::exact(self.away));

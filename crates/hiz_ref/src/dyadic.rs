@@ -5,8 +5,10 @@ use num_bigint::{BigInt, Sign};
 use std::cmp::Ordering;
 
 /// An exact number.
-/// Every finite float64 is one, and sums, differences and products stay among them, so there is
-/// never a common denominator to reduce: several times faster here than fractions in lowest terms.
+///
+/// Every finite float64 is one, and sums, differences and products of them stay dyadic.
+/// So there is never a common denominator to reduce, which makes them several times faster here
+/// than fractions in lowest terms.
 #[derive(Clone, Debug)]
 pub(crate) struct Dyadic {
     mantissa: BigInt,
@@ -20,9 +22,9 @@ impl Dyadic {
         &self.mantissa << shift
     }
 
-    /// `mantissa * 2^exponent` in float64, 62 bits of the number cut off and rounded once: less
-    /// than 2^-52 off, relative.
-    /// 0 for 0.
+    /// The number as `mantissa * 2^exponent` with a float64 mantissa; 0 for 0.
+    ///
+    /// It keeps the leading 62 bits and rounds them once, so its relative error is below 2^-52.
     fn leading(&self) -> (f64, i64) {
         let bits = self.mantissa.bits();
         let cut = bits.saturating_sub(62);
@@ -31,12 +33,12 @@ impl Dyadic {
         (sign * digits as f64, i64::from(self.exponent) + i64::try_from(cut).expect("fits memory"))
     }
 
-    /// `self / other`, less than 2^-48 off, relative; `None` where float64 cannot hold it, and for
-    /// `other` 0.
+    /// `self / other` with a relative error below 2^-48.
+    /// `None` if float64 cannot hold the quotient, and if `other` is 0.
     pub(crate) fn quotient(&self, other: &Self) -> Option<f64> {
         let ((a, i), (b, j)) = (self.leading(), other.leading());
         let power = i32::try_from(i - j).ok().filter(|power| power.abs() < 2000)?;
-        // In two steps: one power of two may lie beyond float64 where the quotient does not.
+        // In two steps, because one power of two may exceed float64 while the quotient does not.
         let quotient = a / b * 2.0_f64.powi(power / 2) * 2.0_f64.powi(power - power / 2);
         (b != 0.0 && (a == 0.0 || quotient.is_normal())).then_some(quotient)
     }
@@ -53,14 +55,14 @@ impl Scalar for Dyadic {
         let bits = value.to_bits();
         let field = i32::try_from((bits >> 52) & 0x7ff).expect("eleven bits");
         let fraction = bits & ((1 << 52) - 1);
-        // IEEE 754: exponent field 0 means a subnormal, which has no hidden bit and the exponent of
-        // field 1.
+        // IEEE 754: exponent field 0 means a subnormal.
+        // It has no hidden bit, and the exponent of field 1.
         let (integer, exponent) =
             if field == 0 { (fraction, -1074) } else { (fraction | (1 << 52), field - 1075) };
         if integer == 0 {
             return Dyadic { mantissa: BigInt::ZERO, exponent: 0 };
         }
-        // Odd mantissas keep the integers short: most inputs are round numbers.
+        // Odd mantissas keep the integers short, because most inputs are round numbers.
         let zeros = integer.trailing_zeros();
         let magnitude = BigInt::from(integer >> zeros);
         Dyadic {
@@ -132,7 +134,7 @@ mod tests {
         BigRational::from_float(x).expect("finite")
     }
 
-    /// The sign as num-rational sees it.
+    /// The sign according to num-rational.
     fn sign(x: &BigRational) -> Option<Ordering> {
         Some(if x.is_positive() {
             Ordering::Greater
@@ -172,8 +174,8 @@ mod tests {
 
     #[test]
     fn one_tenth_three_times_is_not_three_tenths() {
-        // The float64 nearest 0.1 lies above it and the one nearest 0.3 below: 3 * 0.1 > 0.3,
-        // although the two are within an ulp.
+        // The float64 nearest to 0.1 lies above it, and the one nearest to 0.3 below.
+        // So 3 * 0.1 > 0.3, although the two are within an ulp.
         let difference = Dyadic::exact(0.1).times(&Dyadic::exact(3.0)).minus(&Dyadic::exact(0.3));
         assert_eq!(difference.sign(), Some(Ordering::Greater));
         let least = Dyadic::exact(f64::from_bits(1));

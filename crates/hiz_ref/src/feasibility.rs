@@ -1,28 +1,44 @@
-//! Whether a cube or a ball meets a set of half-spaces, by complete enumeration of separating
-//! certificates.
+//! Whether a cube or a ball meets a set of half-spaces, decided by trying every separating
+//! certificate.
 //!
-//! Everything happens in the local coordinates of a volume, where it is the cube `[-1, 1]^3` or the
-//! unit ball and a linear function of position is a [`Form`].
-//! If no point satisfies all of the conditions `R_i >= 0`, then some combination with weights
-//! `lambda_i >= 0` is negative on the whole volume (Farkas; the weight of a condition `R_i = 0` may
-//! have either sign).
-//! Such weights are found among finitely many candidates, each a polynomial in the inputs, so that
-//! signs of sums of products decide.
+//! Everything happens in the local coordinates of a volume.
+//! There the volume is the cube `[-1, 1]^3` or the unit ball, and a linear function of position is
+//! a [`Form`].
+//! The conditions are `R_i >= 0`, or `R_i = 0`.
 //!
-//! *Cube.*
-//! `g(lambda) = sum lambda_i m_i + sum_k |sum lambda_i v_ik|`, the maximum of the combination over
-//! the cube, is linear on each cell into which the hyperplanes `sum lambda_i v_ik = 0` cut the cone
-//! of weights, so it is negative somewhere only if it is on an edge of a cell: one, two, three or
-//! four weights with none, one, two or all three of these sums zero.
-//! (Four mean a negative constant: the half-spaces have no common point at all. For what the pixels
-//! of a camera see, one is easily found, and then four need no trial.)
+//! By Farkas' lemma, if no point of the volume satisfies all conditions, some combination of them
+//! is negative on the whole volume.
+//! Its weights are `lambda_i >= 0`; the weight of a condition `R_i = 0` may have either sign.
+//! Finitely many candidates for the weights suffice, and each is a polynomial in the inputs.
+//! So signs of sums of products decide.
 //!
-//! *Ball.*
-//! The nearest point of the intersection is the projection of the centre to the planes that are
-//! active there, and at most three independent ones are needed (Karush, Kuhn, Tucker;
-//! Caratheodory).
-//! With their values `m` at the centre and the Gram matrix `G` of their normals, the weights are
-//! `-adj(G) m` and the squared distance is `m . adj(G) m / det G`, to be compared with 1.
+//! # Cube
+//!
+//! Let g be the maximum of the combination over the cube:
+//!
+//! ```text
+//! g(lambda) = sum lambda_i m_i + sum_k |sum lambda_i v_ik|
+//! ```
+//!
+//! The hyperplanes `sum lambda_i v_ik = 0` cut the cone of weights into cells, and `g` is linear on
+//! each cell.
+//! So if `g` is negative anywhere, it is negative on an edge of a cell.
+//! On an edge, one, two, three or four weights are not zero, and none, one, two or all three of
+//! these sums vanish.
+//!
+//! Four weights mean that the combination is a negative constant: the half-spaces have no common
+//! point at all.
+//! For what the pixels of a camera see, a common point is easily found, and then no four weights
+//! need be tried.
+//!
+//! # Ball
+//!
+//! The point of the intersection that is nearest to the centre is the projection of the centre onto
+//! the active planes.
+//! At most three independent planes are needed (Karush, Kuhn, Tucker; Caratheodory).
+//! Let `m` be the values of the planes at the centre, and `G` the Gram matrix of their normals.
+//! Then the weights are `-adj(G) m`, and the squared distance is `m . adj(G) m / det G`, which is
+//! compared with 1.
 
 use crate::scalar::{Ball, Scalar};
 use std::cmp::Ordering;
@@ -105,8 +121,8 @@ impl<S> Constraint<S> {
 /// Whether some point of the volume satisfies every constraint.
 /// With an exact scalar the answer is never `None`.
 ///
-/// `consistent` says that some point, of the volume or not, is known to satisfy them; it saves
-/// work.
+/// `consistent` says that some point, inside the volume or not, is known to satisfy them.
+/// That saves work.
 pub(crate) fn feasible<S: Scalar>(
     constraints: &[Constraint<S>],
     shape: Shape,
@@ -116,8 +132,8 @@ pub(crate) fn feasible<S: Scalar>(
         Shape::Cube => cube_separated(constraints, consistent),
         Shape::Ball => {
             let separated = ball_separated(constraints);
-            // Its certificates presuppose that the half-spaces have a common point; if none is
-            // known, the cube around the ball decides.
+            // The ball's certificates presuppose that the half-spaces have a common point.
+            // If none is known, the cube around the ball decides too.
             if consistent || separated == Some(true) {
                 separated
             } else {
@@ -128,8 +144,8 @@ pub(crate) fn feasible<S: Scalar>(
     separated.map(|separated| !separated)
 }
 
-/// The same in float64, with shortcuts for what is plain: one plane separates, or a guessed point
-/// satisfies everything.
+/// [`feasible`] in float64, with shortcuts for simple cases.
+/// One plane may separate, or a guessed point may satisfy everything.
 pub(crate) fn feasible_in_float(constraints: &[Constraint<Ball>], shape: Shape) -> Option<bool> {
     for constraint in constraints.iter().filter(|c| !c.equality) {
         let negated =
@@ -144,9 +160,11 @@ pub(crate) fn feasible_in_float(constraints: &[Constraint<Ball>], shape: Shape) 
     feasible(constraints, shape, is_consistent(constraints))
 }
 
-/// Whether some point, of the volume or not, surely satisfies all constraints.
-/// Tries one: if they come in opposite pairs (left and right, top and bottom, near and far), the
-/// point that is equally far inside both of each pair.
+/// Whether some point, inside the volume or not, surely satisfies all constraints.
+///
+/// Tries one point if the constraints come in opposite pairs (left and right, top and bottom, near
+/// and far).
+/// It is the point that is equally far inside both constraints of each pair.
 pub(crate) fn is_consistent(constraints: &[Constraint<Ball>]) -> bool {
     let [left, right, top, bottom, near, far] = constraints else {
         return false;
@@ -156,7 +174,7 @@ pub(crate) fn is_consistent(constraints: &[Constraint<Ball>]) -> bool {
         let [x, y, z] = difference.along.map(|x| x.mid);
         [x, y, z, -difference.middle.mid]
     });
-    // Cramer's rule, columns i, j, k of the three rows.
+    // Cramer's rule with columns i, j, k of the three rows.
     let det = |i: usize, j: usize, k: usize| {
         let [a, b, c] = &rows;
         a[i] * (b[j] * c[k] - b[k] * c[j]) - a[j] * (b[i] * c[k] - b[k] * c[i])
@@ -191,7 +209,7 @@ fn or(a: Option<bool>, b: Option<bool>) -> Option<bool> {
 }
 
 /// Looks for a point by projecting onto the worst violated half-space again and again.
-/// Nobody has to trust the search: its result counts only if every constraint surely holds there.
+/// The search need not be trusted: its result counts only if every constraint surely holds there.
 fn guess_point(constraints: &[Constraint<Ball>], shape: Shape) -> bool {
     const STEPS: usize = 24;
     /// Overshooting leads into the inside, where signs are certain.
@@ -313,10 +331,12 @@ fn cube_separated<S: Scalar>(constraints: &[Constraint<S>], consistent: bool) ->
     result
 }
 
-/// Whether these weights, or their negatives, make a combination that is negative on the whole cube
-/// and have the signs that they need.
-/// The weights are known up to a common sign; `vanishing` lists the axes along which the
-/// combination is zero by construction.
+/// Whether these weights, or their negatives, form a certificate.
+///
+/// The weights must have the signs that the constraints need, and the combination must be negative
+/// on the whole cube.
+/// They are known up to a common sign.
+/// `vanishing` lists the axes along which the combination is zero by construction.
 fn is_certificate<S: Scalar>(
     constraints: &[Constraint<S>],
     members: &[usize],
@@ -326,7 +346,7 @@ fn is_certificate<S: Scalar>(
     let (mut positive, mut negative) = (Some(true), Some(true));
     for (&i, weight) in members.iter().zip(weights) {
         let sign = weight.sign();
-        // Without this member it is a candidate with fewer members, which has its own turn.
+        // With a weight of 0, this is a candidate with fewer members, which is tried separately.
         if sign == Some(Ordering::Equal) {
             return Some(false);
         }
@@ -355,8 +375,8 @@ fn is_certificate<S: Scalar>(
     or(and(positive, below(middle.clone())), and(negative, below(middle.negated())))
 }
 
-/// Whether the nearest point to the centre of some active set of at most three planes is outside
-/// the unit ball.
+/// Whether the projection of the centre onto some active set of at most three planes is outside the
+/// unit ball.
 fn ball_separated<S: Scalar>(constraints: &[Constraint<S>]) -> Option<bool> {
     let n = constraints.len();
     let form = |i: usize| &constraints[i].form;
@@ -368,8 +388,8 @@ fn ball_separated<S: Scalar>(constraints: &[Constraint<S>]) -> Option<bool> {
     let cross = |a: &S, b: &S, c: &S, d: &S| a.times(b).minus(&c.times(d));
 
     // `solution` is adj(G) m, the weights times -1; `square` is det G.
-    // Any weights of the right signs with m . adj(G) m > det G separate, even where G is singular:
-    // then the combination is a negative constant.
+    // Any weights of the right signs with m . adj(G) m > det G separate.
+    // That holds even if G is singular: then the combination is a negative constant.
     let mut result = Some(false);
     let mut try_solution = |members: &[usize], solution: &[S], square: &S| {
         let mut signs = Some(true);

@@ -3,37 +3,62 @@
 //!
 //! A cull is right if everything that it hides is really hidden in the depth image that it was
 //! given.
-//! This crate says what "really" means, in exact arithmetic, and shares no code with the engine
-//! that it judges.
-//! From top to bottom:
+//! This crate says in exact arithmetic what "really" means.
+//! It shares no code with the engine that it judges.
 //!
-//! 1. A [`View`] is a projection and an image size, a [`Volume`] a sphere or box.
-//!    Their numbers are taken as the exact real numbers that the float64 values denote.
+//! # Definitions
+//!
+//! 1. A [`View`] is a projection and an image size.
+//!    A [`Volume`] is a sphere or a box.
+//!    Their numbers are the exact real numbers that the float64 values denote.
 //! 2. A pixel is **touched** if some point of the volume with w > 0 and `0 <= z <= w` has pixel
-//!    coordinates in the pixel's closed square (or on its centre: [`Coverage`]).
-//! 3. A pixel **hides** the volume if its depth is strictly nearer than *all* of the volume: `z -
-//!    depth w > 0` on all of it (reversed Z: `< 0`), the parts outside of the frustum included; or,
-//!    with [`OwnDepth::PerPixel`], than the part of it that the pixel can show.
+//!    coordinates in the pixel's closed square.
+//!    With [`Coverage::Sample`], the point must lie on the pixel's centre.
+//! 3. A pixel **hides** the volume if its depth is strictly nearer than *all* of the volume,
+//!    including the parts outside of the frustum.
+//!    That means `z - depth w > 0` on all of it (reversed Z: `< 0`).
+//!    With [`OwnDepth::PerPixel`], the depth must only be nearer than the part that the pixel can
+//!    show.
 //!    Depths are cleaned up first ([`sanitized_depth`]).
-//! 4. [`classify`]: if some touched pixel does not hide the volume, it is [`Verdict::Visible`], and
-//!    to cull it would be a false cull.
-//!    Otherwise it is [`Verdict::Hidden`]: outside of the frustum, or occluded.
-//! 5. [`depth_bounds`] says what the numbers of an image that holds no NDC depth are as NDC depth,
-//!    between two float32; [`classify_between`] judges by such an image.
-//! 6. [`pyramid()`] is the reference of the depth pyramid, each texel computed from all of its
-//!    pixels.
-//! 7. [`check_proxy`] and [`check_bounds`] say whether an occluder proxy lies inside its mesh and
-//!    whether bounds contain theirs.
+//! 4. If some touched pixel does not hide the volume, [`classify`] returns [`Verdict::Visible`],
+//!    and culling it would be a false cull.
+//!    Otherwise it returns [`Verdict::Hidden`]: the volume is outside of the frustum, or occluded.
 //!
-//! Inside, "touched" is the question whether a convex volume meets a few half-spaces, and "hides"
-//! whether it lies on one side of a plane; both come down to signs of polynomials in the inputs.
-//! These are evaluated in float64 with a running bound of the error, and in exact dyadic fractions
-//! where the bound leaves a sign open, so no verdict depends on rounding.
+//! # Other questions
+//!
+//! - [`depth_bounds`] converts an image that does not hold NDC depth.
+//!   Its result is NDC depth between two float32 per pixel, and [`classify_between`] judges by such
+//!   an image.
+//! - [`pyramid()`] is the reference of the depth pyramid; it computes each texel from all of its
+//!   pixels.
+//! - [`check_proxy`] says whether an occluder proxy lies inside its mesh.
+//! - [`check_bounds`] says whether bounds contain their mesh.
+//!
+//! # How it decides
+//!
+//! "Touched" is the question whether a convex volume meets a few half-spaces.
+//! "Hides" is the question whether it lies on one side of a plane.
+//! Both reduce to signs of polynomials in the inputs.
+//! These are first evaluated in float64 with a running bound of the error.
+//! If the bound leaves a sign open, exact dyadic fractions decide, so no verdict depends on
+//! rounding.
+//!
+//! # Walk through the files
+//!
+//! `view` and `volume` turn the inputs into linear functions, and `feasibility` asks whether a
+//! volume meets half-spaces.
+//! `search` looks through the image for a pixel that proves a volume visible.
+//! `scalar` and `dyadic` have the two arithmetics.
+//! `depth` converts depth kinds, `pyramid` builds levels, and `containment` checks proxies and
+//! bounds.
+//!
+//! # Example
 //!
 //! ```
 //! use hiz_ref::{Verdict, View, Volume, classify};
 //!
-//! // Looks along +z from the origin, 90 degrees wide, near plane at 1, infinite far plane, standard Z: depth is 1 - 1/z.
+//! // Looks along +z from the origin, 90 degrees wide.
+//! // Near plane at 1, infinite far plane, standard Z: depth is 1 - 1/z.
 //! let view = View {
 //!     rows: [[1., 0., 0., 0.], [0., 1., 0., 0.], [0., 0., 1., -1.], [0., 0., 1., 0.]],
 //!     origin: [0.; 3],
@@ -41,7 +66,8 @@
 //!     height: 4,
 //!     reversed: false,
 //! };
-//! let ball = Volume::Sphere { center: [0., 0., 10.], radius: 2. }; // nearest point at z = 8, depth 0.875
+//! // The nearest point of the ball is at z = 8, which is depth 0.875.
+//! let ball = Volume::Sphere { center: [0., 0., 10.], radius: 2. };
 //! assert_eq!(classify(&view, &ball, &[0.8; 16])?, Verdict::Hidden);
 //! assert_eq!(classify(&view, &ball, &[0.9; 16])?, Verdict::Visible);
 //! # Ok::<(), hiz_ref::Error>(())
@@ -68,68 +94,68 @@ use search::{Found, Projected, find_open_pixel};
 /// The answer for one volume and one depth image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// Some touched pixel does not hide the volume: to cull it is a false cull.
+    /// Some touched pixel does not hide the volume: culling it would be a false cull.
     Visible,
-    /// Every touched pixel hides the volume, or none is touched: it may be culled.
+    /// Every touched pixel hides the volume, or no pixel is touched: it may be culled.
     Hidden,
-    /// Float64 could not tell.
-    /// Only with [`Arithmetic::Float`].
+    /// Float64 could not decide.
+    /// Only with [`Arithmetic::Float`], and from [`classify_between`].
     Undecided,
-    /// Not a volume ([`Volume::is_valid`]): it has to be kept.
+    /// The volume is invalid ([`Volume::is_valid`]): it has to be kept.
     Invalid,
 }
 
 /// The arithmetic that decides.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Arithmetic {
-    /// Float64 with error bounds alone: some cases stay [`Verdict::Undecided`].
+    /// Float64 with error bounds alone; some cases stay [`Verdict::Undecided`].
     Float,
-    /// Float64 with error bounds, and exact arithmetic for what that leaves open.
+    /// Float64 with error bounds, and exact arithmetic if these leave a sign open.
     #[default]
     Escalate,
-    /// Exact arithmetic wherever a verdict hangs on it; float64 proofs serve only to leave out what
-    /// lies far away.
-    /// Slow; the tests compare the others with it.
+    /// Exact arithmetic wherever a verdict depends on it.
+    /// Float64 proofs only leave out what lies far away.
+    /// Slow: tests compare the others with it.
     Exact,
 }
 
-/// Which part of a volume a pixel's depth has to be nearer than to hide it there.
+/// To hide a volume in a pixel, which part of it the pixel's depth must be nearer than.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OwnDepth {
     /// All of it: one nearest depth stands for the whole volume.
     #[default]
     Nearest,
-    /// The part inside the frustum that projects into the pixel's square (or onto its centre:
-    /// [`Coverage`]).
-    /// Hides more.
+    /// The part inside the frustum that projects into the pixel's square, or onto its centre
+    /// ([`Coverage`]).
+    /// A depth hides more volumes this way.
     PerPixel,
 }
 
-/// Choices for [`classify_with`].
+/// The choices of [`classify_with`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Options {
     /// The arithmetic that decides.
     pub arithmetic: Arithmetic,
-    /// What of a pixel counts.
+    /// Which part of a pixel counts.
     pub coverage: Coverage,
-    /// What of a volume counts in a pixel.
+    /// Which part of a volume counts in a pixel.
     pub own_depth: OwnDepth,
 }
 
-/// A verdict and what it rests on.
+/// A verdict with what it rests on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome {
     /// The verdict.
     pub verdict: Verdict,
-    /// Whether no point of the volume is inside the frustum (with [`Coverage::Sample`]: the frustum
-    /// through the hull of the image's samples).
-    /// `None` if float64 alone could not tell, or if the volume is invalid.
+    /// Whether no point of the volume is inside the frustum.
+    /// With [`Coverage::Sample`]: inside the frustum through the hull of the image's samples.
+    /// `None` if float64 alone could not decide, or if the volume is invalid.
     pub outside: Option<bool>,
     /// For a visible volume: column and row of a touched pixel that does not hide it.
-    /// (`None` if float64 alone lost its trail.)
+    /// `None` if float64 alone could not locate one.
     pub witness: Option<[u32; 2]>,
-    /// The NDC depth of the volume's nearest point, in plain float64 and for the eyes alone: no
-    /// verdict rests on it.
+    /// The NDC depth of the volume's nearest point in plain float64.
+    /// It is for display; no verdict rests on it.
     /// `None` unless all of the volume has w > 0.
     pub nearest_depth: Option<f64>,
 }
@@ -137,7 +163,7 @@ pub struct Outcome {
 /// An input that has no meaning.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
-    /// An image side is 0 or too large.
+    /// An image side is 0 or larger than 32768 pixels.
     #[error("view size: expected sides of 1 to 32768 pixels, got {width}x{height}")]
     Size {
         /// Width in pixels.
@@ -148,7 +174,7 @@ pub enum Error {
     /// The matrix or the origin is not finite.
     #[error("view: expected finite rows and a finite origin, got NaN or infinity")]
     NonFiniteView,
-    /// The depth image is of another size.
+    /// The depth image has another number of pixels than the view.
     #[error("depth: expected {expected} values ({width}x{height}), got {got}")]
     DepthLength {
         /// Number of pixels of the view.
@@ -160,24 +186,26 @@ pub enum Error {
         /// Height in pixels.
         height: u32,
     },
-    /// The numbers of a depth image cannot mean what they are said to mean in this view.
+    /// The numbers of a depth image cannot mean in this view what they are said to mean.
+    /// The text says why.
     #[error("{0}")]
     DepthMeaning(&'static str),
 }
 
-/// Whether a cull may hide `volume`, given the NDC depth image `depth` (row order, row 0 on top,
-/// `view.width * view.height` values).
+/// Whether a cull may hide `volume`, given an NDC depth image.
 ///
-/// Never [`Verdict::Undecided`].
+/// `depth` has `view.width * view.height` values in row order, row 0 on top.
+/// The answer is never [`Verdict::Undecided`].
 ///
 /// # Errors
 ///
-/// If the view is not finite or its size or that of the image is wrong.
+/// [`Error::NonFiniteView`] if the view is not finite.
+/// [`Error::Size`] or [`Error::DepthLength`] if the size of the view or of the image is wrong.
 pub fn classify(view: &View, volume: &Volume, depth: &[f32]) -> Result<Verdict, Error> {
     Ok(classify_with(view, volume, depth, Options::default())?.verdict)
 }
 
-/// [`classify`] with choices, and with what the verdict rests on.
+/// [`classify`] with choices; the result says what the verdict rests on.
 ///
 /// # Errors
 ///
@@ -199,7 +227,7 @@ pub fn classify_with(
         });
     }
     let projected = Projected::new(view, volume, options);
-    // Asked first: what misses the image as a whole needs no search of its pixels.
+    // Asked first, because a volume that misses the image as a whole needs no search of its pixels.
     let met = projected.meets(view.image());
     let (verdict, outside, witness) = if met == Some(false) {
         (Verdict::Hidden, Some(true), None)
@@ -213,11 +241,11 @@ pub fn classify_with(
     Ok(Outcome { verdict, outside, witness, nearest_depth: projected.nearest_depth() })
 }
 
-/// [`classify_with`], by an image that is known to lie between two.
+/// [`classify_with`] for a depth image that is only known to lie between two images.
 ///
-/// A volume is [`Verdict::Visible`] if it is so in the nearer image, which hides most, and
-/// [`Verdict::Hidden`] if it is so in the farther one.
-/// Between them it is [`Verdict::Undecided`].
+/// - [`Verdict::Visible`]: visible even in the nearer image, which hides most.
+/// - [`Verdict::Hidden`]: hidden even in the farther image, which hides least.
+/// - [`Verdict::Undecided`]: hidden in the nearer image, but visible in the farther one.
 ///
 /// # Errors
 ///
@@ -238,14 +266,14 @@ pub fn classify_between(
     })
 }
 
-/// Whether no point of `volume` is inside the frustum: `w > 0`, `0 <= z <= w`, pixel coordinates in
-/// the closed image.
-/// Exact.
+/// Whether no point of `volume` is inside the frustum, decided exactly.
+///
+/// Inside means `w > 0`, `0 <= z <= w` and pixel coordinates in the closed image.
 /// `false` for an invalid volume, which has to be kept.
 ///
 /// # Errors
 ///
-/// If the view is not finite or its size is wrong.
+/// [`Error::NonFiniteView`] if the view is not finite, [`Error::Size`] if its size is wrong.
 pub fn is_outside(view: &View, volume: &Volume) -> Result<bool, Error> {
     view.check()?;
     if !volume.is_valid() {
@@ -255,14 +283,15 @@ pub fn is_outside(view: &View, volume: &Volume) -> Result<bool, Error> {
     Ok(projected.meets(view.image()) == Some(false))
 }
 
-/// Whether `depth` (after [`sanitized_depth`]) is strictly nearer than all of `volume`, wherever in
-/// the image that may be.
-/// Exact.
+/// Whether `depth` is strictly nearer than all of `volume`, decided exactly.
+///
+/// `depth` is NDC depth and passes [`sanitized_depth`] first.
+/// The place of the volume in the image has no effect.
 /// `false` for an invalid volume, and for the far plane, which hides nothing.
 ///
 /// # Errors
 ///
-/// If the view is not finite or its size is wrong.
+/// [`Error::NonFiniteView`] if the view is not finite, [`Error::Size`] if its size is wrong.
 pub fn hides(view: &View, volume: &Volume, depth: f32) -> Result<bool, Error> {
     view.check()?;
     let depth = sanitized_depth(depth, view.reversed);
@@ -275,12 +304,13 @@ pub fn hides(view: &View, volume: &Volume, depth: f32) -> Result<bool, Error> {
 }
 
 /// Column and row of every pixel that `volume` touches, in row order.
-/// Exact, and as slow as it sounds for large volumes.
+///
+/// The result is exact, and the time grows with the number of touched pixels.
 /// Empty for an invalid volume.
 ///
 /// # Errors
 ///
-/// If the view is not finite or its size is wrong.
+/// [`Error::NonFiniteView`] if the view is not finite, [`Error::Size`] if its size is wrong.
 pub fn touched_pixels(
     view: &View,
     volume: &Volume,
@@ -296,14 +326,15 @@ pub fn touched_pixels(
     Ok(pixels)
 }
 
-/// The nearest depth at which pixel (`column`, `row`) shows something of `volume`: every nearer one
-/// hides there what [`OwnDepth::PerPixel`] asks for.
-/// `None` if the pixel is not touched, or the volume invalid.
-/// Exact.
+/// The nearest NDC depth at which pixel (`column`, `row`) shows something of `volume`, decided
+/// exactly.
+///
+/// Every nearer depth hides there the part that [`OwnDepth::PerPixel`] asks about.
+/// `None` if the pixel is not touched, or if the volume is invalid.
 ///
 /// # Errors
 ///
-/// If the view is not finite or its size is wrong.
+/// [`Error::NonFiniteView`] if the view is not finite, [`Error::Size`] if its size is wrong.
 ///
 /// # Panics
 ///

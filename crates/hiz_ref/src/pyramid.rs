@@ -1,4 +1,4 @@
-//! What a depth image means, and the reference of the depth pyramid.
+//! The depth that a pixel stands for, and the reference of the depth pyramid.
 
 /// The bits of 1.0f32: the greatest pattern that denotes a depth.
 pub(crate) const ONE: u32 = 0x3f80_0000;
@@ -9,10 +9,10 @@ const MINUS_ZERO: u32 = 0x8000_0000;
 
 /// The depth that a pixel of a depth image stands for, decided on its bits.
 ///
-/// NaN, infinities and what lies outside 0..1 (negative subnormals among it) are "far": 1, or 0 if
-/// `reversed`.
-/// Positive subnormals and -0 are +0.
-/// Everything else is itself.
+/// - NaN, infinities and everything outside 0..=1 are "far": 1, or 0 if `reversed`.
+///   That includes negative subnormals.
+/// - Positive subnormals and -0 are +0.
+/// - Everything else is itself.
 #[must_use]
 pub fn sanitized_depth(depth: f32, reversed: bool) -> f32 {
     let bits = depth.to_bits();
@@ -38,14 +38,16 @@ pub struct Level {
     pub texels: Vec<f32>,
 }
 
-/// The farthest-depth pyramid of an NDC depth image (row order, row 0 on top), from level 0 down to
-/// 1x1.
+/// The farthest-depth pyramid of an NDC depth image, from level 0 down to 1x1.
 ///
-/// Level `k` has `ceil(width / 2^k)` by `ceil(height / 2^k)` texels; texel (x, y) is the farthest
-/// [sanitized](sanitized_depth) depth (greatest, or least if `reversed`) of the pixel block `[x <<
-/// k, (x + 1) << k) x [y << k, (y + 1) << k)`.
-/// Each texel is computed from all of its pixels, never from the level before, so that a mistake of
-/// a reduction cannot repeat itself here.
+/// `depth` has `width * height` values in row order, row 0 on top.
+/// Level `k` has `ceil(width / 2^k)` by `ceil(height / 2^k)` texels.
+/// Texel (x, y) covers the pixel block `[x << k, (x + 1) << k) x [y << k, (y + 1) << k)`.
+/// It is the farthest [sanitized](sanitized_depth) depth in that block: the greatest, or the least
+/// if `reversed`.
+///
+/// Each texel is computed from all of its pixels, never from the level before.
+/// So a mistake of a reduction cannot repeat itself here.
 ///
 /// # Panics
 ///
@@ -117,7 +119,8 @@ mod tests {
 
     #[test]
     fn a_five_by_three_image_by_hand() {
-        // Odd on both sides: the last column and row are blocks of their own, down to the end.
+        // Both sides are odd: the last column and row form blocks of their own down to the last
+        // level.
         #[rustfmt::skip]
         let depth = [
             0.1, 0.2, 0.3, 0.4, 0.5,

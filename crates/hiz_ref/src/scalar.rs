@@ -1,15 +1,17 @@
-//! Numbers that know what they know: the arithmetic every decision is written in.
+//! The arithmetic in which every decision is written: numbers with a known or an open sign.
 //!
 //! A decision of this crate is the sign of a polynomial in the inputs.
-//! It is written once, over [`Scalar`], and run twice: in [`Ball`] (float64 and a bound of its own
-//! error; nearly always enough) and, where a ball's sign is open, in
-//! [`Dyadic`](crate::dyadic::Dyadic) (exact).
+//! It is written once, over [`Scalar`], and runs in up to two arithmetics:
+//!
+//! - [`Ball`]: float64 with a bound of its own error, which nearly always suffices.
+//! - [`Dyadic`](crate::dyadic::Dyadic): exact, if a ball leaves the sign open.
 
 use std::cmp::Ordering;
 
-/// A number with ring operations and a sign that may be unknown.
-/// No division: every test is cross-multiplied instead, so that the dyadic fractions (to which
-/// every float64 belongs) are closed under all that is needed.
+/// A number with ring operations, whose sign may be unknown.
+///
+/// There is no division: every test is multiplied out instead.
+/// So the dyadic fractions, to which every float64 belongs, are closed under all operations here.
 pub(crate) trait Scalar: Clone {
     /// The number that a finite float64 denotes, exactly.
     fn exact(value: f64) -> Self;
@@ -21,7 +23,8 @@ pub(crate) trait Scalar: Clone {
     fn sign(&self) -> Option<Ordering>;
 
     /// The absolute value.
-    /// A ball around 0 may keep its centre's sign: it still contains the true absolute value.
+    /// A ball around 0 may keep its centre's sign, because it still contains the true absolute
+    /// value.
     fn magnitude(&self) -> Self;
 
     fn is_zero(&self) -> bool {
@@ -31,16 +34,17 @@ pub(crate) trait Scalar: Clone {
 
 /// Half an ulp of a number in [1, 2): the relative error of one rounded operation.
 const UNIT: f64 = f64::EPSILON / 2.0;
-/// More than what the at most nine roundings of an error bound's own computation can lose: `(1 -
-/// UNIT)^9 * GROW > 1`.
+/// Covers the at most nine roundings in the computation of an error bound.
+/// That is, `(1 - UNIT)^9 * GROW > 1`.
 const GROW: f64 = 1.0 + 8.0 * f64::EPSILON;
 
-/// A float64 and a bound of its distance from the true value: the true value lies in `[mid - err,
-/// mid + err]`.
+/// A float64 and a bound of its distance from the true value.
+/// The true value lies in `[mid - err, mid + err]`.
 ///
 /// Overflow gives an infinite or NaN bound, which decides nothing.
-/// A bound of 0 means that `mid` is the true value; exact zeros are kept exact, because the
-/// coefficients of axis-aligned views and boxes are full of them.
+/// A bound of 0 means that `mid` is the true value.
+/// Exact zeros stay exact, because the coefficients of axis-aligned views and boxes contain many of
+/// them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ball {
     pub(crate) mid: f64,
@@ -50,25 +54,26 @@ pub(crate) struct Ball {
 impl Ball {
     const ZERO: Ball = Ball { mid: 0.0, err: 0.0 };
 
-    /// The numbers within `err` of `mid`.
+    /// The ball of the numbers within `err` of `mid`.
     pub(crate) fn around(mid: f64, err: f64) -> Ball {
         Ball { mid, err }
     }
 
-    /// Whether its error is small beside it.
+    /// Whether its error is small relative to its centre: at most 1e-6 of it.
     pub(crate) fn is_tight(self) -> bool {
         self.err <= self.mid.abs() * 1e-6
     }
 
-    /// Contains every quotient of a number of this ball and one of `other`; anything where `other`
-    /// may be 0.
+    /// A ball that contains every quotient of a number of this ball and one of `other`.
+    /// It contains every number if `other` may be 0.
     pub(crate) fn divided_by(self, other: Ball) -> Ball {
         let least = other.mid.abs() - other.err;
         if least.is_nan() || least <= 0.0 {
             return Ball { mid: 0.0, err: f64::INFINITY };
         }
         let mid = self.mid / other.mid;
-        // a'/b' - a/b = ((a' - a) - (a/b) (b' - b)) / b', with the division's own rounding twice.
+        // a'/b' - a/b = ((a' - a) - (a/b) (b' - b)) / b', with the division's own rounding counted
+        // twice.
         let err = ((self.err + mid.abs() * (other.err + 2.0 * UNIT * other.mid.abs())) / least
             + UNIT * mid.abs()
             + f64::MIN_POSITIVE)
@@ -76,14 +81,14 @@ impl Ball {
         Ball { mid, err }
     }
 
-    /// How far `mid` may be off.
+    /// The bound of the distance from `mid` to the true value.
     pub(crate) fn err(self) -> f64 {
         self.err
     }
 
-    /// Contains the roots of this ball's numbers that are not negative.
+    /// A ball that contains the square roots of this ball's numbers that are not negative.
     pub(crate) fn square_root(self) -> Ball {
-        // Each end outwards by more than its sum's and its root's rounding.
+        // Each end is moved outwards by more than the rounding of its sum and of its root.
         let low = ((self.mid - self.err) * (1.0 - 4.0 * UNIT)).max(0.0).sqrt() * (1.0 - 2.0 * UNIT);
         let high = ((self.mid + self.err) * (1.0 + 4.0 * UNIT)).sqrt() * (1.0 + 4.0 * UNIT);
         let mid = low.midpoint(high);
@@ -108,8 +113,8 @@ impl Scalar for Ball {
             return *self;
         }
         let mid = self.mid + other.mid;
-        // Half an ulp of the sum is at most UNIT |mid|, among the subnormals too, where sums are
-        // exact.
+        // Half an ulp of the sum is at most UNIT |mid|.
+        // That holds among the subnormals too, where sums are exact.
         let err = (self.err + other.err + UNIT * mid.abs()) * GROW;
         Ball { mid, err }
     }
@@ -186,8 +191,8 @@ mod tests {
     }
 
     proptest! {
-        /// A quotient is checked by multiplying it back: `|mid b - a| <= err |b|` for every a and b
-        /// of the balls, here their ends.
+        /// A quotient is checked by multiplying it back: `|mid b - a| <= err |b|` for the ends a
+        /// and b of both balls.
         #[test]
         fn quotients_are_contained(a in -9.0f64..9.0, b in -9.0f64..9.0, fuzz in 0.0f64..1.0) {
             let (x, y) = (Ball { mid: a, err: fuzz * 1e-3 }, Ball { mid: b, err: fuzz * fuzz });
@@ -202,7 +207,7 @@ mod tests {
             }
         }
 
-        /// Random straight-line programs, extreme exponents and subnormals included.
+        /// Random straight-line programs, with extreme exponents and subnormals.
         #[test]
         fn a_ball_contains_the_exact_value(
             inputs in prop::collection::vec(prop_oneof![
@@ -226,7 +231,7 @@ mod tests {
 
     #[test]
     fn an_open_sign_is_reported_as_open() {
-        // (1 + e)^2 and 1 + 2e differ by e^2, which float64 cannot see.
+        // (1 + e)^2 and 1 + 2e differ by e^2, which float64 cannot resolve.
         let e = f64::EPSILON;
         let square = Ball::exact(1.0 + e).times(&Ball::exact(1.0 + e));
         assert_eq!(square.minus(&Ball::exact(1.0 + 2.0 * e)).sign(), None);

@@ -9,15 +9,15 @@ use crate::volume::{Frame, Volume};
 use crate::{Arithmetic, Options, OwnDepth};
 use std::cell::OnceCell;
 
-/// A volume as a view sees it, and the two questions about it: does it meet a block of pixels, does
-/// a depth hide it.
+/// A volume as a view sees it, with the two questions about it.
+/// Does it meet a block of pixels, and does a depth hide it?
 pub(crate) struct Projected<'a> {
     view: &'a View,
     volume: &'a Volume,
     options: Options,
     shape: Shape,
     float: Clip<Ball>,
-    /// Made when float64 first leaves a sign open: nearly never.
+    /// Made when float64 first leaves a sign open, which is rare.
     exact: OnceCell<Clip<Dyadic>>,
 }
 
@@ -63,8 +63,8 @@ impl<'a> Projected<'a> {
         )
     }
 
-    /// Whether a point of the volume is inside the frustum and the block, and not farther than a
-    /// depth in 0..=1.
+    /// Whether a point of the volume is inside the frustum and the block, and not farther than
+    /// `depth`, which is in 0..=1.
     pub(crate) fn meets_before(&self, block: Block, depth: f32) -> Option<bool> {
         let coverage = self.options.coverage;
         let before = self.float.inside_and_before(self.view, block, coverage, depth);
@@ -77,8 +77,10 @@ impl<'a> Projected<'a> {
         )
     }
 
-    /// The nearest depth at which a pixel shows something of the volume: by bisection over the
-    /// float32 numbers from near to far, for what one depth shows the farther ones show, too.
+    /// The nearest depth at which a pixel shows something of the volume.
+    ///
+    /// Bisection over the float32 numbers from near to far works because a depth shows whatever a
+    /// nearer depth shows.
     pub(crate) fn own_depth(&self, [x, y]: [u32; 2]) -> Option<f32> {
         let pixel = Block { x: [x, x + 1], y: [y, y + 1] };
         let depth =
@@ -103,7 +105,7 @@ impl<'a> Projected<'a> {
         feasible_in_float(&inside, self.shape)
     }
 
-    /// Whether all of the volume lies strictly farther than a depth in 0..=1.
+    /// Whether all of the volume lies strictly farther than `depth`, which is in 0..=1.
     pub(crate) fn is_beyond(&self, depth: f32) -> Option<bool> {
         fn beyond<S: Scalar>(clip: &Clip<S>, depth: f32, p: &Projected) -> Option<bool> {
             clip.beyond(depth, p.view.reversed).is_positive_on(p.shape)
@@ -111,17 +113,17 @@ impl<'a> Projected<'a> {
         self.decide(|| beyond(&self.float, depth, self), || beyond(self.exact(), depth, self))
     }
 
-    /// Whether all of the volume has w > 0.
-    /// If that is open, so be it: it only saves work.
+    /// Whether all of the volume surely has w > 0.
+    /// An open answer counts as no, because the answer only saves work.
     fn is_in_front(&self) -> bool {
         self.float.w.is_positive_on(self.shape) == Some(true)
     }
 
-    /// A block that holds every pixel that the volume can touch, most often much smaller than the
-    /// image.
+    /// A block that holds every pixel that the volume can touch.
+    /// It is usually much smaller than the image.
     ///
-    /// The rectangle is guessed from eight corners.
-    /// It counts only where the part of the image that it leaves out is proved empty.
+    /// The projection of eight corners gives a first guess.
+    /// Each part of the image outside of the guess is left out only if it is proved empty.
     fn bounding_block(&self) -> Block {
         let image = self.view.image();
         let mut low = [f64::INFINITY; 2];
@@ -146,8 +148,8 @@ impl<'a> Projected<'a> {
         }
         let mut guess = [image.x, image.y];
         for (axis, [from, to]) in guess.iter_mut().enumerate() {
-            // A little wider than the guess, since what touches the border of an outer strip cannot
-            // be left out.
+            // A little wider than the guess, because a volume that touches the border of an outer
+            // strip keeps the strip.
             // Casts saturate.
             let first = (low[axis] - 0.01).floor().max(0.0) as u32;
             let last = (high[axis] + 0.01).floor().max(0.0) as u32;
@@ -174,7 +176,7 @@ impl<'a> Projected<'a> {
         kept
     }
 
-    /// Every pixel that the volume touches, in row order, and whether each decision was made.
+    /// Every pixel that the volume touches, in row order, and whether every decision was made.
     pub(crate) fn touched(&self) -> (Vec<[u32; 2]>, bool) {
         let mut pixels = Vec::new();
         let mut decided = true;
@@ -191,8 +193,8 @@ impl<'a> Projected<'a> {
         (pixels, decided)
     }
 
-    /// The NDC depth of the volume's nearest point, in plain float64; `None` unless all of the
-    /// volume has w > 0.
+    /// The NDC depth of the volume's nearest point in plain float64.
+    /// `None` unless all of the volume surely has w > 0.
     pub(crate) fn nearest_depth(&self) -> Option<f64> {
         if !self.is_in_front() {
             return None;
@@ -211,14 +213,14 @@ impl<'a> Projected<'a> {
                 let nearer = |a: f64, b: f64| if sign * a < sign * b { a } else { b };
                 depths.reduce(nearer)?
             }
-            // The depths t whose plane z - t w = 0 is tangent: (z0 - t w0)^2 = |zv - t wv|^2, as a
-            // t^2 - 2 b t + c = 0.
+            // At the nearest depth t, the plane z - t w = 0 is tangent to the ball.
+            // That gives (z0 - t w0)^2 = |zv - t wv|^2, written as a t^2 - 2 b t + c = 0.
             Shape::Ball => {
                 let a = w0 * w0 - dot(wv, wv);
                 let b = z0 * w0 - dot(zv, wv);
                 let c = z0 * z0 - dot(zv, zv);
                 let root = (b * b - a * c).max(0.0).sqrt();
-                // The smaller root without cancellation where b > 0.
+                // This form of the smaller root has no cancellation if b > 0.
                 match (self.view.reversed, b > 0.0) {
                     (true, _) => (b + root) / a,
                     (false, true) => c / (b + root),
@@ -231,13 +233,14 @@ impl<'a> Projected<'a> {
 
 /// What is known so far about which depths hide a volume.
 ///
-/// If w > 0 on the volume, a depth that is nearer than one that hides it hides it too: then the
-/// answers are kept as two bounds that close in on the threshold, and an image needs a few
-/// evaluations, not one a pixel.
+/// If w > 0 on the volume and a depth hides it, every nearer depth hides it too.
+/// Then two bounds that close in on the threshold keep all answers.
+/// So an image needs a few evaluations instead of one per pixel.
 struct Hiding<'a> {
     projected: &'a Projected<'a>,
     monotone: bool,
-    /// In steps of float32 from the nearest depth: all up to here hide, all from there on do not.
+    /// In float32 steps from the nearest depth.
+    /// All depths up to `hides_to` hide the volume, and all from `open_from` on do not.
     hides_to: i64,
     open_from: i64,
 }
@@ -274,11 +277,11 @@ impl<'a> Hiding<'a> {
 /// What the search found.
 pub(crate) enum Found {
     /// A touched pixel that does not hide the volume.
-    /// (Its place is unknown if float64 alone could not follow it.)
+    /// Its position is unknown if float64 alone could not locate it.
     Open(Option<[u32; 2]>),
-    /// There is none.
+    /// There is no such pixel.
     Nothing,
-    /// There may be one.
+    /// There may be such a pixel.
     Unknown,
 }
 
@@ -290,10 +293,10 @@ enum Pixels {
     Mixed,
 }
 
-/// Looks for a touched pixel that does not hide the volume: blocks are halved, and dropped where
-/// all pixels hide it or none is touched.
-/// With [`OwnDepth::PerPixel`] "hides" is asked anew in every block, against the farthest of its
-/// depths.
+/// Looks for a touched pixel that does not hide the volume.
+///
+/// Blocks are halved, and dropped if all of their pixels hide the volume or none is touched.
+/// With [`OwnDepth::PerPixel`], every block is asked anew, against the farthest of its depths.
 pub(crate) fn find_open_pixel(projected: &Projected, depth: &[f32]) -> Found {
     let mut hiding = Hiding::new(projected);
     let width = projected.view.width as usize;
@@ -330,8 +333,9 @@ pub(crate) fn find_open_pixel(projected: &Projected, depth: &[f32]) -> Found {
         if meets == Some(false) {
             continue;
         }
-        // Squares cover their block; samples do not, nor does the farthest depth stand for all, so
-        // there only single pixels count.
+        // The squares of its pixels cover a block, but its samples do not.
+        // Nor does the farthest depth stand for all pixels.
+        // So with samples or own depths, only single pixels count.
         let Options { coverage, own_depth, .. } = projected.options;
         let counts =
             (coverage == Coverage::Area && own_depth == OwnDepth::Nearest) || block.is_pixel();
@@ -347,7 +351,7 @@ pub(crate) fn find_open_pixel(projected: &Projected, depth: &[f32]) -> Found {
     if unknown { Found::Unknown } else { Found::Nothing }
 }
 
-/// The farthest depth of a block, cleaned up.
+/// The farthest depth of a block after [`sanitized_depth`].
 fn farthest(view: &View, depth: &[f32], block: Block) -> f32 {
     let rows = block.y[0]..block.y[1];
     let columns = block.x[0] as usize..block.x[1] as usize;

@@ -1,12 +1,12 @@
-//! A view: the exact projection, its image, and what "inside a block of pixels" means as linear
-//! inequalities.
+//! Views: the exact projection, its image, and the linear inequalities of "inside a block of
+//! pixels".
 
 use crate::Error;
 use crate::feasibility::{Constraint, Form};
 use crate::scalar::Scalar;
 use crate::volume::Frame;
 
-/// The largest image side that is accepted; hizvk promises no more either.
+/// The largest image side in pixels; hizvk accepts no larger one either.
 const MAX_SIDE: u32 = 32768;
 
 /// A projection to an image, taken exactly as written: `clip = rows * (p - origin, 1)` in real
@@ -26,8 +26,7 @@ const MAX_SIDE: u32 = 32768;
 pub struct View {
     /// Rows of the 4x4 matrix that takes `(p - origin, 1)` to clip coordinates x, y, z, w.
     pub rows: [[f64; 4]; 4],
-    /// The world point that positions are taken relative to before they meet `rows`, in world
-    /// units.
+    /// The world point that is subtracted from positions before `rows` apply, in world units.
     pub origin: [f64; 3],
     /// Image width in pixels.
     pub width: u32,
@@ -47,7 +46,7 @@ impl View {
         if finite { Ok(()) } else { Err(Error::NonFiniteView) }
     }
 
-    /// Whether a depth image of so many numbers is this view's.
+    /// Checks that a depth image with `got` numbers has this view's size.
     pub(crate) fn check_length(&self, got: usize) -> Result<(), Error> {
         let expected = self.width as usize * self.height as usize;
         if got == expected {
@@ -63,13 +62,14 @@ impl View {
     }
 }
 
-/// What of a pixel counts when a volume touches it.
+/// Which part of a pixel counts when a volume touches it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Coverage {
     /// The whole closed square: nothing that overlaps the pixel may be hidden.
     #[default]
     Area,
-    /// The centre alone: what covers no sample cannot be seen in an image with one sample a pixel.
+    /// The centre alone, for images with one sample per pixel.
+    /// A volume that covers no sample cannot be seen there.
     Sample,
 }
 
@@ -86,8 +86,8 @@ impl Block {
         self.x[1] - self.x[0] == 1 && self.y[1] - self.y[0] == 1
     }
 
-    /// Two halves across the longer side.
-    /// (Not for single pixels.)
+    /// The two halves across the longer side.
+    /// The block must not be a single pixel.
     pub(crate) fn halves(self) -> [Block; 2] {
         let Block { x, y } = self;
         if x[1] - x[0] >= y[1] - y[0] {
@@ -104,8 +104,9 @@ impl Block {
 /// [`Frame`]).
 #[derive(Debug)]
 pub(crate) struct Clip<S> {
-    /// Image width times clip x, and image height times clip y: pixel edges then have
-    /// whole-numbered coefficients.
+    /// Image width times clip x.
+    /// Pixel edges then have whole-numbered coefficients, and so they do for `height_y`, image
+    /// height times clip y.
     pub(crate) width_x: Form<S>,
     pub(crate) height_y: Form<S>,
     pub(crate) z: Form<S>,
@@ -123,8 +124,7 @@ impl<S: Scalar> Clip<S> {
         }
     }
 
-    /// `z - depth w`, signed so that it is positive where a point lies strictly farther than
-    /// `depth`.
+    /// `z - depth w`, signed so that it is positive if a point lies strictly farther than `depth`.
     pub(crate) fn beyond(&self, depth: f32, reversed: bool) -> Form<S> {
         let threshold = self.w.scaled(f64::from(depth));
         if reversed { threshold.minus(&self.z) } else { self.z.minus(&threshold) }
@@ -140,9 +140,10 @@ impl<S: Scalar> Clip<S> {
         depth: f32,
     ) -> Vec<Constraint<S>> {
         let mut all = self.inside(view, block, coverage);
-        // z >= 0 and w - z >= 0 stand last.
-        // One of them follows from the new condition and the other one, unless the depth is the
-        // near plane's: then they alone keep w from being negative.
+        // The last two conditions are z >= 0 and w - z >= 0.
+        // One of them follows from the new condition and the other one, so it is removed.
+        // At the near plane's depth it does not follow: there both are needed to keep w from being
+        // negative.
         let at_near_plane = depth == if view.reversed { 1.0 } else { 0.0 };
         if !at_near_plane {
             all.remove(all.len() - if view.reversed { 2 } else { 1 });
@@ -151,13 +152,13 @@ impl<S: Scalar> Clip<S> {
         all
     }
 
-    /// The conditions under which a point is inside the frustum and inside the block (its closed
-    /// rectangle, or the hull of its samples).
+    /// The conditions under which a point is inside the frustum and inside the block.
+    /// For samples, the block is the hull of the samples; otherwise its closed rectangle.
     ///
-    /// `w > 0` needs no condition of its own: `0 <= z <= w` gives `w >= 0`, and `w = 0` leaves only
-    /// the points with `x = y = z = w = 0`, which a matrix of full rank does not have.
-    /// For a singular matrix such a point counts as inside, so that the answer errs towards
-    /// visible.
+    /// `w > 0` needs no condition of its own.
+    /// `0 <= z <= w` gives `w >= 0`, and `w = 0` leaves only points with `x = y = z = w = 0`.
+    /// A matrix of full rank has no such point.
+    /// For a singular matrix such a point counts as inside, so the answer errs towards visible.
     pub(crate) fn inside(
         &self,
         view: &View,
@@ -168,7 +169,7 @@ impl<S: Scalar> Clip<S> {
             Coverage::Area => 0.0,
             Coverage::Sample => 1.0,
         };
-        // Edges in half pixels, so that samples are whole numbers too (and all of them exact).
+        // Edges in half pixels: then samples are whole numbers too, and all of them are exact.
         let edges =
             |[from, to]: [u32; 2]| (2.0 * f64::from(from) + inset, 2.0 * f64::from(to) - inset);
         let (width, height) = (f64::from(view.width), f64::from(view.height));

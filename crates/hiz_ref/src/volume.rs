@@ -3,11 +3,11 @@
 use crate::feasibility::{Form, Shape};
 use crate::scalar::Scalar;
 
-/// A closed convex volume in world units; its numbers are the exact real numbers that the float64
-/// values denote.
+/// A closed convex volume in world units.
+/// Its numbers are the exact real numbers that the float64 values denote.
 ///
-/// Zero sizes are valid (a point, a segment, a rectangle), and so are mirrored, sheared or singular
-/// `axes`.
+/// Sizes of 0 are valid (a point, a segment, a rectangle).
+/// So are mirrored, sheared or singular `axes`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Volume {
     /// All points within `radius` of `center`.
@@ -21,7 +21,7 @@ pub enum Volume {
     Box {
         /// The corner with the least coordinates.
         min: [f64; 3],
-        /// The corner with the greatest coordinates, nowhere below `min`.
+        /// The corner with the greatest coordinates, none of them below that of `min`.
         max: [f64; 3],
     },
     /// A parallelepiped: `center + axes * (half_sizes * s)` for all `s` in `[-1, 1]^3`.
@@ -36,7 +36,7 @@ pub enum Volume {
 }
 
 impl Volume {
-    /// Whether this is a volume: every number finite, no negative size, `min <= max`.
+    /// Whether the volume is valid: every number finite, no negative size, `min <= max`.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         let finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
@@ -64,8 +64,10 @@ impl Volume {
     }
 }
 
-/// Local coordinates of a volume: it is the image of the unit ball, or of the cube `[-1, 1]^3`,
-/// under `s -> center + sum_k axes[k] s_k`.
+/// Local coordinates of a volume.
+///
+/// The volume is the image of the unit ball, or of the cube `[-1, 1]^3`.
+/// The map is `s -> center + sum_k axes[k] s_k`.
 pub(crate) struct Frame<S> {
     /// Centre relative to the view's origin.
     center: [S; 3],
@@ -90,8 +92,8 @@ impl<S: Scalar> Frame<S> {
                 Frame { center: relative(center), axes: diagonal([radius; 3].map(number)) }
             }
             Volume::Box { min, max } => {
-                // Relative to the origin first: far from it the halves would otherwise cost float64
-                // its last digits.
+                // Relative to the origin first.
+                // Far from it, halving would otherwise cost float64 its last digits.
                 let (low, high) = (relative(min), relative(max));
                 let half = number(0.5);
                 let axis = |i: usize| low[i].plus(&high[i]).times(&half);
@@ -111,7 +113,7 @@ impl<S: Scalar> Frame<S> {
         }
     }
 
-    /// A matrix row as a function of the local coordinates.
+    /// A matrix row as a linear function of the local coordinates.
     pub(crate) fn form(&self, row: &[f64; 4]) -> Form<S> {
         let row = row.map(S::exact);
         let dot =

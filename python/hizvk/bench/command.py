@@ -1,10 +1,7 @@
-"""``hizvk bench``: speed beside error, for every configuration, on scenes with known truth."""
+"""The command line of ``hizvk bench``, and the run over all scenes."""
 
 from __future__ import annotations
 
-import argparse
-import importlib.util
-import json
 import sys
 import time
 from dataclasses import dataclass
@@ -13,16 +10,23 @@ from typing import TYPE_CHECKING, Final
 
 import hizvk
 
-from .. import terminal
-from . import configurations, report, scenes
+from ..commands import arguments as args
+from ..commands import figure
+from ..commands.progress import Progress
+from ..scenes import embree
+from . import catalogue, configurations
 from .measure import measure
+from .report import Report
 
 if TYPE_CHECKING:
+    import argparse
     from collections.abc import Sequence
 
     from .._arguments import Size
 
 __all__ = ["Extent", "main", "run"]
+
+PROG: Final = "hizvk bench"
 
 
 @dataclass(frozen=True)
@@ -30,7 +34,7 @@ class Extent:
     """How much is measured."""
 
     instances: dict[str, int]
-    """By scene; the castle has what it has."""
+    """By scene; the castle's number is given."""
     views: dict[str, int]
     size: Size
     repetitions: int
@@ -62,25 +66,27 @@ def run(
     out: Path,
     *,
     extent: str = "default",
-    keys: Sequence[str] = scenes.NAMES,
+    keys: Sequence[str] = catalogue.NAMES,
     castle: Path | None = None,
     seed: int = 2010,
     instances: int | None = None,
     views: int | None = None,
     size: Size | None = None,
     repetitions: int | None = None,
-    command: str = "hizvk bench",
-) -> report.Report:
-    """Runs the bench and leaves report.md, report.json and, with matplotlib, a plot of each scene in `out`.
+    command: str = PROG,
+) -> Report:
+    """Runs the bench and leaves report.md, report.json and plots of all scenes in `out`.
+
+    Plots need matplotlib and are left out without it.
 
     Parameters
     ----------
     out : Path
         A folder; made if it is not there.
     extent : "quick", "default" or "full"
-        How much, where the parameters below do not say it.
+        How much is measured, unless the parameters below say otherwise.
     keys : sequence of str
-        Of `scenes.NAMES`.
+        Of `catalogue.NAMES`.
     castle : Path, optional
         The castle's file.
     seed : int
@@ -90,7 +96,7 @@ def run(
     size : (height, width), optional
         Of the views.
     command : str
-        What the report says that prints it.
+        The command that the report names.
 
     Raises
     ------
@@ -102,24 +108,19 @@ def run(
     chosen = EXTENTS[extent]
     size, repetitions = size or chosen.size, repetitions or chosen.repetitions
     device = hizvk.Device()
-    found = report.Report(
+    found = Report(
         command=command, seed=seed, extent=extent, adapter=device.adapter, missing=_left_out()
     )
     measured = configurations.matrix(extent)
     plots: dict[str, str] = {}
     for key in keys:
+        count, stations = instances or chosen.instances.get(key, 1), views or chosen.views[key]
         try:
-            bench = scenes.make(
-                key,
-                instances or chosen.instances.get(key, 1),
-                views or chosen.views[key],
-                seed,
-                castle,
-            )
-        except scenes.Missing as missing:
+            bench = catalogue.make(key, count, stations, seed, castle)
+        except catalogue.Missing as missing:
             found.missing.append(str(missing))
             continue
-        steps = terminal.Progress(
+        steps = Progress(
             len(bench.scene.views) + repetitions,
             f"hizvk bench: {key}, {len(bench.scene):,} instances",
         )
@@ -128,114 +129,99 @@ def run(
         finally:
             steps.close()
         found.scenes.append(result)
-        if importlib.util.find_spec("matplotlib"):
+        if figure.can_draw():
             from . import plots as drawing
 
             plots[key] = f"{key}.png"
             drawing.draw(out / plots[key], result)
     found.seconds = time.perf_counter() - started
-    report.write(found, out, plots)
+    found.write(out, plots)
     return found
 
 
 def _left_out() -> list[str]:
     """Rows and columns that this installation cannot have."""
     found = []
-    if not importlib.util.find_spec("embreex"):
+    if not embree.can_cast():
         found.append(
-            "ray casting (embreex is not installed: pip install embreex); the truth is that of boxes before the "
-            "rendered depth, so it says nothing about the depth image"
+            f"{embree.MISSING}; the truth is that of boxes before the rendered depth, so it says "
+            "nothing about the depth image"
         )
-    if not importlib.util.find_spec("matplotlib"):
-        found.append("plots (matplotlib is not installed: pip install matplotlib)")
+    if not figure.can_draw():
+        found.append(figure.MISSING)
     return found
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="hizvk bench",
-        description="Measures speed and error of every configuration on scenes with known truth, beside a numpy Hi-Z "
-        "and ray casting (exit code 1 if a configuration with the promise culled what can be seen).",
+    parser = args.parser(
+        PROG,
+        "Measures speed and error of every configuration on scenes with known truth, beside a "
+        "numpy Hi-Z and ray casting (exit code 1 if a configuration with the promise culled what "
+        "can be seen).",
+        out="out/bench",
+        holds="report and plots",
     )
-    # Told here, taken by `main`.
-    parser.add_argument(
-        "--speed",
-        action="store_true",
-        help="measure times against yardsticks instead: see --speed --help",
-    )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        default=Path("out/bench"),
-        help="folder for report and plots (out/bench)",
-    )
-    parser.add_argument(
-        "--scene", action="append", choices=scenes.NAMES, metavar="NAME",
-        help=f"{', '.join(scenes.NAMES)}; may come several times (all)",
-    )  # fmt: skip
-    extent = parser.add_mutually_exclusive_group()
-    extent.add_argument(
-        "--quick", action="store_const", const="quick", dest="extent", help="small scenes, few rows"
-    )
-    extent.add_argument(
-        "--full", action="store_const", const="full", dest="extent", help="all combinations; long"
+    args.add_several(parser, "--scene", catalogue.NAMES)
+    args.add_extent(
+        parser, quick="small scenes, few rows", full="all combinations; long", seeded="the scenes"
     )
     parser.add_argument(
         "--castle",
         type=Path,
         metavar="PATH",
-        help=f"castle.npz (or the variable {scenes.VARIABLE})",
+        help=f"castle.npz (or the variable {catalogue.VARIABLE})",
     )
-    parser.add_argument("--seed", type=int, default=2010, help="of the scenes (2010)")
-    parser.add_argument("--instances", type=terminal.count, help="in every scene but the castle")
-    parser.add_argument("--views", type=terminal.count, help="of every scene")
+    parser.add_argument("--instances", type=args.count, help="in every scene but the castle")
+    parser.add_argument("--views", type=args.count, help="of every scene")
     parser.add_argument(
-        "--size", type=terminal.size, metavar="WIDTHxHEIGHT", help="of the views (640x360)"
+        "--size", type=args.size, metavar="WIDTHxHEIGHT", help="of the views (default: 640x360)"
     )
     parser.add_argument(
-        "--repetitions", type=terminal.count, help="how often everything is timed (5)"
+        "--repetitions", type=args.count, help="how often everything is timed (default: 5)"
     )
-    parser.add_argument("--json", action="store_true", help="print the report as one JSON object")
-    parser.set_defaults(extent="default")
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command and returns its exit code: 0 good, 1 a promise was broken or it cannot run."""
+    """Runs the command; exit code 1: a promise was broken, or it cannot run."""
     arguments = list(sys.argv[1:] if arguments is None else arguments)
+    parser = _parser()
     if "--speed" in arguments:
-        from . import speed
+        parser.error(
+            "--speed is no part of the package any more; in a checkout run `make bench-speed` "
+            "or `python -m tools.speed`"
+        )
+    parsed = parser.parse_args(arguments)
+    return args.execute(
+        PROG,
+        lambda: run(
+            parsed.out,
+            extent=parsed.extent,
+            keys=parsed.scene or catalogue.NAMES,
+            castle=parsed.castle,
+            seed=parsed.seed,
+            instances=parsed.instances,
+            views=parsed.views,
+            size=parsed.size,
+            repetitions=parsed.repetitions,
+            command=" ".join([PROG, *arguments]),
+        ),
+        lambda found: _tell(found, parsed.out),
+        as_json=parsed.json,
+    )
 
-        return speed.main([argument for argument in arguments if argument != "--speed"])
-    parsed = _parser().parse_args(arguments)
-    try:
-        found = run(
-            parsed.out, extent=parsed.extent, keys=parsed.scene or scenes.NAMES, castle=parsed.castle, seed=parsed.seed,
-            instances=parsed.instances, views=parsed.views, size=parsed.size, repetitions=parsed.repetitions,
-            command=" ".join(["hizvk bench", *arguments]),
-        )  # fmt: skip
-    except (hizvk.HizError, OSError) as error:
-        print(f"hizvk bench: {error}", file=sys.stderr)
-        return 1
-    if parsed.json:
-        print(json.dumps(found.as_data(), indent=2))
-    else:
-        _tell(found, parsed.out)
-    return 0 if found.passed else 1
 
-
-def _tell(found: report.Report, out: Path) -> None:
+def _tell(found: Report, out: Path) -> None:
     print(f"adapter  {found.adapter}")
     for scene in found.scenes:
         print(
             f"{scene.key}: the Pareto front of {scene.instances:,} instances, {scene.views} views"
         )
-        for row in sorted(
-            (row for row in scene.rows if row.pareto), key=lambda row: -row.hidden_kept
-        ):
+        best = (row for row in scene.rows if row.pareto)
+        for row in sorted(best, key=lambda row: -row.hidden_kept):
             total = row.total_ms.median if row.total_ms else float("nan")
             print(
-                f"  {total:8.2f} ms a view, {row.ns_per_instance or 0.0:6.0f} ns an instance, "
+                f"  {total:8.2f} ms per view, {row.ns_per_instance or 0.0:6.0f} ns per instance, "
                 f"{100.0 * row.hidden_kept:6.2f} % of the hidden kept: {row.label}"
             )
     for each in found.missing:

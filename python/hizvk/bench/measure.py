@@ -1,31 +1,34 @@
 """Times and counts: every configuration and yardstick on every view of a scene, in turns.
 
-A repetition goes through the views, and in each through all configurations, each time beginning
-with another one, so that what disturbs the machine for a while disturbs all alike; then the same
-with the yardsticks.
-Each stage is waited for and timed by the clock on the wall, with what Python adds to it.
+A repetition goes through the views, and in each view through all configurations.
+It begins with another configuration each time, so that whatever disturbs the machine for a while
+disturbs all alike.
+The yardsticks follow in the same way.
+
+Each stage is waited for and timed by the wall clock, which includes what Python adds.
 The first call of everything comes before and is reported apart.
-Counts come from culls of their own (counting costs time), and the timed culls have to keep the
-same.
+Counts come from culls of their own, because counting costs time.
+The timed culls have to keep the same instances.
 """
 
 from __future__ import annotations
 
-import importlib.util
 import time
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from .. import truth as truths_
 from ..bounds import Spheres
+from ..measuring.configuration import Configuration, DepthVariant
+from ..measuring.spread import spread
+from ..measuring.stopwatch import Stopwatch, cull, rendered
+from ..scenes import embree
+from ..scenes.truth import make_caster
 from . import numpy_hiz
-from .configurations import Configuration, DepthVariant
 from .rays import Rays
-from .results import STAGES, Row, SceneResult, spread
+from .results import STAGES, Row, SceneResult
 from .score import ViewTruth, look, score
-from .stages import Stopwatch, cull, rendered
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -33,7 +36,7 @@ if TYPE_CHECKING:
     from .._arguments import Size
     from ..device import Device
     from ..resources import DepthImage
-    from .scenes import BenchScene
+    from .catalogue import BenchScene
 
 __all__ = ["measure"]
 
@@ -69,25 +72,26 @@ class _Run:
         self.upload_ms = watch.lap()
         self.boxes32 = self.scene.box_min.astype(np.float32), self.scene.box_max.astype(np.float32)
         self.warm_up_ms = 0.0
-        self.rays = Rays(self.scene) if importlib.util.find_spec("embreex") else None
-        self.caster = truths_.make_caster(self.scene)
+        self.rays = Rays(self.scene) if embree.can_cast() else None
+        self.caster = make_caster(self.scene)
         self.rows: list[Row] = []
         self.truths: list[ViewTruth] = []
         self.masks: list[list[Mask]] = []
         self.ms: list[dict[str, npt.NDArray[np.float64]]] = []
 
-    # -- rows that are not
-    # hizvk's -----------------------------------------------------------------------------------
-
     def yardsticks(self) -> dict[str, Callable[[int, DepthImage], tuple[Mask, dict[str, float]]]]:
-        """By label: ``(view, depth image) -> mask, milliseconds by stage``."""
+        """What is measured beside hizvk, by label.
+
+        Each is called with a view's number and its depth image, and returns a mask and milliseconds
+        by stage.
+        """
         found: dict[str, Any] = {
             "numpy Hi-Z, float64": lambda k, depth: self._numpy(k, depth, np.float64),
             "numpy Hi-Z, float32": lambda k, depth: self._numpy(k, depth, np.float32),
         }
         if self.rays is not None:
             rays, small = self.rays, DepthVariant(4).size(self.size)
-            found["Embree, one ray a pixel"] = lambda k, _: _timed(
+            found["Embree, one ray per pixel"] = lambda k, _: _timed(
                 lambda: rays.image(self.scene.views[k], self.size)
             )
             found["Embree, one ray for 4x4 pixels"] = lambda k, _: _timed(
@@ -112,11 +116,8 @@ class _Run:
         done = time.perf_counter()
         return mask, {"reduce": 1000.0 * (built - start), "cull": 1000.0 * (done - built)}
 
-    # --
-    # passes ------------------------------------------------------------------------------------------------------
-
     def count(self, step: Callable[[str], None]) -> None:
-        """The first call of everything, the truth, the masks and the texels."""
+        """Makes the first call of everything; finds the truth, the masks and the texels."""
         self.rows = [Row(str(one), one) for one in self.configurations]
         texels = np.zeros(len(self.rows))
         self.masks = [[] for _ in self.rows]
@@ -169,10 +170,10 @@ class _Run:
         self.masks.append(masks)
 
     def time(self, step: Callable[[str], None]) -> None:
-        """All repetitions; each goes through the configurations first and through the yardsticks then.
+        """Times all repetitions; each has the configurations first and the yardsticks after them.
 
-        The two stay apart, for whatever follows on a yardstick finds cold caches and threads that
-        sleep.
+        The two stay apart, because whatever runs after a yardstick finds cold caches and sleeping
+        threads.
         """
         shape = self.repetitions, len(self.cameras)
         yardsticks = list(self.yardsticks().values())
@@ -220,7 +221,7 @@ class _Run:
     def _note(
         self, number: int, repetition: int, k: int, mask: Mask, took: dict[str, float]
     ) -> None:
-        """Keeps the times of one row in one view, if it kept what it kept before."""
+        """Notes the times of one row in one view; its mask has to be the same as before."""
         if not np.array_equal(mask, self.masks[number][k]):
             raise RuntimeError(
                 f"{self.rows[number].label}, view {k}: two culls of the same view differ"
@@ -231,7 +232,7 @@ class _Run:
             ] = value
 
     def one_instance(self) -> float:
-        """The median cull of one instance in the middle of the first view."""
+        """The median milliseconds of culling one instance in the middle of the first view."""
         view = self.scene.views[0]
         point = np.add(view.eye, 10.0 * view.basis()[2])[None]
         instances = self.device.instances(Spheres(point, 0.1))
@@ -265,7 +266,7 @@ def measure(
     device : Device
         Where.
     step : callable
-        Is told what comes next, ``len(views) + repetitions`` times.
+        Is called with what comes next, ``len(views) + repetitions`` times.
 
     Raises
     ------
@@ -281,12 +282,23 @@ def measure(
     visible = sum(int(truth.visible.sum()) for truth in run.truths)
     scene = bench.scene
     found = SceneResult(
-        key=bench.key, name=scene.name, instances=len(scene), occluder_triangles=len(scene.triangles),
-        instance_triangles=len(scene.instance_triangles), views=len(scene.views), size=size, repetitions=repetitions,
-        truth=run.caster.method, visible=visible, hidden=len(scene) * len(scene.views) - visible,
-        inside=sum(int(truth.projected.inside.sum()) for truth in run.truths), one_instance_ms=run.one_instance(),
-        upload_ms=run.upload_ms, warm_up_ms=run.warm_up_ms, rows=run.rows,
-    )  # fmt: skip
+        key=bench.key,
+        name=scene.name,
+        instances=len(scene),
+        occluder_triangles=len(scene.triangles),
+        instance_triangles=len(scene.instance_triangles),
+        views=len(scene.views),
+        size=size,
+        repetitions=repetitions,
+        truth=run.caster.method,
+        visible=visible,
+        hidden=len(scene) * len(scene.views) - visible,
+        inside=sum(int(truth.projected.inside.sum()) for truth in run.truths),
+        one_instance_ms=run.one_instance(),
+        upload_ms=run.upload_ms,
+        warm_up_ms=run.warm_up_ms,
+        rows=run.rows,
+    )
     found.mark_front()
     return found
 

@@ -1,9 +1,10 @@
-"""The Hi-Z that a Python user would write: levels by slicing and minimum (reversed Z), 2x2 texels gathered by indexing.
+"""The Hi-Z that a Python user would write, with NumPy alone.
 
-It is as good as such code gets: vectorised, odd sizes padded, the level chosen so that four texels
-cover the rectangle, what crosses the near plane kept.
-It has no margins, so nothing promises that float32 or coordinates far from the origin do no harm;
-the bench counts what they do.
+Levels are made by slicing and minimum (reversed Z), and 2x2 texels are gathered by indexing.
+It is as good as such code gets: it is vectorised, pads odd sizes, chooses the level at which four
+texels cover the rectangle, and keeps what crosses the near plane.
+It has no margins, so nothing guarantees that float32 or coordinates far from the origin do no harm.
+The bench counts the harm they do.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ __all__ = ["NumpyPyramid", "cull"]
 
 @dataclass(frozen=True)
 class NumpyPyramid:
-    """All levels in one flat array; level ``k`` begins at ``first[k]`` and is ``width[k]`` texels wide."""
+    """All levels in one flat array; level k begins at ``first[k]``, ``width[k]`` texels wide."""
 
     texels: npt.NDArray[Any]
     first: npt.NDArray[np.intp]
@@ -30,7 +31,7 @@ class NumpyPyramid:
 
     @classmethod
     def build(cls, depth: npt.NDArray[Any]) -> NumpyPyramid:
-        """The farthest depth of every 2^k x 2^k pixels.
+        """Makes levels of the farthest depth of every 2^k x 2^k pixels.
 
         Parameters
         ----------
@@ -66,11 +67,11 @@ def cull(
     box_min, box_max : (N, 3) float array
         Corners.
     clip_from_world : (4, 4) float array
-        For column vectors; NDC depth is 1 near and 0 far, w is the view depth.
+        For column vectors; NDC depth is 1 near and 0 far, and w is the view depth.
     pyramid : NumpyPyramid
         Of the depth image.
     near : float
-        Boxes with a corner before it are kept.
+        Distance of the near plane; boxes with a corner before it are kept.
 
     Returns
     -------

@@ -1,4 +1,7 @@
-"""Speed against error: one picture a scene, for choosing a configuration by looking. Needs matplotlib."""
+"""Speed against error: one picture per scene, for choosing a configuration by eye.
+
+Needs matplotlib (the extra ``viz``).
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from ..commands import figure as figures
 from .results import fronts
 
 if TYPE_CHECKING:
@@ -23,10 +27,12 @@ MARKERS: Final = {1: "o", 2: "s", 4: "D"}
 
 
 def draw(path: Path, scene: SceneResult) -> None:
-    """Writes a PNG: milliseconds from occluders to mask, and nanoseconds of the cull alone, against hidden kept.
+    """Writes a PNG with two panels of speed against hidden instances kept.
 
-    Points are the rows of the report's table, by number; those on the front are joined and named
-    beside.
+    The left one shows milliseconds from occluders to mask, the right one nanoseconds of the cull
+    alone.
+    Points are the rows of the report's table, by number.
+    Those on the front are joined, and the legend names them.
 
     Parameters
     ----------
@@ -35,19 +41,17 @@ def draw(path: Path, scene: SceneResult) -> None:
     scene : SceneResult
         A measured scene, with its front marked.
     """
-    from matplotlib.figure import Figure
-
     rows = [(number, row) for number, row in enumerate(scene.rows, 1) if row.total_ms is not None]
-    figure = Figure(figsize=(14.0, 6.4), dpi=100, layout="constrained")
+    figure = figures.sheet(14.0, 6.4)
     left, right = figure.subplots(1, 2, sharey=True)
-    # The rows of hizvk decide what is shown; what keeps far less (rays) sits on the lower edge,
-    # with an arrow.
+    # The rows of hizvk set the scale. A row that keeps far less, such as rays, is drawn on the
+    # lower edge with an arrow.
     errors = [_error(row) for _, row in rows if row.configuration is not None]
     margin = 0.08 * (max(errors) - min(errors)) + 0.05
     floor = max(min(errors) - margin, 0.0)
     left.set_ylim(floor, max(_error(row) for _, row in rows) + margin)
     _panel(left, rows, {number: row.total_ms.median for number, row in rows if row.total_ms}, floor)
-    left.set_xlabel("ms a view: render, reduce, cull and read")
+    left.set_xlabel("ms per view: render, reduce, cull and read")
     left.set_ylabel("hidden instances kept, % of the hidden in the view volume")
     own = [
         (number, row)
@@ -55,23 +59,25 @@ def draw(path: Path, scene: SceneResult) -> None:
         if row.configuration is None or row.configuration.depth.divisor == 1
     ]
     _panel(right, own, {number: row.ns_per_instance or np.nan for number, row in own}, floor)
-    right.set_xlabel("ns an instance: the cull alone, depth at full resolution")
+    right.set_xlabel("ns per instance: the cull alone, depth at full resolution")
     best = next((row for row in scene.rows if row.label.startswith("best rectangle")), None)
     for axis in (left, right):
         if best is not None:
             level = 100.0 * best.hidden_kept_in_view
             axis.axhline(level, color="#999999", linewidth=0.9, linestyle=":", zorder=0)
             axis.annotate(
-                "best rectangle test", (0.995, level), xycoords=("axes fraction", "data"), fontsize=7.5,
-                color="#777777", ha="right", va="bottom",
-            )  # fmt: skip
+                "best rectangle test",
+                (0.995, level),
+                xycoords=("axes fraction", "data"),
+                fontsize=7.5,
+                color="#777777",
+                ha="right",
+                va="bottom",
+            )
     _legend(figure, rows)
     height, width = scene.size
-    figure.suptitle(
-        f"{scene.key}: {scene.instances:,} instances, {scene.views} views of {width}x{height}; down and left is better",
-        fontsize=11,
-    )
-    figure.savefig(path)
+    title = f"{scene.key}: {scene.instances:,} instances, {scene.views} views of {width}x{height}"
+    figures.save(figure, f"{title}; down and left is better", path)
 
 
 def _panel(axis: Any, rows: list[tuple[int, Row]], cost: dict[int, float], floor: float) -> None:
@@ -128,7 +134,10 @@ def _error(row: Row) -> float:
 
 
 def _number(axis: Any, points: list[tuple[float, float, int, bool, bool]]) -> None:
-    """Each point's number at its side; points that (nearly) coincide share one label. An arrow: it lies below."""
+    """Writes each point's number at its side; points that nearly coincide share one label.
+
+    An arrow after it says that the point lies below the lower edge.
+    """
     place = axis.transData.transform([(x, y) for x, y, *_ in points])
     left = set(range(len(points)))
     while left:
@@ -162,9 +171,15 @@ def _label(
     after: str = "",
 ) -> None:
     axis.annotate(
-        ",".join(map(str, numbers)) + after, point, xytext=shift, textcoords="offset points", fontsize=7.5,
-        fontweight=weight, color=colour, zorder=4,
-    )  # fmt: skip
+        ",".join(map(str, numbers)) + after,
+        point,
+        xytext=shift,
+        textcoords="offset points",
+        fontsize=7.5,
+        fontweight=weight,
+        color=colour,
+        zorder=4,
+    )
 
 
 def _legend(figure: Any, rows: list[tuple[int, Row]]) -> None:

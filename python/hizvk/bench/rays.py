@@ -1,11 +1,12 @@
-"""The same question by ray casting: Embree (`embreex`) on the real triangles, as a user without Hi-Z would ask it."""
+"""Visibility by ray casting, as a user without Hi-Z would find it: Embree on the real triangles."""
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
+
+from ..scenes.embree import embree_scene
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -17,7 +18,7 @@ __all__ = ["SAMPLES", "Rays"]
 
 #: Points of a box that `Rays.points` looks at: its corners and its middle.
 SAMPLES: Final = 9
-#: The part of the way to a point that has to be free: the point lies on its own thing's box, not behind it.
+#: The part of the way to a point that has to be free; the point itself lies on its own box.
 REACH: Final = 1.0 - 1e-4
 
 
@@ -36,25 +37,20 @@ class Rays:
     """
 
     def __init__(self, scene: Scene) -> None:
-        scenes: Any = importlib.import_module("embreex.rtcore_scene")
-        mesh: Any = importlib.import_module("embreex.mesh_construction").TriangleMesh
         self._scene = scene
         self._origin = np.array(scene.origin)
-        occluders = (scene.vertices - self._origin).astype(np.float32)
-        things = (scene.instance_vertices - self._origin).astype(np.float32)
-        triangles = scene.triangles.astype(np.int32)
-        self._all: Any = scenes.EmbreeScene(robust=True)
-        mesh(
-            self._all,
-            np.concatenate([occluders, things]),
-            np.concatenate([triangles, scene.instance_triangles.astype(np.int32) + len(occluders)]),
+        occluders = scene.vertices - self._origin
+        things = scene.instance_vertices - self._origin
+        vertices = np.concatenate([occluders, things])
+        triangles = np.concatenate(
+            [scene.triangles, scene.instance_triangles + np.uint32(len(occluders))]
         )
-        self._owner = np.concatenate([np.full(len(triangles), -1, np.int32), scene.owner])
-        self._occluders: Any = scenes.EmbreeScene(robust=True)
-        mesh(self._occluders, occluders, triangles)
+        self._all = embree_scene([(vertices, triangles)])
+        self._occluders = embree_scene([(occluders, scene.triangles)])
+        self._owner = np.concatenate([np.full(len(scene.triangles), -1, np.int32), scene.owner])
 
     def image(self, view: View, size: Size) -> npt.NDArray[np.bool_]:
-        """``(N,)``: which instances own a pixel of an image of `size`: one ray for each pixel, the first hit counts."""
+        """``(N,)``: which instances own a pixel; one ray per pixel, and the first hit counts."""
         rays = view.rays(size).reshape(-1, 3)
         start = ((np.array(view.eye) - self._origin) + view.near * rays).astype(np.float32)
         reach = np.full(len(rays), np.inf if view.far is None else view.far - view.near, np.float32)
@@ -65,7 +61,7 @@ class Rays:
         return visible
 
     def points(self, view: View, size: Size) -> npt.NDArray[np.bool_]:
-        """``(N,)``: which instances in the view volume have a corner or middle that no occluder hides from the eye."""
+        """``(N,)``: which instances in view have a corner or middle that no occluder hides."""
         scene, eye = self._scene, np.array(view.eye)
         bit = ((np.arange(8)[:, None] >> np.arange(3)) & 1).astype(np.float32)
         where = np.concatenate([bit, np.full((1, 3), 0.5, np.float32)])
@@ -86,7 +82,7 @@ class Rays:
 
 
 def _in_view(point: npt.NDArray[np.float32], view: View, size: Size) -> npt.NDArray[np.bool_]:
-    """``(N,)``: not all of the points ``(N, SAMPLES, 3)`` lie outside the same plane of the view volume."""
+    """``(N,)``: whether no plane of the view volume has all points ``(N, SAMPLES, 3)`` outside."""
     x, y, z = np.moveaxis(point @ view.basis().T.astype(np.float32), -1, 0)
     tangent = np.float32(np.tan(np.radians(view.fov_y_deg) / 2.0))
     tall, wide = tangent * z, tangent * np.float32(size[1] / size[0]) * z

@@ -1,8 +1,11 @@
 """The best that a rectangle test can do: float64, full resolution, every pixel of the rectangle.
 
 It shares no code with the engine or with the oracle.
-A box is culled if it lies outside the view volume, or if every pixel that the rectangle about its
-projected corners touches shows something nearer than the nearest of its corners.
+It culls a box in two cases:
+
+- The box lies outside the view volume.
+- Every pixel that the rectangle about its projected corners touches shows something nearer than the
+  nearest of its corners.
 """
 
 from __future__ import annotations
@@ -12,16 +15,20 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from ..scenes.scene import box_corners
+
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from .._arguments import Size
-    from ..scenes import Floats, Scene, View
+    from ..scenes import Scene, View
+    from ..scenes.grid import Floats
 
 __all__ = ["Projected", "project", "rectangle_test"]
 
-#: Pixels by which rectangles grow, and the part of the depth that must lie between: float64 rounds in 1e-12.
+#: Pixels by which rectangles grow; float64 rounds by about 1e-12.
 PAD: Final = 1e-6
+#: The part of the depth by which a box has to be farther.
 SLACK: Final = 1e-9
 
 
@@ -32,7 +39,7 @@ class Projected:
     inside: npt.NDArray[np.bool_]
     """``(N,)``: not wholly outside one plane of the view volume."""
     crosses: npt.NDArray[np.bool_]
-    """``(N,)``: some corner lies before the near plane, so that the rectangle means nothing."""
+    """``(N,)``: some corner lies before the near plane, so the rectangle means nothing."""
     nearest: Floats
     """``(N,)``: the least view depth of the corners."""
     rectangle: Floats
@@ -42,8 +49,7 @@ class Projected:
 def project(scene: Scene, view: View, size: Size) -> Projected:
     """The instances' boxes as `view` sees them in an image of `size`."""
     height, width = size
-    corner = (np.arange(8)[:, None] >> np.arange(3)) & 1
-    world = np.where(corner, scene.box_max[:, None], scene.box_min[:, None])
+    world = box_corners(scene.box_min, scene.box_max)
     x, y, z = np.moveaxis((world - view.eye) @ view.basis().T, -1, 0)
     tangent = np.tan(np.radians(view.fov_y_deg) / 2.0)
     wide = tangent * width / height

@@ -3,72 +3,57 @@
 report.json holds one object::
 
     passed        bool: no configuration with the promise culled what can be seen
-    command       str: what prints it again
+    command       str: prints it again
     seed          int
     extent        "quick" | "default" | "full"
     adapter       {index, name, driver, driver_info, backend, device_type}
-    versions      {hizvk, python, numpy, embreex, platform}; embreex is null where it is not installed
+    versions      {hizvk, python, numpy, embreex, platform}; embreex is null if not installed
     seconds       float: the whole run
     missing       [str]: scenes and columns that were left out, and why
     scenes        [scene]
 
-    scene: key, name, instances, occluder_triangles, instance_triangles, views, size [height, width], repetitions,
-           truth (how it was found out what is visible), visible, hidden, inside (instances over all
-           views that own a pixel, that own none, and that are inside the view volume),
+    scene: key, name, instances, occluder_triangles, instance_triangles, views,
+           size [height, width], repetitions, truth (how it was found what is visible),
+           visible, hidden, inside (instances, summed over all views, that own a pixel, that own
+           none, and that are inside the view volume),
            one_instance_ms (a cull of one instance), upload_ms, warm_up_ms (first calls: they
            compile and build), rows [row]
 
-    row:   label, configuration {volume, footprint, descent, coverage, order, fit,
+    row:   label, configuration {volume, footprint, descent, coverage, order, fit, guard_px,
            depth {divisor, conservative, levels}} or null for a yardstick, ms {render, reduce, cull,
            read: spread or null}, total_ms spread or null, ns_per_instance, first_ms,
            texels_per_instance (null where it was not measured), kept, false_culls, hairs,
            hidden_kept, hidden_kept_in_view, share_of_rectangle (shares, 0 to 1 and above), pareto
            bool
 
-    spread: {median, q1, q3} milliseconds a view: over the repetitions of each view, then the mean
-    over the views
+    spread: {median, q1, q3} in milliseconds per view: over the repetitions of each view, then the
+           mean over the views
 
 `results.Row` and `results.SceneResult` say what each number is.
 """
 
 from __future__ import annotations
 
-import importlib.metadata
-import json
-import platform
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from .._core import __version__
+from ..commands import report
+from ..commands.page import Page
 from .results import STAGES
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from ..adapter import Adapter
     from .results import Row, SceneResult
 
-__all__ = ["Report", "versions", "write"]
+__all__ = ["Report"]
 
 #: Shares of the best rectangle test's culls for which the report picks the fastest configuration.
 SUFFICIENT: Final = (0.90, 0.95, 0.99)
-
-
-def versions() -> dict[str, str | None]:
-    """Of everything that takes part in the numbers."""
-    try:
-        embreex: str | None = importlib.metadata.version("embreex")
-    except importlib.metadata.PackageNotFoundError:
-        embreex = None
-    return {
-        "hizvk": __version__,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "embreex": embreex,
-        "platform": f"{platform.system()} {platform.machine()}",
-    }
 
 
 @dataclass
@@ -105,68 +90,57 @@ class Report:
             "seed": self.seed,
             "extent": self.extent,
             "adapter": asdict(self.adapter),
-            "versions": versions(),
+            "versions": report.versions(),
             "seconds": self.seconds,
             "missing": self.missing,
             "scenes": [scene.as_data() for scene in self.scenes],
         }
 
+    def write(self, folder: Path, plots: dict[str, str]) -> None:
+        """Writes report.json and report.md.
 
-def write(report: Report, folder: Path, plots: dict[str, str]) -> None:
-    """Writes report.json and report.md.
+        Parameters
+        ----------
+        folder : Path
+            Where.
+        plots : dict of str to str
+            By scene: the plot's file name relative to `folder`.
+        """
+        report.write(folder, self.as_data(), _page(self, plots))
 
-    Parameters
-    ----------
-    report : Report
-        The numbers.
-    folder : Path
-        Where.
-    plots : dict of str to str
-        By scene: the plot's file name relative to `folder`.
-    """
-    (folder / "report.json").write_text(
-        json.dumps(report.as_data(), indent=2) + "\n", encoding="utf-8"
+
+def _page(found: Report, plots: dict[str, str]) -> Page:
+    broken = found.broken()
+    verdict = "no configuration with the promise culled what can be seen"
+    page = Page("hizvk bench")
+    page.text(f"**{'FAILED: ' + '; '.join(broken) if broken else verdict}.**")
+    page.items(
+        f"Command: `{found.command}` ({found.seconds:.0f} s; seed {found.seed})",
+        report.adapter_words(found.adapter),
+        report.version_words(),
+        *(f"Left out: {each}" for each in found.missing),
     )
-    (folder / "report.md").write_text("\n".join(_page(report, plots)) + "\n", encoding="utf-8")
-
-
-def _page(report: Report, plots: dict[str, str]) -> list[str]:
-    known = versions()
-    adapter = report.adapter
-    broken = report.broken()
-    verdict = (
-        f"FAILED: {'; '.join(broken)}"
-        if broken
-        else "no configuration with the promise culled what can be seen"
+    page.heading("What suffices")
+    page.text(
+        "For each share of what the best rectangle test culls inside the view: the fastest "
+        "configuration of area coverage that culls as much, and its milliseconds from occluders to "
+        "mask.",
+        "The last row of a scene is the configuration that keeps least.",
+        "On another device the order may be another one.",
     )
-    lines = [
-        "# hizvk bench",
-        "",
-        f"**{verdict}.**",
-        "",
-        f"- Command: `{report.command}` ({report.seconds:.0f} s; seed {report.seed})",
-        f"- Adapter: {adapter.name} ({adapter.device_type}); driver: {adapter.driver} {adapter.driver_info}",
-        f"- hizvk {known['hizvk']}, Python {known['python']}, NumPy {known['numpy']}, embreex "
-        f"{known['embreex'] or 'not installed'}; {known['platform']}",
-        *(f"- Left out: {each}" for each in report.missing),
-        "",
-        "## What suffices",
-        "",
-        "The fastest configuration of area coverage that culls so much of what the best rectangle test culls inside "
-        "the view, and its milliseconds from occluders to mask; what keeps least. On another device the order may be "
-        "another one.",
-        "",
-        f"| scene | {' | '.join(f'{100 * share:.0f} %' for share in SUFFICIENT)} | keeps least |",
-        f"|---|{'---|' * (len(SUFFICIENT) + 1)}",
-        *(_picks(scene) for scene in report.scenes),
-        "",
-    ]
-    for scene in report.scenes:
-        lines += _scene(scene, plots.get(scene.key))
-    return lines + _legend()
+    page.table(
+        "scene | culls | configuration | ms",
+        (cells for scene in found.scenes for cells in _picks(scene)),
+        left=3,
+    )
+    for scene in found.scenes:
+        _scene(page, scene, plots.get(scene.key))
+    _legend(page)
+    return page
 
 
-def _picks(scene: SceneResult) -> str:
+def _picks(scene: SceneResult) -> Iterator[list[str]]:
+    """The rows of a scene in the table of what suffices."""
     able = [
         row
         for row in scene.rows
@@ -179,90 +153,113 @@ def _picks(scene: SceneResult) -> str:
     def milliseconds(row: Row) -> float:
         return row.total_ms.median if row.total_ms else np.inf
 
-    found = []
+    def cells(what: str, row: Row | None) -> list[str]:
+        if row is None:
+            return [scene.key, what, "none", ""]
+        return [scene.key, what, row.label, f"{milliseconds(row):.2f}"]
+
     for share in SUFFICIENT:
         enough = [row for row in able if row.share_of_rectangle >= share]
-        found.append(min(enough, key=milliseconds, default=None))
-    found.append(min(able, key=lambda row: (row.hidden_kept, milliseconds(row)), default=None))
-    cells = " | ".join(
-        "none" if row is None else f"{row.label}: {milliseconds(row):.2f} ms" for row in found
-    )
-    return f"| {scene.key} | {cells} |"
+        yield cells(f"{100 * share:.0f} %", min(enough, key=milliseconds, default=None))
+    least = min(able, key=lambda row: (row.hidden_kept, milliseconds(row)), default=None)
+    yield cells("keeps least", least)
 
 
-def _scene(scene: SceneResult, plot: str | None) -> list[str]:
+def _scene(page: Page, scene: SceneResult, plot: str | None) -> None:
     height, width = scene.size
-    lines = [
-        f"## {scene.key}",
-        "",
-        f"{scene.name[0].upper()}{scene.name[1:]}: {scene.occluder_triangles:,} triangles hide, {scene.instances:,} "
-        f"instances ({scene.instance_triangles:,} triangles) are tested, from {scene.views} views of {width}x{height}; "
-        f"{scene.repetitions} repetitions. Over all views {scene.inside:,} instances are inside the view volume and "
-        f"{scene.visible:,} are visible ({scene.truth}). A cull of one instance takes {scene.one_instance_ms:.2f} ms, "
-        f"uploads took {scene.upload_ms:.0f} ms, first calls (compiling the shaders that are new) "
+    page.heading(scene.key)
+    page.text(
+        f"{scene.name[0].upper()}{scene.name[1:]}.",
+        f"{scene.occluder_triangles:,} triangles hide, and {scene.instances:,} instances "
+        f"({scene.instance_triangles:,} triangles) are tested.",
+        f"{scene.views} views of {width}x{height}, {scene.repetitions} repetitions.",
+        f"Over all views {scene.inside:,} instances are inside the view volume and "
+        f"{scene.visible:,} are visible.",
+        f"Truth: {scene.truth}.",
+        f"A cull of one instance takes {scene.one_instance_ms:.2f} ms, uploads took "
+        f"{scene.upload_ms:.0f} ms, and first calls, which compile new shaders, "
         f"{scene.warm_up_ms:.0f} ms.",
-        "",
-    ]
+    )
     if plot is not None:
-        lines += [f"![speed against error, {scene.key}]({plot})", ""]
-    head = "| # | | render | reduce | cull | read | sum | quartiles | ns/inst. | texels/inst. | false culls | "
-    lines += [
-        head + "hidden kept | of those in view | of best rect. |",
-        f"|---:|---|{'---:|' * 12}",
-    ]
-    for number, row in enumerate(scene.rows, 1):
-        lines.append(_row(number, row))
-    return [*lines, ""]
+        page.picture(f"speed against error, {scene.key}", plot)
+    numbered = list(enumerate(scene.rows, 1))
+    page.table(
+        f"# | | {' | '.join(STAGES)} | sum | quartiles",
+        (_name(number, row) + _times(row) for number, row in numbered),
+        left=2,
+    )
+    page.table(
+        "# | | ns/inst. | texels/inst. | false culls | hidden kept | of those in view "
+        "| of best rect.",
+        (_name(number, row) + _counts(row) for number, row in numbered),
+        left=2,
+    )
 
 
-def _row(number: int, row: Row) -> str:
-    stages = [row.ms.get(stage) for stage in STAGES]
-    times = [f"{stage.median:.2f}" if stage else "" for stage in stages]
-    total = row.total_ms
-    times += [f"{total.median:.2f}", f"{total.q1:.2f}..{total.q3:.2f}"] if total else ["", ""]
-    each = "" if row.ns_per_instance is None else f"{row.ns_per_instance:,.0f}"
-    texels = "" if row.texels_per_instance is None else f"{row.texels_per_instance:.2f}"
+def _name(number: int, row: Row) -> list[str]:
+    """Number and label; on the Pareto front a P and bold, yardsticks in italics."""
     label = row.label if row.configuration else f"*{row.label}*"
-    label = f"**{label}**" if row.pareto else label
+    return [f"{number} P", f"**{label}**"] if row.pareto else [str(number), label]
+
+
+def _times(row: Row) -> list[str]:
+    stages = [row.ms.get(stage) for stage in STAGES]
+    cells = [f"{stage.median:.2f}" if stage else "" for stage in stages]
+    total = row.total_ms
+    return [*cells, *([f"{total.median:.2f}", total.quartiles()] if total else ["", ""])]
+
+
+def _counts(row: Row) -> list[str]:
     shares = (row.hidden_kept, row.hidden_kept_in_view, row.share_of_rectangle)
-    cells = [
-        f"{number}{' P' if row.pareto else ''}",
-        label,
-        *times,
-        each,
-        texels,
-        f"{row.false_culls:,}",
-    ]
-    cells += [f"{100.0 * share:.2f} %" for share in shares]
-    return f"| {' | '.join(cells)} |"
-
-
-def _legend() -> list[str]:
     return [
-        "## What the columns mean",
-        "",
-        "Rows: the volume that is tested, the footprint (N x N texels of one level; *descent*: then finer levels where "
-        "that cannot decide), and what differs from area coverage, any order, the rectangle's fit and plain depth at "
-        "full resolution. *Italic*: what one would otherwise do, in the same run. **Bold** and P: on the Pareto front "
-        "of sum and hidden kept (to 0.1 % of those in the view), among those whose promise reaches to the view's "
-        "pixels and that culled nothing visible; sample coverage promises less, so it takes no area coverage off the "
-        "front. Rows that differ by less than their quartiles are equal in practice.",
-        "",
-        "- *render*, *reduce*, *cull*, *read*: milliseconds a view of the occluders into depth, of all levels of the "
-        "pyramid, of the test of all instances, and of the mask to the host; by the clock on the wall, each waited "
-        "for, Python included. All are medians over a view's repetitions, and the mean over the views. *sum*: all of "
-        "them; *quartiles*: of the sum, where render and reduce, which the rows of a depth image share, stand still. "
-        "numpy reads the depth image back and builds its levels under *reduce*.",
-        "- *ns/inst.*: the cull by the number of instances; *texels/inst.*: depth texels read, by tests of groups "
-        "and of instances, over all instances; what lies outside the view reads none.",
-        "- *false culls*: instances that own a pixel by more than a hair and were culled (visible by a hair: the ray "
-        "moved by 1/16 pixel, or the depth by 1e-6, hides it). A smaller image of plain samples promises nothing for "
-        "the pixels of the view, so its rows may have some.",
-        "- *hidden kept*: kept, of those in no pixel of the view; *of those in view*: the same among those inside the "
-        "view volume.",
-        "- *of best rect.*: culled inside the view volume, over what a rectangle test of boxes in float64 over all "
-        "pixels culls there; tighter volumes and a volume fit can exceed 100 %.",
-        "- *Embree, one ray a pixel* is how the truth is found out, hence its zeros. It casts on one thread here, and "
-        "the first ray builds its trees (`first_ms` in report.json). It needs the triangles of all instances, hizvk "
-        "their bounds.",
+        "" if row.ns_per_instance is None else f"{row.ns_per_instance:,.0f}",
+        "" if row.texels_per_instance is None else f"{row.texels_per_instance:.2f}",
+        f"{row.false_culls:,}",
+        *(f"{100.0 * share:.2f} %" for share in shares),
     ]
+
+
+def _legend(page: Page) -> None:
+    page.heading("What the columns mean")
+    page.text(
+        "A label names the bounds that are tested and the footprint: N x N texels of one level.",
+        "With *descent*, finer levels follow where that level cannot decide.",
+        "Then it names what differs from area coverage, any order, the rectangle's fit, and plain "
+        "depth at full resolution.",
+        "*Italic*: what one would otherwise do, in the same run.",
+    )
+    page.text(
+        "**Bold** and P: on the Pareto front of sum and hidden kept, to 0.1 % of those in view.",
+        "A row takes part if its promise reaches the view's pixels and it culled nothing visible.",
+        "Sample coverage promises less, so it takes no row of area coverage off the front.",
+        "Rows that differ by less than their quartiles are equal in practice.",
+    )
+    page.items(
+        "*render*, *reduce*, *cull*, *read*: milliseconds per view.\n"
+        "They are the occluders into depth, all levels of the pyramid, the test of all instances, "
+        "and the mask to the host.\n"
+        "Each stage is waited for and timed by the wall clock, Python included.\n"
+        "All are medians over a view's repetitions, then the mean over the views.\n"
+        "numpy reads the depth image back and builds its levels under *reduce*.",
+        "*sum*: all stages together.\n"
+        "*quartiles*: of the sum, with render and reduce, which the rows of a depth image share, "
+        "held at their medians.",
+        "*ns/inst.*: the cull divided by the number of instances.\n"
+        "*texels/inst.*: depth texels read by tests of groups and instances, divided by all "
+        "instances.\n"
+        "What lies outside the view reads none.",
+        "*false culls*: instances that own a pixel by more than a hair and were culled.\n"
+        "A hair: a ray moved by 1/16 pixel, or a depth changed by 1e-6, hides them.\n"
+        "A smaller image of plain samples promises nothing for the pixels of the view, so its rows "
+        "may have some.",
+        "*hidden kept*: kept, as a share of those that own no pixel of the view.\n"
+        "*of those in view*: the same among those inside the view volume.",
+        "*of best rect.*: culled inside the view volume, divided by what the best rectangle test "
+        "culls there.\n"
+        "That test takes boxes in float64 and all pixels; tighter bounds and a volume fit can "
+        "exceed 100 %.",
+        "*Embree, one ray per pixel* is how the truth is found, hence its zeros.\n"
+        "It casts on one thread here, and the first ray builds its trees (`first_ms` in "
+        "report.json).\n"
+        "It needs the triangles of all instances, where hizvk needs their bounds.",
+    )

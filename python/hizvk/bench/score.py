@@ -1,4 +1,4 @@
-"""Holds masks against what is seen: false culls, hidden instances that were kept, and the best rectangle test."""
+"""Compares masks with what is seen: false culls, and hidden instances kept."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from ..truth import linear_depth
+from ..scenes.truth import linear_depth
 from .rectangle import project, rectangle_test
 
 if TYPE_CHECKING:
     from .._arguments import Size
-    from ..scenes import Floats, Scene, View
-    from ..truth import Caster, Sight
+    from ..scenes import Scene, View
+    from ..scenes.grid import Floats
+    from ..scenes.truth import Caster, Sight
     from .rectangle import Projected
     from .results import Row
 
@@ -25,12 +26,12 @@ Mask: TypeAlias = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class ViewTruth:
-    """What is right in one view."""
+    """The truth about one view."""
 
     view: View
     sight: Sight
     given: Floats
-    """``(height, width)``: view depth of the occluders as the device renders them at full resolution."""
+    """``(height, width)``: view depth of the occluders as the device renders them in full size."""
     projected: Projected
     visible: Mask
     """``(N,)``: owns a pixel."""
@@ -46,11 +47,11 @@ def look(
     Parameters
     ----------
     scene, view, size
-        What is seen from where, and how large.
+        What is seen, from where, and in how many pixels.
     depth : (height, width) float32 array
         The occluders as the device renders them, reversed NDC.
-    caster : hizvk.truth.Caster
-        Who finds out what is seen.
+    caster : hizvk.scenes.truth.Caster
+        Finds out what is seen.
     """
     given = linear_depth(depth, view.near, view.far)
     sight = caster.look(view, size, given)
@@ -78,7 +79,7 @@ def score(
         What each row keeps (first index) in each view (second).
     truths : list of ViewTruth
         By view.
-    caster : hizvk.truth.Caster
+    caster : hizvk.scenes.truth.Caster
         Says which instances are visible by more than a hair.
     """
     visible = np.stack([truth.visible for truth in truths])

@@ -1,4 +1,4 @@
-"""Bounds of a scene's instances, from their real vertices: boxes, spheres, and boxes turned about the vertical."""
+"""Bounds of a scene's instances from their real vertices: boxes, spheres, and turned boxes."""
 
 from __future__ import annotations
 
@@ -12,15 +12,14 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from ..bounds import Bounds
-    from ..scenes import Floats, Scene
+    from ..scenes import Scene
+    from ..scenes.grid import Floats
 
-__all__ = ["VOLUMES", "bounds_of"]
+__all__ = ["bounds_of"]
 
-#: The kinds of volume, as `Instances.kind` calls them.
-VOLUMES: Final = ("spheres", "boxes", "oriented_boxes")
-#: Angles that are tried where nobody knows how a thing is turned.
+#: Angles that are tried where the angle of a thing is not known.
 TURNS: Final = np.arange(24) * (np.pi / 48.0)
-#: What float64 may have lost of a position, relative to its coordinates.
+#: Bound of the rounding of a position in float64, relative to its coordinates.
 ROUNDING: Final = 2.0**-50
 
 
@@ -32,17 +31,17 @@ def bounds_of(scene: Scene, kind: str, *, up: int = 2, yaw: Floats | None = None
     scene : Scene
         Every instance has at least one triangle.
     kind : "spheres", "boxes" or "oriented_boxes"
-        Spheres stand about the middle of the box and reach to the farthest vertex.
+        Spheres are centred on the box and reach the farthest vertex.
     up : 0, 1 or 2
         The vertical axis, about which oriented boxes are turned.
     yaw : (N,) float64 array, optional
-        How each instance is turned, in radians.
-        None: of `TURNS` the angle with the smallest box.
+        The angle of each instance, in radians.
+        None: the angle of `TURNS` that gives the smallest box.
 
     Returns
     -------
     Spheres, Boxes or OrientedBoxes
-        Float64, and grown by what float64 rounds: they contain all vertices.
+        Float64, grown by the rounding of float64, so they contain all vertices.
     """
     if kind == "boxes":
         return Boxes(scene.box_min, scene.box_max)
@@ -70,7 +69,7 @@ def bounds_of(scene: Scene, kind: str, *, up: int = 2, yaw: Floats | None = None
 
 
 def _by_instance(scene: Scene, middle: Floats) -> tuple[Floats, npt.NDArray[np.intp]]:
-    """Vertices about the middle of their instance, instance by instance; and where each instance begins."""
+    """Vertices relative to their instance's middle, sorted by instance; where each one begins."""
     owner = np.full(len(scene.instance_vertices), -1, np.int32)
     owner[scene.instance_triangles] = scene.owner[:, None]
     used = np.flatnonzero(owner >= 0)
@@ -80,7 +79,7 @@ def _by_instance(scene: Scene, middle: Floats) -> tuple[Floats, npt.NDArray[np.i
 
 
 def _about(up: int, angle: npt.NDArray[np.float64]) -> Floats:
-    """``(N, 3, 3)`` rotations about an axis; column k is the box's own axis k in the world."""
+    """``(N, 3, 3)``: rotations about an axis; column k is the box's axis k in the world."""
     one, two = (up + 1) % 3, (up + 2) % 3
     rotation = np.zeros((len(angle), 3, 3))
     rotation[:, up, up] = 1.0

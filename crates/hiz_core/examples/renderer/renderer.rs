@@ -7,7 +7,7 @@ use hiz_core::wgpu::{self, util::DeviceExt};
 use hiz_core::{
     Camera, CullOptions, DepthConvention, DrawTemplate, Floats, HizContext, ImageSize,
     InstanceOptions, Instances, MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders, Order,
-    Outputs, PyramidOptions, Visible, VisibleOptions,
+    Outputs, PyramidOptions, Visible,
 };
 
 use crate::scene::{Mesh, Scene, Shot};
@@ -223,13 +223,10 @@ impl Renderer {
         // What the draw arguments say beside the count: how many indices one body has.
         let index_count = 3 * one.triangles.len() as u32;
         let draw = DrawTemplate { index_count, ..DrawTemplate::default() };
-        let visible = |outputs| {
-            self.hiz.create_visible(&crowd, &VisibleOptions { outputs, capacity: None, draw })
-        };
-        let (visible, in_view) = (
-            visible(Outputs { mask: true, verdicts: false, indices: true, draws: true })?,
-            visible(Outputs { mask: true, ..Outputs::NONE })?,
-        );
+        let listed = Outputs { mask: true, indices: true, draws: true, draw, ..Outputs::NONE };
+        let masked = Outputs { mask: true, ..Outputs::NONE };
+        let visible = self.hiz.create_visible(&crowd, &listed)?;
+        let in_view = self.hiz.create_visible(&crowd, &masked)?;
         let occluders = |meshes: &[&Mesh]| {
             let parts: Vec<MeshData<'_>> = meshes
                 .iter()
@@ -498,7 +495,7 @@ impl Renderer {
 
     fn read_buffer(&self, source: &wgpu::Buffer) -> Vec<u8> {
         self.read(source.size(), |encoder, staging| {
-            encoder.copy_buffer_to_buffer(source, 0, staging, 0, source.size())
+            encoder.copy_buffer_to_buffer(source, 0, staging, 0, source.size());
         })
     }
 
@@ -520,7 +517,7 @@ impl Renderer {
         copy(&mut encoder, &staging);
         self.queue.submit([encoder.finish()]);
         staging.map_async(wgpu::MapMode::Read, .., |mapped| {
-            mapped.expect("a staging buffer can be mapped")
+            mapped.expect("a staging buffer can be mapped");
         });
         self.device.poll(wgpu::PollType::wait_indefinitely()).expect("the device answers");
         let view = staging.get_mapped_range(..).expect("it is mapped");

@@ -209,7 +209,7 @@ impl Scene {
         for body in &self.crowd {
             match &body.shape {
                 Shape::Box { min, max } => {
-                    arrays.iter_mut().zip([min, max]).for_each(|(a, p)| a.extend(p))
+                    arrays.iter_mut().zip([min, max]).for_each(|(a, p)| a.extend(p));
                 }
                 Shape::Turned { center, half, rotation } => {
                     let parts: [&[f64]; 3] = [center, half, rotation];

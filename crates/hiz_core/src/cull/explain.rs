@@ -1,13 +1,20 @@
-//! The explanation of a single verdict: the cull's own steps for one instance.
+//! The explanation of a single verdict: the cull's own steps, repeated for one instance.
 
-use super::{CullInputs, Seen, group_key};
+use crate::cull::groups::group_key;
+use crate::cull::inputs::{CullInputs, Seen};
+use crate::cull::pipelines::{
+    CERTIFIED, CullKey, DepthStore, TWO_STORAGES, classify_constants, layouts, module,
+};
 use crate::error::{Error, Result};
-use crate::gpu::Gpu;
-use crate::groups::GROUP;
-use crate::instances::bind_records;
-use crate::pyramid::entry;
+use crate::gpu::buffers::entry;
+use crate::gpu::device::Gpu;
+use crate::gpu::pipelines::Compute;
+use crate::gpu::shader::{Source, wgsl};
+use crate::input::bounds::BoundsKind;
+use crate::instances::groups::GROUP;
+use crate::instances::piece::bind_records;
 
-/// `shaders/explain.wgsl`, `Explanation`.
+/// Twin: `shaders/cull/explain.wgsl`, `Explanation`, which documents the fields.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct ExplanationRecord {
@@ -24,20 +31,82 @@ pub(crate) struct ExplanationRecord {
     pub(crate) any_before: u32,
 }
 
+/// The step at which a test stopped; twin: `shaders/cull/outcome.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u32)]
+pub(crate) enum Stage {
+    /// The bounds are invalid.
+    Validity = 0,
+    /// The volume is outside a plane of the frustum.
+    Frustum = 1,
+    /// The volume crosses the plane of the eye.
+    EyePlane = 2,
+    /// At the rectangle of pixels.
+    Rectangle = 3,
+    /// At the comparison with the farthest depth of the footprint.
+    Depth = 4,
+    /// At the certificate that the texels cover the projection.
+    Block = 5,
+    /// Within the descent.
+    Descent = 6,
+    /// No stored level fits the footprint.
+    Level = 7,
+}
+
+impl Stage {
+    /// All stages, in the order of their codes.
+    pub(crate) const ALL: [Self; 8] = [
+        Self::Validity,
+        Self::Frustum,
+        Self::EyePlane,
+        Self::Rectangle,
+        Self::Depth,
+        Self::Block,
+        Self::Descent,
+        Self::Level,
+    ];
+}
+
+impl ExplanationRecord {
+    /// The stage at which the test stopped.
+    pub(crate) fn stage(&self) -> Stage {
+        Stage::ALL.get(self.stage as usize).copied().unwrap_or(Stage::Validity)
+    }
+}
+
 /// A texel that was read: its level and flags, column, row, and the bits of its depth.
 pub(crate) type Reading = [u32; 4];
 
-/// Of a reading's first word, what is the level; and its flags (`shaders/explain.wgsl`).
+/// The bits of a reading's first word that hold the level.
+/// The others are flags (`shaders/cull/explain.wgsl`).
 pub(crate) const LEVEL_MASK: u32 = 0xFF;
 pub(crate) const BEHIND: u32 = 0x100;
 pub(crate) const CLEAR: u32 = 0x200;
 
-/// How many readings an explanation tells at most.
-/// A descent may read 65,536 texels; what comes after these is counted.
+/// How many readings an explanation holds at most.
+/// A descent may read 65,536 texels; those past this number are only counted.
 pub(crate) const TEXELS_TOLD: usize = 4096;
 
-/// Records the explanation of instance `index`, or of the box around its group, into `target`, an
-/// `ExplanationRecord`, and `readings`, as many [`Reading`]s as there is room for: both storage.
+/// The shader that explains one instance's verdict.
+pub(crate) fn explain_module(store: DepthStore, kind: BoundsKind) -> Source {
+    module(store, kind, CERTIFIED, &[wgsl!("cull/explain")])
+}
+
+/// The pipeline of the explanation.
+fn explain_pipeline(gpu: &Gpu, key: &CullKey) -> Result<wgpu::ComputePipeline> {
+    gpu.compute_pipeline(&Compute {
+        label: "hiz.explain.pipeline",
+        source: explain_module(key.store, key.kind),
+        entry_point: "explain",
+        layouts: &layouts(gpu, key.store, "hiz.storage_layout", TWO_STORAGES)?,
+        constants: &classify_constants(key),
+    })
+}
+
+/// Records the explanation of instance `index`, or of the box around its group.
+///
+/// It goes into two storage buffers: `target`, an `ExplanationRecord`, and `readings`, as many
+/// [`Reading`]s as fit.
 pub(crate) fn record_explain(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
@@ -64,11 +133,11 @@ pub(crate) fn record_explain(
     let which = gpu.uniform("hiz.explain.which", &[which as u32, 0, 0, 0])?;
     let output = gpu.bind_group(
         "hiz.explain.target",
-        &gpu.layouts().two_storages,
+        &gpu.layout("hiz.storage_layout", TWO_STORAGES)?,
         &[entry(0, target.as_entire_binding()), entry(1, readings.as_entire_binding())],
     )?;
     let (pipeline, records) =
-        (gpu.explain_pipeline(seen.key)?, bind_records(gpu, &which, records)?);
+        (explain_pipeline(gpu, &seen.key)?, bind_records(gpu, &which, records)?);
     let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
         label: Some("hiz.explain.pass"),
         timestamp_writes: None,

@@ -1,29 +1,30 @@
-//! How instances are culled.
+//! The options of a cull, all chosen by the caller.
 
-use crate::view::EPS;
+use crate::host::rounding::EPS;
 
 /// In which order the indices of the kept instances are listed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Order {
-    /// Ascending: the same list from every run and driver.
+    /// Ascending: every run and every driver gives the same list.
     #[default]
     Stable,
-    /// As invocations arrive: one pass fewer.
+    /// As invocations arrive, which saves a pass.
     Any,
 }
 
-/// Where a volume must not be seen to be culled.
+/// Where a culled volume must not be seen.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Coverage {
     /// Anywhere in the closed pixel squares that its projection meets.
     #[default]
     Area,
-    /// At pixel centres alone, for one sample a pixel and the same viewport and jitter.
+    /// At pixel centres alone.
+    /// This is for images with one sample per pixel and the same viewport and jitter.
     Sample,
 }
 
 /// How many texels of one level a test may read, as N x N.
-/// More texels mean a finer level: less is kept, more is read.
+/// A larger footprint uses a finer level, so a cull keeps less and reads more.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Footprint {
     /// 2 x 2.
@@ -45,67 +46,72 @@ impl Footprint {
     }
 }
 
-/// As what a volume is compared with the depth image.
+/// What stands for a volume in the comparison with the depth image.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Fit {
     /// The rectangle around its projection, at its nearest depth.
     #[default]
     Rectangle,
-    /// Where the rectangle cannot decide: its own outline, and in each texel its own depth there.
-    /// Less is kept, more is computed; with a descent it comes down to single pixels.
+    /// First the rectangle; where that cannot decide, the volume's own outline and its own depth in
+    /// each texel.
+    /// A cull keeps less and computes more.
+    /// With a descent, the comparison goes down to single pixels.
     Volume,
 }
 
 /// Whether whole groups of 64 instances are tested before their members.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Hierarchy {
-    /// Where there are enough instances for it to pay.
+    /// If there are enough instances for it to pay.
     #[default]
     Auto,
-    /// Whatever their number.
+    /// For any number of instances.
     Always,
-    /// Each instance by itself.
+    /// Each instance is tested by itself.
     Never,
 }
 
-/// How instances are culled.
+/// The options of a cull.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CullOptions {
     /// The order of the packed list.
     pub order: Order,
     /// Area or sample coverage.
     pub coverage: Coverage,
-    /// Extra distance in pixels, a multiple of 1/256 in 0..=16, that a projection must keep from
-    /// what it does not touch.
-    /// `None`: 0 in area coverage, 1/64 in sample coverage (what a rasteriser's snapping may move a
-    /// sample).
+    /// Extra distance in pixels that a projection must keep from a pixel or sample that it does not
+    /// touch.
+    /// A multiple of 1/256 in 0..=16.
+    /// `None`: 0 in area coverage, and 1/64 in sample coverage, where snapping in a rasteriser may
+    /// move a sample that far.
     pub guard_px: Option<f64>,
-    /// Relative slack of the stored depth, 0..=0.5: 2^-23 covers float32 depth that was rounded to
-    /// nearest.
-    /// What another format rounds comes beside it, from the pyramid
-    /// ([`DepthTolerance`](crate::DepthTolerance)).
+    /// Relative slack of the stored depth, 0..=0.5.
+    /// 2^-23 covers float32 depth that was rounded to nearest.
+    /// The pyramid adds what another format rounds ([`DepthTolerance`](crate::DepthTolerance)).
     pub depth_slack: f64,
-    /// Absolute slack of the stored depth, 0..=0.5, in units of NDC depth and beside the relative
-    /// one: the rasteriser of an orthographic camera errs by the same amount near and far.
-    /// Anything above 0 counts 2^-23 more.
+    /// Absolute slack of the stored depth in units of NDC depth, 0..=0.5, in addition to the
+    /// relative slack.
+    /// Use it for orthographic cameras, where a rasteriser errs by the same amount near and far.
+    /// Any value above 0 counts as 2^-23 more.
     pub depth_slack_abs: f64,
-    /// kappa, 0..=1e6: how many eps of `sum |M| |p|` the transform of the depth image's renderer
-    /// may have cost; 0 for depth that is exact for the camera's matrices, about 4 for a renderer
-    /// that transforms world coordinates in float32.
+    /// kappa, 0..=1e6: how much the transform of the depth image's renderer may err.
+    /// Its unit is an eps of `sum |M| |p|`.
+    /// 0 is for depth that is exact for the camera's matrices.
+    /// About 4 is for a renderer that transforms world coordinates in float32.
     pub transform_slack: f64,
     /// How many texels a test reads.
     pub footprint: Footprint,
-    /// How many texels of finer levels a test may read where the footprint cannot decide,
-    /// 0..=65536; 0: none.
-    /// With enough of them the answer is that of a rectangle test at full resolution.
+    /// How many texels of finer levels a test may read if the footprint cannot decide, 0..=65536.
+    /// 0: none.
+    /// With enough of them, the answer is that of a rectangle test at full resolution.
     pub descent: u32,
-    /// What stands for a volume.
+    /// What stands for a volume in the comparison with the depth image.
     pub fit: Fit,
-    /// Whether groups are tested first.
-    /// What a group's test hides, its members' own tests would have hidden but for the level that
-    /// they read: what is kept differs by next to nothing, and verdicts but for that not at all.
+    /// Whether groups are tested before their members.
+    /// A group's test hides only what its members' own tests would also hide, unless they read
+    /// other texels.
+    /// So the kept instances hardly differ; apart from these few, the verdicts are the same.
     pub hierarchy: Hierarchy,
-    /// Count the depth tests of each level and the texels read.
+    /// Whether to count the depth tests of each level and the texels read.
     pub statistics: bool,
 }
 

@@ -1,40 +1,104 @@
-//! The verdicts of the members of groups that were hidden as a whole, which a cull leaves to
-//! whoever reads them.
+//! The refinement: verdicts for the members of groups that were hidden as a whole.
+//!
+//! A cull does not write them; they are written before verdicts or counts are first read.
 
 use std::sync::Arc;
 
-use super::{Coverage, CullOptions, ViewUniform, is_grouped};
-use crate::camera::Camera;
+use crate::cull::groups::is_grouped;
+use crate::cull::options::{Coverage, CullOptions};
+use crate::cull::pipelines::{
+    CullKey, DepthStore, TWO_STORAGES, classify_constants, layouts, untold,
+};
+use crate::cull::view_uniform::ViewUniform;
 use crate::error::Result;
-use crate::gpu::Gpu;
+use crate::gpu::buffers::entry;
+use crate::gpu::device::Gpu;
+use crate::gpu::pipelines::Compute;
+use crate::gpu::shader::{Source, wgsl};
+use crate::input::bounds::BoundsKind;
+use crate::input::camera::Camera;
+use crate::input::tolerance::DepthTolerance;
 use crate::instances::Instances;
-use crate::pyramid::{Pyramid, entry};
-use crate::shader::DepthStore;
-use crate::tolerance::DepthTolerance;
-use crate::visible::Visible;
+use crate::instances::watch::Refine;
+use crate::output::visible::Visible;
+use crate::pyramid::Pyramid;
 
-/// Groups that one workgroup tells; `shaders/refine.wgsl`.
+/// Groups whose members one workgroup refines; `shaders/cull/refine.wgsl`.
 const WORKGROUP: u32 = 64;
 
-/// Of a group's word, what is its verdict; the next bit says that its members have theirs
-/// (`shaders/refine.wgsl`, `TOLD`).
-pub(crate) const VERDICT_MASK: u8 = 3;
+/// The shader that writes the verdicts of the members of hidden groups.
+pub(crate) fn refine_module(kind: BoundsKind) -> Source {
+    let entry = [wgsl!("instances/piece"), wgsl!("instances/groups"), wgsl!("cull/refine")];
+    untold(DepthStore::Nowhere, kind, &entry)
+}
 
-/// What is left to be done of a cull that tested groups.
+/// The shader that finds the groups that lie within the view.
+pub(crate) fn refine_groups_module() -> Source {
+    let entry = [wgsl!("instances/piece"), wgsl!("cull/refine_groups")];
+    untold(DepthStore::Nowhere, BoundsKind::Box, &entry)
+}
+
+/// The pipeline that refines members.
+fn refine_pipeline(
+    gpu: &Gpu,
+    kind: BoundsKind,
+    sample_coverage: bool,
+) -> Result<wgpu::ComputePipeline> {
+    let source = refine_module(kind);
+    without_depth(gpu, "hiz.refine.pipeline", source, "refine", (kind, sample_coverage))
+}
+
+/// The pipeline that refines groups.
+/// It is only valid for area coverage.
+fn refine_groups_pipeline(gpu: &Gpu) -> Result<wgpu::ComputePipeline> {
+    let label = "hiz.refine_groups.pipeline";
+    let kind = BoundsKind::Box;
+    without_depth(gpu, label, refine_groups_module(), "refine_groups", (kind, false))
+}
+
+fn without_depth(
+    gpu: &Gpu,
+    label: &'static str,
+    source: Source,
+    entry_point: &'static str,
+    (kind, sample_coverage): (BoundsKind, bool),
+) -> Result<wgpu::ComputePipeline> {
+    let key = CullKey {
+        store: DepthStore::Nowhere,
+        kind,
+        sample_coverage,
+        // These have no effect, because no depth is read.
+        reversed: false,
+        chunks: 1,
+        footprint_log2: 1,
+        descent: false,
+        fit_volume: false,
+    };
+    gpu.compute_pipeline(&Compute {
+        label,
+        source,
+        entry_point,
+        layouts: &layouts(gpu, key.store, "hiz.storage_layout", TWO_STORAGES)?,
+        constants: &classify_constants(&key),
+    })
+}
+
+/// What a cull that tested groups leaves undone.
 #[derive(Debug)]
 pub(crate) struct Refinement {
     view: ViewUniform,
     options: CullOptions,
-    /// Its levels are asked which one would be read.
+    instances: Arc<Instances>,
+    /// The shader asks its layout which level a test would read.
     pyramid: Arc<Pyramid>,
     visible: Arc<Visible>,
 }
 
 impl Refinement {
-    /// Of a cull that was recorded; nothing where every place has a verdict of its own, or none was
-    /// asked for.
+    /// The refinement of a cull that was recorded.
+    /// `None` if every place has a verdict of its own already, or if no verdicts were asked for.
     pub(crate) fn new(
-        instances: &Instances,
+        instances: &Arc<Instances>,
         camera: &Camera,
         pyramid: &Arc<Pyramid>,
         options: &CullOptions,
@@ -45,24 +109,25 @@ impl Refinement {
         if !is_needed {
             return Ok(None);
         }
-        // Of no reduction in particular: no depth is read.
+        // The number of the reduction does not matter, because no depth is read.
         let view = ViewUniform::new(camera, 1, options, DepthTolerance::NONE)?;
-        let (pyramid, visible) = (Arc::clone(pyramid), Arc::clone(visible));
-        Ok(Some(Self { view, options: options.clone(), pyramid, visible }))
+        Ok(Some(Self {
+            view,
+            options: options.clone(),
+            instances: Arc::clone(instances),
+            pyramid: Arc::clone(pyramid),
+            visible: Arc::clone(visible),
+        }))
     }
+}
 
-    /// Records it.
-    /// It may run more than once, and the first time counts.
-    pub(crate) fn record(
-        &self,
-        gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
-        instances: &Instances,
-    ) -> Result<()> {
+impl Refine for Refinement {
+    fn record(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder) -> Result<()> {
+        let instances = &*self.instances;
         let view = gpu.uniform("hiz.refine.view", &self.view)?;
         let view = gpu.bind_group(
             "hiz.refine.view",
-            gpu.layouts().cull(DepthStore::Nowhere),
+            &DepthStore::Nowhere.layout(gpu)?,
             &[
                 entry(2, self.pyramid.uniform.as_entire_binding()),
                 entry(6, view.as_entire_binding()),
@@ -70,7 +135,7 @@ impl Refinement {
         )?;
         let is_sample = self.options.coverage == Coverage::Sample;
         let (of_groups, of_members) =
-            (gpu.refine_groups_pipeline()?, gpu.refine_pipeline(instances.kind, is_sample)?);
+            (refine_groups_pipeline(gpu)?, refine_pipeline(gpu, instances.kind, is_sample)?);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("hiz.refine.pass"),
             timestamp_writes: None,
@@ -82,7 +147,7 @@ impl Refinement {
             };
             let verdicts = gpu.bind_group(
                 "hiz.refine.verdicts",
-                &gpu.layouts().two_storages,
+                &gpu.layout("hiz.storage_layout", TWO_STORAGES)?,
                 &[
                     entry(0, output.mask.as_entire_binding()),
                     entry(1, groups.verdicts.as_entire_binding()),

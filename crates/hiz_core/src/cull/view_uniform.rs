@@ -1,12 +1,13 @@
-//! What the shader knows of a camera and of the options.
+//! The view uniform: what the shaders know of a camera and of the options.
 
-use super::options::{Coverage, CullOptions};
-use crate::camera::Camera;
+use crate::cull::options::{Coverage, CullOptions};
 use crate::error::{Error, Result};
-use crate::tolerance::DepthTolerance;
-use crate::view::{EPS, ViewRows};
+use crate::host::rounding::{EPS, round_up};
+use crate::input::camera::Camera;
+use crate::input::tolerance::DepthTolerance;
+use crate::input::view::ViewRows;
 
-/// `shaders/shared/view.wgsl`, `View`.
+/// Twin: `shaders/cull/view.wgsl`, `View`, which documents the fields.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct ViewUniform {
@@ -37,9 +38,13 @@ const _: () = assert!(size_of::<ViewUniform>() == 176);
 impl ViewUniform {
     #[expect(
         clippy::cast_possible_truncation,
-        reason = "multiples of 2^-8 and sizes below 2^15 are exact, the factor is rounded towards far"
+        reason = "multiples of 2^-8 and sizes below 2^15 are exact, the factor is rounded towards \
+                  far"
     )]
-    /// `tolerance` is what the depth image's format has rounded; the options' slack comes on top.
+    /// Rounds a camera and the options to the numbers of a cull.
+    ///
+    /// `tolerance` is what the format of the depth image has rounded; the slack of the options is
+    /// added to it.
     pub(crate) fn new(
         camera: &Camera,
         reduction: u32,
@@ -57,7 +62,7 @@ impl ViewUniform {
             relative: range("depth_slack", options.depth_slack, 0.5)?,
             absolute: range("depth_slack_abs", options.depth_slack_abs, 0.5)?,
         };
-        // The maker erred first, then the format rounded.
+        // The renderer's error came first, then the rounding of the format.
         let DepthTolerance { relative: slack, absolute: slack_abs } = tolerance.after(of_caller);
         range("descent", f64::from(options.descent), 65_536.0)?;
         let kappa = range("transform_slack", options.transform_slack, 1e6)?;
@@ -76,17 +81,18 @@ impl ViewUniform {
             Coverage::Area => guard,
             Coverage::Sample => guard - 0.5,
         };
-        // Rounded towards far; what the product itself rounds away stays (docs/accuracy.md).
+        // Rounded towards far; this does not cover the rounding of the product in the shader
+        // (`docs/accuracy.md`).
         let depth_factor = if camera.convention().is_reversed() {
-            -crate::view::round_up(slack - 1.0)
+            -round_up(slack - 1.0)
         } else {
-            crate::view::round_up(1.0 + slack)
+            round_up(1.0 + slack)
         };
-        // The product and the sum in the shader lose less than 2^-24 each where the depth stays
-        // below 1: that is added here.
-        // 0 adds nothing and loses nothing.
-        let depth_offset =
-            if slack_abs > 0.0 { crate::view::round_up(slack_abs + EPS) } else { 0.0 };
+        // The product and the sum in the shader lose less than 2^-24 each while the depth stays
+        // below 1.
+        // That loss is added here.
+        // An offset of 0 adds nothing, so it loses nothing.
+        let depth_offset = if slack_abs > 0.0 { round_up(slack_abs + EPS) } else { 0.0 };
         let depth_offset =
             if camera.convention().is_reversed() { -depth_offset } else { depth_offset };
         let rows =
@@ -111,7 +117,7 @@ impl ViewUniform {
             eye_hi: rows.eye_hi,
             z_slope: rows.z_slope,
             eye_lo: rows.eye_lo,
-            halves_size: crate::view::round_up(halves_size(&rows)),
+            halves_size: round_up(halves_size(&rows)),
             half_size: [size.width as f32 / 2.0, size.height as f32 / 2.0],
             reach: reach as f32,
             depth_factor,
@@ -126,9 +132,11 @@ impl ViewUniform {
     }
 }
 
-/// What low halves of positions near the eye come to, all axes added: those of the eye, and twice
-/// 2^-24 of the high halves, for theirs and for what both cannot hold; and a little, for the
-/// roundings of this sum.
+/// Upper bound, summed over the axes, of `|eye_lo| + 2 * 2^-24 * |eye_hi|`, and a little more for
+/// the roundings of this sum.
+///
+/// It bounds two things: the low half of a position near the eye, and the remainder that two
+/// float32 cannot represent.
 fn halves_size(rows: &ViewRows) -> f64 {
     let sum = |v: [f32; 3]| v.iter().map(|v| f64::from(v.abs())).sum::<f64>();
     sum(rows.eye_lo) * (1.0 + EPS) + EPS * (1.0 + 1.0 / 256.0) * sum(rows.eye_hi)
@@ -137,10 +145,10 @@ fn halves_size(rows: &ViewRows) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{DepthConvention, ImageSize};
+    use crate::input::image::{DepthConvention, ImageSize};
 
-    /// Slack is never less than what was asked for: a factor rounded to nearest would be, half of
-    /// the time.
+    /// The slack is never less than what was asked for.
+    /// A factor that is rounded to nearest would be too small half of the time.
     #[test]
     fn the_depth_factor_is_rounded_towards_far() {
         for (convention, z) in [
@@ -167,13 +175,12 @@ mod tests {
         }
     }
 
-    /// A format's step is in what the shader reads: whole, and no more than what rounding upwards
-    /// adds.
-    /// With the caller's slack on top, in either convention.
+    /// The shader reads the whole step of a format, and no more than upward rounding adds to it.
+    /// The caller's slack is added on top, in either convention.
     #[test]
     fn the_step_of_a_format_comes_before_the_callers_slack() {
         use wgpu::TextureFormat as Format;
-        // The step, and what is relative to the depth, by hand.
+        // The step, and the part relative to the depth, worked out by hand.
         let formats = [
             (Format::Depth16Unorm, 1.0 / 65_535.0, 2.0_f64.powi(-22)),
             (Format::Depth24Plus, 1.0 / 16_777_215.0, 2.0_f64.powi(-22)),
@@ -204,7 +211,8 @@ mod tests {
                     };
                     let of_both = (1.0 + relative) * (1.0 + depth_slack) - 1.0;
                     let what = format!(
-                        "{convention:?} {format:?} {depth_slack} {depth_slack_abs}: {moved} {offset}"
+                        "{convention:?} {format:?} {depth_slack} {depth_slack_abs}: {moved} \
+                         {offset}"
                     );
                     assert!(moved >= of_both && moved <= of_both + 1.01 * EPS, "{what}");
                     let of_both = step * (1.0 + depth_slack) + depth_slack_abs + EPS;

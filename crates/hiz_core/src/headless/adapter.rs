@@ -1,20 +1,20 @@
-//! Which Vulkan adapters there are.
+//! The adapters of this machine, and how one is chosen.
 
 use crate::error::Error;
 
-/// The environment variable that chooses an adapter.
+/// The environment variable that chooses an adapter: an index, or part of a name or driver.
 pub const ADAPTER_VARIABLE: &str = "HIZVK_ADAPTER";
 
-/// How to install a software driver: the advice where there is no adapter at all.
+/// How to install a software driver: the advice if there is no adapter at all.
 pub const INSTALL_HINT: &str =
     "A software Vulkan driver: apt install libvulkan1 mesa-vulkan-drivers";
 
-/// A Vulkan adapter, as text.
+/// An adapter, described as text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AdapterSummary {
-    /// Its place in [`adapters`].
+    /// Its index in [`adapters`].
     pub index: usize,
-    /// The device's name.
+    /// The name of the GPU.
     pub name: String,
     /// The driver's name.
     pub driver: String,
@@ -45,14 +45,14 @@ impl AdapterSummary {
         }
     }
 
-    /// Lower is better: real GPUs first.
+    /// The rank of the adapter; lower is better, and real GPUs come first.
     pub(super) fn rank(&self) -> usize {
         let order = ["discrete_gpu", "integrated_gpu", "virtual_gpu", "cpu"];
         order.iter().position(|t| *t == self.device_type).unwrap_or(order.len())
     }
 
     pub(super) fn matches(&self, request: &str) -> bool {
-        // Digits are an index and nothing else: "1" is also part of many a version.
+        // Digits are an index and nothing else, because "1" is also part of many versions.
         if let Ok(index) = request.parse::<usize>() {
             return index == self.index;
         }
@@ -69,36 +69,48 @@ impl std::fmt::Display for AdapterSummary {
     }
 }
 
-/// The error of a request that no adapter answers to: with how to choose one of those that are
-/// there, or how to get one.
+/// The error of a request that no adapter fits.
+/// Its hint says how to choose one of the adapters `seen`, or how to get one.
 pub(super) fn no_adapter(request: String, seen: &[AdapterSummary]) -> Error {
     let hint = if seen.is_empty() {
         INSTALL_HINT.to_owned()
     } else {
         format!(
-            "Choose one of these by its number, or by a part of its name or driver, as an argument or in {ADAPTER_VARIABLE}; \
-             without both the best one is taken. One that is missing has no Vulkan driver here that the loader finds"
+            "Choose one of these by its number, or by a part of its name or driver, as an argument \
+             or in {ADAPTER_VARIABLE}; without both the best one is taken. One that is missing has \
+             no Vulkan driver here that the loader finds"
         )
     };
     let seen = seen.iter().map(|summary| format!("{}: {summary}", summary.index)).collect();
     Error::NoAdapter { request, seen, hint }
 }
 
+/// The backends that this crate was built with.
+/// Any other would silently take over if a driver is missing.
+fn backends() -> wgpu::Backends {
+    let built = [
+        (cfg!(feature = "vulkan"), wgpu::Backends::VULKAN),
+        (cfg!(feature = "metal"), wgpu::Backends::METAL),
+        (cfg!(feature = "dx12"), wgpu::Backends::DX12),
+    ];
+    built.into_iter().filter_map(|(is_built, backend)| is_built.then_some(backend)).collect()
+}
+
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-    descriptor.backends = wgpu::Backends::VULKAN;
+    descriptor.backends = backends();
     wgpu::Instance::new(descriptor)
 }
 
 pub(super) fn enumerate() -> Vec<(AdapterSummary, wgpu::Adapter)> {
-    pollster::block_on(instance().enumerate_adapters(wgpu::Backends::VULKAN))
+    pollster::block_on(instance().enumerate_adapters(backends()))
         .into_iter()
         .enumerate()
         .map(|(i, adapter)| (AdapterSummary::new(i, &adapter.get_info()), adapter))
         .collect()
 }
 
-/// The Vulkan adapters of this machine; none without a driver.
+/// The adapters of this machine that the built backends find; an empty list without a driver.
 pub fn adapters() -> Vec<AdapterSummary> {
     enumerate().into_iter().map(|(summary, _)| summary).collect()
 }

@@ -1,85 +1,42 @@
-//! A cull that was submitted, and what can be read of it.
+//! A submitted cull, and everything that can be read from it.
 
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
-use super::explanation::{Explanation, Told};
-use super::{Engine, locked, milliseconds, to_u32};
-use crate::camera::Camera;
-use crate::compact::Compaction;
-use crate::count;
-use crate::cull::{
-    CullInputs, CullOptions, ExplanationRecord, Reading, TEXELS_TOLD, VERDICT_MASK, group_options,
-    is_grouped, record_explain,
-};
+use crate::cull::count::record_count;
+use crate::cull::explain::{ExplanationRecord, Reading, TEXELS_TOLD, record_explain};
+use crate::cull::groups::{group_options, is_grouped};
+use crate::cull::inputs::CullInputs;
+use crate::cull::options::CullOptions;
 use crate::error::{Error, Result};
-use crate::groups::GROUP;
-use crate::host;
-use crate::instances::{Instances, Piece};
-use crate::lists::{DrawIndexedIndirect, Lists};
+use crate::gpu::buffers::STORAGE;
+use crate::headless::counts::{Counts, Timings, milliseconds};
+use crate::headless::engine::Engine;
+use crate::headless::explanation::{Explanation, Told};
+use crate::headless::readback::{self, BufferRange, Staged, to_u32};
+use crate::host::memory;
+use crate::host::threads::Locked;
+use crate::input::camera::Camera;
+use crate::instances::Instances;
+use crate::instances::groups::GROUP;
+use crate::instances::piece::Piece;
+use crate::instances::watch::Watch;
+use crate::output::compact::Compaction;
+use crate::output::counters::{CounterRecord, StatisticsRecord};
+use crate::output::draw::DrawIndexedIndirect;
+use crate::output::lists::Lists;
+use crate::output::outputs::Outputs;
+use crate::output::survivors::{GroupOutput, SurvivorsRecord};
+use crate::output::verdict::Verdict;
+use crate::output::visible::{PieceOutput, Visible, verdicts_offset};
 use crate::pyramid::Pyramid;
-use crate::readback::{self, BufferRange, Staged};
-use crate::visible::{
-    CounterRecord, GroupOutput, PieceOutput, STORAGE, StatisticsRecord, SurvivorsRecord, Visible,
-    VisibleOptions, verdicts_offset,
-};
-use crate::watch::Watch;
 
-/// Up to this size, of 131,072 instances, a mask is copied to where it can be read by the submit of
-/// its cull.
+/// The largest mask that the cull's own submit copies to a staging buffer: that of 131,072
+/// instances.
 const STAGED_MASK_BYTES: u64 = 1 << 14;
 
-/// The verdicts of `shaders/shared/verdict.wgsl`.
-const OUTSIDE: u8 = 0;
-pub(super) const OCCLUDED: u8 = 1;
-const VISIBLE: u8 = 2;
-
-/// How many instances met which end: [`Culling::verdicts`], counted.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// All instances.
-    pub tested: u64,
-    /// Outside the frustum, or between all pixel centres in sample coverage.
-    pub outside: u64,
-    /// Hidden by the depth image, and not outside.
-    pub occluded: u64,
-    /// Possibly visible.
-    pub visible: u64,
-    /// Bad bounds, kept.
-    pub invalid: u64,
-    /// Visible and invalid: what the lists would hold without a capacity.
-    pub demand: u64,
-    /// What they hold.
-    pub written: u64,
-    /// Groups that were tested as a whole.
-    pub tested_groups: u64,
-    /// Instances that were tested by themselves: all, or those of the groups that were left.
-    pub tested_instances: u64,
-    /// Depth tests at each level, of groups and of instances (with [`CullOptions::statistics`]).
-    pub levels: [u64; 16],
-    /// Texels read by them (with [`CullOptions::statistics`]).
-    pub texels_read: u64,
-}
-
-/// Times of one cull by the clock on the wall.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Timings {
-    /// Making buffers and recording.
-    pub record_ms: f64,
-    /// Making the pipelines that were not there yet, the driver's own compiling included; next to 0
-    /// in a cull like an earlier one.
-    pub compile_ms: f64,
-    /// From the submit until the device was seen to be done with it; 0 before that.
-    /// What was submitted earlier and was not done yet comes first, so it counts.
-    /// A device tells only who asks: that is each read and wait, and each submit.
-    /// Who does something else before the first of them finds more than the device took.
-    pub wall_ms: f64,
-    /// Copies to the host after that, so far.
-    pub readback_ms: f64,
-}
-
 /// A cull that was submitted.
-/// Reading waits for it.
+/// Every read waits for it.
 #[derive(Debug)]
 pub struct Culling {
     pub(super) engine: Engine,
@@ -87,22 +44,21 @@ pub struct Culling {
     pub(super) pyramid: Arc<Pyramid>,
     pub(super) camera: Camera,
     pub(super) options: CullOptions,
-    pub(super) output: VisibleOptions,
     pub(super) visible: Arc<Visible>,
-    /// A small mask, copied by the cull's own submit.
-    pub(super) staged_mask: Mutex<Option<Staged>>,
+    /// The copy of a small mask, made by the cull's own submit.
+    pub(super) staged_mask: Locked<Option<Staged>>,
     pub(super) later: OnceLock<Lists>,
-    /// What later updates leave here, and do first.
+    /// Where updates note what they changed, and find the refinement that must run before them.
     pub(super) watch: Arc<Watch>,
     pub(super) submission: wgpu::SubmissionIndex,
     pub(super) submitted: Instant,
-    /// When the device was seen to be done.
+    /// When the device was first seen to be done.
     pub(super) done: Arc<OnceLock<Instant>>,
-    pub(super) timings: Mutex<Timings>,
+    pub(super) timings: Locked<Timings>,
 }
 
 impl Culling {
-    /// The buffers on the device.
+    /// The buffers on the device that the cull fills.
     pub fn visible(&self) -> &Visible {
         &self.visible
     }
@@ -112,26 +68,26 @@ impl Culling {
         &self.instances
     }
 
-    /// Waits until the device is done.
+    /// Waits until the device has run the cull.
     ///
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost).
     pub fn wait(&self) -> Result<()> {
         self.engine
             .scoped(|| readback::wait(self.engine.device(), Some(self.submission.clone())))?;
-        // The wait itself has called back, unless another thread's is about to.
+        // The wait itself has called back, unless another thread is about to.
         self.done.get_or_init(Instant::now);
         Ok(())
     }
 
-    /// Times so far.
+    /// The times of this cull so far.
     pub fn timings(&self) -> Timings {
         let wall_ms = self.done.get().map_or(0.0, |done| milliseconds(self.submitted, *done));
-        Timings { wall_ms, ..*locked(&self.timings) }
+        Timings { wall_ms, ..*self.timings.lock() }
     }
 
-    /// Records the copy of a mask that is asked for and so small that a submit of its own would
-    /// cost more.
+    /// Records the copy of the mask if it was asked for and is small.
+    /// For a small mask, a submit of its own would cost more than the copy.
     pub(super) fn stage_mask(
         device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
@@ -146,15 +102,15 @@ impl Culling {
     /// The words of the masks of all pieces.
     fn mask_words(&self) -> Result<Vec<Vec<u8>>> {
         self.engine.check_process()?;
-        // Whoever comes first takes it; a second reader copies again.
-        let Some(staged) = locked(&self.staged_mask).take() else {
+        // The first reader takes the staged copy, and later readers copy again.
+        let Some(staged) = self.staged_mask.lock().take() else {
             return self.read(&mask_ranges(&self.instances, &self.visible));
         };
         self.wait()?;
         let start = Instant::now();
         let bytes =
             self.engine.scoped(|| staged.read(self.engine.device(), self.submission.clone()))?;
-        locked(&self.timings).readback_ms += milliseconds(start, Instant::now());
+        self.timings.lock().readback_ms += milliseconds(start, Instant::now());
         Ok(bytes)
     }
 
@@ -164,40 +120,43 @@ impl Culling {
         let bytes = self
             .engine
             .scoped(|| readback::read_buffers(self.engine.device(), self.engine.queue(), ranges))?;
-        locked(&self.timings).readback_ms += milliseconds(start, Instant::now());
+        self.timings.lock().readback_ms += milliseconds(start, Instant::now());
         Ok(bytes)
     }
 
-    /// Whether each instance is kept.
+    /// Whether each instance is kept, by its index.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without [`Outputs::mask`](crate::Outputs::mask),
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// - [`Error::Mismatch`] for a cull without [`Outputs::mask`](crate::Outputs::mask).
+    /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn mask(&self) -> Result<Vec<bool>> {
         self.require("mask", self.visible.outputs().mask)?;
         let planes = self.mask_words()?;
-        let mut mask = host::list(self.instances.len() as usize, "mask")?;
+        let mut mask = memory::list(self.instances.len() as usize, "mask")?;
         for (piece, plane) in self.instances.pieces.iter().zip(planes) {
-            let words = host::collected(to_u32(&plane), "mask")?;
+            let words = memory::collected(to_u32(&plane), "mask")?;
             mask.extend((0..piece.count() as usize).map(|i| words[i / 32] >> (i % 32) & 1 == 1));
         }
         Ok(mask)
     }
 
-    /// Each instance's verdict: 0 outside, 1 occluded, 2 visible, 3 invalid (kept).
+    /// The verdict of each instance, by its index.
     ///
-    /// Outside is what lies outside the frustum by a certificate of its own or of its group's box
-    /// (in sample coverage also what lies between all pixel centres).
-    /// Occluded is every other instance that is hidden.
-    /// So a verdict does not depend on whether groups were tested, but for the few instances that a
-    /// group's test hides and their own would keep: they are occluded.
-    /// Members of hidden groups get theirs by a pass of its own, when verdicts or counts are first
-    /// read, or before the next update.
+    /// - **Outside**: outside the frustum, by a certificate of its own or of its group's box.
+    ///   In sample coverage also: between all pixel centres.
+    /// - **Occluded**: every other instance that is hidden.
+    /// - **Visible** and **invalid**: every instance that is kept.
+    ///
+    /// So a verdict does not depend on whether groups were tested, except for a few instances.
+    /// A group's test hides these, and their own tests would keep them: they are occluded.
+    ///
+    /// The members of hidden groups get their verdicts in a pass of their own.
+    /// It runs when verdicts or counts are first read, or before the next update.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without [`Outputs::verdicts`](crate::Outputs::verdicts),
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
-    pub fn verdicts(&self) -> Result<Vec<u8>> {
+    /// - [`Error::Mismatch`] for a cull without [`Outputs::verdicts`](crate::Outputs::verdicts).
+    /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn verdicts(&self) -> Result<Vec<Verdict>> {
         self.require("verdicts", self.visible.outputs().verdicts)?;
         self.refine()?;
         let of_places = self.read(&self.ranges(|piece, output| BufferRange {
@@ -205,23 +164,23 @@ impl Culling {
             offset: verdicts_offset(piece),
             size: 4 * u64::from(piece.count()),
         }))?;
-        let mut verdicts = host::list(self.instances.len() as usize, "verdicts")?;
-        verdicts.resize(self.instances.len() as usize, VISIBLE);
+        let mut verdicts = memory::list(self.instances.len() as usize, "verdicts")?;
+        verdicts.resize(self.instances.len() as usize, Verdict::Visible);
         for (piece, words) in self.instances.pieces.iter().zip(of_places) {
             let first = piece.range.start as usize;
             for (place, verdict) in words.iter().step_by(4).enumerate() {
-                verdicts[first + piece.order.index(place)] = *verdict;
+                verdicts[first + piece.order.index(place)] = Verdict::of_word((*verdict).into());
             }
         }
         Ok(verdicts)
     }
 
-    /// The draw arguments, one record a piece.
-    /// Where the cull left none they are made from its mask.
+    /// The draw arguments, one record per piece.
+    /// If the cull did not write them, they are made from its mask.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without draws, indices and mask, [`Error::DeviceLost`],
-    /// [`Error::OutOfMemory`].
+    /// - [`Error::Mismatch`] for a cull without draws, indices and mask.
+    /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn draws(&self) -> Result<Vec<DrawIndexedIndirect>> {
         let draws = match &self.visible.lists {
             Some(lists) => &lists.draws,
@@ -231,12 +190,12 @@ impl Culling {
         Ok(bytemuck::pod_collect_to_vec(&bytes[0]))
     }
 
-    /// The packed list, the pieces joined.
-    /// Where the cull left none it is made from its mask, ascending.
+    /// The packed list of the kept instances' indices, all pieces joined.
+    /// If the cull did not write it, it is made from its mask, ascending.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without indices and mask, [`Error::DeviceLost`],
-    /// [`Error::OutOfMemory`].
+    /// - [`Error::Mismatch`] for a cull without indices and mask.
+    /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn indices(&self) -> Result<Vec<u32>> {
         let lists = match &self.visible.lists {
             Some(lists) if self.visible.outputs().indices => lists,
@@ -255,16 +214,16 @@ impl Culling {
             })
             .collect();
         let parts = self.read(&ranges)?;
-        let mut indices = host::list(parts.iter().map(|bytes| bytes.len() / 4).sum(), "indices")?;
+        let mut indices = memory::list(parts.iter().map(|bytes| bytes.len() / 4).sum(), "indices")?;
         indices.extend(parts.iter().flat_map(|bytes| to_u32(bytes)));
         Ok(indices)
     }
 
-    /// How many instances met which end.
+    /// How many instances got which verdict, and how many were tested.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull without [`Outputs::verdicts`](crate::Outputs::verdicts),
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// - [`Error::Mismatch`] for a cull without [`Outputs::verdicts`](crate::Outputs::verdicts).
+    /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn counts(&self) -> Result<Counts> {
         self.require("verdicts", self.visible.outputs().verdicts)?;
         self.refine()?;
@@ -275,7 +234,7 @@ impl Culling {
             let counters = gpu.empty("hiz.count.counters", size, STORAGE)?;
             let mut encoder = engine.encoder("hiz.count.encoder");
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            count::record(gpu, &mut pass, &self.instances, &self.visible, &counters)?;
+            record_count(gpu, &mut pass, &self.instances, &self.visible, &counters)?;
             drop(pass);
             self.finish(encoder)?;
             Ok(counters)
@@ -285,7 +244,7 @@ impl Culling {
             Some(groups) => BufferRange::first(&groups.survivors, groups.survivors.size()),
             None => BufferRange::first(&output.mask, 0),
         }));
-        // The last group may have fewer members.
+        // The last group may have fewer members than 64.
         ranges.extend(self.ranges(|piece, output| match self.groups(piece, output) {
             Some(groups) => BufferRange {
                 buffer: &groups.verdicts,
@@ -335,12 +294,13 @@ impl Culling {
         })
     }
 
-    /// How many instances are kept, and how many of them the lists hold.
-    /// The first is unknown to a cull that was asked for full lists alone.
+    /// How many instances are kept (the demand), and how many of them the lists hold.
+    /// The demand is `None` if the cull was asked for lists alone, and they are full but too short
+    /// for all instances.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a cull that left nothing that tells, [`Error::DeviceLost`],
-    /// [`Error::OutOfMemory`].
+    /// - [`Error::Mismatch`] for a cull without mask, verdicts, indices and draws.
+    /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn demand_and_written(&self) -> Result<(Option<u64>, u64)> {
         let capacity = u64::from(self.visible.capacity());
         let outputs = self.visible.outputs();
@@ -358,11 +318,11 @@ impl Culling {
             return Ok((Some(counts.demand), counts.written));
         }
         let written = self.draws()?.iter().map(|draw| u64::from(draw.instance_count)).sum();
-        // Where there was room for all, the lists' lengths tell.
+        // Lists that had room for all hold as many as are kept.
         Ok(((written < capacity || !self.visible.is_capped()).then_some(written), written))
     }
 
-    /// Lists that the cull did not leave, made from its mask when they are first asked for.
+    /// The lists that the cull did not write, made from its mask when they are first asked for.
     fn later_lists(&self, what: &str) -> Result<&Lists> {
         self.require(what, self.visible.outputs().mask)?;
         if let Some(lists) = self.later.get() {
@@ -371,7 +331,7 @@ impl Culling {
         let engine = &self.engine;
         let gpu = &engine.context().gpu;
         let lists = engine.scoped(|| {
-            let VisibleOptions { capacity, draw, .. } = self.output;
+            let Outputs { capacity, draw, .. } = self.visible.outputs();
             let lists = Lists::new(gpu, &self.instances, true, capacity, draw)?;
             let compaction = Compaction::new(gpu, &self.instances, &self.visible, &lists)?;
             let mut encoder = engine.encoder("hiz.compact.encoder");
@@ -385,20 +345,21 @@ impl Culling {
         Ok(self.later.get_or_init(|| lists))
     }
 
-    /// Submits what makes an answer, and waits: only the copy that follows counts as one.
+    /// Submits the commands that make an answer, and waits.
+    /// So the read-back time counts only the copy that follows.
     fn finish(&self, encoder: wgpu::CommandEncoder) -> Result<()> {
         let submission = self.engine.queue().submit([encoder.finish()]);
         readback::wait(self.engine.device(), Some(submission))
     }
 
-    /// Sees to it that each place has a verdict of its own.
+    /// Makes sure that each place has a verdict of its own.
     fn refine(&self) -> Result<()> {
         let engine = &self.engine;
         let submission = engine.scoped(|| {
             let watches = self.instances.watches();
             let mut encoder = engine.encoder("hiz.refine.encoder");
             let gpu = &engine.context().gpu;
-            if !watches.record_refinement(gpu, &mut encoder, &self.instances, &self.watch)? {
+            if !watches.record_refinement(gpu, &mut encoder, &self.watch)? {
                 return Ok(None);
             }
             let submission = engine.queue().submit([encoder.finish()]);
@@ -440,11 +401,14 @@ impl Culling {
     }
 
     /// Why instance `index` got its verdict: the cull's own steps, run for it once more.
-    /// They read the bounds as they are now: those of an instance that was updated since make an
-    /// explanation that is [`stale`](Explanation::stale).
+    ///
+    /// The test reads the bounds as they are now.
+    /// If the instance was updated since the cull, the explanation is
+    /// [`stale`](Explanation::stale).
     ///
     /// # Errors
-    /// [`Error::Invalid`](crate::Error::Invalid) for an index past the end.
+    /// - [`Error::Invalid`](crate::Error::Invalid) for an index past the end.
+    /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn explain(&self, index: u64) -> Result<Explanation> {
         let index = u32::try_from(index).unwrap_or(u32::MAX);
         let mut told = self.test(index, false)?;
@@ -457,7 +421,9 @@ impl Culling {
         let Some((of_group, is_updated)) = self.hidden_group(index)? else { return Ok(told) };
         let mut group = self.test(index, true)?;
         group.stale = is_updated;
-        told.verdict = if told.verdict == OUTSIDE { OUTSIDE } else { of_group };
+        if told.verdict != Verdict::Outside {
+            told.verdict = of_group;
+        }
         told.reason = format!(
             "its group of 64 is hidden as a whole ({}); by itself: {}",
             group.reason, told.reason
@@ -466,7 +432,7 @@ impl Culling {
         Ok(told)
     }
 
-    /// The test of an instance, or of the box around its group.
+    /// Repeats the test of an instance, or of the box around its group.
     fn test(&self, index: u32, whole_group: bool) -> Result<Explanation> {
         let engine = &self.engine;
         let bytes = engine.scoped(|| {
@@ -484,7 +450,6 @@ impl Culling {
                 camera: &self.camera,
                 pyramid: &self.pyramid,
                 options: &self.options,
-                certified: true,
                 idle: false,
             };
             record_explain(gpu, &mut encoder, &inputs, (index, whole_group), [&target, &readings])?;
@@ -501,9 +466,9 @@ impl Culling {
         Ok(Told { record, readings, camera: &self.camera, options }.explanation())
     }
 
-    /// Where this cull hid the group of an instance: the group's verdict, and whether any of its
-    /// members was updated since.
-    fn hidden_group(&self, index: u32) -> Result<Option<(u8, bool)>> {
+    /// If this cull hid the group of an instance: the group's verdict, and whether any member was
+    /// updated since.
+    fn hidden_group(&self, index: u32) -> Result<Option<(Verdict, bool)>> {
         let pieces = self.instances.pieces.iter().zip(&self.visible.pieces);
         let Some((piece, output)) =
             pieces.into_iter().find(|(piece, _)| piece.range.contains(&index))
@@ -525,13 +490,13 @@ impl Culling {
             let index = piece.range.start + piece.order.index(place) as u32;
             self.watch.is_updated(&(index..index + 1))
         };
-        Ok(Some((word & VERDICT_MASK, members.into_iter().any(is_updated))))
+        Ok(Some((Verdict::of_word(word.into()), members.into_iter().any(is_updated))))
     }
 }
 
 /// Whether the word of a group says that it was hidden as a whole.
 fn is_hidden(word: u8) -> bool {
-    word & VERDICT_MASK < VISIBLE
+    !Verdict::of_word(word.into()).is_kept()
 }
 
 /// The masks of all pieces.

@@ -1,17 +1,22 @@
-//! Depth images on the device: made, filled from the host, read back.
+//! Depth images on the device: drawn, uploaded, read back.
 
-use super::{Engine, to_u32};
-use crate::camera::{Camera, ImageSize};
 use crate::error::{Error, Result};
-use crate::host;
-use crate::readback;
-use crate::shader::SourceKind;
-use crate::tolerance::DepthTolerance;
+use crate::gpu::depth_source::SourceKind;
+use crate::headless::engine::Engine;
+use crate::headless::readback::{self, to_u32};
+use crate::host::memory;
+use crate::input::camera::Camera;
+use crate::input::image::ImageSize;
+use crate::input::tolerance::DepthTolerance;
+use crate::occluders::Occluders;
+use crate::occluders::raster::OCCLUDER_DEPTH_FORMAT;
+use crate::occluders::surface::ConservativeDepthOptions;
 
-/// Bytes of an upload's staging area at most: larger images go in bands of rows.
+/// Bytes of an upload's staging buffer at most.
+/// Larger images are uploaded in bands of rows.
 const STAGING_BYTES: u32 = 1 << 26;
 
-/// A depth image on the device and the camera that it was made by.
+/// A depth image on the device, and the camera that made it.
 #[derive(Debug, Clone)]
 pub struct DepthImage {
     pub(super) engine: Engine,
@@ -22,27 +27,28 @@ pub struct DepthImage {
 }
 
 impl DepthImage {
-    /// The image's size.
+    /// The image's size in pixels.
     pub fn size(&self) -> ImageSize {
         self.camera.size()
     }
 
-    /// The camera that it was made by.
+    /// The camera that made the image.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
-    /// What its depths were rounded by before they came into the texture.
+    /// How far the depths may have been rounded before they came into the texture.
     pub fn tolerance(&self) -> DepthTolerance {
         self.tolerance
     }
 
     /// The texture.
+    /// Images from [`Engine::upload_depth`] hold four pixels per texel (`Rgba32Uint`).
     pub fn texture(&self) -> &wgpu::Texture {
         &self.texture
     }
 
-    /// The depth as given, row 0 on top.
+    /// The NDC depths as they were given, one per pixel, row 0 on top.
     ///
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost),
@@ -53,10 +59,10 @@ impl DepthImage {
         let bytes = engine.scoped(|| {
             readback::read_texture(engine.device(), engine.queue(), &self.texture, row)
         })?;
-        host::collected(to_u32(&bytes).map(f32::from_bits), "depth")
+        memory::collected(to_u32(&bytes).map(f32::from_bits), "depth")
     }
 
-    /// An image that holds nothing yet.
+    /// An image without contents.
     pub(super) fn new(
         engine: &Engine,
         camera: &Camera,
@@ -98,8 +104,8 @@ impl DepthImage {
         })
     }
 
-    /// An image of the numbers given, for shaders that read it as `kind`, which is none of a depth
-    /// texture.
+    /// An image that holds the given NDC depths.
+    /// Shaders read it as `kind`, which must not be that of a depth texture.
     pub(super) fn uploaded(
         engine: &Engine,
         kind: SourceKind,
@@ -130,7 +136,7 @@ impl DepthImage {
             for (band, rows) in (0..).zip(ndc.chunks((rows_at_once * size.width) as usize)) {
                 image.write_rows(band * rows_at_once, rows, kind.pixels_of_texel());
                 if band > 0 {
-                    // Lets go of the previous band's staging.
+                    // An empty submit releases the staging buffer of the previous band.
                     engine.queue().submit([]);
                 }
             }
@@ -138,7 +144,7 @@ impl DepthImage {
         })
     }
 
-    /// Writes whole rows from row `first` on.
+    /// Writes whole rows, the first of which is row `first`.
     fn write_rows(&self, first: u32, rows: &[f32], pixels_of_texel: u32) {
         let width = self.size().width;
         let height = (rows.len() / width as usize) as u32;
@@ -162,12 +168,90 @@ impl DepthImage {
             write(0, whole, bytemuck::cast_slice(rows), 4 * width);
         }
         if whole < self.texture.width() {
-            // What fills a row's last texel repeats its last pixel.
+            // The last texel of a row repeats the row's last pixel.
             let (begin, end) = ((whole * pixels_of_texel) as usize, width as usize);
             let last = rows
                 .chunks_exact(end)
                 .flat_map(|row| (0..4).map(move |i| row[(begin + i).min(end - 1)]));
             write(whole, 1, bytemuck::cast_slice(&last.collect::<Vec<_>>()), 16);
         }
+    }
+}
+
+impl Engine {
+    /// Draws occluders into a depth image of the camera's size.
+    ///
+    /// # Errors
+    /// - [`Error::Mismatch`] for occluders of another device.
+    /// - [`Error::Invalid`] for a camera that float32 cannot hold.
+    /// - [`Error::Limit`] for an image larger than the device's textures.
+    /// - [`Error::OutOfMemory`].
+    pub fn render_depth(&self, occluders: &Occluders, camera: &Camera) -> Result<DepthImage> {
+        self.scoped(|| {
+            let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
+                | wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::COPY_SRC;
+            let depth = DepthImage::new(self, camera, OCCLUDER_DEPTH_FORMAT, usage)?;
+            let mut encoder = self.encoder("hiz.occluders.encoder");
+            self.context().record_occluders(&mut encoder, occluders, camera, &depth.view)?;
+            self.queue().submit([encoder.finish()]);
+            Ok(depth)
+        })
+    }
+
+    /// Makes occluder depth that holds for every larger image of the same view
+    /// ([`OccluderSurface::conservative_depth`]).
+    /// It is computed on the host and uploaded.
+    ///
+    /// # Errors
+    /// Those of [`Engine::upload_depth`] and [`OccluderSurface::conservative_depth`], and
+    /// [`Error::Mismatch`] for occluders of another device.
+    ///
+    /// [`OccluderSurface::conservative_depth`]: crate::OccluderSurface::conservative_depth
+    pub fn render_depth_conservative(
+        &self,
+        occluders: &Occluders,
+        camera: &Camera,
+        options: &ConservativeDepthOptions,
+    ) -> Result<DepthImage> {
+        self.check_process()?;
+        self.context().gpu.check_context("occluders", occluders.context)?;
+        self.upload_depth(&occluders.surface().conservative_depth(camera, options)?, camera)
+    }
+
+    /// Uploads NDC depth: one float32 per pixel, row 0 on top, in the camera's size and convention.
+    /// Values that are no depth (NaN, infinite, outside 0..=1) become far when they are read.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] for another number of pixels.
+    /// - [`Error::Limit`] for an image larger than the device's textures.
+    /// - [`Error::OutOfMemory`].
+    pub fn upload_depth(&self, ndc: &[f32], camera: &Camera) -> Result<DepthImage> {
+        DepthImage::uploaded(self, SourceKind::Bits, ndc, camera)
+    }
+
+    /// [`Engine::upload_depth`] for depth that was rounded within `tolerance` before.
+    /// For half floats that is [`DepthTolerance::HALF`].
+    ///
+    /// # Errors
+    /// Those of [`Engine::upload_depth`], and [`Error::Invalid`] for a tolerance outside 0..=0.5.
+    pub fn upload_depth_within(
+        &self,
+        ndc: &[f32],
+        camera: &Camera,
+        tolerance: DepthTolerance,
+    ) -> Result<DepthImage> {
+        let tolerance = tolerance.checked()?;
+        Ok(DepthImage { tolerance, ..self.upload_depth(ndc, camera)? })
+    }
+
+    /// [`Engine::upload_depth`] into a float texture, for tests.
+    /// Shaders sample it like a depth texture.
+    ///
+    /// # Errors
+    /// Those of [`Engine::upload_depth`].
+    #[cfg(feature = "testing")]
+    pub fn upload_depth_sampled(&self, ndc: &[f32], camera: &Camera) -> Result<DepthImage> {
+        DepthImage::uploaded(self, SourceKind::Float, ndc, camera)
     }
 }

@@ -1,68 +1,69 @@
-//! The explanation of one verdict, out of what the shader wrote down.
+//! The explanation of one verdict, made from what the shader wrote down.
 
-use crate::camera::Camera;
-use crate::cull::{BEHIND, CLEAR, CullOptions, ExplanationRecord, Fit, LEVEL_MASK, Reading};
-use crate::depth::ViewDepth;
-
-use super::culling::OCCLUDED;
+use crate::cull::explain::{BEHIND, CLEAR, ExplanationRecord, LEVEL_MASK, Reading, Stage};
+use crate::cull::options::{CullOptions, Fit};
+use crate::input::camera::Camera;
+use crate::input::depth::ViewDepth;
+use crate::output::verdict::Verdict;
 
 /// Why an instance got its verdict: the cull's own steps, run for it once more.
 ///
 /// A member of a group that was hidden as a whole was never tested by itself.
-/// Its verdict is then the group's (told of in `group`), or outside where its own test says so;
-/// everything else here is its own test, which may have kept it.
+/// Its verdict is then that of the group, which `group` explains, or outside if its own test says
+/// so.
+/// Everything else here is its own test, which may have kept it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explanation {
-    /// 0 outside, 1 occluded, 2 visible, 3 invalid (kept).
-    pub verdict: u8,
+    /// The verdict.
+    pub verdict: Verdict,
     /// First and last pixel column and row that the projection may touch, inclusive: x0, y0, x1,
     /// y1.
     pub rectangle: Option<[i32; 4]>,
     /// The level of the footprint.
     pub level: Option<u32>,
-    /// The texels (x, y) that were read, in order: those of the footprint, then those of a descent;
-    /// the first 4,096.
+    /// The texels (x, y) that were read, in order: those of the footprint, then those of a descent.
+    /// At most the first 4,096.
     pub texels: Vec<[u32; 2]>,
-    /// Their levels.
+    /// The level of each of these texels.
     pub texel_levels: Vec<u32>,
-    /// Their depths.
+    /// The NDC depth of each of these texels.
     pub texel_depths: Vec<f32>,
-    /// How many were read, those that are not listed included.
+    /// How many texels were read, including those that are not listed.
     pub texels_read: u32,
-    /// Which of the listed texels decided: the farthest one that hides it, or the one that does
-    /// not.
-    /// `None` where no single one did or it is not listed.
+    /// Which of the listed texels decided: the farthest one that hides the instance, or the one
+    /// that does not.
+    /// `None` if no single texel decided, or if it is not listed.
     pub decisive: Option<usize>,
-    /// The farthest depth of those that hide it, or the depth that does not.
+    /// The farthest NDC depth of those that hide the instance, or the depth that does not.
     pub farthest: Option<f32>,
     /// The NDC depth of the bounds' nearest point, an estimate.
     pub nearest: Option<f64>,
-    /// `farthest` as view depth, in world units; infinite for far.
-    /// `None` where the camera's NDC depth does not tell it alone: an orthographic camera of a bare
-    /// matrix, an oblique near plane.
+    /// `farthest` as view depth in world units; infinite for far.
+    /// `None` if view depth does not follow from the camera's NDC depth alone.
+    /// That is so for an orthographic camera from a bare matrix, and for an oblique near plane.
     pub farthest_z: Option<f64>,
     /// The view depth of the bounds' nearest point in world units, an estimate.
-    /// `None` for an orthographic camera of a bare matrix.
+    /// `None` for an orthographic camera from a bare matrix.
     pub nearest_z: Option<f64>,
-    /// The instance was updated since the cull: everything here is of its new bounds, and the
-    /// cull's verdict may be another.
+    /// Whether the instance was updated since the cull.
+    /// If so, everything here is about its new bounds, and the cull's verdict may be another.
     pub stale: bool,
-    /// Of a member of a group that was hidden as a whole: the test of the box around the group.
+    /// For a member of a group that was hidden as a whole: the test of the box around the group.
     pub group: Option<Box<Self>>,
-    /// In words.
+    /// The reason in words.
     pub reason: String,
 }
 
-/// What the shader wrote down of one test, and what the test was asked.
+/// What the shader wrote down about one test, and what the test was given.
 pub(super) struct Told<'a> {
     pub(super) record: ExplanationRecord,
     pub(super) readings: &'a [Reading],
     pub(super) camera: &'a Camera,
-    /// Of a group: those of its test.
+    /// For the test of a group: the options of that test.
     pub(super) options: &'a CullOptions,
 }
 
-/// What a test came to.
+/// How a test ended, and which texel decided.
 struct End {
     reason: &'static str,
     decisive: Option<usize>,
@@ -75,18 +76,14 @@ impl End {
     }
 }
 
-// The stages of `shaders/shared/outcome.wgsl` from which on there is a rectangle, and pixels in it.
-const AT_RECTANGLE: u32 = 3;
-const AT_DEPTH: u32 = 4;
-
 impl Told<'_> {
     pub(super) fn explanation(&self) -> Explanation {
         let record = &self.record;
-        let reached_depth = record.stage >= AT_DEPTH;
+        let reached_depth = record.stage() >= Stage::Depth;
         let End { reason, decisive, farthest } = self.end();
         let [least, greatest, w_least, _] = record.depths.map(f64::from);
         let nearest = if self.camera.convention().is_reversed() { greatest } else { least };
-        let is_before_eye = record.stage >= AT_RECTANGLE;
+        let is_before_eye = record.stage() >= Stage::Rectangle;
         let view_depth = ViewDepth::new(self.camera);
         let z_of = |ndc: f64| view_depth.as_ref().and_then(|view| view.of_ndc(ndc));
         let nearest_z = match view_depth.as_ref().and_then(|view| view.of_w(w_least)) {
@@ -94,7 +91,7 @@ impl Told<'_> {
             None => z_of(nearest),
         };
         Explanation {
-            verdict: record.verdict as u8,
+            verdict: Verdict::of_word(record.verdict),
             rectangle: reached_depth.then_some(record.pixels),
             level: reached_depth.then_some(record.level),
             texels: self.readings.iter().map(|[_, x, y, _]| [*x, *y]).collect(),
@@ -112,30 +109,37 @@ impl Told<'_> {
         }
     }
 
-    /// How the test ended; the stages of `shaders/shared/outcome.wgsl`.
+    /// How the test ended.
     fn end(&self) -> End {
         let record = &self.record;
-        let is_hidden = record.verdict == u32::from(OCCLUDED);
-        match record.stage {
-            0 => {
+        let verdict = Verdict::of_word(record.verdict);
+        let is_hidden = verdict == Verdict::Occluded;
+        match record.stage() {
+            Stage::Validity => {
                 End::new("the bounds are not finite, negative, or too large for this camera: kept")
             }
-            1 => End::new("outside one plane of the frustum"),
-            2 => End::new("crosses the plane of the eye: kept"),
-            AT_RECTANGLE if record.verdict == 0 => End::new("between the pixel centres"),
-            AT_RECTANGLE => End::new(
+            Stage::Frustum => End::new("outside one plane of the frustum"),
+            Stage::EyePlane => End::new("crosses the plane of the eye: kept"),
+            Stage::Rectangle if verdict == Verdict::Outside => {
+                End::new("between the pixel centres")
+            }
+            Stage::Rectangle => End::new(
                 "touches no pixel for sure, but no plane of the frustum separates it: kept",
             ),
-            _ if record.texels_read == 0 => End::new(match record.stage {
-                AT_DEPTH => "the pyramid's reduction has not run: kept",
-                _ => "spans more texels of the coarsest stored level than the footprint has: kept",
-            }),
-            AT_DEPTH => self.footprint("not surely behind the farthest depth of the texels: kept"),
-            5 if is_hidden => {
+            Stage::Depth if record.texels_read == 0 => {
+                End::new("the pyramid's reduction has not run: kept")
+            }
+            _ if record.texels_read == 0 => End::new(
+                "spans more texels of the coarsest stored level than the footprint has: kept",
+            ),
+            Stage::Depth => {
+                self.footprint("not surely behind the farthest depth of the texels: kept")
+            }
+            Stage::Block if is_hidden => {
                 self.footprint("behind the farthest depth of all texels that it can touch")
             }
-            5 => End::new("behind the texels, but not surely inside their block: kept"),
-            _ if is_hidden => {
+            Stage::Block => End::new("behind the texels, but not surely inside their block: kept"),
+            Stage::Descent | Stage::Level if is_hidden => {
                 let farthest = (record.any_before != 0).then_some(record.farthest_before);
                 let is_it = |r: &Reading| r[0] & BEHIND != 0 && Some(r[3]) == farthest;
                 End {
@@ -144,7 +148,7 @@ impl Told<'_> {
                     farthest: farthest.map(f32::from_bits),
                 }
             }
-            _ => self.failed_descent(),
+            Stage::Descent | Stage::Level => self.failed_descent(),
         }
     }
 
@@ -159,8 +163,9 @@ impl Told<'_> {
         }
     }
 
-    /// Why a descent did not hide the volume: at a texel that shows it, at the end of its budget,
-    /// or at the last certificate.
+    /// Why a descent did not hide the volume.
+    /// It ended at a texel that does not hide it, at the end of its budget, or at the last
+    /// certificate.
     fn failed_descent(&self) -> End {
         let [word, x, y, bits] = self.record.last;
         let level = word & LEVEL_MASK;
@@ -170,7 +175,7 @@ impl Told<'_> {
         let end_x = ((i64::from(x) + 1) << level).min(i64::from(size.width));
         let end_y = ((i64::from(y) + 1) << level).min(i64::from(size.height));
         if word & (BEHIND | CLEAR) != 0 {
-            // The walk ends at the rectangle's last pixel.
+            // The descent ends at the rectangle's last pixel.
             let is_last = (begin_x..end_x).contains(&x1) && (begin_y..end_y).contains(&y1);
             return End::new(if is_last {
                 "behind every pixel that it can touch, but those are not surely all: kept"

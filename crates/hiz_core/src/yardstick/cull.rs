@@ -1,22 +1,38 @@
-//! The flat cull of boxes without certificates, in the same frame.
+//! A flat cull of boxes without certificates, recorded in the same pass as the library's own.
 
-use crate::bounds::BoundsKind;
-use crate::camera::Camera;
-use crate::cull::{self, CullInputs, CullOptions, Hierarchy};
+use crate::cull::inputs::CullInputs;
+use crate::cull::options::{CullOptions, Hierarchy};
+use crate::cull::pipelines::{CullKey, DepthStore, FLAT, ReportKey, flat_pipeline, module};
+use crate::cull::record::record_cull_by;
 use crate::error::{Error, Result};
+use crate::gpu::device::Gpu;
+use crate::gpu::shader::{Source, wgsl};
 use crate::headless::Engine;
+use crate::headless::readback::{self, BufferRange};
+use crate::input::bounds::BoundsKind;
+use crate::input::camera::Camera;
 use crate::instances::Instances;
+use crate::output::visible::Visible;
 use crate::pyramid::Pyramid;
-use crate::readback::{self, BufferRange};
-use crate::visible::Visible;
 
-/// Records the cull of `instances`, boxes, as one would write it who trusts float32: it hides what
-/// can be seen.
-/// Of the options order and footprint count.
+/// The shader of the flat cull of boxes without certificates.
+pub(crate) fn cull_module(store: DepthStore) -> Source {
+    // The bounds' shader files use the types of the supporting planes, which this cull never tests.
+    let classify = [wgsl!("cull/supporting_planes"), wgsl!("yardstick/classify_uncertified")];
+    module(store, BoundsKind::Box, &classify, FLAT)
+}
+
+fn pipeline(gpu: &Gpu, key: &CullKey, report: &ReportKey) -> Result<wgpu::ComputePipeline> {
+    flat_pipeline(gpu, "hiz.yardstick.cull", cull_module(key.store), key, report)
+}
+
+/// Records a cull of `instances`, which must be boxes, that trusts float32.
+/// It has no margins, so it hides some instances that can be seen.
+/// Of the options, only order and footprint have an effect.
 ///
 /// # Errors
-/// As [`HizContext::record_cull`](crate::HizContext::record_cull), and [`Error::Invalid`] for other
-/// volumes.
+/// Those of [`HizContext::record_cull`](crate::HizContext::record_cull), and [`Error::Invalid`] for
+/// other bounds than boxes.
 pub fn record_uncertified_cull(
     engine: &Engine,
     encoder: &mut wgpu::CommandEncoder,
@@ -34,15 +50,16 @@ pub fn record_uncertified_cull(
     }
     let options =
         &CullOptions { hierarchy: Hierarchy::Never, statistics: false, ..options.clone() };
-    let inputs = CullInputs { instances, camera, pyramid, options, certified: false, idle: false };
-    cull::record(&engine.context().gpu, encoder, &inputs, visible)
+    let inputs = CullInputs { instances, camera, pyramid, options, idle: false };
+    record_cull_by(&engine.context().gpu, encoder, &inputs, visible, pipeline)
 }
 
-/// Whether each instance is kept, by the mask of the last cull into `visible`: what a yardstick
-/// hides is counted beside its time.
+/// Whether each instance is kept, by the mask of the last cull into `visible`.
+/// A benchmark counts what a yardstick hides beside its time.
 ///
 /// # Errors
-/// [`Error::Mismatch`] where there is no mask, [`Error::DeviceLost`].
+/// - [`Error::Mismatch`] for a cull without a mask.
+/// - [`Error::DeviceLost`].
 pub fn read_mask(engine: &Engine, visible: &Visible) -> Result<Vec<bool>> {
     if !visible.outputs().mask {
         let got = visible.outputs();

@@ -1,21 +1,27 @@
-//! What the library is measured against: the same work in the shapes that others give it.
-//! For benchmarks and their tests alone.
+//! Yardsticks: reference work that the library is measured against.
+//!
+//! `reduce` builds a pyramid with one dispatch per level, and `cull` culls without certificates.
+//! They are for benchmarks and their tests alone.
 
 mod cull;
 mod reduce;
 
 use std::time::Instant;
 
+#[cfg(feature = "testing")]
+pub(crate) use cull::cull_module;
 pub use cull::{read_mask, record_uncertified_cull};
+#[cfg(feature = "testing")]
+pub(crate) use reduce::modules;
 pub use reduce::{PerLevelReduction, ReductionShape, reduce};
 
 use crate::error::Result;
-use crate::headless::Engine;
-use crate::readback;
+use crate::headless::{Engine, readback};
 
-/// Milliseconds on the wall from the submit of what `record` records to its end.
-/// (Timestamps are wrong on lavapipe once a render pass has run.)
-/// Whatever was submitted before is waited for first; recording is not counted.
+/// Wall-clock milliseconds from the submit of what `record` records to its end.
+///
+/// Waits first for whatever was submitted before; recording is not counted.
+/// Timestamps are not used, because they are wrong on lavapipe once a render pass has run.
 ///
 /// # Errors
 /// Those of `record`, and [`Error::DeviceLost`](crate::Error::DeviceLost).
@@ -36,19 +42,19 @@ pub fn submitted_ms(
     Ok(start.elapsed().as_secs_f64() * 1e3)
 }
 
-/// Milliseconds of a submit that does nothing, and the wait for it.
+/// Wall-clock milliseconds of a submit that does nothing, and of the wait for it.
 ///
 /// # Errors
-/// As [`submitted_ms`].
+/// Those of [`submitted_ms`].
 pub fn empty_submit_ms(engine: &Engine) -> Result<f64> {
     submitted_ms(engine, |_| Ok(()))
 }
 
-/// Milliseconds of copying `from` into `to` on one thread of the host: what touching every number
-/// once costs.
+/// Wall-clock milliseconds of copying `from` into `to` on one thread of the host.
+/// This is the price of touching every number once.
 ///
 /// # Panics
-/// If the two are not of the same length.
+/// If the lengths differ.
 pub fn memcpy_ms(from: &[f32], to: &mut [f32]) -> f64 {
     let start = Instant::now();
     to.copy_from_slice(std::hint::black_box(from));

@@ -1,14 +1,34 @@
-//! The reduction as one dispatch a level, on a flat buffer or on a texture's mip levels.
+//! The reduction with one dispatch per level, into a flat buffer or a texture's mip levels.
 
-use crate::camera::ImageSize;
 use crate::error::Result;
-use crate::gpu::Gpu;
+use crate::gpu::buffers::entry;
+use crate::gpu::depth_source::SourceKind;
+use crate::gpu::device::Gpu;
+use crate::gpu::layouts::Binding;
+use crate::gpu::pipelines::{Compute, flag};
+use crate::gpu::shader::{File, Source, wgsl};
+use crate::headless::readback::{self, BufferRange};
 use crate::headless::{DepthImage, Engine};
-use crate::pyramid::{Pyramid, entry};
-use crate::readback::{self, BufferRange};
-use crate::shader::{self, SourceKind};
+use crate::input::image::ImageSize;
+use crate::pyramid::Pyramid;
 
-/// What one dispatch a level writes into.
+fn module(source: SourceKind, entry: File) -> Source {
+    Source::of(&[&[wgsl!("gpu/depth_bits")], source.files(), &[entry]])
+}
+
+const IN_BUFFER: File = wgsl!("yardstick/reduce_buffer");
+const IN_TEXTURE: File = wgsl!("yardstick/reduce_texture");
+
+/// A name and the module of each shape.
+#[cfg(feature = "testing")]
+pub(crate) fn modules(source: SourceKind) -> [(&'static str, Source); 2] {
+    [
+        ("one dispatch a level, buffer", module(source, IN_BUFFER)),
+        ("one dispatch a level, textures", module(source, IN_TEXTURE)),
+    ]
+}
+
+/// What each dispatch writes into.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReductionShape {
     /// A storage buffer, by vectors of four texels.
@@ -17,8 +37,8 @@ pub enum ReductionShape {
     Textures,
 }
 
-/// `shaders/yardstick/reduce_buffer.wgsl`, `YardstickLevel`: offset and stride in vectors of four
-/// texels.
+/// Twin: `shaders/yardstick/reduce_buffer.wgsl`, `YardstickLevel`.
+/// Offset and stride are in vectors of four texels.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct Level {
@@ -41,8 +61,8 @@ enum Storage {
     Textures(wgpu::Texture),
 }
 
-/// All levels of a depth image's pyramid, reduced by one dispatch each; everything that can be made
-/// beforehand is.
+/// All levels of a depth image's pyramid, reduced by one dispatch each.
+/// Everything that can be made beforehand is made beforehand.
 #[derive(Debug)]
 pub struct PerLevelReduction {
     levels: Vec<Level>,
@@ -51,10 +71,10 @@ pub struct PerLevelReduction {
 }
 
 impl PerLevelReduction {
-    /// For an image of `depth`, which has more than one pixel.
+    /// Prepares the reduction of `depth`, which must have more than one pixel.
     ///
     /// # Errors
-    /// [`Error::Device`](crate::Error::Device) where the device has no memory for it.
+    /// [`Error::Device`](crate::Error::Device) if the device has no memory for it.
     pub fn new(engine: &Engine, depth: &DepthImage, shape: ReductionShape) -> Result<Self> {
         let gpu = &*engine.context().gpu;
         let levels = levels(depth.size());
@@ -89,7 +109,7 @@ impl PerLevelReduction {
         }
     }
 
-    /// Level `k`, 1 or more, row by row.
+    /// The texels of level `k`, which is at least 1, in row order.
     ///
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost).
@@ -149,7 +169,7 @@ impl PerLevelReduction {
 /// Records the library's own reduction of `depth` into `pyramid`.
 ///
 /// # Errors
-/// As [`HizContext::record_reduce`](crate::HizContext::record_reduce).
+/// Those of [`HizContext::record_reduce`](crate::HizContext::record_reduce).
 pub fn reduce(
     engine: &Engine,
     encoder: &mut wgpu::CommandEncoder,
@@ -174,8 +194,8 @@ fn levels(size: ImageSize) -> Vec<Level> {
     levels
 }
 
-/// A texture halves its mip levels downwards, a pyramid upwards: sides that are powers of two hold
-/// both.
+/// A texture's mip levels round odd sizes down, and a pyramid's levels round them up.
+/// Sides that are powers of two are large enough for both.
 fn mip_levels(gpu: &Gpu, levels: &[Level]) -> wgpu::Texture {
     gpu.device().create_texture(&wgpu::TextureDescriptor {
         label: Some("hiz.yardstick.mips"),
@@ -195,7 +215,7 @@ fn mip_levels(gpu: &Gpu, levels: &[Level]) -> wgpu::Texture {
     })
 }
 
-/// The dispatch that makes level `k` out of the one before.
+/// The dispatch that makes level `k` from the level before.
 fn step(
     gpu: &Gpu,
     depth: &DepthImage,
@@ -213,50 +233,26 @@ fn step(
             ..Default::default()
         })
     };
-    let from_source = [("FROM_SOURCE", f64::from(u8::from(k == 1)))];
-    let reversed = ("REVERSED", f64::from(u8::from(depth.camera().convention().is_reversed())));
-    let constants = [reversed, from_source[0]];
-    let texture = |binding| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::COMPUTE,
-        ty: wgpu::BindingType::Texture {
-            sample_type: wgpu::TextureSampleType::Float { filterable: false },
-            view_dimension: wgpu::TextureViewDimension::D2,
-            multisampled: false,
-        },
-        count: None,
-    };
-    let mut entries = vec![
-        wgpu::BindGroupLayoutEntry { ty: kind.binding(), ..texture(0) },
-        wgpu::BindGroupLayoutEntry {
-            ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering),
-            ..texture(1)
-        },
-        wgpu::BindGroupLayoutEntry { ty: buffer(wgpu::BufferBindingType::Uniform), ..texture(2) },
+    let constants = [
+        ("REVERSED", flag(depth.camera().convention().is_reversed())),
+        ("FROM_SOURCE", flag(k == 1)),
     ];
-    let (module, name, uniform, workgroups) = match storage {
+    let mut bindings =
+        vec![(0, Binding::Depth(kind)), (1, Binding::Sampler), (2, Binding::Uniform)];
+    let (source_module, entry_point, uniform, workgroups) = match storage {
         Storage::Buffer(_) => {
-            let storage = buffer(wgpu::BufferBindingType::Storage { read_only: false });
-            entries.push(wgpu::BindGroupLayoutEntry { ty: storage, ..texture(3) });
+            bindings.push((3, Binding::Write));
             (
-                shader::yardstick_reduce_buffer(kind),
+                module(kind, IN_BUFFER),
                 "reduce_buffer",
                 gpu.uniform("hiz.yardstick.step", &[read, written])?,
                 [written.stride.div_ceil(64), written.height],
             )
         }
         Storage::Textures(_) => {
-            entries.push(texture(3));
-            entries.push(wgpu::BindGroupLayoutEntry {
-                ty: wgpu::BindingType::StorageTexture {
-                    access: wgpu::StorageTextureAccess::WriteOnly,
-                    format: wgpu::TextureFormat::R32Float,
-                    view_dimension: wgpu::TextureViewDimension::D2,
-                },
-                ..texture(4)
-            });
+            bindings.extend([(3, Binding::Depth(SourceKind::Float)), (4, Binding::WriteFloats)]);
             (
-                shader::yardstick_reduce_texture(kind),
+                module(kind, IN_TEXTURE),
                 "reduce_texture",
                 gpu.uniform(
                     "hiz.yardstick.step",
@@ -266,11 +262,14 @@ fn step(
             )
         }
     };
-    let layout = gpu.device().create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("hiz.yardstick.layout"),
-        entries: &entries,
-    });
-    let pipeline = gpu.pipeline("hiz.yardstick.pipeline", &module, name, &[&layout], &constants)?;
+    let layout = gpu.layout("hiz.yardstick.layout", &bindings)?;
+    let pipeline = gpu.compute_pipeline(&Compute {
+        label: "hiz.yardstick.pipeline",
+        source: source_module,
+        entry_point,
+        layouts: std::slice::from_ref(&layout),
+        constants: &constants,
+    })?;
     let mut bound = vec![
         entry(0, wgpu::BindingResource::TextureView(&source)),
         entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
@@ -280,26 +279,19 @@ fn step(
     match storage {
         Storage::Buffer(buffer) => bound.push(entry(3, buffer.as_entire_binding())),
         Storage::Textures(mips) => {
-            // The first dispatch reads the source and binds any other level as the one before.
+            // The first dispatch reads the depth image, so any level can be bound as the level
+            // before.
             let finer = if k == 1 { idle_texture(gpu) } else { mips.clone() };
             views = [mip(&finer, if k == 1 { 1 } else { k - 1 }), mip(mips, k)];
             bound.push(entry(3, wgpu::BindingResource::TextureView(&views[0])));
             bound.push(entry(4, wgpu::BindingResource::TextureView(&views[1])));
         }
     }
-    let bindings = gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("hiz.yardstick.bindings"),
-        layout: &layout,
-        entries: &bound,
-    });
+    let bindings = gpu.bind_group("hiz.yardstick.bindings", &layout, &bound)?;
     Ok(Step { pipeline, bindings, workgroups })
 }
 
-fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
-    wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None }
-}
-
-/// Something to bind where nothing is read.
+/// A texture that is bound but never read.
 fn idle_texture(gpu: &Gpu) -> wgpu::Texture {
     gpu.device().create_texture(&wgpu::TextureDescriptor {
         label: Some("hiz.yardstick.idle"),

@@ -6,7 +6,8 @@ use crate::scalar::{Ball, Scalar};
 use crate::volume::Volume;
 use std::cmp::Ordering;
 
-/// Whether a point lies in a volume, both taken exactly; never in one that is not valid.
+/// Whether a point lies in a volume, decided exactly.
+/// `false` for an invalid volume and for a point that is not finite.
 #[must_use]
 pub fn contains(volume: &Volume, point: [f64; 3]) -> bool {
     volume.is_valid()
@@ -16,12 +17,17 @@ pub fn contains(volume: &Volume, point: [f64; 3]) -> bool {
             .expect("exact numbers have a sign")
 }
 
-/// How far the points `world_from_mesh * p` of `vertices` lie outside of the volume, in world
-/// units: none if all of them lie in it, the products taken exactly; infinite for a volume that is
-/// none or a point that is not finite.
+/// How far the vertices of a mesh lie outside of a volume, in world units.
 ///
-/// The distance is in plain float64 and no more than what really sticks out, up to rounding.
-/// (The volume is convex: the mesh lies in it if its vertices do.)
+/// The points are `world_from_mesh * p` for the `vertices` p; the matrix is 4x4, row-major and
+/// affine, and `None` is the identity.
+/// Whether a point lies in the volume is decided exactly, products included.
+/// The volume is convex, so it contains the mesh if it contains the vertices.
+///
+/// - `None`: the volume contains all points.
+/// - Infinity: the volume is invalid, or a number is not finite.
+/// - Otherwise the largest distance in plain float64.
+///   Up to rounding, it is no more than what really sticks out.
 pub fn check_bounds(
     volume: &Volume,
     vertices: &[[f64; 3]],
@@ -41,7 +47,7 @@ pub fn check_bounds(
             .expect("exact numbers have a sign");
         if !inside {
             let at: [Ball; 3] = placed(p, world_from_mesh);
-            // The offender may lie outside by less than float64 can say.
+            // The point may lie outside by less than float64 can represent.
             let distance = distance(volume, at.map(|x| x.mid)).max(f64::MIN_POSITIVE);
             worst = Some(worst.map_or(distance, |w| w.max(distance)));
         }
@@ -60,7 +66,7 @@ fn placed<S: Scalar>(p: &[f64; 3], world_from_mesh: Option<&[f64; 16]>) -> [S; 3
     }
 }
 
-/// Whether every inequality of the volume holds; none if one is open.
+/// Whether every inequality of the volume holds; `None` if one stays open.
 fn all_hold<S: Scalar>(volume: &Volume, p: &[S; 3]) -> Option<bool> {
     let mut open = false;
     for rest in rests(volume, p) {
@@ -73,7 +79,7 @@ fn all_hold<S: Scalar>(volume: &Volume, p: &[S; 3]) -> Option<bool> {
     (!open).then_some(true)
 }
 
-/// What the volume's inequalities leave: the point is inside if none is negative.
+/// The slacks of the volume's inequalities: the point is inside if none of them is negative.
 fn rests<S: Scalar>(volume: &Volume, p: &[S; 3]) -> Vec<S> {
     let number = |x: f64| S::exact(x);
     match volume {
@@ -104,9 +110,11 @@ fn rests<S: Scalar>(volume: &Volume, p: &[S; 3]) -> Vec<S> {
     }
 }
 
-/// Directions whose slabs together are the parallelepiped with these half axes: cross products of
-/// two where it is solid; where it is flat, what bounds it within its plane or line, too.
-/// Every direction's slab contains it, so that none is wrong.
+/// Directions whose slabs together are the parallelepiped with these half axes.
+///
+/// If it is solid, the cross products of two half axes suffice.
+/// If it is flat, directions within its plane or line bound it as well.
+/// The slab of every direction contains the parallelepiped, so none of them is wrong.
 fn normals<S: Scalar>(e: &[[S; 3]; 3]) -> Vec<[S; 3]> {
     let pairs = [(0, 1), (1, 2), (2, 0)];
     let faces = pairs.map(|(i, j): (usize, usize)| cross(&e[i], &e[j]));
@@ -133,7 +141,8 @@ fn dot<S: Scalar>(u: &[S; 3], v: &[S; 3]) -> S {
     u[0].times(&v[0]).plus(&u[1].times(&v[1])).plus(&u[2].times(&v[2]))
 }
 
-/// How far a point lies outside, in plain float64: the farthest of the volume's slabs.
+/// How far a point lies outside, in plain float64.
+/// For an oriented box, it is the distance to its farthest slab.
 fn distance(volume: &Volume, p: [f64; 3]) -> f64 {
     let norm = |v: [f64; 3]| {
         let scale = unit_scale(v);

@@ -1,5 +1,8 @@
-//! Whether occluder proxies lie inside their mesh and bounds contain theirs: what a cull takes for
-//! granted, decided exactly.
+//! Containment: whether occluder proxies lie inside their mesh, and whether bounds contain theirs.
+//!
+//! A cull takes both for granted; here they are decided exactly.
+//! `proxy` and `bounds` answer the two questions.
+//! `winding` says how often a mesh winds about a point, and `ratio` has the exact fractions.
 
 mod bounds;
 mod proxy;
@@ -10,8 +13,10 @@ pub use bounds::{check_bounds, contains};
 pub use proxy::{Protrusion, check_proxy};
 
 /// A power of two that brings the largest of the numbers near 1.
-/// Distances are told in plain float64, and its squares and products leave its range where
-/// coordinates are large or small; times a power of two nothing is lost.
+///
+/// Distances are computed in plain float64.
+/// Squares and products of large or small coordinates would leave its range, and scaling by a power
+/// of two loses nothing.
 fn unit_scale(numbers: impl IntoIterator<Item = f64>) -> f64 {
     let largest = numbers.into_iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     if largest > 0.0 && largest.is_finite() {
@@ -26,17 +31,17 @@ fn unit_scale(numbers: impl IntoIterator<Item = f64>) -> f64 {
 pub struct TriangleMesh<'a> {
     /// Positions.
     pub vertices: &'a [[f64; 3]],
-    /// Indices of vertices.
+    /// Three indices into `vertices` per triangle.
     pub triangles: &'a [[u32; 3]],
 }
 
-/// A mesh that has no inside, or is none.
+/// A mesh that has no inside, or that is malformed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MeshError {
-    /// NaN or infinite positions.
+    /// A position is NaN or infinite; the number of its vertex.
     #[error("expected finite vertices, got NaN or infinity at vertex {0}")]
     NonFinite(usize),
-    /// An index past the vertices.
+    /// An index does not name a vertex.
     #[error("expected indices below the {vertices} vertices, got {index}")]
     Index {
         /// Number of vertices.
@@ -44,13 +49,14 @@ pub enum MeshError {
         /// The index.
         index: u32,
     },
-    /// Borders that do not cancel.
+    /// The mesh is not closed: some edges do not cancel.
     #[error(
-        "expected a closed mesh whose triangles run consistently around, got {edges} edges that run more often in one direction \
-         than in the other (the first in triangle {triangle}); equal positions count as one vertex"
+        "expected a closed mesh whose triangles run consistently around, got {edges} edges that \
+         run more often in one direction than in the other (the first in triangle {triangle}); \
+         equal positions count as one vertex"
     )]
     Open {
-        /// How many.
+        /// How many such edges there are.
         edges: usize,
         /// A triangle with such an edge.
         triangle: usize,
@@ -73,9 +79,10 @@ impl TriangleMesh<'_> {
         self.triangles[triangle].map(|v| self.vertices[v as usize])
     }
 
-    /// Refuses meshes that have no inside: every edge has to run as often one way as the other.
+    /// Refuses meshes that have no inside: every edge must run as often in one direction as in the
+    /// other.
     fn check_closed(&self) -> Result<(), MeshError> {
-        // Keys order as bits; adding 0 makes -0 and 0 equal.
+        // Keys compare as bits; adding 0 makes -0 equal to 0.
         let key = |v: u32| self.vertices[v as usize].map(|x| (x + 0.0).to_bits());
         let mut edges: Vec<(_, _, bool, usize)> = Vec::with_capacity(3 * self.triangles.len());
         for (number, t) in self.triangles.iter().enumerate() {

@@ -1,42 +1,45 @@
 //! Whether an occluder proxy lies inside its mesh.
 //!
-//! The solid of a closed mesh is its surface and all points that it winds about.
-//! A proxy triangle lies in it if the mesh winds about all of its points that are not on the mesh.
-//! The mesh meets the triangle's plane in segments and in triangles of that plane; between the
-//! segments the winding is constant.
-//! So one point of each part decides: the parts are found by slabs between the x coordinates of all
-//! ends and crossings of segments, exactly, and each part has a point in the middle of some slab.
+//! The solid of a closed mesh is its surface, together with all points that it winds about.
+//! A proxy triangle lies in it if the mesh winds about all of the triangle's points that are not on
+//! the mesh.
+//!
+//! The mesh meets the plane of the triangle in segments and in triangles of that plane.
+//! Between the segments the winding is constant, so one point of each part decides.
+//! The ends and crossings of all segments cut the plane into strips by their x coordinates,
+//! computed exactly.
+//! Each part has a point in the middle of some strip.
 
 use super::ratio::Ratio;
 use super::winding::{Place, surely_beside};
 use super::{MeshError, TriangleMesh, unit_scale};
 use std::cmp::Ordering;
 
-/// What of a proxy is outside of its mesh.
+/// The part of a proxy that is outside of its mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Protrusion {
     /// Proxy triangles that are outside somewhere, ascending.
     pub triangles: Vec<usize>,
-    /// For each of them a point that is outside, rounded to float64.
+    /// One point per such triangle that is outside, rounded to float64.
     pub witnesses: Vec<[f64; 3]>,
     /// Proxy vertices of triangles that are outside, ascending.
     pub vertices: Vec<usize>,
-    /// The largest distance of a witness or an outside vertex to the mesh, in plain float64: no
-    /// more than what the proxy really protrudes.
+    /// The largest distance of a witness or an outside vertex to the mesh, in plain float64.
+    /// The proxy protrudes at least that far.
     pub distance: f64,
 }
 
-/// What of `proxy` does not lie in the closed solid of `mesh`: nothing, if the proxy is safe to
-/// draw in its mesh's stead.
-/// Exact.
+/// Which part of `proxy` does not lie in the closed solid of `mesh`, decided exactly.
 ///
-/// Any ray from outside of the solid that meets a safe proxy has met the mesh before, or meets it
-/// there.
+/// If the result is empty, the proxy is safe to draw in its mesh's stead.
+/// Any ray from outside of the solid that meets a safe proxy meets the mesh before, or at the same
+/// point.
 /// The proxy need not be closed.
-/// Proxy triangles without area hide nothing and are passed over.
+/// Proxy triangles without area hide nothing and are skipped.
 ///
 /// # Errors
-/// Meshes with bad positions or indices, and a `mesh` that is not closed: it has no inside.
+/// - [`MeshError::NonFinite`] and [`MeshError::Index`] for bad positions or indices of either mesh.
+/// - [`MeshError::Open`] for a `mesh` that is not closed, because it has no inside.
 pub fn check_proxy(
     proxy: &TriangleMesh<'_>,
     mesh: &TriangleMesh<'_>,
@@ -68,26 +71,26 @@ pub fn check_proxy(
     Ok(found)
 }
 
-/// A point of the triangle's plane, two coordinates of it.
+/// A point of the triangle's plane, by two of its coordinates.
 type Point = [Ratio; 2];
 
-/// A triangle and the two axes that its plane is drawn in.
+/// A triangle, with the two axes onto which its plane is projected.
 struct Flat {
     corners: [[f64; 3]; 3],
-    /// The axis that is left out, the other two following it.
+    /// The axis that is left out; the other two follow it in cyclic order.
     dropped: usize,
     normal: [Ratio; 3],
 }
 
 impl Flat {
-    /// None for a triangle without area.
+    /// `None` for a triangle without area.
     fn new(corners: [[f64; 3]; 3]) -> Option<Flat> {
         let edge =
             |k: usize| [0, 1, 2].map(|i| Ratio::of(corners[k][i]).minus(&Ratio::of(corners[0][i])));
         let (u, v) = (edge(1), edge(2));
         let normal = [(1, 2), (2, 0), (0, 1)]
             .map(|(i, j): (usize, usize)| u[i].times(&v[j]).minus(&u[j].times(&v[i])));
-        // Any axis that the plane is not parallel to will do; the best one keeps balls small.
+        // Any axis to which the plane is not parallel will do; the best one keeps the balls small.
         let dropped = (0..3)
             .filter(|i| normal[*i].sign() != Ordering::Equal)
             .max_by(|i, j| normal[*i].ball.mid.abs().total_cmp(&normal[*j].ball.mid.abs()))?;
@@ -114,14 +117,14 @@ impl Flat {
         Place::new(&at)
     }
 
-    /// How far a point is from the plane, up to the normal's length.
+    /// The signed distance of a point from the plane, times the length of the normal.
     fn height(&self, p: [f64; 3]) -> Ratio {
         (0..3).fold(Ratio::of(0.0), |sum, i| {
             sum.plus(&self.normal[i].times(&Ratio::of(p[i]).minus(&Ratio::of(self.corners[0][i]))))
         })
     }
 
-    /// The edges of the triangle, as drawn.
+    /// The edges of the projected triangle.
     fn border(&self) -> [[Point; 2]; 3] {
         [0, 1, 2].map(|k| [self.drawn(self.corners[k]), self.drawn(self.corners[(k + 1) % 3])])
     }
@@ -152,7 +155,8 @@ fn outside_point(flat: &Flat, mesh: &TriangleMesh<'_>) -> Option<[f64; 3]> {
         (!covered && mesh.winding_about(&place) == 0).then(|| place.rounded())
     };
     if segments.is_empty() {
-        // One part: any point inside, here the middle of a corner and the middle of the others.
+        // There is one part, and any inner point will do.
+        // This is the middle between a corner and the middle of the other two.
         let half = Ratio::of(0.5);
         let [a, b, c] = flat.corners.map(|p| flat.drawn(p));
         let middle = |p: &Point, q: &Point| [0, 1].map(|i| p[i].plus(&q[i]).times(&half));
@@ -174,7 +178,7 @@ fn outside_point(flat: &Flat, mesh: &TriangleMesh<'_>) -> Option<[f64; 3]> {
             heights.dedup_by(|a, b| a.compare(b) == Ordering::Equal);
             heights
         };
-        // Between its two borders here lies the triangle; nowhere if the strip is beside it.
+        // In a strip, the triangle lies between its two borders; a strip beside it has none.
         let [low, high] = &heights(&border)[..] else { continue };
         for pair in heights(&segments).windows(2) {
             if pair[0].compare(low) != Ordering::Less && pair[1].compare(high) != Ordering::Greater
@@ -189,7 +193,7 @@ fn outside_point(flat: &Flat, mesh: &TriangleMesh<'_>) -> Option<[f64; 3]> {
     None
 }
 
-/// Where a triangle of the mesh meets the plane: a segment, or all of it.
+/// Where a triangle of the mesh meets the plane: in a segment, or as a whole.
 fn cut(
     flat: &Flat,
     t: &[[f64; 3]; 3],
@@ -213,13 +217,15 @@ fn cut(
             ends.push([0, 1].map(|i| a[i].plus(&b[i].minus(&a[i]).times(&part))));
         }
     }
-    // A single common point divides nothing, but no sample may lie on it: strips end there.
+    // A single common point divides nothing, but it becomes a segment too.
+    // Then strips end there, and no sample lies on it.
     if let [a, .., b] | [a @ b] = &ends[..] {
         segments.push([a.clone(), b.clone()]);
     }
 }
 
-/// Whether a segment lies on or beyond an edge of the triangle `border` and so divides nothing.
+/// Whether a segment lies on or beyond an edge of the triangle `border`, so that it divides
+/// nothing.
 fn is_beyond(s: &[Point; 2], edge: &[Point; 2], border: &[[Point; 2]; 3]) -> bool {
     let side = |p: &Point, [a, b]: &[Point; 2]| {
         let (u, v) = ([0, 1].map(|i| b[i].minus(&a[i])), [0, 1].map(|i| p[i].minus(&a[i])));
@@ -229,7 +235,7 @@ fn is_beyond(s: &[Point; 2], edge: &[Point; 2], border: &[[Point; 2]; 3]) -> boo
     s.iter().all(|end| side(end, edge) != inner)
 }
 
-/// The x where two segments cross; none where they are parallel or do not meet.
+/// The x at which two segments cross; `None` if they are parallel or do not meet.
 fn crossing_x(s: &[Point; 2], other: &[Point; 2]) -> Option<Ratio> {
     let difference = |a: &Point, b: &Point| [0, 1].map(|i| b[i].minus(&a[i]));
     let cross = |u: &Point, v: &Point| u[0].times(&v[1]).minus(&u[1].times(&v[0]));
@@ -247,7 +253,7 @@ fn crossing_x(s: &[Point; 2], other: &[Point; 2]) -> Option<Ratio> {
     (within(&at_s) && within(&at_other)).then(|| s[0][0].plus(&u[0].times(&at_s)))
 }
 
-/// The y of a segment above x; none where it does not pass x.
+/// The y of a segment at x; `None` if the segment does not pass x.
 fn y_at(s: &[Point; 2], x: &Ratio) -> Option<Ratio> {
     let [a, b] = s;
     let (before, after) = (a[0].compare(x), b[0].compare(x));
@@ -258,8 +264,9 @@ fn y_at(s: &[Point; 2], x: &Ratio) -> Option<Ratio> {
     Some(a[1].plus(&b[1].minus(&a[1]).times(&part)))
 }
 
-/// The distance of a point to the nearest triangle, in plain float64 (Ericson, Real-Time Collision
-/// Detection, 5.1.5).
+/// The distance of a point to the nearest triangle, in plain float64.
+///
+/// Source: Ericson, "Real-Time Collision Detection", 5.1.5.
 fn distance_to(mesh: &TriangleMesh<'_>, p: [f64; 3]) -> f64 {
     let scale = unit_scale(mesh.vertices.iter().flatten().copied().chain(p));
     let scaled = |p: [f64; 3]| p.map(|x| x * scale);

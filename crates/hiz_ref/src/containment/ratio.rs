@@ -1,11 +1,11 @@
-//! Fractions with a float64 in front: compared by a ball where that decides, exactly where it does
-//! not.
+//! Exact fractions with a float64 ball: the ball decides comparisons if it can, and exact numbers
+//! decide the others.
 
 use crate::dyadic::Dyadic;
 use crate::scalar::{Ball, Scalar};
 use std::cmp::Ordering;
 
-/// A number `over / under`, `under > 0`, and a ball around it.
+/// A number `over / under` with `under > 0`, and a ball around it.
 #[derive(Clone, Debug)]
 pub(super) struct Ratio {
     pub(super) ball: Ball,
@@ -18,8 +18,9 @@ impl Ratio {
         Ratio { ball: Ball::exact(value), over: Dyadic::exact(value), under: Dyadic::exact(1.0) }
     }
 
-    /// `under` is positive; a ball that cancellation or a division made useless is drawn anew from
-    /// the exact numbers.
+    /// Makes a fraction; `under` must be positive.
+    /// If cancellation or a division made the ball too wide, a new one is computed from the exact
+    /// numbers.
     fn new(ball: Ball, over: Dyadic, under: Dyadic) -> Ratio {
         let ball = match (ball.is_tight(), over.quotient(&under)) {
             (false, Some(quotient)) => Ball::around(quotient, quotient.abs() * 2.0_f64.powi(-48)),
@@ -52,7 +53,7 @@ impl Ratio {
         )
     }
 
-    /// `other` is not 0.
+    /// The quotient; `other` must not be 0.
     pub(super) fn divided_by(&self, other: &Ratio) -> Ratio {
         let (over, under) = (self.over.times(&other.under), self.under.times(&other.over));
         let negative = other.sign() == Ordering::Less;
@@ -70,8 +71,8 @@ impl Ratio {
         self.ball.minus(&other.ball).sign().or_else(exact).expect("exact numbers have a sign")
     }
 
-    /// A number strictly between two different ones; a float64 where there is one, so that it stays
-    /// short.
+    /// A number strictly between two different ones.
+    /// It is a float64 if there is one, so that its digits stay few.
     pub(super) fn between(&self, other: &Ratio) -> Ratio {
         let middle = Ratio::of(self.ball.mid / 2.0 + other.ball.mid / 2.0);
         let (low, high) =
@@ -91,8 +92,8 @@ impl Ratio {
 mod tests {
     use super::*;
 
-    /// Witnesses are told from the balls: on real meshes some lay far from their triangle when
-    /// balls were left as they came.
+    /// Witnesses are reported from the balls.
+    /// When balls were not renewed, some witnesses on real meshes lay far from their triangle.
     #[test]
     fn what_cancels_keeps_a_useful_ball() {
         let tiny = Ratio::of(1.0).plus(&Ratio::of(1e-17)).minus(&Ratio::of(1.0));

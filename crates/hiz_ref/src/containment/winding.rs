@@ -1,4 +1,4 @@
-//! How often a closed mesh winds about a point, exactly.
+//! How often a closed mesh winds about a point, decided exactly.
 
 use super::TriangleMesh;
 use super::ratio::Ratio;
@@ -6,14 +6,14 @@ use crate::dyadic::Dyadic;
 use crate::scalar::{Ball, Scalar};
 use std::cmp::Ordering;
 
-/// A point for predicates over any scalar: coordinates times a positive `w`.
+/// A point for predicates over any scalar: its coordinates times a positive `w`.
 #[derive(Clone, Debug)]
 struct Homogeneous<S> {
     at: [S; 3],
     w: S,
 }
 
-/// A place in space.
+/// A point in space, in float64 with error bounds and exactly.
 #[derive(Clone, Debug)]
 pub(super) struct Place {
     ball: Homogeneous<Ball>,
@@ -39,7 +39,7 @@ impl Place {
         }
     }
 
-    /// In float64, for the eyes.
+    /// The point rounded to float64, for display.
     pub(super) fn rounded(&self) -> [f64; 3] {
         self.ball.at.map(|x| x.mid)
     }
@@ -55,12 +55,12 @@ impl Place {
             .expect("exact numbers have a sign")
     }
 
-    /// On which side of the plane through three points.
+    /// The side of the plane through three points on which the point lies.
     pub(super) fn side(&self, t: &[[f64; 3]; 3]) -> Ordering {
         self.decide(|p| volume(t, p), |p| volume(t, p))
     }
 
-    /// On which side of the line from a to b, seen along `axis`.
+    /// The side of the line from a to b on which the point lies, seen along `axis`.
     fn side_along(&self, axis: usize, a: [f64; 3], b: [f64; 3]) -> Ordering {
         self.decide(|p| area(axis, a, b, p), |p| area(axis, a, b, p))
     }
@@ -73,9 +73,10 @@ impl Place {
         self.decide(|p| difference(p, axis, value), |p| difference(p, axis, value))
     }
 
-    /// How often a triangle winds about the point as seen along `axis`, the point moved by less
-    /// than anything where it lies on an edge: half-open intervals, and edges that it lies on count
-    /// as passed.
+    /// How often a triangle winds about the point as seen along `axis`.
+    ///
+    /// If the point lies on an edge, it is moved by an infinitesimal amount.
+    /// So intervals are half-open, and edges on which it lies count as passed.
     fn winds_along(&self, axis: usize, t: &[[f64; 3]; 3]) -> i32 {
         let up = (axis + 2) % 3;
         let above = t.map(|p| self.compare(up, p[up]) == Ordering::Less);
@@ -93,7 +94,7 @@ impl Place {
         winding
     }
 
-    /// Whether the point lies in the closed triangle; not for triangles without area.
+    /// Whether the point lies in the closed triangle, which must have an area.
     pub(super) fn lies_in(&self, t: &[[f64; 3]; 3]) -> bool {
         (0..3).all(|axis| {
             let [low, high] =
@@ -102,22 +103,23 @@ impl Place {
                 && self.compare(axis, high) != Ordering::Greater
         }) && self.side(t) == Ordering::Equal
             && (0..3).all(|axis| {
-                // In the plane already: in the triangle if it is so from every side.
+                // It lies in the plane already; it lies in the triangle if it does so as seen along
+                // every axis.
                 let sides = [0, 1, 2].map(|k| self.side_along(axis, t[k], t[(k + 1) % 3]));
                 !(sides.contains(&Ordering::Less) && sides.contains(&Ordering::Greater))
             })
     }
 }
 
-/// Whether three points lie strictly on one side of the plane through `t`, as far as float64 can
-/// tell.
+/// Whether three points surely lie strictly on one side of the plane through `t`, decided in
+/// float64.
 pub(super) fn surely_beside(t: &[[f64; 3]; 3], points: &[[f64; 3]; 3]) -> bool {
     let sides = points
         .map(|p| volume(t, &Homogeneous { at: p.map(Ball::exact), w: Ball::exact(1.0) }).sign());
     sides == [Some(Ordering::Less); 3] || sides == [Some(Ordering::Greater); 3]
 }
 
-/// Six times the signed volume of a triangle and the point.
+/// Six times the signed volume of the tetrahedron of a triangle and the point.
 fn volume<S: Scalar>(t: &[[f64; 3]; 3], p: &Homogeneous<S>) -> S {
     let number = |x: f64| S::exact(x);
     let edge = |k: usize| [0, 1, 2].map(|i| number(t[k][i]).minus(&number(t[0][i])));
@@ -127,7 +129,7 @@ fn volume<S: Scalar>(t: &[[f64; 3]; 3], p: &Homogeneous<S>) -> S {
     minor(1, 2).times(&d[0]).plus(&minor(2, 0).times(&d[1])).plus(&minor(0, 1).times(&d[2]))
 }
 
-/// Twice the signed area of a, b and the point, seen along `axis`.
+/// Twice the signed area of the triangle of a, b and the point, seen along `axis`.
 fn area<S: Scalar>(axis: usize, a: [f64; 3], b: [f64; 3], p: &Homogeneous<S>) -> S {
     let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
     let number = |x: f64| S::exact(x);
@@ -137,19 +139,19 @@ fn area<S: Scalar>(axis: usize, a: [f64; 3], b: [f64; 3], p: &Homogeneous<S>) ->
 }
 
 impl TriangleMesh<'_> {
-    /// How often the closed mesh winds about a point that does not lie on it: signed crossings of
-    /// the ray along +x.
+    /// How often the closed mesh winds about a point that does not lie on it.
     ///
-    /// The ray is moved sideways by less than anything, so it meets no edge; it cannot start on the
-    /// mesh, as the point is off it.
+    /// Counts the signed crossings of the ray along +x.
+    /// The ray is moved sideways by an infinitesimal amount, so it meets no edge.
+    /// It cannot start on the mesh, because the point does not lie on it.
     pub(super) fn winding_about(&self, place: &Place) -> i32 {
         const X: usize = 0;
         (0..self.triangles.len())
             .map(|number| {
                 let t = self.corners(number);
                 let winds = place.winds_along(X, &t);
-                // The normal's x has the sign of `winds`; the crossing lies ahead if the point lies
-                // against the normal.
+                // The normal's x has the sign of `winds`.
+                // The crossing lies ahead if the point is on the side of the plane with lower x.
                 let ahead = if winds > 0 { Ordering::Less } else { Ordering::Greater };
                 if winds != 0 && place.side(&t) == ahead { winds } else { 0 }
             })

@@ -77,7 +77,7 @@ impl Class {
             Self::Random | Self::Tiny | Self::Huge => {}
             Self::PixelBorders => s.style = random.pick(&[DepthStyle::Column, DepthStyle::Row]),
             Self::Grazing => {
-                s.style = random.pick(&[DepthStyle::Column, DepthStyle::Row, DepthStyle::Far])
+                s.style = random.pick(&[DepthStyle::Column, DepthStyle::Row, DepthStyle::Far]);
             }
             Self::NearPlane => s.style = random.pick(&[DepthStyle::Far, DepthStyle::Near]),
             Self::OffCentre => {

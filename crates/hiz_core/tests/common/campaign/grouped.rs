@@ -2,7 +2,7 @@
 //! their boxes are as nearly decided as it is.
 
 use hiz_core::headless::Engine;
-use hiz_core::{Coverage, CullOptions, Hierarchy, InstanceOptions, StoredOrder, VisibleOptions};
+use hiz_core::{Coverage, CullOptions, Hierarchy, InstanceOptions, Outputs, StoredOrder, Verdict};
 
 use super::{Arrays, Round};
 use crate::common::Random;
@@ -48,13 +48,7 @@ impl Round {
             let instances = engine.instances(&arrays.bounds(*kind), &options).expect("instances");
             let cull = |hierarchy| {
                 let options = CullOptions { hierarchy, ..self.options.clone() };
-                engine.cull(
-                    &instances,
-                    &self.camera,
-                    &pyramid,
-                    &options,
-                    &VisibleOptions::default(),
-                )
+                engine.cull(&instances, &self.camera, &pyramid, &options, &Outputs::default())
             };
             let (flat_cull, grouped) = match (cull(Hierarchy::Never), cull(Hierarchy::Always)) {
                 (Ok(flat), Ok(grouped)) => (flat, grouped),
@@ -68,24 +62,28 @@ impl Round {
             let pairs = alone.chunks_exact(copies).zip(verdicts.chunks_exact(copies)).zip(volumes);
             let changed = pairs.map(|((alone, verdicts), volume)| {
                 // By the certificate of its group's box, which is another one than its own.
-                let by_box = alone
-                    .iter()
-                    .zip(verdicts)
-                    .filter(|(alone, verdict)| matches!(alone, 1 | 2) && **verdict == 0);
+                let by_box = alone.iter().zip(verdicts).filter(|(alone, verdict)| {
+                    matches!(alone, Verdict::Occluded | Verdict::Visible)
+                        && **verdict == Verdict::Outside
+                });
                 let by_box = by_box.count() as u64;
                 let is_right = by_box == 0
                     || !is_area
                     || hiz_ref::is_outside(&self.view, volume).expect("a finite view");
-                let others = alone
-                    .iter()
-                    .zip(verdicts)
-                    .filter(|pair| !matches!(pair, (1 | 2, 0) | (2, 1)) && pair.0 != pair.1);
+                let others = alone.iter().zip(verdicts).filter(|pair| {
+                    let known = matches!(
+                        pair,
+                        (Verdict::Occluded | Verdict::Visible, Verdict::Outside)
+                            | (Verdict::Visible, Verdict::Occluded)
+                    );
+                    !known && pair.0 != pair.1
+                });
                 others.count() as u64 + if is_right { 0 } else { by_box }
             });
             let counted = [counts.outside, counts.occluded, counts.visible, counts.invalid];
-            let wrong_counts = (0..4_u8).map(|verdict| {
-                counted[usize::from(verdict)]
-                    .abs_diff(verdicts.iter().filter(|v| **v == verdict).count() as u64)
+            let wrong_counts = (0..4).map(|verdict| {
+                counted[verdict]
+                    .abs_diff(verdicts.iter().filter(|v| **v as usize == verdict).count() as u64)
             });
             let kept = mask.iter().filter(|kept| **kept).count() as u64;
             let kept_alone =

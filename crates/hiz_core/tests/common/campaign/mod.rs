@@ -20,7 +20,7 @@ mod volume;
 use hiz_core::headless::{DepthImage, Engine};
 use hiz_core::{
     AtlasUse, BoundsKind, Camera, Coverage, CullOptions, Fit, Footprint, Hierarchy,
-    InstanceOptions, PyramidOptions, StoredLevels, VisibleOptions,
+    InstanceOptions, Outputs, PyramidOptions, StoredLevels,
 };
 use hiz_ref::{Options, Outcome, OwnDepth, Verdict, View, Volume};
 
@@ -254,7 +254,7 @@ impl Round {
                 &self.camera,
                 &pyramid,
                 &self.options,
-                &VisibleOptions::default(),
+                &Outputs::default(),
             ) {
                 Ok(culling) => masks.push(culling.mask().expect("mask")),
                 Err(hiz_core::Error::Invalid { .. }) => return None,

@@ -158,7 +158,7 @@ impl Mirror {
     /// Nothing for a camera that is refused.
     pub(crate) fn new(round: &Round) -> Option<Self> {
         let CullOptions { footprint, coverage, descent, fit, .. } = round.options;
-        let view = View::new(&hiz_core::words::view(&round.camera, &round.options).ok()?);
+        let view = View::new(&hiz_core::testing::words::view(&round.camera, &round.options).ok()?);
         let words = round
             .volumes
             .iter()
@@ -166,7 +166,8 @@ impl Mirror {
                 let arrays = Arrays::new(volumes);
                 (
                     *kind,
-                    hiz_core::words::instances(&arrays.bounds(*kind)).expect("arrays that agree"),
+                    hiz_core::testing::words::instances(&arrays.bounds(*kind))
+                        .expect("arrays that agree"),
                 )
             })
             .collect();
@@ -234,7 +235,8 @@ impl Mirror {
             hiz_ref::Volume::OrientedBox { .. } => BoundsKind::OrientedBox,
         };
         let arrays = Arrays::new(std::slice::from_ref(volume));
-        let record = hiz_core::words::instances(&arrays.bounds(kind)).expect("arrays that agree");
+        let record =
+            hiz_core::testing::words::instances(&arrays.bounds(kind)).expect("arrays that agree");
         self.culls(kind, &record, margins.into(), arithmetic)
     }
 

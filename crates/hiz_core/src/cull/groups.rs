@@ -1,0 +1,116 @@
+//! The cull in groups: first the boxes of whole groups, then the members of the surviving groups.
+
+use crate::cull::options::{CullOptions, Hierarchy};
+use crate::cull::pipelines::{
+    CullKey, MEMBER_BINDINGS, ReportKey, SURVIVOR_BINDINGS, cull_groups_pipeline,
+    cull_members_pipeline,
+};
+use crate::error::Result;
+use crate::gpu::buffers::entry;
+use crate::gpu::device::Gpu;
+use crate::input::bounds::BoundsKind;
+use crate::instances::piece::Piece;
+use crate::output::survivors::GroupOutput;
+use crate::output::visible::PieceOutput;
+
+/// The label of the buffer that is bound if levels are not counted.
+pub(super) const NO_STATISTICS: &str = "hiz.no_statistics";
+
+/// Groups whose members one workgroup tests; `shaders/instances/groups.wgsl`, `RUN`.
+pub(crate) const GROUPS_OF_RUN: u32 = 8;
+
+/// The fewest texels of finer levels that a group's test may read.
+/// A box around 64 instances is large, so its footprint is coarse (`docs/performance.md`).
+pub(super) const GROUP_DESCENT: u32 = 16;
+
+/// From this many instances on, groups are culled first.
+/// Fewer are tested one by one before the dispatches for groups would have begun
+/// (`docs/performance.md`).
+const GROUPS_PAY_FROM: u32 = 16_384;
+
+/// The options of a group's test.
+pub(crate) fn group_options(options: &CullOptions) -> CullOptions {
+    CullOptions { descent: options.descent.max(GROUP_DESCENT), ..options.clone() }
+}
+
+/// The key of the pipeline of a group's test.
+pub(super) fn group_key(key: CullKey) -> CullKey {
+    CullKey { kind: BoundsKind::Box, descent: true, ..key }
+}
+
+/// Whether the groups of a piece are culled before its instances.
+pub(crate) fn is_grouped(piece: &Piece, options: &CullOptions) -> bool {
+    match options.hierarchy {
+        Hierarchy::Never => false,
+        Hierarchy::Always => piece.count() > 0,
+        Hierarchy::Auto => piece.count() >= GROUPS_PAY_FROM,
+    }
+}
+
+/// The pipelines and bindings of the cull of a piece in groups.
+pub(super) struct GroupCull<'a> {
+    output: &'a GroupOutput,
+    /// The test of the boxes of the groups.
+    boxes: (wgpu::ComputePipeline, wgpu::BindGroup),
+    /// The test of the members of the surviving groups.
+    members: (wgpu::ComputePipeline, wgpu::BindGroup),
+}
+
+impl<'a> GroupCull<'a> {
+    /// `statistics`: the buffer in which levels are counted, if they are.
+    pub(super) fn new(
+        gpu: &Gpu,
+        (key, report): (CullKey, ReportKey),
+        piece: &Piece,
+        output: &'a PieceOutput,
+        statistics: Option<&wgpu::Buffer>,
+    ) -> Result<Self> {
+        let output = output.groups_or_new(gpu, piece)?;
+        let counted = match statistics {
+            Some(statistics) => statistics.clone(),
+            None => gpu.stand_in(NO_STATISTICS)?,
+        };
+        let left = gpu.bind_group(
+            "hiz.cull.groups",
+            &gpu.layout("hiz.cull_groups.layout", SURVIVOR_BINDINGS)?,
+            &[
+                entry(0, output.survivors.as_entire_binding()),
+                entry(1, output.verdicts.as_entire_binding()),
+                entry(2, wgpu::BindingResource::TextureView(&output.survivor_list)),
+                entry(3, counted.as_entire_binding()),
+            ],
+        )?;
+        let members = gpu.bind_group(
+            "hiz.cull.survivors",
+            &gpu.layout("hiz.cull_members.layout", MEMBER_BINDINGS)?,
+            &[
+                entry(0, output.survivors.as_entire_binding()),
+                entry(1, wgpu::BindingResource::TextureView(&output.survivor_list)),
+            ],
+        )?;
+        Ok(Self {
+            output,
+            boxes: (cull_groups_pipeline(gpu, &group_key(key), statistics.is_some())?, left),
+            members: (cull_members_pipeline(gpu, &key, &report)?, members),
+        })
+    }
+
+    /// Records the test of the boxes, in so many `workgroups`.
+    pub(super) fn record_boxes(
+        &self,
+        pass: &mut wgpu::ComputePass<'_>,
+        piece: &Piece,
+        workgroups: u32,
+    ) {
+        pass.set_pipeline(&self.boxes.0);
+        pass.set_bind_group(1, &piece.group_bindings, &[]);
+        pass.set_bind_group(2, &self.boxes.1, &[]);
+        pass.dispatch_workgroups(workgroups, 1, 1);
+    }
+
+    pub(super) fn record_members(&self, pass: &mut wgpu::ComputePass<'_>) {
+        pass.set_bind_group(3, &self.members.1, &[]);
+        pass.set_pipeline(&self.members.0);
+        pass.dispatch_workgroups_indirect(&self.output.survivors, 0);
+    }
+}

@@ -1,0 +1,79 @@
+//! The kinds of textures that can be level 0 of a pyramid, and how each is bound.
+
+use crate::gpu::shader::File;
+use crate::gpu::shader::wgsl;
+use crate::input::image::ImageSize;
+
+/// The kind of texture that level 0 of a pyramid is read from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum SourceKind {
+    /// A depth texture.
+    Depth,
+    /// A float colour texture with one channel.
+    Float,
+    /// A texture of float32 bits, with four pixels of a row per texel.
+    Bits,
+}
+
+impl SourceKind {
+    /// The shader files that read this kind.
+    pub(crate) fn files(self) -> &'static [File] {
+        match self {
+            Self::Depth => &[wgsl!("gpu/source_depth"), wgsl!("gpu/source_sampled")],
+            Self::Float => &[wgsl!("gpu/source_float"), wgsl!("gpu/source_sampled")],
+            Self::Bits => &[wgsl!("gpu/source_bits")],
+        }
+    }
+
+    /// The type of its binding.
+    pub(crate) fn binding(self) -> wgpu::BindingType {
+        let view_dimension = wgpu::TextureViewDimension::D2;
+        let sampled = |sample_type| wgpu::BindingType::Texture {
+            sample_type,
+            view_dimension,
+            multisampled: false,
+        };
+        match self {
+            Self::Depth => sampled(wgpu::TextureSampleType::Depth),
+            Self::Float => sampled(wgpu::TextureSampleType::Float { filterable: false }),
+            Self::Bits => wgpu::BindingType::StorageTexture {
+                access: wgpu::StorageTextureAccess::ReadOnly,
+                format: wgpu::TextureFormat::Rgba32Uint,
+                view_dimension,
+            },
+        }
+    }
+
+    /// The usage that its texture needs to be bound.
+    pub(crate) fn usage(self) -> wgpu::TextureUsages {
+        match self {
+            Self::Depth | Self::Float => wgpu::TextureUsages::TEXTURE_BINDING,
+            Self::Bits => wgpu::TextureUsages::STORAGE_BINDING,
+        }
+    }
+
+    /// Pixels of a row that one texel holds.
+    pub(crate) fn pixels_of_texel(self) -> u32 {
+        if self == Self::Bits { 4 } else { 1 }
+    }
+
+    /// The size in texels of the texture for an image of this size in pixels.
+    pub(crate) fn texture_size(self, image: ImageSize) -> ImageSize {
+        ImageSize::new(image.width.div_ceil(self.pixels_of_texel()), image.height)
+    }
+
+    /// The kind for a texture format; `None` for formats that no pyramid can be built from.
+    pub(crate) fn of(format: wgpu::TextureFormat) -> Option<Self> {
+        match format {
+            wgpu::TextureFormat::R32Float | wgpu::TextureFormat::R16Float => Some(Self::Float),
+            wgpu::TextureFormat::Rgba32Uint => Some(Self::Bits),
+            f if f.has_depth_aspect() => Some(Self::Depth),
+            _ => None,
+        }
+    }
+}
+
+/// All kinds of source, in the order of their declaration.
+#[cfg(feature = "testing")]
+pub(crate) const SOURCES: [SourceKind; 3] =
+    [SourceKind::Depth, SourceKind::Float, SourceKind::Bits];

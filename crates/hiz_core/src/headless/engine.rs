@@ -1,0 +1,206 @@
+//! The engine: a device, its queue and its errors.
+
+use std::sync::Arc;
+
+use crate::context::HizContext;
+use crate::error::{Error, Result};
+use crate::headless::adapter::{self, ADAPTER_VARIABLE, AdapterSummary};
+use crate::headless::process::Process;
+use crate::headless::readback;
+use crate::host::threads::Locked;
+use crate::input::image::MAX_IMAGE_SIDE;
+
+/// A device, its queue and the pipelines on it.
+/// The last clone waits until the device is idle, and releases it.
+#[derive(Debug, Clone)]
+pub struct Engine {
+    shared: Arc<Shared>,
+}
+
+impl Drop for Engine {
+    fn drop(&mut self) {
+        if self.shared.process.check().is_err() {
+            // Destroying the device would join threads that a fork does not have.
+            // So one more owner keeps it alive for good.
+            std::mem::forget(Arc::clone(&self.shared));
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Shared {
+    process: Process,
+    context: HizContext,
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    adapter: AdapterSummary,
+    /// Why the device was lost, once it was.
+    /// `uncaught`: an error that no scope caught.
+    lost: Arc<Locked<Option<String>>>,
+    uncaught: Arc<Locked<Option<String>>>,
+}
+
+impl Drop for Shared {
+    fn drop(&mut self) {
+        // A lost device has nothing to wait for, so an error here is ignored.
+        drop(self.device.poll(wgpu::PollType::wait_indefinitely()));
+    }
+}
+
+impl Engine {
+    /// Opens a device on an adapter.
+    ///
+    /// `adapter` is an index, or a part of a name or driver in any case, as [`AdapterSummary`]
+    /// lists them.
+    /// Without it, the environment variable [`ADAPTER_VARIABLE`] says which adapter to take.
+    /// Without both, the best adapter is taken: discrete GPUs first, software drivers last.
+    ///
+    /// # Errors
+    /// [`Error::NoAdapter`] if no adapter fits.
+    /// It lists the adapters that were found and says how to choose one of them.
+    /// If there are none, it names the command that installs a software driver.
+    pub fn new(adapter: Option<&str>) -> Result<Self> {
+        Self::open(adapter, HizContext::new)
+    }
+
+    /// Opens a device whose shaders have planted faults, for tests; see
+    /// [`HizContext::with_planted_faults`].
+    ///
+    /// # Errors
+    /// Those of [`Engine::new`].
+    #[cfg(feature = "testing")]
+    pub fn with_planted_faults(adapter: Option<&str>, faults: &[(&str, &str)]) -> Result<Self> {
+        Self::open(adapter, |device| HizContext::with_planted_faults(device, faults))
+    }
+
+    fn open(
+        adapter: Option<&str>,
+        context: impl FnOnce(&wgpu::Device) -> Result<HizContext>,
+    ) -> Result<Self> {
+        let from_environment = std::env::var(ADAPTER_VARIABLE).ok().filter(|s| !s.is_empty());
+        let request = adapter.map(str::to_owned).or(from_environment);
+        let mut found = adapter::enumerate();
+        let seen: Vec<AdapterSummary> = found.iter().map(|(summary, _)| summary.clone()).collect();
+        if let Some(request) = &request {
+            found.retain(|(summary, _)| summary.matches(request));
+        }
+        let Some((summary, adapter)) =
+            found.into_iter().min_by_key(|(summary, _)| (summary.rank(), summary.index))
+        else {
+            let request =
+                request.map_or_else(|| "was found".to_owned(), |r| format!("matches {r:?}"));
+            return Err(adapter::no_adapter(request, &seen));
+        };
+        let features = adapter.features() & wgpu::Features::INDIRECT_FIRST_INSTANCE;
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("hiz.device"),
+            required_features: features,
+            required_limits: adapter.limits(),
+            ..Default::default()
+        }))
+        .map_err(|e| adapter::no_adapter(format!("would open: {summary}: {e}"), &seen))?;
+        let lost = Arc::new(Locked::new(None));
+        let uncaught = Arc::new(Locked::new(None));
+        let (lost_to, uncaught_to) = (Arc::clone(&lost), Arc::clone(&uncaught));
+        device.set_device_lost_callback(move |reason, message| {
+            lost_to.lock().get_or_insert(format!("{reason:?}: {message}"));
+        });
+        // The default handler panics.
+        // Every call through `scoped` reports what this handler stores.
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            uncaught_to.lock().get_or_insert(error.to_string());
+        }));
+        let context = context(&device)?;
+        let process = Process::this();
+        Ok(Self {
+            shared: Arc::new(Shared {
+                process,
+                context,
+                device,
+                queue,
+                adapter: summary,
+                lost,
+                uncaught,
+            }),
+        })
+    }
+
+    /// Refuses to go on in a fork of the process that made the device.
+    ///
+    /// Call it before taking any lock.
+    /// If another thread held a lock at the fork, nobody ever releases it in the fork.
+    pub(super) fn check_process(&self) -> Result<()> {
+        self.shared.process.check()
+    }
+
+    /// The adapter of the device.
+    pub fn adapter(&self) -> &AdapterSummary {
+        &self.shared.adapter
+    }
+
+    /// The device.
+    pub fn device(&self) -> &wgpu::Device {
+        &self.shared.device
+    }
+
+    /// The device's queue.
+    pub fn queue(&self) -> &wgpu::Queue {
+        &self.shared.queue
+    }
+
+    /// The context that records on this device.
+    pub fn context(&self) -> &HizContext {
+        &self.shared.context
+    }
+
+    /// The largest width or height of a depth image, in pixels.
+    pub fn max_image_side(&self) -> u32 {
+        self.device().limits().max_texture_dimension_2d.min(MAX_IMAGE_SIDE)
+    }
+
+    /// Waits until everything that was submitted has run.
+    ///
+    /// # Errors
+    /// - [`Error::DeviceLost`].
+    /// - [`Error::OtherProcess`] in a fork.
+    pub fn wait(&self) -> Result<()> {
+        self.scoped(|| readback::wait(self.device(), None))
+    }
+
+    pub(super) fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
+        self.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) })
+    }
+
+    /// Runs `work`, and returns what the device finds wrong as an error instead of panicking.
+    pub(super) fn scoped<T>(&self, work: impl FnOnce() -> Result<T>) -> Result<T> {
+        self.check_process()?;
+        let device = self.device();
+        if let Some(reason) = self.shared.lost.lock().clone() {
+            return Err(Error::DeviceLost(reason));
+        }
+        let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let validation = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let internal = device.push_error_scope(wgpu::ErrorFilter::Internal);
+        let result = work();
+        if result.is_err() {
+            // A callback reports a lost device, and it runs when the device is polled.
+            // What the loss broke may appear as any error, so poll before looking.
+            drop(device.poll(wgpu::PollType::wait_indefinitely()));
+        }
+        // Scopes are popped from the innermost to the outermost.
+        let internal = pollster::block_on(internal.pop());
+        let validation = pollster::block_on(validation.pop());
+        let memory = pollster::block_on(memory.pop());
+        if let Some(reason) = self.shared.lost.lock().clone() {
+            return Err(Error::DeviceLost(reason));
+        }
+        if let Some(error) = memory {
+            return Err(Error::OutOfMemory(error.to_string()));
+        }
+        let uncaught = self.shared.uncaught.lock().take();
+        if let Some(error) = internal.or(validation).map(|e| e.to_string()).or(uncaught) {
+            return Err(Error::Device(error));
+        }
+        result
+    }
+}

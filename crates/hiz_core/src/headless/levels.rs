@@ -1,0 +1,121 @@
+//! Pyramids of uploaded depth images, and their levels as arrays.
+
+use std::sync::Arc;
+
+use crate::error::{Error, Result};
+use crate::headless::depth_image::DepthImage;
+use crate::headless::engine::Engine;
+use crate::headless::readback::{self, BufferRange, to_u32};
+use crate::host::memory;
+use crate::input::depth::sanitized;
+use crate::pyramid::atlas;
+use crate::pyramid::levels::StoredLevels;
+use crate::pyramid::reduce::record_reduce;
+use crate::pyramid::{Pyramid, PyramidOptions};
+
+impl Engine {
+    /// Builds the depth pyramid of an image, with default options.
+    ///
+    /// # Errors
+    /// - [`Error::Mismatch`] for an image of another device.
+    /// - [`Error::OutOfMemory`].
+    pub fn pyramid(&self, depth: &DepthImage) -> Result<Arc<Pyramid>> {
+        self.pyramid_with(depth, &PyramidOptions::default())
+    }
+
+    /// [`Engine::pyramid`] with options.
+    ///
+    /// # Errors
+    /// Those of [`Engine::pyramid`] and of
+    /// [`HizContext::create_pyramid`](crate::HizContext::create_pyramid).
+    pub fn pyramid_with(
+        &self,
+        depth: &DepthImage,
+        options: &PyramidOptions,
+    ) -> Result<Arc<Pyramid>> {
+        self.context().gpu.check_context("depth", depth.engine.context().gpu.id())?;
+        self.scoped(|| {
+            let pyramid = self.context().create_pyramid(depth.size(), options)?;
+            let mut encoder = self.encoder("hiz.reduce.encoder");
+            let DepthImage { view, camera, tolerance, .. } = depth;
+            record_reduce(&self.context().gpu, &mut encoder, view, camera, &pyramid, *tolerance)?;
+            self.queue().submit([encoder.finish()]);
+            Ok(Arc::new(pyramid))
+        })
+    }
+
+    /// Reads a level of a pyramid: one float32 per texel, sanitised NDC depth, row 0 on top.
+    /// The array has as many rows and columns as the level.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] past the last level, for a level that is not stored, and for level 0 of
+    ///   a format that is not read as float32.
+    /// - [`Error::Mismatch`] for a pyramid that was never built.
+    /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn read_level(&self, pyramid: &Pyramid, level: u32) -> Result<Vec<f32>> {
+        self.check_process()?;
+        self.context().gpu.check_context("pyramid", pyramid.context)?;
+        let layout = pyramid.layout.levels.get(level as usize).ok_or_else(|| {
+            Error::invalid(
+                "level",
+                format!("expected a level below {}, got {level}", pyramid.num_levels()),
+            )
+        })?;
+        if !pyramid.layout.is_there(level) {
+            let StoredLevels { first, last } = pyramid.layout.stored;
+            return Err(Error::invalid(
+                "level",
+                format!("expected 0 or a stored level, {first}..={last}, got {level}"),
+            ));
+        }
+        let built = pyramid.built().ok_or_else(|| {
+            Error::mismatch(
+                "pyramid",
+                "expected one that was built from a depth image, got one that never was",
+            )
+        })?;
+        if level == 0 {
+            let format = built.source.texture().format();
+            if !atlas::travels(format) {
+                return Err(Error::invalid(
+                    "level",
+                    format!(
+                        "expected a level above 0 of a pyramid of {format:?}, which is not read as \
+                         float32, got 0"
+                    ),
+                ));
+            }
+            let row = 4 * u64::from(layout.width);
+            let bytes = self.scoped(|| {
+                readback::read_texture(self.device(), self.queue(), built.source.texture(), row)
+            })?;
+            let convention = built.camera.convention();
+            return memory::collected(
+                to_u32(&bytes).map(|bits| sanitized(bits, convention)),
+                "level",
+            );
+        }
+        let (width, stride) = (layout.width as usize, layout.stride as usize);
+        let (first, count) =
+            (u64::from(layout.offset), u64::from(layout.stride) * u64::from(layout.height));
+        let chunk = 1_u64 << pyramid.layout.chunk_shift;
+        let ranges: Vec<_> = (first / chunk..=(first + count - 1) / chunk)
+            .map(|c| {
+                let begin = first.max(c * chunk);
+                let end = (first + count).min((c + 1) * chunk);
+                BufferRange {
+                    buffer: &pyramid.chunks[c as usize],
+                    offset: 4 * (begin - c * chunk),
+                    size: 4 * (end - begin),
+                }
+            })
+            .collect();
+        let bytes =
+            self.scoped(|| readback::read_buffers(self.device(), self.queue(), &ranges))?.concat();
+        let mut texels = memory::list(width * layout.height as usize, "level")?;
+        for row in bytes.chunks_exact(4 * stride) {
+            texels.extend(to_u32(&row[..4 * width]).map(f32::from_bits));
+        }
+        Ok(texels)
+    }
+}

@@ -1,0 +1,83 @@
+//! Uploads: instances with their updates, and occluders.
+
+use std::sync::Arc;
+
+use crate::error::Result;
+use crate::headless::engine::Engine;
+use crate::headless::readback;
+use crate::input::bounds::Bounds;
+use crate::input::mesh::MeshData;
+use crate::instances::update::record_update;
+use crate::instances::{InstanceOptions, Instances};
+use crate::occluders::{OccluderOptions, Occluders};
+
+impl Engine {
+    /// Uploads bounding volumes.
+    ///
+    /// # Errors
+    /// Those of [`HizContext::record_instances`](crate::HizContext::record_instances), and
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost).
+    pub fn instances(
+        &self,
+        bounds: &Bounds<'_>,
+        options: &InstanceOptions,
+    ) -> Result<Arc<Instances>> {
+        // Waits after each piece, so that only one piece has a staging buffer at a time.
+        let copy = |copies: &dyn Fn(&mut wgpu::CommandEncoder), more: bool| {
+            let mut encoder = self.encoder("hiz.instances.encoder");
+            copies(&mut encoder);
+            let submission = self.queue().submit([encoder.finish()]);
+            if more { readback::wait(self.device(), Some(submission)) } else { Ok(()) }
+        };
+        self.scoped(|| Instances::new(&self.context().gpu, bounds, options, copy)).map(Arc::new)
+    }
+
+    /// Replaces the bounds of instances `first..first + n`: it records and submits.
+    ///
+    /// A cull that was submitted before sees the old bounds, whenever its answer is read.
+    /// Any thread may call this.
+    /// Updates of the same instances run in the order of the calls.
+    ///
+    /// # Errors
+    /// Those of [`HizContext::record_update`](crate::HizContext::record_update), and
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost).
+    pub fn update(
+        &self,
+        instances: &Instances,
+        first: u32,
+        bounds: &Bounds<'_>,
+        strict: bool,
+    ) -> Result<()> {
+        self.scoped(|| {
+            let _in_order = instances.submitting.lock();
+            let gpu = &self.context().gpu;
+            let mut encoder = self.encoder("hiz.update.encoder");
+            let mut updated = 0..0;
+            record_update(gpu, &mut encoder, instances, first, bounds, strict, |_, range| {
+                updated = range;
+                Ok(())
+            })?;
+            // Taken late, so that culls on other threads need not wait for the packing above.
+            let watches = instances.watches();
+            let mut before = self.encoder("hiz.refine.encoder");
+            let before = watches.record_refinements(gpu, &mut before)?.then(|| before.finish());
+            self.queue().submit(before.into_iter().chain([encoder.finish()]));
+            watches.all_refined();
+            watches.note(&updated);
+            Ok(())
+        })
+    }
+
+    /// Uploads triangle meshes as occluders.
+    ///
+    /// # Errors
+    /// Those of [`HizContext::create_occluders`](crate::HizContext::create_occluders), and
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost).
+    pub fn occluders(
+        &self,
+        meshes: &[MeshData<'_>],
+        options: &OccluderOptions,
+    ) -> Result<Arc<Occluders>> {
+        self.scoped(|| self.context().create_occluders(meshes, options)).map(Arc::new)
+    }
+}

@@ -1,0 +1,10 @@
+//! Vector algebra, rounding, memory and threads on the host.
+//!
+//! This room knows numbers and the standard library alone: no camera, no instance, no device.
+//! Every other room may use it.
+
+pub(crate) mod inverse;
+pub(crate) mod linear;
+pub(crate) mod memory;
+pub(crate) mod rounding;
+pub(crate) mod threads;

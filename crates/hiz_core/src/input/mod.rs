@@ -1,0 +1,14 @@
+//! What the caller gives, checked and converted in float64, without a device.
+//!
+//! Nothing is rounded to float32 before the records and rows that the device reads are formed.
+//! Cameras and depth images become float32 here (`view`, `depth`); bounds do so in the room
+//! `instances`.
+
+pub(crate) mod bounds;
+pub(crate) mod camera;
+pub(crate) mod depth;
+pub(crate) mod image;
+pub(crate) mod mesh;
+pub(crate) mod projection;
+pub(crate) mod tolerance;
+pub(crate) mod view;

@@ -1,0 +1,234 @@
+//! Instances: bounding volumes on the device.
+//!
+//! The data goes through these files:
+//!
+//! 1. `piece` cuts the instances of one call into pieces that fit a binding and a dispatch.
+//! 2. `order` and `morton` choose where each instance is stored: along a curve through space.
+//! 3. `groups` and `extent` form groups of 64 neighbours with a box around each.
+//! 4. `volume_record` and `records` write the records that the cull reads.
+//! 5. `update` replaces bounds later, and `watch` connects submitted culls with later updates.
+//!
+//! An instance has two numbers.
+//! Its *index* is the caller's number, and everything public uses it.
+//! Its *place* is where its piece stores it.
+//!
+//! This room records copies and dispatches; it never submits or waits.
+
+pub(crate) mod extent;
+pub(crate) mod groups;
+pub(crate) mod morton;
+pub(crate) mod order;
+pub(crate) mod piece;
+pub(crate) mod records;
+pub(crate) mod update;
+pub(crate) mod volume_record;
+pub(crate) mod watch;
+
+use std::sync::MutexGuard;
+
+use crate::error::{Error, Result};
+use crate::gpu::device::{ContextId, Gpu};
+use crate::host::memory;
+use crate::host::threads::Locked;
+use crate::input::bounds::{Bounds, BoundsKind};
+use crate::instances::groups::Groups;
+use crate::instances::order::StoredOrder;
+#[cfg(feature = "testing")]
+use crate::instances::piece::CULL_WORKGROUP;
+use crate::instances::piece::{Piece, packed, piece_capacity};
+use crate::instances::watch::Watches;
+
+/// How instances are uploaded.
+#[derive(Debug, Clone, Default)]
+pub struct InstanceOptions {
+    /// Whether to refuse invalid bounds (NaN, infinite, negative radius, min > max).
+    /// Otherwise they are kept visible.
+    pub strict: bool,
+    /// The order in which the instances of each piece are stored.
+    pub order: StoredOrder,
+    /// The most instances of one piece, a multiple of 128.
+    /// `None`: as many as the device allows.
+    #[cfg(feature = "testing")]
+    pub piece_capacity: Option<u32>,
+}
+
+impl InstanceOptions {
+    /// The most instances of one piece, at most `most`.
+    #[cfg(feature = "testing")]
+    fn checked_piece_capacity(&self, most: u32) -> Result<u32> {
+        match self.piece_capacity {
+            None => Ok(most),
+            Some(c) if c > 0 && c <= most && c.is_multiple_of(CULL_WORKGROUP) => Ok(c),
+            Some(c) => Err(Error::invalid(
+                "piece_capacity",
+                format!(
+                    "expected a multiple of {CULL_WORKGROUP} from {CULL_WORKGROUP} to {most}, got \
+                     {c}"
+                ),
+            )),
+        }
+    }
+
+    #[cfg(not(feature = "testing"))]
+    #[expect(clippy::unnecessary_wraps, clippy::unused_self, reason = "as with the feature")]
+    fn checked_piece_capacity(&self, most: u32) -> Result<u32> {
+        Ok(most)
+    }
+}
+
+/// The state on the host that updates change.
+#[derive(Debug)]
+pub(crate) struct Changing {
+    /// One per piece.
+    pub(crate) groups: Vec<Groups>,
+    /// The number of the next update; the docs of `update` say what it is for.
+    pub(crate) next_update: u32,
+}
+
+/// Bounding volumes on the device.
+#[derive(Debug)]
+pub struct Instances {
+    pub(crate) context: ContextId,
+    pub(crate) kind: BoundsKind,
+    /// At least one piece, so that there is always a draw to consume.
+    /// Without instances it is empty.
+    pub(crate) pieces: Vec<Piece>,
+    /// `shaders/instances/update.wgsl`, `Sequence`.
+    pub(crate) sequence: wgpu::Buffer,
+    changing: Locked<Changing>,
+    /// A thread holds it while it records *and* submits an update, so that both happen in one
+    /// order.
+    pub(crate) submitting: Locked<()>,
+    watches: Locked<Watches>,
+}
+
+impl Instances {
+    /// Packs the pieces one by one, and calls `copy` for each.
+    ///
+    /// `copy` gets a function that records the copies of the piece into an encoder.
+    /// It also learns whether more pieces follow.
+    /// A caller with a queue can submit then, and release the piece's staging buffers.
+    pub(crate) fn new(
+        gpu: &Gpu,
+        bounds: &Bounds<'_>,
+        options: &InstanceOptions,
+        mut copy: impl FnMut(&dyn Fn(&mut wgpu::CommandEncoder), bool) -> Result<()>,
+    ) -> Result<Self> {
+        let n = bounds.len()?;
+        let total = u32::try_from(n)
+            .map_err(|_| Error::limit("instances", n as u64, u64::from(u32::MAX)))?;
+        let kind = bounds.kind();
+        let most = piece_capacity(kind.record_bytes(), gpu.limits());
+        let capacity = options.checked_piece_capacity(most)?;
+        let (mut pieces, mut groups) = (Vec::new(), Vec::new());
+        let num_pieces = total.div_ceil(capacity).max(1);
+        for index in 0..num_pieces {
+            let start = index * capacity;
+            let range = start..total.min(start.saturating_add(capacity));
+            let (piece, its_groups, uploads) = packed(gpu, bounds, index, range, options.order)?;
+            copy(
+                &|encoder| uploads.iter().for_each(|upload| upload.record(encoder)),
+                index + 1 < num_pieces,
+            )?;
+            pieces.push(piece);
+            groups.push(its_groups);
+        }
+        let sequence =
+            gpu.filled("hiz.instances.sequence", &[0; 16], wgpu::BufferUsages::STORAGE)?;
+        let changing = Locked::new(Changing { groups, next_update: 0 });
+        let this = Self {
+            context: gpu.id(),
+            kind,
+            pieces,
+            sequence,
+            changing,
+            submitting: Locked::default(),
+            watches: Locked::default(),
+        };
+        if options.strict {
+            let invalid = this.invalid()?;
+            refuse_bad(n, invalid.len(), invalid.first().copied())?;
+        }
+        Ok(this)
+    }
+
+    /// The number of instances.
+    pub fn len(&self) -> u32 {
+        self.pieces.last().map_or(0, |p| p.range.end)
+    }
+
+    /// Whether there are no instances.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The kind of the bounding volumes.
+    pub fn kind(&self) -> BoundsKind {
+        self.kind
+    }
+
+    /// The number of pieces, which is also the number of lists and draws; at least 1.
+    pub fn num_pieces(&self) -> usize {
+        self.pieces.len()
+    }
+
+    /// The indices of instances with invalid bounds, ascending, after the last update.
+    /// A cull always keeps them.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`] if the host has no memory for the list.
+    pub fn invalid(&self) -> Result<Vec<u64>> {
+        let changing = self.changing();
+        let mut invalid =
+            memory::list(changing.groups.iter().map(|g| g.invalid().count()).sum(), "invalid")?;
+        for (piece, groups) in self.pieces.iter().zip(&changing.groups) {
+            let places = groups.invalid();
+            invalid
+                .extend(places.map(|p| u64::from(piece.range.start) + piece.order.index(p) as u64));
+        }
+        invalid.sort_unstable();
+        Ok(invalid)
+    }
+
+    /// Bytes on the device: one record per instance, and one box per 64 instances.
+    pub fn device_bytes(&self) -> u64 {
+        self.pieces.iter().map(|p| p.records.size() + p.group_records.size()).sum()
+    }
+
+    /// Bytes on the host.
+    ///
+    /// - 8 per instance for its place and its index; none with [`StoredOrder::Given`].
+    /// - 88 per group of 64 instances.
+    /// - 48 per instance in those groups of which a part was updated.
+    pub fn host_bytes(&self) -> u64 {
+        let groups = self.changing().groups.iter().map(Groups::host_bytes).sum::<u64>();
+        self.pieces.iter().map(|p| p.order.host_bytes()).sum::<u64>() + groups
+    }
+
+    /// The culls that were submitted.
+    ///
+    /// The lock is held while a cull is submitted and added, and while an update is submitted and
+    /// noted.
+    pub(crate) fn watches(&self) -> MutexGuard<'_, Watches> {
+        self.watches.lock()
+    }
+
+    pub(crate) fn changing(&self) -> MutexGuard<'_, Changing> {
+        self.changing.lock()
+    }
+}
+
+/// The error that `strict` gives if `bad` of `n` bounds are invalid.
+/// `first` is the index of the first of them.
+pub(crate) fn refuse_bad(n: usize, bad: usize, first: Option<u64>) -> Result<()> {
+    match first {
+        None => Ok(()),
+        Some(first) => Err(Error::invalid(
+            "bounds",
+            format!(
+                "expected finite numbers below 2^60, lengths >= 0 and min <= max, got {bad} bad of \
+                 {n}, the first at index {first}"
+            ),
+        )),
+    }
+}

@@ -1,0 +1,352 @@
+//! The Morton order, in which instances are stored.
+//! Instances that lie together in space then lie together in memory.
+//!
+//! Source: Morton, "A computer oriented geodetic data base and a new technique in file sequencing",
+//! IBM, 1966.
+//!
+//! The curve runs through cubes that are nested in one another.
+//! Each instance has its key in the smallest cube that holds its centre.
+//! The innermost cube comes from a sample of the centres, and each cube is 8 times as large as the
+//! one inside it.
+//! So an outlier does not coarsen the cells of the others.
+//! An instance a million times as far away as all others lies in an outer cube of its own.
+
+use std::ops::Range;
+
+use crate::error::Result;
+use crate::host::memory;
+use crate::host::threads::on_two_threads;
+use crate::input::bounds::Bounds;
+
+/// Bits of a cell's number along each axis.
+const AXIS_BITS: u32 = 19;
+
+/// The bits above the cell's three numbers hold the number of the cube: 63 bits in all.
+const CUBE_SHIFT: u32 = 3 * AXIS_BITS;
+
+/// The last cube also takes whatever lies outside it: coordinates beyond 2^60, which no record
+/// holds.
+const LAST_CUBE: u64 = 63;
+
+/// The key of invalid bounds: after every cell of every cube.
+const NO_VOLUME: u64 = u64::MAX;
+
+/// The most centres that are sampled to place the innermost cube.
+const SAMPLES: usize = 4096;
+
+/// From this many instances on, a second thread helps to sort.
+/// It takes tens of microseconds to start, and sorting them takes milliseconds.
+const PARALLEL_FROM: usize = 1 << 15;
+
+/// The key of a cell, and the index of an instance in it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct Keyed {
+    key: u64,
+    index: u32,
+}
+
+/// The innermost cube.
+#[derive(Debug, Clone, Copy)]
+struct Cube {
+    center: [f64; 3],
+    half_size: f64,
+}
+
+impl Cube {
+    /// Places the innermost cube by a sample of the centres.
+    ///
+    /// The cube's centre is the median along each axis.
+    /// Its half size is the width of the middle eight tenths of the sample, along the widest axis;
+    /// if that is 0, the width of the whole sample.
+    /// If the centres are spread evenly, the cube holds all of them.
+    /// A tenth of outliers on each side cannot move it.
+    fn new(bounds: &Bounds<'_>, range: &Range<usize>) -> Result<Self> {
+        let step = range.len().div_ceil(SAMPLES).max(1);
+        let mut axes: [Vec<f64>; 3] = [
+            memory::list(SAMPLES, "order")?,
+            memory::list(SAMPLES, "order")?,
+            memory::list(SAMPLES, "order")?,
+        ];
+        for extent in range.clone().step_by(step).filter_map(|i| bounds.extent(i)) {
+            for (axis, value) in axes.iter_mut().zip(extent.center()) {
+                axis.push(value);
+            }
+        }
+        let samples = axes[0].len();
+        if samples == 0 {
+            return Ok(Self { center: [0.0; 3], half_size: 1.0 });
+        }
+        for axis in &mut axes {
+            axis.sort_unstable_by(f64::total_cmp);
+        }
+        let widest =
+            |low: usize, high: usize| axes.iter().map(|a| a[high] - a[low]).fold(0.0, f64::max);
+        let tenth = samples / 10;
+        let width = [widest(tenth, samples - 1 - tenth), widest(0, samples - 1)]
+            .into_iter()
+            .find(|w| *w > 0.0);
+        // An extent below 2^-100 counts as a point; from there 63 cubes still reach past 2^60.
+        let half_size = width.unwrap_or(0.0).clamp(1.0 / 2.0_f64.powi(100), 2.0_f64.powi(60));
+        Ok(Self { center: axes.map(|a| a[samples / 2]), half_size })
+    }
+
+    fn key(&self, center: [f64; 3]) -> u64 {
+        let from_center: [f64; 3] =
+            std::array::from_fn(|k| (center[k] - self.center[k]) / self.half_size);
+        let distance = from_center.iter().fold(0.0, |d: f64, v| d.max(v.abs()));
+        let cube = if distance < 1.0 { 0 } else { (exponent(distance) / 3 + 1).min(LAST_CUBE) };
+        // The cube has 2^18 cells on each side of its centre.
+        // The clamp takes what lies outside the last cube.
+        let cells = f64::from(1_u32 << (AXIS_BITS - 1));
+        let scale = cells / power_of_8(cube);
+        let last = f64::from((1_u32 << AXIS_BITS) - 1);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+        let cell = from_center.map(|v| (v * scale + cells).clamp(0.0, last) as u64);
+        cube << CUBE_SHIFT | spread(cell[0]) << 2 | spread(cell[1]) << 1 | spread(cell[2])
+    }
+}
+
+/// The binary exponent of a finite number >= 1.
+fn exponent(v: f64) -> u64 {
+    (v.to_bits() >> 52) - 1023
+}
+
+fn power_of_8(power: u64) -> f64 {
+    f64::from_bits((1023 + 3 * power) << 52)
+}
+
+/// Spreads the 21 lowest bits: each is followed by two zeros.
+fn spread(v: u64) -> u64 {
+    let v = (v | v << 32) & 0x001F_0000_0000_FFFF;
+    let v = (v | v << 16) & 0x001F_0000_FF00_00FF;
+    let v = (v | v << 8) & 0x100F_00F0_0F00_F00F;
+    let v = (v | v << 4) & 0x10C3_0C30_C30C_30C3;
+    (v | v << 2) & 0x1249_2492_4924_9249
+}
+
+/// The instances of `range` along the curve, as indices relative to its start.
+///
+/// Instances with equal keys keep the caller's order, and invalid bounds come last.
+/// So the order is the same on every machine.
+pub(crate) fn order(bounds: &Bounds<'_>, range: Range<usize>) -> Result<Vec<u32>> {
+    let cube = Cube::new(bounds, &range)?;
+    let mut keyed = memory::list(range.len(), "order")?;
+    keyed.resize(range.len(), Keyed::default());
+    let mut spare = memory::collected(keyed.iter().copied(), "order")?;
+    let half = if range.len() < PARALLEL_FROM { 0 } else { range.len() / 2 };
+    let sort = |(begin, part, spare): (usize, &mut [Keyed], &mut [Keyed])| {
+        for (k, keyed) in part.iter_mut().enumerate() {
+            let key =
+                bounds.extent(range.start + begin + k).map_or(NO_VOLUME, |e| cube.key(e.center()));
+            *keyed = Keyed { key, index: (begin + k) as u32 };
+        }
+        radix_sort(part, spare);
+        Ok(())
+    };
+    let (first, second) = keyed.split_at_mut(half);
+    let (first_spare, second_spare) = spare.split_at_mut(half);
+    on_two_threads(
+        (half > 0).then_some((0, first, first_spare)),
+        (half, second, second_spare),
+        sort,
+    )?;
+    drop(spare);
+    let mut order = memory::list(range.len(), "order")?;
+    merge(&keyed[..half], &keyed[half..], &mut order);
+    Ok(order)
+}
+
+/// Merges the indices of two sorted lists in the order of their keys.
+/// Of equal keys, those of the first list come first.
+fn merge(first: &[Keyed], second: &[Keyed], order: &mut Vec<u32>) {
+    let (mut i, mut j) = (0, 0);
+    while i < first.len() && j < second.len() {
+        let take_second = second[j].key < first[i].key;
+        order.push(if take_second { second[j].index } else { first[i].index });
+        i += usize::from(!take_second);
+        j += usize::from(take_second);
+    }
+    order.extend(first[i..].iter().chain(&second[j..]).map(|k| k.index));
+}
+
+const DIGIT_BITS: u32 = 11;
+const DIGITS: usize = 64_usize.div_ceil(DIGIT_BITS as usize);
+
+fn digit(key: u64, place: usize) -> usize {
+    (key >> (place as u32 * DIGIT_BITS) & ((1 << DIGIT_BITS) - 1)) as usize
+}
+
+/// Sorts by key, least significant digit first; the sort is stable.
+/// Digits in which all keys agree are skipped.
+fn radix_sort(keyed: &mut [Keyed], spare: &mut [Keyed]) {
+    let mut counts = [[0_u32; 1 << DIGIT_BITS]; DIGITS];
+    for k in keyed.iter() {
+        for (place, counts) in counts.iter_mut().enumerate() {
+            counts[digit(k.key, place)] += 1;
+        }
+    }
+    let (mut from, mut to) = (keyed, spare);
+    let mut swapped = false;
+    for (place, counts) in counts.iter_mut().enumerate() {
+        if counts.iter().any(|c| *c as usize == from.len()) {
+            continue;
+        }
+        let mut begin = 0;
+        for count in counts.iter_mut() {
+            begin += std::mem::replace(count, begin);
+        }
+        for k in from.iter() {
+            let slot = &mut counts[digit(k.key, place)];
+            to[*slot as usize] = *k;
+            *slot += 1;
+        }
+        std::mem::swap(&mut from, &mut to);
+        swapped = !swapped;
+    }
+    if swapped {
+        to.copy_from_slice(from);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::bounds::Floats;
+
+    /// Marsaglia's xorshift.
+    struct Random(u64);
+
+    impl Random {
+        fn unit(&mut self) -> f64 {
+            self.0 ^= self.0 << 13;
+            self.0 ^= self.0 >> 7;
+            self.0 ^= self.0 << 17;
+            (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+        }
+    }
+
+    fn order_of(centers: &[f64]) -> Vec<u32> {
+        let n = centers.len() / 3;
+        let radii = vec![0.5; n];
+        order(&Bounds::Spheres { centers: Floats::F64(centers), radii: Floats::F64(&radii) }, 0..n)
+            .unwrap()
+    }
+
+    fn assert_is_permutation(order: &[u32]) {
+        let mut seen = vec![false; order.len()];
+        for i in order {
+            assert!(!std::mem::replace(&mut seen[*i as usize], true), "{i} twice");
+        }
+    }
+
+    #[test]
+    fn every_input_gives_a_permutation() {
+        assert_eq!(order_of(&[]), [0_u32; 0]);
+        assert_eq!(order_of(&[1.0, 2.0, 3.0]), [0]);
+        for special in
+            [0.0, 1.0, f64::NAN, f64::INFINITY, -1e300, f64::MAX, 1e30, -5e-324, 2.0_f64.powi(60)]
+        {
+            for n in [2, 63, 64, 1000, PARALLEL_FROM + 1] {
+                // All instances have the special centre, then every seventh.
+                let same = vec![special; 3 * n];
+                assert_eq!(
+                    order_of(&same),
+                    (0..n as u32).collect::<Vec<_>>(),
+                    "{special} {n}: equal keys keep their order"
+                );
+                let mut random = Random(n as u64);
+                let centers: Vec<_> = (0..3 * n)
+                    .map(|i| if i % 21 < 3 { special } else { random.unit() - 0.5 })
+                    .collect();
+                assert_is_permutation(&order_of(&centers));
+                assert_eq!(order_of(&centers), order_of(&centers), "the same from every run");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_volume_comes_last_in_its_order() {
+        let centers = [[9.0; 3], [f64::NAN; 3], [0.0; 3], [f64::INFINITY; 3], [3.0; 3]].concat();
+        assert_eq!(order_of(&centers)[3..], [1, 3]);
+        let radii = [0.5, 0.5, -1.0, 0.5, f64::NAN];
+        let bounds =
+            Bounds::Spheres { centers: Floats::F64(&[0.0; 15]), radii: Floats::F64(&radii) };
+        assert_eq!(order(&bounds, 0..5).unwrap(), [0, 1, 3, 2, 4]);
+        assert_eq!(order(&bounds, 2..5).unwrap(), [1, 0, 2], "relative to the range's start");
+    }
+
+    #[test]
+    fn one_thread_and_two_give_the_same_order() {
+        let n = PARALLEL_FROM + 77;
+        let mut random = Random(5);
+        let centers: Vec<_> = (0..3 * n).map(|_| (random.unit() * 16.0).floor()).collect();
+        let (radii, order) = (vec![0.0; n], order_of(&centers));
+        let bounds = Bounds::Spheres { centers: Floats::F64(&centers), radii: Floats::F64(&radii) };
+        let cube = Cube::new(&bounds, &(0..n)).unwrap();
+        let mut expected: Vec<_> = (0..n as u32).collect();
+        expected.sort_by_key(|i| cube.key(std::array::from_fn(|k| centers[3 * *i as usize + k])));
+        assert_eq!(order, expected);
+    }
+
+    /// The order of a curve through 8 cells, written out.
+    #[test]
+    fn keys_follow_the_z_of_morton() {
+        let cube = Cube { center: [0.0; 3], half_size: 1.0 };
+        let corners = |scale: f64| {
+            (0..8).map(move |i| {
+                [i & 4, i & 2, i & 1].map(|bit| if bit == 0 { -0.5 * scale } else { 0.5 * scale })
+            })
+        };
+        for scale in [1.0, 4.0, 32.0, 1e20] {
+            let keys: Vec<_> = corners(scale).map(|c| cube.key(c)).collect();
+            assert!(keys.is_sorted() && keys[7] < NO_VOLUME, "{scale}: {keys:?}");
+        }
+        assert!(cube.key([0.9; 3]) < cube.key([-1.5; 3]), "the inner cube comes first");
+    }
+
+    /// The cube root of the volume of the box around a group's centres.
+    /// Returns the median over all groups of 64.
+    fn mean_size(centers: &[f64], order: &[u32]) -> f64 {
+        let sizes = order.chunks(64).map(|group| {
+            let axis = |k: usize| {
+                let values = group.iter().map(|i| centers[3 * *i as usize + k]);
+                values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)
+            };
+            (axis(0) * axis(1) * axis(2)).cbrt()
+        });
+        let sizes: Vec<_> = sizes.collect();
+        // The median, because a group with an outlier is as large as the outlier is far.
+        let mut sorted = sizes;
+        sorted.sort_by(f64::total_cmp);
+        sorted[sorted.len() / 2]
+    }
+
+    /// Clusters, first without and then with outliers.
+    /// The instances were made in random order.
+    #[test]
+    fn groups_are_small_with_and_without_outliers() {
+        let mut random = Random(77);
+        let homes: Vec<[f64; 3]> =
+            (0..20).map(|_| std::array::from_fn(|_| 1000.0 * random.unit())).collect();
+        let n = 40_000;
+        let mut centers: Vec<f64> = (0..n)
+            .flat_map(|_| {
+                let home = homes[(random.unit() * 20.0) as usize];
+                home.map(|h| h + 20.0 * random.unit())
+            })
+            .collect();
+        let given: Vec<_> = (0..n as u32).collect();
+        let (random_order, sorted) =
+            (mean_size(&centers, &given), mean_size(&centers, &order_of(&centers)));
+        assert!(sorted < random_order / 100.0, "{sorted} against {random_order}");
+        for far in [1e5, 1e9, 1e17] {
+            for i in (0..n).step_by(100) {
+                for k in 0..3 {
+                    centers[3 * i + k] = far * (random.unit() - 0.5);
+                }
+            }
+            let with_outliers = mean_size(&centers, &order_of(&centers));
+            assert!(with_outliers < 1.2 * sorted, "{far}: {with_outliers} against {sorted}");
+        }
+    }
+}

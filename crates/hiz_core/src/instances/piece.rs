@@ -1,0 +1,189 @@
+//! Pieces: the instances of one call, cut so that each part fits a binding and a dispatch.
+
+use std::ops::Range;
+
+use crate::error::Result;
+use crate::gpu::buffers::{Mapped, entry};
+use crate::gpu::device::Gpu;
+use crate::gpu::layouts::Binding;
+use crate::input::bounds::Bounds;
+use crate::instances::groups::{GROUP, Groups, Origin};
+use crate::instances::order::{PieceOrder, StoredOrder};
+use crate::instances::records::{RECORDS_PER_ROW, Records, Upload};
+use crate::instances::volume_record::BoxRecord;
+
+/// Invocations of one workgroup of the cull of groups, and of updates.
+/// Twins: `shaders/cull/cull_groups.wgsl`, `WORKGROUP`; `shaders/instances/update.wgsl`.
+pub(crate) const CULL_WORKGROUP: u32 = 128;
+
+/// How many instances one piece may hold.
+///
+/// Its records must fit one texture and one staging buffer.
+/// Its verdicts must fit one binding, and its workgroups one dimension of a dispatch.
+pub(crate) fn piece_capacity(record_bytes: u64, limits: &wgpu::Limits) -> u32 {
+    let rows = u64::from(limits.max_texture_dimension_2d) * u64::from(RECORDS_PER_ROW);
+    let staging = limits.max_buffer_size / record_bytes;
+    // Per instance: a verdict of 4 bytes, and a bit of the mask.
+    let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) / 5;
+    let dispatch =
+        u64::from(limits.max_compute_workgroups_per_dimension) * u64::from(CULL_WORKGROUP);
+    // Whole rows, so that the padding of a staging buffer cannot exceed the limit.
+    let whole =
+        rows.min(staging).min(binding).min(dispatch).min(1 << 24) / u64::from(RECORDS_PER_ROW);
+    u32::try_from(whole * u64::from(RECORDS_PER_ROW)).unwrap_or(1 << 24)
+}
+
+/// Twin: `shaders/instances/piece.wgsl`, `Piece`.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct PieceUniform {
+    pub(crate) base: u32,
+    pub(crate) count: u32,
+    pub(crate) index: u32,
+    pub(crate) words: u32,
+}
+
+#[derive(Debug)]
+pub(crate) struct Piece {
+    pub(crate) range: Range<u32>,
+    /// The records in stored order.
+    /// Each holds its instance's index relative to the piece's first.
+    pub(crate) records: Records,
+    /// One `BoxRecord` per group.
+    pub(crate) group_records: Records,
+    pub(crate) uniform: wgpu::Buffer,
+    /// What the cull of instances binds.
+    pub(crate) bindings: wgpu::BindGroup,
+    /// What the cull of groups binds: its boxes, as if they were a piece of instances.
+    pub(crate) group_bindings: wgpu::BindGroup,
+    pub(crate) order: PieceOrder,
+}
+
+impl Piece {
+    pub(crate) fn count(&self) -> u32 {
+        self.range.end - self.range.start
+    }
+
+    /// The number of groups.
+    pub(crate) fn groups(&self) -> u32 {
+        self.count().div_ceil(GROUP as u32)
+    }
+
+    /// Words of the mask of this piece.
+    pub(crate) fn words(&self) -> u32 {
+        self.count().div_ceil(32)
+    }
+}
+
+/// The bindings of a piece's uniform and records in every cull.
+pub(crate) const RECORD_BINDINGS: &[(u32, Binding)] =
+    &[(0, Binding::Uniform), (1, Binding::ReadQuads)];
+
+/// Makes a piece, its groups, and the uploads that bring both to the device.
+pub(super) fn packed(
+    gpu: &Gpu,
+    bounds: &Bounds<'_>,
+    index: u32,
+    range: Range<u32>,
+    order: StoredOrder,
+) -> Result<(Piece, Groups, [Upload; 2])> {
+    let (first, count) = (range.start as usize, range.end - range.start);
+    let record_bytes = bounds.kind().record_bytes();
+    let order = PieceOrder::new(bounds, first..range.end as usize, order)?;
+    let source = |place: usize| Origin {
+        bounds: first + order.index(place),
+        index: order.index(place) as u32,
+    };
+    let (records, upload, groups) =
+        Records::new(gpu, "hiz.instances.records", count, record_bytes, |records| {
+            Groups::packed(bounds, count as usize, source, records)
+        })?;
+    let num_groups = groups.len() as u32;
+    let box_bytes = size_of::<BoxRecord>() as u64;
+    let (group_records, groups_upload, ()) =
+        Records::new(gpu, "hiz.instances.groups", num_groups, box_bytes, |boxes| {
+            write_boxes(boxes, (0..groups.len()).map(|g| groups.record(g)))
+        })?;
+    let uniform = |count: u32| {
+        let words = count.div_ceil(32);
+        gpu.uniform("hiz.instances.piece", &PieceUniform { base: range.start, count, index, words })
+    };
+    let uniform_of_groups = uniform(num_groups)?;
+    let uniform = uniform(count)?;
+    let bindings = bind_records(gpu, &uniform, &records)?;
+    let group_bindings = bind_records(gpu, &uniform_of_groups, &group_records)?;
+    let piece = Piece { range, records, group_records, uniform, bindings, group_bindings, order };
+    Ok((piece, groups, [upload, groups_upload]))
+}
+
+/// Binds a piece's uniform and records for a cull.
+pub(crate) fn bind_records(
+    gpu: &Gpu,
+    uniform: &wgpu::Buffer,
+    records: &Records,
+) -> Result<wgpu::BindGroup> {
+    gpu.bind_group(
+        "hiz.cull.instances",
+        &gpu.layout("hiz.cull.instances_layout", RECORD_BINDINGS)?,
+        &[
+            entry(0, uniform.as_entire_binding()),
+            entry(1, wgpu::BindingResource::TextureView(&records.view)),
+        ],
+    )
+}
+
+/// Writes box records, one after the other.
+pub(crate) fn write_boxes(
+    target: &Mapped<'_>,
+    records: impl ExactSizeIterator<Item = BoxRecord>,
+) -> Result<()> {
+    let mut view = target.range(0..(records.len() * size_of::<BoxRecord>()) as u64)?;
+    let chunks = view.slice(..).into_chunks::<{ size_of::<BoxRecord>() }>().0;
+    chunks.into_iter().zip(records).for_each(|(chunk, record)| chunk.write(bytemuck::cast(record)));
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Checks each limit alone against values worked out by hand.
+    /// On a device only twenty million instances would reach these limits.
+    #[test]
+    fn every_limit_makes_pieces_smaller() {
+        let large = wgpu::Limits {
+            max_texture_dimension_2d: 1 << 20,
+            max_buffer_size: 1 << 40,
+            max_storage_buffer_binding_size: 1 << 40,
+            max_compute_workgroups_per_dimension: 1 << 30,
+            ..wgpu::Limits::default()
+        };
+        // float32 holds every index of a piece exactly.
+        assert_eq!(piece_capacity(64, &large), 1 << 24);
+        let rows = wgpu::Limits { max_texture_dimension_2d: 8, ..large.clone() };
+        assert_eq!(piece_capacity(64, &rows), 8 * 1024);
+        // 2^20 bytes hold 16384 records of 64 bytes, or 32768 records of 32 bytes.
+        let buffer = wgpu::Limits { max_buffer_size: 1 << 20, ..large.clone() };
+        assert_eq!((piece_capacity(64, &buffer), piece_capacity(32, &buffer)), (16_384, 32_768));
+        // A verdict and a bit of the mask take at most 5 bytes: 209715 instances, cut to whole
+        // rows.
+        let binding = wgpu::Limits { max_storage_buffer_binding_size: 1 << 20, ..large.clone() };
+        assert_eq!(piece_capacity(64, &binding), 204 * 1024);
+        // 100 workgroups of 128 invocations.
+        let dispatch = wgpu::Limits { max_compute_workgroups_per_dimension: 100, ..large };
+        assert_eq!(piece_capacity(64, &dispatch), 12 * 1024);
+    }
+
+    #[test]
+    fn pieces_fit_the_binding_and_the_dispatch() {
+        let limits = wgpu::Limits::default();
+        for bytes in [32, 48, 64] {
+            let piece = u64::from(piece_capacity(bytes, &limits));
+            assert!(piece * bytes <= 256 << 20, "records wait in one buffer");
+            assert!(piece / 1024 <= 8192, "and lie in the rows of one texture");
+            assert!(4 * piece + piece / 8 <= 128 << 20, "verdicts and the mask are one binding");
+            assert!(piece.is_multiple_of(128) && piece / 128 <= 65_535);
+            assert!(piece > 2_000_000);
+        }
+    }
+}

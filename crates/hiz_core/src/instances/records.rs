@@ -1,0 +1,109 @@
+//! Records of volumes on the device.
+//!
+//! They lie in a texture, because a software driver fetches a texel of 16 bytes whole.
+//! From a buffer it would fetch the words one by one (`docs/performance.md`).
+//! Twin: `shaders/instances/record_layout.wgsl`.
+
+use crate::error::Result;
+use crate::gpu::buffers::Mapped;
+use crate::gpu::device::Gpu;
+
+/// Records in a row of the texture.
+pub(crate) const RECORDS_PER_ROW: u32 = 1024;
+
+/// Bytes of a texel of `Rgba32Uint`.
+pub(crate) const TEXEL_BYTES: u64 = 16;
+
+/// A short row is padded to a multiple of this many records.
+/// Then every size of record meets the alignment that copies need.
+const ROW_MULTIPLE: u32 = 16;
+
+/// The format of the texture.
+pub(crate) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
+
+/// Records, one after the other, in rows of [`RECORDS_PER_ROW`].
+#[derive(Debug)]
+pub(crate) struct Records {
+    pub(crate) view: wgpu::TextureView,
+    texture: wgpu::Texture,
+    record_bytes: u64,
+}
+
+/// Records in a staging buffer, to be copied to the texture that the cull reads.
+pub(crate) struct Upload {
+    staging: wgpu::Buffer,
+    texture: wgpu::Texture,
+}
+
+impl Records {
+    /// Makes room for `count` records; `fill` writes them into mapped memory.
+    /// They are on the device once the upload was recorded and has run.
+    pub(crate) fn new<T>(
+        gpu: &Gpu,
+        label: &str,
+        count: u32,
+        record_bytes: u64,
+        fill: impl FnOnce(&Mapped<'_>) -> Result<T>,
+    ) -> Result<(Self, Upload, T)> {
+        let columns = count.clamp(1, RECORDS_PER_ROW).next_multiple_of(ROW_MULTIPLE);
+        let rows = count.div_ceil(RECORDS_PER_ROW).max(1);
+        let size = u64::from(columns) * u64::from(rows) * record_bytes;
+        // Without MAP_WRITE, wgpu would map a staging buffer of its own and copy it into this one.
+        let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::MAP_WRITE;
+        let (staging, filled) = gpu.written(label, size, usage, fill)?;
+        let texture = gpu.texture(
+            label,
+            (columns * (record_bytes / TEXEL_BYTES) as u32, rows),
+            FORMAT,
+            wgpu::TextureUsages::STORAGE_BINDING
+                | wgpu::TextureUsages::COPY_DST
+                | wgpu::TextureUsages::COPY_SRC,
+        )?;
+        let view = gpu.view(&texture)?;
+        let records = Self { view, texture: texture.clone(), record_bytes };
+        Ok((records, Upload { staging, texture }, filled))
+    }
+
+    /// Texels per record.
+    pub(crate) fn texels(&self) -> u32 {
+        (self.record_bytes / TEXEL_BYTES) as u32
+    }
+
+    /// The texture.
+    /// Its rows have no padding except after the last record.
+    #[cfg(feature = "testing")]
+    pub(crate) fn texture(&self) -> &wgpu::Texture {
+        &self.texture
+    }
+
+    /// Bytes on the device.
+    pub(crate) fn size(&self) -> u64 {
+        TEXEL_BYTES * u64::from(self.texture.width()) * u64::from(self.texture.height())
+    }
+}
+
+impl Upload {
+    pub(crate) fn record(&self, encoder: &mut wgpu::CommandEncoder) {
+        encoder.copy_buffer_to_texture(
+            wgpu::TexelCopyBufferInfo {
+                buffer: &self.staging,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(self.texture.width() * TEXEL_BYTES as u32),
+                    rows_per_image: None,
+                },
+            },
+            self.texture.as_image_copy(),
+            self.texture.size(),
+        );
+    }
+}
+
+const _: () =
+    assert!((ROW_MULTIPLE * 32).is_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT), "spheres");
+const _: () =
+    assert!((ROW_MULTIPLE * 48).is_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT), "boxes");
+const _: () = assert!(
+    (ROW_MULTIPLE * 64).is_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT),
+    "oriented boxes"
+);

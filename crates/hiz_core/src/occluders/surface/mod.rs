@@ -1,0 +1,220 @@
+//! Occluder depth that holds for every larger image of the same view, with any sample positions.
+//!
+//! A rasterised depth image knows its sample points alone.
+//! Between them it may show a wall where a larger image shows a gap beside the wall.
+//! A cull against it hides what is visible through that gap.
+//! The image made here promises more:
+//!
+//! > Every ray through the **closed square** of a pixel meets an occluder at the pixel's depth or
+//! > nearer, and beyond the near plane.
+//! > Where that cannot be shown the pixel is far.
+//!
+//! So every point of a larger image, with any size, jitter or multisampling, has an occluder at
+//! most as far as the pixel that contains the point.
+//! A cull with area coverage against the small image is therefore right for the large one.
+//!
+//! Two published methods promise less:
+//!
+//! - Hardware and "inner conservative" rasterisers (Akenine-Moller and Aila 2005) give this
+//!   guarantee for one triangle alone.
+//!   They lose every pixel that an inner edge of a mesh crosses.
+//! - Masked Software Occlusion Culling (Hasselgren, Andersson, Akenine-Moller 2016) merges by
+//!   sample coverage, and admits the error.
+//!
+//! Here pixels are covered by *sheets*, on the host in float64.
+//!
+//! **Sheets.**
+//! Let P be a closed square, and G a set of triangles as they appear in the image.
+//! Orient all of them the same way round.
+//! Where two triangles of G share an edge and lie on different sides of it, their borders run in
+//! opposite directions along the edge and cancel.
+//! The edges that remain are the border of G.
+//! How often that border winds about a point is the sum over the triangles of how often theirs do.
+//! This number does not change while the point moves without crossing the border.
+//!
+//! Therefore, **if no remaining edge meets P, and the border winds about P's centre a number of
+//! times other than 0, then every point of P lies in a triangle of G**.
+//! No ray through P then gets farther than the farthest depth that the triangles of G reach in P.
+//!
+//! Nothing is assumed of G.
+//! It may fold, overlap, intersect itself or face the wrong way.
+//! It may have triangles of area zero, or three triangles at one edge.
+//! Every choice of G gives a valid depth.
+//!
+//! **Which sheets.**
+//! `sheets` links the triangles that touch P across shared edges that meet P.
+//! Each connected component is a sheet.
+//! If a triangle is missing, its neighbour's edge stays unpaired, which spoils that sheet alone.
+//! The nearest of all sheets that cover P counts.
+//! A lamp post in front of a wall spoils its own sheet, not the wall's.
+//!
+//! At folds and at silhouettes of closed meshes two triangles lie on the *same* side of their edge.
+//! Their borders then add up instead of cancelling.
+//! Modulo 2 they cancel again, and an odd winding covers P, too.
+//! That closes small folds.
+//!
+//! Where no sheet covers P, its quarters are tried (`refinement`).
+//! Every ray through P goes through a quarter, so the farthest quarter counts for P.
+//!
+//! **Rounding.**
+//! No step trusts a sign that float64 may have got wrong.
+//!
+//! - Each projected vertex carries a bound of its error, which is a few roundings of its terms,
+//!   counted in `cells`.
+//! - An exact edge lies within the margins of its ends from the computed edge.
+//!   It misses P if the computed edge misses P grown by the margins (`square`).
+//! - Moving all vertices from their computed to their exact places moves no border across P.
+//!   Each edge of the computed border lies certainly on one side of P's centre.
+//!   The computed border therefore winds about it as often as the exact border.
+//! - Inner edges that miss P cancel exactly.
+//!   The float64 expression for the edge from b to a is the negative of the one for a to b.
+//! - Depths are bounded over P grown by the margins, and rounded to float32 towards far.
+//!
+//! **Near and far.**
+//! Triangles are clipped a millionth of the depth range behind the near plane.
+//! The cuts are at points that lie exactly on the edges and that neighbours share; the cut itself
+//! is a border.
+//! Triangles without a certain projection are dropped; their neighbours' edges become borders.
+//! Beyond the far plane nothing is hidden: such depths become far.
+
+mod cells;
+pub(crate) mod planted_fault;
+mod sheets;
+mod square;
+mod topology;
+
+use std::sync::OnceLock;
+
+use crate::error::Result;
+use crate::host::linear::Vec3;
+use crate::host::rounding::round_up;
+use crate::input::camera::Camera;
+use crate::input::mesh::FaceCull;
+use crate::occluders::surface::cells::Cells;
+use crate::occluders::surface::planted_fault::{Planted, is_planted};
+use crate::occluders::surface::sheets::Sheets;
+use crate::occluders::surface::topology::Topology;
+
+/// The least normal float32.
+/// Depths below it, next to the far plane of reversed Z, count as far.
+const LEAST_DEPTH: f32 = f32::MIN_POSITIVE;
+
+/// Choices for [`OccluderSurface::conservative_depth`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ConservativeDepthOptions {
+    /// How often a pixel is quartered where no sheet covers all of it; more than 8 counts as 8.
+    ///
+    /// Each step finds more occlusion beside silhouettes and costs time there.
+    /// The result is right for every number.
+    pub refinement: u32,
+}
+
+impl Default for ConservativeDepthOptions {
+    fn default() -> Self {
+        Self { refinement: 2 }
+    }
+}
+
+/// The occluders' triangles on the host, in float64 world coordinates.
+///
+/// | memory on the host, in bytes | per vertex | per triangle |
+/// |---|---|---|
+/// | always | 24 | 12 |
+/// | from the first conservative depth image on, besides | 24 | about 42 |
+/// | while a conservative depth image is made, besides | about 110 | about 110 |
+#[derive(Debug)]
+pub struct OccluderSurface {
+    positions: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    cull_mode: FaceCull,
+    topology: OnceLock<Result<Topology>>,
+}
+
+impl OccluderSurface {
+    pub(crate) fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, cull_mode: FaceCull) -> Self {
+        Self { positions, triangles, cull_mode, topology: OnceLock::new() }
+    }
+
+    /// The NDC depth of these occluders, which holds for every larger image of the same view.
+    ///
+    /// Every ray through a pixel's closed square meets an occluder at the pixel's depth or nearer.
+    /// Where that cannot be shown the pixel is far.
+    /// The result has one number per pixel of `camera`, row 0 on top, in its depth convention.
+    ///
+    /// The proof, by sheets of neighbouring triangles, opens `occluders/surface/mod.rs`.
+    ///
+    /// # Errors
+    /// [`Error::Limit`](crate::Error::Limit) for more than 357 million triangles.
+    pub fn conservative_depth(
+        &self,
+        camera: &Camera,
+        options: &ConservativeDepthOptions,
+    ) -> Result<Vec<f32>> {
+        self.conservative_depth_planted(camera, options, Planted::default())
+    }
+
+    /// [`OccluderSurface::conservative_depth`] with a planted fault, for tests.
+    ///
+    /// # Errors
+    /// As [`OccluderSurface::conservative_depth`].
+    #[cfg(feature = "testing")]
+    pub fn conservative_depth_with_fault(
+        &self,
+        camera: &Camera,
+        options: &ConservativeDepthOptions,
+        fault: Option<planted_fault::PlantedFault>,
+    ) -> Result<Vec<f32>> {
+        self.conservative_depth_planted(camera, options, Planted(fault))
+    }
+
+    fn conservative_depth_planted(
+        &self,
+        camera: &Camera,
+        options: &ConservativeDepthOptions,
+        fault: Planted,
+    ) -> Result<Vec<f32>> {
+        let topology =
+            self.topology.get_or_init(|| Topology::new(&self.positions, &self.triangles));
+        let topology = topology.as_ref().map_err(Clone::clone)?;
+        let convention = camera.convention();
+        let culled = self.cull_mode.as_seen_by(camera);
+        let cells = Cells::new(topology, camera, culled, fault);
+        // The value of `far` at the far plane; reversed Z counts its depths negative.
+        let beyond = if convention.is_reversed() { 0.0 } else { 1.0 };
+        let far =
+            Sheets::new(&cells, fault).image(camera.size(), beyond, options.refinement.min(8));
+        #[expect(clippy::cast_possible_truncation, reason = "the fault that is planted")]
+        let rounded =
+            if is_planted!(fault, RoundedToNearest) { |far| far as f32 } else { round_up };
+        let ndc = |far: f64| match (far < beyond, convention.is_reversed()) {
+            (false, _) => convention.far(),
+            (true, false) => rounded(far).min(1.0),
+            (true, true) => Some(-rounded(far)).filter(|d| *d >= LEAST_DEPTH).unwrap_or(0.0),
+        };
+        Ok(far.into_iter().map(ndc).collect())
+    }
+
+    /// World positions of the vertices, in the meshes' order, repeated for each transform.
+    pub fn positions(&self) -> &[[f64; 3]] {
+        &self.positions
+    }
+
+    /// Triangles as indices into [`positions`](Self::positions).
+    ///
+    /// The corners of a mirrored copy are reversed, so that front faces stay front faces.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// Which faces do not occlude.
+    pub fn cull_mode(&self) -> FaceCull {
+        self.cull_mode
+    }
+
+    /// Bytes on the host, including the topology once a conservative depth image was made.
+    pub fn host_bytes(&self) -> u64 {
+        let made = self.topology.get().and_then(|topology| topology.as_ref().ok());
+        (size_of_val(&self.positions[..]) + size_of_val(&self.triangles[..])) as u64
+            + made.map_or(0, Topology::bytes)
+    }
+}

@@ -1,0 +1,58 @@
+//! Faults that tests plant into conservative depth.
+//!
+//! Without the feature `testing` nothing of them is compiled.
+
+/// The fault that is planted, if any.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Planted(#[cfg(feature = "testing")] pub(crate) Option<PlantedFault>);
+
+/// Whether this fault is planted.
+#[cfg(feature = "testing")]
+macro_rules! is_planted {
+    ($planted:expr, $fault:ident) => {
+        $planted.0 == Some($crate::occluders::surface::planted_fault::PlantedFault::$fault)
+    };
+}
+
+/// False: without the feature no fault can be planted.
+#[cfg(not(feature = "testing"))]
+macro_rules! is_planted {
+    ($planted:expr, $fault:ident) => {{
+        let _: $crate::occluders::surface::planted_fault::Planted = $planted;
+        false
+    }};
+}
+pub(super) use is_planted;
+
+/// A way to make conservative depth wrong.
+///
+/// See [`conservative_depth`](crate::OccluderSurface::conservative_depth).
+/// A test suite is trusted once a planted fault makes it fail.
+#[cfg(feature = "testing")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PlantedFault {
+    /// A border that meets a pixel does not spoil its sheet.
+    ContoursIgnored,
+    /// A triangle's depth at the pixel's centre counts for the whole pixel.
+    DepthAtCentre,
+    /// Projected vertices count as exact.
+    NoWidening,
+    /// Triangles on the same side of their edge count as if they were on different sides.
+    FoldsIgnored,
+    /// Depths are rounded to the nearest float32.
+    RoundedToNearest,
+    /// Triangles slightly in front of the near plane count, too.
+    BeforeNear,
+    /// A point counts as behind the near plane if float64 says so, without a proof.
+    NearPointsUnproved,
+    /// Projected depths count as exact.
+    DepthsExact,
+    /// The depths of a triangle's corners count as exact, but not those of its plane.
+    CornerDepthsExact,
+    /// Points where edges are cut at the near plane count as exact.
+    CutPointsExact,
+    /// The side along the near plane counts as the edge that was cut.
+    CutSidesJoined,
+    /// A triangle faces the camera if float64 says so, without a proof.
+    FacingUnproved,
+}

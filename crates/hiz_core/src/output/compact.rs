@@ -1,0 +1,103 @@
+//! The ordered compaction: from the mask to an ascending list and the draw's instance count.
+
+use crate::error::Result;
+use crate::gpu::buffers::entry;
+use crate::gpu::device::Gpu;
+use crate::gpu::layouts::Binding;
+use crate::gpu::pipelines::Compute;
+use crate::gpu::shader::{Source, wgsl};
+use crate::instances::Instances;
+use crate::output::lists::Lists;
+use crate::output::visible::Visible;
+
+/// Words of the mask that one workgroup of `scatter` turns into indices;
+/// `shaders/output/compact.wgsl`.
+const SCATTER_WORKGROUP: u32 = 64;
+
+const LAYOUT: &str = "hiz.compact.layout";
+
+/// The bindings of the compaction of a piece.
+const BINDINGS: &[(u32, Binding)] = &[
+    (0, Binding::Uniform),
+    (1, Binding::Read),
+    (2, Binding::Write),
+    (3, Binding::Write),
+    (4, Binding::Write),
+    (5, Binding::Uniform),
+];
+
+/// The shader of the ordered compaction.
+pub(crate) fn module() -> Source {
+    Source::of(&[&[wgsl!("instances/piece"), wgsl!("output/compact")]])
+}
+
+fn pipeline(gpu: &Gpu, entry_point: &'static str) -> Result<wgpu::ComputePipeline> {
+    gpu.compute_pipeline(&Compute {
+        label: "hiz.compact.pipeline",
+        source: module(),
+        entry_point,
+        layouts: &[gpu.layout(LAYOUT, BINDINGS)?],
+        constants: &[],
+    })
+}
+
+/// The pipelines and bindings of the compaction of all pieces that have instances.
+pub(crate) struct Compaction {
+    scan: wgpu::ComputePipeline,
+    scatter: wgpu::ComputePipeline,
+    /// Per piece: its bindings and, if it has a list, how many workgroups scatter its indices.
+    pieces: Vec<(wgpu::BindGroup, Option<u32>)>,
+}
+
+impl Compaction {
+    pub(crate) fn new(
+        gpu: &Gpu,
+        instances: &Instances,
+        visible: &Visible,
+        lists: &Lists,
+    ) -> Result<Self> {
+        let layout = gpu.layout(LAYOUT, BINDINGS)?;
+        let of_pieces = instances.pieces.iter().zip(&visible.pieces).zip(&lists.pieces);
+        let pieces =
+            of_pieces.filter(|((piece, _), _)| piece.count() > 0).map(|((piece, output), list)| {
+                let bind_group = gpu.bind_group(
+                    "hiz.compact.piece",
+                    &layout,
+                    &[
+                        entry(0, piece.uniform.as_entire_binding()),
+                        entry(1, output.mask.as_entire_binding()),
+                        entry(2, list.bound().as_entire_binding()),
+                        entry(3, lists.draws.as_entire_binding()),
+                        entry(4, list.before.as_entire_binding()),
+                        entry(5, lists.capacity_uniform.as_entire_binding()),
+                    ],
+                )?;
+                Ok((
+                    bind_group,
+                    list.indices.as_ref().map(|_| piece.words().div_ceil(SCATTER_WORKGROUP)),
+                ))
+            });
+        Ok(Self {
+            scan: pipeline(gpu, "scan")?,
+            scatter: pipeline(gpu, "scatter")?,
+            pieces: pieces.collect::<Result<_>>()?,
+        })
+    }
+
+    /// Records the compaction of every piece.
+    ///
+    /// The pieces go in order, because each needs the capacity that earlier pieces have left.
+    /// `idle`: as `CullInputs::idle`.
+    pub(crate) fn record(&self, pass: &mut wgpu::ComputePass<'_>, idle: bool) {
+        let workgroups = |count: u32| if idle { 0 } else { count };
+        for (bind_group, scattering) in &self.pieces {
+            pass.set_bind_group(0, bind_group, &[]);
+            pass.set_pipeline(&self.scan);
+            pass.dispatch_workgroups(workgroups(1), 1, 1);
+            if let Some(count) = scattering {
+                pass.set_pipeline(&self.scatter);
+                pass.dispatch_workgroups(workgroups(*count), 1, 1);
+            }
+        }
+    }
+}

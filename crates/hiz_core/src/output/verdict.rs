@@ -1,0 +1,32 @@
+//! The verdict of a cull on one instance.
+
+/// The verdict of a cull on an instance; twin: `shaders/output/verdict.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, bytemuck::NoUninit)]
+#[repr(u8)]
+pub enum Verdict {
+    /// Not kept: outside the frustum, or in sample coverage between all pixel centres.
+    Outside = 0,
+    /// Not kept: hidden by the depth image, and not outside.
+    Occluded = 1,
+    /// Kept: possibly visible.
+    Visible = 2,
+    /// Kept: invalid bounds (NaN, infinite, negative radius, min > max).
+    Invalid = 3,
+}
+
+impl Verdict {
+    /// Whether the instance is kept.
+    pub fn is_kept(self) -> bool {
+        self >= Self::Visible
+    }
+
+    /// The verdict in the two lowest bits of a word from the device.
+    pub(crate) fn of_word(word: u32) -> Self {
+        match word & 3 {
+            0 => Self::Outside,
+            1 => Self::Occluded,
+            2 => Self::Visible,
+            _ => Self::Invalid,
+        }
+    }
+}

@@ -1,0 +1,348 @@
+//! The depth pyramid: its storage, and the passes that fill it.
+//!
+//! Data flows through the room in this order:
+//!
+//! 1. `layout` plans levels, offsets and dispatches without a device; `levels` says what is stored.
+//! 2. [`Pyramid`] holds the buffers of the stored levels.
+//! 3. `reduce` records the passes that fill them from a depth image; `built` remembers that image.
+//! 4. `atlas` copies all levels into one texture for large culls.
+//!
+//! Passes are recorded into the caller's encoder; nothing here submits, waits or reads back.
+
+pub(crate) mod atlas;
+pub(crate) mod built;
+pub(crate) mod layout;
+pub(crate) mod levels;
+pub(crate) mod reduce;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+use crate::error::{Error, Result};
+use crate::gpu::device::{ContextId, Gpu};
+use crate::gpu::kept::KeptBindings;
+use crate::host::threads::Locked;
+use crate::input::camera::Camera;
+use crate::input::image::ImageSize;
+use crate::input::tolerance::DepthTolerance;
+use crate::pyramid::atlas::{Atlas, AtlasUse};
+use crate::pyramid::built::Built;
+use crate::pyramid::layout::{PYRAMID_CHUNKS, PyramidLayout, chunk_shift};
+use crate::pyramid::levels::{Level, MAX_LEVELS, StoredLevels};
+
+/// Twin of `Pyramid` in `shaders/pyramid/pyramid.wgsl`.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct PyramidUniform {
+    pub(crate) levels: [Level; MAX_LEVELS],
+    pub(crate) origins: [[u32; 4]; MAX_LEVELS],
+    pub(crate) chunk_shift: u32,
+    pub(crate) first_stored: u32,
+    pub(crate) last_stored: u32,
+    pub(crate) padding: u32,
+}
+
+const _: () = assert!(size_of::<PyramidUniform>() == 528);
+
+/// Labels of the stand-ins that are bound for the chunks that a small pyramid does not have.
+const NO_CHUNK: [&str; PYRAMID_CHUNKS] = ["hiz.no_chunk_0", "hiz.no_chunk_1", "hiz.no_chunk_2"];
+
+/// How a pyramid is stored.
+#[derive(Debug, Clone, Default)]
+pub struct PyramidOptions {
+    /// Which levels are stored; all by default.
+    pub levels: StoredLevels,
+    /// Texels per chunk as a power of two, at least 2.
+    ///
+    /// `None`: as many as one storage binding of the device holds, which is the most allowed.
+    #[cfg(feature = "testing")]
+    pub chunk_shift: Option<u32>,
+    /// Whether culls read all levels from one texture.
+    pub atlas: AtlasUse,
+}
+
+impl PyramidOptions {
+    /// Texels per chunk as a power of two, at most `most`.
+    #[cfg(feature = "testing")]
+    fn checked_chunk_shift(&self, most: u32) -> Result<u32> {
+        let shift = self.chunk_shift.unwrap_or(most);
+        if (2..=most).contains(&shift) {
+            return Ok(shift);
+        }
+        Err(Error::invalid("chunk_shift", format!("expected 2 to {most}, got {shift}")))
+    }
+
+    #[cfg(not(feature = "testing"))]
+    #[expect(clippy::unnecessary_wraps, clippy::unused_self, reason = "as with the feature")]
+    fn checked_chunk_shift(&self, most: u32) -> Result<u32> {
+        Ok(most)
+    }
+}
+
+/// A depth pyramid on the device: for every level, the farthest depth of each block of pixels.
+///
+/// Level 0 is the depth texture itself, which the pyramid keeps alive but does not copy.
+/// **Do not write to that texture between the reduction and the culls that use it.**
+#[derive(Debug)]
+pub struct Pyramid {
+    pub(crate) context: ContextId,
+    pub(crate) layout: PyramidLayout,
+    pub(crate) chunks: Vec<wgpu::Buffer>,
+    pub(crate) uniform: wgpu::Buffer,
+    built: Locked<Option<Built>>,
+    atlas_use: AtlasUse,
+    /// Set once there was no memory for an atlas.
+    no_atlas: AtomicBool,
+    atlas: Locked<Option<Atlas>>,
+    /// The last reduction that is known to have run; one that was only recorded may never run.
+    reduced: Arc<AtomicU32>,
+    /// The last bind groups of culls, for instances and for groups, since many culls share a view.
+    pub(crate) bindings: KeptBindings,
+}
+
+impl Pyramid {
+    pub(crate) fn new(gpu: &Gpu, size: ImageSize, options: &PyramidOptions) -> Result<Self> {
+        let side = size.width.max(size.height);
+        let allowed = gpu.limits().max_texture_dimension_2d;
+        if side > allowed {
+            return Err(Error::limit(
+                "max_texture_dimension_2d",
+                u64::from(side),
+                u64::from(allowed),
+            ));
+        }
+        if side == 0 || size.width.min(size.height) == 0 {
+            return Err(Error::invalid(
+                "size",
+                format!("expected at least one pixel a side, got {size}"),
+            ));
+        }
+        let chunk_shift = options.checked_chunk_shift(chunk_shift(gpu.limits()))?;
+        let layout = PyramidLayout::new(size, options.levels, chunk_shift)?;
+        let chunks = layout
+            .chunk_sizes()
+            .iter()
+            .map(|texels| {
+                let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+                gpu.empty("hiz.pyramid.chunk", texels * 4, usage)
+            })
+            .collect::<Result<_>>()?;
+        let mut levels = [Level { offset: 0, stride: 0, width: 0, height: 0 }; MAX_LEVELS];
+        levels[..layout.levels.len()].copy_from_slice(&layout.levels);
+        let (StoredLevels { first, last }, origins) = (layout.stored, layout.atlas.origins);
+        let uniform = gpu.uniform(
+            "hiz.pyramid.layout",
+            &PyramidUniform {
+                levels,
+                origins,
+                chunk_shift,
+                first_stored: first,
+                last_stored: last,
+                padding: 0,
+            },
+        )?;
+        Ok(Self {
+            context: gpu.id(),
+            layout,
+            chunks,
+            uniform,
+            built: Locked::default(),
+            atlas_use: options.atlas,
+            no_atlas: AtomicBool::new(false),
+            atlas: Locked::default(),
+            reduced: Arc::default(),
+            bindings: KeptBindings::default(),
+        })
+    }
+
+    /// The depth image's size in pixels.
+    pub fn size(&self) -> ImageSize {
+        self.layout.size
+    }
+
+    /// The number of levels, from level 0 down to the level of 1x1.
+    pub fn num_levels(&self) -> u32 {
+        self.layout.num_levels()
+    }
+
+    /// Which levels above 0 are stored, limited to those that exist.
+    ///
+    /// `None` for an image of one pixel, which has level 0 alone.
+    pub fn stored_levels(&self) -> Option<StoredLevels> {
+        let stored = self.layout.stored;
+        (stored.first <= stored.last).then_some(stored)
+    }
+
+    /// The size of a level in texels; `None` past the last level.
+    pub fn level_size(&self, level: u32) -> Option<ImageSize> {
+        self.layout.levels.get(level as usize).map(|l| ImageSize::new(l.width, l.height))
+    }
+
+    /// Bytes on the device, including an atlas and excluding the depth texture.
+    pub fn device_bytes(&self) -> u64 {
+        let atlas = self.atlas.lock();
+        let atlas = atlas.as_ref().map_or(0, Atlas::bytes);
+        self.chunks.iter().map(wgpu::Buffer::size).sum::<u64>() + atlas
+    }
+
+    /// Whether culls of `instances` instances read an atlas: where one is possible, and pays.
+    ///
+    /// `built` is what the cull is against.
+    /// The pyramid may meanwhile be built from another kind of image.
+    pub(crate) fn wants_atlas(&self, gpu: &Gpu, built: &Built, instances: u32) -> bool {
+        self.atlas_use.pays(&self.layout, instances)
+            && !self.no_atlas.load(Ordering::Relaxed)
+            && atlas::is_possible(&self.layout, built.source.texture(), gpu.limits())
+    }
+
+    /// Releases everything that was made for culls, after an error on the device.
+    ///
+    /// Returns whether that included an atlas.
+    pub(crate) fn forget(&self) -> bool {
+        self.bindings.clear();
+        self.atlas.lock().take().is_some()
+    }
+
+    /// Called where there is no memory for an atlas.
+    ///
+    /// From now on culls read the depth image and the stored levels in place.
+    pub(crate) fn do_without_atlas(&self) {
+        self.no_atlas.store(true, Ordering::Relaxed);
+    }
+
+    /// The atlas of what the pyramid was built from; `None` where there is no memory for one.
+    ///
+    /// The copies into it are recorded, unless they are known to have run after that reduction.
+    /// Once memory was short the pyramid never tries an atlas again.
+    pub(crate) fn record_atlas(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        built: &Built,
+    ) -> Result<Option<wgpu::TextureView>> {
+        let mut kept = self.atlas.lock();
+        let made = match kept.take() {
+            Some(there) => Ok(there),
+            None => Atlas::new(gpu, &self.layout),
+        };
+        let recorded = made.and_then(|mut atlas| {
+            if !atlas.holds(built.reduction) {
+                atlas.record(gpu, encoder, &self.layout, &self.chunks[0], built)?;
+                self.note_copies(encoder, &atlas, built.reduction);
+            }
+            Ok(atlas)
+        });
+        let error = match recorded {
+            Ok(atlas) => return Ok(Some(kept.insert(atlas).view())),
+            Err(error) => error,
+        };
+        // The kept bind groups may refer to the atlas that was just dropped.
+        self.bindings.clear();
+        if matches!(error, Error::OutOfMemory(_)) {
+            self.do_without_atlas();
+            return Ok(None);
+        }
+        Err(error)
+    }
+
+    /// Notes what the atlas holds once the copies into it have run.
+    fn note_copies(&self, encoder: &wgpu::CommandEncoder, atlas: &Atlas, reduction: u32) {
+        let (contents, reduced) = (atlas.contents(), self.reduced());
+        encoder.on_submitted_work_done(move || {
+            // If the copies ran before their reduction or after the next one, they have overwritten
+            // the atlas with other levels.
+            let ran_behind_it = reduced.load(Ordering::Acquire) == reduction;
+            contents.store(if ran_behind_it { reduction } else { 0 }, Ordering::Release);
+        });
+    }
+
+    /// The camera of the depth image that the pyramid was last built from.
+    ///
+    /// `None` before the first reduction.
+    pub fn camera(&self) -> Option<Camera> {
+        self.built().map(|b| b.camera)
+    }
+
+    /// How far the depths in the pyramid may lie from those that were given to be stored.
+    ///
+    /// The bound combines the format of the depth image ([`DepthTolerance::of`]) and the rounding
+    /// of what was uploaded into it.
+    /// `None` before the first reduction.
+    /// Every cull counts it, beside the slack of its options.
+    pub fn tolerance(&self) -> Option<DepthTolerance> {
+        self.built().map(|b| b.tolerance)
+    }
+
+    /// Checks that the depth image of `built` has not been destroyed.
+    ///
+    /// A cull would bind it, and a destroyed texture makes the caller's encoder invalid.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] for a destroyed depth image.
+    pub(crate) fn check_source(gpu: &Gpu, built: &Built) -> Result<()> {
+        gpu.view(built.source.texture()).map(drop).map_err(|error| match error {
+            Error::Device(why) => Error::mismatch(
+                "pyramid",
+                format!(
+                    "expected one whose depth image has not been destroyed since it was \
+                     reduced, but {why}"
+                ),
+            ),
+            other => other,
+        })
+    }
+
+    /// The buffer of chunk `i`, or a stand-in if the pyramid has fewer chunks.
+    pub(crate) fn chunk(&self, gpu: &Gpu, i: usize) -> Result<wgpu::Buffer> {
+        match self.chunks.get(i) {
+            Some(chunk) => Ok(chunk.clone()),
+            None => gpu.stand_in(NO_CHUNK[i]),
+        }
+    }
+
+    /// Notes that a reduction was recorded.
+    pub(super) fn set_built(&self, built: Built) {
+        // The kept bind groups refer to the last depth image.
+        self.bindings.clear();
+        *self.built.lock() = Some(built);
+    }
+
+    /// The last reduction that is known to have run, shared with the callback that sets it.
+    pub(super) fn reduced(&self) -> Arc<AtomicU32> {
+        Arc::clone(&self.reduced)
+    }
+
+    pub(crate) fn built(&self) -> Option<Built> {
+        self.built.lock().clone()
+    }
+
+    /// What the pyramid was built from, for a cull with `camera`.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] if the pyramid was never built, or was built with another camera.
+    pub(crate) fn built_for(&self, camera: &Camera) -> Result<Built> {
+        let built = self.built().ok_or_else(|| {
+            Error::mismatch(
+                "pyramid",
+                "expected one that was built from a depth image, got one that never was",
+            )
+        })?;
+        if built.camera == *camera {
+            return Ok(built);
+        }
+        let (theirs, ours) = (built.camera.size(), camera.size());
+        Err(Error::mismatch(
+            "camera",
+            if theirs == ours {
+                "expected the camera of the pyramid's depth image, got another one".to_owned()
+            } else {
+                format!(
+                    "expected the camera of the pyramid's depth image, size {theirs}, got one of \
+                     size {ours}"
+                )
+            },
+        ))
+    }
+}
+
+const _: () = assert!(PYRAMID_CHUNKS == 3, "the bind groups list three chunks");

@@ -1,0 +1,326 @@
+//! The reduction: the passes that fill a pyramid from a depth image.
+//!
+//! Each pass reads one level, and writes up to three coarser ones, or all of the rest.
+//! The passes follow AMD's Single Pass Downsampler (SPD, 2020).
+//! `shaders/pyramid/reduce.wgsl` says where they differ from it.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use crate::error::{Error, Result};
+use crate::gpu::buffers::entry;
+use crate::gpu::depth_source::SourceKind;
+use crate::gpu::device::Gpu;
+use crate::gpu::layouts::Binding;
+use crate::gpu::pipelines::{Compute, flag};
+use crate::gpu::shader::{File, Source, wgsl};
+use crate::input::camera::Camera;
+use crate::input::image::ImageSize;
+use crate::input::tolerance::DepthTolerance;
+use crate::pyramid::Pyramid;
+use crate::pyramid::built::Built;
+use crate::pyramid::layout::Step;
+
+/// The bindings of the depth image and the pyramid.
+const fn bindings(source: SourceKind) -> [(u32, Binding); 6] {
+    use Binding::{Depth, Sampler, Uniform, Write};
+    [(0, Depth(source)), (1, Sampler), (2, Uniform), (3, Write), (4, Write), (5, Write)]
+}
+
+/// The binding of one step.
+const STEP_BINDINGS: &[(u32, Binding)] = &[(0, Binding::Uniform)];
+
+/// Which shader and entry point make a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Shape {
+    /// `shaders/pyramid/reduce.wgsl`, `reduce`.
+    /// `first` is the first stored level, counted from the level that is read.
+    Blocks { from_source: bool, first: u32 },
+    /// `shaders/pyramid/reduce.wgsl`, `reduce_tail`, which makes all remaining levels.
+    Tail,
+    /// `shaders/pyramid/reduce_coarse.wgsl`; if `shared`, a whole workgroup makes each texel.
+    Coarse { shared: bool },
+}
+
+fn module(source: SourceKind, entry: File) -> Source {
+    Source::of(&[
+        &[wgsl!("gpu/depth_bits")],
+        source.files(),
+        &[wgsl!("pyramid/pyramid"), wgsl!("pyramid/pyramid_write"), entry],
+    ])
+}
+
+/// The shader module of the reduction, three levels per pass.
+pub(crate) fn blocks_module(source: SourceKind) -> Source {
+    module(source, wgsl!("pyramid/reduce"))
+}
+
+/// The shader module of the reduction to one coarse level.
+pub(crate) fn coarse_module(source: SourceKind) -> Source {
+    module(source, wgsl!("pyramid/reduce_coarse"))
+}
+
+/// `tall`: neighbouring invocations read below each other.
+fn pipeline(
+    gpu: &Gpu,
+    source: SourceKind,
+    shape: Shape,
+    (reversed, tall, chunks): (bool, bool, usize),
+) -> Result<wgpu::ComputePipeline> {
+    let mut constants =
+        vec![("REVERSED", flag(reversed)), ("CHUNKS", chunks as f64), ("TALL", flag(tall))];
+    let (module, entry_point) = match shape {
+        Shape::Blocks { from_source, first } => {
+            constants.extend([("FROM_SOURCE", flag(from_source)), ("FIRST", f64::from(first))]);
+            (blocks_module(source), "reduce")
+        }
+        Shape::Tail => {
+            constants.extend([("FROM_SOURCE", flag(false)), ("FIRST", 1.0)]);
+            (blocks_module(source), "reduce_tail")
+        }
+        Shape::Coarse { shared } => {
+            constants.push(("SHARED", flag(shared)));
+            (coarse_module(source), "reduce_coarse")
+        }
+    };
+    gpu.compute_pipeline(&Compute {
+        label: "hiz.reduce.pipeline",
+        source: module,
+        entry_point,
+        layouts: &[
+            gpu.layout("hiz.reduce.layout", &bindings(source))?,
+            gpu.layout("hiz.reduce.step_layout", STEP_BINDINGS)?,
+        ],
+        constants: &constants,
+    })
+}
+
+/// Invocations per workgroup of the reduction, in one row.
+/// The shader's side is `place_of` in `shaders/pyramid/pyramid_write.wgsl`.
+const REDUCE_WORKGROUP: u32 = 64;
+/// The side of the square that a workgroup forms instead if `TALL` is set.
+const TALL_SIDE: u32 = 8;
+/// Pixels of 4 KiB, a page, at 4 bytes per pixel.
+const PAGE_PIXELS: u32 = 1024;
+/// The finest level whose texels are shared by a workgroup if it is made alone.
+/// Each invocation then reads at least 8x8 pixels.
+const SHARED_LEVEL: u32 = 6;
+
+/// Twin of `Step` in `shaders/pyramid/pyramid_write.wgsl`.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct StepUniform {
+    pub(crate) source: u32,
+    pub(crate) last: u32,
+    pub(crate) reduction: u32,
+    pub(crate) padding: u32,
+    pub(crate) blocks: [u32; 2],
+    pub(crate) padding_1: [u32; 2],
+}
+
+const _: () = assert!(size_of::<StepUniform>() == 32);
+
+/// Records the reduction of `depth` into `pyramid`; all of the texture's first mip level is read.
+///
+/// `uploaded` is the rounding of the depths before they were uploaded into the texture.
+///
+/// # Errors
+/// As [`HizContext::record_reduce`](crate::HizContext::record_reduce).
+pub(crate) fn record_reduce(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    depth: &wgpu::TextureView,
+    camera: &Camera,
+    pyramid: &Pyramid,
+    uploaded: DepthTolerance,
+) -> Result<()> {
+    gpu.check_context("pyramid", pyramid.context)?;
+    let texture = depth.texture();
+    let format = texture.format();
+    let (Some(source_kind), Some(of_format)) = (SourceKind::of(format), DepthTolerance::of(format))
+    else {
+        return Err(Error::invalid(
+            "depth",
+            format!(
+                "expected a depth format, R32Float, R16Float or Rgba32Uint (the bits of four \
+                 pixels), got {format:?}"
+            ),
+        ));
+    };
+    let (size, texels) = (pyramid.size(), ImageSize::new(texture.width(), texture.height()));
+    let expected = source_kind.texture_size(size);
+    if texels != expected {
+        let packed = if expected == size {
+            String::new()
+        } else {
+            format!(" as {expected} texels of four pixels")
+        };
+        return Err(Error::mismatch(
+            "depth",
+            format!("expected the pyramid's size {size}{packed}, got {texels}"),
+        ));
+    }
+    if size != camera.size() {
+        return Err(Error::mismatch(
+            "camera",
+            format!("expected the depth image's size {size}, got {}", camera.size()),
+        ));
+    }
+    // A view does not say which part of its texture it shows, so only one may exist.
+    let parts =
+        (texture.mip_level_count(), texture.sample_count(), texture.depth_or_array_layers());
+    if parts != (1, 1, 1) || texture.dimension() != wgpu::TextureDimension::D2 {
+        return Err(Error::invalid(
+            "depth",
+            format!(
+                "expected a 2D texture of one mip level, sample and layer, got {:?} with {} mip \
+                 levels, {} samples, {} layers",
+                texture.dimension(),
+                parts.0,
+                parts.1,
+                parts.2
+            ),
+        ));
+    }
+    let needed = source_kind.usage();
+    if !texture.usage().contains(needed) {
+        let name =
+            if source_kind == SourceKind::Bits { "STORAGE_BINDING" } else { "TEXTURE_BINDING" };
+        return Err(Error::invalid(
+            "depth",
+            format!("expected the usage {name}, got {:?}", texture.usage()),
+        ));
+    }
+    let (source, view) = bind_source(gpu, depth, source_kind, pyramid)?;
+    // Everything that can fail comes before the first command is recorded.
+    let reduction = next_reduction();
+    let dispatch = |step: &Step| {
+        let tall = step.source == 0 && reads_tall(step, source_kind, size);
+        let (shape, workgroups) = shape_of(step, tall);
+        let constants = (camera.convention().is_reversed(), tall, pyramid.chunks.len());
+        let pipeline = pipeline(gpu, source_kind, shape, constants)?;
+        let uniform = gpu.uniform("hiz.reduce.step", &step_uniform(step, reduction))?;
+        let layout = gpu.layout("hiz.reduce.step_layout", STEP_BINDINGS)?;
+        let entries = [entry(0, uniform.as_entire_binding())];
+        Ok((pipeline, gpu.bind_group("hiz.reduce.step", &layout, &entries)?, workgroups))
+    };
+    let dispatches = pyramid.layout.steps.iter().map(dispatch).collect::<Result<Vec<_>>>()?;
+    gpu.recorded(|| {
+        let descriptor =
+            wgpu::ComputePassDescriptor { label: Some("hiz.reduce.pass"), timestamp_writes: None };
+        let mut pass = encoder.begin_compute_pass(&descriptor);
+        pass.set_bind_group(0, &source, &[]);
+        for (pipeline, bind_group, [columns, rows]) in &dispatches {
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(1, bind_group, &[]);
+            // At least one workgroup, which writes the header even if nothing is stored.
+            pass.dispatch_workgroups((*columns).max(1), (*rows).max(1), 1);
+        }
+        Ok(())
+    })?;
+    let reduced = pyramid.reduced();
+    encoder.on_submitted_work_done(move || reduced.store(reduction, Ordering::Release));
+    let tolerance = of_format.after(uploaded);
+    let camera = camera.clone();
+    pyramid.set_built(Built { reduction, source: view, source_kind, camera, tolerance });
+    Ok(())
+}
+
+/// The bind group of the reduction, and the view of the depth image that it binds.
+///
+/// That is the caller's view if it can be bound.
+/// If not, as with the default view of a texture with a stencil, it is a view of the whole depth.
+fn bind_source(
+    gpu: &Gpu,
+    depth: &wgpu::TextureView,
+    source_kind: SourceKind,
+    pyramid: &Pyramid,
+) -> Result<(wgpu::BindGroup, wgpu::TextureView)> {
+    let layout = gpu.layout("hiz.reduce.layout", &bindings(source_kind))?;
+    let chunks = [pyramid.chunk(gpu, 0)?, pyramid.chunk(gpu, 1)?, pyramid.chunk(gpu, 2)?];
+    let bind = |view: &wgpu::TextureView| {
+        gpu.bind_group(
+            "hiz.reduce.pyramid",
+            &layout,
+            &[
+                entry(0, wgpu::BindingResource::TextureView(view)),
+                entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
+                entry(2, pyramid.uniform.as_entire_binding()),
+                entry(3, chunks[0].as_entire_binding()),
+                entry(4, chunks[1].as_entire_binding()),
+                entry(5, chunks[2].as_entire_binding()),
+            ],
+        )
+    };
+    let error = match bind(depth) {
+        Ok(bound) => return Ok((bound, depth.clone())),
+        Err(error) => error,
+    };
+    let refused = |error| match error {
+        Error::Device(why) => Error::mismatch(
+            "depth",
+            format!(
+                "expected a texture of this device and context that has not been destroyed, but \
+                 {why}"
+            ),
+        ),
+        other => other,
+    };
+    // A view of another device's texture would report its errors to that device, whose handler may
+    // end the process.
+    if error.to_string().contains(OF_ANOTHER_DEVICE) {
+        return Err(refused(error));
+    }
+    let view = gpu.view(depth.texture()).map_err(refused)?;
+    Ok((bind(&view).map_err(refused)?, view))
+}
+
+/// What wgpu's message contains for objects of another device.
+const OF_ANOTHER_DEVICE: &str = "doesn't match";
+
+/// The shader of a step, and its workgroups.
+fn shape_of(step: &Step, tall: bool) -> (Shape, [u32; 2]) {
+    let [columns, rows] = step.blocks;
+    let of_places = if tall {
+        step.blocks.map(|n| n.div_ceil(TALL_SIDE))
+    } else {
+        [columns.div_ceil(REDUCE_WORKGROUP), rows]
+    };
+    if step.is_tail() {
+        (Shape::Tail, [1, 1])
+    } else if !step.is_coarse() {
+        let (from_source, first) = (step.source == 0, step.first - step.source);
+        (Shape::Blocks { from_source, first }, of_places)
+    } else if step.last < SHARED_LEVEL {
+        (Shape::Coarse { shared: false }, of_places)
+    } else {
+        (Shape::Coarse { shared: true }, [columns, rows])
+    }
+}
+
+/// Whether neighbouring invocations of a step that reads the depth image read below each other.
+///
+/// Two cases gain nothing (`docs/performance.md`):
+///
+/// - Images with four pixels per texel, except in coarse steps.
+/// - Rows that begin at multiples of a page, which would all fall into the same lines of a cache.
+fn reads_tall(step: &Step, source: SourceKind, size: ImageSize) -> bool {
+    (source != SourceKind::Bits || step.is_coarse()) && !size.width.is_multiple_of(PAGE_PIXELS)
+}
+
+fn step_uniform(step: &Step, reduction: u32) -> StepUniform {
+    let reduction = if step.source == 0 { reduction } else { 0 };
+    StepUniform {
+        source: step.source,
+        last: step.last,
+        reduction,
+        padding: 0,
+        blocks: step.blocks,
+        padding_1: [0; 2],
+    }
+}
+
+/// A new number for a reduction, never 0.
+fn next_reduction() -> u32 {
+    static NEXT: AtomicU32 = AtomicU32::new(1);
+    NEXT.fetch_add(1, Ordering::Relaxed).max(1)
+}

@@ -1,0 +1,8 @@
+//! What tests of this library need and its users do not: planted faults, the words on the device,
+//! and the shaders.
+
+pub mod shaders;
+pub mod words;
+
+pub use crate::occluders::surface::planted_fault::PlantedFault;
+pub use crate::output::lists::CANARY_WORDS;

@@ -1,0 +1,32 @@
+"""Figures of matplotlib in one style. Needs matplotlib (the extra ``viz``)."""
+
+from __future__ import annotations
+
+import importlib.util
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+__all__ = ["MISSING", "can_draw", "save", "sheet"]
+
+#: What a report names as left out where it is not.
+MISSING = "plots (matplotlib is not installed: pip install matplotlib)"
+
+
+def can_draw() -> bool:
+    """Whether matplotlib is installed."""
+    return importlib.util.find_spec("matplotlib") is not None
+
+
+def sheet(width: float, height: float, *, dpi: int = 100) -> Any:
+    """An empty figure; `width` and `height` are in inches."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), dpi=dpi, layout="constrained")
+
+
+def save(figure: Any, title: str, path: Path) -> None:
+    """Sets the title and writes a PNG."""
+    figure.suptitle(title, fontsize=11)
+    figure.savefig(path)

@@ -1,0 +1,115 @@
+"""`Recommendation`: what `hizvk.recommend` found, with notes in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .candidate import Candidate
+    from .checking import Check
+
+__all__ = ["Recommendation", "notes_on"]
+
+
+@dataclass(frozen=True, eq=False)
+class Recommendation:
+    """What `recommend` found; ``print`` shows it as a table."""
+
+    best: Candidate
+    """The candidate to use; it is `Candidate.safe`."""
+    within_budget: bool
+    """False if no safe candidate is within ``max_ms``; then `best` is the fastest of them."""
+    candidates: tuple[Candidate, ...]
+    """All candidates, the fastest first."""
+    tested: int
+    """Instances times cameras."""
+    adapter: str
+    """Where it was measured; another device may order the candidates otherwise."""
+    check: str = ""
+    """How candidates were checked, and how much of what they cull was looked at."""
+    notes: tuple[str, ...] = ()
+    """Why candidates were dropped, and what is proven of the best."""
+
+    @property
+    def front(self) -> tuple[Candidate, ...]:
+        """The Pareto front of time and instances kept, the fastest first."""
+        return tuple(one for one in self.candidates if one.on_front)
+
+    def __str__(self) -> str:
+        over = (
+            "" if self.within_budget else " (over the budget, as all are that may be recommended)"
+        )
+        lines = [
+            f"on {self.adapter}: {self.best}{over}",
+            "    ms per camera      kept     hides   unclear"
+            "   (* the Pareto front; - not for what was asked)",
+        ]
+        for one in self.candidates:
+            share = 100.0 * one.kept / max(self.tested, 1)
+            mark = "*" if one.on_front else " " if one.asked else "-"
+            lines.append(
+                f"  {mark} {one.ms.median:11.2f}  {share:8.2f} %  "
+                f"{one.hides:8,}  {one.unclear:8,}   {one}"
+            )
+        lines += [f"checked by {self.check}"] if self.check else []
+        return "\n".join([*lines, *self.notes])
+
+
+def notes_on(
+    candidates: Sequence[Candidate],
+    best: Candidate,
+    check: Check,
+    *,
+    coverage: str,
+    points: bool,
+    rendered: bool,
+) -> tuple[str, ...]:
+    """What to know about a recommendation, a sentence or two each."""
+    notes = []
+    dropped = [one for one in candidates if one.asked and not one.safe]
+    if dropped:
+        asked = sum(one.asked for one in candidates)
+        lost, unclear = max(one.hides for one in dropped), max(one.unclear for one in dropped)
+        what = []
+        if lost:
+            seen = f"the {check.visible:,} that the check found visible"
+            what.append(f"hide up to {lost:,} of {seen}")
+        if unclear:
+            what.append(f"cull up to {unclear:,} that are not shown to be hidden")
+        why = ""
+        if rendered and coverage == "area":
+            why = " Plain depth knows the depth at its pixels' centres alone."
+        elif points:
+            why = (
+                " The image knows the depth at its pixels' centres alone, and points lie on what "
+                "it shows."
+            )
+        notes.append(
+            f"{len(dropped)} of {asked} candidates were dropped: they {', and '.join(what)}.{why}"
+        )
+    if best.configuration.guard_px:
+        notes.append(
+            "A guard of half a pixel is a good guess for points before an image, and no proof."
+        )
+    if not best.proven:
+        notes.append(
+            "The best is right before the cameras given: all that it culls there is hidden. "
+            "Before other cameras, only conservative depth is proven for what shows between the "
+            "pixels' centres."
+        )
+    if rendered and coverage == "area" and not points:  # points cover no pixel's centre
+        notes.append(
+            "If your image has one sample per pixel, at its centre and without jitter, ask with "
+            'coverage="sample": plain depth of the full size is proven for that.'
+        )
+    if not rendered and coverage == "area":
+        notes.append(
+            "It is right for the images as they are. With multisampling or jitter, a pixel has to "
+            "hold the farthest depth of all its samples."
+        )
+    if points and coverage == "sample":
+        notes.append('Points cover no pixel centre, so all are culled: ask with coverage="area".')
+    return tuple(notes)

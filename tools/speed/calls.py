@@ -1,0 +1,177 @@
+"""Whole calls from Python with the mask read back.
+
+What Python adds, what small calls cost, and what numpy and Embree take for the same.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hizvk.bench.numpy_hiz import NumpyPyramid
+from hizvk.bench.numpy_hiz import cull as numpy_cull
+from hizvk.bench.rays import Rays
+from hizvk.scenes import Scene, box_mesh, embree
+
+from .errors import Judge
+from .rounds import in_turns
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from hizvk.resources import DepthImage, Instances, Pyramid
+
+    from .run import Run
+    from .town import Town
+
+__all__ = ["measure"]
+
+#: Instances of a small call.
+SMALL = 1_000
+#: Rounds with the others; rays for every pixel take long.
+SLOW_ROUNDS = 3
+
+
+def measure(run: Run) -> None:
+    """Measures calls of `Extent.calls` instances, 95 % hidden, and of `SMALL`."""
+    count = run.extent.calls
+    run.step(f"calls of {count:,} and {SMALL:,} instances from Python")
+    scene = run.town(count, 0.95)
+    depth = run.depth(scene, run.extent.images[0][1])
+    pyramid = run.device.pyramid(depth)
+    _ours(run, scene, depth, pyramid)
+    run.step("numpy and Embree")
+    _others(run, scene, depth, pyramid)
+
+
+def _call(run: Run, instances: Instances, pyramid: Pyramid, *, read: bool) -> Callable[[], float]:
+    def call() -> float:
+        run.device.wait()
+        start = time.perf_counter()
+        seen = run.device.cull(instances, pyramid.camera, pyramid, outputs=["mask"])
+        if read:
+            _ = seen.mask
+        else:
+            run.device.wait()
+        return 1e3 * (time.perf_counter() - start)
+
+    return call
+
+
+def _recorded(run: Run, instances: Instances, pyramid: Pyramid) -> float:
+    return run.device.cull(instances, pyramid.camera, pyramid, outputs=["mask"])._inner.timings()[0]
+
+
+def _ours(run: Run, scene: Town, depth: DepthImage, pyramid: Pyramid) -> None:
+    many = run.device.instances(scene.boxes)
+    few = run.device.instances(run.town(SMALL, 0.95).boxes)
+    ways = {
+        "many, mask read": _call(run, many, pyramid, read=True),
+        "many, device": run.cull(many, depth.camera, pyramid, groups=None).ms,
+        "few, mask read": _call(run, few, pyramid, read=True),
+        "few, not read": _call(run, few, pyramid, read=False),
+        "few, device": run.cull(few, depth.camera, pyramid, groups=None).ms,
+        "empty submit": run.yardstick.empty_submit_ms,
+    }
+    ms = in_turns(ways, 3 * run.extent.rounds)
+    found, count = run.found, len(many)
+    found.timed("calls", ms)
+    found.spread(
+        "calls.beyond",
+        f"{count:,} instances, mask read, beyond device time",
+        ms["many, mask read"] - ms["many, device"],
+        "ms",
+        1.0,
+    )
+    for key, way, target in (
+        ("small", "mask read", 3.0),
+        ("small_unread", "not read", None),
+        ("small_device", "device", None),
+    ):
+        found.ratio(
+            f"calls.{key}",
+            f"{len(few):,} instances, {way} / empty submit",
+            ms[f"few, {way}"],
+            ms["empty submit"],
+            target,
+        )
+
+
+def _others(run: Run, scene: Town, depth: DepthImage, pyramid: Pyramid) -> None:
+    boxes = run.device.instances(scene.boxes)
+    numbers, view = depth.numpy(), scene.view
+    matrix = depth.camera.clip_from_world.astype(np.float32)
+    masks = {}
+
+    def with_numpy() -> float:
+        start = time.perf_counter()
+        masks["numpy Hi-Z, float32"] = numpy_cull(scene.low, scene.high, matrix, levels, view.near)
+        return 1e3 * (time.perf_counter() - start)
+
+    def pyramid_with_numpy() -> float:
+        start = time.perf_counter()
+        NumpyPyramid.build(numbers)
+        return 1e3 * (time.perf_counter() - start)
+
+    levels = NumpyPyramid.build(numbers)
+    ways: dict[str, Callable[[], float]] = {
+        "hizvk, mask read": _call(run, boxes, pyramid, read=True),
+        "hizvk, reduction": run.yardstick.reduction(depth._inner, "own", (1, 15)).ms,
+        "numpy, cull": with_numpy,
+        "numpy, pyramid": pyramid_with_numpy,
+    }
+    if embree.can_cast():
+        rays = Rays(_as_scene(scene))
+
+        def pixels() -> float:
+            start = time.perf_counter()
+            rays.image(view, depth.size)
+            return 1e3 * (time.perf_counter() - start)
+
+        def points() -> float:
+            start = time.perf_counter()
+            masks["Embree, rays to 9 points of a box"] = rays.points(view, depth.size)
+            return 1e3 * (time.perf_counter() - start)
+
+        ways |= {"Embree, one ray per pixel": pixels, "Embree, rays to 9 points of a box": points}
+    else:
+        run.found.notes.append(f"left out: {embree.MISSING}")
+    ms = in_turns(ways, SLOW_ROUNDS)
+    run.found.timed("beside others", ms)
+    for label in ways:
+        if label.startswith(("numpy, cull", "Embree")):
+            run.found.ratio(
+                f"others.{label}", f"{label} / hizvk, mask read", ms[label], ms["hizvk, mask read"]
+            )
+    run.found.ratio(
+        "others.numpy, pyramid",
+        "numpy, pyramid / hizvk, all levels",
+        ms["numpy, pyramid"],
+        ms["hizvk, reduction"],
+    )
+    judge = Judge(run, scene.boxes, depth)
+    judge.judge(
+        "calls", "hizvk", run.device.cull(boxes, depth.camera, pyramid, outputs=["mask"]).mask
+    )
+    for label, mask in masks.items():
+        judge.judge("calls", label, mask, promises=False)
+
+
+def _as_scene(town: Town) -> Scene:
+    """The town for `Rays`, with every box of the crowd as the thing itself."""
+    low, high = town.low.astype(np.float64), town.high.astype(np.float64)
+    vertices, triangles = box_mesh(low, high)
+    return Scene(
+        name="a town",
+        origin=(0.0, 0.0, 0.0),
+        vertices=town.vertices,
+        triangles=town.triangles,
+        instance_vertices=vertices,
+        instance_triangles=triangles,
+        owner=np.repeat(np.arange(len(low), dtype=np.int32), 12),
+        box_min=low,
+        box_max=high,
+        views=(town.view,),
+    )
