@@ -1,13 +1,13 @@
-"""Which Vulkan adapter the tests run on, and whether it is the one that they expect.
+"""Which Vulkan adapter the tests run on, and whether it is the expected one.
 
-`python tests/adapter_check.py` prints it and fails on a wrong one; conftest.py does so when pytest
-starts.
+`python tests/adapter_check.py` prints it and fails on a wrong one.
+conftest.py does the same when pytest starts.
 """
 
 import os
 import sys
 
-# The name of lavapipe's driver.
+# lavapipe gives its driver this name.
 # `HIZVK_EXPECT_ADAPTER=...` names another one: any part of its name or driver.
 DEFAULT_EXPECTATION = "llvmpipe"
 

@@ -1,4 +1,4 @@
-"""Every run says which adapter it is on, and stops when it is not the expected one."""
+"""Every run reports its adapter, and stops if it is not the expected one."""
 
 import importlib.util
 import os
@@ -11,7 +11,7 @@ from hypothesis import settings
 
 import adapter_check
 
-# Every run has the same examples, so that a failure comes from a change of the code.
+# Every run has the same examples, so that a red test is due to a change.
 # `make soak` tries others (HIZVK_FUZZ=random).
 settings.register_profile(
     "hizvk", derandomize=os.environ.get("HIZVK_FUZZ") != "random", database=None
@@ -27,14 +27,17 @@ def pytest_report_header() -> str:
 
 
 def pytest_sessionstart() -> None:
-    """Stops the run on another driver than the expected one."""
+    """Results of a driver other than the expected one are worth nothing."""
     if _wrong:
         pytest.exit(_wrong, returncode=1)
 
 
 @pytest.fixture(scope="session")
 def judge() -> Any:
-    """The judge of Intel's castle, which lies beside `castle.npz`, outside of the repository."""
+    """The judge of Intel's castle, with `castle.npz` beside its file.
+
+    Neither is part of the repository.
+    """
     folder = Path(__file__).resolve().parents[2] / "shared" / "judge"
     if not (folder / "castle.npz").exists():
         pytest.skip("the castle and its judge are not beside this checkout (../shared/judge)")

@@ -1,4 +1,4 @@
-"""The tables of the documents, for tests that print the same counts."""
+"""Reads the documents' tables, for tests that print the same counts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def page(name: str) -> str:
 
 
 def table(text: str, *head: str) -> list[dict[str, str]]:
-    """The rows, by column, of the one table whose first columns are `head`; without emphasis.
+    """The rows of the one table that begins with these columns, by column and without emphasis.
 
     Raises
     ------
@@ -39,8 +39,8 @@ def table(text: str, *head: str) -> list[dict[str, str]]:
 def is_of_this_driver(text: str) -> bool:
     """Whether the page names the adapter of this run.
 
-    On another adapter, rasterised depth differs in its last bits.
+    On another adapter rasterised depth differs in its last bits.
     """
     adapter = hizvk.Device().adapter
-    text = " ".join(text.split())  # a name may go on in the next line
+    text = " ".join(text.split())  # a name may continue on the next line
     return all(part in text for part in (adapter.name, adapter.driver, adapter.driver_info))

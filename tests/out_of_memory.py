@@ -1,9 +1,9 @@
-"""Runs one call in a process whose address space is limited; test_out_of_memory.py starts it.
+"""Runs one call in a process with a limited address space; test_out_of_memory.py starts it.
 
-``out_of_memory.py CALL MEBIBYTES``: everything is prepared without a limit, then the call may take
-that much more.
-Prints the exception's class, and after it what the next device says of two spheres, one before a
-wall and one behind.
+``out_of_memory.py CALL MEBIBYTES`` prepares everything without a limit.
+Then the call may take that much more.
+It prints the exception's class.
+After that it prints what the next device keeps of two spheres, in front of and behind a wall.
 """
 
 import resource
@@ -19,12 +19,12 @@ COUNT = 12_000_000
 
 
 def camera(side: int) -> hizvk.Camera:
-    """Looking along -z."""
+    """A camera that looks along -z."""
     return hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(side, side), near=0.1)
 
 
 def works(device: hizvk.Device) -> list[bool]:
-    """What is seen of two spheres."""
+    """Which of two spheres the device keeps: one in front of a wall, one behind it."""
     spheres = hizvk.Spheres(np.array([[0.0, 0, -5], [0, 0, -20]]), 1.0)
     view = camera(64)
     pyramid = device.pyramid(np.full(view.size, 10.0), view, kind="z")
@@ -33,7 +33,7 @@ def works(device: hizvk.Device) -> list[bool]:
 
 
 def prepared(device: hizvk.Device, call: str) -> Callable[[], object]:
-    """The call, with its arguments ready."""
+    """The call, with its arguments prepared."""
     view = camera(SIDE)
     if call == "instances":
         spheres = hizvk.Spheres(np.zeros((COUNT, 3), np.float32), np.ones(COUNT, np.float32))
@@ -48,7 +48,7 @@ def prepared(device: hizvk.Device, call: str) -> Callable[[], object]:
         image = np.full(view.size, 0.1, np.float32)
         return lambda: device.pyramid(image, view, kind="reversed_ndc")
     if call == "cull":
-        # So many that all levels would be copied into one texture of 100 MB.
+        # So many instances that all levels would be copied into one texture of 100 MB.
         view = camera(4096)
         pyramid = device.pyramid(np.full(view.size, 10.0), view, kind="z")
         centers = np.zeros((6_000_000, 3), np.float32)
@@ -62,7 +62,7 @@ def prepared(device: hizvk.Device, call: str) -> Callable[[], object]:
             result = device.cull(instances, view, pyramid, hierarchy=False, outputs=["mask"])
             return int(np.count_nonzero(result.mask))
 
-        # Compilers take memory of their own.
+        # Done before the limit, because compilers take memory of their own.
         assert cull(few) == 0
         return lambda: cull(crowd)
     assert call == "render"
@@ -71,7 +71,7 @@ def prepared(device: hizvk.Device, call: str) -> Callable[[], object]:
 
 
 def main(call: str, mebibytes: int) -> None:
-    """Runs the call that the command line names."""
+    """Run the call; the module's docstring says what is printed."""
     device = hizvk.Device()
     works(device)
     run = prepared(device, call)

@@ -1,7 +1,7 @@
-"""Scenes of processes that use a device before they end or fork.
+"""What a process does with a device before it ends or forks.
 
-``test_processes.py`` runs each as ``processes.py SCENE`` in a process of its own.
-The scene prints what the test compares, and ends the process in its way.
+test_processes.py runs each scene in a process of its own.
+``processes.py SCENE`` prints what the test compares, and ends as the scene says.
 """
 
 import atexit
@@ -17,26 +17,26 @@ from concurrent.futures import ProcessPoolExecutor
 
 
 def threads() -> int:
-    """The threads of this process, those of a driver included."""
+    """The number of threads of this process, including a driver's."""
     return len(os.listdir("/proc/self/task"))
 
 
 def early() -> None:
-    """Is registered before hizvk is imported, so it runs after every device was dropped."""
+    """Registered before hizvk is imported, so it runs after every device has been dropped."""
     if "after_the_end" in sys.argv:
         try:
             print(cull(KEPT[0]))
         except hizvk.HizError as error:
             print(f"HizError: {error}")
-        # The system removes a joined thread from its list a moment after the join returns.
+        # Linux removes a joined thread from its list a moment after the join has returned.
         until = time.monotonic() + 30
         while threads() > THREADS and time.monotonic() < until:
             time.sleep(0.001)
-        # The driver of a GPU may keep threads.
+        # A GPU's driver may keep threads.
         print("threads left:", threads() - THREADS if SOFTWARE else 0)
 
     if "after_the_end_for_many" in sys.argv:
-        # The threads meet while the first error is made.
+        # They all arrive while the first error is being made.
         sys.setswitchinterval(1e-6)
         GO.set()
         for thread in MANY:
@@ -56,17 +56,17 @@ SOFTWARE = all(adapter.device_type == "cpu" for adapter in hizvk.adapters())
 THREADS = threads()
 CAMERA = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(64, 64), near=0.1)
 WALL = np.full(CAMERA.size, 10.0)
-#: One before the wall, one behind it.
+#: One in front of the wall, one behind it.
 SPHERES = hizvk.Spheres(np.array([[0.0, 0, -5], [0, 0, -20]]), 1.0)
 SEEN = [True, False]
-#: What the module still refers to when it ends.
+#: Objects that the module still refers to when it ends.
 KEPT: list[hizvk.Device] = []
 OBJECTS: list[object] = []
 FORK = multiprocessing.get_context("fork")
 
 
 def cull(device: hizvk.Device) -> list[bool]:
-    """Everything from the upload on; the objects are kept."""
+    """Do everything from the upload on, and keep the objects."""
     pyramid, instances = device.pyramid(WALL, CAMERA, kind="z"), device.instances(SPHERES)
     result = device.cull(instances, CAMERA, pyramid)
     seen: list[bool] = result.mask.tolist()
@@ -88,7 +88,7 @@ def by_default(_: int = 0) -> list[bool]:
 
 
 def in_threads(work: Callable[[], object], number: int = 2) -> None:
-    """Starts daemons that do `work` until the process ends; returns once each has done it twice."""
+    """Start daemons that do `work` until the process ends; return once each has done it twice."""
     ready = threading.Barrier(number + 1)
 
     def repeat() -> None:
@@ -108,7 +108,7 @@ def in_threads(work: Callable[[], object], number: int = 2) -> None:
 
 
 def forked(work: Callable[[], object], *, ends: str = "_exit") -> None:
-    """Forks, and prints what `work` says in the child and how the child ended."""
+    """Fork, and print the result of `work` in the child and how the child ended."""
     sys.stdout.flush()
     child = os.fork()
     if child == 0:
@@ -121,7 +121,7 @@ def forked(work: Callable[[], object], *, ends: str = "_exit") -> None:
 
 
 def refused() -> list[str]:
-    """The error of each object of the parent."""
+    """Which of the parent's objects do not refuse to be used, or say something else."""
     device, (pyramid, instances, result) = KEPT[0], OBJECTS[:3]
     assert isinstance(pyramid, hizvk.Pyramid)
     assert isinstance(instances, hizvk.Instances)
@@ -161,7 +161,7 @@ def refused() -> list[str]:
         )
         if not str(error).startswith(expected):
             wrong.append(f"the engine in Rust: {error}")
-    # These calls need no device.
+    # Calls that need no device.
     texts = [repr(thing) for thing in (device, pyramid, instances, result)]
     assert len(texts[0]) > 0
     assert (len(result), result.mask.tolist(), pyramid.size, pyramid.num_levels) == (
@@ -178,7 +178,7 @@ IMAGES: list[hizvk.DepthImage] = []
 
 
 def inherits() -> None:
-    """A device of the parent, everything on it, and a depth image."""
+    """Make a device in the parent, everything on it, and a depth image."""
     device = used()
     triangle = device.occluders(
         np.array([[-9.0, -9, -10], [9, -9, -10], [0, 9, -10]]), np.array([[0, 1, 2]])
@@ -188,7 +188,7 @@ def inherits() -> None:
 
 
 def collect() -> str:
-    """Drops everything of the parent."""
+    """Drop everything of the parent."""
     KEPT.clear()
     OBJECTS.clear()
     IMAGES.clear()
@@ -197,7 +197,7 @@ def collect() -> str:
 
 
 def with_threads() -> list[bool]:
-    """New threads take the memory of the threads that exist only in the parent."""
+    """New threads reuse the memory of those that stayed in the parent."""
     for _ in range(4):
         threads = [threading.Thread(target=time.sleep, args=(0.001,)) for _ in range(8)]
         for thread in threads:
@@ -208,7 +208,7 @@ def with_threads() -> list[bool]:
 
 
 def end(how: str) -> None:
-    """Ends a process whose module still refers to every object."""
+    """End a process whose module still refers to everything."""
     used()
     by_default()
     if how == "daemons":
@@ -230,7 +230,7 @@ def end(how: str) -> None:
 
 
 def waits_for_the_end() -> None:
-    """Daemons that use a device after every device was dropped."""
+    """Start daemons that use a device after all devices have been dropped."""
     device = used()
 
     def ask() -> None:
@@ -245,7 +245,7 @@ def waits_for_the_end() -> None:
 
 
 def while_threads_cull() -> None:
-    """Forks while other threads upload, render and cull."""
+    """Fork while other threads are in the middle of everything."""
 
     def work() -> None:
         device = hizvk.Device()
@@ -279,7 +279,7 @@ def pool_in_a_worker() -> None:
 
 
 def main(scene: str) -> None:
-    """Runs the scene that the command line names."""
+    """Run the scene; the module's docstring says what is printed."""
     if scene.startswith("end_") or scene == "after_the_end":
         end(scene.removeprefix("end_"))
         return
@@ -305,7 +305,7 @@ def main(scene: str) -> None:
     else:
         assert scene == "pools"
         pools()
-    # The parent's devices work on.
+    # The parent's devices still work.
     assert by_default() == SEEN
     assert not KEPT or cull(KEPT[0]) == SEEN
 

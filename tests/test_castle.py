@@ -1,9 +1,11 @@
-"""Intel's castle with ray-cast ground truth: nothing visible is culled, and little that is hidden is kept.
+"""Intel's castle against ray-cast truth: nothing visible is culled, and few hidden things are kept.
 
-The scene and its judge are not part of the repository; where they are absent these tests are
-skipped.
-The judge knows what is truly visible (Embree rays against the real geometry) and what the best
-rectangle test at full resolution keeps.
+The scene and its judge are not part of the repository.
+These tests are skipped where they are absent.
+The judge knows two things:
+
+- what is truly visible, by Embree rays against the real geometry;
+- what the best rectangle test at full resolution keeps.
 """
 
 from __future__ import annotations
@@ -19,10 +21,10 @@ import hizvk
 SIZES = [(360, 640), (563, 1001)]
 CONVENTIONS = ["standard", "reversed"]
 
-# What exact arithmetic keeps with a footprint of 2x2, 4x4 and 8x8 is 1.237, 1.113 and 1.045 times
-# what the judge's rectangle test at full resolution keeps; a descent with budget to finish is such
-# a test.
-# The judge's exact box at pixel centres keeps 0.883 of it.
+# The unit of these limits is what the judge's rectangle test at full resolution keeps.
+# In that unit exact arithmetic keeps 1.237, 1.113 and 1.045 with footprints 2x2, 4x4 and 8x8.
+# A descent with enough budget to finish is a rectangle test at full resolution.
+# The judge's exact box at pixel centres keeps 0.883.
 MOST_KEPT = [
     ({"footprint": 2}, 1.26),
     ({"footprint": 4}, 1.13),
@@ -57,7 +59,7 @@ def uploaded(device: hizvk.Device, scene: Any) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def truths(judge: Any, scene: Any) -> dict[Any, Any]:
-    """Ray-cast truth by size and camera, made when first asked for."""
+    """Ray-cast truth by size and camera, made at the first request."""
 
     class Truths(dict):
         def __missing__(self, key: Any) -> Any:
@@ -114,7 +116,7 @@ def test_nothing_visible_is_culled(
 
 @pytest.fixture(scope="module")
 def best(judge: Any, scene: Any) -> list[tuple[np.ndarray, int]]:
-    """View depth, and how many instances the best rectangle test keeps, by camera."""
+    """By camera: view depth, and how many instances the best rectangle test keeps."""
     size = (360, 640)
     depths = [judge.occluder_depth(scene, camera, size)[0] for camera in scene.cameras]
     return [
@@ -126,8 +128,8 @@ def best(judge: Any, scene: Any) -> list[tuple[np.ndarray, int]]:
 @pytest.mark.parametrize("convention", CONVENTIONS)
 @pytest.mark.parametrize(("options", "most"), MOST_KEPT)
 def test_boxes_keep_little_more_than_the_best_rectangle_test(
-    judge: Any, scene: Any, device: hizvk.Device, uploaded: Any, best: Any, truths: Any, convention: str,
-    options: dict[str, Any], most: float,
+    judge: Any, scene: Any, device: hizvk.Device, uploaded: Any, best: Any, truths: Any,
+    convention: str, options: dict[str, Any], most: float,
 ) -> None:  # fmt: skip
     size = (360, 640)
     kept = read = 0
@@ -150,7 +152,7 @@ def test_boxes_keep_little_more_than_the_best_rectangle_test(
 def test_a_volume_is_kept_where_the_oracle_sees_it_or_it_crosses_the_eye_plane(
     judge: Any, scene: Any, device: hizvk.Device, uploaded: Any, best: Any, coverage: str
 ) -> None:
-    """What is left to gain beside a descent with ``fit="volume"``, and beside its texels."""
+    """How much more than ``fit="volume"`` with a descent could gain, and what its texels cost."""
     kept = hidden = crossing = texels = texels_of_kept = 0
     for k, (camera, (linear, _)) in list(enumerate(zip(scene.cameras, best, strict=True)))[::4]:
         depth = judge.encode_depth(linear, camera, "standard").astype(np.float32)
@@ -177,8 +179,9 @@ def test_a_volume_is_kept_where_the_oracle_sees_it_or_it_crosses_the_eye_plane(
         again = cull(device, device.instances(boxes), ours, depth, "standard", **options)
         texels_of_kept += again.stats.texels_read or 0
     print(
-        f"{coverage}: kept {kept}, of them hidden {hidden}, {crossing} of those cross the plane of the eye; "
+        f"{coverage}: kept {kept}, of them hidden {hidden}, "
+        f"{crossing} of those cross the plane of the eye; "
         f"{texels} texels read, {texels_of_kept} of them for what is kept"
     )
-    # Float32 margins may keep a few that touch the very depth.
+    # Margins of float32 may keep a few whose nearest depth is the stored depth.
     assert hidden - crossing <= 0.01 * kept

@@ -1,8 +1,10 @@
-"""Conservative occluder depth of a small image: it holds for large ones, and culls by it hide nothing that those show.
+"""Conservative occluder depth of a small image holds for large images of the same view.
 
-Whether the depth is right for every single ray is decided exactly, by
-`crates/hiz_core/tests/conservative_depth.rs`.
-Here real scenes are held against large rasterised images and against rays at the real geometry.
+Culls that use it hide nothing that the large images show.
+
+`crates/hiz_core/tests/conservative_depth.rs` decides exactly whether the depth is right for every
+single ray.
+Here real scenes are compared with large rasterised images, and with rays at the real geometry.
 """
 
 from __future__ import annotations
@@ -33,9 +35,9 @@ SIZES = pytest.mark.parametrize(
         pytest.param((288, 512), id="512x288", marks=pytest.mark.slow),
     ],
 )
-#: The image whose truth culls by small images are held against.
+#: The size of the image whose truth judges culls by small images.
 LARGE = (864, 1536)
-#: How many times larger the rasterised image is that the small one is held against.
+#: How many times as large the rasterised image is that the small one is compared with.
 TIMES = 16
 
 
@@ -46,7 +48,7 @@ def device() -> hizvk.Device:
 
 @dataclass(frozen=True)
 class Case:
-    """A view of occluders, by image size and convention."""
+    """A view of occluders; its camera depends on the image's size and the depth convention."""
 
     name: str
     vertices: np.ndarray
@@ -61,8 +63,8 @@ def view_cases(scene: scenes.Scene, views: tuple[scenes.View, ...]) -> Iterator[
             size: tuple[int, int], reversed_z: bool, view: scenes.View = view
         ) -> hizvk.Camera:
             return hizvk.Camera.look_at(
-                view.eye, view.target, up=view.up, fov_y_deg=view.fov_y_deg, size=size, near=view.near,
-                reversed_z=reversed_z,
+                view.eye, view.target, up=view.up, fov_y_deg=view.fov_y_deg, size=size,
+                near=view.near, reversed_z=reversed_z,
             )  # fmt: skip
 
         yield Case(view.name, scene.vertices, scene.triangles, camera)
@@ -81,7 +83,10 @@ def castle_cases(judge: Any, names: tuple[str, ...]) -> Iterator[Case]:
 
 
 def blocked(case: Case, camera: hizvk.Camera, at: tuple[Fraction, Fraction], depth: float) -> bool:
-    """Whether the ray through an image point of `camera` meets a triangle at `depth` or nearer, in exact fractions."""
+    """Whether the ray through image point `at` meets a triangle at `depth` or nearer.
+
+    Decided in exact fractions.
+    """
     height, width = camera.size
     matrix = camera.clip_from_world
     x, y = 2 * at[0] / width - 1, 1 - 2 * at[1] / height
@@ -124,7 +129,10 @@ def blocked(case: Case, camera: hizvk.Camera, at: tuple[Fraction, Fraction], dep
 def check_against_large_image(
     device: hizvk.Device, cases: Iterator[Case], most_loss: float
 ) -> None:
-    """No sample of an image `TIMES` larger is farther than the small image says; and little is lost."""
+    """Check that no sample of an image `TIMES` as large is farther than the small image's depth.
+
+    At most the share `most_loss` of covered pixels may lack a depth.
+    """
     full_pixels = shown = 0
     for case in cases:
         occluders = device.occluders(case.vertices, case.triangles)
@@ -147,8 +155,8 @@ def check_against_large_image(
             known, full = depth != far, farthest != far
             suspects = np.argwhere(known & (sign * farthest > sign * depth))
             # A rasteriser moves corners and rounds depths.
-            # What it says is farther has to be its own error: the exact ray through the very sample
-            # is blocked.
+            # Where its sample is farther, that has to be its own error.
+            # The exact ray through that very sample is blocked.
             assert len(suspects) < 200, f"{case.name}: {len(suspects)} pixels"
             for row, column in suspects:
                 sub_row, sub_column = divmod(int(at[row, column]), TIMES)
@@ -165,9 +173,12 @@ def check_against_large_image(
                 np.abs(farthest - depth)[known & full] / np.abs(farthest - far)[known & full]
             )
             print(
-                f"{case.name}, reversed_z={reversed_z}: of {full.sum()} covered pixels {(known & full).sum()} have a "
-                f"depth, {np.median(looseness):.2e} farther in the median (relative to the distance to far), "
-                f"{np.quantile(looseness, 0.9):.2e} at 90 %; {len(suspects)} samples were the rasteriser's error"
+                f"{case.name}, reversed_z={reversed_z}: "
+                f"of {full.sum()} covered pixels {(known & full).sum()} have a depth, "
+                f"{np.median(looseness):.2e} farther in the median "
+                f"(relative to the distance to far), "
+                f"{np.quantile(looseness, 0.9):.2e} at 90 %; "
+                f"{len(suspects)} samples were the rasteriser's error"
             )
     assert shown >= (1.0 - most_loss) * full_pixels
 
@@ -256,11 +267,12 @@ def report(
     for conservative, (wrong, idle, visible) in counts.items():
         kind = "conservative" if conservative else "plain"
         print(
-            f"{name}, {kind} {size[1]}x{size[0]}: of {visible} visible at {LARGE[1]}x{LARGE[0]}, {wrong} culled; "
+            f"{name}, {kind} {size[1]}x{size[0]}: "
+            f"of {visible} visible at {LARGE[1]}x{LARGE[0]}, {wrong} culled; "
             f"{idle} kept that are not visible"
         )
     assert counts[True][0] == 0
-    # Otherwise this test would prove nothing.
+    # The test proves nothing unless the plain image fails.
     assert counts[False][0] > 0 or not plain_has_to_fail
     text = documented.page("occluders.md")
     if not documented.is_of_this_driver(text):
@@ -275,7 +287,10 @@ def report(
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [SMALL, (288, 512)], ids=["256x144", "512x288"])
 def test_refinement_keeps_no_more(device: hizvk.Device, judge: Any, size: tuple[int, int]) -> None:
-    """What refinement buys and costs, over all cameras of the castle; each step may only keep less."""
+    """Print what refinement gains and costs over all cameras of the castle.
+
+    No step may keep more than the step before.
+    """
     scene = judge.load_scene(Path(judge.__file__).with_name("castle.npz"))
     boxes = device.instances(hizvk.Boxes(scene.instance_aabb_min, scene.instance_aabb_max))
     occluders = device.occluders(scene.occluder_vertices, scene.occluder_triangles)
@@ -316,17 +331,20 @@ def test_refinement_keeps_no_more(device: hizvk.Device, judge: Any, size: tuple[
         assert [int(cell.split(",")[0]) for cell in list(row.values())[1:]] == kept, row
 
 
-# --- by hand ---
+# -- by hand ---------------------------------------------------------------------------------------
 
 
 def wall(left: float, right: float) -> tuple[np.ndarray, np.ndarray]:
-    """At depth 4, as high as the image of `camera` and more."""
+    """A wall at depth 4 that is higher than the image of `camera`."""
     corners = [[left, -9.0, -4.0], [right, -9.0, -4.0], [right, 9.0, -4.0], [left, 9.0, -4.0]]
     return np.array(corners), np.array([[0, 1, 2], [0, 2, 3]])
 
 
 def is_at_the_wall(depth: np.ndarray) -> bool:
-    """Depth 1/4, or the next float32 farther: the bound lies a rounding of float64 behind the wall."""
+    """Whether depth is 1/4 or the next float32 farther.
+
+    The bound is a rounding of float64 behind the wall.
+    """
     return bool(
         ((depth == 0.25) | (depth == np.nextafter(np.float32(0.25), np.float32(0.0)))).all()
     )
@@ -334,7 +352,7 @@ def is_at_the_wall(depth: np.ndarray) -> bool:
 
 @pytest.fixture
 def camera() -> hizvk.Camera:
-    """90 degrees, 8 pixels of one world unit at depth 4; depth 1/z there."""
+    """A camera 90 degrees wide: 8 pixels, each one world unit at depth 4; NDC depth is 1/z."""
     return hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(8, 8), near=1.0)
 
 
@@ -371,8 +389,8 @@ def test_silhouettes_have_the_depth_of_what_is_behind(
 def test_refinement_finds_what_two_surfaces_cover_together(
     device: hizvk.Device, camera: hizvk.Camera
 ) -> None:
-    # Neither covers column 4, which they overlap in: the left one to 0.7 of it, the right one from
-    # 0.3.
+    # The walls overlap in column 4, and neither of them covers it.
+    # The left wall covers it up to 0.7, the right wall from 0.3 on.
     occluders = device.occluders([wall(-9.0, 0.7), wall(0.3, 9.0)])
     assert (
         device.render_depth(occluders, camera, conservative=True, refinement=0).numpy()[:, 4] == 0.0

@@ -1,6 +1,6 @@
 """`check_proxy` and `check_bounds` from Python.
 
-The geometry is tested in crates/hiz_ref/tests/containment.rs.
+Their geometry is tested in crates/hiz_ref/tests/containment.rs.
 """
 
 from __future__ import annotations

@@ -1,8 +1,11 @@
-"""Cameras as other tools hold them, against each tool's own projection, written out here.
+"""Cameras in the form in which other tools have them.
 
-A tool says where a camera's point shows: OpenCV ``u = fx X/Z + cx`` where the first pixel's centre
-is 0, COLMAP the same where it is 0.5.
-Nothing here uses the library's matrices for what it expects.
+They are compared with each tool's own projection, which is written out here.
+
+A tool defines where a camera's point is in the image.
+In OpenCV it is ``u = fx X/Z + cx``, where the first pixel's centre is 0.
+In COLMAP it is the same, where the first pixel's centre is 0.5.
+No expectation uses the library's matrices.
 """
 
 import inspect
@@ -44,7 +47,7 @@ TURNED = np.diag([1.0, -1, -1, 1])
 
 
 class Tool(NamedTuple):
-    """A tool's camera in this library, and where it says that pixel coordinates begin."""
+    """A tool's camera in this library, and where the tool's pixel coordinates begin."""
 
     camera: hizvk.Camera
     focal: tuple[float, float]
@@ -52,12 +55,12 @@ class Tool(NamedTuple):
     first_center: float
     """The coordinate of the first pixel's centre, along both axes."""
     forward: float
-    """1: the camera looks along +z, y down; -1: along -z, y up."""
+    """1 if the camera looks along +z with y down, -1 if it looks along -z with y up."""
 
     def world(self, column: Any, row: Any, depth: Any) -> Floats:
         """World positions at `depth` that the tool shows at these columns and rows.
 
-        They are counted from the corner of the image.
+        Columns and rows are distances from the image's corner.
         """
         u = np.asarray(column) - 0.5 + self.first_center
         v = np.asarray(row) - 0.5 + self.first_center
@@ -109,7 +112,7 @@ TOOLS = {
 
 
 def project(camera: hizvk.Camera, points: Floats) -> tuple[Floats, Floats]:
-    """Columns and rows from the image's corner: the first pixel's centre is (0.5, 0.5)."""
+    """Columns and rows from the image's corner, so the first pixel's centre is (0.5, 0.5)."""
     x, y, _, w = camera.clip_from_world @ np.vstack([points.T, np.ones(len(points))])
     height, width = camera.size
     return (x / w + 1) * width / 2, (1 - y / w) * height / 2
@@ -120,7 +123,7 @@ def device() -> hizvk.Device:
     return hizvk.Device()
 
 
-# --- pixel centres ---
+# -- pixel centres ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", TOOLS)
@@ -134,7 +137,7 @@ def test_a_pixels_centre_lands_on_it(name: str) -> None:
 
 
 def scene(tool: Tool) -> tuple[hizvk.Spheres, Floats]:
-    """Points just before the wall that the tool shows in their pixel, and the walls' depth."""
+    """Points just in front of the wall that the tool shows in their pixel, and the walls' depth."""
     rng = np.random.default_rng(7)
     walls = rng.uniform(4.0, 40.0, SIZE)
     row, column = (side.ravel() for side in np.mgrid[: SIZE[0], : SIZE[1]])
@@ -154,24 +157,19 @@ def test_what_a_tool_shows_is_not_culled(device: hizvk.Device, name: str) -> Non
         assert seen.all()
 
 
-@pytest.mark.parametrize(
-    ("right", "wrong"),
-    [
-        ("OpenCV", "gsplat"),
-        ("gsplat", "OpenCV"),
-        ("COLMAP", "OpenCV"),
-        ("nerfstudio", "OpenGL axes, integer"),
-    ],
-)
+@pytest.mark.parametrize(("right", "wrong"), [
+    ("OpenCV", "gsplat"), ("gsplat", "OpenCV"), ("COLMAP", "OpenCV"),
+    ("nerfstudio", "OpenGL axes, integer"),
+])  # fmt: skip
 def test_half_a_pixel_off_hides_what_shows(device: hizvk.Device, right: str, wrong: str) -> None:
-    """Why there is no default: of 768 points that show, the other choice culls about 300."""
+    """Why there is no default: of 768 visible points the wrong choice culls about 300."""
     points, walls = scene(TOOLS[right])
     seen = hizvk.visible(points, TOOLS[wrong].camera, depth=walls, kind="z", device=device)
     assert np.count_nonzero(~seen) > 150
 
 
 def test_a_missing_or_unknown_word_is_told_the_way() -> None:
-    """Python itself would only name it."""
+    """Python's own error would only name the parameter."""
     with pytest.raises(
         TypeError, match=r"^pixel_center: expected \"integer\" .*OpenCV.* or \"half\" .*COLMAP"
     ):
@@ -187,7 +185,7 @@ def test_a_missing_or_unknown_word_is_told_the_way() -> None:
         (hizvk.Camera.from_opencv, sees),
         (hizvk.Camera.from_opengl, sees),
         (hizvk.Camera.from_matrices, {}),
-    ):
+    ):  # fmt: skip
         for word in ("R", "t", "rotation", "tvec", "viewmat", "c2w"):
             with pytest.raises(
                 TypeError,
@@ -202,7 +200,9 @@ def test_a_missing_or_unknown_word_is_told_the_way() -> None:
     with pytest.raises(
         TypeError, match=r"^order: expected \"wxyz\" .*nuScenes.* or \"xyzw\" .*SciPy"
     ):
-        hizvk.OrientedBoxes.from_quaternions(quaternions=[[1, 0, 0, 0]], **boxes)  # type: ignore[call-arg]
+        hizvk.OrientedBoxes.from_quaternions(  # type: ignore[call-arg]
+            quaternions=[[1, 0, 0, 0]], **boxes
+        )
     with pytest.raises(
         TypeError, match=r"^up: expected the axis of the turn, \(0, 0, 1\) where z is up"
     ):
@@ -211,7 +211,7 @@ def test_a_missing_or_unknown_word_is_told_the_way() -> None:
         hizvk.OrientedBoxes.from_yaw(yaw=0.0, up=(0, 0, 1), **boxes)  # type: ignore[call-arg]
 
 
-# --- poses ---
+# -- poses -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["camera_from_world", "world_from_camera"])
@@ -234,8 +234,8 @@ def test_every_form_of_a_pose(name: str) -> None:
             (rotation.tolist(), shift[:, None]), (rotation, shift[None]),
         ):  # fmt: skip
             assert maker(**{name: form}) == whole
-    # And what it means, by hand: the camera of solvePnP's R and t sees the world point R^T (p - t)
-    # at p.
+    # The meaning, worked out by hand.
+    # The camera of solvePnP's R and t sees the world point R^T (p - t) at p.
     camera = hizvk.Camera.from_opencv(
         K, pixel_center="integer", camera_from_world=(ROTATION, SHIFT.reshape(3, 1)), **GIVEN
     )
@@ -244,7 +244,10 @@ def test_every_form_of_a_pose(name: str) -> None:
 
 
 def turned_by(quaternion: tuple[float, ...], point: Floats) -> Floats:
-    """The point turned by a unit quaternion (w, x, y, z): q p q*, by products of Hamilton's."""
+    """The point turned by a unit quaternion (w, x, y, z).
+
+    It is q p q*, by Hamilton's products and without a matrix.
+    """
 
     def times(a: Any, b: Any) -> tuple[float, ...]:
         w, x, y, z = a
@@ -261,7 +264,7 @@ def turned_by(quaternion: tuple[float, ...], point: Floats) -> Floats:
 
 
 def test_colmaps_own_example() -> None:
-    """The image and camera of COLMAP's description of its format, with its own projection."""
+    """The image and camera of COLMAP's description of its format, by COLMAP's own projection."""
     quaternion, shift = (
         (0.851773, 0.0165051, 0.503764, -0.142941),
         np.array([-0.737434, 1.02973, 3.74354]),
@@ -305,10 +308,14 @@ def test_a_colmap_model_is_a_pinhole_if_nothing_is_bent(model: str) -> None:
         ):
             hizvk.Camera.from_colmap(model, params, **pose)
 
-    class Enumeration:  # as pycolmap's CameraModelId
+    class Enumeration:  # like pycolmap's CameraModelId
         name = model
 
-    named = hizvk.Camera.from_colmap(Enumeration(), [*focal, CX, CY, *[0.0] * bent], **pose)  # type: ignore[arg-type]
+    named = hizvk.Camera.from_colmap(
+        Enumeration(),  # type: ignore[arg-type]
+        [*focal, CX, CY, *[0.0] * bent],
+        **pose,
+    )
     assert named == straight
 
 
@@ -316,7 +323,10 @@ def test_a_colmap_model_is_a_pinhole_if_nothing_is_bent(model: str) -> None:
     "model", ["OPENCV_FISHEYE", "SIMPLE_FISHEYE", "RADIAL_FISHEYE", "EQUIRECTANGULAR"]
 )
 def test_a_fisheye_is_no_pinhole_with_zeros_either(model: str) -> None:
-    """With zeros it would hide what shows: at 45 degrees it shows a point at f pi / 4, not at f."""
+    """At 45 degrees an equidistant fisheye shows a point at f pi / 4, and a pinhole shows it at f.
+
+    So zeros would hide visible things.
+    """
     with pytest.raises(
         ValueError, match=r"^model: .*no pinhole with any numbers; run COLMAP's image_undistorter"
     ):
@@ -345,11 +355,11 @@ def test_one_pose_of_a_colmap_image() -> None:
         make(world_from_camera=np.eye(4), camera_from_world=np.eye(4))
 
 
-# --- OpenGL's axes ---
+# -- OpenGL's axes ---------------------------------------------------------------------------------
 
 
 def test_a_camera_matrix_is_pyrenders_projection() -> None:
-    """pyrender.IntrinsicsCamera.get_projection_matrix, as its source has it."""
+    """The matrix of pyrender.IntrinsicsCamera.get_projection_matrix, copied from its source."""
     near, far = 0.5, 20.0
     height, width = SIZE
     projection = np.zeros((4, 4))
@@ -413,7 +423,10 @@ def test_one_way_to_say_what_an_opengl_camera_sees() -> None:
 
 
 def test_what_pyrenders_depth_costs() -> None:
-    """docs/conventions.md says less than 2^-20, for 24-bit buffers and pyrender's float32."""
+    """The loss that docs/conventions.md states as less than 2^-20.
+
+    It is that of a buffer of 24 bits, and of pyrender's conversion back in float32.
+    """
     rng = np.random.default_rng(5)
     exact = rng.random(200_000)
     for near, far in ((1.0, 2.0), (0.05, 100.0), (1e-3, 1e4), (0.01, 1e5), (3.0, 7.0)):
@@ -426,7 +439,7 @@ def test_what_pyrenders_depth_costs() -> None:
             assert np.abs(again - exact[stored < 1.0]).max() < 2.0**-20
 
 
-# --- boxes ---
+# -- boxes -----------------------------------------------------------------------------------------
 
 
 def test_yaw_turns_from_x_to_y_where_z_is_up() -> None:
@@ -439,15 +452,15 @@ def test_yaw_turns_from_x_to_y_where_z_is_up() -> None:
     ):
         assert (rotation == expected).all()  # quarter turns are exact
     assert boxes.half_sizes.tolist() == [[2.0, 1.0, 0.5]] * 4
-    # KITTI's devkit: R = [c 0 s; 0 1 0; -s 0 c] about the camera's y; a car at ry = -pi/2 points
-    # along +z.
+    # KITTI's devkit has R = [c 0 s; 0 1 0; -s 0 c] about the camera's y.
+    # A car at ry = -pi/2 points along +z.
     ry = -1.3
     kitti = hizvk.OrientedBoxes.from_yaw(
         np.zeros((1, 3)), 1.0, np.degrees(ry), up=(0, 1, 0)
     ).rotations[0]
     c, s = np.cos(ry), np.sin(ry)
     np.testing.assert_allclose(kitti, [[c, 0, s], [0, 1, 0], [-s, 0, c]], rtol=0, atol=1e-15)
-    # Any axis, against the quaternion of the same turn (cos, sin * axis).
+    # Any axis, compared with the quaternion of the same turn (cos, sin * axis).
     axis, angle = np.array([1.0, -2, 0.5]), 77.0
     half = np.radians(angle) / 2
     quaternion = (np.cos(half), *(np.sin(half) * axis / np.linalg.norm(axis)))
@@ -464,7 +477,7 @@ def test_quaternions_in_either_order_and_of_any_length(order: Any, dtype: Any) -
     rng = np.random.default_rng(3)
     unit = rng.normal(size=(50, 4))
     unit /= np.linalg.norm(unit, axis=1, keepdims=True)
-    most = 200 if dtype == np.float64 else 30  # squares of them over- and underflow
+    most = 200 if dtype == np.float64 else 30  # their squares overflow and underflow
     given = (unit * 10.0 ** rng.integers(-most, most, (50, 1))).astype(dtype)
     if order == "xyzw":
         given = np.roll(given, -1, axis=1)
@@ -518,18 +531,18 @@ def test_boxes_that_are_none_are_kept_and_counted(device: hizvk.Device) -> None:
         assert device.cull(uploaded, camera, near_wall).mask.tolist() == [False, True, True]
 
 
-# --- meshes of other libraries ---
+# -- meshes of other libraries ---------------------------------------------------------------------
 
 
 class Trimesh:
-    """What trimesh.Trimesh shows of itself."""
+    """The attributes of trimesh.Trimesh that the library reads."""
 
     def __init__(self, vertices: Any, faces: Any) -> None:
         self.vertices, self.faces = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
 
 
 class Vector:
-    """As open3d.utility.Vector3dVector: no array, but numpy can make one of it."""
+    """Like open3d.utility.Vector3dVector: not an array, but numpy can make one of it."""
 
     def __init__(self, rows: Any, dtype: Any) -> None:
         self._rows = np.asarray(rows, dtype)
@@ -542,7 +555,7 @@ class Vector:
 
 
 class Open3d:
-    """What open3d.geometry.TriangleMesh shows of itself."""
+    """The attributes of open3d.geometry.TriangleMesh that the library reads."""
 
     def __init__(self, vertices: Any, triangles: Any) -> None:
         self.vertices, self.triangles = Vector(vertices, np.float64), Vector(triangles, np.int32)
@@ -582,7 +595,7 @@ def test_meshes_of_trimesh_and_open3d_hide(device: hizvk.Device) -> None:
 
 
 def test_what_is_no_mesh_is_told_so(device: hizvk.Device) -> None:
-    class Points:  # trimesh.PointCloud has vertices alone
+    class Points:  # trimesh.PointCloud has only vertices
         vertices = CORNERS
 
     class Scene:
@@ -593,7 +606,8 @@ def test_what_is_no_mesh_is_told_so(device: hizvk.Device) -> None:
     for value, text in (
         (
             Points(),
-            r"^vertices: expected a Mesh, a mesh of trimesh or Open3D, or a list .*got Points",
+            r"^vertices: expected a Mesh, a mesh of trimesh or Open3D, or a list of them "
+            r".*got Points",
         ),
         ([Points()], r"^vertices\[0\]: expected a Mesh"),
         (
@@ -609,7 +623,7 @@ def test_what_is_no_mesh_is_told_so(device: hizvk.Device) -> None:
         device.occluders([Trimesh(CORNERS, FACES), Trimesh(CORNERS, [[0, 1, 2, 3]])])
 
 
-# --- hints that work ---
+# -- hints that work -------------------------------------------------------------------------------
 
 
 def test_the_hint_for_a_masked_array_works() -> None:
@@ -623,7 +637,7 @@ def test_the_hint_for_a_masked_array_works() -> None:
 
 
 def test_what_is_advised_to_install_can_be_installed() -> None:
-    """hizvk itself is on no index: packages are named, those of the extras."""
+    """hizvk itself is on no package index, so hints name the packages of its extras instead."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = {
         re.match(r"[\w-]+", one)[0]
@@ -639,7 +653,7 @@ def test_what_is_advised_to_install_can_be_installed() -> None:
     assert advised == extras
 
 
-# --- the page ---
+# -- the page --------------------------------------------------------------------------------------
 
 
 def blocks() -> list[str]:
@@ -649,7 +663,7 @@ def blocks() -> list[str]:
 
 @pytest.mark.parametrize("block", blocks(), ids=range(len(blocks())))
 def test_the_pages_blocks_run(block: str) -> None:
-    """Each stands for itself, and asserts what it shows."""
+    """Each block runs by itself and asserts what it shows."""
     assert "assert " in block
     exec(compile(block, "docs/conventions.md", "exec"), {})
 
@@ -668,6 +682,11 @@ def test_words_of_other_cameras_get_a_way_out() -> None:
     with pytest.raises(
         TypeError, match="pixel_center: expected no such parameter: COLMAP's centres are at halves"
     ):
-        hizvk.Camera.from_colmap("PINHOLE", [20, 20, 16, 12], pixel_center="half", **words)  # type: ignore[call-arg]
+        hizvk.Camera.from_colmap(
+            "PINHOLE",
+            [20, 20, 16, 12],
+            pixel_center="half",  # type: ignore[call-arg]
+            **words,
+        )
     with pytest.raises(ValueError, match=r"pass k\[:3, :3\]"):
         hizvk.Camera.from_opencv(np.eye(4), pixel_center="half", **words)

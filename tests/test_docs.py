@@ -1,4 +1,4 @@
-"""What README and docs show runs as it stands: code and commands.
+"""The code and the commands that README and docs show run unchanged.
 
 Faults that they plant are tested by `planted_texts.rs`.
 """
@@ -18,14 +18,15 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("crates/*/README.md")])
 FENCE = re.compile(r"^```(?P<language>[^\n]*)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
-#: Languages that are shown and not run here. rustdoc runs `rust` (`crates/hiz_core/src/lib.rs`).
+#: Languages that are shown and not run here.
+#: rustdoc runs `rust` (`crates/hiz_core/src/lib.rs`).
 NOT_RUN = {"sh", "text", "rust", "toml", "wgsl", "json", "{eval-rst}", "{toctree}"}
 #: The pages whose Rust blocks rustdoc compiles and runs.
 BY_RUSTDOC = ("README.md", "docs/rust.md")
 
 
 def blocks() -> list[tuple[str, str, str]]:
-    """Where each fenced block stands, its language and its text."""
+    """For each fenced block its place, its language and its text."""
     found = []
     for page in PAGES:
         text = page.read_text(encoding="utf-8")
@@ -43,10 +44,10 @@ PYTHON = [
 
 
 def test_every_block_says_what_it_is() -> None:
-    """A block of no or another language would be run by nobody."""
+    """Nothing would run a block without a language, or with another one."""
     strange = [place for place, language, _ in BLOCKS if language not in {*NOT_RUN, "python"}]
     assert not strange
-    # rustdoc runs those of some pages alone, and passes over what is marked so.
+    # rustdoc runs only the pages in BY_RUSTDOC; nothing would run a Rust block on another page.
     unrun = [
         place
         for place, language, _ in BLOCKS
@@ -62,7 +63,7 @@ def test_every_block_says_what_it_is() -> None:
 def test_rustdoc_runs_the_page(page: str) -> None:
     source = (ROOT / "crates" / "hiz_core" / "src" / "lib.rs").read_text(encoding="utf-8")
     assert f'#[doc = include_str!("../../../{page}")]' in source
-    # To rustdoc, indented lines outside of a fence are Rust.
+    # To rustdoc, indented lines outside a fence are Rust.
     outside = FENCE.sub("", (ROOT / page).read_text(encoding="utf-8"))
     assert not re.search(r"^(    |\t)\S", outside, re.MULTILINE)
 
@@ -94,7 +95,7 @@ def test_examples_in_docstrings_run(name: str) -> None:
 
 
 def test_no_example_is_skipped() -> None:
-    """What is not run falls behind."""
+    """An example that is not run becomes outdated."""
     skipped = [
         path
         for path in (ROOT / "python").rglob("*.py")
@@ -106,7 +107,7 @@ def test_no_example_is_skipped() -> None:
 def shown() -> str:
     """All pages as one text."""
     text = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
-    return re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)  # sources of other projects
+    return re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)  # comments name other projects' sources
 
 
 def test_commands_that_are_shown_exist() -> None:

@@ -1,8 +1,9 @@
-"""Tables of counts in README and docs say what their command prints today.
+"""Tables of counts in README and docs contain what their command prints today.
 
-Tables made from other tables agree with them.
-Counts repeat with the seed on one driver.
-On another driver, rasterised depth differs in its last bits, and a few counts with it.
+Numbers that are derived from another table agree with that table.
+
+On one driver counts repeat with the seed.
+On another driver rasterised depth differs in its last bits, and so do a few counts.
 There the comparison is skipped.
 """
 
@@ -27,7 +28,7 @@ COUNTS = ("texels/inst.", "false culls", "hidden kept", "of those in view", "of 
 
 
 def script(name: str) -> Any:
-    """A module of scripts/, which is no package."""
+    """A module of scripts/, which is not a package."""
     spec = importlib.util.spec_from_file_location(name, ROOT / "scripts" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
@@ -41,7 +42,7 @@ guide_docs = script("guide_docs")
 
 
 def test_the_guide_quotes_the_bench() -> None:
-    """If this fails, run scripts/guide_docs.py."""
+    """If this is red, run scripts/guide_docs.py."""
     guide = page("guide.md")
     assert guide_docs.QUOTATION.search(guide)
     assert guide_docs.renewed(guide, page("bench.md")) == guide
@@ -69,7 +70,10 @@ def test_a_table_that_was_edited_is_seen() -> None:
     ],
 )
 def test_the_bench_still_counts_so(tmp_path: Path, scene: str) -> None:
-    """If this fails: `make bench`, scripts/bench_docs.py, and say why the counts have changed."""
+    """If this is red, run `make bench` and scripts/bench_docs.py.
+
+    Write in the log what changed the counts.
+    """
     if not documented.is_of_this_driver(page("bench.md")):
         pytest.skip(f"docs/bench.md was printed on another driver than {hizvk.Device().adapter}")
     if scene == "castle" and not CASTLE.exists():

@@ -1,8 +1,8 @@
-"""Arrays of every kind for every parameter that takes one.
+"""Arrays of every layout and dtype for every parameter that takes one.
 
-Each gets an answer or a named error, and there is no crash and no huge copy.
+The outcome is a result or a named error, never a crash, and never a huge copy.
 
-The parameters and valid arguments beside them are those of api_bad_values.py.
+The parameters, and valid arguments beside them, are those of api_bad_values.py.
 """
 
 from __future__ import annotations
@@ -69,13 +69,8 @@ ARRAYS = [
 ]
 
 DTYPES = [
-    "<f4", ">f4", "<f8", ">f8", "<f2", ">f2", "g", "i1", ">i4", "i8", "u1", ">u2", "u8", "?", "c8",
-    "c16", "O", "U3", "S2", "M8[s]", "m8[s]", "V4", [("x", "f4"), ("y", "f4")],
-]  # fmt: skip
-
-LAYOUTS = [
-    "plain", "fortran", "strided", "reversed", "readonly", "misaligned", "list", "tuple",
-    "memoryview", "subclass", "masked", "scalar", "broadcast", "transposed",
+    "<f4", ">f4", "<f8", ">f8", "<f2", ">f2", "g", "i1", ">i4", "i8", "u1", ">u2", "u8", "?",
+    "c8", "c16", "O", "U3", "S2", "M8[s]", "m8[s]", "V4", [("x", "f4"), ("y", "f4")],
 ]  # fmt: skip
 
 SHAPES: list[tuple[int, ...]] = [
@@ -83,7 +78,7 @@ SHAPES: list[tuple[int, ...]] = [
     (8, 6), (0, 0), (48, 64), (2, 4, 4), (0, 4, 4), (2, 3, 3), (1, 2, 3, 3), (6, 8, 1), (1, 6, 8),
 ]  # fmt: skip
 
-#: Views of one number that claim far more than any machine has.
+#: Shapes of views of one number that claim far more memory than any machine has.
 CLAIMS: list[tuple[int, ...]] = [
     (2**58,),
     (2**40, 3),
@@ -118,7 +113,7 @@ def device() -> hizvk.Device:
 
 
 def filled(draw: Callable[..., Any], shape: tuple[int, ...], dtype: Any) -> Any:
-    """An array of that shape with special numbers in it, as far as the dtype takes them."""
+    """An array of that shape with special numbers in it, as far as the dtype can hold them."""
     size = int(np.prod(shape))
     values = np.array([draw(st.sampled_from(NUMBERS)) for _ in range(min(size, 12))] or [0.0])
     with np.errstate(all="ignore"):
@@ -130,7 +125,10 @@ def filled(draw: Callable[..., Any], shape: tuple[int, ...], dtype: Any) -> Any:
 
 def dressed(draw: Callable[..., Any], array: Any) -> Any:
     """The array in another layout or class."""
-    how = draw(st.sampled_from(LAYOUTS))
+    how = draw(st.sampled_from([
+        "plain", "fortran", "strided", "reversed", "readonly", "misaligned", "list", "tuple",
+        "memoryview", "subclass", "masked", "scalar", "broadcast", "transposed",
+    ]))  # fmt: skip
     if how == "fortran":
         return np.asfortranarray(array)
     if how == "strided" and array.ndim:
@@ -164,9 +162,9 @@ def dressed(draw: Callable[..., Any], array: Any) -> Any:
 
 
 def attempt(device: hizvk.Device, function: str, parameter: str, value: Any) -> Any:
-    """The function's answer, or None for an error that names what is wrong."""
+    """The function's result, or None for an error that names the fault."""
     call, arguments = TABLES[function].make(device)
-    # What is wrong may show in another argument: a longer array, a camera as a whole.
+    # The fault may show in another argument, such as a longer array, or the camera as a whole.
     words = (*TABLES[function].bad, "camera")
     caught: Exception | None = None
     try:
@@ -189,7 +187,7 @@ def test_any_array_is_an_answer_or_a_named_error(device: hizvk.Device, data: st.
     if answer is None:
         return
     if isinstance(answer, hizvk.Spheres | hizvk.Boxes | hizvk.OrientedBoxes):
-        # What was taken can be culled, and what is no volume is kept.
+        # Accepted bounds can be culled, and invalid bounds are kept.
         instances = device.instances(answer)
         camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(6, 8), near=0.1)
         seen = device.cull(instances, camera, device.pyramid(np.ones((6, 8)), camera, kind="z"))
@@ -203,7 +201,7 @@ def test_any_array_is_an_answer_or_a_named_error(device: hizvk.Device, data: st.
 
 
 def address_space() -> int:
-    """Bytes of this process's address space."""
+    """The size of this process's address space in bytes."""
     with open("/proc/self/statm", encoding="ascii") as file:
         return int(file.read().split()[0]) * resource.getpagesize()
 
@@ -213,7 +211,10 @@ def address_space() -> int:
 def test_views_that_claim_more_than_there_is_are_refused(
     device: hizvk.Device, function: str, parameter: str, claim: tuple[int, ...]
 ) -> None:
-    """With strides of 0, one number in memory has a shape of terabytes: it is refused uncopied."""
+    """Strides of 0: one number in memory, terabytes by their shape.
+
+    They are refused at once, before anything is copied.
+    """
     before = address_space()
     for dtype in ("f4", "f8", "f2", "i8", "?", "u2", "u1"):
         value = np.broadcast_to(np.zeros((), dtype), claim)
@@ -243,7 +244,7 @@ def test_images_beyond_the_devices_limit_are_refused_before_they_are_copied(
 
 
 def test_every_array_parameter_is_fuzzed() -> None:
-    """A parameter whose table has a bad shape takes arrays."""
+    """A parameter takes arrays if its table has a bad shape."""
     listed = {
         (function, parameter)
         for function, table in TABLES.items()
@@ -260,6 +261,6 @@ def test_every_array_parameter_is_fuzzed() -> None:
 
 
 def test_this_process_still_has_its_device(device: hizvk.Device) -> None:
-    """After all of the above."""
+    """The device survives all of the tests above."""
     device.wait()
     assert hizvk.Device().adapter == device.adapter

@@ -1,4 +1,4 @@
-"""Depth in half floats and in float32: a cull allows for what rounding to them may have cost.
+"""Depth in half floats and in float32: their rounding counts as slack, in every kind.
 
 Every expectation is worked out by hand.
 """
@@ -18,7 +18,7 @@ def device() -> hizvk.Device:
     return hizvk.Device()
 
 
-# The kind, what is stored, and the view depth of a wall half a spacing behind it.
+# The kind, the stored number, and the view depth of a wall half a spacing behind it.
 # That wall is stored as the same number.
 # A spacing is 2^-7 from 8 to 16, 2^-11 from 0.5 to 1, and 2^-14 from 2^-4 to 2^-3.
 CASES = [
@@ -37,8 +37,9 @@ def test_what_a_half_float_rounds_is_counted(
     camera = hizvk.Camera.look_at(
         (0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(1, 1), near=1.0, reversed_z=kind != "ndc"
     )
-    # Flat boxes: a quarter of that half spacing before the wall, and far enough behind the stored
-    # number.
+    # Flat boxes.
+    # One is a quarter of that half spacing in front of the wall.
+    # The other is far enough behind the stored number.
     step = wall - stored if kind in ("z", "distance") else wall - (8.0 if kind == "ndc" else 16.0)
     depths = np.array([wall - 0.25 * step, wall + 4.0 * step])
     low = np.stack([-0.1 * depths, -0.1 * depths, -depths], axis=1)
@@ -55,7 +56,7 @@ def test_what_a_half_float_rounds_is_counted(
 
     half = np.full((1, 1), stored, ">f2" if way == "big-endian" else np.float16)
     assert seen([[half[0, 0]]] if way == "list" else half) == [True, False]
-    # Of a wall that stands where the number says, the first one is hidden.
+    # If the wall is exactly at the stored number, the first box is hidden.
     assert seen(half.astype(np.float32)) == [False, False]
 
 
@@ -71,7 +72,7 @@ def test_what_float32_rounds_of_a_metric_depth_is_counted(
     camera = hizvk.Camera.orthographic(
         (0, 0, 0), (0, 0, -1), height=2, size=(1, 1), near=1024, far=1056, reversed_z=reversed_z
     )
-    # A spacing is 2^-13: a wall just short of half of it behind 1025 is stored as 1025.
+    # A spacing is 2^-13, and a wall just short of half a spacing behind 1025 is stored as 1025.
     wall = 1025.0 + 0.49 * 2.0**-13
     image = np.full((1, 1), wall).astype(np.float32)
     assert image[0, 0] == 1025.0
@@ -111,13 +112,16 @@ def test_listed_rows_are_refused_where_their_array_is(device: hizvk.Device) -> N
         for form in (image, list(image), [list(row) for row in image]):
             with pytest.raises(TypeError, match=r"^depth: expected "):
                 hizvk.visible(behind, camera, depth=form, kind="z", device=device)
-    # Python's own whole numbers are metres.
+    # Python's own integers are metres.
     assert not hizvk.visible(behind, camera, depth=[[5] * 8] * 8, kind="z", device=device).any()
 
 
 @pytest.mark.parametrize("dtype", [np.float16, np.float32, np.dtype(">f2")])
 def test_lists_of_several_dtypes_are_refused(device: hizvk.Device, dtype: Any) -> None:
-    """Promoted to float64 they would count as exact, and the rounding would hide things."""
+    """Promoted to float64 they would count as exact.
+
+    Then the rounding of the half floats would hide visible things.
+    """
     camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(2, 2), near=0.1)
     row = np.full(2, 10, dtype)
     mixtures: list[list[object]] = [
@@ -136,7 +140,7 @@ def test_lists_of_several_dtypes_are_refused(device: hizvk.Device, dtype: Any) -
 
 
 def test_what_masked_parameters_are_told_leads_somewhere(device: hizvk.Device) -> None:
-    """NaN is no way out where NaN is refused."""
+    """Where NaN is refused, the hint does not suggest NaN."""
     vertices = np.ma.zeros((3, 3))
     with pytest.raises(TypeError, match=r"^vertices: .*masked array; leave out what is masked"):
         device.occluders(vertices, [[0, 1, 2]])

@@ -1,8 +1,10 @@
-"""Every option changes an answer: each has a scene whose answers are worked out by hand.
+"""Every option changes a result: there is one scene per option, worked out by hand.
 
-The camera looks along -z from the origin, 90 degrees wide, near plane at 1, with 16x16 pixels.
-At depth 8 a pixel is a unit wide; column 8 begins at x = 0, and row 8 at y = 0, downwards.
-The wall stands at depth 4.
+The camera is at the origin and looks along -z, 90 degrees wide, with the near plane at 1.
+The image has 16x16 pixels.
+At depth 8 a pixel is a unit wide, column 8 begins at x = 0, and row 8 begins at y = 0.
+Rows run downwards.
+The wall is at depth 4.
 """
 
 from __future__ import annotations
@@ -36,7 +38,7 @@ def sphere(center: Any, radius: float) -> hizvk.Spheres:
 
 
 def wall(*open_pixels: tuple[Any, Any]) -> Any:
-    """Depth 4, but for (row, column) pixels or slices that are open."""
+    """Depth 4, except for (row, column) pixels or slices, which are open."""
     depth = np.full(SIZE, 4.0)
     for pixel in open_pixels:
         depth[pixel] = np.inf
@@ -45,9 +47,9 @@ def wall(*open_pixels: tuple[Any, Any]) -> Any:
 
 HOLE_COLUMN = wall((slice(None), 8))
 
-#: What is tested behind which depth image, and options that hide it and that keep it.
+#: The bounds and the depth image, then options that hide the bounds and options that keep them.
 CULLS: dict[str, tuple[Any, Any, dict[str, Any], dict[str, Any]]] = {
-    # Between the centres of pixels, before the wall.
+    # Between pixel centres, in front of the wall.
     "coverage": (sphere((0, 0, -2), 0.01), wall(), {"coverage": "sample"}, {"coverage": "area"}),
     # A quarter of a pixel beside the open column.
     "guard_px": (
@@ -62,15 +64,16 @@ CULLS: dict[str, tuple[Any, Any, dict[str, Any], dict[str, Any]]] = {
         {},
         {"guard_px": 0.5},
     ),
-    # In sample coverage the default is 1/64: a box that ends 1/100 before the centres of the
-    # column.
+    # In sample coverage the default is 1/64.
+    # The box ends 1/100 in front of the column's pixel centres.
     "guard_px, sample": (
         box((-1.5, -0.5, -8), (0.49, 0.5, -8)),
         HOLE_COLUMN,
         {"coverage": "sample", "guard_px": 0.0},
         {"coverage": "sample"},
     ),
-    # 1/4 less a hundredth of it is 1 / 4.0404; less 1/100 it is 1 / 4.1667.
+    # The wall is at 1/4 in reversed Z.
+    # A hundredth of that less is 1 / 4.0404, and 1/100 less is 1 / 4.1667.
     "depth_slack": (
         box((-1, -1, -5), (1, 1, -4.03)),
         wall(),
@@ -83,16 +86,16 @@ CULLS: dict[str, tuple[Any, Any, dict[str, Any], dict[str, Any]]] = {
         {"depth_slack_abs": 0.005},
         {"depth_slack_abs": 0.01},
     ),
-    # kappa eps (1 + 4.1 / 4) and more: 0.0024 at 10,000, where 4.1 / 4 - 1 is 0.025; 0.24 at a
-    # million.
+    # The slack is kappa eps (1 + 4.1 / 4) and more.
+    # It is 0.0024 at 10,000 and 0.24 at a million, while 4.1 / 4 - 1 is 0.025.
     "transform_slack": (
         box((-1, -1, -5), (1, 1, -4.1)),
         wall(),
         {"transform_slack": 1e4},
         {"transform_slack": 1e6},
     ),
-    # Three pixels, columns 9 to 11, beside the open column 8: 2x2 texels that span them are of
-    # level 1 and have it.
+    # Three pixels, columns 9 to 11, beside the open column 8.
+    # The 2x2 texels that span them are of level 1 and contain that column.
     "footprint": (
         box((1.1, 0.1, -8), (3.9, 0.9, -8)),
         HOLE_COLUMN,
@@ -117,8 +120,8 @@ CULLS: dict[str, tuple[Any, Any, dict[str, Any], dict[str, Any]]] = {
         {"descent": 4096},
         {"descent": 3},
     ),
-    # A ball of 3.24 pixels about the middle: its rectangle has the open pixel in its corner, its
-    # outline has not.
+    # A ball of 3.24 pixels about the middle.
+    # Its rectangle has the open pixel in its corner, but its outline does not contain it.
     "fit": (
         sphere((0, 0, -8), 3.0),
         wall((4, 11)),
@@ -138,7 +141,7 @@ def by_cull(device: hizvk.Device, bounds: Any, depth: Any, options: dict[str, An
 
 
 def by_groups(device: hizvk.Device, bounds: Any, depth: Any, options: dict[str, Any]) -> bool:
-    """A hundred times the same, in two groups: hidden as a whole, or all kept."""
+    """A hundred copies of the bounds, in two groups: hidden as a whole, or all kept."""
     many = type(bounds)(
         *(np.repeat(getattr(bounds, name), 100, axis=0) for name in bounds.__dataclass_fields__)
     )
@@ -153,14 +156,18 @@ def by_groups(device: hizvk.Device, bounds: Any, depth: Any, options: dict[str, 
 def test_each_option_of_a_cull(device: hizvk.Device, name: str, face: Any) -> None:
     bounds, depth, hiding, keeping = CULLS[name]
     assert not face(device, bounds, depth, hiding), "hidden"
-    # The test of a group always descends by 16 texels, which hides what its footprint keeps.
+    # A group's test always descends by up to 16 texels.
+    # So it hides what its footprint alone would keep.
     if face is not by_groups or not name.startswith(("descent", "footprint")):
         assert face(device, bounds, depth, keeping), "kept"
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32, np.uint16])
 def test_kind_and_scale(device: hizvk.Device, dtype: Any) -> None:
-    """A distance of 4 in the corner is a view depth of 2.4; steps of 2 put the wall at 8."""
+    """A distance of 4 in the image's corner is a view depth of 2.4.
+
+    Steps of 2 put a wall at depth 8.
+    """
     corner = sphere((3.0 * 14 / 16, 3.0 * 14 / 16, -3.0), 0.05)
     depth = wall().astype(dtype)
 
@@ -181,14 +188,17 @@ def test_kind_and_scale(device: hizvk.Device, dtype: Any) -> None:
 
 
 def test_levels(device: hizvk.Device) -> None:
-    """Three pixels far from an open column: a texel of level 3 has both, one of level 1 has not."""
+    """Three pixels far from an open column.
+
+    A texel of level 3 contains both, and it is read only if level 3 is the finest level.
+    """
     three = box((1.1, 0.1, -8), (3.9, 0.9, -8))
     depth = wall((slice(None), 15))
     for levels, kept in ((None, False), (1, False), ((1, 1), False), (3, True), ((3, 3), True)):
         pyramid = device.pyramid(depth, CAMERA, kind="z", levels=levels)
         assert bool(device.cull(device.instances(three), CAMERA, pyramid).mask[0]) == kept, levels
-    # Six pixels are more than two texels of level 1, and no more than two of level 2 (columns 8 to
-    # 15).
+    # Six pixels are more than two texels of level 1.
+    # They are no more than two texels of level 2 (columns 8 to 15).
     six = box((1.1, 0.1, -8), (6.9, 0.9, -8))
     for levels, kept in ((None, False), ((1, 2), False), ((1, 1), True)):
         pyramid = device.pyramid(wall((slice(None), 0)), CAMERA, kind="z", levels=levels)
@@ -196,7 +206,7 @@ def test_levels(device: hizvk.Device) -> None:
 
 
 def points(count: int) -> tuple[hizvk.Spheres, Any]:
-    """Specks in any order before and behind the wall, and which are before it."""
+    """Specks in random order in front of and behind the wall, and which of them are in front."""
     random = np.random.default_rng(3)
     z = np.where(random.random(count) < 0.5, 2.0, 8.0)
     centers = np.stack(
@@ -215,7 +225,7 @@ def test_order_of_the_list(device: hizvk.Device) -> None:
     )
     assert stable.tolist() == expected.tolist()
     assert np.sort(any_order).tolist() == expected.tolist()
-    # As they are stored, which is not the caller's order.
+    # In stored order, which is not the caller's order.
     assert any_order.tolist() != expected.tolist()
 
 
@@ -228,7 +238,7 @@ def test_hierarchy_and_statistics(device: hizvk.Device) -> None:
         for h in (None, True, False)
     }
     assert groups == {None: 0, True: 47, False: 0}
-    # Where nothing is hidden each instance is tested; the last of 47 groups has 56 members.
+    # Where nothing is hidden, each instance is tested; the last of 47 groups has 56 members.
     nothing = device.pyramid(np.full(SIZE, np.inf), CAMERA, kind="z")
     assert device.cull(instances, CAMERA, nothing, hierarchy=True).stats.tested_instances == 3000
     without, with_them = (
@@ -265,7 +275,7 @@ def test_outputs_capacity_and_draws(device: hizvk.Device) -> None:
     for name, of in asked.items():
         result = device.cull(instances, CAMERA, pyramid, order="any", outputs=[name])
         assert len(of(result)) > 0
-        # Lists can be made from a mask, and a draw from a list.
+        # Lists can be worked out from a mask, and a draw from its list.
         refused = {
             "mask": ["verdicts"],
             "verdicts": ["mask", "indices"],
@@ -307,7 +317,7 @@ def drawn(device: hizvk.Device, occluders: hizvk.Occluders, **options: Any) -> A
 
 
 def about(depth: Any) -> Any:
-    """A depth in reversed Z, give or take what conservative depth is rounded towards far."""
+    """A depth in reversed Z, with a tolerance for conservative depth's rounding towards far."""
     return pytest.approx(1.0 / depth, rel=1e-6)
 
 
@@ -315,12 +325,16 @@ def about(depth: Any) -> Any:
 def test_faces_and_transforms_of_occluders(device: hizvk.Device, conservative: bool) -> None:
     for triangles, left_out in ((FRONT, "front"), (FRONT[:, ::-1], "back")):
         for cull in ("none", "back", "front"):
-            occluders = device.occluders(SQUARE, triangles, cull=cull)  # type: ignore[call-overload]
+            occluders = device.occluders(
+                SQUARE,
+                triangles,
+                cull=cull,  # type: ignore[call-overload]
+            )
             seen = drawn(device, occluders, conservative=conservative)
             assert seen[8, 8] == (0.0 if cull == left_out else about(4)), (cull, left_out)
             assert seen[0, 0] == 0.0
-    # At depth 4 a pixel is half a unit: columns 4 to 11.
-    # Moved by 4 to either side: columns 12 to 15, and 0 to 3.
+    # At depth 4 a pixel is half a unit, so the square covers columns 4 to 11.
+    # Moved by 4 to either side it covers columns 12 to 15, and 0 to 3.
     still = drawn(device, device.occluders(SQUARE, FRONT), conservative=conservative)
     moved = np.stack([np.eye(4), np.eye(4)])
     moved[0][0, 3], moved[1][0, 3] = 4.0, -4.0
@@ -332,9 +346,9 @@ def test_faces_and_transforms_of_occluders(device: hizvk.Device, conservative: b
 
 
 def test_size_conservative_and_refinement(device: hizvk.Device) -> None:
-    """The right edge of a wall crosses column 8 beyond its centre.
+    """A wall whose right edge crosses column 8 beyond its centre.
 
-    So the centre is covered, and the pixel is not.
+    The centre is covered, and the pixel is not.
     """
     right = 4.0 * 0.8 / 8
     wide = np.array([[-9.0, -9, -4], [right, -9, -4], [right, 9, -4], [-9, 9, -4]])
@@ -344,8 +358,8 @@ def test_size_conservative_and_refinement(device: hizvk.Device) -> None:
     assert [plain[8, 8], whole[8, 8], plain[8, 7], whole[8, 7]] == [0.25, 0.0, 0.25, about(4)]
     assert drawn(device, occluders, size=(4, 8)).shape == (4, 8)
     assert drawn(device, occluders, size=(4, 8), conservative=True)[2, 3] == about(4)
-    # Two walls that end within column 8, the farther one where the nearer one still is: none covers
-    # the pixel, but each of its quarters is covered.
+    # Two walls that end within column 8; the farther one begins where the nearer one still is.
+    # Neither covers the pixel, but together they cover each of its quarters.
     left, lap = wide.copy(), wide.copy()
     left[1:3, 0] = 0.26  # ends at 8.52, at depth 4
     lap[[0, 3], 0], lap[[1, 2], 0] = 0.2, 9.0  # begins at 8.32, at depth 5
@@ -362,7 +376,10 @@ def test_size_conservative_and_refinement(device: hizvk.Device) -> None:
 def test_a_resized_orthographic_camera_and_depth_along_z(
     device: hizvk.Device, size: tuple[int, int], reversed_z: bool
 ) -> None:
-    """The view is 8 wide and 4 high, from 1 to 9 away; the four quarters are 3, 5, 7 and 8 away."""
+    """8 wide, 4 high, and from 1 to 9 away.
+
+    The walls in the image's quarters are 3, 5, 7 and 8 away.
+    """
     first = hizvk.Camera.orthographic(
         (1, 2, 3),
         (1, 2, 2),
@@ -381,7 +398,7 @@ def test_a_resized_orthographic_camera_and_depth_along_z(
     pyramid = device.pyramid(depth, camera, kind="z")
     expected = 1.0 - ndc if reversed_z else ndc
     np.testing.assert_allclose(pyramid.level(0), expected, rtol=0, atol=1e-6)
-    # In the middle of each quarter a box a little before and a little behind what stands there.
+    # In each quarter's middle there is one box a little in front of its wall and one behind it.
     low, high, kept = [], [], []
     for row, column in np.ndindex(2, 2):
         x, y = 1.0 + (column - 0.5) * 4.0, 2.0 - (row - 0.5) * 2.0

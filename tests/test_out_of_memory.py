@@ -1,4 +1,4 @@
-"""Out of memory for real: a named error, no crash, and the next device works."""
+"""Real out-of-memory conditions give a named error and no crash, and the next device works."""
 
 import subprocess
 import sys
@@ -21,9 +21,10 @@ SCRIPT = Path(__file__).with_name("out_of_memory.py")
     ],
 )
 def test_out_of_memory_is_an_error_and_the_next_device_works(call: str, mebibytes: int) -> None:
-    """The host's share (a list in Rust) and the device's run out at different limits.
+    """The host's memory (a list in Rust) and the device's run out at different limits.
 
-    wgpu gives the device up when its own staging memory ends; then the loss is what is reported.
+    wgpu gives up the device when its own staging memory runs out.
+    Then the error reports the lost device.
     """
     run = subprocess.run(
         [sys.executable, str(SCRIPT), call, str(mebibytes)],
@@ -39,7 +40,7 @@ def test_out_of_memory_is_an_error_and_the_next_device_works(call: str, mebibyte
 
 
 def test_a_cull_without_memory_for_all_levels_in_one_texture_goes_on() -> None:
-    """A cull without the copy reads the depth image and the levels where they are."""
+    """The cull reads the depth image and the levels in place."""
     run = subprocess.run(
         [sys.executable, str(SCRIPT), "cull", "70"],
         capture_output=True,

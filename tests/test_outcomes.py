@@ -1,7 +1,7 @@
-"""The named outcomes of docs/accuracy.md, row by row and bit by bit, as Python sees them.
+"""The named outcomes of docs/accuracy.md as Python sees them, row by row and bit by bit.
 
-The camera looks along -z from the origin, 90 degrees wide, near plane at 1; the wall stands at
-depth 4 unless a test says otherwise.
+The camera is at the origin and looks along -z, 90 degrees wide, with the near plane at 1.
+The wall is at depth 4 unless a test says otherwise.
 Every expectation is worked out by hand.
 """
 
@@ -53,10 +53,10 @@ FLAT = np.diag([1.0, 1, 0])
 MIRROR = np.diag([-1.0, 1, 1])
 SINGULAR = np.array([[1.0, 1, 0], [1, 1, 0], [0, 0, 0]])
 
-#: What is tested, and what becomes of it behind a wall at depth 4.
+#: A name, the bounds, and their verdict with a wall at depth 4.
 BOUNDS: list[tuple[str, Any, Verdict]] = [
     ("behind", sphere(0, 0, -8, 1), Verdict.OCCLUDED),
-    # NaN, infinite, overflowing, negative, inverted: kept and counted.
+    # NaN, infinite, overflowing, negative and inverted bounds are kept and counted.
     ("NaN centre", sphere(NAN, 0, -8, 1), Verdict.INVALID),
     ("infinite centre", sphere(0, -INF, -8, 1), Verdict.INVALID),
     ("overflowing centre", sphere(0, 0, -1e300, 1), Verdict.INVALID),
@@ -73,7 +73,7 @@ BOUNDS: list[tuple[str, Any, Verdict]] = [
     ("NaN rotation", oriented((1, 1, 1), np.full((3, 3), NAN)), Verdict.INVALID),
     ("infinite rotation", oriented((1, 1, 1), np.full((3, 3), INF)), Verdict.INVALID),
     ("beyond the camera's coordinates", sphere(0, 0, -(2.0**55), 1), Verdict.INVALID),
-    # No size, flat, mirrored, singular: valid.
+    # Bounds without size, flat, mirrored and singular ones are valid.
     ("a point behind", sphere(0, 0, -8, 0), Verdict.OCCLUDED),
     ("minus zero radius", sphere(0, 0, -8, -0.0), Verdict.OCCLUDED),
     ("subnormal radius", sphere(0, 0, -8, 1e-310), Verdict.OCCLUDED),
@@ -85,7 +85,7 @@ BOUNDS: list[tuple[str, Any, Verdict]] = [
     ("singular behind", oriented((1, 1, 1), SINGULAR), Verdict.OCCLUDED),
     ("singular before", oriented((1, 1, 9), SINGULAR, (0, 0, -2)), Verdict.VISIBLE),
     ("a zero matrix behind", oriented((1, 1, 1), np.zeros((3, 3))), Verdict.OCCLUDED),
-    # Around the eye, w <= 0 somewhere, across the near plane.
+    # Around the eye, with w <= 0 somewhere, and across the near plane.
     ("around the eye", sphere(0, 0, 0, 10), Verdict.VISIBLE),
     ("the eye on its skin", sphere(0, 0, -3, 3), Verdict.VISIBLE),
     ("a box around the eye", box((-1, -1, -1), (1, 1, 1)), Verdict.VISIBLE),
@@ -97,7 +97,7 @@ BOUNDS: list[tuple[str, Any, Verdict]] = [
         box((-0.1, -0.1, -8), (0.1, 0.1, -0.5)),
         Verdict.VISIBLE,
     ),
-    # Equal depth, and a hair behind.
+    # At equal depth, and a hair behind it.
     ("equal depth", box((-1, -1, -5), (1, 1, -4)), Verdict.VISIBLE),
     ("touching from behind", sphere(0, 0, -5, 1), Verdict.VISIBLE),
     ("a hair behind", box((-1, -1, -5), (1, 1, -4.001)), Verdict.OCCLUDED),
@@ -128,8 +128,8 @@ def of_bits(bits: int) -> np.float32:
     return np.array([bits], np.uint32).view(np.float32)[0]
 
 
-#: The bits of a pixel of a depth image, and their meaning.
-#: None is the number itself; else it is the near end, 0, or no depth, which is far.
+#: The bits of a depth image's pixel and their meaning.
+#: None: the number itself; "zero": the near end 0; "one": 1; "far": no depth.
 BITS: list[tuple[int, str | None]] = [
     (0x3F000000, None),  # 1/2
     (0x00800000, None),  # the least normal number
@@ -159,7 +159,7 @@ BITS: list[tuple[int, str | None]] = [
 @BOTH
 @pytest.mark.parametrize(("bits", "meaning"), BITS, ids=[f"{bits:08x}" for bits, _ in BITS])
 def test_depth_bits(device: hizvk.Device, bits: int, meaning: str | None, reversed_z: bool) -> None:
-    """Every level shows the cleaned number, and the oracle's pyramid agrees."""
+    """Every level has the cleaned number, and so does the oracle's pyramid."""
     camera = view(reversed_z=reversed_z)
     far = 0.0 if reversed_z else 1.0
     clean = {None: of_bits(bits), "zero": 0.0, "one": 1.0, "far": far}[meaning]
@@ -177,7 +177,7 @@ def test_depth_bits(device: hizvk.Device, bits: int, meaning: str | None, revers
     "bits", [bits for bits, _ in BITS], ids=[f"{bits:08x}" for bits, _ in BITS]
 )
 def test_what_is_no_depth_is_a_hole(device: hizvk.Device, bits: int, reversed_z: bool) -> None:
-    """One such pixel in a wall: it is seen through unless it holds a depth before the box."""
+    """One such pixel in a wall is a hole, unless it holds a depth in front of the box."""
     camera = view(reversed_z=reversed_z)
     wall = np.float32(0.25 if reversed_z else 0.75)  # depth 4
     depth = np.full(SIZE, wall)
@@ -204,8 +204,9 @@ def test_what_is_no_depth_is_a_hole(device: hizvk.Device, bits: int, reversed_z:
 def test_view_depth_and_distance_that_are_none_are_far(
     device: hizvk.Device, bad: float, far_plane: float | None, reversed_z: bool
 ) -> None:
-    """Zero, negative, NaN, infinite and numbers outside near..far (1 to 100) count as far.
+    """Zero, negative, NaN and infinite depths count as far.
 
+    So do depths outside near..far, which is 1 to 100.
     A distance of 180 is a view depth above 100 in every corner of the image.
     """
     if far_plane is None and bad > 100:
@@ -243,7 +244,7 @@ def test_singular_cameras_and_rows_beyond_float32_are_refused(device: hizvk.Devi
 
 
 def test_pyramids_of_another_size_camera_or_device_are_errors(device: hizvk.Device) -> None:
-    """A pyramid that was never built cannot be had in Python: `Device.pyramid` builds it."""
+    """Python has no pyramid that was never built, because `Device.pyramid` builds it."""
     camera = view(reversed_z=True)
     pyramid = device.pyramid(np.full(SIZE, 4.0), camera, kind="z")
     instances = device.instances(sphere(0, 0, -8, 1))
@@ -259,7 +260,7 @@ def test_pyramids_of_another_size_camera_or_device_are_errors(device: hizvk.Devi
     elsewhere = hizvk.Device()
     with pytest.raises(ValueError, match="pyramid: expected Pyramid of this device"):
         elsewhere.cull(elsewhere.instances(sphere(0, 0, -8, 1)), camera, pyramid)
-    # An equal camera is the same camera.
+    # An equal camera counts as the same camera.
     assert device.cull(instances, view(reversed_z=True), pyramid).verdicts.tolist() == [
         Verdict.OCCLUDED
     ]

@@ -1,6 +1,6 @@
 """Faults that an environment variable plants into the shaders reach Python.
 
-A module without the feature `testing` does not take them.
+Release builds ignore them.
 """
 
 from __future__ import annotations
@@ -14,16 +14,19 @@ import pytest
 
 from hizvk import _core
 
-#: A wall at depth 4 with a hole of one pixel, and a box at depth 8 that is seen through it.
-#: It prints whether the box is kept, and the depth in the middle of an occluder at depth 2.
+#: A wall at depth 4 with a hole of one pixel, and a box at depth 8 that is visible through it.
+#: Prints whether the box is kept, and the depth in the middle of an occluder at depth 2.
 SCRIPT = textwrap.dedent("""
     import numpy as np, hizvk
-    camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(16, 16), near=1.0)
+    camera = hizvk.Camera.look_at(
+        (0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(16, 16), near=1.0, reversed_z=True
+    )
     depth = np.full((16, 16), 4.0)
     depth[8, 7] = 100.0
     device = hizvk.Device()
-    box = hizvk.Boxes([[-2.0, -2, -9]], [[2.0, 2, -8]])
-    kept = hizvk.visible(box, camera, depth=depth, kind="z", device=device)
+    kept = hizvk.visible(
+        hizvk.Boxes([[-2.0, -2, -9]], [[2.0, 2, -8]]), camera, depth=depth, kind="z", device=device
+    )
     wall = np.array([[-9.0, -9, -2], [9, -9, -2], [0, 30, -2]])
     drawn = device.render_depth(device.occluders(wall, np.array([[0, 1, 2]])), camera)
     print(bool(kept[0]), float(device.pyramid(drawn).level(0)[8, 8]))
@@ -44,7 +47,7 @@ FAULTS = {
 
 
 def run(fault: str) -> str:
-    """What the script prints."""
+    """The output of the script with this fault."""
     environment = os.environ | {"HIZVK_PLANTED_FAULT": fault}
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, timeout=120
@@ -59,6 +62,9 @@ def test_without_a_fault_nothing_is_wrong() -> None:
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_planted_faults_reach_python(name: str) -> None:
-    """In a development build; a release, as a benchmark may have left it here, takes no notice."""
+    """A development build takes the fault.
+
+    A release build ignores it; a benchmark may have left one here.
+    """
     fault, wrong = FAULTS[name]
     assert run(fault) == (wrong if _core.takes_planted_faults else "True 0.5")

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 SCRIPT = Path(__file__).with_name("processes.py")
-#: A guard against hanging, not a test of speed: a scene takes a second or two.
+#: A limit against hanging, not a test of speed: scenes take a second or two.
 GUARD_S = 120
 
 
@@ -26,7 +26,7 @@ def run(scene: str) -> "subprocess.CompletedProcess[str]":
     try:
         out, err = process.communicate(timeout=GUARD_S)
     except subprocess.TimeoutExpired:
-        # This ends its forks, too.
+        # Kills its forks, too.
         os.killpg(process.pid, 9)
         out, err = process.communicate()
         pytest.fail(f"{scene}: a process hangs (ended after {GUARD_S} s)\n{out}{err}")

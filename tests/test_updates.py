@@ -1,6 +1,6 @@
 """The stored order of instances, and their update.
 
-The answers equal those of a fresh upload in the given order.
+Results are those of fresh instances in the caller's order.
 """
 
 import threading
@@ -54,9 +54,9 @@ def pyramid(device: hizvk.Device) -> hizvk.Pyramid:
 def test_a_cull_sees_the_bounds_that_were_there(
     device: hizvk.Device, pyramid: hizvk.Pyramid, make: Callable[..., Bounds]
 ) -> None:
-    """Verdicts of members of hidden groups are found when they are read.
+    """Verdicts of the members of hidden groups are worked out when they are read.
 
-    An update in between changes nothing.
+    An update in between does not change them.
     """
     (centers, sizes), (elsewhere, _) = crowd(3000, 1), crowd(3000, 2)
     instances = device.instances(make(centers, sizes))
@@ -144,8 +144,8 @@ def test_float64_far_away_and_other_dtypes_than_before(device: hizvk.Device) -> 
 
 def test_a_cull_in_flight_sees_the_old_bounds(device: hizvk.Device, pyramid: hizvk.Pyramid) -> None:
     old, new = crowd(20_000, 4), crowd(20_000, 5)
-    # Flat: a group of moved members is another one than that of new ones, and its test may read
-    # other texels.
+    # Culled flat: a group of moved members is not the group that new ones would form.
+    # Its test may read other texels.
     expected = [verdicts(device, device.instances(spheres(*each)), pyramid) for each in (old, new)]
     assert expected[0] != expected[1]
     instances = device.instances(spheres(*old))
@@ -158,7 +158,7 @@ def test_a_cull_in_flight_sees_the_old_bounds(device: hizvk.Device, pyramid: hiz
 
 
 def test_updates_of_many_threads(device: hizvk.Device, pyramid: hizvk.Pyramid) -> None:
-    """Each thread has instances of its own in the same list, and culls while the others update."""
+    """Each thread has its own instances in a shared list, and culls while the others update."""
     start, end = crowd(4000, 6), crowd(4000, 7)
     instances = device.instances(boxes(*start))
     barrier = threading.Barrier(4)

@@ -1,10 +1,12 @@
-//! The cull against its yardstick, with everything made beforehand: kinds of volumes, flat and by
-//! groups, and what each output costs.
+//! The cull against its yardstick: each kind of bounds, flat and in groups, and each output.
+//! Everything that can be made beforehand is made beforehand.
 //!
-//! First tables of medians, then criterion's own figures.
-//! `cargo bench --workspace --bench cull` (`-- --test`: everything once; `-- nothing`: the tables
-//! alone).
-//! `HIZVK_BENCH_INSTANCES`: how many (100000).
+//! The tables of medians come first, then criterion's own figures.
+//! Run it with `cargo bench --workspace --bench cull`.
+//!
+//! - `-- --test` runs everything once.
+//! - `-- nothing` prints only the tables.
+//! - `HIZVK_BENCH_INSTANCES` is the number of instances, 100000 by default.
 
 mod common;
 
@@ -18,12 +20,13 @@ use hiz_core::{
     Instances, MeshData, OccluderOptions, Order, Outputs, Pose, Projection, Pyramid,
 };
 
-/// Half the width of the crowd by its distance, well inside the view.
+/// Half the width of the crowd, divided by its distance: well inside the view.
 const HALF_WIDTH: f64 = 0.55;
-/// The wall's distance; the crowd stands before or behind it.
+/// The wall's distance.
+/// Instances are placed before or behind it.
 const WALL: f64 = 100.0;
 
-/// Numbers in 0..1 from a seed.
+/// Uniform numbers in 0..1 from a seed.
 struct Random(u64);
 
 impl Random {
@@ -34,7 +37,7 @@ impl Random {
     }
 }
 
-/// Volumes of all kinds at the same places.
+/// Bounds of all kinds at the same places.
 struct Crowd {
     centers: Vec<f32>,
     half_sizes: Vec<f32>,
@@ -45,7 +48,7 @@ struct Crowd {
 }
 
 impl Crowd {
-    /// `count` of them along -z, of which the share `behind` stands behind the wall.
+    /// Places `count` instances along -z, the share `behind` of them behind the wall.
     #[expect(clippy::cast_possible_truncation, reason = "places for a benchmark")]
     fn new(count: usize, behind: f64) -> Self {
         let mut random = Random(1);
@@ -97,7 +100,7 @@ impl Crowd {
     }
 }
 
-/// A wall across all of the view.
+/// A wall that fills the view.
 fn wall(engine: &Engine, camera: &Camera) -> DepthImage {
     let (x, y) = (2.0 * WALL, WALL);
     let vertices = [-x, -y, -WALL, x, -y, -WALL, x, y, -WALL, -x, y, -WALL];
@@ -141,7 +144,7 @@ fn way<'a>(
 
 const MASK: Outputs = Outputs { mask: true, ..Outputs::NONE };
 
-/// Flat and by groups, of each kind; the mask alone.
+/// Each kind of bounds, flat and in groups, with the mask as the only output.
 fn kinds<'a>(
     engine: &'a Engine,
     crowd: &Crowd,
@@ -164,7 +167,7 @@ fn kinds<'a>(
     ways
 }
 
-/// Boxes by what is asked for.
+/// Boxes with different outputs.
 fn outputs<'a>(
     engine: &'a Engine,
     crowd: &Crowd,

@@ -1,10 +1,12 @@
 //! The depth reduction against its yardsticks.
 //!
-//! First a table of medians, all ways taken in turns so that a busy moment hits all of them; then
-//! criterion's own figures.
-//! `cargo bench --workspace --bench reduce` (`-- --test`: everything once; `-- nothing`: the tables
-//! alone).
-//! `HIZVK_BENCH_SIZES` chooses among 1080p and 4K.
+//! A table of medians comes first, then criterion's own figures.
+//! All ways are run in turns, so that a busy moment hits all of them.
+//! Run it with `cargo bench --workspace --bench reduce`.
+//!
+//! - `-- --test` runs everything once.
+//! - `-- nothing` prints only the table.
+//! - `HIZVK_BENCH_SIZES` chooses among 1080p and 4K.
 
 mod common;
 
@@ -28,7 +30,7 @@ fn camera(size: ImageSize, convention: DepthConvention) -> Camera {
     Camera::look_at(&pose, &projection, size).expect("a plain camera")
 }
 
-/// A few hundred triangles anywhere before the camera.
+/// A depth image of a few hundred random triangles in front of the camera.
 fn depth_texture(engine: &Engine, camera: &Camera) -> DepthImage {
     let mut state = 1_u64;
     let mut unit = || {
@@ -89,8 +91,8 @@ fn ways<'a>(engine: &'a Engine, depth: &'a DepthImage) -> Vec<Way<'a>> {
     ways
 }
 
-/// Ways of an image from the host to a texture, each with a texture of its own, as an upload has
-/// it.
+/// Ways to bring an image from the host into a texture.
+/// Each makes a texture of its own, as an upload does.
 fn uploads<'a>(engine: &'a Engine, numbers: &'a [f32], camera: &'a Camera) -> Vec<Way<'a>> {
     let mut copy = vec![0.0; numbers.len()];
     let ours = move || {

@@ -57,9 +57,9 @@ mod input;
 
 mod gpu;
 
-mod pyramid;
-
 mod occluders;
+
+mod pyramid;
 
 mod instances;
 

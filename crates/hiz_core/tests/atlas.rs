@@ -1,5 +1,5 @@
-//! The texture that large culls read all levels from, while its pyramid is reduced again and
-//! encoders run in another order than they were recorded in, or never.
+//! The atlas: the texture from which large culls read all levels.
+//! Its pyramid is reduced again while encoders run out of order or never.
 
 mod common;
 
@@ -16,15 +16,15 @@ use hiz_core::{
 const WIDTH: u32 = 37;
 const HEIGHT: u32 = 29;
 
-/// Random orders of recording and running; the first that shows an atlas of one header is
-/// number 36.
+/// Random orders of recording and running.
+/// The first order that exposes an atlas with a single header is number 36.
 const ROUNDS: u64 = 40;
 
 fn encoder(engine: &Engine) -> wgpu::CommandEncoder {
     engine.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
 }
 
-/// Spheres of all sizes behind and before walls 4 and 16 away.
+/// Spheres of all sizes, in front of and behind the walls at distances 4 and 16.
 fn spheres(engine: &Engine) -> Arc<Instances> {
     let mut random = Random(3);
     let (mut centers, mut radii) = (Vec::new(), Vec::new());
@@ -37,7 +37,7 @@ fn spheres(engine: &Engine) -> Arc<Instances> {
     engine.instances(&bounds, &InstanceOptions::default()).unwrap()
 }
 
-/// Images that hide different things, in both kinds of texture that can be uploaded.
+/// Images that hide different instances, in both kinds of texture that can be uploaded.
 fn images(engine: &Engine, camera: &Camera) -> Vec<DepthImage> {
     let mut random = Random(5);
     let convention = camera.convention();
@@ -86,7 +86,7 @@ fn mask(
         .unwrap()
 }
 
-/// The words of a mask that the caller's own encoder left.
+/// Reads the mask that a cull in the caller's own encoder has left.
 fn read_mask(engine: &Engine, visible: &Visible, count: usize) -> Vec<bool> {
     let size = 4 * (count as u64).div_ceil(32);
     let staging = engine.device().create_buffer(&wgpu::BufferDescriptor {
@@ -104,10 +104,10 @@ fn read_mask(engine: &Engine, visible: &Visible, count: usize) -> Vec<bool> {
     (0..count).map(|i| view[i / 8] >> (i % 8) & 1 == 1).collect()
 }
 
-/// A cull that was recorded for an earlier image runs late, after one for a later image has been
-/// recorded and before it runs.
-/// How many instances are lost that the later image shows; what is recorded after all that answers
-/// for it.
+/// A cull recorded for an earlier image is submitted late.
+/// By then a second cull has been recorded for a later image, and it runs right after the first.
+/// Returns how many instances of the later image the second cull loses.
+/// A cull that is recorded after both has to be right for the later image.
 fn lost_to_a_late_copy(engine: &Engine) -> usize {
     let camera = camera_along_z(WIDTH, HEIGHT, DepthConvention::Standard);
     let images = images(engine, &camera);
@@ -152,9 +152,9 @@ fn a_late_copy_of_an_earlier_image_hides_nothing() {
     );
 }
 
-/// Whatever runs in whatever order, or never: a cull answers as for the image that it was recorded
-/// for, or keeps everything; and what is recorded and run after all of it answers for the last
-/// image.
+/// A cull answers for the image that it was recorded for, or keeps everything.
+/// This holds in whatever order encoders run, and if some never run.
+/// What is recorded and run after all of them answers for the last image.
 #[test]
 fn culls_in_any_order_answer_for_their_image_or_keep_everything() {
     let engine = &*engine();
@@ -185,7 +185,7 @@ fn culls_in_any_order_answer_for_their_image_or_keep_everything() {
         let mut reduction = encoder(engine);
         record_reduce(engine, &mut reduction, &images[current], &pyramid);
         engine.queue().submit([reduction.finish()]);
-        // What was recorded and did not run yet, and what it should answer.
+        // Encoders that were recorded and have not run yet, and the image of each cull among them.
         let mut waiting: VecDeque<wgpu::CommandEncoder> = VecDeque::new();
         let mut answers: Vec<(usize, Visible)> = Vec::new();
         for _ in 0..40 {
@@ -197,7 +197,7 @@ fn culls_in_any_order_answer_for_their_image_or_keep_everything() {
                     waiting.push_back(new);
                 }
                 1..=4 => {
-                    // In an encoder of its own, or behind what another one has.
+                    // In an encoder of its own, or appended to one that waits.
                     let mut encoder = if random.below(3) == 0 { waiting.pop_back() } else { None }
                         .unwrap_or_else(|| encoder(engine));
                     let visible =
@@ -232,7 +232,7 @@ fn culls_in_any_order_answer_for_their_image_or_keep_everything() {
         for (image, visible) in &answers {
             let got = read_mask(engine, visible, count);
             hidden += u32::from(got == expected[*image] && got != kept_all);
-            // A cull that never ran left all bits 0, as they began.
+            // A cull that never ran leaves all bits 0, their initial value.
             let ran = got.iter().any(|kept| *kept);
             assert!(!ran || got == expected[*image] || got == kept_all, "round {round}");
         }
@@ -247,8 +247,8 @@ fn culls_in_any_order_answer_for_their_image_or_keep_everything() {
     assert!(hidden > ROUNDS as u32, "too little was hidden to tell: {hidden}");
 }
 
-/// The depth image passes through a buffer, which may be larger than those that the device has:
-/// such an image is read where it is.
+/// The depth image passes through a buffer on its way into the atlas.
+/// An image larger than the device's largest buffer is read in place instead.
 #[test]
 fn an_image_that_no_buffer_holds_is_read_where_it_is() {
     let camera = camera_along_z(640, 512, DepthConvention::Standard);

@@ -1,7 +1,7 @@
-//! Coarse levels, where the farthest of thousands of pixels hangs on one of them: images with a
-//! handful of far pixels, and images without any bad number, in which every texel of every level
-//! differs.
-//! (Where one pixel in fifty is far, all texels from level 4 on are.)
+//! Coarse levels, where one pixel of thousands decides the farthest depth of a texel.
+//! Where one pixel in fifty is far, every texel from level 4 on is far, and faults do not show.
+//! So these images have a handful of far pixels and no invalid numbers.
+//! Every texel of every level has a different depth.
 
 mod common;
 
@@ -22,8 +22,8 @@ const SIZES: [(u32, u32); 10] = [
     (1920, 1080),
 ];
 
-/// Depths from 1/4 to 3/4 without a number that is none, all different; then some pixels anywhere
-/// that are farther, each by itself.
+/// Depths from 1/4 to 3/4, all finite and all different.
+/// Then `far` single pixels at random places are set to greater distances.
 fn image(
     width: u32,
     height: u32,
@@ -41,8 +41,8 @@ fn image(
     depth
 }
 
-/// The first texel that differs from the oracle's, with any of these choices of levels and both
-/// kinds of upload.
+/// The first texel that differs from the oracle's.
+/// Tries each of these choices of levels with both kinds of upload.
 fn difference(
     engine: &Engine,
     (width, height): (u32, u32),
@@ -89,7 +89,7 @@ fn every_coarse_level_alone_has_the_farthest_of_its_pixels() {
         let convention = CONVENTIONS[number % 2];
         assert_eq!(difference(&engine(), size, convention, 5, choices), None);
     }
-    // Both conventions where a workgroup shares a texel, and where it does not.
+    // Both conventions, at a size where a workgroup shares a texel and at one where it does not.
     assert_eq!(difference(&engine(), (257, 255), CONVENTIONS[1], 3, &alone), None);
     assert_eq!(
         difference(
@@ -124,8 +124,9 @@ fn all_levels_down_to_the_last_have_the_farthest_of_their_pixels() {
     }
 }
 
-/// The mean of two depths in the place of the farthest, wherever one is taken; and parts that are
-/// left out of a coarse level.
+/// Two kinds of fault.
+/// One takes the mean of two depths in place of the farthest, at each place that takes a farthest.
+/// The other leaves out parts of a coarse level.
 #[test]
 fn faults_of_coarse_levels_are_seen() {
     let all = [StoredLevels::ALL];
@@ -148,14 +149,14 @@ fn faults_of_coarse_levels_are_seen() {
         (("select(max(a, b), min(a, b), REVERSED)", &two), &all),
         (("bits = farthest(bits, farthest4(by_row));", &blocks), &alone),
         (("bits = farthest(bits, parts[i]);", &shares), &alone),
-        // Half of the shares; shares one off and too short.
+        // Half of the shares; shares off by one; shares that are too short.
         (("i < WORKGROUP; i += 1u", "i < 32u; i += 1u"), &alone),
         (("var bits = parts[0];", "var bits = parts[1];"), &alone),
         (
             ("let part = side >> SIDE_LOG2;", "let part = max(side >> (SIDE_LOG2 + 1u), 1u);"),
             &alone,
         ),
-        // The last column of blocks.
+        // The last column of blocks is left out.
         (
             (
                 "min(begin + vec2<u32>(side), blocks)",
@@ -163,7 +164,7 @@ fn faults_of_coarse_levels_are_seen() {
             ),
             &alone,
         ),
-        // A tail's blocks and lanes.
+        // A tail's blocks and lanes are left out.
         (
             ("blocks = (blocks + vec2<u32>(7u)) / 8u;", "blocks = (blocks + vec2<u32>(3u)) / 8u;"),
             &all,

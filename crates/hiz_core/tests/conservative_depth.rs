@@ -1,5 +1,6 @@
-//! Conservative occluder depth against exact rays: whatever the mesh, no ray through a pixel gets
-//! past its depth; and the tests of that, tested with planted faults.
+//! Conservative occluder depth against exact rays.
+//! Whatever the mesh, no ray through a pixel gets past the depth of that pixel.
+//! Planted faults show that these tests can fail.
 //! No device is needed.
 
 mod common;
@@ -15,7 +16,7 @@ use hiz_core::{
 
 type Vec3 = [f64; 3];
 
-/// A mesh around the origin: about 1 in size, seen from about 3 away.
+/// A mesh around the origin, about 1 in size, that is seen from about 3 away.
 #[derive(Debug, Clone, Default)]
 struct Mesh {
     vertices: Vec<f64>,
@@ -38,8 +39,8 @@ fn anywhere(random: &mut Random, size: f64) -> Vec3 {
     std::array::from_fn(|_| random.range(-size, size))
 }
 
-/// Triangles among few vertices: shared edges of two, three and more, folds, intersections,
-/// duplicates, zero areas.
+/// Triangles among few vertices.
+/// They have edges shared by two, three and more, folds, intersections, duplicates and zero areas.
 fn tangle(random: &mut Random) -> Mesh {
     let mut mesh = Mesh::default();
     let vertices = 4 + random.below(8);
@@ -53,7 +54,7 @@ fn tangle(random: &mut Random) -> Mesh {
     mesh
 }
 
-/// Separate triangles, slivers among them.
+/// Separate triangles, some of them slivers.
 fn soup(random: &mut Random) -> Mesh {
     let mut mesh = Mesh::default();
     for _ in 0..4 + random.below(16) {
@@ -69,7 +70,7 @@ fn soup(random: &mut Random) -> Mesh {
     mesh
 }
 
-/// Closed boxes that stand in each other.
+/// Closed boxes that overlap each other.
 fn boxes(random: &mut Random) -> Mesh {
     let mut mesh = Mesh::default();
     for _ in 0..1 + random.below(4) {
@@ -111,8 +112,8 @@ fn terrain(random: &mut Random) -> Mesh {
     mesh
 }
 
-/// A wall of planks with cracks between them, down to widths that float64 hardly tells from none;
-/// some planks share vertices.
+/// A wall of planks with cracks between them, some of which share vertices.
+/// The narrowest cracks are hardly above zero width in float64.
 fn planks(random: &mut Random) -> Mesh {
     let mut mesh = Mesh::default();
     let mut x = -3.0;
@@ -127,7 +128,7 @@ fn planks(random: &mut Random) -> Mesh {
 
 const KINDS: [fn(&mut Random) -> Mesh; 5] = [tangle, soup, boxes, terrain, planks];
 
-/// A view of the mesh, far from or near to the world's origin, and the mesh in that place.
+/// A view of the mesh, and the mesh moved to that place, near to or far from the world's origin.
 fn viewed(random: &mut Random, mesh: &Mesh) -> (Camera, Mesh) {
     let offset = random.pick(&[0.0, 0.0, 1e3, 1e6, 1e7]);
     let place = anywhere(random, offset);
@@ -165,7 +166,7 @@ fn viewed(random: &mut Random, mesh: &Mesh) -> (Camera, Mesh) {
         _ => Projection::Perspective { fov_y: random.range(0.2, 2.0), near, far, convention },
     };
     let camera = Camera::look_at(&pose, &projection, size).unwrap();
-    // A bare matrix has its constants cancel: the errors are those of the world's size.
+    // In a bare matrix constants cancel, so that errors scale with the size of the world.
     let camera = if random.below(3) == 0 {
         Camera::from_clip_from_world(camera.clip_from_world(), size, convention).unwrap()
     } else {
@@ -174,8 +175,8 @@ fn viewed(random: &mut Random, mesh: &Mesh) -> (Camera, Mesh) {
     (camera, moved)
 }
 
-/// Image points of the closed pixel: corners, centre, anywhere, and a hair beside what is drawn
-/// through it.
+/// Image points of the closed pixel.
+/// They are its corners, its centre, random ones, and ones a hair beside an edge drawn through it.
 fn points(
     random: &mut Random,
     camera: &Camera,
@@ -218,7 +219,7 @@ fn points(
             }
         }
     }
-    // Multiples of 2^-60 pixels: what the exact integers hold.
+    // Multiples of 2^-60 pixels, which the exact integers can hold.
     let grid = 2.0_f64.powi(60);
     points.iter().map(|p| p.map(|v| (v * grid).round() / grid)).filter(inside).collect()
 }
@@ -280,7 +281,8 @@ fn examine(
                     tally.past += 1;
                     if fault.is_none() {
                         eprintln!(
-                            "pixel ({column}, {row}), depth {depth}, ray {point:?}\n{camera:?}\n{mesh:?}"
+                            "pixel ({column}, {row}), depth {depth}, ray {point:?}\n\
+                             {camera:?}\n{mesh:?}"
                         );
                     }
                 }
@@ -327,7 +329,7 @@ fn no_ray_gets_past_a_pixels_depth_in_many_cases() {
     }
 }
 
-/// A wall's border a rounding away from a pixel's, in cameras whose constants cancel.
+/// A wall whose border is within a rounding of a pixel's, in cameras whose constants cancel.
 fn borders(seed: u64, cases: u32, fault: Option<PlantedFault>) -> Tally {
     let mut random = Random(seed);
     let mut tally = Tally::default();
@@ -349,7 +351,7 @@ fn borders(seed: u64, cases: u32, fault: Option<PlantedFault>) -> Tally {
         };
         let z = random.range(1.0, 9.0);
         let unit = 2.0 * (fov_y / 2.0).tan() / f64::from(height) * z;
-        // The right border of a pixel column, in world units, give or take nothing.
+        // The right border of a pixel column in world units, as exact as float64 has it.
         let column = f64::from(1 + random.below(width - 1)) - f64::from(width) / 2.0;
         let right = place[0] + column * unit;
         let mut mesh = Mesh::default();
@@ -372,8 +374,8 @@ fn borders_that_rounding_cannot_place_do_not_count() {
     assert!(tally.deep > 1000);
 }
 
-/// A view that loses what float64 holds so far from the origin: its matrix is a bare one, and its
-/// axes are nobody's.
+/// A view that loses as much as float64 can lose so far from the origin.
+/// Its matrix is a bare one, and its axes are in no special direction.
 struct Lossy {
     camera: Camera,
     place: Vec3,
@@ -397,8 +399,8 @@ impl Lossy {
         let size = ImageSize::new(2 + random.below(4), 2 + random.below(4));
         let fov_y = random.range(0.5, 2.0);
         let projection = Projection::Perspective { fov_y, near, far: None, convention };
-        // About the origin the axes are as good as float64 has them; then to its place, in one
-        // matrix.
+        // About the origin the axes are as accurate as float64 allows.
+        // Then one matrix moves them to their place.
         let pose = Pose { eye: [0.0; 3], target: forward, up: axes[1] };
         let mut m = Camera::look_at(&pose, &projection, size).unwrap().clip_from_world();
         for row in &mut m {
@@ -416,7 +418,8 @@ impl Lossy {
     }
 }
 
-/// Walls that face such a camera, a few near planes away: at a depth that nobody is sure of.
+/// Walls that face such a camera from a few near planes away.
+/// Their depth is uncertain in float64.
 fn facing_walls(seed: u64, fault: Option<PlantedFault>) -> Tally {
     let (mut random, mut tally) = (Random(seed), Tally::default());
     for _ in 0..40 {
@@ -434,7 +437,7 @@ fn facing_walls(seed: u64, fault: Option<PlantedFault>) -> Tally {
     tally
 }
 
-/// Walls so near to the near plane that float64 cannot tell which side of it they are on.
+/// Walls so near to the near plane that float64 cannot decide on which side they are.
 fn walls_at_the_near_plane(seed: u64, fault: Option<PlantedFault>) -> Tally {
     let (mut random, mut tally) = (Random(seed), Tally::default());
     for _ in 0..300 {
@@ -452,9 +455,9 @@ fn walls_at_the_near_plane(seed: u64, fault: Option<PlantedFault>) -> Tally {
     tally
 }
 
-/// Walls whose right border is that of a column, give or take nothing, and is cut at the near plane
-/// in the middle of the image: the cut's place in it is far less certain than that of the border's
-/// other end, a thousand times as far away.
+/// Walls whose right border is a column's, as exact as float64 has it.
+/// The near plane cuts that border in the middle of the image.
+/// The border's other end is a thousand times as far away, and its place is far more certain.
 fn cut_borders(seed: u64, fault: Option<PlantedFault>) -> Tally {
     let (mut random, mut tally) = (Random(seed), Tally::default());
     for _ in 0..150 {
@@ -477,9 +480,9 @@ fn cut_borders(seed: u64, fault: Option<PlantedFault>) -> Tally {
     tally
 }
 
-/// A wall with a crack that is closed by a triangle that faces away, so narrow that float64 cannot
-/// tell how it faces.
-/// It does not occlude: what is seen through the crack?
+/// A wall with a crack, closed by a triangle that faces away.
+/// The triangle is so narrow that float64 cannot decide which way it faces.
+/// It does not occlude, so rays through the crack have to get through.
 fn closed_from_behind(seed: u64, fault: Option<PlantedFault>) -> Tally {
     let (mut random, mut tally) = (Random(seed), Tally::default());
     for _ in 0..600 {
@@ -493,7 +496,7 @@ fn closed_from_behind(seed: u64, fault: Option<PlantedFault>) -> Tally {
             .map(|(x, y)| mesh.vertex(corner(x, y)));
         let [f, g, h] =
             [(9.0, -9.0), (9.0, 9.0), (crack, 9.0)].map(|(x, y)| mesh.vertex(corner(x, y)));
-        // Counter-clockwise as seen, but for the one in the crack.
+        // Counter-clockwise as seen, except for the triangle in the crack.
         mesh.triangles.extend([a, b, c, a, c, d, b, f, g, b, g, h, b, c, h]);
         let depth = surface(&mesh, FaceCull::Back)
             .conservative_depth_with_fault(
@@ -520,15 +523,19 @@ fn closed_from_behind(seed: u64, fault: Option<PlantedFault>) -> Tally {
     tally
 }
 
-/// What float64 is not sure of: depths, cuts at the near plane, which side of it a point is on, how
-/// a triangle faces.
+/// Four things that float64 cannot always decide:
+///
+/// - a depth;
+/// - the place of a cut at the near plane;
+/// - the side of that plane on which a point is;
+/// - the way that a triangle faces.
 #[test]
 fn what_float64_is_not_sure_of_does_not_count() {
     for (name, tally, deep) in [
         ("walls", facing_walls(3, None), 300),
         ("walls at the near plane", walls_at_the_near_plane(9, None), 5),
-        // Where a cut's place matters it is not sure to lie behind the near plane: such triangles
-        // are dropped.
+        // Where a cut's place matters it is not certain to lie behind the near plane.
+        // Such triangles are dropped.
         ("cut borders", cut_borders(4, None), 0),
         ("cracks", closed_from_behind(5, None), 0),
     ] {
@@ -562,8 +569,8 @@ fn planted_faults_let_rays_through() {
         assert!(past > 0, "{name}: stayed green");
     }
     println!(
-        "rays past a pixel's depth: contours ignored {contours}, depth at the centre {centre}, folds ignored {folds}, rounded to \
-         nearest {nearest}, no widening {exact}"
+        "rays past a pixel's depth: contours ignored {contours}, depth at the centre {centre}, \
+         folds ignored {folds}, rounded to nearest {nearest}, no widening {exact}"
     );
     assert!(contours > 100 && centre > 100 && exact > 10, "{contours} {centre} {exact}");
     assert!(folds > 10 && nearest > 10, "{folds} {nearest}");

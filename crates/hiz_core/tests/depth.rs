@@ -1,5 +1,5 @@
-//! Depth of every kind against the oracle's, which is exact: never nearer, and hardly ever farther
-//! than float32 asks for.
+//! Depth of every kind against the oracle's, which is exact.
+//! It is never nearer, and hardly ever farther than float32 requires.
 
 mod common;
 
@@ -18,13 +18,15 @@ const SIZE: ImageSize = ImageSize { width: 5, height: 4 };
 const KINDS: [(DepthKind, hiz_ref::DepthKind); 2] =
     [(DepthKind::Z, hiz_ref::DepthKind::Z), (DepthKind::Distance, hiz_ref::DepthKind::Distance)];
 
-/// Nothing for a camera that is too near to a singular one.
+/// `None` for a camera that is too close to a singular one.
 fn engine(image: &[f64], kind: DepthKind, camera: &Camera) -> Option<Vec<f32>> {
     ndc_from_kind(Floats::F64(image), kind, 1.0, &[], camera).ok()
 }
 
-/// Of the pixels that are not far: how many float32 the engine's depths are farther than the least
-/// that is not nearer than the exact ones; below zero: nearer.
+/// How many float32 steps the engine's depths are farther than they have to be.
+/// The reference is the nearest float32 that is not nearer than the exact depth.
+/// Negative steps mean that the engine's depth is nearer.
+/// Pixels whose reference is far are left out.
 fn steps_farther(
     camera: &Camera,
     image: &[f64],
@@ -43,31 +45,31 @@ fn steps_farther(
     let exact = depth_bounds(&view, image, meaning).expect("a view that the engine takes").farther;
     let steps = |d: f32| i64::from(d.to_bits()) * if reversed { -1 } else { 1 };
     let pairs = engine(image, kinds.0, camera)?.into_iter().zip(exact);
-    // What is far as it is says nothing.
+    // A pixel that is far in any case proves nothing.
     let shown = pairs.filter(|(_, least)| *least != camera.convention().far());
     Some(shown.map(|(d, least)| steps(d) - steps(least)).collect())
 }
 
-/// What makes the rows x, y and w of a camera nearly dependent, or z of a mixture of them.
+/// What makes a camera's rows x, y and w nearly dependent, or makes z a mixture of them.
 #[derive(Debug, Clone, Copy)]
 enum Stress {
-    /// Borders far off the axis.
+    /// Image borders far off the axis.
     Tangent,
     /// The same, as one matrix.
     BareTangent,
-    /// A field of view of so small a part.
+    /// A very narrow field of view; the size is its reciprocal.
     Narrow,
-    /// A sensor whose columns lean by so much.
+    /// A sensor whose columns lean by the size.
     Skew,
-    /// A near plane that leans by so much (Lengyel, "Oblique view frustum depth projection and
+    /// A near plane that leans by the size (Lengyel, "Oblique view frustum depth projection and
     /// clipping", 2005).
     ObliqueNearPlane,
-    /// An eye so far away, in a bare matrix.
+    /// An eye at this distance, in a bare matrix.
     FarEye,
 }
 
-/// One of its cameras; `None` where it is refused.
-/// With it the near plane's view depth on the axis.
+/// One of the stressed cameras, and its near plane's view depth on the axis.
+/// `None` where it is refused.
 fn stressed(
     random: &mut Random,
     stress: Stress,
@@ -117,8 +119,8 @@ fn stressed(
     Some((camera, near))
 }
 
-/// Depths of each pixel between the planes, for a view depth of `z` at the near plane; distances go
-/// by the pixel's ray.
+/// For each pixel a depth between the planes, where `near` is the near plane's view depth.
+/// Distances are along the pixel's ray.
 fn depths(
     random: &mut Random,
     camera: &Camera,
@@ -133,8 +135,8 @@ fn depths(
             if kind == DepthKind::Z {
                 return z;
             }
-            // By Cramer's rule in plain float64: any number does, one between the planes is worth
-            // more.
+            // By Cramer's rule in plain float64.
+            // Any number will do, but one between the planes tests more.
             let column = (i % u64::from(SIZE.width)) as f64;
             let row = (i / u64::from(SIZE.width)) as f64;
             let at = [(column + 0.5) / 2.5 - 1.0, 1.0 - (row + 0.5) / 2.0, 1.0];
@@ -151,11 +153,12 @@ fn depths(
         .collect()
 }
 
-/// Nearly singular cameras of every direction, up to where they are refused.
+/// Nearly singular cameras of every kind, up to where they are refused.
 #[test]
 fn depth_is_never_nearer_than_the_exact_one() {
     println!(
-        "\n| camera | size of it | images refused | pixels | nearer | exact | farther by a float32 | by more | at most |"
+        "\n| camera | size of it | images refused | pixels | nearer | exact \
+         | farther by a float32 | by more | at most |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     let (mut random, mut all_exact, mut rows) = (Random(6), 0, Vec::new());
@@ -189,14 +192,14 @@ fn depth_is_never_nearer_than_the_exact_one() {
                 all_exact += pixels;
             } else {
                 let row = format!(
-                    "| {stress:?} | 1e{power} | {refused} | {pixels} | {nearer} | {exact} | {next} | {more} | {most} |"
+                    "| {stress:?} | 1e{power} | {refused} | {pixels} | {nearer} | {exact} \
+                     | {next} | {more} | {most} |"
                 );
                 println!("{row}");
                 rows.push(row);
             }
             assert_eq!(nearer, 0, "{stress:?} 1e{power}");
-            // Plain cameras lose a float32 where the exact depth lies within float64's rounding of
-            // one.
+            // Plain cameras lose a float32 only within float64's rounding of the exact depth.
             assert!(
                 power > 6 || more == 0,
                 "{stress:?} 1e{power}: {more} of {pixels} are farther than they have to be"
@@ -209,12 +212,13 @@ fn depth_is_never_nearer_than_the_exact_one() {
     println!("{row}");
     assert!(all_exact > 30_000, "{all_exact}");
     rows.push(row);
-    // No device takes part in it.
+    // No device takes part, so every driver gives the page's numbers.
     rows.iter().for_each(|row| assert_said(row));
 }
 
-/// Parallel rays: near planes before and behind the eye, wide and thin ranges, eyes far away,
-/// images far beside them.
+/// Parallel rays.
+/// Near planes are before and behind the eye, and ranges are wide and thin.
+/// Eyes are far away, and images are far beside them.
 #[test]
 fn parallel_depth_is_never_nearer_than_the_exact_one() {
     let mut random = Random(60);
@@ -247,10 +251,11 @@ fn parallel_depth_is_never_nearer_than_the_exact_one() {
     let nearer = all.iter().filter(|steps| **steps < 0).count();
     let farther = all.iter().filter(|steps| **steps > 1).count();
     println!(
-        "parallel: {} pixels, {signs:?} negative, {nearer} nearer, {farther} farther by more than a float32",
+        "parallel: {} pixels, {signs:?} negative, {nearer} nearer, \
+         {farther} farther by more than a float32",
         all.len()
     );
     assert!(nearer == 0 && signs[0] == 0 && signs[1] > 2000 && all.len() > 15_000);
-    // Rays that lean by float64's rounding, in images that are much wider than deep.
+    // Rays lean by float64's rounding in images that are much wider than deep.
     assert!(farther * 50 < all.len(), "{farther}");
 }

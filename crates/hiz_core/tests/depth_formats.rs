@@ -1,8 +1,10 @@
-//! What the format of a depth image rounds is slack: what can be seen past a wall is never hidden
-//! because the wall was stored nearer than it stands.
-//! Expectations are worked out from the formats' definitions (Vulkan 1.3, "Fixed-Point Data
-//! Conversions" and "Floating-Point Format Conversions": a number between two that can be stored
-//! may become either).
+//! Whatever the format of a depth image rounds counts as slack.
+//! A wall may be stored nearer than it is.
+//! What is visible past it must not be hidden because of that.
+//!
+//! Expectations are worked out from the definitions of the formats.
+//! They are in Vulkan 1.3, "Fixed-Point Data Conversions" and "Floating-Point Format Conversions".
+//! A number between two that can be stored may become either.
 
 mod common;
 
@@ -33,7 +35,7 @@ fn texture(engine: &Engine, format: Format, usage: wgpu::TextureUsages) -> wgpu:
     })
 }
 
-/// Walls across the whole image, rasterised into a texture of a depth format.
+/// Walls that fill the image, rasterised into a texture of a depth format.
 struct Walls {
     pipeline: wgpu::RenderPipeline,
     layout: wgpu::BindGroupLayout,
@@ -96,7 +98,7 @@ impl Walls {
         Self { pipeline, layout, format }
     }
 
-    /// A wall of NDC depth `depth`.
+    /// Draws a wall of NDC depth `depth`.
     fn draw(&self, engine: &Engine, depth: f32) -> wgpu::Texture {
         let device = engine.device();
         let texture = texture(engine, self.format, wgpu::TextureUsages::RENDER_ATTACHMENT);
@@ -138,7 +140,7 @@ impl Walls {
     }
 }
 
-/// A texture of one number, given as its bits.
+/// A texture filled with one number, given as its bits.
 fn filled(engine: &Engine, format: Format, bits: u16) -> wgpu::Texture {
     let texture =
         texture(engine, format, wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC);
@@ -178,10 +180,10 @@ fn reduced(
     Arc::new(pyramid)
 }
 
-/// Boxes of no thickness at these depths, in the middle of the image; 64 of each, so that groups
-/// hold one depth alone.
-/// They are as wide as five pixels; where an atlas is asked for less than one wide, so that the
-/// image itself is read.
+/// The verdicts of flat boxes at these depths, in the middle of the image.
+/// There are 64 of each, so that a group holds only one depth.
+/// They are five pixels wide.
+/// With an atlas they are less than one pixel wide, so that the image itself is read.
 fn verdicts(
     engine: &Engine,
     depths: &[f64],
@@ -221,7 +223,7 @@ fn verdicts(
     all.into_iter().step_by(64).collect()
 }
 
-/// Every way to ask for depth.
+/// Every kind of test that compares depth.
 fn ways() -> Vec<CullOptions> {
     let plain =
         CullOptions { depth_slack: 0.0, hierarchy: Hierarchy::Never, ..CullOptions::default() };
@@ -232,12 +234,12 @@ fn ways() -> Vec<CullOptions> {
     ]
 }
 
-/// The view depth of NDC depth for [`camera_along_z`].
+/// The view depth of NDC depth `ndc` for [`camera_along_z`].
 fn view_depth(ndc: f64, convention: DepthConvention) -> f64 {
     if convention.is_reversed() { 1.0 / ndc } else { 1.0 / (1.0 - ndc) }
 }
 
-/// `steps` steps of `step` behind `stored`.
+/// The view depth that is `steps` steps of `step` behind `stored`.
 fn behind(stored: f64, steps: f64, step: f64, convention: DepthConvention) -> f64 {
     view_depth(
         if convention.is_reversed() { stored - steps * step } else { stored + steps * step },
@@ -245,15 +247,16 @@ fn behind(stored: f64, steps: f64, step: f64, convention: DepthConvention) -> f6
     )
 }
 
-/// A wall is anywhere up to a step behind the number that is stored: what stands 0.95 of it behind
-/// may be seen, what stands 1.1 of it behind cannot, whatever the way to ask.
-/// A half step of slack, or none, or none for groups, hides the first.
+/// A wall may be anywhere up to one step behind the number that is stored.
+/// So an instance 0.95 steps behind that number may be visible, and one 1.1 steps behind cannot be.
+/// This holds for every kind of test.
+/// Half a step of slack would hide the first, and so would no slack, or none for groups.
 #[test]
 fn a_step_of_the_format_decides() {
     let engine = &engine();
     for convention in CONVENTIONS {
         let camera = camera_along_z(SIDE, SIDE, convention);
-        // The bits, the number that they stand for, the step about it.
+        // The bits, the number that they encode, and the step at that number.
         let unorm = |c: u16| (Format::Depth16Unorm, c, f64::from(c) / 65_535.0, 1.0 / 65_535.0);
         let half =
             |bits, value: f64| (Format::R16Float, bits, value, value / 1024.0 + 2.0_f64.powi(-24));
@@ -265,21 +268,21 @@ fn a_step_of_the_format_decides() {
         };
         for (format, bits, stored, step) in cases {
             let texture = filled(engine, format, bits);
-            // An atlas holds float32: asked for one, culls read such an image where it is.
+            // An atlas holds float32, so culls read such an image in place.
             for (atlas, ways) in [(AtlasUse::Never, &ways()[..]), (AtlasUse::Always, &ways()[..1])]
             {
                 let pyramid = reduced(engine, &texture, &camera, atlas);
                 assert_eq!(pyramid.tolerance(), DepthTolerance::of(format));
                 for options in ways {
-                    // The shader's own roundings take 2^-23, which is two steps of subnormal
-                    // halves.
+                    // The shader's own roundings take 2^-23.
+                    // That is two steps of subnormal halves.
                     let far = if stored < 1e-6 { 4.0 } else { 1.1 };
                     let depths =
                         [0.55, 0.95, far, 8.0].map(|k| behind(stored, k, step, convention));
                     let got = verdicts(engine, &depths, &camera, (&pyramid, atlas), options);
                     let what = format!("{convention:?} {format:?} {stored} {atlas:?} {options:?}");
                     assert_eq!(got, [VISIBLE, VISIBLE, OCCLUDED, OCCLUDED], "{what}");
-                    // The caller's slack comes on top: half a step of it more.
+                    // The caller's slack is added: here half a step.
                     let options = CullOptions { depth_slack_abs: 0.5 * step, ..options.clone() };
                     let depths = [1.45, far + 0.5].map(|k| behind(stored, k, step, convention));
                     let got = verdicts(engine, &depths, &camera, (&pyramid, atlas), &options);
@@ -290,9 +293,9 @@ fn a_step_of_the_format_decides() {
     }
 }
 
-/// The same of depth in 24 bits, or in the float32 that a driver keeps instead, and of the formats
-/// of float32, which bring no slack.
-/// The wall is drawn; reversed Z, far away, where a step is large beside float32's.
+/// The same for depth in 24 bits, or in the float32 that a driver uses instead.
+/// Formats of float32 bring no slack.
+/// The wall is drawn with reversed Z and far away, where a step is large beside float32's.
 #[test]
 fn depth_of_24_bits_brings_its_step_and_float32_none() {
     let engine = &engine();
@@ -306,8 +309,8 @@ fn depth_of_24_bits_brings_its_step_and_float32_none() {
         assert_eq!(pyramid.tolerance(), DepthTolerance::of(format));
         let expected = if format == Format::Depth32Float { OCCLUDED } else { VISIBLE };
         for options in ways() {
-            // Beside the step the shader's own roundings take 2^-23, two steps; a tenth is
-            // float32's margin.
+            // Beside the step, the shader's own roundings take 2^-23, which is two steps.
+            // Another tenth is float32's margin.
             let depths =
                 [0.55, 0.95, 3.3, 10.0].map(|k| behind(stored, k, step, DepthConvention::Reversed));
             let got = verdicts(engine, &depths, &camera, (&pyramid, AtlasUse::Never), &options);
@@ -316,11 +319,11 @@ fn depth_of_24_bits_brings_its_step_and_float32_none() {
     }
 }
 
-/// Spheres one to three centimetres before a wall 10 to 30 metres away, the wall rasterised: what
-/// the issue of 4,200 hidden spheres of 10,000 describes.
+/// Spheres one to three centimetres in front of a rasterised wall 10 to 30 metres away.
+/// In a bug report 4,200 of 10,000 such spheres were hidden.
 /// Near planes are chosen so that a step of the format is 6 cm at 20 m.
-/// Twenty steps behind the wall spheres are hidden: of 24 bits the slack of float32 alone, relative
-/// to a depth near 1, is eight.
+/// Spheres twenty steps behind the wall are hidden.
+/// With 24 bits the slack of float32 alone, relative to a depth near 1, is eight steps.
 #[test]
 fn nothing_that_stands_before_a_wall_is_hidden() {
     let engine = &engine();
@@ -345,8 +348,8 @@ fn nothing_that_stands_before_a_wall_is_hidden() {
                 let ndc = if convention.is_reversed() { 1.0 - standard } else { standard };
                 let pyramid =
                     reduced(engine, &walls.draw(engine, ndc as f32), &camera, AtlasUse::Never);
-                // 125 spheres with their farthest points 1 to 3 cm before the wall, and 125 beyond
-                // twenty steps behind it.
+                // 125 spheres whose farthest points are 1 to 3 cm in front of the wall.
+                // Then 125 that are more than twenty steps behind it.
                 let step = z * z / near / steps;
                 let (mut centers, mut radii) = (Vec::new(), Vec::new());
                 for i in 0..125 {
@@ -382,8 +385,8 @@ fn nothing_that_stands_before_a_wall_is_hidden() {
     }
 }
 
-/// Half floats that were uploaded as float32: the image knows, the pyramid and every cull of it do,
-/// by the atlas too.
+/// Half floats that were uploaded as float32.
+/// The image knows its step, and so do the pyramid and every cull, with an atlas, too.
 #[test]
 fn uploaded_halves_bring_their_step() {
     let engine = &engine();
@@ -419,7 +422,7 @@ fn uploaded_halves_bring_their_step() {
     }
 }
 
-/// Level 0 of such an image is not float32; the levels above are read.
+/// Level 0 of such an image is not float32, so it cannot be read back; the levels above can.
 #[test]
 fn level_0_of_other_bits_is_not_read() {
     let engine = &engine();

@@ -1,5 +1,5 @@
-//! View depth becomes NDC depth that is never nearer than the exact one: at depths whose exact NDC
-//! depth lies within a rounding of a float32, where what float64 loses decides.
+//! View depth becomes NDC depth that is never nearer than the exact one.
+//! The exact NDC depths lie within a rounding of a float32, where float64's losses decide.
 
 mod common;
 
@@ -28,7 +28,7 @@ fn integer(v: f64, scale: i32) -> i128 {
 fn depth_is_never_nearer_than_the_exact_one() {
     let mut random = Random(8);
     for convention in CONVENTIONS {
-        // From 1 to 9: NDC depth is (9 z - 9) / 8 z, reversed (9 - z) / 8 z, by exact rows.
+        // Near 1 and far 9: NDC depth is (9 z - 9) / 8 z, reversed (9 - z) / 8 z, with exact rows.
         let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
         let fov_y = std::f64::consts::FRAC_PI_2;
         let projection = Projection::Perspective { fov_y, near: 1.0, far: Some(9.0), convention };
@@ -47,8 +47,8 @@ fn depth_is_never_nearer_than_the_exact_one() {
             ndc_from_kind(Floats::F64(&depths), DepthKind::Z, 1.0, &[], &camera).unwrap();
         let mut at_the_border = 0;
         for (z, ndc) in depths.iter().zip(&converted) {
-            // Both sides times 8 z: a float32 below 1 is a multiple of 2^-48 here, a depth of
-            // 2^-52.
+            // Both sides are multiplied by 8 z.
+            // Here a float32 below 1 is a multiple of 2^-48, and a depth is a multiple of 2^-52.
             let (d, depth) = (integer(f64::from(*ndc), 48), integer(*z, 52));
             let product = 8 * d * depth;
             let exact = |z: i128, nine: i128| match convention {
@@ -60,7 +60,7 @@ fn depth_is_never_nearer_than_the_exact_one() {
                 DepthConvention::Standard => assert!(product >= exact, "{z}: {ndc} is nearer"),
                 DepthConvention::Reversed => assert!(product <= exact, "{z}: {ndc} is nearer"),
             }
-            // And not much farther: two steps of float32.
+            // And not much farther: at most two steps of float32.
             let two = 8 * depth * integer(f64::from(ndc.next_up() - ndc), 48) * 2;
             assert!((product - exact).abs() <= two, "{z}: {ndc} is too far");
             at_the_border += usize::from((product - exact).abs() > two / 8);

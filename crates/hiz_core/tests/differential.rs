@@ -9,7 +9,7 @@ use campaign::{Campaign, Checkpoint, HEADER, MISSING_LEVELS, Report};
 use common::engine;
 use hiz_core::{Coverage, Fit, Footprint, StoredLevels};
 
-/// Every footprint, and descents with and without budget to finish.
+/// Every footprint, and descents with and without enough budget to finish.
 const ALL: &[(Footprint, u32)] = &[
     (Footprint::Two, 0),
     (Footprint::Two, 0),
@@ -19,10 +19,11 @@ const ALL: &[(Footprint, u32)] = &[
     (Footprint::Four, 4096),
 ];
 
-/// Where a volume fit decides; few, for each compiles six pipelines.
+/// Modes in which a volume fit decides.
+/// They are few, because each compiles six pipelines.
 const FITTED: &[(Footprint, u32)] = &[(Footprint::Two, 4096)];
 
-/// Green, and no class without culls: one that hides nothing proves nothing.
+/// No false culls, and culls in every class: a class that hides nothing proves nothing.
 fn assert_green(name: &str, report: &Report) {
     eprintln!("{name}\n{HEADER}\n{report}");
     assert_eq!((report.total().false_culls, report.tested.contradictions), (0, 0));
@@ -70,7 +71,7 @@ fn no_false_cull_with_a_volume_fit() {
     }
 }
 
-/// Level 0 and the stored levels are all that is read, whatever the rectangle asks for.
+/// Only level 0 and the stored levels are read, whatever level the rectangle asks for.
 #[test]
 fn no_false_cull_with_missing_levels() {
     for (seed, fit, rounds, modes) in [(16, Fit::Rectangle, 60, ALL), (17, Fit::Volume, 12, FITTED)]
@@ -81,8 +82,8 @@ fn no_false_cull_with_missing_levels() {
     }
 }
 
-/// Groups first, in both stored orders: nothing more is kept than without, and nothing visible is
-/// lost.
+/// Culls in groups, in both stored orders.
+/// Nothing more is kept than without groups, and nothing visible is lost.
 #[test]
 fn no_false_cull_in_groups() {
     for (seed, coverage) in [(16, Coverage::Area), (17, Coverage::Sample)] {
@@ -107,7 +108,7 @@ fn no_false_cull_in_groups() {
     assert_grouped("groups, volume fit", &fitted.run(&engine()));
 }
 
-/// Green, and groups were hidden as a whole.
+/// No false culls, and some groups were hidden as a whole.
 fn assert_grouped(name: &str, report: &Report) {
     eprintln!("{name}\n{HEADER}\n{report}");
     assert_eq!((report.total().false_culls, report.tested.contradictions), (0, 0));
@@ -123,14 +124,16 @@ fn little_that_is_hidden_is_kept() {
     let report =
         Campaign { seed: 13, rounds: 15, count_keeps: true, ..Campaign::default() }.run(&engine());
     assert_green("false keeps", &report);
-    // Adversarial cases, made to be undecided; what plain scenes keep is measured on scenes.
+    // The cases are adversarial, made to be undecided.
+    // False keeps of ordinary scenes are measured on scenes.
     let total = report.total();
     assert!(total.false_keeps < total.cases / 2, "{total:?}");
 }
 
-/// The long form, `make soak`: `HIZVK_SOAK_CASES` (1,000,000) of each kind of volume from seed
-/// `HIZVK_SOAK_SEED` (1000) on.
-/// It can be stopped at any time: the next run with the same settings goes on where this one was.
+/// The long form, run by `make soak`.
+/// It takes `HIZVK_SOAK_CASES` (1,000,000) of each kind of bounds.
+/// Seeds start at `HIZVK_SOAK_SEED` (1000).
+/// It can be stopped at any time, and the next run with the same settings continues.
 #[test]
 #[ignore = "minutes: make soak"]
 fn soak() {
@@ -151,7 +154,7 @@ fn soak() {
         eprintln!("soak: goes on after {done} chunks, {} cases", report.total().cases);
     }
     let (start, before) = (std::time::Instant::now(), report.total().cases);
-    // A camera that float32 cannot hold leaves its round out, so the cases are counted.
+    // A round whose camera float32 cannot hold is left out, so cases are counted, not rounds.
     while (report.total().cases as u64) < 3 * wanted {
         let coverage = if done % 4 == 3 { Coverage::Sample } else { Coverage::Area };
         let fit = if done % 8 >= 6 { Fit::Volume } else { Fit::Rectangle };

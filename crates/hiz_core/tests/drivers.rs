@@ -1,6 +1,6 @@
-//! One campaign on every adapter that Vulkan lists: none may cull what can be seen, and where their
-//! verdicts differ, it is counted.
-//! With one driver installed there is nothing to compare; `make test-swiftshader` shows it two.
+//! One campaign on every adapter that Vulkan lists.
+//! None may cull anything visible, and differences between their verdicts are counted.
+//! With one driver installed there is nothing to compare; `make test-swiftshader` provides two.
 
 mod common;
 
@@ -11,8 +11,8 @@ use campaign::{Campaign, Class, Report};
 use hiz_core::Coverage;
 use hiz_core::headless::{Engine, adapters};
 
-/// A campaign's report for each engine, and how many volumes the first keeps and another culls, and
-/// the reverse, by class.
+/// A campaign's report for each engine.
+/// Then, by class, how many volumes the first engine keeps and another culls, and the reverse.
 fn compare(engines: &[Engine]) -> (Vec<Report>, Vec<[usize; 2]>) {
     let mut reports = vec![Report::new(&Class::ALL, false); engines.len()];
     let mut differences = vec![[0; 2]; Class::ALL.len()];
@@ -47,8 +47,8 @@ fn drivers_may_differ_but_none_errs() {
         eprintln!("one alone: nothing to compare (make test-swiftshader compares two)");
         return;
     }
-    // Without the margin, too: there verdicts hang on single roundings, and drivers that round
-    // otherwise would show.
+    // Without the margin, too.
+    // There single roundings decide verdicts, and drivers that round differently would show.
     for (margin, faults) in
         [("full", &[][..]), ("none", &[("ERROR_ULPS: f32 = 24.0", "ERROR_ULPS: f32 = 0.0")][..])]
     {

@@ -1,5 +1,5 @@
-//! A process that ends in the middle of a driver's work: `scripts/exits.py` runs this one thousands
-//! of times and counts those that abort.
+//! A process that ends in the middle of a driver's work.
+//! `scripts/exits.py` runs this test thousands of times and counts the runs that abort.
 
 mod common;
 
@@ -8,8 +8,8 @@ use hiz_core::yardstick::{PerLevelReduction, ReductionShape, submitted_ms};
 use hiz_core::{Bounds, CullOptions, DepthConvention, Floats, InstanceOptions, Outputs};
 
 /// Pipelines are dropped before the last submit.
-/// A driver in software frees them on a thread of its own, after it has told that the submit is
-/// done: then this process ends.
+/// A software driver frees them on a thread of its own after it has reported the submit as done.
+/// At that moment this process ends.
 #[test]
 fn a_process_ends_while_the_driver_frees() {
     let engine = engine();

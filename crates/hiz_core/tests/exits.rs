@@ -1,6 +1,6 @@
-//! The end of a device: destroyed with the last object on it, on each way out.
-//! A driver in software has threads of its own, which the destruction joins; so the threads of this
-//! process tell whether it has happened.
+//! A device is destroyed with the last object on it, on every way out.
+//! A software driver has threads of its own, and destroying the device joins them.
+//! So the thread count of this process shows whether it was destroyed.
 
 mod common;
 
@@ -22,17 +22,17 @@ fn submitted(engine: &Engine) -> Culling {
         .unwrap()
 }
 
-/// The threads of this process: two of a test, and those of the driver.
+/// The number of threads of this process: two of the test, and those of the driver.
 fn threads() -> usize {
     std::fs::read_dir("/proc/self/task").expect("Linux").count()
 }
 
-/// Runs `work` on a thread of its own; how many threads it saw, unless it panicked.
+/// Runs `work` on another thread, and returns its thread count unless it panicked.
 fn on_a_thread(work: impl FnOnce() -> usize + Send + 'static) -> Option<usize> {
     std::thread::spawn(work).join().ok()
 }
 
-/// One test, so that no other has a device meanwhile.
+/// A single test, so that no other test has a device at the same time.
 #[test]
 fn a_device_ends_with_the_last_object_on_it() {
     let names = hiz_core::headless::adapters();
@@ -40,7 +40,7 @@ fn a_device_ends_with_the_last_object_on_it() {
     let in_software = names.iter().all(|adapter| adapter.device_type == "cpu");
     let before = threads();
     let settles = || {
-        // The system strikes a joined thread off its list a moment after it has let the joiner go.
+        // Linux removes a joined thread from its list a moment after the join has returned.
         let start = Instant::now();
         while in_software && threads() > before && start.elapsed() < Duration::from_secs(30) {
             std::thread::yield_now();
@@ -52,7 +52,7 @@ fn a_device_ends_with_the_last_object_on_it() {
         assert_eq!(culling.mask().unwrap(), [false]);
         threads()
     });
-    // One is the thread that counted.
+    // One of them is the thread that counts.
     assert!(
         !in_software || seen.unwrap() > before + 1,
         "a driver without threads: nothing is shown here"

@@ -1,6 +1,6 @@
-//! `Fit::Volume` against the exact oracle, on depth images made to fit: each pixel holds just about
-//! the depth at which it begins to show the volume, so that an ulp, or one pixel of them all,
-//! decides.
+//! `Fit::Volume` against the exact oracle, on depth images that are made to fit.
+//! Each pixel holds almost exactly the depth at which it begins to show the volume.
+//! So an ulp, or a single pixel, decides the verdict.
 
 mod common;
 
@@ -13,16 +13,16 @@ use hiz_core::headless::Engine;
 use hiz_core::{BoundsKind, Coverage, Fit, Footprint};
 use hiz_ref::{OwnDepth, Verdict};
 
-/// What a run found.
+/// The counts of a run.
 #[derive(Debug, Default)]
 struct Tally {
     cases: usize,
-    /// Says the oracle.
+    /// Hidden, according to the oracle.
     hidden: usize,
-    /// Hidden, but not if all of the volume had its nearest depth.
+    /// Hidden, but not if all of the volume were at its nearest depth.
     to_gain: usize,
     culled: usize,
-    /// Culled of those to gain.
+    /// Of `to_gain`, those that were culled.
     gained: usize,
     /// Culled although visible: must be 0.
     false_culls: usize,
@@ -48,7 +48,7 @@ fn run(
         ..Campaign::default()
     };
     for round in campaign.fitted(kinds, sharp) {
-        // Nothing for a camera that float32 cannot hold.
+        // `None` for a camera that float32 cannot hold.
         let Some(masks) = round.masks(engine) else { continue };
         let (kind, volume, culled) = (round.volumes[0].0, &round.volumes[0].1[0], !masks[0][0]);
         tally.cases += 1;
@@ -73,7 +73,7 @@ fn run(
 fn no_false_cull_on_depth_that_fits() {
     type Kinds = &'static [BoundsKind];
     type Modes = &'static [(Footprint, u32)];
-    // Few pipelines: each takes long to compile.
+    // Few pipelines, because each takes long to compile.
     let modes: [(u64, Coverage, Kinds, Modes); 3] = [
         (31, Coverage::Area, &KINDS, &[(Footprint::Two, 4096)]),
         (
@@ -92,8 +92,8 @@ fn no_false_cull_on_depth_that_fits() {
     }
 }
 
-/// Each fault makes the fit too tight somewhere; a depth image that fits must show it.
-/// (One kind: each fault compiles anew.)
+/// Each fault makes the fit too tight somewhere, and a depth image that fits must show it.
+/// Each fault compiles its own pipelines, so only one kind of bounds is used.
 #[test]
 fn planted_faults_turn_it_red() {
     type Faults = [(&'static str, &'static str)];

@@ -1,10 +1,11 @@
-//! What float32 keeps in vain: boxes behind a wall that the engine keeps, beside those that the
-//! oracle calls visible, for every kind of camera, range of depth and size of the world.
+//! False keeps of float32: boxes behind a wall that the engine keeps.
+//! They are compared with those that the oracle calls visible.
+//! Every kind of camera, range of depth and size of the world is tried.
 //!
 //! A wall of one depth fills the image.
-//! The boxes lie behind it, by 1e-4 of its distance and more.
-//! That of some the oracle sees something is the depth image's own rounding.
-//! `docs/accuracy_log.md` has the table.
+//! The boxes are behind it by 1e-4 of its distance or more.
+//! The oracle still sees some of them, because the depth image rounds the wall's depth.
+//! The table is in `docs/accuracy_log.md`.
 
 mod common;
 
@@ -20,7 +21,7 @@ use hiz_core::{
 use hiz_ref::{Verdict, View, Volume};
 
 const SIZE: ImageSize = ImageSize { width: 16, height: 12 };
-/// Boxes of a view.
+/// Boxes per view.
 const BOXES: usize = 150;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,22 +32,22 @@ enum Kind {
     OneMatrix,
     /// A projection and a world-to-camera matrix.
     TwoMatrices,
-    /// OpenGL's camera axes, and its pose.
+    /// A projection and a camera pose, with OpenGL's camera axes.
     Pose,
-    /// A perspective that begins just before the wall.
+    /// A perspective whose near plane is just in front of the wall.
     ThinRange,
-    /// A narrow one from a thousand times as far away, of a thin range.
+    /// A narrow perspective of a thin range, from a thousand times as far away.
     Telephoto,
-    /// The near plane at the eye.
+    /// The near plane is at the eye.
     Orthographic,
-    /// The eye in the middle of the range.
+    /// The eye is in the middle of the range.
     OrthographicAround,
     /// A bare matrix of [`Kind::Orthographic`].
     OrthographicMatrix,
-    /// A bare matrix of [`Kind::OrthographicAround`], the world's origin at the eye.
+    /// A bare matrix of [`Kind::OrthographicAround`]; the world's origin is at the eye.
     OrthographicMatrixAround,
-    /// The same, the world's origin out of view: nothing says where things are, and depth is
-    /// measured from the near plane.
+    /// The same with the world's origin out of view.
+    /// The matrix does not say where the instances are, so depth is measured from the near plane.
     OrthographicMatrixAway,
 }
 
@@ -67,17 +68,17 @@ const PARALLEL: [Kind; 5] = [
     Kind::OrthographicMatrixAway,
 ];
 
-/// How many times as far away [`Kind::Telephoto`] stands.
+/// How many times as far away the eye of [`Kind::Telephoto`] is.
 const TELE: f64 = 1e3;
 
-/// How far the wall is from the eye, and the eye from the world's origin.
-/// No wall is nearer than 1e-6 of where it stands in the world.
+/// The wall's distance from the eye, and the eye's from the world's origin.
+/// No wall is nearer to the eye than 1e-6 of its distance from the world's origin.
 const PLACES: [(f64, f64); 7] =
     [(1e-3, 0.0), (1.0, 0.0), (1e3, 0.0), (1e6, 0.0), (1e-3, 1e3), (1.0, 1e6), (1e3, 1e6)];
 
 impl Kind {
-    /// A camera at `eye` whose wall stands at `distance`; the ratio is that of far to near, or of
-    /// far to the wall.
+    /// A camera at `eye` with the wall at `distance`.
+    /// `ratio` is far to near for a perspective, and far to the wall's distance otherwise.
     fn camera(
         self,
         eye: Vec3,
@@ -145,7 +146,7 @@ impl Kind {
             }
             Kind::Pose => {
                 let clip = projection.clip_from_camera(SIZE).expect("a plain projection");
-                // Camera space of OpenGL looks along -z.
+                // OpenGL's camera space looks along -z.
                 let clip: Mat4 = clip.map(|row| [row[0], row[1], -row[2], row[3]]);
                 let pose: Mat4 = std::array::from_fn(|k| match k {
                     3 => [0.0, 0.0, 0.0, 1.0],
@@ -173,7 +174,7 @@ fn wall_depth(camera: &Camera, point: Vec3) -> f32 {
     }
 }
 
-/// Boxes that the oracle sees, and that the engine keeps, of [`BOXES`].
+/// Of [`BOXES`] boxes, how many the oracle sees and how many the engine keeps.
 fn counts(
     kind: Kind,
     random: &mut Random,
@@ -234,7 +235,7 @@ fn counts(
     let bounds = Bounds::Boxes { min: Floats::F64(&low), max: Floats::F64(&high) };
     let boxes = engine().instances(&bounds, &InstanceOptions::default()).unwrap();
     let pyramid = engine().pyramid(&engine().upload_depth(&depth, &camera).unwrap()).unwrap();
-    // The wall's depth is not nearer than the wall: no slack.
+    // The stored depth is not nearer than the wall, so no slack is needed.
     let options = CullOptions { depth_slack: 0.0, ..CullOptions::default() };
     let culling = engine().cull(&boxes, &camera, &pyramid, &options, &Outputs::default()).unwrap();
     let kept = culling.mask().unwrap().iter().filter(|kept| **kept).count();
@@ -244,7 +245,8 @@ fn counts(
 #[test]
 fn hardly_more_than_exact_arithmetic_keeps() {
     println!(
-        "\n| camera | depth | boxes of a cell | far/near or far/wall: 1e2 | 1e4 | 1e6 | 1e9 | 1e12 | infinite |"
+        "\n| camera | depth | boxes of a cell | far/near or far/wall: 1e2 \
+         | 1e4 | 1e6 | 1e9 | 1e12 | infinite |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     let mut random = Random(8);
@@ -268,12 +270,14 @@ fn hardly_more_than_exact_arithmetic_keeps() {
                 for (distance, away) in places.clone() {
                     let [visible, left] =
                         counts(kind, &mut random, *away, *distance, *ratio, convention);
-                    // A hair, and those that lie a hair behind the depth image's own rounding.
+                    // A little more is allowed.
+                    // Some boxes are a hair behind the depth image's own rounding.
                     if kind != Kind::OrthographicMatrixAway
                         && left as f64 > 1.05 * visible as f64 + 5.0
                     {
                         worse.push(format!(
-                            "{kind:?} {convention:?}, ratio {ratio:e}, wall at {distance:e}, eye {away:e} away: {left} for {visible}"
+                            "{kind:?} {convention:?}, ratio {ratio:e}, wall at {distance:e}, \
+                             eye {away:e} away: {left} for {visible}"
                         ));
                     }
                     (seen, kept) = (seen + visible, kept + left);

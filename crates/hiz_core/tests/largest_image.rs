@@ -1,5 +1,6 @@
-//! The largest depth image that the device's textures allow: 16384 x 16384 on lavapipe (1 GiB, and
-//! a pyramid whose first level alone is two bindings), 8192 x 8192 on SwiftShader.
+//! The largest depth image that the device's textures allow.
+//! On lavapipe it is 16384 x 16384: 1 GiB, and the pyramid's first level alone needs two bindings.
+//! On SwiftShader it is 8192 x 8192.
 
 mod common;
 
@@ -10,8 +11,8 @@ use hiz_core::{Bounds, CullOptions, DepthConvention, Floats, InstanceOptions, Ou
 fn the_largest_image_is_reduced_and_culled_against() {
     let side = engine().max_image_side().min(16_384);
     let camera = camera_along_z(side, side, DepthConvention::Reversed);
-    // A wall at depth 4 with one far pixel in every block of 2048: beside its block's last corner,
-    // so that split levels matter.
+    // A wall at depth 4 with one far pixel in every block of 2048.
+    // Most are beside their block's last corner, so that errors in split levels show.
     let block = 2048;
     let mut depth = vec![0.25_f32; side as usize * side as usize];
     let blocks = side / block;
@@ -25,12 +26,12 @@ fn the_largest_image_is_reduced_and_culled_against() {
     let level = block.ilog2();
     let expected: Vec<f32> = (0..blocks * blocks).map(|i| 1.0 / f32::from(8 + i as u16)).collect();
     assert_eq!(engine().read_level(&pyramid, level).unwrap(), expected);
-    // Level 1 in full, across its chunks: the far pixels and nothing else.
+    // Level 1 in full, across its chunks, shows the far pixels and nothing else.
     let first = engine().read_level(&pyramid, 1).unwrap();
     assert_eq!(first.iter().filter(|d| **d != 0.25).count(), (blocks * blocks) as usize);
     drop(first);
-    // Specks in the middle of each block's last pixel but one are hidden, those behind the far
-    // pixel are not.
+    // Specks in the middle of a pixel.
+    // Those behind a far pixel are visible; those 40 pixels to the left of one are hidden.
     let mut centers = Vec::new();
     for (y, x) in (0..blocks).flat_map(|y| (0..blocks).map(move |x| (y, x))) {
         let (row, column) = ((y + 1) * block - 1 - x, (x + 1) * block - 1 - y);

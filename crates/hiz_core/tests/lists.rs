@@ -1,5 +1,5 @@
-//! The packed lists, their draw arguments, masks and counters: order, capacity, pieces, and nothing
-//! written past an end.
+//! The packed lists, their draw arguments, masks and counters.
+//! Checks order, capacity and pieces, and that nothing is written past an end.
 
 mod common;
 
@@ -15,14 +15,15 @@ use hiz_core::{
 
 const CONVENTION: DepthConvention = DepthConvention::Reversed;
 
-/// A wall at depth 4 and what surely lies before or behind it.
+/// A camera and the pyramid of a wall at depth 4.
 fn scene() -> (Camera, Arc<Pyramid>) {
     let camera = camera_along_z(64, 64, CONVENTION);
     let depth = engine().upload_depth(&[ndc(4.0, CONVENTION); 64 * 64], &camera).unwrap();
     (camera, engine().pyramid(&depth).unwrap())
 }
 
-/// `n` specks, of which those at the returned indices lie before the wall and the others behind it.
+/// `n` specks.
+/// Those at the returned indices are in front of the wall, the others behind it.
 fn specks(n: usize, share: f64, piece: Option<u32>, seed: u64) -> (Arc<Instances>, Vec<u32>) {
     let mut random = Random(seed);
     let mut kept = Vec::new();
@@ -50,14 +51,14 @@ fn cull(instances: &Arc<Instances>, order: Order, capacity: Option<u32>) -> Cull
 const DRAW: DrawTemplate =
     DrawTemplate { index_count: 36, first_index: 7, base_vertex: -3, first_instance: 0 };
 
-/// Counts of levels and of texels: boxes of 2, 4 and 8 pixels that begin at texels of the level
-/// that fits them.
+/// Counts of levels and of texels.
+/// The boxes of 2, 4 and 8 pixels begin at texel borders of the level that fits them.
 #[test]
 fn statistics_say_which_level_was_read() {
     let camera = camera_along_z(64, 64, CONVENTION);
     let pyramid = scene().1;
     // At depth 8 a pixel is a quarter of a unit; the middle is the border of column and row 32.
-    // (A box of no size reads one pixel.)
+    // A box half a pixel wide reads one pixel.
     let (mut min, mut max) = (Vec::new(), Vec::new());
     for (pixels, copies) in [(0.5, 1), (1.5, 2), (3.5, 3), (7.5, 4), (30.0, 5)] {
         for _ in 0..copies {
@@ -72,7 +73,7 @@ fn statistics_say_which_level_was_read() {
         let culling =
             engine().cull(&instances, &camera, &pyramid, &options, &Outputs::default()).unwrap();
         let counts = culling.counts().unwrap();
-        // 1 pixel and 2 x 2 of level 0, then 2 x 2 texels each.
+        // 1 pixel and 2 x 2 pixels of level 0, then 2 x 2 texels each.
         let mut levels = [0; 16];
         (levels[0], levels[1], levels[2], levels[4]) = (3, 3, 4, 5);
         assert_eq!((counts.levels, counts.texels_read), (levels, 1 + 4 * 14));
@@ -80,7 +81,7 @@ fn statistics_say_which_level_was_read() {
     }
 }
 
-/// The words of every list, canary included.
+/// The words of every list, including the canary.
 fn raw_lists(culling: &Culling) -> Vec<Vec<u32>> {
     culling.wait().unwrap();
     (0..culling.visible().num_pieces())
@@ -106,9 +107,9 @@ fn words_of(buffer: &wgpu::Buffer) -> Vec<u32> {
     view.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect()
 }
 
-/// Buffers that a renderer uses frame after frame hold the last answer and nothing of those before;
-/// and so does what a pyramid keeps for the next cull: the same pyramid, asked with other options,
-/// answers for those.
+/// Buffers that a renderer uses frame after frame hold the last result and nothing of earlier ones.
+/// The same holds for what a pyramid keeps for the next cull.
+/// If it is culled with other options, the result is right for those.
 #[test]
 fn buffers_and_bindings_that_are_used_again_answer_for_the_last_cull() {
     let (instances, kept) = specks(3000, 0.3, Some(1024), 5);
@@ -151,7 +152,7 @@ fn buffers_and_bindings_that_are_used_again_answer_for_the_last_cull() {
         };
         let all: Vec<u32> = (0..3000).collect();
         let plain = CullOptions::default();
-        // 1/8 and the wall's 1/4: with half of it as slack nothing is hidden.
+        // The specks are at 1/8 and the wall at 1/4, so with a slack of 0.2 nothing is hidden.
         let slack = CullOptions { depth_slack_abs: 0.2, ..plain.clone() };
         for (pyramid, options, expected) in [
             (&open, &plain, &all),
@@ -164,8 +165,8 @@ fn buffers_and_bindings_that_are_used_again_answer_for_the_last_cull() {
             assert!(cull(pyramid, options) == *expected, "{order:?} {hierarchy:?}");
         }
     }
-    // A box a quarter of a pixel beside an open column, and a speck between the centres of pixels:
-    // each option makes a binding of its own.
+    // A box a quarter of a pixel beside an open column, and a speck between pixel centres.
+    // Each option makes a binding of its own.
     let camera = camera_along_z(16, 16, CONVENTION);
     let mut depth = [ndc(4.0, CONVENTION); 256];
     (0..16).for_each(|row| depth[16 * row + 8] = 0.0);
@@ -262,7 +263,7 @@ fn a_capacity_too_small_reports_the_demand_and_writes_nothing_past_the_end() {
                 list[written as usize..].iter().all(|word| *word == u32::MAX),
                 "words behind the count were written"
             );
-            // The mask is whole whatever the capacity.
+            // The mask is complete, whatever the capacity.
             assert_eq!(culling.mask().unwrap().iter().filter(|m| **m).count(), kept.len());
         }
     }
@@ -291,7 +292,7 @@ fn pieces_join_to_one_answer() {
     }
 }
 
-/// The capacity holds for all pieces together; the first pieces are served first.
+/// All pieces share the capacity, and the first pieces are served first.
 #[test]
 fn pieces_share_one_capacity() {
     let (instances, kept) = specks(2000, 0.5, Some(256), 3);
@@ -327,8 +328,8 @@ fn piece_sizes_that_do_not_fit_are_refused() {
     }
 }
 
-/// Past the binding and dispatch limits of lavapipe: 20 million instances come in pieces, and one
-/// answer comes out.
+/// Past the binding and dispatch limits of lavapipe.
+/// 20 million instances are split into pieces, and the results are joined.
 #[test]
 fn twenty_million_instances() {
     let n = 20_000_000;

@@ -1,10 +1,10 @@
-//! How large margins, slacks and guards are, and not only that they are there: what lies a little
-//! within one is kept, what lies a little outside is culled.
-//! By single instances and by groups, whose boxes are tested with the same slack.
+//! Margins, slacks and guards have the right size; it is not enough that they exist.
+//! An instance a little within a margin is kept, and one a little outside it is culled.
+//! Both are tested alone and in groups, whose boxes get the same slack.
 //!
-//! Every threshold is worked out here, in float64, from docs/accuracy.md: a claim `R - t W' > 0`
-//! holds where its value exceeds `E = 24 eps (a size + a_3) + |t| (the same of W')`, with the
-//! magnitudes a of rows that are written down beside it.
+//! Every threshold is worked out here in float64 from docs/accuracy.md.
+//! A claim `R - t W' > 0` holds where its value exceeds `E = e(R) + |t| e(W')`.
+//! Here e is `24 eps (a size + a_3)`, with the magnitudes a that are given beside each threshold.
 
 mod common;
 
@@ -21,7 +21,8 @@ const VISIBLE: Verdict = Verdict::Visible;
 const EPS: f64 = 1.0 / 8_388_608.0;
 const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
 
-/// A box by its centre and half sizes; a sphere has the first of them for its radius.
+/// A box by its centre and half sizes.
+/// As a sphere its radius is the first half size.
 #[derive(Debug, Clone, Copy)]
 struct Thing {
     center: [f64; 3],
@@ -56,8 +57,8 @@ fn instances(things: &[Thing], kind: BoundsKind) -> Arc<Instances> {
     engine().instances(&bounds, &options).unwrap()
 }
 
-/// Things that have to be kept and things that have to be culled, alone and as groups of 64 of the
-/// same, which are culled as a whole.
+/// Asserts which things are kept and which are culled.
+/// They are tested alone, and as groups of 64 copies, which are culled as a whole.
 fn assert_between(
     what: &str,
     (camera, depth): (&Camera, &[f32]),
@@ -89,7 +90,7 @@ fn assert_between(
                 .all(|(group, kept)| group.iter().all(|k| k == kept)),
             "{what}"
         );
-        // What is hidden is hidden as a whole group.
+        // A group that is hidden is hidden as a whole.
         assert_eq!(
             groups.counts().unwrap().tested_instances,
             64 * kept.len() as u64,
@@ -98,7 +99,7 @@ fn assert_between(
     }
 }
 
-/// The s between `low` and `high` at which `value - error` passes 0.
+/// The argument between `low` and `high` at which `excess`, a value minus its error, passes 0.
 fn threshold(low: f64, high: f64, excess: impl Fn(f64) -> f64) -> f64 {
     let (mut below, mut above) = (low, high);
     assert!(excess(below) < 0.0 && excess(above) > 0.0, "{} {}", excess(below), excess(above));
@@ -130,10 +131,10 @@ fn plain() -> CullOptions {
     CullOptions { depth_slack: NO_SLACK, ..CullOptions::default() }
 }
 
-/// Behind a wall at depth 4, what is r away: Z' is 1 (its constant), W' is r and t is 1/4 up to
-/// signs, so that the value is r / 4 - 1.
-/// `constant`: the magnitude of that of Z'; `size`: of the volume without r, and the magnitude of
-/// the constant of W'.
+/// Distances r just within and just outside the margin behind a wall at depth 4.
+/// Z' is 1, its constant; W' is r; t is 1/4 up to signs; so the value is r / 4 - 1.
+/// `constant` is the magnitude of the constant of Z'.
+/// `size` is the volume's size without r, plus the magnitude of the constant of W'.
 fn behind_the_wall(constant: f64, size: f64) -> [f64; 2] {
     [0.88, 1.12].map(|share| {
         threshold(3.9, 40.0, |r| {
@@ -142,23 +143,24 @@ fn behind_the_wall(constant: f64, size: f64) -> [f64; 2] {
     })
 }
 
-/// The margin of a depth's certificate: what of it belongs to the constant, to the distance, to the
-/// volume's own size, and to what the halves of a distant eye cannot hold.
+/// The parts of the margin of a depth's certificate.
+/// They belong to the constant, to the distance, to the volume's own size, and to a distant eye.
+/// The last is what the two halves of the eye's position cannot hold.
 #[test]
 fn the_margin_of_depth_is_as_large_as_it_is_derived() {
     let far_away = 2.0_f64.powi(27);
     // eps (1 + 2^-8) of the eye, and its low half: a float32 near 2^27 is a multiple of 8 or 16.
     let halves = 16.0 * (1.0 + 1.0 / 256.0);
     for convention in CONVENTIONS {
-        // Where the eye is far along the view the constants are what float64 made of it: 8
-        // roundings of 2^-53 of twice the eye, which is 2 eps, and as much again where W' was taken
-        // from z.
+        // For an eye far along the view, the constants are what float64 made of them.
+        // They have 8 roundings of 2^-53 of twice the eye, which is 2 eps.
+        // They have as much again where W' was taken from z.
         let lost = if convention == DepthConvention::Standard { 4.0 } else { 1.0 };
         for (eye, constant, size) in [
             ([0.0; 3], 1.0, 0.0),
             ([far_away, 0.0, 0.0], 1.0, halves),
             ([0.0, far_away + 6.0, 0.0], 1.0, halves + 6.0),
-            // (There the distance of 4 is in low halves, which the eye's share covers.)
+            // Here the distance of 4 is in low halves, which the eye's share covers.
             ([0.0, 0.0, far_away], lost, halves + 2.0 - 4.0),
         ] {
             let camera = camera_at(eye, convention);
@@ -173,9 +175,10 @@ fn the_margin_of_depth_is_as_large_as_it_is_derived() {
                 (&kept, &culled),
             );
         }
-        // A flat box of half sizes 3: they count as 6.
-        // A sphere of radius 3: as 9, and its nearest point is 3 nearer; the squares that it is
-        // compared by have a millionth, half of it for the support 3/4.
+        // A flat box of half sizes 3 has size 6.
+        // A sphere of radius 3 has size 9, and its nearest point is 3 nearer.
+        // Squares that are compared get a margin of a millionth.
+        // Half of it applies to the support 3/4.
         let camera = camera_along_z(SIDE, SIDE, convention);
         let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
         let [kept, culled] = behind_the_wall(1.0, 6.0)
@@ -193,7 +196,7 @@ fn the_margin_of_depth_is_as_large_as_it_is_derived() {
                 r / 4.0 - 1.0 - share * (24.0 * EPS * (1.0 + 0.25 * (r + 9.0)) + 0.75 * 5e-7) - 0.75
             })
         });
-        // (In a group it is a box: of half sizes 3, at the same depth, which count as 9, too.)
+        // In a group it is a box of half sizes 3 at the same depth, which also has size 9.
         let ball = |r: f64| [Thing { center: [0.0, 0.0, r], half: [3.0; 3] }];
         let cull = |r: f64| {
             let pyramid =
@@ -210,7 +213,8 @@ fn the_margin_of_depth_is_as_large_as_it_is_derived() {
 }
 
 /// The margin at the planes of the frustum.
-/// Right of the image: X' = 8 x, W' = r and t = 8; before the near plane.
+/// Points are to the right of the image, where X' = 8 x, W' = r and t = 8.
+/// Others are before the near plane.
 #[test]
 fn the_margin_of_the_frustums_planes_is_as_large_as_it_is_derived() {
     for convention in CONVENTIONS {
@@ -222,8 +226,8 @@ fn the_margin_of_the_frustums_planes_is_as_large_as_it_is_derived() {
                 8.0 * (x - r) - share * 24.0 * EPS * (8.0 * (x + r) + 8.0 * (x + r))
             })
         };
-        // Before the near plane: Z' + W' = r - 1 < 0 (standard), with a constant of 1; reversed the
-        // same with other signs.
+        // Before the near plane: Z' + W' = r - 1 < 0 with a constant of 1 (standard).
+        // Reversed Z has the same with other signs.
         let before =
             |share: f64| -threshold(-1.5, -0.5, |z| 1.0 + z - share * 24.0 * EPS * (1.0 - z));
         let [kept, culled] = [0.85, 1.15].map(|share| {
@@ -240,8 +244,8 @@ fn the_margin_of_the_frustums_planes_is_as_large_as_it_is_derived() {
     }
 }
 
-/// kappa eps of `sum |M| |p|`: on the linear part by the distance and on the constant by the eye's
-/// own coordinates, of both rows.
+/// The slack is kappa eps of `sum |M| |p|` for both rows.
+/// The linear part counts the distance, and the constant counts the eye's own coordinates.
 #[test]
 fn transform_slack_is_as_large_as_it_says() {
     let kappa = 65_536.0;
@@ -251,9 +255,10 @@ fn transform_slack_is_as_large_as_it_says() {
         for eye in [[0.0; 3], [0.0, 0.0, 100.0], [30.0, -50.0, 100.0]] {
             let camera = camera_at(eye, convention);
             let z = eye[2];
-            // Of Z' = z - A w and W', with A = 1: 2 for a position, |z| + |z + 1| and twice |z| for
-            // the constants; with A = 0: nothing and 1.
-            // Of W': 1, and twice |z|.
+            // Magnitudes, where Z' = z - A w.
+            // With A = 1: 2 for a position; |z| + |z + 1| and twice |z| for the constants.
+            // With A = 0: 0 for a position and 1 for the constant.
+            // W': 1 for a position and twice |z| for the constant.
             let (linear, constant) = match convention {
                 DepthConvention::Standard => (2.0, 4.0 * z + 1.0),
                 DepthConvention::Reversed => (0.0, 1.0),
@@ -274,8 +279,8 @@ fn transform_slack_is_as_large_as_it_says() {
                 &KINDS,
                 (&kept, &culled),
             );
-            // Beside the image: of X' = 8 x' and t W', t = 8; the constant of a row is its
-            // coefficients on the eye, twice.
+            // Beside the image: the slack of X' = 8 x' and of t W', t = 8.
+            // A row's constant is its coefficients times the eye, twice.
             let open = vec![convention.far(); (SIDE * SIDE) as usize];
             let r = 40.0;
             let beside = |axis: usize, share: f64| {
@@ -301,8 +306,8 @@ fn depth_slack_is_as_large_as_it_says() {
         let camera = camera_along_z(SIDE, SIDE, convention);
         let wall = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
         for slack in [1e-3, 0.02, 0.2] {
-            // The depth that has so much of the slack: 1 - 1 / r = 0.75 (1 + slack), 1 / r = 0.25
-            // (1 - slack).
+            // The depth at this share of the slack.
+            // It follows from 1 - 1 / r = 0.75 (1 + slack), or 1 / r = 0.25 (1 - slack).
             let [kept, culled] = [0.97, 1.03].map(|share| {
                 let r = match convention {
                     DepthConvention::Standard => 1.0 / (1.0 - 0.75 * (1.0 + share * slack)),
@@ -313,7 +318,7 @@ fn depth_slack_is_as_large_as_it_says() {
             for fit in [Fit::Rectangle, Fit::Volume] {
                 let options = CullOptions { depth_slack: slack, fit, ..CullOptions::default() };
                 let what = format!("slack {slack}, {convention:?}, {fit:?}");
-                // (Another fit takes long to compile: one kind tells.)
+                // `Fit::Volume` takes long to compile, so one kind of bounds has to be enough.
                 let kinds = if fit == Fit::Volume { &KINDS[1..2] } else { &KINDS[..] };
                 assert_between(&what, (&camera, &wall), &options, kinds, (&kept, &culled));
             }
@@ -321,7 +326,7 @@ fn depth_slack_is_as_large_as_it_says() {
     }
 }
 
-/// An orthographic camera: z from 1 to 9 is depth from 0 to 1 or back.
+/// An orthographic camera whose z from 1 to 9 is depth from 0 to 1, or from 1 to 0.
 fn orthographic(convention: DepthConvention) -> (Camera, f64, f64) {
     match convention {
         DepthConvention::Standard => parallel(convention, 0.125, -0.125),
@@ -329,7 +334,7 @@ fn orthographic(convention: DepthConvention) -> (Camera, f64, f64) {
     }
 }
 
-/// One whose depth is `slope` times z and a constant.
+/// An orthographic camera whose depth is `slope` times z plus a constant.
 fn parallel(convention: DepthConvention, slope: f64, constant: f64) -> (Camera, f64, f64) {
     let m = [
         [0.25, 0.0, 0.0, 0.0],
@@ -344,15 +349,16 @@ fn parallel(convention: DepthConvention, slope: f64, constant: f64) -> (Camera, 
     )
 }
 
-/// `depth_slack_abs` in units of NDC depth, and 2^-23 more, which what the shader rounds is taken
-/// from.
+/// `depth_slack_abs` is in units of NDC depth.
+/// The cull adds 2^-23, from which the shader's own roundings are taken.
 #[test]
 fn absolute_slack_is_as_large_as_it_says() {
     for convention in CONVENTIONS {
         let far_sign = orthographic(convention).1.signum();
-        // Near depth 0 a float32 is fine enough to tell.
-        // The margin is proportional to the distance from the reference point, which is the origin
-        // where it is in view: it lies there.
+        // Near depth 0 float32 is fine enough to resolve the slack.
+        // The margin is proportional to the distance from the reference point.
+        // Here that point is the origin, because the origin is in view.
+        // The instance is next to it.
         let small = 2.0_f64.powi(-13);
         for (wall, slack, shares) in [
             (0.25, 1e-3, [0.97, 1.03]),
@@ -378,8 +384,9 @@ fn absolute_slack_is_as_large_as_it_says() {
     }
 }
 
-/// A pixel that is open in a wall: what stays `guard_px` away from it, from all four sides, is
-/// hidden, and what does not is kept; in sample coverage away from the pixel's centre.
+/// A column, or a row, of open pixels in a wall, approached from either side.
+/// A box that stays `guard_px` away from it is hidden, and one that does not is kept.
+/// In sample coverage the distance is from the pixels' centres.
 #[test]
 fn guards_of_pixels_are_as_large_as_they_say() {
     for convention in CONVENTIONS {
@@ -397,7 +404,7 @@ fn guards_of_pixels_are_as_large_as_they_say() {
                         depth[if axis == 0 { 16 * i + 8 } else { 16 * 8 + i }] = convention.far();
                     }
                     // At depth 8 a pixel is a unit: column 8 is x in 0..1, row 8 is y in -1..0.
-                    // A box of 1.1 pixels on each side of it.
+                    // There is a box of 1.1 pixels on each side of it.
                     let middle = if axis == 0 { 0.5 } else { -0.5 };
                     let [kept, culled] = [0.97 * size - 2e-3, 1.03 * size + 2e-3].map(|distance| {
                         [-1.0, 1.0].map(|side| {
@@ -407,7 +414,7 @@ fn guards_of_pixels_are_as_large_as_they_say() {
                             thing
                         })
                     });
-                    // Down to single pixels, for a footprint alone reads others beside them.
+                    // Descends to single pixels: a footprint alone reads others beside them.
                     let options =
                         CullOptions { coverage, guard_px: guard, descent: 4096, ..plain() };
                     let what = format!("guard {guard:?} {coverage:?} {convention:?} axis {axis}");
@@ -424,7 +431,7 @@ fn guards_of_pixels_are_as_large_as_they_say() {
     }
 }
 
-/// The guard beyond the image's border, and between the centres of pixels.
+/// The guard beyond the image's border, and between pixel centres.
 #[test]
 fn guards_of_the_image_are_as_large_as_they_say() {
     let convention = DepthConvention::Reversed;
@@ -440,8 +447,8 @@ fn guards_of_the_image_are_as_large_as_they_say() {
         let [kept, culled] = [0.99 * guard, 1.01 * guard].map(|beyond| {
             // At depth 8 a pixel is a unit.
             let x = rim + beyond;
-            // In sample coverage a point has to be at the height of a centre, or it is between two
-            // rows of them.
+            // In sample coverage a point has to be at the height of a pixel centre.
+            // Otherwise it is between two rows of centres.
             [[x, 0.5, 8.0], [-x, 0.5, 8.0], [0.5, x, 8.0], [0.5, -x, 8.0]].map(point)
         });
         let what = format!("guard {guard} {coverage:?} beside the image");
@@ -450,7 +457,7 @@ fn guards_of_the_image_are_as_large_as_they_say() {
     for guard in [None, Some(0.25)] {
         let size = guard.unwrap_or(1.0 / 64.0);
         let [kept, culled] = [0.97, 1.03].map(|share| {
-            // Beside the centre of column 8 and of row 8, to both sides.
+            // On both sides of the centre of column 8 and of row 8.
             let d = share * size;
             [[0.5 + d, 0.5, 8.0], [0.5 - d, 0.5, 8.0], [0.5, -0.5 + d, 8.0], [0.5, -0.5 - d, 8.0]]
                 .map(point)

@@ -1,6 +1,6 @@
-//! The certificates in every arithmetic that WGSL permits: the shader's steps on the host, rounding
-//! up and down, fusing, reassociating and flushing.
-//! A device does one of these; the margin has to cover all.
+//! The certificates in every arithmetic that WGSL permits.
+//! The shader's steps run on the host, rounding up and down, fusing, reassociating and flushing.
+//! A device does one of these, and the margin has to cover all.
 
 mod common;
 
@@ -38,7 +38,7 @@ impl Power {
 
     fn add(&mut self, round: &Round) {
         let Some(mirror) = Mirror::new(round) else { return };
-        // The oracle is asked once about a volume, and only if somebody culls it.
+        // The oracle is asked once per volume, and only if some arithmetic culls it.
         let mut visible: Vec<Vec<Option<bool>>> =
             round.volumes.iter().map(|(_, v)| vec![None; v.len()]).collect();
         self.cases += visible.iter().map(Vec::len).sum::<usize>();
@@ -85,9 +85,10 @@ impl std::fmt::Display for Power {
     }
 }
 
-/// `round` with each volume twice: moved to where the full margin just keeps it, and to where it
-/// just culls it, by a hundredth of the margin.
-/// What a term of the margin contributes shows there, and nowhere else.
+/// `round` with each volume twice.
+/// One copy is moved to where the full margin just keeps it, the other to where it just culls it.
+/// Both are off by a hundredth of the margin.
+/// Only there does it show what a term of the margin contributes.
 fn at_the_margin(mut round: Round, mirror: &Mirror) -> Round {
     let arithmetic = &mut Arithmetic::new(STYLES[0], 0);
     for ((_, volumes), ways) in round.volumes.iter_mut().zip(&round.away) {
@@ -112,13 +113,18 @@ fn at_the_margin(mut round: Round, mirror: &Mirror) -> Round {
     round
 }
 
-/// The mirror is the shader: rounding to nearest it says what the device says, on cases that the
-/// oracle's verdict hangs on, on cases that the margin decides, and with any guard and slack; with
-/// the sums at the frustum's planes in the order that the device's compiler takes them in.
+/// The mirror computes what the shader computes.
+/// Rounding to nearest, it agrees with the device in three kinds of case:
+///
+/// - those where the last bits decide the oracle's verdict;
+/// - those that the margin decides;
+/// - those with random guards and slacks.
+///
+/// The sums at the frustum's planes are taken in the order of the device's compiler.
 #[test]
 fn to_nearest_it_agrees_with_the_device() {
     let (mut cases, mut culled) = (0, 0);
-    // By the order of those sums: kept by the mirror alone, by the device alone.
+    // By the order of those sums: kept only by the mirror, kept only by the device.
     let mut differences = [[0; 2]; 2];
     for (seed, coverage, any_slack) in
         [(31, Coverage::Area, false), (36, Coverage::Area, true), (37, Coverage::Sample, true)]
@@ -160,8 +166,8 @@ fn to_nearest_it_agrees_with_the_device() {
         "in the order that is written {:?}, the margin first {:?}",
         differences[0], differences[1]
     );
-    // These drivers round to nearest, fuse nothing and keep one of the two orders.
-    // Another may decide some that lie within a rounding of the margin otherwise.
+    // These drivers round to nearest, fuse nothing and use one of the two orders.
+    // Another driver may give different verdicts to volumes within a rounding of the margin.
     let plain = ["llvmpipe", "SwiftShader"]
         .iter()
         .any(|name| engine().adapter().to_string().contains(name));
@@ -182,7 +188,7 @@ fn no_arithmetic_gives_a_false_cull() {
     }
 }
 
-/// With a 24th of the margin some arithmetic errs: the campaign is sharp enough to tell.
+/// With a 24th of the margin some arithmetic errs, so the campaign is sharp enough to notice.
 #[test]
 fn a_twenty_fourth_of_the_margin_is_too_little() {
     let campaign = Campaign { seed: 34, rounds: 12, ..Campaign::default() };
@@ -192,9 +198,10 @@ fn a_twenty_fourth_of_the_margin_is_too_little() {
     assert_eq!(power.false_culls[0][0], 0, "to nearest it takes less than that");
 }
 
-/// Why `bar` stands in the shader: a compiler that folds `(hi - eye_hi) + (lo - eye_lo)` or `z -
-/// (d - A) w` makes false culls that no margin in eps covers.
-/// (Neither driver at hand folds them, so that taking the bars away turns nothing else red.)
+/// Why the shader has `bar`.
+/// A compiler could fold `(hi - eye_hi) + (lo - eye_lo)` or `z - (d - A) w`.
+/// That makes false culls that no margin in eps covers.
+/// Neither driver at hand folds them, so no other test turns red without the bars.
 #[test]
 fn without_bars_a_compiler_could_fold_what_cancels() {
     let campaign = Campaign { seed: 35, rounds: 6, ..Campaign::default() };
@@ -203,7 +210,7 @@ fn without_bars_a_compiler_could_fold_what_cancels() {
     assert!(power.total(0) > 0);
 }
 
-/// False culls with some margins, in some arithmetics.
+/// False culls with these margins, in these arithmetics.
 fn false_culls(margins: Margins, styles: &[Style], campaign: Campaign) -> usize {
     let mut false_culls = 0;
     for round in campaign.rounds() {
@@ -220,8 +227,8 @@ fn false_culls(margins: Margins, styles: &[Style], campaign: Campaign) -> usize 
     false_culls
 }
 
-/// Why `below` and `above` of a box's extent end at 0: beside a wild end the rest of the claim has
-/// the other sign.
+/// Why `below` and `above` of a box's extent are clamped to 0.
+/// Beside a wild end the rest of the claim has the other sign.
 #[test]
 fn an_extent_that_proves_more_than_its_end_says_is_no_use() {
     let wild: Vec<Style> = STYLES.into_iter().filter(|style| style.wild).collect();
@@ -233,9 +240,9 @@ fn an_extent_that_proves_more_than_its_end_says_is_no_use() {
     assert!(with == 0 && without > 0);
 }
 
-/// `like` with another camera, all pixels at one depth, and a box there that nearly faces it: a
-/// thousand times as wide as it is away, and moved backwards to the last place where the oracle
-/// sees it.
+/// `like` with another camera, all pixels at one depth, and a box there that nearly faces it.
+/// The box is a thousand times as wide as its distance.
+/// It is moved backwards to the last place where the oracle sees it.
 fn facing(like: Round, random: &mut Random) -> Option<Round> {
     let any = |random: &mut Random| [0; 3].map(|_| random.range(-1.0, 1.0));
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -259,7 +266,7 @@ fn facing(like: Round, random: &mut Random) -> Option<Round> {
         height: 8,
         reversed: convention.is_reversed(),
     };
-    // A tilt of some eps, so that the box reaches a little nearer at its ends.
+    // A tilt of some eps, so that the box is a little nearer at its ends.
     let tilt = random.range(-1e-6, 1e-6);
     let axes = [0, 1, 2].map(|k| [right[k] + tilt * forward[k], up[k], forward[k]]);
     let half_sizes = [1e3 * z, 1e3 * z, 0.0];
@@ -285,7 +292,8 @@ fn facing(like: Round, random: &mut Random) -> Option<Round> {
     Some(round)
 }
 
-/// A size that forgets the volume's own makes no margin for what is large beside its distance.
+/// The margin has to grow with the volume's own size.
+/// Without it, it is too small for a volume that is large beside its distance.
 #[test]
 fn sizes_count_the_volume() {
     let campaign = Campaign { seed: 44, ..Campaign::default() };
@@ -307,8 +315,9 @@ fn sizes_count_the_volume() {
     assert!(cases > 100 && with == 0 && without > 0);
 }
 
-/// What float64 lost on the host has its share in the magnitudes (`view.rs`): without it constants
-/// that cancel at a distant eye make false culls, to nearest and with the full margin.
+/// The magnitudes include what float64 lost on the host (`view.rs`).
+/// Without that share, constants that cancel at a distant eye make false culls.
+/// That happens even to nearest and with the full margin.
 #[test]
 fn the_hosts_error_share_is_needed() {
     let campaign =
@@ -331,9 +340,10 @@ fn the_hosts_error_share_is_needed() {
     assert!(false_culls[0] == 0 && false_culls[1] > 0, "{false_culls:?}");
 }
 
-/// How much of the margin is needed: false culls by style and margin in a tenth of
-/// `HIZVK_SOAK_CASES` (1,000,000) cases of each kind of volume, from seed `HIZVK_SOAK_SEED` (2000)
-/// on; and by style with the full margin in all of them.
+/// How much of the margin is needed.
+/// Prints false culls by style and margin, and by style with the full margin.
+/// The former takes a tenth of `HIZVK_SOAK_CASES` (1,000,000) cases of each kind, the latter all.
+/// Seeds start at `HIZVK_SOAK_SEED` (2000).
 #[test]
 #[ignore = "minutes: make soak"]
 fn power() {

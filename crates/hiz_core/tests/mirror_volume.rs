@@ -1,5 +1,5 @@
-//! The volume fit and the descent in every arithmetic that WGSL permits, over slopes and offsets
-//! that may be anything.
+//! The volume fit and the descent in every arithmetic that WGSL permits.
+//! Slopes and offsets may be anything.
 
 mod common;
 
@@ -55,7 +55,7 @@ impl Power {
     fn add(&mut self, round: &Round) {
         let Some(mirror) = Mirror::new(round) else { return };
         let (kind, volumes) = &round.volumes[0];
-        // The oracle is asked only if somebody culls.
+        // The oracle is asked only if some arithmetic culls.
         let mut visible = None;
         self.cases += 1;
         for (i, style) in self.styles.iter().enumerate() {
@@ -103,9 +103,9 @@ impl std::fmt::Display for Power {
     }
 }
 
-/// To nearest the mirror says what the device says, with any guard and slack; but for the guesses:
-/// nothing demands of a device's quotients, roots and sines what the host's are, and a plane may be
-/// proved with the one and not with the other.
+/// To nearest the mirror agrees with the device, with random guards and slacks, except for guesses.
+/// A device's quotients, roots and sines need not be those of the host.
+/// So a plane may be proved by one of them and not by the other.
 #[test]
 fn to_nearest_it_agrees_with_the_device() {
     let (mut cases, mut culled, mut kept_by_mirror, mut kept_by_device, mut false_culls) =
@@ -128,8 +128,8 @@ fn to_nearest_it_agrees_with_the_device() {
         }
     }
     eprintln!(
-        "mirror: {cases} cases, {culled} culled, kept by it alone {kept_by_mirror}, by the device alone {kept_by_device}, \
-         false culls {false_culls}"
+        "mirror: {cases} cases, {culled} culled, kept by it alone {kept_by_mirror}, \
+         by the device alone {kept_by_device}, false culls {false_culls}"
     );
     assert_eq!(false_culls, 0);
     assert!(culled > cases / 5, "few culls prove little");
@@ -138,7 +138,7 @@ fn to_nearest_it_agrees_with_the_device() {
 
 type Fault = (&'static str, &'static [(&'static str, &'static str)]);
 
-/// What the oracle does not see in `fit_volume.rs`, for it knows neither slack nor guard.
+/// Faults that the oracle does not see in `fit_volume.rs`, because it has neither slack nor guard.
 const FAULTS: &[Fault] = &[
     (
         "no slack",
@@ -148,7 +148,7 @@ const FAULTS: &[Fault] = &[
     ("no guard, right and bottom", &[("vec2<f32>(end) + view.reach", "vec2<f32>(end)")]),
 ];
 
-/// More of them: a minute.
+/// More faults, which take a minute.
 const MORE_FAULTS: &[Fault] = &[
     ("the other convention's front", &[("return select(1.0, -1.0, REVERSED);", "return 1.0;")]),
     (
@@ -198,8 +198,8 @@ const MORE_FAULTS: &[Fault] = &[
     ),
 ];
 
-/// What the device culls beyond the mirror is more with each fault than without any.
-/// (One kind, one convention: each compiles anew.)
+/// With each fault the device culls more beyond the mirror than without any.
+/// One kind of bounds and one convention, because each fault compiles its own pipelines.
 fn assert_seen(kinds: &'static [BoundsKind], faults: &[Fault]) {
     let rounds: Vec<_> = [(61, false), (62, true), (63, true), (64, true)]
         .into_iter()
@@ -268,8 +268,8 @@ fn no_arithmetic_gives_a_false_cull() {
     }
 }
 
-/// With a 24th of the margin, and none for texels, bent arithmetics err; with none at all each
-/// does.
+/// With a 24th of the margin, and with none for texels, some arithmetics err.
+/// With no margin at all each of them does.
 #[test]
 fn with_less_margin_some_do() {
     let margins = [(1.0, 8.0), (1.0, 0.0), (0.0, 8.0), (0.0, 0.0)]
@@ -283,8 +283,8 @@ fn with_less_margin_some_do() {
     assert!(power.false_culls.iter().all(|counts| counts[3] > 0), "no margin, and green");
 }
 
-/// What is really lost of the 24 eps of a tilted row's certificate, and of the 8 of a texel's
-/// comparison.
+/// How much is really lost of the 24 eps of a tilted row's certificate.
+/// The same of the 8 eps of a texel's comparison.
 #[test]
 fn what_certificates_and_texels_lose() {
     let styles = [&styles()[..], &[WITHOUT_SLOPE_BARS]].concat();
@@ -301,7 +301,8 @@ fn what_certificates_and_texels_lose() {
     for (style, Losses { planes, extents, least_w }) in styles.iter().zip(&losses) {
         let texels = texel_loss(10_000, &mut Arithmetic::new(*style, 57));
         eprintln!(
-            "{:<22} planes {:5.2} eps of {:6}, extents {:5.2} of {:6}, least w {:5.2} of {:6}, texels {:5.2} of {}",
+            "{:<22} planes {:5.2} eps of {:6}, extents {:5.2} of {:6}, \
+             least w {:5.2} of {:6}, texels {:5.2} of {}",
             style.name,
             planes.eps,
             planes.claims,
@@ -312,7 +313,7 @@ fn what_certificates_and_texels_lose() {
             texels.eps,
             texels.claims
         );
-        // Half of what is counted by hand leaves room for cases that are not tried.
+        // Half of the losses counted by hand leaves room for cases that are not tried.
         for (loss, most) in [(planes, 10.25), (extents, 9.25), (least_w, 6.75), (&texels, 2.5)] {
             assert!(loss.claims > 1000 && loss.eps < most, "{}: {loss:?}", style.name);
         }
@@ -322,9 +323,10 @@ fn what_certificates_and_texels_lose() {
     assert!(folded > barred, "a folded slope costs more: {folded} {barred}");
 }
 
-/// Why a slope is never subnormal: flushed in one product of a certificate and not in another, it
-/// moves a row by more than the floor of the margin where X' is large.
-/// A slab across all of an image that holds nothing, on a device that guesses such slopes.
+/// Why a slope is never subnormal.
+/// It could be flushed in one product of a certificate and not in another.
+/// Where X' is large, that moves a row by more than the floor of the margin.
+/// The case is a slab across an empty image, on a device that guesses such slopes.
 #[test]
 fn subnormal_slopes_would_be_two_slopes() {
     let mut round = campaign(58, Coverage::Area).rounds().next().expect("a round");
@@ -340,8 +342,8 @@ fn subnormal_slopes_would_be_two_slopes() {
             .expect("a camera");
     (round.view.width, round.view.height, round.view.reversed) = (1, 1, true);
     round.depth = vec![0.0];
-    // Just within the camera's coordinate limit, 2^42, and so far away that it is not taken for one
-    // that crosses the eye's plane.
+    // Just within the camera's coordinate limit, 2^42.
+    // It is so far away that it does not count as crossing the eye's plane.
     let (across, away) = (0.95 * 2.0_f64.powi(42), 2.0_f64.powi(25));
     let slab = hiz_ref::Volume::Box {
         min: [-0.5 * away, -0.5 * away, away],

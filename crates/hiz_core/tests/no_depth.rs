@@ -1,5 +1,5 @@
-//! Pixels that are no depth (NaN, infinite, above 1, negative) within a wall, in every way in which
-//! a cull reads single texels: what lies behind such a pixel is kept.
+//! Pixels in a wall that are no valid depth: NaN, infinite, above 1 or negative.
+//! In every way in which a cull reads single texels, what is behind such a pixel is kept.
 
 mod common;
 
@@ -16,8 +16,8 @@ use hiz_core::{
 };
 use sources::{SOURCES, Source, pyramid_from};
 
-/// The image: cells of 11 x 11 pixels (so that they begin at every remainder by 2, 4 and 8), one
-/// thing and one bad pixel in each.
+/// The image has cells of 11 x 11 pixels, each with one thing and one bad pixel.
+/// With 11 they begin at every remainder by 2, 4 and 8.
 const CELL: u32 = 11;
 const CELLS: u32 = 8;
 const SIDE: u32 = CELL * CELLS;
@@ -34,7 +34,7 @@ const BAD: [f32; 9] = [
     f32::from_bits(0x3f80_0001),
 ];
 
-/// A way to read texels: what is asked for, and how many pixels a thing is wide.
+/// A way to read texels: the options, and the width of a thing in pixels.
 #[derive(Debug, Clone, Copy)]
 struct Way {
     footprint: Footprint,
@@ -47,8 +47,8 @@ const fn way(footprint: Footprint, descent: u32, fit: Fit, pixels: u32) -> Way {
     Way { footprint, descent, fit, pixels }
 }
 
-/// A footprint of level 0, one of a stored level, a descent from there to level 0; and the same
-/// texel by texel for a volume's own fit.
+/// A footprint of level 0, one of a stored level, and a descent from there to level 0.
+/// Then the same texel by texel for a volume's own fit.
 const WAYS: [Way; 12] = [
     way(Footprint::Two, 0, Fit::Rectangle, 1),
     way(Footprint::Two, 0, Fit::Rectangle, 2),
@@ -64,8 +64,8 @@ const WAYS: [Way; 12] = [
     way(Footprint::Eight, 0, Fit::Volume, 10),
 ];
 
-/// Flat boxes at depth 8 that take `pixels` x `pixels` of each cell, from its second pixel on, each
-/// `copies` times.
+/// Flat boxes at depth 8, each `copies` times.
+/// Each covers `pixels` x `pixels` of its cell, beginning at the cell's second pixel.
 fn things(engine: &Engine, pixels: u32, copies: usize) -> Arc<Instances> {
     let (mut min, mut max) = (Vec::new(), Vec::new());
     for cell in 0..CELLS * CELLS {
@@ -84,8 +84,8 @@ fn things(engine: &Engine, pixels: u32, copies: usize) -> Arc<Instances> {
     engine.instances(&bounds, &options).unwrap()
 }
 
-/// A wall at depth 4 with one bad pixel in what each thing covers: every place of it, every value,
-/// as far as the cells reach.
+/// A wall at depth 4 with one bad pixel in what each thing covers.
+/// Every place and every value is used, as far as there are cells.
 fn wall_with_bad_pixels(convention: DepthConvention, pixels: u32, shift: u32) -> Vec<f32> {
     let mut depth = vec![ndc(4.0, convention); (SIDE * SIDE) as usize];
     for cell in 0..CELLS * CELLS {
@@ -112,8 +112,8 @@ fn kept(
 }
 
 /// Which cells have an open pixel.
-/// What a depth texture holds in place of a number that is no depth is the driver's choice: where
-/// it is one that hides depth 8, nothing is asked of its cell.
+/// A driver chooses what a depth texture holds in place of an invalid number.
+/// Where that depth hides depth 8, the cell is not tested.
 fn open_cells(camera: &Camera, pixels: u32, shift: u32, pyramid: &Pyramid) -> Vec<bool> {
     let convention = camera.convention();
     let image = engine().read_level(pyramid, 0).unwrap();
@@ -121,7 +121,7 @@ fn open_cells(camera: &Camera, pixels: u32, shift: u32, pyramid: &Pyramid) -> Ve
     for (i, given) in (0..).zip(wall_with_bad_pixels(convention, pixels, shift)) {
         if given.to_bits() != ndc(4.0, convention).to_bits() {
             let cell = i % SIDE / CELL + CELLS * (i / SIDE / CELL);
-            // Depth 8 is 7/8 and 1/8: what is nearer hides it.
+            // Depth 8 is 7/8 and 1/8, and anything nearer hides it.
             open[cell as usize] = match convention {
                 DepthConvention::Standard => image[i as usize] > 0.875,
                 DepthConvention::Reversed => image[i as usize] < 0.125,
@@ -219,9 +219,9 @@ fn what_is_no_depth_hides_no_group() {
     }
 }
 
-/// A footprint of four and a descent read single pixels; without what cleans those they hide what
-/// is seen.
-/// (A depth texture holds no such pixel here: `shader.rs` looks at the text of its shader.)
+/// A footprint of four and a descent read single pixels.
+/// Without the code that cleans those, visible instances are hidden.
+/// A depth texture holds no such pixel here, so `shader.rs` checks the text of its shader.
 #[test]
 fn pixels_that_nobody_cleans_hide_something() {
     for (source, atlas, (what, by)) in [

@@ -1,5 +1,5 @@
-//! Occluder meshes: drawn at any size, relative to the eye, one- or two-sided; and pyramids of
-//! textures that were not uploaded.
+//! Occluder meshes: drawn at any size, relative to the eye, one-sided or two-sided.
+//! Also pyramids of textures that were not uploaded.
 
 mod common;
 
@@ -11,9 +11,9 @@ use hiz_core::{
     Projection, Pyramid, PyramidOptions, StoredLevels,
 };
 
-/// A square at depth `z` from (-r, -r) to (r, r), seen counter-clockwise by a camera with x right,
-/// y up that looks along +z... which is a left-handed one: in this world a triangle that appears
-/// counter-clockwise in the image is listed so.
+/// A square at depth `z` from (-r, -r) to (r, r).
+/// The camera looks along +z with x right and y up, which makes it left-handed.
+/// A triangle that appears counter-clockwise in its image is listed in that order.
 fn square(z: f64, r: f64) -> (Vec<f64>, Vec<u32>) {
     (vec![-r, -r, z, r, -r, z, r, r, z, -r, r, z], vec![0, 1, 2, 0, 2, 3])
 }
@@ -34,7 +34,7 @@ fn draw(
     engine().render_depth(&occluders, camera).unwrap().read().unwrap()
 }
 
-/// A camera at the world's `eye` that looks along -z, y up: the usual right-handed one.
+/// A camera at the world's `eye` that looks along -z with y up: the usual right-handed one.
 fn right_handed(eye: [f64; 3], size: ImageSize, convention: DepthConvention) -> Camera {
     let pose = Pose { eye, target: [eye[0], eye[1], eye[2] - 1.0], up: [0.0, 1.0, 0.0] };
     let fov_y = std::f64::consts::FRAC_PI_2;
@@ -81,7 +81,7 @@ fn the_nearer_of_two_walls_wins() {
             vertices.extend(next);
             triangles.extend(second.iter().map(|i| i + 4));
             let depth = draw(&vertices, &triangles, None, FaceCull::None, &camera);
-            // The near square spans half the image: pixels 2 to 5.
+            // The near square covers half the image's width and height: pixels 2 to 5.
             for (i, d) in depth.iter().enumerate() {
                 let inside = (2..6).contains(&(i % 8)) && (2..6).contains(&(i / 8));
                 assert_eq!(*d, ndc(if inside { 2.0 } else { 8.0 }, convention), "pixel {i}");
@@ -90,7 +90,7 @@ fn the_nearer_of_two_walls_wins() {
     }
 }
 
-/// Row 0 is the top of the image, where y is greatest; column 0 the left.
+/// Row 0 is the top of the image, where y is greatest, and column 0 the left.
 #[test]
 fn images_are_the_right_way_up() {
     let camera = right_handed([0.0; 3], ImageSize::new(4, 4), DepthConvention::Reversed);
@@ -103,7 +103,7 @@ fn images_are_the_right_way_up() {
 #[test]
 fn faces_are_culled_by_their_orientation_in_the_world() {
     let camera = right_handed([0.0; 3], ImageSize::new(8, 8), DepthConvention::Reversed);
-    // Counter-clockwise seen from +z, that is from the camera.
+    // Counter-clockwise as seen from +z, which is where the camera is.
     let (vertices, front) = square(-4.0, 100.0);
     let back: Vec<u32> = front.chunks(3).flat_map(|t| [t[0], t[2], t[1]]).collect();
     let mirror = [-1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
@@ -113,7 +113,7 @@ fn faces_are_culled_by_their_orientation_in_the_world() {
     assert!(seen(&front, None, FaceCull::None) && seen(&back, None, FaceCull::None));
     assert!(seen(&front, None, FaceCull::Back) && !seen(&back, None, FaceCull::Back));
     assert!(!seen(&front, None, FaceCull::Front) && seen(&back, None, FaceCull::Front));
-    // A mirror does not turn a mesh inside out.
+    // A mirroring transform does not turn a mesh inside out.
     assert!(
         seen(&front, Some(&mirror), FaceCull::Back) && !seen(&back, Some(&mirror), FaceCull::Back)
     );
@@ -144,8 +144,8 @@ fn transforms_place_a_mesh_many_times() {
     }
 }
 
-/// A wall as far from the origin as a city or a planet's surface trembles by no more than float64's
-/// own positions do.
+/// A wall may be as far from the origin as the size of a city or a planet.
+/// It jitters by no more than float64's own positions do.
 #[test]
 fn distance_from_the_origin_costs_nothing() {
     let size = ImageSize::new(32, 32);
@@ -165,9 +165,9 @@ fn distance_from_the_origin_costs_nothing() {
     }
 }
 
-/// Slanted walls seen from eyes that float32 does not hold, against float64: every pixel's depth,
-/// and which pixels are covered.
-/// The faults that leave a half out move what is drawn by up to half a unit.
+/// Slanted walls seen from eyes that float32 cannot hold, compared with float64.
+/// Checks every pixel's depth, and which pixels are covered.
+/// Faults that leave out a half of the eye move the picture by up to half a unit.
 #[test]
 fn eyes_that_float32_does_not_hold_see_what_float64_says() {
     assert_eq!(wrong_pixels(&engine()), 0);
@@ -186,7 +186,7 @@ fn eyes_that_float32_does_not_hold_see_what_float64_says() {
     }
 }
 
-/// Pixels that are not as float64 says, of those that are surely covered or surely not.
+/// Pixels that differ from float64, among those that are surely covered or surely not.
 fn wrong_pixels(engine: &Engine) -> usize {
     let size = ImageSize::new(40, 24);
     let mut wrong = 0;
@@ -197,8 +197,8 @@ fn wrong_pixels(engine: &Engine) -> usize {
             [-3e7 - 1.3, 0.7, 2e6 + 0.6],
         ] {
             let camera = right_handed(eye, size, convention);
-            // A quadrangle that tilts away to the right and upwards: its depth is 4 + 0.5 x + 0.25
-            // y, and x and y end at 2 and 1.
+            // A quadrangle that recedes to the right and upwards.
+            // Its depth is 4 + 0.5 x + 0.25 y, and x and y end at 2 and 1.
             let (right, top) = (2.0, 1.0);
             let depth = |x: f64, y: f64| 4.0 + 0.5 * x + 0.25 * y;
             let corner = |x: f64, y: f64| [eye[0] + x, eye[1] + y, eye[2] - depth(x, y)];
@@ -213,15 +213,15 @@ fn wrong_pixels(engine: &Engine) -> usize {
             let occluders = engine.occluders(&[mesh], &OccluderOptions::default()).unwrap();
             let drawn = engine.render_depth(&occluders, &camera).unwrap().read().unwrap();
             for (i, got) in (0..).zip(drawn) {
-                // 90 degrees high: the ray through a pixel's centre is (u, v, 1), and meets the
-                // plane at z = 4 / (1 - u / 2 - v / 4).
+                // The field of view is 90 degrees high.
+                // The ray through a pixel's centre is (u, v, 1).
+                // It meets the plane at z = 4 / (1 - u / 2 - v / 4).
                 let [w, h] = [size.width, size.height].map(f64::from);
                 let u = (2.0 * (f64::from(i % size.width) + 0.5) / w - 1.0) * w / h;
                 let v = 1.0 - 2.0 * (f64::from(i / size.width) + 0.5) / h;
                 let z = 4.0 / (1.0 - 0.5 * u - 0.25 * v);
                 let (x, y) = (u * z, v * z);
-                // (The corners at the left and below are behind the plane z = 1, or beyond the
-                // image.)
+                // The left and lower corners are in front of the plane z = 1, or outside the image.
                 let beyond = (x - right).max(y - top);
                 let expected =
                     if beyond > 0.0 { f64::from(convention.far()) } else { ndc64(z, convention) };
@@ -263,7 +263,7 @@ fn bad_meshes_are_refused_by_name() {
     assert!(message(&[0.0; 9], &[0, 1, 2], Some(&[1.0; 16])).contains("last row"));
 }
 
-/// The pyramid of a depth texture: what the rasteriser left, bit for bit.
+/// The pyramid of a depth texture holds what the rasteriser left, bit for bit.
 #[test]
 fn pyramids_of_rendered_depth_are_bit_exact() {
     let mut random = Random(8);
@@ -348,8 +348,12 @@ fn pyramids_of_float_textures_are_bit_exact() {
     }
 }
 
-/// One of each kind of dispatch: all, without fine ones, one by an invocation, one by a workgroup a
-/// texel.
+/// One choice of levels for each kind of dispatch:
+///
+/// - all levels;
+/// - without the fine ones;
+/// - a coarse level with one invocation per texel;
+/// - a coarse level with one workgroup per texel.
 const LEVELS: [StoredLevels; 5] = [
     StoredLevels::ALL,
     StoredLevels::from(2),
@@ -358,7 +362,7 @@ const LEVELS: [StoredLevels; 5] = [
     StoredLevels::only(6),
 ];
 
-/// The stored levels are those of the oracle.
+/// Asserts that the stored levels are the oracle's.
 fn assert_levels(pyramid: &Pyramid, depth: &[f32], convention: DepthConvention) {
     let ImageSize { width, height } = pyramid.size();
     for (k, level) in
@@ -378,7 +382,7 @@ fn assert_levels(pyramid: &Pyramid, depth: &[f32], convention: DepthConvention) 
     }
 }
 
-/// A depth texture, rendered, in sizes that leave blocks over on both sides.
+/// A rendered depth texture, in sizes that leave partial blocks on both sides.
 #[test]
 fn depth_textures_are_reduced_to_the_chosen_levels() {
     let mut random = common::Random(9);

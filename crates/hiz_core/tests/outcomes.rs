@@ -1,7 +1,7 @@
-//! The named outcomes: one test each, every expectation worked out by hand.
+//! The named outcomes: one test each, with every expectation worked out by hand.
 //!
-//! The camera stands at the origin and looks along +z; x and y span -1..1 at depth 1, the near
-//! plane is at 1, there is no far plane.
+//! The camera is at the origin and looks along +z.
+//! x and y span -1..1 at depth 1, the near plane is at 1, and there is no far plane.
 //! The depth image is a wall at depth 4 unless a test says otherwise.
 
 mod common;
@@ -66,7 +66,7 @@ fn cull_with(
         .unwrap()
 }
 
-/// Verdicts before a wall at depth 4, the same in both conventions.
+/// Verdicts with a wall at depth 4, which are the same in both conventions.
 fn before_a_wall(instances: &Arc<Instances>) -> Vec<Verdict> {
     let mut seen: Vec<Vec<Verdict>> = CONVENTIONS
         .iter()
@@ -95,7 +95,7 @@ fn behind_and_before_the_wall() {
 
 #[test]
 fn outside_each_plane() {
-    // |x| and |y| reach as far as z; the near plane is at 1.
+    // In view |x| and |y| are at most z; the near plane is at 1.
     let away = [
         [-9.0, 0.0, 4.0],
         [9.0, 0.0, 4.0],
@@ -112,7 +112,7 @@ fn outside_each_plane() {
     assert_eq!(before_a_wall(&list), [OUTSIDE; 6]);
 }
 
-/// Darnell's shader culls a sphere that holds the camera.
+/// Darnell's shader culls a sphere that contains the camera.
 #[test]
 fn the_camera_inside_is_visible() {
     assert_eq!(before_a_wall(&spheres(&[([0.0; 3], 10.0), ([0.0, 0.0, 3.0], 3.5)])), [VISIBLE; 2]);
@@ -199,9 +199,9 @@ fn strict_instances_refuse_bad_bounds_by_index() {
 
 #[test]
 fn too_far_for_this_camera_is_invalid_and_kept() {
-    // 2^55 passes the test of the bits but not the camera's coordinate limit, 2^50 at most.
+    // 2^55 passes the test of the bits but exceeds the camera's coordinate limit, 2^50 at most.
     assert_eq!(before_a_wall(&spheres(&[([0.0, 0.0, 2.0_f64.powi(55)], 1.0)])), [INVALID]);
-    // This camera's: 2^58 over 2^16 times the coefficients of w, which are 1.
+    // This camera's limit is 2^58 over 2^16 times the coefficients of w, which are 1.
     let at = |exponent| ([0.0, 0.0, 2.0_f64.powi(exponent)], 1.0);
     assert_eq!(before_a_wall(&spheres(&[at(41), at(43), at(49)])), [OCCLUDED, INVALID, INVALID]);
 }
@@ -254,8 +254,8 @@ fn far_depth_and_what_is_no_depth_never_occlude() {
                     .unwrap(),
                 [VISIBLE]
             );
-            // One such pixel in the middle of the wall is a hole that the sphere could be seen
-            // through.
+            // One such pixel in the middle of the wall is a hole.
+            // The sphere could be seen through it.
             let mut depth = [wall; 256];
             depth[8 * 16 + 8] = value;
             assert_eq!(
@@ -270,7 +270,7 @@ fn far_depth_and_what_is_no_depth_never_occlude() {
             [OCCLUDED]
         );
     }
-    // Standard Z: 0, -0 and subnormals are the near plane, which hides all that lies behind it.
+    // Standard Z: 0, -0 and subnormals are the near plane, which hides everything behind it.
     let camera = camera_along_z(SIDE, SIDE, DepthConvention::Standard);
     for near in [0.0, -0.0, 1e-40] {
         assert_eq!(
@@ -282,7 +282,7 @@ fn far_depth_and_what_is_no_depth_never_occlude() {
 
 #[test]
 fn one_pixel_holes_are_seen_through_at_every_level() {
-    // A sphere behind the wall that covers the whole image: any hole shows it.
+    // A box behind the wall that covers the whole image, so that any hole shows it.
     let list = boxes(&[([-20.0, -20.0, 8.0], [20.0, 20.0, 9.0])]);
     for convention in CONVENTIONS {
         for (width, height) in [(1, 1), (5, 3), (16, 16), (33, 17)] {
@@ -301,8 +301,8 @@ fn one_pixel_holes_are_seen_through_at_every_level() {
 
 #[test]
 fn sample_coverage_drops_what_falls_between_pixel_centres() {
-    // Pixel centres lie at odd multiples of 1/16 at depth 1: a speck at x = 0 falls between two of
-    // them.
+    // Pixel centres are at odd multiples of 1/16 at depth 1.
+    // So a speck at x = 0 falls between two of them.
     let list = spheres(&[([0.0, 0.0, 2.0], 0.01), ([2.0 / 16.0, 2.0 / 16.0, 2.0], 0.01)]);
     let camera = camera_along_z(SIDE, SIDE, DepthConvention::Standard);
     let wall = [ndc(4.0, DepthConvention::Standard); 256];
@@ -315,9 +315,10 @@ fn sample_coverage_drops_what_falls_between_pixel_centres() {
     assert_eq!(verdicts(Coverage::Sample), [OUTSIDE, VISIBLE]);
 }
 
-/// A box that reaches into a column or row of holes, but not to its samples, is hidden in sample
-/// coverage and visible in area coverage; one that reaches past the samples is visible in both.
-/// From all four sides.
+/// A box that reaches into a column or row of holes, but not to its samples.
+/// It is hidden in sample coverage and visible in area coverage.
+/// One that reaches past the samples is visible in both.
+/// All four sides are tested.
 #[test]
 fn holes_are_seen_through_at_their_samples() {
     let verdict =
@@ -350,7 +351,8 @@ fn holes_are_seen_through_at_their_samples() {
                     assert_eq!(
                         verdict(&depth, &camera, reaching(far), coverage, guard),
                         expected,
-                        "{convention:?} axis {axis} below {below} reaching {far} {coverage:?} guard {guard}"
+                        "{convention:?} axis {axis} below {below} reaching {far} \
+                         {coverage:?} guard {guard}"
                     );
                 }
             }
@@ -388,8 +390,8 @@ fn pyramids_that_do_not_belong_are_refused() {
     assert!(message(&reversed, &pyramid).contains("got another one"));
 }
 
-/// A reduction that was recorded but has not run is no pyramid: whatever is culled against it is
-/// kept.
+/// A pyramid whose reduction was recorded but has not run holds no depth.
+/// A cull against it keeps everything.
 #[test]
 fn a_reduction_that_never_ran_hides_nothing() {
     let list = spheres(&[([0.0, 0.0, 8.0], 1.0), ([0.0, 0.0, 8.0], 0.01)]);
@@ -477,7 +479,8 @@ fn textures_that_a_view_cannot_tell_apart_are_refused() {
     assert_eq!(
         unpacked,
         format!(
-            "depth: expected the pyramid's size {whole} as (height 8, width 2) texels of four pixels, got {whole}"
+            "depth: expected the pyramid's size {whole} as (height 8, width 2) texels \
+             of four pixels, got {whole}"
         )
     );
     assert!(message(&|d| d.format = wgpu::TextureFormat::R8Unorm).contains("got R8Unorm"));
@@ -490,7 +493,7 @@ fn textures_that_a_view_cannot_tell_apart_are_refused() {
     }
 }
 
-/// A lost device says so, and the next one works.
+/// A lost device is reported as lost, and the next device works.
 #[test]
 fn a_lost_device_is_an_error_and_the_next_one_works() {
     let camera = camera_along_z(SIDE, SIDE, DepthConvention::Standard);
@@ -564,8 +567,8 @@ fn options_out_of_range_are_refused_by_name() {
 
 #[test]
 fn depth_slack_moves_the_wall_back_in_both_conventions() {
-    // The wall at depth 4, slack a hundredth: ndc 0.75 becomes 0.7575 (depth 4.12), reversed 0.25
-    // becomes 0.2475 (depth 4.04).
+    // The wall is at depth 4, and the slack is a hundredth.
+    // NDC 0.75 becomes 0.7575 (depth 4.12), reversed 0.25 becomes 0.2475 (depth 4.04).
     for (convention, hidden_without, hidden_with) in
         [(DepthConvention::Standard, 4.1, 4.2), (DepthConvention::Reversed, 4.03, 4.1)]
     {
@@ -587,10 +590,10 @@ fn depth_slack_moves_the_wall_back_in_both_conventions() {
 
 #[test]
 fn absolute_slack_moves_every_wall_by_the_same_amount() {
-    // An orthographic camera: z from 1 to 9 is depth from 0 to 1 or back, one unit of z an eighth
-    // of depth.
-    // A box one unit behind a wall is hidden; with an absolute slack of 1/8 it is not, a hair
-    // farther back it is again: before walls near and far.
+    // An orthographic camera whose z from 1 to 9 is depth from 0 to 1, or from 1 to 0.
+    // One unit of z is an eighth of depth.
+    // A box one unit behind a wall is hidden, and with an absolute slack of 1/8 it is not.
+    // A hair farther back it is hidden again, for walls near and far.
     for convention in CONVENTIONS {
         let (slope, constant) = match convention {
             DepthConvention::Standard => (0.125, -0.125),
@@ -616,7 +619,7 @@ fn absolute_slack_moves_every_wall_by_the_same_amount() {
             };
             assert_eq!(verdicts(0.0), [OCCLUDED; 3], "{convention:?} {wall_z}");
             assert_eq!(verdicts(0.125), [VISIBLE, VISIBLE, OCCLUDED], "{convention:?} {wall_z}");
-            // The least there is: 2^-23.
+            // The least slack that the cull adds, 2^-23.
             assert_eq!(verdicts(1e-300), [OCCLUDED; 3], "{convention:?} {wall_z}");
         }
     }
@@ -624,8 +627,8 @@ fn absolute_slack_moves_every_wall_by_the_same_amount() {
 
 #[test]
 fn slack_and_guard_only_ever_keep_more() {
-    // A hair behind the wall: hidden without slack, kept with it; a box that ends a quarter pixel
-    // beside a hole, with a guard.
+    // A box a hair behind the wall is hidden without slack and kept with it.
+    // A box that ends a quarter pixel beside a hole is kept with a guard.
     let camera = camera_along_z(SIDE, SIDE, DepthConvention::Reversed);
     let wall = [0.25; 256];
     let list = boxes(&[([-1.0, -1.0, 4.01], [1.0, 1.0, 5.0])]);
@@ -671,8 +674,8 @@ fn explain_agrees_with_the_verdict_and_names_what_was_read() {
         let explained: Vec<_> = (0..5).map(|i| culling.explain(i).unwrap()).collect();
         assert_eq!(verdicts, explained.iter().map(|e| e.verdict).collect::<Vec<_>>());
         let hidden = &explained[0];
-        // Nearest point at depth 7; the silhouette spans +-1/sqrt(63) at depth 1, a pixel is 1/8
-        // wide: pixels 6 to 9.
+        // The nearest point is at depth 7.
+        // The silhouette spans +-1/sqrt(63) at depth 1, where a pixel is 1/8 wide: pixels 6 to 9.
         assert!((hidden.nearest.unwrap() - f64::from(ndc(7.0, convention))).abs() < 1e-6);
         assert_eq!(hidden.rectangle, Some([6, 6, 9, 9]));
         assert_eq!((hidden.level, hidden.texels.len()), (Some(1), 4));

@@ -1,5 +1,5 @@
 //! Faults planted into the shaders: each must turn the suite red.
-//! A fault that stays green means that a margin, a clamp or an order is not tested.
+//! If a fault stays green, a margin, a clamp or an order is not tested.
 
 mod common;
 
@@ -58,8 +58,8 @@ fn without_faults_it_is_green() {
     }
 }
 
-/// The campaign's power: every class finds that there is no margin, and all together that there is
-/// a 48th of it.
+/// The campaign's power.
+/// Every class notices that there is no margin; all together notice that there is only a 48th.
 #[test]
 fn cuts_of_the_margin() {
     let is_documented = is_of_this_driver(&faulty(&[]));
@@ -118,8 +118,8 @@ fn nearest_instead_of_farthest() {
     );
 }
 
-/// The mean of two depths in the place of the farthest: where a footprint is read, and where four
-/// pixels are.
+/// The mean of two depths instead of the farthest.
+/// It is planted where a footprint is read, and where four pixels are read.
 #[test]
 fn a_mean_instead_of_the_farthest() {
     const FOUR: &[(Footprint, u32)] = &[(Footprint::Four, 0)];
@@ -144,21 +144,21 @@ fn a_mean_instead_of_the_farthest() {
     );
 }
 
-/// Slanted plates, each nearest at one end, which is half a pixel inside the pixel where it begins:
-/// left, right, top and bottom.
-/// Of that end a tenth of a pixel is nearer than the wall.
-/// Which are culled by their own fit?
+/// Which of four slanted plates are culled by their own fit.
+/// Each is nearest at one end: left, right, top or bottom.
+/// That end is half a pixel inside the pixel where it begins.
+/// A tenth of a pixel of it is nearer than the wall, so the plate has to be kept.
 fn culled_slanted_plates(faults: &[(&str, &str)]) -> [bool; 4] {
     let engine = faulty(faults);
     // At depth 8 a pixel is a unit.
-    // A tenth of a pixel from such an end a plate is at depth 8.1, two tenths at 8.2.
+    // A tenth of a pixel from such an end a plate is at depth 8.1, and two tenths from it at 8.2.
     let camera = camera_along_z(16, 16, DepthConvention::Reversed);
     let image = engine.upload_depth(&[1.0 / 8.1; 256], &camera).unwrap();
     let pyramid = engine.pyramid(&image).unwrap();
     let options = CullOptions { fit: Fit::Volume, descent: 4096, ..CullOptions::default() };
     let c = 0.5_f64.sqrt();
-    // Rows run downwards: the top's end is at y = -1/2, half a pixel below a border, and goes on
-    // downwards.
+    // Rows run downwards.
+    // The top's end is at y = -1/2, half a pixel below a border, and extends downwards.
     [(0, 1.0), (0, -1.0), (1, -1.0), (1, 1.0)].map(|(axis, sign)| {
         let (mut along, mut across, mut end) =
             ([0.0, 0.0, c], [0.0, 0.0, -sign * c], [0.0, 0.0, 8.0]);
@@ -179,9 +179,10 @@ fn culled_slanted_plates(faults: &[(&str, &str)]) -> [bool; 4] {
     })
 }
 
-/// The sides of a volume fit's rectangle: guesses that are a fifth of a pixel too far inside are
-/// harmless, for certificates refuse them; without those they cut off what is seen.
-/// (`shaders/cull/supporting_planes.wgsl`, `proved_interval`.)
+/// The sides of a volume fit's rectangle.
+/// Guesses that are a fifth of a pixel too far inside are harmless: certificates refuse them.
+/// Without the certificates they cut off something visible.
+/// See `proved_interval` in `shaders/cull/supporting_planes.wgsl`.
 #[test]
 fn sides_of_a_volumes_rectangle_are_proved() {
     let low = ("guess.x - widened", "guess.x - widened + 0.2");
@@ -207,23 +208,23 @@ fn a_depth_certificate_at_the_centre_alone() {
 
 #[test]
 fn a_rectangle_that_is_too_small_without_block_certificates() {
-    // The rectangle alone, unwidened: the edges are what certificates are for.
+    // The rectangle alone, not widened: the certificates are there for its edges.
     let unwidened =
         ["below", "above"].map(|end| (format!("(extent.{end} * per_w + rounding)"), "view.reach"));
     let [low, high] = unwidened.each_ref().map(|(what, by)| (what.as_str(), *by));
     assert_red("rectangle", &[low, high, (INSIDE_X, "true"), (INSIDE_Y, "true")]);
 }
 
-/// What the rectangle is widened by besides its own error.
+/// The amount that the rectangle is widened by besides its own error.
 const WIDENING: &str = "let rounding = 4.0 * EPS * half_size + view.reach;";
 /// A rectangle 0.7 pixels too small on each side.
 const TOO_SMALL: (&str, &str) =
     (WIDENING, "let rounding = 4.0 * EPS * half_size + view.reach - 0.7;");
 
-/// The rectangle only chooses what is certified: where it is wrong, less is culled and nothing
-/// wrongly.
-/// (The level that follows from it is integer arithmetic, and no heuristic: four corners are all
-/// texels of a 2 x 2 footprint only.)
+/// The rectangle only chooses what is certified.
+/// Where it is wrong, less is culled, and nothing is culled wrongly.
+/// The level that follows from it is not a heuristic but integer arithmetic.
+/// Only in a 2 x 2 footprint are the four corners all texels.
 #[test]
 fn a_rectangle_that_is_too_small_is_harmless() {
     for coverage in [Coverage::Area, Coverage::Sample] {
@@ -232,7 +233,7 @@ fn a_rectangle_that_is_too_small_is_harmless() {
     }
 }
 
-/// Each of the block's four certificates is what makes it harmless.
+/// Each of the block's four certificates is needed to make it harmless.
 #[test]
 fn each_block_certificate_is_needed() {
     for gone in [
@@ -253,7 +254,7 @@ fn each_block_certificate_is_needed() {
     }
 }
 
-/// A descent is certified by the rectangle's own edges, and its budget's end decides nothing.
+/// The rectangle's own edges certify a descent, and the end of its budget decides nothing.
 #[test]
 fn a_descent_without_its_certificates_or_past_its_budget() {
     let (x, y) = ((INSIDE_X, "true"), (INSIDE_Y, "true"));
@@ -270,8 +271,8 @@ fn a_descent_without_its_certificates_or_past_its_budget() {
     }
 }
 
-/// Boxes a quarter of a pixel beside a hole, left, right, above and below of it, with half a pixel
-/// of guard: are any culled?
+/// Whether any of four boxes beside a hole is culled, with a guard of half a pixel.
+/// They are a quarter of a pixel away from it: left, right, above and below.
 fn culls_within_the_guard(engine: &Engine) -> bool {
     let camera = camera_along_z(16, 16, DepthConvention::Reversed);
     let options = CullOptions { guard_px: Some(0.5), ..CullOptions::default() };
@@ -298,9 +299,9 @@ fn culls_within_the_guard(engine: &Engine) -> bool {
 }
 
 /// The guard in the block's certificates.
-/// The rectangle is widened by it as well, so that in area coverage no input reaches them alone;
-/// with a rectangle that forgets the guard they have to keep what lies within it.
-/// (In sample coverage the same terms decide what is *culled*: `outcomes.rs`.)
+/// The rectangle is widened by it, too, so in area coverage no input tests only the certificates.
+/// With a rectangle that forgets the guard they have to keep what is within it.
+/// In sample coverage the same terms decide what is *culled*: see `outcomes.rs`.
 #[test]
 fn the_guard_stands_in_the_block_certificates_too() {
     let forgetful = (WIDENING, "let rounding = 4.0 * EPS * half_size;");
@@ -320,8 +321,8 @@ fn a_descent_that_forgets_a_column() {
     assert_red_with("descent", &[fault], &[(Footprint::Two, 4096)]);
 }
 
-/// A level that is too fine for a rectangle, or not there at all; a descent past missing levels
-/// that forgets children.
+/// A level that is too fine for a rectangle, or that is not stored.
+/// Also a descent past missing levels that forgets children.
 #[test]
 fn wrong_levels_where_some_are_missing() {
     let chosen = "select(clamp(level, first_stored, last_stored), 0u, level == 0u)";
@@ -350,7 +351,7 @@ fn texels_clamped_one_off() {
     );
 }
 
-/// What the cheaper certificates rest on: each claim taken away.
+/// The claims that the cheaper certificates rely on, each taken away.
 #[test]
 fn claims_of_the_extent_and_the_sizes() {
     let support = "support(r.half - low * w.half) - (r.center - low * w.center)";
@@ -358,7 +359,7 @@ fn claims_of_the_extent_and_the_sizes() {
     let beyond = "surely_above(Value(side * r.center, r.error, side * r.half), t, w)";
     let least_w = "w.center - support(w.half) - error_bound(w, 0.0, w)";
     let faults: [(&str, &[(&str, &str)]); 5] = [
-        // Where the farthest corner for the centre's ratio is not the extreme one.
+        // Needed where the farthest corner for the centre's ratio is not the extreme one.
         (
             "extent, no support",
             &[
@@ -389,8 +390,8 @@ fn claims_of_the_extent_and_the_sizes() {
     }
 }
 
-/// The constants' share of a margin covers what float64 lost in them: large where they cancel at a
-/// distant eye.
+/// The constants' share of a margin covers what float64 lost in them.
+/// That is much where they cancel at a distant eye.
 #[test]
 fn margins_count_the_constants() {
     let fault = (
@@ -402,9 +403,9 @@ fn margins_count_the_constants() {
     assert_report_red("no constants", &campaign.run(&faulty(&[fault])));
 }
 
-/// Pixels of level 0 come four at a time.
-/// Those beside a rectangle that is narrower are replaced; left in they only cost culls, and taken
-/// in another order they let something through.
+/// Pixels of level 0 are gathered four at a time.
+/// Those outside a narrower rectangle are replaced.
+/// Left in, they only cost culls; taken in another order, they cause false culls.
 #[test]
 fn gathered_pixels_beside_the_rectangle() {
     let run = |faults: &[(&str, &str)]| campaign(faults, Coverage::Area, PLAIN);
@@ -418,7 +419,7 @@ fn gathered_pixels_beside_the_rectangle() {
     assert_red("gather", &[(".wzxy;", ";")]);
 }
 
-/// Where all levels lie in one texture, four texels of a row come at a time.
+/// In an atlas four texels of a row are read at a time.
 #[test]
 fn atlas_texels_beside_the_right_ones() {
     for (what, by) in [
@@ -430,7 +431,7 @@ fn atlas_texels_beside_the_right_ones() {
     }
 }
 
-/// Uploads hold four pixels of a row a texel, of which a rectangle's corner is one.
+/// Uploads hold four pixels of a row per texel, and a rectangle's corner is one of them.
 #[test]
 fn uploaded_pixels_beside_the_right_ones() {
     for (what, by) in [
@@ -441,8 +442,8 @@ fn uploaded_pixels_beside_the_right_ones() {
     }
 }
 
-/// Groups: what is planted in them alone.
-/// (Boxes themselves are left out where a fault would reach them, too.)
+/// Faults in groups only.
+/// Bounds that are boxes are left out where a fault would reach them, too.
 #[test]
 fn groups_that_forget_members_or_shrink() {
     const ALL: &[BoundsKind] = &campaign::KINDS;
@@ -483,7 +484,7 @@ fn groups_that_forget_members_or_shrink() {
     }
 }
 
-/// Verdicts of the members of hidden groups, told when they are read.
+/// Verdicts of the members of hidden groups, which are worked out when they are read.
 #[test]
 fn refined_verdicts() {
     let run = |faults: &[(&str, &str)]| {
@@ -512,18 +513,18 @@ fn refined_verdicts() {
     }
 }
 
-/// Reduction faults, seen by the pyramid itself.
+/// Faults of the reduction, seen in the pyramid itself.
 #[test]
 fn dropped_rows_and_columns() {
     for (what, by) in [
-        // The last row of an odd level; the last columns, where a block reaches past the row's
-        // padding.
+        // The last row of an odd level.
+        // Then the last columns, where a block reaches past the row's padding.
         ("min(2u * y + 1u, level.height - 1u)", "min(2u * y, level.height - 1u)"),
         ("let right = min(8u * x + 4u, last);", "let right = left;"),
         ("vec2<u32>(2u * x + 1u, 2u * y + 1u)", "vec2<u32>(2u * x, 2u * y + 1u)"),
         ("f32(2u * x + 1u)", "f32(min(2u * x + 1u, textureDimensions(source).x - 2u))"),
         ("f32(2u * y + 1u)", "f32(min(2u * y + 1u, textureDimensions(source).y - 2u))"),
-        // Depth whose bits are no depth.
+        // Depth whose bits are no valid depth.
         ("most > ONE_BITS - LEAST_NORMAL_BITS", "most > ONE_BITS"),
         ("greatest == NEGATIVE_ZERO_BITS", "false"),
         ("bits < LEAST_NORMAL_BITS);\n}\n", "false);\n}\n"),
@@ -531,8 +532,8 @@ fn dropped_rows_and_columns() {
         let engine = faulty(&[(what, by)]);
         let mut random = Random(5);
         let (width, height) = (37, 29);
-        // Blocks of one kind here and there, for what is farther than a block's other depths does
-        // not show in it.
+        // Some blocks have one kind of number only.
+        // Elsewhere a number that is nearer than the block's other depths would not show.
         let odd = [-0.0, 1e-40, f32::MIN_POSITIVE];
         let depth: Vec<f32> = (0..width * height)
             .map(|i| if i / 4 % 5 == 0 { odd[(i / 4 % 3) as usize] } else { random.unit() as f32 })

@@ -1,7 +1,7 @@
-//! Every text that a test plants a fault at stands in a shader: in tests that are ignored, in
-//! Python's and in what is written about it, too.
-//! (`Engine::with_planted_faults` panics at a text that is gone, but an ignored test says so only
-//! when somebody runs it.)
+//! Every text at which a test plants a fault occurs in a shader.
+//! This includes ignored tests, Python's tests, and documents about them.
+//! `Engine::with_planted_faults` panics at a text that no longer exists.
+//! An ignored test would report that only when somebody runs it.
 
 use std::collections::HashMap;
 use std::fs;
@@ -36,7 +36,7 @@ fn tokens(source: &str) -> Vec<Token> {
                     }
                     match chars[i + 1] {
                         'n' => text.push('\n'),
-                        // The line goes on where the next one's text begins.
+                        // The text continues on the next line, after its indentation.
                         '\n' => {
                             while chars[i + 2].is_whitespace() {
                                 i += 1;
@@ -56,7 +56,7 @@ fn tokens(source: &str) -> Vec<Token> {
                 }
                 tokens.push(Token::Word(chars[begin..i].iter().collect()));
             }
-            // A quote of its own: the character of a literal would begin a text.
+            // A character literal that is a quote would otherwise begin a text.
             '\'' if chars.get(i + 2) == Some(&'\'') => i += 3,
             c => {
                 if !c.is_whitespace() {
@@ -69,8 +69,9 @@ fn tokens(source: &str) -> Vec<Token> {
     tokens
 }
 
-/// The texts that faults are planted at: the first of two texts, `(what, by)` or `(what, by, ...)`,
-/// that are no call's arguments; `what` may be a name that the same file gives to a text.
+/// The texts at which faults are planted.
+/// A text is the first of two in `(what, by)` or `(what, by, ...)` that are not a call's arguments.
+/// `what` may also be a name that the same file gives to a text.
 fn planted(source: &str) -> Vec<String> {
     use Token::{Sign, Text, Word};
     let tokens = tokens(source);
@@ -187,6 +188,7 @@ fn planted_texts_are_found_as_tests_write_them() {
     let expected =
         ["what", "select(min(a, b))", "a wide text", "what \"more\"\nand on", "inner", "made"];
     assert_eq!(planted(source), expected);
-    let shell = "  HIZVK_PLANTED_FAULT='a - 1u => a - 2u' cargo test\n    \"max(a, b) => min(a, b)\",\nnot this => that";
+    let shell = "  HIZVK_PLANTED_FAULT='a - 1u => a - 2u' cargo test\n    \
+                 \"max(a, b) => min(a, b)\",\nnot this => that";
     assert_eq!(planted_by_variable(shell), ["a - 1u", "max(a, b)"]);
 }

@@ -1,5 +1,5 @@
-//! The depth pyramid, bit for bit against the oracle's, which takes every texel directly from the
-//! image.
+//! The depth pyramid, bit for bit against the oracle's.
+//! The oracle takes every texel directly from the image.
 
 mod common;
 
@@ -13,8 +13,9 @@ use hiz_core::{
     MeshData, OccluderOptions, Outputs, Pyramid, PyramidOptions, StoredLevels, wgpu,
 };
 
-/// Every size class that has broken somebody's reduction: single pixels, rows, columns, odd in one
-/// or both sides, powers of two and their neighbours, primes, common screens.
+/// Every class of size that has broken a reduction.
+/// There are single pixels, rows, columns, and sizes odd in one or both sides.
+/// There are powers of two and their neighbours, primes, and common screens.
 const SIZES: [(u32, u32); 34] = [
     (1, 1),
     (1, 2),
@@ -91,13 +92,14 @@ fn check(
     }
 }
 
-/// SwiftShader's compiler takes more memory than there is for a reduction over several chunks.
-/// Its largest image, 8192 x 8192, needs one.
+/// SwiftShader's compiler runs out of memory on a reduction over several chunks.
+/// Its largest image, 8192 x 8192, needs one chunk.
 fn only_one_chunk() -> bool {
     let swiftshader = engine().adapter().to_string().contains("SwiftShader");
     if swiftshader {
         eprintln!(
-            "skipped: SwiftShader cannot compile a reduction over several chunks, and its images need none"
+            "skipped: SwiftShader cannot compile a reduction over several chunks, \
+             and its images need none"
         );
     }
     swiftshader
@@ -132,7 +134,8 @@ fn check_image(
         assert_eq!(texels.len(), level.texels.len());
         if let Some(i) = differing {
             panic!(
-                "{width}x{height} {convention:?} {asked:?} level {k} texel ({}, {}): device {}, oracle {}",
+                "{width}x{height} {convention:?} {asked:?} level {k} texel ({}, {}): \
+                 device {}, oracle {}",
                 i as u32 % level.width,
                 i as u32 / level.width,
                 texels[i],
@@ -153,8 +156,8 @@ fn every_size_is_bit_exact_in_both_conventions() {
     }
 }
 
-/// All fours of numbers that are special to the bits of a depth: what lies on either side of each
-/// border, and depths between.
+/// All quads of numbers at which the treatment of a depth's bits changes.
+/// They are the numbers on either side of each border, and depths between.
 #[test]
 fn four_of_any_kind_have_the_farthest_of_their_depths() {
     let special = [
@@ -178,7 +181,7 @@ fn four_of_any_kind_have_the_farthest_of_their_depths() {
     let depth: Vec<f32> = (0..side * side)
         .map(|i| {
             let (x, y) = (i % side, i / side);
-            // The pair of a column of quads, and that of a row of them.
+            // The pair of a column of quads, and the pair of a row of them.
             let pair = if y % 2 == 0 { x / 2 } else { y / 2 };
             special[(if x % 2 == 0 { pair % n } else { pair / n }) as usize]
         })
@@ -198,8 +201,10 @@ fn random_small_sizes_are_bit_exact() {
     }
 }
 
-/// Every choice of levels, by both shaders and their seams: up to three levels a pass, one coarse
-/// level by an invocation or a workgroup a texel, and what goes on from there.
+/// Every choice of levels, by both shaders, including the seams between them.
+/// A pass makes up to three levels, or one coarse level.
+/// A coarse level has one invocation or one workgroup per texel.
+/// Further passes continue from there.
 #[test]
 fn chosen_levels_are_bit_exact() {
     let mut random = Random(4);
@@ -245,7 +250,7 @@ fn levels_that_make_no_sense_are_refused() {
     }
 }
 
-/// What the reduction is timed against does the same work: all its levels are ours.
+/// The yardsticks of the reduction do the same work: all their levels are equal to ours.
 #[test]
 fn the_yardsticks_have_the_same_levels() {
     let mut random = Random(6);
@@ -275,7 +280,7 @@ fn the_yardsticks_have_the_same_levels() {
     }
 }
 
-/// A level larger than one binding is split: small chunks stand in for large images.
+/// A level larger than one binding is split; small chunks stand in for large images.
 #[test]
 fn split_pyramids_are_bit_exact() {
     if only_one_chunk() {
@@ -304,8 +309,8 @@ fn split_pyramids_are_bit_exact() {
     }
 }
 
-/// A single far pixel at each border must reach the top: dropped rows and columns show here by
-/// name.
+/// A single far pixel at each border must reach the top.
+/// A dropped row or column is reported by its place here.
 #[test]
 fn no_border_pixel_is_dropped() {
     for (width, height) in [(5, 5), (7, 3), (9, 9), (33, 17), (100, 75)] {
@@ -347,7 +352,7 @@ fn limits_are_named() {
     assert!(error.to_string().contains("pyramid texels: requested"), "{error}");
 }
 
-/// Triangles anywhere before a camera along z.
+/// Random triangles in front of a camera along z.
 fn triangles(random: &mut Random) -> MeshData<'static> {
     let vertices: Vec<f32> = (0..40)
         .flat_map(|_| {
@@ -363,8 +368,8 @@ fn triangles(random: &mut Random) -> MeshData<'static> {
     MeshData { vertices: Floats::F32(vertices.leak()), triangles: indices.leak(), transforms: None }
 }
 
-/// Culls that read all levels from one texture answer as those that read them where they are, for
-/// each kind of depth image, and follow the next reduction.
+/// Culls that read all levels from an atlas give the same results as those that read them in place.
+/// This holds for each kind of depth image, and after the next reduction.
 #[test]
 fn an_atlas_culls_alike_and_follows_the_next_reduction() {
     let mut random = Random(9);
@@ -437,7 +442,7 @@ fn an_atlas_culls_alike_and_follows_the_next_reduction() {
     }
 }
 
-/// A depth image that cannot be copied from is read where it is, and so are chunks.
+/// A depth image that cannot be copied from is read in place, and so are several chunks.
 #[test]
 fn without_an_atlas_culls_go_on() {
     let camera = camera_along_z(64, 64, DepthConvention::Standard);
@@ -484,7 +489,8 @@ fn without_an_atlas_culls_go_on() {
     }
 }
 
-/// What was recorded may never run: neither a dropped copy nor one before its reduction may last.
+/// What was recorded may never run.
+/// A copy that was dropped, or that was made before its reduction, must not be used.
 #[test]
 fn a_copy_that_never_ran_is_made_again() {
     let camera = camera_along_z(32, 24, DepthConvention::Reversed);

@@ -1,5 +1,5 @@
-//! The example renderer: with culling and without, pixel for pixel, in three scenes; and how much
-//! slack a driver's depth needs for that.
+//! The example renderer in three scenes: with culling and without, pixel for pixel.
+//! Also how much slack a driver's depth needs for that.
 
 #[path = "common/cameras.rs"]
 mod cameras;
@@ -24,14 +24,14 @@ use scene::{Body, Scene, Shape, Shot};
 /// A row of 321 pixels is padded where it is copied.
 const SIZES: [(u32, u32); 2] = [(640, 360), (321, 203)];
 
-/// Where float32 knows quarters of a metre, and half metres, only.
+/// Places where the spacing of float32 is a quarter of a metre, and half a metre.
 const FAR_AWAY: Vec3 = [2_345_678.9, 123.4, -3_456_789.1];
 const ON_A_PLANET: Vec3 = [6_371_000.1, -31.7, 1_234.5];
 
-/// Every scene is drawn by this many random cameras.
+/// The number of random cameras for each scene.
 const RANDOM: usize = 104;
 
-/// Those of `make soak`.
+/// The number of them in `make soak`.
 fn soak() -> usize {
     number("HIZVK_SOAK_CAMERAS", 1000)
 }
@@ -42,7 +42,7 @@ fn number<T: std::str::FromStr>(variable: &str, default: T) -> T {
     })
 }
 
-/// One way to cull; a picture has to come out the same with each.
+/// One way to cull; the picture has to be the same with each.
 type Way = (&'static str, fn(CullOptions) -> CullOptions);
 
 const WAYS: [Way; 6] = [
@@ -61,8 +61,8 @@ const WAYS: [Way; 6] = [
         fit: Fit::Volume,
         ..options
     }),
-    // What a rasteriser snaps to sixteenths of a pixel moves by half of one: the guard is four
-    // times that.
+    // A rasteriser that snaps to sixteenths of a pixel moves an edge by half of one.
+    // The guard is four times that.
     ("sample coverage", |options| CullOptions {
         coverage: Coverage::Sample,
         guard_px: Some(0.125),
@@ -96,7 +96,7 @@ fn open(faults: &[(&str, &str)]) -> Renderer {
     renderer
 }
 
-/// What the tests look at: one camera, what it saw of everything, and what it saw with culling.
+/// What the tests look at: one camera, its picture of everything, and its picture with culling.
 struct Seen<'a> {
     scene: &'a Scene,
     shot: &'a Shot,
@@ -110,10 +110,11 @@ impl Seen<'_> {
         self.all.differing_pixels(&self.culled.picture)
     }
 
-    /// Those that the rasteriser does not account for.
-    /// It does where the body that is missing was drawn nearer than its own bounds, by more than
-    /// the slack, or where the depth image was nearer than what the picture without culling shows:
-    /// faces that are seen edge-on take any depth.
+    /// The differing pixels that the rasteriser does not explain.
+    /// It explains a pixel in two cases, because faces that are seen edge-on take any depth:
+    ///
+    /// - the missing body was drawn nearer than its own bounds by more than the slack;
+    /// - the depth image was nearer than the picture without culling.
     fn unaccounted(&self, slack: Slack) -> usize {
         let (camera, all) = (&self.shot.camera, self.all);
         let pixels = all
@@ -183,7 +184,7 @@ fn pictures_with_culling_equal_those_without() {
             assert_eq!(seen.differing(), 0, "{label}");
             assert_eq!(counts.drawn, counts.kept, "{label}");
             assert_eq!(counts.kept + counts.occluded + counts.outside, crowd);
-            // Equal pictures prove nothing where nothing is hidden or nobody is seen.
+            // Equal pictures prove nothing where nothing is hidden or no body is visible.
             assert!(
                 counts.kept < 2 * crowd / 3 && counts.occluded > crowd / 8,
                 "{label}: {counts:?}"
@@ -196,17 +197,18 @@ fn pictures_with_culling_equal_those_without() {
     }
 }
 
-/// Random cameras, each in some ways.
-/// Fails with all cameras whose pictures differ by more than the rasteriser accounts for, and if it
-/// has to account for more than a pixel in a hundred pictures (lavapipe: none; `SwiftShader` draws
-/// a fragment of depth 0 where a face is thinner than the sixteenth of a pixel that it snaps to,
-/// now and then).
+/// Random cameras, each in some of the ways.
+/// Fails with all cameras whose pictures differ by more than the rasteriser explains.
+/// Fails, too, if the rasteriser has to explain more than one pixel in a hundred pictures.
+/// With lavapipe it explains none.
+/// `SwiftShader` snaps to sixteenths of a pixel.
+/// Where a face is thinner than that, it sometimes draws a fragment of depth 0.
 fn random_cameras(number: usize, seed: u64, ways: impl Fn(usize) -> Vec<Way>) {
     let renderer = open(&[]);
     let (mut differing, mut tolerated, mut pictures) = (Vec::new(), 0, 0);
     for (place, (scene, _, origin)) in SCENES.iter().enumerate() {
         let scene = scene(*origin);
-        // How many bodies were there, kept, and hidden.
+        // How many bodies there were, and how many were kept and hidden.
         let (mut total, mut kept, mut occluded) = (0_u64, 0_u64, 0_u64);
         for (i, shot) in random_shots(&scene, number, seed + place as u64).into_iter().enumerate() {
             let shots = [shot];
@@ -232,7 +234,8 @@ fn random_cameras(number: usize, seed: u64, ways: impl Fn(usize) -> Vec<Way>) {
             });
         }
         eprintln!(
-            "{} at {origin:?}: {number} cameras, {total} bodies, {kept} kept, {occluded} occluded, {} outside",
+            "{} at {origin:?}: {number} cameras, {total} bodies, {kept} kept, \
+             {occluded} occluded, {} outside",
             scene.name,
             total - kept - occluded
         );
@@ -251,7 +254,7 @@ fn random_cameras(number: usize, seed: u64, ways: impl Fn(usize) -> Vec<Way>) {
 
 #[test]
 fn so_do_those_of_random_cameras() {
-    // Every kind of camera meets every way.
+    // Every kind of camera is combined with every way.
     random_cameras(RANDOM, 3, |i| vec![WAYS[(i + i / KINDS.len()) % WAYS.len()]]);
 }
 
@@ -283,8 +286,8 @@ fn red(faults: &[(&str, &str)], way: Way) -> Vec<(String, usize)> {
     differing
 }
 
-/// The comparison would see a false cull: the pyramid holds the nearest depth instead of the
-/// farthest.
+/// The comparison would notice a false cull.
+/// With this fault the pyramid holds the nearest depth instead of the farthest.
 #[test]
 fn a_pyramid_upside_down_is_seen() {
     let fault =
@@ -292,7 +295,7 @@ fn a_pyramid_upside_down_is_seen() {
     assert!(red(&[fault], WAYS[0]).len() >= 12);
 }
 
-/// And a single body that the draw forgets: the last of each list.
+/// It notices even a single body that the draw forgets, the last of each list.
 #[test]
 fn a_forgotten_body_is_seen() {
     let fault = (
@@ -308,15 +311,16 @@ fn a_shifted_footprint_is_seen() {
     let faults = [
         (
             "let t = vec4<u32>(first >> vec2<u32>(level), last >> vec2<u32>(level));",
-            "let t = vec4<u32>(min((first >> vec2<u32>(level)) + vec2<u32>(1u, 0u), last >> vec2<u32>(level)), last >> vec2<u32>(level));",
+            "let t = vec4<u32>(min((first >> vec2<u32>(level)) + vec2<u32>(1u, 0u), \
+             last >> vec2<u32>(level)), last >> vec2<u32>(level));",
         ),
         ("return (lo == 0u | surely_after", "return (true | surely_after"),
     ];
     assert!(red(&faults, WAYS[0]).len() >= 12);
 }
 
-/// With neither margin nor slack bodies are hidden by their own depth.
-/// (Without slack alone that takes faces that are seen edge-on: a picture in thousands.)
+/// With neither margin nor slack, bodies are hidden by their own depth.
+/// Without slack alone that needs faces seen edge-on, which is one picture in thousands.
 #[test]
 fn no_margin_and_no_slack_is_seen() {
     let none: Way =
@@ -324,8 +328,8 @@ fn no_margin_and_no_slack_is_seen() {
     assert!(!red(&[("ERROR_ULPS: f32 = 24.0", "ERROR_ULPS: f32 = 0.0")], none).is_empty());
 }
 
-/// The least and greatest depth of a body's bounds in float64; nothing if they cross the near or
-/// far plane.
+/// The least and greatest depth of a body's bounds in float64.
+/// `None` if they cross the near or far plane.
 fn depth_range(body: &Body, camera: &Camera) -> Option<[f64; 2]> {
     let rows = camera.rows();
     let dot = |a: Vec3, b: Vec3| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -352,7 +356,7 @@ fn depth_range(body: &Body, camera: &Camera) -> Option<[f64; 2]> {
         let range = z.map(|z| z / w[0]);
         return (range[0] >= 0.0 && range[1] <= 1.0).then_some(range);
     }
-    // z = slope w + constant for every point: depth is monotonic in w.
+    // z = slope w + constant for every point, so depth is monotonic in w.
     let slope = dot(linear(2), linear(3)) / dot(linear(3), linear(3));
     let constant = rows[2][3] - slope * rows[3][3];
     if w[0] <= 0.0 {
@@ -362,7 +366,7 @@ fn depth_range(body: &Body, camera: &Camera) -> Option<[f64; 2]> {
     (a.min(b) >= 0.0 && a.max(b) <= 1.0).then_some([a.min(b), a.max(b)])
 }
 
-/// How much nearer depth `b` is than `a`: in proportion, or for orthographic cameras absolutely.
+/// How much nearer depth `b` is than `a`: relative, or absolute for orthographic cameras.
 fn nearer(camera: &Camera, a: f64, b: f64) -> f64 {
     match (is_orthographic(camera), camera.convention().is_reversed()) {
         (true, false) => a - b,
@@ -372,7 +376,7 @@ fn nearer(camera: &Camera, a: f64, b: f64) -> f64 {
     }
 }
 
-/// The end of a range of depths that is nearest.
+/// The nearest end of a range of depths.
 fn nearest(camera: &Camera, [least, greatest]: [f64; 2]) -> f64 {
     if camera.convention().is_reversed() { greatest } else { least }
 }
@@ -381,20 +385,21 @@ fn is_orthographic(camera: &Camera) -> bool {
     camera.rows()[3][..3] == [0.0; 3]
 }
 
-/// The worst of a kind of camera.
+/// The greatest errors of a kind of camera.
 #[derive(Debug, Clone, Copy, Default)]
 struct Worst {
-    /// How much nearer than their bounds bodies were.
+    /// How much nearer than their bounds bodies were drawn.
     bodies: f64,
-    /// How much farther than in the prepass what was drawn there was.
+    /// How much farther than in the prepass its occluders were drawn.
     prepass: f64,
-    /// Fragments that were measured, and those of them that were off by more than the slack.
+    /// Fragments that were measured, and those that were off by more than the slack.
     fragments: u64,
     beyond: u64,
 }
 
-/// For perspective (relative) cameras, for those whose eye may lie in a face's plane, and for
-/// orthographic (absolute) ones; standard and reversed depth.
+/// Measures the greatest errors for three kinds of camera, with standard and reversed depth.
+/// They are perspective (relative), those whose eye may be in a face's plane, and orthographic
+/// (absolute).
 fn measure(renderer: &Renderer, number: usize, seed: u64) -> [[Worst; 2]; 3] {
     let mut worst = [[Worst::default(); 2]; 3];
     for (place, make) in SCENES.iter().enumerate() {
@@ -435,14 +440,17 @@ fn measure(renderer: &Renderer, number: usize, seed: u64) -> [[Worst; 2]; 3] {
     worst
 }
 
-/// What [`slack`] has to cover.
-/// A culled body lies behind the prepass exactly; it stays unseen only if its own rasterised depth
-/// comes out no nearer than its bounds, and the walls' no farther than in the prepass, both up to
-/// the slack together.
+/// Checks what [`slack`] has to cover.
+/// A culled body is exactly behind the prepass.
+/// It stays invisible only if two errors together are within the slack:
+///
+/// - its own rasterised depth may be nearer than its bounds;
+/// - the walls' may be farther than in the prepass.
+///
 /// The same keeps a body from being hidden by itself.
 ///
-/// At most `share` of the fragments may be off by more: the nearer to edge-on a face is seen the
-/// more it is off, without a bound.
+/// At most `share` of the fragments may be off by more.
+/// The nearer to edge-on a face is, the larger its error, without a bound.
 fn check_slack(number: usize, seed: u64, share: f64) {
     let renderer = open(&[]);
     let worst = measure(&renderer, number, seed);
@@ -456,18 +464,19 @@ fn check_slack(number: usize, seed: u64, share: f64) {
             let name =
                 ["perspective", "perspective, the eye in a face's plane", "orthographic"][kind];
             eprintln!(
-                "{name}, {convention:?}: bodies {bodies:.2e} nearer than their bounds, {prepass:.2e} farther than in the \
-                 prepass, slack {given:.0e}, beyond it {beyond} of {fragments} fragments"
+                "{name}, {convention:?}: bodies {bodies:.2e} nearer than their bounds, \
+                 {prepass:.2e} farther than in the prepass, slack {given:.0e}, \
+                 beyond it {beyond} of {fragments} fragments"
             );
-            // A face whose plane holds the eye takes any depth: that is printed, and no slack
-            // covers it.
+            // A face whose plane contains the eye takes any depth.
+            // Its error is printed, but no slack covers it.
             enough &= kind == 1 || *beyond as f64 <= share * *fragments as f64;
         }
     }
     assert!(enough, "{worst:?}");
 }
 
-/// [`slack`] of any camera of a kind.
+/// [`slack`] for any camera of a kind.
 fn example_slack(
     renderer: &Renderer,
     orthographic: bool,

@@ -1,5 +1,6 @@
-//! Stored order, groups and updates: the same answers as fresh instances in the caller's order, and
-//! boxes that contain their members.
+//! Stored order, groups and updates.
+//! They give the same results as fresh instances in the caller's order, and boxes contain their
+//! members.
 
 mod common;
 
@@ -18,7 +19,7 @@ const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind:
 const ORDERS: [StoredOrder; 2] = [StoredOrder::Morton, StoredOrder::Given];
 const CONVENTION: DepthConvention = DepthConvention::Reversed;
 
-/// Volumes about the camera's walls, in arrays for every kind.
+/// Bounds near the camera's wall, in arrays for every kind.
 #[derive(Clone, Default)]
 struct Crowd {
     centers: Vec<f64>,
@@ -80,13 +81,13 @@ impl Crowd {
         }
     }
 
-    /// Makes volume `i` none, whatever its kind.
+    /// Makes bounds `i` invalid, whatever their kind.
     fn spoil(&mut self, i: usize) {
         self.centers[3 * i] = f64::NAN;
         self.max[3 * i + 1] = f64::NAN;
     }
 
-    /// Whether volume `i` lies in the box, in exact arithmetic.
+    /// Whether bounds `i` are within the box, in exact arithmetic.
     fn is_within(&self, kind: BoundsKind, i: usize, corners: &[[f64; 3]; 2]) -> bool {
         (0..3).all(|k| {
             let at = |values: &[f64]| Exact::new(values[3 * i + k]);
@@ -111,7 +112,7 @@ impl Crowd {
     }
 }
 
-/// An integer times 2^-2400: every sum of products of two float64 is one.
+/// An integer times 2^-2400, as every sum of products of two float64 is.
 struct Exact(BigInt);
 
 impl Exact {
@@ -147,7 +148,7 @@ fn instances(crowd: &Crowd, kind: BoundsKind, order: StoredOrder) -> Arc<Instanc
     engine().instances(&crowd.bounds(kind), &options).unwrap()
 }
 
-/// A wall that hides the left of what lies behind it.
+/// Culls against a wall that hides the left part of what is behind it.
 fn cull(instances: &Arc<Instances>, order: Order) -> Culling {
     let camera = camera_along_z(64, 64, CONVENTION);
     let depth: Vec<_> =
@@ -157,8 +158,12 @@ fn cull(instances: &Arc<Instances>, order: Order) -> Culling {
     engine().cull(instances, &camera, &pyramid, &options, &Outputs::default()).unwrap()
 }
 
-/// What is wrong with the groups: members missing or twice, a box that does not contain its members
-/// or is larger than `slack` times what it must be, a record that is not the box's.
+/// The first thing that is wrong with the groups:
+///
+/// - a member is missing or occurs twice;
+/// - a box does not contain its members;
+/// - a box is larger than `slack` times the box that it has to be;
+/// - a record is not the box's.
 fn wrong_groups(
     groups: &[GroupWords],
     crowd: &Crowd,
@@ -264,8 +269,9 @@ fn updated_instances_get_the_verdicts_of_fresh_ones() {
             crowd.spoil(3);
             crowd.spoil(500);
             let list = instances(&crowd, kind, order);
-            // Across borders of pieces (384) and groups, one alone, one twice, all, none; bad ones
-            // mended and made.
+            // Updates across borders of pieces (384) and groups.
+            // They are of one instance, one twice, all, and none.
+            // Some invalid bounds are repaired and some are made.
             for (first, n, spoilt) in [
                 (0, 1, None),
                 (999, 1, None),
@@ -303,7 +309,7 @@ fn boxes_of_groups_contain_their_members_exactly() {
     let mut random = Random(13);
     let mut crowd = Crowd::default();
     for i in 0..2000 {
-        // With the rotations' smallness some products vanish in float64.
+        // Together with the small rotations some products vanish in float64.
         let scale = 10.0_f64.powi(i / 64 - 24);
         let mut number = || (random.unit() - 0.5) * scale;
         let center = std::array::from_fn(|_| number() + 1e6 * f64::from(i % 3));
@@ -316,8 +322,8 @@ fn boxes_of_groups_contain_their_members_exactly() {
             let list = instances(&crowd, kind, order);
             let groups = words::groups(&engine(), &list).unwrap();
             assert_eq!(wrong_groups(&groups, &crowd, kind, &[]), None, "{kind:?} {order:?}");
-            // The check can fail: a box that is a few units in the last place smaller, a sphere
-            // without its radius.
+            // The check can fail.
+            // It notices a box that is a few ulps smaller, and a sphere without its radius.
             for k in 0..3 {
                 let mut small = groups.clone();
                 let [min, max] = small[7].corners.as_mut().unwrap();
@@ -339,7 +345,7 @@ fn boxes_of_groups_contain_their_members_exactly() {
     );
 }
 
-/// What the tests above would see if groups were not refitted.
+/// The tests above would notice if groups were not refitted.
 #[test]
 fn boxes_from_before_an_update_are_found_out() {
     let mut random = Random(14);
@@ -352,8 +358,8 @@ fn boxes_from_before_an_update_are_found_out() {
     assert!(wrong_groups(&before, &crowd, BoundsKind::Box, &[]).unwrap().contains("is not within"));
 }
 
-/// A group does not grow along a member's path, and is as tight as a new one once all have been
-/// moved.
+/// A group does not grow along a member's path.
+/// Once all members have moved, it is as tight as a new one.
 #[test]
 fn boxes_forget_where_members_were() {
     let place = |x: f64| {
@@ -397,7 +403,7 @@ impl Crowd {
     }
 }
 
-/// The host's next boxes would be formed for volumes that the device does not have.
+/// Otherwise the host's next boxes would be built for bounds that the device does not have.
 #[test]
 fn after_an_update_that_never_ran_touched_groups_are_never_culled_as_a_whole() {
     let is_no_volume =
@@ -483,10 +489,11 @@ fn updates_that_do_not_fit_are_refused_and_change_nothing() {
     );
     assert_eq!(
         refused(3, bad.bounds(BoundsKind::Sphere)),
-        "bounds: expected finite numbers below 2^60, lengths >= 0 and min <= max, got 2 bad of 10, the first at index 4"
+        "bounds: expected finite numbers below 2^60, lengths >= 0 and min <= max, \
+         got 2 bad of 10, the first at index 4"
     );
     assert_same_as_fresh(&list, &crowd, BoundsKind::Sphere, "after refusals");
-    // And a refusal takes no number.
+    // A refusal takes no update number.
     let moved = Crowd::new(10, &mut random);
     engine().update(&list, 3, &moved.bounds(BoundsKind::Sphere), true).unwrap();
     crowd.replace(3, &moved);

@@ -1,9 +1,9 @@
-//! What wgpu's validation would find wrong in the library's own calls comes back as an error that
-//! names the parameter.
-//! Devices here have wgpu's own error handler, which ends a process: whatever gets there fails the
-//! test.
-//! After each error the same encoder is finished and submitted, and the same device culls as
-//! before.
+//! What wgpu's validation would find wrong in the library's own calls is returned as an error.
+//! That error names the parameter.
+//! Devices here have wgpu's own error handler, which ends the process.
+//! So an error that reaches it fails the test.
+//! After each error the same encoder is finished and submitted.
+//! The same device then culls as before.
 
 mod common;
 
@@ -40,7 +40,8 @@ fn open(
     pollster::block_on(adapter.request_device(&descriptor)).expect("a device")
 }
 
-/// A device and one of everything on it: a wall 4 away, a box before it and one behind.
+/// A device and one of everything on it.
+/// A wall is 4 away, and there is one box in front of it and one behind it.
 struct World {
     device: wgpu::Device,
     queue: wgpu::Queue,
@@ -69,8 +70,8 @@ impl World {
         world
     }
 
-    /// Two devices of one instance.
-    /// (Of two instances wgpu mixes up what lives on them.)
+    /// Two devices of one wgpu instance.
+    /// With two instances wgpu mixes up their objects.
     fn two() -> [Self; 2] {
         let adapter = adapter();
         let open =
@@ -98,7 +99,7 @@ impl World {
         self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
 
-    /// A texture of the image's size, but for what `change` makes of it.
+    /// A texture of the image's size, with what `change` makes different.
     fn texture_but(
         &self,
         format: Format,
@@ -142,7 +143,7 @@ impl World {
         self.context.record_cull(encoder, instances, camera, pyramid, visible, options)
     }
 
-    /// The first bits of a mask, copied behind what is in `encoder`.
+    /// The first bits of a mask, copied after what is already in `encoder`.
     fn mask(&self, mut encoder: wgpu::CommandEncoder, visible: &Visible) -> u32 {
         let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("test.mask"),
@@ -158,7 +159,7 @@ impl World {
         u32::from_le_bytes([view[0], view[1], view[2], view[3]])
     }
 
-    /// Everything still works, in an encoder that was used before.
+    /// Asserts that everything still works, in an encoder that was used before.
     fn works(&self, mut encoder: wgpu::CommandEncoder, what: &str) {
         let wall = self.wall(&mut encoder);
         let pyramid =
@@ -173,7 +174,7 @@ impl World {
     }
 }
 
-/// The driver is done with everything before the device goes.
+/// The driver has to finish everything before the device is dropped.
 impl Drop for World {
     fn drop(&mut self) {
         drop(self.device.poll(wgpu::PollType::wait_indefinitely()));
@@ -184,7 +185,8 @@ fn plain(texture: &wgpu::Texture) -> wgpu::TextureView {
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
-/// A case: what is done, and how the error begins; nothing where it works.
+/// A case: its name, how the error begins, and what is done.
+/// The error is empty where the call works.
 type Case<'a> = (&'a str, &'a str, Box<dyn Fn(&mut wgpu::CommandEncoder) -> Result<()> + 'a>);
 
 fn run(world: &World, cases: &[Case<'_>]) {
@@ -386,7 +388,8 @@ fn targets_that_cannot_be_drawn_into_are_refused_by_name() {
     let destroyed = world.texture(depth, usage);
     let of_destroyed = plain(&destroyed);
     destroyed.destroy();
-    let gone = "target: expected a view of one layer of a texture of this device that has not been destroyed";
+    let gone = "target: expected a view of one layer of a texture of this device \
+                that has not been destroyed";
     run(
         &world,
         &[
@@ -444,7 +447,8 @@ fn targets_that_cannot_be_drawn_into_are_refused_by_name() {
     );
 }
 
-/// A world with its wall reduced, by an atlas or not, and culled once, so that bindings are kept.
+/// A world whose wall is reduced, with or without an atlas, and culled once.
+/// So its pyramid keeps bindings.
 fn culled(mut world: World, atlas: AtlasUse) -> (World, wgpu::Texture) {
     let options = PyramidOptions { atlas, ..PyramidOptions::default() };
     world.pyramid = world.context.create_pyramid(world.camera.size(), &options).unwrap();
@@ -694,7 +698,8 @@ fn what_cannot_be_made_is_refused_by_name() {
             ),
             (
                 "a first instance",
-                "first_instance: expected 0 on a device without the feature INDIRECT_FIRST_INSTANCE, got 7",
+                "first_instance: expected 0 on a device without the feature \
+                 INDIRECT_FIRST_INSTANCE, got 7",
                 visible(&world.instances, first),
             ),
             (
@@ -730,7 +735,7 @@ fn what_cannot_be_made_is_refused_by_name() {
             ),
         ],
     );
-    // With the feature it is taken.
+    // With the feature it is accepted.
     let features = wgpu::Features::INDIRECT_FIRST_INSTANCE;
     let world = World::on(open(&adapter(), features, &HizContext::required_limits()));
     world
@@ -771,7 +776,7 @@ fn nothing_at_all_is_drawn_reduced_and_culled() {
     assert_eq!(world.mask(encoder, &world.visible), 0);
 }
 
-/// A device that is lost: nothing panics, whatever comes back.
+/// When a device is lost nothing panics, whatever is returned.
 #[test]
 fn a_lost_device_ends_nothing() {
     let (world, wall) = culled(World::new(), AtlasUse::Never);
@@ -790,15 +795,15 @@ fn a_lost_device_ends_nothing() {
         HizContext::new(&world.device).map(drop),
     ];
     for (i, outcome) in outcomes.into_iter().enumerate() {
-        // Some cannot tell; what needs memory that is mapped does.
+        // Some calls cannot notice the loss; those that need mapped memory do.
         assert!(outcome.is_ok() || matches!(outcome, Err(Error::Device(_))), "{i}: {outcome:?}");
     }
     drop(encoder.finish());
 }
 
-/// wgpu tells of an encoder of another device where that is finished, and of one with an open pass
-/// at once or there.
-/// Nothing panics here, and the devices can be used on.
+/// wgpu reports an encoder of another device when it is finished.
+/// An encoder with an open pass is reported at once or when it is finished.
+/// Nothing panics here, and the devices can still be used.
 #[test]
 fn encoders_that_cannot_be_used_are_told_of() {
     let [world, other] = World::two();
@@ -829,7 +834,7 @@ fn encoders_that_cannot_be_used_are_told_of() {
         let pass =
             encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()).forget_lifetime();
         let outcome = act(&mut encoder);
-        // Where copies come first wgpu tells later.
+        // Where copies are recorded first, wgpu reports it later.
         if [0, 2, 3].contains(&i) {
             let text = outcome.unwrap_err().to_string();
             assert!(
@@ -846,8 +851,8 @@ fn encoders_that_cannot_be_used_are_told_of() {
     other.works(other.encoder(), "the other one");
 }
 
-/// The least of each limit that the shaders need, counted by hand from `gpu/layouts.rs` and
-/// `shaders/`.
+/// The least of each limit that the shaders need.
+/// They are counted by hand from `gpu/layouts.rs` and `shaders/`.
 fn least() -> wgpu::Limits {
     wgpu::Limits {
         max_texture_dimension_2d: 4096,
@@ -872,7 +877,7 @@ fn least() -> wgpu::Limits {
         max_compute_workgroup_size_y: 1,
         max_compute_workgroup_size_z: 1,
         max_compute_workgroups_per_dimension: 65_535,
-        // What nothing here needs.
+        // Limits that nothing here needs.
         max_texture_dimension_1d: 1,
         max_texture_dimension_3d: 1,
         max_texture_array_layers: 1,
@@ -930,7 +935,7 @@ fn devices_with_less_than_the_shaders_need_are_refused() {
     }
 }
 
-/// Everything that there is runs on a device that has just what is asked for.
+/// Everything runs on a device with only the required limits.
 #[test]
 fn the_least_limits_are_enough_for_everything() {
     let world = World::on(open(&adapter(), wgpu::Features::empty(), &least()));
@@ -994,7 +999,7 @@ fn the_least_limits_are_enough_for_everything() {
         }
         world.works(encoder, &format!("{format:?} {kind:?}"));
     }
-    // Past them there are errors by name.
+    // Beyond these limits there are named errors.
     let many = vec![0.0_f32; 3 * 3000];
     let mesh = MeshData { vertices: Floats::F32(&many), triangles: &[0, 1, 2], transforms: None };
     let error = context.create_occluders(&[mesh], &OccluderOptions::default()).unwrap_err();
@@ -1004,11 +1009,11 @@ fn the_least_limits_are_enough_for_everything() {
     assert!(error.to_string().starts_with("pyramid texels: requested"), "{error}");
 }
 
-/// An update of more records than a storage binding holds goes in bands: the device answers for all
-/// of them.
+/// An update of more records than a storage binding holds is split into bands.
+/// The device has the results of all of them.
 #[test]
 fn an_update_larger_than_a_binding_reaches_every_instance() {
-    // 256 spheres of 32 bytes a band.
+    // 256 spheres of 32 bytes per band.
     let world = World::on(open(&adapter(), wgpu::Features::empty(), &least()));
     let context = &world.context;
     let count = 1000;
@@ -1026,7 +1031,7 @@ fn an_update_larger_than_a_binding_reaches_every_instance() {
         let before = Bounds::Spheres { centers: Floats::F32(&far), radii: Floats::F32(&radii) };
         let options = InstanceOptions { order, ..InstanceOptions::default() };
         let instances = context.record_instances(&mut encoder, &before, &options).unwrap();
-        // All but the first 40 and the last 40 come before the wall.
+        // All but the first 40 and the last 40 move in front of the wall.
         let range = 40..count - 40;
         let after = Bounds::Spheres {
             centers: Floats::F32(&near[3 * range.start..3 * range.end]),

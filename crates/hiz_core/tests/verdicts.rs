@@ -1,5 +1,5 @@
-//! What a verdict says: the same with groups and without, whenever it is read, and explained by
-//! what was read for it.
+//! A verdict is the same with groups and without, and whenever it is read.
+//! It is explained by the texels that were read for it.
 
 mod common;
 
@@ -20,9 +20,8 @@ const OCCLUDED: Verdict = Verdict::Occluded;
 const VISIBLE: Verdict = Verdict::Visible;
 const SIDE: u32 = 64;
 
-/// Volumes behind the wall at depth 4, a good part of them beside what the camera sees: |x| and |y|
-/// up to z.
-/// In arrays of any kind; the volume of each holds the sphere about its centre.
+/// Bounds behind the wall at depth 4, many of them outside the view, which is |x| and |y| up to z.
+/// There are arrays of every kind; each contains the sphere about its centre.
 struct Crowd {
     centers: Vec<f64>,
     radii: Vec<f64>,
@@ -65,8 +64,9 @@ impl Crowd {
         }
     }
 
-    /// How far the sphere within volume `i` and the box around it stay from the sides of the view,
-    /// x = +-z and y = +-z: negative inside.
+    /// The distances of two shapes from the sides of the view, x = +-z and y = +-z.
+    /// Negative inside.
+    /// The shapes are the sphere within bounds `i` and the box around them.
     /// Worked out by hand, as a distance times the square root of 2.
     fn beside(&self, i: usize) -> [f64; 2] {
         let [x, y, z] = [0, 1, 2].map(|k| self.centers[3 * i + k]);
@@ -76,12 +76,12 @@ impl Crowd {
 }
 
 fn upload(engine: &Engine, crowd: &Crowd, kind: BoundsKind) -> Arc<Instances> {
-    // Two pieces and a bit.
+    // Two pieces and a part of a third.
     let options = InstanceOptions { piece_capacity: Some(1024), ..InstanceOptions::default() };
     engine.instances(&crowd.bounds(kind), &options).unwrap()
 }
 
-/// A wall at depth 4; with a hole, if that is asked for.
+/// A wall at depth 4, with a hole if asked for.
 fn wall(engine: &Engine, camera: &Camera, hole: bool, atlas: AtlasUse) -> Arc<Pyramid> {
     let convention = camera.convention();
     let is_hole = |i: u32| hole && (20..30).contains(&(i % SIDE)) && (40..43).contains(&(i / SIDE));
@@ -108,7 +108,8 @@ fn counted(verdicts: &[Verdict], culling: &Culling) -> bool {
         && counts.tested == verdicts.len() as u64
 }
 
-/// Verdicts and counts do not depend on the hierarchy, and what is outside is so by hand.
+/// Verdicts and counts do not depend on the hierarchy.
+/// What is outside is checked by hand.
 #[test]
 fn verdicts_are_the_same_with_groups_and_without() {
     let crowd = Crowd::new(2500, 5);
@@ -126,7 +127,7 @@ fn verdicts_are_the_same_with_groups_and_without() {
                     cull(&engine(), (&instances, &camera, &pyramid), &options)
                 };
                 let (flat, grouped) = (with(Hierarchy::Never), with(Hierarchy::Always));
-                // One reads the counts first, the other the verdicts.
+                // One cull reads the counts first, the other the verdicts.
                 let counts = grouped.counts().unwrap();
                 assert!(
                     counts.tested_instances < counts.tested / 2,
@@ -170,8 +171,8 @@ fn verdicts_are_the_same_with_groups_and_without() {
     assert!(refined > 20, "members outside of groups that are hidden by depth: {refined}");
 }
 
-/// An update in between does not change what a cull found, on whatever way it comes, and whatever
-/// was read before.
+/// An update in between does not change the results of an earlier cull.
+/// That holds for every kind of update, and whatever was read before.
 #[test]
 fn verdicts_are_those_of_the_bounds_that_were_culled() {
     let (before, after) = (Crowd::new(2500, 7), Crowd::new(2500, 8));
@@ -195,8 +196,8 @@ fn verdicts_are_those_of_the_bounds_that_were_culled() {
                 engine().device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
             };
             let (mut kept, mut dropped) = (encoder(), encoder());
-            // One that is recorded and submitted, after the refinement of a cull was recorded that
-            // never ran.
+            // The first update is submitted after a second one was recorded and dropped.
+            // With the second, the refinement of a cull never runs.
             engine().context().record_update(&mut kept, instances, 0, &bounds, true).unwrap();
             drop(engine().context().record_update(&mut dropped, instances, 0, &bounds, true));
             engine().queue().submit([kept.finish()]);
@@ -225,7 +226,7 @@ fn verdicts_are_those_of_the_bounds_that_were_culled() {
     }
 }
 
-/// Only what was updated is stale, and of a group that has a member that was.
+/// Stale are only the updated instances, and groups that have an updated member.
 #[test]
 fn explanations_of_updated_instances_are_stale() {
     let crowd = Crowd::new(640, 9);
@@ -251,7 +252,7 @@ fn explanations_of_updated_instances_are_stale() {
     assert!((0..640).all(|i| i == 77 || again[i].verdict == told[i].verdict));
 }
 
-/// Counts down where a thread ends, in a panic as well.
+/// Counts down when a thread ends, also after a panic.
 struct Done<'a>(&'a AtomicUsize);
 
 impl Drop for Done<'_> {
@@ -260,7 +261,7 @@ impl Drop for Done<'_> {
     }
 }
 
-/// Culls, reads and updates on threads: each answer is that of one state of the instances.
+/// Culls, reads and updates on threads: each result belongs to one state of the instances.
 #[test]
 fn verdicts_on_threads() {
     let states = [Crowd::new(700, 21), Crowd::new(700, 22)];
@@ -297,15 +298,15 @@ fn verdicts_on_threads() {
         scope.spawn(|| {
             for k in (1..).take_while(|_| running.load(Ordering::Relaxed) > 0) {
                 engine().update(&instances, 0, &states[k % 2].bounds(kind), true).unwrap();
-                // Otherwise a slow driver's queue fills with updates, and each cull waits for all
-                // of them.
+                // Otherwise a slow driver's queue fills with updates.
+                // Each cull would wait for all of them.
                 engine().wait().unwrap();
             }
         });
     });
 }
 
-/// What one cull of one instance read, by its own count.
+/// A cull of one instance, and how many texels it read by its own count.
 fn texels_counted(
     engine: &Engine,
     camera: &Camera,
@@ -320,8 +321,8 @@ fn texels_counted(
     (culling, counts.texels_read)
 }
 
-/// Every texel that a test reads is told, with the depth that the level has there, and `farthest`
-/// agrees with the verdict.
+/// Every texel that a test reads is listed with the depth that its level has there.
+/// `farthest` agrees with the verdict.
 #[test]
 fn explain_tells_what_was_read() {
     let mut random = Random(31);
@@ -370,7 +371,7 @@ fn explain_tells_what_was_read() {
                 }
                 let is_descent = told.texels_read as usize > footprint_of(&told).len();
                 if told.verdict == VISIBLE && is_descent && descent > 0 {
-                    // At a texel that decides no budget helps, and where a budget ended one does.
+                    // If a texel decided, no budget helps; if the budget ended, a larger one does.
                     let deeper = CullOptions { descent: 65_536, ..options.clone() };
                     let (deeper, more) =
                         texels_counted(&engine(), &camera, &pyramid, &bounds, &deeper);
@@ -412,7 +413,7 @@ fn assert_told(told: &Explanation, levels: &[Vec<f32>], what: &str) {
         assert_eq!(levels[*level as usize][(y * width + x) as usize], *depth, "{what}");
     }
     let Some(level) = told.level else { return };
-    // The footprint comes first.
+    // The footprint is listed first.
     let footprint = footprint_of(told);
     assert_eq!(told.texels[..footprint.len()], footprint, "{what}");
     assert!(told.texel_levels[..footprint.len()].iter().all(|l| *l == level), "{what}");
@@ -427,7 +428,7 @@ fn assert_told(told: &Explanation, levels: &[Vec<f32>], what: &str) {
     }
 }
 
-/// A depth that hides is nearer than the bounds' nearest one, a depth that does not is not.
+/// A depth that hides is nearer than the bounds' nearest one; a depth that does not hide is not.
 fn assert_farthest(told: &Explanation, convention: DepthConvention, what: &str) {
     let (Some(farthest), Some(nearest)) = (told.farthest.map(f64::from), told.nearest) else {
         return;
@@ -445,13 +446,14 @@ fn assert_farthest(told: &Explanation, convention: DepthConvention, what: &str) 
     assert!((nearest_z / z(nearest) - 1.0).abs() < 1e-4, "{what}");
 }
 
-/// A descent reads more than is listed: the rest is counted, and what is told of it agrees with the
-/// verdict.
+/// A descent reads more texels than are listed.
+/// The rest is counted, and `farthest` agrees with the verdict.
 #[test]
 fn what_is_not_listed_is_counted() {
     let convention = DepthConvention::Reversed;
     let camera = camera_along_z(512, 512, convention);
-    // One pixel in four is a dent that a box behind the wall does not show in; the last one does.
+    // One pixel in four is a dent that is too shallow for a box behind the wall to show.
+    // The last pixel is deep enough.
     let mut depth: Vec<_> = (0..512 * 512)
         .map(|i| ndc(if i % 2 == 0 && i / 512 % 2 == 0 { 6.0 } else { 4.0 }, convention))
         .collect();
@@ -459,8 +461,8 @@ fn what_is_not_listed_is_counted() {
         Bounds::Boxes { min: Floats::F64(&[-7.0, -7.0, 8.0]), max: Floats::F64(&[7.0, 7.0, 9.0]) };
     let options = CullOptions { descent: 65_536, ..CullOptions::default() };
     for (far, verdict) in [(None, OCCLUDED), (Some(511 - 40), VISIBLE)] {
-        // At depth 8 the box spans pixels 32 to 479: below, a pixel of the last rows.
-        // And the dents hide a box at depth 8.
+        // At depth 8 the box spans pixels 32 to 479, and the far pixel is in one of its last rows.
+        // The dents hide a box at depth 8.
         if let Some(row) = far {
             depth[row * 512 + 470] = ndc(50.0, convention);
         }
@@ -477,7 +479,8 @@ fn what_is_not_listed_is_counted() {
     }
 }
 
-/// What groups read is counted: of a group that is hidden as a whole it is all that is read.
+/// The texels that groups read are counted.
+/// For a group that is hidden as a whole, nothing else is read.
 #[test]
 fn the_reads_of_groups_are_counted() {
     let centers: Vec<f64> = (0..64).flat_map(|i| [0.01 * f64::from(i), 0.0, 8.0]).collect();
@@ -513,7 +516,8 @@ fn the_reads_of_groups_are_counted() {
     }
 }
 
-/// Compiling is no part of what a cull takes, and the second cull of a kind compiles nothing.
+/// Compile time is not part of a cull's time.
+/// The second cull of a kind compiles nothing.
 #[test]
 fn compiling_is_told_apart() {
     let engine = &Engine::new(None).unwrap();
@@ -525,7 +529,7 @@ fn compiling_is_told_apart() {
         let options = CullOptions { hierarchy, ..CullOptions::default() };
         let [first, second] =
             [0, 1].map(|_| cull(engine, (&instances, &camera, &pyramid), &options));
-        // What the driver compiled with did not cull: the answers are the same.
+        // The work that the driver compiled with culled nothing, so the results are the same.
         assert_eq!(first.verdicts().unwrap(), second.verdicts().unwrap());
         assert_eq!(first.indices().unwrap(), second.indices().unwrap());
         let (first, second) = (first.timings(), second.timings());
@@ -535,7 +539,8 @@ fn compiling_is_told_apart() {
             "{first:?}"
         );
         assert!(second.compile_ms == 0.0, "{second:?}");
-        // It ends when the device is seen to be done, whoever asks and whenever the answer is read.
+        // The time ends when the device is seen to be done.
+        // It does not matter who asks, and when the result is read.
         let third = cull(engine, (&instances, &camera, &pyramid), &options);
         engine.wait().unwrap();
         let seen = third.timings().wall_ms;

@@ -1,6 +1,6 @@
-//! The campaign against the exact oracle where images are wide (columns past 512, up to the sizes
-//! of screens) and where the stored levels are cut into two and three chunks; and cheap twins of
-//! what only twenty million instances showed.
+//! The campaign against the exact oracle on wide images, and on stored levels in several chunks.
+//! Wide images have columns past 512, up to the sizes of screens; there are two and three chunks.
+//! Also cheap counterparts of faults that otherwise show only with twenty million instances.
 
 mod common;
 
@@ -26,7 +26,7 @@ const IN_IMAGES: &[Class] = &[
     Class::InfiniteReversed,
 ];
 
-/// SwiftShader's compiler takes more memory than there is for a reduction over several chunks.
+/// SwiftShader's compiler runs out of memory on a reduction over several chunks.
 fn has_chunks() -> bool {
     !engine().adapter().to_string().contains("SwiftShader")
 }
@@ -69,7 +69,7 @@ fn culls_of_split_pyramids_give_no_false_cull() {
     for chunks in [2, 3] {
         let total = split(&engine(), chunks, 3);
         eprintln!("{chunks} chunks: {total:?}");
-        // The same rounds: whatever chunk a level lies in, its texels are the same.
+        // The rounds are the same: whatever chunk holds a level, its texels are the same.
         assert!(
             total == whole && total.false_culls == 0 && total.culled > total.cases / 10,
             "{total:?} {whole:?}"
@@ -88,14 +88,18 @@ fn culls_of_split_pyramids_give_no_false_cull() {
     }
 }
 
-/// More instances than a row of the survivors' list has groups (4096 of 64), than the scan's
-/// invocations have words (256 of 32), and than a row of records has places; pieces that begin past
-/// 2^16.
-/// What is kept is known one by one, and nothing is kept beside it.
+/// Culls a crowd that exceeds several sizes:
+///
+/// - more groups than a row of the survivors' list has (4096 of 64);
+/// - more words than the scan's invocations have (256 of 32);
+/// - more places than a row of records has;
+/// - pieces that begin past 2^16.
+///
+/// Checks that exactly the instances known to be visible are kept.
 fn crowd(engine: &Engine, piece: Option<u32>, hierarchy: Hierarchy, order: Order) -> bool {
     let count: usize = 300_000;
     let mut random = Random(6);
-    // One in sixteen before the wall, so that nearly every group survives.
+    // One in sixteen is in front of the wall, so that nearly every group survives.
     let kept: Vec<bool> = (0..count).map(|_| random.below(16) == 0).collect();
     let centers: Vec<f32> =
         kept.iter().flat_map(|kept| [0.0, 0.0, if *kept { 2.0 } else { 8.0 }]).collect();
@@ -139,12 +143,12 @@ fn three_hundred_thousand_instances() {
     }
 }
 
-/// What only many instances show.
+/// Faults that only many instances show.
 #[test]
 fn faults_of_many_instances_are_seen() {
     for (what, by) in [
-        // Rows of records; of the survivors' list; shares of the scan; places in the mask; groups
-        // of a workgroup.
+        // Rows of records; rows of the survivors' list; shares of the scan; places in the mask.
+        // Then groups of a workgroup.
         ("i >> RECORDS_PER_ROW_LOG2)", "(i >> RECORDS_PER_ROW_LOG2) % 256u)"),
         ("slot >> SURVIVORS_PER_ROW_LOG2)", "0u)"),
         ("(piece.words + LANES - 1u) / LANES", "piece.words / LANES"),

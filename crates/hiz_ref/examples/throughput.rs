@@ -1,5 +1,5 @@
-//! How many verdicts a second one core gives: `cargo run --release -p hiz_ref --example
-//! throughput`.
+//! How many verdicts per second one core gives.
+//! Run it with `cargo run --release -p hiz_ref --example throughput`.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -44,8 +44,9 @@ fn main() {
             let [visible, occluded, outside, undecided] = counts;
             let [escalate, float] = spent.map(|time| time.as_secs_f64() * 1e6 / cases as f64);
             println!(
-                "{width}x{height} {coverage:?}: {cases} cases, {visible} visible, {occluded} occluded, {outside} outside; \
-                 {escalate:.1} us each; float64 alone {float:.1} us and {undecided} undecided"
+                "{width}x{height} {coverage:?}: {cases} cases, {visible} visible, \
+                 {occluded} occluded, {outside} outside; {escalate:.1} us each; \
+                 float64 alone {float:.1} us and {undecided} undecided"
             );
         }
     }

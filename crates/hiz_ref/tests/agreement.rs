@@ -1,5 +1,5 @@
-//! Float64 with error bounds, float64 with exact escalation, and exact arithmetic throughout give
-//! the same answers.
+//! Three kinds of arithmetic give the same answers.
+//! They are float64 with error bounds, float64 with exact escalation, and exact throughout.
 
 mod common;
 
@@ -57,7 +57,7 @@ fn all_arithmetics_agree_on_scenes() {
     assert!(undecided < 2 * CASES / 50, "float64 leaves {undecided} open");
 }
 
-/// The search with its shortcuts against the definition: pixel by pixel, nothing left out.
+/// The search with its shortcuts against the definition, pixel by pixel with nothing left out.
 #[test]
 fn the_search_agrees_with_the_definition() {
     let mut random = Random(3);

@@ -1,5 +1,6 @@
-//! Proxies in meshes and meshes in bounds: cases by hand, and random ones whose truth comes from
-//! cutting triangles at boxes in ordinary fractions.
+//! Proxies in meshes and meshes in bounds.
+//! There are cases by hand, and random ones.
+//! The truth of the latter comes from cutting triangles at boxes in ordinary fractions.
 
 use hiz_ref::{MeshError, TriangleMesh, Volume, check_bounds, check_proxy, contains};
 use num_rational::BigRational;
@@ -67,12 +68,12 @@ fn boxes_in_boxes() {
     assert!((0.5e-9..=1.1e-9).contains(&found.distance), "{}", found.distance);
     assert!(found.witnesses.iter().all(|p| p[2] >= 1.0));
     assert!(!is_inside(&box_mesh([2.0; 3], [3.0; 3]), &mesh), "beside it");
-    // The least that float64 can stick out.
+    // The least distance that float64 can stick out.
     assert!(!is_inside(&box_mesh([0.5; 3], [1.0_f64.next_up(); 3]), &mesh));
 }
 
-/// A block with a notch from above: a bridge over it has its vertices inside and its middle in the
-/// open.
+/// A block with a notch from above, and a bridge over the notch.
+/// The bridge's vertices are inside the block and its middle is outside.
 #[test]
 fn a_bridge_over_a_notch_is_outside_with_all_its_vertices_inside() {
     let mut mesh = Mesh::default();
@@ -84,11 +85,11 @@ fn a_bridge_over_a_notch_is_outside_with_all_its_vertices_inside() {
     assert_eq!((found.triangles.as_slice(), found.vertices.len()), (&[0][..], 0));
     assert!((1.0..=2.0).contains(&found.witnesses[0][0]));
     assert!(is_inside(&triangle([[0.5, 0.25, 0.75], [2.5, 0.25, 0.75], [2.5, 0.75, 0.75]]), &mesh));
-    // On the floor of the notch: touching it.
+    // On the floor of the notch, and touching it.
     assert!(is_inside(&triangle([[0.5, 0.25, 1.0], [2.5, 0.25, 1.0], [2.5, 0.75, 1.0]]), &mesh));
 }
 
-/// The block's corner touches the triangle in the very point that would have been looked at.
+/// The block's corner touches the triangle in the very point that would otherwise be tested.
 #[test]
 fn a_triangle_that_a_corner_touches_is_outside() {
     let mesh = box_mesh([0.0, 3.0, 1.0], [2.0, 4.0, 2.0]);
@@ -119,7 +120,7 @@ fn meshes_without_an_inside_are_refused() {
         check_proxy(&proxy.borrowed(), &inconsistent.borrowed()).unwrap_err(),
         MeshError::Open { edges: 3, .. }
     ));
-    // The proxy may be open, and what has no area does not count.
+    // The proxy may be open, and a triangle without area does not count.
     let closed = box_mesh([0.0; 3], [1.0; 3]);
     assert!(is_inside(&proxy, &closed));
     assert!(is_inside(&triangle([[5.0; 3], [6.0; 3], [7.0; 3]]), &closed));
@@ -142,7 +143,7 @@ fn q(x: f64) -> Q {
     Q::from_float(x).expect("finite")
 }
 
-/// What of a convex polygon lies where `sign * (p[axis] - at) >= 0`.
+/// The part of a convex polygon where `sign * (p[axis] - at) >= 0`.
 fn clipped(polygon: &Polygon, axis: usize, at: f64, sign: i32) -> Polygon {
     let height = |p: &[Q; 3]| (p[axis].clone() - q(at)) * q(f64::from(sign));
     let mut out = Polygon::new();
@@ -173,8 +174,8 @@ fn has_area(polygon: &Polygon) -> bool {
     })
 }
 
-/// Whether closed boxes together cover a triangle: cut each box out and see whether any area is
-/// left.
+/// Whether closed boxes together cover a triangle.
+/// Cuts each box out and looks whether any area is left.
 fn covered(corners: [Vec3; 3], boxes: &[(Vec3, Vec3)]) -> bool {
     let mut left: Vec<Polygon> = vec![corners.iter().map(|p| p.map(q)).collect()];
     for (low, high) in boxes {
@@ -183,8 +184,8 @@ fn covered(corners: [Vec3; 3], boxes: &[(Vec3, Vec3)]) -> bool {
             for axis in 0..3 {
                 for (at, inner) in [(low[axis], 1), (high[axis], -1)] {
                     let outer = clipped(&polygon, axis, at, -inner);
-                    // A polygon on the border is cut to itself on both sides, and belongs to the
-                    // closed box.
+                    // A polygon on the border is cut to itself on both sides.
+                    // It belongs to the closed box.
                     let beyond = |p: &[Q; 3]| p[axis] != q(at);
                     if has_area(&outer) && outer.iter().any(beyond) {
                         still.push(outer);
@@ -207,7 +208,7 @@ fn some_box() -> impl Strategy<Value = (Vec3, Vec3)> {
         .prop_map(|(low, size)| (low, std::array::from_fn(|k| low[k] + f64::from(size[k]))))
 }
 
-/// Sheared, so that planes are slanted; in whole numbers, so that nothing rounds.
+/// Shears a point, so that planes are slanted; in whole numbers, so that nothing rounds.
 fn sheared(p: Vec3, shear: [i32; 4]) -> Vec3 {
     let [a, b, c, d] = shear.map(f64::from);
     let [x, y, z] = p;
@@ -224,7 +225,8 @@ fn straightened([x, y, z]: Vec3, shear: [i32; 4]) -> Vec3 {
     [x - a * y - b * z, y, z]
 }
 
-/// Spheres of many triangles: their numbers are as crooked as real ones, and some nearly cancel.
+/// Spheres of many triangles, whose coordinates are as irregular as real ones.
+/// Some of them nearly cancel.
 #[test]
 fn witnesses_of_crooked_meshes_are_outside() {
     let sphere = |rings: u32| {
@@ -269,7 +271,7 @@ fn witnesses_of_crooked_meshes_are_outside() {
     let proxy = Mesh { triangles: crooked.collect(), vertices: coarse.vertices.clone() };
     let found = check_proxy(&proxy.borrowed(), &fine.borrowed()).unwrap();
     assert!(found.triangles.len() > 10 && found.triangles.len() == proxy.triangles.len());
-    // A chord of 1.8 degrees lies 0.00012 below its arc, and each way counts.
+    // A chord of 1.8 degrees is 0.00012 below its arc, and that counts in both directions.
     for witness in &found.witnesses {
         let radius = witness.iter().map(|x| x * x).sum::<f64>().sqrt();
         assert!(radius > 0.9997, "{witness:?}");
@@ -300,9 +302,11 @@ proptest! {
             *v = sheared(*v, shear);
         }
         let mesh = if flip { mesh.flipped() } else { mesh };
-        // Some that are likely to be inside: between the corners of a box.
+        // Some triangles that are likely to be inside: between the corners of a box.
         let (low, high) = boxes[0];
-        let within = |p: Vec3| -> Vec3 { std::array::from_fn(|k| low[k] + (high[k] - low[k]) * p[k].min(4.0) / 4.0) };
+        let within = |p: Vec3| -> Vec3 {
+            std::array::from_fn(|k| low[k] + (high[k] - low[k]) * p[k].min(4.0) / 4.0)
+        };
         for corners in proxies.iter().copied().chain(proxies.iter().map(|t| t.map(within))) {
             let proxy = triangle(corners.map(|p| sheared(p, shear)));
             let found = check_proxy(&proxy.borrowed(), &mesh.borrowed()).unwrap();
@@ -310,14 +314,21 @@ proptest! {
             prop_assert_eq!(found.triangles.is_empty(), inside, "{:?} in {:?}", corners, boxes);
             for witness in found.witnesses {
                 let p = straightened(witness, shear);
-                let deep = |(low, high): &(Vec3, Vec3)| (0..3).all(|k| low[k] + 1e-9 < p[k] && p[k] < high[k] - 1e-9);
-                prop_assert!(!boxes.iter().any(deep), "{:?} is no witness for {:?} in {:?}", p, corners, boxes);
+                let deep = |(low, high): &(Vec3, Vec3)|
+                    (0..3).all(|k| low[k] + 1e-9 < p[k] && p[k] < high[k] - 1e-9);
+                prop_assert!(
+                    !boxes.iter().any(deep),
+                    "{:?} is no witness for {:?} in {:?}",
+                    p,
+                    corners,
+                    boxes
+                );
             }
         }
     }
 
-    /// Points made of half axes lie in an oriented box, solid or flat; beyond its farthest point in
-    /// some direction they do not.
+    /// Points made of half axes are in an oriented box, solid or flat.
+    /// Points beyond its farthest point in some direction are not.
     #[test]
     fn oriented_boxes_contain_their_points_and_no_others(
         center in [-9_i32..9, -9..9, -9..9],
@@ -331,13 +342,15 @@ proptest! {
         let half_sizes = half_sizes.map(f64::from);
         let volume = Volume::OrientedBox { center, half_sizes, axes };
         let at = |u: Vec3| -> Vec3 {
-            std::array::from_fn(|i| center[i] + (0..3).map(|k| axes[i][k] * half_sizes[k] * u[k]).sum::<f64>())
+            std::array::from_fn(|i|
+                center[i] + (0..3).map(|k| axes[i][k] * half_sizes[k] * u[k]).sum::<f64>())
         };
         prop_assert!(contains(&volume, at(place.map(|x| f64::from(x) / 4.0))));
         prop_assert_eq!(check_bounds(&volume, &[at([1.0; 3]), center], None), None);
         let n = direction.map(f64::from);
         prop_assume!(n != [0.0; 3]);
-        let farthest = at(std::array::from_fn(|k| (0..3).map(|i| n[i] * axes[i][k]).sum::<f64>().signum()));
+        let farthest = at(std::array::from_fn(|k|
+            (0..3).map(|i| n[i] * axes[i][k]).sum::<f64>().signum()));
         let beyond: Vec3 = std::array::from_fn(|i| farthest[i] + n[i] / 1024.0);
         prop_assert!(!contains(&volume, beyond));
         let distance = check_bounds(&volume, &[center, beyond], None).unwrap();
@@ -346,7 +359,7 @@ proptest! {
     }
 }
 
-/// What a check of vertices alone would miss, and the cutting finds.
+/// A check of vertices alone would miss this case, and cutting finds it.
 #[test]
 fn a_triangle_across_a_corner_is_outside_with_all_its_vertices_inside() {
     let boxes = [([0.0, 0.0, 0.0], [2.0, 5.0, 5.0]), ([0.0, 0.0, 0.0], [5.0, 2.0, 5.0])];
@@ -357,7 +370,8 @@ fn a_triangle_across_a_corner_is_outside_with_all_its_vertices_inside() {
     assert!(!covered(corners, &boxes) && found.triangles == [0] && found.vertices.is_empty());
 }
 
-/// Verdicts are exact at any size; what is told beside them has to be near the truth there, too.
+/// Verdicts are exact at any size.
+/// The reported distances and witnesses have to be near the truth there, too.
 #[test]
 fn distances_and_witnesses_hold_at_any_size() {
     for size in [1.0, 1e100, 1e-100, 1e160, 1e-160, 1e300, 1e-300] {
@@ -384,7 +398,7 @@ fn distances_and_witnesses_hold_at_any_size() {
 fn bounds_at_the_last_bit() {
     let third = 1.0 / 3.0;
     let sphere = Volume::Sphere { center: [third; 3], radius: 5.0 };
-    // 3-4-5 about a centre of integers is on the sphere exactly.
+    // A 3-4-5 triangle about a centre of integers is on the sphere exactly.
     let whole = Volume::Sphere { center: [1.0, 2.0, 3.0], radius: 5.0 };
     assert_eq!(check_bounds(&whole, &[[4.0, 6.0, 3.0], [1.0, -1.0, 7.0]], None), None);
     let off = check_bounds(&whole, &[[4.0, 6.0_f64.next_up(), 3.0]], None).unwrap();
@@ -393,7 +407,7 @@ fn bounds_at_the_last_bit() {
     let cube = Volume::Box { min: [0.0; 3], max: [1.0; 3] };
     assert_eq!(check_bounds(&cube, &[[0.0; 3], [1.0; 3], [0.5, 1.0, 0.0]], None), None);
     assert_eq!(check_bounds(&cube, &[[0.0, 0.0, -0.25], [1.0; 3]], None), Some(0.25));
-    // 0.1 times 10 in exact numbers is more than 1; float64 rounds it to 1.
+    // In exact numbers 0.1 times 10 is more than 1; float64 rounds it to 1.
     let mut ten = [0.0; 16];
     for k in 0..4 {
         ten[5 * k] = if k < 3 { 10.0 } else { 1.0 };

@@ -1,4 +1,5 @@
-//! Cases worked by hand: every expectation follows from the few lines of arithmetic beside it.
+//! Cases worked by hand.
+//! Every expectation follows from the few lines of arithmetic beside it.
 
 use hiz_ref::{
     Coverage, Error, Options, OwnDepth, Verdict, View, Volume, classify, classify_with, hides,
@@ -6,7 +7,8 @@ use hiz_ref::{
 };
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// From the origin along +z, 90 degrees, near plane 1, infinite far plane, standard Z.
+/// A camera at the origin that looks along +z.
+/// 90 degrees, near plane 1, infinite far plane, standard Z.
 /// With 4x4 pixels a point has `x_pixel = 2 + 2 x/z`, `y_pixel = 2 - 2 y/z`, depth `1 - 1/z`.
 fn perspective(width: u32, height: u32) -> View {
     View {
@@ -32,7 +34,7 @@ fn reversed(width: u32, height: u32) -> View {
 }
 
 /// World coordinates are NDC.
-/// With 4x4 pixels `x_pixel = 2 + 2 x`, `y_pixel = 2 - 2 y`.
+/// With 4x4 pixels `x_pixel = 2 + 2 x` and `y_pixel = 2 - 2 y`.
 fn orthographic(width: u32, height: u32) -> View {
     let mut view = perspective(width, height);
     view.rows[2] = [0.0, 0.0, 1.0, 0.0];
@@ -61,9 +63,9 @@ fn verdict(view: &View, volume: Volume, depth: &[f32]) -> Verdict {
 
 #[test]
 fn a_pixel_is_closed() {
-    // At z = 2, x = 1 is x_pixel = 3: the edge between columns 2 and 3. y in 0.1..0.2 is y_pixel
-    // 1.8..1.9: row 1.
-    // Depth 0.5.
+    // At z = 2, x = 1 is x_pixel = 3, the edge between columns 2 and 3.
+    // y in 0.1..0.2 is y_pixel 1.8..1.9, which is row 1.
+    // The depth is 0.5.
     let view = perspective(4, 4);
     let plate = |left| aabb([left, 0.1, 2.0], [1.5, 0.2, 2.0]);
     let image = hole(&view, 0.25, [2, 1], 1.0);
@@ -80,7 +82,7 @@ fn a_pixel_is_closed() {
 
 #[test]
 fn equal_depth_is_visible_and_one_step_nearer_hides() {
-    // Nearest z = 8: depth 1 - 1/8 = 0.875, reversed 0.125; both are float32 numbers.
+    // The nearest z is 8: depth 1 - 1/8 = 0.875, reversed 0.125; both are float32 numbers.
     for volume in [
         sphere([0.0, 0.0, 10.0], 2.0),
         aabb([-1.0, -1.0, 8.0], [1.0, 1.0, 9.0]),
@@ -90,7 +92,7 @@ fn equal_depth_is_visible_and_one_step_nearer_hides() {
             axes: [[1.0, 0.0, 0.0], [0.0, 0.0, 3.0], [0.0, 1.0, 0.0]],
         },
     ] {
-        // The oriented box reaches from z = 10 - 2 to 10 + 2: its axis 1 is along z.
+        // The oriented box reaches from z = 10 - 2 to 10 + 2, because its axis 1 is along z.
         for (view, depth, nearer) in [
             (perspective(5, 3), 0.875f32, 0.875f32.next_down()),
             (reversed(5, 3), 0.125, 0.125f32.next_up()),
@@ -111,8 +113,9 @@ fn equal_depth_is_visible_and_one_step_nearer_hides() {
 #[test]
 fn a_sphere_tangent_to_a_pixel_edge() {
     // Eight columns: x_pixel = 4 + 4 x/z, so x_pixel = 7 is the plane 4 x - 3 z = 0.
-    // From (0, 0, 10) it is 30/5 = 6 away, and the foot is (4.8, 0, 6.4), well in front of the near
-    // plane: radius 6 touches column 7, the float64 below 6 does not.
+    // Its distance from (0, 0, 10) is 30/5 = 6.
+    // The foot is (4.8, 0, 6.4), well beyond the near plane.
+    // So radius 6 touches column 7, and the float64 below 6 does not.
     let view = perspective(8, 8);
     let image: Vec<f32> = (0..64).map(|i| if i % 8 == 7 { 1.0 } else { 0.0 }).collect();
     let ball = |radius: f64| sphere([0.0, 0.0, 10.0], radius);
@@ -127,9 +130,9 @@ fn a_sphere_tangent_to_a_pixel_edge() {
 #[test]
 fn a_disk_misses_the_corners_of_its_square() {
     // Orthographic, 8x8: one pixel is a quarter wide.
-    // Radius 0.75 about the middle reaches column 7 (x from 0.75) only where y = 0; the corner of
-    // pixel (6, 1) that is nearest to the middle is (0.5, 0.5), 0.707 away: touched.
-    // With 0.7 it is not.
+    // Radius 0.75 about the middle reaches column 7 (x from 0.75) only where y = 0.
+    // The corner of pixel (6, 1) nearest to the middle is (0.5, 0.5), 0.707 away, so it is touched.
+    // With radius 0.7 it is not.
     let view = orthographic(8, 8);
     let ball = |radius| sphere([0.0, 0.0, 0.5], radius);
     let touched = |volume| touched_pixels(&view, &volume, Coverage::Area).expect("valid");
@@ -141,7 +144,7 @@ fn a_disk_misses_the_corners_of_its_square() {
     let small = touched(ball(0.7));
     // The 6x6 squares without their four corners.
     assert_eq!(small.len(), 32);
-    // sqrt(0.5) itself: the float64 below it is short of the corner, the one above reaches it.
+    // At sqrt(0.5) itself the float64 below is short of the corner, and the one above reaches it.
     let corner = |radius| touched(ball(radius)).contains(&[6, 1]);
     let (below, above) = if FRAC_1_SQRT_2 * FRAC_1_SQRT_2 > 0.5 {
         (FRAC_1_SQRT_2.next_down(), FRAC_1_SQRT_2)
@@ -163,8 +166,8 @@ fn row_0_is_on_top() {
 fn the_near_plane_and_what_lies_behind() {
     let view = perspective(4, 4);
     let nearest = [0.0f32; 16];
-    // Around the camera, and across the near plane inside the frustum: visible whatever the image
-    // says.
+    // Around the camera, and across the near plane inside the frustum.
+    // Both are visible, whatever the image holds.
     assert_eq!(verdict(&view, sphere([0.0; 3], 3.0), &nearest), Verdict::Visible);
     let across = aabb([-0.1, -0.1, 0.5], [0.1, 0.1, 5.0]);
     assert_eq!(verdict(&view, across, &nearest), Verdict::Visible);
@@ -172,14 +175,14 @@ fn the_near_plane_and_what_lies_behind() {
     let beside = aabb([6.0, -1.0, -5.0], [7.0, 1.0, 5.0]);
     assert!(is_outside(&view, &beside).expect("valid"));
     assert_eq!(verdict(&view, beside, &[1.0; 16]), Verdict::Hidden);
-    // Behind, and up to the near plane: touching it counts.
+    // Behind the camera and up to the near plane; touching that plane counts.
     let behind = |to| aabb([-0.5, -0.5, -9.0], [0.5, 0.5, to]);
     assert!(is_outside(&view, &behind(1.0f64.next_down())).expect("valid"));
     assert!(!is_outside(&view, &behind(1.0)).expect("valid"));
     assert_eq!(verdict(&view, behind(1.0), &[0.5; 16]), Verdict::Visible);
-    // Between the camera and the near plane nothing is drawn.
+    // Nothing is drawn between the camera and the near plane.
     assert!(is_outside(&view, &sphere([0.0, 0.0, 0.5], 0.25)).expect("valid"));
-    // The orthographic far plane is z = 1, closed.
+    // The orthographic far plane is z = 1 and belongs to the frustum.
     let view = orthographic(4, 4);
     assert!(!is_outside(&view, &sphere([0.0, 0.0, 2.0], 1.0)).expect("valid"));
     assert!(is_outside(&view, &sphere([0.0, 0.0, 2.0], 1.0f64.next_down())).expect("valid"));
@@ -187,18 +190,17 @@ fn the_near_plane_and_what_lies_behind() {
 
 #[test]
 fn the_corner_of_the_frustum_where_no_plane_alone_decides() {
-    // Orthographic: a ball beyond the corner (1, 1), nearer than its radius to both side planes but
-    // not to the edge: 3-4-5.
+    // Orthographic: a ball beyond the corner (1, 1).
+    // It is nearer than its radius to both side planes but not to their edge: 3-4-5.
     let view = orthographic(4, 4);
     let ball = |radius| sphere([1.0 + 3.0, 1.0 + 4.0, 0.5], radius);
     assert!(!is_outside(&view, &ball(5.0)).expect("valid"));
     assert!(is_outside(&view, &ball(5.0f64.next_down())).expect("valid"));
-    // And the corner (1, 1, 1) of the far plane: 2-3-6-7.
+    // The same at the corner (1, 1, 1) of the far plane: 2-3-6-7.
     let ball = |radius| sphere([1.0 + 2.0, 1.0 + 3.0, 1.0 + 6.0], radius);
     assert!(!is_outside(&view, &ball(7.0)).expect("valid"));
     assert!(is_outside(&view, &ball(7.0f64.next_down())).expect("valid"));
-    // A square standing on its tip beyond the corner: |x - 3| + |y - 3| <= 4 reaches exactly (1,
-    // 1).
+    // A square on its tip beyond the corner: |x - 3| + |y - 3| <= 4 reaches exactly (1, 1).
     let diamond = |half| Volume::OrientedBox {
         center: [3.0, 3.0, 0.5],
         half_sizes: [half, half, 0.25],
@@ -231,8 +233,8 @@ fn special_depths() {
     for far in [f32::NAN, f32::NEG_INFINITY, -0.5, 1.5, 0.0, -0.0, 1e-40] {
         assert_eq!(verdict(&back, far_away, &[far]), Verdict::Visible, "{far}");
     }
-    // Beyond the far plane a depth of 1 is nearer than everything; it stands for "nothing there"
-    // and hides nothing all the same.
+    // Beyond the far plane a depth of 1 is nearer than everything.
+    // It means "nothing there" and hides nothing all the same.
     let beyond = sphere([0.0, 0.0, 5.0], 1.0);
     assert!(!hides(&orthographic(1, 1), &beyond, 1.0).expect("valid"));
     assert!(hides(&orthographic(1, 1), &beyond, 1.0f32.next_down()).expect("valid"));
@@ -258,8 +260,8 @@ fn samples_count_alone_where_asked() {
     assert_eq!(sample(plate(0.25f64.next_down())), (Verdict::Hidden, None));
     assert_eq!(verdict(&view, plate(0.2), &[1.0; 16]), Verdict::Visible, "the square is touched");
     let ball = |radius| sphere([-0.05, 0.65, 0.5], radius);
-    // The sample nearest to (-0.05, 0.65) is (-0.25, 0.75), the centre of pixel (1, 0):
-    // sqrt(0.05) = 0.2236 away.
+    // The sample nearest to (-0.05, 0.65) is (-0.25, 0.75), the centre of pixel (1, 0).
+    // It is sqrt(0.05) = 0.2236 away.
     assert_eq!(sample(ball(0.22)), (Verdict::Hidden, None));
     assert_eq!(sample(ball(0.23)), (Verdict::Visible, Some([1, 0])));
     let touched = touched_pixels(&view, &plate(0.25), Coverage::Sample).expect("valid");
@@ -268,7 +270,8 @@ fn samples_count_alone_where_asked() {
 
 #[test]
 fn far_from_the_origin() {
-    // The first case again, 1e9 units out: the view is relative to its origin, so nothing changes.
+    // The first case again, 1e9 units away.
+    // The view is relative to its origin, so nothing changes.
     let origin = [1e9, -1e9, 1e9];
     let view = View { origin, ..perspective(4, 4) };
     let moved = |p: [f64; 3]| [p[0] + origin[0], p[1] + origin[1], p[2] + origin[2]];
@@ -297,10 +300,10 @@ fn huge_and_tiny_numbers_are_decided_exactly() {
 
 #[test]
 fn a_matrix_that_float64_cannot_follow() {
-    // x = 5 K p.x - 4 K p.y - K p.z + 0.6 is 0.6 for p = (t, t, t), but each product is rounded by
-    // up to 32: in plain float64 the point lands anywhere.
-    // `x_pixel` = 2 + 1.2: column 3; `y_pixel` = 2 - 0.2: row 1.
-    // Mirrored, and with x and y exchanged, likewise.
+    // x = 5 K p.x - 4 K p.y - K p.z + 0.6 is 0.6 for p = (t, t, t).
+    // Each product is rounded by up to 32, so in plain float64 the point may be anywhere.
+    // `x_pixel` = 2 + 1.2 is column 3; `y_pixel` = 2 - 0.2 is row 1.
+    // The same holds mirrored, and with x and y exchanged.
     const K: f64 = 1e17;
     for (sign, exchanged, pixel) in
         [(1.0, false, [3, 1]), (-1.0, false, [0, 1]), (1.0, true, [2, 0]), (-1.0, true, [2, 3])]
@@ -322,9 +325,8 @@ fn a_matrix_that_float64_cannot_follow() {
 
 #[test]
 fn strange_matrices() {
-    // Negated rows: 0 <= z <= w asks for points behind the camera whose z/w is that of points
-    // before it.
-    // There are none.
+    // With negated rows 0 <= z <= w asks for points behind the camera.
+    // Their z/w would have to be that of points in front of it, and there are none.
     let mut negated = perspective(4, 4);
     negated.rows = negated.rows.map(|row| row.map(|x| -x));
     for volume in
@@ -332,13 +334,13 @@ fn strange_matrices() {
     {
         assert!(is_outside(&negated, &volume).expect("valid"), "{volume:?}");
     }
-    // A singular matrix has a point with clip = (0, 0, 0, 0): it counts as touched everywhere, the
-    // safe side.
+    // A singular matrix has a point with clip = (0, 0, 0, 0).
+    // It counts as touched everywhere, which is the safe side.
     let mut singular = perspective(4, 4);
     singular.rows[2] = [0.0; 4];
     let eye = sphere([0.0; 3], 0.0);
     assert_eq!(verdict(&singular, eye, &[0.0; 16]), Verdict::Visible);
-    // All zero: every point is such a point.
+    // If all are zero, every point is such a point.
     singular.rows = [[0.0; 4]; 4];
     assert_eq!(verdict(&singular, sphere([3.0; 3], 1.0), &[0.5; 16]), Verdict::Visible);
 }
@@ -371,9 +373,9 @@ fn invalid_volumes_and_bad_input_have_names() {
 #[test]
 fn a_pixel_shows_its_own_part_of_a_slope() {
     // World is NDC: columns 0..4 are x in -1..1.
-    // A plate that recedes to the right: depth 0.5 at its middle (x = 0), 0.25 at x = -0.9, 0.75 at
-    // x = 0.9.
-    // In column 0 (x below -0.5) it reaches from 0.25 to 0.361, in column 3 from 0.639 to 0.75.
+    // A plate recedes to the right.
+    // Its depth is 0.5 in its middle (x = 0), 0.25 at x = -0.9, and 0.75 at x = 0.9.
+    // In column 0 (x below -0.5) its depth is from 0.25 to 0.361, in column 3 from 0.639 to 0.75.
     let view = orthographic(4, 1);
     let slope = Volume::OrientedBox {
         center: [0.0, 0.0, 0.5],
@@ -387,12 +389,12 @@ fn a_pixel_shows_its_own_part_of_a_slope() {
     let following = [0.24, 0.36, 0.49, 0.63];
     assert_eq!(ask(following, OwnDepth::PerPixel).verdict, Verdict::Hidden);
     assert_eq!(ask(following, OwnDepth::Nearest).verdict, Verdict::Visible);
-    // What column 2 shows begins with the depth of x = 0.
+    // The part in column 2 begins with the depth of x = 0.
     let begins =
         |column| own_depth(&view, &slope, Coverage::Area, [column, 0]).expect("valid input");
     assert_eq!(begins(2), Some(0.5));
     assert!((f64::from(begins(3).expect("touched")) - (0.5 + 0.5 / 0.9 * 0.25)).abs() < 1e-7);
-    // At x = 0.5 it is 0.6389 deep.
+    // At x = 0.5 the depth is 0.6389.
     let outcome = ask([0.24, 0.36, 0.49, 0.64], OwnDepth::PerPixel);
     assert_eq!((outcome.verdict, outcome.witness), (Verdict::Visible, Some([3, 0])));
     // Equal depth is visible: at x = 0 the third column begins with 0.5.

@@ -1,9 +1,10 @@
-//! The oracle decides by certificates that separate; here the same questions are decided by points
-//! that belong to both sides, in whole numbers, for every pixel of small images: a second method
-//! that shares nothing with the first.
+//! A second method that shares nothing with the oracle.
+//! The oracle decides by certificates that separate two sides.
+//! Here the same questions are decided by points that belong to both sides.
+//! It works in whole numbers, for every pixel of small images.
 //!
-//! All numbers are small integers, so degenerate cases (touching, parallel, flat, singular) are the
-//! rule.
+//! All numbers are small integers.
+//! So degenerate cases (touching, parallel, flat, singular) are the rule.
 
 mod common;
 
@@ -13,7 +14,7 @@ use hiz_ref::{
     touched_pixels,
 };
 
-/// `v . s + m >= 0`, in local coordinates of the volume.
+/// `v . s + m >= 0`, in the volume's local coordinates.
 #[derive(Clone, Copy)]
 struct Plane {
     v: [i128; 3],
@@ -21,7 +22,7 @@ struct Plane {
 }
 
 /// A case in whole numbers.
-/// Local coordinates: world = center + axes s, with s in the cube or in the unit ball.
+/// In local coordinates world = center + axes s, with s in the cube or in the unit ball.
 struct Case {
     rows: [[i128; 4]; 4],
     center: [i128; 3],
@@ -38,7 +39,7 @@ impl Case {
     fn random(random: &mut Random) -> Case {
         let mut w = |n: i64| i128::from(random.whole(-n, n));
         let rows = match w(3) {
-            // A pinhole like those of real cameras, or an orthographic view, or anything at all.
+            // A pinhole like those of real cameras, an orthographic view, or anything.
             -3..=0 => {
                 let (a, b) = (w(2).abs() + 1, w(2).abs() + 1);
                 let z = if w(1) > 0 { [0, 0, 0, 1] } else { [0, 0, 1, -1] };
@@ -90,7 +91,7 @@ impl Case {
             let corner = |sign: f64| [0, 1, 2].map(|k| center[k] + sign * diagonal[k]);
             return Volume::Box { min: corner(-1.0), max: corner(1.0) };
         }
-        // Column k of the matrix is axis k; the factor 2 moves to the half sizes.
+        // Column k of the matrix is axis k; the factor 2 moves into the half sizes.
         Volume::OrientedBox {
             center,
             half_sizes: [2.0; 3],
@@ -106,7 +107,7 @@ impl Case {
         Plane { v: self.axes.map(along), m: along(self.center) + row[3] }
     }
 
-    /// Inside 0 <= z <= w and between pixel coordinates, given in halves.
+    /// Planes of 0 <= z <= w and of a range of pixel coordinates, given in halves.
     fn frustum(&self, [left, right]: [i128; 2], [top, bottom]: [i128; 2]) -> Vec<Plane> {
         let [width, height] = self.size;
         [
@@ -190,7 +191,7 @@ fn satisfies(planes: &[Plane], (x, d): ([i128; 3], i128)) -> bool {
     planes.iter().all(|plane| dot(plane.v, x) + plane.m * d >= 0)
 }
 
-/// A bounded polytope is not empty if three of its planes meet in a point of it.
+/// A bounded polytope is not empty if three of its planes meet in one of its points.
 fn polytope_is_not_empty(planes: &[Plane]) -> bool {
     let n = planes.len();
     (0..n).any(|i| {
@@ -204,8 +205,9 @@ fn polytope_is_not_empty(planes: &[Plane]) -> bool {
     })
 }
 
-/// The nearest point to the centre is the centre or its projection to one, two or three of the
-/// planes: tries all that are inside.
+/// Whether the unit ball meets the polytope.
+/// Its point nearest to the centre is the centre, or the centre projected onto one to three planes.
+/// Tries all of these that are inside.
 fn ball_meets(planes: &[Plane]) -> bool {
     let close = |(x, d): ([i128; 3], i128)| dot(x, x) <= d * d && satisfies(planes, (x, d));
     if close(([0; 3], 1)) {
@@ -220,8 +222,8 @@ fn ball_meets(planes: &[Plane]) -> bool {
         }
         (i + 1..n).any(|j| {
             let b = planes[j];
-            // The foot lies in both planes and in the plane through the centre that their normals
-            // span.
+            // The foot is in both planes.
+            // It is also in the plane through the centre that their normals span.
             let across = [
                 a.v[1] * b.v[2] - a.v[2] * b.v[1],
                 a.v[2] * b.v[0] - a.v[0] * b.v[2],
@@ -275,7 +277,7 @@ fn certificates_and_points_agree() {
             }
             let modes = [Arithmetic::Escalate, Arithmetic::Exact, Arithmetic::Float];
             for arithmetic in modes {
-                // The slowest way needs no repetition to be believed.
+                // The slowest arithmetic is tried in one case of 16.
                 if arithmetic == Arithmetic::Exact && number % 16 != 0 {
                     continue;
                 }
@@ -312,7 +314,7 @@ fn certificates_and_points_agree() {
     }
     println!("{tally:#?}, hidden only by their own depth in each pixel: {gained}");
     assert!(gained > 1000, "{gained}");
-    // The cases are worth something only if every kind of answer is among them.
+    // The cases prove something only if every kind of answer is among them.
     for (verdict, outside) in [("Visible", false), ("Hidden", false), ("Hidden", true)] {
         let count = tally[&(format!("Area Escalate {verdict}"), outside)];
         assert!(count > 1000, "{verdict} {outside}: {count}");

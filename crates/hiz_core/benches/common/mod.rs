@@ -1,17 +1,17 @@
-//! What the benches share: a table of medians, all ways taken in turns so that a busy moment hits
-//! all of them; then criterion's figures.
+//! What the benches share: a table of medians, then criterion's own figures.
+//! All ways are run in turns, so that a busy moment hits all of them.
 
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion};
 use hiz_core::headless::Engine;
 
-/// A name, and what does the work once and returns its milliseconds.
+/// A name, and a function that does the work once and returns its milliseconds.
 pub(crate) type Way<'a> = (String, Box<dyn FnMut() -> f64 + 'a>);
 
-/// A device.
-/// As in the tests, `HIZVK_PLANTED_FAULT` tries a variant of a shader: `what => by what` in the
-/// shaders' text, one a line.
+/// Opens a device.
+/// As in the tests, `HIZVK_PLANTED_FAULT` tries a variant of a shader.
+/// Each of its lines reads `old text => new text`.
 pub(crate) fn engine() -> Engine {
     let edits = std::env::var("HIZVK_PLANTED_FAULT").unwrap_or_default().replace("\\n", "\n");
     let edits: Vec<_> = edits.lines().filter_map(|line| line.split_once(" => ")).collect();
@@ -24,7 +24,7 @@ pub(crate) fn criterion() -> Criterion {
     Criterion::default().without_plots().sample_size(20).configure_from_args()
 }
 
-/// How many rounds a table takes: one where everything is only tried (`-- --test`).
+/// How many rounds a table takes: one where everything is only tried out (`-- --test`).
 fn rounds() -> usize {
     if std::env::args().any(|argument| argument == "--test") { 1 } else { 25 }
 }
@@ -34,9 +34,10 @@ fn median(times: &mut [f64]) -> f64 {
     times[times.len() / 2]
 }
 
-/// Milliseconds that all threads of this process have run: on a busy machine steadier than the
-/// clock on the wall, and of a software driver the whole of its work.
-/// 0 where the system does not say.
+/// CPU milliseconds of all threads of this process so far.
+/// On a busy machine they are steadier than wall-clock time.
+/// With a software driver they are the whole of its work.
+/// 0 where the system does not report them.
 fn cpu_ms() -> f64 {
     let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
     let ran = tasks.filter_map(|task| {
@@ -46,7 +47,8 @@ fn cpu_ms() -> f64 {
     ran.sum::<f64>() / 1e6
 }
 
-/// Prints medians; `times_first` heads the column of times of the first way.
+/// Prints medians.
+/// `times_first` heads the column that divides each time by the first way's.
 pub(crate) fn table(name: &str, times_first: &str, ways: &mut [Way<'_>]) {
     let rounds = rounds();
     let mut times = vec![Vec::new(); ways.len()];
@@ -55,7 +57,7 @@ pub(crate) fn table(name: &str, times_first: &str, ways: &mut [Way<'_>]) {
         for (number, (_, run)) in ways.iter_mut().enumerate() {
             let before = cpu_ms();
             let took = run();
-            // The first are compilations and page faults.
+            // The first rounds pay for compilations and page faults.
             if round >= 3 {
                 times[number].push(took);
                 work[number].push(cpu_ms() - before);
@@ -71,7 +73,7 @@ pub(crate) fn table(name: &str, times_first: &str, ways: &mut [Way<'_>]) {
     }
 }
 
-/// The same ways by criterion.
+/// Measures the same ways with criterion.
 pub(crate) fn measure(criterion: &mut Criterion, name: &str, ways: &mut [Way<'_>]) {
     let mut group = criterion.benchmark_group(name);
     for (way, run) in ways {

@@ -164,27 +164,36 @@ impl Gpu {
         Ok((buffer, filled))
     }
 
-    /// A 2D texture of one mip level, sample and layer.
+    /// A 2D texture with one mip level, one sample and one layer.
     pub(crate) fn texture(
+        &self,
+        label: &str,
+        size: (u32, u32),
+        format: wgpu::TextureFormat,
+        usage: wgpu::TextureUsages,
+    ) -> Result<wgpu::Texture> {
+        self.texture_of_levels(label, size, format, usage, 1)
+    }
+
+    /// A 2D texture with `levels` mip levels, one sample and one layer.
+    pub(crate) fn texture_of_levels(
         &self,
         label: &str,
         (width, height): (u32, u32),
         format: wgpu::TextureFormat,
         usage: wgpu::TextureUsages,
+        levels: u32,
     ) -> Result<wgpu::Texture> {
         let allowed = self.limits().max_texture_dimension_2d;
-        if width.max(height) > allowed {
-            return Err(Error::limit(
-                "max_texture_dimension_2d",
-                width.max(height).into(),
-                allowed.into(),
-            ));
+        let side = width.max(height);
+        if side > allowed {
+            return Err(Error::limit("max_texture_dimension_2d", side.into(), allowed.into()));
         }
         self.checked(|device| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
                 size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-                mip_level_count: 1,
+                mip_level_count: levels,
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
                 format,

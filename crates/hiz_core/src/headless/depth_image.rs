@@ -70,31 +70,11 @@ impl DepthImage {
         usage: wgpu::TextureUsages,
     ) -> Result<Self> {
         let size = camera.size();
-        let side = size.width.max(size.height);
-        let allowed = engine.device().limits().max_texture_dimension_2d;
-        if side > allowed {
-            return Err(Error::limit(
-                "max_texture_dimension_2d",
-                u64::from(side),
-                u64::from(allowed),
-            ));
-        }
         let texels = SourceKind::of(format).map_or(size, |kind| kind.texture_size(size));
-        let texture = engine.device().create_texture(&wgpu::TextureDescriptor {
-            label: Some("hiz.depth.image"),
-            size: wgpu::Extent3d {
-                width: texels.width,
-                height: texels.height,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage,
-            view_formats: &[],
-        });
-        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let gpu = &engine.context().gpu;
+        let texture =
+            gpu.texture("hiz.depth.image", (texels.width, texels.height), format, usage)?;
+        let view = gpu.view(&texture)?;
         Ok(Self {
             engine: engine.clone(),
             texture,

@@ -22,7 +22,7 @@ use crate::gpu::buffers::Mapped;
 use crate::host::memory;
 use crate::host::threads::on_two_threads;
 use crate::input::bounds::{Bounds, Floats};
-use crate::instances::extent::Extent;
+use crate::instances::aabb::Aabb;
 use crate::instances::volume_record::{BoxRecord, OrientedBoxRecord};
 
 /// Members of a full group: as many as a `u64` has bits.
@@ -35,14 +35,14 @@ const PARALLEL_FROM: usize = 1 << 13;
 #[derive(Debug)]
 struct Group {
     /// A box around every member that no later update has moved.
-    around: Extent,
+    around: Aabb,
     /// Bit k: the bounds of member k are invalid now.
     invalid: u64,
     /// Bit k: member k was moved since `around` was formed.
     moved: u64,
     /// The box of member k at position k: filled for moved members, empty for invalid bounds.
     /// The list has no elements until a part of the group is moved.
-    extents: Vec<Extent>,
+    boxes: Vec<Aabb>,
 }
 
 /// The groups of one piece.
@@ -66,7 +66,7 @@ pub(crate) struct Origin {
 /// First the given numbers are fetched from wherever the caller has them, one after the other, so
 /// that the processor can wait for many loads at once.
 /// The records are made here too, before they are copied to the memory that the device reads.
-struct Part {
+struct Batch {
     indices: [u32; GROUP],
     threes: [[f64; 3 * GROUP]; 2],
     ones: [f64; GROUP],
@@ -76,7 +76,7 @@ struct Part {
 
 const LARGEST_RECORD: usize = size_of::<OrientedBoxRecord>();
 
-impl Part {
+impl Batch {
     fn new() -> Self {
         Self {
             indices: [0; GROUP],
@@ -96,7 +96,7 @@ impl Part {
         bounds: &Bounds<'_>,
         sources: impl ExactSizeIterator<Item = Origin>,
         target: WriteOnly<'a, [u8]>,
-        mut each: impl FnMut(usize, Option<Extent>),
+        mut each: impl FnMut(usize, Option<Aabb>),
     ) -> WriteOnly<'a, [u8]> {
         let count = sources.len();
         let Self { indices, threes: [first, second], ones, nines, records } = self;
@@ -131,7 +131,7 @@ impl Part {
         let record_bytes = bounds.kind().record_bytes() as usize;
         for (k, record) in records.chunks_exact_mut(record_bytes).take(count).enumerate() {
             let is_volume = fetched.write_record(k, indices[k], record);
-            each(k, fetched.extent(k).filter(|_| is_volume));
+            each(k, fetched.aabb(k).filter(|_| is_volume));
         }
         let (mut here, rest) = target.split_at(count * record_bytes);
         here.copy_from_slice(&records[..count * record_bytes]);
@@ -141,16 +141,16 @@ impl Part {
 
 impl Group {
     fn new() -> Self {
-        Self { around: Extent::EMPTY, invalid: 0, moved: 0, extents: Vec::new() }
+        Self { around: Aabb::EMPTY, invalid: 0, moved: 0, boxes: Vec::new() }
     }
 
     /// The box around all members, given as the bits of `all`; `None` if a member is invalid.
-    fn extent(&self, all: u64) -> Option<Extent> {
+    fn aabb(&self, all: u64) -> Option<Aabb> {
         if self.invalid != 0 {
             return None;
         }
-        let others = if self.moved == all { Extent::EMPTY } else { self.around };
-        Some(bits(self.moved).fold(others, |sum, k| sum.union(&self.extents[k])))
+        let others = if self.moved == all { Aabb::EMPTY } else { self.around };
+        Some(bits(self.moved).fold(others, |sum, k| sum.union(&self.boxes[k])))
     }
 
     /// Takes new boxes for `members`; those in `invalid` have invalid bounds.
@@ -159,18 +159,18 @@ impl Group {
         all: u64,
         members: u64,
         invalid: u64,
-        extents: &[Extent; GROUP],
+        boxes: &[Aabb; GROUP],
     ) -> Result<()> {
         if members == all {
-            let around = extents.iter().fold(Extent::EMPTY, |sum, e| sum.union(e));
+            let around = boxes.iter().fold(Aabb::EMPTY, |sum, e| sum.union(e));
             *self = Self { around, invalid, ..Self::new() };
             return Ok(());
         }
-        if self.extents.is_empty() {
-            self.extents = memory::collected([Extent::EMPTY; GROUP].into_iter(), "update")?;
+        if self.boxes.is_empty() {
+            self.boxes = memory::collected([Aabb::EMPTY; GROUP].into_iter(), "update")?;
         }
         for k in bits(members) {
-            self.extents[k] = extents[k];
+            self.boxes[k] = boxes[k];
         }
         self.moved |= members;
         self.invalid = self.invalid & !members | invalid;
@@ -204,11 +204,11 @@ impl Groups {
             let (first, end) = (begin * GROUP, count.min((begin + groups.len()) * GROUP));
             let mut view = records.range(first as u64 * record_bytes..end as u64 * record_bytes)?;
             let mut rest = view.slice(..);
-            let mut part = Part::new();
+            let mut batch = Batch::new();
             for (g, group) in (begin..).zip(groups) {
                 let sources = (g * GROUP..count.min((g + 1) * GROUP)).map(&source);
-                rest = part.pack(bounds, sources, rest, |k, extent| match extent {
-                    Some(extent) => group.around = group.around.union(&extent),
+                rest = batch.pack(bounds, sources, rest, |k, aabb| match aabb {
+                    Some(aabb) => group.around = group.around.union(&aabb),
                     None => group.invalid |= 1 << k,
                 });
             }
@@ -234,19 +234,19 @@ impl Groups {
     }
 
     /// The box around a group; `None` if a member is invalid.
-    pub(crate) fn extent(&self, group: usize) -> Option<Extent> {
-        self.groups[group].extent(all_members(self.count, group))
+    pub(crate) fn aabb(&self, group: usize) -> Option<Aabb> {
+        self.groups[group].aabb(all_members(self.count, group))
     }
 
     /// The record of a group for the device.
     pub(crate) fn record(&self, group: usize) -> BoxRecord {
-        BoxRecord::valid_or_none(self.extent(group).map(|extent| [extent.min, extent.max]))
+        BoxRecord::valid_or_none(self.aabb(group).map(|aabb| [aabb.min, aabb.max]))
     }
 
     /// Bytes on the host.
     pub(crate) fn host_bytes(&self) -> u64 {
-        let extents = self.groups.iter().map(|g| g.extents.capacity()).sum::<usize>();
-        (self.groups.capacity() * size_of::<Group>() + extents * size_of::<Extent>()) as u64
+        let boxes = self.groups.iter().map(|g| g.boxes.capacity()).sum::<usize>();
+        (self.groups.capacity() * size_of::<Group>() + boxes * size_of::<Aabb>()) as u64
     }
 
     /// Takes new bounds for the instances at `places`, which ascend without repetition.
@@ -268,20 +268,20 @@ impl Groups {
         let work = |(begin, places, first_group, groups): (usize, &[u32], usize, &mut [Group])| -> Result<()> {
             let mut view = records.range(begin as u64 * record_bytes..(begin + places.len()) as u64 * record_bytes)?;
             let mut rest = view.slice(..);
-            let mut part = Part::new();
+            let mut batch = Batch::new();
             for places in places.chunk_by(|a, b| group_of(*a) == group_of(*b)) {
                 let group = group_of(places[0]);
-                let (mut members, mut invalid, mut extents) = (0, 0, [Extent::EMPTY; GROUP]);
+                let (mut members, mut invalid, mut boxes) = (0, 0, [Aabb::EMPTY; GROUP]);
                 let sources = places.iter().map(|place| source(*place as usize));
-                rest = part.pack(bounds, sources, rest, |k, extent| {
+                rest = batch.pack(bounds, sources, rest, |k, aabb| {
                     let k = places[k] as usize % GROUP;
                     members |= 1 << k;
-                    match extent {
-                        Some(extent) => extents[k] = extent,
+                    match aabb {
+                        Some(aabb) => boxes[k] = aabb,
                         None => invalid |= 1 << k,
                     }
                 });
-                groups[group - first_group].replace(all_members(count, group), members, invalid, &extents)?;
+                groups[group - first_group].replace(all_members(count, group), members, invalid, &boxes)?;
             }
             Ok(())
         };

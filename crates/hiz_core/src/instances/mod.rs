@@ -4,7 +4,7 @@
 //!
 //! 1. `piece` cuts the instances of one call into pieces that fit a binding and a dispatch.
 //! 2. `order` and `morton` choose where each instance is stored: along a curve through space.
-//! 3. `groups` and `extent` form groups of 64 neighbours with a box around each.
+//! 3. `groups` and `aabb` form groups of 64 neighbours with a box around each.
 //! 4. `volume_record` and `records` write the records that the cull reads.
 //! 5. `update` replaces bounds later, and `watch` connects submitted culls with later updates.
 //!
@@ -14,7 +14,7 @@
 //!
 //! This room records copies and dispatches; it never submits or waits.
 
-pub(crate) mod extent;
+pub(crate) mod aabb;
 pub(crate) mod groups;
 pub(crate) mod morton;
 pub(crate) mod order;

@@ -67,8 +67,8 @@ impl Cube {
             memory::list(SAMPLES, "order")?,
             memory::list(SAMPLES, "order")?,
         ];
-        for extent in range.clone().step_by(step).filter_map(|i| bounds.extent(i)) {
-            for (axis, value) in axes.iter_mut().zip(extent.center()) {
+        for aabb in range.clone().step_by(step).filter_map(|i| bounds.aabb(i)) {
+            for (axis, value) in axes.iter_mut().zip(aabb.center()) {
                 axis.push(value);
             }
         }
@@ -137,7 +137,7 @@ pub(crate) fn order(bounds: &Bounds<'_>, range: Range<usize>) -> Result<Vec<u32>
     let sort = |(begin, part, spare): (usize, &mut [Keyed], &mut [Keyed])| {
         for (k, keyed) in part.iter_mut().enumerate() {
             let key =
-                bounds.extent(range.start + begin + k).map_or(NO_VOLUME, |e| cube.key(e.center()));
+                bounds.aabb(range.start + begin + k).map_or(NO_VOLUME, |e| cube.key(e.center()));
             *keyed = Keyed { key, index: (begin + k) as u32 };
         }
         radix_sort(part, spare);

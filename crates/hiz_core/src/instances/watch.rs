@@ -112,7 +112,7 @@ impl Watches {
     ) -> Result<bool> {
         let mut any = false;
         for watch in self.living() {
-            any |= record(gpu, encoder, &watch)?;
+            any |= record_refinement(gpu, encoder, &watch)?;
         }
         Ok(any)
     }
@@ -125,7 +125,7 @@ impl Watches {
         encoder: &mut wgpu::CommandEncoder,
         watch: &Watch,
     ) -> Result<bool> {
-        record(gpu, encoder, watch)
+        record_refinement(gpu, encoder, watch)
     }
 
     /// Notes that the recorded refinement of a cull was submitted.
@@ -144,7 +144,7 @@ impl Watches {
     }
 }
 
-fn record(gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, watch: &Watch) -> Result<bool> {
+fn record_refinement(gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, watch: &Watch) -> Result<bool> {
     let state = watch.state();
     let Some(refinement) = &state.refinement else { return Ok(false) };
     refinement.record(gpu, encoder)?;

@@ -73,7 +73,7 @@ pub fn groups(engine: &Engine, instances: &Instances) -> Result<Vec<GroupWords>>
                 members: (g * GROUP..(piece.count() as usize).min((g + 1) * GROUP))
                     .map(|place| piece.range.start + piece.order.index(place) as u32)
                     .collect(),
-                corners: groups.extent(g).map(|e| [e.min, e.max]),
+                corners: groups.aabb(g).map(|e| [e.min, e.max]),
                 record: record.to_vec(),
             });
         groups.collect()

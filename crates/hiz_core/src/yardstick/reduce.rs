@@ -41,7 +41,7 @@ pub enum ReductionShape {
 /// Offset and stride are in vectors of four texels.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-struct Level {
+struct PlainLevel {
     offset: u32,
     stride: u32,
     width: u32,
@@ -49,7 +49,7 @@ struct Level {
 }
 
 #[derive(Debug)]
-struct Step {
+struct LevelPass {
     pipeline: wgpu::ComputePipeline,
     bindings: wgpu::BindGroup,
     workgroups: [u32; 2],
@@ -65,9 +65,9 @@ enum Storage {
 /// Everything that can be made beforehand is made beforehand.
 #[derive(Debug)]
 pub struct PerLevelReduction {
-    levels: Vec<Level>,
+    levels: Vec<PlainLevel>,
     storage: Storage,
-    steps: Vec<Step>,
+    steps: Vec<LevelPass>,
 }
 
 impl PerLevelReduction {
@@ -88,7 +88,7 @@ impl PerLevelReduction {
                     mapped_at_creation: false,
                 }))
             }
-            ReductionShape::Textures => Storage::Textures(mip_levels(gpu, &levels)),
+            ReductionShape::Textures => Storage::Textures(mip_levels(gpu, &levels)?),
         };
         let steps = (1..levels.len())
             .map(|k| step(gpu, depth, &levels, &storage, k))
@@ -102,7 +102,7 @@ impl PerLevelReduction {
             label: Some("hiz.yardstick.pass"),
             timestamp_writes: None,
         });
-        for Step { pipeline, bindings, workgroups: [x, y] } in &self.steps {
+        for LevelPass { pipeline, bindings, workgroups: [x, y] } in &self.steps {
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, bindings, &[]);
             pass.dispatch_workgroups(*x, *y, 1);
@@ -114,7 +114,7 @@ impl PerLevelReduction {
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost).
     pub fn read(&self, engine: &Engine, k: usize) -> Result<Vec<f32>> {
-        let Level { offset, stride, width, height } = self.levels[k];
+        let PlainLevel { offset, stride, width, height } = self.levels[k];
         let device = engine.device();
         let bytes = match &self.storage {
             Storage::Buffer(buffer) => {
@@ -180,15 +180,16 @@ pub fn reduce(
     engine.context().record_reduce(encoder, &view, depth.camera(), pyramid)
 }
 
-fn levels(size: ImageSize) -> Vec<Level> {
-    let mut levels = vec![Level { offset: 0, stride: 0, width: size.width, height: size.height }];
+fn levels(size: ImageSize) -> Vec<PlainLevel> {
+    let mut levels =
+        vec![PlainLevel { offset: 0, stride: 0, width: size.width, height: size.height }];
     let mut offset = 0;
-    while let Some(Level { width, height, .. }) =
+    while let Some(PlainLevel { width, height, .. }) =
         levels.last().filter(|l| l.width > 1 || l.height > 1)
     {
         let (width, height) = (width.div_ceil(2), height.div_ceil(2));
         let stride = width.div_ceil(4);
-        levels.push(Level { offset, stride, width, height });
+        levels.push(PlainLevel { offset, stride, width, height });
         offset += stride * height;
     }
     levels
@@ -196,33 +197,26 @@ fn levels(size: ImageSize) -> Vec<Level> {
 
 /// A texture's mip levels round odd sizes down, and a pyramid's levels round them up.
 /// Sides that are powers of two are large enough for both.
-fn mip_levels(gpu: &Gpu, levels: &[Level]) -> wgpu::Texture {
-    gpu.device().create_texture(&wgpu::TextureDescriptor {
-        label: Some("hiz.yardstick.mips"),
-        size: wgpu::Extent3d {
-            width: levels[1].width.next_power_of_two(),
-            height: levels[1].height.next_power_of_two(),
-            depth_or_array_layers: 1,
-        },
-        mip_level_count: levels.len() as u32 - 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::R32Float,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING
+fn mip_levels(gpu: &Gpu, levels: &[PlainLevel]) -> Result<wgpu::Texture> {
+    gpu.texture_of_levels(
+        "hiz.yardstick.mips",
+        (levels[1].width.next_power_of_two(), levels[1].height.next_power_of_two()),
+        wgpu::TextureFormat::R32Float,
+        wgpu::TextureUsages::TEXTURE_BINDING
             | wgpu::TextureUsages::STORAGE_BINDING
             | wgpu::TextureUsages::COPY_SRC,
-        view_formats: &[],
-    })
+        levels.len() as u32 - 1,
+    )
 }
 
 /// The dispatch that makes level `k` from the level before.
 fn step(
     gpu: &Gpu,
     depth: &DepthImage,
-    levels: &[Level],
+    levels: &[PlainLevel],
     storage: &Storage,
     k: usize,
-) -> Result<Step> {
+) -> Result<LevelPass> {
     let kind = SourceKind::of(depth.texture().format()).expect("a depth image's own format");
     let (read, written) = (levels[k - 1], levels[k]);
     let source = depth.texture().create_view(&wgpu::TextureViewDescriptor::default());
@@ -281,26 +275,17 @@ fn step(
         Storage::Textures(mips) => {
             // The first dispatch reads the depth image, so any level can be bound as the level
             // before.
-            let finer = if k == 1 { idle_texture(gpu) } else { mips.clone() };
+            let finer = if k == 1 {
+                let usage = wgpu::TextureUsages::TEXTURE_BINDING;
+                gpu.texture("hiz.yardstick.idle", (1, 1), wgpu::TextureFormat::R32Float, usage)?
+            } else {
+                mips.clone()
+            };
             views = [mip(&finer, if k == 1 { 1 } else { k - 1 }), mip(mips, k)];
             bound.push(entry(3, wgpu::BindingResource::TextureView(&views[0])));
             bound.push(entry(4, wgpu::BindingResource::TextureView(&views[1])));
         }
     }
     let bindings = gpu.bind_group("hiz.yardstick.bindings", &layout, &bound)?;
-    Ok(Step { pipeline, bindings, workgroups })
-}
-
-/// A texture that is bound but never read.
-fn idle_texture(gpu: &Gpu) -> wgpu::Texture {
-    gpu.device().create_texture(&wgpu::TextureDescriptor {
-        label: Some("hiz.yardstick.idle"),
-        size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::R32Float,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
-    })
+    Ok(LevelPass { pipeline, bindings, workgroups })
 }

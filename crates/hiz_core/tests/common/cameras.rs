@@ -1,26 +1,26 @@
-//! Random cameras for a scene: where rasterisers and float32 err the most, where depths tie, and
-//! anywhere.
+//! Random cameras for a scene.
+//! Some stress rasterisers and float32, some make depths tie, and the rest are anywhere.
 
 use hiz_core::{Camera, DepthConvention, ImageSize, Pose, Projection, Vec3};
 
 use crate::scene::{Mesh, Random, Scene, Shot, normal};
 
-/// What a camera is chosen for; every kind comes by turns.
+/// The kinds of camera, taken in turn.
 pub(crate) const KINDS: [&str; 8] = [
-    // Along an axis: faces are seen edge-on or parallel to the image, where depths tie.
+    // Along an axis: faces are edge-on or parallel to the image, where depths tie.
     "straight",
     "anywhere",
-    // The eye in a face's plane or next to it, looking along it at less than a degree.
+    // The eye is in a face's plane or next to it and looks along it at less than a degree.
     "grazing",
     "off_centre",
-    // In no special direction: lavapipe gives faces that are seen exactly edge-on any depth at all
-    // (`docs/accuracy.md`).
+    // In no special direction.
+    // lavapipe gives arbitrary depth to faces that are exactly edge-on (`docs/accuracy.md`).
     "orthographic",
-    // The eye on a body or inside of it.
+    // The eye is on a body or inside it.
     "touching",
-    // A near plane metres away that cuts through what is there.
+    // A near plane metres away that cuts through bodies.
     "cutting",
-    // An orthographic camera inside of the scene, its near plane cutting.
+    // An orthographic camera inside the scene, whose near plane cuts bodies.
     "orthographic_inside",
 ];
 
@@ -69,7 +69,7 @@ fn on_a_face(mesh: &Mesh, random: &mut Random) -> (Vec3, Vec3, Vec3) {
     (along(along(a, to_b, u), to_c, v), n, unit(random.pick(&[to_b, to_c])))
 }
 
-/// Cameras for `scene`, as many as asked for.
+/// `count` cameras for `scene`.
 pub(crate) fn random_shots(scene: &Scene, count: usize, seed: u64) -> Vec<Shot> {
     let mut random = Random(seed);
     (0..count).map(|i| random_shot(scene, KINDS[i % KINDS.len()], &mut random)).collect()
@@ -142,8 +142,8 @@ fn random_shot(scene: &Scene, name: &'static str, random: &mut Random) -> Shot {
             if !inside {
                 eye = along(scene.origin, forward, -0.5 * depth);
             }
-            // The pose stands where depth is 0: there the engine's own prepass has its origin, too,
-            // and rounds as the picture does.
+            // The eye is where depth is 0.
+            // The engine's own prepass has its origin there, too, and rounds as the picture does.
             let (near, far) = if convention.is_reversed() { (-length, 0.0) } else { (0.0, length) };
             if convention.is_reversed() {
                 eye = along(eye, forward, length);
@@ -160,7 +160,7 @@ fn random_shot(scene: &Scene, name: &'static str, random: &mut Random) -> Shot {
         }
         _ => Projection::Perspective { fov_y: random.range(0.3, 2.0), near, far, convention },
     };
-    // Upright, rolled, or, looking straight up or down, along another axis.
+    // Upright or rolled; along another axis where the view is straight up or down.
     let mut up = if random.below(2) == 0 { [0.0, 1.0, 0.0] } else { direction(random) };
     if forward[1].abs() > 0.999 {
         up = [1.0, 0.0, 0.0];

@@ -1,10 +1,10 @@
-//! The truth about rays and triangles: exact integers, brute force, no code of the crate but a
-//! camera's rows.
+//! The truth about rays and triangles, in exact integers and by brute force.
+//! It uses no code of the crate except a camera's rows.
 
 use hiz_core::Camera;
 use num_bigint::{BigInt, Sign};
 
-/// Numbers are integers times 2^-SCALE; what is finer is no input of these tests.
+/// Numbers are integers times 2^-SCALE; no input of these tests is finer.
 const SCALE: i32 = 200;
 
 fn exact(x: f64) -> BigInt {
@@ -62,9 +62,9 @@ impl ExactScene {
         }
     }
 
-    /// Whether the ray through image point `at` (pixels, row 0 on top) meets a triangle of `facing`
-    /// inside of the near plane at `depth` or nearer.
-    /// Triangles seen exactly edge-on count as missed.
+    /// Whether a ray meets a triangle of `facing` beyond the near plane, at `depth` or nearer.
+    /// The ray goes through the image point `at` (pixels, row 0 on top).
+    /// Triangles that are exactly edge-on count as missed.
     pub(crate) fn blocked(&self, at: [f64; 2], depth: f32, facing: Facing) -> bool {
         let [width, height] = self.size.map(exact);
         let (px, py) = (exact(at[0]), exact(at[1]));
@@ -72,7 +72,7 @@ impl ExactScene {
         let (qx, qy) = ((&px << 1usize) - &width, &height - (&py << 1usize));
         let depth = exact(f64::from(depth));
         self.triangles.iter().any(|t| {
-            // The ray's line meets the corners' combination whose x W = q w.
+            // The ray's line meets the combination of the corners with x W = q w.
             let u: [[BigInt; 2]; 3] = std::array::from_fn(|i| {
                 [&t[i][0] * &width - &qx * &t[i][3], &t[i][1] * &height - &qy * &t[i][3]]
             });

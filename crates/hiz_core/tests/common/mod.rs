@@ -1,5 +1,5 @@
-//! What the device tests share: one engine a process, its adapter printed and checked, and a small
-//! seeded generator.
+//! What the device tests share: one engine per process and a small seeded generator.
+//! The engine's adapter is printed and checked.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
 use std::cell::OnceCell;
@@ -9,16 +9,17 @@ use hiz_core::headless::Engine;
 use hiz_core::{Camera, DepthConvention, ImageSize, Mat4};
 
 /// The engine that the tests of this process share.
-/// It lives as long as one of their threads: each that has asked for it holds it until the thread
-/// ends, and then the device is waited for and destroyed.
-/// (A static would keep it until the process ends, and lavapipe may then still be freeing memory on
-/// a thread of its own: `free(): invalid size`.)
+/// Each thread that has asked for it holds it until that thread ends.
+/// After the last of them the device is waited for and destroyed.
 ///
-/// `HIZVK_EXPECT_ADAPTER` (a part of the adapter's name or driver) refuses any other.
-/// `HIZVK_PLANTED_FAULT` (`what => by what`, one a line) replaces texts in the shaders: does any
-/// test turn red?
+/// A static would keep the engine until the process ends.
+/// lavapipe may then still be freeing memory on a thread of its own: `free(): invalid size`.
+///
+/// `HIZVK_EXPECT_ADAPTER` is a part of the adapter's name or driver; any other is refused.
+/// `HIZVK_PLANTED_FAULT` replaces texts in the shaders, to see whether any test turns red.
+/// Each of its lines reads `old text => new text`.
 pub(crate) fn engine() -> Arc<Engine> {
-    // A weak reference holds no device.
+    // A weak reference does not keep the device alive.
     static SHARED: Mutex<Weak<Engine>> = Mutex::new(Weak::new());
     thread_local!(static HELD: OnceCell<Held> = const { OnceCell::new() });
     let held = |cell: &OnceCell<Held>| {
@@ -39,8 +40,7 @@ struct Held(Option<Arc<Engine>>);
 impl Drop for Held {
     fn drop(&mut self) {
         if let Some(last) = self.0.take().and_then(Arc::into_inner) {
-            // On a thread of its own: those of this thread's locals that wgpu uses may be gone
-            // already.
+            // On another thread: this one may already have lost wgpu's thread-local variables.
             std::thread::spawn(move || drop(last)).join().expect("the device is let go of");
         }
     }
@@ -64,10 +64,10 @@ fn open() -> Engine {
     engine
 }
 
-/// A camera at the origin whose clip coordinates are written down: view depth is z, x and y span
-/// -1..1 at depth 1.
+/// A camera at the origin with clip coordinates that are easy to work out by hand.
+/// View depth is z, and x and y span -1..1 at depth 1.
 pub(crate) fn camera_along_z(width: u32, height: u32, convention: DepthConvention) -> Camera {
-    // Near plane at 1, infinitely far: standard z = w - 1, reversed z = 1.
+    // The near plane is at 1, and there is no far plane: standard z = w - 1, reversed z = 1.
     let z = match convention {
         DepthConvention::Standard => [0.0, 0.0, 1.0, -1.0],
         DepthConvention::Reversed => [0.0, 0.0, 0.0, 1.0],

@@ -1,5 +1,5 @@
-//! Every kind of texture that a pyramid takes a depth image from, filled with any bits that its
-//! kind can hold.
+//! Every kind of texture that a pyramid takes a depth image from.
+//! They are filled with any bits that their kind can hold.
 
 use std::sync::Arc;
 
@@ -30,7 +30,7 @@ const DRAWN: &str = "
 }
 ";
 
-/// A texture of `usage` that holds `words`, one a pixel.
+/// A texture for `usage` that holds `words`, one per pixel.
 fn texture_of(
     engine: &Engine,
     (width, height): (u32, u32),
@@ -68,8 +68,8 @@ fn descriptor(
     }
 }
 
-/// A depth texture whose pixels are what fragments say.
-/// (What a driver makes of NaN is its own affair.)
+/// A depth texture whose pixels are written by fragments.
+/// The driver decides what becomes of NaN.
 fn drawn(engine: &Engine, (width, height): (u32, u32), depth: &[f32]) -> wgpu::Texture {
     let device = engine.device();
     let bits = texture_of(

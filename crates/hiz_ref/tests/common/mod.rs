@@ -1,5 +1,5 @@
-//! Random cases with a seed, shared by the tests and the throughput example; none of them uses all
-//! of it.
+//! Random cases from a seed, shared by the tests and the throughput example.
+//! None of them uses all of it.
 #![allow(dead_code, unreachable_pub)]
 
 pub mod scenes;

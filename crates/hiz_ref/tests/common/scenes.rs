@@ -1,5 +1,5 @@
-//! Random views and volumes as scenes have them, in float64, and some that sit on a border on
-//! purpose.
+//! Random views and volumes in float64 as real scenes have them.
+//! Some are on a border on purpose.
 
 use super::Random;
 use hiz_ref::{View, Volume};
@@ -22,7 +22,7 @@ impl Random {
         10.0f64.powf(self.uniform(from, to))
     }
 
-    /// Three rows, orthonormal up to rounding: a random rotation from a random unit quaternion.
+    /// Three rows that are orthonormal up to rounding: a rotation from a random unit quaternion.
     pub fn rotation(&mut self) -> [Vector; 3] {
         let q = loop {
             let q = [0; 4].map(|_| self.uniform(-1.0, 1.0));
@@ -40,14 +40,14 @@ impl Random {
     }
 }
 
-/// A camera at `origin`: camera axes are the rows of a rotation (right, up, forward).
+/// A camera, whose axes (right, up, forward) are the rows of a rotation.
 pub struct Scene {
     pub view: View,
     pub axes: [Vector; 3],
 }
 
-/// Perspective or orthographic, standard or reversed, finite or infinite, off-centre, somewhere in
-/// a large world.
+/// A random camera somewhere in a large world.
+/// It is perspective or orthographic, standard or reversed, finite or infinite, and off-centre.
 pub fn scene(random: &mut Random, width: u32, height: u32) -> Scene {
     let axes = if random.whole(0, 3) == 0 {
         [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
@@ -64,8 +64,8 @@ pub fn scene(random: &mut Random, width: u32, height: u32) -> Scene {
         let [a, b, c] = [0, 1, 2].map(|i| scale * v[i] + shift * forward[i]);
         [a, b, c, constant]
     };
-    // z = slope * depth + offset, by hand from z(near), z(far) = 0, w and w, 0 for the two
-    // conventions.
+    // z = slope * depth + offset.
+    // By hand from z(near), z(far) = 0, w for standard and w, 0 for reversed depth.
     let depth_row = |slope: f64, offset: f64| {
         let [a, b, c] = forward.map(|x| slope * x);
         [a, b, c, offset]
@@ -108,7 +108,7 @@ pub fn scene(random: &mut Random, width: u32, height: u32) -> Scene {
     Scene { view, axes }
 }
 
-/// Something before the camera, most often: any kind, from specks to walls.
+/// A volume, mostly in front of the camera: any kind, from specks to walls.
 pub fn volume(random: &mut Random, scene: &Scene) -> Volume {
     let depth = random.power(-1.0, 2.5);
     let spread = 1.3 * depth;
@@ -129,8 +129,8 @@ pub fn volume(random: &mut Random, scene: &Scene) -> Volume {
     }
 }
 
-/// An image whose depths lie about the volume's nearest depth: all nearer, with holes, equal, or
-/// noise.
+/// An image with depths near the volume's nearest depth.
+/// They are all nearer, or with holes, equal, or noise.
 pub fn image(random: &mut Random, view: &View, nearest: Option<f64>) -> Vec<f32> {
     let count = view.width as usize * view.height as usize;
     let nearest = nearest.unwrap_or(0.5).clamp(0.0, 1.0) as f32;

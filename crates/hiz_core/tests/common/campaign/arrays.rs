@@ -1,4 +1,4 @@
-//! Volumes as the engine's flat arrays.
+//! Volumes as the flat arrays that the engine takes.
 
 use hiz_core::{Bounds, BoundsKind, Floats};
 use hiz_ref::Volume;

@@ -1,21 +1,21 @@
-//! A long campaign's place in a file: it can be stopped at any time, and the next run goes on from
-//! there.
+//! The progress of a long campaign, kept in a file.
+//! It can be stopped at any time, and the next run continues from there.
 
 use std::path::PathBuf;
 
 use super::class::Class;
 use super::report::{Report, Tally};
 
-/// Where a campaign of these settings keeps its place.
+/// The file that holds the progress of a campaign with these settings.
 #[derive(Debug)]
 pub(crate) struct Checkpoint {
     path: PathBuf,
-    /// The settings in a line: another run's place is not this one's.
+    /// The settings in one line: progress made with other settings is ignored.
     settings: String,
 }
 
 impl Checkpoint {
-    /// The place of the campaign `settings` (one line), in the build's folder for tests.
+    /// The checkpoint of the campaign `settings` (one line), in the build's folder for tests.
     pub(crate) fn new(name: &str, settings: String) -> Self {
         Self {
             path: PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.txt")),
@@ -23,8 +23,8 @@ impl Checkpoint {
         }
     }
 
-    /// How many chunks are done and what they found; nothing is, where no run of these settings
-    /// stopped.
+    /// How many chunks are done, and what they found.
+    /// 0 and an empty report unless a run with these settings was stopped.
     pub(crate) fn load(&self, keeps: bool) -> (u64, Report) {
         let fresh = || (0, Report::new(&Class::ALL, keeps));
         let Ok(text) = std::fs::read_to_string(&self.path) else { return fresh() };
@@ -46,8 +46,8 @@ impl Checkpoint {
         (done, report)
     }
 
-    /// Notes the place.
-    /// Written beside and renamed, so that a run that is killed leaves the last one.
+    /// Saves the progress.
+    /// Writes a new file and renames it, so that a killed run leaves the previous one intact.
     pub(crate) fn save(&self, done: u64, report: &Report) {
         let mut text = format!("{}\n{done}\n", self.settings);
         for (_, t) in &report.classes {
@@ -59,7 +59,7 @@ impl Checkpoint {
             .expect("a place to note");
     }
 
-    /// The campaign is over: the next run begins anew.
+    /// Removes the file: the campaign is over, and the next run starts anew.
     pub(crate) fn remove(&self) {
         std::fs::remove_file(&self.path).ok();
     }

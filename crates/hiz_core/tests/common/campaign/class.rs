@@ -1,4 +1,4 @@
-//! The classes of cases: what each of them insists on, while everything else stays random.
+//! The classes of cases: what each of them fixes, while everything else stays random.
 
 use hiz_core::{DepthConvention, ImageSize};
 
@@ -9,19 +9,19 @@ use super::scene::{DepthStyle, Settings};
 /// One class of adversarial cases.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Class {
-    /// Nothing in particular: a little of everything.
+    /// Nothing is fixed: a little of everything.
     Random,
     /// Rectangles that end on pixel and texel borders, beside a column or row of holes.
     PixelBorders,
     /// Volumes from 1e-9 to 1e-2 pixels.
     Tiny,
-    /// Volumes from ten to 1e5 images wide, the camera inside of some.
+    /// Volumes from ten to 1e5 images wide; the camera is inside some of them.
     Huge,
     /// Plates seen edge-on.
     Grazing,
     /// Volumes that touch the near plane, from either side.
     NearPlane,
-    /// Images up to three times their width beside the optical axis.
+    /// Images up to three times their width off the optical axis.
     OffCentre,
     /// Parallel rays.
     Orthographic,
@@ -31,25 +31,25 @@ pub(crate) enum Class {
     ThinRange,
     /// far / near from 1e4 to 1e8.
     DeepRange,
-    /// The camera 1e3 to 1e9 from the world's origin.
+    /// The camera is 1e3 to 1e9 away from the world's origin.
     FarAway,
-    /// Volumes nearly tangent to a plane of the frustum, from outside.
+    /// Volumes outside the frustum that are nearly tangent to one of its planes.
     FrustumPlanes,
-    /// Volumes whose nearest point has the stored depth, to within an ulp and much less.
+    /// Volumes whose nearest point has the stored depth, to within an ulp or far less.
     EqualDepth,
-    /// Single pixels that are seen through.
+    /// Single pixels with nothing in them.
     Holes,
-    /// Images of one row or column, pixels and volumes up to 1e4 times as wide as high.
+    /// Images of one row or column; pixels and volumes up to 1e4 times as wide as high.
     AspectRatios,
-    /// Worlds from 1e-24 to 1e12 units across, the unit of the camera being 1.
+    /// Worlds from 1e-24 to 1e12 times the usual size, camera included.
     Scale,
-    /// A matrix about the world's origin, its camera far away: constants cancel at the eye, and the
-    /// rows have to own up to it.
+    /// A matrix about the world's origin, whose camera is far away.
+    /// Constants cancel at the eye, and the rows' error bounds have to include that.
     BareMatrix,
 }
 
 impl Class {
-    /// All of them.
+    /// All classes.
     pub(crate) const ALL: [Self; 18] = [
         Self::Random,
         Self::PixelBorders,
@@ -71,7 +71,7 @@ impl Class {
         Self::BareMatrix,
     ];
 
-    /// What the class insists on, said to settings that are random so far.
+    /// Fixes what the class needs in settings that are random so far.
     pub(super) fn insist(self, s: &mut Settings, random: &mut Random) {
         match self {
             Self::Random | Self::Tiny | Self::Huge => {}
@@ -114,10 +114,10 @@ impl Class {
                 s.bare_matrix = true;
                 let distance = 10.0_f64.powf(random.range(0.0, 9.0));
                 s.stand_away(distance, random);
-                // A near plane so close that what float64 lost in the constants is large beside it,
-                // and volumes far behind it: there nothing else in the margin of a depth covers
-                // that.
-                // (Without a far plane z and w lose the same.)
+                // A near plane so close that float64's loss in the constants is large beside it.
+                // The volumes are far behind it.
+                // There no other part of a depth's margin covers that loss.
+                // Without a far plane z and w lose the same amount.
                 s.near = distance * 10.0_f64.powf(random.range(-13.0, -10.0));
                 s.far = s.near * 10.0_f64.powf(random.range(4.0, 8.0));
                 s.style = random.pick(&[DepthStyle::Equal, s.style]);
@@ -125,7 +125,7 @@ impl Class {
         }
     }
 
-    /// How many pixels a volume is wide, or high, in an image of `side`.
+    /// How many pixels a volume is wide, or high, in an image of `side` pixels.
     pub(super) fn extent(self, side: u32, random: &mut Random) -> f64 {
         match self {
             Self::Tiny => 10.0_f64.powf(random.range(-9.0, -2.0)),

@@ -1,6 +1,6 @@
-//! Depth images that fit a volume: each pixel holds just about the depth at which it begins to show
-//! the volume, so that an ulp, or one pixel of them all, decides.
-//! What `Fit::Volume` culls is decided there.
+//! Depth images that fit a volume, as tests of `Fit::Volume`.
+//! Each pixel holds almost exactly the depth at which it begins to show the volume.
+//! So an ulp, or a single pixel, decides the verdict.
 
 use hiz_core::{BoundsKind, Coverage};
 use hiz_ref::{Verdict, View, Volume};
@@ -8,7 +8,7 @@ use hiz_ref::{Verdict, View, Volume};
 use super::{Campaign, Round, moved};
 use crate::common::Random;
 
-/// Some steps of float32 nearer (below 0) or farther, within 0..=1.
+/// `depth` moved by a number of float32 steps: nearer below 0, else farther; within 0..=1.
 fn stepped(depth: f32, steps: i64, reversed: bool) -> f32 {
     let steps = if reversed { -steps } else { steps };
     f32::from_bits(
@@ -16,8 +16,9 @@ fn stepped(depth: f32, steps: i64, reversed: bool) -> f32 {
     )
 }
 
-/// Depth that is nearer than what a volume shows in each pixel, by a few ulps or by a share of the
-/// way to the nearest depth of all; often one pixel is spoilt.
+/// Depth that is nearer than the volume in each pixel.
+/// It is nearer by a few ulps, or by a share of the way to the volume's nearest depth.
+/// Often one pixel is spoilt.
 fn tight_image(
     random: &mut Random,
     view: &View,
@@ -32,8 +33,8 @@ fn tight_image(
         own.iter().flatten().copied().reduce(if view.reversed { f32::max } else { f32::min });
     let ulps = random.pick(&[0, 1, 20, 1000, 30_000]);
     let share = random.pick(&[0.0, 0.0, 0.02, 0.2, 0.6]);
-    // The pixels that it does not touch: far beyond it (they must be told apart), or in front of
-    // it.
+    // Pixels that the volume does not touch are far beyond it, or in front of it.
+    // The cull has to recognise those that are far as outside the volume.
     let outside = random.pick(&[0.0, 1.0]);
     let mut depth: Vec<f32> = own
         .iter()
@@ -55,8 +56,8 @@ fn tight_image(
     depth
 }
 
-/// Boxes at every angle, and plates that recede before the eye: faces that recede are what the fit
-/// is for.
+/// Boxes at every angle, and plates that recede from the eye.
+/// The fit exists for faces that recede.
 fn tilted(random: &mut Random, round: &Round, volume: &Volume) -> Volume {
     let Volume::OrientedBox { center, half_sizes, .. } = *volume else { return *volume };
     let (a, b) = (unit(any_vector(random)), any_vector(random));
@@ -65,7 +66,7 @@ fn tilted(random: &mut Random, round: &Round, volume: &Volume) -> Volume {
         let c = unit(cross(a, b));
         return Volume::OrientedBox { center, half_sizes, axes: [a, cross(c, a), c] };
     }
-    // Its normal is up to 60 degrees off the line to the eye; thin or flat.
+    // A thin or flat plate, whose normal is up to 60 degrees off the line to the eye.
     let toward = unit(to_eye);
     let normal = unit([0, 1, 2].map(|k| toward[k] + 0.8 * a[k]));
     let side = unit(cross(normal, b));
@@ -78,9 +79,9 @@ fn tilted(random: &mut Random, round: &Round, volume: &Volume) -> Volume {
     }
 }
 
-/// `round` with its one volume moved to the last place where the oracle still sees some of it, to
-/// within 1e-10 of its distance, or a hair before.
-/// Unchanged where there is no such place nearby.
+/// Moves the round's one volume to where the oracle's verdict changes.
+/// It is the last place that the oracle still calls visible, to within 1e-10 of its distance.
+/// The round is unchanged where there is no such place nearby.
 fn on_the_edge(mut round: Round, random: &mut Random) -> Round {
     let volume = round.volumes[0].1[0];
     let distance = length(round.away[0][0]);
@@ -122,9 +123,9 @@ fn on_the_edge(mut round: Round, random: &mut Random) -> Round {
 }
 
 impl Campaign {
-    /// Rounds of one volume each, with a depth image that fits it; `sharp`: and then moved to where
-    /// the oracle's verdict changes.
-    /// Small images alone: the depth of each pixel is searched for.
+    /// Rounds of one volume each, with a depth image that fits it.
+    /// With `sharp` the volume is then moved to where the oracle's verdict changes.
+    /// Only small images: the depth of each pixel is found by a search.
     pub(crate) fn fitted(
         self,
         kinds: &'static [BoundsKind],
@@ -152,7 +153,7 @@ impl Campaign {
         })
     }
 
-    /// Rounds of one volume each, and the depth as it was.
+    /// Rounds of one volume each, with the depth image of the original round.
     pub(crate) fn loose(self, kinds: &'static [BoundsKind]) -> impl Iterator<Item = Round> {
         self.rounds().flat_map(move |round| {
             let mut random = Random(self.seed ^ round.number as u64);
@@ -170,7 +171,7 @@ impl Campaign {
 }
 
 impl Round {
-    /// The same with one volume and a depth image of its own.
+    /// The same round with one volume and a depth image of its own.
     fn alone(&self, kind: BoundsKind, volume: Volume, away: [f64; 3], depth: Vec<f32>) -> Self {
         Self {
             depth,

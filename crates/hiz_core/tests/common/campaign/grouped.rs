@@ -1,5 +1,6 @@
-//! A round culled in groups: each volume many times over, so that some groups hold nothing else and
-//! their boxes are as nearly decided as it is.
+//! A round that is culled in groups.
+//! Each volume is repeated, so that some groups hold nothing else.
+//! The boxes of those groups are as nearly undecided as the volume itself.
 
 use hiz_core::headless::Engine;
 use hiz_core::{Coverage, CullOptions, Hierarchy, InstanceOptions, Outputs, StoredOrder, Verdict};
@@ -7,15 +8,20 @@ use hiz_core::{Coverage, CullOptions, Hierarchy, InstanceOptions, Outputs, Store
 use super::{Arrays, Round};
 use crate::common::Random;
 
-/// What a cull in groups spared, and what contradicts the flat one.
+/// How many instances a cull in groups tested one by one, and what contradicts the flat cull.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Tested {
     /// All instances.
     pub(crate) instances: u64,
     /// Those that were tested by themselves.
     pub(crate) one_by_one: u64,
-    /// Instances that are kept with groups alone, verdicts that are counted and not there, or the
-    /// reverse, and those that groups change beyond hiding a few more: must be 0.
+    /// Must be 0.
+    /// The sum of four counts:
+    ///
+    /// - instances that are kept with groups alone;
+    /// - the difference between the demand and the kept bits;
+    /// - the difference between counted verdicts and those in the list;
+    /// - verdicts that groups change, other than hiding a few more.
     pub(crate) contradictions: u64,
 }
 
@@ -28,12 +34,12 @@ impl Tested {
 }
 
 impl Round {
-    /// What the device keeps with groups, for each kind, in any stored order.
-    /// A volume is kept if all of its copies are.
-    /// Nothing for a camera that is refused.
+    /// The masks that the device gives with groups, for each kind, in a random stored order.
+    /// A volume counts as kept if all of its copies are kept.
+    /// `None` for a camera that is refused.
     pub(crate) fn grouped_masks(&self, engine: &Engine) -> Option<(Vec<Vec<bool>>, Tested)> {
         let random = &mut Random(self.seed ^ (self.number as u64) << 32);
-        // Whole groups of one volume, groups of a few, and one of all.
+        // Whole groups of one volume, groups of a few volumes, and one group of everything.
         let copies = random.pick(&[64, 64, 21, 1]);
         let order = random.pick(&[StoredOrder::Morton, StoredOrder::Given]);
         let is_area = self.options.coverage == Coverage::Area;
@@ -61,7 +67,7 @@ impl Round {
             let alone = flat_cull.verdicts().expect("verdicts");
             let pairs = alone.chunks_exact(copies).zip(verdicts.chunks_exact(copies)).zip(volumes);
             let changed = pairs.map(|((alone, verdicts), volume)| {
-                // By the certificate of its group's box, which is another one than its own.
+                // Outside by the certificate of the group's box, which is not the volume's own.
                 let by_box = alone.iter().zip(verdicts).filter(|(alone, verdict)| {
                     matches!(alone, Verdict::Occluded | Verdict::Visible)
                         && **verdict == Verdict::Outside

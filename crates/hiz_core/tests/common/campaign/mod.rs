@@ -1,11 +1,14 @@
 //! Random and adversarial culls against the oracle.
 //!
-//! A round is a camera, a depth image and a few dozen volumes of each kind, of one [`Class`], made
-//! so that something is nearly decided the other way: their nearest points share a depth that the
-//! image repeats, their silhouettes end on pixel borders beside holes or at the frustum's planes,
-//! and most are moved by bisection to where the oracle's verdict hangs on the last bits.
-//! The oracle decides exactly; a volume that is culled although the oracle calls it visible is a
-//! false cull.
+//! A round is a camera, a depth image and a few dozen volumes of each kind, of one [`Class`].
+//! Each round is made so that some verdict is nearly the opposite:
+//!
+//! - the nearest points of the volumes share a depth that the image repeats;
+//! - their silhouettes end on pixel borders beside holes, or at the frustum's planes;
+//! - most are moved by bisection to where the last bits decide the oracle's verdict.
+//!
+//! The oracle decides exactly.
+//! A volume that is culled although the oracle calls it visible is a false cull.
 #![allow(dead_code, unused_imports, reason = "each test binary uses its own part")]
 
 mod arrays;
@@ -34,14 +37,14 @@ pub(crate) use grouped::Tested;
 pub(crate) use report::{HEADER, Report, Tally};
 pub(crate) use volume::moved;
 
-/// Every kind of bounding volume.
+/// Every kind of bounds.
 pub(crate) const KINDS: [BoundsKind; 3] =
     [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
 
-/// What a cull reads by default.
+/// The footprint and descent of a default cull.
 pub(crate) const PLAIN: &[(Footprint, u32)] = &[(Footprint::Two, 0)];
 
-/// Pyramids that lack levels: fine ones, coarse ones, all but one.
+/// Pyramids that lack fine levels, coarse levels, or all but one.
 pub(crate) const MISSING_LEVELS: &[StoredLevels] = &[
     StoredLevels::from(2),
     StoredLevels::from(3),
@@ -52,11 +55,11 @@ pub(crate) const MISSING_LEVELS: &[StoredLevels] = &[
     StoredLevels { first: 2, last: 3 },
 ];
 
-/// How to run one.
+/// How to run a campaign.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Campaign {
     pub(crate) seed: u64,
-    /// Taken in turn, one a round.
+    /// Taken in turn, one per round.
     pub(crate) classes: &'static [Class],
     /// Rounds of each class.
     pub(crate) rounds: usize,
@@ -65,20 +68,21 @@ pub(crate) struct Campaign {
     pub(crate) kinds: &'static [BoundsKind],
     pub(crate) coverage: Coverage,
     /// Footprints and descent budgets to choose from.
-    /// (Each costs pipelines, and those cost time.)
+    /// Each needs pipelines of its own, which take time to compile.
     pub(crate) modes: &'static [(Footprint, u32)],
     pub(crate) fit: Fit,
     /// Which levels are stored, to choose from.
     pub(crate) levels: &'static [StoredLevels],
-    /// Sizes of images to choose from; none: up to 48 pixels a side, whatever the class says.
+    /// Sizes of images to choose from.
+    /// If empty: up to 48 pixels a side, or what the class wants.
     pub(crate) sizes: &'static [(u32, u32)],
-    /// How many chunks the stored levels are cut into, at most: 1 to 3.
+    /// The greatest number of chunks of the stored levels: 1 to 3.
     pub(crate) chunks: u64,
-    /// Cull whole groups first, in any stored order, and compare with the flat cull.
+    /// Whether to cull in groups, in a random stored order, and to compare with the flat cull.
     pub(crate) groups: bool,
-    /// Guards and slacks at random.
+    /// Whether guards and slacks are random.
     pub(crate) any_slack: bool,
-    /// Whether false keeps are counted, too (asks the oracle about everything).
+    /// Whether to count false keeps, too, which asks the oracle about every volume.
     pub(crate) count_keeps: bool,
 }
 
@@ -103,7 +107,7 @@ impl Default for Campaign {
     }
 }
 
-/// One camera, one depth image, volumes of each kind.
+/// One camera, one depth image, and volumes of each kind.
 #[derive(Debug)]
 pub(crate) struct Round {
     pub(crate) seed: u64,
@@ -116,13 +120,13 @@ pub(crate) struct Round {
     pub(crate) levels: StoredLevels,
     pub(crate) chunks: u64,
     pub(crate) volumes: Vec<(BoundsKind, Vec<Volume>)>,
-    /// For each volume the way, as long as its distance, on which it becomes hidden.
+    /// For each volume the direction in which it becomes hidden, as long as the scene's distance.
     pub(crate) away: Vec<Vec<[f64; 3]>>,
 }
 
 impl Campaign {
     /// The rounds, made as they are asked for.
-    /// Those whose camera float64 or float32 cannot hold are left out.
+    /// Leaves out those whose camera float64 or float32 cannot hold.
     pub(crate) fn rounds(self) -> impl Iterator<Item = Round> {
         (0..self.rounds * self.classes.len()).filter_map(move |number| self.round(number))
     }
@@ -135,7 +139,7 @@ impl Campaign {
         let (footprint, descent) = random.pick(self.modes);
         let mut options = CullOptions {
             coverage: self.coverage,
-            // No slack and no guard: they would hide a margin that is too small.
+            // No slack and no guard, which would hide a margin that is too small.
             guard_px: Some(0.0),
             depth_slack: 0.0,
             footprint,
@@ -160,7 +164,7 @@ impl Campaign {
             away.push(ways);
         }
         let Scene { camera, view, depth, .. } = scene;
-        // Last, so that a round is the same whatever is stored.
+        // Drawn last, so that a round is the same whatever levels are stored.
         let levels = random.pick(self.levels);
         let (seed, chunks) = (self.seed, self.chunks);
         Some(Round {
@@ -208,22 +212,22 @@ impl Campaign {
 }
 
 impl Round {
-    /// One of four ways to hold depth, whatever the class.
+    /// One of four ways to hold depth, independent of the class.
     fn way(&self) -> u64 {
         (self.number as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 62
     }
 
-    /// The depth image; in two of four ways in a texture that is gathered from, like a depth
-    /// texture.
+    /// The depth image.
+    /// Two of the four ways use a texture that is gathered from, like a depth texture.
     pub(crate) fn upload(&self, engine: &Engine) -> DepthImage {
         let upload =
             if self.way() % 2 == 1 { Engine::upload_depth_sampled } else { Engine::upload_depth };
         upload(engine, &self.depth, &self.camera).expect("upload")
     }
 
-    /// The levels of this round; in two of four ways, one of each kind of image, culls read all of
-    /// them from one texture.
-    /// Of more than one chunk there is none.
+    /// The levels of this round.
+    /// In two of the four ways, one for each kind of image, culls read all levels from one atlas.
+    /// A pyramid of more than one chunk has no atlas.
     pub(crate) fn pyramid_options(&self, engine: &Engine) -> PyramidOptions {
         let atlas = if self.way() < 2 { AtlasUse::Always } else { AtlasUse::Never };
         let options = PyramidOptions { levels: self.levels, atlas, ..PyramidOptions::default() };
@@ -231,15 +235,15 @@ impl Round {
             return options;
         }
         let whole = engine.context().create_pyramid(self.camera.size(), &options).expect("pyramid");
-        // The least chunks of a power of two of which so many are enough.
+        // The smallest chunks of a power of two of which `chunks` are enough.
         let shift = (2..30)
             .find(|shift| whole.device_bytes() / 4 <= self.chunks << shift)
             .expect("a small pyramid");
         PyramidOptions { chunk_shift: Some(shift), ..options }
     }
 
-    /// What the device keeps, for each kind.
-    /// Nothing for a camera that is refused: float32 cannot hold its rows.
+    /// The masks that the device gives, for each kind.
+    /// `None` for a camera that is refused because float32 cannot hold its rows.
     pub(crate) fn masks(&self, engine: &Engine) -> Option<Vec<Vec<bool>>> {
         let image = self.upload(engine);
         let pyramid = engine.pyramid_with(&image, &self.pyramid_options(engine)).expect("pyramid");
@@ -273,7 +277,7 @@ impl Round {
         self.outcome_as(volume, own_depth)
     }
 
-    /// The oracle's answer, a volume's own depth taken otherwise than the options say.
+    /// The oracle's answer, with another own depth of the volume than the options say.
     pub(crate) fn outcome_as(&self, volume: &Volume, own_depth: OwnDepth) -> Outcome {
         let coverage = match self.options.coverage {
             Coverage::Area => hiz_ref::Coverage::Area,
@@ -283,8 +287,8 @@ impl Round {
         hiz_ref::classify_with(&self.view, volume, &self.depth, options).expect("a finite view")
     }
 
-    /// The count of one verdict.
-    /// What is kept is right unless false keeps are asked for.
+    /// Counts one verdict.
+    /// A volume that is kept counts as right unless false keeps are asked for.
     pub(crate) fn tally(&self, volume: &Volume, kept: bool, count_keeps: bool) -> Tally {
         let mut tally = Tally { cases: 1, culled: usize::from(!kept), ..Tally::default() };
         if !kept || count_keeps {
@@ -295,13 +299,14 @@ impl Round {
         tally
     }
 
-    /// Everything that is needed to see it again.
+    /// Everything that is needed to reproduce the case.
     pub(crate) fn describe(&self, kind: BoundsKind, volume: &Volume) -> String {
         let (seed, number, class) = (self.seed, self.number, self.class);
         let outcome = self.outcome(volume);
         let levels = self.levels;
         format!(
-            "seed {seed} round {number} {class:?} {kind:?} {levels:?}: {volume:?}\n{:?}\noracle {outcome:?}",
+            "seed {seed} round {number} {class:?} {kind:?} {levels:?}: {volume:?}\n{:?}\n\
+             oracle {outcome:?}",
             self.view
         )
     }

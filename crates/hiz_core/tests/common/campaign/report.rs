@@ -10,8 +10,8 @@ pub(crate) struct Tally {
     pub(crate) culled: usize,
     /// Culled although visible: must be 0.
     pub(crate) false_culls: usize,
-    /// Kept although hidden: the price.
-    /// (Only where the campaign counts them.)
+    /// Kept although hidden: the price of being conservative.
+    /// Only where the campaign counts them.
     pub(crate) false_keeps: usize,
 }
 
@@ -30,7 +30,7 @@ pub(crate) struct Report {
     pub(crate) classes: Vec<(Class, Tally)>,
     /// Whether false keeps were counted.
     pub(crate) keeps: bool,
-    /// What groups spared; all 0 without groups.
+    /// What groups tested; all 0 without groups.
     pub(crate) tested: Tested,
 }
 
@@ -82,7 +82,8 @@ impl std::fmt::Display for Report {
             let Tested { instances, one_by_one, contradictions } = self.tested;
             writeln!(
                 f,
-                "groups: {one_by_one} of {instances} instances tested one by one, {contradictions} contradictions"
+                "groups: {one_by_one} of {instances} instances tested one by one, \
+                 {contradictions} contradictions"
             )?;
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! A camera, a depth image, and where volumes begin.
+//! A camera, a depth image, and the depth at which volumes begin.
 
 use hiz_core::{Camera, Coverage, DepthConvention, ImageSize, Pose, Projection};
 use hiz_ref::View;
@@ -7,40 +7,40 @@ use crate::common::Random;
 
 use super::class::Class;
 
-/// What a depth image shows.
+/// The content of a depth image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum DepthStyle {
     /// One depth, at which the volumes begin.
     Equal,
     /// One depth, the near plane's.
     Near,
-    /// Nothing at all.
+    /// Nothing: all pixels are far.
     Far,
-    /// A wall before all volumes, with holes in one column.
+    /// A wall in front of all volumes, with a column of holes.
     Column,
-    /// The same, in one row.
+    /// The same wall with a row of holes.
     Row,
-    /// The same, in one column and one row.
+    /// The same wall with a column and a row of holes.
     Cross,
-    /// The same, in one pixel.
+    /// The same wall with a hole of one pixel.
     Pixel,
-    /// Anything.
+    /// Random depths.
     Noise,
 }
 
-/// What a scene is made from; random, until a class insists.
+/// The settings that a scene is made from: random, until a class fixes some.
 #[derive(Debug, Clone)]
 pub(super) struct Settings {
     pub(super) size: ImageSize,
     pub(super) convention: DepthConvention,
     pub(super) eye: [f64; 3],
-    /// How far the eye may be away from the world's origin.
+    /// The greatest distance of the eye from the world's origin along each axis.
     away: f64,
     pub(super) near: f64,
-    /// Infinite: none (a perspective alone).
+    /// Infinite where there is no far plane, which only a perspective can lack.
     pub(super) far: f64,
-    /// Half the image in world units at view depth 1 (perspective) or anywhere (orthographic), and
-    /// its middle.
+    /// Half the image in world units, and then its middle.
+    /// Measured at view depth 1 (perspective) or anywhere (orthographic).
     pub(super) half: [f64; 2],
     pub(super) middle: [f64; 2],
     pub(super) orthographic: bool,
@@ -87,8 +87,8 @@ impl Settings {
         settings
     }
 
-    /// Puts the camera up to `distance` from the world's origin along each axis; farther views are
-    /// of larger things.
+    /// Puts the camera up to `distance` from the world's origin along each axis.
+    /// Views from far away have larger near and far distances.
     pub(super) fn stand_away(&mut self, distance: f64, random: &mut Random) {
         self.away = distance;
         self.eye = [0; 3].map(|_| distance * random.range(-1.0, 1.0));
@@ -108,7 +108,7 @@ impl Settings {
         } else {
             std::array::from_fn(|_| random.range(-1.0, 1.0))
         };
-        // A target beyond the rounding of a distant eye.
+        // A target far enough not to be lost in the rounding of a distant eye.
         let target = std::array::from_fn(|k| self.eye[k] + (1.0 + self.away) * direction[k]);
         let (left, right) = (self.middle[0] - self.half[0], self.middle[0] + self.half[0]);
         let (bottom, top) = (self.middle[1] - self.half[1], self.middle[1] + self.half[1]);
@@ -130,7 +130,7 @@ impl Settings {
     }
 }
 
-/// A camera, its axes, its depth image and the view depth that volumes begin at.
+/// A camera, its axes, its depth image, and the view depth at which volumes begin.
 #[derive(Debug)]
 pub(super) struct Scene {
     pub(super) settings: Settings,
@@ -146,12 +146,12 @@ pub(super) struct Scene {
     /// Column and row of the holes.
     pub(super) hole: [u32; 2],
     pub(super) depth: Vec<f32>,
-    /// Where in a pixel a hole begins to be seen: 0 and 1 (area coverage), or its centre.
+    /// Where in its pixel a hole can be seen from: 0 and 1 (area coverage), or the pixel's centre.
     pub(super) edges: [f64; 2],
 }
 
 impl Scene {
-    /// Nothing where float64 cannot make such a camera.
+    /// `None` where float64 cannot represent such a camera.
     pub(super) fn new(
         class: Class,
         coverage: Coverage,
@@ -174,7 +174,7 @@ impl Scene {
             height: settings.size.height,
             reversed,
         };
-        // The axes as the camera has them, up to float64.
+        // The camera's axes, to the accuracy of float64.
         let unit = |v: [f64; 3]| {
             let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
             v.map(|x| x / length)
@@ -192,7 +192,7 @@ impl Scene {
         let axes = [across(0), across(1), forward];
         let (near, size) = (settings.near, settings.size);
         let range = (settings.far / near).min(1e9);
-        // Mostly within a thousand near planes; the whole range where it has to be deep.
+        // Mostly within a thousand near planes; the whole range for the classes that need depth.
         let exponent = match class {
             Class::DeepRange => random.unit(),
             Class::BareMatrix => random.range(0.3, 1.0),
@@ -250,7 +250,7 @@ impl Scene {
             .collect();
         self.front_depth = if style == DepthStyle::Near { 1.0 - far } else { equal };
         if matches!(style, DepthStyle::Equal | DepthStyle::Near) {
-            // The view depth of the stored depth itself, as exact as float64 has it.
+            // The view depth of the stored depth itself, to the accuracy of float64.
             let [z, w] = [2, 3].map(|r| self.along_forward(r));
             let d = f64::from(self.front_depth);
             let front = (d * w[1] - z[1]) / (z[0] - d * w[0]);
@@ -274,7 +274,7 @@ impl Scene {
         clip_z / clip_w
     }
 
-    /// World position of view space (right, up, forward).
+    /// World position of a position in view space (right, up, forward).
     pub(super) fn world(&self, v: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|k| {
             self.settings.eye[k] + (0..3).map(|j| self.axes[j][k] * v[j]).sum::<f64>()
@@ -291,8 +291,8 @@ impl Scene {
         ]
     }
 
-    /// The view of the pixel columns (axis 0) or rows (axis 1) from `begin` to `end` alone, up to
-    /// float64: good for a search.
+    /// The view of only the pixel columns (axis 0) or rows (axis 1) from `begin` to `end`.
+    /// It has the accuracy of float64, which is enough for a search.
     pub(super) fn cropped(&self, axis: usize, begin: f64, end: f64) -> View {
         let size = f64::from([self.view.width, self.view.height][axis]);
         let (stretch, shift) = (size / (end - begin), (size - begin - end) / (end - begin));

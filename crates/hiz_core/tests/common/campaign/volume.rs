@@ -1,5 +1,6 @@
-//! Volumes that are nearly decided the other way: placed beside a hole or before a depth, then
-//! moved until the oracle's verdict hangs on the last bits.
+//! Volumes whose verdict is nearly the opposite.
+//! They are placed beside a hole or in front of a depth.
+//! Then they are moved until the last bits decide the oracle's verdict.
 
 use hiz_core::BoundsKind;
 use hiz_ref::{View, Volume};
@@ -12,15 +13,15 @@ use super::scene::{DepthStyle, Scene};
 /// How far beside a border an edge may be placed, in pixels.
 const HAIRS: [f64; 9] = [0.0, 1e-7, -1e-7, 3e-6, -3e-6, 1e-4, -1e-4, 1e-12, -1e-12];
 
-/// A direction, and whether a volume has come far enough on it.
+/// A direction, and a predicate: has a volume moved far enough along it?
 struct Way<'a> {
     direction: [f64; 3],
     cleared: Box<dyn Fn(&Volume) -> bool + 'a>,
 }
 
 impl Scene {
-    /// A volume of `kind` as `class` wants it, and the way, as long as its distance, on which it
-    /// becomes hidden.
+    /// A volume of `kind` as `class` wants it, and the direction in which it becomes hidden.
+    /// The direction is as long as the scene's distance.
     pub(super) fn volume(
         &self,
         class: Class,
@@ -34,15 +35,15 @@ impl Scene {
         };
         let way = self.way(class, random);
         let away = way.direction.map(|x| x * self.front.abs());
-        // The rest stays where it was put: a hair beside a border, or anywhere.
+        // One in four stays where it was placed: a hair beside a border, or anywhere.
         if random.below(4) == 0 {
             return (placed, away);
         }
         (self.last_before(placed, away, &*way.cleared, random).unwrap_or(placed), away)
     }
 
-    /// An interval in pixels along an axis: anywhere, or ending a hair beside the border of the
-    /// hole or of a texel.
+    /// An interval in pixels along an axis.
+    /// It is random, or ends a hair beside the border of the hole or of a texel.
     fn interval(&self, class: Class, axis: usize, random: &mut Random) -> [f64; 2] {
         let side = [self.view.width, self.view.height][axis];
         let hole = f64::from(self.hole[axis]);
@@ -87,8 +88,8 @@ impl Scene {
                 Volume::Sphere { center: self.world([middle[0], middle[1], z + radius]), radius }
             }
             BoundsKind::Box if self.settings.aligned => {
-                // The camera looks along -z of the world with y up: view (x, y, depth) is world (x,
-                // y, -depth).
+                // The camera looks along the world's -z with y up.
+                // View (x, y, depth) is world (x, y, -depth).
                 let a = self.world([left.min(right), top.min(bottom), z + thickness]);
                 let b = self.world([left.max(right), top.max(bottom), z]);
                 spanned(a, b)
@@ -100,7 +101,8 @@ impl Scene {
             }
             BoundsKind::OrientedBox => {
                 let [right, up, forward] = self.axes;
-                // A roll about the view keeps the front where it is; so does a shear along it.
+                // A roll about the view direction keeps the front in place.
+                // So does a reflection along it.
                 let (s, c) = if random.below(3) == 0 {
                     random.range(0.0, 6.3).sin_cos()
                 } else {
@@ -116,8 +118,8 @@ impl Scene {
         }
     }
 
-    /// A flat box that holds a line of sight: all of it projects onto a line, along a border of the
-    /// hole.
+    /// A flat box that contains a line of sight along a border of the hole.
+    /// All of it projects onto one line of the image.
     fn plate(&self, kind: BoundsKind, random: &mut Random) -> Volume {
         let z = self.front;
         let axis = if self.settings.style == DepthStyle::Row { 1 } else { 0 };
@@ -132,7 +134,7 @@ impl Scene {
         let (forward, center) =
             (self.world(along), self.world([0, 1, 2].map(|k| [x, y, z][k] + depth * along[k])));
         if kind == BoundsKind::Box {
-            // Along the world's axes a plate is seen edge-on from on or near its plane alone.
+            // A plate along the world's axes is edge-on only from an eye on or near its plane.
             let mut half = [depth; 3];
             half[random.below(3) as usize] = 0.0;
             return spanned(
@@ -145,7 +147,7 @@ impl Scene {
         Volume::OrientedBox { center, half_sizes: [depth, height, 0.0], axes }
     }
 
-    /// A way on which volumes become hidden, as the depth image offers it.
+    /// A way for volumes to become hidden, given the depth image.
     fn way(&self, class: Class, random: &mut Random) -> Way<'_> {
         let [right, up, forward] = self.axes;
         let outside = |view: View| move |v: &Volume| hiz_ref::is_outside(&view, v).unwrap_or(false);
@@ -176,8 +178,8 @@ impl Scene {
                 };
                 let size = f64::from([self.view.width, self.view.height][axis]);
                 let hole = f64::from(self.hole[axis]);
-                // Towards smaller pixel coordinates, clear of the hole and all beyond it; or the
-                // other way.
+                // Towards smaller pixel coordinates, clear of the hole and of everything beyond it.
+                // Or the other way.
                 let down = random.below(2) == 0;
                 let (begin, end) =
                     if down { (hole + self.edges[0], size) } else { (0.0, hole + self.edges[1]) };
@@ -189,9 +191,9 @@ impl Scene {
         }
     }
 
-    /// Moves `volume` along `away` to the last place where it is not yet `cleared`, to within 1e-10
-    /// of its distance, or some eps before it.
-    /// Nothing where there is no such place nearby.
+    /// Moves `volume` along `away` to the last place where it is not yet `cleared`.
+    /// The place is found to within 1e-10 of the distance, or lies a few eps before it.
+    /// `None` where there is no such place nearby.
     fn last_before(
         &self,
         volume: Volume,
@@ -201,7 +203,7 @@ impl Scene {
     ) -> Option<Volume> {
         let at = |s: f64| moved(&volume, away.map(|x| x * s));
         let towards = if cleared(&volume) { -1.0 } else { 1.0 };
-        // A bracket around the change: it is near, mostly.
+        // A bracket around the change, which is mostly near.
         let (mut inner, mut outer) = (0.0, 1e-9 * towards);
         while cleared(&at(outer)) == (towards < 0.0) {
             (inner, outer) = (outer, outer * 16.0);
@@ -226,7 +228,7 @@ fn spanned(a: [f64; 3], b: [f64; 3]) -> Volume {
     Volume::Box { min: [0, 1, 2].map(|k| a[k].min(b[k])), max: [0, 1, 2].map(|k| a[k].max(b[k])) }
 }
 
-/// `volume`, shifted.
+/// `volume`, translated.
 pub(crate) fn moved(volume: &Volume, by: [f64; 3]) -> Volume {
     let plus = |p: [f64; 3]| [0, 1, 2].map(|k| p[k] + by[k]);
     match *volume {

@@ -1,13 +1,16 @@
-//! float32 `+ - *` in every way that WGSL permits: a result may be either neighbour of the exact
-//! one, a product and a sum may be fused, sums may be taken in any order, subnormals may be
-//! flushed.
+//! float32 `+ - *` in every way that WGSL permits:
+//!
+//! - a result may be either neighbour of the exact one;
+//! - a product and a sum may be fused;
+//! - sums may be taken in any order;
+//! - subnormals may be flushed.
 
 use crate::common::Random;
 
-/// Which neighbour an inexact result becomes.
+/// Which neighbour an inexact result is rounded to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Rounding {
-    /// To nearest, ties to even: what hardware does.
+    /// To nearest, ties to even, as hardware does.
     Nearest,
     /// The greater one.
     Up,
@@ -15,8 +18,8 @@ pub(crate) enum Rounding {
     Down,
     /// Either, drawn for each operation.
     Either,
-    /// Either, drawn for each *part* of the computation: what a part loses adds up, as the margin
-    /// has to assume.
+    /// Either, drawn for each *part* of the computation.
+    /// The losses of a part then add up, as the margin has to assume.
     EitherByPart,
 }
 
@@ -25,21 +28,20 @@ pub(crate) enum Rounding {
 pub(crate) struct Style {
     pub(crate) name: &'static str,
     pub(crate) rounding: Rounding,
-    /// Fuse products into sums: in 1 of `n` places at random, 1: everywhere, 0: nowhere.
+    /// Fuse products into sums: in 1 of `n` places at random, everywhere for 1, nowhere for 0.
     pub(crate) fused: u32,
     /// Take sums in any order.
     pub(crate) reassociated: bool,
-    /// Subnormals are 0: in 1 of `n` operations at random, 1: in all, 0: in none.
+    /// Flush subnormals to 0: in 1 of `n` operations at random, in all for 1, in none for 0.
     pub(crate) flushed: u32,
-    /// The rectangle is anything, and so are the slopes and offsets of a volume fit: they only
-    /// choose what is certified.
+    /// The rectangle is arbitrary, and so are the slopes and offsets of a volume fit.
+    /// They only choose what is certified, so no verdict may depend on them.
     pub(crate) wild: bool,
-    /// `bar` and `bar3` stop the compiler from folding a difference that cancels into what it was
-    /// made of.
+    /// `bar` and `bar3` stop the compiler from folding a cancelling difference into its operands.
     pub(crate) bars: bool,
-    /// `bar2` stops it from folding the quotient that a slope is into what it is multiplied with.
+    /// `bar2` stops it from folding a slope's quotient into the products with that slope.
     pub(crate) slope_bars: bool,
-    /// At the frustum's planes the margin is taken off before the second product.
+    /// At the frustum's planes the margin is subtracted before the second product.
     pub(crate) margin_first: bool,
 }
 
@@ -55,11 +57,12 @@ const PLAIN: Style = Style {
     margin_first: false,
 };
 
-/// What lavapipe's compiler makes of the plain one.
+/// The code that lavapipe's compiler makes of the plain style.
 pub(crate) const MARGIN_FIRST: Style =
     Style { name: "nearest, margin first", margin_first: true, ..PLAIN };
 
-/// What reassociation may do where no bar stops it; no style that the margin covers.
+/// What reassociation may do where no bar stops it.
+/// The margin does not cover this style.
 pub(crate) const WITHOUT_BARS: Style = Style { name: "no bars", bars: false, ..PLAIN };
 
 /// The first is the plain one.
@@ -94,7 +97,7 @@ pub(crate) const STYLES: [Style; 14] = [
     Style { name: "wild, by part", wild: true, rounding: Rounding::EitherByPart, ..PLAIN },
 ];
 
-/// One device's float32.
+/// The float32 arithmetic of one device.
 #[derive(Debug)]
 pub(crate) struct Arithmetic {
     pub(crate) style: Style,
@@ -109,14 +112,14 @@ impl Arithmetic {
         Self { style, random, up }
     }
 
-    /// Something else begins to be computed.
+    /// Begins another part of the computation.
     pub(crate) fn part(&mut self) {
         if self.style.rounding == Rounding::EitherByPart {
             self.up = self.random.below(2) == 0;
         }
     }
 
-    /// Uniform in 0..n, for what is left to chance outside of the arithmetic.
+    /// Uniform in 0..n, for random choices outside the arithmetic.
     pub(crate) fn below(&mut self, n: u32) -> u32 {
         self.random.below(n)
     }
@@ -127,11 +130,11 @@ impl Arithmetic {
         if flushes { 0.0 } else { v }
     }
 
-    /// The float32 that the exact number `value + rest` becomes; `nearest` is what to nearest makes
-    /// of it.
+    /// The float32 that the exact number `value + rest` is rounded to.
+    /// `nearest` is the result of rounding to nearest.
     fn rounded(&mut self, value: f64, rest: f64, nearest: f32) -> f32 {
         // Exact: `nearest` is within half a spacing of `value`.
-        // So the sign of the sum is that of the error.
+        // So the sign of the sum is the sign of the error.
         let error = (value - f64::from(nearest)) + rest;
         let up = match self.style.rounding {
             Rounding::Nearest => return self.flush(nearest),
@@ -175,7 +178,7 @@ impl Arithmetic {
         self.rounded(sum, rest, a.mul_add(b, c))
     }
 
-    /// The sum of the products and of the rest, in the order that is written or any other.
+    /// The sum of the products and of the rest, in the order written or in any other.
     pub(crate) fn sum_of_products(&mut self, a: [f32; 3], b: [f32; 3], rest: Option<f32>) -> f32 {
         let mut order = [0, 1, 2];
         if self.style.reassociated {
@@ -197,10 +200,10 @@ impl Arithmetic {
         }
     }
 
-    /// `from` less two products and `margin`, in the order that is written or any other.
+    /// `from` minus two products and `margin`, in the order written or in any other.
     pub(crate) fn difference(&mut self, from: f32, products: [(f32, f32); 2], margin: f32) -> f32 {
         let [(a, b), (c, d)] = products;
-        // As products: those of 1 are exact, fused or not.
+        // All terms are products; those with 1 are exact, fused or not.
         let mut terms = [(from, 1.0), (-a, b), (-c, d), (-margin, 1.0)];
         if self.style.reassociated {
             (0..3).for_each(|k| terms.swap(k, k + self.random.below(4 - k as u32) as usize));
@@ -209,8 +212,8 @@ impl Arithmetic {
         terms[1..].iter().fold(first, |sum, (a, b)| self.mul_add(*a, *b, sum))
     }
 
-    /// Whether the sums of one expression are taken as one, in any order: half of the time where
-    /// that is permitted.
+    /// Whether the sums of one expression are taken as a single sum in any order.
+    /// Half of the time where that is permitted.
     pub(crate) fn takes_any_order(&mut self) -> bool {
         self.style.reassociated && self.random.below(2) == 0
     }
@@ -218,7 +221,7 @@ impl Arithmetic {
     /// The sum of products, in any order.
     pub(crate) fn sum_in_any_order<const N: usize>(&mut self, mut terms: [(f32, f32); N]) -> f32 {
         (0..N - 1).for_each(|k| terms.swap(k, k + self.random.below((N - k) as u32) as usize));
-        // As products: those of 1 are exact, fused or not.
+        // All terms are products; those with 1 are exact, fused or not.
         let first = self.mul(terms[0].0, terms[0].1);
         terms[1..].iter().fold(first, |sum, (a, b)| self.mul_add(*a, *b, sum))
     }
@@ -232,8 +235,8 @@ impl Arithmetic {
     }
 }
 
-/// What a volume fit has to stand besides [`STYLES`]: subnormals flushed in one place and not in
-/// another.
+/// What a volume fit has to withstand besides [`STYLES`].
+/// Subnormals are flushed in one place and not in another.
 pub(crate) const WILDEST: Style = Style {
     name: "all, wild",
     rounding: Rounding::EitherByPart,
@@ -244,11 +247,11 @@ pub(crate) const WILDEST: Style = Style {
     ..PLAIN
 };
 
-/// The same, and slopes that are certified are not those that are compared with.
+/// The same, where the slopes that are certified differ from those that are compared with.
 pub(crate) const WITHOUT_SLOPE_BARS: Style =
     Style { name: "no bars at slopes", slope_bars: false, ..WILDEST };
 
-/// Knuth's: the float64 sum, and what it lost, exactly.
+/// Knuth's two-sum: the float64 sum and its exact error.
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let bb = sum - a;

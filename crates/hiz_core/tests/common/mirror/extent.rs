@@ -1,5 +1,5 @@
-//! `extent_of` and what is certified by it (`bounds_box_support.wgsl`, `bounds_sphere.wgsl`): of
-//! boxes over ends that may be anything, for what is proved is proved of them.
+//! `extent_of` and what it certifies (`bounds_box_support.wgsl`, `bounds_sphere.wgsl`).
+//! The ends of a box's extent may be anything, because the proof holds for any ends.
 
 use hiz_core::BoundsKind;
 
@@ -15,8 +15,8 @@ pub(super) struct Extent {
     pub(super) above: f32,
 }
 
-/// An end that a wild device may take for the least or greatest ratio: near the right one or
-/// anywhere in the image.
+/// An end that a wild device may take for the least or greatest ratio.
+/// It is near the right one or anywhere in the image.
 fn wild_end(end: f32, half_size: f32, f: &mut Arithmetic) -> f32 {
     let unit = f.below(1 << 24) as f32 / (1 << 23) as f32 - 1.0;
     let small = 0.1_f32.powi(1 + f.below(7) as i32);
@@ -31,7 +31,7 @@ fn wild_end(end: f32, half_size: f32, f: &mut Arithmetic) -> f32 {
 }
 
 impl Certificates<'_> {
-    /// `w_min`: of boxes a lower bound of w, of spheres an estimate.
+    /// `w_min`: a lower bound of w for boxes, an estimate for spheres.
     pub(super) fn least_w(&mut self, w: &Value) -> f32 {
         self.arithmetic.part();
         let support = self.support(w.half);
@@ -46,8 +46,7 @@ impl Certificates<'_> {
         self.arithmetic.sub(least, w.error)
     }
 
-    /// `extent_of`, along an axis of which the image has `half_size` pixels on each side of its
-    /// middle.
+    /// `extent_of`, along an axis with `half_size` pixels on each side of the image's middle.
     pub(super) fn extent_of(&mut self, r: &Value, w: &Value, half_size: f32) -> Extent {
         if self.kind == BoundsKind::Sphere {
             let [low, high] = ratio_interval(self.kind, r, w);
@@ -68,8 +67,8 @@ impl Certificates<'_> {
         Extent { low, high, below, above }
     }
 
-    /// `below` for the end `t` and the sign 1, `above` for -1: `sign (r - t w)` is nowhere less
-    /// than its negative.
+    /// `below` for the end `t` and the sign 1, `above` for the sign -1.
+    /// On the whole volume `sign (r - t w)` is at least the negative of it.
     fn beyond(&mut self, sign: f32, r: &Value, t: f32, w: &Value) -> f32 {
         self.arithmetic.part();
         let half = [0, 1, 2].map(|k| self.arithmetic.mul_add(-t, w.half[k], r.half[k]));

@@ -1,5 +1,5 @@
-//! `candidate` and `on_border` of `bounds_box_support.wgsl` and `bounds_sphere.wgsl`: guesses that
-//! nothing rests on, so plain float32 will do in every style.
+//! `candidate` and `on_border` of `bounds_box_support.wgsl` and `bounds_sphere.wgsl`.
+//! They are guesses that no proof relies on, so plain float32 will do in every style.
 
 use hiz_core::BoundsKind;
 

@@ -1,5 +1,5 @@
-//! How many eps the arithmetic really loses: what a certificate or a texel's comparison claims,
-//! against the same in float64.
+//! How many eps the arithmetic really loses.
+//! The claims of certificates and of a texel's comparison are compared with the same in float64.
 
 use hiz_core::BoundsKind;
 use hiz_ref::Volume as Exact;
@@ -10,7 +10,7 @@ use super::volume::Volume;
 use super::{Arithmetic, Certificates, EPS, LEAST_W, Margins, Mirror, two_to};
 use crate::campaign::Round;
 
-/// The most that was lost, and of how many claims.
+/// The greatest loss, and the number of claims that it is taken over.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Loss {
     pub(crate) eps: f64,
@@ -24,7 +24,7 @@ impl Loss {
     }
 }
 
-/// What was lost, claim by claim.
+/// The losses by kind of claim.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Losses {
     /// Of supporting planes.
@@ -48,10 +48,10 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 impl Mirror {
-    /// What certificates on the round's one volume lose: the margin, less what is left of it in
-    /// float64.
-    /// In a wild arithmetic, for it alone moves the supporting planes' offsets to where they just
-    /// hold.
+    /// The losses of certificates on the round's one volume.
+    /// A loss is the margin minus what is left of it in float64.
+    /// The arithmetic has to be a wild one.
+    /// Only there are the supporting planes' offsets moved to where they just hold.
     pub(crate) fn losses(&self, round: &Round, arithmetic: &mut Arithmetic) -> Losses {
         let mut losses = Losses::default();
         let (kind, words) = &self.words[0];
@@ -89,7 +89,7 @@ impl Mirror {
                 for (sign, end, beyond) in [(1.0, low, below), (-1.0, high, above)] {
                     let mut slope = [0.0; 2];
                     slope[k] = sign;
-                    // Where it ends at 0 it claims less than it has proved.
+                    // A bound that was clamped to 0 claims less than it has proved.
                     if beyond > 0.0 && end.is_finite() {
                         add(
                             &mut losses.extents,
@@ -104,8 +104,8 @@ impl Mirror {
         losses
     }
 
-    /// The least of `facing Z' + slope . (X', Y') - offset W'` on the volume, in float64; nothing
-    /// where that is off by more than `tolerance`.
+    /// The least of `facing Z' + slope . (X', Y') - offset W'` on the volume, in float64.
+    /// `None` where that is off by more than `tolerance`.
     fn left(&self, round: &Round, plane: &Plane, tolerance: f64) -> Option<f64> {
         let (rows, origin) = (&round.view.rows, round.view.origin);
         // The rows that the shader reads are these times a power of two.
@@ -157,8 +157,9 @@ impl Mirror {
     }
 }
 
-/// What a texel's comparison with a plane loses: random terms that nearly cancel, offsets moved to
-/// where it just holds with 8 eps.
+/// The loss of a texel's comparison with a plane.
+/// The terms are random and nearly cancel.
+/// Offsets are moved to where the comparison just holds with 8 eps.
 pub(crate) fn texel_loss(cases: usize, arithmetic: &mut Arithmetic) -> Loss {
     let mut loss = Loss::default();
     for _ in 0..cases {
@@ -168,7 +169,7 @@ pub(crate) fn texel_loss(cases: usize, arithmetic: &mut Arithmetic) -> Loss {
         };
         let slope = [any(6), any(6)];
         let corner = [any(8), any(8)].map(|v| (v * 256.0).round() / 256.0);
-        // `bound` is a depth less z_slope, both float32.
+        // `bound` is a depth minus z_slope, both float32.
         let (depth, z_slope) = (any(0).abs(), any(0));
         let exact = f64::from(depth) - f64::from(z_slope);
         let bound = arithmetic.sub(depth, z_slope);

@@ -1,7 +1,7 @@
-//! The cull shader once more, on the host: the same words in, the same steps, but the arithmetic is
-//! an argument.
-//! It shows what the certificates would do on devices that round, fuse, reassociate and flush
-//! otherwise than the ones at hand.
+//! The cull shader once more, on the host: the same input words and the same steps.
+//! The arithmetic is an argument.
+//! So it shows how the certificates would do on devices that round, fuse, reassociate and flush
+//! differently from the ones at hand.
 #![allow(dead_code, unused_imports, reason = "each test binary uses its own part")]
 
 mod arithmetic;
@@ -37,17 +37,16 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// How many eps a certificate, and how many a texel's comparison with a supporting plane keeps
-/// back.
+/// How many eps a certificate keeps back, and how many a texel's comparison with a plane does.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Margins {
     pub(crate) certificate: f32,
     pub(crate) texel: f32,
     /// `FLATTEST`.
     pub(crate) flattest: f32,
-    /// Whether `below` and `above` of an extent end at 0.
+    /// Whether `below` and `above` of an extent are clamped to 0.
     pub(crate) clamped: bool,
-    /// How much of a volume's own size counts in its margins.
+    /// The share of a volume's own size that counts in its margins.
     pub(crate) own: f32,
 }
 
@@ -68,8 +67,8 @@ impl From<f32> for Margins {
     }
 }
 
-/// A linear function, and what its margin is made from (`view.wgsl`, `magnitudes` and
-/// `constant_magnitudes`).
+/// A linear function, and the terms of its margin.
+/// They are `magnitudes` and `constant_magnitudes` of `view.wgsl`.
 #[derive(Debug, Clone, Copy)]
 struct Row {
     m: [f32; 4],
@@ -77,7 +76,7 @@ struct Row {
     constant_magnitude: f32,
 }
 
-/// `view.wgsl`, `View`; read from the words that the shader reads.
+/// `View` of `view.wgsl`, read from the words that the shader reads.
 #[derive(Debug)]
 struct View {
     x: Row,
@@ -135,13 +134,13 @@ struct Value {
 }
 
 impl Value {
-    /// `sign` times it, which is exact.
+    /// `sign` times the value, which is exact.
     fn signed(&self, sign: f32) -> Self {
         Self { center: sign * self.center, error: self.error, half: self.half.map(|h| sign * h) }
     }
 }
 
-/// A round's camera and depth image, made ready.
+/// A round's camera and depth image, prepared.
 #[derive(Debug)]
 pub(crate) struct Mirror {
     view: View,
@@ -155,7 +154,7 @@ pub(crate) struct Mirror {
 }
 
 impl Mirror {
-    /// Nothing for a camera that is refused.
+    /// `None` for a camera that is refused.
     pub(crate) fn new(round: &Round) -> Option<Self> {
         let CullOptions { footprint, coverage, descent, fit, .. } = round.options;
         let view = View::new(&hiz_core::testing::words::view(&round.camera, &round.options).ok()?);
@@ -192,8 +191,8 @@ impl Mirror {
         })
     }
 
-    /// The same without the host's share in the magnitudes: they bound the coefficients, and not
-    /// what float64 lost in them.
+    /// The same without the host's share in the magnitudes.
+    /// They then bound the coefficients, but not what float64 lost in them.
     pub(crate) fn without_error_share(mut self) -> Self {
         let view = &mut self.view;
         for row in [&mut view.x, &mut view.y, &mut view.z, &mut view.w] {
@@ -203,7 +202,7 @@ impl Mirror {
         self
     }
 
-    /// What is kept, for each kind.
+    /// The masks of kept volumes, for each kind.
     pub(crate) fn masks(
         &self,
         margins: impl Into<Margins>,
@@ -240,7 +239,7 @@ impl Mirror {
         self.culls(kind, &record, margins.into(), arithmetic)
     }
 
-    /// `classify.wgsl`, `classify`; the numbers are its steps.
+    /// `classify` of `classify.wgsl`; the numbers are its steps.
     fn culls(
         &self,
         kind: BoundsKind,
@@ -284,7 +283,7 @@ impl Mirror {
                 if c.arithmetic.below(4) == 0 {
                     [first[k], last[k]] = [wild[0].min(wild[1]), wild[0].max(wild[1])];
                 } else if first[k] < last[k] {
-                    // Near misses: a pixel too few on one side.
+                    // Near misses: one pixel too few on one side.
                     if c.arithmetic.below(2) == 0 { first[k] += 1 } else { last[k] -= 1 }
                 }
             }
@@ -296,7 +295,7 @@ impl Mirror {
                     || (empty[1] && c.between_samples(&y, &w, first[1], view, 1)));
         }
 
-        // 4. The finest level at which it spans no more texels than the footprint.
+        // 4. The finest level at which the rectangle spans no more texels than the footprint.
         let (first, last) = (first.map(|v| v as u32), last.map(|v| v as u32));
         let n = self.footprint_log2;
         let extent = (last[0] - first[0]) | (last[1] - first[1]) | 1;
@@ -306,8 +305,8 @@ impl Mirror {
         }
         let (from, to) = (first.map(|v| v >> level), last.map(|v| v >> level));
 
-        // 5. All of it is farther than the farthest depth there, or 5a. than the depths in finer
-        //    levels, each texel by itself.
+        // 5. All of the volume is farther than the farthest depth in the footprint.
+        //    Or 5a. than the depths in finer levels, texel by texel.
         let farthest = self.farthest(level as usize, from, to);
         let block = if self.surely_behind(farthest, &z, &w, &mut c) {
             (from, to, level)
@@ -476,7 +475,7 @@ impl Certificates<'_> {
         }
     }
 
-    /// `sign (r - t w) > 0` on all of the volume.
+    /// `sign (r - t w) > 0` on the whole volume.
     fn surely(&mut self, sign: f32, r: &Value, t: f32, w: &Value) -> bool {
         self.arithmetic.part();
         let center = if self.arithmetic.takes_any_order() {
@@ -518,7 +517,7 @@ impl Certificates<'_> {
         self.surely(-1.0, r, t, w)
     }
 
-    /// `sign (z - (d - z_slope) w) > 0`, the difference barred or folded.
+    /// `sign (z - (d - z_slope) w) > 0`; the difference is behind a bar, or folded.
     fn surely_deeper(&mut self, sign: f32, z: &Value, d: f32, z_slope: f32, w: &Value) -> bool {
         let t = self.arithmetic.sub(d, z_slope);
         if self.arithmetic.style.bars {

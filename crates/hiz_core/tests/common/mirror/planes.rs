@@ -1,11 +1,11 @@
-//! `supporting_planes.wgsl`: the certified planes in any arithmetic, over slopes and offsets that
-//! are guessed or wild.
+//! `supporting_planes.wgsl`: the certified planes in any arithmetic.
+//! Their slopes and offsets are guessed or wild.
 
 use super::guesses::{self, Candidate};
 use super::volume::ratio_interval;
 use super::{Arithmetic, Certificates, EPS, Margins, Value, View, two_to};
 
-/// A volume on the four rows.
+/// The four clip rows on a volume.
 #[derive(Debug)]
 pub(super) struct Projected {
     pub(super) x: Value,
@@ -46,8 +46,8 @@ fn wild_slope(guessed: f32, f: &mut Arithmetic) -> f32 {
     }
 }
 
-/// `surely_clear`, its comparison at a texel's corner: `offset - slope . corner > bound` with
-/// `ulps` eps of margin.
+/// The comparison of `surely_clear` at a texel's corner.
+/// It is `offset - slope . corner > bound` with a margin of `ulps` eps.
 pub(super) fn surely_beyond(
     plane: &Plane,
     corner: [f32; 2],
@@ -67,13 +67,14 @@ pub(super) fn surely_beyond(
 }
 
 impl Certificates<'_> {
-    /// The greatest `t` near `guess` (`width` says how near) at which `sign (r - t w) > 0` is
-    /// certified: an offset is trusted no more than a slope is, so a wild one lies where the
-    /// certificate is tightest.
-    /// `sign` -1: the least.
+    /// The greatest `t` near `guess` at which `sign (r - t w) > 0` is certified.
+    /// For `sign` -1 it is the least.
+    /// `width` is the reach of the search.
+    /// An offset is trusted no more than a slope is.
+    /// So a wild one lies where the certificate is tightest.
     fn wild_offset(&mut self, sign: f32, r: &Value, w: &Value, guess: f32, width: f32) -> f32 {
         let (mut proved, mut open) = (guess, guess + sign * width);
-        // Some to where nothing but the margin's floor is left.
+        // Some searches go on until nothing but the margin's floor is left.
         let steps = if self.arithmetic.below(4) == 0 { 40 } else { 14 };
         for _ in 0..steps {
             let middle = 0.5 * (proved + open);
@@ -102,8 +103,8 @@ impl Certificates<'_> {
     /// The row `facing z + slope . (x, y)`.
     fn tilted(&mut self, p: &Projected, facing: f32, slope: [f32; 2]) -> Value {
         let factors = [facing, slope[0], slope[1]];
-        // Without a bar the slope's own quotient may be folded into the products: another slope, by
-        // a few roundings.
+        // Without a bar the slope's own quotient may be folded into the products.
+        // The products then use another slope, a few roundings away.
         let mut on = |factors: [f32; 3], values: [f32; 3]| {
             self.arithmetic.part();
             let factors = if self.arithmetic.style.slope_bars {
@@ -175,7 +176,7 @@ impl Certificates<'_> {
         })
     }
 
-    /// `surely_clear`; `depth` is the stored one's, with its slack.
+    /// `surely_clear`; `depth` is the stored depth with its slack.
     pub(super) fn surely_clear(
         &mut self,
         planes: &Planes,

@@ -1,21 +1,21 @@
-//! `bounds_*.wgsl`: records, and what of them differs from kind to kind.
+//! `bounds_*.wgsl`: the records, and what differs between kinds of bounds.
 
 use hiz_core::BoundsKind;
 
 use super::{Arithmetic, Margins, Value, View};
 
-/// A volume about the reference point.
+/// A volume relative to the reference point.
 #[derive(Debug)]
 pub(super) struct Volume {
     pub(super) center: [f32; 3],
     pub(super) size: f32,
-    /// Spheres: the radius on each axis.
+    /// For spheres: the radius on each axis.
     half_axes: [[f32; 3]; 3],
     kind: BoundsKind,
 }
 
 impl Volume {
-    /// `load_volume`; nothing where it is not valid.
+    /// `load_volume`; `None` where the bounds are invalid.
     pub(super) fn load(
         kind: BoundsKind,
         record: &[u32],
@@ -70,7 +70,8 @@ impl Volume {
     }
 }
 
-/// `ratio_interval`: an estimate that nothing rests on, so plain float32 will do in every style.
+/// `ratio_interval`: an estimate that no proof relies on.
+/// So plain float32 will do in every style.
 pub(super) fn ratio_interval(kind: BoundsKind, r: &Value, w: &Value) -> [f32; 2] {
     if kind == BoundsKind::Sphere {
         let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

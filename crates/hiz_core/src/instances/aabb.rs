@@ -5,12 +5,12 @@ use crate::input::bounds::{Bounds, Floats};
 
 /// An axis-aligned box in world units.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Extent {
+pub(crate) struct Aabb {
     pub(crate) min: [f64; 3],
     pub(crate) max: [f64; 3],
 }
 
-impl Extent {
+impl Aabb {
     /// The box that contains nothing and adds nothing to a union.
     pub(crate) const EMPTY: Self = Self { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
 
@@ -49,20 +49,20 @@ impl Extent {
 impl Bounds<'_> {
     /// The box around volume `i`.
     /// `None` for invalid bounds: a number that is not finite, a negative size, or min > max.
-    pub(crate) fn extent(&self, i: usize) -> Option<Extent> {
-        let extent = match *self {
+    pub(crate) fn aabb(&self, i: usize) -> Option<Aabb> {
+        let aabb = match *self {
             Self::Spheres { centers, radii } => sphere(centers.array(i), radii.get(i))?,
-            Self::Boxes { min, max } => Extent { min: min.array(i), max: max.array(i) },
+            Self::Boxes { min, max } => Aabb { min: min.array(i), max: max.array(i) },
             Self::OrientedBoxes { centers, half_sizes, rotations } => {
                 oriented_box(centers, half_sizes, rotations, i)?
             }
         };
-        extent.is_box().then_some(extent)
+        aabb.is_box().then_some(aabb)
     }
 }
 
-fn sphere(center: [f64; 3], radius: f64) -> Option<Extent> {
-    (radius >= 0.0).then(|| Extent::about(center, [radius; 3]))
+fn sphere(center: [f64; 3], radius: f64) -> Option<Aabb> {
+    (radius >= 0.0).then(|| Aabb::about(center, [radius; 3]))
 }
 
 /// Along each world axis, the box reaches `sum over k of |A_ik| h_k` from its centre.
@@ -71,7 +71,7 @@ fn oriented_box(
     half_sizes: Floats<'_>,
     rotations: Floats<'_>,
     i: usize,
-) -> Option<Extent> {
+) -> Option<Aabb> {
     let (h, a): ([f64; 3], [f64; 9]) = (half_sizes.array(i), rotations.array(i));
     if !h.iter().all(|h| *h >= 0.0) {
         return None;
@@ -82,7 +82,7 @@ fn oriented_box(
             if part == 0.0 { sum } else { (sum + part).next_up() }
         })
     });
-    Some(Extent::about(centers.array(i), reach))
+    Some(Aabb::about(centers.array(i), reach))
 }
 
 /// A float64 that is not below the exact product of two numbers >= 0.
