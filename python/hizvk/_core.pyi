@@ -151,7 +151,6 @@ class Engine:
         arrays: Sequence[_Floats],
         strict: bool,
         order: str,
-        piece_capacity: int | None,
     ) -> Instances: ...
     def update(
         self, instances: Instances, first: int, kind: str, arrays: Sequence[_Floats], strict: bool

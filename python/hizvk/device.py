@@ -145,7 +145,7 @@ class Device:
         kind, arrays = as_arrays("bounds", bounds)
         strict = _arguments.flag("strict", strict)
         stored_order = _arguments.choice("order", order, words(StoredOrder))
-        uploaded = self._engine.instances(kind, arrays, strict, stored_order, None)
+        uploaded = self._engine.instances(kind, arrays, strict, stored_order)
         return Instances(self, uploaded, points=are_points(bounds))
 
     @overload

@@ -75,7 +75,6 @@ impl Engine {
         arrays: Vec<FloatArray<'_>>,
         strict: bool,
         order: &str,
-        piece_capacity: Option<u32>,
     ) -> PyResult<Instances> {
         let bounds = bounds(kind, &arrays)?;
         let order = match order {
@@ -83,7 +82,8 @@ impl Engine {
             "given" => StoredOrder::Given,
             other => return Err(PyValueError::new_err(format!("order: no order {other:?}"))),
         };
-        let options = InstanceOptions { strict, order, piece_capacity };
+        #[allow(clippy::needless_update, reason = "hiz_core's `testing` adds a field")]
+        let options = InstanceOptions { strict, order, ..InstanceOptions::default() };
         self.0
             .run(py, |engine| engine.instances(&bounds, &options))
             .map(|instances| Instances(Held::new(py, instances)))

@@ -2,9 +2,7 @@
 //!
 //! The struct expressions name every field, so that an option without its line does not compile.
 
-use hiz_core::{
-    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, Order, Outputs,
-};
+use hiz_core::{Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, Order, Outputs};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyAny;
@@ -105,9 +103,7 @@ pub(crate) fn options_text(
     outputs: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(String, String)> {
     let options = options.map_or_else(|| Ok(CullOptions::default()), cull_options)?;
-    let outputs = outputs.map_or_else(
-        || Ok(Outputs::default()),
-        |given| self::outputs(given, options.order),
-    )?;
+    let outputs = outputs
+        .map_or_else(|| Ok(Outputs::default()), |given| self::outputs(given, options.order))?;
     Ok((format!("{options:?}"), format!("{outputs:?}")))
 }
