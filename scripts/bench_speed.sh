@@ -9,5 +9,5 @@ scripts/setup.sh
 rm -f "$STAMPS/module"
 step "building the Python module for release (the first time takes some minutes)" \
   env VIRTUAL_ENV="$VENV" PATH="$VENV/bin:$PATH" \
-  maturin develop --release --extras viz,scene "${LOCKED[@]}"
+  maturin develop --release --extras viz,scene --features testing,yardstick "${LOCKED[@]}"
 step "speed" "$VENV_PYTHON" -m tools.speed "$@"

@@ -150,7 +150,8 @@ build_module() {
   # With the profile of the tests, in which dependencies are optimised, wgpu is compiled once for
   # `cargo test` and for Python.
   step "building the Python module (the first time takes some minutes)" \
-    env VIRTUAL_ENV="$VENV" PATH="$VENV/bin:$PATH" maturin develop --extras viz,scene "${LOCKED[@]}"
+    env VIRTUAL_ENV="$VENV" PATH="$VENV/bin:$PATH" \
+    maturin develop --extras viz,scene --features testing,yardstick "${LOCKED[@]}"
   # The key is the one from before the build, so what was edited meanwhile is built next time.
   printf '%s\n' "$key" >"$STAMPS/module"
 }

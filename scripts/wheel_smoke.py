@@ -8,6 +8,7 @@ import sys
 import numpy as np
 
 import hizvk
+from hizvk import _core
 
 INSTALL_LINE = "apt install libvulkan1 mesa-vulkan-drivers"
 
@@ -40,6 +41,11 @@ if __name__ == "__main__":
     assert "site-packages" in hizvk.__file__, (
         f"hizvk comes from {hizvk.__file__}, not from the wheel"
     )
+    for name in ("Yardstick", "YardstickCull", "YardstickReduction", "options_text"):
+        assert not hasattr(_core, name), (
+            f"hizvk._core.{name}: expected in a developer's module alone"
+        )
+    assert not _core.takes_planted_faults
     if "--no-driver" in sys.argv[1:]:
         without_driver()
     else:

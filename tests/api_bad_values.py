@@ -1,7 +1,7 @@
 """Bad arguments of every public function: the tables behind test_api_errors.py.
 
-One table a function: valid arguments, and for each parameter bad values with the exception and a
-part of its text.
+Each function has a table: valid arguments, and for each parameter bad values with the exception and
+a part of its text.
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ EYE4 = np.eye(4)
 SINGULAR = np.diag([1.0, 1.0, 0.0, 1.0])
 TRANSPOSED_POSE = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [5, 6, 7, 1]])
 K = np.array([[100.0, 0, 32], [0, 100, 24], [0, 0, 1]])
-# OpenGL's own: near 1, far 3, 90 degrees.
+# The projection of OpenGL: near 1, far 3, 90 degrees.
 GL = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, -2, -3], [0, 0, -1, 0]])
 
 Bad = tuple[Any, type[Exception], str]
@@ -25,7 +25,7 @@ BadValues = dict[str, list[Bad]]
 
 
 class Table(NamedTuple):
-    """`make(device)` gives the function and valid arguments; `bad` has the bad values by parameter."""
+    """A function's arguments: `make(device)` gives it with valid ones, and `bad` the bad values."""
 
     make: Callable[[hizvk.Device], tuple[Callable[..., Any], dict[str, Any]]]
     bad: BadValues
@@ -39,8 +39,7 @@ def camera(size: tuple[int, int] = (6, 8), **more: Any) -> hizvk.Camera:
 TETRAHEDRON = hizvk.Mesh(np.eye(4)[:, :3] / 4, [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]])
 
 
-# -- bad values that several functions
-# share -----------------------------------------------------------------
+# --- bad values that several functions share ---
 
 LEVELS: list[Bad] = [
     (0, ValueError, "expected an integer in 1..15, got int 0"),
@@ -103,7 +102,8 @@ POSE: list[Bad] = [
     (
         np.eye(3),
         ValueError,
-        "expected (3, 4) or (4, 4) finite numbers, got (3, 3) float64; pass a rotation and a translation as a pair",
+        "expected (3, 4) or (4, 4) finite numbers, got (3, 3) float64; "
+        "pass a rotation and a translation as a pair",
     ),
     (np.eye(4)[:, :3], ValueError, "got (4, 3) float64"),
     (
@@ -149,7 +149,8 @@ PIXEL_CENTER: list[Bad] = [
     (
         None,
         TypeError,
-        '"integer" (the first pixel\'s centre is (0, 0): OpenCV, KITTI, ROS) or "half" (it is (0.5, 0.5)',
+        '"integer" (the first pixel\'s centre is (0, 0): OpenCV, KITTI, ROS) or '
+        '"half" (it is (0.5, 0.5)',
     ),
     ("center", ValueError, "COLMAP, nerfstudio, gsplat, pyrender, CARLA), got str 'center'"),
     (0.5, TypeError, "got float 0.5; there is no default"),
@@ -346,8 +347,7 @@ def unsigned(name: str) -> list[Bad]:
     ]
 
 
-# -- the
-# tables ----------------------------------------------------------------------------------------------
+# --- the tables ---
 
 VIEW: BadValues = {
     "eye": VECTOR,
@@ -410,6 +410,37 @@ def cull_arguments(device: hizvk.Device) -> dict[str, Any]:
     pyramid = device.pyramid(np.ones((6, 8)), view, kind="z")
     return {"instances": device.instances(spheres()), "camera": view, "pyramid": pyramid}
 
+
+FLAG_OR_NONE: list[Bad] = [
+    (1, TypeError, "expected True, False or None, got int 1"),
+    ("auto", TypeError, "got str"),
+]
+CAPACITY: list[Bad] = [
+    (-1, ValueError, "in 0..4294967295"),
+    (1.5, TypeError, "got float 1.5"),
+]
+DRAW: list[Bad] = [((36,), TypeError, "expected a DrawTemplate or None, got tuple (36,)")]
+OPTIONS_OBJECT: list[Bad] = [
+    ({"order": "any"}, TypeError, "expected a CullOptions or None, got dict {'order': 'any'}"),
+    ("any", TypeError, "got str 'any'"),
+]
+#: The fields of `CullOptions`, which are also keywords of functions.
+OPTIONS: dict[str, list[Bad]] = {
+    "order": [
+        ("fast", ValueError, 'expected one of "stable", "any"'),
+        (None, TypeError, "got None"),
+    ],
+    "coverage": COVERAGE,
+    "guard_px": GUARD,
+    "depth_slack": DEPTH_SLACK,
+    "depth_slack_abs": DEPTH_SLACK,
+    "transform_slack": TRANSFORM_SLACK,
+    "footprint": FOOTPRINT,
+    "descent": DESCENT,
+    "fit": FIT,
+    "hierarchy": FLAG_OR_NONE,
+    "statistics": FLAG,
+}
 
 TABLES: dict[str, Table] = {
     "Spheres": Table(
@@ -824,30 +855,28 @@ TABLES: dict[str, Table] = {
                     "expected a Pyramid of Device.pyramid, got (6, 8) float64",
                 )
             ],
-            "order": [
-                ("fast", ValueError, 'expected one of "stable", "any"'),
-                (None, TypeError, "got None"),
-            ],
-            "coverage": COVERAGE,
-            "guard_px": GUARD,
-            "depth_slack": DEPTH_SLACK,
-            "depth_slack_abs": DEPTH_SLACK,
-            "transform_slack": TRANSFORM_SLACK,
-            "footprint": FOOTPRINT,
-            "descent": DESCENT,
-            "fit": FIT,
-            "hierarchy": [
-                (1, TypeError, "expected True, False or None, got int 1"),
-                ("auto", TypeError, "got str"),
-            ],
+            "options": OPTIONS_OBJECT,
             "outputs": [
                 ("mask", TypeError, "expected None or a collection of"),
                 (["masks"], ValueError, 'expected one of "mask", "verdicts", "indices", "draws"'),
                 ([1], TypeError, "got int 1"),
+                (hizvk.CullOptions(), TypeError, "'draws', or an Outputs, got CullOptions"),
             ],
-            "capacity": [(-1, ValueError, "in 0..4294967295"), (1.5, TypeError, "got float 1.5")],
-            "draw": [((36,), TypeError, "expected a DrawTemplate or None, got tuple (36,)")],
-            "statistics": FLAG,
+            **OPTIONS,
+            "capacity": CAPACITY,
+            "draw": DRAW,
+        },
+    ),
+    "CullOptions": Table(lambda _: (hizvk.CullOptions, {}), OPTIONS),
+    "Outputs": Table(
+        lambda _: (hizvk.Outputs, {}),
+        {
+            "mask": FLAG,
+            "verdicts": FLAG,
+            "indices": FLAG_OR_NONE,
+            "draws": FLAG_OR_NONE,
+            "capacity": CAPACITY,
+            "draw": DRAW,
         },
     ),
     "check_proxy": Table(
@@ -931,14 +960,8 @@ TABLES: dict[str, Table] = {
             "scale": SCALE,
             "invalid": INVALID,
             "device": [("lavapipe", TypeError, "expected a Device or None, got str 'lavapipe'")],
-            "coverage": COVERAGE,
-            "guard_px": GUARD,
-            "depth_slack": DEPTH_SLACK,
-            "depth_slack_abs": DEPTH_SLACK,
-            "transform_slack": TRANSFORM_SLACK,
-            "footprint": FOOTPRINT,
-            "descent": DESCENT,
-            "fit": FIT,
+            "options": OPTIONS_OBJECT,
+            **OPTIONS,
         },
     ),
     "recommend": Table(
@@ -993,7 +1016,8 @@ TABLES: dict[str, Table] = {
             "scale": SCALE,
             "invalid": INVALID,
             "device": [("lavapipe", TypeError, "expected a Device or None, got str 'lavapipe'")],
-            "coverage": COVERAGE,
+            "options": OPTIONS_OBJECT,
+            **OPTIONS,
             "max_ms": [(0, ValueError, "above 0, got int 0"), ("2", TypeError, "got str '2'")],
             "kept_within": [
                 (0.9, ValueError, "at least 1, got float 0.9"),
@@ -1060,7 +1084,7 @@ TABLES: dict[str, Table] = {
     ),
 }
 
-#: What the package makes and callers only read; nothing to get wrong.
+#: Classes that only the package makes, so no argument can be bad.
 MADE_BY_THE_PACKAGE = {
     "Adapter",
     "Comparison",

@@ -392,9 +392,9 @@ def test_a_candidate_that_hides_what_is_visible_is_never_chosen(
     honest = timing.cull
 
     def lying(
-        device: hizvk.Device, instances: Any, pyramid: Any, one: Configuration
+        device: hizvk.Device, instances: Any, pyramid: Any, one: Configuration, base: Any
     ) -> tuple[Mask, float, float]:
-        mask, *took = honest(device, instances, pyramid, one)
+        mask, *took = honest(device, instances, pyramid, one, base)
         if planted(one):
             mask, took = mask.copy(), [0.0, 0.0]
             mask[victim] = False

@@ -167,8 +167,7 @@ def test_integers_lists_and_small_floats_are_numbers_too() -> None:
         assert camera == exact
 
 
-# -- cameras as
-# values ---------------------------------------------------------------------------------------
+# --- cameras as values ---
 
 
 def shifted(by: float) -> np.ndarray:
@@ -243,8 +242,8 @@ def test_cameras_are_values() -> None:
 def test_repr_says_how_to_make_it() -> None:
     camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(4, 6), near=0.5)
     assert repr(camera) == (
-        "Camera.look_at(eye=(0.0, 0.0, 0.0), target=(0.0, 0.0, -1.0), up=(0.0, 1.0, 0.0), fov_y_deg=60.0, size=(4, 6), "
-        "near=0.5, far=None, reversed_z=True)"
+        "Camera.look_at(eye=(0.0, 0.0, 0.0), target=(0.0, 0.0, -1.0), up=(0.0, 1.0, 0.0), "
+        "fov_y_deg=60.0, size=(4, 6), near=0.5, far=None, reversed_z=True)"
     )
     assert eval(repr(camera), {"Camera": hizvk.Camera}) == camera
     assert repr(camera.resized((2, 3))) == repr(camera) + ".resized((2, 3))"
@@ -258,8 +257,8 @@ def test_repr_says_how_to_make_it() -> None:
         "PINHOLE", [9, 9, 3, 2], qvec=[1, 0, 0, 0], tvec=[0, 0, 1], size=(4, 6), near=0.5
     )
     assert repr(colmap) == (
-        "Camera.from_colmap(model='PINHOLE', params=<4>, camera_from_world=<4x4>, size=(4, 6), near=0.5, far=None, "
-        "reversed_z=True)"
+        "Camera.from_colmap(model='PINHOLE', params=<4>, camera_from_world=<4x4>, size=(4, 6), "
+        "near=0.5, far=None, reversed_z=True)"
     )
 
 

@@ -1,4 +1,4 @@
-"""Depth images as files and sensors give them: what means "no data", and what a message proposes."""
+"""Depth images of files and sensors: what means "no data", and what a message proposes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def camera(
 
 
 def behind(depth: float) -> hizvk.Spheres:
-    """A ball in each of the image's four quarters, at half as much again."""
+    """A ball in each of the image's four quarters, at one and a half times the depth."""
     z = depth * 1.5
     spread = z / 4.0
     centers = np.array([[x * spread, y * spread, -z] for x in (-1, 1) for y in (-1, 1)])
@@ -200,7 +200,7 @@ def test_a_buffer_means_what_its_dtype_does(device: hizvk.Device) -> None:
 def test_a_message_proposes_what_works(
     device: hizvk.Device, image: npt.NDArray[Any], fragment: str
 ) -> None:
-    """Each way out, taken, is taken by the call."""
+    """The call accepts what each message proposes."""
     ways: dict[str, Callable[[], tuple[Any, hizvk.Camera]]] = {
         ".astype(np.float32)": lambda: (image.astype(np.float32), camera()),
         ".astype(np.uint16)": lambda: (image.astype(np.uint16), camera()),
@@ -238,7 +238,10 @@ def test_values_that_the_dtype_cannot_hold(device: hizvk.Device) -> None:
 def test_equal_depth_is_visible_and_the_oracle_says_what_it_does_not_know(
     device: hizvk.Device,
 ) -> None:
-    """Standard Z, near 1, no far plane: depth is 1 - 1/z, which float32 holds for z = 8 and not for z = 3."""
+    """Standard Z, near 1, no far plane: depth is 1 - 1/z.
+
+    float32 holds it for z = 8 and not for z = 3.
+    """
     eye = ((0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
     view = hizvk.Camera.look_at(*eye, fov_y_deg=90, near=1.0, size=SIZE, reversed_z=False)
     for wall, at_it in ((8.0, hizvk.reference.VISIBLE), (3.0, hizvk.reference.UNDECIDED)):
@@ -254,7 +257,7 @@ def test_equal_depth_is_visible_and_the_oracle_says_what_it_does_not_know(
 
 
 def test_a_scale_beside_what_has_its_own_units_is_refused(device: hizvk.Device) -> None:
-    """It was passed over in silence: of a rendered image nothing is in millimetres."""
+    """It used to be ignored: a rendered image has no units."""
     camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(4, 4), near=0.1)
     wall = hizvk.Mesh([[-8.0, -8, -12], [8.0, -8, -12], [0.0, 8, -12]], [[0, 1, 2]])
     depth = device.render_depth(device.occluders([wall]), camera)

@@ -34,7 +34,7 @@ def device() -> hizvk.Device:
 def test_bad_argument(device: hizvk.Device, function: str, parameter: str, bad: Bad) -> None:
     value, exception, fragment = bad
     call, arguments = TABLES[function].make(device)
-    # The alternatives of one another: only the bad one comes.
+    # Of parameters that are alternatives, only the bad one is passed.
     if parameter == "world_from_camera":
         arguments.pop("camera_from_world", None)
     if function == "Camera.from_colmap" and parameter in ("camera_from_world", "world_from_camera"):
@@ -67,7 +67,7 @@ def test_bad_argument(device: hizvk.Device, function: str, parameter: str, bad: 
         call(**{**arguments, parameter: value})
     assert type(caught.value) is exception
     text = str(caught.value)
-    # A pose or a way to see may be missing altogether, and a list's item is told by its number.
+    # Some messages begin with several names, and an item of a list has its number.
     assert text.startswith((f"{parameter}:", f"{parameter}, ", f"{parameter}[")), text
     assert fragment in text
 
@@ -112,6 +112,11 @@ def test_every_parameter_has_a_bad_value() -> None:
     assert set(found) == set(TABLES)
     for name, function in found.items():
         parameters = set(inspect.signature(function).parameters) - {"self"}
+        if "keywords" in parameters:
+            keywords = {"Device.cull": hizvk.options.CullKeywords}.get(
+                name, hizvk.options.OptionKeywords
+            )
+            parameters = parameters - {"keywords"} | set(keywords.__annotations__)
         assert parameters == set(TABLES[name].bad), name
 
 
@@ -164,7 +169,8 @@ def test_a_rendered_image_has_its_camera_and_kind(device: hizvk.Device) -> None:
         (
             [np.zeros((3, 3))],
             TypeError,
-            "vertices[0]: expected a Mesh, a mesh of trimesh or Open3D, or a list of them when triangles is left out",
+            "vertices[0]: expected a Mesh, a mesh of trimesh or Open3D, or a list of them when "
+            "triangles is left out",
         ),
         (
             [(np.zeros((3, 2)), [[0, 1, 2]])],

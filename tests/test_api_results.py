@@ -133,7 +133,7 @@ def test_groups_are_tested_first(device: hizvk.Device, camera: hizvk.Camera) -> 
 @pytest.mark.parametrize("order", ["stable", "any"])
 @pytest.mark.parametrize("hierarchy", [False, True])
 def test_what_was_not_asked_for_is_not_there(
-    device: hizvk.Device, camera: hizvk.Camera, order: hizvk.device.Order, hierarchy: bool
+    device: hizvk.Device, camera: hizvk.Camera, order: hizvk.options.Order, hierarchy: bool
 ) -> None:
     parts = {
         "mask": lambda seen: np.flatnonzero(seen.mask).tolist(),
@@ -253,7 +253,10 @@ def test_explain_by_hand(device: hizvk.Device, camera: hizvk.Camera) -> None:
 
 
 def wide_camera(*, reversed_z: bool = True) -> hizvk.Camera:
-    """64 pixels a side, 8 of them a unit at depth 4: column 32 begins at x = 0, row 31 ends at y = 0."""
+    """64 pixels per side, 8 of them a unit wide at depth 4.
+
+    Column 32 begins at x = 0, and row 31 ends at y = 0.
+    """
     return hizvk.Camera.look_at(
         (0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(64, 64), near=0.125, reversed_z=reversed_z
     )
@@ -386,7 +389,7 @@ def test_an_explanation_after_an_update_is_stale(
 
 
 def test_results_export_by_dlpack(device: hizvk.Device, camera: hizvk.Camera) -> None:
-    """They are shared and read-only; whoever imports one gets a copy."""
+    """They are shared and read-only; an import by DLPack gets a copy."""
     result = culled(device, camera)
     for array in (result.mask, result.verdicts, result.indices):
         assert type(array.__dlpack__()).__name__ == "PyCapsule"
@@ -397,7 +400,7 @@ def test_results_export_by_dlpack(device: hizvk.Device, camera: hizvk.Camera) ->
         assert not array.flags.writeable
         part = np.from_dlpack(array[2:])
         np.testing.assert_array_equal(part, array[2:])
-        # What is made of them is NumPy's own.
+        # What is computed from them is a plain array.
         for made in (array == array, array & array, np.flatnonzero(array), np.where(array, 1, 0)):
             assert type(made) is np.ndarray
         assert isinstance(array.sum(), np.integer)
@@ -514,7 +517,10 @@ def test_pyramid_levels_by_hand(device: hizvk.Device) -> None:
 
 
 def test_chosen_levels_by_hand(device: hizvk.Device) -> None:
-    """What is stored is what all levels have there; what is not says so, and what it decided is decided coarser."""
+    """A stored level equals that of a pyramid with all levels; reading another one is an error.
+
+    What a level that is not stored would have decided, a coarser one decides.
+    """
     depth = np.full((40, 40), 0.5, np.float32)
     depth[3, 3] = 0.0
     view = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(40, 40), near=1)
@@ -646,8 +652,7 @@ def test_instances_and_repr(device: hizvk.Device, camera: hizvk.Camera) -> None:
     device.wait()
 
 
-# -- the oracle and the
-# comparison ---------------------------------------------------------------------------
+# --- the oracle and the comparison ---
 
 TRUTH = {
     Verdict.OUTSIDE: HIDDEN,

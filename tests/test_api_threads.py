@@ -108,7 +108,7 @@ def test_the_interpreter_runs_while_the_device_works(device: hizvk.Device) -> No
             # One call each between the two times; none of them comes back to Python on its way.
             start = time.perf_counter()
             instances = device._engine.instances(
-                "spheres", (bounds.centers, bounds.radii), False, "morton", None
+                "spheres", (bounds.centers, bounds.radii), False, "morton"
             )
             calls.append((start, time.perf_counter()))
             del instances
@@ -127,7 +127,7 @@ def test_the_interpreter_runs_while_the_device_works(device: hizvk.Device) -> No
 
 
 def test_many_threads_cull_a_crowd_that_copies_the_levels(device: hizvk.Device) -> None:
-    """Several copy the depth image and its levels into one texture; none may look before a copy has run."""
+    """Threads copy depth and levels into one texture; none may read it before a copy ran."""
     rng = np.random.default_rng(8)
     centers = rng.uniform((-20, -20, -30), (20, 20, -2), (40_000, 3)).astype(np.float32)
     crowd = device.instances(hizvk.Spheres(centers, np.full(len(centers), 0.1, np.float32)))

@@ -2,8 +2,6 @@
 
 import dataclasses
 import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -152,17 +150,6 @@ def test_speed_says_where_it_went(capsys: pytest.CaptureFixture[str]) -> None:
         command.main(["--speed", "--quick"])
     assert caught.value.code == 2
     assert "make bench-speed" in capsys.readouterr().err
-
-
-def test_importing_hizvk_loads_no_command_no_scene_and_no_plot() -> None:
-    code = "import sys, hizvk; print(*sys.modules)"
-    loaded = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    ).stdout.split()
-    assert "hizvk.recommendation" in loaded
-    strangers = ("hizvk.bench", "hizvk.demo", "hizvk.scenes", "hizvk.commands", "hizvk.cli")
-    unwanted = [one for one in loaded if one.startswith((*strangers, "matplotlib", "embreex"))]
-    assert not unwanted
 
 
 def test_recommend_is_a_function_of_the_package() -> None:

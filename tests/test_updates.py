@@ -82,7 +82,7 @@ def test_after_updates_the_answers_are_those_of_fresh_instances(
     device: hizvk.Device,
     pyramid: hizvk.Pyramid,
     make: Callable[..., Bounds],
-    order: hizvk.device.StoredOrder,
+    order: hizvk._types.StoredOrder,
 ) -> None:
     centers, sizes = crowd(3000, 1)
     centers[77] = np.nan

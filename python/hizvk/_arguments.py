@@ -1,9 +1,10 @@
 """Checks of arguments, in one place, so that every message reads the same.
 
-``<parameter>: expected <what>, got <what came>``: a `TypeError` when the type or the kind of dtype
-is wrong, a `ValueError` when the shape or the value is.
-Nothing here copies an array that is already as the engine takes it (float32 or float64, C order,
-native byte order, aligned).
+A message is ``<parameter>: expected <what>, got <what came>``.
+It is a `TypeError` when the type or the kind of dtype is wrong, and a `ValueError` when the shape
+or the value is.
+An array that already is as the engine takes it is not copied: float32 or float64, C order, native
+byte order, aligned.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ import math
 import numbers
 import operator
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import sys
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
@@ -31,7 +33,9 @@ P = ParamSpec("P")
 LARGEST_SIDE = 32768
 #: Whole numbers up to here are exact in float64.
 LARGEST_EXACT_INTEGER = 2**53
-#: Rows that are checked at once.
+#: The coarsest level of the largest image.
+COARSEST_LEVEL = 15
+#: Rows that are checked together, so that no temporary array is as long as the argument.
 BLOCK = 2**16
 
 
@@ -56,8 +60,9 @@ def _shape_text(shape: Sequence[int | str]) -> str:
 def explained(texts: Mapping[str, str]) -> Callable[[Callable[P, T]], Callable[P, T]]:
     """A decorator that says more than Python does about keywords that are missing or unknown.
 
-    `texts` has what follows ``<name>: `` in the `TypeError`, by name: of a parameter without a
-    default that is left out, or of a word that is no parameter and is passed all the same.
+    `texts` has what follows ``<name>: `` in the `TypeError`.
+    Its names are parameters without a default, or words that are no parameters and are often passed
+    all the same.
     """
 
     def decorate(maker: Callable[P, T]) -> Callable[P, T]:
@@ -82,6 +87,20 @@ def explained(texts: Mapping[str, str]) -> Callable[[Callable[P, T]], Callable[P
     return decorate
 
 
+def refuse_unknown(keywords: Iterable[str], known: Collection[str]) -> None:
+    """A `TypeError` for the first keyword that is not known; it names the closest one that is."""
+    for name in keywords:
+        if name not in known:
+            # Loaded here: only this error needs it.
+            from difflib import get_close_matches
+
+            closest = get_close_matches(name, known, 1, cutoff=0.0)[0]
+            raise TypeError(
+                f"{name}: expected no such parameter; the closest is {closest}, "
+                f"and all are {', '.join(known)}"
+            )
+
+
 def _wrong_type(name: str, expected: str, value: object) -> TypeError:
     return TypeError(f"{name}: expected {expected}, got {describe(value)}")
 
@@ -91,16 +110,16 @@ def _wrong_value(name: str, expected: str, value: object) -> ValueError:
 
 
 def is_masked(value: object) -> bool:
-    """A masked array, or rows of which one is: NumPy makes an array of them without their masks."""
+    """Whether it is a masked array, or has rows that are: NumPy drops the masks of rows."""
     if isinstance(value, (list, tuple)):
         return any(isinstance(row, np.ma.MaskedArray) for row in value)
     return isinstance(value, np.ma.MaskedArray)
 
 
 def _as_array(name: str, expected: str, value: object) -> npt.NDArray[Any]:
-    """`value` as an array of numbers, without a copy where it is one; lists of Python ints become float64."""
+    """`value` as an array of numbers, itself if it is one; lists of Python ints become float64."""
     if is_masked(value):
-        # Only floats have a NaN to fill with, and not every parameter takes a NaN.
+        # Only floats have a NaN to fill with, and only some parameters take a NaN.
         is_float = isinstance(value, np.ma.MaskedArray) and value.dtype.kind == "f"
         way = "fill it first, e.g. with " + (
             ".filled(np.nan)" if is_float else ".astype(np.float64).filled(np.nan)"
@@ -153,15 +172,18 @@ def _check_shape(
 
 
 def _host_memory() -> int:
-    """Bytes of memory that this machine has."""
-    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    """Bytes of memory of this machine; without bound where the system does not tell."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return sys.maxsize
 
 
 def copied(name: str, array: npt.NDArray[Any], wanted: npt.DTypeLike) -> npt.NDArray[Any]:
     """The array in this dtype, native, aligned and in C order; itself where it is that.
 
-    A broadcast view can claim terabytes that are nowhere: what this machine cannot hold is refused,
-    not tried.
+    A broadcast view can have terabytes that are stored nowhere, so a copy that this machine cannot
+    hold is refused before it is tried.
     """
     flags = array.flags
     if not (flags.c_contiguous and flags.aligned and array.dtype == wanted):
@@ -179,9 +201,8 @@ def copied(name: str, array: npt.NDArray[Any], wanted: npt.DTypeLike) -> npt.NDA
 
 def _ready(name: str, array: npt.NDArray[Any]) -> FloatArray:
     """The array as the engine reads it: float32 or float64; itself where it is that."""
-    return copied(
-        name, array, np.float64 if array.dtype.itemsize == 8 else np.float32
-    )  # float16 widens exactly
+    # A float16 widens exactly.
+    return copied(name, array, np.float64 if array.dtype.itemsize == 8 else np.float32)
 
 
 def floats(
@@ -189,7 +210,8 @@ def floats(
 ) -> FloatArray:
     """A float array of this shape (letters are free sides), converted only where it has to be.
 
-    `why` follows the expected shape, and `hint` an error of the shape that has no plainer way out.
+    `why` follows the expected shape in a message.
+    `hint` ends the message of a wrong shape for which no index makes it right.
     """
     expected = f"float {_shape_text(shape)}{why}"
     array = _as_array(name, expected, value)
@@ -206,7 +228,7 @@ def floats(
 
 
 def _is_real(value: object) -> bool:
-    """Whether it is one number; truth values are none, and NumPy's durations, though they say so."""
+    """Whether it is one number; truth values and NumPy's durations claim to be, and are not."""
     return isinstance(value, numbers.Real) and not isinstance(
         value, (bool, np.bool_, np.timedelta64)
     )
@@ -232,7 +254,6 @@ def finite_floats(name: str, value: object, shape: Sequence[int | str]) -> Float
             f"{name}: expected {expected}, got a masked array; leave out what is masked"
         )
     array = floats(name, value, shape)
-    # Row by row in blocks: no temporary array as long as the argument.
     blocks = (array[start : start + BLOCK] for start in range(0, len(array), BLOCK))
     bad = sum(int(np.count_nonzero(~np.isfinite(block))) for block in blocks)
     if bad:
@@ -245,10 +266,10 @@ def finite_floats(name: str, value: object, shape: Sequence[int | str]) -> Float
 def numbers_of_shape(
     name: str, value: object, *shapes: Sequence[int], of: str = "", hint: str = ""
 ) -> npt.NDArray[np.float64]:
-    """A small float64 array of finite numbers (a vector or matrix of a camera); integers are welcome here.
+    """A small float64 array of finite numbers, such as a vector or matrix of a camera.
 
-    Any of `shapes` will do.
-    `of` comes before them in an error, and `hint` after what came.
+    Integers are welcome here, and any of `shapes` will do.
+    In a message `of` comes before the shapes, and `hint` after what came.
     """
     expected = f"{of}{' or '.join(map(_shape_text, shapes))} finite numbers"
     array = _as_array(name, expected, value)
@@ -280,9 +301,9 @@ def matrix(name: str, value: object) -> npt.NDArray[np.float64]:
 
 
 def pose(name: str, value: object) -> npt.NDArray[np.float64]:
-    """An invertible ``(4, 4)`` matrix that maps points to points: its last row is 0, 0, 0, 1.
+    """An invertible ``(4, 4)`` matrix whose last row is 0, 0, 0, 1.
 
-    It comes as such, as ``(3, 4)`` without that row, or as a pair ``(R, t)``.
+    `value` is such a matrix, ``(3, 4)`` without the last row, or a pair ``(R, t)``.
     """
     result = np.eye(4)
     if isinstance(value, (tuple, list)) and len(value) == 2:
@@ -301,7 +322,7 @@ def _rotation_and_translation(
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     hint = "; a rotation vector becomes a matrix by cv2.Rodrigues(rvec)[0]"
     linear = numbers_of_shape(name, rotation, (3, 3), of="R of a pair (R, t) to be ", hint=hint)
-    # OpenCV's translations are columns.
+    # Translations of OpenCV are columns.
     moved = numbers_of_shape(
         name, translation, (3, 1), (1, 3), (3,), of="t of a pair (R, t) to be "
     )
@@ -309,7 +330,7 @@ def _rotation_and_translation(
 
 
 def check_affine(name: str, matrices: npt.NDArray[Any]) -> None:
-    """Refuse a last row other than 0, 0, 0, 1; the usual cause is a transposed matrix, so say so."""
+    """Refuses a last row other than 0, 0, 0, 1; the usual cause, a transposed matrix, is named."""
     if not (matrices[..., 3, :] == (0.0, 0.0, 0.0, 1.0)).all():
         rows = matrices[..., 3, :].reshape(-1, 4)
         bad = rows[(rows != (0.0, 0.0, 0.0, 1.0)).any(axis=1)][0].tolist()
@@ -320,7 +341,10 @@ def check_affine(name: str, matrices: npt.NDArray[Any]) -> None:
 
 
 def _refuse_singular(name: str, expected: str, square: npt.NDArray[np.float64]) -> None:
-    """Exactly or hopelessly singular after rows and columns are brought to one scale (a far plane of 1e9 is fine)."""
+    """Refuses a matrix that is singular in float64, whatever the scales of its rows and columns.
+
+    They are brought to one scale first, so a far plane of 1e9 is fine.
+    """
     scaled = square.copy()
     for axis in (1, 0, 1, 0):
         largest = np.abs(scaled).max(axis=axis, keepdims=True)
@@ -401,8 +425,23 @@ def size(name: str, value: object) -> Size:
     return (sides[0], sides[1])
 
 
+def stored_levels(name: str, value: object) -> tuple[int, int]:
+    """The first and the last level that a pyramid stores, of 1 to 15; None stores all of them."""
+    if value is None:
+        return 1, COARSEST_LEVEL
+    if isinstance(value, (tuple, list)):
+        if len(value) != 2:
+            expected = "None, a level or a pair (first, last)"
+            raise ValueError(f"{name}: expected {expected}, got {describe(value)}")
+        first, last = (integer(name, k, low=1, high=COARSEST_LEVEL) for k in value)
+        if first > last:
+            raise ValueError(f"{name}: expected first <= last, got ({first}, {last})")
+        return first, last
+    return integer(name, value, low=1, high=COARSEST_LEVEL), COARSEST_LEVEL
+
+
 def flag(name: str, value: object) -> bool:
-    """True or False, nothing that merely counts as one."""
+    """True or False; other values that count as true are refused."""
     if not isinstance(value, (bool, np.bool_)):
         raise _wrong_type(name, "True or False", value)
     return bool(value)
@@ -435,7 +474,8 @@ def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
     expected = f"bool {_shape_text(shape)}"
     if is_masked(value):
         raise TypeError(
-            f"{name}: expected {expected}, got a masked array; fill it first, with .filled(False) or (True)"
+            f"{name}: expected {expected}, got a masked array; "
+            "fill it first, with .filled(False) or (True)"
         )
     if isinstance(value, (str, bytes)) or value is None:
         raise _wrong_type(name, expected, value)
@@ -455,7 +495,8 @@ def triangles(name: str, value: object, vertex_count: int) -> npt.NDArray[np.uin
     expected = "integer (T, 3)"
     if is_masked(value):
         raise TypeError(
-            f"{name}: expected {expected}, got a masked array; leave out the triangles that are masked"
+            f"{name}: expected {expected}, got a masked array; "
+            "leave out the triangles that are masked"
         )
     if isinstance(value, (str, bytes)) or value is None:
         raise _wrong_type(name, expected, value)

@@ -1,9 +1,9 @@
-"""Checks of a camera's arguments that concern cameras alone."""
+"""Checks of arguments that only cameras have."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, Literal, TypeAlias
+from typing import TYPE_CHECKING, Final, TypedDict
 
 import numpy as np
 
@@ -14,47 +14,50 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-Vector = tuple[float, float, float]
-#: A pose: the parameter's name, which says its direction, and the (4, 4) matrix.
-Pose = tuple[str, "npt.NDArray[np.float64]"]
-# A union of words: stubtest takes Literal["a", "b"] for something else at run time.
-PixelCenter: TypeAlias = Literal["integer"] | Literal["half"]
+    from ._arguments import Size
+    from ._types import PixelCenter
 
-#: OpenCV's longest list of distortion coefficients.
+Vector = tuple[float, float, float]
+#: The name of the parameter, which says the direction of the pose, and the (4, 4) matrix.
+Pose = tuple[str, "npt.NDArray[np.float64]"]
+
+#: The length of OpenCV's longest list of distortion coefficients.
 MOST_COEFFICIENTS = 14
 
-#: What is added to cx and cy, so that the first pixel's centre is at (0.5, 0.5) as it is here.
+#: What is added to cx and cy, so that the first pixel's centre comes to (0.5, 0.5).
 TO_HALF: Final = {"integer": 0.5, "half": 0.0}
 _CENTERS = (
-    '"integer" (the first pixel\'s centre is (0, 0): OpenCV, KITTI, ROS) or "half" (it is (0.5, 0.5): '
-    "COLMAP, nerfstudio, gsplat, pyrender, CARLA)"
+    '"integer" (the first pixel\'s centre is (0, 0): OpenCV, KITTI, ROS) or '
+    '"half" (it is (0.5, 0.5): COLMAP, nerfstudio, gsplat, pyrender, CARLA)'
 )
 _NO_DEFAULT = "there is no default, for half a pixel too far hides what can be seen"
 
-#: Words for a pose that say no direction, or say it in another library's words.
+#: Names of a pose that say no direction, or say it in the words of another library.
 _POSES = (
-    "R", "t", "T", "rotation", "translation", "rvec", "tvec", "pose", "extrinsic", "extrinsics", "viewmat", "viewmats",
-    "view", "c2w", "w2c", "cam_from_world", "transform_matrix", "matrix_world",
+    "R", "t", "T", "rotation", "translation", "rvec", "tvec", "pose", "extrinsic", "extrinsics",
+    "viewmat", "viewmats", "view", "c2w", "w2c", "cam_from_world", "transform_matrix",
+    "matrix_world",
 )  # fmt: skip
 _POSE_WORDS = (
-    "expected no such parameter: pass camera_from_world=(R, t) where camera = R @ world + t (OpenCV, COLMAP), or "
-    "world_from_camera=(R, t) where world = R @ camera + t; (3, 4) and (4, 4) matrices will do too"
+    "expected no such parameter: pass camera_from_world=(R, t) where camera = R @ world + t "
+    "(OpenCV, COLMAP), or world_from_camera=(R, t) where world = R @ camera + t; "
+    "(3, 4) and (4, 4) matrices will do too"
 )
-#: What `_arguments.explained` says about other words for a pose.
+#: What `_arguments.explained` says about other names of a pose.
 POSE_KEYWORDS: Final = dict.fromkeys(_POSES, _POSE_WORDS)
-#: And about COLMAP's cameras.
+#: The same for cameras of COLMAP.
 COLMAP_KEYWORDS: Final = {
     "pixel_center": "expected no such parameter: COLMAP's centres are at halves, always",
     **POSE_KEYWORDS,
 }
-#: And about a camera matrix of which nobody says where its pixels' centres are.
+#: The same for a camera matrix, for which `pixel_center` has to be said.
 KEYWORDS: Final = {
     "pixel_center": f"expected {_CENTERS}, got nothing; {_NO_DEFAULT}",
     **POSE_KEYWORDS,
 }
 
-#: COLMAP's models that are a pinhole where what follows cx and cy is 0, and the order of their
-#: parameters in cameras.txt and pycolmap (colmap/src/colmap/sensor/models/).
+#: COLMAP's models that are a pinhole if all parameters after cx and cy are 0.
+#: The parameters are in the order of cameras.txt and pycolmap (colmap/src/colmap/sensor/models/).
 COLMAP_MODELS: Final = {
     "SIMPLE_PINHOLE": "f, cx, cy",
     "PINHOLE": "fx, fy, cx, cy",
@@ -66,35 +69,62 @@ COLMAP_MODELS: Final = {
     "SIMPLE_DIVISION": "f, cx, cy, k",
     "DIVISION": "fx, fy, cx, cy, k",
 }
-#: COLMAP's models that map angles: even with zeros behind cx and cy they are no pinhole.
+#: COLMAP's models that map angles: even with zeros after cx and cy they are not a pinhole.
 COLMAP_CURVED: Final = (
-    "SIMPLE_FISHEYE", "FISHEYE", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "OPENCV_FISHEYE", "THIN_PRISM_FISHEYE",
-    "RAD_TAN_THIN_PRISM_FISHEYE", "EUCM", "EQUIRECTANGULAR",
+    "SIMPLE_FISHEYE", "FISHEYE", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "OPENCV_FISHEYE",
+    "THIN_PRISM_FISHEYE", "RAD_TAN_THIN_PRISM_FISHEYE", "EUCM", "EQUIRECTANGULAR",
 )  # fmt: skip
-_UNDISTORT = "run COLMAP's image_undistorter, and pass the PINHOLE camera that it writes (its depth maps belong to that camera)"
-#: How far a quaternion of a file may be from length 1.
+_UNDISTORT = (
+    "run COLMAP's image_undistorter, and pass the PINHOLE camera that it writes "
+    "(its depth maps belong to that camera)"
+)
+#: How far from 1 the length of a quaternion in a file may be.
 UNIT_TOLERANCE = 1e-2
 
 
-def view(eye: object, target: object, up: object) -> tuple[Vector, Vector, Vector]:
+class View(TypedDict):
+    """From where a camera looks, and which way."""
+
+    eye: Vector
+    target: Vector
+    up: Vector
+
+
+class Image(TypedDict):
+    """The image of a perspective camera, and the planes of its depth."""
+
+    size: Size
+    near: float
+    far: float | None
+    reversed_z: bool
+
+
+def view(eye: object, target: object, up: object) -> View:
     """The three vectors of a view; the engine refuses those that leave it without a direction."""
-    return (
-        _arguments.vector("eye", eye),
-        _arguments.vector("target", target),
-        _arguments.vector("up", up),
-    )
+    return {
+        "eye": _arguments.vector("eye", eye),
+        "target": _arguments.vector("target", target),
+        "up": _arguments.vector("up", up),
+    }
 
 
-def near_far(near: object, far: object) -> tuple[float, float | None]:
-    """The planes of a perspective camera."""
-    near_ = _arguments.number("near", near, above=0.0)
-    if far is None or (isinstance(far, float) and far == math.inf):
-        return near_, None
-    return near_, _arguments.number("far", far, above=near_)
+def perspective_image(size: object, near: object, far: object, reversed_z: object) -> Image:
+    """The arguments that all perspective constructors end with."""
+    sides = _arguments.size("size", size)
+    nearest = _arguments.number("near", near, above=0.0)
+    farthest = None
+    if far is not None and not (isinstance(far, float) and far == math.inf):
+        farthest = _arguments.number("far", far, above=nearest)
+    return {
+        "size": sides,
+        "near": nearest,
+        "far": farthest,
+        "reversed_z": _arguments.flag("reversed_z", reversed_z),
+    }
 
 
 def pixel_center(value: object) -> PixelCenter:
-    """Where the first pixel's centre is in the coordinates of a camera matrix."""
+    """The word for where a camera matrix has the centre of the first pixel."""
     if not isinstance(value, str):
         raise TypeError(
             f"pixel_center: expected {_CENTERS}, got {_arguments.describe(value)}; {_NO_DEFAULT}"
@@ -105,8 +135,8 @@ def pixel_center(value: object) -> PixelCenter:
 
 
 def intrinsics(k: object) -> npt.NDArray[np.float64]:
-    """A camera matrix, with the zeros where they have to be."""
-    # KITTI's P: the translation in it belongs into the pose.
+    """A camera matrix, with its zeros in place."""
+    # For a P of KITTI: the translation in it belongs into the pose.
     hints = {(3, 4): "; of a projection P = K [I | t] pass P[:, :3]", (4, 4): "; pass k[:3, :3]"}
     hint = hints.get(getattr(k, "shape", (3, 3)), "")
     result = _arguments.numbers_of_shape("k", k, (3, 3), hint=hint)
@@ -120,7 +150,7 @@ def intrinsics(k: object) -> npt.NDArray[np.float64]:
 
 
 def refuse_distortion(distortion: object) -> None:
-    """Only no distortion at all is a linear camera."""
+    """Refuses distortion coefficients other than 0: such a camera is not linear."""
     if distortion is None:
         return
     coefficients = np.asarray(distortion)
@@ -134,14 +164,15 @@ def refuse_distortion(distortion: object) -> None:
         raise TypeError(f"distortion: expected None or an array of zeros, got {got}")
     if coefficients.any():
         raise ValueError(
-            "distortion: expected None or zeros, got coefficients other than 0; undistort the depth image first, by "
-            "cv2.initUndistortRectifyMap and cv2.remap with cv2.INTER_NEAREST (cv2.undistort interpolates, and makes "
-            "depth that nothing has), and pass the new camera matrix as k"
+            "distortion: expected None or zeros, got coefficients other than 0; "
+            "undistort the depth image first, by cv2.initUndistortRectifyMap and cv2.remap with "
+            "cv2.INTER_NEAREST (cv2.undistort interpolates, and makes depth that nothing has), "
+            "and pass the new camera matrix as k"
         )
 
 
 def one_pose(camera_from_world: object, world_from_camera: object) -> Pose:
-    """The name and the matrix of the one pose that came."""
+    """The pose, of which exactly one direction must be given."""
     if (camera_from_world is None) == (world_from_camera is None):
         got = "neither" if camera_from_world is None else "both"
         expected = "exactly one of them: (4, 4), (3, 4) or a pair (R, t)"
@@ -154,7 +185,7 @@ def one_pose(camera_from_world: object, world_from_camera: object) -> Pose:
 def colmap_pose(
     qvec: object, tvec: object, camera_from_world: object, world_from_camera: object
 ) -> Pose:
-    """The pose of an image of COLMAP: a matrix, or quaternion and translation of images.txt."""
+    """The pose of a COLMAP image: a matrix, or the quaternion and translation of images.txt."""
     if qvec is None and tvec is None:
         if camera_from_world is None and world_from_camera is None:
             expected = "both as images.txt has them, or camera_from_world"
@@ -183,16 +214,16 @@ def colmap_pose(
 def colmap_intrinsics(
     model: object, params: object
 ) -> tuple[str, npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """The model's name, its parameters, and the camera matrix that they are."""
+    """The model's name, its parameters, and the camera matrix that they stand for."""
     expected = f"one of COLMAP's models {', '.join(COLMAP_MODELS)}"
-    name = (
-        model if isinstance(model, str) else getattr(model, "name", None)
-    )  # pycolmap: an enumeration
+    # In pycolmap the model is an enumeration.
+    name = model if isinstance(model, str) else getattr(model, "name", None)
     if not isinstance(name, str):
         raise TypeError(f"model: expected {expected}, got {_arguments.describe(model)}")
     if name in COLMAP_CURVED:
         raise ValueError(
-            f"model: expected {expected}, got {name}, which is no pinhole with any numbers; {_UNDISTORT}"
+            f"model: expected {expected}, got {name}, which is no pinhole with any numbers; "
+            f"{_UNDISTORT}"
         )
     if name not in COLMAP_MODELS:
         raise ValueError(f"model: expected {expected}, got {_arguments.describe(name)}")
@@ -203,9 +234,8 @@ def colmap_intrinsics(
     values = dict(zip(words, listed.tolist(), strict=True))
     fx, fy = (values["f"], values["f"]) if "f" in values else (values["fx"], values["fy"])
     if not (fx > 0.0 and fy > 0.0):
-        raise ValueError(
-            f"params: expected {COLMAP_MODELS[name]} of {name} with focal lengths above 0, got {values}"
-        )
+        expected = f"{COLMAP_MODELS[name]} of {name} with focal lengths above 0"
+        raise ValueError(f"params: expected {expected}, got {values}")
     bent = {
         word: value
         for word, value in values.items()
@@ -214,7 +244,8 @@ def colmap_intrinsics(
     if bent:
         got = ", ".join(f"{word}={value:g}" for word, value in bent.items())
         raise ValueError(
-            f"params: expected no distortion, all zeros behind cx and cy, got {got} of {name}; {_UNDISTORT}"
+            f"params: expected no distortion, all zeros behind cx and cy, got {got} of {name}; "
+            f"{_UNDISTORT}"
         )
     return (
         name,
@@ -233,7 +264,7 @@ def only_one(names: Sequence[str], values: Sequence[object]) -> str:
 
 
 def nothing_beside(what: str, values: Mapping[str, object]) -> None:
-    """Refuse parameters that would mean nothing."""
+    """Refuses parameters that have no meaning beside `what`."""
     for name, value in values.items():
         if value is not None:
             raise TypeError(
@@ -242,22 +273,21 @@ def nothing_beside(what: str, values: Mapping[str, object]) -> None:
 
 
 def only_beside(what: str, values: Mapping[str, object], came: str) -> None:
-    """Refuse parameters that mean something beside another one alone."""
+    """Refuses parameters that have a meaning beside `what` alone."""
     for name, value in values.items():
         if value is not None:
-            raise TypeError(
-                f"{name}: expected beside {what} alone, got {_arguments.describe(value)} beside {came}"
-            )
+            got = f"{_arguments.describe(value)} beside {came}"
+            raise TypeError(f"{name}: expected beside {what} alone, got {got}")
 
 
 def opengl_projection(projection: object) -> npt.NDArray[np.float64]:
-    """A projection of OpenGL's for column vectors."""
+    """A projection of OpenGL for column vectors; one that looks transposed is refused."""
     clip = _arguments.matrix("projection", projection)
     perspective_memory = clip[2, 3] == -1.0 and clip[3, 2] not in (-1.0, 0.0) and clip[3, 3] == 0.0
     orthographic_memory = (clip[:, 3] == (0.0, 0.0, 0.0, 1.0)).all() and clip[3, :3].any()
     if perspective_memory or orthographic_memory:
         raise ValueError(
-            "projection: expected a matrix for column vectors (clip = M @ [x, y, z, 1]), got one that looks "
-            "transposed; pass projection.T"
+            "projection: expected a matrix for column vectors (clip = M @ [x, y, z, 1]), "
+            "got one that looks transposed; pass projection.T"
         )
     return clip

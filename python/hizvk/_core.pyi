@@ -1,10 +1,17 @@
-"""The compiled engine (Rust). Not public: its arguments are checked by the modules around it."""
+"""The compiled engine (Rust). Not public: its arguments are checked by the modules around it.
+
+This describes the module of a checkout, as ``make setup`` builds it.
+A wheel is built without the features ``testing`` and ``yardstick``: it has neither `options_text`
+nor the yardsticks.
+"""
 
 from collections.abc import Sequence
 from typing import Self, TypeAlias, final
 
 import numpy as np
 import numpy.typing as npt
+
+from .options import CullOptions, Outputs
 
 __all__ = [
     "Camera",
@@ -28,6 +35,7 @@ __all__ = [
     "check_proxy",
     "frustum_matrix",
     "let_go",
+    "options_text",
     "reference_classify",
     "reference_pyramid",
     "takes_planted_faults",
@@ -49,6 +57,7 @@ def adapters() -> list[_Adapter]: ...
 def let_go() -> None: ...
 def before_fork() -> None: ...
 def after_fork() -> None: ...
+def options_text(options: CullOptions | None, outputs: Outputs | None) -> tuple[str, str]: ...
 def check_proxy(
     proxy: _Mesh, mesh: _Mesh
 ) -> tuple[list[int], list[list[float]], list[int], float]: ...
@@ -142,7 +151,6 @@ class Engine:
         arrays: Sequence[_Floats],
         strict: bool,
         order: str,
-        piece_capacity: int | None,
     ) -> Instances: ...
     def update(
         self, instances: Instances, first: int, kind: str, arrays: Sequence[_Floats], strict: bool
@@ -169,20 +177,8 @@ class Engine:
         instances: Instances,
         camera: Camera,
         pyramid: Pyramid,
-        order: str,
-        coverage: str,
-        guard_px: float | None,
-        depth_slack: float,
-        depth_slack_abs: float,
-        transform_slack: float,
-        footprint: int,
-        descent: int,
-        fit: str,
-        hierarchy: bool | None,
-        outputs: tuple[bool, bool, bool, bool],
-        capacity: int | None,
-        draw: tuple[int, int, int, int],
-        statistics: bool,
+        options: CullOptions,
+        outputs: Outputs,
     ) -> Culling: ...
     def wait(self) -> None: ...
     def wait_without_guard(self) -> None: ...
@@ -298,9 +294,8 @@ class Yardstick:
         camera: Camera,
         pyramid: Pyramid,
         certified: bool,
-        hierarchy: bool | None,
-        order: str,
-        outputs: tuple[bool, bool, bool, bool],
+        options: CullOptions,
+        outputs: Outputs,
         depth: DepthImage | None,
     ) -> YardstickCull: ...
 

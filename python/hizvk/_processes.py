@@ -1,8 +1,8 @@
-"""What ending processes, forks and the driver's environment ask of this package.
+"""What ending processes, forks and the driver's environment demand of this package.
 
 A lock that another thread holds at a fork is never released in the child.
-So nothing here or elsewhere in the package waits for a lock of another process: what has one
-belongs to a process (`per_process`), and `cached_property` has none.
+So no part of the package waits for a lock of another process: an object with a lock belongs to one
+process (`per_process`), and `cached_property` has no lock.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ __all__ = ["cached_property", "driver_is_asked", "per_process"]
 
 _T = TypeVar("_T")
 
-#: Mesa's layer of this name prints "error: XDG_RUNTIME_DIR is invalid" where there is no desktop. Where the variable is
-#: set, the Vulkan loader leaves the layer out.
+#: Mesa's layer of this name prints "error: XDG_RUNTIME_DIR is invalid" where there is no desktop.
+#: Where the variable is set, the Vulkan loader leaves the layer out.
 _NO_DEVICE_SELECT = "NODEVICE_SELECT"
 
 
 class cached_property(Generic[_T]):
     """`functools.cached_property` without its lock: Python 3.11 has one for all objects of a class.
 
-    Two threads may both compute; whoever comes first decides what all see.
+    Two threads may both compute the value; all see the one that was stored first.
     """
 
     def __init__(self, compute: Callable[[Any], _T]) -> None:
@@ -53,7 +53,10 @@ class cached_property(Generic[_T]):
 
 
 def per_process(of: dict[int, _T], make: Callable[[], _T]) -> _T:
-    """The value of `of` for this process; a forked child gets its own, and its parent's is kept as it is."""
+    """The value of `of` for this process.
+
+    A forked child makes its own, and keeps its parent's as it is.
+    """
     try:
         return of[os.getpid()]
     except KeyError:
@@ -61,7 +64,7 @@ def per_process(of: dict[int, _T], make: Callable[[], _T]) -> _T:
 
 
 class _Environment:
-    """How many calls of a process ask the driver now, and whether they have set the variable."""
+    """How many calls of this process ask the driver now, and whether they set the variable."""
 
     def __init__(self) -> None:
         self.lock = threading.RLock()
@@ -92,7 +95,10 @@ _environments: dict[int, _Environment] = {}
 
 @contextmanager
 def driver_is_asked() -> Iterator[None]:
-    """For calls that make a Vulkan instance: its layers say nothing on stderr, and the environment is as before."""
+    """For calls that make a Vulkan instance: its layers print nothing on stderr.
+
+    Afterwards the environment is as before.
+    """
     environment = per_process(_environments, _Environment)
     environment.enter()
     try:
@@ -102,7 +108,7 @@ def driver_is_asked() -> Iterator[None]:
 
 
 def _c_functions() -> tuple[Any, Any] | None:
-    """The C library's `on_exit` and `__cxa_atexit`, bound before any fork; None where there are none."""
+    """The C library's `on_exit` and `__cxa_atexit`, bound before any fork; None without them."""
     if not hasattr(os, "register_at_fork"):
         return None
     libc = ctypes.CDLL(None)
@@ -120,13 +126,13 @@ if _at_exit is not None:
 
 
 def _after_fork_in_child() -> None:
-    """Without any lock: the environment as it was, and an end without the parent's drivers.
+    """Restores the environment, and lets the child end without its parent's drivers; takes no lock.
 
-    Mesa joins threads at a C program's exit.
-    In a fork they do not exist, and it crashes or waits for ever.
-    So the child of a process that has asked a driver ends, once Python has ended, without its
-    parent's C exit handlers.
-    (`multiprocessing` ends its children so in any case.)
+    Mesa joins its threads when a C program exits.
+    In a fork these threads do not exist, so it crashes or waits for ever.
+    So the child of a process that has asked a driver skips its parent's C exit handlers, once
+    Python has ended.
+    `multiprocessing` ends its children in this way in any case.
     """
     if not _environments:
         return
@@ -134,7 +140,7 @@ def _after_fork_in_child() -> None:
         environment.restore()
     if _at_exit is not None:
         on_exit, cxa_atexit = _at_exit
-        # The last one runs first: C's streams are written out, then the process ends with its
+        # The last handler runs first: C's streams are written, then the process ends with its
         # status.
         on_exit(_exit, None)
         cxa_atexit(_fflush, None, None)

@@ -1,7 +1,7 @@
 """Rotation matrices from angles and quaternions, in float64.
 
-What they return *is* the rotation from there on: a camera or a box denotes the float64 matrix that
-was formed, so that the roundings here (some 1e-16) are no error that a cull would have to cover.
+From here on, the rotation is the float64 matrix that was formed.
+A camera or a box has exactly this matrix, so a cull need not cover the roundings here, about 1e-16.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 
 
 def from_quaternions(w: Any, x: Any, y: Any, z: Any) -> npt.NDArray[np.float64]:
-    """``(N, 3, 3)`` from the four parts, ``(N,)`` each, of Hamilton quaternions of any length.
+    """``(N, 3, 3)`` from the four parts, ``(N,)`` each, of Hamilton quaternions.
 
-    A quaternion of length 0, or one that is not finite, becomes a matrix of NaN.
+    They may have any length; one of length 0, or one that is not finite, becomes a matrix of NaN.
     """
     parts = np.stack([np.asarray(part, np.float64) for part in (w, x, y, z)])
     with np.errstate(all="ignore"):
-        parts = parts / np.abs(parts).max(axis=0)  # no square over- or underflows
+        parts = parts / np.abs(parts).max(axis=0)  # so that no square overflows or underflows
         w, x, y, z = parts / np.sqrt((parts * parts).sum(axis=0))
         rows = (
             (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),

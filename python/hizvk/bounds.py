@@ -1,16 +1,17 @@
-"""The volumes that are tested: spheres, axis-aligned boxes and oriented boxes, as arrays over the instances.
+"""The bounds that are tested: spheres, axis-aligned boxes and oriented boxes, an array row each.
 
-The arrays are kept as they come (float32 and float64 in C order without a copy) and are read when
-they are uploaded (`Device.instances`).
-Positions may be float64: the engine re-centres them on the eye before it rounds.
-Bad bounds (NaN, infinite, a negative radius or half size, min > max) are no error here: a cull
-keeps them visible and counts them, or `Device.instances(..., strict=True)` refuses them.
+The arrays are kept as they come, float32 and float64 in C order without a copy.
+They are read when they are uploaded (`Device.instances`).
+Positions may be float64: the engine subtracts the eye before it rounds to float32.
+
+Invalid bounds are not an error here: NaN, infinite, a negative radius or half size, min > max.
+A cull keeps them visible and counts them, or `Device.instances(..., strict=True)` refuses them.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 
@@ -22,28 +23,27 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from ._arguments import FloatArray
+    from ._types import QuaternionOrder
 
 __all__ = ["Boxes", "OrientedBoxes", "Spheres"]
 
-
-# A union of words: stubtest takes Literal["a", "b"] for something else at run time.
-QuaternionOrder: TypeAlias = Literal["wxyz"] | Literal["xyzw"]
 
 _ORDERS = (
     '"wxyz" (nuScenes, COLMAP, Blender, trimesh, MuJoCo) or "xyzw" (SciPy, ROS, glTF, PyBullet, '
     "pycolmap's rotation.quat)"
 )
 _NO_DEFAULT = "there is no default, for a wrong guess hides things"
-#: What `_arguments.explained` says about keywords of the constructors of boxes.
+#: What `_arguments.explained` says about keywords of the constructors of `OrientedBoxes`.
 _KEYWORDS: Final = {
     "order": f"expected {_ORDERS}, got nothing; {_NO_DEFAULT}",
-    "up": "expected the axis of the turn, (0, 0, 1) where z is up (nuScenes, CARLA, Waymo) or (0, 1, 0) (KITTI's "
-    f"rotation_y in camera coordinates, worlds whose y is up), got nothing; {_NO_DEFAULT}",
+    "up": "expected the axis of the turn, (0, 0, 1) where z is up (nuScenes, CARLA, Waymo) or "
+    "(0, 1, 0) (KITTI's rotation_y in camera coordinates, worlds whose y is up), "
+    f"got nothing; {_NO_DEFAULT}",
     "yaw": "expected yaw_deg, in degrees: np.degrees(yaw)",
 }
 _OTHER_ROTATIONS = (
-    "; angles, quaternions and matrices with a translation are taken by OrientedBoxes.from_yaw, .from_quaternions and "
-    ".from_transforms"
+    "; angles, quaternions and matrices with a translation are taken by "
+    "OrientedBoxes.from_yaw, .from_quaternions and .from_transforms"
 )
 
 
@@ -125,9 +125,10 @@ class OrientedBoxes:
 
     `from_yaw`, `from_quaternions` and `from_transforms` make them from what data sets hold instead
     of `rotations`.
-    The matrices that they form in float64 *are* the boxes' rotations from then on: what a cull
-    promises, it promises about the boxes with those matrices.
-    They are off an exact turn by some 1e-16, as far as a half size of 1 km by 1e-13 m.
+    They form float64 matrices, and a cull promises what it promises about the boxes with those
+    matrices.
+    The matrices are off an exact turn by about 1e-16, which moves a corner of a box with a half
+    size of 1 km by 1e-13 m.
 
     Parameters
     ----------
@@ -136,9 +137,9 @@ class OrientedBoxes:
     half_sizes : (N, 3) float array
         Half the side along each of the box's own axes.
     rotations : (N, 3, 3) float array
-        Column ``k`` is the world direction of the box's axis ``k``: ``world = center + rotation @
-        local``.
-        Any matrix is allowed (scaled, sheared, mirrored, flat), not rotations alone.
+        Column ``k`` is the world direction of the box's axis ``k``:
+        ``world = center + rotation @ local``.
+        Any matrix is allowed: scaled, sheared, mirrored, flat.
 
     Raises
     ------
@@ -180,13 +181,13 @@ class OrientedBoxes:
         ----------
         centers : (N, 3) float array
             World positions of the boxes' centres.
-            (KITTI's labels hold the middle of the lower face.)
+            KITTI's labels hold the middle of the lower face instead.
         half_sizes : (N, 3) or (3,) float array, or one number
             Half the side along each of the box's own axes, which are the world's at an angle of 0.
         yaw_deg : (N,) float array or one number
-            Degrees (``np.degrees`` of a data set's radians) by which the boxes turn about `up`, by
-            the right-hand rule: for ``up=(0, 0, 1)`` from x towards y, as CARLA has it in its
-            left-handed coordinates, too.
+            Degrees by which the boxes turn about `up`, by the right-hand rule.
+            For ``up=(0, 0, 1)`` that is from x towards y, also in CARLA's left-handed coordinates.
+            Of radians pass ``np.degrees(yaw)``.
             Whole quarter turns are exact.
         up : three numbers
             The axis, of any length: ``(0, 0, 1)`` where z is up.
@@ -200,7 +201,8 @@ class OrientedBoxes:
         Examples
         --------
         >>> import numpy as np, hizvk
-        >>> hizvk.OrientedBoxes.from_yaw(np.zeros((2, 3)), [2.0, 1.0, 0.8], [0.0, 30.0], up=(0, 0, 1))
+        >>> yaws = [0.0, 30.0]
+        >>> hizvk.OrientedBoxes.from_yaw(np.zeros((2, 3)), [2.0, 1.0, 0.8], yaws, up=(0, 0, 1))
         OrientedBoxes(2 of float64)
         """
         centers = _arguments.floats("centers", centers, ("N", 3))
@@ -230,10 +232,9 @@ class OrientedBoxes:
         half_sizes : (N, 3) or (3,) float array, or one number
             Half the side along each of the box's own axes.
         quaternions : (N, 4) float array
-            The turn from the box's axes to the world's; of any length but 0, for they are
-            normalised.
-            One of length 0, or not finite, makes a box that is no volume: a cull keeps it and
-            counts it as invalid.
+            The turn from the box's axes to the world's.
+            They are normalised, so they may have any length but 0.
+            One of length 0, or not finite, makes an invalid box: a cull keeps it and counts it.
         order : {"wxyz", "xyzw"}
             Where the scalar part is.
             There is no default.
@@ -266,10 +267,9 @@ class OrientedBoxes:
         Parameters
         ----------
         world_from_box : (N, 4, 4) or (N, 3, 4) float array; or one matrix without the N
-            ``world = M @ [x, y, z, 1]`` for column vectors, with any turn, scale, shear or
-            mirroring; the last row of a ``(4, 4)`` is 0, 0, 0, 1.
-            A matrix that is not finite makes a box that is no volume: a cull keeps it and counts it
-            as invalid.
+            ``world = M @ [x, y, z, 1]`` for column vectors.
+            Any turn, scale, shear or mirroring will do; the last row of a ``(4, 4)`` is 0, 0, 0, 1.
+            A matrix that is not finite makes an invalid box: a cull keeps it and counts it.
         half_sizes : (N, 3) or (3,) float array, or one number
             Half the side along each of the box's own axes, before the matrix.
             The default is the cube from -0.5 to 0.5.
@@ -305,7 +305,7 @@ class OrientedBoxes:
 
 
 def _sides(value: Any) -> tuple[int, ...] | None:
-    """The shape of anything that has one; None for a ragged list, which `_arguments` refuses by name."""
+    """The shape of anything that has one; None for a ragged list, which `_arguments` refuses."""
     try:
         return tuple(np.shape(value))
     except ValueError:
@@ -325,7 +325,7 @@ Bounds: TypeAlias = Spheres | Boxes | OrientedBoxes
 
 
 def as_arrays(name: str, bounds: object) -> tuple[str, tuple[FloatArray, ...]]:
-    """The kind's name in the engine and its arrays; a `TypeError` for anything that is no bounds."""
+    """The engine's word for the kind of bounds, and the arrays; a `TypeError` for other objects."""
     match bounds:
         case Spheres():
             return "spheres", (bounds.centers, bounds.radii)

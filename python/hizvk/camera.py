@@ -1,11 +1,13 @@
-"""The camera: which clip coordinates a world position has, in which image, in which depth convention.
+"""The camera: how world positions project, into which image, in which depth convention.
 
 Conventions are named constructors, never guessed.
-Matrices are C-order ``(4, 4)`` for column vectors (``clip = M @ [x, y, z, 1]``), normalised device
-coordinates have x right, y up and z in 0..1, image sizes are ``(height, width)`` and row 0 is the
-top of the image.
-The numbers are float64 from here to the engine, which re-centres everything on the eye, so that
-world positions of millions of metres are fine.
+Matrices are C-order ``(4, 4)`` for column vectors: ``clip = M @ [x, y, z, 1]``.
+Normalised device coordinates have x right, y up and z in 0..1.
+Image sizes are ``(height, width)``, and row 0 is the top of the image.
+
+The numbers are float64 from here to the engine, which subtracts the eye before it rounds to
+float32.
+So world positions of millions of metres are fine.
 """
 
 from __future__ import annotations
@@ -18,14 +20,14 @@ import numpy as np
 from . import _arguments, _camera_arguments, _core
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
     from typing import Self
 
     import numpy.typing as npt
 
     from ._arguments import Size
-    from ._camera_arguments import PixelCenter
-    from .depth import DepthKind
+    from ._camera_arguments import Image, Pose
+    from ._types import DepthKind, PixelCenter
 
 __all__ = ["Camera"]
 
@@ -33,22 +35,22 @@ __all__ = ["Camera"]
 class Camera:
     """An immutable camera with an image size; made by one of its named constructors.
 
-    ======================  ==========================================================================
+    ======================  ======================================================================
     `Camera.look_at`        perspective, from an eye towards a target
     `Camera.frustum`        perspective, off-centre
     `Camera.orthographic`   parallel projection
     `Camera.from_opencv`    an intrinsic matrix K; the camera looks along +z, y down
-    `Camera.from_colmap`    a model of COLMAP's with its parameters, and an image's pose
-    `Camera.from_opengl`    the camera looks along -z, y up; a projection of OpenGL, K or an angle of view
+    `Camera.from_colmap`    a COLMAP model with its parameters, and the pose of an image
+    `Camera.from_opengl`    the camera looks along -z, y up: an OpenGL projection, K or an angle
     `Camera.from_matrices`  matrices that already are in this library's conventions
-    ======================  ==========================================================================
+    ======================  ======================================================================
 
     ``docs/conventions.md`` has the call for each of a dozen tools.
-    Poses are ``(4, 4)``, ``(3, 4)`` or a pair ``(R, t)`` of ``(3, 3)`` and ``(3,)``, for column
-    vectors.
+    A pose is a ``(4, 4)`` or ``(3, 4)`` matrix, or a pair ``(R, t)`` of ``(3, 3)`` and ``(3,)``,
+    for column vectors.
 
-    Cameras compare by what they project, can be hashed, copied and pickled, and may be used from
-    any thread.
+    Cameras are equal if they project alike.
+    They can be hashed, copied and pickled, and used from any thread.
     """
 
     __slots__ = ("_inner", "_recipe")
@@ -58,20 +60,38 @@ class Camera:
 
     def __init__(self) -> None:
         raise TypeError(
-            "Camera() takes no arguments: use Camera.look_at, .frustum, .orthographic, .from_opencv, .from_colmap, "
-            ".from_opengl or .from_matrices"
+            "Camera() takes no arguments: use Camera.look_at, .frustum, .orthographic, "
+            ".from_opencv, .from_colmap, .from_opengl or .from_matrices"
         )
 
     @classmethod
-    def _made(cls, core: _core.Camera, name: str, **arguments: Any) -> Self:
-        """The camera around `core`, and how to make it again (for `repr` and pickle)."""
+    def _made(cls, inner: _core.Camera, name: str, **arguments: Any) -> Self:
+        """The camera around `inner`, and the call that makes it again (for `repr` and pickle)."""
         camera = cls.__new__(cls)
-        object.__setattr__(camera, "_inner", core)
+        object.__setattr__(camera, "_inner", inner)
         object.__setattr__(camera, "_recipe", (name, tuple(arguments.items())))
         return camera
 
-    # --
-    # constructors ------------------------------------------------------------------------------------------------
+    @classmethod
+    def _posed(
+        cls,
+        name: str,
+        seen: Mapping[str, Any],
+        clip_from_camera: npt.NDArray[np.float64],
+        pose: Pose,
+        image: Mapping[str, Any],
+        reversed_z: bool,
+    ) -> Self:
+        """The camera of a projection and a pose; constructor `name` takes `seen` and `image`."""
+        direction, matrix = pose
+        make = {
+            "camera_from_world": _core.Camera.from_clip_from_camera,
+            "world_from_camera": _core.Camera.from_clip_from_camera_pose,
+        }[direction]
+        inner = make(clip_from_camera.tolist(), matrix.tolist(), reversed_z, image["size"])
+        return cls._made(inner, name, **seen, **{direction: matrix}, **image)
+
+    # Constructors.
 
     @classmethod
     def look_at(
@@ -93,38 +113,32 @@ class Camera:
         eye, target : three numbers
             World positions.
         up : three numbers
-            The direction that points to the top of the image.
-            The default is +y: in a world whose z is up (Blender, CARLA, ROS, maps) pass ``(0, 0,
-            1)``, or the image comes out rolled.
-            It must not be parallel to the view direction: to look straight down, pass what shall be
-            at the top, such as the heading, or north.
+            The direction that points to the top of the image; not parallel to the view direction.
+            The default is +y.
+            In a world whose z is up (Blender, CARLA, ROS, maps) pass ``(0, 0, 1)``, or the image
+            comes out rolled.
+            To look straight down, pass what shall be at the top, such as the heading, or north.
         fov_y_deg : float
             The full vertical angle of view in degrees, above 0 and below 180.
         size : (height, width)
             Pixels of the image; they are square.
         near, far : float
-            Distances of the near and far plane along the view direction, ``0 < near < far``; None
-            is infinitely far.
+            Distances of the near and far plane along the view direction, ``0 < near < far``.
+            ``far=None`` is infinitely far.
         reversed_z : bool
-            True: depth 1 at the near plane and 0 at the far plane; False: 0 near, 1 far.
+            True: depth 1 at the near plane and 0 at the far plane.
+            False: 0 near, 1 far.
 
         Raises
         ------
         TypeError, ValueError
             They name the parameter, what it expects and what came.
         """
-        eye, target, up = _camera_arguments.view(eye, target, up)
+        view = _camera_arguments.view(eye, target, up)
         fov_y_deg = _arguments.number("fov_y_deg", fov_y_deg, above=0.0, below=180.0)
-        size = _arguments.size("size", size)
-        near, far = _camera_arguments.near_far(near, far)
-        reversed_z = _arguments.flag("reversed_z", reversed_z)
-        core = _core.Camera.perspective(
-            eye, target, up, math.radians(fov_y_deg), near, far, reversed_z, size
-        )
-        return cls._made(
-            core, "look_at", eye=eye, target=target, up=up, fov_y_deg=fov_y_deg, size=size, near=near, far=far,
-            reversed_z=reversed_z,
-        )  # fmt: skip
+        image = _camera_arguments.perspective_image(size, near, far, reversed_z)
+        inner = _core.Camera.perspective(**view, fov_y=math.radians(fov_y_deg), **image)
+        return cls._made(inner, "look_at", **view, fov_y_deg=fov_y_deg, **image)
 
     @classmethod
     def frustum(
@@ -142,15 +156,17 @@ class Camera:
         far: float | None = None,
         reversed_z: bool = True,
     ) -> Self:
-        """An off-centre perspective camera (a tile of a larger image, one eye of a headset, a shifted lens).
+        """An off-centre perspective camera.
+
+        Examples are a tile of a larger image, one eye of a headset, and a shifted lens.
 
         Parameters
         ----------
         eye, target, up : three numbers
             As in `look_at`.
         left, right, bottom, top : float
-            The image borders at view depth 1: tangents of the angles to the view direction, x to
-            the right and y up; ``left < right`` and ``bottom < top``.
+            The borders of the image at view depth 1, ``left < right`` and ``bottom < top``.
+            They are tangents of the angles to the view direction, x to the right and y up.
         size, near, far, reversed_z
             As in `look_at`.
 
@@ -159,20 +175,15 @@ class Camera:
         TypeError, ValueError
             They name the parameter, what it expects and what came.
         """
-        eye, target, up = _camera_arguments.view(eye, target, up)
+        view = _camera_arguments.view(eye, target, up)
         left = _arguments.number("left", left)
         right = _arguments.number("right", right, above=left)
         bottom = _arguments.number("bottom", bottom)
         top = _arguments.number("top", top, above=bottom)
-        size = _arguments.size("size", size)
-        near, far = _camera_arguments.near_far(near, far)
-        reversed_z = _arguments.flag("reversed_z", reversed_z)
-        borders = (left, right, bottom, top)
-        core = _core.Camera.frustum(eye, target, up, borders, near, far, reversed_z, size)
-        return cls._made(
-            core, "frustum", eye=eye, target=target, up=up, left=left, right=right, bottom=bottom, top=top, size=size,
-            near=near, far=far, reversed_z=reversed_z,
-        )  # fmt: skip
+        image = _camera_arguments.perspective_image(size, near, far, reversed_z)
+        inner = _core.Camera.frustum(**view, borders=(left, right, bottom, top), **image)
+        borders = {"left": left, "right": right, "bottom": bottom, "top": top}
+        return cls._made(inner, "frustum", **view, **borders, **image)
 
     @classmethod
     def orthographic(
@@ -201,7 +212,8 @@ class Camera:
             Pixels of the image.
         near, far : float
             The two planes, as distances from `eye` along the view direction; ``near < far``, both
-            finite; near may be negative.
+            finite.
+            `near` may be negative.
         reversed_z : bool
             As in `look_at`.
 
@@ -210,7 +222,7 @@ class Camera:
         TypeError, ValueError
             They name the parameter, what it expects and what came.
         """
-        eye, target, up = _camera_arguments.view(eye, target, up)
+        view = _camera_arguments.view(eye, target, up)
         height = _arguments.number("height", height, above=0.0)
         size = _arguments.size("size", size)
         if width is None:
@@ -220,11 +232,11 @@ class Camera:
         far = _arguments.number("far", far, above=near)
         reversed_z = _arguments.flag("reversed_z", reversed_z)
         borders = (-0.5 * width, 0.5 * width, -0.5 * height, 0.5 * height)
-        core = _core.Camera.orthographic(eye, target, up, borders, near, far, reversed_z, size)
-        return cls._made(
-            core, "orthographic", eye=eye, target=target, up=up, height=height, width=width, size=size, near=near,
-            far=far, reversed_z=reversed_z,
-        )  # fmt: skip
+        image: Image = {"size": size, "near": near, "far": far, "reversed_z": reversed_z}
+        inner = _core.Camera.orthographic(
+            **view, borders=borders, near=near, far=far, reversed_z=reversed_z, size=size
+        )
+        return cls._made(inner, "orthographic", **view, height=height, width=width, **image)
 
     @classmethod
     @_arguments.explained(_camera_arguments.KEYWORDS)
@@ -253,6 +265,7 @@ class Camera:
 
             ``"integer"``: at (0, 0), as in OpenCV, ROS, KITTI and Open3D's cameras.
             Here it is at (0.5, 0.5), so ``cx + 0.5`` and ``cy + 0.5`` are used.
+
             ``"half"``: at (0.5, 0.5), as in COLMAP, nerfstudio, gsplat, and wherever ``cx`` is half
             of the width (CARLA).
             `cx` and `cy` are used as they are.
@@ -267,11 +280,12 @@ class Camera:
         near, far, reversed_z
             As in `look_at`; view depth is the camera's z.
         distortion : array, optional
-            Lens distortion coefficients; None or all zero.
-            Others are refused: remap the depth image first (``cv2.initUndistortRectifyMap`` and
-            ``cv2.remap`` with ``cv2.INTER_NEAREST``; ``cv2.undistort`` interpolates, and makes
-            depth that nothing has) and pass the new camera matrix.
-            A fisheye is no pinhole, even with coefficients of 0 (``cv2.fisheye``).
+            Lens distortion coefficients: None or all zero.
+            Others are refused, because a camera with distortion is not linear.
+            Remap the depth image first, and pass the new camera matrix: use
+            ``cv2.initUndistortRectifyMap`` and ``cv2.remap`` with ``cv2.INTER_NEAREST``.
+            ``cv2.undistort`` interpolates, which makes depth that nothing has.
+            A fisheye is not a pinhole, even with coefficients of 0 (``cv2.fisheye``).
 
         Raises
         ------
@@ -289,18 +303,12 @@ class Camera:
         """
         k = _camera_arguments.intrinsics(k)
         pixel_center = _camera_arguments.pixel_center(pixel_center)
-        name, pose = _camera_arguments.one_pose(camera_from_world, world_from_camera)
-        size = _arguments.size("size", size)
-        near, far = _camera_arguments.near_far(near, far)
+        pose = _camera_arguments.one_pose(camera_from_world, world_from_camera)
+        image = _camera_arguments.perspective_image(size, near, far, reversed_z)
         _camera_arguments.refuse_distortion(distortion)
-        reversed_z = _arguments.flag("reversed_z", reversed_z)
-        core = _posed(
-            _pinhole(k, pixel_center, near, far, reversed_z, size), name, pose, reversed_z, size
-        )
-        return cls._made(
-            core, "from_opencv", k=k, pixel_center=pixel_center, **{name: pose}, size=size, near=near, far=far,
-            reversed_z=reversed_z,
-        )  # fmt: skip
+        projection = _pinhole(k, pixel_center, image)
+        seen = {"k": k, "pixel_center": pixel_center}
+        return cls._posed("from_opencv", seen, projection, pose, image, image["reversed_z"])
 
     @classmethod
     @_arguments.explained(_camera_arguments.COLMAP_KEYWORDS)
@@ -320,34 +328,33 @@ class Camera:
     ) -> Self:
         """A camera of a COLMAP model (cameras.txt and images.txt, or pycolmap).
 
-        Its axes are OpenCV's (x right, y down, z forward), and the first pixel's centre is at (0.5,
-        0.5), as it is here.
+        It has OpenCV's axes, and the first pixel's centre is at (0.5, 0.5): this is `from_opencv`
+        with ``pixel_center="half"``.
 
         Parameters
         ----------
         model : str
-            The camera's model, ``"PINHOLE"`` or ``"SIMPLE_PINHOLE"``.
+            The camera's model, ``"PINHOLE"`` or ``"SIMPLE_PINHOLE"``; pycolmap's ``camera.model``
+            will do.
             Models with distortion (``"SIMPLE_RADIAL"``, ``"OPENCV"``, ...) are taken if all of it
             is 0; a fisheye never is.
-            The way out is COLMAP's ``image_undistorter``, whose cameras are ``PINHOLE``. pycolmap's
-            ``camera.model`` will do.
+            The way out is COLMAP's ``image_undistorter``, whose cameras are ``PINHOLE``.
         params : (P,) numbers
-            The model's parameters in COLMAP's order, ``fx, fy, cx, cy`` of ``PINHOLE``.
+            The model's parameters in COLMAP's order: ``fx, fy, cx, cy`` for ``PINHOLE``.
         qvec : (4,) numbers, optional
             The image's rotation from world to camera in the order of images.txt: **w, x, y, z**.
-            (In pycolmap, ``rotation.quat`` is x, y, z, w: pass ``camera_from_world`` there.)
-            The camera denotes the float64 matrix that is formed of it.
+            pycolmap's ``rotation.quat`` is x, y, z, w: pass ``camera_from_world`` there.
+            The camera has the float64 matrix that is formed from it.
         tvec : (3,) numbers, optional
-            The translation that belongs to it.
+            The translation that belongs to `qvec`.
             It is not the camera's position.
         camera_from_world, world_from_camera : (4, 4), (3, 4) or a pair (R, t), optional
             The pose instead of `qvec` and `tvec`; pycolmap's is
             ``camera_from_world=image.cam_from_world().matrix()``.
         size : (height, width)
             Pixels of the camera; COLMAP writes the width first.
-            For a depth image of another resolution, take `resized` of the camera.
         near, far, reversed_z
-            As in `look_at`; view depth is the camera's z.
+            As in `from_opencv`.
 
         Raises
         ------
@@ -363,17 +370,11 @@ class Camera:
         ... )
         """
         model, params, k = _camera_arguments.colmap_intrinsics(model, params)
-        name, pose = _camera_arguments.colmap_pose(qvec, tvec, camera_from_world, world_from_camera)
-        size = _arguments.size("size", size)
-        near, far = _camera_arguments.near_far(near, far)
-        reversed_z = _arguments.flag("reversed_z", reversed_z)
-        core = _posed(
-            _pinhole(k, "half", near, far, reversed_z, size), name, pose, reversed_z, size
-        )
-        return cls._made(
-            core, "from_colmap", model=model, params=params, **{name: pose}, size=size, near=near, far=far,
-            reversed_z=reversed_z,
-        )  # fmt: skip
+        pose = _camera_arguments.colmap_pose(qvec, tvec, camera_from_world, world_from_camera)
+        image = _camera_arguments.perspective_image(size, near, far, reversed_z)
+        projection = _pinhole(k, "half", image)
+        seen = {"model": model, "params": params}
+        return cls._posed("from_colmap", seen, projection, pose, image, image["reversed_z"])
 
     @classmethod
     @_arguments.explained(_camera_arguments.POSE_KEYWORDS)
@@ -396,12 +397,12 @@ class Camera:
         """A camera with OpenGL's axes (and Blender's, nerfstudio's, pyrender's, trimesh's).
 
         It has x right, y up, and looks along -z.
-        What it sees is one of four: OpenGL's `projection`; or `k`, `fov_x_deg` or `fov_y_deg`, each
-        with `near` and `far`.
+        Pass what it sees in one of four ways: OpenGL's `projection`; or `k`, `fov_x_deg` or
+        `fov_y_deg`, each with `near` and `far`.
 
-        With a `projection` (clip z in -w..w, mapped to 0..w here) the camera has standard depth,
-        and a depth buffer that was read back in 0..1 is of kind ``"ndc"``.
-        Its rows start at the bottom in OpenGL: turn them, ``depth[::-1]``.
+        With a `projection` (clip z in -w..w, mapped to 0..w here) the camera has standard depth.
+        A depth buffer that was read back in 0..1 is then of kind ``"ndc"``.
+        Its rows start at the bottom in OpenGL: flip them, ``depth[::-1]``.
         A projection that was made for ``glClipControl(..., GL_ZERO_TO_ONE)`` belongs into
         `from_matrices`.
 
@@ -411,31 +412,32 @@ class Camera:
             ``clip_from_camera`` for column vectors.
             OpenGL's and glm's memory is column by column: transpose it.
         k : (3, 3)
-            ``[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]`` in pixels from the top-left corner, as
-            nerfstudio writes it beside poses of this kind.
+            As in `from_opencv`, in pixels from the top-left corner.
+            Nerfstudio writes it beside poses of this kind.
         pixel_center : {"integer", "half"}
-            Needed with `k`, and with nothing else, as in `from_opencv`. nerfstudio, pyrender and
-            trimesh: ``"half"``.
+            As in `from_opencv`; needed with `k`, and with nothing else.
+            Nerfstudio, pyrender and trimesh: ``"half"``.
         fov_x_deg, fov_y_deg : float
-            The full horizontal or vertical angle of view in degrees, above 0 and below 180, of
-            square pixels with the axis in the middle.
+            The full horizontal or vertical angle of view in degrees, above 0 and below 180.
+            The pixels are square, and the axis is in the middle of the image.
             Blender, NeRF and pyrender have radians: pass ``np.degrees(angle)``.
         camera_from_world, world_from_camera : (4, 4), (3, 4) or a pair (R, t)
             The pose; pass exactly one.
-            ``camera_from_world`` is what OpenGL calls the view matrix; ``world_from_camera`` is
-            Blender's ``matrix_world``, nerfstudio's ``transform_matrix``.
+            ``camera_from_world`` is what OpenGL calls the view matrix.
+            ``world_from_camera`` is Blender's ``matrix_world``, nerfstudio's ``transform_matrix``.
         size : (height, width)
             Pixels of the viewport.
             For a depth image of another resolution, take `resized` of the camera.
         near, far : float
-            As in `look_at`, along -z; `near` is needed without a `projection`, which has its own.
+            As in `look_at`, along -z.
+            `near` is needed without a `projection`, which has its own planes.
         distortion : array, optional
             Lens distortion that belongs to `k`, as in `from_opencv`: None or all zero.
         reversed_z : bool, optional
-            As in `look_at`; None is True, as in all constructors that take `near`.
-            Metric depth does not care; for a depth buffer of OpenGL's pass False, or the
+            As in `look_at`, and not beside a `projection`.
+            None is True, as in all constructors that take `near`.
+            Metric depth does not depend on it; for a depth buffer of OpenGL pass False, or the
             projection.
-            Not beside a `projection`.
 
         Raises
         ------
@@ -446,57 +448,38 @@ class Camera:
             ("projection", "k", "fov_x_deg", "fov_y_deg"), (projection, k, fov_x_deg, fov_y_deg)
         )
         if way != "k":
-            _camera_arguments.only_beside(
-                "k", {"pixel_center": pixel_center, "distortion": distortion}, way
-            )
+            of_k = {"pixel_center": pixel_center, "distortion": distortion}
+            _camera_arguments.only_beside("k", of_k, way)
         if way == "projection":
             beside = {"near": near, "far": far, "reversed_z": reversed_z}
             _camera_arguments.nothing_beside("a projection, which has its own", beside)
             clip = _camera_arguments.opengl_projection(projection)
             zero_to_one = clip.copy()
             zero_to_one[2] = 0.5 * clip[2] + 0.5 * clip[3]
-            name, pose = _camera_arguments.one_pose(camera_from_world, world_from_camera)
-            size = _arguments.size("size", size)
-            core = _posed(zero_to_one, name, pose, False, size)
-            return cls._made(core, "from_opengl", projection=clip, **{name: pose}, size=size)
-        name, pose = _camera_arguments.one_pose(camera_from_world, world_from_camera)
-        size = _arguments.size("size", size)
-        near, far = _camera_arguments.near_far(near, far)
-        reversed_z = True if reversed_z is None else _arguments.flag("reversed_z", reversed_z)
-        seen: dict[str, Any]
+            pose = _camera_arguments.one_pose(camera_from_world, world_from_camera)
+            viewport = {"size": _arguments.size("size", size)}
+            seen: dict[str, Any] = {"projection": clip}
+            return cls._posed("from_opengl", seen, zero_to_one, pose, viewport, reversed_z=False)
+        pose = _camera_arguments.one_pose(camera_from_world, world_from_camera)
+        if reversed_z is None:
+            reversed_z = True
+        image = _camera_arguments.perspective_image(size, near, far, reversed_z)
         if way == "k":
             k = _camera_arguments.intrinsics(k)
             pixel_center = _camera_arguments.pixel_center(pixel_center)
             _camera_arguments.refuse_distortion(distortion)
             seen = {"k": k, "pixel_center": pixel_center}
-            projected = _pinhole(k, pixel_center, near, far, reversed_z, size) @ _TURNED
+            clip_from_camera = _pinhole(k, pixel_center, image) @ _OPENCV_FROM_OPENGL
         else:
-            angle = _arguments.number(
-                way, fov_x_deg if way == "fov_x_deg" else fov_y_deg, above=0.0, below=180.0
-            )
+            given = fov_x_deg if way == "fov_x_deg" else fov_y_deg
+            angle = _arguments.number(way, given, above=0.0, below=180.0)
             seen = {way: angle}
-            tangent, side = (
-                math.tan(math.radians(angle) / 2.0),
-                size[1] if way == "fov_x_deg" else size[0],
-            )
-            right, top = tangent * size[1] / side, tangent * size[0] / side
-            projected = (
-                np.array(
-                    _core.frustum_matrix((-right, right, -top, top), near, far, reversed_z, size)
-                )
-                @ _BACKWARDS
-            )
-        core = _posed(projected, name, pose, reversed_z, size)
-        return cls._made(
-            core,
-            "from_opengl",
-            **seen,
-            **{name: pose},
-            size=size,
-            near=near,
-            far=far,
-            reversed_z=reversed_z,
-        )
+            height, width = image["size"]
+            side = width if way == "fov_x_deg" else height
+            tangent = math.tan(math.radians(angle) / 2.0)
+            right, top = tangent * width / side, tangent * height / side
+            clip_from_camera = _frustum((-right, right, -top, top), image) @ _FORWARD_FROM_OPENGL
+        return cls._posed("from_opengl", seen, clip_from_camera, pose, image, image["reversed_z"])
 
     @classmethod
     @_arguments.explained(_camera_arguments.POSE_KEYWORDS)
@@ -510,7 +493,7 @@ class Camera:
         size: Size,
         reversed_z: bool,
     ) -> Self:
-        """A camera from matrices in this library's conventions (those of Vulkan's clip volume, with y up).
+        """A camera from matrices in this library's conventions: Vulkan's clip volume, with y up.
 
         Pass `clip_from_world` alone, or `clip_from_camera` with exactly one of `camera_from_world`
         and `world_from_camera`.
@@ -527,7 +510,7 @@ class Camera:
             Pixels of the image.
         reversed_z : bool
             True when ``z = w`` is the near plane, False when it is the far plane.
-            There is no default: only you know.
+            There is no default, because the matrices do not say it.
 
         Raises
         ------
@@ -536,35 +519,28 @@ class Camera:
         """
         size = _arguments.size("size", size)
         reversed_z = _arguments.flag("reversed_z", reversed_z)
+        image = {"size": size, "reversed_z": reversed_z}
         if clip_from_world is not None:
             others = (clip_from_camera, camera_from_world, world_from_camera)
             if any(other is not None for other in others):
                 raise ValueError(
-                    "clip_from_world: expected alone, or clip_from_camera with one pose instead; got both"
+                    "clip_from_world: expected alone, or clip_from_camera with one pose instead; "
+                    "got both"
                 )
             clip = _arguments.matrix("clip_from_world", clip_from_world)
-            core = _core.Camera.from_clip_from_world(clip.tolist(), reversed_z, size)
-            return cls._made(
-                core, "from_matrices", clip_from_world=clip, size=size, reversed_z=reversed_z
-            )
+            inner = _core.Camera.from_clip_from_world(clip.tolist(), reversed_z, size)
+            return cls._made(inner, "from_matrices", clip_from_world=clip, **image)
         if clip_from_camera is None:
             raise ValueError(
-                "clip_from_world: expected (4, 4), or clip_from_camera=(4, 4) with one pose instead; got neither"
+                "clip_from_world: expected (4, 4), or clip_from_camera=(4, 4) with one pose "
+                "instead; got neither"
             )
         clip = _arguments.matrix("clip_from_camera", clip_from_camera)
-        name, pose = _camera_arguments.one_pose(camera_from_world, world_from_camera)
-        core = _posed(clip, name, pose, reversed_z, size)
-        return cls._made(
-            core,
-            "from_matrices",
-            clip_from_camera=clip,
-            **{name: pose},
-            size=size,
-            reversed_z=reversed_z,
-        )
+        pose = _camera_arguments.one_pose(camera_from_world, world_from_camera)
+        seen = {"clip_from_camera": clip}
+        return cls._posed("from_matrices", seen, clip, pose, image, reversed_z)
 
-    # -- what it
-    # is --------------------------------------------------------------------------------------------------
+    # Properties.
 
     @property
     def size(self) -> Size:
@@ -596,8 +572,7 @@ class Camera:
         size = _arguments.size("size", size)
         return self._made(self._inner.with_size(size), "resized", camera=self, size=size)
 
-    # -- as a
-    # value --------------------------------------------------------------------------------------------------
+    # As a value.
 
     def __setattr__(self, name: str, value: object) -> NoReturn:
         raise AttributeError(f"cannot set {name!r}: a Camera is immutable")
@@ -645,47 +620,31 @@ def _again(name: str, arguments: dict[str, Any]) -> Camera:
     return maker(**arguments)
 
 
-#: OpenCV's camera axes of OpenGL's, and axes that look forward with y up of OpenGL's.
-_TURNED = np.diag([1.0, -1.0, -1.0, 1.0])
-_BACKWARDS = np.diag([1.0, 1.0, -1.0, 1.0])
+#: OpenCV's camera axes (y down, z forward) from OpenGL's (y up, looking along -z).
+_OPENCV_FROM_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
+#: Axes with y up that look along +z, from OpenGL's.
+_FORWARD_FROM_OPENGL = np.diag([1.0, 1.0, -1.0, 1.0])
+
+
+def _frustum(borders: tuple[float, float, float, float], image: Image) -> npt.NDArray[np.float64]:
+    """``clip_from_camera`` for axes with y up that look along +z."""
+    matrix = _core.frustum_matrix(
+        borders, image["near"], image["far"], image["reversed_z"], image["size"]
+    )
+    return np.array(matrix)
 
 
 def _pinhole(
-    k: npt.NDArray[np.float64],
-    pixel_center: PixelCenter,
-    near: float,
-    far: float | None,
-    reversed_z: bool,
-    size: Size,
+    k: npt.NDArray[np.float64], pixel_center: PixelCenter, image: Image
 ) -> npt.NDArray[np.float64]:
     """``clip_from_camera`` of a camera matrix, for OpenCV's axes."""
     (fx, skew, cx), (_, fy, cy), _ = k.tolist()
-    height, width = size
-    cx, cy = (
-        cx + _camera_arguments.TO_HALF[pixel_center],
-        cy + _camera_arguments.TO_HALF[pixel_center],
-    )
+    height, width = image["size"]
+    moved = _camera_arguments.TO_HALF[pixel_center]
+    cx, cy = cx + moved, cy + moved
     borders = (-cx / fx, (width - cx) / fx, (cy - height) / fy, cy / fy)
-    # From OpenCV's camera (y down) to one with y up, and the skew as a shear: fx (X + skew / fx
-    # Y) + cx Z.
+    # From OpenCV's axes to those with y up, and the skew as a shear:
+    # x = fx * (X + skew / fx * Y) + cx * Z.
     upright_from_opencv = np.diag([1.0, -1.0, 1.0, 1.0])
     upright_from_opencv[0, 1] = skew / fx
-    projection: npt.NDArray[np.float64] = np.array(
-        _core.frustum_matrix(borders, near, far, reversed_z, size)
-    )
-    return projection @ upright_from_opencv
-
-
-def _posed(
-    clip_from_camera: npt.NDArray[np.float64],
-    name: str,
-    pose: npt.NDArray[np.float64],
-    reversed_z: bool,
-    size: Size,
-) -> _core.Camera:
-    """The engine's camera from a projection and a pose of either direction."""
-    make = {
-        "camera_from_world": _core.Camera.from_clip_from_camera,
-        "world_from_camera": _core.Camera.from_clip_from_camera_pose,
-    }[name]
-    return make(clip_from_camera.tolist(), pose.tolist(), reversed_z, size)
+    return _frustum(borders, image) @ upright_from_opencv

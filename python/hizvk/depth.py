@@ -1,14 +1,15 @@
-"""What the numbers of a depth image mean, and the checks of an image against its camera."""
+"""What the numbers of a depth image mean, and checks of an image against its camera."""
 
 from __future__ import annotations
 
 import numbers
 from collections.abc import Collection
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from . import _arguments
+from ._types import DepthKind, Rounding, words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,19 +19,14 @@ if TYPE_CHECKING:
     from ._arguments import FloatArray
     from .camera import Camera
 
-__all__ = ["DEPTH_KINDS", "DepthArray", "DepthKind"]
-
-# Unions of words: stubtest takes Literal["a", "b"] for something else at run time.
-DepthKind: TypeAlias = Literal["ndc"] | Literal["reversed_ndc"] | Literal["z"] | Literal["distance"]
+__all__ = ["DEPTH_KINDS", "DepthArray", "DepthKind", "checked_image"]
 
 #: The kinds of depth that an array can hold; see `Device.pyramid`.
-DEPTH_KINDS: tuple[DepthKind, ...] = ("ndc", "reversed_ndc", "z", "distance")
+DEPTH_KINDS = words(DepthKind)
 
 _METRIC = ("z", "distance")
 
-Rounding: TypeAlias = Literal["none"] | Literal["single"] | Literal["half"]
-
-#: What sensors and their files write where they saw nothing, by dtype: the ends of what it can hold.
+#: What sensors and their files write where they saw nothing, by dtype.
 NO_DATA: dict[str, tuple[float, ...]] = {"uint16": (0.0, 65535.0), "float16": (65504.0,)}
 
 
@@ -46,40 +42,43 @@ class DepthArray(NamedTuple):
     invalid: tuple[float, ...]
     """The numbers that mean "no data", as the array's own dtype holds them."""
     rounding: Rounding
-    """What its dtype may have rounded, which whoever uploads it counts: half floats of every kind, float32 of metric
-    ones. (For NDC depth `depth_slack` covers float32.)"""
+    """What its dtype may have rounded, which the upload counts as a tolerance.
+
+    Half floats of every kind count, and float32 of metric kinds.
+    For NDC depth `CullOptions.depth_slack` covers float32."""
 
 
 def checked_image(
     name: str, value: object, camera: Camera, kind: object, scale: object, invalid: object = None
 ) -> DepthArray:
-    """The image as the engine takes it and what its numbers mean, or an error that says why not."""
+    """The image as the engine takes it, and what its numbers mean; or an error that says why."""
     if kind is None:
-        words = ", ".join(f'"{word}"' for word in DEPTH_KINDS)
+        listed = ", ".join(f'"{word}"' for word in DEPTH_KINDS)
         raise TypeError(
-            f"kind: expected one of {words}, got None; there is no default, a wrong guess hides things"
+            f"kind: expected one of {listed}, got None; "
+            "there is no default, a wrong guess hides things"
         )
     kind_: DepthKind = _arguments.choice("kind", kind, DEPTH_KINDS)  # type: ignore[assignment]
     if kind_ not in _METRIC and kind_ != camera.depth_kind:
         meaning = {"ndc": "0 near and 1 far", "reversed_ndc": "1 near and 0 far"}
         raise ValueError(
-            f'kind: expected "{camera.depth_kind}" ({meaning[camera.depth_kind]}) for a camera with '
-            f'reversed_z={camera.reversed_z}, got "{kind_}" ({meaning[kind_]})'
+            f'kind: expected "{camera.depth_kind}" ({meaning[camera.depth_kind]}) for a camera '
+            f'with reversed_z={camera.reversed_z}, got "{kind_}" ({meaning[kind_]})'
         )
     scale_ = _arguments.number("scale", scale, above=0.0)
     if scale_ != 1.0 and kind_ not in _METRIC:
         raise ValueError(
-            f'scale: expected 1 for the kind "{kind_}", got {scale_:g}; only "z" and "distance" have units'
+            f'scale: expected 1 for the kind "{kind_}", got {scale_:g}; '
+            'only "z" and "distance" have units'
         )
     mask: npt.NDArray[np.bool_] | None = None
     if _arguments.is_masked(value):
-        value = np.ma.array(value)  # of rows, too, whose masks numpy.asarray would drop
+        value = np.ma.array(value)  # numpy.asarray would drop the masks of rows
     if isinstance(value, np.ma.MaskedArray):
         mask = None if value.mask is np.ma.nomask else np.asarray(value.mask)
         value = value.data
     elif not isinstance(value, (np.ndarray, list, tuple, str, bytes, type(None))):
-        # An image of another library, or a buffer: its dtype says what its numbers mean, as an
-        # array's does.
+        # An image of another library, or a buffer: its dtype counts as that of an array does.
         array = np.asarray(value)
         value = array if array.ndim else value
     elif isinstance(value, (list, tuple)):
@@ -89,16 +88,17 @@ def checked_image(
         _refuse_shape(name, value, camera)
     dtype = value.dtype if isinstance(value, np.ndarray) else np.dtype(np.float64)
     if dtype.kind == "u":
-        value = _arguments.copied(name, value, np.float32)  # type: ignore[arg-type]  # exact: 16 bits
+        # Exact: 16 bits.
+        value = _arguments.copied(name, value, np.float32)  # type: ignore[arg-type]
     image = _arguments.floats(name, value, camera.size, why=" (the camera's size)")
     if mask is not None and mask.any():
-        # Masked is no data, whatever lies below the mask.
+        # What is masked is "no data", whatever number lies there.
         image = np.where(mask, image.dtype.type(np.nan), image)
     return DepthArray(image, kind_, scale_, _no_data(invalid, dtype), _rounding(dtype, kind_))
 
 
 def _rounding(dtype: np.dtype[Any], kind: DepthKind) -> Rounding:
-    """Of any byte order. Whole numbers and float64 count as exact."""
+    """What the dtype may have rounded, in any byte order; whole numbers and float64 are exact."""
     if dtype.kind != "f" or dtype.itemsize > 4:
         return "none"
     if dtype.itemsize == 2:
@@ -107,10 +107,11 @@ def _rounding(dtype: np.dtype[Any], kind: DepthKind) -> Rounding:
 
 
 def _from_rows(name: str, rows: Sequence[Any]) -> Any:
-    """Listed rows or numbers of NumPy, at any depth, as the array of their dtype; Python's own as they are.
+    """Listed rows or numbers of NumPy, at any depth, as an array of their dtype.
 
-    Of several dtypes NumPy makes a wider one, which would not say what the narrower numbers had
-    rounded.
+    Python's own numbers stay as they are.
+    Several dtypes are refused: NumPy would make a wider one of them, which does not say what the
+    narrower ones had rounded.
     """
     try:
         array = np.asarray(rows)
@@ -127,14 +128,14 @@ def _from_rows(name: str, rows: Sequence[Any]) -> Any:
             of_item = np.asarray(item).dtype
             if of_item.newbyteorder("=") != array.dtype.newbyteorder("="):
                 raise TypeError(
-                    f"{name}: expected numbers of one dtype, got a list of {array.dtype} with {of_item} in it; "
-                    "make one array of the dtype that they were rounded to"
+                    f"{name}: expected numbers of one dtype, got a list of {array.dtype} with "
+                    f"{of_item} in it; make one array of the dtype that they were rounded to"
                 )
     return array if has_a_dtype else rows
 
 
 def _refuse_dtype(name: str, array: npt.NDArray[Any], kind: DepthKind) -> None:
-    """Whole numbers are depth where a sensor writes them: 16 bits without a sign, in steps of `scale`."""
+    """Refuses whole numbers, except uint16 of a metric kind: sensors write those."""
     metric = kind in _METRIC
     if array.dtype.kind not in "iub" or (
         array.dtype.kind == "u" and array.dtype.itemsize == 2 and metric
@@ -143,19 +144,19 @@ def _refuse_dtype(name: str, array: npt.NDArray[Any], kind: DepthKind) -> None:
     hint = ""
     if metric and array.dtype.kind != "b" and array.dtype.itemsize > 1:
         hint = (
-            "; whole numbers of a 16-bit image (Pillow's mode I) become what they were by .astype(np.uint16), "
-            "others by .astype(np.float32)"
+            "; whole numbers of a 16-bit image (Pillow's mode I) become what they were by "
+            ".astype(np.uint16), others by .astype(np.float32)"
         )
     raise TypeError(
-        f'{name}: expected float (height, width), or uint16 for the kinds "z" and "distance", got '
-        f'{_arguments.describe(array)} of kind "{kind}"{hint}'
+        f'{name}: expected float (height, width), or uint16 for the kinds "z" and "distance", '
+        f'got {_arguments.describe(array)} of kind "{kind}"{hint}'
     )
 
 
 def _refuse_shape(name: str, array: npt.NDArray[Any], camera: Camera) -> None:
     size = camera.size
     if array.ndim == 0 or array.shape == size:
-        return  # a number that is no image says so elsewhere
+        return  # a single number is refused elsewhere
     expected = "uint16" if array.dtype.kind == "u" else "float"
     hint = ""
     if array.ndim == 3 and array.shape[2] == 1:
@@ -173,10 +174,13 @@ def _refuse_shape(name: str, array: npt.NDArray[Any], camera: Camera) -> None:
 
 
 def _no_data(invalid: object, dtype: np.dtype[Any]) -> tuple[float, ...]:
-    """The caller's values as `dtype` holds them, or its convention."""
+    """The caller's values as `dtype` holds them, or for None the convention of the dtype."""
     if invalid is None:
         return NO_DATA.get(dtype.name, ())
-    expected = "None or a collection of the numbers that mean no data, in the array's own units (before scale)"
+    expected = (
+        "None or a collection of the numbers that mean no data, "
+        "in the array's own units (before scale)"
+    )
     if isinstance(invalid, np.ndarray) and invalid.ndim == 1 and invalid.dtype.kind in "fiu":
         invalid = invalid.tolist()
     if isinstance(invalid, (str, bytes, np.ndarray)) or not isinstance(invalid, Collection):
@@ -186,7 +190,7 @@ def _no_data(invalid: object, dtype: np.dtype[Any]) -> tuple[float, ...]:
         if isinstance(value, (bool, np.bool_)) or not isinstance(value, numbers.Real):
             raise TypeError(f"invalid: expected {expected}, got {_arguments.describe(value)} in it")
         if not np.isfinite(float(value)):
-            continue  # never depth
+            continue  # never a depth in any case
         held = float(value)
         if dtype.kind == "u":
             if held != int(held) or not 0 <= held <= np.iinfo(dtype).max:

@@ -1,7 +1,10 @@
 """What can go wrong beyond a bad argument: every error of the device is a `HizError`.
 
-Bad arguments are plain `TypeError` (a wrong type or kind of dtype) and `ValueError` (a wrong shape,
-a camera with NaN, a stale pyramid); their text names the parameter, what it expects and what came.
+A bad argument raises a plain exception whose text names the parameter, what it expects and what
+came:
+
+- `TypeError` for a wrong type or kind of dtype,
+- `ValueError` for a wrong shape, a camera with NaN, or a pyramid of another camera.
 """
 
 from __future__ import annotations
@@ -21,23 +24,23 @@ __all__ = [
 
 
 class HizError(Exception):
-    """Base of what the device, its driver or its limits refuse."""
+    """The base of all errors of the device, its driver and its limits."""
 
 
 class HizWarning(UserWarning):
-    """What is right as it was asked, and looks like a mistake: see `CullResult.hints`."""
+    """A cull is right as it was asked, but looks like a mistake: see `CullResult.hints`."""
 
 
 class NoAdapterError(HizError):
-    """There is no Vulkan adapter, or none that answers to the name that was asked for.
+    """There is no Vulkan adapter, or none of the name that was asked for.
 
     Attributes
     ----------
     seen : tuple of str
-        The adapters that were found, one line each; empty when there is no Vulkan driver.
+        The adapters that were found, one line each.
+        It is empty if there is no Vulkan driver.
     hint : str
-        What to do about it: how to choose one of those seen, or the line that installs a software
-        driver.
+        What to do: how to choose one of those seen, or the line that installs a software driver.
     request : str
         What was asked for, in words.
     """
@@ -76,8 +79,8 @@ class LimitError(HizError):
 
 
 class DeviceLostError(HizError):
-    """The driver gave the device up (a reset, a removed GPU): make a new `Device` and upload again."""
+    """The driver lost the device (a reset, a removed GPU): make a new `Device` and upload again."""
 
 
 class OutOfMemoryError(HizError):
-    """The device, or this machine for a copy of an array, has no memory for what was asked."""
+    """The device has no memory for what was asked, or this machine none for a copy of an array."""

@@ -1,8 +1,9 @@
-"""What looks like a mistake in a cull that is right as it was asked: everything outside, nothing that could hide.
+"""Hints at mistakes in a cull that is right as it was asked: all is outside, or nothing can hide.
 
-No hint changes a result, and each says something that holds for all instances or all pixels, so
-that a scene which is as it should be gets none.
-`hizvk.visible` warns (`HizWarning`), `CullResult.hints` tells when asked.
+No hint changes a result.
+Each says something that holds for all instances or all pixels, so a scene that is as it should be
+gets none.
+`hizvk.visible` warns of them (`HizWarning`), and `CullResult.hints` returns them.
 """
 
 from __future__ import annotations
@@ -19,55 +20,59 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from .bounds import Bounds
+    from .options import CullOptions
     from .resources import Pyramid
-    from .result import CullStats
+    from .stats import CullStats
 
 __all__ = ["Question", "posed_otherwise"]
 
-#: Instances whose middles are looked at through other poses.
+#: The most instances whose middles are looked at through other poses.
 MOST_MIDDLES: Final = 4096
-#: Depth is sparse if so small a part of the pixels has any, and so small a part of those lies in full blocks of 2x2.
+#: Depth is sparse if a smaller share of the pixels than this has any,
 SPARSE_PIXELS: Final = 0.25
+#: and a smaller share of those than this begins a full block of 2x2.
 SPARSE_BLOCKS: Final = 0.1
 #: The level that is looked at first: where one of its texels is not far, depth is dense somewhere.
 COARSE: Final = 3
-#: OpenCV's camera axes from OpenGL's, and back: half a turn about x.
+#: OpenCV's camera axes from OpenGL's, and the reverse: half a turn about x.
 TURNED: Final = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What a cull was asked, as far as hints need it."""
+    """What a cull was asked, for hints."""
 
     camera: Camera
     pyramid: Pyramid
-    coverage: str
+    options: CullOptions
     points: bool
     """Whether all bounds have size zero."""
 
     def hints(self, stats: CullStats, bounds: Bounds | None = None) -> tuple[str, ...]:
-        """What looks like a mistake, in whole sentences; empty where nothing does.
+        """What looks like a mistake, in whole sentences; empty if nothing does.
 
         Parameters
         ----------
         stats : CullStats
-            What came of it.
+            The answer.
         bounds : Spheres, Boxes or OrientedBoxes, optional
-            What was culled, to find the pose that was meant.
+            What was tested, to find the pose that was meant.
         """
         if not stats.tested:
             return ()
-        if self.coverage == "sample" and self.points:
+        if self.options.coverage == "sample" and self.points:
             return (
-                "bounds, coverage: all sizes are zero, and a point covers no pixel's centre, so what can be seen is "
-                'culled; use coverage="area"',
+                "bounds, coverage: all sizes are zero, and a point covers no pixel's centre, "
+                'so what can be seen is culled; use coverage="area"',
             )
         if stats.outside == stats.tested:
-            # By sample coverage, what lies between the pixels' centres counts as outside, too.
-            if self.coverage == "sample" and (bounds is None or _in_view(self.camera, bounds)):
+            # With sample coverage, what lies between the pixels' centres counts as outside, too.
+            if self.options.coverage == "sample" and (
+                bounds is None or _in_view(self.camera, bounds)
+            ):
                 return (
-                    "bounds, coverage: nothing covers a pixel's centre: all are too small, or outside of the view; "
-                    'coverage="area" keeps small ones',
+                    "bounds, coverage: nothing covers a pixel's centre: all are too small, "
+                    'or outside of the view; coverage="area" keeps small ones',
                 )
             return _outside(stats.tested, self.camera, bounds)
         if stats.occluded or stats.kept == stats.invalid:
@@ -75,31 +80,33 @@ class Question:
         return self._depth()
 
     def _known(self, level: int) -> npt.NDArray[np.bool_]:
-        """Where something may be hidden: not far, as far as numbers without a meaning are."""
+        """The texels of a level that can hide something: those with a depth that is not far."""
         depth = self.pyramid.level(level)
         if self.camera.reversed_z:
             return (depth > 0.0) & (depth <= 1.0)
         return (depth >= 0.0) & (depth < 1.0)
 
     def _depth(self) -> tuple[str, ...]:
-        """Of an image that hid nothing of what is in view."""
+        """Hints at an image that hid nothing of what is in view."""
         coarse = max((k for k in self.pyramid.levels if k <= COARSE), default=0)
         if self._known(coarse).any():
             return ()
         known = self._known(0)
         if not known.any():
             return (
-                "depth: every pixel is far, so nothing can be hidden; if something should be there, check kind and "
-                "scale: numbers that do not lie between the camera's near and far planes count as no data",
+                "depth: every pixel is far, so nothing can be hidden; if something should be "
+                "there, check kind and scale: numbers that do not lie between the camera's near "
+                "and far planes count as no data",
             )
         full = known[:-1, :-1] & known[1:, :-1] & known[:-1, 1:] & known[1:, 1:]
         if self.pyramid._is_rendered:
-            return ()  # nothing is missing: what is far is sky
+            return ()  # no depth is missing: what is far is sky
         if known.mean() < SPARSE_PIXELS and full.sum() < SPARSE_BLOCKS * known.sum():
             return (
-                f"depth: {100.0 * known.mean():.1f} % of the pixels have a depth, hardly any of them beside another, "
-                "and empty ones are far, so next to nothing can be hidden; if depth is missing there (a LiDAR, not the "
-                'sky), "Sparse depth" in docs/guide.md fills it, and says what that costs the promise',
+                f"depth: {100.0 * known.mean():.1f} % of the pixels have a depth, hardly any of "
+                "them beside another, and empty ones are far, so next to nothing can be hidden; if "
+                'depth is missing there (a LiDAR, not the sky), "Sparse depth" in docs/guide.md '
+                "fills it, and says what that costs the promise",
             )
         return ()
 
@@ -112,15 +119,16 @@ def _outside(count: int, camera: Camera, bounds: Bounds | None) -> tuple[str, ..
         if seen:
             return (f"{said}, and {seen:,} would be inside of it with {what}",)
     if count == 1:
-        return ()  # a single thing is often outside, with nothing wrong
+        return ()  # a single instance is often outside, with nothing wrong
     return (
-        f"{said}; if that is not meant, check the pose's direction (camera_from_world or world_from_camera), its "
-        "convention (from_opencv looks along +z, from_opengl along -z) and the units",
+        f"{said}; if that is not meant, check the pose's direction (camera_from_world or "
+        "world_from_camera), its convention (from_opencv looks along +z, from_opengl along -z) "
+        "and the units",
     )
 
 
 def posed_otherwise(camera: Camera) -> list[tuple[str, Camera]]:
-    """The camera with its pose taken in the ways that poses are mistaken for, with words for each; often empty."""
+    """The camera with each pose that may have been meant, and words for it; may be empty."""
     name, recipe = camera._recipe
     arguments: dict[str, Any] = dict(recipe)
     if name == "resized":
@@ -145,7 +153,7 @@ def posed_otherwise(camera: Camera) -> list[tuple[str, Camera]]:
 
 
 def _in_view(camera: Camera, bounds: Bounds | None) -> int:
-    """How many middles lie in the view; of many bounds, some are looked at."""
+    """How many middles of bounds lie in the view; of many bounds, some are looked at."""
     middles = _middles(bounds)
     clip = np.c_[middles, np.ones(len(middles))] @ camera.clip_from_world.T
     x, y, z, w = clip.T

@@ -1,4 +1,4 @@
-"""The whole way in one call: bounds and a depth image in, a mask out."""
+"""One call from bounds and a depth image to a mask."""
 
 from __future__ import annotations
 
@@ -8,28 +8,29 @@ from typing import TYPE_CHECKING
 
 from . import _arguments
 from ._processes import per_process
-from .bounds import Bounds, are_points, as_arrays
+from .bounds import Bounds, as_arrays
 from .camera import Camera
 from .depth import checked_image
-from .device import Device, cull_options, stored_levels
+from .device import Device, maker_of
 from .errors import HizWarning
-from .hints import Question
+from .options import Outputs, cull_options
 from .resources import DepthImage
 
 if TYPE_CHECKING:
     from collections.abc import Collection
+    from typing import Unpack
 
     import numpy as np
     import numpy.typing as npt
 
-    from .depth import DepthKind
-    from .device import Coverage, Fit
+    from ._types import DepthKind
+    from .options import CullOptions, OptionKeywords
 
 __all__ = ["visible"]
 
 
 class _Default:
-    """A device that is made at its first use, once."""
+    """A device that is made once, at its first use."""
 
     def __init__(self) -> None:
         self.lock = threading.RLock()
@@ -42,11 +43,14 @@ class _Default:
             return self.device
 
 
+#: The answer, and the counts that hints look at.
+_MASK_AND_COUNTS = Outputs(mask=True, verdicts=True, indices=False, draws=False)
+
 _defaults: dict[int, _Default] = {}
 
 
 def default_device() -> Device:
-    """The device of callers who bring none; made at the first use, once a process: a forked child has its own."""
+    """The device of callers who bring none: one per process, made at its first use."""
     return per_process(_defaults, _Default).get()
 
 
@@ -59,44 +63,42 @@ def visible(
     scale: float = 1.0,
     invalid: Collection[float] | None = None,
     device: Device | None = None,
-    coverage: Coverage = "area",
-    guard_px: float | None = None,
-    depth_slack: float = 2.0**-23,
-    depth_slack_abs: float = 0.0,
-    transform_slack: float = 0.0,
-    footprint: int = 2,
-    descent: int = 0,
-    fit: Fit = "rectangle",
+    options: CullOptions | None = None,
+    **keywords: Unpack[OptionKeywords],
 ) -> npt.NDArray[np.bool_]:
-    """Which bounds can be seen: False only for what is surely outside the view or surely behind the depth image.
+    """Which bounds can be seen.
 
+    False is only what is surely outside the view or surely behind the depth image.
     For many calls with the same bounds, upload them once (`Device.instances`) and use
     `Device.cull`.
 
     Parameters
     ----------
     bounds : Spheres, Boxes or OrientedBoxes
-        The N volumes.
+        The N instances.
     camera : Camera
         The camera that saw `depth`.
     depth : (height, width) array or DepthImage
         The depth image, row 0 on top; its shape is the camera's size.
     kind : {"ndc", "reversed_ndc", "z", "distance"}
-        What an array's numbers are (see `Device.pyramid`); left out for a `DepthImage`.
+        What an array's numbers are (see `Device.pyramid`).
+        Left out for a `DepthImage`.
     scale : float
         World units of one step of `depth`, for the kinds ``"z"`` and ``"distance"``.
     invalid : collection of float, optional
-        Which numbers of an array mean "no data", in its own units (before `scale`); None: what its
-        dtype is written with, 0 and 65535 for uint16, 65504 for float16 (see `Device.pyramid`).
+        Which numbers of an array mean "no data", before `scale`.
+        None: those that are usual for its dtype, as in `Device.pyramid`.
     device : Device, optional
-        None: one that is made at the first call and kept.
-    coverage, guard_px, depth_slack, depth_slack_abs, transform_slack, footprint, descent, fit
-        As in `Device.cull`.
+        None: the device of `depth`, else one that is made at the first call and kept.
+    options : CullOptions, optional
+        How the cull decides; None takes the defaults.
+    **keywords
+        Any field of `CullOptions`, in the place of that of `options`.
 
     Returns
     -------
     (N,) bool array
-        True for what is kept; bad bounds (NaN, negative sizes) are kept.
+        True for what is kept; invalid bounds (NaN, negative sizes) are kept.
 
     Raises
     ------
@@ -108,9 +110,9 @@ def visible(
     Warns
     -----
     HizWarning
-        Of what is right as it was asked and looks like a mistake: all bounds outside of the view,
-        points of size zero with ``coverage="sample"``, depth that is far everywhere or sparse (see
-        `CullResult.hints`).
+        If the call looks like a mistake, as in `CullResult.hints`: all bounds are outside of the
+        view, points of size zero with ``coverage="sample"``, depth that is far everywhere or
+        sparse.
 
     Examples
     --------
@@ -118,44 +120,33 @@ def visible(
     >>> camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(90, 160), near=0.1)
     >>> image = np.full(camera.size, 12.0)  # a wall
     >>> centers = np.array([[0.0, 0.0, -5.0], [0.0, 0.0, -20.0]])
-    >>> hizvk.visible(hizvk.Boxes(centers - 0.5, centers + 0.5), camera, depth=image, kind="z").tolist()
+    >>> boxes = hizvk.Boxes(centers - 0.5, centers + 0.5)
+    >>> hizvk.visible(boxes, camera, depth=image, kind="z").tolist()
     [True, False]
     """
     as_arrays("bounds", bounds)
     _arguments.instance("camera", camera, Camera, "a Camera")
-    options = cull_options(
-        order="any", coverage=coverage, guard_px=guard_px, depth_slack=depth_slack, depth_slack_abs=depth_slack_abs,
-        transform_slack=transform_slack, footprint=footprint, descent=descent, fit=fit, capacity=None, draw=None,
-        statistics=False,
-    )  # fmt: skip
+    options = cull_options(options, keywords)
     if device is not None:
         _arguments.instance("device", device, Device, "a Device or None")
     if isinstance(depth, DepthImage):
-        device = depth.device if device is None else device
+        device = maker_of(depth) if device is None else device
         if camera != depth.camera:
             raise ValueError(
                 f"camera: expected the camera of depth, {depth.camera!r}, got {camera!r}"
             )
         for name, value in (("kind", kind), ("invalid", invalid)):
             if value is not None:
-                raise TypeError(
-                    f"{name}: expected nothing beside a DepthImage, got {_arguments.describe(value)}"
-                )
+                got = _arguments.describe(value)
+                raise TypeError(f"{name}: expected nothing beside a DepthImage, got {got}")
         pyramid = device.pyramid(depth, scale=scale)
     else:
         if device is not None:
             device._check_side(camera)
         image = checked_image("depth", depth, camera, kind, scale, invalid)
         device = default_device() if device is None else device
-        pyramid = device._pyramid_of(image, camera, stored_levels(None))
-    _, coverage_, guard, slack, slack_abs, transform, side, budget, fit_, *_ = options
-    result = device.cull(
-        device.instances(bounds), camera, pyramid, order="any", coverage=coverage_,  # type: ignore[arg-type]
-        guard_px=guard, depth_slack=slack, depth_slack_abs=slack_abs, transform_slack=transform, footprint=side,
-        descent=budget, fit=fit_, statistics=False,  # type: ignore[arg-type]
-    )  # fmt: skip
-    for hint in Question(camera, pyramid, coverage_, are_points(bounds)).hints(
-        result.stats, bounds
-    ):
+        pyramid = device._pyramid_of(image, camera, _arguments.stored_levels("levels", None))
+    result = device.cull(device.instances(bounds), camera, pyramid, options, _MASK_AND_COUNTS)
+    for hint in result._question.hints(result.stats, bounds):
         warnings.warn(hint, HizWarning, stacklevel=2)
     return result.mask.copy()

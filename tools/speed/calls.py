@@ -61,9 +61,7 @@ def _call(run: Run, instances: Instances, pyramid: Pyramid, *, read: bool) -> Ca
 
 
 def _recorded(run: Run, instances: Instances, pyramid: Pyramid) -> float:
-    return run.device.cull(instances, pyramid.camera, pyramid, outputs=["mask"])._culling.timings()[
-        0
-    ]
+    return run.device.cull(instances, pyramid.camera, pyramid, outputs=["mask"])._inner.timings()[0]
 
 
 def _ours(run: Run, scene: Town, depth: DepthImage, pyramid: Pyramid) -> None:

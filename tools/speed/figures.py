@@ -13,7 +13,7 @@ from hizvk.measuring.spread import over_rounds
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from hizvk.device import Adapter
+    from hizvk.adapter import Adapter
     from hizvk.measuring.spread import Spread
     from hizvk.scenes.grid import Floats
 

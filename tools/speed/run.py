@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from hizvk import _core
+from hizvk.options import CullOptions, Outputs
 
 from . import town as towns
 
@@ -131,13 +132,13 @@ class Run:
         depth: DepthImage | None = None,
     ) -> _core.YardstickCull:
         """A cull that was recorded into buffers of its own; ``.ms()`` submits it and waits."""
+        mask, verdicts, indices, draws = outputs
         return self.yardstick.cull(
             instances._inner,
             camera._inner,
             pyramid._inner,
             certified,
-            groups,
-            order,
-            outputs,
+            CullOptions(order=order, hierarchy=groups),  # type: ignore[arg-type]
+            Outputs(mask=mask, verdicts=verdicts, indices=indices, draws=draws),
             None if depth is None else depth._inner,
         )

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 pub(crate) type LevelArray<'py> = ((u32, u32), Bound<'py, PyArray1<f32>>);
 
 /// A float array of any shape.
-/// Held during a call, so that its memory stays; read without the interpreter lock.
+/// A call holds it, so that its memory stays while it is read without the interpreter lock.
 #[derive(FromPyObject)]
 pub(crate) enum FloatArray<'py> {
     #[pyo3(transparent, annotation = "float32 array")]
@@ -34,7 +34,7 @@ impl FloatArray<'_> {
     }
 }
 
-/// `as_slice` also takes Fortran order, whose numbers come in another sequence.
+/// Refuses Fortran order, which `as_slice` accepts although its numbers come in another sequence.
 pub(crate) fn in_c_order(is_c_contiguous: bool) -> PyResult<()> {
     if is_c_contiguous {
         Ok(())
@@ -62,7 +62,7 @@ pub(crate) fn bounds<'a>(kind: &str, arrays: &'a [FloatArray<'_>]) -> PyResult<B
     }
 }
 
-/// What a depth image's numbers mean.
+/// The meaning of a depth image's numbers.
 pub(crate) fn depth_kind(kind: &str) -> PyResult<DepthKind> {
     match kind {
         "ndc" => Ok(DepthKind::Ndc),
@@ -73,12 +73,12 @@ pub(crate) fn depth_kind(kind: &str) -> PyResult<DepthKind> {
     }
 }
 
-/// Python's `(height, width)`.
+/// The size from Python's `(height, width)`.
 pub(crate) fn image_size((height, width): (u32, u32)) -> ImageSize {
     ImageSize { width, height }
 }
 
-/// Python's `reversed_z`.
+/// The convention from Python's `reversed_z`.
 pub(crate) fn convention(reversed_z: bool) -> DepthConvention {
     if reversed_z { DepthConvention::Reversed } else { DepthConvention::Standard }
 }

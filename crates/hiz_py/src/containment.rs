@@ -9,7 +9,7 @@ use crate::arguments::{FloatArray, bounds, in_c_order};
 use crate::errors::raised;
 use crate::reference::volume;
 
-/// Protruding triangles, a point outside for each, protruding vertices, distance.
+/// Protruding triangles, for each a point outside the mesh, protruding vertices, and the distance.
 type Protrusion = (Vec<usize>, Vec<[f64; 3]>, Vec<usize>, f64);
 
 /// float64 positions and indices.
@@ -24,7 +24,7 @@ fn mesh<'a>((vertices, triangles): &'a MeshArrays<'_>) -> PyResult<TriangleMesh<
     })
 }
 
-/// What of a proxy is not inside of its mesh.
+/// The parts of a proxy that are not inside its mesh.
 #[pyfunction]
 #[expect(clippy::needless_pass_by_value, reason = "the arrays are held during the call")]
 pub(crate) fn check_proxy(
@@ -39,8 +39,8 @@ pub(crate) fn check_proxy(
     Ok((found.triangles, found.witnesses, found.vertices, found.distance))
 }
 
-/// How far each instance's vertices are outside of its bounds; -1 for those that contain them.
-/// `instances`: number of a mesh and, where it is placed, of a matrix.
+/// How far each instance's vertices lie outside its bounds; -1 for bounds that contain them.
+/// `instances` holds, for each, the number of its mesh and that of its matrix, if it has one.
 #[pyfunction]
 #[expect(clippy::needless_pass_by_value, reason = "the arrays are held during the call")]
 pub(crate) fn check_bounds<'py>(

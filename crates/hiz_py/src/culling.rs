@@ -1,87 +1,11 @@
-//! The answer of a cull, read on request.
+//! The answer of a cull, which is read on request.
 
-use hiz_core::{
-    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, Order, Outputs, Verdict,
-    headless,
-};
+use hiz_core::{Verdict, headless};
 use numpy::PyArray1;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::held::{Held, OnDevice};
-
-/// The options of a cull as Python words them.
-pub(crate) struct CullArguments<'a> {
-    pub(crate) order: &'a str,
-    pub(crate) coverage: &'a str,
-    pub(crate) guard_px: Option<f64>,
-    pub(crate) depth_slack: f64,
-    pub(crate) depth_slack_abs: f64,
-    pub(crate) transform_slack: f64,
-    pub(crate) footprint: u32,
-    pub(crate) descent: u32,
-    pub(crate) fit: &'a str,
-    pub(crate) hierarchy: Option<bool>,
-    /// Mask, verdicts, indices, draws.
-    pub(crate) outputs: (bool, bool, bool, bool),
-    pub(crate) capacity: Option<u32>,
-    /// Index count, first index, base vertex, first instance.
-    pub(crate) draw: (u32, u32, i32, u32),
-    pub(crate) statistics: bool,
-}
-
-impl CullArguments<'_> {
-    /// The engine's options.
-    pub(crate) fn options(&self) -> PyResult<CullOptions> {
-        let order = match self.order {
-            "stable" => Order::Stable,
-            "any" => Order::Any,
-            other => return Err(PyValueError::new_err(format!("order: no order {other:?}"))),
-        };
-        let coverage = match self.coverage {
-            "area" => Coverage::Area,
-            "sample" => Coverage::Sample,
-            other => return Err(PyValueError::new_err(format!("coverage: no coverage {other:?}"))),
-        };
-        let footprint = match self.footprint {
-            2 => Footprint::Two,
-            4 => Footprint::Four,
-            8 => Footprint::Eight,
-            other => return Err(PyValueError::new_err(format!("footprint: no footprint {other}"))),
-        };
-        let fit = match self.fit {
-            "rectangle" => Fit::Rectangle,
-            "volume" => Fit::Volume,
-            other => return Err(PyValueError::new_err(format!("fit: no fit {other:?}"))),
-        };
-        Ok(CullOptions {
-            order,
-            coverage,
-            guard_px: self.guard_px,
-            depth_slack: self.depth_slack,
-            depth_slack_abs: self.depth_slack_abs,
-            transform_slack: self.transform_slack,
-            footprint,
-            descent: self.descent,
-            fit,
-            hierarchy: match self.hierarchy {
-                None => Hierarchy::Auto,
-                Some(true) => Hierarchy::Always,
-                Some(false) => Hierarchy::Never,
-            },
-            statistics: self.statistics,
-        })
-    }
-
-    /// The room for the list, and what is drawn.
-    pub(crate) fn output(&self) -> Outputs {
-        let (index_count, first_index, base_vertex, first_instance) = self.draw;
-        let draw = DrawTemplate { index_count, first_index, base_vertex, first_instance };
-        let (mask, verdicts, indices, draws) = self.outputs;
-        Outputs { mask, verdicts, indices, draws, capacity: self.capacity, draw }
-    }
-}
 
 /// A submitted cull.
 #[pyclass(frozen, module = "hizvk._core")]
@@ -133,12 +57,12 @@ impl Culling {
         })
     }
 
-    /// How many instances are kept, and how many of them are listed.
+    /// How many instances were kept, if that is known, and how many of them are listed.
     fn demand_and_written(&self, py: Python<'_>) -> PyResult<(Option<u64>, u64)> {
         self.0.run(py, headless::Culling::demand_and_written)
     }
 
-    /// Milliseconds to record, to compile, until the device was done, and to read back.
+    /// Milliseconds for recording, for compiling, until the device was done, and for readback.
     fn timings(&self, py: Python<'_>) -> PyResult<(f64, f64, f64, f64)> {
         let timings = self.0.get(py)?.timings();
         Ok((timings.record_ms, timings.compile_ms, timings.wall_ms, timings.readback_ms))
@@ -149,7 +73,7 @@ impl Culling {
     }
 }
 
-/// How many instances met which fate.
+/// How many instances got which verdict, and how many tests that took.
 #[pyclass(frozen, get_all, module = "hizvk._core")]
 pub(crate) struct Counts {
     tested: u64,
@@ -191,7 +115,7 @@ impl Explanation {
         self.0.level
     }
 
-    /// Level, column, row and depth of each.
+    /// Level, column, row and depth of each texel.
     #[getter]
     fn texels(&self) -> Vec<(u32, u32, u32, f32)> {
         let told = &self.0;

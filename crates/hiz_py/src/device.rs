@@ -1,4 +1,4 @@
-//! The device and what lives on it.
+//! The device, and the objects on it.
 
 use std::sync::Arc;
 
@@ -13,10 +13,11 @@ use pyo3::prelude::*;
 
 use crate::arguments::{FloatArray, LevelArray, bounds, depth_kind, in_c_order};
 use crate::camera::Camera;
-use crate::culling::{CullArguments, Culling};
+use crate::culling::Culling;
 use crate::held::{Held, OnDevice, detached};
+use crate::options::Request;
 
-/// Index, name, driver, its version, backend, type.
+/// Index, name, driver, version of the driver, backend, device type.
 type Summary = (usize, String, String, String, String, String);
 
 fn summary(adapter: &AdapterSummary) -> Summary {
@@ -30,19 +31,16 @@ pub(crate) fn adapters(py: Python<'_>) -> PyResult<Vec<Summary>> {
     Ok(detached(py, || Ok(headless::adapters()))?.iter().map(summary).collect())
 }
 
-/// Whether faults can be planted into the shaders of this build by an environment variable:
-/// development builds alone take it.
-pub(crate) const TAKES_PLANTED_FAULTS: bool = cfg!(debug_assertions);
-
-#[cfg(not(debug_assertions))]
+#[cfg(not(feature = "testing"))]
 fn open(adapter: Option<&str>) -> hiz_core::Result<headless::Engine> {
     headless::Engine::new(adapter)
 }
 
-/// `HIZVK_PLANTED_FAULT` (`what => by what`, one a line) replaces texts in the shaders, as for the
-/// Rust tests: does a Python test turn red?
-/// A release has no word of it.
-#[cfg(debug_assertions)]
+/// Opens a device whose shaders may have planted faults, so that a Python test can be seen to fail.
+/// `HIZVK_PLANTED_FAULT` replaces texts in the shaders, as for the Rust tests: `what => by what` on
+/// each line.
+/// A build without the feature `testing` does not read it.
+#[cfg(feature = "testing")]
 fn open(adapter: Option<&str>) -> hiz_core::Result<headless::Engine> {
     let planted = std::env::var("HIZVK_PLANTED_FAULT").unwrap_or_default();
     let planted: Vec<String> = planted.lines().map(|line| line.replace("\\n", "\n")).collect();
@@ -77,7 +75,6 @@ impl Engine {
         arrays: Vec<FloatArray<'_>>,
         strict: bool,
         order: &str,
-        piece_capacity: Option<u32>,
     ) -> PyResult<Instances> {
         let bounds = bounds(kind, &arrays)?;
         let order = match order {
@@ -85,7 +82,8 @@ impl Engine {
             "given" => StoredOrder::Given,
             other => return Err(PyValueError::new_err(format!("order: no order {other:?}"))),
         };
-        let options = InstanceOptions { strict, order, piece_capacity };
+        #[allow(clippy::needless_update, reason = "hiz_core's `testing` adds a field")]
+        let options = InstanceOptions { strict, order, ..InstanceOptions::default() };
         self.0
             .run(py, |engine| engine.instances(&bounds, &options))
             .map(|instances| Instances(Held::new(py, instances)))
@@ -157,8 +155,7 @@ impl Engine {
             .map(|depth| DepthImage(Held::new(py, depth)))
     }
 
-    /// `rounding`: to which floats the numbers had been rounded before they came, "none", "single"
-    /// or "half".
+    /// `rounding` says to which floats the numbers were rounded before: "none", "single" or "half".
     #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn upload_depth(
         &self,
@@ -183,7 +180,7 @@ impl Engine {
         };
         let camera = &camera.0;
         let upload = |engine: &headless::Engine| match image {
-            // Already what is uploaded: no copy in between.
+            // The numbers already are what is uploaded, so they are not copied.
             Floats::F32(ndc) if kind == own_kind && scale == 1.0 && invalid.is_empty() => {
                 engine.upload_depth_within(ndc, camera, tolerance)
             }
@@ -207,48 +204,20 @@ impl Engine {
         self.0.run(py, reduce).map(|built| Pyramid(Held::new(py, built)))
     }
 
-    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
+    /// `options` is a `hizvk.CullOptions`, `outputs` a `hizvk.Outputs`.
     fn cull(
         &self,
         py: Python<'_>,
         instances: &Instances,
         camera: &Camera,
         pyramid: &Pyramid,
-        order: &str,
-        coverage: &str,
-        guard_px: Option<f64>,
-        depth_slack: f64,
-        depth_slack_abs: f64,
-        transform_slack: f64,
-        footprint: u32,
-        descent: u32,
-        fit: &str,
-        hierarchy: Option<bool>,
-        outputs: (bool, bool, bool, bool),
-        capacity: Option<u32>,
-        draw: (u32, u32, i32, u32),
-        statistics: bool,
+        options: &Bound<'_, PyAny>,
+        outputs: &Bound<'_, PyAny>,
     ) -> PyResult<Culling> {
-        let arguments = CullArguments {
-            order,
-            coverage,
-            guard_px,
-            depth_slack,
-            depth_slack_abs,
-            transform_slack,
-            footprint,
-            descent,
-            fit,
-            hierarchy,
-            outputs,
-            capacity,
-            draw,
-            statistics,
-        };
-        let (options, output) = (arguments.options()?, arguments.output());
+        let Request { options, outputs } = Request::new(options, outputs)?;
         let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
         self.0
-            .run(py, |engine| engine.cull(&instances, &camera.0, &pyramid.1, &options, &output))
+            .run(py, |engine| engine.cull(&instances, &camera.0, &pyramid.1, &options, &outputs))
             .map(|culling| Culling(Held::new(py, culling)))
     }
 
@@ -256,8 +225,8 @@ impl Engine {
         self.0.run(py, headless::Engine::wait)
     }
 
-    /// For tests: what the engine itself says in a fork, where [`Held::get`] speaks first; and a
-    /// clone of it is dropped.
+    /// For tests: the engine's own error in a fork, which the error of [`Held::get`] usually hides.
+    /// It also drops a clone of the engine there.
     fn wait_without_guard(&self, py: Python<'_>) -> PyResult<()> {
         let engine = headless::Engine::clone(&*self.0.look(py)?);
         detached(py, move || engine.wait())
@@ -301,7 +270,7 @@ impl Instances {
     }
 }
 
-/// Positions and triangles, flat, and a word about the faces.
+/// Flat positions and triangles, and which faces do not occlude.
 type SurfaceArrays<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u32>>, &'static str);
 
 /// Triangle meshes on the device.
@@ -314,8 +283,8 @@ impl Occluders {
         Ok(self.0.look(py)?.surface().host_bytes())
     }
 
-    /// World positions, 3 a vertex; vertices, 3 a triangle; and the faces that do not occlude.
-    /// Copies.
+    /// Copies of the world positions, 3 per vertex, and of the vertices, 3 per triangle; and the
+    /// faces that do not occlude.
     fn surface<'py>(&self, py: Python<'py>) -> PyResult<SurfaceArrays<'py>> {
         let occluders = self.0.look(py)?;
         let surface = occluders.surface();
@@ -373,7 +342,7 @@ impl Pyramid {
         Ok(self.0.look(py)?.1.num_levels())
     }
 
-    /// The first and the last stored level above 0; nothing for an image of one pixel.
+    /// The first and the last stored level above 0; none for an image of one pixel.
     fn stored_levels(&self, py: Python<'_>) -> PyResult<Option<(u32, u32)>> {
         Ok(self.0.look(py)?.1.stored_levels().map(|levels| (levels.first, levels.last)))
     }

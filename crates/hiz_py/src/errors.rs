@@ -1,5 +1,5 @@
-//! Errors of the engine as the exceptions of `hizvk.errors`, or as plain `ValueError` for what an
-//! argument did wrong.
+//! Errors of the engine as exceptions of Python: those of `hizvk.errors`, or a plain `ValueError`
+//! for a bad argument.
 
 use hiz_core::Error;
 use pyo3::exceptions::PyValueError;
@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
 
-/// A class of `hizvk.errors`, imported at its first use.
+/// A class of `hizvk.errors`, which is imported at its first use.
 struct Exception {
     name: &'static str,
     class: PyOnceLock<Py<PyType>>,
@@ -18,7 +18,7 @@ impl Exception {
         Self { name, class: PyOnceLock::new() }
     }
 
-    /// The exception with these arguments; the import's own error where that fails.
+    /// The exception with these arguments, or the error of the import.
     fn raise<A>(&self, py: Python<'_>, arguments: A) -> PyErr
     where
         A: pyo3::PyErrArguments + Send + Sync + 'static,
@@ -36,8 +36,8 @@ static LIMIT: Exception = Exception::new("LimitError");
 static DEVICE_LOST: Exception = Exception::new("DeviceLostError");
 static OUT_OF_MEMORY: Exception = Exception::new("OutOfMemoryError");
 
-/// Imports all of them: what is made once at its first use has a lock, which a forked child may
-/// find held.
+/// Imports all classes, before any fork.
+/// A cell that is filled at its first use has a lock, and a forked child might find it held.
 pub(crate) fn prepare(py: Python<'_>) -> PyResult<()> {
     for exception in [&HIZ_ERROR, &NO_ADAPTER, &LIMIT, &DEVICE_LOST, &OUT_OF_MEMORY] {
         exception.class.import(py, "hizvk.errors", exception.name)?;
@@ -58,7 +58,7 @@ pub(crate) fn raised(py: Python<'_>, error: Error) -> PyErr {
     }
 }
 
-/// A `HizError` of no other class.
+/// A plain `HizError`.
 pub(crate) fn hiz_error(py: Python<'_>, text: String) -> PyErr {
     HIZ_ERROR.raise(py, (text,))
 }

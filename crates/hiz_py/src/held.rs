@@ -1,14 +1,16 @@
-//! What lives on a device, as Python's objects hold it: let go of before the process ends, and
-//! refused in a fork of it.
+//! How Python's objects hold what is on a device: they release it before the process ends, and
+//! refuse to use it in a fork.
 //!
-//! A driver may be at work on threads of its own after the last wait for it; only the destruction
-//! of the device joins them.
-//! The interpreter drops nothing that a module still names when it ends, so [`let_go`] empties
-//! every holder at its exit.
+//! A driver may work on threads of its own after the last wait; only the destruction of the device
+//! joins them.
+//! The interpreter does not drop objects that a module still refers to when it ends, so [`let_go`]
+//! empties every holder at exit.
 //!
 //! A lock that another thread holds at a fork is never released in the child.
-//! So those here are only held with the interpreter lock, which whoever forks has; and
-//! [`before_fork`] waits until no call is within the driver, whose locks a child would meet.
+//! So the locks here are held only together with the interpreter lock, which the forking thread
+//! has.
+//! [`before_fork`] waits until no call is within the driver, because a child would meet the locks
+//! of the driver.
 
 use std::any::Any;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
@@ -21,9 +23,9 @@ use pyo3::prelude::*;
 
 use crate::errors::{hiz_error, raised};
 
-/// What a [`Held`] may hold.
+/// A type that a [`Held`] may hold.
 pub(crate) trait OnDevice: Send + Sync + 'static {
-    /// The engine, where it has one at hand.
+    /// The engine, if it holds one.
     fn engine(&self) -> Option<&Engine> {
         None
     }
@@ -37,7 +39,7 @@ impl OnDevice for Engine {
 
 impl<T: Send + Sync + 'static> OnDevice for Arc<T> {}
 
-/// Holds a `T` until the process ends or Python lets go of it.
+/// Holds a `T` until the process ends or Python drops it.
 pub(crate) struct Held<T: OnDevice>(Arc<Cell<T>>);
 
 impl<T: OnDevice> Held<T> {
@@ -47,37 +49,37 @@ impl<T: OnDevice> Held<T> {
             contents: Mutex::new(Some(Arc::new(value))),
         });
         let as_any: Arc<dyn Empty> = cell.clone();
-        house(py).admit(Arc::downgrade(&as_any));
+        registry(py).admit(Arc::downgrade(&as_any));
         Self(cell)
     }
 
-    /// For calls that ask the device or take a lock.
+    /// The value, for calls that use the device or take a lock; an error in a fork.
     pub(crate) fn get(&self, py: Python<'_>) -> PyResult<Arc<T>> {
-        // Before any lock is taken: one that another thread held at the fork is never released
+        // Before any lock is taken: a lock that another thread held at the fork is never released
         // here.
         let (made_by, here) = (self.0.process, std::process::id());
         if made_by != here {
             return Err(hiz_error(
                 py,
                 format!(
-                    "the device of this object was made by process {made_by}, and process {here} is a fork of it: no device works \
-                     after a fork. Make a Device in this process and upload again, or start workers with multiprocessing's \
-                     \"spawn\""
+                    "the device of this object was made by process {made_by}, and process {here} \
+                     is a fork of it: no device works after a fork. Make a Device in this process \
+                     and upload again, or start workers with multiprocessing's \"spawn\""
                 ),
             ));
         }
         self.look(py)
     }
 
-    /// For what the host knows and no lock guards: works in forks, too.
+    /// The value, for what the host knows and no lock guards; this works in forks, too.
     pub(crate) fn look(&self, py: Python<'_>) -> PyResult<Arc<T>> {
-        // The lock is let go of before the exception is made: that may hand the interpreter lock
-        // on, to a thread that wants this one.
+        // The lock is released before the exception is made: making it may pass the interpreter
+        // lock to a thread that wants this lock.
         let value = self.0.lock().clone();
         value.ok_or_else(|| closed(py))
     }
 
-    /// [`detached`] with what is held.
+    /// Calls [`detached`] with the value.
     pub(crate) fn run<R: Send>(
         &self,
         py: Python<'_>,
@@ -88,8 +90,8 @@ impl<T: OnDevice> Held<T> {
     }
 }
 
-/// What a [`Held`] holds.
-/// The lock is held for moments, with the interpreter lock.
+/// The contents of a [`Held`].
+/// The lock is held for moments only, together with the interpreter lock.
 struct Cell<T> {
     process: u32,
     contents: Mutex<Option<Arc<T>>>,
@@ -104,8 +106,8 @@ impl<T> Cell<T> {
 impl<T> Drop for Cell<T> {
     fn drop(&mut self) {
         if self.process != std::process::id() {
-            // In a fork the device's threads are gone, and its locks may be held for ever: nothing
-            // of it may be touched.
+            // In a fork the threads of the device do not exist, and its locks may be held for ever.
+            // So the value is leaked.
             std::mem::forget(
                 self.contents.get_mut().unwrap_or_else(PoisonError::into_inner).take(),
             );
@@ -117,7 +119,7 @@ impl<T> Drop for Cell<T> {
 trait Empty: Send + Sync {
     fn engine(&self) -> Option<Engine>;
 
-    /// What it held, for the caller to drop.
+    /// Takes its value out, for the caller to drop.
     fn empty(&self) -> Option<Box<dyn Any + Send>>;
 }
 
@@ -131,19 +133,19 @@ impl<T: OnDevice> Empty for Cell<T> {
     }
 }
 
-/// All holders of this process, and the calls that use what they hold.
-struct House {
+/// All holders of this process, and the calls that use their values.
+struct Registry {
     process: u32,
     holders: Vec<Weak<dyn Empty>>,
-    /// How many there may be before those that are gone are struck off.
+    /// The number of holders at which dead ones are removed.
     sweep_at: usize,
     calls: usize,
-    /// The threads that are about to fork: others' calls wait.
+    /// The threads that are about to fork; the calls of others wait.
     forking: Vec<ThreadId>,
     closed: bool,
 }
 
-impl House {
+impl Registry {
     const fn new(process: u32, closed: bool) -> Self {
         Self { process, holders: Vec::new(), sweep_at: 64, calls: 0, forking: Vec::new(), closed }
     }
@@ -157,39 +159,41 @@ impl House {
     }
 }
 
-/// The one of this process.
-/// Like a cell's, its lock is only held with the interpreter lock.
-fn house(_with_the_interpreter_lock: Python<'_>) -> MutexGuard<'static, House> {
-    static HOUSE: Mutex<House> = Mutex::new(House::new(0, false));
-    let mut house = HOUSE.lock().unwrap_or_else(PoisonError::into_inner);
+/// The registry of this process.
+/// Like the lock of a cell, its lock is held only together with the interpreter lock.
+fn registry(_with_the_interpreter_lock: Python<'_>) -> MutexGuard<'static, Registry> {
+    static REGISTRY: Mutex<Registry> = Mutex::new(Registry::new(0, false));
+    let mut registry = REGISTRY.lock().unwrap_or_else(PoisonError::into_inner);
     let here = std::process::id();
-    if house.process != here {
-        // A fork: other threads, and their calls, stayed behind.
-        *house = House::new(here, house.closed);
+    if registry.process != here {
+        // A fork: other threads and their calls do not exist here.
+        *registry = Registry::new(here, registry.closed);
     }
-    house
+    registry
 }
 
 fn closed(py: Python<'_>) -> PyErr {
     hiz_error(py, "the interpreter is about to end: every device has been let go of".to_owned())
 }
 
-/// A call that runs without the interpreter lock.
+/// A call that runs without the interpreter lock, counted in the registry.
 struct Call<'py>(Python<'py>);
 
 impl<'py> Call<'py> {
     fn begin(py: Python<'py>) -> PyResult<Self> {
         loop {
-            let mut house = house(py);
-            if house.closed {
-                drop(house);
+            let mut registry = registry(py);
+            if registry.closed {
+                drop(registry);
                 return Err(closed(py));
             }
-            if house.forking.is_empty() || house.forking.contains(&std::thread::current().id()) {
-                house.calls += 1;
+            if registry.forking.is_empty()
+                || registry.forking.contains(&std::thread::current().id())
+            {
+                registry.calls += 1;
                 return Ok(Self(py));
             }
-            drop(house);
+            drop(registry);
             nap(py);
         }
     }
@@ -197,8 +201,8 @@ impl<'py> Call<'py> {
 
 impl Drop for Call<'_> {
     fn drop(&mut self) {
-        let mut house = house(self.0);
-        house.calls = house.calls.saturating_sub(1);
+        let mut registry = registry(self.0);
+        registry.calls = registry.calls.saturating_sub(1);
     }
 }
 
@@ -208,8 +212,8 @@ where
     T: Send,
     F: Send + FnOnce() -> Result<T, Error>,
 {
-    // Ends with the interpreter lock held: a thread that still waited for the lock when the
-    // interpreter ends would be struck down within this module.
+    // The call ends with the interpreter lock held: a thread that still waits for the lock when the
+    // interpreter ends would be killed within this module.
     let call = Call::begin(py)?;
     let result = py.detach(work);
     drop(call);
@@ -217,51 +221,51 @@ where
 }
 
 /// Lets other threads have the interpreter for a moment.
-/// (Waiting by a condition variable would hold a lock without the interpreter's.)
+/// Waiting for a condition variable would hold a lock without the interpreter lock.
 fn nap(py: Python<'_>) {
     py.detach(|| std::thread::sleep(Duration::from_millis(1)));
 }
 
-/// Waits until no call is within the driver and every device is idle; calls of other threads wait
-/// until [`after_fork`].
+/// Waits until no call is within the driver and every device is idle.
+/// Calls of other threads wait until [`after_fork`].
 #[pyfunction]
 pub(crate) fn before_fork(py: Python<'_>) {
-    house(py).forking.push(std::thread::current().id());
-    while house(py).calls > 0 {
+    registry(py).forking.push(std::thread::current().id());
+    while registry(py).calls > 0 {
         nap(py);
     }
-    let holders = house(py).holders.clone();
+    let holders = registry(py).holders.clone();
     let engines: Vec<_> =
         holders.iter().filter_map(Weak::upgrade).filter_map(|holder| holder.engine()).collect();
     py.detach(|| {
         for engine in &engines {
-            // What is freed after the end of one submit is freed before that of the next.
-            // A lost device is idle.
+            // What is freed after one submission ends is freed before the next one ends.
+            // The error of a lost device is dropped: such a device is idle.
             engine.queue().submit([]);
             drop(engine.wait());
         }
     });
 }
 
-/// The parent goes on.
+/// Ends [`before_fork`] in the parent.
 #[pyfunction]
 pub(crate) fn after_fork(py: Python<'_>) {
-    let (mut house, me) = (house(py), std::thread::current().id());
-    if let Some(mine) = house.forking.iter().position(|thread| *thread == me) {
-        house.forking.swap_remove(mine);
+    let (mut registry, me) = (registry(py), std::thread::current().id());
+    if let Some(mine) = registry.forking.iter().position(|thread| *thread == me) {
+        registry.forking.swap_remove(mine);
     }
 }
 
-/// The interpreter is about to end: waits for the calls of threads that it does not wait for
-/// (daemons), and lets go of every device.
-/// What comes later is an error.
+/// Drops every device, as the interpreter is about to end.
+/// It first waits for the calls of daemon threads, for which the interpreter does not wait.
+/// A later call is an error.
 #[pyfunction]
 pub(crate) fn let_go(py: Python<'_>) {
-    house(py).closed = true;
-    while house(py).calls > 0 {
+    registry(py).closed = true;
+    while registry(py).calls > 0 {
         nap(py);
     }
-    let holders = std::mem::take(&mut house(py).holders);
+    let holders = std::mem::take(&mut registry(py).holders);
     let held: Vec<_> =
         holders.iter().filter_map(Weak::upgrade).filter_map(|holder| holder.empty()).collect();
     py.detach(|| drop(held));

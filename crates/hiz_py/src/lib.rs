@@ -1,8 +1,9 @@
 //! The module `hizvk._core`: conversion of arguments, release of the interpreter lock, errors.
-//! No algorithm lives here.
+//! It contains no algorithm.
 //!
-//! The Python modules around it check every argument first, so what arrives here is float32 or
-//! float64 in C order; what is still wrong is refused by `hiz_core` in the same words.
+//! The Python modules around it check every argument first, so arrays arrive here as float32 or
+//! float64 in C order.
+//! What is still wrong is refused by `hiz_core` in the same words.
 //! Every class is frozen and may be used from any thread.
 
 mod arguments;
@@ -12,7 +13,9 @@ mod culling;
 mod device;
 mod errors;
 mod held;
+mod options;
 mod reference;
+#[cfg(feature = "yardstick")]
 mod yardstick;
 
 /// The compiled engine of `hizvk`.
@@ -31,6 +34,14 @@ mod _core {
     use crate::held::{after_fork, before_fork, let_go};
     #[pymodule_export]
     use crate::reference::{reference_classify, reference_pyramid};
+
+    /// For tests.
+    #[cfg(feature = "testing")]
+    #[pymodule_export]
+    use crate::options::options_text;
+
+    /// For benchmarks of single submits.
+    #[cfg(feature = "yardstick")]
     #[pymodule_export]
     use crate::yardstick::{Yardstick, YardstickCull, YardstickReduction};
 
@@ -38,21 +49,22 @@ mod _core {
     #[expect(non_upper_case_globals, reason = "the name is Python's")]
     const __version__: &str = env!("CARGO_PKG_VERSION");
 
-    /// How this module was compiled: what runs on the host is slower in a development build.
+    /// How this module was compiled; host code is slower in a development build.
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "the name is Python's")]
     const __build__: &str = if cfg!(debug_assertions) { "development" } else { "release" };
 
+    /// Whether `HIZVK_PLANTED_FAULT` replaces texts in the shaders.
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "the name is Python's")]
-    const takes_planted_faults: bool = crate::device::TAKES_PLANTED_FAULTS;
+    const takes_planted_faults: bool = cfg!(feature = "testing");
 
     #[pymodule_init]
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
         use numpy::PyArrayMethods;
         use pyo3::types::{PyAnyMethods, PyDictMethods};
         crate::errors::prepare(module.py())?;
-        // The same for what stands between NumPy and Rust.
+        // The binding to NumPy fills such cells, too.
         drop(numpy::PyArray1::<f32>::from_vec(module.py(), Vec::new()).readonly());
         let (atexit, os) = (module.py().import("atexit")?, module.py().import("os")?);
         atexit.call_method1("register", (module.getattr("let_go")?,))?;

@@ -10,7 +10,7 @@ use crate::arguments::{FloatArray, LevelArray, bounds, depth_kind, in_c_order};
 use crate::camera::Camera;
 use crate::held::detached;
 
-/// Instances between two looks at whether the user wants to stop.
+/// How many instances are decided between two checks for an interrupt by the user.
 const BATCH: usize = 256;
 
 // The codes of `hizvk.reference`.
@@ -19,7 +19,7 @@ const VISIBLE: u8 = 2;
 const INVALID: u8 = 3;
 const UNDECIDED: u8 = 4;
 
-/// What the oracle says about each instance.
+/// The oracle's code for each instance.
 #[expect(clippy::too_many_arguments, reason = "the signature of Python's function")]
 #[pyfunction]
 pub(crate) fn reference_classify<'py>(

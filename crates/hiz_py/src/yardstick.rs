@@ -1,5 +1,5 @@
-//! What `hizvk bench --speed` times: submits of work whose buffers were made beforehand, and the
-//! same work in other shapes.
+//! Work for benchmarks to time: submissions whose buffers were made beforehand, and the same work
+//! done in other ways.
 
 use std::sync::Arc;
 
@@ -13,11 +13,11 @@ use pyo3::prelude::*;
 
 use crate::arguments::in_c_order;
 use crate::camera::Camera;
-use crate::culling::CullArguments;
 use crate::device::{DepthImage, Engine};
 use crate::held::{Held, OnDevice, detached};
+use crate::options::Request;
 
-/// Milliseconds on the wall of single submits on one device.
+/// Wall-clock milliseconds of single submissions to one device.
 #[pyclass(frozen, module = "hizvk._core")]
 pub(crate) struct Yardstick(Held<headless::Engine>);
 
@@ -29,7 +29,7 @@ impl Yardstick {
         Ok(Self(Held::new(py, engine)))
     }
 
-    /// How this module was compiled: what runs on the host is slower in a `dev` build.
+    /// The profile of Cargo that this module was compiled with; host code is slower with `dev`.
     #[staticmethod]
     fn profile() -> &'static str {
         if cfg!(debug_assertions) { "dev" } else { "release" }
@@ -39,7 +39,7 @@ impl Yardstick {
         self.0.run(py, yardstick::empty_submit_ms)
     }
 
-    /// Of a copy on one thread of the host.
+    /// Milliseconds of a copy by one thread of the host.
     #[staticmethod]
     #[expect(clippy::needless_pass_by_value, reason = "the arrays are held during the call")]
     fn memcpy_ms(
@@ -59,8 +59,8 @@ impl Yardstick {
         detached(py, || Ok(yardstick::memcpy_ms(from, to)))
     }
 
-    /// The reduction of `depth`: the library's own with these levels, or one dispatch a level,
-    /// which makes all of them.
+    /// A reduction of `depth`: the library's own with these levels, or one dispatch per level.
+    /// The latter makes all levels.
     fn reduction(
         &self,
         py: Python<'_>,
@@ -87,8 +87,8 @@ impl Yardstick {
         Ok(YardstickReduction(Held::new(py, Reduction { engine, depth, reducer })))
     }
 
-    /// The cull of `instances`, into buffers of its own; with `depth` its reduction into `pyramid`
-    /// goes before it.
+    /// A cull of `instances` into buffers of its own.
+    /// With `depth`, each submission first reduces it into `pyramid`.
     #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn cull(
         &self,
@@ -97,34 +97,16 @@ impl Yardstick {
         camera: &Camera,
         pyramid: &crate::device::Pyramid,
         certified: bool,
-        hierarchy: Option<bool>,
-        order: &str,
-        outputs: (bool, bool, bool, bool),
+        options: &Bound<'_, PyAny>,
+        outputs: &Bound<'_, PyAny>,
         depth: Option<&DepthImage>,
     ) -> PyResult<YardstickCull> {
-        let defaults = CullOptions::default();
-        let arguments = CullArguments {
-            order,
-            coverage: "area",
-            guard_px: None,
-            depth_slack: defaults.depth_slack,
-            depth_slack_abs: defaults.depth_slack_abs,
-            transform_slack: defaults.transform_slack,
-            footprint: 2,
-            descent: defaults.descent,
-            fit: "rectangle",
-            hierarchy,
-            outputs,
-            capacity: None,
-            draw: (0, 0, 0, 0),
-            statistics: false,
-        };
-        let (options, output) = (arguments.options()?, arguments.output());
+        let Request { options, outputs } = Request::new(options, outputs)?;
         let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
         let depth = depth.map(|depth| depth.0.get(py)).transpose()?;
         let prepare = |engine: &headless::Engine| {
             Ok(Cull {
-                visible: engine.context().create_visible(&instances, &output)?,
+                visible: engine.context().create_visible(&instances, &outputs)?,
                 engine: engine.clone(),
                 instances: Arc::clone(&instances),
                 camera: camera.0.clone(),
@@ -189,14 +171,14 @@ impl YardstickCull {
         self.0.run(py, |cull| yardstick::submitted_ms(&cull.engine, |encoder| cull.record(encoder)))
     }
 
-    /// What the last submit kept.
+    /// The mask of the last submission.
     fn mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
         self.0
             .run(py, |cull| yardstick::read_mask(&cull.engine, &cull.visible))
             .map(|mask| PyArray1::from_vec(py, mask))
     }
 
-    /// Of the buffers that take what is found.
+    /// Bytes of the buffers for the answer.
     fn device_bytes(&self, py: Python<'_>) -> PyResult<u64> {
         Ok(self.0.look(py)?.visible.device_bytes())
     }

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from ..device import Adapter
+    from ..adapter import Adapter
     from .results import Row, SceneResult
 
 __all__ = ["Report"]

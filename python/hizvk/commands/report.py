@@ -14,7 +14,7 @@ from .._core import __version__
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from ..device import Adapter
+    from ..adapter import Adapter
     from .page import Page
 
 __all__ = ["adapter_words", "version_words", "versions", "write"]

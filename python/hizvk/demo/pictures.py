@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from ..commands import figure as figures
-from ..result import Verdict
+from ..explanation import Verdict
 from ..scenes.massif import MAP_CORNER
 from ..scenes.truth import OCCLUDER, linear_depth
 from .shading import to_bytes

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from .._arguments import Size
-    from ..device import Adapter
-    from ..result import CullStats
+    from ..adapter import Adapter
     from ..scenes.truth import Check
+    from ..stats import CullStats
 
 __all__ = ["STAGES", "Report", "ViewReport"]
 

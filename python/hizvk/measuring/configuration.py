@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from .._arguments import Size
-    from ..device import Levels
+    from .._types import Levels
+    from ..options import CullOptions
 
 __all__ = ["DESCENT", "READS", "SOME_LEVELS", "Configuration", "DepthVariant"]
 
@@ -115,6 +116,10 @@ class Configuration:
             for name in ("footprint", "descent", "fit", "coverage", "order")
         }
         return options | ({} if self.guard_px is None else {"guard_px": self.guard_px})
+
+    def options(self, base: CullOptions) -> CullOptions:
+        """`base`, with the fields of this configuration in the place of its own."""
+        return replace(base, **self.cull_options())
 
     def render_options(self, full: Size) -> dict[str, Any]:
         """The keyword arguments of `Device.render_depth` for a view of `full` pixels."""

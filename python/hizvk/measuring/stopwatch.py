@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
+from ..options import CullOptions
+
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
@@ -45,11 +47,16 @@ def rendered(
 
 
 def cull(
-    device: Device, instances: Instances, pyramid: Pyramid, configuration: Configuration
+    device: Device,
+    instances: Instances,
+    pyramid: Pyramid,
+    configuration: Configuration,
+    base: CullOptions | None = None,
 ) -> tuple[npt.NDArray[np.bool_], float, float]:
     """The mask, and the milliseconds of the cull and of reading the mask."""
+    options = configuration.options(base or CullOptions())
     watch = Stopwatch(device)
-    result = device.cull(instances, pyramid.camera, pyramid, **configuration.cull_options())
+    result = device.cull(instances, pyramid.camera, pyramid, options)
     took = watch.lap()
     mask = result.mask
     return mask, took, watch.lap()

@@ -10,8 +10,10 @@ import numpy as np
 from .. import _arguments
 from ..camera import Camera
 from ..depth import DepthArray, checked_image
+from ..device import maker_of
 from ..measuring.volumes import KINDS
-from ..resources import A_MESH, Instances, Occluders, meshes_of
+from ..mesh import A_MESH, meshes_of
+from ..resources import Instances, Occluders
 
 if TYPE_CHECKING:
     from ..bounds import Bounds
@@ -80,7 +82,7 @@ def device_of(occluders: object, alternatives: dict[str, Any]) -> Device | None:
     """The device of the first argument that lies on one already."""
     for thing in (occluders, *alternatives.values()):
         if isinstance(thing, (Occluders, Instances)):
-            return thing.device
+            return maker_of(thing)
     return None
 
 

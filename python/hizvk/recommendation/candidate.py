@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from .. import _arguments
+from ..device import maker_of
+from ..options import CullOptions
 from ..resources import DepthImage, Instances
 
 if TYPE_CHECKING:
@@ -61,6 +63,8 @@ class Candidate:
     """False for what is only shown for comparison: sample coverage, where every ray counts."""
     bounds: Bounds | Instances | None = field(default=None, repr=False, compare=False)
     """The given bounds of this kind, for `Device.instances` unless they are `Instances` already."""
+    options: CullOptions = field(default=CullOptions(), repr=False)
+    """How it culls, for `Device.cull`."""
 
     @property
     def safe(self) -> bool:
@@ -74,8 +78,8 @@ class Candidate:
 
     @property
     def cull_options(self) -> dict[str, Any]:
-        """Keyword arguments for `Device.cull`."""
-        return self.configuration.cull_options()
+        """`options` as keyword arguments for `Device.cull`."""
+        return asdict(self.options)
 
     @property
     def pyramid_options(self) -> dict[str, Any]:
@@ -123,7 +127,7 @@ class Candidate:
         if (occluders is None) == (depth is None):
             got = "neither" if occluders is None else "both"
             raise TypeError(f"occluders, depth: expected exactly one of them, got {got}")
-        device = instances.device
+        device = maker_of(instances)
         if occluders is not None:
             depth = device.render_depth(occluders, camera, **self.render_options(camera.size))
         elif self.render_options(camera.size):
@@ -136,7 +140,7 @@ class Candidate:
         else:
             array: Any = depth
             pyramid = device.pyramid(array, camera, **depth_options, **self.pyramid_options)
-        return device.cull(instances, pyramid.camera, pyramid, **self.cull_options)
+        return device.cull(instances, pyramid.camera, pyramid, self.options)
 
     def __str__(self) -> str:
         return str(self.configuration)

@@ -11,6 +11,7 @@ from ..device import Device
 from ..measuring.pareto import front
 from ..measuring.spread import spread
 from ..oneline import default_device
+from ..options import cull_options
 from ..resources import Instances
 from . import checking
 from .answer import Recommendation, notes_on
@@ -21,14 +22,16 @@ from .tried import promised
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
+    from typing import Unpack
 
     import numpy.typing as npt
 
+    from .._types import DepthKind
     from ..bounds import Bounds
     from ..camera import Camera
-    from ..depth import DepthKind
-    from ..device import Coverage
-    from ..resources import MeshLike, Occluders
+    from ..mesh import MeshLike
+    from ..options import CullOptions, OptionKeywords
+    from ..resources import Occluders
 
 __all__ = ["recommend"]
 
@@ -43,10 +46,11 @@ def recommend(
     scale: float = 1.0,
     invalid: Collection[float] | None = None,
     device: Device | None = None,
-    coverage: Coverage = "area",
+    options: CullOptions | None = None,
     max_ms: float | None = None,
     kept_within: float = 1.05,
     repetitions: int = 5,
+    **keywords: Unpack[OptionKeywords],
 ) -> Recommendation:
     """Measures configurations on the caller's scene, checks them there, and recommends one.
 
@@ -99,8 +103,12 @@ def recommend(
         What the numbers of `depths` are, as in `Device.pyramid`.
     device : Device, optional
         None: that of the occluders or instances, else one that is made at the first call and kept.
-    coverage : "area" or "sample"
-        What counts as seen.
+    options : CullOptions, optional
+        What every candidate has in common; None takes the defaults.
+        Candidates differ in ``footprint``, ``descent``, ``fit`` and ``order``, so theirs take the
+        place of those given.
+
+        ``coverage`` says what counts as seen.
         ``"area"``: what any ray of the view meets.
         It is right for multisampling, jitter, larger images, and points.
         Then candidates of sample coverage are shown for comparison and never recommended.
@@ -114,6 +122,8 @@ def recommend(
         the candidate that keeps least.
     repetitions : int
         How often each is timed, beside the first call.
+    **keywords
+        Any field of `CullOptions`, in the place of that of `options`.
 
     Returns
     -------
@@ -148,7 +158,8 @@ def recommend(
     if (occluders is None) == (depths is None):
         got = "neither" if occluders is None else "both"
         raise TypeError(f"occluders, depths: expected exactly one of them, got {got}")
-    _arguments.choice("coverage", coverage, ("area", "sample"))
+    options = cull_options(options, keywords)
+    coverage = options.coverage
     if max_ms is not None:
         max_ms = _arguments.number("max_ms", max_ms, above=0.0)
     kept_within = _arguments.number("kept_within", kept_within, at_least=1.0)
@@ -172,7 +183,7 @@ def recommend(
 
     chosen = promised(tuple(volumes), coverage, rendered=walls is not None, points=points)
     source = DepthSource(device, walls, views, images)
-    times = time_all(chosen, volumes, source, repetitions)
+    times = time_all(chosen, volumes, source, repetitions, options)
     every_ray = walls is not None and coverage == "area"
     if walls is not None and every_ray:
         judge = checking.by_rays(walls, views)
@@ -192,6 +203,7 @@ def recommend(
             proven=one.promises_rays or not every_ray,
             asked=coverage == "sample" or one.coverage == "area",
             bounds=alternatives[one.volume],
+            options=one.options(options),
         )
         for k, one in enumerate(chosen)
     ]

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from .. import _arguments
 from ..depth import DepthArray
-from ..device import stored_levels
 from ..measuring.configuration import DepthVariant
 from ..measuring.spread import spread
 from ..measuring.stopwatch import Stopwatch, cull
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ..device import Device
     from ..measuring.configuration import Configuration
     from ..measuring.spread import Spread
+    from ..options import CullOptions
     from ..resources import DepthImage, Instances, Occluders, Pyramid
 
 __all__ = ["DepthSource", "Times", "time_all"]
@@ -75,7 +76,7 @@ class DepthSource:
     def _pyramid(self, variant: DepthVariant, k: int) -> tuple[Pyramid, float]:
         if self._images is not None:
             watch = Stopwatch(self.device)
-            stored = stored_levels(variant.levels)
+            stored = _arguments.stored_levels("levels", variant.levels)
             pyramid = self.device._pyramid_of(self._images[k], self.views[k], stored)
             return pyramid, watch.lap()
         depth, took = self._depth(variant, k)
@@ -124,6 +125,7 @@ def time_all(
     volumes: Mapping[str, Instances],
     source: DepthSource,
     repetitions: int,
+    base: CullOptions,
 ) -> Times:
     """Times every candidate `repetitions` times on every view.
 
@@ -142,7 +144,9 @@ def time_all(
             for turn in range(len(chosen)):
                 number = (turn + repetition * len(chosen) // rounds + k) % len(chosen)
                 one = chosen[number]
-                mask, *both = cull(source.device, volumes[one.volume], made[one.depth][0], one)
+                mask, *both = cull(
+                    source.device, volumes[one.volume], made[one.depth][0], one, base
+                )
                 culling[number, repetition, k], reading[number, repetition, k] = both
                 if repetition == 0:
                     masks[number].append(mask)

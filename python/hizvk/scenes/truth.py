@@ -27,7 +27,7 @@ import numpy.typing as npt
 
 from .. import reference
 from ..bounds import Boxes
-from ..comparison import Comparison, compare
+from ..check import Comparison, compare
 from .embree import can_cast, embree_scene
 from .scene import box_corners
 

@@ -1,10 +1,11 @@
-"""What a cull takes for granted, checked exactly: occluder proxies lie inside their mesh, bounds contain theirs.
+"""Checks of what a cull takes for granted: proxies lie inside their mesh, meshes in their bounds.
 
-A proxy that sticks out hides what can be seen, and an instance that sticks out of its bounds is
-hidden while it shows.
-The checks decide in exact arithmetic (``crates/hiz_ref``), so that touching is inside and a
-protrusion of one rounding is found.
-They need no device, and are for tools and tests, not for every frame.
+A proxy that sticks out of its mesh hides what can be seen.
+An instance that sticks out of its bounds may be hidden while it shows.
+
+The checks decide in exact arithmetic (``crates/hiz_ref``): touching is inside, and a protrusion of
+one rounding is found.
+They need no device, and are meant for tools and tests, not for every frame.
 """
 
 from __future__ import annotations
@@ -15,15 +16,15 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from . import _core
-from .bounds import Bounds, as_arrays
-from .resources import A_MESH, as_mesh, meshes_of
+from .. import _core
+from ..bounds import Bounds, as_arrays
+from ..mesh import A_MESH, as_mesh, meshes_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
-    from .resources import Mesh, MeshLike
+    from ..mesh import Mesh, MeshLike
 
 __all__ = ["BoundsCheck", "ProxyCheck", "check_bounds", "check_proxy"]
 
@@ -41,10 +42,13 @@ class ProxyCheck:
     witnesses: npt.NDArray[np.float64]
     """``(K, 3)``: for each of them a point of it that is outside, rounded to float64."""
     vertices: npt.NDArray[np.intp]
-    """The proxy's vertices that are outside, ascending; may be empty while triangles are outside. Exact."""
+    """The proxy's vertices that are outside, ascending. Exact.
+
+    It may be empty while triangles are outside."""
     protrusion: float
-    """The largest distance of a witness or an outside vertex to the mesh's surface, in plain float64; what really
-    sticks out may be more. 0 if nothing does."""
+    """The largest distance of a witness or an outside vertex to the mesh's surface, or 0.
+
+    It is computed in plain float64, and other points of the proxy may stick out farther."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +58,9 @@ class BoundsCheck:
     contained: npt.NDArray[np.bool_]
     """``(N,)``: whether the instance's bounds contain all of its mesh. Exact."""
     protrusion: npt.NDArray[np.float64]
-    """``(N,)``: how far a vertex lies outside, in world units and plain float64; 0 for what is contained, infinite for
-    bounds that are no volume."""
+    """``(N,)``: how far a vertex lies outside, in world units, computed in plain float64.
+
+    0 for contained meshes, infinite for invalid bounds."""
     offenders: npt.NDArray[np.intp]
     """The instances that stick out, the worst first."""
 
@@ -68,26 +73,28 @@ class BoundsCheck:
 def check_proxy(
     proxy: MeshLike | tuple[npt.ArrayLike, ...], mesh: MeshLike | tuple[npt.ArrayLike, ...]
 ) -> ProxyCheck:
-    """Whether an occluder proxy may be rendered in its mesh's stead.
+    """Whether an occluder proxy may be rendered in place of its mesh.
 
-    Inside means: every point of every proxy triangle lies in the closed solid of the mesh, which is
-    its surface and all points that it winds about (so parts may overlap, and the whole may run
-    either way round).
-    Then every ray from outside of the solid that meets the proxy has met the mesh before, or meets
-    it there, and the proxy hides nothing that the mesh does not hide.
+    Inside means that every point of every proxy triangle lies in the closed solid of the mesh.
+    The solid is the surface of the mesh and all points with a winding number other than 0.
+    So parts of the mesh may overlap, and all of it may be wound either way.
+
+    A ray from outside of the solid that meets the proxy then meets the mesh there or before.
+    So the proxy hides nothing that the mesh does not hide.
     Touching is allowed.
     The proxy need not be closed; its triangles without area hide nothing and are passed over.
 
-    What is proved is about the numbers as given.
-    A renderer that moves or rounds the two differently has to leave room.
-    For a camera inside of the mesh's solid, or a near plane that cuts it, nothing is said; nor for
-    a mesh of which a renderer leaves out the back faces while it keeps those of the proxy.
+    The proof is about the numbers as given:
+
+    - A renderer that moves or rounds proxy and mesh differently has to leave room between them.
+    - It says nothing for a camera inside the solid, or a near plane that cuts it.
+    - It says nothing for a mesh whose back faces are left out while those of the proxy are drawn.
 
     Parameters
     ----------
     proxy, mesh : Mesh, tuple, or a mesh of trimesh or Open3D
         A tuple is ``(vertices, triangles)``.
-        In the same coordinates, without transforms.
+        Both are in the same coordinates, without transforms.
         The mesh is closed and consistently oriented: each of its edges runs as often one way as the
         other, where equal positions count as one vertex.
 
@@ -105,7 +112,9 @@ def check_proxy(
     --------
     >>> import hizvk
     >>> from hizvk.scenes import box_mesh
-    >>> hizvk.check_proxy(box_mesh([[0.1, 0.1, 0.1]], [[0.9, 0.9, 1.0]]), box_mesh([[0, 0, 0]], [[1, 1, 1]])).inside
+    >>> mesh = box_mesh([[0, 0, 0]], [[1, 1, 1]])
+    >>> proxy = box_mesh([[0.1, 0.1, 0.1]], [[0.9, 0.9, 1.0]])
+    >>> hizvk.check_proxy(proxy, mesh).inside
     True
     """
     found = _core.check_proxy(_unplaced("proxy", proxy), _unplaced("mesh", mesh))
@@ -125,21 +134,22 @@ def check_bounds(
     """Whether bounds contain what they bound.
 
     Bounds are convex, so a mesh lies in them if its vertices do.
-    Each vertex is ``world_from_mesh @ (x, y, z, 1)`` in exact arithmetic, not as some renderer
-    rounds it; the bounds are the numbers as given.
+    A vertex is ``world_from_mesh @ (x, y, z, 1)`` in exact arithmetic, not as a renderer rounds it.
+    The bounds are the numbers as given.
 
     Parameters
     ----------
     bounds : Spheres, Boxes or OrientedBoxes
         The N volumes.
     meshes : list of Mesh, of tuples, or of meshes of trimesh or Open3D; or one Mesh
-        One for each instance in order; a mesh with K transforms stands for K instances in a row.
+        One for each instance, in order.
+        A mesh with K transforms stands for K instances in a row.
         A tuple is ``(vertices, triangles)`` or ``(vertices, triangles, transforms)``.
 
     Returns
     -------
     BoundsCheck
-        Bounds that are no volume (NaN, a negative size, min > max) contain nothing.
+        Invalid bounds (NaN, a negative size, min > max) contain nothing.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""How a cull compares with the truth: what it must never do, and what it costs."""
+"""A cull beside the truth: false culls, which are bugs, and false keeps, which are a cost."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import _arguments, reference
+from .. import _arguments
+from . import reference
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -32,7 +33,7 @@ class Comparison:
     hidden: int
     """Instances that are hidden in truth (outside the view, or occluded)."""
     undecided: int
-    """Instances that the truth leaves open; they count neither as false culls nor as false keeps."""
+    """Instances that the truth leaves open; they count as neither."""
 
     @property
     def culled(self) -> int:
@@ -51,7 +52,7 @@ class Comparison:
 
     @property
     def kept_over_visible(self) -> float:
-        """`kept` / `visible`: 1 is perfect; infinite where nothing is visible and something was kept."""
+        """`kept` / `visible`: 1 is perfect; infinite where only hidden instances were kept."""
         if self.visible:
             return self.kept / self.visible
         return float("inf") if self.kept else 1.0
@@ -61,9 +62,10 @@ class Comparison:
 
     def __str__(self) -> str:
         return (
-            f"{self.total:,} instances, {self.kept:,} kept, {self.visible:,} visible, {self.hidden:,} hidden, "
-            f"{self.undecided:,} undecided; {len(self.false_culls):,} wrongly culled, {len(self.false_keeps):,} "
-            f"wrongly kept ({100.0 * self.false_keep_share:.1f} % of the hidden)"
+            f"{self.total:,} instances, {self.kept:,} kept, {self.visible:,} visible, "
+            f"{self.hidden:,} hidden, {self.undecided:,} undecided; "
+            f"{len(self.false_culls):,} wrongly culled, {len(self.false_keeps):,} wrongly kept "
+            f"({100.0 * self.false_keep_share:.1f} % of the hidden)"
         )
 
 
@@ -75,8 +77,9 @@ def compare(mask: npt.ArrayLike, truth: npt.ArrayLike) -> Comparison:
     mask : (N,) bool array
         True for what was kept, as `CullResult.mask`.
     truth : (N,) bool or uint8 array
-        True for what is visible; or the codes of `hizvk.reference.classify`, where `reference.UNDECIDED` counts as
-        neither and `reference.INVALID` as visible (bad bounds have to be kept).
+        True for what is visible; or the codes of `hizvk.reference.classify`.
+        `reference.INVALID` counts as visible, because invalid bounds have to be kept.
+        `reference.UNDECIDED` counts as neither.
 
     Returns
     -------
@@ -90,9 +93,9 @@ def compare(mask: npt.ArrayLike, truth: npt.ArrayLike) -> Comparison:
     Examples
     --------
     >>> import hizvk
-    >>> hizvk.compare([True, False, True], [True, True, False])
-    <Comparison: 3 instances, 2 kept, 2 visible, 1 hidden, 0 undecided; 1 wrongly culled, 1 wrongly kept (100.0 % of \
-the hidden)>
+    >>> found = hizvk.compare([True, False, True], [True, True, False])
+    >>> found.false_culls.tolist(), found.false_keeps.tolist(), found.kept_over_visible
+    ([1], [2], 1.0)
     """
     kept = _arguments.bools("mask", mask, None)
     codes = np.asarray(truth)

@@ -1,0 +1,109 @@
+//! `hizvk.CullOptions` and `hizvk.Outputs` as the engine's options: a line per field.
+//!
+//! The struct expressions name every field, so that an option without its line does not compile.
+
+use hiz_core::{Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, Order, Outputs};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyAny;
+
+/// What a cull is asked, taken whole from the two Python objects.
+pub(crate) struct Request {
+    pub(crate) options: CullOptions,
+    pub(crate) outputs: Outputs,
+}
+
+impl Request {
+    pub(crate) fn new(options: &Bound<'_, PyAny>, outputs: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let options = cull_options(options)?;
+        let outputs = self::outputs(outputs, options.order)?;
+        Ok(Self { options, outputs })
+    }
+}
+
+fn cull_options(given: &Bound<'_, PyAny>) -> PyResult<CullOptions> {
+    Ok(CullOptions {
+        order: match word(given, "order")?.as_ref() {
+            "stable" => Order::Stable,
+            "any" => Order::Any,
+            other => return Err(unknown("order", other)),
+        },
+        coverage: match word(given, "coverage")?.as_ref() {
+            "area" => Coverage::Area,
+            "sample" => Coverage::Sample,
+            other => return Err(unknown("coverage", other)),
+        },
+        guard_px: given.getattr("guard_px")?.extract()?,
+        depth_slack: given.getattr("depth_slack")?.extract()?,
+        depth_slack_abs: given.getattr("depth_slack_abs")?.extract()?,
+        transform_slack: given.getattr("transform_slack")?.extract()?,
+        footprint: match given.getattr("footprint")?.extract()? {
+            2 => Footprint::Two,
+            4 => Footprint::Four,
+            8 => Footprint::Eight,
+            other => return Err(unknown("footprint", other)),
+        },
+        descent: given.getattr("descent")?.extract()?,
+        fit: match word(given, "fit")?.as_ref() {
+            "rectangle" => Fit::Rectangle,
+            "volume" => Fit::Volume,
+            other => return Err(unknown("fit", other)),
+        },
+        hierarchy: match given.getattr("hierarchy")?.extract()? {
+            None => Hierarchy::Auto,
+            Some(true) => Hierarchy::Always,
+            Some(false) => Hierarchy::Never,
+        },
+        statistics: given.getattr("statistics")?.extract()?,
+    })
+}
+
+fn outputs(given: &Bound<'_, PyAny>, order: Order) -> PyResult<Outputs> {
+    // An ordered list can be made from the mask later; one in the order of the device cannot.
+    let by_default = order == Order::Any;
+    let listed = |name| -> PyResult<bool> {
+        Ok(given.getattr(name)?.extract::<Option<bool>>()?.unwrap_or(by_default))
+    };
+    Ok(Outputs {
+        mask: given.getattr("mask")?.extract()?,
+        verdicts: given.getattr("verdicts")?.extract()?,
+        indices: listed("indices")?,
+        draws: listed("draws")?,
+        capacity: given.getattr("capacity")?.extract()?,
+        draw: draw_template(&given.getattr("draw")?)?,
+    })
+}
+
+fn draw_template(given: &Bound<'_, PyAny>) -> PyResult<DrawTemplate> {
+    if given.is_none() {
+        return Ok(DrawTemplate::default());
+    }
+    Ok(DrawTemplate {
+        index_count: given.getattr("index_count")?.extract()?,
+        first_index: given.getattr("first_index")?.extract()?,
+        base_vertex: given.getattr("base_vertex")?.extract()?,
+        first_instance: given.getattr("first_instance")?.extract()?,
+    })
+}
+
+fn word(given: &Bound<'_, PyAny>, name: &str) -> PyResult<String> {
+    given.getattr(name)?.extract()
+}
+
+fn unknown(name: &str, value: impl std::fmt::Display) -> PyErr {
+    PyValueError::new_err(format!("{name}: expected another value, got {value}"))
+}
+
+/// The engine's options in Rust's debug format: of the given objects, or with None its defaults.
+/// Tests compare them with Python's.
+#[cfg(feature = "testing")]
+#[pyfunction]
+pub(crate) fn options_text(
+    options: Option<&Bound<'_, PyAny>>,
+    outputs: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(String, String)> {
+    let options = options.map_or_else(|| Ok(CullOptions::default()), cull_options)?;
+    let outputs = outputs
+        .map_or_else(|| Ok(Outputs::default()), |given| self::outputs(given, options.order))?;
+    Ok((format!("{options:?}"), format!("{outputs:?}")))
+}

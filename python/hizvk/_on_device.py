@@ -1,0 +1,83 @@
+"""What all objects on a device have in common: the device that made them, their memory, a text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from . import _core
+    from .adapter import Adapter
+
+__all__ = ["Allocated", "Maker", "OnDevice", "check_owner"]
+
+
+class Maker(Protocol):
+    """The `Device` that made an object, as this object's module knows it.
+
+    `Device` returns instances, depth images and results, so their modules cannot import it.
+    """
+
+    _engine: _core.Engine
+
+    @property
+    def adapter(self) -> Adapter: ...
+    @property
+    def max_image_side(self) -> int: ...
+    @property
+    def instances(self) -> Callable[..., Any]: ...
+    @property
+    def occluders(self) -> Callable[..., Any]: ...
+    @property
+    def render_depth(self) -> Callable[..., Any]: ...
+    @property
+    def pyramid(self) -> Callable[..., Any]: ...
+    @property
+    def cull(self) -> Callable[..., Any]: ...
+    def wait(self) -> None: ...
+
+
+class _HasBytes(Protocol):
+    def device_bytes(self) -> int: ...
+
+
+_Inner = TypeVar("_Inner")
+_InnerWithBytes = TypeVar("_InnerWithBytes", bound=_HasBytes)
+
+
+class OnDevice(Generic[_Inner]):
+    """An object on a device: the compiled module's object, and the `Device` that made it."""
+
+    def __init__(self, device: Maker, inner: _Inner) -> None:
+        self._device = device
+        self._inner = inner
+
+    @property
+    def device(self) -> Maker:
+        """The `Device` that made it."""
+        return self._device
+
+    def _summary(self) -> str:
+        """What `repr` says after the name of the class."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}{self._summary()}>"
+
+
+class Allocated(OnDevice[_InnerWithBytes]):
+    """An object whose memory on the device can be asked for."""
+
+    @property
+    def device_bytes(self) -> int:
+        """Bytes that it takes on the device."""
+        return self._inner.device_bytes()
+
+
+def check_owner(name: str, thing: OnDevice[Any], device: object) -> None:
+    """A `ValueError` if `thing` was made by another device."""
+    if thing.device is not device:
+        raise ValueError(
+            f"{name}: expected {type(thing).__name__} of this device, got one of another Device"
+        )

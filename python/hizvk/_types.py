@@ -1,0 +1,41 @@
+"""Type aliases that several modules share: the words that parameters take.
+
+They stand below every other module, so that an alias never makes two modules import one another.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, TypeAlias, get_args
+
+# These are unions of single words because stubtest, at run time, takes Literal["a", "b"] for
+# something else.
+
+#: What the numbers of a depth image are; see `Device.pyramid`.
+DepthKind: TypeAlias = Literal["ndc"] | Literal["reversed_ndc"] | Literal["z"] | Literal["distance"]
+#: What rounded depth before it arrived: nothing, a conversion to float32, or one to float16.
+Rounding: TypeAlias = Literal["none"] | Literal["single"] | Literal["half"]
+#: Where a camera matrix has the centre of the first pixel: (0, 0) or (0.5, 0.5).
+PixelCenter: TypeAlias = Literal["integer"] | Literal["half"]
+#: Whether the scalar part of a quaternion comes first or last.
+QuaternionOrder: TypeAlias = Literal["wxyz"] | Literal["xyzw"]
+#: How instances are stored on the device.
+StoredOrder: TypeAlias = Literal["morton"] | Literal["given"]
+#: Which faces of occluders are left out.
+FaceCull: TypeAlias = Literal["none"] | Literal["back"] | Literal["front"]
+#: Which levels of a pyramid are built; see `Device.pyramid`.
+Levels: TypeAlias = int | tuple[int, int] | None
+#: The order of the list of kept instances; see `CullOptions`.
+Order: TypeAlias = Literal["stable"] | Literal["any"]
+#: Which part of a pixel counts; see `CullOptions`.
+Coverage: TypeAlias = Literal["area"] | Literal["sample"]
+#: What stands for the bounds in a test; see `CullOptions`.
+Fit: TypeAlias = Literal["rectangle"] | Literal["volume"]
+#: What a cull can make; see `Outputs`.
+Output: TypeAlias = Literal["mask"] | Literal["verdicts"] | Literal["indices"] | Literal["draws"]
+#: Which depth of the bounds a pixel of the oracle is compared with.
+OwnDepth: TypeAlias = Literal["nearest"] | Literal["pixel"]
+
+
+def words(alias: Any) -> tuple[str, ...]:
+    """The words of one of the aliases above, in their order."""
+    return tuple(get_args(word)[0] for word in get_args(alias))

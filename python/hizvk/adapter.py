@@ -1,0 +1,38 @@
+"""The Vulkan adapters of this machine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from . import _core
+from ._processes import driver_is_asked
+
+__all__ = ["Adapter", "adapters"]
+
+
+@dataclass(frozen=True)
+class Adapter:
+    """A Vulkan adapter: a GPU, or a software driver."""
+
+    index: int
+    """Its place in the list of `adapters`."""
+    name: str
+    """The adapter's name."""
+    driver: str
+    """The driver's name."""
+    driver_info: str
+    """The driver's version."""
+    backend: str
+    """The graphics interface, ``"vulkan"``."""
+    device_type: str
+    """``"discrete_gpu"``, ``"integrated_gpu"``, ``"virtual_gpu"``, ``"cpu"`` or ``"other"``."""
+
+    def __str__(self) -> str:
+        driver = " ".join(part for part in (self.driver, self.driver_info) if part)
+        return f"{self.index}: {self.name} [{self.device_type}, {driver}]"
+
+
+def adapters() -> list[Adapter]:
+    """The Vulkan adapters of this machine; an empty list without a Vulkan driver."""
+    with driver_is_asked():
+        return [Adapter(*summary) for summary in _core.adapters()]

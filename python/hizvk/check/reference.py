@@ -1,0 +1,121 @@
+"""The oracle: what a cull may and may not hide, by brute force and without a GPU.
+
+It decides in float64 and exact arithmetic, and shares no code with the engine.
+It looks at every pixel that an instance can meet, so it is slow.
+Use it in tests, and for the last word about single instances.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from .. import _arguments, _core
+from .._types import Coverage, OwnDepth, words
+from ..bounds import Bounds, as_arrays
+from ..camera import Camera
+from ..depth import checked_image
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    import numpy.typing as npt
+
+    from .._types import DepthKind
+
+__all__ = ["HIDDEN", "INVALID", "UNDECIDED", "VISIBLE", "classify", "pyramid"]
+
+HIDDEN: Final = 1
+"""Surely hidden: outside the view, or every pixel that it can meet shows something nearer."""
+VISIBLE: Final = 2
+"""Surely visible: some pixel meets the bounds and shows nothing nearer."""
+INVALID: Final = 3
+"""The bounds are invalid; a cull has to keep them."""
+UNDECIDED: Final = 4
+"""Too close to call: it depends on which of the two float32 around a converted depth is taken."""
+
+
+def classify(
+    bounds: Bounds,
+    camera: Camera,
+    depth: npt.ArrayLike,
+    *,
+    kind: DepthKind,
+    scale: float = 1.0,
+    invalid: Collection[float] | None = None,
+    coverage: Coverage = "area",
+    own_depth: OwnDepth = "nearest",
+) -> npt.NDArray[np.uint8]:
+    """The truth about each instance.
+
+    Parameters
+    ----------
+    bounds : Spheres, Boxes or OrientedBoxes
+        The N volumes.
+    camera : Camera
+        The camera that saw `depth`.
+    depth : (height, width) array
+        The depth image, row 0 on top.
+    kind, scale, invalid
+        What its numbers are, as in `Device.pyramid`.
+        For ``"z"`` and ``"distance"`` the oracle finds the NDC depth by itself, exactly, between
+        two neighbouring float32.
+    coverage : "area" or "sample"
+        Which part of a pixel counts: its closed square, or its centre.
+    own_depth : "nearest" or "pixel"
+        When a pixel hides the bounds.
+        ``"nearest"``: if it is nearer than all of them; ``fit="rectangle"`` culls no more than
+        that.
+        ``"pixel"``: if it is nearer than the part of them that it can show; for ``fit="volume"``.
+
+    Returns
+    -------
+    (N,) uint8 array
+        `HIDDEN`, `VISIBLE`, `INVALID` or `UNDECIDED`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        They name the parameter, what it expects and what came.
+    """
+    bounds_kind, arrays = as_arrays("bounds", bounds)
+    _arguments.instance("camera", camera, Camera, "a Camera")
+    checked = checked_image("depth", depth, camera, kind, scale, invalid)
+    asked = (
+        _arguments.choice("coverage", coverage, words(Coverage)),
+        _arguments.choice("own_depth", own_depth, words(OwnDepth)),
+    )
+    # The image as given: the tolerance for half floats is not part of the truth.
+    image = (checked.image, checked.kind, checked.scale, checked.invalid)
+    return _core.reference_classify(bounds_kind, arrays, camera._inner, *image, *asked)
+
+
+def pyramid(depth: npt.ArrayLike, *, reversed_z: bool) -> list[npt.NDArray[np.float32]]:
+    """All levels of the depth pyramid of an NDC image, finest first.
+
+    Parameters
+    ----------
+    depth : (height, width) float array
+        NDC depth of at least one pixel. float64 is rounded to float32 first.
+    reversed_z : bool
+        True: 0 is far; False: 1 is far.
+
+    Returns
+    -------
+    list of (height, width) float32 arrays
+        Level ``k`` has ``ceil(side / 2^k)`` texels per side; the last is 1x1.
+
+    Raises
+    ------
+    TypeError, ValueError
+        They name the parameter, what it expects and what came.
+    """
+    image = _arguments.floats("depth", depth, ("height", "width"))
+    if image.size == 0:
+        raise ValueError(f"depth: expected at least one pixel, got {_arguments.describe(image)}")
+    reversed_z = _arguments.flag("reversed_z", reversed_z)
+    height, width = image.shape
+    flat = np.ascontiguousarray(image, dtype=np.float32).reshape(-1)
+    levels = _core.reference_pyramid(flat, width, height, reversed_z)
+    return [texels.reshape(size) for size, texels in levels]

@@ -1,0 +1,335 @@
+"""What a cull is asked: how it decides (`CullOptions`) and what it makes (`Outputs`).
+
+An option is a field here, with its default, its check and its paragraph of documentation.
+The keywords of `Device.cull` and `visible` are these fields, and the compiled module takes the two
+objects whole (``crates/hiz_py/src/options.rs``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, fields
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final, TypedDict, TypeVar
+
+import numpy as np
+
+from . import _arguments
+from ._types import Coverage, Fit, Order, Output, words
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+__all__ = [
+    "Coverage",
+    "CullKeywords",
+    "CullOptions",
+    "DrawTemplate",
+    "Fit",
+    "OptionKeywords",
+    "Order",
+    "Output",
+    "Outputs",
+]
+
+#: How many texels per side a test may read of one level.
+FOOTPRINTS: Final = (2, 4, 8)
+#: What a cull can make, by name.
+OUTPUTS: Final = words(Output)
+_LARGEST_U32: Final = 2**32 - 1
+
+_Given = TypeVar("_Given", "CullOptions", "Outputs")
+
+
+def _by(check: Callable[..., Any], **limits: Any) -> dict[str, Any]:
+    """The metadata of a field that `check` takes, with the field's name, when an object is made."""
+    return {"check": partial(check, **limits)}
+
+
+def _check_fields(made: Any) -> None:
+    """Puts every field of a new object through its check."""
+    for one in fields(made):
+        value = one.metadata["check"](one.name, getattr(made, one.name))
+        object.__setattr__(made, one.name, value)
+
+
+def _replaced(given: _Given, values: Mapping[str, Any]) -> _Given:
+    """`dataclasses.replace`, but only the new values are checked.
+
+    Each cull with keywords comes here, and a cull may take less than a millisecond.
+    """
+    made = object.__new__(type(given))
+    made.__dict__.update(given.__dict__)
+    for name, value in values.items():
+        made.__dict__[name] = given.__dataclass_fields__[name].metadata["check"](name, value)
+    return made
+
+
+def _guard(name: str, value: object) -> float | None:
+    if value is None:
+        return None
+    guard = _arguments.number(name, value, at_least=0.0, at_most=16.0)
+    if guard * 256.0 != round(guard * 256.0):
+        raise ValueError(f"{name}: expected a multiple of 1/256, got {guard}")
+    return guard
+
+
+def _footprint(name: str, value: object) -> int:
+    footprint = _arguments.integer(name, value, low=2, high=8)
+    if footprint not in FOOTPRINTS:
+        raise ValueError(f"{name}: expected one of 2, 4, 8, got {footprint}")
+    return footprint
+
+
+def _flag_or_none(name: str, value: object) -> bool | None:
+    if value is not None and not isinstance(value, (bool, np.bool_)):
+        got = _arguments.describe(value)
+        raise TypeError(f"{name}: expected True, False or None, got {got}")
+    return None if value is None else bool(value)
+
+
+def _capacity(name: str, value: object) -> int | None:
+    return None if value is None else _arguments.integer(name, value, low=0, high=_LARGEST_U32)
+
+
+def _draw(name: str, value: object) -> DrawTemplate | None:
+    if value is None:
+        return None
+    return _arguments.instance(name, value, DrawTemplate, "a DrawTemplate or None")
+
+
+@dataclass(frozen=True)
+class DrawTemplate:
+    """The numbers of a draw of the kept instances that a cull does not find out.
+
+    Parameters
+    ----------
+    index_count : int
+        Indices of the mesh.
+    first_index : int
+        Where they start in the index buffer.
+    base_vertex : int
+        Added to each index; may be negative.
+    first_instance : int
+        The first instance id of the draw.
+
+    Raises
+    ------
+    TypeError, ValueError
+        They name the parameter, what it expects and what came.
+    """
+
+    index_count: int = field(metadata=_by(_arguments.integer, low=0, high=_LARGEST_U32))
+    first_index: int = field(default=0, metadata=_by(_arguments.integer, low=0, high=_LARGEST_U32))
+    base_vertex: int = field(
+        default=0, metadata=_by(_arguments.integer, low=-(2**31), high=2**31 - 1)
+    )
+    first_instance: int = field(
+        default=0, metadata=_by(_arguments.integer, low=0, high=_LARGEST_U32)
+    )
+
+    def __post_init__(self) -> None:
+        _check_fields(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CullOptions:
+    """How a cull decides.
+
+    Every combination keeps what could be seen in the depth image.
+    The options trade time for how much that is hidden is kept, and say how exact the depth is.
+
+    Parameters
+    ----------
+    order : "stable" or "any"
+        The order of the list of kept instances.
+        ``"stable"``: ascending.
+        ``"any"``: as the device finishes, which is faster.
+    coverage : "area" or "sample"
+        ``"area"``: visible is what meets any part of a pixel.
+        ``"sample"``: visible is what covers the centre of a pixel.
+        The latter is right for an image with one sample per pixel, the same viewport and no jitter.
+
+        A plain depth image speaks for the centres of its pixels in either case.
+        Multisampling and jitter need ``"area"`` and conservative depth (`Device.render_depth`).
+    guard_px : float, optional
+        Pixels by which bounds grow in the image: a multiple of 1/256, at most 16.
+        None: 0 for ``coverage="area"``, 1/64 for ``coverage="sample"``.
+    depth_slack : float
+        Relative error of the depth image, 0 to 0.5.
+        The default, 2^-23, is one ulp: it covers depth that was rounded to float32.
+    depth_slack_abs : float
+        Absolute error of the depth image in NDC depth, 0 to 0.5, in addition to `depth_slack`.
+        An orthographic camera needs it, because a rasteriser errs there by the same amount near and
+        far.
+        Any value above 0 counts 2^-23 more.
+    transform_slack : float
+        For depth images of a renderer that transforms in float32: how many ulps its matrix product
+        may have cost, 0 to 1e6; about 4 for such a renderer.
+    footprint : 2, 4 or 8
+        How many texels per side a test may read of one level.
+        More texels mean a finer level, so less is kept and more is read.
+    descent : int
+        How many texels of finer levels a test may read where the footprint cannot decide, 0 to
+        65536.
+        0 means none.
+        With enough of them the answer is that of a test at full resolution.
+    fit : "rectangle" or "volume"
+        What stands for the bounds.
+        ``"rectangle"``: the rectangle around their projection, at their nearest depth.
+        ``"volume"``: where the rectangle cannot decide, the outline of the bounds, and in each
+        texel their own depth there.
+
+        The latter keeps less and computes more; with a descent it goes down to single pixels.
+    hierarchy : bool, optional
+        Whether groups of 64 neighbouring instances are tested first.
+        Only instances of the groups that remain are then tested one by one.
+        None: where there are enough instances for it to pay.
+
+        What is kept differs by next to nothing, because the test of a group may read other texels.
+        `CullResult.stats` says how many tests were spent.
+    statistics : bool
+        Whether to count the tests on each level and the texels that they read; this is slower.
+
+    Raises
+    ------
+    TypeError, ValueError
+        They name the parameter, what it expects and what came.
+
+    Examples
+    --------
+    >>> import hizvk
+    >>> exact = hizvk.CullOptions(footprint=4, descent=4096, fit="volume")
+    >>> exact.footprint, exact.coverage
+    (4, 'area')
+    """
+
+    order: Order = field(default="stable", metadata=_by(_arguments.choice, choices=words(Order)))
+    coverage: Coverage = field(
+        default="area", metadata=_by(_arguments.choice, choices=words(Coverage))
+    )
+    guard_px: float | None = field(default=None, metadata=_by(_guard))
+    depth_slack: float = field(
+        default=2.0**-23, metadata=_by(_arguments.number, at_least=0.0, at_most=0.5)
+    )
+    depth_slack_abs: float = field(
+        default=0.0, metadata=_by(_arguments.number, at_least=0.0, at_most=0.5)
+    )
+    transform_slack: float = field(
+        default=0.0, metadata=_by(_arguments.number, at_least=0.0, at_most=1e6)
+    )
+    footprint: int = field(default=2, metadata=_by(_footprint))
+    descent: int = field(default=0, metadata=_by(_arguments.integer, low=0, high=65536))
+    fit: Fit = field(default="rectangle", metadata=_by(_arguments.choice, choices=words(Fit)))
+    hierarchy: bool | None = field(default=None, metadata=_by(_flag_or_none))
+    statistics: bool = field(default=False, metadata=_by(_arguments.flag))
+
+    def __post_init__(self) -> None:
+        _check_fields(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outputs:
+    """What a cull makes.
+
+    What is not asked for is neither computed nor stored.
+    A `CullResult` that is asked for it later raises a `ValueError`, except for `indices` and
+    `draws`: these can be made from a mask.
+
+    Parameters
+    ----------
+    mask : bool
+        A bit for each instance: kept or not.
+    verdicts : bool
+        The `Verdict` of each instance, and the counts of `CullResult.stats`.
+    indices : bool, optional
+        The list of the kept instances.
+        None: with ``order="any"`` during the cull; otherwise when the list is first read.
+    draws : bool, optional
+        The indirect draw arguments.
+        None: as for `indices`.
+    capacity : int, optional
+        The most instances in the list, 0 to 2^32 - 1; None leaves room for all.
+        Too small a capacity shows as ``count < demand``; mask and verdicts stay complete.
+    draw : DrawTemplate, optional
+        The other numbers of the draw arguments; None leaves them 0.
+
+    Raises
+    ------
+    TypeError, ValueError
+        They name the parameter, what it expects and what came.
+
+    Examples
+    --------
+    >>> import hizvk
+    >>> hizvk.Outputs(verdicts=False, capacity=1000, draw=hizvk.DrawTemplate(36)).capacity
+    1000
+    """
+
+    mask: bool = field(default=True, metadata=_by(_arguments.flag))
+    verdicts: bool = field(default=True, metadata=_by(_arguments.flag))
+    indices: bool | None = field(default=None, metadata=_by(_flag_or_none))
+    draws: bool | None = field(default=None, metadata=_by(_flag_or_none))
+    capacity: int | None = field(default=None, metadata=_by(_capacity))
+    draw: DrawTemplate | None = field(default=None, metadata=_by(_draw))
+
+    def __post_init__(self) -> None:
+        _check_fields(self)
+
+
+def _outputs_of(names: object) -> Outputs:
+    """The outputs of these names, and no others."""
+    if isinstance(names, str) or not isinstance(names, Collection):
+        expected = f"None or a collection of {', '.join(map(repr, OUTPUTS))}, or an Outputs"
+        raise TypeError(f"outputs: expected {expected}, got {_arguments.describe(names)}")
+    asked = {_arguments.choice("outputs", name, OUTPUTS) for name in names}
+    return _replaced(_OUTPUTS, {name: name in asked for name in OUTPUTS})
+
+
+class OptionKeywords(TypedDict, total=False):
+    """The fields of `CullOptions` as keywords, for type checkers."""
+
+    order: Order
+    coverage: Coverage
+    guard_px: float | None
+    depth_slack: float
+    depth_slack_abs: float
+    transform_slack: float
+    footprint: int
+    descent: int
+    fit: Fit
+    hierarchy: bool | None
+    statistics: bool
+
+
+class CullKeywords(OptionKeywords, total=False):
+    """The keywords of `Device.cull`: those of `CullOptions`, and these two of `Outputs`."""
+
+    capacity: int | None
+    draw: DrawTemplate | None
+
+
+_OPTIONS: Final = CullOptions()
+_OUTPUTS: Final = Outputs()
+
+
+def cull_options(options: object, keywords: Mapping[str, Any]) -> CullOptions:
+    """The options (None: the defaults), with `keywords` in the place of their fields."""
+    chosen = _OPTIONS
+    if options is not None:
+        chosen = _arguments.instance("options", options, CullOptions, "a CullOptions or None")
+    _arguments.refuse_unknown(keywords, OptionKeywords.__annotations__)
+    return _replaced(chosen, keywords) if keywords else chosen
+
+
+def cull_request(
+    options: object, outputs: object, keywords: Mapping[str, Any]
+) -> tuple[CullOptions, Outputs]:
+    """Both objects of a cull, from what `Device.cull` was given."""
+    _arguments.refuse_unknown(keywords, CullKeywords.__annotations__)
+    of_outputs = {name: keywords[name] for name in ("capacity", "draw") if name in keywords}
+    of_options = {name: keywords[name] for name in keywords if name not in of_outputs}
+    if outputs is None:
+        outputs = _OUTPUTS
+    made = outputs if isinstance(outputs, Outputs) else _outputs_of(outputs)
+    return cull_options(options, of_options), _replaced(made, of_outputs) if of_outputs else made

@@ -1,0 +1,63 @@
+"""The numbers of a cull."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["CullStats"]
+
+
+@dataclass(frozen=True)
+class CullStats:
+    """The numbers of one cull.
+
+    ``tested = outside + occluded + kept``, and `invalid` of the kept ones have invalid bounds.
+    These are the counts of `CullResult.verdicts`.
+    The four times are wall-clock times.
+    """
+
+    tested: int
+    """Instances."""
+    outside: int
+    """Culled: `Verdict.OUTSIDE`."""
+    occluded: int
+    """Culled: `Verdict.OCCLUDED`."""
+    kept: int
+    """Not culled, `invalid` ones included, and those for which `capacity` left no place."""
+    invalid: int
+    """Kept because their bounds are invalid."""
+    tested_groups: int
+    """Groups of 64 that were tested as a whole."""
+    tested_instances: int
+    """Instances that were tested by themselves: all, or those of the groups that remained."""
+    levels: tuple[int, ...] | None
+    """How many groups and instances were compared with the pyramid on each level; None without
+    ``statistics=True``."""
+    texels_read: int | None
+    """Texels of the pyramid that were read for it; None without ``statistics=True``."""
+    record_ms: float
+    """Milliseconds to make buffers and record the commands."""
+    compile_ms: float
+    """Milliseconds to make pipelines that did not exist yet, compiling by the driver included; 0
+    for a cull like an earlier one."""
+    wall_ms: float
+    """Milliseconds from the submission until the device was seen to be done.
+
+    Work that was submitted before and was not done yet counts, because it comes first.
+    The device is asked by each read, wait and submission.
+    So time that passes before the first of these counts, too."""
+    readback_ms: float
+    """Milliseconds spent so far on copying results to the host."""
+
+    @property
+    def comparisons(self) -> int:
+        """Tests of groups and of instances together; a cull without groups spends `tested`."""
+        return self.tested_groups + self.tested_instances
+
+    def __str__(self) -> str:
+        culled = self.outside + self.occluded
+        return (
+            f"{self.tested:,} tested: {self.kept:,} kept ({self.invalid:,} invalid), "
+            f"{culled:,} culled ({self.outside:,} outside, {self.occluded:,} occluded); "
+            f"{self.wall_ms:.2f} ms until the device was done"
+        )
