@@ -265,8 +265,11 @@ impl Groups {
         let count = self.count;
         // Packs `places`, which begin at position `begin` of the list, into `groups`, the first of
         // which is `first_group`.
-        let work = |(begin, places, first_group, groups): (usize, &[u32], usize, &mut [Group])| -> Result<()> {
-            let mut view = records.range(begin as u64 * record_bytes..(begin + places.len()) as u64 * record_bytes)?;
+        let work = |half: (usize, &[u32], usize, &mut [Group])| -> Result<()> {
+            let (begin, places, first_group, groups) = half;
+            let end = begin + places.len();
+            let bytes = begin as u64 * record_bytes..end as u64 * record_bytes;
+            let mut view = records.range(bytes)?;
             let mut rest = view.slice(..);
             let mut batch = Batch::new();
             for places in places.chunk_by(|a, b| group_of(*a) == group_of(*b)) {
@@ -281,7 +284,8 @@ impl Groups {
                         None => invalid |= 1 << k,
                     }
                 });
-                groups[group - first_group].replace(all_members(count, group), members, invalid, &boxes)?;
+                let all = all_members(count, group);
+                groups[group - first_group].replace(all, members, invalid, &boxes)?;
             }
             Ok(())
         };
