@@ -4,15 +4,12 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use crate::cull::count::record_count;
-use crate::cull::explain::{ExplanationRecord, Reading, TEXELS_TOLD, record_explain};
-use crate::cull::groups::{group_options, is_grouped};
-use crate::cull::inputs::CullInputs;
+use crate::cull::groups::is_grouped;
 use crate::cull::options::CullOptions;
 use crate::error::{Error, Result};
 use crate::gpu::buffers::STORAGE;
 use crate::headless::counts::{Counts, Timings, milliseconds};
 use crate::headless::engine::Engine;
-use crate::headless::explanation::{Explanation, Told};
 use crate::headless::readback::{self, BufferRange, Staged, to_u32};
 use crate::host::memory;
 use crate::host::threads::Locked;
@@ -145,7 +142,7 @@ impl Culling {
         Ok(bytes)
     }
 
-    fn read(&self, ranges: &[BufferRange<'_>]) -> Result<Vec<Vec<u8>>> {
+    pub(super) fn read(&self, ranges: &[BufferRange<'_>]) -> Result<Vec<Vec<u8>>> {
         self.wait()?;
         let start = Instant::now();
         let bytes = self
@@ -415,7 +412,11 @@ impl Culling {
     }
 
     /// What this cull left of a piece's groups, if it tested them.
-    fn groups<'a>(&self, piece: &Piece, output: &'a PieceOutput) -> Option<&'a GroupOutput> {
+    pub(super) fn groups<'a>(
+        &self,
+        piece: &Piece,
+        output: &'a PieceOutput,
+    ) -> Option<&'a GroupOutput> {
         output.groups().filter(|_| is_grouped(piece, &self.options))
     }
 
@@ -430,103 +431,10 @@ impl Culling {
             .map(|(piece, output)| of(piece, output))
             .collect()
     }
-
-    /// Why instance `index` got its verdict: the cull's own steps, run for it once more.
-    ///
-    /// The test reads the bounds as they are now.
-    /// If the instance was updated since the cull, the explanation is
-    /// [`stale`](Explanation::stale).
-    ///
-    /// # Errors
-    /// - [`Error::Invalid`](crate::Error::Invalid) for an index past the end.
-    /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
-    pub fn explain(&self, index: u64) -> Result<Explanation> {
-        let index = u32::try_from(index).unwrap_or(u32::MAX);
-        let mut told = self.test(index, false)?;
-        told.stale = self.watch.is_updated(&(index..index.saturating_add(1)));
-        if told.stale {
-            told.reason =
-                format!("updated since the cull, so this is of its new bounds: {}", told.reason);
-            return Ok(told);
-        }
-        let Some((of_group, is_updated)) = self.hidden_group(index)? else { return Ok(told) };
-        let mut group = self.test(index, true)?;
-        group.stale = is_updated;
-        if told.verdict != Verdict::Outside {
-            told.verdict = of_group;
-        }
-        told.reason = format!(
-            "its group of 64 is hidden as a whole ({}); by itself: {}",
-            group.reason, told.reason
-        );
-        told.group = Some(Box::new(group));
-        Ok(told)
-    }
-
-    /// Repeats the test of an instance, or of the box around its group.
-    fn test(&self, index: u32, whole_group: bool) -> Result<Explanation> {
-        let engine = &self.engine;
-        let bytes = engine.scoped(|| {
-            let gpu = &engine.context().gpu;
-            let target =
-                gpu.empty("hiz.explain.target", size_of::<ExplanationRecord>() as u64, STORAGE)?;
-            let readings = gpu.empty(
-                "hiz.explain.readings",
-                (TEXELS_TOLD * size_of::<Reading>()) as u64,
-                STORAGE,
-            )?;
-            let mut encoder = engine.encoder("hiz.explain.encoder");
-            let inputs = CullInputs {
-                instances: &self.instances,
-                camera: &self.camera,
-                pyramid: &self.pyramid,
-                options: &self.options,
-                idle: false,
-            };
-            record_explain(gpu, &mut encoder, &inputs, (index, whole_group), [&target, &readings])?;
-            engine.queue().submit([encoder.finish()]);
-            let ranges =
-                [&target, &readings].map(|buffer| BufferRange::first(buffer, buffer.size()));
-            readback::read_buffers(engine.device(), engine.queue(), &ranges)
-        })?;
-        let record: ExplanationRecord = bytemuck::pod_read_unaligned(&bytes[0]);
-        let readings: Vec<Reading> = bytemuck::pod_collect_to_vec(&bytes[1]);
-        let readings = &readings[..readings.len().min(record.texels_read as usize)];
-        let of_group = group_options(&self.options);
-        let options = if whole_group { &of_group } else { &self.options };
-        Ok(Told { record, readings, camera: &self.camera, options }.explanation())
-    }
-
-    /// If this cull hid the group of an instance: the group's verdict, and whether any member was
-    /// updated since.
-    fn hidden_group(&self, index: u32) -> Result<Option<(Verdict, bool)>> {
-        let pieces = self.instances.pieces.iter().zip(&self.visible.pieces);
-        let Some((piece, output)) =
-            pieces.into_iter().find(|(piece, _)| piece.range.contains(&index))
-        else {
-            return Ok(None);
-        };
-        let Some(groups) = self.groups(piece, output) else { return Ok(None) };
-        let group = piece.order.place((index - piece.range.start) as usize) / GROUP;
-        let word = self.read(&[BufferRange {
-            buffer: &groups.verdicts,
-            offset: 4 * group as u64,
-            size: 4,
-        }])?;
-        let Some(word) = word[0].first().copied().filter(|word| is_hidden(*word)) else {
-            return Ok(None);
-        };
-        let members = group * GROUP..((group + 1) * GROUP).min(piece.count() as usize);
-        let is_updated = |place| {
-            let index = piece.range.start + piece.order.index(place) as u32;
-            self.watch.is_updated(&(index..index + 1))
-        };
-        Ok(Some((Verdict::of_word(word.into()), members.into_iter().any(is_updated))))
-    }
 }
 
 /// Whether the word of a group says that it was hidden as a whole.
-fn is_hidden(word: u8) -> bool {
+pub(super) fn is_hidden(word: u8) -> bool {
     !Verdict::of_word(word.into()).is_kept()
 }
 

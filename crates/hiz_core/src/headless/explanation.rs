@@ -3,7 +3,7 @@
 use crate::cull::explain::{BEHIND, CLEAR, ExplanationRecord, LEVEL_MASK, Reading, Stage};
 use crate::cull::options::{CullOptions, Fit};
 use crate::input::camera::Camera;
-use crate::input::depth::ViewDepth;
+use crate::input::view_depth::ViewDepth;
 use crate::output::verdict::Verdict;
 
 /// Why an instance got its verdict: the cull's own steps, run for it once more.

@@ -48,6 +48,7 @@ mod cull;
 mod culling;
 mod depth_image;
 pub(crate) mod engine;
+mod explain;
 mod explanation;
 mod levels;
 mod process;

@@ -7,8 +7,12 @@
 pub(crate) mod bounds;
 pub(crate) mod camera;
 pub(crate) mod depth;
+pub(crate) mod depth_kind;
 pub(crate) mod image;
+mod lens;
 pub(crate) mod mesh;
 pub(crate) mod projection;
 pub(crate) mod tolerance;
 pub(crate) mod view;
+#[cfg(feature = "headless")]
+pub(crate) mod view_depth;

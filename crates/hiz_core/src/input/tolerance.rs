@@ -105,7 +105,8 @@ mod tests {
     use super::*;
     use crate::input::bounds::Floats;
     use crate::input::camera::Camera;
-    use crate::input::depth::{DepthKind, ndc_from_kind_within};
+    use crate::input::depth::ndc_from_kind_within;
+    use crate::input::depth_kind::DepthKind;
     use crate::input::image::{DepthConvention, ImageSize};
     use crate::input::projection::{Pose, Projection};
 
