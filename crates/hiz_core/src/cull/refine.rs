@@ -23,7 +23,7 @@ use crate::output::visible::Visible;
 use crate::pyramid::Pyramid;
 
 /// Groups that one workgroup tells; `shaders/cull/refine.wgsl`.
-const WORKGROUP: u32 = 64;
+pub(crate) const WORKGROUP: u32 = 64;
 
 /// The verdicts of the members of groups that were hidden as a whole.
 pub(crate) fn refine_module(kind: BoundsKind) -> Source {

@@ -25,7 +25,7 @@ use crate::instances::{Instances, refuse_bad};
 
 /// Invocations of one workgroup; `shaders/instances/update.wgsl`.
 /// As many as those of the cull, whose pieces fit one dispatch.
-const WORKGROUP: u32 = CULL_WORKGROUP;
+pub(crate) const WORKGROUP: u32 = CULL_WORKGROUP;
 
 /// `shaders/instances/update.wgsl`, `Update`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]

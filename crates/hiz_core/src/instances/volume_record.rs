@@ -100,12 +100,12 @@ fn write<R: Record>(out: &mut [u8], index: u32, record: R) -> bool {
 
 /// Sizes and coordinates from here on are no volume: with those below, no product of the shader
 /// overflows.
-const LARGEST: f32 = 1_152_921_504_606_846_976.0;
+pub(crate) const LARGEST: f32 = 1_152_921_504_606_846_976.0;
 
 /// What bad bounds become: beyond every camera's coordinate limit, so that the shader keeps the
 /// instance and says that it is invalid.
 /// It need not know NaN or infinity, which a compiler may take for absent.
-const BEYOND_LIMITS: f32 = 4.0 * LARGEST;
+pub(crate) const BEYOND_LIMITS: f32 = 4.0 * LARGEST;
 
 trait Record: bytemuck::Pod {
     /// What stands for bad bounds.

@@ -11,7 +11,7 @@ use crate::output::lists::Lists;
 use crate::output::visible::Visible;
 
 /// Words that one workgroup of `scatter` turns into indices; `shaders/output/compact.wgsl`.
-const SCATTER_WORKGROUP: u32 = 64;
+pub(crate) const SCATTER_WORKGROUP: u32 = 64;
 
 const LAYOUT: &str = "hiz.compact.layout";
 

@@ -52,7 +52,7 @@ impl AtlasLayout {
 pub(crate) const PYRAMID_CHUNKS: usize = 3;
 
 /// Blocks of a row come in multiples of this many, so that the reduction stores and loads vectors.
-const BLOCK_ALIGNMENT: u32 = 4;
+pub(crate) const BLOCK_ALIGNMENT: u32 = 4;
 
 /// Rows of every level start at multiples of this many texels, as copies into a texture ask for.
 const ROW_ALIGNMENT: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT / 4;
@@ -65,7 +65,7 @@ const HEADER_TEXELS: u64 = 4;
 
 /// Pixels or texels that an invocation of the reduction reads along a side, as a power of two: it
 /// makes up to three levels.
-const BLOCK_LOG2: u32 = 3;
+pub(crate) const BLOCK_LOG2: u32 = 3;
 
 /// One dispatch of the reduction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -92,13 +92,13 @@ fn pipeline(
 
 /// Invocations of a workgroup of the reduction, all in a row; `shaders/pyramid/pyramid_write.wgsl`,
 /// `place_of`.
-const REDUCE_WORKGROUP: u32 = 64;
+pub(crate) const REDUCE_WORKGROUP: u32 = 64;
 /// Or the side of a square of them, `TALL`.
-const TALL_SIDE: u32 = 8;
+pub(crate) const TALL_SIDE: u32 = 8;
 /// Pixels of 4 KiB.
 const PAGE_PIXELS: u32 = 1024;
 /// From this level on a workgroup shares one texel, if it is made alone: 8x8 pixels an invocation.
-const SHARED_LEVEL: u32 = 6;
+pub(crate) const SHARED_LEVEL: u32 = 6;
 
 /// `shaders/pyramid/reduce.wgsl`, `Step`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]

@@ -2,7 +2,7 @@
 //! For benchmarks and their tests alone.
 
 mod cull;
-mod reduce;
+pub(crate) mod reduce;
 
 use std::time::Instant;
 
