@@ -1,5 +1,5 @@
-//! Tables of docs/accuracy_log.md that are counts: the tests that print them hold them against the
-//! page.
+//! Tables of `docs/accuracy_log.md` that are counts: the tests that print them hold them against
+//! the page.
 
 /// Nothing is compared on another driver than the one that the page names: its guesses are others,
 /// and a few counts with them.
