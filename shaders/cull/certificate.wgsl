@@ -16,7 +16,7 @@ const ERROR_FLOOR: f32 = 0x1p-70;
 struct Value {
     // The value at the volume's centre.
     center: f32,
-    // The most that a certificate loses of it.
+    // The most that it can be off by, with the roundings of a certificate.
     error: f32,
     // The change along each half axis; for a sphere, the linear coefficients times the radius.
     half: vec3<f32>,

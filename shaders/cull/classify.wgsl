@@ -25,7 +25,8 @@ const WIDENING_ULPS: f32 = 4.0;
 // The extent is relative to the image's middle.
 //
 // Without the widening a volume that ends exactly on a pixel border would be tested without the
-// pixel beyond, and its certificate would fail.
+// pixel beyond.
+// Its certificate would fail then, and it would be kept.
 fn pixel_interval(extent: Extent, per_w: f32, half_size: f32, size: i32) -> vec2<i32> {
     let rounding = WIDENING_ULPS * EPS * half_size + view.reach;
     let low = extent.low - (extent.below * per_w + rounding) + half_size;

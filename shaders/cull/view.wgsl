@@ -3,8 +3,9 @@
 
 struct View {
     // The rows: linear functions m . (d, 1) of the position d relative to the reference point.
-    // In this order they are w times the pixel column right of the image's middle, w times the
-    // pixel row below it, w times (depth - z_slope), and w itself.
+    // x: w times the pixel column, counted from the image's middle to the right.
+    // y: w times the pixel row, counted from the image's middle downwards.
+    // z: w times (depth - z_slope).
     x: vec4<f32>,
     y: vec4<f32>,
     z: vec4<f32>,

@@ -5,8 +5,9 @@
 const GROUP: u32 = 64u;
 // How many members of a group one invocation tests, one after the other.
 // So this is also the number of groups that one workgroup takes.
-// Tuning for software drivers: they fetch uniforms anew for every eight invocations and never skip
-// a branch; with a run they do so once per run (docs/performance.md).
+// Tuning for software drivers, which fetch uniforms anew for every eight invocations and never skip
+// a branch.
+// With a run they do so once per run (docs/performance.md).
 // Twin: `GROUPS_OF_RUN` in `crates/hiz_core/src/cull/groups.rs`.
 const RUN: u32 = 8u;
 // Invocations that share a group.

@@ -31,12 +31,12 @@ fn stored_level(level: u32) -> u32 {
     return select(clamp(level, first_stored, last_stored), 0u, level == 0u);
 }
 
-// How many numbers lie between a level above 0 and the next finer one that is there.
+// How many levels it is from a level above 0 down to the next finer one that is there.
 fn levels_down(level: u32) -> u32 {
     return select(1u, level, level <= first_stored);
 }
 
-// How many numbers lie between a level and the next coarser one that is there.
+// The same up to the next coarser one.
 fn levels_up(level: u32) -> u32 {
     return select(1u, first_stored, level == 0u);
 }

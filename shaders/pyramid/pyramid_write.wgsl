@@ -35,8 +35,9 @@ const SIDE_MASK: u32 = SIDE - 1u;
 // Which block an invocation reads: one of a row of blocks or, with TALL, of a square.
 //
 // Tuning for software drivers, which read for eight invocations at once.
-// Eight blocks below each other are read along their rows in small steps, which the processor's
-// prefetcher foresees; eight blocks in a row are read in large steps (docs/performance.md).
+// Eight blocks below each other are read along their rows in small steps, which the processor
+// foresees.
+// Eight blocks in a row are read in large steps (docs/performance.md).
 fn place_of(workgroup: vec2<u32>, lane: u32) -> vec2<u32> {
     if TALL {
         return SIDE * workgroup + place_in_square(lane);

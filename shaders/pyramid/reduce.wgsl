@@ -5,7 +5,8 @@
 //
 // Sizes are halved and rounded up, and reads past an edge repeat the edge.
 // So a texel of level k is the farthest depth of exactly the pixels [x << k, (x + 1) << k).
-// Nothing is dropped at odd sizes, which is the defect of the shader printed in Rakos 2010.
+// At odd sizes nothing is dropped, and no repeated read matters.
+// The shader printed in Rakos 2010 has that defect.
 //
 // Levels are stored with room for whole blocks (`crates/hiz_core/src/pyramid/layout.rs`).
 // So no store has to ask where the level ends: what repeats the edge goes into the padding.
