@@ -1,6 +1,6 @@
 # Every recipe is one script in scripts/, which says what it does and why.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-swiftshader soak lint bench bench-speed docs wheel
+.PHONY: help setup demo test test-swiftshader soak lint bench bench-speed docs wheel package
 
 help: ## This list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | \
@@ -35,3 +35,6 @@ docs: ## The HTML documentation, in docs/_build/html
 
 wheel: ## sdist and manylinux wheel in dist/, tried in an empty virtual environment
 	@scripts/wheel.sh
+
+package: ## The crates' packages and the sdist, each unpacked and compiled in an empty folder
+	@scripts/package.sh

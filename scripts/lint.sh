@@ -9,6 +9,18 @@ python_files=(python tools tests scripts docs examples)
 
 check "cargo fmt" cargo fmt --all -- --check -l
 check "clippy" cargo clippy --workspace --all-targets "${LOCKED[@]}" -- -D warnings
+# The features of a renderer and those of a user without tools: neither has testing or yardstick.
+embedded=(--no-default-features --features vulkan)
+check "clippy, a renderer's features" \
+  cargo clippy -p hiz_core --lib "${embedded[@]}" "${LOCKED[@]}" -- -D warnings
+check "clippy, default features" cargo clippy -p hiz_core --lib "${LOCKED[@]}" -- -D warnings
+# What waits for a device stays out of a renderer's build.
+embedded_tree() {
+  local tree
+  tree=$(cargo tree -p hiz_core "${embedded[@]}" -e normal --prefix none "${LOCKED[@]}") || return
+  ! grep '^pollster ' <<<"$tree"
+}
+check "a renderer's dependencies" embedded_tree
 # Without this, links in documentation break silently.
 rust_links() { RUSTDOCFLAGS="-D warnings" cargo doc --workspace "${LOCKED[@]}" --no-deps; }
 check "rustdoc links" rust_links

@@ -39,5 +39,6 @@ if [ "$driver" = swiftshader ] && [ -n "$(lavapipe_icd)" ]; then
 fi
 check "Python tests" "$VENV_PYTHON" -m pytest -m "not slow"
 check "processes that end" "$VENV_PYTHON" scripts/exits.py --rust 60 --python 15
+check "packages" scripts/package.sh
 printf -- '-- all tests on %s: %d s\n' "$driver" $((SECONDS - started))
 checked

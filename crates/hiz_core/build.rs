@@ -1,7 +1,8 @@
 //! Says where the shaders lie, and lists them.
 //!
-//! In the repository they stand at its top level; a package carries them beside `src/`
-//! (`scripts/package.sh` puts them there), since a package holds no file from above its manifest.
+//! In the repository they are at its top level.
+//! A package holds no file from above its manifest, so it carries them beside `src/`;
+//! `scripts/package.sh` puts them there.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};

@@ -1,26 +1,34 @@
-// The cull of one instance.
-// A verdict that hides it rests on certificates alone; the rectangle, the level, divisions and
-// conversions only choose what is tested, and where they go wrong a certificate fails and the
-// instance is kept.
+// The test of one instance, in six steps.
+//
+// A verdict that hides an instance rests on certificates alone.
+// The rectangle, the level, divisions and conversions only choose what is tested.
+// Where they are wrong, a certificate fails and the instance is kept.
 
-// Pixel centres alone count; otherwise whole pixel squares.
+// True: only pixel centres count; otherwise whole pixel squares.
 override SAMPLE_COVERAGE: bool;
-// Descend to finer levels where the footprint cannot decide.
+// True: descend to finer levels where the footprint cannot decide.
 override DESCENT: bool;
-// Compare each texel with the volume's own outline and front there, not with its rectangle at one
-// nearest depth.
+// True: compare each texel with the volume's own outline and front there.
+// Otherwise a texel is compared with the volume's rectangle at the volume's nearest depth.
 override FIT_VOLUME: bool;
 
-// Below, a ratio could overflow; the margins alone reach 2^-70.
+// Below this w a ratio could overflow, as rows stay below 2^59.
+// The margins alone reach 2^-70, so this keeps next to nothing visible.
 const LEAST_W: f32 = 0x1p-66;
 
-// The first and last pixel that an extent (relative to the image's middle) may touch; first > last:
-// none.
-// It is widened by what its certificate will ask for, and a little more; and by what adding half an
-// image rounds away (without it a volume that ends exactly on a pixel border would be tested
-// without the pixel beyond, and kept for that).
+// The rectangle is widened by what its certificate will ask for, and by a quarter of it more.
+const RECTANGLE_MARGIN: f32 = 1.25;
+// And by this many EPS of half an image, more than adding half an image rounds away.
+const WIDENING_ULPS: f32 = 4.0;
+
+// The first and last pixel that an extent may touch; if first > last there is none.
+// The extent is relative to the image's middle.
+//
+// Without the widening a volume that ends exactly on a pixel border would be tested without the
+// pixel beyond.
+// Its certificate would fail then, and it would be kept.
 fn pixel_interval(extent: Extent, per_w: f32, half_size: f32, size: i32) -> vec2<i32> {
-    let rounding = 4.0 * EPS * half_size + view.reach;
+    let rounding = WIDENING_ULPS * EPS * half_size + view.reach;
     let low = extent.low - (extent.below * per_w + rounding) + half_size;
     let high = extent.high + (extent.above * per_w + rounding) + half_size;
     let edge = f32(size);
@@ -28,16 +36,17 @@ fn pixel_interval(extent: Extent, per_w: f32, half_size: f32, size: i32) -> vec2
     return vec2<i32>(vec2<f32>(clamp(floor(low), 0.0, edge), clamp(floor(high), -1.0, edge - 1.0)));
 }
 
-// Sample coverage: the volume lies between the centres of pixels first - 1 and first.
+// Sample coverage: the volume lies between the centres of the pixels first - 1 and first.
 fn between_samples(r: Value, w: Value, first: i32, half_size: f32) -> bool {
     let left = f32(first) - half_size;
     return surely_above(r, left + view.reach, w) && surely_below(r, left - view.reach, w);
 }
 
-// The block of texels lo..hi of a level spans every pixel that the volume can touch, inside the
-// image.
+// The block of texels lo..=hi of a level spans every pixel that the volume can touch inside the
+// image, along one axis.
 fn inside_block(
-    r: Value, w: Value, extent: Extent, w_min: f32, lo: u32, hi: u32, level: u32, half_size: f32, size: i32,
+    r: Value, w: Value, extent: Extent, w_min: f32,
+    lo: u32, hi: u32, level: u32, half_size: f32, size: i32,
 ) -> bool {
     let begin = i32(lo << level);
     let end = i32((hi + 1u) << level);
@@ -60,13 +69,15 @@ fn surely_behind(bits: u32, z: Value, w: Value) -> bool {
     return can_occlude(d) && surely_above(z, t, w);
 }
 
-// Whether no pixel of the rectangle first..last shows anything of the volume: a walk down the
-// pyramid, from the footprint t of the level `top`, that enters only the texels that cannot tell,
-// and of them only what the rectangle touches.
-// (Greene, Kass and Miller, "Hierarchical Z-Buffer Visibility", SIGGRAPH 1993, descend so.)
-// False where a pixel may show some of it, or the budget ends.
+// True implies: no pixel of the rectangle first..=last shows anything of the volume.
+// False: a pixel may show some of it, or the budget has ended.
+//
+// The walk down the pyramid begins at the footprint t of the level `top`.
+// It enters only the texels that cannot decide, and of them only what the rectangle touches.
+// Source: Greene, Kass and Miller, "Hierarchical Z-Buffer Visibility", SIGGRAPH 1993.
 fn descend(
-    top: u32, t: vec4<u32>, first: vec2<u32>, last: vec2<u32>, p: Projected, texels_read: ptr<function, u32>,
+    top: u32, t: vec4<u32>, first: vec2<u32>, last: vec2<u32>, p: Projected,
+    texels_read: ptr<function, u32>,
 ) -> bool {
     var planes: SupportingPlanes;
     if FIT_VOLUME {
@@ -85,15 +96,16 @@ fn descend(
         var clear = surely_behind(bits, p.z, p.w);
         tell_texel(level, at.x, at.y, bits, clear);
         if !clear {
-            // Its pixels, those past the image's edge left out.
+            // The texel's pixels, cut at the image's edge.
             let begin = at << vec2<u32>(level);
             let end = min((at + vec2<u32>(1u)) << vec2<u32>(level), vec2<u32>(view.size));
             if FIT_VOLUME {
-                clear = surely_clear(&planes, max(begin, first), min(end, last + vec2<u32>(1u)), bits);
+                clear = surely_clear(
+                    &planes, max(begin, first), min(end, last + vec2<u32>(1u)), bits);
                 tell_clear(clear);
             } else if all(begin >= first) && all(end <= last + vec2<u32>(1u)) {
-                // One of its pixels has that depth, and the rectangle has them all: no finer level
-                // can decide otherwise.
+                // One of its pixels has that depth, and the rectangle contains all its pixels.
+                // So no finer level can decide otherwise.
                 return false;
             }
         }
@@ -106,7 +118,7 @@ fn descend(
             at = max(at << vec2<u32>(down), first >> vec2<u32>(level));
             continue;
         }
-        // On to the next sibling, or that of the first parent that has one.
+        // On to the next sibling, or to that of the first parent that has one.
         loop {
             let end = last >> vec2<u32>(level);
             if level == top {
@@ -151,7 +163,7 @@ fn classify(i: u32) -> Outcome {
     let w = value_of(view.w, errors.w, volume);
     let a = view.z_slope;
 
-    // 1. Outside one of the six planes of the frustum.
+    // 1. Is it outside one of the six planes of the frustum?
     out.stage = AT_FRUSTUM;
     out.verdict = OUTSIDE;
     let border = view.half_size + view.reach;
@@ -160,8 +172,8 @@ fn classify(i: u32) -> Outcome {
         return out;
     }
 
-    // 2. Crossing w = 0: no rectangle.
-    //    A lower bound of w (of spheres an estimate: the root is not trusted).
+    // 2. Does it cross w = 0? Then there is no rectangle.
+    //    w_min is a lower bound of w; for spheres it is an estimate, as its root is not trusted.
     out.stage = AT_EYE_PLANE;
     out.verdict = VISIBLE;
     let w_min = w.center - support(w.half) - error_bound(w, 0.0, w);
@@ -169,13 +181,13 @@ fn classify(i: u32) -> Outcome {
         return out;
     }
 
-    // 3. The pixels that the projection may touch: an estimate.
+    // 3. Which pixels may its projection touch? This is an estimate.
     out.stage = AT_RECTANGLE;
-    let extent_x = extent_of(x, w, w_min);
-    let extent_y = extent_of(y, w, w_min);
-    let per_w = 1.25 / w_min;
-    let columns = pixel_interval(extent_x, per_w, view.half_size.x, view.size.x);
-    let rows = pixel_interval(extent_y, per_w, view.half_size.y, view.size.y);
+    let ends_x = extent_of(x, w, w_min);
+    let ends_y = extent_of(y, w, w_min);
+    let per_w = RECTANGLE_MARGIN / w_min;
+    let columns = pixel_interval(ends_x, per_w, view.half_size.x, view.size.x);
+    let rows = pixel_interval(ends_y, per_w, view.half_size.y, view.size.y);
     out.pixels = vec4<i32>(columns.x, rows.x, columns.y, rows.y);
     if columns.x > columns.y || rows.x > rows.y {
         if SAMPLE_COVERAGE {
@@ -187,7 +199,7 @@ fn classify(i: u32) -> Outcome {
         return out;
     }
 
-    // 4. The finest stored level at which it spans no more texels than the footprint.
+    // 4. What is the finest stored level at which it spans no more texels than the footprint?
     let first = vec2<u32>(vec2<i32>(columns.x, rows.x));
     let last = vec2<u32>(vec2<i32>(columns.y, rows.y));
     let finest = finest_level(first, last);
@@ -197,7 +209,7 @@ fn classify(i: u32) -> Outcome {
     out.level = level;
     out.texels = t;
 
-    // 5. All of it is farther than the farthest depth there.
+    // 5. Is all of it farther than the farthest depth there?
     out.stage = AT_DEPTH;
     if !is_reduced {
         return out;
@@ -210,7 +222,7 @@ fn classify(i: u32) -> Outcome {
         texels_read = (t.z - t.x + 1u) * (t.w - t.y + 1u);
         hidden = surely_behind(out.farthest_bits, z, w);
     } else {
-        // More texels than a footprint: the budget of a descent may allow them, nothing else does.
+        // More texels than a footprint has: only the budget of a descent may allow them.
         out.stage = AT_LEVEL;
         out.farthest_bits = far_bits();
     }
@@ -219,8 +231,8 @@ fn classify(i: u32) -> Outcome {
     if hidden {
         out.stage = AT_BLOCK;
     } else if (DESCENT && level > 0u) || FIT_VOLUME {
-        // Texel by texel, and into finer levels, over the pixels of the rectangle alone: its texels
-        // of level 0.
+        // Texel by texel and into finer levels, over the pixels of the rectangle alone.
+        // These are texels of level 0.
         out.stage = AT_DESCENT;
         hidden = descend(level, t, first, last, Projected(x, y, z, w, w_min), &texels_read);
         out.texels_read = texels_read;
@@ -228,9 +240,11 @@ fn classify(i: u32) -> Outcome {
         level = 0u;
     }
 
-    // 6. The texels were those of all pixels that matter.
-    if hidden & inside_block(x, w, extent_x, w_min, block.x, block.z, level, view.half_size.x, view.size.x)
-        & inside_block(y, w, extent_y, w_min, block.y, block.w, level, view.half_size.y, view.size.y) {
+    // 6. Were the texels those of all pixels that matter?
+    if hidden
+        & inside_block(x, w, ends_x, w_min, block.x, block.z, level, view.half_size.x, view.size.x)
+        & inside_block(y, w, ends_y, w_min, block.y, block.w, level, view.half_size.y, view.size.y)
+    {
         out.verdict = OCCLUDED;
     }
     return out;

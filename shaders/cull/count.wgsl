@@ -1,9 +1,11 @@
-// How many instances met which end: their verdicts, added up.
+// The count of verdicts: how many instances are outside, occluded, visible and invalid.
 
+// Invocations of a workgroup, and vectors of four verdicts that each of them reads.
+// Twin: `COUNT_WORKGROUP` in `crates/hiz_core/src/cull/count.rs`, the verdicts of a workgroup.
 const LANES: u32 = 64u;
-// Places of one invocation: a vector of four at a time.
 const VECTORS: u32 = 4u;
 
+// Twin: `CounterRecord` in `crates/hiz_core/src/output/counters.rs`.
 struct Counters {
     outside: atomic<u32>,
     occluded: atomic<u32>,
@@ -20,15 +22,17 @@ var<workgroup> sums: array<vec4<u32>, LANES>;
 
 @compute @workgroup_size(LANES)
 fn count(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    // One sum per verdict, in the order of their codes.
     var sum = vec4<u32>(0u);
     for (var v = 0u; v < VECTORS; v += 1u) {
         let vector = id.x * VECTORS + v;
-        let place = 4u * vector;
+        let place = VERDICT_MULTIPLE * vector;
         if place < piece.count {
-            let four = mask[verdicts_begin(piece.words) / 4u + vector];
+            let four = mask[verdicts_begin(piece.words) / VERDICT_MULTIPLE + vector];
             let here = vec4<u32>(place) + vec4<u32>(0u, 1u, 2u, 3u) < vec4<u32>(piece.count);
-            for (var verdict = 0u; verdict < 4u; verdict += 1u) {
-                let ones = select(vec4<u32>(0u), vec4<u32>(1u), here & (four == vec4<u32>(verdict)));
+            for (var verdict = 0u; verdict < VERDICT_COUNT; verdict += 1u) {
+                let is_it = here & (four == vec4<u32>(verdict));
+                let ones = select(vec4<u32>(0u), vec4<u32>(1u), is_it);
                 sum[verdict] += ones.x + ones.y + ones.z + ones.w;
             }
         }

@@ -1,12 +1,15 @@
-// The cull of whole groups: one invocation tests the box around 64 instances, by the same
-// certificates.
-// What hides the box hides all of them; the other groups are compacted, for `cull_members.wgsl`.
-// (Moller, Haines and others, "Real-Time Rendering", section "Hierarchical Z-Buffering".)
+// The cull of whole groups: one invocation tests the box around the members of a group.
+// It uses the same certificates as a test of an instance, and what hides the box hides all members.
+// The surviving groups are packed into a list, for `cull_members.wgsl`.
+// Source: Akenine-Moller, Haines and others, "Real-Time Rendering", section "Hierarchical
+// Z-Buffering".
 
+// Twin: `CULL_WORKGROUP` in `crates/hiz_core/src/instances/piece.rs`.
 const WORKGROUP: u32 = 128u;
 
+// Twin: `SurvivorsRecord` in `crates/hiz_core/src/output/survivors.rs`.
 struct Survivors {
-    // Arguments of the indirect dispatch, a workgroup for each RUN groups.
+    // The arguments of the indirect dispatch, with a workgroup for every RUN groups.
     workgroups: atomic<u32>,
     workgroups_y: u32,
     workgroups_z: u32,
@@ -16,7 +19,7 @@ struct Survivors {
 // The boxes are instances of a piece of their own.
 @group(1) @binding(0) var<uniform> groups: Piece;
 @group(2) @binding(0) var<storage, read_write> survivors: Survivors;
-// Of each group, or VISIBLE where its members have verdicts of their own.
+// A word per group: its verdict, or VISIBLE where the members have verdicts of their own.
 @group(2) @binding(1) var<storage, read_write> group_verdicts: array<u32>;
 @group(2) @binding(2) var survivor_list: texture_storage_2d<r32uint, write>;
 

@@ -1,5 +1,6 @@
-// The cull of the members of surviving groups: an invocation tests RUN members of one.
+// The cull of the members of surviving groups: an invocation tests RUN members of one group.
 
+// The same record as in `cull_groups.wgsl`, read without atomics.
 struct Survivors {
     workgroups: u32,
     workgroups_y: u32,
@@ -11,7 +12,9 @@ struct Survivors {
 @group(3) @binding(1) var survivor_list: texture_storage_2d<r32uint, read>;
 
 @compute @workgroup_size(GROUP)
-fn cull_members(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+fn cull_members(
+    @builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) lane: u32,
+) {
     begin();
     let slot = workgroup.x * RUN + lane / SHARE;
     if slot < survivors.count {

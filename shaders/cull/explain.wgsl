@@ -1,34 +1,38 @@
-// Why one instance got its verdict: the cull's own steps for it, written out.
+// Why one instance got its verdict: the steps of the cull for this instance, written down.
 
+// Twin: `ExplanationRecord` in `crates/hiz_core/src/cull/explain.rs`.
 struct Explanation {
     verdict: u32,
     stage: u32,
     level: u32,
     farthest_bits: u32,
     pixels: vec4<i32>,
-    // An estimate of the bounds' least and greatest NDC depth, meaningless where they cross w = 0;
-    // then of w.
+    // Estimates: the least and greatest NDC depth of the bounds, then their least and greatest w.
+    // The depths are meaningless where the bounds cross w = 0.
     depths: vec4<f32>,
-    // The last one that was read, told or not.
+    // The last reading, whether it had room in `readings` or not.
     last: vec4<u32>,
     // How many texels were read, and how many of them by the footprint.
     texels_read: u32,
     of_footprint: u32,
-    // The farthest depth of those that all of the volume is behind of, and whether there is one.
+    // The farthest of the depths that all of the volume is behind, and whether there is one.
     farthest_before: u32,
     any_before: u32,
 }
 
-// .x: the instance within its piece.
+// .x: the instance's place within its piece.
 @group(1) @binding(0) var<uniform> which: vec4<u32>;
 @group(2) @binding(0) var<storage, read_write> explanation: Explanation;
-// What was read, in order: level and flags, x, y, the depth's bits.
-// What has no room is only counted.
+// A reading per texel, in order: level and flags, column, row, the bits of the depth.
+// Readings that have no room are only counted.
 @group(2) @binding(1) var<storage, read_write> readings: array<vec4<u32>>;
 
-// Flags: all of the volume is behind the texel's depth; or its own outline and front there tell
-// that nothing shows.
+// The flags in the first word of a reading.
+// Twins: `BEHIND` and `CLEAR` in `crates/hiz_core/src/cull/explain.rs`.
+//
+// All of the volume is behind the depth of the texel.
 const BEHIND: u32 = 0x100u;
+// The volume's own outline and front prove that the texel shows nothing of it.
 const CLEAR: u32 = 0x200u;
 
 var<private> texels_read: u32 = 0u;
@@ -60,7 +64,7 @@ fn tell_texel(level: u32, x: u32, y: u32, bits: u32, is_behind: bool) {
     }
 }
 
-// Of the texel that was told last.
+// Adds to the reading of the texel that was told last.
 fn tell_clear(is_clear: bool) {
     if is_clear {
         texels_read -= 1u;
@@ -84,7 +88,8 @@ fn explain() {
     if outcome.stage >= AT_DEPTH && is_reduced {
         let t = outcome.texels;
         let sides = t.zw - t.xy + vec2<u32>(1u);
-        explanation.of_footprint = select(0u, sides.x * sides.y, max(sides.x, sides.y) <= (1u << FOOTPRINT_LOG2));
+        explanation.of_footprint =
+            select(0u, sides.x * sides.y, max(sides.x, sides.y) <= (1u << FOOTPRINT_LOG2));
     }
     let volume = load_volume(which.x);
     let w = value_of(view.w, 0.0, volume);

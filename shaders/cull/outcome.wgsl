@@ -1,4 +1,7 @@
-// Where the algorithm stopped, for `explain`.
+// The result of a test.
+
+// The stage at which a test stopped.
+// Twin: `Stage` in `crates/hiz_core/src/cull/explain.rs`.
 const AT_VALIDITY: u32 = 0u;
 const AT_FRUSTUM: u32 = 1u;
 const AT_EYE_PLANE: u32 = 2u;
@@ -11,11 +14,13 @@ const AT_LEVEL: u32 = 7u;
 struct Outcome {
     verdict: u32,
     stage: u32,
-    // Valid from AT_DEPTH on: pixel rectangle (inclusive), level, texel rectangle, the farthest
-    // depth in it.
+    // What follows is set from AT_DEPTH on, the pixels from AT_RECTANGLE on.
+    // First column, first row, last column, last row, inclusive.
     pixels: vec4<i32>,
     level: u32,
+    // The texels of that level, in the same order.
     texels: vec4<u32>,
+    // The farthest depth of these texels.
     farthest_bits: u32,
     texels_read: u32,
 }

@@ -1,18 +1,23 @@
-// What the members of hidden groups are themselves: an invocation tells those of one.
-// The cull hides them with their group and asks no more.
-// Here those of a group outside the view are outside; of a group that is hidden by depth those are
-// outside that their own certificates call so, and the others occluded.
-// After it each place has a verdict, and the group is told: it may run again, and with other
-// bounds, and changes nothing.
+// The verdicts of the members of hidden groups: an invocation tells those of one group.
+//
+// The cull hides a group with all its members and tests none of them.
+// Here each member gets a verdict of its own:
+//
+// - Members of a group that is outside are outside.
+// - Members of a group that is hidden by depth are outside if their own certificates say so, and
+//   occluded otherwise.
+//
+// The group is marked as told.
+// Another run, with other bounds even, changes nothing.
 
+// Twin: `WORKGROUP` in `crates/hiz_core/src/cull/refine.rs`.
 const WORKGROUP: u32 = 64u;
 
-// Added to the verdict of a group whose members have theirs (twin:
-// `crates/hiz_core/src/output/verdict.rs`).
+// A flag beside the verdict of a group: its members have verdicts of their own.
 const TOLD: u32 = 4u;
 
 @group(1) @binding(0) var<uniform> piece: Piece;
-// Behind the mask the verdicts.
+// The mask, and behind it the verdicts.
 @group(2) @binding(0) var<storage, read_write> mask: array<u32>;
 @group(2) @binding(1) var<storage, read_write> group_verdicts: array<u32>;
 
@@ -25,7 +30,7 @@ fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let word = group_verdicts[group];
-    let of_group = word & 3u;
+    let of_group = word & VERDICT_MASK;
     if (word & TOLD) != 0u || of_group >= VISIBLE {
         return;
     }
@@ -34,8 +39,8 @@ fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var place = first; place < end; place += 1u) {
         mask[verdicts + place] = of_group;
     }
-    // `refine_groups.wgsl` adds more to those that lie within the view.
-    // A loop of its own: a software driver skips no branch, but it ends a loop.
+    // `refine_groups.wgsl` adds a flag to OCCLUDED for groups that lie within the view.
+    // Tuning for software drivers: a loop of its own, since they skip no branch but end a loop.
     let may_be_outside = word == OCCLUDED;
     for (var place = select(end, first, may_be_outside); place < end; place += 1u) {
         if classify(place).verdict == OUTSIDE {

@@ -1,19 +1,20 @@
-// Which groups that are hidden by depth lie within the view with all that they hold: none of their
-// members is outside, so `refine.wgsl` need not test them.
-// For area coverage: in sample coverage what lies between the pixel centres is outside, wherever it
-// is.
+// Finds the groups that are hidden by depth and lie within the view with all that they hold.
+// None of their members is outside, so `refine.wgsl` need not test them.
+// This is for area coverage.
+// In sample coverage a volume between the pixel centres is outside, wherever it is in the view.
 
+// Twin: `WORKGROUP` in `crates/hiz_core/src/cull/refine.rs`.
 const WORKGROUP: u32 = 64u;
 
-// Added to the verdict of such a group.
+// A flag beside the verdict of such a group; TOLD of `refine.wgsl` is another.
 const WITHIN: u32 = 8u;
 
 // The boxes are instances of a piece of their own.
 @group(1) @binding(0) var<uniform> groups: Piece;
 @group(2) @binding(1) var<storage, read_write> group_verdicts: array<u32>;
 
-// True implies: all of the box lies within the planes that `classify` asks about, so that no
-// certificate of a part of it can say that it is outside.
+// True implies: all of the box lies within the planes that `classify` asks about.
+// Then no certificate can say that a part of the box is outside.
 fn is_within(i: u32) -> bool {
     let volume = load_volume(i);
     if !(volume.size < view.coordinate_limit) {

@@ -1,17 +1,18 @@
 // A volume's own outline and front: planes that bound all of it, tilted to its faces.
-// A texel that lies beyond one of them shows nothing of the volume, or only what is farther than
-// its depth.
+// A texel that lies beyond one of them shows nothing of the volume, or only parts that are farther
+// than the texel's depth.
 //
-// A plane is a linear function of pixel position and depth, facing z / w + slope .
-// (x, y) / w > offset on all of the volume.
-// Its slope is a guess; one certificate proves its offset, once; after that a texel costs a
-// multiplication an axis.
+// A plane is a linear function of pixel position and depth:
+// facing * z / w + slope . (x, y) / w > offset on all of the volume.
+// The slope is a guess.
+// One certificate proves the offset; after that a texel costs one multiplication per axis.
+// docs/accuracy.md derives this, under "A volume's own outline and front".
 
 struct SupportingPlane {
-    // Depth units (an outline: pixels) per pixel.
+    // Depth units per pixel; of an outline, pixels per pixel.
     slope: vec2<f32>,
-    // 1, reversed -1: bounds the depth of a front face.
-    // 0: bounds the outline.
+    // 1, or -1 with reversed Z: the plane bounds the depth of a front face.
+    // 0: it bounds the outline.
     facing: f32,
     offset: f32,
 }
@@ -34,40 +35,51 @@ struct Projected {
     w_min: f32,
 }
 
-// The bits of 2^60, from which on squares of products could overflow.
-// Decided on bits: a compiler may assume that no float is NaN or infinite.
+// All bits of a float but the sign.
+const MAGNITUDE_MASK: u32 = 0x7fffffffu;
+// The bits of 2^60: squares of products could overflow from there on.
+// It is decided on bits, because a compiler may assume that no float is NaN or infinite.
+// Twin: `LARGEST` in `crates/hiz_core/src/instances/volume_record.rs`.
 const LARGEST_BITS: u32 = 0x5d800000u;
-
-fn is_small(bits: u32) -> bool {
-    return (bits & 0x7fffffffu) < LARGEST_BITS;
-}
-
+// Errors below this keep a row's own size below 2^57, so that nothing overflows.
+const LARGEST_ERROR: f32 = 0x1p38;
 // The bits of 2^16: steeper planes say nothing, and could overflow a product.
 const STEEPEST_BITS: u32 = 0x47800000u;
-// Flatter is flat: a subnormal slope could be flushed in one product and not in another, and X' may
-// be large.
+// Slopes below this are set to 0.
+// A subnormal slope could be flushed in one product and not in another, while X' reaches 2^58.
 const FLATTEST: f32 = 0x1p-100;
+// Pixels from an image's middle to beyond any image, whose sides are at most 32768.
+const BEYOND: f32 = 65536.0;
+// A guessed end or offset is moved outwards by this many times its error, so it can be proved.
+const GUESS_ERRORS: f32 = 3.0;
+
+// The margin of a texel's comparison, in EPS of the magnitudes that are compared.
+// Two products, three differences and the depth's own make at most 6 roundings.
+const TEXEL_ULPS: f32 = 8.0;
+// Covers what is flushed there.
+const TEXEL_FLOOR: f32 = 0x1p-100;
+
+fn is_small(bits: u32) -> bool {
+    return (bits & MAGNITUDE_MASK) < LARGEST_BITS;
+}
 
 // The sign that makes farther greater.
 fn farther_sign() -> f32 {
     return select(1.0, -1.0, REVERSED);
 }
 
-// A guess: the plane through a face or edge that may bound the volume, and its value there.
+// A guess: the plane through a face or edge that may bound the volume, and the plane's value there.
 struct Candidate {
     facing: f32,
     slope: vec2<f32>,
     own: f32,
 }
 
-// Beyond every image, from its middle.
-const BEYOND: f32 = 65536.0;
-
-// Bounds of r / w, in pixels, where certificates prove them.
+// Bounds of r / w in pixels, where certificates prove them.
 fn proved_interval(r: Value, w: Value, w_min: f32) -> vec2<f32> {
     let guess = ratio_interval(r, w);
-    let widened = 3.0 * error_bound(r, max(abs(guess.x), abs(guess.y)), w) / w_min;
-    // Barred: what is certified is what is returned.
+    let widened = GUESS_ERRORS * error_bound(r, max(abs(guess.x), abs(guess.y)), w) / w_min;
+    // Barred, so that what is certified is what is returned.
     let low = bar(clamp(guess.x - widened, -BEYOND, BEYOND));
     let high = bar(clamp(guess.y + widened, -BEYOND, BEYOND));
     return vec2<f32>(
@@ -75,9 +87,8 @@ fn proved_interval(r: Value, w: Value, w_min: f32) -> vec2<f32> {
         select(BEYOND, high, surely_below(r, high, w)));
 }
 
-// The planes of a volume's candidates that touch it, less a margin; those alone that a certificate
-// proves.
-// (Through a pointer: handed over by value, so much takes twice as long to compile.)
+// The planes of the volume's candidates that touch it, less a margin, if a certificate proves them.
+// They come through a pointer: returned by value, so much data takes twice as long to compile.
 fn supporting_planes(planes: ptr<function, SupportingPlanes>, p: Projected) {
     (*planes).count = 0u;
     let columns = proved_interval(p.x, p.w, p.w_min);
@@ -86,21 +97,24 @@ fn supporting_planes(planes: ptr<function, SupportingPlanes>, p: Projected) {
     (*planes).right_bottom = vec2<f32>(columns.y, rows.y);
     for (var i = 0u; i < CANDIDATES; i += 1u) {
         let guess = candidate(i, p);
-        if any((bitcast<vec2<u32>>(guess.slope) & vec2<u32>(0x7fffffffu)) > vec2<u32>(STEEPEST_BITS)) {
+        let steepness = bitcast<vec2<u32>>(guess.slope) & vec2<u32>(MAGNITUDE_MASK);
+        if any(steepness > vec2<u32>(STEEPEST_BITS)) {
             continue;
         }
-        // Barred, so that no compiler moves the slope's own quotient into the products: that would
-        // certify another slope.
-        var slope = bar2(select(guess.slope, vec2<f32>(0.0), abs(guess.slope) < vec2<f32>(FLATTEST)));
+        // Barred, so that no compiler moves the quotient of the slope into the products.
+        // That would certify another slope.
+        var slope = bar2(
+            select(guess.slope, vec2<f32>(0.0), abs(guess.slope) < vec2<f32>(FLATTEST)));
         var r = Value(
             guess.facing * p.z.center + slope.x * p.x.center + slope.y * p.y.center,
-            abs(guess.facing) * p.z.error + abs(slope.x) * p.x.error + abs(slope.y) * p.y.error + ERROR_FLOOR,
+            abs(guess.facing) * p.z.error
+                + abs(slope.x) * p.x.error + abs(slope.y) * p.y.error + ERROR_FLOOR,
             guess.facing * p.z.half + slope.x * p.x.half + slope.y * p.y.half);
         let interval = ratio_interval(r, p.w);
         let extent = interval.y - interval.x;
         var least = interval.x;
         if !on_border(guess.own, least, extent) {
-            // The other side of an outline is its other edge's; that of a front is a back.
+            // The other side of an outline belongs to another edge; that of a front is a back.
             if guess.facing != 0.0 || !on_border(guess.own, interval.y, extent) {
                 continue;
             }
@@ -108,8 +122,8 @@ fn supporting_planes(planes: ptr<function, SupportingPlanes>, p: Projected) {
             r = Value(-r.center, r.error, -r.half);
             least = -interval.y;
         }
-        let offset = bar(least - 3.0 * error_bound(r, least, p.w) / p.w_min);
-        let small = is_small(bitcast<u32>(offset)) && error_bound(r, offset, p.w) < 0x1p38;
+        let offset = bar(least - GUESS_ERRORS * error_bound(r, least, p.w) / p.w_min);
+        let small = is_small(bitcast<u32>(offset)) && error_bound(r, offset, p.w) < LARGEST_ERROR;
         if small && surely_above(r, offset, p.w) {
             (*planes).list[(*planes).count] = SupportingPlane(slope, guess.facing, offset);
             (*planes).count += 1u;
@@ -117,22 +131,24 @@ fn supporting_planes(planes: ptr<function, SupportingPlanes>, p: Projected) {
     }
 }
 
-// True implies: pixels from `begin` to before `end` that are no farther than the stored depth show
-// nothing of the volume.
-fn surely_clear(planes: ptr<function, SupportingPlanes>, begin: vec2<u32>, end: vec2<u32>, bits: u32) -> bool {
+// True implies: no pixel from `begin` to before `end` shows anything of the volume, if its depth is
+// no farther than the stored one.
+fn surely_clear(
+    planes: ptr<function, SupportingPlanes>, begin: vec2<u32>, end: vec2<u32>, bits: u32,
+) -> bool {
     // Exact: multiples of 2^-8 below 2^16, and then one of two numbers.
     let left_top = max(vec2<f32>(begin) - view.reach - view.half_size, (*planes).left_top);
     let right_bottom = min(vec2<f32>(end) + view.reach - view.half_size, (*planes).right_bottom);
-    // At the far plane, too: what is farther is outside the view volume.
+    // It may be the far plane, too, since anything farther is outside the view volume.
     let depth = bar(occluding_depth(bits) - view.z_slope);
     for (var i = 0u; i < (*planes).count; i += 1u) {
         let plane = (*planes).list[i];
-        // The plane is nearest, or reaches farthest out, at this corner.
+        // At this corner the plane is nearest, or reaches farthest out.
         let corner = select(left_top, right_bottom, plane.slope > vec2<f32>(0.0));
         let fall = plane.slope * corner;
         let bound = plane.facing * depth;
-        // Two products, three differences and the depth's own: 6 roundings at most.
-        let margin = 8.0 * EPS * (abs(plane.offset) + abs(fall.x) + abs(fall.y) + abs(bound)) + 0x1p-100;
+        let magnitudes = abs(plane.offset) + abs(fall.x) + abs(fall.y) + abs(bound);
+        let margin = TEXEL_ULPS * EPS * magnitudes + TEXEL_FLOOR;
         if plane.offset - fall.x - fall.y - margin > bound {
             return true;
         }

@@ -1,5 +1,6 @@
-// What a test reads is told to nobody here: calls of nothing, which compilers drop.
-// `explain.wgsl` has functions that write it down.
+// The cull does not write down what a test reads: these functions are empty, and compilers drop
+// their calls.
+// `explain.wgsl` has functions of the same names that write it down.
 
 fn tell_corners(level: u32, t: vec4<u32>, bits: vec4<u32>) {}
 

@@ -1,54 +1,57 @@
-// What one cull knows of its camera (twin: `crates/hiz_core/src/cull/view_uniform.rs`,
-// ViewUniform).
+// What a cull knows about its camera.
+// Twin: `ViewUniform` in `crates/hiz_core/src/cull/view_uniform.rs`.
 
 struct View {
-    // Rows, linear functions m .
-    // (d, 1) of the position d about the reference point.
-    // Times w: pixel column right of the image's middle, pixel row below it, depth less z_slope
-    // times w; and w itself.
+    // The rows: linear functions m . (d, 1) of the position d relative to the reference point.
+    // x: w times the pixel column, counted from the image's middle to the right.
+    // y: w times the pixel row, counted from the image's middle downwards.
+    // z: w times (depth - z_slope).
     x: vec4<f32>,
     y: vec4<f32>,
     z: vec4<f32>,
     w: vec4<f32>,
-    // Of these four rows: the greatest magnitude among the linear coefficients, and that of the
-    // constant.
-    // Times float32's eps they bound the coefficients' own errors as well.
+    // Of each row: the greatest magnitude of its linear coefficients, and that of its constant.
+    // Times EPS they also bound the errors of the coefficients themselves.
     magnitudes: vec4<f32>,
     constant_magnitudes: vec4<f32>,
-    // The reference point is exactly eye_hi + eye_lo: the eye, or a point nearer to what is seen
-    // (`Reference` in view.rs).
+    // The reference point is exactly eye_hi + eye_lo.
+    // It is the eye, or a point nearer to what is seen (`Reference` in
+    // `crates/hiz_core/src/input/view.rs`).
     eye_hi: vec3<f32>,
     z_slope: f32,
     eye_lo: vec3<f32>,
-    // All axes added: at least |eye_lo|, and what low halves and what both halves cannot hold come
-    // to near the eye, twice 2^-24 of
-    // |eye_hi|. (Elsewhere it is an eps of |d_hi| more.)
+    // Upper bound, summed over the axes, of |eye_lo| + 2 * 2^-24 * |eye_hi|.
+    // It stands for the low half of a position near the eye, and for the remainder that two float32
+    // cannot represent.
+    // Elsewhere these are greater by up to an EPS of |d_hi|.
     halves_size: f32,
+    // Half of the image's size, in pixels.
     half_size: vec2<f32>,
-    // How far a volume's projection must stay away from a pixel square that it does not touch: the
-    // guard, less half a pixel in sample coverage.
+    // How far a projection must stay away from a pixel square that it does not touch, in pixels.
+    // It is the guard, less half a pixel in sample coverage.
     reach: f32,
-    // What a stored depth is multiplied by before anything is called farther: 1 + slack, reversed
-    // 1 - slack.
+    // Stored depths are multiplied by this before anything is called farther.
+    // It is 1 + slack, or 1 - slack with reversed Z.
     depth_factor: f32,
+    // The image's size in pixels: width, height.
     size: vec2<i32>,
-    // 0, but no compiler knows: see `bar`.
+    // 0, which no compiler knows: see `bar`.
     runtime_zero: u32,
     // The number of the reduction that the pyramid has to hold.
     reduction: u32,
     // How many texels a descent may read.
     descent_budget: u32,
-    // What is added then: the absolute slack, reversed less than 0.
+    // Added to the product with depth_factor: the absolute slack, negative with reversed Z.
     depth_offset: f32,
-    // Sizes from here on could overflow a product: such an instance is invalid.
+    // From this size on a product could overflow, so such an instance is invalid.
     coordinate_limit: f32,
     padding: u32,
 }
 
 var<private> view: View;
 
-// Keeps a compiler from folding what follows into the cancelling sum x was made by, as WGSL lets
-// it.
+// Keeps a compiler from folding the expression around x into the cancelling sum that made x.
+// WGSL permits such folding.
 fn bar(x: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(x) ^ view.runtime_zero);
 }

@@ -1,13 +1,29 @@
-// Depths travel as bits.
-// Non-negative floats order like unsigned integers, so farthest is an integer min or max: exact on
-// every driver, whatever it does with NaN, -0 and subnormals.
+// Depths as bits.
+// Non-negative floats order like unsigned integers, so the farthest depth is an integer min or max.
+// That is exact on every driver, whatever it does with NaN, -0 and subnormals.
 
-// True: near 1, far 0.
+// True: near is 1 and far is 0.
 override REVERSED: bool;
 
+// The bits of 1, of the least normal number, and of -0.
 const ONE_BITS: u32 = 0x3f800000u;
 const LEAST_NORMAL_BITS: u32 = 0x00800000u;
 const NEGATIVE_ZERO_BITS: u32 = 0x80000000u;
+
+// Depths that one load or store takes: a vec4 of a buffer, or a texel of an rgba32uint texture.
+// They follow each other in a row.
+// Twins: `PIXELS` and `BLOCK_ALIGNMENT` in `crates/hiz_core/src/pyramid/layout.rs`.
+const VECTOR_LOG2: u32 = 2u;
+const VECTOR: u32 = 1u << VECTOR_LOG2;
+const VECTOR_MASK: u32 = VECTOR - 1u;
+
+// Texels along a side of the block that one invocation of the reduction reads.
+// The logarithm is also the number of levels that it makes of the block.
+// Twin: `BLOCK_LOG2` in `crates/hiz_core/src/pyramid/layout.rs`.
+const BLOCK_LOG2: u32 = 3u;
+const BLOCK: u32 = 1u << BLOCK_LOG2;
+// Quads of 2x2 texels along a side of a block.
+const BLOCK_QUADS: u32 = BLOCK / 2u;
 
 fn far_bits() -> u32 {
     return select(ONE_BITS, 0u, REVERSED);
@@ -17,8 +33,9 @@ fn near_bits() -> u32 {
     return select(0u, ONE_BITS, REVERSED);
 }
 
-// A depth as given: NaN and what lies outside 0..1 is far, subnormals and -0 are 0.
-// (Bits above 1's are numbers above 1, infinity, NaN, or anything with a sign.)
+// A depth as it was given becomes one that can be compared.
+// NaN and numbers outside of 0..1 are far; subnormals and -0 are 0.
+// Bits above those of 1 belong to numbers above 1, infinity, NaN, or anything with a sign.
 fn sanitized(bits: u32) -> u32 {
     let outside = bits > ONE_BITS && bits != NEGATIVE_ZERO_BITS;
     let flushed = select(bits, 0u, bits < LEAST_NORMAL_BITS || bits == NEGATIVE_ZERO_BITS);
@@ -35,12 +52,14 @@ fn farthest4(v: vec4<u32>) -> u32 {
 
 // The farthest of four sanitized depths, with less work than sanitizing each.
 //
-// Reversed, everything but LEAST_NORMAL_BITS..ONE_BITS is 0 in the end, and 0 is farthest: of
-// ONE_BITS - bits, wrapping, the greatest is that of the farthest, or more than any such number
-// has.
-// Standard, order and sanitizing agree but for -0, which is 0 although its bits are above 1's.
-// Where the greatest is -0 there is no other number with a sign, so the greatest of them as signed
-// integers, -0 the least, is that of the rest.
+// Reversed: all bits outside of LEAST_NORMAL_BITS..ONE_BITS are sanitized to 0, which is farthest.
+// The greatest of ONE_BITS - bits, wrapping, belongs to the farthest depth.
+// If it is greater than that of any number in the range, some depth is sanitized to 0.
+//
+// Standard: sanitizing keeps the order of bits, except for -0, which becomes 0.
+// Its bits are above those of 1.
+// If -0 has the greatest bits, no other number has a sign.
+// As signed integers -0 is then the least, and the greatest is that of the other numbers.
 fn farthest_sanitized4(v: vec4<u32>) -> u32 {
     if REVERSED {
         let below_one = vec4<u32>(ONE_BITS) - v;
@@ -50,6 +69,8 @@ fn farthest_sanitized4(v: vec4<u32>) -> u32 {
     let greatest = max(max(v.x, v.y), max(v.z, v.w));
     let s = bitcast<vec4<i32>>(v);
     let greatest_signed = max(max(s.x, s.y), max(s.z, s.w));
-    let bits = min(select(greatest, u32(max(greatest_signed, 0)), greatest == NEGATIVE_ZERO_BITS), ONE_BITS);
+    let without_negative_zero =
+        select(greatest, u32(max(greatest_signed, 0)), greatest == NEGATIVE_ZERO_BITS);
+    let bits = min(without_negative_zero, ONE_BITS);
     return select(bits, 0u, bits < LEAST_NORMAL_BITS);
 }

@@ -6,8 +6,8 @@ fn source_bits(x: u32, y: u32) -> u32 {
     return sanitized(bitcast<u32>(textureLoad(source, vec2<u32>(x, y), 0).x));
 }
 
-// The four pixels about a point, in the sampler's order: bottom left, bottom right, top right, top
-// left.
+// The four pixels around a point, in the order of a gather:
+// bottom left, bottom right, top right, top left.
 fn gathered(corner: vec2<f32>) -> vec4<u32> {
     return bitcast<vec4<u32>>(textureGather(0, source, source_sampler, corner));
 }

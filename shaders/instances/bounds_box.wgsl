@@ -1,7 +1,8 @@
-// Axis-aligned boxes (twin: `crates/hiz_core/src/instances/volume_record.rs`, BoxRecord).
+// Axis-aligned boxes.
+// Twin: `BoxRecord` in `crates/hiz_core/src/instances/volume_record.rs`.
 
-// xyz: the centre's high half; its low half; the half sizes.
-// The second w: the caller's index.
+// Texels of a record; .xyz: the centre's high half, its low half, the half sizes.
+// The w of the second texel is the caller's index.
 const RECORD_TEXELS: u32 = 3u;
 
 fn caller_index(i: u32) -> u32 {

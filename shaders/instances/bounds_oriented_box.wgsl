@@ -1,11 +1,14 @@
-// Oriented boxes (twin: `crates/hiz_core/src/instances/volume_record.rs`, OrientedBoxRecord).
+// Oriented boxes.
+// Twin: `OrientedBoxRecord` in `crates/hiz_core/src/instances/volume_record.rs`.
 
-// xyz: the centre's high half, its low half, two half axes; the first three w: the third half axis;
-// the last w: the caller's index.
+// Texels of a record; .xyz: the centre's high half, its low half, the first two half axes.
+// The w of the first three texels hold the third half axis.
+// The w of the last texel is the caller's index.
 const RECORD_TEXELS: u32 = 4u;
+const LAST_TEXEL: u32 = RECORD_TEXELS - 1u;
 
 fn caller_index(i: u32) -> u32 {
-    return record_texel(i, 3u).w;
+    return record_texel(i, LAST_TEXEL).w;
 }
 
 fn load_volume(i: u32) -> Volume {
@@ -15,7 +18,7 @@ fn load_volume(i: u32) -> Volume {
     let hi = bitcast<vec3<f32>>(texel_0.xyz);
     let lo = bitcast<vec3<f32>>(texel_1.xyz);
     let e0 = bitcast<vec3<f32>>(texel_2.xyz);
-    let e1 = bitcast<vec3<f32>>(record_texel(i, 3u).xyz);
+    let e1 = bitcast<vec3<f32>>(record_texel(i, LAST_TEXEL).xyz);
     let e2 = bitcast<vec3<f32>>(vec3<u32>(texel_0.w, texel_1.w, texel_2.w));
     let d_hi = bar3(hi - view.eye_hi);
     let d_lo = bar3(lo - view.eye_lo);
@@ -23,5 +26,6 @@ fn load_volume(i: u32) -> Volume {
 }
 
 fn on_half_axes(m: vec3<f32>, volume: Volume) -> vec3<f32> {
-    return vec3<f32>(dot(m, volume.half_axis_0), dot(m, volume.half_axis_1), dot(m, volume.half_axis_2));
+    return vec3<f32>(
+        dot(m, volume.half_axis_0), dot(m, volume.half_axis_1), dot(m, volume.half_axis_2));
 }

@@ -1,16 +1,21 @@
 // Groups of instances.
 
-// Instances of a group, stored one after the other.
+// Instances of a group, which are stored one after the other.
+// Twin: `GROUP` in `crates/hiz_core/src/instances/groups.rs`.
 const GROUP: u32 = 64u;
-// How many members of a group one invocation tests, one after the other, and how many groups so one
-// workgroup: a software driver fetches uniforms for every eight invocations anew and never skips a
-// branch, and does so once a run (docs/performance.md).
+// How many members of a group one invocation tests, one after the other.
+// So this is also the number of groups that one workgroup takes.
+// Tuning for software drivers, which fetch uniforms anew for every eight invocations and never skip
+// a branch.
+// With a run they do so once per run (docs/performance.md).
+// Twin: `GROUPS_OF_RUN` in `crates/hiz_core/src/cull/groups.rs`.
 const RUN: u32 = 8u;
 // Invocations that share a group.
 const SHARE: u32 = GROUP / RUN;
 
-// Survivors in a row of their list, a texture (as `record_layout.wgsl` says, and why), as a power
-// of two (twin: `crates/hiz_core/src/output/survivors.rs`).
+// Survivors in a row of their list, as a power of two.
+// The list is a texture for the reason that `record_layout.wgsl` gives.
+// Twin: `SURVIVORS_PER_ROW` in `crates/hiz_core/src/output/survivors.rs`.
 const SURVIVORS_PER_ROW_LOG2: u32 = 12u;
 
 fn survivor_position(slot: u32) -> vec2<u32> {

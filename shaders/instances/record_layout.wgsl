@@ -1,11 +1,13 @@
-// Where a record lies: in a texture, whose texels a software driver fetches whole, where it picks a
-// buffer's words one by one (docs/performance.md).
+// Where a record lies.
+// Tuning for software drivers: records are in a texture, whose texels these drivers fetch whole.
+// Words of a buffer they fetch one by one (docs/performance.md).
 // Twin: `crates/hiz_core/src/instances/records.rs`.
 
 // Records in a row of the texture, as a power of two.
+// Twin: `RECORDS_PER_ROW` there.
 const RECORDS_PER_ROW_LOG2: u32 = 10u;
 
-// Texel k of record i, of `texels` each.
+// The position of texel k of record i, where each record has `texels`.
 fn record_position(i: u32, k: u32, texels: u32) -> vec2<u32> {
     let column = i % (1u << RECORDS_PER_ROW_LOG2);
     return vec2<u32>(column * texels + k, i >> RECORDS_PER_ROW_LOG2);

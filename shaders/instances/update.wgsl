@@ -1,21 +1,25 @@
-// The update: new records (of instances, or of their groups) go to their places.
+// The update: new records, of instances or of the boxes around their groups, go to their places.
+//
+// If a recorded update is dropped or reordered, the host's group boxes may no longer contain their
+// members.
+// So updates are numbered, and on a mismatch every group box that is written later becomes invalid.
 
+// Twin: `UpdateUniform` in `crates/hiz_core/src/instances/update.rs`.
 struct Update {
     // How many records.
     count: u32,
     // Texels of a record.
     texels: u32,
-    // Which update of these instances this is, in the order of recording.
+    // The number of this update, counted in the order of recording.
     number: u32,
     padding: u32,
 }
 
-// What the device knows of the order in which updates ran.
+// What the device knows about the order in which updates ran.
 struct Sequence {
-    // The number of the next one.
+    // The number of the next update.
     next: u32,
-    // Not 0: one was left out, or overtaken.
-    // The boxes that the host forms from then on may not contain their groups.
+    // Not 0: an update was left out or overtaken.
     broken: u32,
 }
 
@@ -25,8 +29,13 @@ struct Sequence {
 @group(0) @binding(3) var records: texture_storage_2d<rgba32uint, write>;
 @group(0) @binding(4) var<storage, read_write> sequence: Sequence;
 
-// The bits of 2^62: a record of such numbers is no volume, whatever its kind.
-const NO_VOLUME: vec4<u32> = vec4<u32>(0x5e800000u);
+// Twin: `WORKGROUP` in `crates/hiz_core/src/instances/update.rs`.
+const WORKGROUP: u32 = 128u;
+
+// The bits of 2^62, beyond every camera's coordinate limit.
+// A record of such numbers is invalid, whatever its kind.
+// Twin: `BEYOND_LIMITS` in `crates/hiz_core/src/instances/volume_record.rs`.
+const BEYOND_LIMITS_BITS: u32 = 0x5e800000u;
 
 fn replace(id: u32, k: u32, texel: vec4<u32>) {
     textureStore(records, record_position(places[id], k, update.texels), texel);
@@ -38,7 +47,7 @@ fn begin() {
     sequence.next = update.number + 1u;
 }
 
-@compute @workgroup_size(128)
+@compute @workgroup_size(WORKGROUP)
 fn replace_records(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= update.count {
         return;
@@ -48,14 +57,14 @@ fn replace_records(@builtin(global_invocation_id) id: vec3<u32>) {
     }
 }
 
-@compute @workgroup_size(128)
+@compute @workgroup_size(WORKGROUP)
 fn replace_groups(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= update.count {
         return;
     }
     for (var k = 0u; k < update.texels; k += 1u) {
         var texel = fresh[id.x * update.texels + k];
-        if sequence.broken != 0u { texel = NO_VOLUME; }
+        if sequence.broken != 0u { texel = vec4<u32>(BEYOND_LIMITS_BITS); }
         replace(id.x, k, texel);
     }
 }

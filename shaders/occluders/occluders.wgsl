@@ -1,9 +1,11 @@
-// Occluders, depth only.
-// A vertex is two float32 halves of its world position; the eye is subtracted half by half before
-// anything is rounded, so that a wall a million metres from the origin does not tremble.
+// The occluder pass, which draws depth only.
+// A vertex is two float32 halves of its world position.
+// The eye is subtracted half by half before anything is rounded.
+// So a wall a million metres from the origin does not tremble.
 
+// Twin: `OccluderView` in `crates/hiz_core/src/occluders/raster.rs`.
 struct OccluderView {
-    // Clip-space rows about the reference point, w near 1.
+    // The rows of clip space relative to the reference point, with w near 1.
     clip_from_eye: array<vec4<f32>, 4>,
     // The reference point is exactly eye_hi + eye_lo.
     eye_hi: vec4<f32>,
@@ -13,7 +15,9 @@ struct OccluderView {
 @group(0) @binding(0) var<uniform> view: OccluderView;
 
 @vertex
-fn occluder_vertex(@location(0) hi: vec3<f32>, @location(1) lo: vec3<f32>) -> @invariant @builtin(position) vec4<f32> {
+fn occluder_vertex(
+    @location(0) hi: vec3<f32>, @location(1) lo: vec3<f32>,
+) -> @invariant @builtin(position) vec4<f32> {
     let d = vec4<f32>((hi - view.eye_hi.xyz) + (lo - view.eye_lo.xyz), 1.0);
     return vec4<f32>(
         dot(view.clip_from_eye[0], d), dot(view.clip_from_eye[1], d),

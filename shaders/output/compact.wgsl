@@ -1,10 +1,16 @@
-// Compaction: from the mask to the ascending list of the caller's indices and the draw's instance
-// count.
-// `scan` (one workgroup) counts the bits before each word, `scatter` (an invocation a word) writes
-// them.
+// Compaction: from the mask to the ascending list of the caller's indices, and to the instance
+// count of the draw.
+//
+// 1. `scan`, in one workgroup, counts the kept bits before each word of the mask.
+// 2. `scatter`, with an invocation per word, writes the indices.
 
+// Invocations of `scan`.
 const LANES: u32 = 256u;
+// Invocations of a workgroup of `scatter`.
+// Twin: `SCATTER_WORKGROUP` in `crates/hiz_core/src/output/compact.rs`.
+const SCATTER_WORKGROUP: u32 = 64u;
 
+// Twin: `DrawIndexedIndirect` in `crates/hiz_core/src/output/draw.rs`.
 struct DrawIndexedIndirect {
     index_count: u32,
     instance_count: u32,
@@ -19,12 +25,12 @@ struct DrawIndexedIndirect {
 @group(0) @binding(3) var<storage, read_write> draws: array<DrawIndexedIndirect>;
 // Kept bits before each word.
 @group(0) @binding(4) var<storage, read_write> before: array<u32>;
-// .x: how many indices may be written in all pieces together.
+// .x: how many indices may be written, in all pieces together.
 @group(0) @binding(5) var<uniform> capacity: vec4<u32>;
 
 var<workgroup> sums: array<u32, LANES>;
 
-// What earlier pieces left of the capacity.
+// The capacity that earlier pieces have left.
 fn room() -> u32 {
     var left = capacity.x;
     for (var p = 0u; p < piece.index; p += 1u) {
@@ -33,7 +39,7 @@ fn room() -> u32 {
     return left;
 }
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(LANES)
 fn scan(@builtin(local_invocation_index) lane: u32) {
     let share = (piece.words + LANES - 1u) / LANES;
     let begin = min(lane * share, piece.words);
@@ -44,7 +50,8 @@ fn scan(@builtin(local_invocation_index) lane: u32) {
     }
     sums[lane] = sum;
     workgroupBarrier();
-    // Inclusive prefix sums by doubling (Hillis and Steele, "Data Parallel Algorithms", 1986).
+    // Inclusive prefix sums by doubling.
+    // Source: Hillis and Steele, "Data Parallel Algorithms", 1986.
     for (var step = 1u; step < LANES; step *= 2u) {
         var earlier = 0u;
         if lane >= step { earlier = sums[lane - step]; }
@@ -62,7 +69,7 @@ fn scan(@builtin(local_invocation_index) lane: u32) {
     }
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(SCATTER_WORKGROUP)
 fn scatter(@builtin(global_invocation_id) id: vec3<u32>) {
     let word = id.x;
     if word >= piece.words {
@@ -72,7 +79,7 @@ fn scatter(@builtin(global_invocation_id) id: vec3<u32>) {
     var slot = before[word];
     var bits = mask[word];
     while bits != 0u && slot < written {
-        list[slot] = piece.base + 32u * word + countTrailingZeros(bits);
+        list[slot] = piece.base + WORD_BITS * word + countTrailingZeros(bits);
         bits &= bits - 1u;
         slot += 1u;
     }

@@ -1,18 +1,22 @@
-// What a cull leaves behind: for each instance a bit in the caller's numbering, a verdict in the
-// stored one, and its place in the draw's list; of these what was asked for.
+// What a cull leaves behind, as far as it was asked for:
+//
+// - a bit per instance, in the caller's numbering
+// - a verdict per instance, in the stored order
+// - the draw's list of kept instances, and its length
 
-// A bit for each instance that is kept.
+// Set the bit of each instance that is kept.
 override MASK: bool;
-// Its verdict.
+// Write its verdict.
 override VERDICTS: bool;
-// Count what is kept in the draw arguments, here, in whatever order invocations arrive; otherwise
-// `compact.wgsl` counts the mask.
+// Count the kept instances in the draw arguments, in the order in which invocations arrive.
+// Otherwise `compact.wgsl` counts the mask.
 override APPEND: bool;
-// And list it.
+// And list them.
 override LIST: bool;
-// More may be kept than the lists hold.
+// More instances may be kept than the lists hold.
 override CAPPED: bool;
 
+// Twin: `DrawIndexedIndirect` in `crates/hiz_core/src/output/draw.rs`.
 struct DrawIndexedIndirect {
     index_count: u32,
     instance_count: atomic<u32>,
@@ -23,14 +27,14 @@ struct DrawIndexedIndirect {
 
 @group(1) @binding(0) var<uniform> piece: Piece;
 // Bit i of the first words: the caller's instance i of the piece is kept.
-// Then, from a multiple of 4 on, a word for each place: the verdict of who is stored there.
+// From `verdicts_begin` on: a word per place, the verdict of the instance that is stored there.
 @group(2) @binding(0) var<storage, read_write> mask: array<atomic<u32>>;
 @group(2) @binding(1) var<storage, read_write> list: array<u32>;
 @group(2) @binding(2) var<storage, read_write> draws: array<DrawIndexedIndirect>;
-// .x: how many indices may be written in all pieces together.
+// .x: how many indices may be written, in all pieces together.
 @group(2) @binding(4) var<uniform> capacity: vec4<u32>;
 
-// What earlier pieces left of the capacity.
+// The capacity that earlier pieces have left.
 fn room() -> u32 {
     var left = capacity.x;
     for (var p = 0u; p < piece.index; p += 1u) {
@@ -39,8 +43,9 @@ fn room() -> u32 {
     return left;
 }
 
-// The count is the draw's own: it never ends above the room, for who finds none takes its one back,
-// and nobody can have taken a slot below the room before.
+// `instance_count` is also the allocator.
+// An invocation whose slot exceeds the remaining capacity undoes its increment.
+// So the count ends within the capacity, and no slot is handed out twice.
 fn append(index: u32) {
     let slot = atomicAdd(&draws[piece.index].instance_count, 1u);
     if CAPPED {
@@ -54,7 +59,7 @@ fn append(index: u32) {
     }
 }
 
-// Whether the instance at a place is kept; its verdict is written.
+// Whether the instance at a place is kept; writes its verdict.
 fn test(place: u32) -> bool {
     let outcome = classify(place);
     if VERDICTS {
@@ -66,19 +71,19 @@ fn test(place: u32) -> bool {
     return outcome.verdict >= VISIBLE;
 }
 
-// The instance at a place is kept.
+// Reports that the instance at a place is kept.
 fn report(place: u32) {
     let index = caller_index(place);
     if MASK {
-        atomicOr(&mask[index / 32u], 1u << (index % 32u));
+        atomicOr(&mask[index / WORD_BITS], 1u << (index % WORD_BITS));
     }
     if APPEND {
         append(index);
     }
 }
 
-// Tests the RUN members of a group that one of the SHARE invocations has, and then reports those
-// that are kept: few, so that the dear part is done for few.
+// Tests the RUN members of a group that belong to one of its SHARE invocations.
+// Then it reports those that are kept: they are few, so the expensive part runs a few times.
 fn cull_run(group: u32, share: u32) {
     let first = group * GROUP + share;
     var kept = 0u;

@@ -1,11 +1,12 @@
-// The count of what was read, where it is asked for.
+// Counts of what tests have read, where they are asked for.
 
 // Count the tests of each level.
 override STATISTICS: bool;
 
+// Twin: `StatisticsRecord` in `crates/hiz_core/src/output/counters.rs`.
 struct Statistics {
     // How many instances and groups were compared with the depths of each level.
-    levels: array<atomic<u32>, 16>,
+    levels: array<atomic<u32>, MAX_LEVELS>,
     // Texels read, a 64-bit number in two halves.
     texels_low: atomic<u32>,
     texels_high: atomic<u32>,
@@ -13,7 +14,7 @@ struct Statistics {
 
 @group(2) @binding(3) var<storage, read_write> statistics: Statistics;
 
-// A test that read so many texels, of `level` first.
+// Counts a test that began at `level` and read `texels_read` texels.
 fn count_texels(level: u32, texels_read: u32) {
     if texels_read > 0u {
         atomicAdd(&statistics.levels[level], 1u);

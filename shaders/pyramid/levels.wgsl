@@ -1,36 +1,42 @@
-// Which level is read.
-// Level 0, the depth image, is always there; of the others those from first_stored to last_stored
-// (of the pyramid, in registers).
+// Which level a test reads.
+// Level 0, the depth image, is always there.
+// Of the others, the levels first_stored..=last_stored are stored.
 
+// Copies of the pyramid's numbers, in registers.
 var<private> first_stored: u32;
 var<private> last_stored: u32;
 
-// Which bit is the highest one that is set, for 0 < v < 2^24: the exponent of a float that holds v
-// exactly.
+// The layout of float32.
+const MANTISSA_BITS: u32 = 23u;
+const EXPONENT_BIAS: u32 = 127u;
+
+// The number of the highest set bit of v, for 0 < v < 2^24.
+// A float32 holds such a v exactly, and its exponent is that number.
 fn leading_bit(v: u32) -> u32 {
-    return (bitcast<u32>(f32(v)) >> 23u) - 127u;
+    return (bitcast<u32>(f32(v)) >> MANTISSA_BITS) - EXPONENT_BIAS;
 }
 
-// The finest level at which the pixels first..last span no more texels than the footprint.
-// Integer bits, no log2: that rounds.
+// The finest level at which the pixels first..=last span no more texels than the footprint.
+// It is found with integers alone, because log2 may round.
 fn finest_level(first: vec2<u32>, last: vec2<u32>) -> u32 {
     let pixels = last - first;
-    let level = max(leading_bit(pixels.x | pixels.y | 1u), FOOTPRINT_LOG2 - 1u) - (FOOTPRINT_LOG2 - 1u);
+    let side = FOOTPRINT_LOG2 - 1u;
+    let level = max(leading_bit(pixels.x | pixels.y | 1u), side) - side;
     let texels = (last >> vec2<u32>(level)) - (first >> vec2<u32>(level));
     return level + select(0u, 1u, (texels.x | texels.y) >= (1u << FOOTPRINT_LOG2));
 }
 
-// The finest level there is that is as coarse as `level`, or the coarsest one.
+// The finest stored level that is as coarse as `level`, or the coarsest stored one.
 fn stored_level(level: u32) -> u32 {
     return select(clamp(level, first_stored, last_stored), 0u, level == 0u);
 }
 
-// How many levels lie between one and the next finer that is there; 0 has none.
+// How many levels it is from a level above 0 down to the next finer one that is there.
 fn levels_down(level: u32) -> u32 {
     return select(1u, level, level <= first_stored);
 }
 
-// The same to the next coarser.
+// The same up to the next coarser one.
 fn levels_up(level: u32) -> u32 {
     return select(1u, first_stored, level == 0u);
 }

@@ -1,25 +1,31 @@
-// A header, whose first word numbers the reduction that filled the pyramid, and the stored levels:
-// one list of texels, rows padded, cut into chunks that each fit one storage binding.
+// The depth pyramid: a list of texels in up to three storage bindings, the chunks.
+// The list begins with a header, whose first word is the number of the reduction that filled it.
+// The stored levels follow, one after the other, with padded rows.
 
+// Twin: `MAX_LEVELS` in `crates/hiz_core/src/pyramid/levels.rs`.
+const MAX_LEVELS: u32 = 16u;
+
+// Twin: `Level` in `crates/hiz_core/src/pyramid/levels.rs`.
 struct Level {
+    // In texels of the list; both are 0 for a level that is not stored.
     offset: u32,
     stride: u32,
     width: u32,
     height: u32,
 }
 
+// Twin: `PyramidUniform` in `crates/hiz_core/src/pyramid/mod.rs`.
 struct Pyramid {
-    levels: array<Level, 16>,
-    // .xy: where they lie in an atlas.
-    origins: array<vec4<u32>, 16>,
+    levels: array<Level, MAX_LEVELS>,
+    // .xy: where each level begins in an atlas.
+    origins: array<vec4<u32>, MAX_LEVELS>,
     // A chunk holds 1 << chunk_shift texels.
     chunk_shift: u32,
-    // Which levels are stored.
-    // Level 0, the depth image, is always there.
+    // Which levels above 0 are stored; level 0 is the depth image.
     first_stored: u32,
     last_stored: u32,
     padding: u32,
 }
 
-// 1: everything lies in chunk_0, and the compiler drops the others.
+// The number of chunks; with 1 the compiler drops the code for the others.
 override CHUNKS: u32;

@@ -1,4 +1,4 @@
-// A pyramid and one step of its reduction: what is read, what is written.
+// The pyramid as the reduction writes it, and one step of the reduction.
 
 @group(0) @binding(2) var<uniform> pyramid: Pyramid;
 @group(0) @binding(3) var<storage, read_write> chunk_0: array<vec4<u32>>;
@@ -6,46 +6,57 @@
 @group(0) @binding(5) var<storage, read_write> chunk_2: array<vec4<u32>>;
 @group(1) @binding(0) var<uniform> step: Step;
 
+// Twin: `StepUniform` in `crates/hiz_core/src/pyramid/reduce.rs`.
 struct Step {
-    // The level that is read, and the last of the up to three above it that are written.
+    // The level that is read, and the last of the levels above it that are written.
     source: u32,
     last: u32,
-    // This reduction's number, for the header; 0: no header.
+    // The number of this reduction, for the header; 0: this step writes no header.
     reduction: u32,
     padding: u32,
-    // How many 8x8 blocks: a multiple of 4 columns, so that rows are whole vectors on the third
-    // level too.
+    // How many blocks the level has, in columns and rows.
+    // The columns are a multiple of VECTOR, so rows are whole vectors on the third level too.
     blocks: vec2<u32>,
     padding_1: vec2<u32>,
 }
 
-// True: neighbouring invocations read below each other.
+// True: neighbouring invocations read blocks below each other.
 override TALL: bool;
 
-// What an invocation of a workgroup of 64 reads: of 64 places in a row, or, TALL, of eight columns
-// of eight.
-// (A software driver reads for eight invocations at once. Eight below each other walk along their
-// rows in small steps, which the processor foresees, eight in a row in large ones:
-// docs/performance.md.)
+// Invocations of a workgroup of the reduction.
+// Twin: `REDUCE_WORKGROUP` in `crates/hiz_core/src/pyramid/reduce.rs`.
+const WORKGROUP: u32 = 64u;
+// The side of the square that they form where they do not form a row.
+// Twin: `TALL_SIDE` in `crates/hiz_core/src/pyramid/reduce.rs`.
+const SIDE_LOG2: u32 = 3u;
+const SIDE: u32 = 1u << SIDE_LOG2;
+const SIDE_MASK: u32 = SIDE - 1u;
+
+// Which block an invocation reads: one of a row of blocks or, with TALL, of a square.
+//
+// Tuning for software drivers, which read for eight invocations at once.
+// Eight blocks below each other are read along their rows in small steps, which the processor
+// foresees.
+// Eight blocks in a row are read in large steps (docs/performance.md).
 fn place_of(workgroup: vec2<u32>, lane: u32) -> vec2<u32> {
     if TALL {
-        return 8u * workgroup + place_in_square(lane);
+        return SIDE * workgroup + place_in_square(lane);
     }
-    return vec2<u32>(64u * workgroup.x + lane, workgroup.y);
+    return vec2<u32>(WORKGROUP * workgroup.x + lane, workgroup.y);
 }
 
-// Its place where the workgroup takes a square anyway.
+// The place of an invocation in its workgroup's square.
 fn place_in_square(lane: u32) -> vec2<u32> {
-    let down = vec2<u32>(lane >> 3u, lane & 7u);
+    let down = vec2<u32>(lane >> SIDE_LOG2, lane & SIDE_MASK);
     return select(down.yx, down, TALL);
 }
 
-// `index` is a multiple of 4, and so is the size of a chunk.
+// `index` is a multiple of VECTOR, and so is the size of a chunk.
 fn load4(index: u32) -> vec4<u32> {
     if CHUNKS == 1u {
-        return chunk_0[index >> 2u];
+        return chunk_0[index >> VECTOR_LOG2];
     }
-    let i = (index & ((1u << pyramid.chunk_shift) - 1u)) >> 2u;
+    let i = (index & ((1u << pyramid.chunk_shift) - 1u)) >> VECTOR_LOG2;
     switch index >> pyramid.chunk_shift {
         case 0u: { return chunk_0[i]; }
         case 1u: { return chunk_1[i]; }
@@ -55,10 +66,10 @@ fn load4(index: u32) -> vec4<u32> {
 
 fn store4(index: u32, bits: vec4<u32>) {
     if CHUNKS == 1u {
-        chunk_0[index >> 2u] = bits;
+        chunk_0[index >> VECTOR_LOG2] = bits;
         return;
     }
-    let i = (index & ((1u << pyramid.chunk_shift) - 1u)) >> 2u;
+    let i = (index & ((1u << pyramid.chunk_shift) - 1u)) >> VECTOR_LOG2;
     switch index >> pyramid.chunk_shift {
         case 0u: { chunk_0[i] = bits; }
         case 1u: { chunk_1[i] = bits; }
@@ -68,13 +79,13 @@ fn store4(index: u32, bits: vec4<u32>) {
 
 fn store(index: u32, bits: u32) {
     if CHUNKS == 1u {
-        chunk_0[index >> 2u][index & 3u] = bits;
+        chunk_0[index >> VECTOR_LOG2][index & VECTOR_MASK] = bits;
         return;
     }
     let i = index & ((1u << pyramid.chunk_shift) - 1u);
     switch index >> pyramid.chunk_shift {
-        case 0u: { chunk_0[i >> 2u][i & 3u] = bits; }
-        case 1u: { chunk_1[i >> 2u][i & 3u] = bits; }
-        default: { chunk_2[i >> 2u][i & 3u] = bits; }
+        case 0u: { chunk_0[i >> VECTOR_LOG2][i & VECTOR_MASK] = bits; }
+        case 1u: { chunk_1[i >> VECTOR_LOG2][i & VECTOR_MASK] = bits; }
+        default: { chunk_2[i >> VECTOR_LOG2][i & VECTOR_MASK] = bits; }
     }
 }

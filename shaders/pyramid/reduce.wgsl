@@ -1,32 +1,34 @@
-// Depth reduction: each invocation reads an 8x8 block of one level and writes what it makes of the
-// next three.
+// Depth reduction: each invocation reads a block of 8x8 texels and makes three levels of it.
 //
-// The shape of AMD's Single Pass Downsampler (FidelityFX SPD, 2020) cut to registers: no shared
-// memory, no barrier, a pass for every three levels.
-// Sizes are ceil-halved, and reads past an edge repeat the edge, so a texel of level k is the
-// farthest depth of exactly the pixels [x << k, (x + 1) << k): nothing is dropped at odd sizes and
-// nothing is read twice that could matter (the defect of the shader printed in Rakos 2010).
+// The shape is that of AMD's Single Pass Downsampler (FidelityFX SPD, 2020), cut down to registers:
+// no shared memory, no barrier, one pass per three levels.
 //
-// Levels are stored with room for whole blocks (`layout.rs`), so that no store asks where the level
-// ends: the padding takes what lies past the edge, which repeats it, and the pass that reads this
-// level reads the padding like the rest.
+// Sizes are halved and rounded up, and reads past an edge repeat the edge.
+// So a texel of level k is the farthest depth of exactly the pixels [x << k, (x + 1) << k).
+// At odd sizes nothing is dropped, and no repeated read matters.
+// The shader printed in Rakos 2010 has that defect.
+//
+// Levels are stored with room for whole blocks (`crates/hiz_core/src/pyramid/layout.rs`).
+// So no store has to ask where the level ends: what repeats the edge goes into the padding.
+// The pass that reads this level reads the padding like the rest.
 
 // True: level 0, the source texture, is read; otherwise a stored level.
 override FROM_SOURCE: bool;
-// The first level that is stored, 1 to 3 above the one that is read: an image's own level 1 is the
-// dearest to write.
+// The first level that is stored, 1 to 3 above the one that is read.
+// Level 1 of an image is the most expensive one to write.
 override FIRST: u32;
 
-// The farthest of two rows, and of neighbours in them.
+// Two rows of four texels, halved to two texels: the farthest of each 2x2.
 fn halved(a: vec4<u32>, b: vec4<u32>) -> vec2<u32> {
     return vec2<u32>(farthest4(vec4<u32>(a.xy, b.xy)), farthest4(vec4<u32>(a.zw, b.zw)));
 }
 
-// Rows 2y and 2y + 1 of the stored level, eight texels from column 8x on, made four of one row.
+// Rows 2y and 2y + 1 of a stored level, eight texels from column 8x on, halved to four texels.
 fn stored_quads(level: Level, x: u32, y: u32) -> vec4<u32> {
-    let last = ((level.width + 3u) & ~3u) - 4u;
-    let left = min(8u * x, last);
-    let right = min(8u * x + 4u, last);
+    // The column of the row's last vector.
+    let last = ((level.width + VECTOR_MASK) & ~VECTOR_MASK) - VECTOR;
+    let left = min(BLOCK * x, last);
+    let right = min(BLOCK * x + VECTOR, last);
     let top = level.offset + min(2u * y, level.height - 1u) * level.stride;
     let bottom = level.offset + min(2u * y + 1u, level.height - 1u) * level.stride;
     return vec4<u32>(
@@ -35,12 +37,12 @@ fn stored_quads(level: Level, x: u32, y: u32) -> vec4<u32> {
 }
 
 // The 4x4 quads of a block.
-fn quads(level: Level, block: vec2<u32>) -> array<vec4<u32>, 4> {
+fn quads(level: Level, block: vec2<u32>) -> array<vec4<u32>, BLOCK_QUADS> {
     if FROM_SOURCE {
         return source_quads(block);
     }
-    let y = 4u * block.y;
-    return array<vec4<u32>, 4>(
+    let y = BLOCK_QUADS * block.y;
+    return array<vec4<u32>, BLOCK_QUADS>(
         stored_quads(level, block.x, y), stored_quads(level, block.x, y + 1u),
         stored_quads(level, block.x, y + 2u), stored_quads(level, block.x, y + 3u));
 }
@@ -51,12 +53,13 @@ fn store_pair(level: Level, x: u32, y: u32, pair: vec2<u32>) {
     store(index + 1u, pair.y);
 }
 
-// One block of the level `source`, made texels of the levels after it, no further than `last`.
+// Reads a block of the level `source_number` and writes its texels of the levels after it, up to
+// `last`.
 fn reduce_block(source_number: u32, last: u32, block: vec2<u32>) {
     let rows = quads(pyramid.levels[source_number], block);
     if FIRST == 1u {
         let half = pyramid.levels[source_number + 1u];
-        let row = half.offset + 4u * (block.y * half.stride + block.x);
+        let row = half.offset + BLOCK_QUADS * (block.y * half.stride + block.x);
         store4(row, rows[0]);
         store4(row + half.stride, rows[1]);
         store4(row + 2u * half.stride, rows[2]);
@@ -75,11 +78,11 @@ fn reduce_block(source_number: u32, last: u32, block: vec2<u32>) {
             return;
         }
     }
-    let eighth = pyramid.levels[source_number + 3u];
+    let eighth = pyramid.levels[source_number + BLOCK_LOG2];
     store(eighth.offset + block.y * eighth.stride + block.x, farthest4(vec4<u32>(q0, q1)));
 }
 
-@compute @workgroup_size(64, 1)
+@compute @workgroup_size(WORKGROUP, 1)
 fn reduce(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let block = place_of(workgroup.xy, lane);
     if step.reduction != 0u && block.x == 0u && block.y == 0u {
@@ -90,17 +93,17 @@ fn reduce(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
     }
 }
 
-// The last levels, all of them by one workgroup: they are less work than another dispatch.
-@compute @workgroup_size(64, 1)
+// All levels that are left, made by one workgroup: they are less work than another dispatch.
+@compute @workgroup_size(WORKGROUP, 1)
 fn reduce_tail(@builtin(local_invocation_index) lane: u32) {
     var blocks = step.blocks;
-    for (var source_number = step.source; source_number < step.last; source_number += 3u) {
-        for (var i = lane; i < blocks.x * blocks.y; i += 64u) {
+    for (var source_number = step.source; source_number < step.last; source_number += BLOCK_LOG2) {
+        for (var i = lane; i < blocks.x * blocks.y; i += WORKGROUP) {
             reduce_block(source_number, step.last, vec2<u32>(i % blocks.x, i / blocks.x));
         }
         storageBarrier();
-        // Of the level that was written last, as `layout.rs` has it.
-        blocks = (blocks + vec2<u32>(7u)) / 8u;
-        blocks.x = (blocks.x + 3u) & ~3u;
+        // The blocks of the level that was written last, as `passes` in `layout.rs` counts them.
+        blocks = (blocks + vec2<u32>(BLOCK - 1u)) / BLOCK;
+        blocks.x = (blocks.x + VECTOR_MASK) & ~VECTOR_MASK;
     }
 }

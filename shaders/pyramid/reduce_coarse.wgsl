@@ -1,46 +1,46 @@
-// One coarse level alone, straight from the depth image, in one dispatch: a texel takes 16x16
-// pixels and more.
+// One coarse level, made alone and straight from the depth image in one dispatch.
+// A texel of it takes 16x16 pixels or more.
 //
-// Up to 32x32 pixels an invocation reads them all; larger texels are shared by the 64 invocations
-// of a workgroup.
-// Bits are sanitized before they are compared, so -0 and NaN cannot break the integer order, and
-// nothing begins with a depth of 1 that would cap larger ones (both faults of the usual atomicMin
-// on float bits).
+// An invocation reads up to 32x32 pixels; larger texels are shared by a workgroup.
+//
+// The usual way, atomicMin on float bits, has two faults that this one avoids:
+//
+// - Bits are sanitized before they are compared, so -0 and NaN cannot break the integer order.
+// - No value begins as a depth of 1, which would cap larger ones.
 
-// A texel is shared by a workgroup.
+// True: a workgroup shares a texel.
 override SHARED: bool;
-
-const WORKGROUP: u32 = 64u;
-// The workgroup's invocations along a side of its texel (`place_in_square`).
-const SIDE_LOG2: u32 = 3u;
 
 var<workgroup> parts: array<u32, WORKGROUP>;
 
-// The farthest depth of `side` x `side` blocks of 8x8 pixels.
+// The farthest depth of `side` x `side` blocks.
 fn farthest_of(begin: vec2<u32>, side: u32) -> u32 {
     let image = pyramid.levels[0];
-    // What lies past the edge repeats it: a part that begins there takes its own first block.
-    let blocks = (vec2<u32>(image.width, image.height) + vec2<u32>(7u)) / 8u;
+    // Blocks past the edge repeat it: a part that begins there reads its own first block.
+    let blocks = (vec2<u32>(image.width, image.height) + vec2<u32>(BLOCK - 1u)) / BLOCK;
     let end = max(min(begin + vec2<u32>(side), blocks), begin + vec2<u32>(1u));
     var bits = near_bits();
     for (var y = begin.y; y < end.y; y += 1u) {
         for (var x = begin.x; x < end.x; x += 1u) {
             let rows = source_quads(vec2<u32>(x, y));
-            let by_row = vec4<u32>(farthest4(rows[0]), farthest4(rows[1]), farthest4(rows[2]), farthest4(rows[3]));
+            let by_row = vec4<u32>(
+                farthest4(rows[0]), farthest4(rows[1]), farthest4(rows[2]), farthest4(rows[3]));
             bits = farthest(bits, farthest4(by_row));
         }
     }
     return bits;
 }
 
-@compute @workgroup_size(64, 1)
-fn reduce_coarse(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+@compute @workgroup_size(WORKGROUP, 1)
+fn reduce_coarse(
+    @builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32,
+) {
     if lane == 0u && group.x == 0u && group.y == 0u {
         chunk_0[0] = vec4<u32>(step.reduction, 0u, 0u, 0u);
     }
     let level = pyramid.levels[step.last];
     // Blocks along a side of a texel.
-    let side = 1u << (step.last - 3u);
+    let side = 1u << (step.last - BLOCK_LOG2);
     if !SHARED {
         let at = place_of(group.xy, lane);
         if at.x < step.blocks.x && at.y < step.blocks.y {
@@ -48,6 +48,7 @@ fn reduce_coarse(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
         }
         return;
     }
+    // Each invocation takes one of SIDE x SIDE parts of the texel.
     let part = side >> SIDE_LOG2;
     parts[lane] = farthest_of(group.xy * side + place_in_square(lane) * part, part);
     workgroupBarrier();

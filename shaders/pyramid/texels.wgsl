@@ -1,17 +1,18 @@
-// The pyramid as a cull reads it, wherever its levels lie (`texels_apart.wgsl`,
-// `texels_atlas.wgsl`).
+// The pyramid as a cull reads it, wherever its levels lie.
+// `texels_apart.wgsl`, `texels_atlas.wgsl` and `texels_nowhere.wgsl` read single texels.
 
-// The footprint is at most 2^n x 2^n texels.
+// The footprint has at most 2^n x 2^n texels.
 override FOOTPRINT_LOG2: u32;
 
 @group(0) @binding(2) var<uniform> pyramid: Pyramid;
 @group(0) @binding(6) var<uniform> view_uniform: View;
 
-// Whether the pyramid is the one that was promised, and not one whose reduction has yet to run.
+// Whether the pyramid holds the reduction that the view was made for.
+// A reduction that was recorded may never have run.
 var<private> is_reduced: bool;
 
-// The first thing that an entry point calls: what it holds in registers a software driver does not
-// fetch again for every instance.
+// Every entry point calls this first.
+// Tuning for software drivers: what is in registers is not fetched again for every instance.
 fn begin() {
     view = view_uniform;
     is_reduced = reduction_number() == view.reduction;
@@ -21,6 +22,7 @@ fn begin() {
 
 // The farthest depth of the texels from columns t.x to t.z and rows t.y to t.w of a level.
 fn footprint(level: u32, t: vec4<u32>) -> u32 {
+    // The corners of a 2x2 footprint are all of its texels.
     if FOOTPRINT_LOG2 == 1u {
         let bits = corners(level, t);
         tell_corners(level, t, bits);
@@ -39,8 +41,9 @@ fn footprint(level: u32, t: vec4<u32>) -> u32 {
 
 const LEAST_NORMAL: f32 = 0x1p-126;
 
-// The depth that a stored one stands for: with the slack, away from subnormals.
+// The depth that a certificate takes for a stored one: moved by the slack, away from subnormals.
 fn occluding_depth(bits: u32) -> f32 {
-    let stored = select(max(bitcast<f32>(bits), LEAST_NORMAL), min(bitcast<f32>(bits), 1.0), REVERSED);
+    let stored =
+        select(max(bitcast<f32>(bits), LEAST_NORMAL), min(bitcast<f32>(bits), 1.0), REVERSED);
     return bar(stored * view.depth_factor + view.depth_offset);
 }

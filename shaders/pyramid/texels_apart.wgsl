@@ -1,4 +1,4 @@
-// Level 0 in the depth image, the stored levels where the reduction left them.
+// Level 0 is the depth image, and the stored levels are where the reduction wrote them.
 
 @group(0) @binding(3) var<storage, read> chunk_0: array<u32>;
 @group(0) @binding(4) var<storage, read> chunk_1: array<u32>;
@@ -19,17 +19,19 @@ fn reduction_number() -> u32 {
     return stored_bits(0u);
 }
 
-// The stored texels at columns t.x and t.z and rows t.y and t.w of a level.
+// The texels of a stored level at columns t.x and t.z and rows t.y and t.w.
 fn stored_corners(level: u32, t: vec4<u32>) -> vec4<u32> {
     let l = pyramid.levels[level];
     let top = l.offset + t.y * l.stride;
     let bottom = l.offset + t.w * l.stride;
     return vec4<u32>(
-        stored_bits(top + t.x), stored_bits(top + t.z), stored_bits(bottom + t.x), stored_bits(bottom + t.z));
+        stored_bits(top + t.x), stored_bits(top + t.z),
+        stored_bits(bottom + t.x), stored_bits(bottom + t.z));
 }
 
-// The same of any level; level 0's as given.
-// Both are read, whatever the level: a software driver goes both ways of a branch.
+// The same for any level; pixels of level 0 come as given.
+// Tuning for software drivers: both are read, whatever the level, since they take both sides of a
+// branch anyway.
 fn corners(level: u32, t: vec4<u32>) -> vec4<u32> {
     return select(stored_corners(level, t), source_corners(t), level == 0u);
 }

@@ -1,22 +1,28 @@
-// All levels that are there in one texture, four pixels or texels of a row a texel of it
-// (`crates/hiz_core/src/pyramid/atlas.rs`): one fetch serves every level.
+// All levels that are there, in one texture: one fetch serves every level.
+// A texel of the texture holds VECTOR pixels, or texels of a level, of one row.
+// Twin: `crates/hiz_core/src/pyramid/atlas.rs`.
 
 @group(0) @binding(3) var atlas: texture_storage_2d<rgba32uint, read>;
 
-// The number of the reduction whose depth image and stored levels these are; 0, which none has,
-// where they are of two reductions: the copies ran after the next one.
+// Columns at the right end, each with a header in its first row.
+// The first one numbers the reduction of the depth image, the second that of the stored levels.
+// Twin: `HEADERS` in `crates/hiz_core/src/pyramid/layout.rs`.
+const HEADERS: u32 = 2u;
+
+// The number of the reduction that the depth image and the stored levels belong to.
+// It is 0, which no reduction has, if they belong to two: the copies ran after the next reduction.
 fn reduction_number() -> u32 {
-    let column = textureDimensions(atlas).x - 2u;
+    let column = textureDimensions(atlas).x - HEADERS;
     let of_image = textureLoad(atlas, vec2<u32>(column, 0u)).x;
     let of_levels = textureLoad(atlas, vec2<u32>(column + 1u, 0u)).x;
     return select(0u, of_levels, of_levels == of_image);
 }
 
-// The texels at columns t.x and t.z and rows t.y and t.w of a level; level 0's as given.
+// The texels at columns t.x and t.z and rows t.y and t.w of a level; pixels of level 0 as given.
 fn corners(level: u32, t: vec4<u32>) -> vec4<u32> {
-    let at = pyramid.origins[level].xyxy + (t >> vec4<u32>(2u, 0u, 2u, 0u));
-    let left = t.x & 3u;
-    let right = t.z & 3u;
+    let at = pyramid.origins[level].xyxy + (t >> vec4<u32>(VECTOR_LOG2, 0u, VECTOR_LOG2, 0u));
+    let left = t.x & VECTOR_MASK;
+    let right = t.z & VECTOR_MASK;
     return vec4<u32>(
         textureLoad(atlas, at.xy)[left], textureLoad(atlas, at.zy)[right],
         textureLoad(atlas, at.xw)[left], textureLoad(atlas, at.zw)[right]);
@@ -24,5 +30,6 @@ fn corners(level: u32, t: vec4<u32>) -> vec4<u32> {
 
 // The depth of one texel of a level.
 fn texel(level: u32, x: u32, y: u32) -> u32 {
-    return sanitized(textureLoad(atlas, pyramid.origins[level].xy + vec2<u32>(x >> 2u, y))[x & 3u]);
+    let at = pyramid.origins[level].xy + vec2<u32>(x >> VECTOR_LOG2, y);
+    return sanitized(textureLoad(atlas, at)[x & VECTOR_MASK]);
 }

@@ -1,4 +1,5 @@
-// No depth at all, for whoever asks only what is outside: all is far, and no reduction has run.
+// No depth at all, for passes that ask only which instances are outside.
+// Every texel is far, and no reduction has run.
 
 // No reduction has this number, so a test ends before it reads.
 fn reduction_number() -> u32 {

@@ -1,10 +1,9 @@
-// A yardstick: the cull without its certificates, as one would write it who trusts float32.
-// The same records, tests, footprint and level, from the same frame; no margins, no bars, nothing
-// proved.
-// It hides what can be seen, and exists to be measured against.
-// For boxes.
+// A yardstick: the test of a box without certificates, as an author who trusts float32 writes it.
+// It has the same records, tests, footprint and level, and runs in the same frame.
+// It has no margins and no bars, and proves nothing.
+// It hides instances that can be seen, and exists to be measured against.
 
-// Choices of the frame that it does not offer.
+// Options of the frame that it does not offer.
 override SAMPLE_COVERAGE: bool;
 override DESCENT: bool;
 override FIT_VOLUME: bool;
@@ -23,7 +22,8 @@ fn flat_above(r: Flat, t: f32, w: Flat) -> bool {
 }
 
 fn flat_beyond(r: Flat, t: f32, w: Flat) -> bool {
-    return abs(r.center) - t * w.center > support(select(1.0, -1.0, r.center < 0.0) * r.half - t * w.half);
+    return abs(r.center) - t * w.center
+        > support(select(1.0, -1.0, r.center < 0.0) * r.half - t * w.half);
 }
 
 fn flat_interval(r: Flat, w: Flat) -> vec2<f32> {
@@ -31,7 +31,8 @@ fn flat_interval(r: Flat, w: Flat) -> vec2<f32> {
     let toward = select(vec3<f32>(-1.0), vec3<f32>(1.0), r.half - ratio * w.half >= vec3<f32>(0.0));
     let r_half = dot(toward, r.half);
     let w_half = dot(toward, w.half);
-    return vec2<f32>((r.center - r_half) / (w.center - w_half), (r.center + r_half) / (w.center + w_half));
+    return vec2<f32>(
+        (r.center - r_half) / (w.center - w_half), (r.center + r_half) / (w.center + w_half));
 }
 
 fn flat_pixels(interval: vec2<f32>, half_size: f32, size: i32) -> vec2<i32> {

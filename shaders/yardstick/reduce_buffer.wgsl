@@ -1,9 +1,14 @@
-// A yardstick, not a part of the library: the reduction as one dispatch a level on a flat buffer,
-// the shape that most Hi-Z implementations have.
-// Four texels of a level an invocation, so that all loads and stores are vectors.
+// A yardstick, not a part of the library: the reduction with one dispatch per level, on a buffer.
+// Most Hi-Z implementations have this shape.
+// An invocation makes VECTOR texels of a level, so that all loads and stores are vectors.
 
+// Invocations of a workgroup.
+// Twin: `BUFFER_WORKGROUP` in `crates/hiz_core/src/yardstick/reduce.rs`.
+const WORKGROUP: u32 = 64u;
+
+// Twin: `Level` in `crates/hiz_core/src/yardstick/reduce.rs`.
 struct YardstickLevel {
-    // In vectors of four texels.
+    // In vectors.
     offset: u32,
     stride: u32,
     // In texels.
@@ -26,7 +31,7 @@ fn pairs(a: vec4<u32>, b: vec4<u32>) -> vec2<u32> {
     return vec2<u32>(farthest4(vec4<u32>(a.xy, b.xy)), farthest4(vec4<u32>(a.zw, b.zw)));
 }
 
-@compute @workgroup_size(64, 1)
+@compute @workgroup_size(WORKGROUP, 1)
 fn reduce_buffer(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= step.written.stride || id.y >= step.written.height {
         return;
@@ -36,11 +41,14 @@ fn reduce_buffer(@builtin(global_invocation_id) id: vec3<u32>) {
         out = source_quad_row(id.x, id.y);
     } else {
         let top = step.read.offset + (2u * id.y) * step.read.stride;
-        let bottom = step.read.offset + min(2u * id.y + 1u, step.read.height - 1u) * step.read.stride;
+        let bottom =
+            step.read.offset + min(2u * id.y + 1u, step.read.height - 1u) * step.read.stride;
         let left = 2u * id.x;
         // A row's padding repeats its edge.
         let right = min(left + 1u, step.read.stride - 1u);
-        out = vec4<u32>(pairs(texels[top + left], texels[bottom + left]), pairs(texels[top + right], texels[bottom + right]));
+        out = vec4<u32>(
+            pairs(texels[top + left], texels[bottom + left]),
+            pairs(texels[top + right], texels[bottom + right]));
     }
     texels[step.written.offset + id.y * step.written.stride + id.x] = out;
 }

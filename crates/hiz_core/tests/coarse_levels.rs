@@ -165,12 +165,12 @@ fn faults_of_coarse_levels_are_seen() {
             &alone,
         ),
         // A tail's blocks and lanes are left out.
+        (("(blocks + vec2<u32>(BLOCK - 1u)) / BLOCK;", "(blocks + vec2<u32>(3u)) / BLOCK;"), &all),
         (
-            ("blocks = (blocks + vec2<u32>(7u)) / 8u;", "blocks = (blocks + vec2<u32>(3u)) / 8u;"),
-            &all,
-        ),
-        (
-            ("i < blocks.x * blocks.y; i += 64u", "i < min(blocks.x * blocks.y, 64u); i += 64u"),
+            (
+                "i < blocks.x * blocks.y; i += WORKGROUP",
+                "i < min(blocks.x * blocks.y, WORKGROUP); i += WORKGROUP",
+            ),
             &all,
         ),
     ];

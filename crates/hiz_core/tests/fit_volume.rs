@@ -102,7 +102,7 @@ fn planted_faults_turn_it_red() {
             "no certificate, no margin",
             &[
                 ("small && surely_above(r, offset, p.w)", "small"),
-                ("least - 3.0 * error_bound(r, least, p.w) / p.w_min", "least"),
+                ("least - GUESS_ERRORS * error_bound(r, least, p.w) / p.w_min", "least"),
             ],
         ),
         (

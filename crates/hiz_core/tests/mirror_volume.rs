@@ -185,7 +185,10 @@ const MORE_FAULTS: &[Fault] = &[
         "no certificate, no margin",
         &[
             ("small && surely_above(r, offset, p.w)", "small"),
-            ("bar(least - 3.0 * error_bound(r, least, p.w) / p.w_min)", "least + 1e-4 * extent"),
+            (
+                "bar(least - GUESS_ERRORS * error_bound(r, least, p.w) / p.w_min)",
+                "least + 1e-4 * extent",
+            ),
         ],
     ),
     (

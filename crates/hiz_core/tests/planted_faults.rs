@@ -97,9 +97,9 @@ fn cuts_of_the_margin() {
 
 /// The block's certificates along one axis, as the cull calls them.
 const INSIDE_X: &str =
-    "inside_block(x, w, extent_x, w_min, block.x, block.z, level, view.half_size.x, view.size.x)";
+    "inside_block(x, w, ends_x, w_min, block.x, block.z, level, view.half_size.x, view.size.x)";
 const INSIDE_Y: &str =
-    "inside_block(y, w, extent_y, w_min, block.y, block.w, level, view.half_size.y, view.size.y)";
+    "inside_block(y, w, ends_y, w_min, block.y, block.w, level, view.half_size.y, view.size.y)";
 
 #[test]
 fn a_level_too_fine_without_block_certificates() {
@@ -216,10 +216,10 @@ fn a_rectangle_that_is_too_small_without_block_certificates() {
 }
 
 /// The amount that the rectangle is widened by besides its own error.
-const WIDENING: &str = "let rounding = 4.0 * EPS * half_size + view.reach;";
+const WIDENING: &str = "let rounding = WIDENING_ULPS * EPS * half_size + view.reach;";
 /// A rectangle 0.7 pixels too small on each side.
 const TOO_SMALL: (&str, &str) =
-    (WIDENING, "let rounding = 4.0 * EPS * half_size + view.reach - 0.7;");
+    (WIDENING, "let rounding = WIDENING_ULPS * EPS * half_size + view.reach - 0.7;");
 
 /// The rectangle only chooses what is certified.
 /// Where it is wrong, less is culled, and nothing is culled wrongly.
@@ -304,7 +304,7 @@ fn culls_within_the_guard(engine: &Engine) -> bool {
 /// In sample coverage the same terms decide what is *culled*: see `outcomes.rs`.
 #[test]
 fn the_guard_stands_in_the_block_certificates_too() {
-    let forgetful = (WIDENING, "let rounding = 4.0 * EPS * half_size;");
+    let forgetful = (WIDENING, "let rounding = WIDENING_ULPS * EPS * half_size;");
     assert!(!culls_within_the_guard(&faulty(&[])));
     assert!(!culls_within_the_guard(&faulty(&[forgetful])));
     for sign in [
@@ -520,7 +520,7 @@ fn dropped_rows_and_columns() {
         // The last row of an odd level.
         // Then the last columns, where a block reaches past the row's padding.
         ("min(2u * y + 1u, level.height - 1u)", "min(2u * y, level.height - 1u)"),
-        ("let right = min(8u * x + 4u, last);", "let right = left;"),
+        ("let right = min(BLOCK * x + VECTOR, last);", "let right = left;"),
         ("vec2<u32>(2u * x + 1u, 2u * y + 1u)", "vec2<u32>(2u * x, 2u * y + 1u)"),
         ("f32(2u * x + 1u)", "f32(min(2u * x + 1u, textureDimensions(source).x - 2u))"),
         ("f32(2u * y + 1u)", "f32(min(2u * y + 1u, textureDimensions(source).y - 2u))"),

@@ -7,10 +7,14 @@ use crate::gpu::layouts::Binding;
 use crate::gpu::pipelines::Compute;
 use crate::gpu::shader::{Source, wgsl};
 use crate::instances::Instances;
-use crate::output::visible::Visible;
+use crate::output::visible::{VERDICT_MULTIPLE, Visible};
 
-/// Places that one workgroup counts: 64 invocations of 16 each; `shaders/cull/count.wgsl`.
-const COUNT_WORKGROUP: u32 = 64 * 16;
+/// Invocations of a workgroup, and vectors of places that each of them counts;
+/// `shaders/cull/count.wgsl`.
+pub(crate) const LANES: u32 = 64;
+pub(crate) const VECTORS: u32 = 4;
+/// Places that one workgroup counts.
+const COUNT_WORKGROUP: u32 = LANES * VECTORS * VERDICT_MULTIPLE;
 
 /// The bindings of a count.
 const BINDINGS: &[(u32, Binding)] =

@@ -24,7 +24,7 @@ use crate::output::visible::Visible;
 use crate::pyramid::Pyramid;
 
 /// Groups whose members one workgroup refines; `shaders/cull/refine.wgsl`.
-const WORKGROUP: u32 = 64;
+pub(crate) const WORKGROUP: u32 = 64;
 
 /// The shader that writes the verdicts of the members of hidden groups.
 pub(crate) fn refine_module(kind: BoundsKind) -> Source {

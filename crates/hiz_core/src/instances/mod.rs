@@ -85,6 +85,9 @@ pub(crate) struct Changing {
     pub(crate) next_update: u32,
 }
 
+/// Room for `Sequence` of `shaders/instances/update.wgsl`.
+pub(crate) const SEQUENCE_BYTES: usize = 16;
+
 /// Bounding volumes on the device.
 ///
 /// # Examples
@@ -155,8 +158,11 @@ impl Instances {
             pieces.push(piece);
             groups.push(its_groups);
         }
-        let sequence =
-            gpu.filled("hiz.instances.sequence", &[0; 16], wgpu::BufferUsages::STORAGE)?;
+        let sequence = gpu.filled(
+            "hiz.instances.sequence",
+            &[0; SEQUENCE_BYTES],
+            wgpu::BufferUsages::STORAGE,
+        )?;
         let changing = Locked::new(Changing { groups, next_update: 0 });
         let this = Self {
             context: gpu.id(),

@@ -28,7 +28,7 @@ use crate::instances::{Instances, refuse_bad};
 
 /// Invocations of one workgroup; `shaders/instances/update.wgsl`.
 /// It equals the cull's, whose pieces fit one dispatch.
-const WORKGROUP: u32 = CULL_WORKGROUP;
+pub(crate) const WORKGROUP: u32 = CULL_WORKGROUP;
 
 /// Twin: `shaders/instances/update.wgsl`, `Update`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]

@@ -100,13 +100,13 @@ fn write<R: Record>(out: &mut [u8], index: u32, record: R) -> bool {
 
 /// Sizes and coordinates must stay below this, or the bounds are invalid.
 /// Then no product in the shader overflows.
-const LARGEST: f32 = 1_152_921_504_606_846_976.0;
+pub(crate) const LARGEST: f32 = 1_152_921_504_606_846_976.0;
 
 /// The size in the record of invalid bounds.
 ///
 /// It exceeds every camera's coordinate limit, so the shader keeps the instance as invalid.
 /// The shader need not recognise NaN or infinity, which a compiler may assume to be absent.
-const BEYOND_LIMITS: f32 = 4.0 * LARGEST;
+pub(crate) const BEYOND_LIMITS: f32 = 4.0 * LARGEST;
 
 trait Record: bytemuck::Pod {
     /// The record that is stored for invalid bounds.

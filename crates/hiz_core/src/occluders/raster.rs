@@ -20,10 +20,10 @@ pub const OCCLUDER_DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Dept
 /// Twin of `OccluderView` in `shaders/occluders/occluders.wgsl`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-struct OccluderView {
-    rows: [[f32; 4]; 4],
-    eye_hi: [f32; 4],
-    eye_lo: [f32; 4],
+pub(crate) struct OccluderView {
+    pub(crate) rows: [[f32; 4]; 4],
+    pub(crate) eye_hi: [f32; 4],
+    pub(crate) eye_lo: [f32; 4],
 }
 
 /// Whether a box is outside one plane of the frustum.

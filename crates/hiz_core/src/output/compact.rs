@@ -12,7 +12,7 @@ use crate::output::visible::Visible;
 
 /// Words of the mask that one workgroup of `scatter` turns into indices;
 /// `shaders/output/compact.wgsl`.
-const SCATTER_WORKGROUP: u32 = 64;
+pub(crate) const SCATTER_WORKGROUP: u32 = 64;
 
 const LAYOUT: &str = "hiz.compact.layout";
 

@@ -14,6 +14,9 @@ pub enum Verdict {
     Invalid = 3,
 }
 
+/// The bits of a device's word that hold a verdict; flags stand above them.
+pub(crate) const VERDICT_MASK: u32 = 3;
+
 impl Verdict {
     /// Whether the instance is kept.
     pub fn is_kept(self) -> bool {
@@ -22,7 +25,7 @@ impl Verdict {
 
     /// The verdict in the two lowest bits of a word from the device.
     pub(crate) fn of_word(word: u32) -> Self {
-        match word & 3 {
+        match word & VERDICT_MASK {
             0 => Self::Outside,
             1 => Self::Occluded,
             2 => Self::Visible,

@@ -14,7 +14,7 @@ use crate::output::outputs::Outputs;
 use crate::output::survivors::GroupOutput;
 
 /// Places whose verdicts `shaders/cull/count.wgsl` reads at once.
-const VERDICT_MULTIPLE: u32 = 4;
+pub(crate) const VERDICT_MULTIPLE: u32 = 4;
 
 /// The buffers of one piece.
 #[derive(Debug)]

@@ -58,7 +58,7 @@ impl AtlasLayout {
 pub(crate) const PYRAMID_CHUNKS: usize = 3;
 
 /// Columns of blocks come in multiples of this, so that the reduction loads and stores vectors.
-const BLOCK_ALIGNMENT: u32 = 4;
+pub(crate) const BLOCK_ALIGNMENT: u32 = 4;
 
 /// Rows of every level start at multiples of this many texels, as copies into a texture require.
 const ROW_ALIGNMENT: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT / 4;
@@ -73,7 +73,7 @@ const HEADER_TEXELS: u64 = 4;
 /// The side in texels, as a power of two, of the block that an invocation of the reduction reads.
 ///
 /// The invocation makes up to three levels from the block.
-const BLOCK_LOG2: u32 = 3;
+pub(crate) const BLOCK_LOG2: u32 = 3;
 
 /// One dispatch of the reduction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -96,14 +96,14 @@ fn pipeline(
 
 /// Invocations per workgroup of the reduction, in one row.
 /// The shader's side is `place_of` in `shaders/pyramid/pyramid_write.wgsl`.
-const REDUCE_WORKGROUP: u32 = 64;
+pub(crate) const REDUCE_WORKGROUP: u32 = 64;
 /// The side of the square that a workgroup forms instead if `TALL` is set.
-const TALL_SIDE: u32 = 8;
+pub(crate) const TALL_SIDE: u32 = 8;
 /// Pixels of 4 KiB, a page, at 4 bytes per pixel.
 const PAGE_PIXELS: u32 = 1024;
 /// The finest level whose texels are shared by a workgroup if it is made alone.
 /// Each invocation then reads at least 8x8 pixels.
-const SHARED_LEVEL: u32 = 6;
+pub(crate) const SHARED_LEVEL: u32 = 6;
 
 /// Twin of `Step` in `shaders/pyramid/pyramid_write.wgsl`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]

@@ -2,6 +2,8 @@
 //! and the shaders.
 
 pub mod shaders;
+#[cfg(test)]
+mod twins;
 pub mod words;
 
 pub use crate::occluders::surface::planted_fault::PlantedFault;

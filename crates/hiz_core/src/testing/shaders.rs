@@ -1,4 +1,4 @@
-//! Every module of this crate.
+//! Every shader module that this crate makes a pipeline of.
 
 use crate::cull::count;
 use crate::cull::explain::explain_module;
@@ -15,7 +15,8 @@ use crate::pyramid::reduce::{blocks_module, coarse_module};
 use crate::yardstick;
 
 /// All kinds of bounds.
-const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
+pub(super) const KINDS: [BoundsKind; 3] =
+    [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
 
 /// Path below `shaders/`, without its extension, and text of every file.
 pub fn files() -> Vec<(&'static str, &'static str)> {
@@ -27,7 +28,7 @@ pub fn modules() -> Vec<(String, String)> {
     all().into_iter().map(|(name, source)| (name, source.text())).collect()
 }
 
-fn all() -> Vec<(String, Source)> {
+pub(super) fn all() -> Vec<(String, Source)> {
     let mut all = vec![
         ("refine_groups".to_owned(), refine_groups_module()),
         ("compact".to_owned(), compact::module()),
@@ -58,13 +59,12 @@ fn all() -> Vec<(String, Source)> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(in crate::testing) mod tests {
     use super::*;
     use crate::gpu::depth_source::SourceKind;
-    use crate::gpu::shader::wgsl;
     use naga::valid::{Capabilities, ValidationFlags, Validator};
 
-    fn parse(source: &str) -> naga::Module {
+    pub(in crate::testing) fn parse(source: &str) -> naga::Module {
         let module = naga::front::wgsl::parse_str(source)
             .unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
         Validator::new(ValidationFlags::all(), Capabilities::default())
@@ -78,81 +78,6 @@ mod tests {
         for (_, text) in modules() {
             parse(&text);
         }
-    }
-
-    /// Offsets of a WGSL struct's members, and its size.
-    fn layout(module: &naga::Module, name: &str) -> (Vec<(String, u32)>, u32) {
-        let (_, ty) =
-            module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).expect(name);
-        let naga::TypeInner::Struct { members, span } = &ty.inner else {
-            panic!("{name} is no struct")
-        };
-        (members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect(), *span)
-    }
-
-    macro_rules! same_layout {
-        ($module:expr, $wgsl:literal, $rust:ty { $($theirs:literal = $ours:ident),* $(,)? }) => {{
-            let (members, span) = layout(&$module, $wgsl);
-            let expected = vec![$(($theirs.to_owned(), std::mem::offset_of!($rust, $ours) as u32)),*];
-            assert_eq!(members, expected, "{}", $wgsl);
-            assert_eq!(span as usize, size_of::<$rust>(), "{}", $wgsl);
-        }};
-    }
-
-    #[test]
-    fn rust_twins_have_the_offsets_of_wgsl() {
-        use crate::cull::explain::ExplanationRecord;
-        use crate::cull::view_uniform::ViewUniform;
-        use crate::instances::piece::PieceUniform;
-        use crate::instances::update::UpdateUniform;
-        use crate::output::counters::{CounterRecord, StatisticsRecord};
-        use crate::output::draw::DrawIndexedIndirect;
-        use crate::pyramid::PyramidUniform;
-        use crate::pyramid::levels::Level;
-        use crate::pyramid::reduce::StepUniform;
-
-        let module =
-            parse(&cull_module(DepthStore::Apart(SourceKind::Depth), BoundsKind::Sphere).text());
-        same_layout!(module, "Level", Level { "offset" = offset, "stride" = stride, "width" = width, "height" = height });
-        same_layout!(module, "Pyramid", PyramidUniform {
-            "levels" = levels, "origins" = origins, "chunk_shift" = chunk_shift, "first_stored" = first_stored, "last_stored" = last_stored,
-            "padding" = padding
-        });
-        same_layout!(parse(&blocks_module(SourceKind::Depth).text()), "Step", StepUniform {
-            "source" = source, "last" = last, "reduction" = reduction, "padding" = padding, "blocks" = blocks,
-            "padding_1" = padding_1
-        });
-        same_layout!(module, "View", ViewUniform {
-            "x" = x, "y" = y, "z" = z, "w" = w, "magnitudes" = magnitudes, "constant_magnitudes" = constant_magnitudes,
-            "eye_hi" = eye_hi, "z_slope" = z_slope, "eye_lo" = eye_lo, "halves_size" = halves_size, "half_size" = half_size,
-            "reach" = reach, "depth_factor" = depth_factor, "size" = size, "runtime_zero" = runtime_zero,
-            "reduction" = reduction, "descent_budget" = descent_budget, "depth_offset" = depth_offset,
-            "coordinate_limit" = coordinate_limit, "padding" = padding
-        });
-        same_layout!(module, "Piece", PieceUniform { "base" = base, "count" = count, "index" = index, "words" = words });
-        same_layout!(module, "DrawIndexedIndirect", DrawIndexedIndirect {
-            "index_count" = index_count, "instance_count" = instance_count, "first_index" = first_index,
-            "base_vertex" = base_vertex, "first_instance" = first_instance
-        });
-        same_layout!(module, "Statistics", StatisticsRecord {
-            "levels" = levels, "texels_low" = texels_low, "texels_high" = texels_high
-        });
-        let module = parse(&count::module().text());
-        same_layout!(module, "Counters", CounterRecord {
-            "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid
-        });
-        let update = parse(&update::module().text());
-        same_layout!(update, "Update", UpdateUniform {
-            "count" = count, "texels" = texels, "number" = number, "padding" = padding
-        });
-        let oriented = parse(
-            &explain_module(DepthStore::Apart(SourceKind::Depth), BoundsKind::OrientedBox).text(),
-        );
-        same_layout!(oriented, "Explanation", ExplanationRecord {
-            "verdict" = verdict, "stage" = stage, "level" = level, "farthest_bits" = farthest_bits, "pixels" = pixels,
-            "depths" = depths, "last" = last, "texels_read" = texels_read, "of_footprint" = of_footprint,
-            "farthest_before" = farthest_before, "any_before" = any_before
-        });
     }
 
     /// How often `caller` calls `callee`.
@@ -251,69 +176,44 @@ mod tests {
         }
     }
 
-    /// The f32 that a shader says after `before`.
-    fn number(shader: &str, before: &str) -> f64 {
-        let rest = shader.split_once(before).unwrap_or_else(|| panic!("{before}")).1;
-        let text: String =
-            rest.chars().take_while(|c| c.is_alphanumeric() || ".-".contains(*c)).collect();
-        match text.split_once("p") {
-            Some(("0x1", exponent)) => 2.0_f64.powi(exponent.parse().expect("an exponent")),
-            _ => text.parse().expect("a number"),
+    /// Literals of a shader's code, outside of declarations that name them and of attributes.
+    fn literals(text: &str) -> Vec<&str> {
+        let mut found = Vec::new();
+        for line in text.lines() {
+            let code = line.split("//").next().unwrap_or_default();
+            if code.starts_with("const ") || code.starts_with('@') {
+                continue;
+            }
+            let is_word = |c: char| c.is_alphanumeric() || c == '_' || c == '.';
+            found.extend(
+                code.split(|c| !is_word(c)).filter(|w| w.starts_with(|c: char| c.is_ascii_digit())),
+            );
+        }
+        found
+    }
+
+    /// Numbers that need no name: plain arithmetic, and the rows and lanes 0 to 3 of four.
+    const PLAIN: &[&str] =
+        &["0", "1", "2", "3", "0u", "1u", "2u", "3u", "0.0", "1.0", "-1.0", "2.0"];
+
+    #[test]
+    fn numbers_of_shaders_have_names() {
+        // The rows of a matrix.
+        let known = [("occluders/occluders", "4")];
+        for (path, text) in files() {
+            for literal in literals(text) {
+                let is_plain = PLAIN.contains(&literal) || known.contains(&(path, literal));
+                assert!(is_plain, "{path}: what is {literal}?");
+            }
         }
     }
 
-    /// What docs/accuracy.md derives of constants whose absence shows in no verdict but the
-    /// mirror's: they cover what it counts.
     #[test]
-    fn constants_cover_what_is_counted() {
-        let eps = crate::host::rounding::EPS;
-        let certificate = wgsl!("cull/certificate").text;
-        assert!(
-            number(certificate, "ERROR_FLOOR: f32 = ") >= 2.0_f64.powi(-70),
-            "flushed subnormals"
-        );
-        // Both squares, the product and the sum lose at most 6 eps, and squares below 2^-126 what
-        // they are.
-        let sphere = wgsl!("instances/bounds_sphere").text;
-        assert!(number(sphere, "dot(half, half) * ") >= 1.0 + 6.0 * eps, "a sphere's squares");
-        assert!(number(sphere, "1.000001 + ") >= 2.0_f64.powi(-100), "what vanishes of them");
-        // The margin is at least 2^-70; a ratio may not overflow.
-        assert!(
-            number(wgsl!("cull/classify").text, "LEAST_W: f32 = ") >= 2.0_f64.powi(-66),
-            "the least w"
-        );
-        let planes = wgsl!("cull/supporting_planes").text;
-        // Six roundings of a texel's comparison.
-        assert!(number(planes, "let margin = ") >= 6.0, "a texel's margin");
-        assert!(number(planes, "abs(bound)) + ") >= 2.0_f64.powi(-100), "what is flushed there");
-        assert!(
-            number(planes, "FLATTEST: f32 = ") >= 2.0_f64.powi(-100),
-            "slopes that one product would flush"
-        );
-    }
-
-    #[test]
-    fn constants_agree_with_the_shaders() {
-        let margin = format!("ERROR_ULPS: f32 = {:.1};", crate::input::view::ERROR_ULPS);
-        assert!(wgsl!("cull/certificate").text.contains(&margin));
-        let workgroup = crate::instances::piece::CULL_WORKGROUP;
-        assert!(
-            wgsl!("cull/cull_groups").text.contains(&format!("WORKGROUP: u32 = {workgroup}u;"))
-        );
-        assert!(wgsl!("instances/update").text.contains(&format!("@workgroup_size({workgroup})")));
-        let group = format!("GROUP: u32 = {}u;", crate::instances::groups::GROUP);
-        assert!(wgsl!("instances/groups").text.contains(&group));
-        let run = format!("RUN: u32 = {}u;", crate::cull::groups::GROUPS_OF_RUN);
-        assert!(wgsl!("instances/groups").text.contains(&run));
-        let survivors = format!(
-            "SURVIVORS_PER_ROW_LOG2: u32 = {}u;",
-            crate::output::survivors::SURVIVORS_PER_ROW.ilog2()
-        );
-        assert!(wgsl!("instances/groups").text.contains(&survivors));
-        let per_row = format!(
-            "RECORDS_PER_ROW_LOG2: u32 = {}u;",
-            crate::instances::records::RECORDS_PER_ROW.ilog2()
-        );
-        assert!(wgsl!("instances/record_layout").text.contains(&per_row));
+    fn lines_of_shaders_have_at_most_100_columns() {
+        for (path, text) in files() {
+            for (i, line) in text.lines().enumerate() {
+                assert!(line.chars().count() <= 100, "{path}, line {}", i + 1);
+            }
+        }
     }
 }

@@ -4,7 +4,7 @@
 //! They are for benchmarks and their tests alone.
 
 mod cull;
-mod reduce;
+pub(crate) mod reduce;
 
 use std::time::Instant;
 

@@ -19,6 +19,11 @@ fn module(source: SourceKind, entry: File) -> Source {
 const IN_BUFFER: File = wgsl!("yardstick/reduce_buffer");
 const IN_TEXTURE: File = wgsl!("yardstick/reduce_texture");
 
+/// Invocations of a workgroup; `shaders/yardstick/reduce_buffer.wgsl`, `WORKGROUP`.
+pub(crate) const BUFFER_WORKGROUP: u32 = 64;
+/// Along a side of a workgroup; `shaders/yardstick/reduce_texture.wgsl`, `SIDE`.
+pub(crate) const TEXTURE_WORKGROUP_SIDE: u32 = 8;
+
 /// A name and the module of each shape.
 #[cfg(feature = "testing")]
 pub(crate) fn modules(source: SourceKind) -> [(&'static str, Source); 2] {
@@ -41,11 +46,11 @@ pub enum ReductionShape {
 /// Offset and stride are in vectors of four texels.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-struct PlainLevel {
-    offset: u32,
-    stride: u32,
-    width: u32,
-    height: u32,
+pub(crate) struct PlainLevel {
+    pub(crate) offset: u32,
+    pub(crate) stride: u32,
+    pub(crate) width: u32,
+    pub(crate) height: u32,
 }
 
 #[derive(Debug)]
@@ -240,7 +245,7 @@ fn step(
                 module(kind, IN_BUFFER),
                 "reduce_buffer",
                 gpu.uniform("hiz.yardstick.step", &[read, written])?,
-                [written.stride.div_ceil(64), written.height],
+                [written.stride.div_ceil(BUFFER_WORKGROUP), written.height],
             )
         }
         Storage::Textures(_) => {
@@ -252,7 +257,7 @@ fn step(
                     "hiz.yardstick.step",
                     &[written.width, written.height, read.width, read.height],
                 )?,
-                [written.width.div_ceil(8), written.height.div_ceil(8)],
+                [written.width, written.height].map(|n| n.div_ceil(TEXTURE_WORKGROUP_SIDE)),
             )
         }
     };

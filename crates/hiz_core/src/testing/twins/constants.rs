@@ -1,0 +1,328 @@
+//! Constants, pipeline constants and sizes of workgroups.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::declared;
+use crate::cull::count;
+use crate::cull::explain::{self, Stage};
+use crate::cull::groups::GROUPS_OF_RUN;
+use crate::cull::pipelines::{CullKey, DepthStore, ReportKey};
+use crate::cull::pipelines::{classify_constants, cull_module, report_constants};
+use crate::cull::refine;
+use crate::gpu::depth_source::SourceKind;
+use crate::gpu::shader::FILES;
+use crate::host::rounding::EPS;
+use crate::input::bounds::BoundsKind;
+use crate::input::image::MAX_IMAGE_SIDE;
+use crate::input::view::ERROR_ULPS;
+use crate::instances::groups::GROUP;
+use crate::instances::piece::CULL_WORKGROUP;
+use crate::instances::records::{RECORDS_PER_ROW, TEXEL_BYTES};
+use crate::instances::update;
+use crate::instances::volume_record::{BEYOND_LIMITS, LARGEST};
+use crate::output::compact::SCATTER_WORKGROUP;
+use crate::output::survivors::SURVIVORS_PER_ROW;
+use crate::output::verdict::{VERDICT_MASK, Verdict};
+use crate::output::visible::VERDICT_MULTIPLE;
+use crate::pyramid::layout::{BLOCK_ALIGNMENT, BLOCK_LOG2, HEADERS, PIXELS};
+use crate::pyramid::levels::MAX_LEVELS;
+use crate::pyramid::reduce::{REDUCE_WORKGROUP, SHARED_LEVEL, TALL_SIDE};
+use crate::testing::shaders::tests::parse;
+use crate::testing::shaders::{KINDS, all, files};
+use crate::yardstick::reduce as yardstick;
+
+/// Constants of the shaders with a twin in this crate or in Rust's `core`.
+fn twins() -> Vec<(&'static str, &'static str, f64)> {
+    let int = f64::from;
+    let float = |v: f32| f64::from(v);
+    let bits = |v: f32| f64::from(v.to_bits());
+    let verdict = |v: Verdict| int(v as u32);
+    let stage = |s: Stage| int(s as u32);
+    let texels = |kind: BoundsKind| (kind.record_bytes() / TEXEL_BYTES) as f64;
+    vec![
+        ("cull/certificate", "EPS", EPS),
+        ("cull/certificate", "ERROR_ULPS", ERROR_ULPS),
+        ("cull/count", "LANES", int(count::LANES)),
+        ("cull/count", "VECTORS", int(count::VECTORS)),
+        ("cull/cull_groups", "WORKGROUP", int(CULL_WORKGROUP)),
+        ("cull/explain", "BEHIND", int(explain::BEHIND)),
+        ("cull/explain", "CLEAR", int(explain::CLEAR)),
+        ("cull/outcome", "AT_VALIDITY", stage(Stage::Validity)),
+        ("cull/outcome", "AT_FRUSTUM", stage(Stage::Frustum)),
+        ("cull/outcome", "AT_EYE_PLANE", stage(Stage::EyePlane)),
+        ("cull/outcome", "AT_RECTANGLE", stage(Stage::Rectangle)),
+        ("cull/outcome", "AT_DEPTH", stage(Stage::Depth)),
+        ("cull/outcome", "AT_BLOCK", stage(Stage::Block)),
+        ("cull/outcome", "AT_DESCENT", stage(Stage::Descent)),
+        ("cull/outcome", "AT_LEVEL", stage(Stage::Level)),
+        ("cull/refine", "WORKGROUP", int(refine::WORKGROUP)),
+        ("cull/refine_groups", "WORKGROUP", int(refine::WORKGROUP)),
+        ("cull/supporting_planes", "LARGEST_BITS", bits(LARGEST)),
+        ("gpu/depth_bits", "ONE_BITS", bits(1.0)),
+        ("gpu/depth_bits", "LEAST_NORMAL_BITS", bits(f32::MIN_POSITIVE)),
+        ("gpu/depth_bits", "NEGATIVE_ZERO_BITS", bits(-0.0)),
+        ("gpu/depth_bits", "VECTOR_LOG2", int(PIXELS.ilog2())),
+        ("gpu/depth_bits", "VECTOR", int(PIXELS)),
+        ("gpu/depth_bits", "VECTOR_MASK", int(BLOCK_ALIGNMENT - 1)),
+        ("gpu/depth_bits", "BLOCK_LOG2", int(BLOCK_LOG2)),
+        ("gpu/depth_bits", "BLOCK", int(1_u32 << BLOCK_LOG2)),
+        ("gpu/depth_bits", "BLOCK_QUADS", int(1_u32 << (BLOCK_LOG2 - 1))),
+        ("instances/bounds_box", "RECORD_TEXELS", texels(BoundsKind::Box)),
+        ("instances/bounds_oriented_box", "RECORD_TEXELS", texels(BoundsKind::OrientedBox)),
+        ("instances/bounds_oriented_box", "LAST_TEXEL", texels(BoundsKind::OrientedBox) - 1.0),
+        ("instances/bounds_sphere", "RECORD_TEXELS", texels(BoundsKind::Sphere)),
+        ("instances/groups", "GROUP", GROUP as f64),
+        ("instances/groups", "RUN", int(GROUPS_OF_RUN)),
+        ("instances/groups", "SHARE", GROUP as f64 / int(GROUPS_OF_RUN)),
+        ("instances/groups", "SURVIVORS_PER_ROW_LOG2", int(SURVIVORS_PER_ROW.ilog2())),
+        ("instances/piece", "VERDICT_MULTIPLE", int(VERDICT_MULTIPLE)),
+        ("instances/piece", "WORD_BITS", int(u32::BITS)),
+        ("instances/record_layout", "RECORDS_PER_ROW_LOG2", int(RECORDS_PER_ROW.ilog2())),
+        ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
+        ("instances/update", "BEYOND_LIMITS_BITS", bits(BEYOND_LIMITS)),
+        ("output/compact", "SCATTER_WORKGROUP", int(SCATTER_WORKGROUP)),
+        ("output/verdict", "OUTSIDE", verdict(Verdict::Outside)),
+        ("output/verdict", "OCCLUDED", verdict(Verdict::Occluded)),
+        ("output/verdict", "VISIBLE", verdict(Verdict::Visible)),
+        ("output/verdict", "INVALID", verdict(Verdict::Invalid)),
+        ("output/verdict", "VERDICT_COUNT", verdict(Verdict::Invalid) + 1.0),
+        ("output/verdict", "VERDICT_MASK", int(VERDICT_MASK)),
+        ("pyramid/levels", "MANTISSA_BITS", int(f32::MANTISSA_DIGITS - 1)),
+        ("pyramid/levels", "EXPONENT_BIAS", f64::from(f32::MAX_EXP - 1)),
+        ("pyramid/pyramid", "MAX_LEVELS", MAX_LEVELS as f64),
+        ("pyramid/pyramid_write", "WORKGROUP", int(REDUCE_WORKGROUP)),
+        ("pyramid/pyramid_write", "SIDE_LOG2", int(TALL_SIDE.ilog2())),
+        ("pyramid/pyramid_write", "SIDE", int(TALL_SIDE)),
+        ("pyramid/pyramid_write", "SIDE_MASK", int(TALL_SIDE - 1)),
+        ("pyramid/texels", "LEAST_NORMAL", float(f32::MIN_POSITIVE)),
+        ("pyramid/texels_atlas", "HEADERS", int(HEADERS)),
+        ("yardstick/reduce_buffer", "WORKGROUP", int(yardstick::BUFFER_WORKGROUP)),
+        ("yardstick/reduce_texture", "SIDE", int(yardstick::TEXTURE_WORKGROUP_SIDE)),
+    ]
+}
+
+/// Constants that only a shader has.
+/// What is known of those that carry a proof is in `constants_cover_what_is_counted`.
+const SHADER_ONLY: &[(&str, &[&str])] = &[
+    ("cull/certificate", &["ERROR_FLOOR"]),
+    ("cull/classify", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
+    ("cull/refine", &["TOLD"]),
+    ("cull/refine_groups", &["WITHIN"]),
+    (
+        "cull/supporting_planes",
+        &[
+            "MAGNITUDE_MASK",
+            "LARGEST_ERROR",
+            "STEEPEST_BITS",
+            "FLATTEST",
+            "BEYOND",
+            "GUESS_ERRORS",
+            "TEXEL_ULPS",
+            "TEXEL_FLOOR",
+        ],
+    ),
+    (
+        "instances/bounds_box_support",
+        &["EDGES", "FACES", "CANDIDATES", "EDGES_OF_AXIS_LOG2", "BORDER_TOLERANCE"],
+    ),
+    (
+        "instances/bounds_sphere",
+        &[
+            "AXES",
+            "SQUARES_FACTOR",
+            "SQUARES_FLOOR",
+            "LEAST_DIVISOR",
+            "OUTLINE",
+            "RING",
+            "RING_ANGLES",
+            "CANDIDATES",
+            "TURN",
+        ],
+    ),
+    // One workgroup scans, however large it is.
+    ("output/compact", &["LANES"]),
+];
+
+/// The constants of every file that are one number: by file and name.
+fn numbers() -> BTreeMap<(String, String), f64> {
+    let mut numbers = BTreeMap::new();
+    for (_, source) in all() {
+        let text = source.text();
+        let module = parse(&text);
+        let here: Vec<_> = FILES.iter().filter(|file| text.contains(file.text)).collect();
+        for (_, constant) in module.constants.iter() {
+            let Some(name) = &constant.name else { continue };
+            let value = match module.global_expressions[constant.init] {
+                naga::Expression::Literal(naga::Literal::U32(v)) => f64::from(v),
+                naga::Expression::Literal(naga::Literal::I32(v)) => f64::from(v),
+                naga::Expression::Literal(naga::Literal::F32(v)) => f64::from(v),
+                _ => continue,
+            };
+            let said = format!("const {name}:");
+            for file in here.iter().filter(|file| file.text.contains(&said)) {
+                numbers.insert((file.path.to_owned(), name.clone()), value);
+            }
+        }
+    }
+    numbers
+}
+
+#[test]
+fn constants_have_the_numbers_of_their_twins() {
+    let numbers = numbers();
+    let wrong: Vec<_> = twins()
+        .into_iter()
+        .filter_map(|(file, name, ours)| {
+            let theirs = numbers.get(&(file.to_owned(), name.to_owned())).copied();
+            (theirs != Some(ours)).then_some((file, name, ours, theirs))
+        })
+        .collect();
+    assert!(wrong.is_empty(), "file, name, ours, the shader's: {wrong:#?}");
+    assert_eq!(PIXELS, BLOCK_ALIGNMENT, "`VECTOR` is both");
+    assert_eq!(SourceKind::Bits.pixels_of_texel(), PIXELS, "and what an upload's texel holds");
+}
+
+#[test]
+fn every_constant_of_a_shader_is_in_a_list() {
+    let mut listed: BTreeSet<(&str, &str)> = BTreeSet::new();
+    let twins = twins().into_iter().map(|(file, name, _)| (file, name));
+    let only = SHADER_ONLY.iter().flat_map(|(file, names)| names.iter().map(|n| (*file, *n)));
+    for entry in twins.chain(only) {
+        assert!(listed.insert(entry), "{entry:?} is listed twice");
+    }
+    let found: BTreeSet<(&str, &str)> = files()
+        .iter()
+        .flat_map(|(path, text)| declared(text, "const ").map(|name| (*path, name)))
+        .collect();
+    let unlisted: Vec<_> = found.difference(&listed).collect();
+    assert!(unlisted.is_empty(), "has it a twin? {unlisted:?}");
+    let gone: Vec<_> = listed.difference(&found).collect();
+    assert!(gone.is_empty(), "no shader has it: {gone:?}");
+}
+
+/// What two constants say about each other, or about a number of this crate.
+#[test]
+fn constants_fit_each_other() {
+    let numbers = numbers();
+    let number = |file: &str, name: &str| numbers[&(file.to_owned(), name.to_owned())];
+    // A square of invocations.
+    assert_eq!(TALL_SIDE * TALL_SIDE, REDUCE_WORKGROUP);
+    // The least level of which a square of invocations can share a texel.
+    assert_eq!(SHARED_LEVEL, BLOCK_LOG2 + TALL_SIDE.ilog2());
+    // As powers of two they lose nothing.
+    assert!(SURVIVORS_PER_ROW.is_power_of_two() && RECORDS_PER_ROW.is_power_of_two());
+    // Flags stand beside what they flag.
+    let flags = [number("cull/refine", "TOLD"), number("cull/refine_groups", "WITHIN")];
+    let [told, within] = flags.map(|flag| flag as u32);
+    assert!(told & VERDICT_MASK == 0 && within & VERDICT_MASK == 0 && told & within == 0);
+    let (behind, clear) = (explain::BEHIND, explain::CLEAR);
+    assert!(behind & explain::LEVEL_MASK == 0 && clear & explain::LEVEL_MASK == 0);
+    assert!(behind & clear == 0 && MAX_LEVELS as u32 - 1 <= explain::LEVEL_MASK);
+    assert!(number("cull/supporting_planes", "BEYOND") >= f64::from(MAX_IMAGE_SIDE));
+    assert_eq!(MAX_IMAGE_SIDE, 1 << (MAX_LEVELS - 1));
+    assert_eq!(Stage::ALL.map(|s| s as usize), std::array::from_fn(|i| i));
+    // What is beyond limits is beyond what is still valid.
+    const { assert!(BEYOND_LIMITS > LARGEST) };
+}
+
+/// What docs/accuracy.md derives of constants whose absence shows in no verdict but the mirror's:
+/// they cover what it counts.
+#[test]
+fn constants_cover_what_is_counted() {
+    let numbers = numbers();
+    let number = |file: &str, name: &str| numbers[&(file.to_owned(), name.to_owned())];
+    let two_to = |n: i32| 2.0_f64.powi(n);
+    // Flushed subnormals.
+    assert!(number("cull/certificate", "ERROR_FLOOR") >= two_to(-70));
+    // Both squares, the product and the sum lose at most 6 eps.
+    assert!(number("instances/bounds_sphere", "SQUARES_FACTOR") >= 1.0 + 6.0 * EPS);
+    // Squares below 2^-126 lose what they are.
+    assert!(number("instances/bounds_sphere", "SQUARES_FLOOR") >= two_to(-100));
+    assert!(number("instances/bounds_sphere", "AXES") >= 3.0);
+    // The margin is at least 2^-70; a ratio may not overflow.
+    assert!(number("cull/classify", "LEAST_W") >= two_to(-66));
+    let planes = |name: &str| number("cull/supporting_planes", name);
+    // Six roundings of a texel's comparison, and what is flushed there.
+    assert!(planes("TEXEL_ULPS") >= 6.0);
+    assert!(planes("TEXEL_FLOOR") >= two_to(-100));
+    // Slopes that one product would flush.
+    assert!(planes("FLATTEST") >= two_to(-100));
+    // Products of slopes and errors that do not overflow.
+    assert!(planes("STEEPEST_BITS") <= f64::from(65_536.0_f32.to_bits()));
+    assert!(planes("LARGEST_ERROR") <= two_to(38));
+    assert_eq!(planes("MAGNITUDE_MASK"), f64::from(u32::MAX >> 1));
+}
+
+/// The size of every entry point's workgroup; (0, 0, 0) of one that is not a dispatch.
+fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
+    let line = |n: u32| [n, 1, 1];
+    BTreeMap::from([
+        ("begin", line(1)),
+        ("count", line(count::LANES)),
+        ("cull", line(GROUP as u32)),
+        ("cull_groups", line(CULL_WORKGROUP)),
+        ("cull_members", line(GROUP as u32)),
+        ("explain", line(1)),
+        ("occluder_vertex", [0; 3]),
+        ("reduce", line(REDUCE_WORKGROUP)),
+        ("reduce_buffer", line(yardstick::BUFFER_WORKGROUP)),
+        ("reduce_coarse", line(REDUCE_WORKGROUP)),
+        ("reduce_tail", line(REDUCE_WORKGROUP)),
+        (
+            "reduce_texture",
+            [yardstick::TEXTURE_WORKGROUP_SIDE, yardstick::TEXTURE_WORKGROUP_SIDE, 1],
+        ),
+        ("refine", line(refine::WORKGROUP)),
+        ("refine_groups", line(refine::WORKGROUP)),
+        ("replace_groups", line(update::WORKGROUP)),
+        ("replace_records", line(update::WORKGROUP)),
+        // One workgroup, the largest that WebGPU promises.
+        ("scan", line(wgpu::Limits::default().max_compute_invocations_per_workgroup)),
+        ("scatter", line(SCATTER_WORKGROUP)),
+    ])
+}
+
+#[test]
+fn workgroups_have_the_sizes_that_dispatches_count_on() {
+    let expected = workgroups();
+    let mut found = BTreeSet::new();
+    for (name, source) in all() {
+        for point in parse(&source.text()).entry_points {
+            let size = expected.get(point.name.as_str());
+            assert_eq!(size, Some(&point.workgroup_size), "{name}: {}", point.name);
+            found.insert(point.name);
+        }
+    }
+    assert!(found.iter().map(String::as_str).eq(expected.into_keys()), "{found:?}");
+}
+
+#[test]
+fn a_cull_sets_every_override() {
+    let store = DepthStore::Apart(SourceKind::Depth);
+    for kind in KINDS {
+        let key = CullKey {
+            store,
+            kind,
+            reversed: false,
+            chunks: 1,
+            sample_coverage: false,
+            footprint_log2: 1,
+            descent: false,
+            fit_volume: false,
+        };
+        let report = ReportKey {
+            mask: false,
+            verdicts: false,
+            append: false,
+            list: false,
+            capped: false,
+            statistics: false,
+        };
+        let set = classify_constants(&key).into_iter().chain(report_constants(&report));
+        let set: BTreeSet<String> = set.map(|(name, _)| name.to_owned()).collect();
+        let module = parse(&cull_module(store, kind).text());
+        let declared: BTreeSet<String> =
+            module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
+        assert_eq!(set, declared, "{kind:?}");
+    }
+}
