@@ -1,17 +1,19 @@
-// Certificates: "the whole volume lies strictly on one side of a plane", decided in float32 with a
-// margin that covers every rounding of this file and of the bounds (docs/accuracy.md counts them).
-// Nothing else may hide an instance.
+// Certificates: proofs in float32 that the whole volume lies strictly on one side of a plane.
+// Their margin covers every rounding of this file and of the bounds; docs/accuracy.md counts them.
+// Nothing else may cull an instance.
+//
+// A plane is `r - t w = 0`, where r is one of the view's rows, w is its row w, and t is a number.
 
 // float32's spacing at 1.
-// WGSL rounds a sum or product up or down, so each costs up to this much.
+// WGSL may round a sum or product up or down, so each loses up to this much, relative to itself.
 const EPS: f32 = 0x1p-23;
-// The margin in eps; more than any path below can lose.
+// The margin in eps: more than any computation below can lose.
 const ERROR_ULPS: f32 = 24.0;
 // Covers what flushed subnormals lose.
 const ERROR_FLOOR: f32 = 0x1p-70;
 
-// A row on a volume: its value at the centre, the most that it can be off by, and its values on the
-// half axes (on a sphere: times the radius).
+// A row on a volume: its value at the centre, the most by which that can be off, and its change
+// along each half axis (for a sphere: each world axis, times the radius).
 struct Value {
     center: f32,
     error: f32,
@@ -42,9 +44,9 @@ fn surely_below(r: Value, t: f32, w: Value) -> bool {
     return exceeds_support(-(r.center - t * w.center) - error_bound(r, t, w), r.half - t * w.half);
 }
 
-// True implies: r - t w > 0 on all of the volume, or -r - t w > 0 is.
-// The side is that of the centre; on the other one it could only succeed for what lies behind the
-// eye, which the near plane finds.
+// True implies: r - t w > 0 on all of the volume, or -r - t w > 0 on all of it.
+// Only the side on which the centre lies is tested.
+// The other side could only succeed for what lies behind the eye, and the near plane finds that.
 fn surely_beyond(r: Value, t: f32, w: Value) -> bool {
     let side = select(1.0, -1.0, r.center < 0.0);
     return surely_above(Value(side * r.center, r.error, side * r.half), t, w);

@@ -1,24 +1,39 @@
-// The cull of one instance.
-// A verdict that hides it rests on certificates alone; the rectangle, the level, divisions and
-// conversions only choose what is tested, and where they go wrong a certificate fails and the
-// instance is kept.
+// The cull of one instance: `classify`, the last function, decides in six numbered steps.
+//
+// A verdict that culls the instance rests on certificates alone (`certificate.wgsl`).
+// The rectangle, the level, divisions and conversions only choose what is tested.
+// Where they go wrong, a certificate fails and the instance is kept.
+//
+// A module is a list of files, `module` in `crates/hiz_core/src/cull/pipelines.rs`.
+// What is used here and defined elsewhere:
+//
+// - `certificate.wgsl`: `Value`, `surely_*`.
+// - `view.wgsl`: `view`, `bar`.
+// - `../instances/bounds_*.wgsl`: `Volume`, `Extent`, `load_volume`, `support`, `surely_after`.
+// - `../pyramid/texels*.wgsl`, `../pyramid/levels.wgsl`: `footprint`, `texel`, `stored_level`.
+// - `supporting_planes.wgsl`: `Projected`, `surely_clear`.
+// - `untold.wgsl` or `explain.wgsl`: `tell_*`.
 
-// Pixel centres alone count; otherwise whole pixel squares.
+// True: only pixel centres count; otherwise whole pixel squares.
 override SAMPLE_COVERAGE: bool;
-// Descend to finer levels where the footprint cannot decide.
+// True: where the footprint cannot decide, finer levels are read.
 override DESCENT: bool;
-// Compare each texel with the volume's own outline and front there, not with its rectangle at one
-// nearest depth.
+// True: where the rectangle cannot decide, each texel is compared with the volume's own outline and
+// front there.
+// Otherwise the rectangle stands for the volume, at its nearest depth.
 override FIT_VOLUME: bool;
 
-// Below, a ratio could overflow; the margins alone reach 2^-70.
+// Below this w a ratio could overflow.
+// It costs nearly nothing, because the margins alone reach 2^-70.
 const LEAST_W: f32 = 0x1p-66;
 
-// The first and last pixel that an extent (relative to the image's middle) may touch; first > last:
-// none.
-// It is widened by what its certificate will ask for, and a little more; and by what adding half an
-// image rounds away (without it a volume that ends exactly on a pixel border would be tested
-// without the pixel beyond, and kept for that).
+// The first and last pixel that an extent may touch; none if first > last.
+// The extent is relative to the image's middle.
+//
+// It is widened by slightly more than its certificate will ask for.
+// It is also widened by what adding half an image rounds away.
+// Otherwise a volume that ends exactly on a pixel border would be tested without the pixel beyond,
+// and kept for that.
 fn pixel_interval(extent: Extent, per_w: f32, half_size: f32, size: i32) -> vec2<i32> {
     let rounding = 4.0 * EPS * half_size + view.reach;
     let low = extent.low - (extent.below * per_w + rounding) + half_size;
@@ -28,14 +43,15 @@ fn pixel_interval(extent: Extent, per_w: f32, half_size: f32, size: i32) -> vec2
     return vec2<i32>(vec2<f32>(clamp(floor(low), 0.0, edge), clamp(floor(high), -1.0, edge - 1.0)));
 }
 
-// Sample coverage: the volume lies between the centres of pixels first - 1 and first.
+// For sample coverage.
+// True implies: the volume lies between the centres of pixels first - 1 and first.
 fn between_samples(r: Value, w: Value, first: i32, half_size: f32) -> bool {
     let left = f32(first) - half_size;
     return surely_above(r, left + view.reach, w) && surely_below(r, left - view.reach, w);
 }
 
-// The block of texels lo..hi of a level spans every pixel that the volume can touch, inside the
-// image.
+// True implies: along one axis, the block of texels lo..hi of a level spans every pixel inside the
+// image that the volume can touch.
 fn inside_block(
     r: Value, w: Value, extent: Extent, w_min: f32, lo: u32, hi: u32, level: u32, half_size: f32, size: i32,
 ) -> bool {
@@ -45,7 +61,7 @@ fn inside_block(
         & (end >= size | surely_before(r, w, extent, f32(end) - view.reach - half_size, w_min));
 }
 
-// The far plane hides nothing.
+// Whether anything can be behind this depth: nothing is behind the far plane.
 fn can_occlude(d: f32) -> bool {
     return select(1.0 > d, d >= LEAST_NORMAL, REVERSED);
 }
@@ -60,11 +76,12 @@ fn surely_behind(bits: u32, z: Value, w: Value) -> bool {
     return can_occlude(d) && surely_above(z, t, w);
 }
 
-// Whether no pixel of the rectangle first..last shows anything of the volume: a walk down the
-// pyramid, from the footprint t of the level `top`, that enters only the texels that cannot tell,
-// and of them only what the rectangle touches.
-// (Greene, Kass and Miller, "Hierarchical Z-Buffer Visibility", SIGGRAPH 1993, descend so.)
-// False where a pixel may show some of it, or the budget ends.
+// The descent: whether no pixel of the rectangle first..last shows anything of the volume.
+// False where a pixel may show some of it, or where the budget ends.
+//
+// It walks down the pyramid from the texels t of the level `top`.
+// It enters only the texels that cannot decide, and in them only what the rectangle touches.
+// (Greene, Kass and Miller, "Hierarchical Z-Buffer Visibility", SIGGRAPH 1993.)
 fn descend(
     top: u32, t: vec4<u32>, first: vec2<u32>, last: vec2<u32>, p: Projected, texels_read: ptr<function, u32>,
 ) -> bool {
@@ -85,15 +102,15 @@ fn descend(
         var clear = surely_behind(bits, p.z, p.w);
         tell_texel(level, at.x, at.y, bits, clear);
         if !clear {
-            // Its pixels, those past the image's edge left out.
+            // The texel's pixels inside the image.
             let begin = at << vec2<u32>(level);
             let end = min((at + vec2<u32>(1u)) << vec2<u32>(level), vec2<u32>(view.size));
             if FIT_VOLUME {
                 clear = surely_clear(&planes, max(begin, first), min(end, last + vec2<u32>(1u)), bits);
                 tell_clear(clear);
             } else if all(begin >= first) && all(end <= last + vec2<u32>(1u)) {
-                // One of its pixels has that depth, and the rectangle has them all: no finer level
-                // can decide otherwise.
+                // One of the texel's pixels has that depth, and all of them are in the rectangle.
+                // So no finer level can decide otherwise.
                 return false;
             }
         }
@@ -106,7 +123,7 @@ fn descend(
             at = max(at << vec2<u32>(down), first >> vec2<u32>(level));
             continue;
         }
-        // On to the next sibling, or that of the first parent that has one.
+        // Go on to the next sibling, or to that of the first parent that has one.
         loop {
             let end = last >> vec2<u32>(level);
             if level == top {
@@ -121,7 +138,7 @@ fn descend(
                 return true;
             }
             let up = levels_up(level);
-            // The last column and row of a parent's children.
+            // The number of the last column, and row, among a parent's children.
             let last_child = (1u << up) - 1u;
             if (at.x & last_child) < last_child && at.x < end.x {
                 at.x += 1u;
@@ -160,8 +177,8 @@ fn classify(i: u32) -> Outcome {
         return out;
     }
 
-    // 2. Crossing w = 0: no rectangle.
-    //    A lower bound of w (of spheres an estimate: the root is not trusted).
+    // 2. Crossing w = 0, the plane through the eye: it has no rectangle.
+    //    w_min is a lower bound of w; for spheres an estimate, since no square root is trusted.
     out.stage = AT_EYE_PLANE;
     out.verdict = VISIBLE;
     let w_min = w.center - support(w.half) - error_bound(w, 0.0, w);
@@ -210,7 +227,8 @@ fn classify(i: u32) -> Outcome {
         texels_read = (t.z - t.x + 1u) * (t.w - t.y + 1u);
         hidden = surely_behind(out.farthest_bits, z, w);
     } else {
-        // More texels than a footprint: the budget of a descent may allow them, nothing else does.
+        // It spans more texels than a footprint has.
+        // Only the budget of a descent may allow them.
         out.stage = AT_LEVEL;
         out.farthest_bits = far_bits();
     }
@@ -219,8 +237,8 @@ fn classify(i: u32) -> Outcome {
     if hidden {
         out.stage = AT_BLOCK;
     } else if (DESCENT && level > 0u) || FIT_VOLUME {
-        // Texel by texel, and into finer levels, over the pixels of the rectangle alone: its texels
-        // of level 0.
+        // Texel by texel, and into finer levels, over the pixels of the rectangle alone.
+        // Those pixels are the texels of level 0, and step 6 then asks about them.
         out.stage = AT_DESCENT;
         hidden = descend(level, t, first, last, Projected(x, y, z, w, w_min), &texels_read);
         out.texels_read = texels_read;
@@ -228,7 +246,7 @@ fn classify(i: u32) -> Outcome {
         level = 0u;
     }
 
-    // 6. The texels were those of all pixels that matter.
+    // 6. The texels cover every pixel that the volume can touch.
     if hidden & inside_block(x, w, extent_x, w_min, block.x, block.z, level, view.half_size.x, view.size.x)
         & inside_block(y, w, extent_y, w_min, block.y, block.w, level, view.half_size.y, view.size.y) {
         out.verdict = OCCLUDED;

@@ -1,7 +1,8 @@
-// How many instances met which end: their verdicts, added up.
+// How many instances got which verdict.
+// Twin: `crates/hiz_core/src/output/counters.rs`.
 
 const LANES: u32 = 64u;
-// Places of one invocation: a vector of four at a time.
+// Vectors of four places that one invocation counts.
 const VECTORS: u32 = 4u;
 
 struct Counters {

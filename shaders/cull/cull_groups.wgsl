@@ -1,22 +1,23 @@
 // The cull of whole groups: one invocation tests the box around 64 instances, by the same
 // certificates.
-// What hides the box hides all of them; the other groups are compacted, for `cull_members.wgsl`.
+// What hides the box hides all of them.
+// The other groups survive: they are listed, and `cull_members.wgsl` tests their members.
 // (Moller, Haines and others, "Real-Time Rendering", section "Hierarchical Z-Buffering".)
 
 const WORKGROUP: u32 = 128u;
 
 struct Survivors {
-    // Arguments of the indirect dispatch, a workgroup for each RUN groups.
+    // Arguments of the indirect dispatch: one workgroup per RUN groups.
     workgroups: atomic<u32>,
     workgroups_y: u32,
     workgroups_z: u32,
     count: atomic<u32>,
 }
 
-// The boxes are instances of a piece of their own.
+// The groups' boxes, as if they were the instances of a piece.
 @group(1) @binding(0) var<uniform> groups: Piece;
 @group(2) @binding(0) var<storage, read_write> survivors: Survivors;
-// Of each group, or VISIBLE where its members have verdicts of their own.
+// One verdict per group; VISIBLE or INVALID means that its members get verdicts of their own.
 @group(2) @binding(1) var<storage, read_write> group_verdicts: array<u32>;
 @group(2) @binding(2) var survivor_list: texture_storage_2d<r32uint, write>;
 

@@ -1,4 +1,5 @@
-// The cull of the members of surviving groups: an invocation tests RUN members of one.
+// The cull of the members of the groups that `cull_groups.wgsl` left.
+// An invocation tests RUN members of one group (`../instances/groups.wgsl`).
 
 struct Survivors {
     workgroups: u32,

@@ -1,4 +1,5 @@
-// Why one instance got its verdict: the cull's own steps for it, written out.
+// Why one instance got its verdict.
+// It runs the cull's own `classify`, and its `tell_*` functions write down what that reads.
 
 struct Explanation {
     verdict: u32,
@@ -6,15 +7,16 @@ struct Explanation {
     level: u32,
     farthest_bits: u32,
     pixels: vec4<i32>,
-    // An estimate of the bounds' least and greatest NDC depth, meaningless where they cross w = 0;
-    // then of w.
+    // Estimates: the bounds' least and greatest NDC depth, then their least and greatest w.
+    // The NDC depths mean nothing where the bounds cross w = 0.
     depths: vec4<f32>,
-    // The last one that was read, told or not.
+    // The texel that was read last, also where `readings` had no room for it.
     last: vec4<u32>,
     // How many texels were read, and how many of them by the footprint.
     texels_read: u32,
     of_footprint: u32,
-    // The farthest depth of those that all of the volume is behind of, and whether there is one.
+    // The farthest depth among the texels that all of the volume is behind.
+    // any_before says whether there is such a texel.
     farthest_before: u32,
     any_before: u32,
 }
@@ -22,12 +24,13 @@ struct Explanation {
 // .x: the instance within its piece.
 @group(1) @binding(0) var<uniform> which: vec4<u32>;
 @group(2) @binding(0) var<storage, read_write> explanation: Explanation;
-// What was read, in order: level and flags, x, y, the depth's bits.
-// What has no room is only counted.
+// The texels that were read, in order: level and flags, x, y, the depth's bits.
+// Those for which there is no room are only counted.
 @group(2) @binding(1) var<storage, read_write> readings: array<vec4<u32>>;
 
-// Flags: all of the volume is behind the texel's depth; or its own outline and front there tell
-// that nothing shows.
+// Flags of a texel.
+// BEHIND: all of the volume is behind its depth.
+// CLEAR: the volume's own outline and front there prove that nothing shows.
 const BEHIND: u32 = 0x100u;
 const CLEAR: u32 = 0x200u;
 
@@ -60,7 +63,7 @@ fn tell_texel(level: u32, x: u32, y: u32, bits: u32, is_behind: bool) {
     }
 }
 
-// Of the texel that was told last.
+// Adds the flag CLEAR to the texel that was written down last.
 fn tell_clear(is_clear: bool) {
     if is_clear {
         texels_read -= 1u;

@@ -1,4 +1,6 @@
-// Where the algorithm stopped, for `explain`.
+// The outcome of one test: the verdict, and for `explain.wgsl` how it was found.
+
+// The stage at which `classify` stopped.
 const AT_VALIDITY: u32 = 0u;
 const AT_FRUSTUM: u32 = 1u;
 const AT_EYE_PLANE: u32 = 2u;
@@ -11,8 +13,9 @@ const AT_LEVEL: u32 = 7u;
 struct Outcome {
     verdict: u32,
     stage: u32,
-    // Valid from AT_DEPTH on: pixel rectangle (inclusive), level, texel rectangle, the farthest
-    // depth in it.
+    // Valid from AT_DEPTH on: the pixel rectangle (inclusive), the level, its texel rectangle
+    // (inclusive), and the farthest depth in that.
+    // A rectangle is first column, first row, last column, last row.
     pixels: vec4<i32>,
     level: u32,
     texels: vec4<u32>,

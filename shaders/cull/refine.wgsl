@@ -1,18 +1,21 @@
-// What the members of hidden groups are themselves: an invocation tells those of one.
-// The cull hides them with their group and asks no more.
-// Here those of a group outside the view are outside; of a group that is hidden by depth those are
-// outside that their own certificates call so, and the others occluded.
-// After it each place has a verdict, and the group is told: it may run again, and with other
-// bounds, and changes nothing.
+// The refinement: it writes a verdict for every member of a culled group, one invocation per group.
+// The cull itself stops at the group, and this pass runs only if verdicts are read.
+//
+// - The group is outside: so are its members.
+// - The group is occluded: a member whose own certificates say so is outside, the others are
+//   occluded.
+//
+// Then every place has a verdict, and the group is marked as TOLD.
+// A second run, even after an update of the bounds, changes nothing.
 
 const WORKGROUP: u32 = 64u;
 
-// Added to the verdict of a group whose members have theirs (twin:
-// `crates/hiz_core/src/output/verdict.rs`).
+// Added to the verdict of a group once its members have verdicts.
+// Twin: `crates/hiz_core/src/output/verdict.rs`.
 const TOLD: u32 = 4u;
 
 @group(1) @binding(0) var<uniform> piece: Piece;
-// Behind the mask the verdicts.
+// The mask, and behind it the verdicts.
 @group(2) @binding(0) var<storage, read_write> mask: array<u32>;
 @group(2) @binding(1) var<storage, read_write> group_verdicts: array<u32>;
 
@@ -34,8 +37,8 @@ fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var place = first; place < end; place += 1u) {
         mask[verdicts + place] = of_group;
     }
-    // `refine_groups.wgsl` adds more to those that lie within the view.
-    // A loop of its own: a software driver skips no branch, but it ends a loop.
+    // False also for the groups within the view: `refine_groups.wgsl` has added WITHIN to them.
+    // This loop is separate, because a software driver skips no branch, but it does end a loop.
     let may_be_outside = word == OCCLUDED;
     for (var place = select(end, first, may_be_outside); place < end; place += 1u) {
         if classify(place).verdict == OUTSIDE {

@@ -1,19 +1,19 @@
-// Which groups that are hidden by depth lie within the view with all that they hold: none of their
-// members is outside, so `refine.wgsl` need not test them.
-// For area coverage: in sample coverage what lies between the pixel centres is outside, wherever it
-// is.
+// Marks the occluded groups whose whole box lies within the view.
+// None of their members is outside, so `refine.wgsl` need not test them.
+// For area coverage alone: in sample coverage what lies between the pixel centres is outside,
+// wherever it is.
 
 const WORKGROUP: u32 = 64u;
 
 // Added to the verdict of such a group.
 const WITHIN: u32 = 8u;
 
-// The boxes are instances of a piece of their own.
+// The groups' boxes, as if they were the instances of a piece.
 @group(1) @binding(0) var<uniform> groups: Piece;
 @group(2) @binding(1) var<storage, read_write> group_verdicts: array<u32>;
 
-// True implies: all of the box lies within the planes that `classify` asks about, so that no
-// certificate of a part of it can say that it is outside.
+// True implies: all of the box lies within the planes that `classify` asks about.
+// No certificate can then say that a part of the box is outside.
 fn is_within(i: u32) -> bool {
     let volume = load_volume(i);
     if !(volume.size < view.coordinate_limit) {

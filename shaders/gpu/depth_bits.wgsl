@@ -1,8 +1,8 @@
 // Depths travel as bits.
-// Non-negative floats order like unsigned integers, so farthest is an integer min or max: exact on
-// every driver, whatever it does with NaN, -0 and subnormals.
+// Non-negative floats order like unsigned integers, so the farthest is an integer min or max.
+// That is exact on every driver, whatever it does with NaN, -0 and subnormals.
 
-// True: near 1, far 0.
+// True: reversed Z, with depth 1 near and 0 far.
 override REVERSED: bool;
 
 const ONE_BITS: u32 = 0x3f800000u;
@@ -17,8 +17,8 @@ fn near_bits() -> u32 {
     return select(0u, ONE_BITS, REVERSED);
 }
 
-// A depth as given: NaN and what lies outside 0..1 is far, subnormals and -0 are 0.
-// (Bits above 1's are numbers above 1, infinity, NaN, or anything with a sign.)
+// Sanitizes a depth: NaN and what lies outside 0..1 become far, subnormals and -0 become 0.
+// Bits above those of 1 are numbers above 1, infinity, NaN, or anything with a sign.
 fn sanitized(bits: u32) -> u32 {
     let outside = bits > ONE_BITS && bits != NEGATIVE_ZERO_BITS;
     let flushed = select(bits, 0u, bits < LEAST_NORMAL_BITS || bits == NEGATIVE_ZERO_BITS);
@@ -35,12 +35,14 @@ fn farthest4(v: vec4<u32>) -> u32 {
 
 // The farthest of four sanitized depths, with less work than sanitizing each.
 //
-// Reversed, everything but LEAST_NORMAL_BITS..ONE_BITS is 0 in the end, and 0 is farthest: of
-// ONE_BITS - bits, wrapping, the greatest is that of the farthest, or more than any such number
-// has.
-// Standard, order and sanitizing agree but for -0, which is 0 although its bits are above 1's.
-// Where the greatest is -0 there is no other number with a sign, so the greatest of them as signed
-// integers, -0 the least, is that of the rest.
+// With reversed Z, all but LEAST_NORMAL_BITS..ONE_BITS becomes 0, and 0 is the farthest.
+// The wrapping difference ONE_BITS - bits is greatest for the farthest depth.
+// It exceeds ONE_BITS - LEAST_NORMAL_BITS if any of the four becomes 0.
+//
+// With standard Z, the order of bits is that of sanitized depths, except for -0.
+// Its bits are above those of 1, although it becomes 0.
+// If -0 has the greatest bits, no other of the four has a sign.
+// As signed integers -0 is then the least, so the greatest signed integer is that of the rest.
 fn farthest_sanitized4(v: vec4<u32>) -> u32 {
     if REVERSED {
         let below_one = vec4<u32>(ONE_BITS) - v;

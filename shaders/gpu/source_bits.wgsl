@@ -1,7 +1,7 @@
-// Level 0 is a texture of float32 bits, four pixels of a row a texel (rgba32uint): uploads travel
-// so, for a driver may alter NaN and subnormals of a float texture, and a software driver reads
-// four pixels at once in less time than one (docs/performance.md).
-// Pixels of a row's last texel that lie past the image's width count as depth of its last ones.
+// Level 0 is an upload: a texture of float32 bits, four pixels of a row per texel (rgba32uint).
+// A driver may alter NaN and subnormals in a float texture, but not in this one.
+// A software driver also reads four pixels at once in less time than one (docs/performance.md).
+// Pixels past the image's width in a row's last texel count as depth at the end of the row.
 
 @group(0) @binding(0) var source: texture_storage_2d<rgba32uint, read>;
 
@@ -9,8 +9,8 @@ fn source_bits(x: u32, y: u32) -> u32 {
     return sanitized(textureLoad(source, vec2<u32>(x >> 2u, y))[x & 3u]);
 }
 
-// Quads of 2x2 pixels, the farthest depth of each: columns 4x to 4x + 3 of quads in their row y.
-// Pixels past the edge are replaced by ones at the edge.
+// The farthest depth of each of four quads of 2x2 pixels: columns 4x to 4x + 3 of row y of quads.
+// Pixels past the edge are replaced by pixels at the edge.
 fn source_quad_row(x: u32, y: u32) -> vec4<u32> {
     let edge = textureDimensions(source) - vec2<u32>(1u);
     let first = min(vec2<u32>(2u * x, 2u * y), edge);
@@ -26,7 +26,7 @@ fn source_quad_row(x: u32, y: u32) -> vec4<u32> {
         farthest_sanitized4(vec4<u32>(top_right.zw, bottom_right.zw)));
 }
 
-// The same of the four rows of a block of 8x8 pixels.
+// The same for the four rows of quads in a block of 8x8 pixels.
 fn source_quads(block: vec2<u32>) -> array<vec4<u32>, 4> {
     let y = 4u * block.y;
     return array<vec4<u32>, 4>(
@@ -34,7 +34,7 @@ fn source_quads(block: vec2<u32>) -> array<vec4<u32>, 4> {
         source_quad_row(block.x, y + 2u), source_quad_row(block.x, y + 3u));
 }
 
-// The pixels at columns t.x and t.z and rows t.y and t.w, as given.
+// The pixels at columns t.x and t.z and rows t.y and t.w, not sanitized.
 fn source_corners(t: vec4<u32>) -> vec4<u32> {
     let texel = t >> vec4<u32>(2u, 0u, 2u, 0u);
     let left = t.x & 3u;

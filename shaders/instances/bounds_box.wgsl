@@ -1,7 +1,9 @@
-// Axis-aligned boxes (twin: `crates/hiz_core/src/instances/volume_record.rs`, BoxRecord).
-
-// xyz: the centre's high half; its low half; the half sizes.
-// The second w: the caller's index.
+// Axis-aligned boxes.
+// Twin: `crates/hiz_core/src/instances/volume_record.rs`, `BoxRecord`; here it is three texels.
+//
+// - texel 0: the centre's high half
+// - texel 1: the centre's low half, and the caller's index
+// - texel 2: the half sizes
 const RECORD_TEXELS: u32 = 3u;
 
 fn caller_index(i: u32) -> u32 {

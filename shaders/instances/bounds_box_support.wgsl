@@ -1,5 +1,5 @@
-// What axis-aligned and oriented boxes share: the support is a 1-norm over the half axes, no eight
-// corners needed.
+// What axis-aligned and oriented boxes share.
+// The support of a box is a 1-norm over its half axes, so no certificate needs the eight corners.
 
 struct Volume {
     // About the reference point.
@@ -28,17 +28,19 @@ struct Extent {
     above: f32,
 }
 
-// Seen from the centre's ratio, r / w is greatest at the corner that lies farthest along r - ratio
-// w, and least at the opposite one (a step of Dinkelbach, "On Nonlinear Fractional Programming",
-// 1967).
-// Where that is another corner, for the ratio there is another one, `above` and `below` say by how
-// much the volume reaches beyond.
+// An estimate of the ends, and a proved bound of what lies beyond them.
+//
+// Let `ratio` be that of the centre.
+// The corner where `r - ratio w` is greatest is a guess for the greatest r / w, and the opposite
+// corner for the least.
+// This is one step of Dinkelbach, "On Nonlinear Fractional Programming", 1967.
+// Where another corner would be right, `above` and `below` say how far the volume reaches beyond.
 fn extent_of(r: Value, w: Value, w_min: f32) -> Extent {
     let ratio = r.center / w.center;
     let toward = select(vec3<f32>(-1.0), vec3<f32>(1.0), r.half - ratio * w.half >= vec3<f32>(0.0));
     let r_half = dot(toward, r.half);
     let w_half = dot(toward, w.half);
-    // Barred: what is proved is proved of these numbers, not of the quotients.
+    // The barriers make these numbers, not their quotients, what the next lines bound.
     let low = bar((r.center - r_half) / (w.center - w_half));
     let high = bar((r.center + r_half) / (w.center + w_half));
     return Extent(
@@ -48,9 +50,10 @@ fn extent_of(r: Value, w: Value, w_min: f32) -> Extent {
 }
 
 // True implies: r / w > edge on all of the volume, where w >= w_min > 0.
-// For r - edge w = (r - low w) + (low - edge) w.
-// (Barred: the edge is an exact sum of larger numbers. Taken one by one from `low` they would leave
-// roundings of their size behind.)
+// The reason is r - edge w = (r - low w) + (low - edge) w.
+// The edge is an exact sum of larger numbers.
+// Without the barrier a compiler could subtract these from `low` one by one, and leave roundings of
+// their size behind.
 fn surely_after(r: Value, w: Value, extent: Extent, edge: f32, w_min: f32) -> bool {
     return (extent.low - bar(edge)) * w_min > extent.below;
 }
@@ -77,7 +80,8 @@ fn ratio_interval(r: Value, w: Value) -> vec2<f32> {
 
 // The six faces and twelve edges: a plane through each.
 const CANDIDATES: u32 = 18u;
-// Of a box's extent along a plane's normal: how near its border counts as there.
+// How near to the border of the box still counts as on it, relative to the box's extent along the
+// plane's normal.
 const BORDER_TOLERANCE: f32 = 1e-3;
 
 // Pixel position and depth of a corner, given by signs.

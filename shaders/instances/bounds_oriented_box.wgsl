@@ -1,7 +1,10 @@
-// Oriented boxes (twin: `crates/hiz_core/src/instances/volume_record.rs`, OrientedBoxRecord).
-
-// xyz: the centre's high half, its low half, two half axes; the first three w: the third half axis;
-// the last w: the caller's index.
+// Oriented boxes.
+// Twin: `crates/hiz_core/src/instances/volume_record.rs`, `OrientedBoxRecord`; here it is four
+// texels.
+//
+// - xyz of texels 0 to 3: the centre's high half, its low half, half axes 0 and 1
+// - w of texels 0 to 2: half axis 2
+// - w of texel 3: the caller's index
 const RECORD_TEXELS: u32 = 4u;
 
 fn caller_index(i: u32) -> u32 {

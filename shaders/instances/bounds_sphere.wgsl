@@ -1,7 +1,8 @@
-// Spheres (twin: `crates/hiz_core/src/instances/volume_record.rs`, SphereRecord).
-
-// xyz: the centre's high half, and its low half; the first w: the radius; the second w: the
-// caller's index.
+// Spheres.
+// Twin: `crates/hiz_core/src/instances/volume_record.rs`, `SphereRecord`; here it is two texels.
+//
+// - texel 0: the centre's high half, and the radius
+// - texel 1: the centre's low half, and the caller's index
 const RECORD_TEXELS: u32 = 2u;
 
 struct Volume {
@@ -30,8 +31,9 @@ fn on_half_axes(m: vec3<f32>, volume: Volume) -> vec3<f32> {
     return m * volume.radius;
 }
 
-// The support of a sphere is a 2-norm, compared squared so that no square root needs trust;
-// 1.000001 covers the roundings of both squares, 2^-100 their underflow.
+// The support of a sphere is a 2-norm.
+// It is compared squared, so that no square root needs trust.
+// 1.000001 covers the roundings of both squares, and 2^-100 covers their underflow.
 fn exceeds_support(center: f32, half: vec3<f32>) -> bool {
     return center > 0.0 && center * center > dot(half, half) * 1.000001 + 0x1p-100;
 }
@@ -41,10 +43,10 @@ fn support(half: vec3<f32>) -> f32 {
 }
 
 // An estimate of the least and greatest r / w.
-// Mara and McGuire, "2D Polyhedral Bounds of a Clipped, Perspective-Projected 3D Sphere" (JCGT
-// 2013), written for any two linear functions: about the centre's ratio t, the ratio of a point u
-// of the unit sphere is t + g.u / (1 + n.u); its extremes are the roots of q d^2 + 2 p d - g.g = 0,
-// each in the form that does not cancel.
+// (Mara and McGuire, "2D Polyhedral Bounds of a Clipped, Perspective-Projected 3D Sphere", JCGT
+// 2013, written for any two linear functions.)
+// With the centre's ratio t, the ratio at a point u of the unit sphere is t + g.u / (1 + n.u).
+// Its extremes are the roots of q d^2 + 2 p d - g.g = 0, each in the form that does not cancel.
 fn ratio_interval(r: Value, w: Value) -> vec2<f32> {
     let n = w.half / w.center;
     let q = max(1.0 - dot(n, n), 1e-30);
@@ -60,7 +62,8 @@ fn ratio_interval(r: Value, w: Value) -> vec2<f32> {
         t + select(large_root, small_root, p > 0.0));
 }
 
-// The least and greatest r / w, and how far they can be off, times w.
+// Estimates of the least and greatest r / w.
+// `below` and `above` say by how much they can be off, times w.
 struct Extent {
     low: f32,
     high: f32,
@@ -84,13 +87,13 @@ fn surely_before(r: Value, w: Value, extent: Extent, edge: f32, w_min: f32) -> b
     return surely_below(r, edge, w);
 }
 
-// 16 directions of the outline (four are the rectangle's), and two rings of 4 points about the one
-// that is nearest to the eye.
+// 16 directions of the outline, of which four are the rectangle's.
+// Then two rings of 4 points about the point that is nearest to the eye.
 const CANDIDATES: u32 = 24u;
 const TURN: f32 = 6.2831853;
 const RING_ANGLES: vec2<f32> = vec2<f32>(0.7, 1.2);
 
-// How r / w changes with the point, where it is r_point / w_point; times w.
+// How r / w changes with the point of the unit sphere, at `point`; times w.
 fn gradient(r: Value, w: Value, point: vec3<f32>) -> vec3<f32> {
     return r.half - (r.center + dot(r.half, point)) / (w.center + dot(w.half, point)) * w.half;
 }

@@ -1,16 +1,20 @@
-// Groups of instances.
+// Groups of instances, and how the invocations of a cull share them.
+// Twin: `crates/hiz_core/src/instances/groups.rs`, `GROUP`.
 
-// Instances of a group, stored one after the other.
+// Instances of a full group, stored one after the other.
 const GROUP: u32 = 64u;
-// How many members of a group one invocation tests, one after the other, and how many groups so one
-// workgroup: a software driver fetches uniforms for every eight invocations anew and never skips a
-// branch, and does so once a run (docs/performance.md).
+// How many members of a group one invocation tests, one after the other.
+// It is also how many groups one workgroup of GROUP invocations tests.
+// A software driver fetches uniforms anew for every eight invocations, and never skips a branch.
+// With runs it pays for both once per run instead of once per member (docs/performance.md).
+// Twin: `crates/hiz_core/src/cull/groups.rs`, `GROUPS_OF_RUN`.
 const RUN: u32 = 8u;
 // Invocations that share a group.
 const SHARE: u32 = GROUP / RUN;
 
-// Survivors in a row of their list, a texture (as `record_layout.wgsl` says, and why), as a power
-// of two (twin: `crates/hiz_core/src/output/survivors.rs`).
+// Surviving groups in a row of their list, as a power of two.
+// The list is a texture, for the reason that `record_layout.wgsl` gives.
+// Twin: `crates/hiz_core/src/output/survivors.rs`, `SURVIVORS_PER_ROW`.
 const SURVIVORS_PER_ROW_LOG2: u32 = 12u;
 
 fn survivor_position(slot: u32) -> vec2<u32> {

@@ -1,4 +1,4 @@
-// The update: new records (of instances, or of their groups) go to their places.
+// The update: new records, of instances or of their groups, go to their places.
 
 struct Update {
     // How many records.
@@ -12,9 +12,9 @@ struct Update {
 
 // What the device knows of the order in which updates ran.
 struct Sequence {
-    // The number of the next one.
+    // The number of the update that has to run next.
     next: u32,
-    // Not 0: one was left out, or overtaken.
+    // Not 0 if an update was left out or overtaken.
     // The boxes that the host forms from then on may not contain their groups.
     broken: u32,
 }
@@ -25,7 +25,7 @@ struct Sequence {
 @group(0) @binding(3) var records: texture_storage_2d<rgba32uint, write>;
 @group(0) @binding(4) var<storage, read_write> sequence: Sequence;
 
-// The bits of 2^62: a record of such numbers is no volume, whatever its kind.
+// The bits of 2^62: a record of such numbers is invalid, whatever its kind.
 const NO_VOLUME: vec4<u32> = vec4<u32>(0x5e800000u);
 
 fn replace(id: u32, k: u32, texel: vec4<u32>) {

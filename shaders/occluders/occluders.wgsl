@@ -1,6 +1,7 @@
-// Occluders, depth only.
-// A vertex is two float32 halves of its world position; the eye is subtracted half by half before
-// anything is rounded, so that a wall a million metres from the origin does not tremble.
+// Draws occluders, depth only.
+// A vertex is two float32 halves of its world position.
+// The eye is subtracted half by half before anything is rounded.
+// So a wall a million metres from the origin does not tremble.
 
 struct OccluderView {
     // Clip-space rows about the reference point, w near 1.

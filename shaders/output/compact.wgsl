@@ -1,7 +1,7 @@
-// Compaction: from the mask to the ascending list of the caller's indices and the draw's instance
-// count.
-// `scan` (one workgroup) counts the bits before each word, `scatter` (an invocation a word) writes
-// them.
+// Compaction: from the mask to the ascending list of the caller's indices, and to the draw's
+// `instance_count`.
+// `scan`, one workgroup, counts the bits before each word of the mask.
+// `scatter`, one invocation per word, writes the indices.
 
 const LANES: u32 = 256u;
 
@@ -17,14 +17,14 @@ struct DrawIndexedIndirect {
 @group(0) @binding(1) var<storage, read> mask: array<u32>;
 @group(0) @binding(2) var<storage, read_write> list: array<u32>;
 @group(0) @binding(3) var<storage, read_write> draws: array<DrawIndexedIndirect>;
-// Kept bits before each word.
+// How many bits are set before each word of the mask.
 @group(0) @binding(4) var<storage, read_write> before: array<u32>;
 // .x: how many indices may be written in all pieces together.
 @group(0) @binding(5) var<uniform> capacity: vec4<u32>;
 
 var<workgroup> sums: array<u32, LANES>;
 
-// What earlier pieces left of the capacity.
+// How much of the capacity earlier pieces left.
 fn room() -> u32 {
     var left = capacity.x;
     for (var p = 0u; p < piece.index; p += 1u) {

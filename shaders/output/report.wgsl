@@ -1,16 +1,19 @@
-// What a cull leaves behind: for each instance a bit in the caller's numbering, a verdict in the
-// stored one, and its place in the draw's list; of these what was asked for.
+// What a cull writes for each instance: a bit of the mask, a verdict, an entry of the list.
+// Only what was asked for is written.
+// Mask and list use the caller's indices; verdicts lie at places, the stored order.
+// Twin: `crates/hiz_core/src/cull/pipelines.rs`, `ReportKey`.
 
-// A bit for each instance that is kept.
+// True: the mask is written, one bit per instance.
 override MASK: bool;
-// Its verdict.
+// True: verdicts are written.
 override VERDICTS: bool;
-// Count what is kept in the draw arguments, here, in whatever order invocations arrive; otherwise
-// `compact.wgsl` counts the mask.
+// True: kept instances are counted here, in the draw arguments, in the order in which invocations
+// arrive.
+// Otherwise `compact.wgsl` counts the mask later.
 override APPEND: bool;
-// And list it.
+// True, with APPEND: they are also listed.
 override LIST: bool;
-// More may be kept than the lists hold.
+// True: more instances may be kept than the lists hold.
 override CAPPED: bool;
 
 struct DrawIndexedIndirect {
@@ -22,15 +25,15 @@ struct DrawIndexedIndirect {
 }
 
 @group(1) @binding(0) var<uniform> piece: Piece;
-// Bit i of the first words: the caller's instance i of the piece is kept.
-// Then, from a multiple of 4 on, a word for each place: the verdict of who is stored there.
+// Bit i of the first words says whether instance i of the piece is kept, by the caller's index.
+// From `verdicts_begin` on follows one word per place: the verdict of the instance stored there.
 @group(2) @binding(0) var<storage, read_write> mask: array<atomic<u32>>;
 @group(2) @binding(1) var<storage, read_write> list: array<u32>;
 @group(2) @binding(2) var<storage, read_write> draws: array<DrawIndexedIndirect>;
 // .x: how many indices may be written in all pieces together.
 @group(2) @binding(4) var<uniform> capacity: vec4<u32>;
 
-// What earlier pieces left of the capacity.
+// How much of the capacity earlier pieces left.
 fn room() -> u32 {
     var left = capacity.x;
     for (var p = 0u; p < piece.index; p += 1u) {
@@ -39,8 +42,9 @@ fn room() -> u32 {
     return left;
 }
 
-// The count is the draw's own: it never ends above the room, for who finds none takes its one back,
-// and nobody can have taken a slot below the room before.
+// Adds an instance to the list; the draw's `instance_count` allocates the slot.
+// An invocation that finds no room takes its one back, so the count never ends above the room.
+// Once it has reached the room it never falls below it, so no slot is given out twice.
 fn append(index: u32) {
     let slot = atomicAdd(&draws[piece.index].instance_count, 1u);
     if CAPPED {
@@ -54,7 +58,7 @@ fn append(index: u32) {
     }
 }
 
-// Whether the instance at a place is kept; its verdict is written.
+// Tests the instance at a place, writes its verdict, and returns whether it is kept.
 fn test(place: u32) -> bool {
     let outcome = classify(place);
     if VERDICTS {
@@ -66,7 +70,7 @@ fn test(place: u32) -> bool {
     return outcome.verdict >= VISIBLE;
 }
 
-// The instance at a place is kept.
+// Reports the instance at a place as kept.
 fn report(place: u32) {
     let index = caller_index(place);
     if MASK {
@@ -77,8 +81,9 @@ fn report(place: u32) {
     }
 }
 
-// Tests the RUN members of a group that one of the SHARE invocations has, and then reports those
-// that are kept: few, so that the dear part is done for few.
+// Tests RUN members of a group: those of one of the SHARE invocations that share the group.
+// Then it reports those that are kept.
+// They are few, so the atomics, which cost most, run for few.
 fn cull_run(group: u32, share: u32) {
     let first = group * GROUP + share;
     var kept = 0u;

@@ -1,6 +1,7 @@
-// The count of what was read, where it is asked for.
+// Counts of what a cull read, for the option `statistics`.
+// Twin: `crates/hiz_core/src/output/counters.rs`, `StatisticsRecord`.
 
-// Count the tests of each level.
+// True: the tests on each level and the texels are counted.
 override STATISTICS: bool;
 
 struct Statistics {
@@ -13,7 +14,7 @@ struct Statistics {
 
 @group(2) @binding(3) var<storage, read_write> statistics: Statistics;
 
-// A test that read so many texels, of `level` first.
+// Counts a test that began on `level` and read `texels_read` texels.
 fn count_texels(level: u32, texels_read: u32) {
     if texels_read > 0u {
         atomicAdd(&statistics.levels[level], 1u);

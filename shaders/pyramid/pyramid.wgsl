@@ -1,5 +1,8 @@
-// A header, whose first word numbers the reduction that filled the pyramid, and the stored levels:
-// one list of texels, rows padded, cut into chunks that each fit one storage binding.
+// How the pyramid is laid out.
+// It is one list of words, cut into chunks that each fit one storage binding.
+// First comes a header, whose first word is the number of the reduction that filled the pyramid.
+// Then come the texels of the stored levels, with padded rows.
+// Twin: `crates/hiz_core/src/pyramid/mod.rs`, `PyramidUniform`.
 
 struct Level {
     offset: u32,
@@ -10,7 +13,7 @@ struct Level {
 
 struct Pyramid {
     levels: array<Level, 16>,
-    // .xy: where they lie in an atlas.
+    // .xy: where each level lies in an atlas.
     origins: array<vec4<u32>, 16>,
     // A chunk holds 1 << chunk_shift texels.
     chunk_shift: u32,
@@ -21,5 +24,6 @@ struct Pyramid {
     padding: u32,
 }
 
-// 1: everything lies in chunk_0, and the compiler drops the others.
+// The number of chunks.
+// With 1, everything lies in chunk_0, and the compiler drops the others.
 override CHUNKS: u32;

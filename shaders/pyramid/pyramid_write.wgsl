@@ -1,4 +1,5 @@
-// A pyramid and one step of its reduction: what is read, what is written.
+// One step of a reduction: what it reads, and how it writes to the pyramid's chunks.
+// Twin: `crates/hiz_core/src/pyramid/reduce.rs`, `StepUniform`.
 
 @group(0) @binding(2) var<uniform> pyramid: Pyramid;
 @group(0) @binding(3) var<storage, read_write> chunk_0: array<vec4<u32>>;
@@ -7,14 +8,14 @@
 @group(1) @binding(0) var<uniform> step: Step;
 
 struct Step {
-    // The level that is read, and the last of the up to three above it that are written.
+    // The level that is read, and the last level that is written.
     source: u32,
     last: u32,
-    // This reduction's number, for the header; 0: no header.
+    // This reduction's number, for the header; 0 if this step writes no header.
     reduction: u32,
     padding: u32,
-    // How many 8x8 blocks: a multiple of 4 columns, so that rows are whole vectors on the third
-    // level too.
+    // The number of blocks of 8x8 texels, as columns and rows.
+    // Columns are a multiple of 4, so that rows are whole vectors on the third level, too.
     blocks: vec2<u32>,
     padding_1: vec2<u32>,
 }
@@ -22,11 +23,11 @@ struct Step {
 // True: neighbouring invocations read below each other.
 override TALL: bool;
 
-// What an invocation of a workgroup of 64 reads: of 64 places in a row, or, TALL, of eight columns
-// of eight.
-// (A software driver reads for eight invocations at once. Eight below each other walk along their
-// rows in small steps, which the processor foresees, eight in a row in large ones:
-// docs/performance.md.)
+// The block of an invocation of a workgroup of 64: one of 64 in a row, or with TALL one of 8x8.
+//
+// A software driver reads for eight invocations at once.
+// Eight below each other walk along their rows in small steps, which the processor foresees.
+// Eight in a row take large steps (docs/performance.md).
 fn place_of(workgroup: vec2<u32>, lane: u32) -> vec2<u32> {
     if TALL {
         return 8u * workgroup + place_in_square(lane);
@@ -34,7 +35,7 @@ fn place_of(workgroup: vec2<u32>, lane: u32) -> vec2<u32> {
     return vec2<u32>(64u * workgroup.x + lane, workgroup.y);
 }
 
-// Its place where the workgroup takes a square anyway.
+// The place of an invocation in a workgroup that is a square of 8x8.
 fn place_in_square(lane: u32) -> vec2<u32> {
     let down = vec2<u32>(lane >> 3u, lane & 7u);
     return select(down.yx, down, TALL);

@@ -1,28 +1,31 @@
-// Depth reduction: each invocation reads an 8x8 block of one level and writes what it makes of the
-// next three.
+// Depth reduction: each invocation reads a block of 8x8 texels of one level and writes the farthest
+// depths to the next three.
 //
-// The shape of AMD's Single Pass Downsampler (FidelityFX SPD, 2020) cut to registers: no shared
-// memory, no barrier, a pass for every three levels.
-// Sizes are ceil-halved, and reads past an edge repeat the edge, so a texel of level k is the
-// farthest depth of exactly the pixels [x << k, (x + 1) << k): nothing is dropped at odd sizes and
-// nothing is read twice that could matter (the defect of the shader printed in Rakos 2010).
+// It has the shape of AMD's Single Pass Downsampler (FidelityFX SPD, 2020), cut to registers.
+// There is no shared memory and no barrier, and one pass makes three levels.
 //
-// Levels are stored with room for whole blocks (`layout.rs`), so that no store asks where the level
-// ends: the padding takes what lies past the edge, which repeats it, and the pass that reads this
-// level reads the padding like the rest.
+// Sizes are ceil-halved, and reads past an edge repeat the edge.
+// So a texel of level k is the farthest depth of exactly the pixels [x << k, (x + 1) << k).
+// Nothing is dropped at odd sizes, which is the defect of the shader printed in Rakos 2010.
+// What is read twice cannot change a farthest depth.
+//
+// Levels are stored with room for whole blocks (`crates/hiz_core/src/pyramid/layout.rs`).
+// So no store asks where the level ends: the padding repeats the edge.
+// The pass that reads this level reads the padding like the rest.
 
 // True: level 0, the source texture, is read; otherwise a stored level.
 override FROM_SOURCE: bool;
-// The first level that is stored, 1 to 3 above the one that is read: an image's own level 1 is the
-// dearest to write.
+// The first level that is stored, counted from the level that is read: 1 to 3.
+// Skipping level 1 of an image pays, because it is the largest to write.
 override FIRST: u32;
 
-// The farthest of two rows, and of neighbours in them.
+// The farthest depth of each 2x2 texels of two rows.
 fn halved(a: vec4<u32>, b: vec4<u32>) -> vec2<u32> {
     return vec2<u32>(farthest4(vec4<u32>(a.xy, b.xy)), farthest4(vec4<u32>(a.zw, b.zw)));
 }
 
-// Rows 2y and 2y + 1 of the stored level, eight texels from column 8x on, made four of one row.
+// Eight texels from column 8x on, of rows 2y and 2y + 1 of a stored level.
+// They are reduced to four of one row.
 fn stored_quads(level: Level, x: u32, y: u32) -> vec4<u32> {
     let last = ((level.width + 3u) & ~3u) - 4u;
     let left = min(8u * x, last);
@@ -34,7 +37,7 @@ fn stored_quads(level: Level, x: u32, y: u32) -> vec4<u32> {
         halved(load4(top + right), load4(bottom + right)));
 }
 
-// The 4x4 quads of a block.
+// The farthest depth of each of the 4x4 quads of a block; a quad is 2x2 texels.
 fn quads(level: Level, block: vec2<u32>) -> array<vec4<u32>, 4> {
     if FROM_SOURCE {
         return source_quads(block);
@@ -51,7 +54,7 @@ fn store_pair(level: Level, x: u32, y: u32, pair: vec2<u32>) {
     store(index + 1u, pair.y);
 }
 
-// One block of the level `source`, made texels of the levels after it, no further than `last`.
+// Reduces one block of a level to the levels after it, but none after `last`.
 fn reduce_block(source_number: u32, last: u32, block: vec2<u32>) {
     let rows = quads(pyramid.levels[source_number], block);
     if FIRST == 1u {
@@ -90,7 +93,7 @@ fn reduce(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
     }
 }
 
-// The last levels, all of them by one workgroup: they are less work than another dispatch.
+// Makes the last levels, all of them by one workgroup: they are less work than another dispatch.
 @compute @workgroup_size(64, 1)
 fn reduce_tail(@builtin(local_invocation_index) lane: u32) {
     var blocks = step.blocks;
@@ -99,7 +102,7 @@ fn reduce_tail(@builtin(local_invocation_index) lane: u32) {
             reduce_block(source_number, step.last, vec2<u32>(i % blocks.x, i / blocks.x));
         }
         storageBarrier();
-        // Of the level that was written last, as `layout.rs` has it.
+        // The blocks of the level that was written last, as `layout.rs` counts them.
         blocks = (blocks + vec2<u32>(7u)) / 8u;
         blocks.x = (blocks.x + 3u) & ~3u;
     }

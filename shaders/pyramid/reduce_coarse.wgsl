@@ -1,13 +1,14 @@
-// One coarse level alone, straight from the depth image, in one dispatch: a texel takes 16x16
-// pixels and more.
+// One coarse level alone, straight from the depth image, in one dispatch.
+// It serves levels whose texels stand for 16x16 pixels or more.
 //
-// Up to 32x32 pixels an invocation reads them all; larger texels are shared by the 64 invocations
-// of a workgroup.
-// Bits are sanitized before they are compared, so -0 and NaN cannot break the integer order, and
-// nothing begins with a depth of 1 that would cap larger ones (both faults of the usual atomicMin
-// on float bits).
+// A texel of up to 32x32 pixels is made by one invocation.
+// A larger one is shared by the 64 invocations of a workgroup.
+//
+// The usual atomicMin on float bits has two faults that this avoids.
+// Bits are sanitized before they are compared, so -0 and NaN cannot break the integer order.
+// Nothing begins with a depth of 1, which would cap larger ones.
 
-// A texel is shared by a workgroup.
+// True: a texel is shared by a workgroup.
 override SHARED: bool;
 
 const WORKGROUP: u32 = 64u;

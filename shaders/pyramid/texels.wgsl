@@ -1,5 +1,5 @@
-// The pyramid as a cull reads it, wherever its levels lie (`texels_apart.wgsl`,
-// `texels_atlas.wgsl`).
+// The pyramid as a cull reads it, wherever its levels lie.
+// `texels_apart.wgsl`, `texels_atlas.wgsl` or `texels_nowhere.wgsl` comes before this file.
 
 // The footprint is at most 2^n x 2^n texels.
 override FOOTPRINT_LOG2: u32;
@@ -7,11 +7,12 @@ override FOOTPRINT_LOG2: u32;
 @group(0) @binding(2) var<uniform> pyramid: Pyramid;
 @group(0) @binding(6) var<uniform> view_uniform: View;
 
-// Whether the pyramid is the one that was promised, and not one whose reduction has yet to run.
+// Whether the reduction that this cull was recorded for has filled the pyramid.
+// If not, the cull keeps everything.
 var<private> is_reduced: bool;
 
-// The first thing that an entry point calls: what it holds in registers a software driver does not
-// fetch again for every instance.
+// Every entry point calls this first.
+// It copies uniforms to registers; a software driver would fetch them anew for every instance.
 fn begin() {
     view = view_uniform;
     is_reduced = reduction_number() == view.reduction;
@@ -39,7 +40,8 @@ fn footprint(level: u32, t: vec4<u32>) -> u32 {
 
 const LEAST_NORMAL: f32 = 0x1p-126;
 
-// The depth that a stored one stands for: with the slack, away from subnormals.
+// The depth that a stored one may stand for: the farthest that the slack allows.
+// It is kept away from subnormals, which a driver may flush.
 fn occluding_depth(bits: u32) -> f32 {
     let stored = select(max(bitcast<f32>(bits), LEAST_NORMAL), min(bitcast<f32>(bits), 1.0), REVERSED);
     return bar(stored * view.depth_factor + view.depth_offset);

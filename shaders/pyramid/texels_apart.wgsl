@@ -1,4 +1,4 @@
-// Level 0 in the depth image, the stored levels where the reduction left them.
+// Reads level 0 from the depth image, and the other levels from where the reduction left them.
 
 @group(0) @binding(3) var<storage, read> chunk_0: array<u32>;
 @group(0) @binding(4) var<storage, read> chunk_1: array<u32>;
@@ -28,8 +28,8 @@ fn stored_corners(level: u32, t: vec4<u32>) -> vec4<u32> {
         stored_bits(top + t.x), stored_bits(top + t.z), stored_bits(bottom + t.x), stored_bits(bottom + t.z));
 }
 
-// The same of any level; level 0's as given.
-// Both are read, whatever the level: a software driver goes both ways of a branch.
+// The same for any level; those of level 0 are not sanitized.
+// Both are read, whatever the level, since a software driver takes both ways of a branch.
 fn corners(level: u32, t: vec4<u32>) -> vec4<u32> {
     return select(stored_corners(level, t), source_corners(t), level == 0u);
 }

@@ -1,10 +1,12 @@
-// All levels that are there in one texture, four pixels or texels of a row a texel of it
-// (`crates/hiz_core/src/pyramid/atlas.rs`): one fetch serves every level.
+// Reads all levels from one texture, the atlas, so that one fetch serves every level.
+// Each of its texels holds four neighbouring texels of a row of a level
+// (`crates/hiz_core/src/pyramid/atlas.rs`).
 
 @group(0) @binding(3) var atlas: texture_storage_2d<rgba32uint, read>;
 
-// The number of the reduction whose depth image and stored levels these are; 0, which none has,
-// where they are of two reductions: the copies ran after the next one.
+// The number of the reduction whose depth image and stored levels these are.
+// It is 0, which no reduction has, if they belong to two reductions.
+// That happens if the copies ran after the next reduction.
 fn reduction_number() -> u32 {
     let column = textureDimensions(atlas).x - 2u;
     let of_image = textureLoad(atlas, vec2<u32>(column, 0u)).x;
@@ -12,7 +14,8 @@ fn reduction_number() -> u32 {
     return select(0u, of_levels, of_levels == of_image);
 }
 
-// The texels at columns t.x and t.z and rows t.y and t.w of a level; level 0's as given.
+// The texels at columns t.x and t.z and rows t.y and t.w of a level; those of level 0 are not
+// sanitized.
 fn corners(level: u32, t: vec4<u32>) -> vec4<u32> {
     let at = pyramid.origins[level].xyxy + (t >> vec4<u32>(2u, 0u, 2u, 0u));
     let left = t.x & 3u;

@@ -1,4 +1,5 @@
-// No depth at all, for whoever asks only what is outside: all is far, and no reduction has run.
+// Reads no depth: for `refine.wgsl` and `refine_groups.wgsl`, which only ask what is outside.
+// All is far, and no reduction has run.
 
 // No reduction has this number, so a test ends before it reads.
 fn reduction_number() -> u32 {

@@ -1,10 +1,8 @@
-// A yardstick: the cull without its certificates, as one would write it who trusts float32.
-// The same records, tests, footprint and level, from the same frame; no margins, no bars, nothing
-// proved.
-// It hides what can be seen, and exists to be measured against.
-// For boxes.
+// A yardstick, not a part of the library: the cull of boxes as it looks if float32 is trusted.
+// It has the same records, tests, footprint and level, but no margins, no barriers and no proofs.
+// It culls what can be seen, and exists to be measured against.
 
-// Choices of the frame that it does not offer.
+// The library's pipelines set these constants; this shader does not use them.
 override SAMPLE_COVERAGE: bool;
 override DESCENT: bool;
 override FIT_VOLUME: bool;

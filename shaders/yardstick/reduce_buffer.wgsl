@@ -1,6 +1,6 @@
-// A yardstick, not a part of the library: the reduction as one dispatch a level on a flat buffer,
-// the shape that most Hi-Z implementations have.
-// Four texels of a level an invocation, so that all loads and stores are vectors.
+// A yardstick, not a part of the library: the reduction as one dispatch per level on a flat buffer.
+// Most Hi-Z implementations have this shape.
+// An invocation makes four texels of a level, so that all loads and stores are vectors.
 
 struct YardstickLevel {
     // In vectors of four texels.

@@ -1,6 +1,7 @@
-// A yardstick, not a part of the library: the reduction as one dispatch a level on the mip levels
-// of a texture, one texel an invocation, the shape of the published tutorials (with ceil-halved
-// sizes, so that it reads what ours reads).
+// A yardstick, not a part of the library: the reduction as one dispatch per level on the mip levels
+// of a texture, one texel per invocation.
+// Published tutorials have this shape.
+// Here sizes are ceil-halved, so that it reads what ours reads.
 
 // .xy: size of the level that is written; .zw: of the one that is read.
 @group(0) @binding(2) var<uniform> sizes: vec4<u32>;

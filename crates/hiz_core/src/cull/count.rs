@@ -1,4 +1,8 @@
 //! The count of verdicts: how many instances got which verdict.
+//!
+//! It runs when counts are read, not in the cull, so a cull whose counts nobody reads does not pay
+//! for it.
+//! `cull/refine.rs` runs first, since a cull leaves the members of hidden groups without verdicts.
 
 use crate::error::Result;
 use crate::gpu::buffers::entry;
@@ -9,14 +13,15 @@ use crate::gpu::shader::{Source, wgsl};
 use crate::instances::Instances;
 use crate::output::visible::Visible;
 
-/// Places that one workgroup counts: 64 invocations of 16 each; `shaders/cull/count.wgsl`.
+/// Places that one workgroup counts: 64 invocations with 16 places each.
+/// Twins: `shaders/cull/count.wgsl`, `LANES` and 4 times `VECTORS`.
 const COUNT_WORKGROUP: u32 = 64 * 16;
 
 /// The bindings of a count.
 const BINDINGS: &[(u32, Binding)] =
     &[(0, Binding::Uniform), (1, Binding::Read), (2, Binding::Write)];
 
-/// The shader that counts verdicts.
+/// The shader module that counts verdicts.
 pub(crate) fn module() -> Source {
     Source::of(&[&[wgsl!("output/verdict"), wgsl!("instances/piece"), wgsl!("cull/count")]])
 }
