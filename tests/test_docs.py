@@ -1,6 +1,7 @@
-"""The code and the commands that README and docs show run unchanged.
+"""The code that README, docs and docstrings show runs unchanged.
 
-Faults that they plant are tested by `planted_texts.rs`.
+The commands and files that the pages name exist.
+`planted_texts.rs` of hiz_core tests the planted faults that the pages name.
 """
 
 from __future__ import annotations

@@ -117,8 +117,9 @@ class Device:
         Neighbours meet the same pixels, and what hides the box hides the group.
         Masks, indices and `CullResult.explain` number the instances as they came, whatever the
         stored order.
-        On the device an instance takes its record, 4 bytes for its index, and its share of the box
-        of its group (`Instances.device_bytes`).
+        On the device an instance takes its record and its share of the box of its group
+        (`Instances.device_bytes`).
+        The record has 32 bytes for a sphere, 48 for a box and 64 for an oriented box.
 
         Parameters
         ----------

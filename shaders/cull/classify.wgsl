@@ -54,7 +54,7 @@ fn inside_block(
         & (end >= size | surely_before(r, w, extent, f32(end) - view.reach - half_size, w_min));
 }
 
-// The far plane hides nothing.
+// Whether anything can be behind this depth: nothing is behind the far plane.
 fn can_occlude(d: f32) -> bool {
     return select(1.0 > d, d >= LEAST_NORMAL, REVERSED);
 }
@@ -133,7 +133,7 @@ fn descend(
                 return true;
             }
             let up = levels_up(level);
-            // The last column and row of a parent's children.
+            // The number of the last column, and row, among a parent's children.
             let last_child = (1u << up) - 1u;
             if (at.x & last_child) < last_child && at.x < end.x {
                 at.x += 1u;

@@ -16,7 +16,7 @@ struct Survivors {
     count: atomic<u32>,
 }
 
-// The boxes are instances of a piece of their own.
+// The groups' boxes, as if they were the instances of a piece.
 @group(1) @binding(0) var<uniform> groups: Piece;
 @group(2) @binding(0) var<storage, read_write> survivors: Survivors;
 // A word per group: its verdict, or VISIBLE where the members have verdicts of their own.

@@ -9,7 +9,7 @@ const WORKGROUP: u32 = 64u;
 // A flag beside the verdict of such a group; TOLD of `refine.wgsl` is another.
 const WITHIN: u32 = 8u;
 
-// The boxes are instances of a piece of their own.
+// The groups' boxes, as if they were the instances of a piece.
 @group(1) @binding(0) var<uniform> groups: Piece;
 @group(2) @binding(1) var<storage, read_write> group_verdicts: array<u32>;
 

@@ -18,7 +18,7 @@ struct SupportingPlane {
 }
 
 struct SupportingPlanes {
-    // The sides of the rectangle around the volume, finer than pixels.
+    // The rectangle around the volume, to fractions of a pixel.
     left_top: vec2<f32>,
     right_bottom: vec2<f32>,
     list: array<SupportingPlane, CANDIDATES>,

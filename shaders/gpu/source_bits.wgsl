@@ -38,7 +38,7 @@ fn source_quads(block: vec2<u32>) -> array<vec4<u32>, BLOCK_QUADS> {
         source_quad_row(block.x, y + 2u), source_quad_row(block.x, y + 3u));
 }
 
-// The pixels at columns t.x and t.z and rows t.y and t.w, as given.
+// The pixels at columns t.x and t.z and rows t.y and t.w, not sanitized.
 fn source_corners(t: vec4<u32>) -> vec4<u32> {
     let texel = t >> vec4<u32>(VECTOR_LOG2, 0u, VECTOR_LOG2, 0u);
     let left = t.x & VECTOR_MASK;

@@ -1,4 +1,5 @@
-// Groups of instances.
+// Groups of instances, and how the invocations of a cull share them.
+// Twin: `crates/hiz_core/src/instances/groups.rs`, `GROUP`.
 
 // Instances of a group, which are stored one after the other.
 // Twin: `GROUP` in `crates/hiz_core/src/instances/groups.rs`.

@@ -23,7 +23,7 @@ struct DrawIndexedIndirect {
 @group(0) @binding(1) var<storage, read> mask: array<u32>;
 @group(0) @binding(2) var<storage, read_write> list: array<u32>;
 @group(0) @binding(3) var<storage, read_write> draws: array<DrawIndexedIndirect>;
-// Kept bits before each word.
+// How many bits are set before each word of the mask.
 @group(0) @binding(4) var<storage, read_write> before: array<u32>;
 // .x: how many indices may be written, in all pieces together.
 @group(0) @binding(5) var<uniform> capacity: vec4<u32>;

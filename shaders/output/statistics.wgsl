@@ -1,6 +1,6 @@
 // Counts of what tests have read, where they are asked for.
 
-// Count the tests of each level.
+// True: the tests on each level and the texels are counted.
 override STATISTICS: bool;
 
 // Twin: `StatisticsRecord` in `crates/hiz_core/src/output/counters.rs`.

@@ -1,6 +1,7 @@
 //! Certified hierarchical-Z occlusion culling on wgpu.
 //!
-//! The data flows one way, and the steps in this crate are folders of the same names:
+//! The data flows one way.
+//! Steps 1 to 6 are folders, in the order in which `lib.rs` declares them:
 //!
 //! 1. **Input** (`input`).
 //!    A [`Camera`] describes in float64 what is seen.
@@ -16,8 +17,7 @@
 //!    [`HizContext::record_instances`] uploads the bounds as [`Instances`], in groups of 64
 //!    neighbours.
 //! 5. **Output** (`output`).
-//!    [`HizContext::create_visible`] makes the buffers of a [`Visible`], which take what a cull
-//!    finds.
+//!    [`HizContext::create_visible`] makes the buffers of a [`Visible`], which the next step fills.
 //! 6. **Cull** (`cull`).
 //!    [`HizContext::record_cull`] tests the instances against the pyramid; if there are many, it
 //!    tests whole groups first.
@@ -133,8 +133,9 @@
 // Some items serve only a readback, so a build without `headless` never uses them.
 #![cfg_attr(not(feature = "headless"), allow(dead_code))]
 
-// The rooms, in the order of the data: each imports only what stands above it here
-// (`tests/rooms.rs`). Empty lines keep rustfmt from sorting them.
+// The rooms, in the order of the data.
+// Each imports only from itself and from rooms declared before it; `tests/rooms.rs` checks that.
+// Empty lines keep rustfmt from sorting them.
 mod error;
 
 mod host;

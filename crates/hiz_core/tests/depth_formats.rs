@@ -1,6 +1,7 @@
-//! Whatever the format of a depth image rounds counts as slack.
-//! A wall may be stored nearer than it is.
-//! What is visible past it must not be hidden because of that.
+//! Whatever the format of a depth image rounds counts as slack in every cull.
+//!
+//! A format may store a wall nearer than it is.
+//! An instance between the stored depth and the wall is visible, and must not be culled.
 //!
 //! Expectations are worked out from the definitions of the formats.
 //! They are in Vulkan 1.3, "Fixed-Point Data Conversions" and "Floating-Point Format Conversions".

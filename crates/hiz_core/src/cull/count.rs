@@ -1,4 +1,8 @@
 //! The count of verdicts: how many instances got which verdict.
+//!
+//! It runs when counts are read, not in the cull, so a cull whose counts nobody reads does not pay
+//! for it.
+//! `cull/refine.rs` runs first, since a cull leaves the members of hidden groups without verdicts.
 
 use crate::error::Result;
 use crate::gpu::buffers::entry;
@@ -20,7 +24,7 @@ const COUNT_WORKGROUP: u32 = LANES * VECTORS * VERDICT_MULTIPLE;
 const BINDINGS: &[(u32, Binding)] =
     &[(0, Binding::Uniform), (1, Binding::Read), (2, Binding::Write)];
 
-/// The shader that counts verdicts.
+/// The shader module that counts verdicts.
 pub(crate) fn module() -> Source {
     Source::of(&[&[wgsl!("output/verdict"), wgsl!("instances/piece"), wgsl!("cull/count")]])
 }

@@ -1,4 +1,7 @@
-//! The inputs of a cull, and the view that its shaders see.
+//! The inputs of a cull, and what its shaders see of them: the view, and where depth is read.
+//!
+//! Here each option goes one of two ways.
+//! A number goes into the view uniform, and a choice into the key of the pipelines.
 
 use crate::cull::groups::GROUP_DESCENT;
 use crate::cull::options::{Coverage, CullOptions, Fit};

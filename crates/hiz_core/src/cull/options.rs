@@ -105,7 +105,7 @@ pub enum Hierarchy {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct CullOptions {
-    /// The order of the packed list.
+    /// The order of the list of kept instances.
     pub order: Order,
     /// Area or sample coverage.
     pub coverage: Coverage,
@@ -124,8 +124,10 @@ pub struct CullOptions {
     /// Use it for orthographic cameras, where a rasteriser errs by the same amount near and far.
     /// Any value above 0 counts as 2^-23 more.
     pub depth_slack_abs: f64,
-    /// kappa, 0..=1e6: how much the transform of the depth image's renderer may err.
-    /// Its unit is an eps of `sum |M| |p|`.
+    /// How much the transform of the depth image's renderer may err, 0..=1e6.
+    /// The unit is one float32 eps (2^-23) of `sum |M| |p|`: the renderer's matrix M times a world
+    /// position p, with all products taken as positive.
+    /// `docs/accuracy.md` calls it kappa.
     /// 0 is for depth that is exact for the camera's matrices.
     /// About 4 is for a renderer that transforms world coordinates in float32.
     pub transform_slack: f64,

@@ -24,7 +24,7 @@ pub(crate) struct CullKey {
     pub(crate) fit_volume: bool,
 }
 
-/// What a cull writes; `shaders/output/report.wgsl`.
+/// What a cull writes: the `override` constants of `shaders/output/report.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct ReportKey {
     pub(crate) mask: bool,
@@ -173,15 +173,16 @@ pub(crate) fn module(
     ])
 }
 
-/// The files of the certified decision.
+/// The files of the decision by certificates; a yardstick replaces them.
 pub(super) const CERTIFIED: &[File] = &[wgsl!("cull/supporting_planes"), wgsl!("cull/classify")];
 
-/// The module of an entry point that does not record which texels were read.
+/// The module of an entry point that does not write down which texels were read
+/// (`shaders/cull/untold.wgsl`).
 pub(super) fn untold(store: DepthStore, kind: BoundsKind, entry: &[File]) -> Source {
     module(store, kind, CERTIFIED, &[&[wgsl!("cull/untold")], entry].concat())
 }
 
-/// The files of the flat cull, without the decision.
+/// The files of the flat cull, which tests each instance by itself, without the decision.
 pub(crate) const FLAT: &[File] = &[
     wgsl!("cull/untold"),
     wgsl!("instances/piece"),

@@ -1,6 +1,7 @@
 //! Bounds of instances, borrowed from the caller as flat arrays of float32 or float64.
 //!
 //! How they are validated and rounded is up to the room `instances`.
+//! Its file `volume_record.rs` also has `Bounds::kind`, `Bounds::len` and `Bounds::is_empty`.
 
 /// A flat array of float32 or float64 in C order.
 #[derive(Debug, Clone, Copy)]

@@ -26,6 +26,7 @@ use crate::instances::aabb::Aabb;
 use crate::instances::volume_record::{BoxRecord, OrientedBoxRecord};
 
 /// Members of a full group: as many as a `u64` has bits.
+/// Twin: `shaders/instances/groups.wgsl`, `GROUP`.
 pub(crate) const GROUP: usize = 64;
 
 /// From this many instances on, a second thread helps to pack.
@@ -45,7 +46,7 @@ struct Group {
     boxes: Vec<Aabb>,
 }
 
-/// The groups of one piece.
+/// The groups of one piece, of which the last may be short.
 #[derive(Debug)]
 pub(crate) struct Groups {
     count: usize,
@@ -63,9 +64,10 @@ pub(crate) struct Origin {
 
 /// Scratch memory for packing some members of one group.
 ///
-/// First the given numbers are fetched from wherever the caller has them, one after the other, so
-/// that the processor can wait for many loads at once.
-/// The records are made here too, before they are copied to the memory that the device reads.
+/// The stored order scatters the reads over the caller's arrays.
+/// So all given numbers are fetched first, and the processor can wait for many loads at once.
+/// `threes`, `ones` and `nines` hold arrays of three, one and nine numbers per instance.
+/// The records are made here, too, and then copied as one block to the mapped staging buffer.
 struct Batch {
     indices: [u32; GROUP],
     threes: [[f64; 3 * GROUP]; 2],

@@ -123,7 +123,7 @@ fn all_small<const N: usize>(values: [f32; N]) -> bool {
     values.iter().all(|v| v.abs() < LARGEST)
 }
 
-/// Twin: `shaders/instances/bounds_sphere.wgsl`, `SphereRecord`.
+/// Twin: `shaders/instances/bounds_sphere.wgsl`, `load_volume`, which reads two texels.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct SphereRecord {
@@ -133,7 +133,7 @@ pub(crate) struct SphereRecord {
     index: u32,
 }
 
-/// Twin: `shaders/instances/bounds_box.wgsl`, `BoxRecord`.
+/// Twin: `shaders/instances/bounds_box.wgsl`, `load_volume`, which reads three texels.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct BoxRecord {
@@ -145,8 +145,8 @@ pub(crate) struct BoxRecord {
     padding_2: f32,
 }
 
-/// Twin: `shaders/instances/bounds_oriented_box.wgsl`, `OrientedBoxRecord`.
-/// The third half axis fills the fourth lanes.
+/// Twin: `shaders/instances/bounds_oriented_box.wgsl`, `load_volume`, which reads four texels.
+/// Half axis 2 fills the fourth lanes of the first three texels.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct OrientedBoxRecord {
