@@ -94,7 +94,7 @@ fn descend(
         *texels_read += 1u;
         let bits = texel(level, at.x, at.y);
         var clear = surely_behind(bits, p.z, p.w);
-        tell_texel(level, at.x, at.y, bits, clear);
+        note_texel(level, at.x, at.y, bits, clear);
         if !clear {
             // The texel's pixels, cut at the image's edge.
             let begin = at << vec2<u32>(level);
@@ -102,7 +102,7 @@ fn descend(
             if FIT_VOLUME {
                 clear = surely_clear(
                     &planes, max(begin, first), min(end, last + vec2<u32>(1u)), bits);
-                tell_clear(clear);
+                note_clear(clear);
             } else if all(begin >= first) && all(end <= last + vec2<u32>(1u)) {
                 // One of its pixels has that depth, and the rectangle contains all its pixels.
                 // So no finer level can decide otherwise.

@@ -48,14 +48,14 @@ fn write_down(reading: vec4<u32>) {
     texels_read += 1u;
 }
 
-fn tell_corners(level: u32, t: vec4<u32>, bits: vec4<u32>) {
-    tell_texel(level, t.x, t.y, bits.x, false);
-    if t.z != t.x { tell_texel(level, t.z, t.y, bits.y, false); }
-    if t.w != t.y { tell_texel(level, t.x, t.w, bits.z, false); }
-    if t.z != t.x && t.w != t.y { tell_texel(level, t.z, t.w, bits.w, false); }
+fn note_corners(level: u32, t: vec4<u32>, bits: vec4<u32>) {
+    note_texel(level, t.x, t.y, bits.x, false);
+    if t.z != t.x { note_texel(level, t.z, t.y, bits.y, false); }
+    if t.w != t.y { note_texel(level, t.x, t.w, bits.z, false); }
+    if t.z != t.x && t.w != t.y { note_texel(level, t.z, t.w, bits.w, false); }
 }
 
-fn tell_texel(level: u32, x: u32, y: u32, bits: u32, is_behind: bool) {
+fn note_texel(level: u32, x: u32, y: u32, bits: u32, is_behind: bool) {
     let depth = sanitized(bits);
     write_down(vec4<u32>(level | select(0u, BEHIND, is_behind), x, y, depth));
     if is_behind {
@@ -65,7 +65,7 @@ fn tell_texel(level: u32, x: u32, y: u32, bits: u32, is_behind: bool) {
 }
 
 // Adds to the reading of the texel that was told last.
-fn tell_clear(is_clear: bool) {
+fn note_clear(is_clear: bool) {
     if is_clear {
         texels_read -= 1u;
         write_down(last | vec4<u32>(CLEAR, 0u, 0u, 0u));

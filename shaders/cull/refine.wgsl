@@ -14,7 +14,7 @@
 const WORKGROUP: u32 = 64u;
 
 // A flag beside the verdict of a group: its members have verdicts of their own.
-const TOLD: u32 = 4u;
+const REFINED: u32 = 4u;
 
 @group(1) @binding(0) var<uniform> piece: Piece;
 // The mask, and behind it the verdicts.
@@ -31,7 +31,7 @@ fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let word = group_verdicts[group];
     let of_group = word & VERDICT_MASK;
-    if (word & TOLD) != 0u || of_group >= VISIBLE {
+    if (word & REFINED) != 0u || of_group >= VISIBLE {
         return;
     }
     let verdicts = verdicts_begin(piece.words);
@@ -47,5 +47,5 @@ fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
             mask[verdicts + place] = OUTSIDE;
         }
     }
-    group_verdicts[group] = of_group | TOLD;
+    group_verdicts[group] = of_group | REFINED;
 }

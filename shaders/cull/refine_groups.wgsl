@@ -6,7 +6,7 @@
 // Twin: `WORKGROUP` in `crates/hiz_core/src/cull/refine.rs`.
 const WORKGROUP: u32 = 64u;
 
-// A flag beside the verdict of such a group; TOLD of `refine.wgsl` is another.
+// A flag beside the verdict of such a group; REFINED of `refine.wgsl` is another.
 const WITHIN: u32 = 8u;
 
 // The groups' boxes, as if they were the instances of a piece.

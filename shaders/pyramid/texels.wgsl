@@ -25,14 +25,14 @@ fn footprint(level: u32, t: vec4<u32>) -> u32 {
     // The corners of a 2x2 footprint are all of its texels.
     if FOOTPRINT_LOG2 == 1u {
         let bits = corners(level, t);
-        tell_corners(level, t, bits);
+        note_corners(level, t, bits);
         return farthest_sanitized4(bits);
     }
     var bits = near_bits();
     for (var y = t.y; y <= t.w; y += 1u) {
         for (var x = t.x; x <= t.z; x += 1u) {
             let here = texel(level, x, y);
-            tell_texel(level, x, y, here, false);
+            note_texel(level, x, y, here, false);
             bits = farthest(bits, here);
         }
     }

@@ -1,7 +1,7 @@
 //! The explanation of a single verdict: the cull's own steps, repeated for one instance.
 
 use crate::cull::groups::group_key;
-use crate::cull::inputs::{CullInputs, Seen};
+use crate::cull::inputs::{CullInputs, PreparedView};
 use crate::cull::pipelines::{
     CERTIFIED, CullKey, DepthStore, TWO_STORAGES, classify_constants, layouts, module,
 };
@@ -85,7 +85,7 @@ pub(crate) const CLEAR: u32 = 0x200;
 
 /// How many readings an explanation holds at most.
 /// A descent may read 65,536 texels; those past this number are only counted.
-pub(crate) const TEXELS_TOLD: usize = 4096;
+pub(crate) const TEXELS_NOTED: usize = 4096;
 
 /// The shader that explains one instance's verdict.
 pub(crate) fn explain_module(store: DepthStore, kind: BoundsKind) -> Source {
@@ -121,7 +121,7 @@ pub(crate) fn record_explain(
             format!("expected an instance below {}, got {index}", instances.len()),
         )
     })?;
-    let mut seen = Seen::new(gpu, inputs, None)?;
+    let mut seen = PreparedView::new(gpu, inputs, None)?;
     let place = piece.order.place((index - piece.range.start) as usize);
     let (which, records, view) = if whole_group {
         seen.key = group_key(seen.key);

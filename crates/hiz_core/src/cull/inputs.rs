@@ -34,7 +34,7 @@ pub(super) fn check_contexts(gpu: &Gpu, inputs: &CullInputs<'_>) -> Result<()> {
 
 /// What the shaders know of camera and pyramid, and the key of the pipelines that read it.
 #[derive(Debug)]
-pub(super) struct Seen {
+pub(super) struct PreparedView {
     built: Built,
     /// All levels in one texture, if that pays.
     atlas: Option<wgpu::TextureView>,
@@ -42,7 +42,7 @@ pub(super) struct Seen {
     pub(super) key: CullKey,
 }
 
-impl Seen {
+impl PreparedView {
     /// Prepares the view of a cull.
     ///
     /// `encoder` takes the copies into an atlas if one is wanted; without it no atlas is used.
@@ -107,7 +107,7 @@ impl Seen {
         pyramid: &Pyramid,
         uniform: &ViewUniform,
     ) -> Result<wgpu::BindGroup> {
-        let view = gpu.uniform("hiz.cull.view", uniform)?;
+        let view = gpu.uniform("hiz.cull.view_uniform", uniform)?;
         let mut entries =
             vec![entry(2, pyramid.uniform.as_entire_binding()), entry(6, view.as_entire_binding())];
         let chunks;

@@ -177,14 +177,14 @@ pub(crate) fn module(
 pub(super) const CERTIFIED: &[File] = &[wgsl!("cull/supporting_planes"), wgsl!("cull/classify")];
 
 /// The module of an entry point that does not write down which texels were read
-/// (`shaders/cull/untold.wgsl`).
-pub(super) fn untold(store: DepthStore, kind: BoundsKind, entry: &[File]) -> Source {
-    module(store, kind, CERTIFIED, &[&[wgsl!("cull/untold")], entry].concat())
+/// (`shaders/cull/unexplained.wgsl`).
+pub(super) fn unexplained(store: DepthStore, kind: BoundsKind, entry: &[File]) -> Source {
+    module(store, kind, CERTIFIED, &[&[wgsl!("cull/unexplained")], entry].concat())
 }
 
 /// The files of the flat cull, which tests each instance by itself, without the decision.
 pub(crate) const FLAT: &[File] = &[
-    wgsl!("cull/untold"),
+    wgsl!("cull/unexplained"),
     wgsl!("instances/piece"),
     wgsl!("instances/groups"),
     wgsl!("output/statistics"),
@@ -205,7 +205,7 @@ pub(crate) fn cull_groups_module(store: DepthStore) -> Source {
         wgsl!("output/statistics"),
         wgsl!("cull/cull_groups"),
     ];
-    untold(store, BoundsKind::Box, &entry)
+    unexplained(store, BoundsKind::Box, &entry)
 }
 
 /// The shader of the cull of the surviving groups' members.
@@ -217,7 +217,7 @@ pub(crate) fn cull_members_module(store: DepthStore, kind: BoundsKind) -> Source
         wgsl!("instances/groups"),
         wgsl!("cull/cull_members"),
     ];
-    untold(store, kind, &entry)
+    unexplained(store, kind, &entry)
 }
 
 /// The layouts of a cull's view, of its records and of what it writes.

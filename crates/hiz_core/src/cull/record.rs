@@ -1,7 +1,7 @@
 //! The pass of a cull: it clears the buffers, tests, and compacts.
 
 use crate::cull::groups::{GROUPS_OF_RUN, GroupCull, NO_STATISTICS, is_grouped};
-use crate::cull::inputs::{CullInputs, Seen, check_contexts};
+use crate::cull::inputs::{CullInputs, PreparedView, check_contexts};
 use crate::cull::options::{CullOptions, Order};
 use crate::cull::pipelines::{CullKey, ReportKey, VISIBLE_BINDINGS, cull_pipeline};
 use crate::error::{Error, Result};
@@ -107,7 +107,7 @@ fn record_all(
         Some(lists) => Some(Compaction::new(gpu, instances, visible, lists)?),
         None => None,
     };
-    let seen = Seen::new(gpu, inputs, Some(encoder))?;
+    let seen = PreparedView::new(gpu, inputs, Some(encoder))?;
     let key = seen.key;
     let view = seen.bind(gpu, pyramid)?;
     let grouped = instances.pieces.iter().any(|piece| is_grouped(piece, options));

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::cull::groups::is_grouped;
 use crate::cull::options::{Coverage, CullOptions};
 use crate::cull::pipelines::{
-    CullKey, DepthStore, TWO_STORAGES, classify_constants, layouts, untold,
+    CullKey, DepthStore, TWO_STORAGES, classify_constants, layouts, unexplained,
 };
 use crate::cull::view_uniform::ViewUniform;
 use crate::error::Result;
@@ -29,13 +29,13 @@ pub(crate) const WORKGROUP: u32 = 64;
 /// The shader that writes the verdicts of the members of hidden groups.
 pub(crate) fn refine_module(kind: BoundsKind) -> Source {
     let entry = [wgsl!("instances/piece"), wgsl!("instances/groups"), wgsl!("cull/refine")];
-    untold(DepthStore::Nowhere, kind, &entry)
+    unexplained(DepthStore::Nowhere, kind, &entry)
 }
 
 /// The shader that finds the groups that lie within the view.
 pub(crate) fn refine_groups_module() -> Source {
     let entry = [wgsl!("instances/piece"), wgsl!("cull/refine_groups")];
-    untold(DepthStore::Nowhere, BoundsKind::Box, &entry)
+    unexplained(DepthStore::Nowhere, BoundsKind::Box, &entry)
 }
 
 /// The pipeline that refines members.
@@ -124,7 +124,7 @@ impl Refinement {
 impl Refine for Refinement {
     fn record(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder) -> Result<()> {
         let instances = &*self.instances;
-        let view = gpu.uniform("hiz.refine.view", &self.view)?;
+        let view = gpu.uniform("hiz.refine.view_uniform", &self.view)?;
         let view = gpu.bind_group(
             "hiz.refine.view",
             &DepthStore::Nowhere.layout(gpu)?,

@@ -70,6 +70,12 @@ impl DepthImage {
         usage: wgpu::TextureUsages,
     ) -> Result<Self> {
         let size = camera.size();
+        // The pyramid's limit, which an image of four pixels per texel could pass here.
+        let (side, allowed) =
+            (size.width.max(size.height), engine.context().gpu.limits().max_texture_dimension_2d);
+        if side > allowed {
+            return Err(Error::limit("max_texture_dimension_2d", side.into(), allowed.into()));
+        }
         let texels = SourceKind::of(format).map_or(size, |kind| kind.texture_size(size));
         let gpu = &engine.context().gpu;
         let texture =

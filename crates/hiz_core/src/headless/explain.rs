@@ -1,6 +1,6 @@
 //! Explanations of single verdicts: the cull's own steps, run again for one instance.
 
-use crate::cull::explain::{ExplanationRecord, Reading, TEXELS_TOLD, record_explain};
+use crate::cull::explain::{ExplanationRecord, Reading, TEXELS_NOTED, record_explain};
 use crate::cull::groups::group_options;
 use crate::cull::inputs::CullInputs;
 use crate::error::Result;
@@ -53,7 +53,7 @@ impl Culling {
                 gpu.empty("hiz.explain.target", size_of::<ExplanationRecord>() as u64, STORAGE)?;
             let readings = gpu.empty(
                 "hiz.explain.readings",
-                (TEXELS_TOLD * size_of::<Reading>()) as u64,
+                (TEXELS_NOTED * size_of::<Reading>()) as u64,
                 STORAGE,
             )?;
             let mut encoder = engine.encoder("hiz.explain.encoder");

@@ -1,7 +1,8 @@
 //! Bounds of instances, borrowed from the caller as flat arrays of float32 or float64.
 //!
 //! How they are validated and rounded is up to the room `instances`.
-//! Its file `volume_record.rs` also has `Bounds::kind`, `Bounds::len` and `Bounds::is_empty`.
+
+use crate::error::{Error, Result};
 
 /// A flat array of float32 or float64 in C order.
 #[derive(Debug, Clone, Copy)]
@@ -118,4 +119,54 @@ pub enum BoundsKind {
     Box,
     /// Oriented boxes.
     OrientedBox,
+}
+
+impl Bounds<'_> {
+    /// The kind of these volumes.
+    pub fn kind(&self) -> BoundsKind {
+        match self {
+            Self::Spheres { .. } => BoundsKind::Sphere,
+            Self::Boxes { .. } => BoundsKind::Box,
+            Self::OrientedBoxes { .. } => BoundsKind::OrientedBox,
+        }
+    }
+
+    /// The number of instances.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the lengths of the arrays disagree.
+    pub fn len(&self) -> Result<usize> {
+        let (columns, first): (_, Floats<'_>) = match *self {
+            Self::Spheres { centers, radii } => {
+                (vec![("centers", centers, 3), ("radii", radii, 1)], centers)
+            }
+            Self::Boxes { min, max } => (vec![("min", min, 3), ("max", max, 3)], min),
+            Self::OrientedBoxes { centers, half_sizes, rotations } => (
+                vec![
+                    ("centers", centers, 3),
+                    ("half_sizes", half_sizes, 3),
+                    ("rotations", rotations, 9),
+                ],
+                centers,
+            ),
+        };
+        let n = first.len() / 3;
+        for (name, array, width) in columns {
+            if array.len() != n * width {
+                return Err(Error::invalid(
+                    name,
+                    format!("expected {n} x {width} = {} numbers, got {}", n * width, array.len()),
+                ));
+            }
+        }
+        Ok(n)
+    }
+
+    /// Whether there are no instances.
+    ///
+    /// # Errors
+    /// Those of [`Bounds::len`].
+    pub fn is_empty(&self) -> Result<bool> {
+        Ok(self.len()? == 0)
+    }
 }

@@ -29,7 +29,7 @@ const CUBE_SHIFT: u32 = 3 * AXIS_BITS;
 const LAST_CUBE: u64 = 63;
 
 /// The key of invalid bounds: after every cell of every cube.
-const NO_VOLUME: u64 = u64::MAX;
+const INVALID: u64 = u64::MAX;
 
 /// The most centres that are sampled to place the innermost cube.
 const SAMPLES: usize = 4096;
@@ -137,7 +137,7 @@ pub(crate) fn order(bounds: &Bounds<'_>, range: Range<usize>) -> Result<Vec<u32>
     let sort = |(begin, part, spare): (usize, &mut [Keyed], &mut [Keyed])| {
         for (k, keyed) in part.iter_mut().enumerate() {
             let key =
-                bounds.aabb(range.start + begin + k).map_or(NO_VOLUME, |e| cube.key(e.center()));
+                bounds.aabb(range.start + begin + k).map_or(INVALID, |e| cube.key(e.center()));
             *keyed = Keyed { key, index: (begin + k) as u32 };
         }
         radix_sort(part, spare);
@@ -299,7 +299,7 @@ mod tests {
         };
         for scale in [1.0, 4.0, 32.0, 1e20] {
             let keys: Vec<_> = corners(scale).map(|c| cube.key(c)).collect();
-            assert!(keys.is_sorted() && keys[7] < NO_VOLUME, "{scale}: {keys:?}");
+            assert!(keys.is_sorted() && keys[7] < INVALID, "{scale}: {keys:?}");
         }
         assert!(cube.key([0.9; 3]) < cube.key([-1.5; 3]), "the inner cube comes first");
     }

@@ -8,9 +8,8 @@
 //! Invalid bounds (NaN, infinite, negative radius, min > max) are not repaired.
 //! Their record fails a test in the shader; the instance is kept visible and counted as invalid.
 
-use crate::error::{Error, Result};
 use crate::host::rounding::{round_up, split, sum_up, sum_up_difference};
-use crate::input::bounds::{Bounds, BoundsKind, Floats};
+use crate::input::bounds::{Bounds, BoundsKind};
 
 impl BoundsKind {
     /// Bytes of one record on the device: 32 for a sphere, 48 for a box, 64 for an oriented box.
@@ -24,54 +23,6 @@ impl BoundsKind {
 }
 
 impl Bounds<'_> {
-    /// The kind of these volumes.
-    pub fn kind(&self) -> BoundsKind {
-        match self {
-            Self::Spheres { .. } => BoundsKind::Sphere,
-            Self::Boxes { .. } => BoundsKind::Box,
-            Self::OrientedBoxes { .. } => BoundsKind::OrientedBox,
-        }
-    }
-
-    /// The number of instances.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] if the lengths of the arrays disagree.
-    pub fn len(&self) -> Result<usize> {
-        let (columns, first): (_, Floats<'_>) = match *self {
-            Self::Spheres { centers, radii } => {
-                (vec![("centers", centers, 3), ("radii", radii, 1)], centers)
-            }
-            Self::Boxes { min, max } => (vec![("min", min, 3), ("max", max, 3)], min),
-            Self::OrientedBoxes { centers, half_sizes, rotations } => (
-                vec![
-                    ("centers", centers, 3),
-                    ("half_sizes", half_sizes, 3),
-                    ("rotations", rotations, 9),
-                ],
-                centers,
-            ),
-        };
-        let n = first.len() / 3;
-        for (name, array, width) in columns {
-            if array.len() != n * width {
-                return Err(Error::invalid(
-                    name,
-                    format!("expected {n} x {width} = {} numbers, got {}", n * width, array.len()),
-                ));
-            }
-        }
-        Ok(n)
-    }
-
-    /// Whether there are no instances.
-    ///
-    /// # Errors
-    /// Those of [`Bounds::len`].
-    pub fn is_empty(&self) -> Result<bool> {
-        Ok(self.len()? == 0)
-    }
-
     /// Writes the record of instance `i`, `record_bytes()` bytes, with the caller's `index`.
     /// Returns false for invalid bounds.
     pub(crate) fn write_record(&self, i: usize, index: u32, out: &mut [u8]) -> bool {
@@ -93,7 +44,7 @@ impl Bounds<'_> {
 
 fn write<R: Record>(out: &mut [u8], index: u32, record: R) -> bool {
     let is_valid = record.is_valid();
-    let record = if is_valid { record } else { R::NO_VOLUME };
+    let record = if is_valid { record } else { R::INVALID };
     out.copy_from_slice(bytemuck::bytes_of(&record.numbered(index)));
     is_valid
 }
@@ -110,7 +61,7 @@ pub(crate) const BEYOND_LIMITS: f32 = 4.0 * LARGEST;
 
 trait Record: bytemuck::Pod {
     /// The record that is stored for invalid bounds.
-    const NO_VOLUME: Self;
+    const INVALID: Self;
 
     /// Whether all numbers are below 2^60 in magnitude, and no length is negative.
     fn is_valid(&self) -> bool;
@@ -197,7 +148,7 @@ impl SphereRecord {
 }
 
 impl Record for SphereRecord {
-    const NO_VOLUME: Self =
+    const INVALID: Self =
         Self { center_hi: [0.0; 3], radius: BEYOND_LIMITS, center_lo: [0.0; 3], index: 0 };
 
     fn numbered(self, index: u32) -> Self {
@@ -216,7 +167,7 @@ impl BoxRecord {
     /// The record of a box, or an invalid record for `None` and for invalid bounds.
     pub(crate) fn valid_or_none(corners: Option<[[f64; 3]; 2]>) -> Self {
         let record = corners.map(|[min, max]| Self::new(min, max));
-        record.filter(Self::is_valid).unwrap_or(Self::NO_VOLUME)
+        record.filter(Self::is_valid).unwrap_or(Self::INVALID)
     }
 
     fn new(min: [f64; 3], max: [f64; 3]) -> Self {
@@ -244,7 +195,7 @@ impl BoxRecord {
 }
 
 impl Record for BoxRecord {
-    const NO_VOLUME: Self = Self {
+    const INVALID: Self = Self {
         center_hi: [0.0; 3],
         padding_0: 0.0,
         center_lo: [0.0; 3],
@@ -301,7 +252,7 @@ impl OrientedBoxRecord {
 }
 
 impl Record for OrientedBoxRecord {
-    const NO_VOLUME: Self = Self {
+    const INVALID: Self = Self {
         center_hi: [0.0; 3],
         half_axis_2_x: 0.0,
         center_lo: [0.0; 3],
@@ -328,6 +279,7 @@ impl Record for OrientedBoxRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::bounds::Floats;
 
     const TINY: f64 = 1.0 / 9_007_199_254_740_992.0; // 2^-53
 

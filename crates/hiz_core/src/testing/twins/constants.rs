@@ -106,7 +106,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
 const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/certificate", &["ERROR_FLOOR"]),
     ("cull/classify", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
-    ("cull/refine", &["TOLD"]),
+    ("cull/refine", &["REFINED"]),
     ("cull/refine_groups", &["WITHIN"]),
     (
         "cull/supporting_planes",
@@ -212,7 +212,7 @@ fn constants_fit_each_other() {
     // As powers of two they lose nothing.
     assert!(SURVIVORS_PER_ROW.is_power_of_two() && RECORDS_PER_ROW.is_power_of_two());
     // Flags stand beside what they flag.
-    let flags = [number("cull/refine", "TOLD"), number("cull/refine_groups", "WITHIN")];
+    let flags = [number("cull/refine", "REFINED"), number("cull/refine_groups", "WITHIN")];
     let [told, within] = flags.map(|flag| flag as u32);
     assert!(told & VERDICT_MASK == 0 && within & VERDICT_MASK == 0 && told & within == 0);
     let (behind, clear) = (explain::BEHIND, explain::CLEAR);
