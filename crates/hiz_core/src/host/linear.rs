@@ -1,4 +1,6 @@
 //! Algebra of 3-vectors and of 3x3 and 4x4 matrices in float64.
+//!
+//! Small functions are `#[inline]`: loops over pixels and instances in other rooms call them.
 
 /// A 3-vector of float64.
 pub type Vec3 = [f64; 3];
@@ -7,14 +9,17 @@ pub type Mat3 = [[f64; 3]; 3];
 /// A row-major 4x4 matrix of float64 for column vectors.
 pub type Mat4 = [[f64; 4]; 4];
 
+#[inline]
 pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+#[inline]
 pub(crate) fn sub(a: Vec3, b: Vec3) -> Vec3 {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
+#[inline]
 pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
@@ -22,6 +27,7 @@ pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
 /// The unit vector along `v`; `None` for a vector that is zero or not finite.
 ///
 /// `v` is scaled by its largest coordinate first, so that no square overflows or underflows.
+#[inline]
 pub(crate) fn normalized(v: Vec3) -> Option<Vec3> {
     let largest = v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     if !(largest > 0.0 && largest.is_finite()) {
@@ -39,6 +45,7 @@ pub(crate) fn solve3(m: &Mat3, b: Vec3) -> Option<Vec3> {
     x.iter().all(|v| v.is_finite()).then_some(x)
 }
 
+#[inline]
 pub(crate) fn mul3(m: &Mat3, v: Vec3) -> Vec3 {
     m.map(|row| dot(row, v))
 }

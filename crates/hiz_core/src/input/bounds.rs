@@ -15,6 +15,7 @@ pub enum Floats<'a> {
 
 impl Floats<'_> {
     /// The number of scalars.
+    #[inline]
     pub fn len(&self) -> usize {
         match self {
             Self::F32(v) => v.len(),
@@ -31,6 +32,7 @@ impl Floats<'_> {
     ///
     /// # Panics
     /// If `i` is not below [`Floats::len`].
+    #[inline]
     pub fn get(&self, i: usize) -> f64 {
         match self {
             Self::F32(v) => f64::from(v[i]),
@@ -38,6 +40,7 @@ impl Floats<'_> {
         }
     }
 
+    #[inline]
     pub(crate) fn array<const N: usize>(&self, i: usize) -> [f64; N] {
         // Matched once per element, not per scalar: this is the inner loop of every upload.
         match self {

@@ -59,6 +59,7 @@ impl Lens {
     /// The NDC depth of the number `value` of `kind` at a pixel, rounded towards far.
     ///
     /// `value` may be off by up to `off` in either direction.
+    #[inline]
     pub(super) fn ndc(
         &self,
         column: u32,
@@ -113,6 +114,7 @@ impl Lens {
 }
 
 /// The length of the part of the ray through `at` along which w grows by 1, and its error bound.
+#[inline]
 fn ray_length(inverse: &[[(f64, f64); 3]; 3], at: Vec3) -> (f64, f64) {
     let (mut ray, mut error) = ([0.0; 3], 0.0);
     for (coordinate, entries) in ray.iter_mut().zip(inverse) {
@@ -227,6 +229,7 @@ fn largest(v: Vec3) -> f64 {
 /// `d` rounded to float32 towards far; far where `d` is NaN or outside 0..1.
 ///
 /// A number that float32 holds keeps its value.
+#[inline]
 #[expect(clippy::cast_possible_truncation, reason = "rounded towards far in the next lines")]
 pub(super) fn toward_far(d: f64, reversed: bool) -> f32 {
     if !(0.0..=1.0).contains(&d) {
@@ -243,6 +246,7 @@ pub(super) fn toward_far(d: f64, reversed: bool) -> f32 {
 /// `d`, moved towards far by the error bound `lost` and rounded towards far.
 ///
 /// The result is far wherever the exact depth may lie outside 0..1.
+#[inline]
 fn toward_far_by(d: f64, lost: f64, reversed: bool) -> f32 {
     let (nearest, farthest) = if reversed { (d + lost, d - lost) } else { (d - lost, d + lost) };
     // In front of the near plane, or NaN, which fails the comparison.
