@@ -6,9 +6,11 @@ test_processes.py runs each scene in a process of its own.
 
 import atexit
 import contextlib
+import faulthandler
 import gc
 import multiprocessing
 import os
+import signal
 import sys
 import threading
 import time
@@ -47,9 +49,27 @@ def early() -> None:
         print("joined", len(MANY))
 
 
+def before_fork() -> None:
+    """Registered before hizvk is imported, so it runs after hizvk has waited for the driver.
+
+    What the driver's threads still have to do is counted in their time on a CPU, whatever else the
+    machine does.
+    """
+    if "while_the_driver_compiles" in sys.argv:
+        began = time.process_time()
+        for device in KEPT:
+            device.wait()
+        WORKED_MS.append(1e3 * (time.process_time() - began))
+
+
 GO = threading.Event()
 MANY: list[threading.Thread] = []
+#: Milliseconds that all threads of this process worked between hizvk's wait and a fork.
+WORKED_MS: list[float] = []
 atexit.register(early)
+os.register_at_fork(before=before_fork)
+# The test sends it to a scene that hangs; forks inherit it.
+faulthandler.register(signal.SIGUSR1, all_threads=True)
 
 import numpy as np  # noqa: E402
 
@@ -177,17 +197,33 @@ def refused() -> list[str]:
     return wrong
 
 
+def while_the_driver_compiles() -> None:
+    """Fork right after the first submissions of two devices, for which lavapipe compiles shaders.
+
+    It does that on a thread of each device, under locks that the child needs.
+    """
+    os.environ["MESA_SHADER_CACHE_DISABLE"] = "true"
+    submissions: list[Callable[[hizvk.Device], object]] = [
+        lambda device: device.pyramid(WALL, CAMERA, kind="z"),
+        lambda device: device.render_depth(triangle(device), CAMERA),
+        lambda device: device.instances(SPHERES).update(0, SPHERES),
+    ]
+    for submit in submissions:
+        KEPT[:] = [hizvk.Device(), hizvk.Device()]
+        OBJECTS[:] = [submit(device) for device in KEPT]
+        forked(by_default)
+    print("worked on for ms:", [round(ms) for ms in WORKED_MS if ms > 10])
+
+
 IMAGES: list[hizvk.DepthImage] = []
 
 
 def inherits() -> None:
     """Make a device in the parent, everything on it, and a depth image."""
     device = used()
-    triangle = device.occluders(
-        np.array([[-9.0, -9, -10], [9, -9, -10], [0, 9, -10]]), np.array([[0, 1, 2]])
-    )
-    IMAGES.append(device.render_depth(triangle, CAMERA))
-    OBJECTS.append(triangle)
+    occluders = triangle(device)
+    IMAGES.append(device.render_depth(occluders, CAMERA))
+    OBJECTS.append(occluders)
 
 
 def collect() -> str:
@@ -245,6 +281,13 @@ def waits_for_the_end() -> None:
     MANY.extend(threading.Thread(target=ask, daemon=True) for _ in range(8))
     for thread in MANY:
         thread.start()
+
+
+def triangle(device: hizvk.Device) -> hizvk.Occluders:
+    """One triangle before the camera."""
+    return device.occluders(
+        np.array([[-9.0, -9, -10], [9, -9, -10], [0, 9, -10]]), np.array([[0, 1, 2]])
+    )
 
 
 def while_threads_cull() -> None:
@@ -305,6 +348,8 @@ def main(scene: str) -> None:
         forked(with_threads, ends="exit")
     elif scene == "while_threads_cull":
         while_threads_cull()
+    elif scene == "while_the_driver_compiles":
+        while_the_driver_compiles()
     else:
         assert scene == "pools"
         pools()

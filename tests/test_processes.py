@@ -3,9 +3,13 @@
 None aborts or hangs, and errors say what to do.
 """
 
+import contextlib
 import os
+import shutil
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -13,6 +17,28 @@ import pytest
 SCRIPT = Path(__file__).with_name("processes.py")
 #: A limit against hanging, not a test of speed: scenes take a second or two.
 GUARD_S = 120
+
+
+def stacks(group: int) -> str:
+    """What every thread of a scene and of its forks waits for.
+
+    The scenes write Python's stacks on stderr when they are told to.
+    The native ones need gdb.
+    """
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(group, signal.SIGUSR1)
+    time.sleep(1)
+    gdb = shutil.which("gdb")
+    if gdb is None:
+        return "(with gdb installed, the native stacks would stand here)\n"
+    told = []
+    for pid in sorted(int(name) for name in os.listdir("/proc") if name.isdigit()):
+        with contextlib.suppress(ProcessLookupError):
+            if os.getpgid(pid) == group:
+                ask = [gdb, "-batch", "-p", str(pid), "-ex", "thread apply all backtrace 30"]
+                answer = subprocess.run(ask, capture_output=True, text=True, check=False)
+                told.append(f"process {pid}:\n{answer.stdout}")
+    return "".join(told)
 
 
 def run(scene: str) -> "subprocess.CompletedProcess[str]":
@@ -26,10 +52,11 @@ def run(scene: str) -> "subprocess.CompletedProcess[str]":
     try:
         out, err = process.communicate(timeout=GUARD_S)
     except subprocess.TimeoutExpired:
+        threads = stacks(process.pid)
         # Kills its forks, too.
-        os.killpg(process.pid, 9)
+        os.killpg(process.pid, signal.SIGKILL)
         out, err = process.communicate()
-        pytest.fail(f"{scene}: a process hangs (ended after {GUARD_S} s)\n{out}{err}")
+        pytest.fail(f"{scene}: a process hangs (ended after {GUARD_S} s)\n{out}{err}{threads}")
     return subprocess.CompletedProcess(process.args, process.returncode, out, err)
 
 
@@ -73,6 +100,10 @@ def test_a_fork_is_told_of_its_parents_objects() -> None:
         ("no_device", ["nothing", "status 5"]),
         ("threads_of_a_child", ["[True, False]", "status 5"]),
         ("while_threads_cull", ["[True, False]", "status 0"] * 5),
+        (
+            "while_the_driver_compiles",
+            ["[True, False]", "status 0"] * 3 + ["worked on for ms: []"],
+        ),
         ("pools", [str([[True, False]] * 4)] * 2 + ["[True, False]", "status 5", "status 0"]),
     ],
 )

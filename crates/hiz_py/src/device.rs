@@ -237,6 +237,8 @@ impl Engine {
 #[pyclass(frozen, module = "hizvk._core")]
 pub(crate) struct Instances(pub(crate) Held<Arc<hiz_core::Instances>>);
 
+impl OnDevice for Arc<hiz_core::Instances> {}
+
 #[pymethods]
 impl Instances {
     fn num_instances(&self, py: Python<'_>) -> PyResult<u32> {
@@ -276,6 +278,8 @@ type SurfaceArrays<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u32>>,
 /// Triangle meshes on the device.
 #[pyclass(frozen, module = "hizvk._core")]
 pub(crate) struct Occluders(Held<Arc<hiz_core::Occluders>>);
+
+impl OnDevice for Arc<hiz_core::Occluders> {}
 
 #[pymethods]
 impl Occluders {

@@ -24,8 +24,12 @@ use pyo3::prelude::*;
 use crate::errors::{hiz_error, raised};
 
 /// A type that a [`Held`] may hold.
+///
+/// No blanket implementation for [`Arc`] may exist: the contents of a [`Held`] are in an `Arc`, and
+/// its methods would hide theirs.
 pub(crate) trait OnDevice: Send + Sync + 'static {
-    /// The engine, if it holds one.
+    /// The engine, if a fork must wait for it on behalf of this value.
+    /// Python's objects keep the `Device` that made them, so most leave the answer to its engine.
     fn engine(&self) -> Option<&Engine> {
         None
     }
@@ -36,8 +40,6 @@ impl OnDevice for Engine {
         Some(self)
     }
 }
-
-impl<T: Send + Sync + 'static> OnDevice for Arc<T> {}
 
 /// Holds a `T` until the process ends or Python drops it.
 pub(crate) struct Held<T: OnDevice>(Arc<Cell<T>>);
@@ -125,7 +127,7 @@ trait Empty: Send + Sync {
 
 impl<T: OnDevice> Empty for Cell<T> {
     fn engine(&self) -> Option<Engine> {
-        self.lock().as_ref().and_then(|value| value.engine().cloned())
+        self.lock().as_ref().and_then(|value| T::engine(value).cloned())
     }
 
     fn empty(&self) -> Option<Box<dyn Any + Send>> {
@@ -182,7 +184,7 @@ struct Call<'py>(Python<'py>);
 impl<'py> Call<'py> {
     fn begin(py: Python<'py>) -> PyResult<Self> {
         loop {
-            let mut registry = registry(py);
+            let registry = registry(py);
             if registry.closed {
                 drop(registry);
                 return Err(closed(py));
@@ -190,12 +192,18 @@ impl<'py> Call<'py> {
             if registry.forking.is_empty()
                 || registry.forking.contains(&std::thread::current().id())
             {
-                registry.calls += 1;
-                return Ok(Self(py));
+                drop(registry);
+                return Ok(Self::count(py));
             }
             drop(registry);
             nap(py);
         }
+    }
+
+    /// Begins a call without asking whether it may begin.
+    fn count(py: Python<'py>) -> Self {
+        registry(py).calls += 1;
+        Self(py)
     }
 }
 
@@ -228,15 +236,26 @@ fn nap(py: Python<'_>) {
 
 /// Waits until no call is within the driver and every device is idle.
 /// Calls of other threads wait until [`after_fork`].
+///
+/// A driver works on threads of its own after a submission, and holds locks there which a child
+/// would need.
+/// Lavapipe compiles shaders there, under locks of LLVM that are the whole process's.
 #[pyfunction]
 pub(crate) fn before_fork(py: Python<'_>) {
     registry(py).forking.push(std::thread::current().id());
     while registry(py).calls > 0 {
         nap(py);
     }
+    let mut engines: Vec<Engine> = Vec::new();
     let holders = registry(py).holders.clone();
-    let engines: Vec<_> =
-        holders.iter().filter_map(Weak::upgrade).filter_map(|holder| holder.engine()).collect();
+    for engine in holders.iter().filter_map(Weak::upgrade).filter_map(|holder| holder.engine()) {
+        // Not `==`: devices of different instances of wgpu may be equal.
+        if engines.iter().all(|other| !std::ptr::eq(other.device(), engine.device())) {
+            engines.push(engine);
+        }
+    }
+    // Counted as a call: [`let_go`] and the forks of other threads wait until it ends.
+    let call = Call::count(py);
     py.detach(|| {
         for engine in &engines {
             // What is freed after one submission ends is freed before the next one ends.
@@ -245,6 +264,7 @@ pub(crate) fn before_fork(py: Python<'_>) {
             drop(engine.wait());
         }
     });
+    drop(call);
 }
 
 /// Ends [`before_fork`] in the parent.
