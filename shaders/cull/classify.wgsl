@@ -4,7 +4,7 @@
 // The rectangle, the level, divisions and conversions only choose what is tested.
 // Where they are wrong, a certificate fails and the instance is kept.
 //
-// A module is a list of files: `module` in `crates/hiz_core/src/cull/pipelines.rs`.
+// A module is a list of files: `decision_module` in `crates/hiz_core/src/cull/pipelines.rs`.
 // What is used here and defined elsewhere:
 //
 // - `certificate.wgsl`: `Value`, `value_of`, `errors_of`, `error_bound`, `surely_above`, `_below`
