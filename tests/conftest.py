@@ -10,6 +10,7 @@ import pytest
 from hypothesis import settings
 
 import adapter_check
+import hizvk
 
 # Every run has the same examples, so that a red test is due to a change.
 # `make soak` tries others (HIZVK_FUZZ=random).
@@ -30,6 +31,12 @@ def pytest_sessionstart() -> None:
     """Results of a driver other than the expected one are worth nothing."""
     if _wrong:
         pytest.exit(_wrong, returncode=1)
+
+
+@pytest.fixture(scope="module")
+def device() -> hizvk.Device:
+    """A device for the tests of one file."""
+    return hizvk.Device()
 
 
 @pytest.fixture(scope="session")

@@ -33,11 +33,6 @@ EYE = np.array([4.0, -5.0, 3.0])
 GUIDE = Path(__file__).parents[1] / "docs" / "guide.md"
 
 
-@pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
-
-
 def grid(rows: int, columns: int, *, wraps: bool) -> np.ndarray:
     """Triangles of a grid of vertices; its sides meet if it wraps."""
     number = np.arange(rows * columns).reshape(rows, columns)

@@ -61,11 +61,6 @@ LAYOUTS: dict[str, Callable[[npt.NDArray[Any]], Any]] = {
 
 
 @pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
-
-
-@pytest.fixture(scope="module")
 def camera() -> hizvk.Camera:
     return hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(16, 24), near=0.125)
 

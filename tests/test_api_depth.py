@@ -59,11 +59,6 @@ class Faces:
 
 
 @pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
-
-
-@pytest.fixture(scope="module")
 def faces(device: hizvk.Device) -> Faces:
     return Faces(device)
 

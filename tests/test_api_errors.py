@@ -25,11 +25,6 @@ def cases() -> Iterator[Any]:
                 yield pytest.param(function, parameter, bad, id=f"{function}-{parameter}-{number}")
 
 
-@pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
-
-
 @pytest.mark.parametrize(("function", "parameter", "bad"), list(cases()))
 def test_bad_argument(device: hizvk.Device, function: str, parameter: str, bad: Bad) -> None:
     value, exception, fragment = bad

@@ -10,11 +10,6 @@ from hizvk.reference import HIDDEN, INVALID, UNDECIDED, VISIBLE
 NAN = float("nan")
 
 
-@pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
-
-
 @pytest.fixture(scope="module", params=[True, False], ids=["reversed", "standard"])
 def camera(request: pytest.FixtureRequest) -> hizvk.Camera:
     """At the origin, looking along -z: at depth d the image reaches from -d to d in x and y."""

@@ -5,14 +5,8 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-import pytest
 
 import hizvk
-
-
-@pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
 
 
 def crowd(count: int, seed: int) -> hizvk.Spheres:

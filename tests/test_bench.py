@@ -36,11 +36,6 @@ ROW = {field.name for field in dataclasses.fields(Row)}
 SCENE = {field.name for field in dataclasses.fields(SceneResult)}
 
 
-@pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
-
-
 # -- command ---------------------------------------------------------------------------------------
 
 

@@ -43,11 +43,6 @@ def scene(judge: Any) -> Any:
 
 
 @pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
-
-
-@pytest.fixture(scope="module")
 def uploaded(device: hizvk.Device, scene: Any) -> dict[str, Any]:
     return {
         "spheres": device.instances(

@@ -41,11 +41,6 @@ LARGE = (864, 1536)
 TIMES = 16
 
 
-@pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
-
-
 @dataclass(frozen=True)
 class Case:
     """A view of occluders; its camera depends on the image's size and the depth convention."""

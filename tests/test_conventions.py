@@ -118,11 +118,6 @@ def project(camera: hizvk.Camera, points: Floats) -> tuple[Floats, Floats]:
     return (x / w + 1) * width / 2, (1 - y / w) * height / 2
 
 
-@pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
-
-
 # -- pixel centres ---------------------------------------------------------------------------------
 
 

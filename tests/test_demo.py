@@ -20,11 +20,6 @@ PICTURES = ("overview.png", "view.png", "depth.png", "pyramid.png", "top.png")
 
 
 @pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
-
-
-@pytest.fixture(scope="module")
 def small_mountains() -> scenes.Scene:
     pytest.importorskip("matplotlib")
     return scenes.mountains(500, 4)

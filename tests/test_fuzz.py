@@ -25,11 +25,6 @@ OTHERS = ["i4", "u1", "?", "c8", "U3", "O", "M8[s]"]
 
 
 @pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
-
-
-@pytest.fixture(scope="module")
 def camera() -> hizvk.Camera:
     return hizvk.Camera.look_at(
         (0, 0, 0), (0, 0, -1), fov_y_deg=60, size=SIZE, near=0.5, reversed_z=False

@@ -108,11 +108,6 @@ NUMBERS = [
 ]
 
 
-@pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
-
-
 def filled(draw: Callable[..., Any], shape: tuple[int, ...], dtype: Any) -> Any:
     """An array of that shape with special numbers in it, as far as the dtype can hold them."""
     size = int(np.prod(shape))

@@ -12,12 +12,6 @@ import pytest
 
 import hizvk
 
-
-@pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
-
-
 # The kind, the stored number, and the view depth of a wall half a spacing behind it.
 # That wall is stored as the same number.
 # A spacing is 2^-7 from 8 to 16, 2^-11 from 0.5 to 1, and 2^-14 from 2^-4 to 2^-3.

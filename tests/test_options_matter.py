@@ -19,11 +19,6 @@ import hizvk
 SIZE = (16, 16)
 
 
-@pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
-
-
 CAMERA = hizvk.Camera.look_at(
     (0, 0, 0), (0, 0, -1), fov_y_deg=90, size=SIZE, near=1.0, reversed_z=True
 )

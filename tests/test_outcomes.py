@@ -21,11 +21,6 @@ SIZE = (16, 16)
 EYE3 = np.eye(3)
 
 
-@pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
-
-
 def view(
     *, reversed_z: bool, far: float | None = None, size: tuple[int, int] = SIZE
 ) -> hizvk.Camera:

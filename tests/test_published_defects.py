@@ -24,11 +24,6 @@ HOLE = math.inf
 WALL = 10.0
 
 
-@pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
-
-
 def view(
     size: tuple[int, int],
     borders: tuple[float, float, float, float] = (-1, 1, -1, 1),

@@ -38,11 +38,6 @@ def crowd(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.fixture(scope="module")
-def device() -> hizvk.Device:
-    return hizvk.Device()
-
-
-@pytest.fixture(scope="module")
 def pyramid(device: hizvk.Device) -> hizvk.Pyramid:
     camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -10), fov_y_deg=70, size=(45, 64), near=0.125)
     depth = np.full(camera.size, np.inf)

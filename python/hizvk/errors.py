@@ -54,7 +54,7 @@ class NoAdapterError(HizError):
     def __str__(self) -> str:
         found = ", ".join(self.seen) if self.seen else "none"
         wanted = f" {self.request}" if self.request else ""
-        return f"no Vulkan adapter{wanted}; seen: {found}. {self.hint}".rstrip()
+        return f"no adapter{wanted}; seen: {found}. {self.hint}".rstrip()
 
 
 class LimitError(HizError):

@@ -1,8 +1,20 @@
-// The test of one instance, in six steps.
+// The test of one instance: `classify`, the last function, decides in six numbered steps.
 //
 // A verdict that hides an instance rests on certificates alone.
 // The rectangle, the level, divisions and conversions only choose what is tested.
 // Where they are wrong, a certificate fails and the instance is kept.
+//
+// A module is a list of files: `decision_module` in `crates/hiz_core/src/cull/pipelines.rs`.
+// What is used here and defined elsewhere:
+//
+// - `certificate.wgsl`: `Value`, `value_of`, `errors_of`, `error_bound`, `surely_above`, `_below`
+//   and `_beyond`
+// - `view.wgsl`: `view`, `bar`
+// - `supporting_planes.wgsl`: `Projected`, `surely_clear`
+// - `outcome.wgsl`, `../output/verdict.wgsl`: `Outcome`, stages, verdicts
+// - `../instances/bounds_*.wgsl`: `load_volume`, `support`, `extent_of`, `surely_after`, `_before`
+// - `../pyramid/texels*.wgsl`, `../pyramid/levels.wgsl`: `texel`, `footprint`, `finest_level`
+// - `unexplained.wgsl` or `explain.wgsl`: `note_texel`, `note_clear`
 
 // True: only pixel centres count; otherwise whole pixel squares.
 override SAMPLE_COVERAGE: bool;

@@ -7,7 +7,7 @@
 #[non_exhaustive]
 pub enum Error {
     /// No adapter of the built backends fits the request.
-    #[error("no Vulkan adapter {request}; seen: {}. {hint}", if seen.is_empty() { "none".to_owned() } else { seen.join(", ") })]
+    #[error("no adapter {request}; seen: {}. {hint}", listed(seen))]
     NoAdapter {
         /// What was asked for, in words.
         request: String,
@@ -82,6 +82,10 @@ impl Error {
     pub(crate) fn limit(name: &str, requested: u64, allowed: u64) -> Self {
         Self::Limit { name: name.to_owned(), requested, allowed }
     }
+}
+
+fn listed(seen: &[String]) -> String {
+    if seen.is_empty() { "none".to_owned() } else { seen.join(", ") }
 }
 
 /// The result of a fallible call of this crate.

@@ -109,7 +109,7 @@
 //! use hiz_core::{Bounds, Camera, CullOptions, DepthConvention, Floats, ImageSize};
 //! use hiz_core::{InstanceOptions, Outputs, Pose, Projection};
 //!
-//! let engine = Engine::new(None)?; // the best Vulkan adapter
+//! let engine = Engine::new(None)?; // the best adapter, GPUs first
 //! let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
 //! let convention = DepthConvention::Reversed;
 //! let projection = Projection::Perspective { fov_y: 1.0, near: 0.1, far: None, convention };

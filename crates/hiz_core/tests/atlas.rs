@@ -6,7 +6,7 @@ mod common;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use common::{CONVENTIONS, Random, camera_along_z, engine, ndc};
+use common::{CONVENTIONS, Random, camera_along_z, depth_descriptor, engine, ndc};
 use hiz_core::headless::{DepthImage, Engine};
 use hiz_core::{
     AtlasUse, Bounds, Camera, CullOptions, DepthConvention, Floats, HizContext, InstanceOptions,
@@ -267,16 +267,9 @@ fn an_image_that_no_buffer_holds_is_read_where_it_is() {
     let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
     let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).unwrap();
     let context = HizContext::new(&device).unwrap();
-    let depth = device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("test.depth"),
-        size: wgpu::Extent3d { width: 640, height: 512, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::R32Float,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
-        view_formats: &[],
-    });
+    let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
+    let format = wgpu::TextureFormat::R32Float;
+    let depth = device.create_texture(&depth_descriptor((640, 512), format, usage));
     let options = PyramidOptions {
         atlas: AtlasUse::Always,
         levels: StoredLevels::from(2),

@@ -11,7 +11,7 @@ mod common;
 
 use std::sync::Arc;
 
-use common::{CONVENTIONS, camera_along_z, engine};
+use common::{CONVENTIONS, camera_along_z, depth_descriptor, engine};
 use hiz_core::headless::Engine;
 use hiz_core::wgpu::TextureFormat as Format;
 use hiz_core::{
@@ -24,16 +24,8 @@ const VISIBLE: Verdict = Verdict::Visible;
 const SIDE: u32 = 16;
 
 fn texture(engine: &Engine, format: Format, usage: wgpu::TextureUsages) -> wgpu::Texture {
-    engine.device().create_texture(&wgpu::TextureDescriptor {
-        label: Some("test.depth"),
-        size: wgpu::Extent3d { width: SIDE, height: SIDE, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage: usage | wgpu::TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
-    })
+    let usage = usage | wgpu::TextureUsages::TEXTURE_BINDING;
+    engine.device().create_texture(&depth_descriptor((SIDE, SIDE), format, usage))
 }
 
 /// Walls that fill the image, rasterised into a texture of a depth format.

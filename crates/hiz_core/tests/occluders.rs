@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{CONVENTIONS, Random, camera_along_z, engine, ndc};
+use common::{CONVENTIONS, Random, camera_along_z, depth_descriptor, engine, ndc};
 use hiz_core::headless::Engine;
 use hiz_core::wgpu;
 use hiz_core::{
@@ -302,18 +302,11 @@ fn pyramids_of_float_textures_are_bit_exact() {
     for (width, height) in [(5, 7), (65, 33)] {
         let depth: Vec<f32> = (0..width * height).map(|_| random.unit() as f32).collect();
         let extent = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("test.depth"),
-            size: extent,
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::R32Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING
-                | wgpu::TextureUsages::COPY_DST
-                | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
+        let usage = wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::COPY_DST
+            | wgpu::TextureUsages::COPY_SRC;
+        let format = wgpu::TextureFormat::R32Float;
+        let texture = device.create_texture(&depth_descriptor((width, height), format, usage));
         let layout = wgpu::TexelCopyBufferLayout {
             offset: 0,
             bytes_per_row: Some(4 * width),

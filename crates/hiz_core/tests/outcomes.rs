@@ -8,7 +8,7 @@ mod common;
 
 use std::sync::Arc;
 
-use common::{CONVENTIONS, camera_along_z, engine, ndc};
+use common::{CONVENTIONS, camera_along_z, depth_descriptor, engine, ndc};
 use hiz_core::headless::{Culling, Engine};
 use hiz_core::wgpu;
 use hiz_core::{
@@ -440,16 +440,8 @@ fn textures_that_a_view_cannot_tell_apart_are_refused() {
     let pyramid =
         engine().context().create_pyramid(camera.size(), &PyramidOptions::default()).unwrap();
     let message = |change: &dyn Fn(&mut wgpu::TextureDescriptor<'_>)| {
-        let mut descriptor = wgpu::TextureDescriptor {
-            label: Some("test.depth"),
-            size: wgpu::Extent3d { width: 8, height: 8, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::R32Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        };
+        let usage = wgpu::TextureUsages::TEXTURE_BINDING;
+        let mut descriptor = depth_descriptor((8, 8), wgpu::TextureFormat::R32Float, usage);
         change(&mut descriptor);
         let view = engine()
             .device()

@@ -5,7 +5,7 @@ mod common;
 
 use std::sync::Arc;
 
-use common::{CONVENTIONS, Random, camera_along_z, engine, ndc};
+use common::{CONVENTIONS, Random, camera_along_z, depth_descriptor, engine, ndc};
 use hiz_core::headless::DepthImage;
 use hiz_core::yardstick::{PerLevelReduction, ReductionShape, submitted_ms};
 use hiz_core::{
@@ -446,16 +446,8 @@ fn an_atlas_culls_alike_and_follows_the_next_reduction() {
 #[test]
 fn without_an_atlas_culls_go_on() {
     let camera = camera_along_z(64, 64, DepthConvention::Standard);
-    let descriptor = wgpu::TextureDescriptor {
-        label: Some("test.depth"),
-        size: wgpu::Extent3d { width: 64, height: 64, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::R32Float,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
-    };
+    let usage = wgpu::TextureUsages::TEXTURE_BINDING;
+    let descriptor = depth_descriptor((64, 64), wgpu::TextureFormat::R32Float, usage);
     let uncopied = engine().device().create_texture(&descriptor);
     let near = engine().upload_depth_sampled(&[0.0; 64 * 64], &camera).unwrap();
     let bounds =

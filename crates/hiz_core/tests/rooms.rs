@@ -48,43 +48,78 @@ fn module_of(path: &str, modules: &BTreeSet<String>) -> Option<String> {
 /// Identifiers and `::` from the start of a text.
 fn path_at(text: &str) -> &str {
     let end = text.find(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
-    text[..end.unwrap_or(text.len())].trim_end_matches(':')
+    &text[..end.unwrap_or(text.len())]
+}
+
+/// The paths that start here: one, or those of the branches where it ends in `{a, b::{c, d}}`.
+fn paths_at(text: &str) -> Vec<String> {
+    let path = path_at(text);
+    let Some(group) = text[path.len()..].strip_prefix('{').filter(|_| path.ends_with("::")) else {
+        return vec![path.trim_end_matches("::").to_owned()];
+    };
+    let (mut depth, mut start, mut branches) = (0, 0, Vec::new());
+    for (at, c) in group.char_indices() {
+        match c {
+            '{' => depth += 1,
+            '}' if depth > 0 => depth -= 1,
+            ',' | '}' if depth == 0 => {
+                branches.push(group[start..at].trim());
+                start = at + 1;
+                if c == '}' {
+                    break;
+                }
+            }
+            _ => {}
+        }
+    }
+    let inner = branches.into_iter().filter(|branch| !branch.is_empty()).flat_map(paths_at);
+    inner.map(|inner| format!("{path}{inner}")).collect()
+}
+
+/// The path from the crate's root that `path` is within `module`, if it starts with `crate`,
+/// `super`, `self` or one of the module's children.
+fn absolute(path: &str, module: &str, modules: &BTreeSet<String>) -> Option<String> {
+    let mut base: Vec<&str> = module.split("::").collect();
+    let mut parts = path.split("::").peekable();
+    match *parts.peek()? {
+        "crate" => base.clear(),
+        "super" | "self" => {}
+        child if modules.contains(&format!("{module}::{child}")) => {}
+        _ => return None,
+    }
+    while let Some(step) = parts.next_if(|part| ["crate", "super", "self"].contains(part)) {
+        if step == "super" {
+            base.pop();
+        }
+    }
+    Some(base.into_iter().chain(parts).collect::<Vec<_>>().join("::"))
 }
 
 fn graph(texts: &BTreeMap<String, String>) -> Graph {
     let modules: BTreeSet<String> = texts.keys().cloned().collect();
     let mut graph = Graph::new();
-    for (module, text) in texts {
+    for (module, text) in texts.iter().filter(|(module, _)| *module != "lib") {
         let code = code(text);
         let mut imports = BTreeSet::new();
-        let mut add = |path: &str| {
-            if let Some(target) = module_of(path, &modules).filter(|target| target != module) {
-                imports.insert(target);
+        // Every path of the text, in `use` and elsewhere, begins after another character.
+        let inside = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
+        let begins = code.char_indices().zip(std::iter::once(' ').chain(code.chars()));
+        for ((at, c), before) in begins {
+            if !inside(c) || inside(before) || !path_at(&code[at..]).contains("::") {
+                continue;
             }
-        };
-        for (at, _) in code.match_indices("crate::") {
-            add(path_at(&code[at + "crate::".len()..]));
-            // `crate::{a::b, c}` is not written here: rustfmt keeps one path a line.
-            assert!(!code[at..].starts_with("crate::{"), "{module}: one path in each use");
-        }
-        for (at, _) in code.match_indices("super::") {
-            let parent = module.rsplit_once("::").map_or("", |(parent, _)| parent);
-            add(&format!("{parent}::{}", path_at(&code[at + "super::".len()..])));
-        }
-        // `pub use child::Item;` of a `mod.rs`.
-        for line in code.lines() {
-            let line =
-                line.trim_start().trim_start_matches("pub(crate) ").trim_start_matches("pub ");
-            if let Some(path) = line.strip_prefix("use ") {
-                let path = path_at(path);
-                if !path.starts_with("crate") && !path.starts_with("super") {
-                    add(&format!("{module}::{path}"));
+            for path in paths_at(&code[at..]) {
+                let Some(path) = absolute(&path, module, &modules) else { continue };
+                // What `lib.rs` exports comes from any room.
+                let target = module_of(&path, &modules)
+                    .unwrap_or_else(|| panic!("{module} imports {path:?} from the crate's face"));
+                if target != *module {
+                    imports.insert(target);
                 }
             }
         }
         graph.insert(module.clone(), imports);
     }
-    graph.remove("lib");
     graph
 }
 
@@ -170,25 +205,51 @@ fn low_rooms_know_no_stage() {
     }
 }
 
-/// The test itself: planted imports are found.
+/// A module with one more line among its imports.
+fn with_line(module: &str, line: &str) -> BTreeMap<String, String> {
+    let mut texts = texts();
+    let text = texts.get_mut(module).expect("a module");
+    let planted = text.replacen("use crate::", &format!("{line}\nuse crate::"), 1);
+    assert_ne!(planted, *text);
+    *text = planted;
+    texts
+}
+
+/// The test itself: planted imports are found, whatever their form.
 #[test]
 fn planted_imports_are_found() {
-    let mut texts = texts();
-    let lib = rooms(&texts["lib"]);
-    let planted = texts["pyramid::layout"].replacen(
-        "use crate::",
-        "use crate::cull::inputs::CullInputs;\nuse crate::",
-        1,
-    );
-    assert_ne!(planted, texts["pyramid::layout"]);
-    texts.insert("pyramid::layout".to_owned(), planted);
-    let found = upward(&graph(&texts), &lib);
-    assert_eq!(found, [("pyramid::layout".to_owned(), "cull::inputs".to_owned())]);
-    assert!(circle(&graph(&texts)).is_some(), "the cull reads the pyramid's layout");
-    let inner =
-        texts["gpu::checked"].replacen("use crate::", "use super::device::Gpu;\nuse crate::", 1);
-    let mut texts = self::texts();
-    texts.insert("gpu::checked".to_owned(), inner);
-    let found = circle(&graph(&texts)).expect("gpu::device checks what it makes");
-    assert!(found.contains(&"gpu::checked".to_owned()), "{found:?}");
+    let lib = rooms(&texts()["lib"]);
+    for line in [
+        "use crate::cull::inputs::CullInputs;",
+        "pub use crate::cull::inputs::CullInputs as Seen;",
+        "use crate::{cull::inputs::CullInputs, error::Result};",
+        "use crate::cull::{inputs::{self, CullInputs}};",
+        "use super::super::cull::inputs::CullInputs;",
+        "type Seen<'a> = crate::cull::inputs::CullInputs<'a>;",
+        "macro_rules! seen { () => { $crate::cull::inputs::CullInputs } }",
+    ] {
+        let graph = graph(&with_line("pyramid::layout", line));
+        let found = upward(&graph, &lib);
+        assert_eq!(found, [("pyramid::layout".to_owned(), "cull::inputs".to_owned())], "{line}");
+        assert!(circle(&graph).is_some(), "the cull reads the pyramid's layout");
+    }
+    for line in [
+        "use crate::gpu::device::Gpu;",
+        "use crate::gpu::{device::Gpu};",
+        "use super::device::Gpu;",
+        "use super::{device::Gpu};",
+    ] {
+        let found = circle(&graph(&with_line("gpu::checked", line)));
+        let found = found.unwrap_or_else(|| panic!("{line}: gpu::device checks what it makes"));
+        assert!(found.contains(&"gpu::checked".to_owned()), "{found:?}");
+    }
+    let from_root = graph(&with_line("pyramid", "use super::cull::inputs::CullInputs;"));
+    assert_eq!(upward(&from_root, &lib), [("pyramid".to_owned(), "cull::inputs".to_owned())]);
+}
+
+/// What `lib.rs` exports may come from any room, so no module takes it from there.
+#[test]
+#[should_panic(expected = "pyramid::layout imports \"CullOptions\" from the crate's face")]
+fn imports_from_the_face_are_found() {
+    graph(&with_line("pyramid::layout", "use crate::CullOptions;"));
 }

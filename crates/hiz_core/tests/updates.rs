@@ -182,12 +182,12 @@ fn wrong_groups(
             let is_nan =
                 group.record == words::instances(&Bounds::Boxes { min: nan, max: nan }).unwrap();
             if is_valid || !is_nan {
-                return Some(format!("{group:?} is no volume"));
+                return Some(format!("{group:?} is invalid"));
             }
             continue;
         };
         if !is_valid {
-            return Some(format!("{group:?} has a member that is no volume"));
+            return Some(format!("{group:?} has a member that is invalid"));
         }
         if let Some(i) =
             group.members.iter().find(|i| !crowd.is_within(kind, **i as usize, &corners))

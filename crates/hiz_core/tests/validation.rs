@@ -7,7 +7,7 @@
 
 mod common;
 
-use common::camera_along_z;
+use common::{camera_along_z, depth_descriptor};
 use hiz_core::wgpu::{self, TextureFormat as Format, TextureUsages as Usages};
 use hiz_core::{
     AtlasUse, Bounds, BoundsKind, Camera, CullOptions, DepthConvention, DrawTemplate, Error,
@@ -106,16 +106,7 @@ impl World {
         usage: Usages,
         change: impl FnOnce(&mut wgpu::TextureDescriptor<'_>),
     ) -> wgpu::Texture {
-        let mut descriptor = wgpu::TextureDescriptor {
-            label: Some("test.depth"),
-            size: wgpu::Extent3d { width: SIDE, height: SIDE, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage,
-            view_formats: &[],
-        };
+        let mut descriptor = depth_descriptor((SIDE, SIDE), format, usage);
         change(&mut descriptor);
         self.device.create_texture(&descriptor)
     }

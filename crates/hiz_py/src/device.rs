@@ -25,7 +25,7 @@ fn summary(adapter: &AdapterSummary) -> Summary {
     (index, name, driver, driver_info, backend, device_type)
 }
 
-/// The Vulkan adapters of this machine.
+/// The adapters of this machine.
 #[pyfunction]
 pub(crate) fn adapters(py: Python<'_>) -> PyResult<Vec<Summary>> {
     Ok(detached(py, || Ok(headless::adapters()))?.iter().map(summary).collect())

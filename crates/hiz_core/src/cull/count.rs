@@ -25,7 +25,7 @@ const BINDINGS: &[(u32, Binding)] =
     &[(0, Binding::Uniform), (1, Binding::Read), (2, Binding::Write)];
 
 /// The shader module that counts verdicts.
-pub(crate) fn module() -> Source {
+pub(crate) fn count_module() -> Source {
     Source::of(&[&[wgsl!("output/verdict"), wgsl!("instances/piece"), wgsl!("cull/count")]])
 }
 
@@ -41,7 +41,7 @@ pub(crate) fn record_count(
     let layout = gpu.layout("hiz.count.layout", BINDINGS)?;
     let pipeline = gpu.compute_pipeline(&Compute {
         label: "hiz.count.pipeline",
-        source: module(),
+        source: count_module(),
         entry_point: "count",
         layouts: std::slice::from_ref(&layout),
         constants: &[],

@@ -3,7 +3,7 @@
 use crate::cull::groups::group_key;
 use crate::cull::inputs::{CullInputs, PreparedView};
 use crate::cull::pipelines::{
-    CERTIFIED, CullKey, DepthStore, TWO_STORAGES, classify_constants, layouts, module,
+    CERTIFIED, CullKey, DepthStore, TWO_STORAGES, classify_constants, decision_module, layouts,
 };
 use crate::error::{Error, Result};
 use crate::gpu::buffers::entry;
@@ -89,7 +89,7 @@ pub(crate) const TEXELS_NOTED: usize = 4096;
 
 /// The shader that explains one instance's verdict.
 pub(crate) fn explain_module(store: DepthStore, kind: BoundsKind) -> Source {
-    module(store, kind, CERTIFIED, &[wgsl!("cull/explain")])
+    decision_module(store, kind, CERTIFIED, &[wgsl!("cull/explain")])
 }
 
 /// The pipeline of the explanation.

@@ -138,7 +138,7 @@ pub(crate) const TWO_STORAGES: &[(u32, Binding)] = &[(0, Binding::Write), (1, Bi
 
 /// The module of a decision about one instance: `classify` decides, and `entry` has the entry
 /// point.
-pub(crate) fn module(
+pub(crate) fn decision_module(
     store: DepthStore,
     kind: BoundsKind,
     classify: &[File],
@@ -179,7 +179,7 @@ pub(super) const CERTIFIED: &[File] = &[wgsl!("cull/supporting_planes"), wgsl!("
 /// The module of an entry point that does not write down which texels were read
 /// (`shaders/cull/unexplained.wgsl`).
 pub(super) fn unexplained(store: DepthStore, kind: BoundsKind, entry: &[File]) -> Source {
-    module(store, kind, CERTIFIED, &[&[wgsl!("cull/unexplained")], entry].concat())
+    decision_module(store, kind, CERTIFIED, &[&[wgsl!("cull/unexplained")], entry].concat())
 }
 
 /// The files of the flat cull, which tests each instance by itself, without the decision.
@@ -194,7 +194,7 @@ pub(crate) const FLAT: &[File] = &[
 
 /// The shader of the flat cull, for instances of one kind.
 pub(crate) fn cull_module(store: DepthStore, kind: BoundsKind) -> Source {
-    module(store, kind, CERTIFIED, FLAT)
+    decision_module(store, kind, CERTIFIED, FLAT)
 }
 
 /// The shader of the cull of groups.
@@ -231,7 +231,7 @@ pub(super) fn layouts(
     Ok([store.layout(gpu)?, records, gpu.layout(label, written)?])
 }
 
-/// A flat cull that runs `source`, a module made by [`module`].
+/// A flat cull that runs `source`, a module made by [`decision_module`].
 pub(crate) fn flat_pipeline(
     gpu: &Gpu,
     label: &'static str,

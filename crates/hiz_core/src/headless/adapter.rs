@@ -5,9 +5,12 @@ use crate::error::Error;
 /// The environment variable that chooses an adapter: an index, or part of a name or driver.
 pub const ADAPTER_VARIABLE: &str = "HIZVK_ADAPTER";
 
-/// How to install a software driver: the advice if there is no adapter at all.
-pub const INSTALL_HINT: &str =
-    "A software Vulkan driver: apt install libvulkan1 mesa-vulkan-drivers";
+/// How to get a driver: the advice if there is no adapter at all.
+pub const INSTALL_HINT: &str = if cfg!(all(feature = "vulkan", target_os = "linux")) {
+    "A software Vulkan driver: apt install libvulkan1 mesa-vulkan-drivers"
+} else {
+    "Install the driver of a GPU"
+};
 
 /// An adapter, described as text.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -78,7 +81,7 @@ pub(super) fn no_adapter(request: String, seen: &[AdapterSummary]) -> Error {
         format!(
             "Choose one of these by its number, or by a part of its name or driver, as an argument \
              or in {ADAPTER_VARIABLE}; without both the best one is taken. One that is missing has \
-             no Vulkan driver here that the loader finds"
+             no driver here for the backends of this build"
         )
     };
     let seen = seen.iter().map(|summary| format!("{}: {summary}", summary.index)).collect();

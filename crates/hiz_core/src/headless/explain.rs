@@ -20,7 +20,8 @@ impl Culling {
     ///
     /// # Errors
     /// - [`Error::Invalid`](crate::Error::Invalid) for an index past the end.
-    /// - [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// - [`Error::DeviceLost`](crate::Error::DeviceLost).
+    /// - [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn explain(&self, index: u64) -> Result<Explanation> {
         let index = u32::try_from(index).unwrap_or(u32::MAX);
         let mut told = self.test(index, false)?;

@@ -50,14 +50,14 @@ const BINDINGS: &[(u32, Binding)] = &[
 ];
 
 /// The shader that replaces records and group boxes.
-pub(crate) fn module() -> Source {
+pub(crate) fn update_module() -> Source {
     Source::of(&[&[wgsl!("instances/record_layout"), wgsl!("instances/update")]])
 }
 
-fn pipeline(gpu: &Gpu, entry_point: &'static str) -> Result<wgpu::ComputePipeline> {
+fn update_pipeline(gpu: &Gpu, entry_point: &'static str) -> Result<wgpu::ComputePipeline> {
     gpu.compute_pipeline(&Compute {
         label: "hiz.update.pipeline",
-        source: module(),
+        source: update_module(),
         entry_point,
         layouts: &[gpu.layout("hiz.update.layout", BINDINGS)?],
         constants: &[],
@@ -116,7 +116,7 @@ pub(crate) fn record_update(
     let range = first..first + n as u32;
     before(encoder, range.clone())?;
 
-    let begin = pipeline(gpu, "begin")?;
+    let begin = update_pipeline(gpu, "begin")?;
     let mut changing = instances.changing();
     let number = changing.next_update;
     changing.next_update = number.wrapping_add(1);
@@ -128,7 +128,7 @@ pub(crate) fn record_update(
         let mut begun = false;
         let mut dispatch = |replacement: &Replacement<'_>, entry_point| -> Result<()> {
             let (bind_group, pipeline) =
-                (bind(gpu, instances, replacement, number)?, pipeline(gpu, entry_point)?);
+                (bind(gpu, instances, replacement, number)?, update_pipeline(gpu, entry_point)?);
             pass.set_bind_group(0, &bind_group, &[]);
             if !std::mem::replace(&mut begun, true) {
                 pass.set_pipeline(&begin);

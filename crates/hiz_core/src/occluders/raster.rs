@@ -52,14 +52,14 @@ fn outside_frustum(camera: &Camera, min: Vec3, max: Vec3) -> bool {
 const BINDINGS: &[(u32, Binding)] = &[(0, Binding::VertexUniform)];
 
 /// The shader module of the occluder pass.
-pub(crate) fn module() -> Source {
+pub(crate) fn occluders_module() -> Source {
     Source::of(&[&[wgsl!("occluders/occluders")]])
 }
 
-fn pipeline(gpu: &Gpu, reversed: bool, faces: FaceCull) -> Result<wgpu::RenderPipeline> {
+fn occluders_pipeline(gpu: &Gpu, reversed: bool, faces: FaceCull) -> Result<wgpu::RenderPipeline> {
     gpu.depth_pipeline(&Depth {
         label: "hiz.occluders.pipeline",
-        source: module(),
+        source: occluders_module(),
         entry_point: "occluder_vertex",
         layouts: &[gpu.layout("hiz.occluders.layout", BINDINGS)?],
         state: DepthState {
@@ -139,7 +139,7 @@ pub(crate) fn record_occluders(
     let entries = [entry(0, view.as_entire_binding())];
     let bind_group = gpu.bind_group("hiz.occluders.view", &layout, &entries)?;
     let reversed = camera.convention() == DepthConvention::Reversed;
-    let pipeline = pipeline(gpu, reversed, occluders.cull_mode.as_seen_by(camera))?;
+    let pipeline = occluders_pipeline(gpu, reversed, occluders.cull_mode.as_seen_by(camera))?;
     let depth_ops = wgpu::Operations {
         load: wgpu::LoadOp::Clear(camera.convention().far()),
         store: wgpu::StoreOp::Store,

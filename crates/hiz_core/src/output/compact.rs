@@ -27,14 +27,14 @@ const BINDINGS: &[(u32, Binding)] = &[
 ];
 
 /// The shader of the ordered compaction.
-pub(crate) fn module() -> Source {
+pub(crate) fn compact_module() -> Source {
     Source::of(&[&[wgsl!("instances/piece"), wgsl!("output/compact")]])
 }
 
-fn pipeline(gpu: &Gpu, entry_point: &'static str) -> Result<wgpu::ComputePipeline> {
+fn compact_pipeline(gpu: &Gpu, entry_point: &'static str) -> Result<wgpu::ComputePipeline> {
     gpu.compute_pipeline(&Compute {
         label: "hiz.compact.pipeline",
-        source: module(),
+        source: compact_module(),
         entry_point,
         layouts: &[gpu.layout(LAYOUT, BINDINGS)?],
         constants: &[],
@@ -78,8 +78,8 @@ impl Compaction {
                 ))
             });
         Ok(Self {
-            scan: pipeline(gpu, "scan")?,
-            scatter: pipeline(gpu, "scatter")?,
+            scan: compact_pipeline(gpu, "scan")?,
+            scatter: compact_pipeline(gpu, "scatter")?,
             pieces: pieces.collect::<Result<_>>()?,
         })
     }

@@ -41,7 +41,7 @@ enum Shape {
     Coarse { shared: bool },
 }
 
-fn module(source: SourceKind, entry: File) -> Source {
+fn reduce_module(source: SourceKind, entry: File) -> Source {
     Source::of(&[
         &[wgsl!("gpu/depth_bits")],
         source.files(),
@@ -51,16 +51,16 @@ fn module(source: SourceKind, entry: File) -> Source {
 
 /// The shader module of the reduction, three levels per pass.
 pub(crate) fn blocks_module(source: SourceKind) -> Source {
-    module(source, wgsl!("pyramid/reduce"))
+    reduce_module(source, wgsl!("pyramid/reduce"))
 }
 
 /// The shader module of the reduction to one coarse level.
 pub(crate) fn coarse_module(source: SourceKind) -> Source {
-    module(source, wgsl!("pyramid/reduce_coarse"))
+    reduce_module(source, wgsl!("pyramid/reduce_coarse"))
 }
 
 /// `tall`: neighbouring invocations read below each other.
-fn pipeline(
+fn reduce_pipeline(
     gpu: &Gpu,
     source: SourceKind,
     shape: Shape,
@@ -197,7 +197,7 @@ pub(crate) fn record_reduce(
         let tall = step.source == 0 && reads_tall(step, source_kind, size);
         let (shape, workgroups) = shape_of(step, tall);
         let constants = (camera.convention().is_reversed(), tall, pyramid.chunks.len());
-        let pipeline = pipeline(gpu, source_kind, shape, constants)?;
+        let pipeline = reduce_pipeline(gpu, source_kind, shape, constants)?;
         let uniform = gpu.uniform("hiz.reduce.step", &step_uniform(step, reduction))?;
         let layout = gpu.layout("hiz.reduce.step_layout", STEP_BINDINGS)?;
         let entries = [entry(0, uniform.as_entire_binding())];

@@ -1,18 +1,18 @@
 //! Every shader module that this crate makes a pipeline of.
 
-use crate::cull::count;
+use crate::cull::count::count_module;
 use crate::cull::explain::explain_module;
 use crate::cull::pipelines::{DepthStore, cull_groups_module, cull_members_module, cull_module};
 use crate::cull::refine::{refine_groups_module, refine_module};
 use crate::gpu::depth_source::SOURCES;
 use crate::gpu::shader::{FILES, Source};
 use crate::input::bounds::BoundsKind;
-use crate::instances::update;
-use crate::occluders::raster;
-use crate::output::compact;
+use crate::instances::update::update_module;
+use crate::occluders::raster::occluders_module;
+use crate::output::compact::compact_module;
 use crate::pyramid::reduce::{blocks_module, coarse_module};
 #[cfg(feature = "yardstick")]
-use crate::yardstick;
+use crate::yardstick::{uncertified_module, yardstick_modules};
 
 /// All kinds of bounds.
 pub(super) const KINDS: [BoundsKind; 3] =
@@ -31,16 +31,16 @@ pub fn modules() -> Vec<(String, String)> {
 pub(super) fn all() -> Vec<(String, Source)> {
     let mut all = vec![
         ("refine_groups".to_owned(), refine_groups_module()),
-        ("compact".to_owned(), compact::module()),
-        ("count".to_owned(), count::module()),
-        ("update".to_owned(), update::module()),
-        ("occluders".to_owned(), raster::module()),
+        ("compact".to_owned(), compact_module()),
+        ("count".to_owned(), count_module()),
+        ("update".to_owned(), update_module()),
+        ("occluders".to_owned(), occluders_module()),
     ];
     for source in SOURCES {
         all.push((format!("reduce {source:?}"), blocks_module(source)));
         all.push((format!("reduce_coarse {source:?}"), coarse_module(source)));
         #[cfg(feature = "yardstick")]
-        all.extend(yardstick::modules(source).map(|(name, m)| (format!("{name} {source:?}"), m)));
+        all.extend(yardstick_modules(source).map(|(name, m)| (format!("{name} {source:?}"), m)));
     }
     let stores = SOURCES.map(DepthStore::Apart).into_iter().chain([DepthStore::Atlas]);
     for store in stores {
@@ -52,7 +52,7 @@ pub(super) fn all() -> Vec<(String, Source)> {
             all.push((named("explain"), explain_module(store, kind)));
         }
         #[cfg(feature = "yardstick")]
-        all.push((format!("uncertified cull {store:?}"), yardstick::cull_module(store)));
+        all.push((format!("uncertified cull {store:?}"), uncertified_module(store)));
     }
     all.extend(KINDS.map(|kind| (format!("refine {kind:?}"), refine_module(kind))));
     all

@@ -2,7 +2,9 @@
 
 use crate::cull::inputs::CullInputs;
 use crate::cull::options::{CullOptions, Hierarchy};
-use crate::cull::pipelines::{CullKey, DepthStore, FLAT, ReportKey, flat_pipeline, module};
+use crate::cull::pipelines::{
+    CullKey, DepthStore, FLAT, ReportKey, decision_module, flat_pipeline,
+};
 use crate::cull::record::record_cull_by;
 use crate::error::{Error, Result};
 use crate::gpu::device::Gpu;
@@ -16,14 +18,18 @@ use crate::output::visible::Visible;
 use crate::pyramid::Pyramid;
 
 /// The shader of the flat cull of boxes without certificates.
-pub(crate) fn cull_module(store: DepthStore) -> Source {
+pub(crate) fn uncertified_module(store: DepthStore) -> Source {
     // The bounds' shader files use the types of the supporting planes, which this cull never tests.
     let classify = [wgsl!("cull/supporting_planes"), wgsl!("yardstick/classify_uncertified")];
-    module(store, BoundsKind::Box, &classify, FLAT)
+    decision_module(store, BoundsKind::Box, &classify, FLAT)
 }
 
-fn pipeline(gpu: &Gpu, key: &CullKey, report: &ReportKey) -> Result<wgpu::ComputePipeline> {
-    flat_pipeline(gpu, "hiz.yardstick.cull", cull_module(key.store), key, report)
+fn uncertified_pipeline(
+    gpu: &Gpu,
+    key: &CullKey,
+    report: &ReportKey,
+) -> Result<wgpu::ComputePipeline> {
+    flat_pipeline(gpu, "hiz.yardstick.cull", uncertified_module(key.store), key, report)
 }
 
 /// Records a cull of `instances`, which must be boxes, that trusts float32.
@@ -51,7 +57,7 @@ pub fn record_uncertified_cull(
     let options =
         &CullOptions { hierarchy: Hierarchy::Never, statistics: false, ..options.clone() };
     let inputs = CullInputs { instances, camera, pyramid, options, idle: false };
-    record_cull_by(&engine.context().gpu, encoder, &inputs, visible, pipeline)
+    record_cull_by(&engine.context().gpu, encoder, &inputs, visible, uncertified_pipeline)
 }
 
 /// Whether each instance is kept, by the mask of the last cull into `visible`.

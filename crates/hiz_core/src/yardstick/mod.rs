@@ -9,10 +9,10 @@ pub(crate) mod reduce;
 use std::time::Instant;
 
 #[cfg(feature = "testing")]
-pub(crate) use cull::cull_module;
+pub(crate) use cull::uncertified_module;
 pub use cull::{read_mask, record_uncertified_cull};
 #[cfg(feature = "testing")]
-pub(crate) use reduce::modules;
+pub(crate) use reduce::yardstick_modules;
 pub use reduce::{PerLevelReduction, ReductionShape, reduce};
 
 use crate::error::Result;

@@ -12,7 +12,7 @@ use crate::headless::{DepthImage, Engine};
 use crate::input::image::ImageSize;
 use crate::pyramid::Pyramid;
 
-fn module(source: SourceKind, entry: File) -> Source {
+fn yardstick_module(source: SourceKind, entry: File) -> Source {
     Source::of(&[&[wgsl!("gpu/depth_bits")], source.files(), &[entry]])
 }
 
@@ -26,10 +26,10 @@ pub(crate) const TEXTURE_WORKGROUP_SIDE: u32 = 8;
 
 /// A name and the module of each shape.
 #[cfg(feature = "testing")]
-pub(crate) fn modules(source: SourceKind) -> [(&'static str, Source); 2] {
+pub(crate) fn yardstick_modules(source: SourceKind) -> [(&'static str, Source); 2] {
     [
-        ("one dispatch a level, buffer", module(source, IN_BUFFER)),
-        ("one dispatch a level, textures", module(source, IN_TEXTURE)),
+        ("one dispatch a level, buffer", yardstick_module(source, IN_BUFFER)),
+        ("one dispatch a level, textures", yardstick_module(source, IN_TEXTURE)),
     ]
 }
 
@@ -242,7 +242,7 @@ fn step(
         Storage::Buffer(_) => {
             bindings.push((3, Binding::Write));
             (
-                module(kind, IN_BUFFER),
+                yardstick_module(kind, IN_BUFFER),
                 "reduce_buffer",
                 gpu.uniform("hiz.yardstick.step", &[read, written])?,
                 [written.stride.div_ceil(BUFFER_WORKGROUP), written.height],
@@ -251,7 +251,7 @@ fn step(
         Storage::Textures(_) => {
             bindings.extend([(3, Binding::Depth(SourceKind::Float)), (4, Binding::WriteFloats)]);
             (
-                module(kind, IN_TEXTURE),
+                yardstick_module(kind, IN_TEXTURE),
                 "reduce_texture",
                 gpu.uniform(
                     "hiz.yardstick.step",

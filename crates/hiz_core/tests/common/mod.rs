@@ -6,7 +6,7 @@ use std::cell::OnceCell;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use hiz_core::headless::Engine;
-use hiz_core::{Camera, DepthConvention, ImageSize, Mat4};
+use hiz_core::{Camera, DepthConvention, ImageSize, Mat4, wgpu};
 
 /// The engine that the tests of this process share.
 /// Each thread that has asked for it holds it until that thread ends.
@@ -62,6 +62,24 @@ fn open() -> Engine {
         );
     }
     engine
+}
+
+/// A depth image of a test: one layer, one mip level, one sample.
+pub(crate) fn depth_descriptor(
+    (width, height): (u32, u32),
+    format: wgpu::TextureFormat,
+    usage: wgpu::TextureUsages,
+) -> wgpu::TextureDescriptor<'static> {
+    wgpu::TextureDescriptor {
+        label: Some("test.depth"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage,
+        view_formats: &[],
+    }
 }
 
 /// A camera at the origin with clip coordinates that are easy to work out by hand.

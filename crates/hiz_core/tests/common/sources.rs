@@ -6,6 +6,8 @@ use std::sync::Arc;
 use hiz_core::headless::Engine;
 use hiz_core::{Camera, Pyramid, PyramidOptions, wgpu};
 
+use crate::common::depth_descriptor;
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Source {
     /// A packed upload.
@@ -41,7 +43,7 @@ fn texture_of(
     let usage = wgpu::TextureUsages::TEXTURE_BINDING
         | wgpu::TextureUsages::COPY_DST
         | wgpu::TextureUsages::COPY_SRC;
-    let texture = engine.device().create_texture(&descriptor(size, format, usage));
+    let texture = engine.device().create_texture(&depth_descriptor((width, height), format, usage));
     let layout = wgpu::TexelCopyBufferLayout {
         offset: 0,
         bytes_per_row: Some(4 * width),
@@ -49,23 +51,6 @@ fn texture_of(
     };
     engine.queue().write_texture(texture.as_image_copy(), words, layout, size);
     texture
-}
-
-fn descriptor(
-    size: wgpu::Extent3d,
-    format: wgpu::TextureFormat,
-    usage: wgpu::TextureUsages,
-) -> wgpu::TextureDescriptor<'static> {
-    wgpu::TextureDescriptor {
-        label: Some("test.depth"),
-        size,
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage,
-        view_formats: &[],
-    }
 }
 
 /// A depth texture whose pixels are written by fragments.
@@ -78,11 +63,11 @@ fn drawn(engine: &Engine, (width, height): (u32, u32), depth: &[f32]) -> wgpu::T
         wgpu::TextureFormat::R32Uint,
         bytemuck::cast_slice(depth),
     );
-    let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
     let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
         | wgpu::TextureUsages::TEXTURE_BINDING
         | wgpu::TextureUsages::COPY_SRC;
-    let target = device.create_texture(&descriptor(size, wgpu::TextureFormat::Depth32Float, usage));
+    let format = wgpu::TextureFormat::Depth32Float;
+    let target = device.create_texture(&depth_descriptor((width, height), format, usage));
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("test.drawn"),
         source: wgpu::ShaderSource::Wgsl(DRAWN.into()),
