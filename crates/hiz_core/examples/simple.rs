@@ -19,14 +19,13 @@ use hiz_core::{
 };
 
 const SHADER: &str = "
-@group(0) @binding(0) var<uniform> clip_from_world: mat4x4<f32>;
-
 // `i` comes from the packed list: the number of a box that was kept, and its place in the grid.
 @vertex fn corner(@builtin(vertex_index) v: u32, @location(0) i: u32)
         -> @builtin(position) vec4<f32> {
     let center = vec2(f32(i % 20), f32(i / 20)) - 9.5;
     let offset = vec2(f32(v % 2), f32(v / 2)) * 0.5 - 0.25;
-    return clip_from_world * vec4(center + offset, -16.0, 1.0);
+    // A view of 90 degrees along -z from the origin: w is the depth, and z the near plane's.
+    return vec4(center + offset, 0.1, 16.0);
 }
 
 @fragment fn white() -> @location(0) vec4<f32> { return vec4(1.0); }
@@ -92,14 +91,10 @@ pub(crate) fn draw_frame(
     // It has no depth test, so the picture shows everything that was drawn.
     let picture = target(device, wgpu::TextureFormat::R8Unorm);
     let pipeline = pipeline(device, picture.format());
-    let [x, y, z, w] = camera.clip_from_world().map(|row| row.map(|v| v as f32));
-    let columns: [[f32; 4]; 4] = std::array::from_fn(|k| [x[k], y[k], z[k], w[k]]);
-    let view = buffer(device, columns.as_flattened(), wgpu::BufferUsages::UNIFORM);
-    let square = buffer(device, &[0_u32, 1, 2, 2, 1, 3], wgpu::BufferUsages::INDEX);
-    let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
+    let square = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
         label: None,
-        layout: &pipeline.get_bind_group_layout(0),
-        entries: &[wgpu::BindGroupEntry { binding: 0, resource: view.as_entire_binding() }],
+        contents: bytemuck::cast_slice(&[0_u32, 1, 2, 2, 1, 3]),
+        usage: wgpu::BufferUsages::INDEX,
     });
     let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -111,7 +106,6 @@ pub(crate) fn draw_frame(
         ..Default::default()
     });
     pass.set_pipeline(&pipeline);
-    pass.set_bind_group(0, &bindings, &[]);
     pass.set_index_buffer(square.slice(..), wgpu::IndexFormat::Uint32);
     let draws = visible.draw_arguments().expect("among the outputs");
     for piece in 0..visible.num_pieces() {
@@ -135,15 +129,6 @@ fn target(device: &wgpu::Device, format: wgpu::TextureFormat) -> wgpu::Texture {
         usage: Usages::RENDER_ATTACHMENT | Usages::TEXTURE_BINDING | Usages::COPY_SRC,
         view_formats: &[],
     })
-}
-
-fn buffer<T: bytemuck::NoUninit>(
-    device: &wgpu::Device,
-    contents: &[T],
-    usage: wgpu::BufferUsages,
-) -> wgpu::Buffer {
-    let contents = bytemuck::cast_slice(contents);
-    device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage })
 }
 
 fn pipeline(device: &wgpu::Device, format: wgpu::TextureFormat) -> wgpu::RenderPipeline {

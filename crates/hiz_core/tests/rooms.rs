@@ -187,6 +187,18 @@ fn data_goes_one_way() {
     assert_eq!(upward(&graph, &rooms), [], "imports of a room that stands above");
 }
 
+/// `host/` and `input/` touch no device: all that they know of wgpu is the formats of textures.
+#[test]
+fn low_rooms_touch_no_device() {
+    for (module, text) in texts() {
+        if ["host", "input"].contains(&module.split("::").next().unwrap_or_default()) {
+            let code = code(&text);
+            let named = code.matches("wgpu").count();
+            assert_eq!(code.matches("wgpu::TextureFormat").count(), named, "{module} names wgpu");
+        }
+    }
+}
+
 /// `gpu/` knows no stage, and `host/` and `input/` no device.
 #[test]
 fn low_rooms_know_no_stage() {

@@ -99,9 +99,14 @@ struct Cell<T> {
     contents: Mutex<Option<Arc<T>>>,
 }
 
+/// What a lock guards, also after a panic: it is always replaced as a whole.
+fn unpoisoned<T>(locked: Result<T, PoisonError<T>>) -> T {
+    locked.unwrap_or_else(PoisonError::into_inner)
+}
+
 impl<T> Cell<T> {
     fn lock(&self) -> MutexGuard<'_, Option<Arc<T>>> {
-        self.contents.lock().unwrap_or_else(PoisonError::into_inner)
+        unpoisoned(self.contents.lock())
     }
 }
 
@@ -110,9 +115,7 @@ impl<T> Drop for Cell<T> {
         if self.process != std::process::id() {
             // In a fork the threads of the device do not exist, and its locks may be held for ever.
             // So the value is leaked.
-            std::mem::forget(
-                self.contents.get_mut().unwrap_or_else(PoisonError::into_inner).take(),
-            );
+            std::mem::forget(unpoisoned(self.contents.get_mut()).take());
         }
     }
 }
@@ -165,7 +168,7 @@ impl Registry {
 /// Like the lock of a cell, its lock is held only together with the interpreter lock.
 fn registry(_with_the_interpreter_lock: Python<'_>) -> MutexGuard<'static, Registry> {
     static REGISTRY: Mutex<Registry> = Mutex::new(Registry::new(0, false));
-    let mut registry = REGISTRY.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut registry = unpoisoned(REGISTRY.lock());
     let here = std::process::id();
     if registry.process != here {
         // A fork: other threads and their calls do not exist here.

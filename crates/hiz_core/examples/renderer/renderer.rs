@@ -5,6 +5,7 @@
 
 use std::error::Error;
 
+use hiz_core::headless::INSTALL_HINT;
 use hiz_core::wgpu::{self, util::DeviceExt};
 use hiz_core::{
     Camera, CullOptions, DepthConvention, DrawTemplate, Floats, HizContext, ImageSize,
@@ -184,9 +185,7 @@ impl Renderer {
             .into_iter()
             .enumerate()
             .find(|(i, adapter)| is_wanted(*i, adapter))
-            .ok_or(
-                "no Vulkan adapter (a software driver: apt install libvulkan1 mesa-vulkan-drivers)",
-            )?;
+            .ok_or_else(|| format!("no adapter. {INSTALL_HINT}"))?;
         let (device, queue) =
             pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
                 label: Some("renderer.device"),

@@ -21,7 +21,12 @@ pub(crate) const GROUPS_OF_RUN: u32 = 8;
 
 /// The fewest texels of finer levels that a group's test may read.
 /// A box around 64 instances is large, so its footprint is coarse (`docs/performance.md`).
-pub(super) const GROUP_DESCENT: u32 = 16;
+const GROUP_DESCENT: u32 = 16;
+
+/// The budget of a group's descent in a cull whose instances have `budget`.
+pub(super) fn group_descent(budget: u32) -> u32 {
+    budget.max(GROUP_DESCENT)
+}
 
 /// From this many instances on, groups are culled first.
 /// Fewer are tested one by one before the dispatches for groups would have begun
@@ -30,7 +35,7 @@ const GROUPS_PAY_FROM: u32 = 16_384;
 
 /// The options of a group's test.
 pub(crate) fn group_options(options: &CullOptions) -> CullOptions {
-    CullOptions { descent: options.descent.max(GROUP_DESCENT), ..options.clone() }
+    CullOptions { descent: group_descent(options.descent), ..options.clone() }
 }
 
 /// The key of the pipeline of a group's test.

@@ -3,7 +3,7 @@
 //! Here each option goes one of two ways.
 //! A number goes into the view uniform, and a choice into the key of the pipelines.
 
-use crate::cull::groups::GROUP_DESCENT;
+use crate::cull::groups::group_descent;
 use crate::cull::options::{Coverage, CullOptions, Fit};
 use crate::cull::pipelines::{CullKey, DepthStore};
 use crate::cull::view_uniform::ViewUniform;
@@ -86,7 +86,7 @@ impl PreparedView {
 
     /// The bindings for a test of groups.
     pub(super) fn bind_for_groups(&self, gpu: &Gpu, pyramid: &Pyramid) -> Result<wgpu::BindGroup> {
-        let descent_budget = self.view.descent_budget.max(GROUP_DESCENT);
+        let descent_budget = group_descent(self.view.descent_budget);
         self.bind_view(gpu, pyramid, ViewUniform { descent_budget, ..self.view })
     }
 

@@ -26,16 +26,21 @@ impl KeptBuffers {
     }
 }
 
-/// How many bind groups are kept: for two views, one to test instances and one to test groups.
-const KEPT_BINDINGS: usize = 4;
-
 /// The last bind groups, each with the key words that identify it.
 ///
 /// The words are opaque here: the stage that asks for a bind group chooses them.
-#[derive(Debug, Default)]
-pub(crate) struct KeptBindings(Locked<Vec<(Vec<u32>, wgpu::BindGroup)>>);
+#[derive(Debug)]
+pub(crate) struct KeptBindings {
+    most: usize,
+    last: Locked<Vec<(Vec<u32>, wgpu::BindGroup)>>,
+}
 
 impl KeptBindings {
+    /// Keeps `most` bind groups, at least one.
+    pub(crate) fn new(most: usize) -> Self {
+        Self { most, last: Locked::default() }
+    }
+
     /// The bind group with these key words, made by `make` if it is not among the last ones.
     ///
     /// The oldest one gives way.
@@ -44,12 +49,12 @@ impl KeptBindings {
         words: &[u32],
         make: impl FnOnce() -> Result<wgpu::BindGroup>,
     ) -> Result<wgpu::BindGroup> {
-        let mut kept = self.0.lock();
+        let mut kept = self.last.lock();
         if let Some((_, bindings)) = kept.iter().find(|(theirs, _)| theirs == words) {
             return Ok(bindings.clone());
         }
         let bindings = make()?;
-        if kept.len() == KEPT_BINDINGS {
+        if kept.len() == self.most {
             kept.remove(0);
         }
         kept.push((words.to_vec(), bindings.clone()));
@@ -58,6 +63,6 @@ impl KeptBindings {
 
     /// Releases all bind groups, and with them the resources that they hold.
     pub(crate) fn clear(&self) {
-        self.0.lock().clear();
+        self.last.lock().clear();
     }
 }

@@ -44,6 +44,10 @@ pub(crate) struct PyramidUniform {
 
 const _: () = assert!(size_of::<PyramidUniform>() == 528);
 
+/// How many bind groups of culls are kept: for two views, one to test instances and one to test
+/// groups.
+const KEPT_BINDINGS: usize = 4;
+
 /// Labels of the stand-ins that are bound for the chunks that a small pyramid does not have.
 const NO_CHUNK: [&str; PYRAMID_CHUNKS] = ["hiz.no_chunk_0", "hiz.no_chunk_1", "hiz.no_chunk_2"];
 
@@ -177,7 +181,7 @@ impl Pyramid {
             no_atlas: AtomicBool::new(false),
             atlas: Locked::default(),
             reduced: Arc::default(),
-            bindings: KeptBindings::default(),
+            bindings: KeptBindings::new(KEPT_BINDINGS),
         })
     }
 
