@@ -23,10 +23,10 @@ from tools.speed import (
     scale,
     town,
 )
-from tools.speed.run import EXTENTS, Extent, Run
+from tools.speed.run import WORKLOADS, Run, Workload
 
 #: As large as it has to be for every part to run.
-TINY = Extent(
+TINY = Workload(
     images=(("1080p", (45, 80)), ("4K", (90, 160))),
     crowd=2_000,
     calls=2_000,
@@ -95,7 +95,7 @@ def run() -> Run:
 def test_a_run_has_every_target(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(EXTENTS, "quick", TINY)
+    monkeypatch.setitem(WORKLOADS, "quick", TINY)
     out = tmp_path / "a" / "b"
     assert command.main(["--quick", "--seed", "7", "--out", str(out), "--json"]) == 0
     printed = capsys.readouterr()
@@ -162,7 +162,7 @@ def test_a_run_has_every_target(
 def test_one_part_prints_its_targets(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(EXTENTS, "quick", TINY)
+    monkeypatch.setitem(WORKLOADS, "quick", TINY)
     assert command.main(["--quick", "--part", "memory", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
     assert "2,000 boxes, device / (stored bounds" in printed
@@ -179,14 +179,14 @@ def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_every_extent_has_what_the_parts_need() -> None:
-    for extent in EXTENTS.values():
+    for extent in WORKLOADS.values():
         assert extent.images[0][0] == "1080p"
         assert extent.sample <= extent.calls <= extent.crowd
         assert list(extent.counts) == sorted(extent.counts)
         assert extent.large is None or extent.large > extent.crowd
-    assert max(EXTENTS["full"].counts) == 50_000_000
-    assert max(EXTENTS["full"].sides) == 8192
-    assert max(EXTENTS["quick"].counts) == 100_000
+    assert max(WORKLOADS["full"].counts) == 50_000_000
+    assert max(WORKLOADS["full"].sides) == 8192
+    assert max(WORKLOADS["quick"].counts) == 100_000
 
 
 # -- figures, by hand ------------------------------------------------------------------------------
@@ -307,7 +307,7 @@ def test_planted_errors_are_counted(run: Run) -> None:
     )
     assert hidden > 5
     assert visible > 5
-    judge = errors.Judge(run, scene.boxes, depth)
+    judge = errors.OracleSample(run, scene.boxes, depth)
     nothing, everything = (judge.judge("p", "x", np.full(40, kept)) for kept in (False, True))
     assert (nothing.false_culls, nothing.hidden_kept, nothing.kept) == (visible, 0, 0)
     assert (everything.false_culls, everything.hidden_kept, everything.kept) == (0, hidden, 40)

@@ -82,7 +82,7 @@ _UNDISTORT = (
 UNIT_TOLERANCE = 1e-2
 
 
-class View(TypedDict):
+class PoseArguments(TypedDict):
     """From where a camera looks, and which way."""
 
     eye: Vector
@@ -99,7 +99,7 @@ class Image(TypedDict):
     reversed_z: bool
 
 
-def view(eye: object, target: object, up: object) -> View:
+def view(eye: object, target: object, up: object) -> PoseArguments:
     """The three vectors of a view; the engine refuses those that leave it without a direction."""
     return {
         "eye": _arguments.vector("eye", eye),

@@ -111,7 +111,7 @@ def _info(as_json: bool) -> int:
 
 
 @dataclasses.dataclass(frozen=True)
-class Check:
+class DoctorCheck:
     """One finding of `doctor`."""
 
     name: str
@@ -120,37 +120,41 @@ class Check:
     advice: str = ""
 
 
-def checks() -> list[Check]:
+def checks() -> list[DoctorCheck]:
     """Checks what culling needs, from the bottom up, and stops where the rest cannot work."""
     found = [
-        Check("package", True, f"hizvk {hizvk.__version__}, Python {platform.python_version()}")
+        DoctorCheck(
+            "package", True, f"hizvk {hizvk.__version__}, Python {platform.python_version()}"
+        )
     ]
     loader = LOADERS.get(sys.platform, LINUX_LOADER)
     try:
         ctypes.CDLL(loader)
-        found.append(Check("vulkan loader", True, loader))
+        found.append(DoctorCheck("vulkan loader", True, loader))
     except OSError as error:
-        return [*found, Check("vulkan loader", False, str(error), INSTALL_HINT)]
+        return [*found, DoctorCheck("vulkan loader", False, str(error), INSTALL_HINT)]
     if sys.platform not in LOADERS:  # elsewhere drivers are not registered by files alone
         found.append(_drivers())
     adapters = hizvk.adapters()
     if not adapters:
-        return [*found, Check("adapters", False, "none", INSTALL_HINT)]
-    found.append(Check("adapters", True, "; ".join(map(str, adapters))))
+        return [*found, DoctorCheck("adapters", False, "none", INSTALL_HINT)]
+    found.append(DoctorCheck("adapters", True, "; ".join(map(str, adapters))))
     try:
         device = hizvk.Device()
     except hizvk.HizError as error:
         advice = (
             "HIZVK_ADAPTER has to name one of the adapters" if "HIZVK_ADAPTER" in os.environ else ""
         )
-        return [*found, Check("device", False, str(error), advice)]
+        return [*found, DoctorCheck("device", False, str(error), advice)]
     found.append(
-        Check("device", True, f"{device.adapter}, images up to {device.max_image_side} per side")
+        DoctorCheck(
+            "device", True, f"{device.adapter}, images up to {device.max_image_side} per side"
+        )
     )
     return [*found, *(_try_culling(device, reversed_z) for reversed_z in (True, False))]
 
 
-def _drivers() -> Check:
+def _drivers() -> DoctorCheck:
     """The driver descriptions that the loader reads on Linux."""
     chosen = os.environ.get("VK_DRIVER_FILES") or os.environ.get("VK_ICD_FILENAMES")
     files = chosen.split(os.pathsep) if chosen else []
@@ -160,18 +164,18 @@ def _drivers() -> Check:
         files = sorted(file for folder in folders for file in glob(os.path.join(folder, "*.json")))
     missing = [file for file in files if not os.path.exists(file)]
     if missing:
-        return Check(
+        return DoctorCheck(
             "vulkan drivers",
             False,
             f"no such file: {', '.join(missing)}",
             "correct or unset VK_DRIVER_FILES",
         )
     if not files:
-        return Check("vulkan drivers", False, "no driver description found", INSTALL_HINT)
-    return Check("vulkan drivers", True, ", ".join(files))
+        return DoctorCheck("vulkan drivers", False, "no driver description found", INSTALL_HINT)
+    return DoctorCheck("vulkan drivers", True, ", ".join(files))
 
 
-def _try_culling(device: hizvk.Device, reversed_z: bool) -> Check:
+def _try_culling(device: hizvk.Device, reversed_z: bool) -> DoctorCheck:
     """A wall at depth 10 before three points: in front of it, behind it, and behind the camera."""
     name = f"cull ({'reversed' if reversed_z else 'standard'} depth)"
     camera = hizvk.Camera.look_at(
@@ -188,10 +192,10 @@ def _try_culling(device: hizvk.Device, reversed_z: bool) -> Check:
         pyramid = device.pyramid(wall, camera, kind="z")
         got = device.cull(device.instances(spheres), camera, pyramid).verdicts.tolist()
     except (hizvk.HizError, ValueError) as error:
-        return Check(name, False, str(error))
+        return DoctorCheck(name, False, str(error))
     expected = [hizvk.Verdict.VISIBLE, hizvk.Verdict.OCCLUDED, hizvk.Verdict.OUTSIDE]
     words = ", ".join(hizvk.Verdict(code).name.lower() for code in got)
-    return Check(
+    return DoctorCheck(
         name,
         got == expected,
         words,

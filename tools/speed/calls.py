@@ -15,7 +15,7 @@ from hizvk.bench.numpy_hiz import cull as numpy_cull
 from hizvk.bench.rays import Rays
 from hizvk.scenes import Scene, box_mesh, embree
 
-from .errors import Judge
+from .errors import OracleSample
 from .rounds import in_turns
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ SLOW_ROUNDS = 3
 
 
 def measure(run: Run) -> None:
-    """Measures calls of `Extent.calls` instances, 95 % hidden, and of `SMALL`."""
+    """Measures calls of `Workload.calls` instances, 95 % hidden, and of `SMALL`."""
     count = run.extent.calls
     run.step(f"calls of {count:,} and {SMALL:,} instances from Python")
     scene = run.town(count, 0.95)
@@ -151,7 +151,7 @@ def _others(run: Run, scene: Town, depth: DepthImage, pyramid: Pyramid) -> None:
         ms["numpy, pyramid"],
         ms["hizvk, reduction"],
     )
-    judge = Judge(run, scene.boxes, depth)
+    judge = OracleSample(run, scene.boxes, depth)
     judge.judge(
         "calls", "hizvk", run.device.cull(boxes, depth.camera, pyramid, outputs=["mask"]).mask
     )

@@ -16,7 +16,7 @@ from hizvk.commands.progress import Progress
 
 from . import calls, culling, first_call, memory, reduction, report, scale, transfers
 from .figures import Found
-from .run import EXTENTS, Run
+from .run import WORKLOADS, Run
 
 if TYPE_CHECKING:
     import argparse
@@ -78,7 +78,7 @@ def run(
         "see the nanoseconds per instance"
     )
     shown = Progress(len(parts), f"{PROG}, {extent}")
-    measured = Run(device, EXTENTS[extent], seed, found, shown.show)
+    measured = Run(device, WORKLOADS[extent], seed, found, shown.show)
     try:
         for part in parts:
             found.load += _load()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from hizvk.errors import LimitError, OutOfMemoryError
 
 from . import town
-from .errors import Judge
+from .errors import OracleSample
 from .rounds import in_turns
 from .run import MASK
 
@@ -64,7 +64,7 @@ def _ready(run: Run, scene: town.Town) -> tuple[DepthImage, Pyramid]:
 def _by_share(run: Run, hidden: float) -> None:
     scene = run.town(run.extent.crowd, hidden)
     depth, pyramid = _ready(run, scene)
-    judge = Judge(run, scene.boxes, depth)
+    judge = OracleSample(run, scene.boxes, depth)
     boxes = run.device.instances(scene.boxes)
     name = f"{100 * hidden:.0f} % hidden"
     culls = {

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
     from .run import Run
 
-__all__ = ["Judge"]
+__all__ = ["OracleSample"]
 
 
-class Judge:
+class OracleSample:
     """The oracle's verdicts on a sample of instances before one depth image.
 
     Parameters

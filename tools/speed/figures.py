@@ -116,7 +116,7 @@ class ImageSize:
     memcpy_ms: float
     reduce_ms: float
     groups_ms: float
-    """The cull of `Extent.calls` instances with groups."""
+    """The cull of `Workload.calls` instances with groups."""
     device_bytes: int
     """Of the pyramid and the image."""
     texels: float

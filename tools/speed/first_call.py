@@ -30,7 +30,7 @@ CHILD: Final = Path(__file__).with_name("first_mask.py")
 
 
 def measure(run: Run) -> None:
-    """Measures `Extent.calls` boxes, which is enough for the cull with groups."""
+    """Measures `Workload.calls` boxes, which is enough for the cull with groups."""
     if run.extent.processes == 0:
         run.found.notes.append("the first calls of fresh processes were left out")
         return

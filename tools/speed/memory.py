@@ -25,7 +25,7 @@ ROOT: Final = Path(__file__).resolve().parents[2]
 
 
 def measure(run: Run) -> None:
-    """Measures `Extent.crowd` boxes with the first depth image."""
+    """Measures `Workload.crowd` boxes with the first depth image."""
     run.step("memory")
     _device(run)
     _host(run)

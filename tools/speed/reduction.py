@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from .errors import Judge
+from .errors import OracleSample
 from .rounds import in_turns
 from .run import ALL_LEVELS
 
@@ -99,7 +99,7 @@ def _errors(run: Run) -> None:
     scene = run.town(run.extent.calls, 0.5)
     depth = run.depth(scene, run.extent.images[0][1])
     crowd = run.device.instances(scene.boxes)
-    judge = Judge(run, scene.boxes, depth)
+    judge = OracleSample(run, scene.boxes, depth)
     for choice, levels in CHOICES.items():
         pyramid = run.device.pyramid(depth, levels=levels)
         judge.judge(

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from .figures import Found
 
-__all__ = ["ALL_LEVELS", "EXTENTS", "MASK", "Extent", "Run"]
+__all__ = ["ALL_LEVELS", "MASK", "WORKLOADS", "Run", "Workload"]
 
 #: Levels as `_core` takes them.
 ALL_LEVELS: Final = (1, 15)
@@ -29,7 +29,7 @@ MASK: Final = (True, False, False, False)
 
 
 @dataclass(frozen=True)
-class Extent:
+class Workload:
     """How much is measured."""
 
     images: tuple[tuple[str, Size], ...]
@@ -58,8 +58,8 @@ _COUNTS: Final = (1_000, 10_000, 100_000, 1_000_000, 4_000_000)
 _MORE_COUNTS: Final = (8_000_000, 10_000_000, 16_000_000, 32_000_000, 50_000_000)
 _SIDES: Final = (256, 512, 1024, 2048, 4096)
 
-EXTENTS: Final = {
-    "quick": Extent(
+WORKLOADS: Final = {
+    "quick": Workload(
         images=(HD,),
         crowd=100_000,
         calls=100_000,
@@ -70,7 +70,7 @@ EXTENTS: Final = {
         sides=_SIDES[:2],
         large=None,
     ),
-    "default": Extent(
+    "default": Workload(
         images=(HD, UHD),
         crowd=1_000_000,
         calls=100_000,
@@ -81,7 +81,7 @@ EXTENTS: Final = {
         sides=_SIDES,
         large=16_000_000,
     ),
-    "full": Extent(
+    "full": Workload(
         images=(HD, UHD),
         crowd=1_000_000,
         calls=100_000,
@@ -100,7 +100,7 @@ class Run:
     """One run."""
 
     device: Device
-    extent: Extent
+    extent: Workload
     seed: int
     found: Found
     step: Callable[[str], None]

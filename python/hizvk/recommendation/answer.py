@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from .candidate import Candidate
-    from .checking import Check
+    from .checking import CheckedCandidates
 
 __all__ = ["Recommendation", "notes_on"]
 
@@ -61,7 +61,7 @@ class Recommendation:
 def notes_on(
     candidates: Sequence[Candidate],
     best: Candidate,
-    check: Check,
+    check: CheckedCandidates,
     *,
     coverage: str,
     points: bool,

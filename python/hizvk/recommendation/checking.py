@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from ..measuring.configuration import Configuration
     from ..resources import Occluders
 
-__all__ = ["Check", "Judge", "by_oracle", "by_rays", "hold"]
+__all__ = ["CheckedCandidates", "Judge", "by_oracle", "by_rays", "hold"]
 
 Mask: TypeAlias = npt.NDArray[np.bool_]
 Indices: TypeAlias = npt.NDArray[np.intp]
@@ -62,7 +62,7 @@ class Judge:
 
 
 @dataclass(eq=False)
-class Check:
+class CheckedCandidates:
     """What was looked at, and what was found."""
 
     method: str
@@ -138,7 +138,7 @@ def hold(
     judge: Judge,
     *,
     every_ray: bool,
-) -> Check:
+) -> CheckedCandidates:
     """Compares every candidate with what is visible.
 
     Parameters
@@ -159,7 +159,7 @@ def hold(
         visible.
         Such points lie on what the image shows, and it knows the depth only at its pixels' centres.
     """
-    found = Check(judge.method, [0] * len(chosen), [0] * len(chosen))
+    found = CheckedCandidates(judge.method, [0] * len(chosen), [0] * len(chosen))
     random = np.random.default_rng(0)
     for volume, bounds in alternatives.items():
         members = [number for number, one in enumerate(chosen) if one.volume == volume]
