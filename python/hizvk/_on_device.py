@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from . import _core
+    from ._core import Engine as CoreEngine
     from .adapter import Adapter
 
 __all__ = ["Allocated", "Maker", "OnDevice", "check_owner"]
@@ -19,7 +19,7 @@ class Maker(Protocol):
     `Device` returns instances, depth images and results, so their modules cannot import it.
     """
 
-    _engine: _core.Engine
+    _engine: CoreEngine
 
     @property
     def adapter(self) -> Adapter: ...

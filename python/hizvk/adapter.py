@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from . import _core
+from ._core import adapters as found_adapters
 from ._processes import driver_is_asked
 
 __all__ = ["Adapter", "adapters"]
@@ -35,4 +35,4 @@ class Adapter:
 def adapters() -> list[Adapter]:
     """The Vulkan adapters of this machine; an empty list without a Vulkan driver."""
     with driver_is_asked():
-        return [Adapter(*summary) for summary in _core.adapters()]
+        return [Adapter(*summary) for summary in found_adapters()]

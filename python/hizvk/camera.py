@@ -17,7 +17,9 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from . import _arguments, _camera_arguments, _core
+from . import _arguments, _camera_arguments
+from ._core import Camera as CoreCamera
+from ._core import frustum_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -55,7 +57,7 @@ class Camera:
 
     __slots__ = ("_inner", "_recipe")
 
-    _inner: _core.Camera
+    _inner: CoreCamera
     _recipe: tuple[str, tuple[tuple[str, Any], ...]]
 
     def __init__(self) -> None:
@@ -65,7 +67,7 @@ class Camera:
         )
 
     @classmethod
-    def _made(cls, inner: _core.Camera, name: str, **arguments: Any) -> Self:
+    def _made(cls, inner: CoreCamera, name: str, **arguments: Any) -> Self:
         """The camera around `inner`, and the call that makes it again (for `repr` and pickle)."""
         camera = cls.__new__(cls)
         object.__setattr__(camera, "_inner", inner)
@@ -85,8 +87,8 @@ class Camera:
         """The camera of a projection and a pose; constructor `name` takes `seen` and `image`."""
         direction, matrix = pose
         make = {
-            "camera_from_world": _core.Camera.from_clip_from_camera,
-            "world_from_camera": _core.Camera.from_clip_from_camera_pose,
+            "camera_from_world": CoreCamera.from_clip_from_camera,
+            "world_from_camera": CoreCamera.from_clip_from_camera_pose,
         }[direction]
         inner = make(clip_from_camera.tolist(), matrix.tolist(), reversed_z, image["size"])
         return cls._made(inner, name, **seen, **{direction: matrix}, **image)
@@ -137,7 +139,7 @@ class Camera:
         view = _camera_arguments.view(eye, target, up)
         fov_y_deg = _arguments.number("fov_y_deg", fov_y_deg, above=0.0, below=180.0)
         image = _camera_arguments.perspective_image(size, near, far, reversed_z)
-        inner = _core.Camera.perspective(**view, fov_y=math.radians(fov_y_deg), **image)
+        inner = CoreCamera.perspective(**view, fov_y=math.radians(fov_y_deg), **image)
         return cls._made(inner, "look_at", **view, fov_y_deg=fov_y_deg, **image)
 
     @classmethod
@@ -181,7 +183,7 @@ class Camera:
         bottom = _arguments.number("bottom", bottom)
         top = _arguments.number("top", top, above=bottom)
         image = _camera_arguments.perspective_image(size, near, far, reversed_z)
-        inner = _core.Camera.frustum(**view, borders=(left, right, bottom, top), **image)
+        inner = CoreCamera.frustum(**view, borders=(left, right, bottom, top), **image)
         borders = {"left": left, "right": right, "bottom": bottom, "top": top}
         return cls._made(inner, "frustum", **view, **borders, **image)
 
@@ -233,7 +235,7 @@ class Camera:
         reversed_z = _arguments.flag("reversed_z", reversed_z)
         borders = (-0.5 * width, 0.5 * width, -0.5 * height, 0.5 * height)
         image: Image = {"size": size, "near": near, "far": far, "reversed_z": reversed_z}
-        inner = _core.Camera.orthographic(
+        inner = CoreCamera.orthographic(
             **view, borders=borders, near=near, far=far, reversed_z=reversed_z, size=size
         )
         return cls._made(inner, "orthographic", **view, height=height, width=width, **image)
@@ -528,7 +530,7 @@ class Camera:
                     "got both"
                 )
             clip = _arguments.matrix("clip_from_world", clip_from_world)
-            inner = _core.Camera.from_clip_from_world(clip.tolist(), reversed_z, size)
+            inner = CoreCamera.from_clip_from_world(clip.tolist(), reversed_z, size)
             return cls._made(inner, "from_matrices", clip_from_world=clip, **image)
         if clip_from_camera is None:
             raise ValueError(
@@ -628,7 +630,7 @@ _FORWARD_FROM_OPENGL = np.diag([1.0, 1.0, -1.0, 1.0])
 
 def _frustum(borders: tuple[float, float, float, float], image: Image) -> npt.NDArray[np.float64]:
     """``clip_from_camera`` for axes with y up that look along +z."""
-    matrix = _core.frustum_matrix(
+    matrix = frustum_matrix(
         borders, image["near"], image["far"], image["reversed_z"], image["size"]
     )
     return np.array(matrix)

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from . import _arguments, _core
+from . import _arguments
+from ._core import Engine as CoreEngine
 from ._on_device import check_owner
 from ._processes import driver_is_asked
 from ._types import FaceCull, StoredOrder, words
@@ -96,7 +97,7 @@ class Device:
         if not isinstance(adapter, (str, type(None))):
             adapter = str(_arguments.integer("adapter", adapter, low=0, high=2**31 - 1))
         with driver_is_asked():
-            self._engine = _core.Engine(adapter)
+            self._engine = CoreEngine(adapter)
 
     @property
     def adapter(self) -> Adapter:

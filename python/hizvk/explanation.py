@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from . import _core
+    from ._core import Explanation as CoreExplanation
 
 __all__ = ["Explanation", "Verdict", "explanation_of"]
 
@@ -137,7 +137,7 @@ SHOWN_RUNS: Final = 12
 SHOWN_TEXELS: Final = 16
 
 
-def explanation_of(index: int, told: _core.Explanation) -> Explanation:
+def explanation_of(index: int, told: CoreExplanation) -> Explanation:
     """The explanation of instance `index`, from what the compiled module tells."""
     rectangle = None if told.rectangle is None else tuple(told.rectangle)
     texels = told.texels

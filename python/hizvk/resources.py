@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from . import _arguments, _core
+from . import _arguments
+from ._core import DepthImage as CoreDepthImage
+from ._core import Instances as CoreInstances
+from ._core import Occluders as CoreOccluders
+from ._core import Pyramid as CorePyramid
 from ._on_device import Allocated, OnDevice
 from .bounds import Bounds, are_points, as_arrays
 
@@ -20,10 +24,10 @@ if TYPE_CHECKING:
 __all__ = ["DepthImage", "Instances", "Occluders", "Pyramid"]
 
 
-class Instances(Allocated[_core.Instances]):
+class Instances(Allocated[CoreInstances]):
     """Bounds on the device, ready to be tested; made by `Device.instances`."""
 
-    def __init__(self, device: Maker, inner: _core.Instances, *, points: bool) -> None:
+    def __init__(self, device: Maker, inner: CoreInstances, *, points: bool) -> None:
         super().__init__(device, inner)
         self._points = points
 
@@ -117,7 +121,7 @@ class Instances(Allocated[_core.Instances]):
         return f": {len(self)} {self.kind}"
 
 
-class Occluders(Allocated[_core.Occluders]):
+class Occluders(Allocated[CoreOccluders]):
     """Triangle meshes on the device, ready to be rendered; made by `Device.occluders`."""
 
     @property
@@ -160,10 +164,10 @@ class _Seen:
         return self._camera.size
 
 
-class DepthImage(_Seen, OnDevice[_core.DepthImage]):
+class DepthImage(_Seen, OnDevice[CoreDepthImage]):
     """A depth image on the device; made by `Device.render_depth`."""
 
-    def __init__(self, device: Maker, inner: _core.DepthImage, camera: Camera) -> None:
+    def __init__(self, device: Maker, inner: CoreDepthImage, camera: Camera) -> None:
         super().__init__(device, inner)
         self._camera = camera
 
@@ -180,14 +184,14 @@ class DepthImage(_Seen, OnDevice[_core.DepthImage]):
         return f" {self.size[0]}x{self.size[1]} of kind {self.kind}"
 
 
-class Pyramid(_Seen, Allocated[_core.Pyramid]):
+class Pyramid(_Seen, Allocated[CorePyramid]):
     """A depth pyramid on the device; made by `Device.pyramid`.
 
     On level ``k`` a texel holds the farthest depth of a block of ``2^k x 2^k`` pixels.
     """
 
     def __init__(
-        self, device: Maker, inner: _core.Pyramid, camera: Camera, *, is_rendered: bool = False
+        self, device: Maker, inner: CorePyramid, camera: Camera, *, is_rendered: bool = False
     ) -> None:
         super().__init__(device, inner)
         self._camera = camera

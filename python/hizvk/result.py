@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _arguments, _core
+from . import _arguments
+from ._core import Counts as CoreCounts
+from ._core import Culling as CoreCulling
 from ._on_device import OnDevice
 from ._processes import cached_property
 from .explanation import explanation_of
@@ -71,13 +73,13 @@ def _shared(array: npt.NDArray[np.generic]) -> Any:
     return shared
 
 
-class CullResult(OnDevice[_core.Culling]):
+class CullResult(OnDevice[CoreCulling]):
     """The answer of `Device.cull`; reading any part of it waits for the device.
 
     It is made by `Device.cull` alone, and may be read from any thread.
     """
 
-    def __init__(self, device: Maker, culling: _core.Culling, question: Question) -> None:
+    def __init__(self, device: Maker, culling: CoreCulling, question: Question) -> None:
         super().__init__(device, culling)
         self._question = question
 
@@ -112,7 +114,7 @@ class CullResult(OnDevice[_core.Culling]):
         return np.frombuffer(self._inner.draws(), dtype=DRAW_DTYPE)
 
     @cached_property
-    def _counts(self) -> _core.Counts:
+    def _counts(self) -> CoreCounts:
         return self._inner.counts()
 
     @cached_property

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from .. import _core
+from .._core import check_bounds as outside_of_bounds
+from .._core import check_proxy as outside_of_mesh
 from ..bounds import Bounds, as_arrays
 from ..mesh import A_MESH, as_mesh, meshes_of
 
@@ -117,7 +118,7 @@ def check_proxy(
     >>> hizvk.check_proxy(proxy, mesh).inside
     True
     """
-    found = _core.check_proxy(_unplaced("proxy", proxy), _unplaced("mesh", mesh))
+    found = outside_of_mesh(_unplaced("proxy", proxy), _unplaced("mesh", mesh))
     triangles, witnesses, vertices, protrusion = found
     return ProxyCheck(
         inside=not triangles,
@@ -173,7 +174,7 @@ def check_bounds(
             f"meshes: expected one for each of the {len(bounds)} bounds, got {len(instances)}"
         )
     stacked = np.stack(matrices) if matrices else np.empty((0, 4, 4))
-    outside = _core.check_bounds(kind, arrays, pairs, np.ascontiguousarray(stacked), instances)
+    outside = outside_of_bounds(kind, arrays, pairs, np.ascontiguousarray(stacked), instances)
     offenders = np.flatnonzero(outside >= 0.0)
     return BoundsCheck(
         contained=outside < 0.0,

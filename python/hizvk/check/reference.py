@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from .. import _arguments, _core
+from .. import _arguments
+from .._core import reference_classify, reference_pyramid
 from .._types import Coverage, OwnDepth, words
 from ..bounds import Bounds, as_arrays
 from ..camera import Camera
@@ -88,7 +89,7 @@ def classify(
     )
     # The image as given: the tolerance for half floats is not part of the truth.
     image = (checked.image, checked.kind, checked.scale, checked.invalid)
-    return _core.reference_classify(bounds_kind, arrays, camera._inner, *image, *asked)
+    return reference_classify(bounds_kind, arrays, camera._inner, *image, *asked)
 
 
 def pyramid(depth: npt.ArrayLike, *, reversed_z: bool) -> list[npt.NDArray[np.float32]]:
@@ -117,5 +118,5 @@ def pyramid(depth: npt.ArrayLike, *, reversed_z: bool) -> list[npt.NDArray[np.fl
     reversed_z = _arguments.flag("reversed_z", reversed_z)
     height, width = image.shape
     flat = np.ascontiguousarray(image, dtype=np.float32).reshape(-1)
-    levels = _core.reference_pyramid(flat, width, height, reversed_z)
+    levels = reference_pyramid(flat, width, height, reversed_z)
     return [texels.reshape(size) for size, texels in levels]
