@@ -254,3 +254,24 @@ fn toward_far_by(d: f64, lost: f64, reversed: bool) -> f32 {
     let inside = if reversed { nearest <= 1.0 } else { nearest >= 0.0 };
     toward_far(if inside { farthest } else { f64::NAN }, reversed)
 }
+
+/// Cameras for the unit tests of depth in either direction.
+#[cfg(test)]
+pub(super) mod test_cameras {
+    use crate::input::camera::Camera;
+    use crate::input::image::{DepthConvention, ImageSize};
+    use crate::input::projection::{Pose, Projection};
+
+    pub(in crate::input) const POSE: Pose =
+        Pose { eye: [1.0, 2.0, 3.0], target: [1.0, 2.0, -7.0], up: [0.0, 1.0, 0.0] };
+
+    pub(in crate::input) fn perspective(convention: DepthConvention) -> Camera {
+        let projection = Projection::Perspective {
+            fov_y: std::f64::consts::FRAC_PI_2,
+            near: 1.0,
+            far: Some(9.0),
+            convention,
+        };
+        Camera::look_at(&POSE, &projection, ImageSize::new(2, 2)).unwrap()
+    }
+}

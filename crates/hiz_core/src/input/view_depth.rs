@@ -67,19 +67,8 @@ impl ViewDepth {
 mod tests {
     use super::*;
     use crate::input::image::{DepthConvention, ImageSize};
-    use crate::input::projection::{Pose, Projection};
-
-    const POSE: Pose = Pose { eye: [1.0, 2.0, 3.0], target: [1.0, 2.0, -7.0], up: [0.0, 1.0, 0.0] };
-
-    fn perspective(convention: DepthConvention) -> Camera {
-        let projection = Projection::Perspective {
-            fov_y: std::f64::consts::FRAC_PI_2,
-            near: 1.0,
-            far: Some(9.0),
-            convention,
-        };
-        Camera::look_at(&POSE, &projection, ImageSize::new(2, 2)).unwrap()
-    }
+    use crate::input::lens::test_cameras::{POSE, perspective};
+    use crate::input::projection::Projection;
 
     /// View depth from NDC depth and from w, at depths that are worked out by hand.
     #[test]
