@@ -1,7 +1,7 @@
-//! Locks, and work that is split between two threads.
+//! Locks, and work that is split between threads.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::thread::{Builder, scope};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::thread::{Builder, available_parallelism, scope};
 
 use crate::error::Result;
 
@@ -20,6 +20,41 @@ impl<T> Locked<T> {
     pub(crate) fn lock(&self) -> MutexGuard<'_, T> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+#[allow(dead_code, reason = "the rasteriser on the host is being built on it")]
+/// How many threads this process may run at once; asked of the system once.
+pub(crate) fn cores() -> usize {
+    static CORES: OnceLock<usize> = OnceLock::new();
+    *CORES.get_or_init(|| available_parallelism().map_or(1, usize::from))
+}
+
+#[allow(dead_code, reason = "the rasteriser on the host is being built on it")]
+/// Runs `work` on every part, on at most `threads` threads; this one is the first of them.
+///
+/// The parts are handed out in their order, each to the next thread that is free.
+/// So more parts than threads even out parts of unequal size.
+/// Where no thread can be spawned, fewer do the work.
+pub(crate) fn on_threads<T: Send>(
+    threads: usize,
+    parts: impl IntoIterator<Item = T, IntoIter: Send>,
+    work: impl Fn(T) + Sync,
+) {
+    let waiting = Locked::new(parts.into_iter());
+    let next = || waiting.lock().next();
+    let run = || {
+        while let Some(part) = next() {
+            work(part);
+        }
+    };
+    scope(|scope| {
+        let helpers: Vec<_> =
+            (1..threads).map_while(|_| Builder::new().spawn_scoped(scope, run).ok()).collect();
+        run();
+        for helper in helpers {
+            helper.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        }
+    });
 }
 
 /// Runs `work` on both halves of a job at the same time.
@@ -54,6 +89,18 @@ pub(crate) fn on_two_threads<T: Send>(
 mod tests {
     use super::*;
     use crate::error::Error;
+
+    #[test]
+    fn every_part_is_done_once_on_any_number_of_threads() {
+        for threads in [1, 2, 5] {
+            let mut numbers = [0; 37];
+            on_threads(threads, numbers.chunks_mut(5), |part| {
+                part.iter_mut().for_each(|n| *n += 1)
+            });
+            assert_eq!(numbers, [1; 37]);
+        }
+        on_threads(cores(), std::iter::empty::<usize>(), |_| unreachable!());
+    }
 
     #[test]
     fn both_halves_are_done_and_either_error_comes_back() {
