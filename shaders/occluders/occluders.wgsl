@@ -1,25 +1,28 @@
 // The occluder pass, which draws depth only.
-// A vertex is two float32 halves of its world position.
+// A vertex is two float32 halves of its position in the space of its mesh.
 // The eye is subtracted half by half before anything is rounded.
 // So a wall a million metres from the origin does not tremble.
 
-// Twin: `OccluderView` in `crates/hiz_core/src/occluders/raster.rs`.
-struct OccluderView {
-    // The rows of clip space relative to the reference point, with w near 1.
-    clip_from_eye: array<vec4<f32>, 4>,
-    // The reference point is exactly eye_hi + eye_lo.
-    eye_hi: vec4<f32>,
-    eye_lo: vec4<f32>,
+struct Vertex {
+    @location(0) hi: vec3<f32>,
+    @location(1) lo: vec3<f32>,
 }
 
-@group(0) @binding(0) var<uniform> view: OccluderView;
+// One copy of a mesh: the rows of clip space about the eye, in the mesh's space, with w near 1.
+// Twin: `CopyRecord` in `crates/hiz_core/src/occluders/device_raster.rs`.
+struct Copy {
+    @location(2) clip_x: vec4<f32>,
+    @location(3) clip_y: vec4<f32>,
+    @location(4) clip_z: vec4<f32>,
+    @location(5) clip_w: vec4<f32>,
+    // The eye is exactly eye_hi + eye_lo.
+    @location(6) eye_hi: vec3<f32>,
+    @location(7) eye_lo: vec3<f32>,
+}
 
 @vertex
-fn occluder_vertex(
-    @location(0) hi: vec3<f32>, @location(1) lo: vec3<f32>,
-) -> @invariant @builtin(position) vec4<f32> {
-    let d = vec4<f32>((hi - view.eye_hi.xyz) + (lo - view.eye_lo.xyz), 1.0);
+fn occluder_vertex(vertex: Vertex, copy: Copy) -> @invariant @builtin(position) vec4<f32> {
+    let d = vec4<f32>((vertex.hi - copy.eye_hi) + (vertex.lo - copy.eye_lo), 1.0);
     return vec4<f32>(
-        dot(view.clip_from_eye[0], d), dot(view.clip_from_eye[1], d),
-        dot(view.clip_from_eye[2], d), dot(view.clip_from_eye[3], d));
+        dot(copy.clip_x, d), dot(copy.clip_y, d), dot(copy.clip_z, d), dot(copy.clip_w, d));
 }

@@ -18,7 +18,7 @@ use crate::input::tolerance::DepthTolerance;
 use crate::instances::piece::CULL_WORKGROUP;
 use crate::instances::update::record_update;
 use crate::instances::{InstanceOptions, Instances};
-use crate::occluders::raster::record_occluders;
+use crate::occluders::device_raster::record_occluders;
 use crate::occluders::{OccluderOptions, Occluders};
 use crate::output::outputs::Outputs;
 use crate::output::visible::Visible;

@@ -182,7 +182,7 @@ pub use input::tolerance::DepthTolerance;
 pub use input::view::ERROR_ULPS;
 pub use instances::order::StoredOrder;
 pub use instances::{InstanceOptions, Instances};
-pub use occluders::raster::OCCLUDER_DEPTH_FORMAT;
+pub use occluders::device_raster::OCCLUDER_DEPTH_FORMAT;
 pub use occluders::surface::{ConservativeDepthOptions, OccluderSurface};
 pub use occluders::{OccluderOptions, Occluders};
 pub use output::draw::{DrawIndexedIndirect, DrawTemplate};

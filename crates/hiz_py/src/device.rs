@@ -297,8 +297,9 @@ impl Occluders {
             FaceCull::Back => "back",
             FaceCull::Front => "front",
         };
-        let positions = PyArray1::from_slice(py, surface.positions().as_flattened());
-        Ok((positions, PyArray1::from_slice(py, surface.triangles().as_flattened()), faces))
+        let (positions, triangles) = surface.world();
+        let positions = PyArray1::from_slice(py, positions.as_flattened());
+        Ok((positions, PyArray1::from_slice(py, triangles.as_flattened()), faces))
     }
 
     fn num_triangles(&self, py: Python<'_>) -> PyResult<u64> {

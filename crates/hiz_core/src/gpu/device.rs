@@ -159,11 +159,7 @@ impl Gpu {
                         module: &self.shader_module(label, source),
                         entry_point: Some(entry_point),
                         compilation_options: wgpu::PipelineCompilationOptions::default(),
-                        buffers: &[Some(wgpu::VertexBufferLayout {
-                            array_stride: state.stride,
-                            step_mode: wgpu::VertexStepMode::Vertex,
-                            attributes: state.attributes,
-                        })],
+                        buffers: &state.buffers.iter().cloned().map(Some).collect::<Vec<_>>(),
                     },
                     primitive: wgpu::PrimitiveState {
                         front_face: wgpu::FrontFace::Ccw,

@@ -40,9 +40,8 @@ pub(crate) struct DepthState {
     pub(crate) compare: wgpu::CompareFunction,
     /// Faces that are not drawn; the corners of a front face run counter-clockwise.
     pub(crate) cull_mode: Option<wgpu::Face>,
-    /// Bytes from one vertex to the next.
-    pub(crate) stride: u64,
-    pub(crate) attributes: &'static [wgpu::VertexAttribute],
+    /// The vertex buffers, in the order of their slots.
+    pub(crate) buffers: &'static [wgpu::VertexBufferLayout<'static>],
 }
 
 /// 1 for true and 0 for false: the value of a WGSL `override` constant.

@@ -9,7 +9,7 @@ use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
 use crate::input::tolerance::DepthTolerance;
 use crate::occluders::Occluders;
-use crate::occluders::raster::OCCLUDER_DEPTH_FORMAT;
+use crate::occluders::device_raster::OCCLUDER_DEPTH_FORMAT;
 use crate::occluders::surface::ConservativeDepthOptions;
 
 /// Bytes of an upload's staging buffer at most.

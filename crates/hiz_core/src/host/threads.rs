@@ -95,7 +95,7 @@ mod tests {
         for threads in [1, 2, 5] {
             let mut numbers = [0; 37];
             on_threads(threads, numbers.chunks_mut(5), |part| {
-                part.iter_mut().for_each(|n| *n += 1)
+                part.iter_mut().for_each(|n| *n += 1);
             });
             assert_eq!(numbers, [1; 37]);
         }

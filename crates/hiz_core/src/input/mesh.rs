@@ -50,10 +50,15 @@ impl FaceCull {
             lin(2)
         };
         let mirrored = dot(cross(x, y), forward) > 0.0;
-        match (self, mirrored) {
-            (Self::Back, true) => Self::Front,
-            (Self::Front, true) => Self::Back,
-            (as_it_is, _) => as_it_is,
+        if mirrored { self.reversed() } else { self }
+    }
+
+    /// The other faces.
+    pub(crate) fn reversed(self) -> Self {
+        match self {
+            Self::None => Self::None,
+            Self::Back => Self::Front,
+            Self::Front => Self::Back,
         }
     }
 }

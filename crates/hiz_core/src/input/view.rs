@@ -128,28 +128,15 @@ impl ViewRows {
     }
 }
 
-/// The clip-space rows about the reference point, for a vertex shader.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ClipRows {
-    pub(crate) rows: [[f32; 4]; 4],
-    pub(crate) eye_hi: [f32; 3],
-    pub(crate) eye_lo: [f32; 3],
-}
-
-impl ClipRows {
-    /// Rounds the rows of `camera` to float32, scaled so that w is near 1.
-    ///
-    /// # Errors
-    /// As [`ViewRows::new`].
-    pub(crate) fn new(camera: &Camera) -> Result<Self> {
-        // A camera that the cull refuses is not worth drawing with, so both refuse the same ones.
-        ViewRows::new(camera, 0.0)?;
-        let Reference { hi: eye_hi, lo: eye_lo, point: eye, .. } = Reference::of(camera);
-        let rows = camera
-            .rows_near_one()
-            .map(|row| Affine::about(eye, row, camera.origin()).rounded(0.0).m);
-        Ok(Self { rows, eye_hi, eye_lo })
-    }
+/// The point that the float32 rows of `camera` are relative to, for those who draw with it.
+///
+/// It is the sum of two float32 vectors, without rounding.
+///
+/// # Errors
+/// As [`ViewRows::new`]: a camera that the cull refuses is not worth drawing with.
+pub(crate) fn reference_point(camera: &Camera) -> Result<Vec3> {
+    ViewRows::new(camera, 0.0)?;
+    Ok(Reference::of(camera).point)
 }
 
 /// The point that a camera's float32 rows are relative to.

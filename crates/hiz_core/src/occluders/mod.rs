@@ -1,20 +1,31 @@
 //! Occluders: triangle meshes that hide other things.
 //!
-//! They exist twice, made from the same vertices (`bake`):
+//! The data goes through these files:
 //!
-//! - on the device, where `raster` draws them as depth;
-//! - on the host in float64, where `surface` computes conservative depth from them.
+//! 1. `shapes` checks meshes and cuts them into `meshlets`, each mesh in its own space.
+//!    `placement` says where the copies of a mesh stand.
+//! 2. `view` is a camera in the space of a copy.
+//! 3. `device_raster` draws the meshes as depth on the device.
+//! 4. `surface` computes conservative depth from them, on the host in float64.
 //!
 //! The drawing is recorded into the caller's encoder; nothing here submits or reads back.
 
-mod bake;
-pub(crate) mod raster;
+pub(crate) mod device_raster;
+mod meshlets;
+mod placement;
+mod shapes;
 pub(crate) mod surface;
+mod view;
 
-use crate::error::{Error, Result};
+use std::sync::Arc;
+
+use crate::error::Result;
 use crate::gpu::device::{ContextId, Gpu};
+use crate::input::bounds::Floats;
 use crate::input::mesh::{FaceCull, MeshData};
-use crate::occluders::bake::{Baked, Part};
+use crate::occluders::device_raster::DeviceMeshes;
+use crate::occluders::placement::Placement;
+use crate::occluders::shapes::Shapes;
 use crate::occluders::surface::OccluderSurface;
 
 /// How occluders are drawn.
@@ -24,9 +35,9 @@ pub struct OccluderOptions {
     pub cull_mode: FaceCull,
 }
 
-/// Triangle meshes on the device, in world coordinates.
+/// Triangle meshes on the device, and the places where they stand.
 ///
-/// Each mesh is stored once per transform, 24 bytes per vertex and 4 bytes per index.
+/// Each mesh is stored once, 24 bytes per vertex and 12 bytes per triangle.
 ///
 /// # Examples
 /// ```
@@ -60,20 +71,8 @@ pub struct OccluderOptions {
 #[derive(Debug)]
 pub struct Occluders {
     pub(crate) context: ContextId,
-    vertices: wgpu::Buffer,
-    indices: wgpu::Buffer,
-    parts: Vec<Part>,
-    cull_mode: FaceCull,
-    triangles: u64,
+    on_device: DeviceMeshes,
     surface: OccluderSurface,
-}
-
-impl OccluderSurface {
-    /// The surface of `meshes`, made without a device.
-    pub fn from_meshes(meshes: &[MeshData<'_>], options: &OccluderOptions) -> Result<Self> {
-        let baked = Baked::all(meshes)?;
-        Ok(Self::new(baked.world, baked.triangles, options.cull_mode))
-    }
 }
 
 impl Occluders {
@@ -82,35 +81,9 @@ impl Occluders {
         meshes: &[MeshData<'_>],
         options: &OccluderOptions,
     ) -> Result<Self> {
-        let baked = Baked::all(meshes)?;
-        let allowed = gpu.limits().max_buffer_size;
-        for bytes in [size_of_val(&baked.vertices[..]), size_of_val(&baked.indices[..])] {
-            if bytes as u64 > allowed {
-                return Err(Error::limit("max_buffer_size", bytes as u64, allowed));
-            }
-        }
-        let buffer = |label, contents: &[u8], usage| {
-            // A vertex or index buffer may not be empty.
-            let contents = if contents.is_empty() { &[0; 24][..] } else { contents };
-            gpu.filled(label, contents, usage)
-        };
-        Ok(Self {
-            context: gpu.id(),
-            vertices: buffer(
-                "hiz.occluders.vertices",
-                bytemuck::cast_slice(&baked.vertices),
-                wgpu::BufferUsages::VERTEX,
-            )?,
-            indices: buffer(
-                "hiz.occluders.indices",
-                bytemuck::cast_slice(&baked.indices),
-                wgpu::BufferUsages::INDEX,
-            )?,
-            triangles: (baked.indices.len() / 3) as u64,
-            parts: baked.parts,
-            cull_mode: options.cull_mode,
-            surface: OccluderSurface::new(baked.world, baked.triangles, options.cull_mode),
-        })
+        let surface = OccluderSurface::from_meshes(meshes, options)?;
+        let on_device = DeviceMeshes::new(gpu, surface.shapes())?;
+        Ok(Self { context: gpu.id(), on_device, surface })
     }
 
     /// The triangles on the host, from which conservative depth is computed.
@@ -118,18 +91,41 @@ impl Occluders {
         &self.surface
     }
 
-    /// The number of triangles, counted once per transform of their mesh.
-    pub fn num_triangles(&self) -> u64 {
-        self.triangles
+    /// Lets mesh `mesh` (in the order of the upload) stand at other places from now on.
+    ///
+    /// `transforms` are as in [`MeshData::transforms`]; their number may be another one, and 0.
+    /// What was recorded before is drawn where the mesh stood then.
+    /// A move costs its matrices alone: vertices, triangles and what was made of them stay.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`](crate::Error::Invalid) for a mesh that does not exist and for unusable
+    /// transforms.
+    /// Nothing has moved then.
+    pub fn move_mesh(&self, mesh: usize, transforms: Option<Floats<'_>>) -> Result<()> {
+        self.surface.move_mesh(mesh, transforms)
     }
 
-    /// The number of meshes, counted once per transform; meshes without triangles do not count.
+    /// The number of triangles, counted once per transform of their mesh.
+    pub fn num_triangles(&self) -> u64 {
+        self.surface.num_triangles()
+    }
+
+    /// The number of copies: meshes, counted once per transform.
     pub fn num_parts(&self) -> usize {
-        self.parts.len()
+        self.placements().len()
     }
 
     /// Bytes on the device.
     pub fn device_bytes(&self) -> u64 {
-        self.vertices.size() + self.indices.size()
+        self.on_device.bytes()
+    }
+
+    fn shapes(&self) -> &Shapes {
+        self.surface.shapes()
+    }
+
+    /// Where the copies stand now.
+    fn placements(&self) -> Arc<Vec<Placement>> {
+        self.surface.placements()
     }
 }

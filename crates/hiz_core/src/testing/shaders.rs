@@ -8,7 +8,7 @@ use crate::gpu::depth_source::SOURCES;
 use crate::gpu::shader::{FILES, Source};
 use crate::input::bounds::BoundsKind;
 use crate::instances::update::update_module;
-use crate::occluders::raster::occluders_module;
+use crate::occluders::device_raster::occluders_module;
 use crate::output::compact::compact_module;
 use crate::pyramid::reduce::{blocks_module, coarse_module};
 #[cfg(feature = "yardstick")]

@@ -83,13 +83,17 @@ mod sheets;
 mod square;
 mod topology;
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
-use crate::error::Result;
-use crate::host::linear::Vec3;
+use crate::error::{Error, Result};
 use crate::host::rounding::round_up;
+use crate::host::threads::Locked;
+use crate::input::bounds::Floats;
 use crate::input::camera::Camera;
-use crate::input::mesh::FaceCull;
+use crate::input::mesh::{FaceCull, MeshData};
+use crate::occluders::OccluderOptions;
+use crate::occluders::placement::Placement;
+use crate::occluders::shapes::Shapes;
 use crate::occluders::surface::cells::Cells;
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
 use crate::occluders::surface::sheets::Sheets;
@@ -149,15 +153,70 @@ impl Default for ConservativeDepthOptions {
 /// ```
 #[derive(Debug)]
 pub struct OccluderSurface {
-    positions: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
+    shapes: Shapes,
+    placements: Locked<Arc<Vec<Placement>>>,
     cull_mode: FaceCull,
     topology: OnceLock<Result<Topology>>,
 }
 
 impl OccluderSurface {
-    pub(crate) fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, cull_mode: FaceCull) -> Self {
-        Self { positions, triangles, cull_mode, topology: OnceLock::new() }
+    /// The surface of `meshes`, made without a device.
+    ///
+    /// # Errors
+    /// Those of [`HizContext::create_occluders`](crate::HizContext::create_occluders), as far as
+    /// they do not concern a device.
+    pub fn from_meshes(meshes: &[MeshData<'_>], options: &OccluderOptions) -> Result<Self> {
+        let (shapes, placements) = Shapes::new(meshes)?;
+        let placements = Locked::new(Arc::new(placements));
+        Ok(Self { shapes, placements, cull_mode: options.cull_mode, topology: OnceLock::new() })
+    }
+
+    pub(super) fn shapes(&self) -> &Shapes {
+        &self.shapes
+    }
+
+    /// Where the copies stand now.
+    pub(super) fn placements(&self) -> Arc<Vec<Placement>> {
+        Arc::clone(&self.placements.lock())
+    }
+
+    /// Lets mesh `mesh` stand at other places from now on.
+    ///
+    /// See [`Occluders::move_mesh`](crate::Occluders::move_mesh).
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a mesh that does not exist and for unusable transforms.
+    pub fn move_mesh(&self, mesh: usize, transforms: Option<Floats<'_>>) -> Result<()> {
+        let meshes = self.shapes.meshes.len();
+        if mesh >= meshes {
+            return Err(Error::invalid(
+                "mesh",
+                format!("expected the number of one of the {meshes} meshes, got {mesh}"),
+            ));
+        }
+        let mut moved = Placement::of_mesh(&self.shapes, mesh as u32, transforms)?;
+        let mut placements = self.placements.lock();
+        let begin = placements.partition_point(|p| (p.mesh as usize) < mesh);
+        let end = placements.partition_point(|p| p.mesh as usize <= mesh);
+        for (i, placement) in moved.iter_mut().enumerate() {
+            // A copy that stays where it is keeps what was found out about it.
+            let before = placements[begin..end].get(i);
+            placement.moves = match before {
+                Some(before) if before.matrix == placement.matrix => before.moves,
+                Some(before) => before.moves + 1,
+                None => 1,
+            };
+        }
+        let mut all = placements.to_vec();
+        all.splice(begin..end, moved);
+        *placements = Arc::new(all);
+        Ok(())
+    }
+
+    /// The number of triangles, counted once per transform of their mesh.
+    pub fn num_triangles(&self) -> u64 {
+        let of_mesh = |p: &Placement| self.shapes.meshes[p.mesh as usize].triangles.len() as u64;
+        self.placements().iter().map(of_mesh).sum()
     }
 
     /// The NDC depth of these occluders, which holds for every larger image of the same view.
@@ -169,7 +228,7 @@ impl OccluderSurface {
     /// The proof, by sheets of neighbouring triangles, opens `occluders/surface/mod.rs`.
     ///
     /// # Errors
-    /// [`Error::Limit`](crate::Error::Limit) for more than 357 million triangles.
+    /// [`Error::Limit`] for more than 357 million triangles.
     pub fn conservative_depth(
         &self,
         camera: &Camera,
@@ -198,9 +257,22 @@ impl OccluderSurface {
         options: &ConservativeDepthOptions,
         fault: Planted,
     ) -> Result<Vec<f32>> {
-        let topology =
-            self.topology.get_or_init(|| Topology::new(&self.positions, &self.triangles));
-        let topology = topology.as_ref().map_err(Clone::clone)?;
+        let (positions, triangles);
+        let placements = self.placements();
+        let moved;
+        let topology = if placements.iter().all(|p| p.moves == 0) {
+            self.topology
+                .get_or_init(|| {
+                    let (positions, triangles) = self.world();
+                    Topology::new(&positions, &triangles)
+                })
+                .as_ref()
+                .map_err(Clone::clone)?
+        } else {
+            (positions, triangles) = self.world();
+            moved = Topology::new(&positions, &triangles)?;
+            &moved
+        };
         let convention = camera.convention();
         let culled = self.cull_mode.as_seen_by(camera);
         let cells = Cells::new(topology, camera, culled, fault);
@@ -219,16 +291,24 @@ impl OccluderSurface {
         Ok(far.into_iter().map(ndc).collect())
     }
 
-    /// World positions of the vertices, in the meshes' order, repeated for each transform.
-    pub fn positions(&self) -> &[[f64; 3]] {
-        &self.positions
-    }
-
-    /// Triangles as indices into [`positions`](Self::positions).
+    /// World positions of the vertices, and triangles as indices into them.
     ///
+    /// Vertices are in the meshes' order, repeated for each transform.
     /// The corners of a mirrored copy are reversed, so that front faces stay front faces.
-    pub fn triangles(&self) -> &[[u32; 3]] {
-        &self.triangles
+    pub fn world(&self) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+        let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+        for placement in self.placements().iter() {
+            let mesh = &self.shapes.meshes[placement.mesh as usize];
+            let moved = (positions.len() as u32).wrapping_sub(mesh.vertices.start);
+            let own = mesh.vertices.start as usize..mesh.vertices.end as usize;
+            positions.extend(self.shapes.positions[own].iter().map(|p| placement.world(*p)));
+            let own = mesh.triangles.start as usize..mesh.triangles.end as usize;
+            triangles.extend(self.shapes.triangles[own].iter().map(|t| {
+                let [a, b, c] = t.map(|v| v.wrapping_add(moved));
+                if placement.mirrored { [a, c, b] } else { [a, b, c] }
+            }));
+        }
+        (positions, triangles)
     }
 
     /// Which faces do not occlude.
@@ -239,7 +319,6 @@ impl OccluderSurface {
     /// Bytes on the host, including the topology once a conservative depth image was made.
     pub fn host_bytes(&self) -> u64 {
         let made = self.topology.get().and_then(|topology| topology.as_ref().ok());
-        (size_of_val(&self.positions[..]) + size_of_val(&self.triangles[..])) as u64
-            + made.map_or(0, Topology::bytes)
+        self.shapes.bytes() + made.map_or(0, Topology::bytes)
     }
 }

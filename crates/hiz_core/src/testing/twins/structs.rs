@@ -10,7 +10,6 @@ use crate::input::bounds::{Bounds, Floats};
 use crate::instances::SEQUENCE_BYTES;
 use crate::instances::piece::PieceUniform;
 use crate::instances::update::UpdateUniform;
-use crate::occluders::raster::OccluderView;
 use crate::output::counters::{CounterRecord, StatisticsRecord};
 use crate::output::draw::DrawIndexedIndirect;
 use crate::output::survivors::SurvivorsRecord;
@@ -25,6 +24,9 @@ use crate::yardstick::reduce as yardstick;
 /// Structs that only a shader has: they lie in no buffer.
 const SHADER_ONLY_STRUCTS: &[&str] = &[
     "Candidate",
+    // Vertex inputs, which are found by location; see `occluders/device_raster.rs`.
+    "Copy",
+    "Vertex",
     "Extent",
     "Flat",
     "Outcome",
@@ -83,9 +85,6 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         }),
         twin!("Level", Level {
             "offset" = offset, "stride" = stride, "width" = width, "height" = height,
-        }),
-        twin!("OccluderView", OccluderView {
-            "clip_from_eye" = rows, "eye_hi" = eye_hi, "eye_lo" = eye_lo,
         }),
         twin!("Piece", PieceUniform {
             "base" = base, "count" = count, "index" = index, "words" = words,
