@@ -40,7 +40,7 @@ FAULTS = {
         "False 0.5",
     ),
     "occluders twice as far": (
-        "dot(view.clip_from_eye[3], d)); => 2.0 * dot(view.clip_from_eye[3], d));",
+        "dot(copy.clip_w, d)); => 2.0 * dot(copy.clip_w, d));",
         "True 0.25",
     ),
 }

@@ -172,13 +172,13 @@ fn distance_from_the_origin_costs_nothing() {
 fn eyes_that_float32_does_not_hold_see_what_float64_says() {
     assert_eq!(wrong_pixels(&engine()), 0);
     for (what, by) in [
-        ("(lo - view.eye_lo.xyz)", "lo"),
-        ("(lo - view.eye_lo.xyz)", "(vec3<f32>(0.0) - view.eye_lo.xyz)"),
+        ("(vertex.lo - copy.eye_lo)", "vertex.lo"),
+        ("(vertex.lo - copy.eye_lo)", "(vec3<f32>(0.0) - copy.eye_lo)"),
         (
-            "(hi - view.eye_hi.xyz) + (lo - view.eye_lo.xyz)",
-            "(hi + lo) - (view.eye_hi.xyz + view.eye_lo.xyz)",
+            "(vertex.hi - copy.eye_hi) + (vertex.lo - copy.eye_lo)",
+            "(vertex.hi + vertex.lo) - (copy.eye_hi + copy.eye_lo)",
         ),
-        ("dot(view.clip_from_eye[0], d)", "dot(view.clip_from_eye[0], d) + 0.1 * d.z"),
+        ("dot(copy.clip_x, d)", "dot(copy.clip_x, d) + 0.1 * d.z"),
     ] {
         let faulty = Engine::with_planted_faults(None, &[(what, by)])
             .expect("the device tests need a Vulkan driver");
