@@ -6,11 +6,13 @@
 //!    `placement` says where the copies of a mesh stand.
 //! 2. `view` is a camera in the space of a copy.
 //! 3. `device_raster` draws the meshes as depth on the device.
+//!    `host_raster` draws them on the host, for devices that are processors.
 //! 4. `surface` computes conservative depth from them, on the host in float64.
 //!
 //! The drawing is recorded into the caller's encoder; nothing here submits or reads back.
 
 pub(crate) mod device_raster;
+pub(crate) mod host_raster;
 mod meshlets;
 mod placement;
 mod shapes;

@@ -1,9 +1,11 @@
 //! Yardsticks: reference work that the library is measured against.
 //!
 //! `reduce` builds a pyramid with one dispatch per level, and `cull` culls without certificates.
+//! `raster` draws occluders on the host, without what comes before and after.
 //! They are for benchmarks and their tests alone.
 
 mod cull;
+mod raster;
 pub(crate) mod reduce;
 
 use std::time::Instant;
@@ -11,6 +13,7 @@ use std::time::Instant;
 #[cfg(feature = "testing")]
 pub(crate) use cull::uncertified_module;
 pub use cull::{read_mask, record_uncertified_cull};
+pub use raster::HostRaster;
 #[cfg(feature = "testing")]
 pub(crate) use reduce::yardstick_modules;
 pub use reduce::{PerLevelReduction, ReductionShape, reduce};

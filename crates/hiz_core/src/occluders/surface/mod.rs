@@ -86,12 +86,14 @@ mod topology;
 use std::sync::{Arc, OnceLock};
 
 use crate::error::{Error, Result};
+use crate::host::memory;
 use crate::host::rounding::round_up;
-use crate::host::threads::Locked;
+use crate::host::threads::{Locked, cores};
 use crate::input::bounds::Floats;
 use crate::input::camera::Camera;
 use crate::input::mesh::{FaceCull, MeshData};
 use crate::occluders::OccluderOptions;
+use crate::occluders::host_raster::{HostRaster, Scene, Way};
 use crate::occluders::placement::Placement;
 use crate::occluders::shapes::Shapes;
 use crate::occluders::surface::cells::Cells;
@@ -235,6 +237,42 @@ impl OccluderSurface {
         options: &ConservativeDepthOptions,
     ) -> Result<Vec<f32>> {
         self.conservative_depth_planted(camera, options, Planted::default())
+    }
+
+    /// Draws what `camera` sees into an image of its size.
+    pub(crate) fn draw_into(
+        &self,
+        raster: &mut HostRaster,
+        camera: &Camera,
+        way: Way,
+    ) -> Result<()> {
+        let placements = self.placements();
+        let scene = Scene {
+            shapes: &self.shapes,
+            placements: &placements,
+            camera,
+            cull_mode: self.cull_mode,
+        };
+        raster.draw(&scene, way)
+    }
+
+    /// The NDC depth of these occluders at the centres of the pixels, drawn on the host.
+    ///
+    /// No device is needed.
+    /// The result has one number per pixel of `camera`, row 0 on top, in its depth convention.
+    /// What it promises opens `occluders/host_raster/mod.rs`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a camera that float32 cannot hold, and [`Error::OutOfMemory`].
+    pub fn depth(&self, camera: &Camera) -> Result<Vec<f32>> {
+        let size = camera.size();
+        let threads = cores();
+        let mut raster = HostRaster::new(size, threads);
+        self.draw_into(&mut raster, camera, Way { threads, skip: true })?;
+        let mut depth = memory::list(size.pixels() as usize, "depth")?;
+        depth.resize(size.pixels() as usize, 0.0);
+        raster.write(&mut depth, size.width as usize, camera.convention(), threads);
+        Ok(depth)
     }
 
     /// [`OccluderSurface::conservative_depth`] with a planted fault, for tests.

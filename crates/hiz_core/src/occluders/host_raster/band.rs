@@ -1,0 +1,639 @@
+//! A band of the image: whole rows of tiles, which one thread draws.
+//!
+//! A band sees every triangle that meets it, in the order of the frame.
+//! What it draws depends on nothing outside of it, so the number of bands changes no pixel.
+
+use std::ops::RangeInclusive;
+
+use crate::occluders::host_raster::lens::{Extent, HALF, Image, UNITS, greatest, least};
+use crate::occluders::host_raster::tile::{
+    CLEAR, Layer, MOST_LAYERS, Mask, PIXELS, Plane, SIDE, State, Tile, row_of_layers,
+};
+use crate::occluders::host_raster::triangle::Triangle;
+use crate::occluders::meshlets::LANES;
+
+/// Coordinates of triangles up to this size along each axis have edge functions of 32 bits.
+const SMALL: i32 = 64 * UNITS;
+
+/// The depth of some rows of tiles.
+#[derive(Debug)]
+pub(super) struct Band {
+    image: Image,
+    /// The first row of pixels, and the one after the last; multiples of [`SIDE`].
+    pub(super) top: i32,
+    pub(super) bottom: i32,
+    /// Tiles in a row: a multiple of [`LANES`], some past the image's edge.
+    across: usize,
+    /// Pixels in a row, some past the image's edge.
+    stride: usize,
+    /// By tile: see [`Tile`].
+    farthest: Vec<f32>,
+    nearest: Vec<f32>,
+    states: Vec<State>,
+    /// By tile: pixels were written since `farthest` was computed.
+    is_stale: Vec<bool>,
+    /// The tiles that are stale, and some that no longer are.
+    stale: Vec<u32>,
+    /// By cell of 8x8 tiles: no pixel is farther than this.
+    cells: Vec<f32>,
+    /// By cell: a tile's `farthest` has changed since that of the cell was computed.
+    is_cell_stale: Vec<bool>,
+    layers: Vec<Layer>,
+    pixels: Vec<f32>,
+}
+
+/// Exact edges: three linear functions of the pixel that are not negative inside.
+///
+/// They are the cross products of an edge with the way to a pixel's centre, divided by
+/// [`UNITS`] and rounded down: from pixel to pixel they grow by whole numbers.
+/// A centre on an edge belongs to the triangle whose top or left edge that is.
+struct Edges {
+    /// Growth from pixel to pixel, to the right and downwards.
+    right: [i32; 3],
+    down: [i32; 3],
+    bias: [i32; 3],
+}
+
+impl Edges {
+    #[inline(always)]
+    fn new(t: &Triangle) -> Self {
+        let next = |k: usize| if k == 2 { 0 } else { k + 1 };
+        let right = std::array::from_fn(|k| t.y[k] - t.y[next(k)]);
+        let down = std::array::from_fn(|k| t.x[next(k)] - t.x[k]);
+        let bias = std::array::from_fn(|k| {
+            let is_top_left = right[k] > 0 || (right[k] == 0 && down[k] > 0);
+            if is_top_left { 0 } else { -1 }
+        });
+        Self { right, down, bias }
+    }
+
+    /// The functions at a pixel, for a triangle of at most [`SMALL`] near it.
+    #[inline(always)]
+    fn at_small(&self, t: &Triangle, column: i32, row: i32) -> [i32; 3] {
+        let (x, y) = (column * UNITS + HALF, row * UNITS + HALF);
+        std::array::from_fn(|k| {
+            (self.right[k] * (x - t.x[k]) + self.down[k] * (y - t.y[k]) + self.bias[k]) >> 8
+        })
+    }
+
+    #[inline(always)]
+    fn at(&self, t: &Triangle, column: i32, row: i32) -> [i64; 3] {
+        let (x, y) = (column * UNITS + HALF, row * UNITS + HALF);
+        std::array::from_fn(|k| {
+            (i64::from(self.right[k]) * i64::from(x - t.x[k])
+                + i64::from(self.down[k]) * i64::from(y - t.y[k])
+                + i64::from(self.bias[k]))
+                >> 8
+        })
+    }
+
+    /// The functions along the columns of a tile's first row, given those at its first pixel.
+    #[inline(always)]
+    fn columns(&self, at: [i32; 3]) -> [[i32; LANES]; 3] {
+        std::array::from_fn(|k| std::array::from_fn(|l| at[k] + self.right[k] * l as i32))
+    }
+
+    /// Which pixels of a tile are inside, given the functions at its first pixel.
+    #[inline(never)]
+    fn mask(&self, at: [i32; 3]) -> Mask {
+        let mut edges = self.columns(at);
+        // By column, a bit for each row.
+        // Each row has a bit of its own, since of shifts compilers make no vectors here.
+        let mut outside = [0_i32; LANES];
+        for row in 0..SIDE {
+            for l in 0..LANES {
+                let any = (edges[0][l] | edges[1][l] | edges[2][l]) >> 31;
+                outside[l] |= any & (1 << (SIDE - 1 - row));
+            }
+            self.step_down(&mut edges);
+        }
+        !Mask::from_le_bytes(outside.map(|bits| bits as u8))
+    }
+
+    #[inline(always)]
+    fn step_down(&self, edges: &mut [[i32; LANES]; 3]) {
+        for k in 0..3 {
+            for l in 0..LANES {
+                edges[k][l] += self.down[k];
+            }
+        }
+    }
+}
+
+/// For each column: all bits set if the pixel is inside of three edges.
+#[inline(always)]
+fn inside(edges: &[[i32; LANES]; 3]) -> [u32; LANES] {
+    std::array::from_fn(|l| !((edges[0][l] | edges[1][l] | edges[2][l]) >> 31) as u32)
+}
+
+/// Beyond this size the sign of an edge's function is the same over [`LANES`] tiles.
+const LARGE: i64 = 1 << 30;
+
+/// What a triangle's functions do within a tile and from tile to tile.
+struct Steps {
+    /// Growth of the edges' functions over the next [`LANES`] tiles of a row.
+    ramp: [[i32; LANES]; 3],
+    /// What they gain and lose at most within a tile.
+    gain: [i32; 3],
+    loss: [i32; 3],
+    /// The nearness at a tile's farthest and at its nearest corner, less that at its first pixel:
+    /// along the row, and down the column.
+    low: [f32; 2],
+    high: [f32; 2],
+}
+
+impl Steps {
+    #[inline(always)]
+    fn new(t: &Triangle, edges: &Edges) -> Self {
+        let last = STEP - 1;
+        let corner = |k: usize, is_last: bool| t.slope[k] * if is_last { last as f32 } else { 0.0 };
+        Self {
+            ramp: edges.right.map(|right| std::array::from_fn(|l| STEP * right * l as i32)),
+            gain: std::array::from_fn(|k| last * (edges.right[k].max(0) + edges.down[k].max(0))),
+            loss: std::array::from_fn(|k| last * (edges.right[k].min(0) + edges.down[k].min(0))),
+            low: std::array::from_fn(|k| corner(k, t.slope[k] < 0.0)),
+            high: std::array::from_fn(|k| corner(k, t.slope[k] >= 0.0)),
+        }
+    }
+
+    /// The greatest nearness over [`LANES`] tiles; `x` and `y` as for [`Segment::look`].
+    #[inline(always)]
+    fn nearest_of_segment(&self, t: &Triangle, x: f32, y: f32) -> f32 {
+        // Rounded sums are monotone, so one of the two ends has the greatest value of all.
+        let beyond = if t.slope[0] > 0.0 { ((LANES - 1) * SIDE) as f32 } else { 0.0 };
+        let nearness = (t.nearness + t.slope[0] * (x + beyond)) + t.slope[1] * y;
+        least(self.high[0] + (nearness + self.high[1]), t.nearest)
+    }
+}
+
+/// [`LANES`] tiles in a row, and how a triangle meets them.
+#[derive(Default)]
+struct Segment {
+    /// The edges' functions at the first pixel of the first one.
+    at: [i32; 3],
+    /// Nearness at the first pixel of each, and the least and the greatest over each.
+    nearness: [f32; LANES],
+    low: [f32; LANES],
+    high: [f32; LANES],
+    /// A bit for each tile that the triangle may change, and one for each that it covers.
+    open: u32,
+    full: u32,
+}
+
+impl Segment {
+    /// `first` are the edges' functions at the first pixel, `x` and `y` its centre from corner 0 in
+    /// pixels, and `farthest` what is known of the tiles.
+    #[inline(never)]
+    fn look(
+        &mut self,
+        t: &Triangle,
+        steps: &Steps,
+        first: &[i64; 3],
+        (x, y): (f32, f32),
+        farthest: &[f32; LANES],
+    ) {
+        let at = first.map(|value| value.clamp(-LARGE, LARGE) as i32);
+        let (mut most, mut least_of_edges) = ([0; LANES], [0; LANES]);
+        for k in 0..3 {
+            for l in 0..LANES {
+                let value = at[k] + steps.ramp[k][l];
+                most[l] |= value + steps.gain[k];
+                least_of_edges[l] |= value + steps.loss[k];
+            }
+        }
+        let below = t.slope[1] * y;
+        let mut shows = [0; LANES];
+        for l in 0..LANES {
+            let nearness = (t.nearness + t.slope[0] * (x + (l * SIDE) as f32)) + below;
+            self.nearness[l] = nearness;
+            // As in `Plane::row`.
+            self.low[l] = least(steps.low[0] + (nearness + steps.low[1]), t.nearest);
+            let high = least(steps.high[0] + (nearness + steps.high[1]), t.nearest);
+            self.high[l] = high;
+            shows[l] = if high > farthest[l] { 1 << l } else { 0 };
+        }
+        (self.at, self.open, self.full) = (at, 0, 0);
+        for l in 0..LANES {
+            self.open |= (shows[l] & !(most[l] >> 31)) as u32;
+            self.full |= ((1 << l) & !(least_of_edges[l] >> 31)) as u32;
+        }
+    }
+}
+
+impl Band {
+    pub(super) fn new(image: Image, top: i32, bottom: i32) -> Self {
+        let across = (image.width as usize).div_ceil(SIDE).next_multiple_of(LANES);
+        let rows = (bottom - top) as usize / SIDE;
+        let count = across * rows;
+        let cells = across / LANES * rows.div_ceil(LANES);
+        // A segment of a row may begin at the last pixel, and the last one has to fit, too.
+        let stride = (across + 1) * SIDE;
+        Self {
+            image,
+            top,
+            bottom,
+            across,
+            stride,
+            farthest: vec![0.0; count],
+            nearest: vec![0.0; count],
+            states: vec![CLEAR; count],
+            is_stale: vec![false; count],
+            stale: Vec::new(),
+            cells: vec![0.0; cells],
+            is_cell_stale: vec![false; cells],
+            layers: vec![Layer::default(); MOST_LAYERS * count],
+            pixels: vec![0.0; stride * (bottom - top) as usize],
+        }
+    }
+
+    #[allow(dead_code, reason = "images that are drawn again are next")]
+    pub(super) fn clear(&mut self) {
+        self.farthest.fill(0.0);
+        self.nearest.fill(0.0);
+        self.states.fill(CLEAR);
+        self.is_stale.fill(false);
+        self.stale.clear();
+        self.cells.fill(0.0);
+        self.is_cell_stale.fill(false);
+    }
+
+    /// Whether nothing within `extent` would show in this band.
+    ///
+    /// Cells are asked first, and tiles where a cell cannot tell.
+    pub(super) fn hides(&mut self, extent: &Extent) -> bool {
+        let Some((rows, columns)) = self.tiles_of(extent) else { return true };
+        for cell_row in rows.start() / LANES..=rows.end() / LANES {
+            for cell in columns.start() / LANES..=columns.end() / LANES {
+                if self.cell(cell_row, cell) >= extent.nearest {
+                    continue;
+                }
+                let within = |range: &RangeInclusive<usize>, cell: usize| {
+                    let first = cell * LANES;
+                    *range.start().max(&first)..=*range.end().min(&(first + LANES - 1))
+                };
+                let columns = within(&columns, cell);
+                for row in within(&rows, cell_row) {
+                    let tiles = &self.farthest[row * self.across..][columns.clone()];
+                    if tiles.iter().any(|farthest| *farthest < extent.nearest) {
+                        return false;
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    /// The farthest depth of a cell, in rows and columns of cells.
+    #[inline(always)]
+    fn cell(&mut self, row: usize, column: usize) -> f32 {
+        let cell = row * (self.across / LANES) + column;
+        if self.is_cell_stale[cell] {
+            self.renew_cell(cell, row, column);
+        }
+        self.cells[cell]
+    }
+
+    #[inline(never)]
+    fn renew_cell(&mut self, cell: usize, row: usize, column: usize) {
+        let rows = self.farthest.chunks_exact(self.across).skip(row * LANES).take(LANES);
+        let farthest = rows.fold([f32::MAX; LANES], |farthest, row| {
+            let row: &[f32; LANES] = &row.as_chunks().0[column];
+            std::array::from_fn(|l| least(row[l], farthest[l]))
+        });
+        self.cells[cell] = farthest.into_iter().fold(f32::MAX, least);
+        self.is_cell_stale[cell] = false;
+    }
+
+    /// The rows and the columns of tiles that an extent meets.
+    fn tiles_of(&self, extent: &Extent) -> Option<(RangeInclusive<usize>, RangeInclusive<usize>)> {
+        let (first, last) = (extent.rows.0.max(self.top), extent.rows.1.min(self.bottom - 1));
+        let tile = |pixel: i32| pixel as usize / SIDE;
+        (first <= last).then(|| {
+            (
+                tile(first - self.top)..=tile(last - self.top),
+                tile(extent.columns.0)..=tile(extent.columns.1),
+            )
+        })
+    }
+
+    #[inline(always)]
+    fn tile(&mut self, index: usize) -> Tile<'_> {
+        let first = index / self.across * SIDE * self.stride + index % self.across * SIDE;
+        Tile {
+            layer_stride: self.states.len(),
+            farthest: &mut self.farthest[index],
+            nearest: &mut self.nearest[index],
+            state: &mut self.states[index],
+            layers: &mut self.layers[index..],
+            pixels: &mut self.pixels[first..],
+            stride: self.stride,
+        }
+    }
+
+    /// Draws the part of a triangle that lies in this band.
+    #[inline(never)]
+    pub(super) fn draw(&mut self, t: &Triangle) {
+        let bounds = |v: &[i32; 3]| (v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2]));
+        let (left, right) = bounds(&t.x);
+        let (up, down) = bounds(&t.y);
+        let columns =
+            (((left + HALF - 1) >> 8).max(0), ((right - HALF) >> 8).min(self.image.width - 1));
+        let rows =
+            (((up + HALF - 1) >> 8).max(self.top), ((down - HALF) >> 8).min(self.bottom - 1));
+        if columns.0 > columns.1 || rows.0 > rows.1 {
+            return;
+        }
+        let edges = Edges::new(t);
+        if columns.1 - columns.0 < LANES as i32 && right - left <= SMALL && down - up <= SMALL {
+            self.draw_by_rows(t, &edges, columns, rows);
+        } else {
+            self.draw_by_tiles(t, &edges, columns, rows);
+        }
+    }
+
+    /// Draws a triangle of at most [`LANES`] columns, one segment for each row.
+    fn draw_by_rows(&mut self, t: &Triangle, edges: &Edges, columns: (i32, i32), rows: (i32, i32)) {
+        let first_tile = |row: i32| (row - self.top) as usize / SIDE * self.across;
+        let (begin, end) = (columns.0 as usize / SIDE, columns.1 as usize / SIDE);
+        for row in (first_tile(rows.0)..=first_tile(rows.1)).step_by(self.across) {
+            for tile in row + begin..=row + end {
+                self.nearest[tile] = greatest(self.nearest[tile], t.nearest);
+                if !self.is_stale[tile] {
+                    self.is_stale[tile] = true;
+                    self.stale.push(tile as u32);
+                }
+                if self.states[tile] != PIXELS {
+                    self.tile(tile).expand();
+                }
+            }
+        }
+        let mut at_row = edges.columns(edges.at_small(t, columns.0, rows.0));
+        let x = to_pixels(columns.0 * UNITS + HALF - t.x[0]);
+        let y = to_pixels(rows.0 * UNITS + HALF - t.y[0]);
+        let first = t.nearness + t.slope[0] * x;
+        let along: [f32; LANES] = std::array::from_fn(|l| first + t.slope[0] * l as f32);
+        let mut at = (rows.0 - self.top) as usize * self.stride + columns.0 as usize;
+        for row in 0..=rows.1 - rows.0 {
+            let below = t.slope[1] * (y + row as f32);
+            let Ok(pixels) = <&mut [f32; LANES]>::try_from(&mut self.pixels[at..at + LANES]) else {
+                unreachable!("a slice of this length")
+            };
+            let inside = inside(&at_row);
+            for l in 0..LANES {
+                let nearness = least(along[l] + below, t.nearest);
+                pixels[l] = greatest(f32::from_bits(nearness.to_bits() & inside[l]), pixels[l]);
+            }
+            edges.step_down(&mut at_row);
+            at += self.stride;
+        }
+    }
+
+    /// Draws a triangle tile by tile.
+    fn draw_by_tiles(
+        &mut self,
+        t: &Triangle,
+        edges: &Edges,
+        columns: (i32, i32),
+        rows: (i32, i32),
+    ) {
+        const MANY: i32 = LANES as i32;
+        let (begin, end) = (columns.0 / STEP, columns.1 / STEP);
+        let (first, last) = (rows.0 / STEP, rows.1 / STEP);
+        let tiles = (end - begin + 1) * (last - first + 1);
+        let is_large = tiles >= LAYERS_FROM;
+        if is_large && self.hides_all(t.nearest, (begin, end), rows) {
+            return;
+        }
+        let steps = Steps::new(t, edges);
+        if end - begin < NARROW {
+            for row in first..=last {
+                self.draw_narrow(t, edges, &steps, row, (begin, end), is_large);
+            }
+            return;
+        }
+        let mut segment = Segment::default();
+        for row in first..=last {
+            let at = edges.at(t, begin * STEP, row * STEP);
+            let (first, last) = span(&at, &steps.gain, &edges.right, begin, end);
+            let y = to_pixels(row * STEP * UNITS + HALF - t.y[0]);
+            let own_row = (row - self.top / STEP) as usize;
+            for group in first / MANY..=last / MANY {
+                let column = group * MANY;
+                let x = to_pixels(column * STEP * UNITS + HALF - t.x[0]);
+                let (cell_row, cell) = (own_row / LANES, group as usize);
+                if steps.nearest_of_segment(t, x, y) <= self.cell(cell_row, cell) {
+                    continue;
+                }
+                let here = std::array::from_fn(|k| {
+                    at[k] + i64::from(STEP * (column - begin)) * i64::from(edges.right[k])
+                });
+                let tiles = own_row * self.across + column as usize;
+                let farthest = &self.farthest.as_chunks().0[tiles / LANES];
+                segment.look(t, &steps, &here, (x, y), farthest);
+                // Past the row's end there may be no tile.
+                segment.open &= u32::MAX >> (31 - (last - column).min(31));
+                if segment.open != 0 {
+                    self.draw_segment(t, edges, &steps, &segment, tiles);
+                    self.is_cell_stale[cell_row * (self.across / LANES) + cell] = true;
+                }
+            }
+        }
+    }
+
+    /// Whether the cells that these tiles and rows of pixels meet hide what is no nearer than
+    /// `nearest`.
+    #[inline(always)]
+    fn hides_all(&mut self, nearest: f32, (begin, end): (i32, i32), rows: (i32, i32)) -> bool {
+        let cell = |row: i32| (row - self.top) as usize / SIDE / LANES;
+        let (first, last) = (cell(rows.0), cell(rows.1));
+        (first..=last).all(|row| {
+            (begin as usize / LANES..=end as usize / LANES)
+                .all(|column| self.cell(row, column) >= nearest)
+        })
+    }
+
+    /// Draws a triangle into the tiles `begin..=end` of a row, one by one.
+    #[inline(always)]
+    fn draw_narrow(
+        &mut self,
+        t: &Triangle,
+        edges: &Edges,
+        steps: &Steps,
+        row: i32,
+        (begin, end): (i32, i32),
+        is_large: bool,
+    ) {
+        let mut at = edges.at(t, begin * STEP, row * STEP);
+        let below = t.slope[1] * to_pixels(row * STEP * UNITS + HALF - t.y[0]);
+        let first = (row - self.top / STEP) as usize * self.across;
+        for column in begin..=end {
+            let here = at;
+            for k in 0..3 {
+                at[k] += i64::from(STEP * edges.right[k]);
+            }
+            if (0..3).any(|k| here[k] + i64::from(steps.gain[k]) < 0) {
+                continue;
+            }
+            let x = to_pixels(column * STEP * UNITS + HALF - t.x[0]);
+            let nearness = (t.nearness + t.slope[0] * x) + below;
+            let index = first + column as usize;
+            let high = least(steps.high[0] + (nearness + steps.high[1]), t.nearest);
+            if high <= self.farthest[index] {
+                continue;
+            }
+            let low = least(steps.low[0] + (nearness + steps.low[1]), t.nearest);
+            let is_full = (0..3).all(|k| here[k] + i64::from(steps.loss[k]) >= 0);
+            let here = here.map(|value| value.clamp(-LARGE, LARGE) as i32);
+            let plane = Plane { nearness, slope: t.slope, nearest: t.nearest };
+            self.draw_tile(index, edges, here, plane, (low, high), is_full, is_large);
+            let cell = (row - self.top / STEP) as usize / LANES * (self.across / LANES);
+            self.is_cell_stale[cell + column as usize / LANES] = true;
+        }
+    }
+
+    /// Draws a triangle where a segment, which begins with tile `first`, is open to it.
+    #[inline(always)]
+    fn draw_segment(
+        &mut self,
+        t: &Triangle,
+        edges: &Edges,
+        steps: &Steps,
+        segment: &Segment,
+        first: usize,
+    ) {
+        let mut open = segment.open;
+        while open != 0 {
+            let l = open.trailing_zeros() as usize % LANES;
+            open &= open - 1;
+            let plane = Plane { nearness: segment.nearness[l], slope: t.slope, nearest: t.nearest };
+            let range = (segment.low[l], segment.high[l]);
+            let is_full = segment.full >> l & 1 == 1;
+            let at = std::array::from_fn(|k| segment.at[k] + steps.ramp[k][l]);
+            self.draw_tile(first + l, edges, at, plane, range, is_full, true);
+        }
+    }
+
+    /// Draws a triangle into one tile: as a layer, or into pixels.
+    ///
+    /// `at` are the edges' functions at the tile's first pixel.
+    #[expect(clippy::too_many_arguments, reason = "the inner loop, where each is at hand")]
+    #[inline(always)]
+    fn draw_tile(
+        &mut self,
+        index: usize,
+        edges: &Edges,
+        at: [i32; 3],
+        plane: Plane,
+        (low, high): (f32, f32),
+        is_full: bool,
+        is_large: bool,
+    ) {
+        if is_full && low >= self.nearest[index] {
+            self.tile(index).replace(plane, (low, high));
+            self.is_stale[index] = false;
+            return;
+        }
+        if self.states[index] != PIXELS && (is_large || is_full) {
+            let mask = if is_full { Mask::MAX } else { edges.mask(at) };
+            if mask == 0 || self.tile(index).add_layer(mask, plane, (low, high)) {
+                return;
+            }
+        }
+        self.nearest[index] = greatest(self.nearest[index], high);
+        self.is_stale[index] = false;
+        if is_full {
+            self.tile(index).draw_pixels(&plane, |_| [u32::MAX; SIDE]);
+            return;
+        }
+        let mut at_row = edges.columns(at);
+        self.tile(index).draw_pixels(&plane, |_| {
+            let inside = inside(&at_row);
+            edges.step_down(&mut at_row);
+            inside
+        });
+    }
+
+    /// Computes the farthest depths again of the tiles whose pixels were written.
+    pub(super) fn renew(&mut self) {
+        let mut stale = std::mem::take(&mut self.stale);
+        for index in stale.drain(..).map(|index| index as usize) {
+            if std::mem::take(&mut self.is_stale[index]) {
+                let (row, column) = (index / self.across, index % self.across);
+                let cell = row / LANES * (self.across / LANES) + column / LANES;
+                self.is_cell_stale[cell] = true;
+                self.tile(index).renew();
+            }
+        }
+        self.stale = stale;
+    }
+
+    /// Writes the band's rows of the image, `pitch` numbers apart, as NDC depth.
+    ///
+    /// `out` begins at the band's first row.
+    pub(super) fn write(
+        &self,
+        out: &mut [f32],
+        pitch: usize,
+        depth_of: impl Fn(f32) -> f32 + Copy,
+    ) {
+        let (width, count) = (self.image.width as usize, self.states.len());
+        let height = (self.image.height.min(self.bottom) - self.top) as usize;
+        for (y, line) in out.chunks_mut(pitch).enumerate().take(height) {
+            let line = &mut line[..width];
+            let first = y / SIDE * self.across;
+            let pixels = &self.pixels[y * self.stride..][..self.stride];
+            let row = |column: usize| -> [f32; SIDE] {
+                let tile = first + column;
+                let values = match self.states[tile] {
+                    PIXELS => pixels.as_chunks().0[column],
+                    state => row_of_layers(state, &self.layers[tile..], count, y % SIDE),
+                };
+                values.map(depth_of)
+            };
+            let (whole, rest) = line.as_chunks_mut::<SIDE>();
+            for (column, values) in whole.iter_mut().enumerate() {
+                *values = row(column);
+            }
+            if !rest.is_empty() {
+                rest.copy_from_slice(&row(whole.len())[..rest.len()]);
+            }
+        }
+    }
+}
+
+/// [`SIDE`] as a number of pixels.
+const STEP: i32 = SIDE as i32;
+
+/// Triangles of fewer columns of tiles are drawn tile by tile.
+const NARROW: i32 = 4;
+
+/// Triangles that meet fewer tiles are drawn into pixels.
+const LAYERS_FROM: i32 = 9;
+
+#[inline(always)]
+fn to_pixels(units: i32) -> f32 {
+    units as f32 * (1.0 / UNITS as f32)
+}
+
+/// The tiles of a row that no edge excludes as a whole.
+///
+/// A tile to spare on each side covers the roundings; exact tests follow.
+#[inline(always)]
+fn span(at: &[i64; 3], gain: &[i32; 3], right: &[i32; 3], begin: i32, end: i32) -> (i32, i32) {
+    let (mut first, mut last) = (begin, end);
+    if end - begin <= 3 {
+        return (first, last);
+    }
+    for k in 0..3 {
+        let value = (at[k] + i64::from(gain[k])) as f32;
+        let step = SIDE as f32 * right[k] as f32;
+        if right[k] > 0 {
+            first = first.max(begin + ((-value / step) as i32 - 1).max(0));
+        } else if right[k] < 0 {
+            last = last.min(begin + ((value / -step) as i32 + 1).max(-1));
+        } else if value < 0.0 {
+            return (begin, begin - 1);
+        }
+    }
+    (first, last)
+}

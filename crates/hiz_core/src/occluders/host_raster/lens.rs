@@ -1,0 +1,185 @@
+//! A camera in the numbers that the rasteriser computes with.
+//!
+//! Positions in the image are in **units** of 1/256 pixel, the grid that Vulkan's drivers use too.
+//! Depth is **nearness**: 0 on the far plane, 1 on the near plane, greater where nearer.
+//! It is reversed NDC depth, and 1 minus NDC depth for standard Z.
+
+use crate::host::linear::{Vec3, sub};
+use crate::host::rounding::flushed;
+use crate::input::camera::Camera;
+use crate::input::image::ImageSize;
+use crate::occluders::placement::box_corner;
+use crate::occluders::view::PlacedView;
+
+/// Units per pixel.
+pub(super) const UNITS: i32 = 256;
+/// From a pixel's corner to its centre, in units.
+pub(super) const HALF: i32 = UNITS / 2;
+/// How far outside of the image a vertex may lie without its triangles being clipped, in pixels.
+///
+/// With the largest image, 16,384 pixels, a vertex is less than 2^22 units from the middle.
+/// float32 and [`rounded`] hold such numbers.
+const GUARD_PIXELS: f32 = 8000.0;
+
+/// Added to a float32 below 2^22 in size, this leaves its nearest integer in the lowest bits.
+const MAGIC: f32 = 12_582_912.0; // 1.5 * 2^23
+
+/// The integer nearest to `v`, ties to even, for a size below 2^22.
+///
+/// Unlike a cast it becomes one addition and one subtraction of vectors.
+/// Any number is safe; NaN and large ones give some integer.
+#[inline(always)]
+pub(super) fn rounded(v: f32) -> i32 {
+    (v + MAGIC).to_bits().wrapping_sub(MAGIC.to_bits()) as i32
+}
+
+/// `a` where it is less, else `b`: one instruction for vectors, unlike `f32::min`.
+#[inline(always)]
+pub(super) fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// `a` where it is greater, else `b`.
+#[inline(always)]
+pub(super) fn greatest(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// The image, in units about its middle.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Image {
+    /// Pixels.
+    pub(super) width: i32,
+    pub(super) height: i32,
+    /// Half of the width and of the height, in units.
+    pub(super) half: [i32; 2],
+    /// Beyond this distance from the middle triangles are clipped, in units.
+    pub(super) guard: [f32; 2],
+}
+
+/// A camera in the space of one copy of a mesh, in float32.
+#[derive(Debug)]
+pub(super) struct Lens {
+    /// Rows about the eye: x and y in units about the image's middle, times w; nearness times w;
+    /// and w.
+    pub(super) rows: [[f32; 4]; 4],
+    /// The eye is exactly `eye_hi + eye_lo`.
+    pub(super) eye_hi: [f32; 3],
+    pub(super) eye_lo: [f32; 3],
+    eye: Vec3,
+    /// Whether triangles are turned round: the copy is mirrored.
+    pub(super) mirrored: bool,
+}
+
+impl Image {
+    pub(super) fn of_size(size: ImageSize) -> Self {
+        let half = [size.width, size.height].map(|side| side as i32 * HALF);
+        let guard = half.map(|h| h as f32 + GUARD_PIXELS * UNITS as f32);
+        Self { width: size.width as i32, height: size.height as i32, half, guard }
+    }
+
+    /// Columns or rows `low..=high` whose centres lie between two positions from the middle.
+    #[inline(always)]
+    pub(super) fn pixels(half: i32, side: i32, from: f32, to: f32) -> (i32, i32) {
+        let clamped = |v: f32| rounded(greatest(least(v, 4_190_000.0), -4_190_000.0)) + half;
+        ((clamped(from) >> 8).clamp(0, side - 1), (clamped(to) >> 8).clamp(0, side - 1))
+    }
+}
+
+impl Lens {
+    pub(super) fn new(camera: &Camera, image: &Image, placed: &PlacedView, mirrored: bool) -> Self {
+        let [x, y, z, w] = placed.exact;
+        let nearness: [f64; 4] = if camera.convention().is_reversed() {
+            z
+        } else {
+            std::array::from_fn(|k| w[k] - z[k])
+        };
+        let exact = [
+            x.map(|v| v * f64::from(image.half[0])),
+            y.map(|v| v * -f64::from(image.half[1])),
+            nearness,
+            w,
+        ];
+        #[expect(clippy::cast_possible_truncation, reason = "rounding to float32 is the point")]
+        let rows = exact.map(|row| row.map(|v| flushed(v as f32)));
+        Self { rows, eye_hi: placed.eye_hi, eye_lo: placed.eye_lo, eye: placed.eye, mirrored }
+    }
+
+    /// The rows at a point relative to the eye.
+    #[inline(always)]
+    pub(super) fn clip(&self, d: [f32; 3]) -> [f32; 4] {
+        self.rows.map(|r| r[0] * d[0] + r[1] * d[1] + (r[2] * d[2] + r[3]))
+    }
+}
+
+/// What the image shows of a box at most.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Extent {
+    /// No point of the box is nearer than this.
+    pub(super) nearest: f32,
+    /// The first and the last column, and the first and the last row.
+    pub(super) columns: (i32, i32),
+    pub(super) rows: (i32, i32),
+}
+
+/// What may show of a box; `None` if it is surely outside the view.
+///
+/// A box counts as hidden if its nearest point is behind what has been drawn.
+/// A wrong answer would lose an occluder, not hide an instance.
+/// Its margins still cover the roundings, so that skipping hidden boxes changes no pixel.
+pub(super) fn extent(lens: &Lens, image: &Image, min: Vec3, max: Vec3) -> Option<Extent> {
+    #[expect(clippy::cast_possible_truncation, reason = "rounding to float32 is the point")]
+    let at: [[f32; 8]; 3] = {
+        let corners: [Vec3; 8] = std::array::from_fn(|i| sub(box_corner(min, max, i), lens.eye));
+        std::array::from_fn(|k| corners.map(|c| c[k] as f32))
+    };
+    let clip: [[f32; 8]; 4] = lens.rows.map(|r| {
+        std::array::from_fn(|i| r[0] * at[0][i] + r[1] * at[1][i] + (r[2] * at[2][i] + r[3]))
+    });
+    let [x, y, n, w] = clip;
+    let half = image.half.map(|h| h as f32 + 2.0 * UNITS as f32);
+    // How many corners are outside of each plane, and how many need clipping.
+    let mut outside = [0_u32; 6];
+    let mut crossing = 0;
+    for i in 0..8 {
+        outside[0] += u32::from(x[i] < -half[0] * w[i]);
+        outside[1] += u32::from(x[i] > half[0] * w[i]);
+        outside[2] += u32::from(y[i] < -half[1] * w[i]);
+        outside[3] += u32::from(y[i] > half[1] * w[i]);
+        outside[4] += u32::from(n[i] > w[i] * NEAR_MARGIN);
+        outside[5] += u32::from(n[i] < 0.0);
+        crossing += u32::from(!(n[i] <= w[i] && w[i] > 0.0));
+    }
+    if outside.contains(&8) {
+        return None;
+    }
+    if crossing > 0 {
+        let all = |side: i32| (0, side - 1);
+        return Some(Extent {
+            nearest: f32::MAX,
+            columns: all(image.width),
+            rows: all(image.height),
+        });
+    }
+    let (mut left, mut right, mut top, mut bottom) = (f32::MAX, f32::MIN, f32::MAX, f32::MIN);
+    let mut nearest = 0.0;
+    for i in 0..8 {
+        let inverse = 1.0 / w[i];
+        let (px, py) = (x[i] * inverse, y[i] * inverse);
+        left = least(left, px);
+        right = greatest(right, px);
+        top = least(top, py);
+        bottom = greatest(bottom, py);
+        nearest = greatest(nearest, n[i] * inverse);
+    }
+    // A pixel to spare on each side covers the roundings.
+    let spare = UNITS as f32;
+    Some(Extent {
+        nearest: nearest * NEAR_MARGIN,
+        columns: Image::pixels(image.half[0], image.width, left - spare, right + spare),
+        rows: Image::pixels(image.half[1], image.height, top - spare, bottom + spare),
+    })
+}
+
+/// A few roundings of float32 above 1.
+const NEAR_MARGIN: f32 = 1.0 + 1e-5;

@@ -1,0 +1,195 @@
+//! A meshlet's vertices in the image, and the triangles that may cover a pixel's centre.
+//!
+//! Both loops work on [`LANES`] at a time in arrays of fixed length, which compilers turn into
+//! vectors.
+
+use crate::input::mesh::FaceCull;
+use crate::occluders::host_raster::lens::{HALF, Image, Lens, greatest, least, rounded};
+use crate::occluders::meshlets::{Blocks, LANES, MAX_TRIANGLES, MAX_VERTICES, Meshlet};
+
+/// In a vertex' code: it needs clipping, since it is before the near plane or far outside.
+pub(super) const CLIP: u32 = 1;
+
+/// One number of each vertex.
+type PerVertex<T> = [T; MAX_VERTICES];
+
+/// The vertices of one meshlet.
+pub(super) struct Vertices {
+    /// Clip coordinates as in [`Lens::rows`].
+    pub(super) clip: [PerVertex<f32>; 4],
+    /// The position in the image in units, about its middle.
+    pub(super) x: PerVertex<f32>,
+    pub(super) y: PerVertex<f32>,
+    pub(super) nearness: PerVertex<f32>,
+    /// [`CLIP`], and a bit for each plane that the vertex is outside of.
+    pub(super) code: PerVertex<u32>,
+    /// Triangles that may cover a centre, and how many they are.
+    kept: [u8; MAX_TRIANGLES + LANES],
+    num_kept: usize,
+}
+
+impl Vertices {
+    pub(super) fn new() -> Self {
+        Self {
+            clip: [[0.0; MAX_VERTICES]; 4],
+            x: [0.0; MAX_VERTICES],
+            y: [0.0; MAX_VERTICES],
+            nearness: [0.0; MAX_VERTICES],
+            code: [0; MAX_VERTICES],
+            kept: [0; MAX_TRIANGLES + LANES],
+            num_kept: 0,
+        }
+    }
+
+    /// Projects the vertices of `meshlet`.
+    #[inline(never)]
+    pub(super) fn project(
+        &mut self,
+        blocks: &Blocks,
+        meshlet: &Meshlet,
+        lens: &Lens,
+        image: &Image,
+    ) {
+        let groups = (meshlet.num_vertices as usize).div_ceil(LANES);
+        let first = meshlet.first_vertex as usize;
+        let high: [&[[f32; LANES]]; 3] =
+            blocks.high.each_ref().map(|axis| axis[first..][..groups * LANES].as_chunks().0);
+        let low: Option<[&[[f32; LANES]]; 3]> = meshlet.first_low.map(|first| {
+            let first = first as usize;
+            blocks.low.each_ref().map(|axis| axis[first..][..groups * LANES].as_chunks().0)
+        });
+        for group in 0..groups {
+            let from_eye: [[f32; LANES]; 3] = std::array::from_fn(|k| {
+                let (hi, lo) = (lens.eye_hi[k], lens.eye_lo[k]);
+                match &low {
+                    None => high[k][group].map(|v: f32| (v - hi) - lo),
+                    Some(low) => {
+                        std::array::from_fn(|i| (high[k][group][i] - hi) + (low[k][group][i] - lo))
+                    }
+                }
+            });
+            self.project_group(group, &from_eye, lens, image);
+        }
+    }
+
+    #[inline(always)]
+    fn project_group(
+        &mut self,
+        group: usize,
+        from_eye: &[[f32; LANES]; 3],
+        lens: &Lens,
+        image: &Image,
+    ) {
+        fn part<T>(of: &mut PerVertex<T>, group: usize) -> &mut [T; LANES] {
+            &mut of.as_chunks_mut().0[group]
+        }
+        let half = image.half.map(|h| h as f32);
+        let [cx, cy, cn, cw] = self.clip.each_mut().map(|c| part(c, group));
+        let (x, y) = (part(&mut self.x, group), part(&mut self.y, group));
+        let nearness = part(&mut self.nearness, group);
+        let code = part(&mut self.code, group);
+        for i in 0..LANES {
+            let [px, py, n, w] = lens.clip([from_eye[0][i], from_eye[1][i], from_eye[2][i]]);
+            cx[i] = px;
+            cy[i] = py;
+            cn[i] = n;
+            cw[i] = w;
+            // NaN fails each of these, so it is clipped, and there it is dropped.
+            let fits = (n <= w)
+                & (w > 0.0)
+                & (px.abs() <= image.guard[0] * w)
+                & (py.abs() <= image.guard[1] * w);
+            code[i] = u32::from(!fits)
+                | u32::from(px < -half[0] * w) << 1
+                | u32::from(px > half[0] * w) << 2
+                | u32::from(py < -half[1] * w) << 3
+                | u32::from(py > half[1] * w) << 4
+                | u32::from(n > w) << 5
+                | u32::from(n < 0.0) << 6;
+            let inverse = 1.0 / w;
+            x[i] = px * inverse;
+            y[i] = py * inverse;
+            nearness[i] = n * inverse;
+        }
+    }
+
+    /// Finds the triangles of `meshlet` that may cover a centre in rows `top..=bottom`.
+    #[inline(never)]
+    pub(super) fn select(
+        &mut self,
+        blocks: &Blocks,
+        meshlet: &Meshlet,
+        culled: FaceCull,
+        image: &Image,
+        (top, bottom): (i32, i32),
+    ) {
+        let count = meshlet.triangles.len();
+        let groups = count.div_ceil(LANES);
+        let corners = &blocks.corners[meshlet.first_group as usize..][..groups];
+        // Rows run downwards, so what is counter-clockwise with y up has a negative area here.
+        let sign = match culled {
+            FaceCull::None => 0.0,
+            FaceCull::Back => -1.0,
+            FaceCull::Front => 1.0,
+        };
+        let [half_x, half_y] = image.half;
+        let mut kept = 0;
+        for (group, corners) in (0_u8..).zip(corners) {
+            let of = |values: &PerVertex<f32>| {
+                corners.map(|c| c.map(|v| values[usize::from(v) % MAX_VERTICES]))
+            };
+            let ([x0, x1, x2], [y0, y1, y2]) = (of(&self.x), of(&self.y));
+            let [c0, c1, c2] = corners.map(|c| c.map(|v| self.code[usize::from(v) % MAX_VERTICES]));
+            let mut keep = [0_u32; LANES];
+            for i in 0..LANES {
+                let outside = (c0[i] & c1[i] & c2[i]) & !CLIP;
+                let clip = (c0[i] | c1[i] | c2[i]) & CLIP;
+                let (left, right) =
+                    (least(least(x0[i], x1[i]), x2[i]), greatest(greatest(x0[i], x1[i]), x2[i]));
+                let (up, down) =
+                    (least(least(y0[i], y1[i]), y2[i]), greatest(greatest(y0[i], y1[i]), y2[i]));
+                // The first and the last centre between the extremes, rounded like the corners.
+                let first = |v: f32, half: i32| (rounded(v) + half + (HALF - 1)) >> 8;
+                let last = |v: f32, half: i32| (rounded(v) + half - HALF) >> 8;
+                let columns = (first(left, half_x), last(right, half_x));
+                let rows = (first(up, half_y), last(down, half_y));
+                let covers = (columns.0 <= columns.1)
+                    & (columns.1 >= 0)
+                    & (columns.0 < image.width)
+                    & (rows.0 <= rows.1)
+                    & (rows.1 >= top)
+                    & (rows.0 <= bottom);
+                let (ax, ay, bx, by) = (x1[i] - x0[i], y1[i] - y0[i], x2[i] - x0[i], y2[i] - y0[i]);
+                let (p, q) = (ax * by, ay * bx);
+                // Rounding the corners may turn a thin triangle round; those are left to the exact
+                // test.
+                let slack =
+                    (ax.abs() + ay.abs() + bx.abs() + by.abs()) * 2.0 + (p.abs() + q.abs()) * 1e-6;
+                let faces = (p - q) * sign >= -slack;
+                keep[i] = u32::from((outside == 0) & ((clip != 0) | (covers & faces)));
+            }
+            for (i, keep) in (0..).zip(keep) {
+                self.kept[kept] = group * LANES as u8 + i;
+                kept += keep as usize;
+            }
+        }
+        // Padding in the last group is no triangle.
+        while kept > 0 && usize::from(self.kept[kept - 1]) >= count {
+            kept -= 1;
+        }
+        self.num_kept = kept;
+    }
+
+    /// How many triangles [`select`](Self::select) has found.
+    pub(super) fn num_kept(&self) -> usize {
+        self.num_kept
+    }
+
+    /// The corners of the `i`-th of these triangles, as vertices.
+    #[inline(always)]
+    pub(super) fn corners(&self, blocks: &Blocks, meshlet: &Meshlet, i: usize) -> [usize; 3] {
+        let triangle = usize::from(self.kept[i]);
+        let group = &blocks.corners[meshlet.first_group as usize + triangle / LANES];
+        group.each_ref().map(|corner| usize::from(corner[triangle % LANES]) % MAX_VERTICES)
+    }
+}
