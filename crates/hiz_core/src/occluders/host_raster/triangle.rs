@@ -89,18 +89,20 @@ pub(super) fn clipped(
     /// At most three corners and one more for each plane.
     const MOST: usize = 8;
     let [gx, gy] = image.guard.map(f64::from);
-    let inside: [&dyn Fn(&[f64; 4]) -> f64; 5] = [
-        &|p| p[3] - p[2],
-        &|p| gx * p[3] - p[0],
-        &|p| gx * p[3] + p[0],
-        &|p| gy * p[3] - p[1],
-        &|p| gy * p[3] + p[1],
+    // The planes as rows: inside of them the product with a point is not negative.
+    let planes = [
+        [0.0, 0.0, -1.0, 1.0],
+        [-1.0, 0.0, 0.0, gx],
+        [1.0, 0.0, 0.0, gx],
+        [0.0, -1.0, 0.0, gy],
+        [0.0, 1.0, 0.0, gy],
     ];
     let (mut polygon, mut count) = ([[0.0; 4]; MOST], 3);
     for (corner, clip) in polygon.iter_mut().zip(clip) {
         *corner = clip.map(f64::from);
     }
-    for inside in inside {
+    for plane in planes {
+        let inside = |p: &[f64; 4]| (0..4).map(|k| plane[k] * p[k]).sum::<f64>();
         let (mut next, mut left) = ([[0.0; 4]; MOST], 0);
         for i in 0..count {
             let (a, b) = (polygon[i], polygon[(i + 1) % count]);
