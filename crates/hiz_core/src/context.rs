@@ -158,6 +158,12 @@ impl HizContext {
         Ok(Self { gpu: Arc::new(Gpu::new(device, None)?.with_planted_faults(faults)) })
     }
 
+    /// How many objects this context has made so far, for tests.
+    #[cfg(feature = "testing")]
+    pub fn made(&self) -> crate::gpu::made::Made {
+        self.gpu.making.so_far()
+    }
+
     /// Limits that are always enough for a device: the defaults of WebGPU.
     ///
     /// [`HizContext::new`] also accepts lower limits if the shaders, their bindings and one row of

@@ -19,15 +19,13 @@ use crate::input::tolerance::DepthTolerance;
 use crate::pyramid::Pyramid;
 use crate::pyramid::built::Built;
 use crate::pyramid::layout::Step;
+use crate::pyramid::steps::STEP_BINDINGS;
 
 /// The bindings of the depth image and the pyramid.
 const fn bindings(source: SourceKind) -> [(u32, Binding); 6] {
     use Binding::{Depth, Sampler, Uniform, Write};
     [(0, Depth(source)), (1, Sampler), (2, Uniform), (3, Write), (4, Write), (5, Write)]
 }
-
-/// The binding of one step.
-const STEP_BINDINGS: &[(u32, Binding)] = &[(0, Binding::Uniform)];
 
 /// Which shader and entry point make a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,20 +103,6 @@ const PAGE_PIXELS: u32 = 1024;
 /// Each invocation then reads at least 8x8 pixels.
 pub(crate) const SHARED_LEVEL: u32 = 6;
 
-/// Twin of `Step` in `shaders/pyramid/pyramid_write.wgsl`.
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub(crate) struct StepUniform {
-    pub(crate) source: u32,
-    pub(crate) last: u32,
-    pub(crate) reduction: u32,
-    pub(crate) padding: u32,
-    pub(crate) blocks: [u32; 2],
-    pub(crate) padding_1: [u32; 2],
-}
-
-const _: () = assert!(size_of::<StepUniform>() == 32);
-
 /// Records the reduction of `depth` into `pyramid`; all of the texture's first mip level is read.
 ///
 /// `uploaded` is the rounding of the depths before they were uploaded into the texture.
@@ -190,26 +174,27 @@ pub(crate) fn record_reduce(
             format!("expected the usage {name}, got {:?}", texture.usage()),
         ));
     }
-    let (source, view) = bind_source(gpu, depth, source_kind, pyramid)?;
+    let (source, view) = source_bindings(gpu, depth, source_kind, pyramid)?;
     // Everything that can fail comes before the first command is recorded.
     let reduction = next_reduction();
     let dispatch = |step: &Step| {
         let tall = step.source == 0 && reads_tall(step, source_kind, size);
         let (shape, workgroups) = shape_of(step, tall);
         let constants = (camera.convention().is_reversed(), tall, pyramid.chunks.len());
-        let pipeline = reduce_pipeline(gpu, source_kind, shape, constants)?;
-        let uniform = gpu.uniform("hiz.reduce.step", &step_uniform(step, reduction))?;
-        let layout = gpu.layout("hiz.reduce.step_layout", STEP_BINDINGS)?;
-        let entries = [entry(0, uniform.as_entire_binding())];
-        Ok((pipeline, gpu.bind_group("hiz.reduce.step", &layout, &entries)?, workgroups))
+        Ok((reduce_pipeline(gpu, source_kind, shape, constants)?, workgroups))
     };
-    let dispatches = pyramid.layout.steps.iter().map(dispatch).collect::<Result<Vec<_>>>()?;
+    let steps = &pyramid.layout.steps;
+    let dispatches = steps.iter().map(dispatch).collect::<Result<Vec<_>>>()?;
+    let number = gpu.numbers(&reduction.to_ne_bytes())?;
     gpu.recorded(|| {
+        pyramid.steps.record(encoder, steps, number);
         let descriptor =
             wgpu::ComputePassDescriptor { label: Some("hiz.reduce.pass"), timestamp_writes: None };
         let mut pass = encoder.begin_compute_pass(&descriptor);
         pass.set_bind_group(0, &source, &[]);
-        for (pipeline, bind_group, [columns, rows]) in &dispatches {
+        for ((pipeline, [columns, rows]), bind_group) in
+            dispatches.iter().zip(&pyramid.steps.bindings)
+        {
             pass.set_pipeline(pipeline);
             pass.set_bind_group(1, bind_group, &[]);
             // At least one workgroup, which writes the header even if nothing is stored.
@@ -223,6 +208,37 @@ pub(crate) fn record_reduce(
     let camera = camera.clone();
     pyramid.set_built(Built { reduction, source: view, source_kind, camera, tolerance });
     Ok(())
+}
+
+/// The bind group of the reduction and the view of the depth image that it binds, kept from an
+/// earlier reduction of the same texture if there was one.
+fn source_bindings(
+    gpu: &Gpu,
+    depth: &wgpu::TextureView,
+    source_kind: SourceKind,
+    pyramid: &Pyramid,
+) -> Result<(wgpu::BindGroup, wgpu::TextureView)> {
+    let Some(kept) = pyramid.sources.find(depth.texture()) else {
+        let bound = bind_source(gpu, depth, source_kind, pyramid)?;
+        return pyramid.sources.get(depth.texture().clone(), || Ok(bound));
+    };
+    // A bind group does not tell that its texture was destroyed since, but a new view does.
+    gpu.view(depth.texture()).map_err(refused)?;
+    Ok(kept)
+}
+
+/// The error for a depth image that wgpu refuses.
+fn refused(error: Error) -> Error {
+    match error {
+        Error::Device(why) => Error::mismatch(
+            "depth",
+            format!(
+                "expected a texture of this device and context that has not been destroyed, but \
+                 {why}"
+            ),
+        ),
+        other => other,
+    }
 }
 
 /// The bind group of the reduction, and the view of the depth image that it binds.
@@ -254,16 +270,6 @@ fn bind_source(
     let error = match bind(depth) {
         Ok(bound) => return Ok((bound, depth.clone())),
         Err(error) => error,
-    };
-    let refused = |error| match error {
-        Error::Device(why) => Error::mismatch(
-            "depth",
-            format!(
-                "expected a texture of this device and context that has not been destroyed, but \
-                 {why}"
-            ),
-        ),
-        other => other,
     };
     // A view of another device's texture would report its errors to that device, whose handler may
     // end the process.
@@ -305,18 +311,6 @@ fn shape_of(step: &Step, tall: bool) -> (Shape, [u32; 2]) {
 /// - Rows that begin at multiples of a page, which would all fall into the same lines of a cache.
 fn reads_tall(step: &Step, source: SourceKind, size: ImageSize) -> bool {
     (source != SourceKind::Bits || step.is_coarse()) && !size.width.is_multiple_of(PAGE_PIXELS)
-}
-
-fn step_uniform(step: &Step, reduction: u32) -> StepUniform {
-    let reduction = if step.source == 0 { reduction } else { 0 };
-    StepUniform {
-        source: step.source,
-        last: step.last,
-        reduction,
-        padding: 0,
-        blocks: step.blocks,
-        padding_1: [0; 2],
-    }
 }
 
 /// A new number for a reduction, never 0.
