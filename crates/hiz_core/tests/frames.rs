@@ -235,8 +235,8 @@ fn numbers() -> Vec<CullOptions> {
     all
 }
 
-/// Recordings that are submitted in any order, late or never.
-/// Each reduces an image of its own and culls with numbers of its own, all with one pyramid.
+/// Recordings that are submitted in any order, late or never, all with one pyramid.
+/// Each culls with numbers of its own, and in every other round reduces an image of its own.
 #[test]
 fn each_recording_reads_its_own_numbers() {
     let renderer = Renderer::new();
@@ -245,22 +245,26 @@ fn each_recording_reads_its_own_numbers() {
     let instances = renderer.spheres(500);
     let outputs = Outputs { mask: true, ..Outputs::NONE };
     let camera = camera(0);
-    let record = |pyramid: &Pyramid, image: &DepthImage, options: &CullOptions| {
-        let mut encoder = renderer.encoder();
+    let reduce = |encoder: &mut wgpu::CommandEncoder, pyramid: &Pyramid, image: usize| {
+        context.record_reduce(encoder, &view(&images[image]), &camera, pyramid).unwrap();
+    };
+    let cull = |encoder: &mut wgpu::CommandEncoder, pyramid: &Pyramid, number: usize| {
         let visible = context.create_visible(&instances, &outputs).unwrap();
-        context.record_reduce(&mut encoder, &view(image), &camera, pyramid).unwrap();
-        context.record_cull(&mut encoder, &instances, &camera, pyramid, &visible, options).unwrap();
-        (encoder, visible)
+        let options = &numbers[number];
+        context.record_cull(encoder, &instances, &camera, pyramid, &visible, options).unwrap();
+        visible
     };
     // Each alone, with a pyramid of its own.
-    let alone = |image, options| {
-        let pyramid = renderer.pyramid(AtlasUse::Never);
-        let (encoder, visible) = record(&pyramid, image, options);
+    let alone = |image, number| {
+        let (pyramid, mut encoder) = (renderer.pyramid(AtlasUse::Never), renderer.encoder());
+        reduce(&mut encoder, &pyramid, image);
+        let visible = cull(&mut encoder, &pyramid, number);
         renderer.submit(encoder);
         renderer.mask(&visible)
     };
-    let expected: Vec<Vec<_>> =
-        images.iter().map(|image| numbers.iter().map(|o| alone(image, o)).collect()).collect();
+    let expected: Vec<Vec<_>> = (0..images.len())
+        .map(|image| (0..numbers.len()).map(|number| alone(image, number)).collect())
+        .collect();
     let mut distinct: Vec<_> = expected.iter().flatten().collect();
     distinct.sort();
     distinct.dedup();
@@ -269,23 +273,35 @@ fn each_recording_reads_its_own_numbers() {
     let mut random = Random(11);
     for atlas in [AtlasUse::Never, AtlasUse::Always] {
         let pyramid = renderer.pyramid(atlas);
-        for round in 0..20 {
-            let mut recorded: Vec<_> = (0..6)
-                .map(|_| {
-                    let image = random.below(images.len() as u32) as usize;
-                    let number = random.below(numbers.len() as u32) as usize;
-                    (image, number, record(&pyramid, &images[image], &numbers[number]))
-                })
-                .collect();
+        for round in 0..40 {
+            let mut below = |n: usize| random.below(n as u32) as usize;
+            let one_image = (round % 2 == 0).then(|| below(images.len()));
+            if let Some(image) = one_image {
+                let mut encoder = renderer.encoder();
+                reduce(&mut encoder, &pyramid, image);
+                renderer.submit(encoder);
+            }
+            // Few numbers, so that some recordings have the same.
+            let few = [below(numbers.len()), below(numbers.len())];
+            let mut recorded = Vec::new();
+            for _ in 0..6 {
+                let (mut encoder, number) = (renderer.encoder(), few[below(2)]);
+                let image = one_image.unwrap_or_else(|| {
+                    let image = below(images.len());
+                    reduce(&mut encoder, &pyramid, image);
+                    image
+                });
+                let visible = cull(&mut encoder, &pyramid, number);
+                recorded.push((image, number, encoder, visible));
+            }
             let mut submitted = Vec::new();
             while !recorded.is_empty() {
-                let next = random.below(recorded.len() as u32) as usize;
-                let (image, number, (encoder, visible)) = recorded.swap_remove(next);
-                if random.below(4) > 0 {
+                let (image, number, encoder, visible) = recorded.swap_remove(below(recorded.len()));
+                if below(4) > 0 {
                     renderer.submit(encoder);
                     submitted.push((image, number, visible));
                 }
-                if random.below(3) == 0 {
+                if below(3) == 0 {
                     engine.wait().unwrap();
                 }
             }
