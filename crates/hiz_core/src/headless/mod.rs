@@ -6,8 +6,8 @@
 //! 1. `adapter` lists the adapters, and `engine` opens a device on one.
 //! 2. `uploads` brings instances, updates and occluders to it, and `depth_image` depth images.
 //! 3. `levels` builds pyramids and reads their levels.
-//! 4. `cull` submits a cull; `culling` reads its answers, through `counts`, `explanation` and
-//!    `readback`.
+//! 4. `cull` submits a cull into buffers of `answers`; `culling` reads them, through `counts`,
+//!    `explanation` and `readback`.
 //!
 //! `process` guards all of them against forks.
 //! This is the only room that submits, waits and maps buffers for reading; it decides no geometry.
@@ -43,6 +43,7 @@
 //! [`Error::OtherProcess`]: crate::Error::OtherProcess
 
 mod adapter;
+mod answers;
 mod counts;
 mod cull;
 mod culling;
