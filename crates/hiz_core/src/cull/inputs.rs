@@ -27,6 +27,20 @@ pub(crate) struct CullInputs<'a> {
     /// Whether every dispatch has zero workgroups.
     /// Nothing is culled then, but a driver that compiles at the first dispatch does so.
     pub(crate) idle: bool,
+    /// What the pyramid is taken to be built from; `None`: what it was last built from.
+    pub(crate) built: Option<&'a Built>,
+}
+
+impl<'a> CullInputs<'a> {
+    /// A cull that runs, against what the pyramid was last built from.
+    pub(crate) fn new(
+        instances: &'a Instances,
+        camera: &'a Camera,
+        pyramid: &'a Pyramid,
+        options: &'a CullOptions,
+    ) -> Self {
+        Self { instances, camera, pyramid, options, idle: false, built: None }
+    }
 }
 
 pub(super) fn check_contexts(gpu: &Gpu, inputs: &CullInputs<'_>) -> Result<()> {
@@ -72,7 +86,10 @@ impl PreparedView {
     ) -> Result<Self> {
         let CullInputs { instances, camera, pyramid, options, .. } = *inputs;
         check_contexts(gpu, inputs)?;
-        let built = pyramid.built_for(camera)?;
+        let built = match inputs.built {
+            Some(built) => built.clone(),
+            None => pyramid.built_for(camera)?,
+        };
         // Bad options are refused before anything is recorded.
         let view = ViewUniform::new(camera, built.reduction, options, built.tolerance)?;
         Pyramid::check_source(gpu, &built)?;

@@ -44,7 +44,7 @@ impl Engine {
             let (start, made_before) = (Instant::now(), PipelinesMade::so_far());
             let buffers = self.answers().lend(self.context(), instances, outputs)?;
             let visible = Arc::clone(&buffers.visible);
-            let inputs = CullInputs { instances, camera, pyramid, options, idle: false };
+            let inputs = CullInputs::new(instances, camera, pyramid, options);
             let mut encoder = self.encoder("hiz.cull.encoder");
             record_cull(gpu, &mut encoder, &inputs, &visible)?;
             let staged_mask = Culling::stage_mask(&mut encoder, instances, &buffers);

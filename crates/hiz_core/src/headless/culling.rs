@@ -465,7 +465,7 @@ const BITS: [[bool; 8]; 256] = {
     let mut table = [[false; 8]; 256];
     let mut i = 0;
     while i < 8 * table.len() {
-        table[i / 8][i % 8] = i / 8 >> (i % 8) & 1 == 1;
+        table[i / 8][i % 8] = (i / 8) >> (i % 8) & 1 == 1;
         i += 1;
     }
     table

@@ -9,6 +9,7 @@
 //! 4. `cull` submits a cull into buffers of `answers`; `culling` reads them, through `counts`,
 //!    `explanation` and `readback`.
 //!
+//! `warm_up` runs a frame before the first one.
 //! `process` guards all of them against forks.
 //! This is the only room that submits, waits and maps buffers for reading; it decides no geometry.
 //!
@@ -55,6 +56,7 @@ mod levels;
 mod process;
 pub(crate) mod readback;
 mod uploads;
+mod warm_up;
 
 pub use adapter::{ADAPTER_VARIABLE, AdapterSummary, INSTALL_HINT, adapters};
 pub use counts::{Counts, Timings};
