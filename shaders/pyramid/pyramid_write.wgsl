@@ -6,7 +6,7 @@
 @group(0) @binding(5) var<storage, read_write> chunk_2: array<vec4<u32>>;
 @group(1) @binding(0) var<uniform> step: Step;
 
-// Twin: `StepUniform` in `crates/hiz_core/src/pyramid/reduce.rs`.
+// Twin: `StepUniform` in `crates/hiz_core/src/pyramid/steps.rs`.
 struct Step {
     // The level that is read, and the last of the levels above it that are written.
     source: u32,

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use crate::cull::inputs::CullInputs;
 use crate::cull::options::CullOptions;
 use crate::cull::record::record_cull;
+use crate::cull::warm_up::{WarmUp, record_warm_up};
 use crate::error::{Error, Result};
 use crate::gpu::device::Gpu;
 use crate::input::bounds::Bounds;
@@ -156,6 +157,12 @@ impl HizContext {
     pub fn with_planted_faults(device: &wgpu::Device, faults: &[(&str, &str)]) -> Result<Self> {
         Self::new(device)?;
         Ok(Self { gpu: Arc::new(Gpu::new(device, None)?.with_planted_faults(faults)) })
+    }
+
+    /// How many objects this context has made so far, for tests.
+    #[cfg(feature = "testing")]
+    pub fn made(&self) -> crate::gpu::made::Made {
+        self.gpu.making.so_far()
     }
 
     /// Limits that are always enough for a device: the defaults of WebGPU.
@@ -366,8 +373,38 @@ impl HizContext {
         visible: &Visible,
         options: &CullOptions,
     ) -> Result<()> {
-        let inputs = CullInputs { instances, camera, pyramid, options, idle: false };
-        record_cull(&self.gpu, encoder, &inputs, visible)
+        record_cull(
+            &self.gpu,
+            encoder,
+            &CullInputs::new(instances, camera, pyramid, options),
+            visible,
+        )
+    }
+
+    /// Makes everything that frames like this one need, and records work that makes the driver
+    /// compile it.
+    ///
+    /// Submit it and wait for it before the first frame.
+    /// Then the frame's `record_*` calls make no pipeline, and no bind group, texture or buffer of
+    /// their own.
+    /// Call it once for each kind of frame: for each cull and each of several depth images.
+    ///
+    /// Drivers compile at two times, when a pipeline is made and when it is first dispatched.
+    /// So the recorded dispatches have no workgroups: they neither reduce, cull nor update anything.
+    /// Two things do change:
+    ///
+    /// - The occluders are drawn into the depth image, as they are in a frame.
+    /// - The mask, the lists' lengths and the counts in `visible` are cleared.
+    ///
+    /// # Errors
+    /// Those of [`HizContext::record_occluders`], [`HizContext::record_reduce`],
+    /// [`HizContext::record_cull`] and [`HizContext::record_update`].
+    pub fn record_warm_up(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        frame: &WarmUp<'_>,
+    ) -> Result<()> {
+        record_warm_up(&self.gpu, encoder, frame)
     }
 }
 

@@ -169,6 +169,7 @@ pub use wgpu;
 
 pub use context::HizContext;
 pub use cull::options::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
+pub use cull::warm_up::WarmUp;
 pub use error::{Error, Result};
 pub use host::linear::{Mat3, Mat4, Vec3};
 pub use input::bounds::{Bounds, BoundsKind, Floats};

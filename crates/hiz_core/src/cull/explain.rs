@@ -123,12 +123,12 @@ pub(crate) fn record_explain(
     })?;
     let mut seen = PreparedView::new(gpu, inputs, None)?;
     let place = piece.order.place((index - piece.range.start) as usize);
-    let (which, records, view) = if whole_group {
+    let mut view = seen.bind(gpu, inputs.pyramid, whole_group)?;
+    let (which, records) = if whole_group {
         seen.key = group_key(seen.key);
-        let view = seen.bind_for_groups(gpu, inputs.pyramid)?;
-        (place / GROUP, &piece.group_records, view)
+        (place / GROUP, &piece.group_records)
     } else {
-        (place, &piece.records, seen.bind(gpu, inputs.pyramid)?)
+        (place, &piece.records)
     };
     let which = gpu.uniform("hiz.explain.which", &[which as u32, 0, 0, 0])?;
     let output = gpu.bind_group(
@@ -138,12 +138,13 @@ pub(crate) fn record_explain(
     )?;
     let (pipeline, records) =
         (explain_pipeline(gpu, &seen.key)?, bind_records(gpu, &which, records)?);
+    view.record(encoder, inputs.pyramid);
     let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
         label: Some("hiz.explain.pass"),
         timestamp_writes: None,
     });
     pass.set_pipeline(&pipeline);
-    pass.set_bind_group(0, &view, &[]);
+    pass.set_bind_group(0, view.groups.as_ref().unwrap_or(&view.instances), &[]);
     pass.set_bind_group(1, &records, &[]);
     pass.set_bind_group(2, &output, &[]);
     pass.dispatch_workgroups(1, 1, 1);

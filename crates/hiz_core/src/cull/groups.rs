@@ -6,7 +6,7 @@ use crate::cull::pipelines::{
     cull_members_pipeline,
 };
 use crate::error::Result;
-use crate::gpu::buffers::entry;
+use crate::gpu::buffers::{entry, made};
 use crate::gpu::device::Gpu;
 use crate::input::bounds::BoundsKind;
 use crate::instances::piece::Piece;
@@ -71,33 +71,35 @@ impl<'a> GroupCull<'a> {
         statistics: Option<&wgpu::Buffer>,
     ) -> Result<Self> {
         let output = output.groups_or_new(gpu, piece)?;
-        let counted = match statistics {
-            Some(statistics) => statistics.clone(),
-            None => gpu.stand_in(NO_STATISTICS)?,
-        };
-        let left = gpu.bind_group(
-            "hiz.cull.groups",
-            &gpu.layout("hiz.cull_groups.layout", SURVIVOR_BINDINGS)?,
-            &[
-                entry(0, output.survivors.as_entire_binding()),
-                entry(1, output.verdicts.as_entire_binding()),
-                entry(2, wgpu::BindingResource::TextureView(&output.survivor_list)),
-                entry(3, counted.as_entire_binding()),
-            ],
-        )?;
-        let members = gpu.bind_group(
-            "hiz.cull.survivors",
-            &gpu.layout("hiz.cull_members.layout", MEMBER_BINDINGS)?,
-            &[
-                entry(0, output.survivors.as_entire_binding()),
-                entry(1, wgpu::BindingResource::TextureView(&output.survivor_list)),
-            ],
-        )?;
-        Ok(Self {
-            output,
-            boxes: (cull_groups_pipeline(gpu, &group_key(key), statistics.is_some())?, left),
-            members: (cull_members_pipeline(gpu, &key, &report)?, members),
-        })
+        let left = made(&output.bindings[usize::from(statistics.is_some())], || {
+            let counted = match statistics {
+                Some(statistics) => statistics.clone(),
+                None => gpu.stand_in(NO_STATISTICS)?,
+            };
+            gpu.bind_group(
+                "hiz.cull.groups",
+                &gpu.layout("hiz.cull_groups.layout", SURVIVOR_BINDINGS)?,
+                &[
+                    entry(0, output.survivors.as_entire_binding()),
+                    entry(1, output.verdicts.as_entire_binding()),
+                    entry(2, wgpu::BindingResource::TextureView(&output.survivor_list)),
+                    entry(3, counted.as_entire_binding()),
+                ],
+            )
+        })?;
+        let members = made(&output.member_bindings, || {
+            gpu.bind_group(
+                "hiz.cull.survivors",
+                &gpu.layout("hiz.cull_members.layout", MEMBER_BINDINGS)?,
+                &[
+                    entry(0, output.survivors.as_entire_binding()),
+                    entry(1, wgpu::BindingResource::TextureView(&output.survivor_list)),
+                ],
+            )
+        })?;
+        let of_boxes = cull_groups_pipeline(gpu, &group_key(key), statistics.is_some())?;
+        let of_members = cull_members_pipeline(gpu, &key, &report)?;
+        Ok(Self { output, boxes: (of_boxes, left.clone()), members: (of_members, members.clone()) })
     }
 
     /// Records the test of the boxes, in so many `workgroups`.

@@ -10,6 +10,8 @@ use crate::cull::view_uniform::ViewUniform;
 use crate::error::Result;
 use crate::gpu::buffers::entry;
 use crate::gpu::device::Gpu;
+use crate::gpu::numbers::Numbers;
+use crate::gpu::recorded_uniform::BoundParts;
 use crate::input::camera::Camera;
 use crate::instances::Instances;
 use crate::pyramid::Pyramid;
@@ -25,6 +27,20 @@ pub(crate) struct CullInputs<'a> {
     /// Whether every dispatch has zero workgroups.
     /// Nothing is culled then, but a driver that compiles at the first dispatch does so.
     pub(crate) idle: bool,
+    /// What the pyramid is taken to be built from; `None`: what it was last built from.
+    pub(crate) built: Option<&'a Built>,
+}
+
+impl<'a> CullInputs<'a> {
+    /// A cull that runs, against what the pyramid was last built from.
+    pub(crate) fn new(
+        instances: &'a Instances,
+        camera: &'a Camera,
+        pyramid: &'a Pyramid,
+        options: &'a CullOptions,
+    ) -> Self {
+        Self { instances, camera, pyramid, options, idle: false, built: None }
+    }
 }
 
 pub(super) fn check_contexts(gpu: &Gpu, inputs: &CullInputs<'_>) -> Result<()> {
@@ -42,6 +58,23 @@ pub(super) struct PreparedView {
     pub(super) key: CullKey,
 }
 
+/// What a cull binds of its view.
+#[derive(Debug)]
+pub(super) struct BoundView {
+    pub(super) instances: wgpu::BindGroup,
+    pub(super) groups: Option<wgpu::BindGroup>,
+    numbers: Option<Numbers>,
+}
+
+impl BoundView {
+    /// Records what must run before the tests that bind it.
+    pub(super) fn record(&mut self, encoder: &mut wgpu::CommandEncoder, pyramid: &Pyramid) {
+        if let Some(numbers) = self.numbers.take() {
+            pyramid.view.record(encoder, numbers);
+        }
+    }
+}
+
 impl PreparedView {
     /// Prepares the view of a cull.
     ///
@@ -53,7 +86,10 @@ impl PreparedView {
     ) -> Result<Self> {
         let CullInputs { instances, camera, pyramid, options, .. } = *inputs;
         check_contexts(gpu, inputs)?;
-        let built = pyramid.built_for(camera)?;
+        let built = match inputs.built {
+            Some(built) => built.clone(),
+            None => pyramid.built_for(camera)?,
+        };
         // Bad options are refused before anything is recorded.
         let view = ViewUniform::new(camera, built.reduction, options, built.tolerance)?;
         Pyramid::check_source(gpu, &built)?;
@@ -78,38 +114,29 @@ impl PreparedView {
         Ok(Self { built, atlas, view, key })
     }
 
-    /// The bindings for a test of instances.
-    /// They are those of the last cull if it asked for the same.
-    pub(super) fn bind(&self, gpu: &Gpu, pyramid: &Pyramid) -> Result<wgpu::BindGroup> {
-        self.bind_view(gpu, pyramid, self.view)
-    }
-
-    /// The bindings for a test of groups.
-    pub(super) fn bind_for_groups(&self, gpu: &Gpu, pyramid: &Pyramid) -> Result<wgpu::BindGroup> {
+    /// The bindings for a test of instances and, if `grouped`, for one of groups.
+    pub(super) fn bind(&self, gpu: &Gpu, pyramid: &Pyramid, grouped: bool) -> Result<BoundView> {
         let descent_budget = group_descent(self.view.descent_budget);
-        self.bind_view(gpu, pyramid, ViewUniform { descent_budget, ..self.view })
-    }
-
-    fn bind_view(
-        &self,
-        gpu: &Gpu,
-        pyramid: &Pyramid,
-        view: ViewUniform,
-    ) -> Result<wgpu::BindGroup> {
-        let words: [u32; size_of::<ViewUniform>() / 4] = bytemuck::cast(view);
-        let words = [&[self.key.store.code()], &words[..]].concat();
-        pyramid.bindings.get(&words, || self.create(gpu, pyramid, &view))
+        let views = [self.view, ViewUniform { descent_budget, ..self.view }];
+        let parts = views.each_ref().map(bytemuck::bytes_of);
+        let key =
+            (self.key.store.code(), self.atlas.as_ref().unwrap_or(&self.built.source).clone());
+        let bound = pyramid.view.bind(gpu, &key, &parts[..1 + usize::from(grouped)], |view| {
+            self.create(gpu, pyramid, view)
+        })?;
+        let BoundParts { mut parts, numbers } = bound;
+        let groups = parts.split_off(1).pop();
+        let instances = parts.swap_remove(0);
+        Ok(BoundView { instances, groups, numbers })
     }
 
     fn create(
         &self,
         gpu: &Gpu,
         pyramid: &Pyramid,
-        uniform: &ViewUniform,
+        view: wgpu::BindingResource<'_>,
     ) -> Result<wgpu::BindGroup> {
-        let view = gpu.uniform("hiz.cull.view_uniform", uniform)?;
-        let mut entries =
-            vec![entry(2, pyramid.uniform.as_entire_binding()), entry(6, view.as_entire_binding())];
+        let mut entries = vec![entry(2, pyramid.uniform.as_entire_binding()), entry(6, view)];
         let chunks;
         if let Some(atlas) = &self.atlas {
             entries.push(entry(3, wgpu::BindingResource::TextureView(atlas)));

@@ -5,54 +5,64 @@ use crate::cull::inputs::{CullInputs, PreparedView, check_contexts};
 use crate::cull::options::{CullOptions, Order};
 use crate::cull::pipelines::{CullKey, ReportKey, VISIBLE_BINDINGS, cull_pipeline};
 use crate::error::{Error, Result};
-use crate::gpu::buffers::entry;
+use crate::gpu::buffers::{check_alive, entry, made};
 use crate::gpu::device::Gpu;
 use crate::instances::piece::{CULL_WORKGROUP, Piece};
 use crate::output::compact::Compaction;
 use crate::output::survivors::NO_SURVIVORS;
 use crate::output::visible::Visible;
 
-fn bind_output(
+/// The bindings of what a cull of a piece writes, made by the first such cull.
+fn bind_output<'a>(
     gpu: &Gpu,
     piece: &Piece,
-    visible: &Visible,
+    visible: &'a Visible,
     p: usize,
     statistics: bool,
-) -> Result<wgpu::BindGroup> {
+) -> Result<&'a wgpu::BindGroup> {
     let lists = visible.lists.as_ref();
-    let list = match lists {
-        Some(lists) => lists.pieces[p].bound().clone(),
-        None => gpu.stand_in("hiz.no_list")?,
+    let output = &visible.pieces[p];
+    let bind = || {
+        let list = match lists {
+            Some(lists) => lists.pieces[p].bound().clone(),
+            None => gpu.stand_in("hiz.no_list")?,
+        };
+        let draws = match lists {
+            Some(lists) => lists.draws.clone(),
+            None => gpu.stand_in("hiz.no_draws")?,
+        };
+        // If nothing is listed, any uniform can be bound.
+        let capacity = lists.map_or(&piece.uniform, |lists| &lists.capacity_uniform);
+        let statistics = if statistics {
+            visible.statistics_or_new(gpu)?.clone()
+        } else {
+            gpu.stand_in(NO_STATISTICS)?
+        };
+        gpu.bind_group(
+            "hiz.cull.visible",
+            &gpu.layout("hiz.cull.visible_layout", VISIBLE_BINDINGS)?,
+            &[
+                entry(0, output.mask.as_entire_binding()),
+                entry(1, list.as_entire_binding()),
+                entry(2, draws.as_entire_binding()),
+                entry(3, statistics.as_entire_binding()),
+                entry(4, capacity.as_entire_binding()),
+            ],
+        )
     };
-    let draws = match lists {
-        Some(lists) => lists.draws.clone(),
-        None => gpu.stand_in("hiz.no_draws")?,
-    };
-    // If nothing is listed, any uniform can be bound.
-    let capacity = lists.map_or(&piece.uniform, |lists| &lists.capacity_uniform);
-    let statistics = if statistics {
-        visible.statistics_or_new(gpu)?.clone()
-    } else {
-        gpu.stand_in(NO_STATISTICS)?
-    };
-    gpu.bind_group(
-        "hiz.cull.visible",
-        &gpu.layout("hiz.cull.visible_layout", VISIBLE_BINDINGS)?,
-        &[
-            entry(0, visible.pieces[p].mask.as_entire_binding()),
-            entry(1, list.as_entire_binding()),
-            entry(2, draws.as_entire_binding()),
-            entry(3, statistics.as_entire_binding()),
-            entry(4, capacity.as_entire_binding()),
-        ],
-    )
-    .map_err(|error| match error {
-        Error::Device(why) => Error::mismatch(
-            "visible",
-            format!("expected buffers that have not been destroyed, but {why}"),
-        ),
-        other => other,
-    })
+    // A bind group does not tell that one of its buffers was destroyed since.
+    let listed = lists.map(|lists| [&lists.draws, lists.pieces[p].bound()]);
+    let mut written = [&output.mask].into_iter().chain(listed.into_iter().flatten());
+    written
+        .try_for_each(check_alive)
+        .and_then(|()| made(&output.bindings[usize::from(statistics)], bind))
+        .map_err(|error| match error {
+            Error::Device(why) => Error::mismatch(
+                "visible",
+                format!("expected buffers that have not been destroyed, but {why}"),
+            ),
+            other => other,
+        })
 }
 
 /// A function that makes the pipeline of the flat cull.
@@ -109,9 +119,8 @@ fn record_all(
     };
     let seen = PreparedView::new(gpu, inputs, Some(encoder))?;
     let key = seen.key;
-    let view = seen.bind(gpu, pyramid)?;
     let grouped = instances.pieces.iter().any(|piece| is_grouped(piece, options));
-    let group_view = if grouped { Some(seen.bind_for_groups(gpu, pyramid)?) } else { None };
+    let mut view = seen.bind(gpu, pyramid, grouped)?;
     let statistics = if report.statistics { Some(visible.statistics_or_new(gpu)?) } else { None };
     let grouped = pieces()
         .map(|(piece, output)| {
@@ -122,24 +131,25 @@ fn record_all(
     let flat =
         if grouped.iter().all(Option::is_some) { None } else { Some(flat(gpu, &key, &report)?) };
     let workgroups = |count: u32| if inputs.idle { 0 } else { count };
+    view.record(encoder, pyramid);
     record_clears(gpu, encoder, inputs, visible, report)?;
     let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
         label: Some("hiz.cull.pass"),
         timestamp_writes: None,
     });
-    pass.set_bind_group(0, &view, &[]);
+    pass.set_bind_group(0, &view.instances, &[]);
     for ((piece, output), groups) in instances.pieces.iter().zip(&outputs).zip(&grouped) {
-        if let (Some(groups), Some(group_view)) = (groups, &group_view) {
+        if let (Some(groups), Some(group_view)) = (groups, &view.groups) {
             pass.set_bind_group(0, group_view, &[]);
             groups.record_boxes(
                 &mut pass,
                 piece,
                 workgroups(piece.groups().div_ceil(CULL_WORKGROUP)),
             );
-            pass.set_bind_group(0, &view, &[]);
+            pass.set_bind_group(0, &view.instances, &[]);
         }
         pass.set_bind_group(1, &piece.bindings, &[]);
-        pass.set_bind_group(2, output, &[]);
+        pass.set_bind_group(2, *output, &[]);
         if let Some(groups) = groups {
             groups.record_members(&mut pass);
         } else if let Some(flat) = &flat {

@@ -58,6 +58,26 @@ pub(crate) fn made<T>(cell: &OnceLock<T>, make: impl FnOnce() -> Result<T>) -> R
     Ok(cell.get_or_init(|| fresh))
 }
 
+/// Checks that a buffer, which must not be mapped, has not been destroyed.
+///
+/// wgpu tells it to those that use the buffer.
+/// Of all uses, asking for a mapped range costs the least: it makes nothing and needs no error
+/// scope.
+///
+/// # Errors
+/// [`Error::Device`] with wgpu's words for a destroyed buffer.
+pub(crate) fn check_alive(buffer: &wgpu::Buffer) -> Result<()> {
+    match buffer.get_mapped_range(..) {
+        Err(error) if !error.to_string().contains(NOT_MAPPED) => {
+            Err(Error::Device(error.to_string().replace('\n', " ")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What wgpu's message contains for a buffer that exists.
+const NOT_MAPPED: &str = "is not mapped";
+
 /// Bytes of a stand-in: the size of the largest structure that one is bound for.
 const STAND_IN_BYTES: u64 = 256;
 
@@ -92,6 +112,7 @@ impl Gpu {
         if descriptor.size > allowed {
             return Err(Error::limit(name, descriptor.size, allowed));
         }
+        self.making.buffers.add();
         self.checked(|device| device.create_buffer(descriptor))
     }
 
@@ -189,6 +210,7 @@ impl Gpu {
         if side > allowed {
             return Err(Error::limit("max_texture_dimension_2d", side.into(), allowed.into()));
         }
+        self.making.textures.add();
         self.checked(|device| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
@@ -221,6 +243,7 @@ impl Gpu {
         entries: &[wgpu::BindGroupEntry<'_>],
     ) -> Result<wgpu::BindGroup> {
         let descriptor = wgpu::BindGroupDescriptor { label: Some(label), layout, entries };
+        self.making.bind_groups.add();
         self.checked(|device| device.create_bind_group(&descriptor))
     }
 

@@ -4,8 +4,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, Result};
 use crate::gpu::checked::checked;
-use crate::gpu::kept::KeptBuffers;
+use crate::gpu::kept::{KeptBuffers, Ring};
 use crate::gpu::layouts::{Binding, Layouts};
+use crate::gpu::made::Making;
 use crate::gpu::pipelines::{Compute, Depth, Pipelines};
 #[cfg(feature = "testing")]
 use crate::gpu::shader::FILES;
@@ -35,6 +36,8 @@ pub(crate) struct Gpu {
     pub(super) layouts: Layouts,
     pub(super) pipelines: Pipelines,
     pub(super) buffers: KeptBuffers,
+    pub(super) ring: Ring,
+    pub(crate) making: Making,
     /// Texts of the shaders that are replaced, as (what, by what).
     #[cfg(feature = "testing")]
     faults: Vec<(String, String)>,
@@ -59,6 +62,8 @@ impl Gpu {
             layouts: Layouts::default(),
             pipelines: Pipelines::default(),
             buffers: KeptBuffers::default(),
+            ring: Ring::default(),
+            making: Making::default(),
             #[cfg(feature = "testing")]
             faults: Vec::new(),
         })
@@ -130,6 +135,7 @@ impl Gpu {
     pub(crate) fn compute_pipeline(&self, recipe: &Compute<'_>) -> Result<wgpu::ComputePipeline> {
         let Compute { label, source, entry_point, layouts, constants } = recipe;
         self.pipelines.compute(recipe, || {
+            self.making.pipelines.add();
             self.checked(|device| {
                 device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                     label: Some(label),
@@ -151,6 +157,7 @@ impl Gpu {
     pub(crate) fn depth_pipeline(&self, recipe: &Depth<'_>) -> Result<wgpu::RenderPipeline> {
         let Depth { label, source, entry_point, layouts, state } = recipe;
         self.pipelines.depth(recipe, || {
+            self.making.pipelines.add();
             self.checked(|device| {
                 device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                     label: Some(label),

@@ -1,6 +1,7 @@
-//! Objects that are made once and kept: buffers by label, and the last bind groups by key.
+//! Objects that are made once and kept: buffers by label, and the last values by key.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use crate::error::Result;
 use crate::host::threads::Locked;
@@ -26,42 +27,73 @@ impl KeptBuffers {
     }
 }
 
-/// The last bind groups, each with the key words that identify it.
-///
-/// The words are opaque here: the stage that asks for a bind group chooses them.
-#[derive(Debug)]
-pub(crate) struct KeptBindings {
-    most: usize,
-    last: Locked<Vec<(Vec<u32>, wgpu::BindGroup)>>,
+/// Buffers that are mapped, free and all of one size.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Ring(Arc<Locked<Vec<wgpu::Buffer>>>);
+
+impl Ring {
+    /// Buffers that are kept at most; more than that are released.
+    const MOST: usize = 16;
+
+    /// A free buffer, if there is one.
+    pub(crate) fn take(&self) -> Option<wgpu::Buffer> {
+        self.0.lock().pop()
+    }
+
+    /// Takes a buffer back, which must be mapped.
+    pub(crate) fn give(&self, buffer: wgpu::Buffer) {
+        let mut free = self.0.lock();
+        if free.len() < Self::MOST {
+            free.push(buffer);
+        }
+    }
 }
 
-impl KeptBindings {
-    /// Keeps `most` bind groups, at least one.
+/// The last values that were asked for, each with the key that identifies it.
+///
+/// The key is opaque here: the stage that asks for a value chooses it.
+#[derive(Debug)]
+pub(crate) struct Kept<K, V> {
+    most: usize,
+    last: Locked<Vec<(K, V)>>,
+}
+
+/// The last bind groups.
+pub(crate) type KeptBindings<K> = Kept<K, wgpu::BindGroup>;
+
+impl<K: PartialEq, V: Clone> Kept<K, V> {
+    /// Keeps `most` values, at least one.
     pub(crate) fn new(most: usize) -> Self {
         Self { most, last: Locked::default() }
     }
 
-    /// The bind group with these key words, made by `make` if it is not among the last ones.
-    ///
-    /// The oldest one gives way.
-    pub(crate) fn get(
-        &self,
-        words: &[u32],
-        make: impl FnOnce() -> Result<wgpu::BindGroup>,
-    ) -> Result<wgpu::BindGroup> {
+    /// The value with this key, if it is among the last ones.
+    pub(crate) fn find(&self, key: &K) -> Option<V> {
         let mut kept = self.last.lock();
-        if let Some((_, bindings)) = kept.iter().find(|(theirs, _)| theirs == words) {
-            return Ok(bindings.clone());
+        let at = kept.iter().position(|(theirs, _)| theirs == key)?;
+        let found = kept.remove(at);
+        let value = found.1.clone();
+        kept.push(found);
+        Some(value)
+    }
+
+    /// The value with this key, made by `make` if it is not among the last ones.
+    ///
+    /// The one that was asked for the longest ago gives way.
+    pub(crate) fn get(&self, key: K, make: impl FnOnce() -> Result<V>) -> Result<V> {
+        if let Some(value) = self.find(&key) {
+            return Ok(value);
         }
-        let bindings = make()?;
+        let value = make()?;
+        let mut kept = self.last.lock();
         if kept.len() == self.most {
             kept.remove(0);
         }
-        kept.push((words.to_vec(), bindings.clone()));
-        Ok(bindings)
+        kept.push((key, value.clone()));
+        Ok(value)
     }
 
-    /// Releases all bind groups, and with them the resources that they hold.
+    /// Releases all values, and with them the resources that they hold.
     pub(crate) fn clear(&self) {
         self.last.lock().clear();
     }

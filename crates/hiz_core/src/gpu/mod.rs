@@ -10,5 +10,8 @@ pub(crate) mod depth_source;
 pub(crate) mod device;
 pub(crate) mod kept;
 pub(crate) mod layouts;
+pub(crate) mod made;
+pub(crate) mod numbers;
 pub(crate) mod pipelines;
+pub(crate) mod recorded_uniform;
 pub(crate) mod shader;

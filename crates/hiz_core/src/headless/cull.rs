@@ -42,11 +42,12 @@ impl Engine {
         let gpu = &self.context().gpu;
         let attempt = || {
             let (start, made_before) = (Instant::now(), PipelinesMade::so_far());
-            let visible = Arc::new(self.context().create_visible(instances, outputs)?);
-            let inputs = CullInputs { instances, camera, pyramid, options, idle: false };
+            let buffers = self.answers().lend(self.context(), instances, outputs)?;
+            let visible = Arc::clone(&buffers.visible);
+            let inputs = CullInputs::new(instances, camera, pyramid, options);
             let mut encoder = self.encoder("hiz.cull.encoder");
             record_cull(gpu, &mut encoder, &inputs, &visible)?;
-            let staged_mask = Culling::stage_mask(self.device(), &mut encoder, instances, &visible);
+            let staged_mask = Culling::stage_mask(&mut encoder, instances, &buffers);
             let refinement = Refinement::new(instances, camera, pyramid, options, &visible)?;
             let watch = Watch::new(refinement.map(|left| Box::new(left) as Box<dyn Refine>));
             let done = Arc::new(OnceLock::new());
@@ -73,6 +74,7 @@ impl Engine {
                 pyramid: Arc::clone(pyramid),
                 camera: camera.clone(),
                 options: options.clone(),
+                buffers,
                 visible,
                 staged_mask: Locked::new(staged_mask),
                 later: OnceLock::new(),
@@ -85,6 +87,7 @@ impl Engine {
         };
         let culling = self.scoped(attempt);
         let Err(error) = &culling else { return culling };
+        self.answers().forget();
         let had_atlas = pyramid.forget();
         if had_atlas && matches!(error, Error::OutOfMemory(_)) {
             // Without the atlas, the depth image and the levels are read in place.

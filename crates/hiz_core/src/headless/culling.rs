@@ -1,13 +1,14 @@
 //! A submitted cull, and everything that can be read from it.
 
 use std::sync::{Arc, OnceLock};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crate::cull::count::record_count;
 use crate::cull::groups::is_grouped;
 use crate::cull::options::CullOptions;
 use crate::error::{Error, Result};
 use crate::gpu::buffers::STORAGE;
+use crate::headless::answers::{AnswerBuffers, mask_bytes};
 use crate::headless::counts::{Counts, Timings, milliseconds};
 use crate::headless::engine::Engine;
 use crate::headless::readback::{self, BufferRange, Staged, to_u32};
@@ -28,9 +29,12 @@ use crate::output::verdict::Verdict;
 use crate::output::visible::{PieceOutput, Visible, verdicts_offset};
 use crate::pyramid::Pyramid;
 
-/// The largest mask that the cull's own submit copies to a staging buffer: that of 131,072
-/// instances.
-const STAGED_MASK_BYTES: u64 = 1 << 14;
+/// The most instances of a cull whose end is asked for again and again before a thread sleeps.
+/// It is over before a sleeping thread would have woken up (`docs/performance.md`).
+const ASKED_FOR: u32 = 1 << 14;
+
+/// How long it is asked for.
+const ASKING: Duration = Duration::from_micros(200);
 
 /// A cull that was submitted.
 /// Every read waits for it.
@@ -72,8 +76,10 @@ pub struct Culling {
     pub(super) pyramid: Arc<Pyramid>,
     pub(super) camera: Camera,
     pub(super) options: CullOptions,
+    /// Lent by [`Engine::answers`] until this is dropped.
+    pub(super) buffers: Arc<AnswerBuffers>,
     pub(super) visible: Arc<Visible>,
-    /// The copy of a small mask, made by the cull's own submit.
+    /// The copy of a mask that is not large, made by the cull's own submit.
     pub(super) staged_mask: Locked<Option<Staged>>,
     pub(super) later: OnceLock<Lists>,
     /// Where updates note what they changed, and find the refinement that must run before them.
@@ -88,6 +94,7 @@ pub struct Culling {
 impl Culling {
     /// The buffers on the device that the cull fills.
     pub fn visible(&self) -> &Visible {
+        self.engine.answers().keep_apart(&self.buffers);
         &self.visible
     }
 
@@ -101,8 +108,18 @@ impl Culling {
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost).
     pub fn wait(&self) -> Result<()> {
-        self.engine
-            .scoped(|| readback::wait(self.engine.device(), Some(self.submission.clone())))?;
+        let device = self.engine.device();
+        self.engine.scoped(|| {
+            let start = Instant::now();
+            while self.instances.len() <= ASKED_FOR && start.elapsed() < ASKING {
+                if self.done.get().is_some() {
+                    return Ok(());
+                }
+                readback::look(device)?;
+                std::thread::yield_now();
+            }
+            readback::wait(device, Some(self.submission.clone()))
+        })?;
         // The wait itself has called back, unless another thread is about to.
         self.done.get_or_init(Instant::now);
         Ok(())
@@ -114,32 +131,35 @@ impl Culling {
         Timings { wall_ms, ..*self.timings.lock() }
     }
 
-    /// Records the copy of the mask if it was asked for and is small.
-    /// For a small mask, a submit of its own would cost more than the copy.
+    /// Records the copy of the mask into `buffers` if they have room for it.
+    /// A submit of its own would cost more than the copy.
     pub(super) fn stage_mask(
-        device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
         instances: &Instances,
-        visible: &Visible,
+        buffers: &AnswerBuffers,
     ) -> Option<Staged> {
-        let bytes: u64 = instances.pieces.iter().map(|piece| 4 * u64::from(piece.words())).sum();
-        let is_small = visible.outputs().mask && (1..=STAGED_MASK_BYTES).contains(&bytes);
-        is_small.then(|| Staged::record(device, encoder, &mask_ranges(instances, visible)))
+        let staging = buffers.staging.clone()?;
+        Some(Staged::record(encoder, staging, &mask_ranges(instances, &buffers.visible)))
     }
 
-    /// The words of the masks of all pieces.
-    fn mask_words(&self) -> Result<Vec<Vec<u8>>> {
+    /// Calls `use_bytes` with the words of the masks of all pieces.
+    fn with_mask<T>(&self, use_bytes: impl FnOnce(&[&[u8]]) -> T) -> Result<T> {
         self.engine.check_process()?;
         // The first reader takes the staged copy, and later readers copy again.
         let Some(staged) = self.staged_mask.lock().take() else {
-            return self.read(&mask_ranges(&self.instances, &self.visible));
+            let words = self.read(&mask_ranges(&self.instances, &self.visible))?;
+            return Ok(use_bytes(&words.iter().map(Vec::as_slice).collect::<Vec<_>>()));
         };
         self.wait()?;
         let start = Instant::now();
-        let bytes =
-            self.engine.scoped(|| staged.read(self.engine.device(), self.submission.clone()))?;
+        let read = self
+            .engine
+            .scoped(|| staged.read(self.engine.device(), self.submission.clone(), use_bytes));
+        if read.is_err() {
+            self.engine.answers().forget();
+        }
         self.timings.lock().readback_ms += milliseconds(start, Instant::now());
-        Ok(bytes)
+        read
     }
 
     pub(super) fn read(&self, ranges: &[BufferRange<'_>]) -> Result<Vec<Vec<u8>>> {
@@ -159,12 +179,16 @@ impl Culling {
     /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn mask(&self) -> Result<Vec<bool>> {
         self.require("mask", self.visible.outputs().mask)?;
-        let planes = self.mask_words()?;
         let mut mask = memory::list(self.instances.len() as usize, "mask")?;
-        for (piece, plane) in self.instances.pieces.iter().zip(planes) {
-            let words = memory::collected(to_u32(&plane), "mask")?;
-            mask.extend((0..piece.count() as usize).map(|i| words[i / 32] >> (i % 32) & 1 == 1));
-        }
+        mask.resize(self.instances.len() as usize, false);
+        self.with_mask(|planes| {
+            let mut rest = &mut mask[..];
+            for (piece, plane) in self.instances.pieces.iter().zip(planes) {
+                let (part, behind) = rest.split_at_mut(piece.count() as usize);
+                spread_bits(plane, part);
+                rest = behind;
+            }
+        })?;
         Ok(mask)
     }
 
@@ -333,12 +357,10 @@ impl Culling {
         let capacity = u64::from(self.visible.capacity());
         let outputs = self.visible.outputs();
         if outputs.mask {
-            let words = self.mask_words()?;
-            let demand = words
-                .iter()
-                .flat_map(|bytes| to_u32(bytes))
-                .map(|word| u64::from(word.count_ones()))
-                .sum();
+            let demand = self.with_mask(|planes| {
+                let words = planes.iter().flat_map(|bytes| to_u32(bytes));
+                words.map(|word| u64::from(word.count_ones())).sum()
+            })?;
             return Ok((Some(demand), capacity.min(demand)));
         }
         if outputs.verdicts {
@@ -438,13 +460,37 @@ pub(super) fn is_hidden(word: u8) -> bool {
     !Verdict::of_word(word.into()).is_kept()
 }
 
+/// The bits of each byte, lowest first.
+const BITS: [[bool; 8]; 256] = {
+    let mut table = [[false; 8]; 256];
+    let mut i = 0;
+    while i < 8 * table.len() {
+        table[i / 8][i % 8] = (i / 8) >> (i % 8) & 1 == 1;
+        i += 1;
+    }
+    table
+};
+
+/// Writes the first bits of `bytes` into `bits`, lowest first, a byte at a time.
+fn spread_bits(bytes: &[u8], bits: &mut [bool]) {
+    let mut eights = bits.chunks_exact_mut(8);
+    let mut rest = bytes.iter();
+    for (eight, byte) in eights.by_ref().zip(rest.by_ref()) {
+        eight.copy_from_slice(&BITS[usize::from(*byte)]);
+    }
+    let last = eights.into_remainder();
+    if let Some(byte) = rest.next() {
+        last.copy_from_slice(&BITS[usize::from(*byte)][..last.len()]);
+    }
+}
+
 /// The masks of all pieces.
 fn mask_ranges<'a>(instances: &Instances, visible: &'a Visible) -> Vec<BufferRange<'a>> {
-    let words = instances.pieces.iter().map(Piece::words);
+    let sizes = instances.pieces.iter().map(mask_bytes);
     visible
         .pieces
         .iter()
-        .zip(words)
-        .map(|(output, words)| BufferRange::first(&output.mask, 4 * u64::from(words)))
+        .zip(sizes)
+        .map(|(output, size)| BufferRange::first(&output.mask, size))
         .collect()
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::context::HizContext;
 use crate::error::{Error, Result};
 use crate::headless::adapter::{self, ADAPTER_VARIABLE, AdapterSummary};
+use crate::headless::answers::Answers;
 use crate::headless::process::Process;
 use crate::headless::readback;
 use crate::host::threads::Locked;
@@ -59,6 +60,7 @@ impl Drop for Engine {
 struct Shared {
     process: Process,
     context: HizContext,
+    answers: Answers,
     device: wgpu::Device,
     queue: wgpu::Queue,
     adapter: AdapterSummary,
@@ -144,6 +146,7 @@ impl Engine {
             shared: Arc::new(Shared {
                 process,
                 context,
+                answers: Answers::default(),
                 device,
                 queue,
                 adapter: summary,
@@ -179,6 +182,11 @@ impl Engine {
     /// The context that records on this device.
     pub fn context(&self) -> &HizContext {
         &self.shared.context
+    }
+
+    /// The buffers of the last answers.
+    pub(super) fn answers(&self) -> &Answers {
+        &self.shared.answers
     }
 
     /// The largest width or height of a depth image, in pixels.

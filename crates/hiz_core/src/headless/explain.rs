@@ -58,13 +58,8 @@ impl Culling {
                 STORAGE,
             )?;
             let mut encoder = engine.encoder("hiz.explain.encoder");
-            let inputs = CullInputs {
-                instances: &self.instances,
-                camera: &self.camera,
-                pyramid: &self.pyramid,
-                options: &self.options,
-                idle: false,
-            };
+            let inputs =
+                CullInputs::new(&self.instances, &self.camera, &self.pyramid, &self.options);
             record_explain(gpu, &mut encoder, &inputs, (index, whole_group), [&target, &readings])?;
             engine.queue().submit([encoder.finish()]);
             let ranges =

@@ -6,9 +6,10 @@
 //! 1. `adapter` lists the adapters, and `engine` opens a device on one.
 //! 2. `uploads` brings instances, updates and occluders to it, and `depth_image` depth images.
 //! 3. `levels` builds pyramids and reads their levels.
-//! 4. `cull` submits a cull; `culling` reads its answers, through `counts`, `explanation` and
-//!    `readback`.
+//! 4. `cull` submits a cull into buffers of `answers`; `culling` reads them, through `counts`,
+//!    `explanation` and `readback`.
 //!
+//! `warm_up` runs a frame before the first one.
 //! `process` guards all of them against forks.
 //! This is the only room that submits, waits and maps buffers for reading; it decides no geometry.
 //!
@@ -43,6 +44,7 @@
 //! [`Error::OtherProcess`]: crate::Error::OtherProcess
 
 mod adapter;
+mod answers;
 mod counts;
 mod cull;
 mod culling;
@@ -54,6 +56,7 @@ mod levels;
 mod process;
 pub(crate) mod readback;
 mod uploads;
+mod warm_up;
 
 pub use adapter::{ADAPTER_VARIABLE, AdapterSummary, INSTALL_HINT, adapters};
 pub use counts::{Counts, Timings};

@@ -37,9 +37,12 @@ pub(crate) fn read_buffers(
     let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
         label: Some("hiz.readback.encoder"),
     });
-    let staged = Staged::record(device, &mut encoder, ranges);
+    let staged = Staged::record(&mut encoder, staging(device, total), ranges);
     let submission = queue.submit([encoder.finish()]);
-    staged.read(device, submission)
+    let copied = |parts: &[&[u8]]| {
+        parts.iter().map(|part| memory::collected(part.iter().copied(), "readback")).collect()
+    };
+    staged.read(device, submission, copied)?
 }
 
 /// Copies of buffer ranges in a staging buffer.
@@ -51,14 +54,14 @@ pub(crate) struct Staged {
 }
 
 impl Staged {
-    /// Records the copies; at least one range must not be empty.
+    /// Records the copies into `staging`, which is as large as all ranges together.
+    /// At least one range must not be empty.
     pub(crate) fn record(
-        device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
+        staging: wgpu::Buffer,
         ranges: &[BufferRange<'_>],
     ) -> Self {
         let sizes: Vec<_> = ranges.iter().map(|range| range.size).collect();
-        let staging = staging(device, sizes.iter().sum());
         let mut offset = 0;
         for range in ranges.iter().filter(|range| range.size > 0) {
             encoder.copy_buffer_to_buffer(range.buffer, range.offset, &staging, offset, range.size);
@@ -68,21 +71,26 @@ impl Staged {
     }
 
     /// Waits for the submission of the copies.
-    /// Returns the bytes of the ranges in their order.
-    pub(crate) fn read(
+    /// `use_parts` gets the bytes of the ranges in their order, where they lie.
+    pub(crate) fn read<T>(
         &self,
         device: &wgpu::Device,
         submission: wgpu::SubmissionIndex,
-    ) -> Result<Vec<Vec<u8>>> {
+        use_parts: impl FnOnce(&[&[u8]]) -> T,
+    ) -> Result<T> {
         with_mapped(device, &self.staging, submission, |bytes| {
             let mut rest = bytes;
-            let parts = self.sizes.iter().map(|size| {
-                let (part, behind) = rest.split_at(*size as usize);
-                rest = behind;
-                memory::collected(part.iter().copied(), "readback")
-            });
-            parts.collect()
-        })?
+            let parts: Vec<_> = self
+                .sizes
+                .iter()
+                .map(|size| {
+                    let (part, behind) = rest.split_at(*size as usize);
+                    rest = behind;
+                    part
+                })
+                .collect();
+            use_parts(&parts)
+        })
     }
 }
 
@@ -139,6 +147,11 @@ pub(crate) fn read_texture(
         }
         Ok(out)
     })?
+}
+
+/// Looks what is done by now, and runs its callbacks.
+pub(crate) fn look(device: &wgpu::Device) -> Result<()> {
+    device.poll(wgpu::PollType::Poll).map(drop).map_err(|e| Error::DeviceLost(e.to_string()))
 }
 
 /// Waits for a submission; `None`: for all of them.

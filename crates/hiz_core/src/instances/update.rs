@@ -185,6 +185,34 @@ pub(crate) fn record_update(
     result
 }
 
+/// Records the dispatches of an update without workgroups, which update nothing.
+/// They make what an update needs, and a driver that compiles at the first dispatch does so.
+pub(crate) fn record_idle_update(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    instances: &Instances,
+) -> Result<()> {
+    gpu.check_context("instances", instances.context)?;
+    let entry_points = ["begin", "replace_records", "replace_groups"];
+    let pipelines =
+        entry_points.iter().map(|entry| update_pipeline(gpu, entry)).collect::<Result<Vec<_>>>()?;
+    let fresh = gpu.stand_in("hiz.no_update")?;
+    let target = &instances.pieces[0].records;
+    let bind_group = bind(gpu, instances, &Replacement { places: &[0], fresh, target }, 0)?;
+    gpu.recorded(|| {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some("hiz.update.warm_up"),
+            timestamp_writes: None,
+        });
+        pass.set_bind_group(0, &bind_group, &[]);
+        for pipeline in &pipelines {
+            pass.set_pipeline(pipeline);
+            pass.dispatch_workgroups(0, 1, 1);
+        }
+        Ok(())
+    })
+}
+
 /// Splits ascending `places` into bands whose new records fit one storage binding.
 ///
 /// A piece may be larger than that, because its own records lie in a texture.

@@ -1,7 +1,7 @@
 //! The ordered compaction: from the mask to an ascending list and the draw's instance count.
 
 use crate::error::Result;
-use crate::gpu::buffers::entry;
+use crate::gpu::buffers::{entry, made};
 use crate::gpu::device::Gpu;
 use crate::gpu::layouts::Binding;
 use crate::gpu::pipelines::Compute;
@@ -56,24 +56,25 @@ impl Compaction {
         visible: &Visible,
         lists: &Lists,
     ) -> Result<Self> {
-        let layout = gpu.layout(LAYOUT, BINDINGS)?;
         let of_pieces = instances.pieces.iter().zip(&visible.pieces).zip(&lists.pieces);
         let pieces =
             of_pieces.filter(|((piece, _), _)| piece.count() > 0).map(|((piece, output), list)| {
-                let bind_group = gpu.bind_group(
-                    "hiz.compact.piece",
-                    &layout,
-                    &[
-                        entry(0, piece.uniform.as_entire_binding()),
-                        entry(1, output.mask.as_entire_binding()),
-                        entry(2, list.bound().as_entire_binding()),
-                        entry(3, lists.draws.as_entire_binding()),
-                        entry(4, list.before.as_entire_binding()),
-                        entry(5, lists.capacity_uniform.as_entire_binding()),
-                    ],
-                )?;
+                let bind = || {
+                    gpu.bind_group(
+                        "hiz.compact.piece",
+                        &gpu.layout(LAYOUT, BINDINGS)?,
+                        &[
+                            entry(0, piece.uniform.as_entire_binding()),
+                            entry(1, output.mask.as_entire_binding()),
+                            entry(2, list.bound().as_entire_binding()),
+                            entry(3, lists.draws.as_entire_binding()),
+                            entry(4, list.before.as_entire_binding()),
+                            entry(5, lists.capacity_uniform.as_entire_binding()),
+                        ],
+                    )
+                };
                 Ok((
-                    bind_group,
+                    made(&list.bindings, bind)?.clone(),
                     list.indices.as_ref().map(|_| piece.words().div_ceil(SCATTER_WORKGROUP)),
                 ))
             });

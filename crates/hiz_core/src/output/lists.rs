@@ -1,5 +1,7 @@
 //! The packed lists of kept instances, and the draw arguments that go with them.
 
+use std::sync::OnceLock;
+
 use crate::error::Result;
 use crate::gpu::buffers::{STORAGE, write_mapped};
 use crate::gpu::device::Gpu;
@@ -20,6 +22,8 @@ pub(crate) struct PieceList {
     /// Scratch of the compaction: the number of kept bits before each word of the mask.
     /// It is also bound in place of a list if there is none.
     pub(crate) before: wgpu::Buffer,
+    /// What the compaction binds; made by the first one.
+    pub(crate) bindings: OnceLock<wgpu::BindGroup>,
 }
 
 impl PieceList {
@@ -63,6 +67,7 @@ impl Lists {
                     4 * u64::from(piece.words().max(1)),
                     STORAGE,
                 )?,
+                bindings: OnceLock::new(),
             })
         });
         let pieces = pieces.collect::<Result<_>>()?;

@@ -1,5 +1,7 @@
 //! What a cull of groups leaves: a verdict per group, and the list of surviving groups.
 
+use std::sync::OnceLock;
+
 use crate::error::Result;
 use crate::gpu::buffers::STORAGE;
 use crate::gpu::device::Gpu;
@@ -30,6 +32,10 @@ pub(crate) struct GroupOutput {
     /// `survivor_list` says which groups they are.
     pub(crate) survivors: wgpu::Buffer,
     pub(crate) survivor_list: wgpu::TextureView,
+    /// What culls of groups bind, without and with the count of levels; made by the first of either.
+    pub(crate) bindings: [OnceLock<wgpu::BindGroup>; 2],
+    /// What culls of the surviving groups' members bind; made by the first one.
+    pub(crate) member_bindings: OnceLock<wgpu::BindGroup>,
 }
 
 impl GroupOutput {
@@ -41,6 +47,8 @@ impl GroupOutput {
             verdicts: gpu.empty("hiz.visible.group_verdicts", verdicts, STORAGE)?,
             survivors: gpu.empty("hiz.visible.survivors", bytes, usage)?,
             survivor_list: list_of(gpu, piece)?,
+            bindings: Default::default(),
+            member_bindings: OnceLock::new(),
         })
     }
 

@@ -24,6 +24,8 @@ pub(crate) struct PieceOutput {
     pub(crate) mask: wgpu::Buffer,
     /// Made by the first cull that tests groups.
     groups: OnceLock<GroupOutput>,
+    /// What culls bind, without and with the count of levels; made by the first of either.
+    pub(crate) bindings: [OnceLock<wgpu::BindGroup>; 2],
 }
 
 /// What a cull finds, on the device.
@@ -187,7 +189,11 @@ impl PieceOutput {
         let verdicts =
             if has_verdicts { piece.count().max(1).next_multiple_of(VERDICT_MULTIPLE) } else { 0 };
         let size = verdicts_offset(piece).max(16) + 4 * u64::from(verdicts);
-        Ok(Self { mask: gpu.empty("hiz.visible.mask", size, STORAGE)?, groups: OnceLock::new() })
+        Ok(Self {
+            mask: gpu.empty("hiz.visible.mask", size, STORAGE)?,
+            groups: OnceLock::new(),
+            bindings: Default::default(),
+        })
     }
 
     /// The buffers for a cull that tests groups, made if there are none.

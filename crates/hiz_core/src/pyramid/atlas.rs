@@ -136,19 +136,17 @@ impl Atlas {
         // Everything that can fail comes before the first command is recorded.
         let staging =
             if source.format() == FORMAT { None } else { Some(self.staging_or_new(gpu, layout)?) };
-        let of_image = gpu.filled(
-            "hiz.pyramid.atlas_header",
-            bytemuck::cast_slice(&[built.reduction, 0, 0, 0]),
-            wgpu::BufferUsages::COPY_SRC,
-        )?;
-        for (column, buffer) in (layout.atlas.width - HEADERS..).zip([&of_image, stored]) {
-            self.record_rows(
-                encoder,
-                buffer,
-                [column, 0, 0, 0],
-                Rows { offset: 0, pitch: 0, width: PIXELS, height: 1 },
-            );
-        }
+        let of_image = gpu.numbers(bytemuck::cast_slice(&[built.reduction, 0, 0, 0]))?;
+        of_image.record_with(encoder, |encoder, of_image| {
+            for (column, buffer) in (layout.atlas.width - HEADERS..).zip([of_image, stored]) {
+                self.record_rows(
+                    encoder,
+                    buffer,
+                    [column, 0, 0, 0],
+                    Rows { offset: 0, pitch: 0, width: PIXELS, height: 1 },
+                );
+            }
+        });
         for (k, level) in layout.stored_levels() {
             let Level { offset, stride, width, height } = *level;
             let rows = Rows { offset: 4 * u64::from(offset), pitch: 4 * stride, width, height };

@@ -4,7 +4,8 @@
 //!
 //! 1. `layout` plans levels, offsets and dispatches without a device; `levels` says what is stored.
 //! 2. [`Pyramid`] holds the buffers of the stored levels.
-//! 3. `reduce` records the passes that fill them from a depth image; `built` remembers that image.
+//! 3. `reduce` records the passes that fill them from a depth image; `steps` holds what the passes
+//!    bind, and `built` remembers the image.
 //! 4. `atlas` copies all levels into one texture for large culls.
 //!
 //! Passes are recorded into the caller's encoder; nothing here submits, waits or reads back.
@@ -14,13 +15,15 @@ pub(crate) mod built;
 pub(crate) mod layout;
 pub(crate) mod levels;
 pub(crate) mod reduce;
+pub(crate) mod steps;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use crate::error::{Error, Result};
 use crate::gpu::device::{ContextId, Gpu};
-use crate::gpu::kept::KeptBindings;
+use crate::gpu::kept::Kept;
+use crate::gpu::recorded_uniform::RecordedUniform;
 use crate::host::threads::Locked;
 use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
@@ -29,6 +32,7 @@ use crate::pyramid::atlas::{Atlas, AtlasUse};
 use crate::pyramid::built::Built;
 use crate::pyramid::layout::{PYRAMID_CHUNKS, PyramidLayout, chunk_shift};
 use crate::pyramid::levels::{Level, MAX_LEVELS, StoredLevels};
+use crate::pyramid::steps::Steps;
 
 /// Twin of `Pyramid` in `shaders/pyramid/pyramid.wgsl`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -44,9 +48,9 @@ pub(crate) struct PyramidUniform {
 
 const _: () = assert!(size_of::<PyramidUniform>() == 528);
 
-/// How many bind groups of culls are kept: for two views, one to test instances and one to test
-/// groups.
-const KEPT_BINDINGS: usize = 4;
+/// For how many depth images bind groups are kept, by reductions and by culls.
+/// A renderer may alternate between a few.
+const KEPT_IMAGES: usize = 3;
 
 /// Labels of the stand-ins that are bound for the chunks that a small pyramid does not have.
 const NO_CHUNK: [&str; PYRAMID_CHUNKS] = ["hiz.no_chunk_0", "hiz.no_chunk_1", "hiz.no_chunk_2"];
@@ -85,7 +89,8 @@ impl PyramidOptions {
 
 /// A depth pyramid on the device: for every level, the farthest depth of each block of pixels.
 ///
-/// Level 0 is the depth texture itself, which the pyramid keeps alive but does not copy.
+/// Level 0 is the depth texture itself, which the pyramid does not copy.
+/// It keeps the last three depth textures alive, in the bind groups that read them.
 /// **Do not write to that texture between the reduction and the culls that use it.**
 ///
 /// # Examples
@@ -126,8 +131,12 @@ pub struct Pyramid {
     atlas: Locked<Option<Atlas>>,
     /// The last reduction that is known to have run; one that was only recorded may never run.
     reduced: Arc<AtomicU32>,
-    /// The last bind groups of culls, for instances and for groups, since many culls share a view.
-    pub(crate) bindings: KeptBindings,
+    /// The view of a cull, for instances and for groups.
+    pub(crate) view: RecordedUniform,
+    /// What reductions bind for a depth image, and the view of it that they bind.
+    pub(crate) sources: Kept<wgpu::Texture, (wgpu::BindGroup, wgpu::TextureView)>,
+    /// What the steps of a reduction bind.
+    pub(crate) steps: Steps,
 }
 
 impl Pyramid {
@@ -171,6 +180,7 @@ impl Pyramid {
                 padding: 0,
             },
         )?;
+        let steps = Steps::new(gpu, &layout.steps)?;
         Ok(Self {
             context: gpu.id(),
             layout,
@@ -181,7 +191,9 @@ impl Pyramid {
             no_atlas: AtomicBool::new(false),
             atlas: Locked::default(),
             reduced: Arc::default(),
-            bindings: KeptBindings::new(KEPT_BINDINGS),
+            view: RecordedUniform::new(gpu, "hiz.cull.view_uniform", KEPT_IMAGES)?,
+            sources: Kept::new(KEPT_IMAGES),
+            steps,
         })
     }
 
@@ -229,7 +241,8 @@ impl Pyramid {
     ///
     /// Returns whether that included an atlas.
     pub(crate) fn forget(&self) -> bool {
-        self.bindings.clear();
+        self.view.clear();
+        self.sources.clear();
         self.atlas.lock().take().is_some()
     }
 
@@ -267,7 +280,7 @@ impl Pyramid {
             Err(error) => error,
         };
         // The kept bind groups may refer to the atlas that was just dropped.
-        self.bindings.clear();
+        self.view.clear();
         if matches!(error, Error::OutOfMemory(_)) {
             self.do_without_atlas();
             return Ok(None);
@@ -332,8 +345,8 @@ impl Pyramid {
 
     /// Notes that a reduction was recorded.
     pub(super) fn set_built(&self, built: Built) {
-        // The kept bind groups refer to the last depth image.
-        self.bindings.clear();
+        // No later cull has the same view, since that contains the number of the reduction.
+        self.view.forget_contents();
         *self.built.lock() = Some(built);
     }
 

@@ -19,15 +19,13 @@ use crate::input::tolerance::DepthTolerance;
 use crate::pyramid::Pyramid;
 use crate::pyramid::built::Built;
 use crate::pyramid::layout::Step;
+use crate::pyramid::steps::STEP_BINDINGS;
 
 /// The bindings of the depth image and the pyramid.
 const fn bindings(source: SourceKind) -> [(u32, Binding); 6] {
     use Binding::{Depth, Sampler, Uniform, Write};
     [(0, Depth(source)), (1, Sampler), (2, Uniform), (3, Write), (4, Write), (5, Write)]
 }
-
-/// The binding of one step.
-const STEP_BINDINGS: &[(u32, Binding)] = &[(0, Binding::Uniform)];
 
 /// Which shader and entry point make a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,19 +103,116 @@ const PAGE_PIXELS: u32 = 1024;
 /// Each invocation then reads at least 8x8 pixels.
 pub(crate) const SHARED_LEVEL: u32 = 6;
 
-/// Twin of `Step` in `shaders/pyramid/pyramid_write.wgsl`.
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub(crate) struct StepUniform {
-    pub(crate) source: u32,
-    pub(crate) last: u32,
-    pub(crate) reduction: u32,
-    pub(crate) padding: u32,
-    pub(crate) blocks: [u32; 2],
-    pub(crate) padding_1: [u32; 2],
+/// A reduction whose pipelines and bindings are made.
+struct Prepared {
+    source: wgpu::BindGroup,
+    /// The pipeline and the workgroups of each step.
+    dispatches: Vec<(wgpu::ComputePipeline, [u32; 2])>,
+    built: Built,
 }
 
-const _: () = assert!(size_of::<StepUniform>() == 32);
+impl Prepared {
+    /// Checks the arguments of [`record_reduce`], and makes what the reduction `number` needs.
+    fn new(
+        gpu: &Gpu,
+        depth: &wgpu::TextureView,
+        camera: &Camera,
+        pyramid: &Pyramid,
+        uploaded: DepthTolerance,
+        number: u32,
+    ) -> Result<Self> {
+        gpu.check_context("pyramid", pyramid.context)?;
+        let texture = depth.texture();
+        let format = texture.format();
+        let (Some(source_kind), Some(of_format)) =
+            (SourceKind::of(format), DepthTolerance::of(format))
+        else {
+            return Err(Error::invalid(
+                "depth",
+                format!(
+                    "expected a depth format, R32Float, R16Float or Rgba32Uint (the bits of four \
+                     pixels), got {format:?}"
+                ),
+            ));
+        };
+        let (size, texels) = (pyramid.size(), ImageSize::new(texture.width(), texture.height()));
+        let expected = source_kind.texture_size(size);
+        if texels != expected {
+            let packed = if expected == size {
+                String::new()
+            } else {
+                format!(" as {expected} texels of four pixels")
+            };
+            return Err(Error::mismatch(
+                "depth",
+                format!("expected the pyramid's size {size}{packed}, got {texels}"),
+            ));
+        }
+        if size != camera.size() {
+            return Err(Error::mismatch(
+                "camera",
+                format!("expected the depth image's size {size}, got {}", camera.size()),
+            ));
+        }
+        // A view does not say which part of its texture it shows, so only one may exist.
+        let parts =
+            (texture.mip_level_count(), texture.sample_count(), texture.depth_or_array_layers());
+        if parts != (1, 1, 1) || texture.dimension() != wgpu::TextureDimension::D2 {
+            return Err(Error::invalid(
+                "depth",
+                format!(
+                    "expected a 2D texture of one mip level, sample and layer, got {:?} with {} mip \
+                     levels, {} samples, {} layers",
+                    texture.dimension(),
+                    parts.0,
+                    parts.1,
+                    parts.2
+                ),
+            ));
+        }
+        let needed = source_kind.usage();
+        if !texture.usage().contains(needed) {
+            let name =
+                if source_kind == SourceKind::Bits { "STORAGE_BINDING" } else { "TEXTURE_BINDING" };
+            return Err(Error::invalid(
+                "depth",
+                format!("expected the usage {name}, got {:?}", texture.usage()),
+            ));
+        }
+        let (source, view) = source_bindings(gpu, depth, source_kind, pyramid)?;
+        let dispatch = |step: &Step| {
+            let tall = step.source == 0 && reads_tall(step, source_kind, size);
+            let (shape, workgroups) = shape_of(step, tall);
+            let constants = (camera.convention().is_reversed(), tall, pyramid.chunks.len());
+            Ok((reduce_pipeline(gpu, source_kind, shape, constants)?, workgroups))
+        };
+        let dispatches = pyramid.layout.steps.iter().map(dispatch).collect::<Result<_>>()?;
+        let tolerance = of_format.after(uploaded);
+        let camera = camera.clone();
+        let built = Built { reduction: number, source: view, source_kind, camera, tolerance };
+        Ok(Self { source, dispatches, built })
+    }
+
+    /// Records the pass.
+    /// `workgroups` says how many of those of a step there are.
+    fn record(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        pyramid: &Pyramid,
+        workgroups: impl Fn([u32; 2]) -> [u32; 2],
+    ) {
+        let descriptor =
+            wgpu::ComputePassDescriptor { label: Some("hiz.reduce.pass"), timestamp_writes: None };
+        let mut pass = encoder.begin_compute_pass(&descriptor);
+        pass.set_bind_group(0, &self.source, &[]);
+        for ((pipeline, of_step), step) in self.dispatches.iter().zip(&pyramid.steps.bindings) {
+            let [columns, rows] = workgroups(*of_step);
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(1, step, &[]);
+            pass.dispatch_workgroups(columns, rows, 1);
+        }
+    }
+}
 
 /// Records the reduction of `depth` into `pyramid`; all of the texture's first mip level is read.
 ///
@@ -133,96 +228,71 @@ pub(crate) fn record_reduce(
     pyramid: &Pyramid,
     uploaded: DepthTolerance,
 ) -> Result<()> {
-    gpu.check_context("pyramid", pyramid.context)?;
-    let texture = depth.texture();
-    let format = texture.format();
-    let (Some(source_kind), Some(of_format)) = (SourceKind::of(format), DepthTolerance::of(format))
-    else {
-        return Err(Error::invalid(
-            "depth",
-            format!(
-                "expected a depth format, R32Float, R16Float or Rgba32Uint (the bits of four \
-                 pixels), got {format:?}"
-            ),
-        ));
-    };
-    let (size, texels) = (pyramid.size(), ImageSize::new(texture.width(), texture.height()));
-    let expected = source_kind.texture_size(size);
-    if texels != expected {
-        let packed = if expected == size {
-            String::new()
-        } else {
-            format!(" as {expected} texels of four pixels")
-        };
-        return Err(Error::mismatch(
-            "depth",
-            format!("expected the pyramid's size {size}{packed}, got {texels}"),
-        ));
-    }
-    if size != camera.size() {
-        return Err(Error::mismatch(
-            "camera",
-            format!("expected the depth image's size {size}, got {}", camera.size()),
-        ));
-    }
-    // A view does not say which part of its texture it shows, so only one may exist.
-    let parts =
-        (texture.mip_level_count(), texture.sample_count(), texture.depth_or_array_layers());
-    if parts != (1, 1, 1) || texture.dimension() != wgpu::TextureDimension::D2 {
-        return Err(Error::invalid(
-            "depth",
-            format!(
-                "expected a 2D texture of one mip level, sample and layer, got {:?} with {} mip \
-                 levels, {} samples, {} layers",
-                texture.dimension(),
-                parts.0,
-                parts.1,
-                parts.2
-            ),
-        ));
-    }
-    let needed = source_kind.usage();
-    if !texture.usage().contains(needed) {
-        let name =
-            if source_kind == SourceKind::Bits { "STORAGE_BINDING" } else { "TEXTURE_BINDING" };
-        return Err(Error::invalid(
-            "depth",
-            format!("expected the usage {name}, got {:?}", texture.usage()),
-        ));
-    }
-    let (source, view) = bind_source(gpu, depth, source_kind, pyramid)?;
     // Everything that can fail comes before the first command is recorded.
     let reduction = next_reduction();
-    let dispatch = |step: &Step| {
-        let tall = step.source == 0 && reads_tall(step, source_kind, size);
-        let (shape, workgroups) = shape_of(step, tall);
-        let constants = (camera.convention().is_reversed(), tall, pyramid.chunks.len());
-        let pipeline = reduce_pipeline(gpu, source_kind, shape, constants)?;
-        let uniform = gpu.uniform("hiz.reduce.step", &step_uniform(step, reduction))?;
-        let layout = gpu.layout("hiz.reduce.step_layout", STEP_BINDINGS)?;
-        let entries = [entry(0, uniform.as_entire_binding())];
-        Ok((pipeline, gpu.bind_group("hiz.reduce.step", &layout, &entries)?, workgroups))
-    };
-    let dispatches = pyramid.layout.steps.iter().map(dispatch).collect::<Result<Vec<_>>>()?;
+    let prepared = Prepared::new(gpu, depth, camera, pyramid, uploaded, reduction)?;
+    let number = gpu.numbers(&reduction.to_ne_bytes())?;
     gpu.recorded(|| {
-        let descriptor =
-            wgpu::ComputePassDescriptor { label: Some("hiz.reduce.pass"), timestamp_writes: None };
-        let mut pass = encoder.begin_compute_pass(&descriptor);
-        pass.set_bind_group(0, &source, &[]);
-        for (pipeline, bind_group, [columns, rows]) in &dispatches {
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(1, bind_group, &[]);
-            // At least one workgroup, which writes the header even if nothing is stored.
-            pass.dispatch_workgroups((*columns).max(1), (*rows).max(1), 1);
-        }
+        pyramid.steps.record(encoder, &pyramid.layout.steps, number);
+        // At least one workgroup, which writes the header even if nothing is stored.
+        prepared.record(encoder, pyramid, |workgroups| workgroups.map(|n| n.max(1)));
         Ok(())
     })?;
     let reduced = pyramid.reduced();
     encoder.on_submitted_work_done(move || reduced.store(reduction, Ordering::Release));
-    let tolerance = of_format.after(uploaded);
-    let camera = camera.clone();
-    pyramid.set_built(Built { reduction, source: view, source_kind, camera, tolerance });
+    pyramid.set_built(prepared.built);
     Ok(())
+}
+
+/// Records a reduction without workgroups, which reduces nothing but makes what one needs.
+/// Returns what the pyramid would be built from, with a number that no reduction has.
+///
+/// # Errors
+/// As [`record_reduce`].
+pub(crate) fn record_idle_reduce(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    depth: &wgpu::TextureView,
+    camera: &Camera,
+    pyramid: &Pyramid,
+) -> Result<Built> {
+    let prepared = Prepared::new(gpu, depth, camera, pyramid, DepthTolerance::NONE, 0)?;
+    gpu.recorded(|| {
+        prepared.record(encoder, pyramid, |_| [0, 0]);
+        Ok(())
+    })?;
+    Ok(prepared.built)
+}
+
+/// The bind group of the reduction and the view of the depth image that it binds, kept from an
+/// earlier reduction of the same texture if there was one.
+fn source_bindings(
+    gpu: &Gpu,
+    depth: &wgpu::TextureView,
+    source_kind: SourceKind,
+    pyramid: &Pyramid,
+) -> Result<(wgpu::BindGroup, wgpu::TextureView)> {
+    let Some(kept) = pyramid.sources.find(depth.texture()) else {
+        let bound = bind_source(gpu, depth, source_kind, pyramid)?;
+        return pyramid.sources.get(depth.texture().clone(), || Ok(bound));
+    };
+    // A bind group does not tell that its texture was destroyed since, but a new view does.
+    gpu.view(depth.texture()).map_err(refused)?;
+    Ok(kept)
+}
+
+/// The error for a depth image that wgpu refuses.
+fn refused(error: Error) -> Error {
+    match error {
+        Error::Device(why) => Error::mismatch(
+            "depth",
+            format!(
+                "expected a texture of this device and context that has not been destroyed, but \
+                 {why}"
+            ),
+        ),
+        other => other,
+    }
 }
 
 /// The bind group of the reduction, and the view of the depth image that it binds.
@@ -254,16 +324,6 @@ fn bind_source(
     let error = match bind(depth) {
         Ok(bound) => return Ok((bound, depth.clone())),
         Err(error) => error,
-    };
-    let refused = |error| match error {
-        Error::Device(why) => Error::mismatch(
-            "depth",
-            format!(
-                "expected a texture of this device and context that has not been destroyed, but \
-                 {why}"
-            ),
-        ),
-        other => other,
     };
     // A view of another device's texture would report its errors to that device, whose handler may
     // end the process.
@@ -305,18 +365,6 @@ fn shape_of(step: &Step, tall: bool) -> (Shape, [u32; 2]) {
 /// - Rows that begin at multiples of a page, which would all fall into the same lines of a cache.
 fn reads_tall(step: &Step, source: SourceKind, size: ImageSize) -> bool {
     (source != SourceKind::Bits || step.is_coarse()) && !size.width.is_multiple_of(PAGE_PIXELS)
-}
-
-fn step_uniform(step: &Step, reduction: u32) -> StepUniform {
-    let reduction = if step.source == 0 { reduction } else { 0 };
-    StepUniform {
-        source: step.source,
-        last: step.last,
-        reduction,
-        padding: 0,
-        blocks: step.blocks,
-        padding_1: [0; 2],
-    }
 }
 
 /// A new number for a reduction, never 0.

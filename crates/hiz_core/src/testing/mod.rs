@@ -6,5 +6,6 @@ pub mod shaders;
 mod twins;
 pub mod words;
 
+pub use crate::gpu::made::Made;
 pub use crate::occluders::surface::planted_fault::PlantedFault;
 pub use crate::output::lists::CANARY_WORDS;

@@ -56,7 +56,7 @@ pub fn record_uncertified_cull(
     }
     let options =
         &CullOptions { hierarchy: Hierarchy::Never, statistics: false, ..options.clone() };
-    let inputs = CullInputs { instances, camera, pyramid, options, idle: false };
+    let inputs = CullInputs::new(instances, camera, pyramid, options);
     record_cull_by(&engine.context().gpu, encoder, &inputs, visible, uncertified_pipeline)
 }
 

@@ -16,7 +16,7 @@ use crate::output::survivors::SurvivorsRecord;
 use crate::pyramid::PyramidUniform;
 use crate::pyramid::layout::PYRAMID_CHUNKS;
 use crate::pyramid::levels::Level;
-use crate::pyramid::reduce::StepUniform;
+use crate::pyramid::steps::StepUniform;
 use crate::testing::shaders::tests::parse;
 use crate::testing::shaders::{all, files};
 use crate::yardstick::reduce as yardstick;

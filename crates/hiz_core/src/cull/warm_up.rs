@@ -1,0 +1,67 @@
+//! The warm-up: makes everything that frames need before the first of them.
+
+use crate::cull::inputs::CullInputs;
+use crate::cull::options::CullOptions;
+use crate::cull::record::record_cull;
+use crate::error::Result;
+use crate::gpu::device::Gpu;
+use crate::input::camera::Camera;
+use crate::instances::Instances;
+use crate::instances::update::record_idle_update;
+use crate::occluders::Occluders;
+use crate::occluders::raster::record_occluders;
+use crate::output::visible::Visible;
+use crate::pyramid::Pyramid;
+use crate::pyramid::reduce::record_idle_reduce;
+
+/// A frame for which [`HizContext::record_warm_up`](crate::HizContext::record_warm_up) makes
+/// everything.
+///
+/// It consists of the objects that the frames use, and of their options.
+/// A camera only has to be like the frames' cameras in image size, depth convention and
+/// handedness.
+#[derive(Debug, Clone, Copy)]
+pub struct WarmUp<'a> {
+    /// What is drawn into the depth image, if this crate draws it.
+    pub occluders: Option<&'a Occluders>,
+    /// The depth image.
+    pub depth: &'a wgpu::TextureView,
+    /// A camera of the depth image.
+    pub camera: &'a Camera,
+    /// The pyramid that the depth image is reduced into; it need not have been built.
+    pub pyramid: &'a Pyramid,
+    /// The instances that are culled.
+    pub instances: &'a Instances,
+    /// What takes the answers.
+    pub visible: &'a Visible,
+    /// The options of the culls.
+    pub options: &'a CullOptions,
+    /// Whether the instances are updated, too.
+    pub updates: bool,
+}
+
+/// Records the warm-up of `frame`.
+///
+/// # Errors
+/// As [`HizContext::record_warm_up`](crate::HizContext::record_warm_up).
+pub(crate) fn record_warm_up(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    frame: &WarmUp<'_>,
+) -> Result<()> {
+    let WarmUp { depth, camera, pyramid, instances, visible, options, .. } = *frame;
+    if let Some(occluders) = frame.occluders {
+        record_occluders(gpu, encoder, occluders, camera, depth)?;
+    }
+    let built = record_idle_reduce(gpu, encoder, depth, camera, pyramid)?;
+    let inputs = CullInputs {
+        idle: true,
+        built: Some(&built),
+        ..CullInputs::new(instances, camera, pyramid, options)
+    };
+    record_cull(gpu, encoder, &inputs, visible)?;
+    if frame.updates {
+        record_idle_update(gpu, encoder, instances)?;
+    }
+    Ok(())
+}
