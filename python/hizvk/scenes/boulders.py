@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from .grid import on_grid
+from .grid import apart, on_grid
 from .scene import Scene, View, box_mesh
 
 if TYPE_CHECKING:
@@ -70,15 +70,16 @@ def boulders(count: int = 64, things: int = 4000, views: int = 8, *, seed: int =
         shapes.append(on_grid(shape + np.append(place * PITCH, 1.0)))
     triangles = faces + len(unit) * np.arange(len(cell))[:, None, None]
     # Things and eyes stand at the corners of the rows, 8.5 m from the nearest middle.
-    corner = on_grid((rng.integers(-1, side, (things, 2)) + 0.5) * PITCH)
+    places, corners = apart(rng, side, views, things)
+    corner = on_grid((corners + 0.5) * PITCH)
     low = np.zeros((things, 3))
     low[:, :2] = on_grid(corner + rng.uniform(-1.5, 0.5, (things, 2)))
     low[:, 2] = on_grid(rng.uniform(0.0, 6.0, things))
     high = low + on_grid(rng.uniform(0.2, 1.0, (things, 3)))
     shape, sides = box_mesh(low, high)
     eyes = []
-    for number in range(views):
-        eye = on_grid([*((rng.integers(0, side - 1, 2) + 0.5) * PITCH), EYE])
+    for number, place in enumerate((places + 0.5) * PITCH):
+        eye = on_grid([*place, EYE])
         heading = rng.uniform(0.0, 2.0 * np.pi)
         target = eye + np.array([10.0 * np.cos(heading), 10.0 * np.sin(heading), 0.0])
         eyes.append(

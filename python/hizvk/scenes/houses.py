@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from .grid import on_grid
+from .grid import apart, on_grid
 from .scene import Scene, View, box_mesh
 
 if TYPE_CHECKING:
@@ -88,15 +88,15 @@ def village(houses: int = 64, things: int = 4000, views: int = 8, *, seed: int =
     sizes = on_grid(rng.uniform((9.0, 6.0, 3.0, 6.0), (13.0, 9.0, 6.0, 10.0), (count, 4)))
     vertices, triangles = gabled_houses(cell * PITCH, sizes, rng.uniform(0.0, 180.0, count))
     # Things and eyes stand where the rows' corners are, so that no house holds them.
-    corner = on_grid((rng.integers(-1, side, (things, 2)) + 0.5) * PITCH)
+    places, corners = apart(rng, side, views, things)
+    corner = on_grid((corners + 0.5) * PITCH)
     low = np.zeros((things, 3))
     low[:, :2] = on_grid(corner + rng.uniform(-1.5, 1.5, (things, 2)))
     low[:, 2] = on_grid(rng.uniform(0.0, 9.0, things))
     high = low + on_grid(rng.uniform(0.3, 1.5, (things, 3)))
     shape, faces = box_mesh(low, high)
     eyes = []
-    for number in range(views):
-        place = (rng.integers(0, side - 1, 2) + 0.5) * PITCH
+    for number, place in enumerate((places + 0.5) * PITCH):
         eye = on_grid([*place, EYE])
         heading = rng.uniform(0.0, 2.0 * np.pi)
         target = eye + np.array([10.0 * np.cos(heading), 10.0 * np.sin(heading), 0.0])
