@@ -172,12 +172,13 @@ def select_occluders(
         )
     if density is not None and area.sum() > 0.0:
         usual = triangles.sum() / area.sum()
-        dense = (triangles >= MANY) & (triangles > density * usual * area)
-        for k in np.flatnonzero(dense).tolist():
+        # What has no area is small already.
+        times = np.divide(triangles / usual, area, out=np.zeros(count), where=area > 0.0)
+        for k in np.flatnonzero((triangles >= MANY) & (times > density)).tolist():
             reasons.setdefault(
                 k,
-                f"high-polygon: {triangles[k]} triangles, {triangles[k] / area[k] / usual:.3g} "
-                f"times as many for its area as all meshes have, above {density:g}",
+                f"high-polygon: {triangles[k]} triangles, {times[k]:.3g} times as many for its "
+                f"area as all meshes have, above {density:g}",
             )
     if protrusion is not None:
         _drop_redundant(pieces, protrusion, reasons)

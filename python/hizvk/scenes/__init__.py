@@ -13,6 +13,7 @@ The ray caster that checks a cull therefore starts from the same numbers as the 
 - `storeroom`: `room`: crates behind walls
 - `city`: a street-level city from a seed
 - `boulders`: lumps of thousands of triangles
+- `hedge`: where ranking occluders by size and distance fails
 - `houses`: `village`: turned houses with gable roofs
 - `embree`: Embree's ray caster
 - `truth`: what is seen in a view, and the check of a cull against it

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from .grid import Floats
 
-__all__ = ["Boulders", "boulders"]
+__all__ = ["Boulders", "boulder", "boulders"]
 
 #: Metres from boulder to boulder, and the height of eyes.
 PITCH: Final = 12.0
@@ -59,16 +59,13 @@ def boulders(count: int = 64, things: int = 4000, views: int = 8, *, seed: int =
     """
     rng = np.random.default_rng(seed)
     side = int(np.ceil(np.sqrt(count)))
-    unit, faces = _ball()
     cell = np.stack(np.meshgrid(np.arange(side), np.arange(side), indexing="ij"), -1).reshape(-1, 2)
-    shapes = []
-    for place in cell:
-        radius = np.ones(len(unit))
-        for _ in range(WAVES):
-            radius += BUMPS / WAVES * np.sin(unit @ rng.normal(0.0, 3.0, 3) + rng.uniform(0.0, 6.0))
-        shape = unit * radius[:, None] * rng.uniform((3.0, 3.0, 2.5), (5.0, 5.0, 5.0))
+    shapes, faces = [], []
+    for number, place in enumerate(cell):
+        unit, triangles = boulder(rng)
+        shape = unit * rng.uniform((3.0, 3.0, 2.5), (5.0, 5.0, 5.0))
         shapes.append(on_grid(shape + np.append(place * PITCH, 1.0)))
-    triangles = faces + len(unit) * np.arange(len(cell))[:, None, None]
+        faces.append(triangles + np.uint32(number * len(unit)))
     # Things and eyes stand at the corners of the rows, 8.5 m from the nearest middle.
     places, corners = apart(rng, side, views, things)
     corner = on_grid((corners + 0.5) * PITCH)
@@ -90,7 +87,7 @@ def boulders(count: int = 64, things: int = 4000, views: int = 8, *, seed: int =
         name=f"{len(cell)} boulders",
         origin=(middle, middle, 0.0),
         vertices=np.concatenate(shapes),
-        triangles=triangles.reshape(-1, 3).astype(np.uint32),
+        triangles=np.concatenate(faces),
         instance_vertices=shape,
         instance_triangles=sides,
         owner=np.repeat(np.arange(things, dtype=np.int32), 12),
@@ -99,6 +96,15 @@ def boulders(count: int = 64, things: int = 4000, views: int = 8, *, seed: int =
         views=tuple(eyes),
     )
     return Boulders(scene, len(cell))
+
+
+def boulder(rng: np.random.Generator) -> tuple[Floats, npt.NDArray[np.uint32]]:
+    """Vertices and triangles of a closed lump of radius 1, give or take `BUMPS`."""
+    unit, faces = _ball()
+    radius = np.ones(len(unit))
+    for _ in range(WAVES):
+        radius += BUMPS / WAVES * np.sin(unit @ rng.normal(0.0, 3.0, 3) + rng.uniform(0.0, 6.0))
+    return unit * radius[:, None], faces.astype(np.uint32)
 
 
 def _ball() -> tuple[Floats, npt.NDArray[np.intp]]:
