@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from ..adapter import Adapter
     from ..scenes import Scene
 
-__all__ = ["NAMES", "Report", "main", "run"]
+__all__ = ["NAMES", "Report", "cuts", "main", "proxies", "run"]
 
 PROG: Final = "hizvk bench --occluders"
 #: The scenes of this report; the first four are also the bench's.
@@ -105,10 +105,10 @@ class Report:
             "The part of the hidden instances that stay hidden when only a share of the triangles "
             "in view is drawn."
         )
-        page.table(f"scene | ranking | {' | '.join(_part(s) for s in SHARES)}", _cuts(self), left=2)
+        page.table(f"scene | ranking | {' | '.join(_part(s) for s in SHARES)}", cuts(self), left=2)
         page.heading("Simpler occluders")
         page.text("The same when proxies inside of the meshes are drawn in their stead.")
-        page.table("scene | proxies | triangles | drawn | hiding kept", _proxies(self), left=2)
+        page.table("scene | proxies | triangles | drawn | hiding kept", proxies(self), left=2)
         return page
 
 
@@ -116,7 +116,8 @@ def _part(share: float) -> str:
     return f"1/{1.0 / share:.0f}"
 
 
-def _cuts(found: Report) -> list[list[str]]:
+def cuts(found: Report) -> list[list[str]]:
+    """The rows of the table of rankings."""
     return [
         [scene.key, row.label, *(f"{100.0 * row.share(share):.1f} %" for share in SHARES)]
         for scene in found.scenes
@@ -124,7 +125,8 @@ def _cuts(found: Report) -> list[list[str]]:
     ]
 
 
-def _proxies(found: Report) -> list[list[str]]:
+def proxies(found: Report) -> list[list[str]]:
+    """The rows of the table of proxies."""
     return [
         [scene.key, one.label, f"{one.triangles:,}", f"{one.drawn:,}", f"{100.0 * one.share:.1f} %"]
         for scene in found.scenes
