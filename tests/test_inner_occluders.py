@@ -164,6 +164,24 @@ def test_growth_finds_the_largest_box_of_each_part() -> None:
     assert len(growth.grow(inside, grid, 1, 0.0)) == 1
 
 
+def test_grown_boxes_are_full_and_cannot_grow() -> None:
+    """Voxel by voxel, in a random grid from which a few are missing."""
+    inside = np.random.default_rng(6).random((9, 8, 7)) > 0.04
+    candidates = growth._candidates(inside, np.argwhere(inside))
+    assert len(candidates) > 20
+    for (x0, y0, z0), (x1, y1, z1) in candidates.tolist():
+        assert inside[x0:x1, y0:y1, z0:z1].all()
+        beside = (
+            inside[max(x0 - 1, 0) : x0, y0:y1, z0:z1],
+            inside[x1 : x1 + 1, y0:y1, z0:z1],
+            inside[x0:x1, max(y0 - 1, 0) : y0, z0:z1],
+            inside[x0:x1, y1 : y1 + 1, z0:z1],
+            inside[x0:x1, y0:y1, max(z0 - 1, 0) : z0],
+            inside[x0:x1, y0:y1, z1 : z1 + 1],
+        )
+        assert not any(side.size and side.all() for side in beside)
+
+
 def test_a_margin_leaves_room_on_every_side() -> None:
     found = hizvk.inner_boxes(*box_mesh([[0, 0, 0]], [[4, 4, 4]]), margin=0.25)
     assert found.boxes.min.tolist() == [[0.25] * 3]

@@ -69,6 +69,23 @@ def test_groups_fit_their_cells(cell: float) -> None:
     assert (least[~small] > cell).all()
 
 
+def test_triangles_as_large_as_a_cell_are_groups_of_their_own() -> None:
+    """In a row along each axis, where any lattice would join some of them."""
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 1]])
+    for axis in np.eye(3):
+        for side in (1.0, 0.984375):
+            row = side * corners + np.arange(200)[:, None, None] / 128.0 * axis  # exact
+            split = hizvk.split_mesh(row, cell=1.0)
+            assert (split.boxes.max - split.boxes.min <= 1.0).all()
+            assert len(split) > 100
+
+
+def test_large_neighbours_come_together() -> None:
+    corners = np.array([[0.0, 0, 0], [5, 0, 0], [0, 5, 5]])
+    split = hizvk.split_mesh(corners + 0.001 * np.arange(200)[:, None, None], cell=1.0)
+    assert len(split) == 1
+
+
 def test_neighbours_come_together() -> None:
     """100 small triangles in each of 4 places, 50 apart, in random order."""
     rng = np.random.default_rng(3)

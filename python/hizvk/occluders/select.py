@@ -1,8 +1,9 @@
 """Drops poor occluders before any view is known.
 
-The criteria are those of Moller and Haines, *Real-Time Rendering* (1999), for the database of
-occluders, after Zhang et al., *Visibility culling using hierarchical occlusion maps* (1997): leave
-out what is small, has many polygons, has an ill-shaped bounding volume, or is redundant.
+What is left out is small, has an ill-shaped bounding volume or many polygons, or is redundant.
+These are the criteria of Moller and Haines, *Real-Time Rendering* (1999), for the database of
+occluders.
+They follow Zhang et al., *Visibility culling using hierarchical occlusion maps* (1997).
 
 A dropped occluder never makes a cull wrong.
 It is hidden behind others or seen as before; it only hides nothing itself.
