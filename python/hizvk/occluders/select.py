@@ -80,7 +80,7 @@ def select_occluders(
 ) -> OccluderSelection:
     """Drops the meshes that are poor occluders, whatever the view.
 
-    Silhouettes are those along x, y and z, sampled by 24 x 24 points each.
+    Silhouettes are those along x, y and z, sampled by 16 x 16 points each.
     The *area* of a mesh is their mean, and its *size* is the square root of that.
     A mesh is dropped for the first of these reasons that holds:
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-__all__ = ["Grid", "inside", "left_of", "pairs", "planes_of"]
+__all__ = ["Grid", "inside", "pairs", "planes_of"]
 
 #: Pairs of a triangle and a voxel or column that are looked at together.
 CHUNK: Final = 1 << 18
@@ -162,7 +162,7 @@ def _winding(corners: npt.NDArray[np.float64], grid: Grid) -> npt.NDArray[np.int
     for triangle, column in pairs(first, last - first):
         p = corners[triangle]
         px, py = x[column[:, 0]], y[column[:, 1]]
-        sides = np.stack([left_of(p[:, k], p[:, (k + 1) % 3], px, py) for k in range(3)], axis=1)
+        sides = np.stack([_left_of(p[:, k], p[:, (k + 1) % 3], px, py) for k in range(3)], axis=1)
         hit = np.flatnonzero((sides == sides[:, :1]).all(axis=1))
         p, px, py = p[hit], px[hit], py[hit]
         normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
@@ -181,7 +181,7 @@ def _winding(corners: npt.NDArray[np.float64], grid: Grid) -> npt.NDArray[np.int
     return above.reshape(shape)
 
 
-def left_of(
+def _left_of(
     a: npt.NDArray[np.float64],
     b: npt.NDArray[np.float64],
     x: npt.NDArray[np.float64],
