@@ -30,6 +30,8 @@ LAST_LINES = {
     "indirect_draws.py": "draw 600 instances from 0 on, 36 indices from 12 on, base vertex -4",
     # A closed house; each ball of the ring is nearer to some camera than the house.
     "many_views.py": "seen from 24 views: 0 inside, 60 around",
+    # At a distance of 20 m the wall of 6 x 6 m hides 12 x 12 m, and there are 8 x 8 m.
+    "polygon_soup.py": "kept: 100 % of the wall, 0 % of what it hides",
     # x is -9, -7, ... 9: a ball of 0.5 m is hidden up to 3.5 m from the middle.
     "updates.py": "the walker is hidden in frames 3, 4, 5, 6",
 }

@@ -25,6 +25,7 @@ The promise: for the numbers as given, whatever could show in a pixel of the dep
 `compare` counts false culls, of which there are none, and false keeps, which are a cost.
 A small depth image holds for larger ones if it was rendered with ``conservative=True``.
 `check_proxy` and `check_bounds` say whether occluders and bounds are what they should be.
+`split_mesh`, `inner_boxes`, `inner_prisms` and `select_occluders` make occluders of meshes.
 
     >>> import hizvk
     >>> import numpy as np
@@ -75,6 +76,16 @@ from .errors import (
 )
 from .explanation import Explanation, Verdict
 from .mesh import Mesh
+from .occluders import (
+    InnerBoxes,
+    InnerPrisms,
+    OccluderSelection,
+    SplitMesh,
+    inner_boxes,
+    inner_prisms,
+    select_occluders,
+    split_mesh,
+)
 from .oneline import visible
 from .options import CullOptions, DrawTemplate, Outputs
 from .resources import DepthImage, Instances, Occluders, Pyramid
@@ -101,10 +112,13 @@ __all__ = [
     "Explanation",
     "HizError",
     "HizWarning",
+    "InnerBoxes",
+    "InnerPrisms",
     "Instances",
     "LimitError",
     "Mesh",
     "NoAdapterError",
+    "OccluderSelection",
     "Occluders",
     "OrientedBoxes",
     "OutOfMemoryError",
@@ -113,14 +127,19 @@ __all__ = [
     "Pyramid",
     "Recommendation",
     "Spheres",
+    "SplitMesh",
     "Verdict",
     "__version__",
     "adapters",
     "check_bounds",
     "check_proxy",
     "compare",
+    "inner_boxes",
+    "inner_prisms",
     "recommend",
     "reference",
+    "select_occluders",
+    "split_mesh",
     "visible",
 ]
 

@@ -7,6 +7,7 @@
 - `numpy_hiz`, `rays`: what a Python user would do without this library
 - `rectangle`: the best rectangle test
 - `score`: false culls and hidden instances kept
+- `occluders`, `hiding`: ``--occluders``, what is lost with fewer or simpler occluders
 - `results`: the numbers as plain objects
 - `report`, `plots`: report.json (its schema stands there), report.md, a picture per scene
 """

@@ -171,6 +171,11 @@ def _parser() -> argparse.ArgumentParser:
         metavar="PATH",
         help=f"castle.npz (or the variable {catalogue.VARIABLE})",
     )
+    parser.add_argument(
+        "--occluders",
+        action="store_true",
+        help="instead: what is lost with fewer or simpler occluders; --occluders --help tells more",
+    )
     parser.add_argument("--instances", type=args.count, help="in every scene but the castle")
     parser.add_argument("--views", type=args.count, help="of every scene")
     parser.add_argument(
@@ -191,6 +196,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "--speed is no part of the package any more; in a checkout run `make bench-speed` "
             "or `python -m tools.speed`"
         )
+    if "--occluders" in arguments:
+        from . import occluders
+
+        return occluders.main([each for each in arguments if each != "--occluders"])
     parsed = parser.parse_args(arguments)
     return args.execute(
         PROG,

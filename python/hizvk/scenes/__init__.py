@@ -12,15 +12,29 @@ The ray caster that checks a cull therefore starts from the same numbers as the 
 - `massif`: `mountains`, the demo's scene: a real elevation model and trees
 - `storeroom`: `room`: crates behind walls
 - `city`: a street-level city from a seed
+- `boulders`: lumps of thousands of triangles
+- `hedge`: where ranking occluders by size and distance fails
+- `houses`: `village`: turned houses with gable roofs
 - `embree`: Embree's ray caster
 - `truth`: what is seen in a view, and the check of a cull against it
 """
 
 from __future__ import annotations
 
+from .houses import gabled_houses, village
 from .massif import elevation, mountains
 from .scene import Scene, View, box_mesh
 from .storeroom import room
 from .terrain import Terrain
 
-__all__ = ["Scene", "Terrain", "View", "box_mesh", "elevation", "mountains", "room"]
+__all__ = [
+    "Scene",
+    "Terrain",
+    "View",
+    "box_mesh",
+    "elevation",
+    "gabled_houses",
+    "mountains",
+    "room",
+    "village",
+]
