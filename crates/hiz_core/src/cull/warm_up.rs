@@ -9,7 +9,7 @@ use crate::input::camera::Camera;
 use crate::instances::Instances;
 use crate::instances::update::record_idle_update;
 use crate::occluders::Occluders;
-use crate::occluders::raster::record_occluders;
+use crate::occluders::device_raster::record_occluders;
 use crate::output::visible::Visible;
 use crate::pyramid::Pyramid;
 use crate::pyramid::reduce::record_idle_reduce;
