@@ -13,9 +13,9 @@ use std::error::Error;
 
 use hiz_core::wgpu::{self, util::DeviceExt};
 use hiz_core::{
-    Bounds, Camera, CullOptions, DepthConvention, DrawTemplate, Floats, HizContext, ImageSize,
-    InstanceOptions, MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Outputs, Pose, Projection,
-    PyramidOptions, Visible,
+    Bounds, Camera, CullOptions, DepthConvention, DrawOptions, DrawTemplate, Floats, HizContext,
+    ImageSize, InstanceOptions, MeshData, OccluderOptions, Outputs, Pose, Projection,
+    PyramidOptions, Rasteriser, Visible,
 };
 
 const SHADER: &str = "
@@ -74,6 +74,7 @@ pub(crate) fn draw_frame(
     let mut encoder = device.create_command_encoder(&Default::default());
     let hiz = HizContext::new(device)?;
     let occluders = hiz.create_occluders(&[wall], &OccluderOptions::default())?;
+    let depth = hiz.create_occluder_depth(size, Rasteriser::Auto)?;
     let pyramid = hiz.create_pyramid(size, &PyramidOptions::default())?;
     let instances = hiz.record_instances(&mut encoder, &bounds, &InstanceOptions::default())?;
     let draw = DrawTemplate { index_count: 6, ..DrawTemplate::default() };
@@ -81,9 +82,9 @@ pub(crate) fn draw_frame(
     let visible = hiz.create_visible(&instances, &outputs)?;
 
     // Each frame: depth, pyramid, cull.
-    let depth = target(device, OCCLUDER_DEPTH_FORMAT).create_view(&Default::default());
-    hiz.record_occluders(&mut encoder, &occluders, &camera, &depth)?;
-    hiz.record_reduce(&mut encoder, &depth, &camera, &pyramid)?;
+    let all = DrawOptions::default();
+    hiz.record_occluder_depth(&mut encoder, &occluders, &camera, &depth, &all)?;
+    hiz.record_reduce(&mut encoder, depth.view(), &camera, &pyramid)?;
     let options = CullOptions::default();
     hiz.record_cull(&mut encoder, &instances, &camera, &pyramid, &visible, &options)?;
 

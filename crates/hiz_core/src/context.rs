@@ -19,7 +19,9 @@ use crate::input::tolerance::DepthTolerance;
 use crate::instances::piece::CULL_WORKGROUP;
 use crate::instances::update::record_update;
 use crate::instances::{InstanceOptions, Instances};
+use crate::occluders::depth::OccluderDepth;
 use crate::occluders::device_raster::record_occluders;
+use crate::occluders::drawing::{DrawOptions, Rasteriser, Touched};
 use crate::occluders::{OccluderOptions, Occluders};
 use crate::output::outputs::Outputs;
 use crate::output::visible::Visible;
@@ -55,26 +57,14 @@ use crate::pyramid::{Pyramid, PyramidOptions, PyramidUniform};
 /// ```
 /// # use hiz_core::headless::Engine;
 /// use hiz_core::{Bounds, CullOptions, Floats, HizContext, InstanceOptions, MeshData};
-/// use hiz_core::{OccluderOptions, Outputs, PyramidOptions};
-/// # use hiz_core::{Camera, DepthConvention, ImageSize, OCCLUDER_DEPTH_FORMAT, Pose, Projection};
-/// # use hiz_core::wgpu;
+/// use hiz_core::{DrawOptions, OccluderOptions, Outputs, PyramidOptions, Rasteriser};
+/// # use hiz_core::{Camera, DepthConvention, ImageSize, Pose, Projection, wgpu};
 /// # let engine = Engine::new(None)?;
 /// # let (device, queue) = (engine.device(), engine.queue());
 /// # let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
 /// # let (fov_y, convention) = (std::f64::consts::FRAC_PI_2, DepthConvention::Reversed);
 /// # let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
 /// # let camera = Camera::look_at(&pose, &projection, ImageSize::new(64, 64))?;
-/// # let depth = device.create_texture(&wgpu::TextureDescriptor {
-/// #     label: None,
-/// #     size: wgpu::Extent3d { width: 64, height: 64, depth_or_array_layers: 1 },
-/// #     mip_level_count: 1,
-/// #     sample_count: 1,
-/// #     dimension: wgpu::TextureDimension::D2,
-/// #     format: OCCLUDER_DEPTH_FORMAT,
-/// #     usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-/// #     view_formats: &[],
-/// # });
-/// # let depth_view = depth.create_view(&wgpu::TextureViewDescriptor::default());
 /// # let (centers, radii) = ([0.0, 0.0, -5.0, 0.0, 0.0, -20.0], [0.5, 0.5]);
 /// # let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
 /// # let corners = [-20.0, -20.0, -10.0, 20.0, -20.0, -10.0, 0.0, 40.0, -10.0];
@@ -85,13 +75,15 @@ use crate::pyramid::{Pyramid, PyramidOptions, PyramidUniform};
 /// // Once:
 /// let hiz = HizContext::new(device)?;
 /// let occluders = hiz.create_occluders(&[wall], &OccluderOptions::default())?;
+/// let depth = hiz.create_occluder_depth(camera.size(), Rasteriser::Auto)?;
 /// let pyramid = hiz.create_pyramid(camera.size(), &PyramidOptions::default())?;
 /// let instances = hiz.record_instances(&mut encoder, &bounds, &InstanceOptions::default())?;
 /// let visible = hiz.create_visible(&instances, &Outputs::default())?;
 ///
 /// // Each frame:
-/// hiz.record_occluders(&mut encoder, &occluders, &camera, &depth_view)?;
-/// hiz.record_reduce(&mut encoder, &depth_view, &camera, &pyramid)?;
+/// let all = DrawOptions::default();
+/// hiz.record_occluder_depth(&mut encoder, &occluders, &camera, &depth, &all)?;
+/// hiz.record_reduce(&mut encoder, depth.view(), &camera, &pyramid)?;
 /// let options = CullOptions::default();
 /// hiz.record_cull(&mut encoder, &instances, &camera, &pyramid, &visible, &options)?;
 /// queue.submit([encoder.finish()]);
@@ -293,24 +285,69 @@ impl HizContext {
         Occluders::new(&self.gpu, meshes, options)
     }
 
-    /// Records the drawing of `occluders` into `target`, which is cleared to the far plane first.
+    /// Makes a depth image that occluders are drawn into.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] for a size of 0.
+    /// - [`Error::Limit`] for a size beyond the device's textures.
+    /// - [`Error::OutOfMemory`].
+    pub fn create_occluder_depth(
+        &self,
+        size: ImageSize,
+        rasteriser: Rasteriser,
+    ) -> Result<OccluderDepth> {
+        OccluderDepth::new(&self.gpu, size, rasteriser)
+    }
+
+    /// Records the drawing of `occluders` into `depth`, which [`record_reduce`](Self::record_reduce)
+    /// then takes.
+    ///
+    /// Returns the rectangle around what was drawn: columns `x0..=x1` and rows `y0..=y1` as
+    /// `[x0, y0, x1, y1]`.
+    /// No pixel outside of it changes, except by [`DepthLoad::Clear`](crate::DepthLoad::Clear).
+    ///
+    /// The rasteriser on the host draws in this call, on all cores, and records a copy alone.
+    /// With [`DepthLoad::Load`](crate::DepthLoad::Load) it adds to what earlier calls have drawn,
+    /// so submit the recordings in their order.
+    ///
+    /// # Errors
+    /// - [`Error::Mismatch`] for a camera of another size or, with `Load`, of another depth
+    ///   convention, and for objects of another context.
+    /// - [`Error::Invalid`] for copies that do not exist, and for a camera that float32 cannot hold.
+    /// - [`Error::OutOfMemory`].
+    pub fn record_occluder_depth(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        occluders: &Occluders,
+        camera: &Camera,
+        depth: &OccluderDepth,
+        options: &DrawOptions<'_>,
+    ) -> Result<Touched> {
+        depth.record(&self.gpu, encoder, occluders, camera, options)
+    }
+
+    /// Records the drawing of `occluders` into the caller's own `target`, by the device's
+    /// rasteriser.
     ///
     /// `target` is a view of one layer of a 2D `Depth32Float` texture of the camera's size.
     /// The texture has one mip level, one sample per pixel and the usage `RENDER_ATTACHMENT`.
+    /// Returns the rectangle around what was drawn, as
+    /// [`record_occluder_depth`](Self::record_occluder_depth) does.
     ///
     /// # Errors
     /// - [`Error::Mismatch`] for a target of another size, format or device, for a destroyed target
     ///   and for occluders of another context.
-    /// - [`Error::Invalid`] for a target with other usages, samples or mip levels, and for a camera
-    ///   that float32 cannot hold.
+    /// - [`Error::Invalid`] for a target with other usages, samples or mip levels, for copies that
+    ///   do not exist, and for a camera that float32 cannot hold.
     pub fn record_occluders(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         occluders: &Occluders,
         camera: &Camera,
         target: &wgpu::TextureView,
-    ) -> Result<()> {
-        record_occluders(&self.gpu, encoder, occluders, camera, target)
+        options: &DrawOptions<'_>,
+    ) -> Result<Touched> {
+        record_occluders(&self.gpu, encoder, occluders, camera, target, options)
     }
 
     /// Records the reduction of a depth image of `camera` into `pyramid`.
@@ -440,10 +477,10 @@ fn needed(have: &wgpu::Limits) -> Vec<(&'static str, u64, u64)> {
         // The verdicts of a row of records, and the row itself in its staging buffer.
         max_storage_buffer_binding_size >= 8192,
         max_buffer_size >= 65_536,
-        // Occluders.
-        max_vertex_buffers >= 1,
-        max_vertex_attributes >= 2,
-        max_vertex_buffer_array_stride >= 24,
+        // Occluders: vertices and copies (`occluders/device_raster.rs`).
+        max_vertex_buffers >= 2,
+        max_vertex_attributes >= 8,
+        max_vertex_buffer_array_stride >= 88,
         // No shader needs it, but wgpu 30 counts down from it.
         max_inter_stage_shader_variables >= 1,
         // Prefix sums of 256 words (`output/compact.wgsl`); 64 vectors of four words

@@ -3,12 +3,15 @@
 
 mod common;
 
+use std::sync::Arc;
+
 use common::{CONVENTIONS, Random, camera_along_z, depth_descriptor, engine, ndc};
 use hiz_core::headless::Engine;
 use hiz_core::wgpu;
 use hiz_core::{
-    Camera, DepthConvention, FaceCull, Floats, ImageSize, MeshData, OccluderOptions, Pose,
-    Projection, Pyramid, PyramidOptions, StoredLevels,
+    Camera, ConservativeDepthOptions, DepthConvention, DepthLoad, DrawOptions, FaceCull, Floats,
+    ImageSize, MeshData, OccluderOptions, Occluders, Only, Pose, Projection, Pyramid,
+    PyramidOptions, Rasteriser, StoredLevels,
 };
 
 /// A square at depth `z` from (-r, -r) to (r, r).
@@ -31,7 +34,21 @@ fn draw(
         transforms: transforms.map(Floats::F64),
     };
     let occluders = engine().occluders(&[mesh], &OccluderOptions { cull_mode }).unwrap();
-    engine().render_depth(&occluders, camera).unwrap().read().unwrap()
+    let [device, host] = RASTERISERS.map(|which| render(&occluders, camera, which));
+    // Both cover the same pixels, with the same depth up to a few roundings.
+    for (d, h) in device.iter().zip(&host) {
+        let far = camera.convention().far();
+        assert!((*d == far) == (*h == far) && (d - h).abs() <= 1e-6, "{d} and {h}");
+    }
+    device
+}
+
+const RASTERISERS: [Rasteriser; 2] = [Rasteriser::Device, Rasteriser::Host];
+
+fn render(occluders: &Occluders, camera: &Camera, rasteriser: Rasteriser) -> Vec<f32> {
+    let all = DrawOptions::default();
+    let drawn = engine().render_depth_with(occluders, camera, rasteriser, &all).unwrap();
+    drawn.0.read().unwrap()
 }
 
 /// A camera at the world's `eye` that looks along -z with y up: the usual right-handed one.
@@ -170,7 +187,9 @@ fn distance_from_the_origin_costs_nothing() {
 /// Faults that leave out a half of the eye move the picture by up to half a unit.
 #[test]
 fn eyes_that_float32_does_not_hold_see_what_float64_says() {
-    assert_eq!(wrong_pixels(&engine()), 0);
+    for rasteriser in RASTERISERS {
+        assert_eq!(wrong_pixels(&engine(), rasteriser), 0, "{rasteriser:?}");
+    }
     for (what, by) in [
         ("(vertex.lo - copy.eye_lo)", "vertex.lo"),
         ("(vertex.lo - copy.eye_lo)", "(vec3<f32>(0.0) - copy.eye_lo)"),
@@ -182,7 +201,7 @@ fn eyes_that_float32_does_not_hold_see_what_float64_says() {
     ] {
         let faulty = Engine::with_planted_faults(None, &[(what, by)])
             .expect("the device tests need a Vulkan driver");
-        assert!(wrong_pixels(&faulty) > 100, "{what} -> {by}: stayed green");
+        assert!(wrong_pixels(&faulty, Rasteriser::Device) > 100, "{what} -> {by}: stayed green");
     }
 }
 
@@ -190,7 +209,7 @@ fn eyes_that_float32_does_not_hold_see_what_float64_says() {
 const SNAP_PX: f64 = 1.0 / 32.0;
 
 /// Pixels that differ from float64, among those that are surely covered or surely not.
-fn wrong_pixels(engine: &Engine) -> usize {
+fn wrong_pixels(engine: &Engine, rasteriser: Rasteriser) -> usize {
     let size = ImageSize::new(40, 24);
     // 1 / z = (1 - u / 2 - v / 4) / 4, and a pixel is 2 / 24 wide and high in u and v.
     let step = (0.5 + 0.25) * 2.0 / f64::from(size.height) / 4.0;
@@ -217,8 +236,9 @@ fn wrong_pixels(engine: &Engine) -> usize {
                 transforms: None,
             };
             let occluders = engine.occluders(&[mesh], &OccluderOptions::default()).unwrap();
-            let drawn = engine.render_depth(&occluders, &camera).unwrap().read().unwrap();
-            for (i, got) in (0..).zip(drawn) {
+            let all = DrawOptions::default();
+            let drawn = engine.render_depth_with(&occluders, &camera, rasteriser, &all).unwrap();
+            for (i, got) in (0..).zip(drawn.0.read().unwrap()) {
                 // The field of view is 90 degrees high.
                 // The ray through a pixel's centre is (u, v, 1).
                 // It meets the plane at z = 4 / (1 - u / 2 - v / 4).
@@ -283,17 +303,20 @@ fn pyramids_of_rendered_depth_are_bit_exact() {
     for convention in CONVENTIONS {
         for (width, height) in [(1, 1), (2, 3), (17, 31), (640, 360), (1001, 563)] {
             let camera = camera_along_z(width, height, convention);
-            let image = engine().render_depth(&occluders, &camera).unwrap();
-            let depth = image.read().unwrap();
-            let pyramid = engine().pyramid(&image).unwrap();
-            for (k, level) in
-                hiz_ref::pyramid(&depth, width, height, convention.is_reversed()).iter().enumerate()
-            {
-                assert_eq!(
-                    engine().read_level(&pyramid, k as u32).unwrap(),
-                    level.texels,
-                    "{width}x{height} level {k}"
-                );
+            for rasteriser in RASTERISERS {
+                let all = DrawOptions::default();
+                let drawn = engine().render_depth_with(&occluders, &camera, rasteriser, &all);
+                let (image, _) = drawn.unwrap();
+                let depth = image.read().unwrap();
+                let pyramid = engine().pyramid(&image).unwrap();
+                let levels = hiz_ref::pyramid(&depth, width, height, convention.is_reversed());
+                for (k, level) in levels.iter().enumerate() {
+                    assert_eq!(
+                        engine().read_level(&pyramid, k as u32).unwrap(),
+                        level.texels,
+                        "{rasteriser:?} {width}x{height} level {k}"
+                    );
+                }
             }
         }
     }
@@ -394,9 +417,10 @@ fn depth_textures_are_reduced_to_the_chosen_levels() {
     let occluders = engine().occluders(&[mesh], &OccluderOptions::default()).unwrap();
     for (width, height) in [(1, 1), (1, 83), (89, 1), (64, 65), (127, 129), (401, 233)] {
         for convention in CONVENTIONS {
-            let image = engine()
-                .render_depth(&occluders, &camera_along_z(width, height, convention))
-                .unwrap();
+            let camera = camera_along_z(width, height, convention);
+            let all = DrawOptions::default();
+            let drawn = engine().render_depth_with(&occluders, &camera, Rasteriser::Device, &all);
+            let (image, _) = drawn.unwrap();
             let depth = image.read().unwrap();
             for levels in LEVELS {
                 let options = PyramidOptions { levels, ..PyramidOptions::default() };
@@ -407,5 +431,196 @@ fn depth_textures_are_reduced_to_the_chosen_levels() {
                 );
             }
         }
+    }
+}
+
+/// Walls one behind the other, each a mesh in three places along x.
+fn walls() -> Arc<Occluders> {
+    let (vertices, triangles) = square(0.0, 1.0);
+    let places: Vec<Vec<f64>> = [2.0, 4.0, 8.0]
+        .iter()
+        .map(|z| {
+            [-1.0, 0.0, 1.0]
+                .iter()
+                .flat_map(|x| place(x * z, 0.0, *z).into_iter())
+                .collect::<Vec<f64>>()
+        })
+        .collect();
+    let meshes: Vec<MeshData<'_>> = places
+        .iter()
+        .map(|places| MeshData {
+            vertices: Floats::F64(&vertices),
+            triangles: &triangles,
+            transforms: Some(Floats::F64(places)),
+        })
+        .collect();
+    engine().occluders(&meshes, &OccluderOptions::default()).unwrap()
+}
+
+fn place(x: f64, y: f64, z: f64) -> [f64; 16] {
+    [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0]
+}
+
+/// Copies are numbered through all meshes, and drawing them one after the other gives the image of
+/// all, whichever come first.
+#[test]
+fn chosen_copies_are_added_to_an_image() {
+    let walls = walls();
+    for rasteriser in RASTERISERS {
+        for convention in CONVENTIONS {
+            let camera = camera_along_z(90, 60, convention);
+            let all = render(&walls, &camera, rasteriser);
+            let (early, late) = ([8_u32, 0, 4, 0], [1, 2, 3, 5, 6, 7]);
+            let only = |list| DrawOptions { only: Only::Listed(list), ..DrawOptions::default() };
+            let (image, touched) =
+                engine().render_depth_with(&walls, &camera, rasteriser, &only(&early)).unwrap();
+            let before = image.read().unwrap();
+            assert!(before != all, "{rasteriser:?}");
+            assert!(covered(&before, 90, convention).is_some_and(|is| contains(touched, is)));
+            // A mask says the same as a list.
+            let mask: Vec<bool> = (0..9).map(|i| early.contains(&i)).collect();
+            let masked = DrawOptions { only: Only::Masked(&mask), ..DrawOptions::default() };
+            let (by_mask, _) =
+                engine().render_depth_with(&walls, &camera, rasteriser, &masked).unwrap();
+            assert!(by_mask.read().unwrap() == before);
+            // The pyramid follows the image.
+            let more = DrawOptions { load: DepthLoad::Load, ..only(&late) };
+            engine().render_depth_into(&image, &walls, &more).unwrap();
+            assert!(image.read().unwrap() == all, "{rasteriser:?}");
+            let pyramid = engine().pyramid(&image).unwrap();
+            assert!(engine().read_level(&pyramid, 0).unwrap() == all);
+            // Nothing changes outside of the rectangle that one more copy touches.
+            engine().render_depth_into(&image, &walls, &only(&[8])).unwrap();
+            let before = image.read().unwrap();
+            let one = DrawOptions { load: DepthLoad::Load, ..only(&[0]) };
+            let touched = engine().render_depth_into(&image, &walls, &one).unwrap();
+            let after = image.read().unwrap();
+            let changed: Vec<f32> = before
+                .iter()
+                .zip(&after)
+                .map(|(b, a)| if a == b { convention.far() } else { 0.5 })
+                .collect();
+            let changed = covered(&changed, 90, convention).expect("the nearest wall shows");
+            assert!(contains(touched, changed), "{touched:?} around {changed:?}");
+            assert!(touched.unwrap()[2] < 60, "the left third, not {touched:?}");
+            // And nothing at all if nothing is drawn.
+            let none = DrawOptions { load: DepthLoad::Load, ..only(&[]) };
+            assert_eq!(engine().render_depth_into(&image, &walls, &none).unwrap(), None);
+            assert!(image.read().unwrap() == after);
+        }
+    }
+}
+
+/// The rectangle around the pixels that are not far.
+fn covered(depth: &[f32], width: usize, convention: DepthConvention) -> Option<[u32; 4]> {
+    let places = depth.iter().enumerate().filter(|(_, d)| **d != convention.far());
+    places.fold(None, |all, (i, _)| {
+        let (x, y) = ((i % width) as u32, (i / width) as u32);
+        let [x0, y0, x1, y1] = all.unwrap_or([x, y, x, y]);
+        Some([x0.min(x), y0.min(y), x1.max(x), y1.max(y)])
+    })
+}
+
+fn contains(outer: Option<[u32; 4]>, inner: [u32; 4]) -> bool {
+    outer.is_some_and(|o| {
+        o[0] <= inner[0] && o[1] <= inner[1] && o[2] >= inner[2] && o[3] >= inner[3]
+    })
+}
+
+#[test]
+fn copies_that_do_not_exist_are_refused() {
+    let walls = walls();
+    let camera = camera_along_z(8, 8, DepthConvention::Reversed);
+    for rasteriser in RASTERISERS {
+        let refused = |only| {
+            let options = DrawOptions { only, ..DrawOptions::default() };
+            let drawn = engine().render_depth_with(&walls, &camera, rasteriser, &options);
+            drawn.unwrap_err().to_string()
+        };
+        assert_eq!(refused(Only::Listed(&[3, 9])), "only: expected numbers of the 9 copies, got 9");
+        assert_eq!(
+            refused(Only::Masked(&[true; 4])),
+            "only: expected one place for each of the 9 copies, got 4"
+        );
+    }
+    let uploaded = engine().upload_depth(&[0.0; 64], &camera).unwrap();
+    let error = engine().render_depth_into(&uploaded, &walls, &DrawOptions::default());
+    assert_eq!(
+        error.unwrap_err().to_string(),
+        "depth: expected an image that occluders were drawn into, got an uploaded one"
+    );
+}
+
+/// A mesh that moves is seen where a new upload of it would be, by both rasterisers and in
+/// conservative depth.
+#[test]
+fn moved_meshes_stand_where_their_matrices_say() {
+    let mut random = Random(77);
+    let camera = camera_along_z(64, 48, DepthConvention::Reversed);
+    let vertices: Vec<f64> = (0..90).map(|_| random.range(-1.0, 1.0)).collect();
+    let triangles: Vec<u32> = (0..30).collect();
+    let conservative = |occluders: &Occluders| {
+        let options = ConservativeDepthOptions::default();
+        occluders.surface().conservative_depth(&camera, &options).unwrap()
+    };
+    let made = |places: &[f64]| {
+        let still = place(0.0, 0.0, 9.0);
+        let mesh = |transforms| MeshData {
+            vertices: Floats::F64(&vertices),
+            triangles: &triangles,
+            transforms: Some(Floats::F64(transforms)),
+        };
+        let meshes = [mesh(&still), mesh(places), mesh(&still)];
+        engine().occluders(&meshes, &OccluderOptions::default()).unwrap()
+    };
+    let moving = made(&place(0.0, 0.0, 3.0));
+    conservative(&moving);
+    for round in 0..6 {
+        // Turned, mirrored, stretched, doubled and taken away.
+        let count = [1, 1, 2, 0, 3, 1][round];
+        let places: Vec<f64> = (0..count)
+            .flat_map(|_| {
+                let mut m: [f64; 16] = std::array::from_fn(|_| random.range(-1.5, 1.5));
+                m[12..].copy_from_slice(&[0.0, 0.0, 0.0, 1.0]);
+                m[11] += 4.0;
+                m
+            })
+            .collect();
+        moving.move_mesh(1, Some(Floats::F64(&places))).unwrap();
+        let fresh = made(&places);
+        assert_eq!(moving.num_parts(), count + 2);
+        for rasteriser in RASTERISERS {
+            let (seen, expected) =
+                (render(&moving, &camera, rasteriser), render(&fresh, &camera, rasteriser));
+            assert!(seen == expected, "{rasteriser:?}, round {round}");
+        }
+        assert!(conservative(&moving) == conservative(&fresh), "round {round}");
+    }
+    let error = moving.move_mesh(3, None).unwrap_err().to_string();
+    assert_eq!(error, "mesh: expected the number of one of the 3 meshes, got 3");
+    let before = render(&moving, &camera, Rasteriser::Host);
+    assert!(moving.move_mesh(1, Some(Floats::F64(&[f64::NAN; 16]))).is_err());
+    assert!(render(&moving, &camera, Rasteriser::Host) == before);
+}
+
+/// Limits leave the largest, and never show what is not there.
+#[test]
+fn limits_leave_what_is_large_in_the_image() {
+    let walls = walls();
+    let camera = camera_along_z(90, 60, DepthConvention::Reversed);
+    for rasteriser in RASTERISERS {
+        let limited = |max_triangles, max_copies| {
+            let options = DrawOptions { max_triangles, max_copies, ..DrawOptions::default() };
+            let drawn = engine().render_depth_with(&walls, &camera, rasteriser, &options);
+            drawn.unwrap().0.read().unwrap()
+        };
+        let nearest = DrawOptions { only: Only::Listed(&[0, 1, 2]), ..DrawOptions::default() };
+        let drawn = engine().render_depth_with(&walls, &camera, rasteriser, &nearest).unwrap();
+        let nearest = drawn.0.read().unwrap();
+        assert!(limited(Some(6), None) == nearest, "{rasteriser:?}");
+        assert!(limited(None, Some(3)) == nearest, "{rasteriser:?}");
+        assert!(limited(Some(18), Some(9)) == render(&walls, &camera, rasteriser));
+        assert!(limited(Some(1), None).iter().all(|d| *d == 0.0));
+        assert!(limited(None, Some(0)).iter().all(|d| *d == 0.0));
     }
 }

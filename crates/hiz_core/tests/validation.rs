@@ -8,6 +8,7 @@
 mod common;
 
 use common::{camera_along_z, depth_descriptor};
+use hiz_core::DrawOptions;
 use hiz_core::wgpu::{self, TextureFormat as Format, TextureUsages as Usages};
 use hiz_core::{
     AtlasUse, Bounds, BoundsKind, Camera, CullOptions, DepthConvention, DrawTemplate, Error,
@@ -120,7 +121,13 @@ impl World {
         let usage = Usages::RENDER_ATTACHMENT | Usages::TEXTURE_BINDING | Usages::COPY_SRC;
         let wall = self.texture(Format::Depth32Float, usage);
         self.context
-            .record_occluders(encoder, &self.occluders, &self.camera, &plain(&wall))
+            .record_occluders(
+                encoder,
+                &self.occluders,
+                &self.camera,
+                &plain(&wall),
+                &DrawOptions::default(),
+            )
             .unwrap();
         wall
     }
@@ -369,7 +376,9 @@ fn targets_that_cannot_be_drawn_into_are_refused_by_name() {
     let into = |view: wgpu::TextureView| {
         let World { context, occluders, camera, .. } = &world;
         Box::new(move |encoder: &mut wgpu::CommandEncoder| {
-            context.record_occluders(encoder, occluders, camera, &view)
+            context
+                .record_occluders(encoder, occluders, camera, &view, &DrawOptions::default())
+                .map(drop)
         }) as Box<_>
     };
     let but = |usage, change: &dyn Fn(&mut wgpu::TextureDescriptor<'_>)| {
@@ -431,7 +440,16 @@ fn targets_that_cannot_be_drawn_into_are_refused_by_name() {
                 "occluders: expected an object of this device and context",
                 Box::new(|encoder| {
                     let view = plain(&world.texture(depth, usage));
-                    world.context.record_occluders(encoder, &other.occluders, &world.camera, &view)
+                    world
+                        .context
+                        .record_occluders(
+                            encoder,
+                            &other.occluders,
+                            &world.camera,
+                            &view,
+                            &DrawOptions::default(),
+                        )
+                        .map(drop)
                 }),
             ),
         ],
@@ -755,7 +773,16 @@ fn nothing_at_all_is_drawn_reduced_and_culled() {
         world.texture_but(Format::Depth32Float, Usages::RENDER_ATTACHMENT | SAMPLED, |d| {
             (d.size.width, d.size.height) = (1, 1);
         });
-    world.context.record_occluders(&mut encoder, &no_mesh, &world.camera, &plain(&target)).unwrap();
+    world
+        .context
+        .record_occluders(
+            &mut encoder,
+            &no_mesh,
+            &world.camera,
+            &plain(&target),
+            &DrawOptions::default(),
+        )
+        .unwrap();
     world.reduce(&mut encoder, &plain(&target)).unwrap();
     for order in [Order::Stable, Order::Any] {
         for hierarchy in [Hierarchy::Never, Hierarchy::Always] {
@@ -777,7 +804,9 @@ fn a_lost_device_ends_nothing() {
     let outcomes = [
         world.reduce(&mut encoder, &view),
         world.cull(&mut encoder, &CullOptions::default()),
-        context.record_occluders(&mut encoder, occluders, camera, &view),
+        context
+            .record_occluders(&mut encoder, occluders, camera, &view, &DrawOptions::default())
+            .map(drop),
         context.record_update(&mut encoder, instances, 0, &TWO_BOXES, true),
         context.record_instances(&mut encoder, &TWO_BOXES, &InstanceOptions::default()).map(drop),
         context.create_occluders(&[WALL], &OccluderOptions::default()).map(drop),
@@ -814,7 +843,11 @@ fn encoders_that_cannot_be_used_are_told_of() {
     let acts: [Act<'_>; 5] = [
         &|encoder| world.reduce(encoder, &view),
         &|encoder| world.cull(encoder, &CullOptions::default()),
-        &|encoder| context.record_occluders(encoder, occluders, camera, &view),
+        &|encoder| {
+            context
+                .record_occluders(encoder, occluders, camera, &view, &DrawOptions::default())
+                .map(drop)
+        },
         &|encoder| context.record_update(encoder, instances, 0, &TWO_BOXES, true),
         &|encoder| {
             context.record_instances(encoder, &TWO_BOXES, &InstanceOptions::default()).map(drop)

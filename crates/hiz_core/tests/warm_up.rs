@@ -181,7 +181,8 @@ fn the_first_frame_of_a_renderer_makes_nothing() {
         context.record_update(&mut frame, &instances, 0, &bounds, false).unwrap();
         let updated = context.made();
         if is_drawn {
-            context.record_occluders(&mut frame, &occluders, &camera, &depth).unwrap();
+            let all = hiz_core::DrawOptions::default();
+            context.record_occluders(&mut frame, &occluders, &camera, &depth, &all).unwrap();
         }
         let drawn = context.made();
         context.record_reduce(&mut frame, &depth, &camera, &pyramid).unwrap();

@@ -8,7 +8,7 @@ use std::error::Error;
 use hiz_core::headless::INSTALL_HINT;
 use hiz_core::wgpu::{self, util::DeviceExt};
 use hiz_core::{
-    Camera, CullOptions, DepthConvention, DrawTemplate, Floats, HizContext, ImageSize,
+    Camera, CullOptions, DepthConvention, DrawOptions, DrawTemplate, Floats, HizContext, ImageSize,
     InstanceOptions, Instances, MeshData, OCCLUDER_DEPTH_FORMAT, OccluderOptions, Occluders, Order,
     Outputs, PyramidOptions, Visible,
 };
@@ -318,7 +318,8 @@ impl Renderer {
         let prepass = target(&self.device, "renderer.prepass", size, OCCLUDER_DEPTH_FORMAT);
         let depth_view = prepass.create_view(&wgpu::TextureViewDescriptor::default());
         let occluders = &stage.occluders[usize::from(shot.crowd_occludes)];
-        self.hiz.record_occluders(&mut encoder, occluders, camera, &depth_view)?;
+        let all = DrawOptions::default();
+        self.hiz.record_occluders(&mut encoder, occluders, camera, &depth_view, &all)?;
 
         let pyramid = self.hiz.create_pyramid(size, &PyramidOptions::default())?;
         self.hiz.record_reduce(&mut encoder, &depth_view, camera, &pyramid)?;
@@ -451,7 +452,8 @@ impl Renderer {
         let depth = target(&self.device, "renderer.nothing", camera.size(), OCCLUDER_DEPTH_FORMAT);
         let depth = depth.create_view(&wgpu::TextureViewDescriptor::default());
         let pyramid = self.hiz.create_pyramid(camera.size(), &PyramidOptions::default())?;
-        self.hiz.record_occluders(&mut encoder, &stage.nothing, camera, &depth)?;
+        let all = DrawOptions::default();
+        self.hiz.record_occluders(&mut encoder, &stage.nothing, camera, &depth, &all)?;
         self.hiz.record_reduce(&mut encoder, &depth, camera, &pyramid)?;
         self.hiz.record_cull(
             &mut encoder,

@@ -10,6 +10,7 @@ use crate::instances::Instances;
 use crate::instances::update::record_idle_update;
 use crate::occluders::Occluders;
 use crate::occluders::device_raster::record_occluders;
+use crate::occluders::drawing::DrawOptions;
 use crate::output::visible::Visible;
 use crate::pyramid::Pyramid;
 use crate::pyramid::reduce::record_idle_reduce;
@@ -22,7 +23,8 @@ use crate::pyramid::reduce::record_idle_reduce;
 /// handedness.
 #[derive(Debug, Clone, Copy)]
 pub struct WarmUp<'a> {
-    /// What is drawn into the depth image, if this crate draws it.
+    /// What [`HizContext::record_occluders`](crate::HizContext::record_occluders) draws into the
+    /// depth image, if it does.
     pub occluders: Option<&'a Occluders>,
     /// The depth image.
     pub depth: &'a wgpu::TextureView,
@@ -51,7 +53,7 @@ pub(crate) fn record_warm_up(
 ) -> Result<()> {
     let WarmUp { depth, camera, pyramid, instances, visible, options, .. } = *frame;
     if let Some(occluders) = frame.occluders {
-        record_occluders(gpu, encoder, occluders, camera, depth)?;
+        record_occluders(gpu, encoder, occluders, camera, depth, &DrawOptions::default())?;
     }
     let built = record_idle_reduce(gpu, encoder, depth, camera, pyramid)?;
     let inputs = CullInputs {

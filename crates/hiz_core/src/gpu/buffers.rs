@@ -14,7 +14,12 @@ pub(crate) struct Mapped<'a> {
     buffer: &'a wgpu::Buffer,
 }
 
-impl Mapped<'_> {
+impl<'a> Mapped<'a> {
+    /// A buffer that is mapped.
+    pub(crate) fn of(label: &'a str, buffer: &'a wgpu::Buffer) -> Self {
+        Self { label, buffer }
+    }
+
     /// The bytes of `range`, which must not be empty and must begin at a multiple of 8.
     ///
     /// Opening a range costs more than writing one record, so open few.

@@ -25,6 +25,9 @@ impl ContextId {
     }
 }
 
+/// Staging buffers for the numbers of recordings that are kept at most.
+const STAGING_KEPT: usize = 16;
+
 /// A device, its limits, and the objects that are made on it once.
 #[derive(Debug)]
 pub(crate) struct Gpu {
@@ -62,7 +65,7 @@ impl Gpu {
             layouts: Layouts::default(),
             pipelines: Pipelines::default(),
             buffers: KeptBuffers::default(),
-            ring: Ring::default(),
+            ring: Ring::new(STAGING_KEPT),
             making: Making::default(),
             #[cfg(feature = "testing")]
             faults: Vec::new(),
@@ -151,6 +154,11 @@ impl Gpu {
                 })
             })
         })
+    }
+
+    /// Whether the device is a processor, such as lavapipe or SwiftShader.
+    pub(crate) fn is_processor(&self) -> bool {
+        self.device.adapter_info().device_type == wgpu::DeviceType::Cpu
     }
 
     /// The pipeline that `recipe` describes, made on first use.

@@ -28,24 +28,39 @@ impl KeptBuffers {
 }
 
 /// Buffers that are mapped, free and all of one size.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Ring(Arc<Locked<Vec<wgpu::Buffer>>>);
+#[derive(Debug, Clone)]
+pub(crate) struct Ring {
+    free: Arc<Locked<Vec<wgpu::Buffer>>>,
+    most: usize,
+}
 
 impl Ring {
-    /// Buffers that are kept at most; more than that are released.
-    const MOST: usize = 16;
+    /// Keeps `most` buffers; more than that are released.
+    pub(crate) fn new(most: usize) -> Self {
+        Self { free: Arc::default(), most }
+    }
 
     /// A free buffer, if there is one.
     pub(crate) fn take(&self) -> Option<wgpu::Buffer> {
-        self.0.lock().pop()
+        self.free.lock().pop()
     }
 
     /// Takes a buffer back, which must be mapped.
     pub(crate) fn give(&self, buffer: wgpu::Buffer) {
-        let mut free = self.0.lock();
-        if free.len() < Self::MOST {
+        let mut free = self.free.lock();
+        if free.len() < self.most {
             free.push(buffer);
         }
+    }
+
+    /// Has a buffer come back, mapped, when the submission of `encoder` is done.
+    pub(crate) fn come_back(&self, encoder: &wgpu::CommandEncoder, buffer: &wgpu::Buffer) {
+        let (ring, mapped) = (self.clone(), buffer.clone());
+        encoder.map_buffer_on_submit(buffer, wgpu::MapMode::Write, .., move |outcome| {
+            if outcome.is_ok() {
+                ring.give(mapped);
+            }
+        });
     }
 }
 

@@ -68,7 +68,7 @@ impl Numbers {
         for Copy { from, target, to, size } in copies {
             encoder.copy_buffer_to_buffer(&self.staging, *from, target, *to, *size);
         }
-        self.come_back(encoder);
+        self.ring.come_back(encoder, &self.staging);
     }
 
     /// Records commands that read the staging buffer itself.
@@ -78,17 +78,6 @@ impl Numbers {
         record: impl FnOnce(&mut wgpu::CommandEncoder, &wgpu::Buffer),
     ) {
         record(encoder, &self.staging);
-        self.come_back(encoder);
-    }
-
-    /// Has the staging buffer come back to the ring when the submission of `encoder` is done.
-    fn come_back(self, encoder: &wgpu::CommandEncoder) {
-        let Self { staging, ring, .. } = self;
-        let mapped = staging.clone();
-        encoder.map_buffer_on_submit(&staging, wgpu::MapMode::Write, .., move |outcome| {
-            if outcome.is_ok() {
-                ring.give(mapped);
-            }
-        });
+        self.ring.come_back(encoder, &self.staging);
     }
 }

@@ -1,5 +1,7 @@
 //! Depth images on the device: drawn, uploaded, read back.
 
+use std::sync::Arc;
+
 use crate::error::{Error, Result};
 use crate::gpu::depth_source::SourceKind;
 use crate::headless::engine::Engine;
@@ -9,7 +11,8 @@ use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
 use crate::input::tolerance::DepthTolerance;
 use crate::occluders::Occluders;
-use crate::occluders::device_raster::OCCLUDER_DEPTH_FORMAT;
+use crate::occluders::depth::OccluderDepth;
+use crate::occluders::drawing::{DepthLoad, DrawOptions, Rasteriser, Touched};
 use crate::occluders::surface::ConservativeDepthOptions;
 
 /// Bytes of an upload's staging buffer at most.
@@ -24,6 +27,8 @@ pub struct DepthImage {
     pub(super) view: wgpu::TextureView,
     pub(super) camera: Camera,
     pub(super) tolerance: DepthTolerance,
+    /// What draws occluders into it; none for an uploaded image.
+    drawn: Option<Arc<OccluderDepth>>,
 }
 
 impl DepthImage {
@@ -43,7 +48,8 @@ impl DepthImage {
     }
 
     /// The texture.
-    /// Images from [`Engine::upload_depth`] hold four pixels per texel (`Rgba32Uint`).
+    /// Images from [`Engine::upload_depth`], and those that the host has drawn, hold four pixels per
+    /// texel (`Rgba32Uint`).
     pub fn texture(&self) -> &wgpu::Texture {
         &self.texture
     }
@@ -87,7 +93,33 @@ impl DepthImage {
             view,
             camera: camera.clone(),
             tolerance: DepthTolerance::NONE,
+            drawn: None,
         })
+    }
+
+    /// Records the drawing of occluders, and submits it.
+    fn record_occluders(
+        &self,
+        occluders: &Occluders,
+        options: &DrawOptions<'_>,
+    ) -> Result<Touched> {
+        let Some(drawn) = &self.drawn else {
+            return Err(Error::invalid(
+                "depth",
+                "expected an image that occluders were drawn into, got an uploaded one",
+            ));
+        };
+        let engine = &self.engine;
+        let mut encoder = engine.encoder("hiz.occluders.encoder");
+        let touched = engine.context().record_occluder_depth(
+            &mut encoder,
+            occluders,
+            &self.camera,
+            drawn,
+            options,
+        )?;
+        engine.queue().submit([encoder.finish()]);
+        Ok(touched)
     }
 
     /// An image that holds the given NDC depths.
@@ -165,24 +197,67 @@ impl DepthImage {
 }
 
 impl Engine {
-    /// Draws occluders into a depth image of the camera's size.
+    /// Draws all occluders into a depth image of the camera's size, by the rasteriser that suits
+    /// the device.
+    ///
+    /// # Errors
+    /// Those of [`Engine::render_depth_with`].
+    pub fn render_depth(&self, occluders: &Occluders, camera: &Camera) -> Result<DepthImage> {
+        self.render_depth_with(occluders, camera, Rasteriser::Auto, &DrawOptions::default())
+            .map(|(depth, _)| depth)
+    }
+
+    /// Draws occluders into a new depth image of the camera's size.
+    ///
+    /// The image is cleared in any case.
+    /// Returns the rectangle around what was drawn, too, as
+    /// [`HizContext::record_occluder_depth`](crate::HizContext::record_occluder_depth) does.
     ///
     /// # Errors
     /// - [`Error::Mismatch`] for occluders of another device.
-    /// - [`Error::Invalid`] for a camera that float32 cannot hold.
+    /// - [`Error::Invalid`] for a camera that float32 cannot hold, and for copies that do not exist.
     /// - [`Error::Limit`] for an image larger than the device's textures.
     /// - [`Error::OutOfMemory`].
-    pub fn render_depth(&self, occluders: &Occluders, camera: &Camera) -> Result<DepthImage> {
+    pub fn render_depth_with(
+        &self,
+        occluders: &Occluders,
+        camera: &Camera,
+        rasteriser: Rasteriser,
+        options: &DrawOptions<'_>,
+    ) -> Result<(DepthImage, Touched)> {
         self.scoped(|| {
-            let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
-                | wgpu::TextureUsages::TEXTURE_BINDING
-                | wgpu::TextureUsages::COPY_SRC;
-            let depth = DepthImage::new(self, camera, OCCLUDER_DEPTH_FORMAT, usage)?;
-            let mut encoder = self.encoder("hiz.occluders.encoder");
-            self.context().record_occluders(&mut encoder, occluders, camera, &depth.view)?;
-            self.queue().submit([encoder.finish()]);
-            Ok(depth)
+            let drawn = self.context().create_occluder_depth(camera.size(), rasteriser)?;
+            let depth = DepthImage {
+                engine: self.clone(),
+                texture: drawn.texture().clone(),
+                view: drawn.view().clone(),
+                camera: camera.clone(),
+                tolerance: DepthTolerance::NONE,
+                drawn: Some(Arc::new(drawn)),
+            };
+            let options = DrawOptions { load: DepthLoad::Clear, ..*options };
+            let touched = depth.record_occluders(occluders, &options)?;
+            Ok((depth, touched))
         })
+    }
+
+    /// Draws occluders into an image that was made by [`Engine::render_depth`], as its camera sees
+    /// them.
+    ///
+    /// [`DrawOptions::load`] says whether they are added to what is there.
+    /// Culls and pyramids of the image that were submitted before see it as it was.
+    /// A pyramid that was built before is out of date afterwards: build it again.
+    ///
+    /// # Errors
+    /// Those of [`Engine::render_depth_with`], and [`Error::Invalid`] for an image that was uploaded.
+    pub fn render_depth_into(
+        &self,
+        depth: &DepthImage,
+        occluders: &Occluders,
+        options: &DrawOptions<'_>,
+    ) -> Result<Touched> {
+        self.context().gpu.check_context("depth", depth.engine.context().gpu.id())?;
+        self.scoped(|| depth.record_occluders(occluders, options))
     }
 
     /// Makes occluder depth that holds for every larger image of the same view

@@ -10,9 +10,10 @@ use crate::host::linear::Vec3;
 use crate::host::memory;
 use crate::host::rounding::split3;
 use crate::input::camera::Camera;
-use crate::input::image::DepthConvention;
+use crate::input::image::{DepthConvention, ImageSize};
 use crate::input::mesh::FaceCull;
 use crate::occluders::Occluders;
+use crate::occluders::drawing::{DepthLoad, DrawOptions, Ranked, Touched, both};
 use crate::occluders::placement::Placement;
 use crate::occluders::shapes::{Mesh, Shapes};
 use crate::occluders::view::{PlacedView, View};
@@ -148,49 +149,88 @@ struct Draw {
     mirrored: bool,
 }
 
-/// What a camera sees of `placements`: draws, and the record of each copy that is drawn.
-fn draws(
+/// A part of one copy that a camera may see.
+struct Seen<'a> {
+    /// The index of the copy's record.
+    record: u32,
+    copy: u32,
+    placement: &'a Placement,
+    part: &'a Part,
+    /// Where it is in the image.
+    rectangle: [u32; 4],
+}
+
+/// What a camera sees of some copies: their parts, and a record of each copy.
+fn seen<'a>(
     view: &View,
+    size: ImageSize,
     shapes: &Shapes,
-    meshes: &DeviceMeshes,
-    placements: impl Iterator<Item = Placement>,
-) -> (Vec<Draw>, Vec<CopyRecord>) {
-    let (mut draws, mut records) = (Vec::<Draw>::new(), Vec::new());
-    for placement in placements {
+    meshes: &'a DeviceMeshes,
+    copies: &[(u32, &'a Placement)],
+) -> (Vec<Seen<'a>>, Vec<CopyRecord>) {
+    let (mut found, mut records) = (Vec::new(), Vec::new());
+    for (copy, placement) in copies {
         let mesh = &shapes.meshes[placement.mesh as usize];
-        let placed = view.placed(mesh, &placement);
+        let placed = view.placed(mesh, placement);
         if mesh.triangles.is_empty() || placed.is_outside(mesh.min, mesh.max) {
             continue;
         }
-        let copy = records.len() as u32;
-        let PlacedView { rows, eye_hi, eye_lo, .. } = placed;
-        records.push(CopyRecord { rows, eye_hi, eye_lo });
         let parts = &meshes.parts[placement.mesh as usize];
+        let before = found.len();
         for part in parts {
             if parts.len() > 1 && placed.is_outside(part.min, part.max) {
                 continue;
             }
-            let draw = Draw {
-                indices: part.indices.clone(),
-                copies: copy..copy + 1,
-                mirrored: placement.mirrored,
-            };
-            match draws.last_mut().filter(|last| last.mirrored == draw.mirrored) {
-                // The next part of the same copy.
-                Some(last)
-                    if last.copies == draw.copies && last.indices.end == draw.indices.start =>
-                {
-                    last.indices.end = draw.indices.end;
-                }
-                // The next copy of the same triangles.
-                Some(last) if last.copies.end == copy && last.indices == draw.indices => {
-                    last.copies.end = copy + 1;
-                }
-                _ => draws.push(draw),
-            }
+            let rectangle = placed.rectangle(part.min, part.max, size);
+            let record = records.len() as u32;
+            found.push(Seen { record, copy: *copy, placement, part, rectangle });
+        }
+        if found.len() > before {
+            let PlacedView { rows, eye_hi, eye_lo, .. } = placed;
+            records.push(CopyRecord { rows, eye_hi, eye_lo });
         }
     }
-    (draws, records)
+    (found, records)
+}
+
+/// Joins what follows one another into as few draws as possible.
+fn draws(seen: &[Seen<'_>]) -> Vec<Draw> {
+    let mut draws = Vec::<Draw>::new();
+    for Seen { record, placement, part, .. } in seen {
+        let draw = Draw {
+            indices: part.indices.clone(),
+            copies: *record..record + 1,
+            mirrored: placement.mirrored,
+        };
+        match draws.last_mut().filter(|last| last.mirrored == draw.mirrored) {
+            // The next part of the same copy.
+            Some(last) if last.copies == draw.copies && last.indices.end == draw.indices.start => {
+                last.indices.end = draw.indices.end;
+            }
+            // The next copy of the same triangles.
+            Some(last) if last.copies.end == *record && last.indices == draw.indices => {
+                last.copies.end = record + 1;
+            }
+            _ => draws.push(draw),
+        }
+    }
+    draws
+}
+
+/// Those of the parts that a limit leaves.
+fn within_limits<'a>(seen: Vec<Seen<'a>>, options: &DrawOptions<'_>) -> Vec<Seen<'a>> {
+    let ranked = seen.iter().map(|seen| {
+        let [x0, y0, x1, y1] = seen.rectangle;
+        Ranked {
+            copy: seen.copy,
+            triangles: seen.part.indices.len() as u32 / 3,
+            area: (x1 - x0 + 1) as f32 * (y1 - y0 + 1) as f32,
+            // The device does not tell what it found hidden.
+            is_useful: false,
+        }
+    });
+    let is_kept = options.within_limits(&ranked.collect::<Vec<_>>());
+    seen.into_iter().zip(is_kept).filter_map(|(seen, kept)| kept.then_some(seen)).collect()
 }
 
 /// The shader module of the occluder pass.
@@ -257,7 +297,7 @@ fn check_target(camera: &Camera, target: &wgpu::TextureView) -> Result<()> {
     Ok(())
 }
 
-/// Records the pass that clears `target` and draws `occluders` into it.
+/// Records the pass that draws `occluders` into `target`; returns the rectangle around them.
 ///
 /// # Errors
 /// As [`HizContext::record_occluders`](crate::HizContext::record_occluders).
@@ -267,15 +307,23 @@ pub(crate) fn record_occluders(
     occluders: &Occluders,
     camera: &Camera,
     target: &wgpu::TextureView,
-) -> Result<()> {
+    options: &DrawOptions<'_>,
+) -> Result<Touched> {
     gpu.check_context("occluders", occluders.context)?;
     check_target(camera, target)?;
-    let (draws, records) = draws(
+    let placements = occluders.placements();
+    let (mut seen, records) = seen(
         &View::new(camera)?,
+        camera.size(),
         occluders.shapes(),
         &occluders.on_device,
-        occluders.placements().iter().cloned(),
+        &options.only.of(&placements)?,
     );
+    if options.is_limited() {
+        seen = within_limits(seen, options);
+    }
+    let draws = draws(&seen);
+    let touched = seen.iter().fold(None, |all, seen| both(all, Some(seen.rectangle)));
     let reversed = camera.convention() == DepthConvention::Reversed;
     let faces = occluders.surface.cull_mode().as_seen_by(camera);
     let pipeline = occluders_pipeline(gpu, reversed, faces)?;
@@ -290,7 +338,10 @@ pub(crate) fn record_occluders(
         )?),
     };
     let depth_ops = wgpu::Operations {
-        load: wgpu::LoadOp::Clear(camera.convention().far()),
+        load: match options.load {
+            DepthLoad::Clear => wgpu::LoadOp::Clear(camera.convention().far()),
+            DepthLoad::Load => wgpu::LoadOp::Load,
+        },
         store: wgpu::StoreOp::Store,
     };
     gpu.can_draw_into(target, depth_ops).map_err(|error| match error {
@@ -327,6 +378,6 @@ pub(crate) fn record_occluders(
             }
             pass.draw_indexed(draw.indices, 0, draw.copies);
         }
-        Ok(())
+        Ok(touched)
     })
 }

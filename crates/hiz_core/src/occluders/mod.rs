@@ -4,14 +4,17 @@
 //!
 //! 1. `shapes` checks meshes and cuts them into `meshlets`, each mesh in its own space.
 //!    `placement` says where the copies of a mesh stand.
-//! 2. `view` is a camera in the space of a copy.
-//! 3. `device_raster` draws the meshes as depth on the device.
-//!    `host_raster` draws them on the host, for devices that are processors.
-//! 4. `surface` computes conservative depth from them, on the host in float64.
+//! 2. `drawing` says which copies are drawn, and `view` is a camera in the space of a copy.
+//! 3. `host_raster` draws the meshes on the host, for devices that are processors.
+//! 4. `surface` holds them on the host, and computes conservative depth from them in float64.
+//! 5. `device_raster` draws the meshes on the device.
+//! 6. `depth` is the image that the one rasteriser or the other draws into.
 //!
 //! The drawing is recorded into the caller's encoder; nothing here submits or reads back.
 
+pub(crate) mod depth;
 pub(crate) mod device_raster;
+pub(crate) mod drawing;
 pub(crate) mod host_raster;
 mod meshlets;
 mod placement;

@@ -9,6 +9,7 @@ use crate::error::Result;
 use crate::host::linear::{Mat4, Vec3, dot, sub};
 use crate::host::rounding::{flushed, split3};
 use crate::input::camera::Camera;
+use crate::input::image::ImageSize;
 use crate::input::view::reference_point;
 use crate::occluders::placement::{Placement, box_corner};
 use crate::occluders::shapes::Mesh;
@@ -83,5 +84,33 @@ impl PlacedView {
             || all(&|c| c[3] - c[1])
             || all(&|c| c[2])
             || all(&|c| c[3] - c[2])
+    }
+
+    /// The pixels around a box, `[x0, y0, x1, y1]`; the whole image where it crosses the eye's
+    /// plane.
+    pub(super) fn rectangle(&self, min: Vec3, max: Vec3, size: ImageSize) -> [u32; 4] {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        let sides = [size.width, size.height];
+        for corner in 0..8 {
+            let d = sub(box_corner(min, max, corner), self.eye);
+            let [x, y, _, w] = self.exact.map(|r| dot([r[0], r[1], r[2]], d) + r[3]);
+            if w.is_nan() || w <= 0.0 {
+                return [0, 0, size.width - 1, size.height - 1];
+            }
+            for (k, ndc) in [x / w, -y / w].into_iter().enumerate() {
+                let pixel = (ndc + 1.0) * f64::from(sides[k]) / 2.0;
+                low[k] = low[k].min(pixel);
+                high[k] = high[k].max(pixel);
+            }
+        }
+        // A pixel to spare on each side covers what drivers round.
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+        let pixel = |v: f64, k: usize| v.clamp(0.0, f64::from(sides[k] - 1)) as u32;
+        [
+            pixel(low[0] - 1.0, 0),
+            pixel(low[1] - 1.0, 1),
+            pixel(high[0] + 1.0, 0),
+            pixel(high[1] + 1.0, 1),
+        ]
     }
 }

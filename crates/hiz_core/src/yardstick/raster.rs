@@ -3,6 +3,7 @@
 use crate::error::Result;
 use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
+use crate::occluders::drawing::DrawOptions;
 use crate::occluders::host_raster::{self, Way};
 use crate::occluders::surface::OccluderSurface;
 
@@ -37,7 +38,9 @@ impl HostRaster {
     ) -> Result<()> {
         assert_eq!(camera.size(), self.size, "the camera's size");
         self.raster.clear();
-        surface.draw_into(&mut self.raster, camera, Way { threads, skip })
+        surface
+            .draw_into(&mut self.raster, camera, Way { threads, skip }, &DrawOptions::default())
+            .map(drop)
     }
 
     /// Writes the NDC depth of `camera`'s convention, one number per pixel, row 0 on top.
@@ -46,6 +49,6 @@ impl HostRaster {
     /// If `out` does not have one number per pixel.
     pub fn write(&self, out: &mut [f32], camera: &Camera, threads: usize) {
         assert_eq!(out.len() as u64, self.size.pixels(), "one number per pixel");
-        self.raster.write(out, self.size.width as usize, camera.convention(), threads);
+        self.raster.write(out, camera.convention(), threads);
     }
 }

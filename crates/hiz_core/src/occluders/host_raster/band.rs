@@ -3,8 +3,9 @@
 //! A band sees every triangle that meets it, in the order of the frame.
 //! What it draws depends on nothing outside of it, so the number of bands changes no pixel.
 
-use std::ops::RangeInclusive;
+use std::ops::{Range, RangeInclusive};
 
+use crate::input::image::DepthConvention;
 use crate::occluders::host_raster::lens::{Extent, HALF, Image, UNITS, greatest, least};
 use crate::occluders::host_raster::tile::{
     CLEAR, Layer, MOST_LAYERS, Mask, PIXELS, Plane, SIDE, State, Tile, row_of_layers,
@@ -246,7 +247,6 @@ impl Band {
         }
     }
 
-    #[allow(dead_code, reason = "images that are drawn again are next")]
     pub(super) fn clear(&mut self) {
         self.farthest.fill(0.0);
         self.nearest.fill(0.0);
@@ -415,6 +415,9 @@ impl Band {
         for row in first..=last {
             let at = edges.at(t, begin * STEP, row * STEP);
             let (first, last) = span(&at, &steps.gain, &edges.right, begin, end);
+            if first > last {
+                continue;
+            }
             let y = to_pixels(row * STEP * UNITS + HALF - t.y[0]);
             let own_row = (row - self.top / STEP) as usize;
             for group in first / MANY..=last / MANY {
@@ -567,36 +570,49 @@ impl Band {
         self.stale = stale;
     }
 
-    /// Writes the band's rows of the image, `pitch` numbers apart, as NDC depth.
+    /// Writes the band's part of some rows of the image as NDC depth.
     ///
-    /// `out` begins at the band's first row.
+    /// `out` begins at the first of them, and they are `pitch` bytes apart.
+    /// A row ends at a multiple of 4 pixels; those past the width repeat the last one.
     pub(super) fn write(
         &self,
-        out: &mut [f32],
+        out: wgpu::WriteOnly<'_, [u8]>,
         pitch: usize,
-        depth_of: impl Fn(f32) -> f32 + Copy,
+        rows: Range<i32>,
+        convention: DepthConvention,
+    ) {
+        match convention {
+            DepthConvention::Reversed => self.write_as(out, pitch, rows, |nearness| nearness),
+            DepthConvention::Standard => self.write_as(out, pitch, rows, |nearness| 1.0 - nearness),
+        }
+    }
+
+    #[inline(always)]
+    fn write_as(
+        &self,
+        mut out: wgpu::WriteOnly<'_, [u8]>,
+        pitch: usize,
+        rows: Range<i32>,
+        depth_of: impl Fn(f32) -> f32,
     ) {
         let (width, count) = (self.image.width as usize, self.states.len());
-        let height = (self.image.height.min(self.bottom) - self.top) as usize;
-        for (y, line) in out.chunks_mut(pitch).enumerate().take(height) {
-            let line = &mut line[..width];
+        let end = width.next_multiple_of(4).min(pitch / size_of::<f32>());
+        let mut line = vec![0.0; width.next_multiple_of(SIDE)];
+        for (number, y) in rows.map(|row| (row - self.top) as usize).enumerate() {
             let first = y / SIDE * self.across;
             let pixels = &self.pixels[y * self.stride..][..self.stride];
-            let row = |column: usize| -> [f32; SIDE] {
+            for (column, values) in line.as_chunks_mut::<SIDE>().0.iter_mut().enumerate() {
                 let tile = first + column;
-                let values = match self.states[tile] {
+                let row = match self.states[tile] {
                     PIXELS => pixels.as_chunks().0[column],
                     state => row_of_layers(state, &self.layers[tile..], count, y % SIDE),
                 };
-                values.map(depth_of)
-            };
-            let (whole, rest) = line.as_chunks_mut::<SIDE>();
-            for (column, values) in whole.iter_mut().enumerate() {
-                *values = row(column);
+                *values = row.map(&depth_of);
             }
-            if !rest.is_empty() {
-                rest.copy_from_slice(&row(whole.len())[..rest.len()]);
-            }
+            let last = line[width - 1];
+            line[width..].fill(last);
+            let bytes = bytemuck::cast_slice(&line[..end]);
+            out.slice(number * pitch..number * pitch + bytes.len()).copy_from_slice(bytes);
         }
     }
 }

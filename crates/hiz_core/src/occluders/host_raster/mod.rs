@@ -33,12 +33,16 @@ mod tile;
 mod triangle;
 mod vertices;
 
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use crate::error::Result;
 use crate::host::memory;
-use crate::host::threads::on_threads;
+use crate::host::threads::{Locked, on_threads};
 use crate::input::camera::Camera;
 use crate::input::image::{DepthConvention, ImageSize};
 use crate::input::mesh::FaceCull;
+use crate::occluders::drawing::{DrawOptions, Ranked, Touched, both};
 use crate::occluders::host_raster::band::Band;
 use crate::occluders::host_raster::lens::{Extent, Image, Lens, extent};
 use crate::occluders::host_raster::tile::SIDE;
@@ -59,7 +63,8 @@ pub(crate) struct HostRaster {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Scene<'a> {
     pub(crate) shapes: &'a Shapes,
-    pub(crate) placements: &'a [Placement],
+    /// The copies, with their numbers.
+    pub(crate) copies: &'a [(u32, &'a Placement)],
     /// Of the image's size.
     pub(crate) camera: &'a Camera,
     /// Which faces do not occlude.
@@ -77,9 +82,19 @@ pub(crate) struct Way {
 /// A meshlet of one copy that may show.
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
+    copy: u32,
     meshlet: u32,
     lens: u32,
     extent: Extent,
+}
+
+/// What a drawing did.
+#[derive(Debug, Default)]
+pub(crate) struct Drawn {
+    /// The smallest rectangle around the boxes of what was drawn.
+    pub(crate) touched: Touched,
+    /// The meshlets that were drawn, not skipped: copy and number.
+    pub(crate) meshlets: Vec<(u32, u32)>,
 }
 
 impl HostRaster {
@@ -94,23 +109,36 @@ impl HostRaster {
     }
 
     /// Makes the image far everywhere.
-    #[allow(dead_code, reason = "images that are drawn again are next")]
     pub(crate) fn clear(&mut self) {
         self.bands.iter_mut().for_each(Band::clear);
     }
 
-    /// Draws the copies of a scene.
+    /// Draws the copies of a scene, within the limits of `options`.
+    ///
+    /// `useful` are the meshlets that a limit prefers, as in [`Drawn::meshlets`] and sorted.
     ///
     /// # Errors
     /// [`Error::Invalid`](crate::Error::Invalid) for a camera that float32 cannot hold, and
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
-    pub(crate) fn draw(&mut self, scene: &Scene<'_>, way: Way) -> Result<()> {
-        let (lenses, candidates) = self.candidates(scene)?;
+    pub(crate) fn draw(
+        &mut self,
+        scene: &Scene<'_>,
+        way: Way,
+        options: &DrawOptions<'_>,
+        useful: &[(u32, u32)],
+    ) -> Result<Drawn> {
+        let (lenses, mut candidates) = self.candidates(scene)?;
+        if options.is_limited() {
+            candidates = within_limits(scene.shapes, candidates, options, useful);
+        }
+        // Positive floats are ordered like their bits.
+        candidates.sort_unstable_by_key(|c| (!c.extent.nearest.to_bits(), c.lens, c.meshlet));
         let image = self.image;
         let faces = scene.cull_mode.as_seen_by(scene.camera);
+        let drawn: Vec<AtomicBool> = candidates.iter().map(|_| AtomicBool::new(false)).collect();
         on_threads(way.threads, &mut self.bands, |band: &mut Band| {
             let mut vertices = Vertices::new();
-            for candidate in &candidates {
+            for (candidate, drawn) in candidates.iter().zip(&drawn) {
                 let Candidate { extent, .. } = candidate;
                 if extent.rows.1 < band.top || extent.rows.0 >= band.bottom {
                     continue;
@@ -118,19 +146,29 @@ impl HostRaster {
                 if way.skip && band.hides(extent) {
                     continue;
                 }
+                drawn.store(true, Ordering::Relaxed);
                 let lens = &lenses[candidate.lens as usize];
                 draw_meshlet(scene.shapes, candidate, lens, faces, &image, band, &mut vertices);
                 band.renew();
             }
         });
-        Ok(())
+        let shown =
+            candidates.iter().zip(&drawn).filter(|(_, drawn)| drawn.load(Ordering::Relaxed));
+        let mut all = Drawn::default();
+        for (candidate, _) in shown {
+            let Extent { columns, rows, .. } = candidate.extent;
+            let rectangle = [columns.0, rows.0, columns.1, rows.1].map(|v| v as u32);
+            all.touched = both(all.touched, Some(rectangle));
+            all.meshlets.push((candidate.copy, candidate.meshlet));
+        }
+        Ok(all)
     }
 
-    /// The meshlets that may show, front to back.
+    /// The meshlets that may show.
     fn candidates(&self, scene: &Scene<'_>) -> Result<(Vec<Lens>, Vec<Candidate>)> {
         let view = View::new(scene.camera)?;
         let (mut lenses, mut candidates) = (Vec::new(), Vec::new());
-        for placement in scene.placements {
+        for (copy, placement) in scene.copies {
             let mesh = &scene.shapes.meshes[placement.mesh as usize];
             if mesh.triangles.is_empty() {
                 continue;
@@ -146,39 +184,90 @@ impl HostRaster {
                 let meshlet = &scene.shapes.meshlets[number as usize];
                 if let Some(extent) = extent(&lens, &self.image, meshlet.min, meshlet.max) {
                     let lens = lenses.len() as u32;
-                    candidates.push(Candidate { meshlet: number, lens, extent });
+                    candidates.push(Candidate { copy: *copy, meshlet: number, lens, extent });
                 }
             }
             if candidates.len() > before {
                 lenses.push(lens);
             }
         }
-        // Positive floats are ordered like their bits.
-        candidates.sort_unstable_by_key(|c| (!c.extent.nearest.to_bits(), c.lens, c.meshlet));
         Ok((lenses, candidates))
     }
 
-    /// Writes the image as NDC depth, row 0 on top, `pitch` numbers from row to row.
-    pub(crate) fn write(
-        &self,
-        out: &mut [f32],
-        pitch: usize,
-        convention: DepthConvention,
-        threads: usize,
-    ) {
-        let mut rest = out;
-        let parts = self.bands.iter().map(|band| {
-            let rows = (self.image.height.min(band.bottom) - band.top) as usize;
-            let len = if band.bottom >= self.image.height { rest.len() } else { rows * pitch };
-            let (part, behind) = std::mem::take(&mut rest).split_at_mut(len);
-            rest = behind;
-            (band, part)
-        });
-        on_threads(threads, parts.collect::<Vec<_>>(), |(band, part)| match convention {
-            DepthConvention::Reversed => band.write(part, pitch, |nearness| nearness),
-            DepthConvention::Standard => band.write(part, pitch, |nearness| 1.0 - nearness),
+    /// Writes the image as NDC depth, row 0 on top, one number per pixel.
+    pub(crate) fn write(&self, out: &mut [f32], convention: DepthConvention, threads: usize) {
+        let pitch = self.image.width as usize * size_of::<f32>();
+        let mut rest: &mut [u8] = bytemuck::cast_slice_mut(out);
+        let parts: Vec<_> = self
+            .parts(&(0..self.image.height as u32))
+            .map(|(band, rows)| {
+                let (part, behind) = std::mem::take(&mut rest).split_at_mut(rows.len() * pitch);
+                rest = behind;
+                (band, rows, part)
+            })
+            .collect();
+        on_threads(threads, parts, |(band, rows, part)| {
+            band.write(wgpu::WriteOnly::from_mut(part), pitch, rows, convention);
         });
     }
+
+    /// Writes some rows of the image as NDC depth, `pitch` bytes from row to row.
+    ///
+    /// `open` opens a range of the bytes that begin with the first of these rows.
+    /// Where the pitch has room, a row ends at a multiple of 4 pixels; those past the width repeat
+    /// the last one.
+    ///
+    /// # Errors
+    /// The first one of `open`.
+    pub(crate) fn write_rows(
+        &self,
+        open: impl Fn(Range<u64>) -> Result<wgpu::BufferViewMut> + Sync,
+        pitch: usize,
+        convention: DepthConvention,
+        rows: &Range<u32>,
+        threads: usize,
+    ) -> Result<()> {
+        let failed = Locked::new(None);
+        let parts: Vec<_> = self.parts(rows).collect();
+        on_threads(threads, parts, |(band, part)| {
+            let byte = |row: i32| ((row - rows.start as i32) as usize * pitch) as u64;
+            match open(byte(part.start)..byte(part.end)) {
+                Ok(mut view) => band.write(view.slice(..), pitch, part, convention),
+                Err(error) => *failed.lock() = Some(error),
+            }
+        });
+        let failed = failed.lock().take();
+        failed.map_or(Ok(()), Err)
+    }
+
+    /// The bands that some rows lie in, and which of the rows.
+    fn parts(&self, rows: &Range<u32>) -> impl Iterator<Item = (&Band, Range<i32>)> {
+        let (first, end) = (rows.start as i32, rows.end as i32);
+        self.bands
+            .iter()
+            .map(move |band| (band, band.top.max(first)..band.bottom.min(end)))
+            .filter(|(_, rows)| !rows.is_empty())
+    }
+}
+
+/// Those of the candidates that a limit leaves.
+fn within_limits(
+    shapes: &Shapes,
+    candidates: Vec<Candidate>,
+    options: &DrawOptions<'_>,
+    useful: &[(u32, u32)],
+) -> Vec<Candidate> {
+    let ranked = candidates.iter().map(|c| {
+        let side = |(first, last): (i32, i32)| (last - first + 1) as f32;
+        Ranked {
+            copy: c.copy,
+            triangles: shapes.meshlets[c.meshlet as usize].triangles.len() as u32,
+            area: side(c.extent.columns) * side(c.extent.rows),
+            is_useful: useful.binary_search(&(c.copy, c.meshlet)).is_ok(),
+        }
+    });
+    let is_kept = options.within_limits(&ranked.collect::<Vec<_>>());
+    candidates.into_iter().zip(is_kept).filter_map(|(c, kept)| kept.then_some(c)).collect()
 }
 
 fn draw_meshlet(

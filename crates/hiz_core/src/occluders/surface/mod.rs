@@ -83,6 +83,7 @@ mod sheets;
 mod square;
 mod topology;
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use crate::error::{Error, Result};
@@ -93,6 +94,7 @@ use crate::input::bounds::Floats;
 use crate::input::camera::Camera;
 use crate::input::mesh::{FaceCull, MeshData};
 use crate::occluders::OccluderOptions;
+use crate::occluders::drawing::{DrawOptions, Touched};
 use crate::occluders::host_raster::{HostRaster, Scene, Way};
 use crate::occluders::placement::Placement;
 use crate::occluders::shapes::Shapes;
@@ -159,6 +161,10 @@ pub struct OccluderSurface {
     placements: Locked<Arc<Vec<Placement>>>,
     cull_mode: FaceCull,
     topology: OnceLock<Result<Topology>>,
+    has_moved: AtomicBool,
+    /// The meshlets that were not hidden when they were last drawn with a limit: copy and number,
+    /// sorted.
+    useful: Locked<Vec<(u32, u32)>>,
 }
 
 impl OccluderSurface {
@@ -170,7 +176,14 @@ impl OccluderSurface {
     pub fn from_meshes(meshes: &[MeshData<'_>], options: &OccluderOptions) -> Result<Self> {
         let (shapes, placements) = Shapes::new(meshes)?;
         let placements = Locked::new(Arc::new(placements));
-        Ok(Self { shapes, placements, cull_mode: options.cull_mode, topology: OnceLock::new() })
+        Ok(Self {
+            shapes,
+            placements,
+            cull_mode: options.cull_mode,
+            topology: OnceLock::new(),
+            has_moved: AtomicBool::new(false),
+            useful: Locked::default(),
+        })
     }
 
     pub(super) fn shapes(&self) -> &Shapes {
@@ -212,6 +225,7 @@ impl OccluderSurface {
         let mut all = placements.to_vec();
         all.splice(begin..end, moved);
         *placements = Arc::new(all);
+        self.has_moved.store(true, Ordering::Relaxed);
         Ok(())
     }
 
@@ -239,21 +253,29 @@ impl OccluderSurface {
         self.conservative_depth_planted(camera, options, Planted::default())
     }
 
-    /// Draws what `camera` sees into an image of its size.
+    /// Draws what `camera` sees into an image of its size; returns the rectangle around it.
     pub(crate) fn draw_into(
         &self,
         raster: &mut HostRaster,
         camera: &Camera,
         way: Way,
-    ) -> Result<()> {
+        options: &DrawOptions<'_>,
+    ) -> Result<Touched> {
         let placements = self.placements();
         let scene = Scene {
             shapes: &self.shapes,
-            placements: &placements,
+            copies: &options.only.of(&placements)?,
             camera,
             cull_mode: self.cull_mode,
         };
-        raster.draw(&scene, way)
+        if !options.is_limited() {
+            return Ok(raster.draw(&scene, way, options, &[])?.touched);
+        }
+        let useful = self.useful.lock().clone();
+        let mut drawn = raster.draw(&scene, way, options, &useful)?;
+        drawn.meshlets.sort_unstable();
+        *self.useful.lock() = drawn.meshlets;
+        Ok(drawn.touched)
     }
 
     /// The NDC depth of these occluders at the centres of the pixels, drawn on the host.
@@ -268,10 +290,11 @@ impl OccluderSurface {
         let size = camera.size();
         let threads = cores();
         let mut raster = HostRaster::new(size, threads);
-        self.draw_into(&mut raster, camera, Way { threads, skip: true })?;
+        let all = DrawOptions::default();
+        self.draw_into(&mut raster, camera, Way { threads, skip: true }, &all)?;
         let mut depth = memory::list(size.pixels() as usize, "depth")?;
         depth.resize(size.pixels() as usize, 0.0);
-        raster.write(&mut depth, size.width as usize, camera.convention(), threads);
+        raster.write(&mut depth, camera.convention(), threads);
         Ok(depth)
     }
 
@@ -298,7 +321,7 @@ impl OccluderSurface {
         let (positions, triangles);
         let placements = self.placements();
         let moved;
-        let topology = if placements.iter().all(|p| p.moves == 0) {
+        let topology = if !self.has_moved.load(Ordering::Relaxed) {
             self.topology
                 .get_or_init(|| {
                     let (positions, triangles) = self.world();

@@ -1,0 +1,242 @@
+//! A depth image that occluders are drawn into, by the rasteriser that suits the device.
+
+use crate::error::{Error, Result};
+use crate::gpu::buffers::Mapped;
+use crate::gpu::depth_source::SourceKind;
+use crate::gpu::device::{ContextId, Gpu};
+use crate::gpu::kept::Ring;
+use crate::host::threads::{Locked, cores};
+use crate::input::camera::Camera;
+use crate::input::image::{DepthConvention, ImageSize};
+use crate::occluders::Occluders;
+use crate::occluders::device_raster::{OCCLUDER_DEPTH_FORMAT, record_occluders};
+use crate::occluders::drawing::{DepthLoad, DrawOptions, Rasteriser, Touched};
+use crate::occluders::host_raster::{HostRaster, Way};
+
+/// Staging buffers that an image keeps: two frames may be on their way.
+const STAGING_KEPT: usize = 2;
+
+/// A depth image for occluders, made once and drawn each frame.
+///
+/// [`HizContext::record_occluder_depth`](crate::HizContext::record_occluder_depth) draws into it,
+/// and [`HizContext::record_reduce`](crate::HizContext::record_reduce) takes its
+/// [`view`](Self::view).
+///
+/// The device's rasteriser draws into a `Depth32Float` texture.
+/// The host's draws into memory, and its rows are copied into an `Rgba32Uint` texture of four
+/// pixels per texel.
+///
+/// # Examples
+/// ```
+/// # use hiz_core::headless::Engine;
+/// use hiz_core::{DrawOptions, Floats, HizContext, MeshData, OccluderOptions, PyramidOptions};
+/// use hiz_core::Rasteriser;
+/// # use hiz_core::{Camera, DepthConvention, ImageSize, Pose, Projection, wgpu};
+/// # let engine = Engine::new(None)?;
+/// # let (device, queue) = (engine.device(), engine.queue());
+/// # let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
+/// # let (fov_y, convention) = (std::f64::consts::FRAC_PI_2, DepthConvention::Reversed);
+/// # let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
+/// # let camera = Camera::look_at(&pose, &projection, ImageSize::new(64, 64))?;
+/// # let corners = [-20.0, -20.0, -10.0, 20.0, -20.0, -10.0, 0.0, 40.0, -10.0];
+/// # let (vertices, triangles) = (Floats::F32(&corners), &[0, 1, 2]);
+/// # let wall = MeshData { vertices, triangles, transforms: None };
+/// # let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+///
+/// // Once:
+/// let hiz = HizContext::new(device)?;
+/// let occluders = hiz.create_occluders(&[wall], &OccluderOptions::default())?;
+/// let depth = hiz.create_occluder_depth(camera.size(), Rasteriser::Auto)?;
+/// let pyramid = hiz.create_pyramid(camera.size(), &PyramidOptions::default())?;
+///
+/// // Each frame:
+/// let all = DrawOptions::default();
+/// hiz.record_occluder_depth(&mut encoder, &occluders, &camera, &depth, &all)?;
+/// hiz.record_reduce(&mut encoder, depth.view(), &camera, &pyramid)?;
+/// # queue.submit([encoder.finish()]);
+/// # engine.wait()?;
+/// # Ok::<(), hiz_core::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct OccluderDepth {
+    context: ContextId,
+    size: ImageSize,
+    texture: wgpu::Texture,
+    view: wgpu::TextureView,
+    /// The image of the rasteriser on the host, if that one draws.
+    host: Option<Locked<HostImage>>,
+    /// Buffers through which rows come to the texture.
+    staging: Ring,
+}
+
+/// What the host's rasteriser has drawn.
+#[derive(Debug)]
+struct HostImage {
+    raster: HostRaster,
+    /// The convention of the cameras that have drawn into it since it was cleared.
+    convention: Option<DepthConvention>,
+}
+
+impl OccluderDepth {
+    pub(crate) fn new(gpu: &Gpu, size: ImageSize, rasteriser: Rasteriser) -> Result<Self> {
+        if size.width == 0 || size.height == 0 {
+            return Err(Error::invalid("size", format!("expected at least one pixel, got {size}")));
+        }
+        let on_host = match rasteriser {
+            Rasteriser::Auto => gpu.is_processor(),
+            Rasteriser::Device => false,
+            Rasteriser::Host => true,
+        };
+        let common = wgpu::TextureUsages::COPY_SRC;
+        let (texels, format, usage) = if on_host {
+            let kind = SourceKind::Bits;
+            (
+                kind.texture_size(size),
+                wgpu::TextureFormat::Rgba32Uint,
+                kind.usage() | wgpu::TextureUsages::COPY_DST | common,
+            )
+        } else {
+            let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | SourceKind::Depth.usage() | common;
+            (size, OCCLUDER_DEPTH_FORMAT, usage)
+        };
+        // The pyramid's limit, which an image of four pixels per texel could pass here.
+        let (side, allowed) = (size.width.max(size.height), gpu.limits().max_texture_dimension_2d);
+        if side > allowed {
+            return Err(Error::limit("max_texture_dimension_2d", side.into(), allowed.into()));
+        }
+        let texture =
+            gpu.texture("hiz.depth.image", (texels.width, texels.height), format, usage)?;
+        let view = gpu.view(&texture)?;
+        let host = on_host.then(|| {
+            Locked::new(HostImage { raster: HostRaster::new(size, cores()), convention: None })
+        });
+        Ok(Self { context: gpu.id(), size, texture, view, host, staging: Ring::new(STAGING_KEPT) })
+    }
+
+    /// The image's size in pixels.
+    pub fn size(&self) -> ImageSize {
+        self.size
+    }
+
+    /// The rasteriser that draws: [`Rasteriser::Device`] or [`Rasteriser::Host`].
+    pub fn rasteriser(&self) -> Rasteriser {
+        if self.host.is_some() { Rasteriser::Host } else { Rasteriser::Device }
+    }
+
+    /// The texture.
+    pub fn texture(&self) -> &wgpu::Texture {
+        &self.texture
+    }
+
+    /// The view that [`HizContext::record_reduce`](crate::HizContext::record_reduce) reads.
+    pub fn view(&self) -> &wgpu::TextureView {
+        &self.view
+    }
+
+    /// Records the drawing of `occluders`.
+    ///
+    /// # Errors
+    /// As [`HizContext::record_occluder_depth`](crate::HizContext::record_occluder_depth).
+    pub(crate) fn record(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        occluders: &Occluders,
+        camera: &Camera,
+        options: &DrawOptions<'_>,
+    ) -> Result<Touched> {
+        gpu.check_context("depth", self.context)?;
+        gpu.check_context("occluders", occluders.context)?;
+        let Some(host) = &self.host else {
+            return record_occluders(gpu, encoder, occluders, camera, &self.view, options);
+        };
+        if camera.size() != self.size {
+            return Err(Error::mismatch(
+                "camera",
+                format!(
+                    "expected the size of the depth image, {}, got {}",
+                    self.size,
+                    camera.size()
+                ),
+            ));
+        }
+        let mut image = host.lock();
+        let convention = camera.convention();
+        match options.load {
+            DepthLoad::Clear => image.raster.clear(),
+            DepthLoad::Load => {
+                if let Some(drawn) = image.convention.filter(|drawn| *drawn != convention) {
+                    return Err(Error::mismatch(
+                        "camera",
+                        format!(
+                            "expected the depth convention that was drawn with before, {drawn:?}, \
+                             got {convention:?}"
+                        ),
+                    ));
+                }
+            }
+        }
+        let way = Way { threads: cores(), skip: true };
+        let touched = occluders.surface.draw_into(&mut image.raster, camera, way, options)?;
+        // An image that is new or cleared has to come to the device as a whole.
+        let is_whole = options.load == DepthLoad::Clear || image.convention.is_none();
+        image.convention = Some(convention);
+        let rows = match touched {
+            _ if is_whole => 0..self.size.height,
+            Some([_, y0, _, y1]) => y0..y1 + 1,
+            None => return Ok(None),
+        };
+        self.record_rows(gpu, encoder, &image.raster, convention, rows)?;
+        Ok(touched)
+    }
+
+    /// Records the copy of rows of the host's image into the texture.
+    fn record_rows(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        raster: &HostRaster,
+        convention: DepthConvention,
+        rows: std::ops::Range<u32>,
+    ) -> Result<()> {
+        const LABEL: &str = "hiz.occluders.staging";
+        let texels = self.texture.width();
+        let bytes_per_row = (16 * texels).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let bytes = u64::from(bytes_per_row) * u64::from(self.size.height);
+        let staging = match self.staging.take() {
+            Some(free) => free,
+            None => {
+                let usage = wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC;
+                gpu.mapped(LABEL, bytes, usage)?
+            }
+        };
+        let mapped = Mapped::of(LABEL, &staging);
+        let pitch = bytes_per_row as usize;
+        raster.write_rows(|part| mapped.range(part), pitch, convention, &rows, cores())?;
+        staging.unmap();
+        gpu.recorded(|| {
+            encoder.copy_buffer_to_texture(
+                wgpu::TexelCopyBufferInfo {
+                    buffer: &staging,
+                    layout: wgpu::TexelCopyBufferLayout {
+                        offset: 0,
+                        bytes_per_row: Some(bytes_per_row),
+                        rows_per_image: None,
+                    },
+                },
+                wgpu::TexelCopyTextureInfo {
+                    origin: wgpu::Origin3d { x: 0, y: rows.start, z: 0 },
+                    ..self.texture.as_image_copy()
+                },
+                wgpu::Extent3d {
+                    width: texels,
+                    height: rows.end - rows.start,
+                    depth_or_array_layers: 1,
+                },
+            );
+            Ok(())
+        })?;
+        self.staging.come_back(encoder, &staging);
+        Ok(())
+    }
+}
