@@ -164,7 +164,7 @@ class Engine:
     ) -> DepthImage: ...
     def upload_depth(
         self,
-        image: _Floats,
+        image: _Floats | npt.NDArray[np.uint16],
         kind: str,
         scale: float,
         invalid: Sequence[float],

@@ -33,8 +33,8 @@ NO_DATA: dict[str, tuple[float, ...]] = {"uint16": (0.0, 65535.0), "float16": (6
 class DepthArray(NamedTuple):
     """A checked depth image."""
 
-    image: FloatArray
-    """float32 or float64, in the camera's shape."""
+    image: FloatArray | npt.NDArray[np.uint16]
+    """float32, float64 or uint16, in the camera's shape; float16 as its bits, in uint16."""
     kind: DepthKind
     """What its numbers are."""
     scale: float
@@ -46,6 +46,16 @@ class DepthArray(NamedTuple):
 
     Half floats of every kind count, and float32 of metric kinds.
     For NDC depth `CullOptions.depth_slack` covers float32."""
+
+    def numbers(self) -> npt.NDArray[Any]:
+        """The image in a dtype that says what its numbers are: float16 is not in bits here."""
+        are_bits = self.rounding == "half" and self.image.dtype == np.uint16
+        return self.image.view(np.float16) if are_bits else self.image
+
+    def floats(self) -> FloatArray:
+        """The numbers as float32 or float64, which hold all of them exactly."""
+        numbers = self.numbers()
+        return numbers.astype(np.float32) if numbers.itemsize == 2 else numbers
 
 
 def checked_image(
@@ -87,14 +97,24 @@ def checked_image(
         _refuse_dtype(name, value, kind_)
         _refuse_shape(name, value, camera)
     dtype = value.dtype if isinstance(value, np.ndarray) else np.dtype(np.float64)
-    if dtype.kind == "u":
-        # Exact: 16 bits.
-        value = _arguments.copied(name, value, np.float32)  # type: ignore[arg-type]
-    image = _arguments.floats(name, value, camera.size, why=" (the camera's size)")
+    image: FloatArray | npt.NDArray[np.uint16]
+    if dtype.kind in "uf" and dtype.itemsize == 2:
+        narrow = _arguments.copied(name, value, dtype.newbyteorder("="))  # type: ignore[arg-type]
+        if mask is not None and mask.any():
+            # Exact, and has a NaN for what is masked.
+            narrow = narrow.astype(np.float32)
+        image = narrow if narrow.dtype.kind == "u" else _bits_or_floats(narrow)
+    else:
+        image = _arguments.floats(name, value, camera.size, why=" (the camera's size)")
     if mask is not None and mask.any():
         # What is masked is "no data", whatever number lies there.
         image = np.where(mask, image.dtype.type(np.nan), image)
     return DepthArray(image, kind_, scale_, _no_data(invalid, dtype), _rounding(dtype, kind_))
+
+
+def _bits_or_floats(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """The bits of float16; float32 as it is."""
+    return array.view(np.uint16) if array.dtype.itemsize == 2 else array
 
 
 def _rounding(dtype: np.dtype[Any], kind: DepthKind) -> Rounding:

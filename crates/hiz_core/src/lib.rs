@@ -176,6 +176,7 @@ pub use input::bounds::{Bounds, BoundsKind, Floats};
 pub use input::camera::Camera;
 pub use input::depth::{ndc_from_kind, ndc_from_kind_within};
 pub use input::depth_kind::DepthKind;
+pub use input::depth_numbers::DepthNumbers;
 pub use input::image::{DepthConvention, ImageSize, MAX_IMAGE_SIDE};
 pub use input::mesh::{FaceCull, MeshData};
 pub use input::projection::{Pose, Projection};

@@ -1,6 +1,6 @@
 //! Arrays and words from Python as the engine's borrowed types.
 
-use hiz_core::{Bounds, DepthConvention, DepthKind, Floats, ImageSize};
+use hiz_core::{Bounds, DepthConvention, DepthKind, DepthNumbers, Floats, ImageSize};
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -29,6 +29,30 @@ impl FloatArray<'_> {
             Self::F64(array) => {
                 in_c_order(array.is_c_contiguous())?;
                 Floats::F64(array.as_slice()?)
+            }
+        })
+    }
+}
+
+/// A depth image, held like a [`FloatArray`].
+#[derive(FromPyObject)]
+pub(crate) enum DepthArray<'py> {
+    #[pyo3(transparent)]
+    Floats(FloatArray<'py>),
+    #[pyo3(transparent, annotation = "uint16 array")]
+    U16(PyReadonlyArrayDyn<'py, u16>),
+}
+
+impl DepthArray<'_> {
+    /// Its numbers in C order, without a copy.
+    /// `halves`: whether 16 bits are those of a float16.
+    pub(crate) fn numbers(&self, halves: bool) -> PyResult<DepthNumbers<'_>> {
+        Ok(match self {
+            Self::Floats(array) => array.floats()?.into(),
+            Self::U16(array) => {
+                in_c_order(array.is_c_contiguous())?;
+                let numbers = array.as_slice()?;
+                if halves { DepthNumbers::F16(numbers) } else { DepthNumbers::U16(numbers) }
             }
         })
     }

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use hiz_core::headless::{self, AdapterSummary};
 use hiz_core::{
-    ConservativeDepthOptions, DepthConvention, DepthKind, DepthTolerance, FaceCull, Floats,
-    InstanceOptions, MeshData, OccluderOptions, PyramidOptions, StoredLevels, StoredOrder,
+    ConservativeDepthOptions, DepthTolerance, FaceCull, InstanceOptions, MeshData, OccluderOptions,
+    PyramidOptions, StoredLevels, StoredOrder,
 };
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arguments::{FloatArray, LevelArray, bounds, depth_kind, in_c_order};
+use crate::arguments::{DepthArray, FloatArray, LevelArray, bounds, depth_kind, in_c_order};
 use crate::camera::Camera;
 use crate::culling::Culling;
 use crate::held::{Held, OnDevice, detached};
@@ -155,23 +155,20 @@ impl Engine {
             .map(|depth| DepthImage(Held::new(py, depth)))
     }
 
+    /// `image` is float32, float64, or 16 bits: float16 if `rounding` is "half", else whole numbers.
     /// `rounding` says to which floats the numbers were rounded before: "none", "single" or "half".
     #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn upload_depth(
         &self,
         py: Python<'_>,
-        image: FloatArray<'_>,
+        image: DepthArray<'_>,
         kind: &str,
         scale: f64,
         invalid: Vec<f64>,
         rounding: &str,
         camera: &Camera,
     ) -> PyResult<DepthImage> {
-        let (image, kind) = (image.floats()?, depth_kind(kind)?);
-        let own_kind = match camera.0.convention() {
-            DepthConvention::Standard => DepthKind::Ndc,
-            DepthConvention::Reversed => DepthKind::ReversedNdc,
-        };
+        let (image, kind) = (image.numbers(rounding == "half")?, depth_kind(kind)?);
         let tolerance = match rounding {
             "none" => DepthTolerance::NONE,
             "single" => DepthTolerance::SINGLE,
@@ -179,19 +176,11 @@ impl Engine {
             other => return Err(PyValueError::new_err(format!("rounding: no rounding {other:?}"))),
         };
         let camera = &camera.0;
-        let upload = |engine: &headless::Engine| match image {
-            // The numbers already are what is uploaded, so they are not copied.
-            Floats::F32(ndc) if kind == own_kind && scale == 1.0 && invalid.is_empty() => {
-                engine.upload_depth_within(ndc, camera, tolerance)
-            }
-            _ => {
-                let (ndc, left) = hiz_core::ndc_from_kind_within(
-                    image, kind, scale, &invalid, camera, tolerance,
-                )?;
-                engine.upload_depth_within(&ndc, camera, left)
-            }
-        };
-        self.0.run(py, upload).map(|depth| DepthImage(Held::new(py, depth)))
+        self.0
+            .run(py, |engine| {
+                engine.upload_depth_of_kind(image, kind, scale, &invalid, camera, tolerance)
+            })
+            .map(|depth| DepthImage(Held::new(py, depth)))
     }
 
     fn pyramid(&self, py: Python<'_>, depth: &DepthImage, levels: (u32, u32)) -> PyResult<Pyramid> {

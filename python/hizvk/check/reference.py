@@ -88,7 +88,7 @@ def classify(
         _arguments.choice("own_depth", own_depth, words(OwnDepth)),
     )
     # The image as given: the tolerance for half floats is not part of the truth.
-    image = (checked.image, checked.kind, checked.scale, checked.invalid)
+    image = (checked.floats(), checked.kind, checked.scale, checked.invalid)
     return reference_classify(bounds_kind, arrays, camera._inner, *image, *asked)
 
 

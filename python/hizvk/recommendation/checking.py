@@ -115,7 +115,7 @@ def by_oracle(
         codes = reference.classify(
             part_of(bounds, which),
             cameras[k],
-            depth.image,
+            depth.numbers(),
             kind=depth.kind,
             scale=depth.scale,
             invalid=depth.invalid,

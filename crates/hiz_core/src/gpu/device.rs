@@ -114,7 +114,7 @@ impl Gpu {
         }
     }
 
-    pub(super) fn checked<T>(&self, make: impl FnOnce(&wgpu::Device) -> T) -> Result<T> {
+    pub(crate) fn checked<T>(&self, make: impl FnOnce(&wgpu::Device) -> T) -> Result<T> {
         checked(&self.device, || make(&self.device))
     }
 

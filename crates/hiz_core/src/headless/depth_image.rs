@@ -7,7 +7,11 @@ use crate::gpu::depth_source::SourceKind;
 use crate::headless::engine::Engine;
 use crate::headless::readback::{self, to_u32};
 use crate::host::memory;
+use crate::host::threads::{Locked, on_threads};
 use crate::input::camera::Camera;
+use crate::input::depth::Conversion;
+use crate::input::depth_kind::DepthKind;
+use crate::input::depth_numbers::DepthNumbers;
 use crate::input::image::ImageSize;
 use crate::input::tolerance::DepthTolerance;
 use crate::occluders::Occluders;
@@ -141,15 +145,8 @@ impl DepthImage {
                 ),
             ));
         }
-        let format = if kind == SourceKind::Bits {
-            wgpu::TextureFormat::Rgba32Uint
-        } else {
-            wgpu::TextureFormat::R32Float
-        };
         engine.scoped(|| {
-            let usage =
-                kind.usage() | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC;
-            let image = Self::new(engine, camera, format, usage)?;
+            let image = Self::for_upload(engine, kind, camera)?;
             let rows_at_once = (STAGING_BYTES / (4 * size.width)).max(1);
             for (band, rows) in (0..).zip(ndc.chunks((rows_at_once * size.width) as usize)) {
                 image.write_rows(band * rows_at_once, rows, kind.pixels_of_texel());
@@ -160,6 +157,48 @@ impl DepthImage {
             }
             Ok(image)
         })
+    }
+
+    /// An image that holds what `conversion` makes.
+    /// Each thread converts bands of rows and writes them to the image while they are in its cache.
+    fn converted(engine: &Engine, conversion: &Conversion<'_>, camera: &Camera) -> Result<Self> {
+        let (size, kind) = (camera.size(), SourceKind::Bits);
+        engine.scoped(|| {
+            let image = Self::for_upload(engine, kind, camera)?;
+            let gpu = &engine.context().gpu;
+            let rows_at_once = conversion.band_rows();
+            let bands = (0..size.height).step_by(rows_at_once as usize);
+            // One for each thread, however many bands it converts.
+            let spare_bands: Locked<Vec<Vec<f32>>> = Locked::default();
+            let failed: Locked<Option<Error>> = Locked::default();
+            on_threads(conversion.threads(), bands, |first| {
+                let mut band = spare_bands.lock().pop().unwrap_or_default();
+                band.resize((rows_at_once.min(size.height - first) * size.width) as usize, 0.0);
+                conversion.rows(first, &mut band);
+                // Error scopes belong to a thread.
+                let written =
+                    gpu.checked(|_| image.write_rows(first, &band, kind.pixels_of_texel()));
+                if let Err(error) = written {
+                    failed.lock().get_or_insert(error);
+                }
+                spare_bands.lock().push(band);
+            });
+            match failed.lock().take() {
+                Some(error) => Err(error),
+                None => Ok(Self { tolerance: conversion.left(), ..image }),
+            }
+        })
+    }
+
+    /// An image without contents, to be written from the host.
+    fn for_upload(engine: &Engine, kind: SourceKind, camera: &Camera) -> Result<Self> {
+        let format = if kind == SourceKind::Bits {
+            wgpu::TextureFormat::Rgba32Uint
+        } else {
+            wgpu::TextureFormat::R32Float
+        };
+        let usage = kind.usage() | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC;
+        Self::new(engine, camera, format, usage)
     }
 
     /// Writes whole rows, the first of which is row `first`.
@@ -304,6 +343,29 @@ impl Engine {
     ) -> Result<DepthImage> {
         let tolerance = tolerance.checked()?;
         Ok(DepthImage { tolerance, ..self.upload_depth(ndc, camera)? })
+    }
+
+    /// Uploads depth of any kind, and converts it on all cores on its way.
+    /// The parameters are those of [`ndc_from_kind_within`](crate::ndc_from_kind_within).
+    ///
+    /// # Errors
+    /// Those of [`Engine::upload_depth`] and
+    /// [`ndc_from_kind_within`](crate::ndc_from_kind_within).
+    pub fn upload_depth_of_kind<'a>(
+        &self,
+        image: impl Into<DepthNumbers<'a>>,
+        kind: DepthKind,
+        scale: f64,
+        invalid: &[f64],
+        camera: &Camera,
+        tolerance: DepthTolerance,
+    ) -> Result<DepthImage> {
+        let conversion = Conversion::new(image.into(), kind, scale, invalid, camera, tolerance)?;
+        match conversion.unchanged() {
+            // The numbers already are what is uploaded, so they are not copied.
+            Some(ndc) => self.upload_depth_within(ndc, camera, tolerance),
+            None => DepthImage::converted(self, &conversion, camera),
+        }
     }
 
     /// [`Engine::upload_depth`] into a float texture, for tests.

@@ -7,15 +7,27 @@
 //! - the caller's invalid values;
 //! - depth outside the camera's range;
 //! - for most cameras, zero and negative numbers.
+//!
+//! All cores share the rows of an image, and `quick` converts several pixels at once.
 
 use crate::error::{Error, Result};
 use crate::host::memory;
-use crate::input::bounds::Floats;
+use crate::host::threads::{cores, on_threads};
 use crate::input::camera::Camera;
 use crate::input::depth_kind::DepthKind;
-use crate::input::image::DepthConvention;
+use crate::input::depth_numbers::{DepthNumbers, of_half};
+use crate::input::image::{DepthConvention, ImageSize};
 use crate::input::lens::{Lens, toward_far};
+use crate::input::quick::{Number, Quick};
 use crate::input::tolerance::DepthTolerance;
+
+/// Pixels of a band of rows, which one thread converts at a time.
+/// A band and its numbers fit the caches of a core.
+const BAND_PIXELS: u32 = 1 << 16;
+
+/// From this many pixels on, more threads help to convert.
+/// One takes tens of microseconds to start.
+const PARALLEL_FROM: u64 = 1 << 17;
 
 /// Converts a depth image to NDC depth in `camera`'s convention, rounded to float32 towards far.
 ///
@@ -61,14 +73,15 @@ use crate::input::tolerance::DepthTolerance;
 /// assert_eq!(ndc[1], 0.0); // far, which never occludes
 /// # Ok::<(), hiz_core::Error>(())
 /// ```
-pub fn ndc_from_kind(
-    image: Floats<'_>,
+pub fn ndc_from_kind<'a>(
+    image: impl Into<DepthNumbers<'a>>,
     kind: DepthKind,
     scale: f64,
     invalid: &[f64],
     camera: &Camera,
 ) -> Result<Vec<f32>> {
-    converted(image, kind, scale, invalid, camera, DepthTolerance::NONE)
+    ndc_from_kind_within(image, kind, scale, invalid, camera, DepthTolerance::NONE)
+        .map(|(ndc, _)| ndc)
 }
 
 /// [`ndc_from_kind`] for an image whose numbers were rounded within `tolerance` before this call.
@@ -82,109 +95,202 @@ pub fn ndc_from_kind(
 ///
 /// # Errors
 /// As [`ndc_from_kind`], and [`Error::Invalid`] for a tolerance outside 0..=0.5.
-pub fn ndc_from_kind_within(
-    image: Floats<'_>,
+pub fn ndc_from_kind_within<'a>(
+    image: impl Into<DepthNumbers<'a>>,
     kind: DepthKind,
     scale: f64,
     invalid: &[f64],
     camera: &Camera,
     tolerance: DepthTolerance,
 ) -> Result<(Vec<f32>, DepthTolerance)> {
-    let tolerance = tolerance.checked()?;
-    let ndc = converted(image, kind, scale, invalid, camera, tolerance)?;
-    let is_ndc = matches!(kind, DepthKind::Ndc | DepthKind::ReversedNdc);
-    Ok((ndc, if is_ndc { tolerance } else { DepthTolerance::NONE }))
+    let conversion = Conversion::new(image.into(), kind, scale, invalid, camera, tolerance)?;
+    let mut ndc = memory::list(conversion.numbers.len(), "depth")?;
+    ndc.resize(conversion.numbers.len(), 0.0);
+    let bands = ndc.chunks_mut((conversion.band_rows() * conversion.size.width) as usize);
+    let first_rows = (0..).step_by(conversion.band_rows() as usize);
+    on_threads(conversion.threads(), first_rows.zip(bands), |(first, band)| {
+        conversion.rows(first, band);
+    });
+    Ok((ndc, conversion.left()))
 }
 
-/// [`ndc_from_kind`] with kinds `Z` and `Distance` taken at the far end of `tolerance`.
-///
-/// NDC depth ignores the tolerance.
-fn converted(
-    image: Floats<'_>,
+/// How the numbers of an image become NDC depth, rows at a time.
+pub(crate) struct Conversion<'a> {
+    numbers: DepthNumbers<'a>,
+    size: ImageSize,
+    convention: DepthConvention,
+    /// The invalid values as the image's type holds them.
+    invalid: Vec<f64>,
+    tolerance: DepthTolerance,
+    /// `None` for NDC depth.
+    metric: Option<Metric>,
+}
+
+/// The kinds `Z` and `Distance`.
+struct Metric {
     kind: DepthKind,
     scale: f64,
-    invalid: &[f64],
-    camera: &Camera,
-    tolerance: DepthTolerance,
-) -> Result<Vec<f32>> {
-    let size = camera.size();
-    if image.len() as u64 != size.pixels() {
-        return Err(Error::invalid(
-            "depth",
-            format!(
-                "expected the camera's size {size} = {} numbers, got {}",
-                size.pixels(),
-                image.len()
-            ),
-        ));
+    lens: Lens,
+    quick: Option<Quick>,
+}
+
+impl<'a> Conversion<'a> {
+    /// Checks what was given; the errors are those of [`ndc_from_kind_within`].
+    pub(crate) fn new(
+        numbers: DepthNumbers<'a>,
+        kind: DepthKind,
+        scale: f64,
+        invalid: &[f64],
+        camera: &Camera,
+        tolerance: DepthTolerance,
+    ) -> Result<Self> {
+        let (size, convention, tolerance) =
+            (camera.size(), camera.convention(), tolerance.checked()?);
+        if numbers.len() as u64 != size.pixels() {
+            return Err(Error::invalid(
+                "depth",
+                format!(
+                    "expected the camera's size {size} = {} numbers, got {}",
+                    size.pixels(),
+                    numbers.len()
+                ),
+            ));
+        }
+        let metric = match kind {
+            DepthKind::Ndc | DepthKind::ReversedNdc => {
+                check_ndc(kind, scale, convention)?;
+                None
+            }
+            DepthKind::Z | DepthKind::Distance => {
+                if !(scale.is_finite() && scale > 0.0) {
+                    return Err(Error::invalid(
+                        "scale",
+                        format!("expected a positive finite number, got {scale}"),
+                    ));
+                }
+                let lens = Lens::new(camera)?;
+                let is_wide = matches!(numbers, DepthNumbers::F64(_));
+                let quick = Quick::new(&lens, kind, scale, tolerance, is_wide);
+                Some(Metric { kind, scale, lens, quick })
+            }
+        };
+        let invalid = numbers.as_stored(invalid);
+        Ok(Self { numbers, size, convention, invalid, tolerance, metric })
     }
-    let invalid = as_stored(invalid, image);
-    let convention = camera.convention();
-    let reversed = convention.is_reversed();
-    match kind {
-        DepthKind::Ndc | DepthKind::ReversedNdc => {
-            if (kind == DepthKind::ReversedNdc) != reversed {
-                let (image, camera) =
-                    if reversed { ("ndc", "reversed Z") } else { ("reversed_ndc", "standard Z") };
-                return Err(Error::invalid(
-                    "kind",
-                    format!("expected the camera's convention, {camera}, got {image}"),
-                ));
-            }
-            if scale != 1.0 {
-                return Err(Error::invalid(
-                    "scale",
-                    format!("expected 1 for NDC depth, got {scale}"),
-                ));
-            }
-            let ndc = |number| {
-                if invalid.contains(&number) {
-                    convention.far()
-                } else {
-                    toward_far(number, reversed)
-                }
-            };
-            memory::collected((0..image.len()).map(|i| ndc(image.get(i))), "depth")
+
+    /// The tolerance that the NDC depth still has.
+    pub(crate) fn left(&self) -> DepthTolerance {
+        if self.metric.is_some() { DepthTolerance::NONE } else { self.tolerance }
+    }
+
+    /// The numbers, where they already are the NDC depth.
+    pub(crate) fn unchanged(&self) -> Option<&'a [f32]> {
+        match self.numbers {
+            DepthNumbers::F32(ndc) if self.metric.is_none() && self.invalid.is_empty() => Some(ndc),
+            _ => None,
         }
-        DepthKind::Z | DepthKind::Distance => {
-            if !(scale.is_finite() && scale > 0.0) {
-                return Err(Error::invalid(
-                    "scale",
-                    format!("expected a positive finite number, got {scale}"),
-                ));
+    }
+
+    /// Rows that one thread converts at a time.
+    pub(crate) fn band_rows(&self) -> u32 {
+        (BAND_PIXELS / self.size.width).max(1)
+    }
+
+    /// How many threads are worth their start.
+    pub(crate) fn threads(&self) -> usize {
+        if self.size.pixels() < PARALLEL_FROM { 1 } else { cores() }
+    }
+
+    /// Converts whole rows, the first of which is row `first`.
+    pub(crate) fn rows(&self, first: u32, out: &mut [f32]) {
+        let begin = first as usize * self.size.width as usize;
+        let range = begin..begin + out.len();
+        match self.numbers {
+            DepthNumbers::F32(numbers) => {
+                self.convert(first, &numbers[range], &self.narrow_invalid(), out);
             }
-            let lens = Lens::new(camera)?;
-            let mut out = memory::list(image.len(), "depth")?;
-            for row in 0..size.height {
-                for column in 0..size.width {
-                    let number = image.get(out.len());
-                    let value = number * scale;
-                    let known = value.is_finite()
-                        && (value > 0.0 || lens.signed)
-                        && !invalid.contains(&number);
-                    // Slightly more than the tolerance, to cover the roundings of this expression.
-                    let off = (number.abs() * tolerance.relative + tolerance.absolute)
-                        * scale
-                        * (1.0 + 1e-15);
-                    out.push(if known {
-                        lens.ndc(column, row, (value, off), kind)
-                    } else {
-                        convention.far()
-                    });
+            DepthNumbers::F64(numbers) => {
+                self.convert(first, &numbers[range], &self.invalid, out);
+            }
+            DepthNumbers::F16(bits) => self.widened(first, &bits[range], of_half, out),
+            DepthNumbers::U16(numbers) => self.widened(first, &numbers[range], f32::from, out),
+        }
+    }
+
+    /// The invalid values of a type that float32 holds exactly.
+    #[expect(clippy::cast_possible_truncation, reason = "exact, by the image's type")]
+    fn narrow_invalid(&self) -> Vec<f32> {
+        self.invalid.iter().map(|v| *v as f32).collect()
+    }
+
+    /// Converts rows of 16 bits, which `read` turns into float32.
+    fn widened(&self, first: u32, stored: &[u16], read: impl Fn(u16) -> f32, out: &mut [f32]) {
+        let (width, invalid) = (self.size.width as usize, self.narrow_invalid());
+        let mut numbers = vec![0.0; width];
+        let rows = stored.chunks_exact(width).zip(out.chunks_exact_mut(width));
+        for (row, (stored, out)) in (first..).zip(rows) {
+            for (number, stored) in numbers.iter_mut().zip(stored) {
+                *number = read(*stored);
+            }
+            self.convert(row, &numbers, &invalid, out);
+        }
+    }
+
+    fn convert<T: Number>(&self, first: u32, numbers: &[T], invalid: &[T], out: &mut [f32]) {
+        let Some(metric) = &self.metric else {
+            let (far, reversed) = (self.convention.far(), self.convention.is_reversed());
+            for (out, number) in out.iter_mut().zip(numbers) {
+                let rounded = toward_far((*number).into(), reversed);
+                *out = if invalid.contains(number) { far } else { rounded };
+            }
+            return;
+        };
+        let width = self.size.width as usize;
+        let rows = numbers.chunks_exact(width).zip(out.chunks_exact_mut(width));
+        for (row, (numbers, out)) in (first..).zip(rows) {
+            let exact =
+                |column: usize, number: T| self.exact(metric, column as u32, row, number.into());
+            if let Some(quick) = &metric.quick {
+                quick.row(row, numbers, invalid, out, exact);
+            } else {
+                for (column, (out, number)) in out.iter_mut().zip(numbers).enumerate() {
+                    *out = exact(column, *number);
                 }
             }
-            Ok(out)
         }
+    }
+
+    /// The NDC depth of one number, by the bounds of its own pixel.
+    fn exact(&self, metric: &Metric, column: u32, row: u32, number: f64) -> f32 {
+        let Metric { kind, scale, lens, .. } = metric;
+        let value = number * scale;
+        let known =
+            value.is_finite() && (value > 0.0 || lens.signed) && !self.invalid.contains(&number);
+        if !known {
+            return self.convention.far();
+        }
+        // Slightly more than the tolerance, to cover the roundings of this expression.
+        let DepthTolerance { relative, absolute } = self.tolerance;
+        let off = (number.abs() * relative + absolute) * scale * (1.0 + 1e-15);
+        lens.ndc(column, row, (value, off), *kind)
     }
 }
 
-/// The caller's invalid values, rounded to the image's own type.
-#[expect(clippy::cast_possible_truncation, reason = "rounded as the image's own numbers were")]
-fn as_stored(invalid: &[f64], image: Floats<'_>) -> Vec<f64> {
-    match image {
-        Floats::F32(_) => invalid.iter().map(|v| f64::from(*v as f32)).collect(),
-        Floats::F64(_) => invalid.to_vec(),
+/// Checks kind and scale of NDC depth.
+fn check_ndc(kind: DepthKind, scale: f64, convention: DepthConvention) -> Result<()> {
+    let reversed = convention.is_reversed();
+    if (kind == DepthKind::ReversedNdc) != reversed {
+        let (image, camera) =
+            if reversed { ("ndc", "reversed Z") } else { ("reversed_ndc", "standard Z") };
+        return Err(Error::invalid(
+            "kind",
+            format!("expected the camera's convention, {camera}, got {image}"),
+        ));
     }
+    if scale != 1.0 {
+        return Err(Error::invalid("scale", format!("expected 1 for NDC depth, got {scale}")));
+    }
+    Ok(())
 }
 
 /// A stored depth as the shaders read it.
@@ -204,7 +310,7 @@ pub(crate) fn sanitized(bits: u32, convention: DepthConvention) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::image::ImageSize;
+    use crate::input::bounds::Floats;
     use crate::input::lens::test_cameras::{POSE, perspective};
     use crate::input::projection::Projection;
 

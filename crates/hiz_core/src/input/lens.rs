@@ -9,11 +9,11 @@ use crate::input::depth_kind::DepthKind;
 
 /// How a camera's rays run, which turns a depth along them into NDC depth.
 pub(super) struct Lens {
-    reversed: bool,
+    pub(super) reversed: bool,
     /// Whether zero and negative numbers are depth too, since the near plane lies behind the eye.
     pub(super) signed: bool,
-    size: [f64; 2],
-    rays: Rays,
+    pub(super) size: [f64; 2],
+    pub(super) rays: Rays,
 }
 
 pub(super) enum Rays {

@@ -8,10 +8,12 @@ pub(crate) mod bounds;
 pub(crate) mod camera;
 pub(crate) mod depth;
 pub(crate) mod depth_kind;
+pub(crate) mod depth_numbers;
 pub(crate) mod image;
 mod lens;
 pub(crate) mod mesh;
 pub(crate) mod projection;
+mod quick;
 pub(crate) mod tolerance;
 pub(crate) mod view;
 #[cfg(feature = "headless")]
