@@ -158,7 +158,23 @@ class Engine:
     def occluders(
         self, meshes: Sequence[tuple[_Floats, npt.NDArray[np.uint32], _Floats | None]], cull: str
     ) -> Occluders: ...
-    def render_depth(self, occluders: Occluders, camera: Camera) -> DepthImage: ...
+    def render_depth(
+        self,
+        occluders: Occluders,
+        camera: Camera,
+        rasteriser: str,
+        only: npt.NDArray[np.bool_] | None,
+        max_triangles: int | None,
+        max_occluders: int | None,
+    ) -> DepthImage: ...
+    def render_depth_into(
+        self,
+        depth: DepthImage,
+        occluders: Occluders,
+        only: npt.NDArray[np.bool_] | None,
+        max_triangles: int | None,
+        max_occluders: int | None,
+    ) -> tuple[int, int, int, int] | None: ...
     def render_depth_conservative(
         self, occluders: Occluders, camera: Camera, refinement: int
     ) -> DepthImage: ...
@@ -194,6 +210,7 @@ class Instances:
 
 @final
 class Occluders:
+    def move(self, mesh: int, transforms: _Floats | None) -> None: ...
     def host_bytes(self) -> int: ...
     def surface(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32], str]: ...
     def num_triangles(self) -> int: ...
@@ -203,6 +220,7 @@ class Occluders:
 @final
 class DepthImage:
     def read(self) -> npt.NDArray[np.float32]: ...
+    def rasteriser(self) -> str | None: ...
 
 @final
 class Pyramid:

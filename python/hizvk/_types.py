@@ -22,6 +22,8 @@ QuaternionOrder: TypeAlias = Literal["wxyz"] | Literal["xyzw"]
 StoredOrder: TypeAlias = Literal["morton"] | Literal["given"]
 #: Which faces of occluders are left out.
 FaceCull: TypeAlias = Literal["none"] | Literal["back"] | Literal["front"]
+#: What draws occluders; see `Device.render_depth`.
+Rasteriser: TypeAlias = Literal["auto"] | Literal["device"] | Literal["host"]
 #: Which levels of a pyramid are built; see `Device.pyramid`.
 Levels: TypeAlias = int | tuple[int, int] | None
 #: The order of the list of kept instances; see `CullOptions`.

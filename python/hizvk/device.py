@@ -17,11 +17,12 @@ from . import _arguments
 from ._core import Engine as CoreEngine
 from ._on_device import check_owner
 from ._processes import driver_is_asked
-from ._types import FaceCull, StoredOrder, words
+from ._types import FaceCull, Rasteriser, StoredOrder, words
 from .adapter import Adapter
 from .bounds import Bounds, are_points, as_arrays
 from .camera import Camera
 from .depth import checked_image
+from .drawing import Drawing, chosen, limit
 from .errors import LimitError
 from .hints import Question
 from .mesh import as_meshes
@@ -209,6 +210,7 @@ class Device:
         raw = [(mesh.vertices, mesh.triangles, mesh.transforms) for mesh in meshes]
         return Occluders(self, self._engine.occluders(raw, cull_mode))
 
+    @overload
     def render_depth(
         self,
         occluders: Occluders,
@@ -217,11 +219,44 @@ class Device:
         size: Size | None = None,
         conservative: bool = False,
         refinement: int = 2,
-    ) -> DepthImage:
+        rasteriser: Rasteriser = "auto",
+        into: None = None,
+        only: CullResult | npt.ArrayLike | None = None,
+        max_triangles: int | None = None,
+        max_occluders: int | None = None,
+    ) -> DepthImage: ...
+
+    @overload
+    def render_depth(
+        self,
+        occluders: Occluders,
+        camera: Camera | None = None,
+        *,
+        into: DepthImage,
+        only: CullResult | npt.ArrayLike | None = None,
+        max_triangles: int | None = None,
+        max_occluders: int | None = None,
+    ) -> tuple[int, int, int, int] | None: ...
+
+    def render_depth(
+        self,
+        occluders: Occluders,
+        camera: Camera | None = None,
+        *,
+        size: Size | None = None,
+        conservative: bool = False,
+        refinement: int = 2,
+        rasteriser: Rasteriser = "auto",
+        into: DepthImage | None = None,
+        only: CullResult | npt.ArrayLike | None = None,
+        max_triangles: int | None = None,
+        max_occluders: int | None = None,
+    ) -> DepthImage | tuple[int, int, int, int] | None:
         """Renders occluders into a depth image that stays on the device.
 
         **The plain image** is rasterised: it knows the depth at the pixels' centres.
-        The driver moves corners to a grid, of 1/256 pixel on lavapipe and at most 1/16.
+        Rasterisers move corners to a grid: the host's and lavapipe's to 1/256 pixel, and no driver
+        to more than 1/16.
         A cull by it promises for an image of that size and those samples, with two limits:
 
         - A larger image of the same view, multisampling or jitter may show a gap that no centre
@@ -247,7 +282,7 @@ class Device:
         occluders : Occluders
             Of this device.
         camera : Camera
-            The view.
+            The view; left out with `into`, which has its own.
         size : (height, width), optional
             Another image size for the same view.
             The image's camera is then ``camera.resized(size)``.
@@ -262,6 +297,38 @@ class Device:
             For `conservative`, 0..8: how often a pixel is quartered where no surface covers all of
             it.
             Each step finds a little more and costs time at silhouettes; any number is safe.
+
+        rasteriser : "auto", "device" or "host"
+            What draws the plain image.
+            ``"device"`` is the device's own render pass.
+            ``"host"`` draws on all cores and uploads; software drivers take 4 to 12 times as long.
+            ``"auto"`` takes the host's for devices that are processors, and the device's for GPUs.
+            ``docs/occluders.md`` says what each promises.
+        into : DepthImage, optional
+            Draws more occluders into this image, which `render_depth` has made, and returns the
+            rectangle that was touched.
+            Build its pyramid again afterwards.
+        only : CullResult, (K,) bool array or integer array, optional
+            Which of the K copies of meshes are drawn: all that a cull kept, a mask, or numbers.
+            Copies are numbered through all meshes, in the order of the upload.
+            So upload the copies' bounds as instances in that order.
+        max_triangles : int, optional
+            At most so many triangles are drawn.
+            Clusters of neighbouring triangles are chosen that are large in the image.
+            The host's rasteriser begins with those that were not hidden when these occluders were
+            last drawn with a limit.
+            Each occluder that is left out costs hiding, and hidden ones cost little time anyway.
+        max_occluders : int, optional
+            At most so many copies of meshes are drawn: those that are largest in the image.
+
+        Returns
+        -------
+        DepthImage
+            A new image; with `into` none.
+        (x0, y0, x1, y1) : tuple of four int, or None
+            With `into`: the rectangle around what was drawn, both ends included, row 0 on top.
+            No pixel outside of it has changed.
+            None if nothing was drawn.
 
         Raises
         ------
@@ -278,17 +345,44 @@ class Device:
         """
         _arguments.instance("occluders", occluders, Occluders, "Occluders of Device.occluders")
         check_owner("occluders", occluders, self)
-        _arguments.instance("camera", camera, Camera, "a Camera")
         conservative = _arguments.flag("conservative", conservative)
         refinement = _arguments.integer("refinement", refinement, low=0, high=8)
+        _arguments.choice("rasteriser", rasteriser, words(Rasteriser))
+        drawing = Drawing(
+            chosen("only", only, occluders),
+            limit("max_triangles", max_triangles),
+            limit("max_occluders", max_occluders),
+        )
+        if into is not None:
+            _arguments.instance("into", into, DepthImage, "a DepthImage of Device.render_depth")
+            check_owner("into", into, self)
+            for name, value, default in (
+                ("size", size, None),
+                ("conservative", conservative, False),
+                ("rasteriser", rasteriser, "auto"),
+            ):
+                if value != default:
+                    raise ValueError(f"{name}: expected {default!r} beside into, got {value!r}")
+            if camera is not None and camera != into.camera:
+                raise ValueError(
+                    f"camera: expected None or that of into, {into.camera!r}, got {camera!r}"
+                )
+            return self._engine.render_depth_into(into._inner, occluders._inner, *drawing)
+        camera = _arguments.instance("camera", camera, Camera, "a Camera")
         if size is not None:
             camera = camera.resized(size)
         if conservative:
+            if any(part is not None for part in drawing) or rasteriser != "auto":
+                raise ValueError(
+                    "conservative: expected False beside rasteriser, only, max_triangles and "
+                    "max_occluders, got True"
+                )
             drawn = self._engine.render_depth_conservative(
                 occluders._inner, camera._inner, refinement
             )
             return DepthImage(self, drawn, camera)
-        return DepthImage(self, self._engine.render_depth(occluders._inner, camera._inner), camera)
+        drawn = self._engine.render_depth(occluders._inner, camera._inner, rasteriser, *drawing)
+        return DepthImage(self, drawn, camera)
 
     @overload
     def pyramid(

@@ -15,7 +15,17 @@ if TYPE_CHECKING:
 
     from ._arguments import FloatArray
 
-__all__ = ["A_MESH", "Mesh", "MeshLike", "as_mesh", "as_meshes", "meshes_of"]
+__all__ = ["A_MESH", "Mesh", "MeshLike", "as_mesh", "as_meshes", "meshes_of", "placed"]
+
+
+def placed(name: str, transforms: npt.ArrayLike | None) -> FloatArray | None:
+    """``(K, 4, 4)``: affine matrices, of which a single one may come as ``(4, 4)``; or None."""
+    if transforms is None:
+        return None
+    single = np.ndim(transforms) == 2
+    checked = _arguments.finite_floats(name, transforms, (4, 4) if single else ("K", 4, 4))
+    _arguments.check_affine(name, checked)
+    return checked.reshape(-1, 4, 4)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,15 +63,7 @@ class Mesh:
         object.__setattr__(
             self, "triangles", _arguments.triangles("triangles", triangles, len(checked))
         )
-        placed: FloatArray | None = None
-        if transforms is not None:
-            single = np.ndim(transforms) == 2
-            placed = _arguments.finite_floats(
-                "transforms", transforms, (4, 4) if single else ("K", 4, 4)
-            )
-            _arguments.check_affine("transforms", placed)
-            placed = placed.reshape(-1, 4, 4)
-        object.__setattr__(self, "transforms", placed)
+        object.__setattr__(self, "transforms", placed("transforms", transforms))
 
     def __repr__(self) -> str:
         copies = 1 if self.transforms is None else len(self.transforms)

@@ -11,6 +11,7 @@ from ._core import Occluders as CoreOccluders
 from ._core import Pyramid as CorePyramid
 from ._on_device import Allocated, OnDevice
 from .bounds import Bounds, are_points, as_arrays
+from .mesh import placed
 
 if TYPE_CHECKING:
     import numpy as np
@@ -134,11 +135,43 @@ class Occluders(Allocated[CoreOccluders]):
         """Triangles in all places."""
         return self._inner.num_triangles()
 
+    def move(self, mesh: int, transforms: npt.ArrayLike | None) -> None:
+        """Lets one of the meshes stand at other places from now on.
+
+        A move costs its matrices alone: vertices and what was made of them stay.
+        Depth images that were rendered before stay as they are.
+
+        Parameters
+        ----------
+        mesh : int
+            The mesh, by its place in the list of the upload.
+        transforms : (K, 4, 4) or (4, 4) float array, or None
+            ``world_from_mesh`` of each copy, as in `Mesh`; K may be another number than before.
+            None: one copy, whose vertices are world positions.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came; then nothing has moved.
+
+        Examples
+        --------
+        >>> import numpy as np, hizvk
+        >>> device = hizvk.Device()
+        >>> square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+        >>> door = device.occluders(square, [[0, 1, 2], [0, 2, 3]], transforms=np.eye(4))
+        >>> aside = np.eye(4)
+        >>> aside[0, 3] = 0.9
+        >>> door.move(0, aside)
+        """
+        mesh = _arguments.integer("mesh", mesh, low=0, high=2**32 - 1)
+        self._inner.move(mesh, placed("transforms", transforms))
+
     @property
     def host_bytes(self) -> int:
         """Bytes that they take on the host.
 
-        - The float64 mesh: 24 per vertex and 12 per triangle.
+        - Each mesh once: 36 to 48 per vertex and about 16 per triangle.
         - Once a conservative depth image was rendered: about 24 more per vertex and 42 per
           triangle, for good.
         """
@@ -175,6 +208,11 @@ class DepthImage(_Seen, OnDevice[CoreDepthImage]):
     def kind(self) -> DepthKind:
         """``"reversed_ndc"`` or ``"ndc"``, as for its camera."""
         return self._camera.depth_kind
+
+    @property
+    def rasteriser(self) -> str | None:
+        """What drew it: ``"device"`` or ``"host"``; None for conservative and uploaded depth."""
+        return self._inner.rasteriser()
 
     def numpy(self) -> npt.NDArray[np.float32]:
         """``(height, width)`` float32: the NDC depth, row 0 on top; a copy."""

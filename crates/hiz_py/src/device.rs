@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use hiz_core::headless::{self, AdapterSummary};
 use hiz_core::{
-    ConservativeDepthOptions, DepthTolerance, FaceCull, InstanceOptions, MeshData, OccluderOptions,
-    PyramidOptions, StoredLevels, StoredOrder,
+    ConservativeDepthOptions, DepthLoad, DepthTolerance, DrawOptions, FaceCull, InstanceOptions,
+    MeshData, OccluderOptions, Only, PyramidOptions, Rasteriser, StoredLevels, StoredOrder,
 };
-use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -47,6 +47,14 @@ fn open(adapter: Option<&str>) -> hiz_core::Result<headless::Engine> {
     let faults: Vec<(&str, &str)> =
         planted.iter().filter_map(|line| line.split_once(" => ")).collect();
     headless::Engine::with_planted_faults(adapter, &faults)
+}
+
+/// The copies that a mask names; all of them without one.
+fn chosen<'a>(mask: Option<&'a PyReadonlyArray1<'_, bool>>) -> PyResult<Only<'a>> {
+    Ok(match mask {
+        None => Only::All,
+        Some(mask) => Only::Masked(mask.as_slice()?),
+    })
 }
 
 /// A device with its queue and pipelines.
@@ -129,16 +137,52 @@ impl Engine {
             .map(|occluders| Occluders(Held::new(py, occluders)))
     }
 
+    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn render_depth(
         &self,
         py: Python<'_>,
         occluders: &Occluders,
         camera: &Camera,
+        rasteriser: &str,
+        only: Option<PyReadonlyArray1<'_, bool>>,
+        max_triangles: Option<u64>,
+        max_occluders: Option<u64>,
     ) -> PyResult<DepthImage> {
+        let rasteriser = match rasteriser {
+            "auto" => Rasteriser::Auto,
+            "device" => Rasteriser::Device,
+            "host" => Rasteriser::Host,
+            _ => {
+                let error = format!("rasteriser: no rasteriser {rasteriser:?}");
+                return Err(PyValueError::new_err(error));
+            }
+        };
         let occluders = occluders.0.get(py)?;
-        self.0
-            .run(py, |engine| engine.render_depth(&occluders, &camera.0))
-            .map(|depth| DepthImage(Held::new(py, depth)))
+        let only = chosen(only.as_ref())?;
+        let options =
+            DrawOptions { load: DepthLoad::Clear, only, max_triangles, max_copies: max_occluders };
+        let draw = |engine: &headless::Engine| {
+            engine.render_depth_with(&occluders, &camera.0, rasteriser, &options)
+        };
+        self.0.run(py, draw).map(|(depth, _)| DepthImage(Held::new(py, depth)))
+    }
+
+    fn render_depth_into(
+        &self,
+        py: Python<'_>,
+        depth: &DepthImage,
+        occluders: &Occluders,
+        only: Option<PyReadonlyArray1<'_, bool>>,
+        max_triangles: Option<u64>,
+        max_occluders: Option<u64>,
+    ) -> PyResult<Option<(u32, u32, u32, u32)>> {
+        let (depth, occluders) = (depth.0.get(py)?, occluders.0.get(py)?);
+        let only = chosen(only.as_ref())?;
+        let options =
+            DrawOptions { load: DepthLoad::Load, only, max_triangles, max_copies: max_occluders };
+        let touched =
+            self.0.run(py, |engine| engine.render_depth_into(&depth, &occluders, &options))?;
+        Ok(touched.map(<(u32, u32, u32, u32)>::from))
     }
 
     fn render_depth_conservative(
@@ -272,6 +316,17 @@ impl OnDevice for Arc<hiz_core::Occluders> {}
 
 #[pymethods]
 impl Occluders {
+    #[pyo3(name = "move")]
+    fn move_mesh(
+        &self,
+        py: Python<'_>,
+        mesh: usize,
+        transforms: Option<FloatArray<'_>>,
+    ) -> PyResult<()> {
+        let transforms = transforms.as_ref().map(FloatArray::floats).transpose()?;
+        self.0.run(py, |occluders| occluders.move_mesh(mesh, transforms))
+    }
+
     fn host_bytes(&self, py: Python<'_>) -> PyResult<u64> {
         Ok(self.0.look(py)?.surface().host_bytes())
     }
@@ -312,6 +367,14 @@ pub(crate) struct DepthImage(pub(crate) Held<headless::DepthImage>);
 impl DepthImage {
     fn read<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f32>>> {
         self.0.run(py, headless::DepthImage::read).map(|depth| PyArray1::from_vec(py, depth))
+    }
+
+    fn rasteriser(&self, py: Python<'_>) -> PyResult<Option<&'static str>> {
+        Ok(self.0.look(py)?.rasteriser().map(|rasteriser| match rasteriser {
+            Rasteriser::Auto => "auto",
+            Rasteriser::Device => "device",
+            Rasteriser::Host => "host",
+        }))
     }
 }
 

@@ -51,6 +51,11 @@ impl DepthImage {
         self.tolerance
     }
 
+    /// What has drawn occluders into it; `None` for an uploaded image.
+    pub fn rasteriser(&self) -> Option<Rasteriser> {
+        self.drawn.as_ref().map(|drawn| drawn.rasteriser())
+    }
+
     /// The texture.
     /// Images from [`Engine::upload_depth`], and those that the host has drawn, hold four pixels per
     /// texel (`Rgba32Uint`).

@@ -319,7 +319,7 @@ impl OccluderSurface {
         fault: Planted,
     ) -> Result<Vec<f32>> {
         let (positions, triangles);
-        let placements = self.placements();
+
         let moved;
         let topology = if !self.has_moved.load(Ordering::Relaxed) {
             self.topology
