@@ -180,6 +180,15 @@ class Engine:
         options: CullOptions,
         outputs: Outputs,
     ) -> Culling: ...
+    def warm_up(
+        self,
+        instances: Instances,
+        camera: Camera,
+        occluders: Occluders | None,
+        levels: tuple[int, int],
+        options: CullOptions,
+        outputs: Outputs,
+    ) -> None: ...
     def wait(self) -> None: ...
     def wait_without_guard(self) -> None: ...
 
