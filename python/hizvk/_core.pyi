@@ -297,6 +297,13 @@ class Yardstick:
     def reduction(
         self, depth: DepthImage, shape: str, levels: tuple[int, int]
     ) -> YardstickReduction: ...
+    def frames(
+        self,
+        instances: Instances,
+        occluders: Occluders,
+        cameras: Sequence[Camera],
+        is_warmed: bool,
+    ) -> tuple[float, list[list[float]]]: ...
     def cull(
         self,
         instances: Instances,

@@ -300,7 +300,7 @@ type SurfaceArrays<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u32>>,
 
 /// Triangle meshes on the device.
 #[pyclass(frozen, module = "hizvk._core")]
-pub(crate) struct Occluders(Held<Arc<hiz_core::Occluders>>);
+pub(crate) struct Occluders(pub(crate) Held<Arc<hiz_core::Occluders>>);
 
 impl OnDevice for Arc<hiz_core::Occluders> {}
 
