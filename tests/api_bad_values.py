@@ -424,6 +424,12 @@ OPTIONS_OBJECT: list[Bad] = [
     ({"order": "any"}, TypeError, "expected a CullOptions or None, got dict {'order': 'any'}"),
     ("any", TypeError, "got str 'any'"),
 ]
+OUTPUTS_OBJECT: list[Bad] = [
+    ("mask", TypeError, "expected None or a collection of"),
+    (["masks"], ValueError, 'expected one of "mask", "verdicts", "indices", "draws"'),
+    ([1], TypeError, "got int 1"),
+    (hizvk.CullOptions(), TypeError, "'draws', or an Outputs, got CullOptions"),
+]
 #: The fields of `CullOptions`, which are also keywords of functions.
 OPTIONS: dict[str, list[Bad]] = {
     "order": [
@@ -856,12 +862,36 @@ TABLES: dict[str, Table] = {
                 )
             ],
             "options": OPTIONS_OBJECT,
-            "outputs": [
-                ("mask", TypeError, "expected None or a collection of"),
-                (["masks"], ValueError, 'expected one of "mask", "verdicts", "indices", "draws"'),
-                ([1], TypeError, "got int 1"),
-                (hizvk.CullOptions(), TypeError, "'draws', or an Outputs, got CullOptions"),
+            "outputs": OUTPUTS_OBJECT,
+            **OPTIONS,
+            "capacity": CAPACITY,
+            "draw": DRAW,
+        },
+    ),
+    "Device.warm_up": Table(
+        lambda device: (
+            device.warm_up,
+            {"instances": device.instances(spheres()), "camera": camera()},
+        ),
+        {
+            "instances": [
+                (
+                    spheres(),
+                    TypeError,
+                    "expected Instances of Device.instances, got Spheres Spheres(1",
+                )
             ],
+            "camera": CAMERA,
+            "options": OPTIONS_OBJECT,
+            "outputs": OUTPUTS_OBJECT,
+            "occluders": [
+                (
+                    np.zeros((3, 3)),
+                    TypeError,
+                    "expected Occluders of Device.occluders or None, got (3, 3) float64",
+                )
+            ],
+            "levels": LEVELS,
             **OPTIONS,
             "capacity": CAPACITY,
             "draw": DRAW,

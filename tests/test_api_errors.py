@@ -108,9 +108,8 @@ def test_every_parameter_has_a_bad_value() -> None:
     for name, function in found.items():
         parameters = set(inspect.signature(function).parameters) - {"self"}
         if "keywords" in parameters:
-            keywords = {"Device.cull": hizvk.options.CullKeywords}.get(
-                name, hizvk.options.OptionKeywords
-            )
+            of_culls = name in ("Device.cull", "Device.warm_up")
+            keywords = hizvk.options.CullKeywords if of_culls else hizvk.options.OptionKeywords
             parameters = parameters - {"keywords"} | set(keywords.__annotations__)
         assert parameters == set(TABLES[name].bad), name
 
@@ -138,6 +137,10 @@ def test_what_belongs_to_another_device_is_refused(device: hizvk.Device) -> None
         other.cull(other.instances(spheres()), view, pyramid)
     with pytest.raises(ValueError, match="occluders: expected Occluders of this device"):
         other.render_depth(occluders, view)
+    with pytest.raises(ValueError, match="instances: expected Instances of this device"):
+        other.warm_up(instances, view)
+    with pytest.raises(ValueError, match="occluders: expected Occluders of this device"):
+        other.warm_up(other.instances(spheres()), view, occluders=occluders)
     with pytest.raises(ValueError, match="depth: expected DepthImage of this device"):
         other.pyramid(image)
 

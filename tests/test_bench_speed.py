@@ -55,7 +55,8 @@ TARGETS = {
     "cull.many.flat": (2.0, False),
     "cull.many.groups": (2.0, False),
     "calls.beyond": (1.0, False),
-    "calls.small": (3.0, False),
+    "calls.small": (4.0, False),
+    "calls.groups": (1.05, False),
 }
 #: What is told beside them.
 TOLD = (
@@ -71,6 +72,8 @@ TOLD = (
     "outputs.groups.draws",
     "outputs.flat.indices, any order",
     "calls.small_unread",
+    "calls.small_part.the wait",
+    "calls.groups_read",
     "others.numpy, cull",
     "transfers.upload.Morton",
     "transfers.upload.given",
@@ -374,6 +377,11 @@ def test_a_fresh_process_reaches_a_mask(tmp_path: Path) -> None:
     )
     # The cache of this user: cold compilations take long.
     cache = Path(os.environ.get(first_call.CACHE, Path.home() / ".cache"))
-    seconds = first_call._process(file, cache)
+    seconds = first_call._process(first_call.CHILD, file, cache)
     assert len(seconds) == 4
     assert all(second > 0.0 for second in seconds)
+    for kind in ("warmed", "unwarmed"):
+        warm_up, *others = first_call._process(first_call.FRAMES, file, cache, kind)
+        assert (warm_up > 0.0) == (kind == "warmed")
+        assert len(others) == 4
+        assert all(ms > 0.0 for ms in others)

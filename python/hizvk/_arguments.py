@@ -450,22 +450,23 @@ def flag(name: str, value: object) -> bool:
 def choice(name: str, value: object, choices: Iterable[str]) -> str:
     """One of a few words."""
     known = tuple(choices)
+    # Each cull with keywords comes here, so the text is made for errors alone.
+    if isinstance(value, str) and value in known:
+        return value
     expected = "one of " + ", ".join(f'"{word}"' for word in known)
     if not isinstance(value, str):
         raise _wrong_type(name, expected, value)
-    if value not in known:
-        raise _wrong_value(name, expected, value)
-    return value
+    raise _wrong_value(name, expected, value)
 
 
 def instance(name: str, value: object, wanted: type[T], expected: str) -> T:
     """An object of this class."""
+    if isinstance(value, wanted):
+        return value
     if isinstance(value, (list, tuple)) and value and all(isinstance(one, wanted) for one in value):
         got = f"{type(value).__name__} of {len(value)}"
         raise TypeError(f"{name}: expected {expected}, got a {got}; pass one a call, in a loop")
-    if not isinstance(value, wanted):
-        raise _wrong_type(name, expected, value)
-    return value
+    raise _wrong_type(name, expected, value)
 
 
 def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:

@@ -196,6 +196,15 @@ class Engine:
         options: CullOptions,
         outputs: Outputs,
     ) -> Culling: ...
+    def warm_up(
+        self,
+        instances: Instances,
+        camera: Camera,
+        occluders: Occluders | None,
+        levels: tuple[int, int],
+        options: CullOptions,
+        outputs: Outputs,
+    ) -> None: ...
     def wait(self) -> None: ...
     def wait_without_guard(self) -> None: ...
 
@@ -306,6 +315,13 @@ class Yardstick:
     def reduction(
         self, depth: DepthImage, shape: str, levels: tuple[int, int]
     ) -> YardstickReduction: ...
+    def frames(
+        self,
+        instances: Instances,
+        occluders: Occluders,
+        cameras: Sequence[Camera],
+        is_warmed: bool,
+    ) -> tuple[float, list[list[float]]]: ...
     def cull(
         self,
         instances: Instances,

@@ -565,6 +565,80 @@ class Device:
         )
         return CullResult(self, culling, Question(camera, pyramid, options, instances._points))
 
+    def warm_up(
+        self,
+        instances: Instances,
+        camera: Camera,
+        options: CullOptions | None = None,
+        outputs: Outputs | Collection[Output] | None = None,
+        *,
+        occluders: Occluders | None = None,
+        levels: Levels = None,
+        **keywords: Unpack[CullKeywords],
+    ) -> None:
+        """Compiles what frames with these options need, before the first of them.
+
+        Without it the first frame compiles: that takes tenths of a second, or milliseconds where
+        the driver finds its compiled shaders on disk.
+        Afterwards the first frame takes as long as the later ones, and its
+        `CullStats.compile_ms` is 0.
+
+        The call runs a whole frame and waits for it: a depth image, its pyramid, a cull, and the
+        reads of what it makes.
+        It also compiles `Instances.update`, and changes no instance.
+        Call it once for each set of options, for each kind of bounds and for depth from either
+        source.
+        What matters of the numbers is compiled as well: how many instances there are decides
+        whether groups are tested, and the image size how a pyramid is built.
+
+        Parameters
+        ----------
+        instances : Instances
+            Of this device: those of the frames, or as many of the same kind.
+        camera : Camera
+            One like those of the frames: with their image size and their direction of depth
+            (``reversed_z``), and left-handed if they are.
+        options, outputs, **keywords
+            As for `cull`.
+        occluders : Occluders, optional
+            Of this device; then the depth of the frames is rendered (`render_depth`).
+            None: it comes from arrays.
+        levels : int or pair of int, optional
+            As for `pyramid`.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+        LimitError, OutOfMemoryError
+            If the device cannot hold such a frame.
+
+        Examples
+        --------
+        >>> import numpy as np, hizvk
+        >>> device = hizvk.Device()
+        >>> crowd = device.instances(hizvk.Spheres(np.zeros((1000, 3)), 0.5))
+        >>> camera = hizvk.Camera.look_at(
+        ...     (0, 0, 9), (0, 0, 0), fov_y_deg=60, size=(90, 160), near=0.1
+        ... )
+        >>> device.warm_up(crowd, camera, outputs=["mask"])
+        >>> pyramid = device.pyramid(np.full(camera.size, 20.0), camera, kind="z")
+        >>> device.cull(crowd, camera, pyramid, outputs=["mask"]).count
+        1000
+        """
+        _arguments.instance("instances", instances, Instances, "Instances of Device.instances")
+        check_owner("instances", instances, self)
+        _arguments.instance("camera", camera, Camera, "a Camera")
+        self._check_side(camera)
+        if occluders is not None:
+            expected = "Occluders of Device.occluders or None"
+            _arguments.instance("occluders", occluders, Occluders, expected)
+            check_owner("occluders", occluders, self)
+        stored = _arguments.stored_levels("levels", levels)
+        options, outputs = cull_request(options, outputs, keywords)
+        drawn = None if occluders is None else occluders._inner
+        self._engine.warm_up(instances._inner, camera._inner, drawn, stored, options, outputs)
+
     def _check_side(self, camera: Camera) -> None:
         """Refuses an image that the device cannot hold, before its array is converted."""
         side = max(camera.size)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any, Final, TypedDict, TypeVar
 
 import numpy as np
@@ -282,7 +282,13 @@ def _outputs_of(names: object) -> Outputs:
     if isinstance(names, str) or not isinstance(names, Collection):
         expected = f"None or a collection of {', '.join(map(repr, OUTPUTS))}, or an Outputs"
         raise TypeError(f"outputs: expected {expected}, got {_arguments.describe(names)}")
-    asked = {_arguments.choice("outputs", name, OUTPUTS) for name in names}
+    asked = frozenset(_arguments.choice("outputs", name, OUTPUTS) for name in names)
+    return _outputs_named(asked)
+
+
+@cache
+def _outputs_named(asked: frozenset[str]) -> Outputs:
+    """There are sixteen of them."""
     return _replaced(_OUTPUTS, {name: name in asked for name in OUTPUTS})
 
 

@@ -12,7 +12,8 @@ From a checkout with the module built for release: ``python -m tools.speed``.
 - `calls`: what Python adds; small calls; numpy and Embree
 - `transfers`: uploads, updates, and when sorting again pays
 - `memory`: bytes on the device, and the peak on the host (`host_peak`)
-- `first_call`: fresh processes (`first_mask`) with the driver's shader cache cold and warm
+- `first_call`: fresh processes (`first_mask`) with the driver's shader cache cold and warm, and
+  their first frames (`first_frame`) with and without a warm-up
 - `scale`: time, memory and texels against the numbers of instances and pixels
 - `report`: report.json (its schema stands there), report.md; `plots` draws the scale
 - `command`: the command line

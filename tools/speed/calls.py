@@ -6,7 +6,7 @@ What Python adds, what small calls cost, and what numpy and Embree take for the 
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -35,13 +35,18 @@ SLOW_ROUNDS = 3
 
 
 def measure(run: Run) -> None:
-    """Measures calls of `Workload.calls` instances, 95 % hidden, and of `SMALL`."""
+    """Measures calls of `Workload.calls` and `Workload.crowd` instances, and of `SMALL`.
+
+    95 % of them are hidden.
+    """
     count = run.extent.calls
     run.step(f"calls of {count:,} and {SMALL:,} instances from Python")
     scene = run.town(count, 0.95)
     depth = run.depth(scene, run.extent.images[0][1])
     pyramid = run.device.pyramid(depth)
     _ours(run, scene, depth, pyramid)
+    run.step(f"calls of {run.extent.crowd:,} instances in groups")
+    _groups(run)
     run.step("numpy and Embree")
     _others(run, scene, depth, pyramid)
 
@@ -60,8 +65,25 @@ def _call(run: Run, instances: Instances, pyramid: Pyramid, *, read: bool) -> Ca
     return call
 
 
-def _recorded(run: Run, instances: Instances, pyramid: Pyramid) -> float:
-    return run.device.cull(instances, pyramid.camera, pyramid, outputs=["mask"])._inner.timings()[0]
+#: The parts of a call, in their order.
+PARTS: Final = ("until cull returns", "the wait", "the mask")
+
+
+def _part(run: Run, instances: Instances, pyramid: Pyramid, part: str) -> Callable[[], float]:
+    """A call whose parts are taken apart; ``"the wait"`` is left to `Device.wait`."""
+
+    def call() -> float:
+        run.device.wait()
+        times = [time.perf_counter()]
+        seen = run.device.cull(instances, pyramid.camera, pyramid, outputs=["mask"])
+        times.append(time.perf_counter())
+        run.device.wait()
+        times.append(time.perf_counter())
+        _ = seen.mask
+        times.append(time.perf_counter())
+        return 1e3 * float(np.diff(times)[PARTS.index(part)])
+
+    return call
 
 
 def _ours(run: Run, scene: Town, depth: DepthImage, pyramid: Pyramid) -> None:
@@ -71,6 +93,7 @@ def _ours(run: Run, scene: Town, depth: DepthImage, pyramid: Pyramid) -> None:
         "many, mask read": _call(run, many, pyramid, read=True),
         "many, device": run.cull(many, depth.camera, pyramid, groups=None).ms,
         "few, mask read": _call(run, few, pyramid, read=True),
+        **{f"few, {part}": _part(run, few, pyramid, part) for part in PARTS},
         "few, not read": _call(run, few, pyramid, read=False),
         "few, device": run.cull(few, depth.camera, pyramid, groups=None).ms,
         "empty submit": run.yardstick.empty_submit_ms,
@@ -86,7 +109,7 @@ def _ours(run: Run, scene: Town, depth: DepthImage, pyramid: Pyramid) -> None:
         1.0,
     )
     for key, way, target in (
-        ("small", "mask read", 3.0),
+        ("small", "mask read", 4.0),
         ("small_unread", "not read", None),
         ("small_device", "device", None),
     ):
@@ -95,6 +118,33 @@ def _ours(run: Run, scene: Town, depth: DepthImage, pyramid: Pyramid) -> None:
             f"{len(few):,} instances, {way} / empty submit",
             ms[f"few, {way}"],
             ms["empty submit"],
+            target,
+        )
+    whole = np.sum([ms[f"few, {part}"] for part in PARTS], axis=0)
+    for part in PARTS:
+        label = f"{len(few):,} instances: {part} / the call part by part"
+        found.ratio(f"calls.small_part.{part}", label, ms[f"few, {part}"], whole)
+
+
+def _groups(run: Run) -> None:
+    """What the public call adds to its own recorded cull, for many instances in groups."""
+    scene = run.town(run.extent.crowd, 0.95)
+    depth = run.depth(scene, run.extent.images[0][1])
+    pyramid = run.device.pyramid(depth)
+    crowd = run.device.instances(scene.boxes)
+    ways = {
+        "groups, mask read": _call(run, crowd, pyramid, read=True),
+        "groups, not read": _call(run, crowd, pyramid, read=False),
+        "groups, device": run.cull(crowd, depth.camera, pyramid, groups=None).ms,
+    }
+    ms = in_turns(ways, 3 * run.extent.rounds)
+    run.found.timed("calls in groups", ms)
+    for key, way, target in (("groups", "not read", 1.05), ("groups_read", "mask read", None)):
+        run.found.ratio(
+            f"calls.{key}",
+            f"{len(crowd):,} instances in groups, {way} / device",
+            ms[f"groups, {way}"],
+            ms["groups, device"],
             target,
         )
 

@@ -105,6 +105,9 @@ pub struct HizContext {
 impl HizContext {
     /// Makes a context on the caller's device.
     ///
+    /// Pipelines are made when they are first used.
+    /// [`HizContext::record_warm_up`] makes them before the first frame.
+    ///
     /// # Errors
     /// [`Error::Limit`] if the device offers less than the shaders need.
     /// [`HizContext::required_limits`] are always enough.
@@ -427,7 +430,7 @@ impl HizContext {
     /// Call it once for each kind of frame: for each cull and each of several depth images.
     ///
     /// Drivers compile at two times, when a pipeline is made and when it is first dispatched.
-    /// So the recorded dispatches have no workgroups: they neither reduce, cull nor update anything.
+    /// So the recorded dispatches have no workgroups, and reduce, cull and update nothing.
     /// Two things do change:
     ///
     /// - The occluders are drawn into the depth image, as they are in a frame.

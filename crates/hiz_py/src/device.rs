@@ -254,6 +254,29 @@ impl Engine {
             .map(|culling| Culling(Held::new(py, culling)))
     }
 
+    /// As `cull`; `occluders` says where depth comes from, and `levels` what is stored.
+    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
+    fn warm_up(
+        &self,
+        py: Python<'_>,
+        instances: &Instances,
+        camera: &Camera,
+        occluders: Option<&Occluders>,
+        levels: (u32, u32),
+        options: &Bound<'_, PyAny>,
+        outputs: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let Request { options, outputs } = Request::new(options, outputs)?;
+        let instances = instances.0.get(py)?;
+        let occluders = occluders.map(|occluders| occluders.0.get(py)).transpose()?;
+        let levels = StoredLevels { first: levels.0, last: levels.1 };
+        let levels = PyramidOptions { levels, ..PyramidOptions::default() };
+        self.0.run(py, |engine| {
+            let occluders = occluders.as_deref().map(Arc::as_ref);
+            engine.warm_up(&instances, &camera.0, occluders, &levels, &options, &outputs)
+        })
+    }
+
     fn wait(&self, py: Python<'_>) -> PyResult<()> {
         self.0.run(py, headless::Engine::wait)
     }
@@ -310,7 +333,7 @@ type SurfaceArrays<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u32>>,
 
 /// Triangle meshes on the device.
 #[pyclass(frozen, module = "hizvk._core")]
-pub(crate) struct Occluders(Held<Arc<hiz_core::Occluders>>);
+pub(crate) struct Occluders(pub(crate) Held<Arc<hiz_core::Occluders>>);
 
 impl OnDevice for Arc<hiz_core::Occluders> {}
 

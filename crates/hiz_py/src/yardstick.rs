@@ -87,6 +87,28 @@ impl Yardstick {
         Ok(YardstickReduction(Held::new(py, Reduction { engine, depth, reducer })))
     }
 
+    /// Frames of a renderer: the milliseconds of the warm-up, and per frame those of
+    /// `record_occluders`, `record_reduce`, `record_cull` and of the device.
+    fn frames(
+        &self,
+        py: Python<'_>,
+        instances: &crate::device::Instances,
+        occluders: &crate::device::Occluders,
+        cameras: Vec<PyRef<'_, Camera>>,
+        is_warmed: bool,
+    ) -> PyResult<(f64, Vec<[f64; 4]>)> {
+        let (instances, occluders) = (instances.0.get(py)?, occluders.0.get(py)?);
+        let cameras: Vec<_> = cameras.iter().map(|camera| camera.0.clone()).collect();
+        let options = CullOptions::default();
+        let (warm_up, frames) = self.0.run(py, |engine| {
+            yardstick::frames(engine, &instances, &occluders, &cameras, &options, is_warmed)
+        })?;
+        let of_frame = |times: yardstick::FrameTimes| {
+            [times.occluders, times.reduce, times.cull, times.device]
+        };
+        Ok((warm_up, frames.into_iter().map(of_frame).collect()))
+    }
+
     /// A cull of `instances` into buffers of its own.
     /// With `depth`, each submission first reduces it into `pyramid`.
     #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]

@@ -1,10 +1,14 @@
 //! Yardsticks: reference work that the library is measured against.
 //!
-//! `reduce` builds a pyramid with one dispatch per level, and `cull` culls without certificates.
-//! `raster` draws occluders on the host, without what comes before and after.
+//! - `reduce` builds a pyramid with one dispatch per level.
+//! - `cull` culls without certificates.
+//! - `raster` draws occluders on the host, without what comes before and after.
+//! - `frames` times a renderer's frames call by call.
+//!
 //! They are for benchmarks and their tests alone.
 
 mod cull;
+mod frames;
 mod raster;
 pub(crate) mod reduce;
 
@@ -13,6 +17,7 @@ use std::time::Instant;
 #[cfg(feature = "testing")]
 pub(crate) use cull::uncertified_module;
 pub use cull::{read_mask, record_uncertified_cull};
+pub use frames::{FrameTimes, frames};
 pub use raster::HostRaster;
 #[cfg(feature = "testing")]
 pub(crate) use reduce::yardstick_modules;
