@@ -11,6 +11,7 @@ use crate::input::camera::Camera;
 use crate::instances::Instances;
 use crate::occluders::Occluders;
 use crate::occluders::device_raster::OCCLUDER_DEPTH_FORMAT;
+use crate::occluders::drawing::DrawOptions;
 use crate::output::outputs::Outputs;
 use crate::pyramid::PyramidOptions;
 
@@ -80,7 +81,13 @@ pub fn frames(
     let frame = |camera: &Camera| {
         let mut encoder = encoder();
         let start = Instant::now();
-        context.record_occluders(&mut encoder, occluders, camera, &depth)?;
+        context.record_occluders(
+            &mut encoder,
+            occluders,
+            camera,
+            &depth,
+            &DrawOptions::default(),
+        )?;
         let (of_occluders, start) = (ms(start), Instant::now());
         context.record_reduce(&mut encoder, &depth, camera, &pyramid)?;
         let (of_reduce, start) = (ms(start), Instant::now());
