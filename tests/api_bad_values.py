@@ -419,6 +419,11 @@ CAPACITY: list[Bad] = [
     (-1, ValueError, "in 0..4294967295"),
     (1.5, TypeError, "got float 1.5"),
 ]
+LIMIT: list[Bad] = [
+    (-1, ValueError, "in 0..9223372036854775807"),
+    (1.5, TypeError, "got float 1.5"),
+    (True, TypeError, "got bool True"),
+]
 DRAW: list[Bad] = [((36,), TypeError, "expected a DrawTemplate or None, got tuple (36,)")]
 OPTIONS_OBJECT: list[Bad] = [
     ({"order": "any"}, TypeError, "expected a CullOptions or None, got dict {'order': 'any'}"),
@@ -756,6 +761,20 @@ TABLES: dict[str, Table] = {
             ],
         },
     ),
+    "Occluders.move": Table(
+        lambda device: (
+            device.occluders(np.zeros((3, 3)), [[0, 1, 2]]).move,
+            {"mesh": 0, "transforms": EYE4},
+        ),
+        {
+            "mesh": [
+                (1, ValueError, "expected the number of one of the 1 meshes, got 1"),
+                (-1, ValueError, "in 0..4294967295, got int -1"),
+                ("door", TypeError, "got str 'door'"),
+            ],
+            "transforms": TRANSFORMS,
+        },
+    ),
     "Instances.update": Table(
         lambda device: (device.instances(spheres()).update, {"first": 0, "bounds": spheres()}),
         {
@@ -813,6 +832,24 @@ TABLES: dict[str, Table] = {
                 (-1, ValueError, "in 0..8"),
                 (2.0, TypeError, "got float 2.0"),
             ],
+            "rasteriser": [
+                ("gpu", ValueError, 'expected one of "auto", "device", "host", got str'),
+                (None, TypeError, "got None"),
+            ],
+            "into": [
+                (np.zeros((6, 8)), TypeError, "expected a DepthImage of Device.render_depth"),
+            ],
+            "only": [
+                ("all", TypeError, "expected a CullResult, a bool (1,) array or an array of int"),
+                ([0.0], TypeError, "got (1,) float64"),
+                ([[0]], TypeError, "got (1, 1) int64"),
+                ([1], ValueError, "expected numbers of copies in 0..0, got 1"),
+                ([-1], ValueError, "expected numbers of copies in 0..0, got -1"),
+                ([True, False], ValueError, "expected bool (1,), got (2,) bool"),
+                (np.ma.masked_all(1, bool), TypeError, "got a masked array"),
+            ],
+            "max_triangles": LIMIT,
+            "max_occluders": LIMIT,
         },
     ),
     "Device.pyramid": Table(

@@ -53,7 +53,12 @@ def chosen(
             )
         return only.mask
     expected = f"a CullResult, a bool ({copies},) array or an array of integers"
-    if _arguments.is_masked(only) or isinstance(only, (str, bytes)):
+    if _arguments.is_masked(only):
+        raise TypeError(
+            f"{name}: expected {expected}, got a masked array; "
+            "fill it first, with .filled(False) or (True)"
+        )
+    if isinstance(only, (str, bytes)):
         raise TypeError(f"{name}: expected {expected}, got {_arguments.describe(only)}")
     try:
         array = np.asarray(only)
