@@ -624,3 +624,37 @@ fn limits_leave_what_is_large_in_the_image() {
         assert!(limited(None, Some(0)).iter().all(|d| *d == 0.0));
     }
 }
+
+/// Images are lent again once they are dropped, and never while anything still reads them.
+#[test]
+fn images_stay_as_they_are_while_a_pyramid_or_a_handle_is_left() {
+    let walls = walls();
+    for rasteriser in RASTERISERS {
+        let camera = camera_along_z(321, 200, DepthConvention::Reversed);
+        let shown = |list: &[u32]| {
+            let options = DrawOptions { only: Only::Listed(list), ..DrawOptions::default() };
+            engine().render_depth_with(&walls, &camera, rasteriser, &options).unwrap().0
+        };
+        let first = shown(&[0, 4]);
+        let expected = first.read().unwrap();
+        let pyramid = engine().pyramid(&first).unwrap();
+        let kept = first.clone();
+        drop(first);
+        // Every image of the same size that is made meanwhile is another one.
+        let others: Vec<_> = [[1_u32], [2], [8]].iter().map(|one| shown(one)).collect();
+        assert!(kept.read().unwrap() == expected);
+        drop(kept);
+        drop(others);
+        for one in [[1_u32], [2], [8], [7]] {
+            shown(&one);
+        }
+        assert!(engine().read_level(&pyramid, 0).unwrap() == expected, "the pyramid's level 0");
+        drop(pyramid);
+        let seen = shown(&[3]);
+        let texture = seen.texture().clone();
+        drop(seen);
+        for one in [[1_u32], [2], [8], [7]] {
+            assert!(*shown(&one).texture() != texture);
+        }
+    }
+}

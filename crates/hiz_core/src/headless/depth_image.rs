@@ -32,7 +32,7 @@ pub struct DepthImage {
     pub(super) camera: Camera,
     pub(super) tolerance: DepthTolerance,
     /// What draws occluders into it; none for an uploaded image.
-    drawn: Option<Arc<OccluderDepth>>,
+    pub(super) drawn: Option<Arc<OccluderDepth>>,
 }
 
 impl DepthImage {
@@ -60,6 +60,9 @@ impl DepthImage {
     /// Images from [`Engine::upload_depth`], and those that the host has drawn, hold four pixels per
     /// texel (`Rgba32Uint`).
     pub fn texture(&self) -> &wgpu::Texture {
+        if let Some(drawn) = &self.drawn {
+            self.engine.images().keep_apart(drawn);
+        }
         &self.texture
     }
 
@@ -270,17 +273,18 @@ impl Engine {
         options: &DrawOptions<'_>,
     ) -> Result<(DepthImage, Touched)> {
         self.scoped(|| {
-            let drawn = self.context().create_occluder_depth(camera.size(), rasteriser)?;
+            let drawn = self.images().lend(self.context(), camera.size(), rasteriser)?;
             let depth = DepthImage {
                 engine: self.clone(),
                 texture: drawn.texture().clone(),
                 view: drawn.view().clone(),
                 camera: camera.clone(),
                 tolerance: DepthTolerance::NONE,
-                drawn: Some(Arc::new(drawn)),
+                drawn: Some(drawn),
             };
             let options = DrawOptions { load: DepthLoad::Clear, ..*options };
-            let touched = depth.record_occluders(occluders, &options)?;
+            let touched = depth.record_occluders(occluders, &options);
+            let touched = touched.inspect_err(|_| self.images().forget())?;
             Ok((depth, touched))
         })
     }

@@ -6,6 +6,7 @@ use crate::context::HizContext;
 use crate::error::{Error, Result};
 use crate::headless::adapter::{self, ADAPTER_VARIABLE, AdapterSummary};
 use crate::headless::answers::Answers;
+use crate::headless::images::Images;
 use crate::headless::process::Process;
 use crate::headless::readback;
 use crate::host::threads::Locked;
@@ -61,6 +62,7 @@ struct Shared {
     process: Process,
     context: HizContext,
     answers: Answers,
+    images: Images,
     device: wgpu::Device,
     queue: wgpu::Queue,
     adapter: AdapterSummary,
@@ -147,6 +149,7 @@ impl Engine {
                 process,
                 context,
                 answers: Answers::default(),
+                images: Images::default(),
                 device,
                 queue,
                 adapter: summary,
@@ -182,6 +185,11 @@ impl Engine {
     /// The context that records on this device.
     pub fn context(&self) -> &HizContext {
         &self.shared.context
+    }
+
+    /// The depth images that may be lent again.
+    pub(super) fn images(&self) -> &Images {
+        &self.shared.images
     }
 
     /// The buffers of the last answers.

@@ -9,6 +9,7 @@ use crate::headless::readback::{self, BufferRange, to_u32};
 use crate::host::memory;
 use crate::input::depth::sanitized;
 use crate::pyramid::atlas;
+use crate::pyramid::built::Owner;
 use crate::pyramid::levels::StoredLevels;
 use crate::pyramid::reduce::record_reduce;
 use crate::pyramid::{Pyramid, PyramidOptions};
@@ -39,6 +40,9 @@ impl Engine {
             let mut encoder = self.encoder("hiz.reduce.encoder");
             let DepthImage { view, camera, tolerance, .. } = depth;
             record_reduce(&self.context().gpu, &mut encoder, view, camera, &pyramid, *tolerance)?;
+            if let Some(drawn) = &depth.drawn {
+                pyramid.keep_with_it(Arc::clone(drawn) as Arc<dyn Owner>);
+            }
             self.queue().submit([encoder.finish()]);
             Ok(Arc::new(pyramid))
         })

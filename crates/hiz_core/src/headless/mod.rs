@@ -52,6 +52,7 @@ mod depth_image;
 pub(crate) mod engine;
 mod explain;
 mod explanation;
+mod images;
 mod levels;
 mod process;
 pub(crate) mod readback;

@@ -29,7 +29,7 @@ use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
 use crate::input::tolerance::DepthTolerance;
 use crate::pyramid::atlas::{Atlas, AtlasUse};
-use crate::pyramid::built::Built;
+use crate::pyramid::built::{Built, Owner};
 use crate::pyramid::layout::{PYRAMID_CHUNKS, PyramidLayout, chunk_shift};
 use crate::pyramid::levels::{Level, MAX_LEVELS, StoredLevels};
 use crate::pyramid::steps::Steps;
@@ -340,6 +340,13 @@ impl Pyramid {
         match self.chunks.get(i) {
             Some(chunk) => Ok(chunk.clone()),
             None => gpu.stand_in(NO_CHUNK[i]),
+        }
+    }
+
+    /// Keeps `owner` with the image that the pyramid was just built from.
+    pub(crate) fn keep_with_it(&self, owner: Arc<dyn Owner>) {
+        if let Some(built) = &mut *self.built.lock() {
+            built.owner = Some(owner);
         }
     }
 

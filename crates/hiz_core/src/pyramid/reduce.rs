@@ -189,7 +189,8 @@ impl Prepared {
         let dispatches = pyramid.layout.steps.iter().map(dispatch).collect::<Result<_>>()?;
         let tolerance = of_format.after(uploaded);
         let camera = camera.clone();
-        let built = Built { reduction: number, source: view, source_kind, camera, tolerance };
+        let built =
+            Built { reduction: number, source: view, source_kind, camera, tolerance, owner: None };
         Ok(Self { source, dispatches, built })
     }
 
