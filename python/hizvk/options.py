@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields
-from functools import cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypedDict, TypeVar
 
 import numpy as np
@@ -283,13 +283,10 @@ def _outputs_of(names: object) -> Outputs:
         expected = f"None or a collection of {', '.join(map(repr, OUTPUTS))}, or an Outputs"
         raise TypeError(f"outputs: expected {expected}, got {_arguments.describe(names)}")
     asked = frozenset(_arguments.choice("outputs", name, OUTPUTS) for name in names)
-    return _outputs_named(asked)
-
-
-@cache
-def _outputs_named(asked: frozenset[str]) -> Outputs:
-    """There are sixteen of them."""
-    return _replaced(_OUTPUTS, {name: name in asked for name in OUTPUTS})
+    made = _NAMED.get(asked)
+    if made is None:
+        made = _NAMED[asked] = _replaced(_OUTPUTS, {name: name in asked for name in OUTPUTS})
+    return made
 
 
 class OptionKeywords(TypedDict, total=False):
@@ -317,6 +314,8 @@ class CullKeywords(OptionKeywords, total=False):
 
 _OPTIONS: Final = CullOptions()
 _OUTPUTS: Final = Outputs()
+#: The outputs of each set of names; there are sixteen of them.
+_NAMED: Final[dict[frozenset[str], Outputs]] = {}
 
 
 def cull_options(options: object, keywords: Mapping[str, Any]) -> CullOptions:

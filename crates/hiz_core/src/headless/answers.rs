@@ -15,11 +15,12 @@ use crate::instances::piece::Piece;
 use crate::output::outputs::Outputs;
 use crate::output::visible::Visible;
 
-/// Answers whose buffers are kept at most.
-const MOST_KEPT: usize = 8;
+/// The most bytes on the device of all buffers that are kept.
+/// They are held until their instances are gone.
+const MOST_BYTES: u64 = 1 << 24;
 
-/// The most bytes on the device of an answer whose buffers are kept.
-const MOST_BYTES: u64 = 1 << 23;
+/// Answers whose buffers are kept at most: they are looked through at each cull.
+const MOST_KEPT: usize = 64;
 
 /// The largest mask that the cull's own submit copies to a staging buffer: that of 8 million
 /// instances.
@@ -47,7 +48,11 @@ impl AnswerBuffers {
 
     /// Lists start as 0xFFFFFFFF, which only new ones do.
     fn may_serve_again(&self) -> bool {
-        self.visible.lists.is_none() && self.visible.device_bytes() <= MOST_BYTES
+        self.visible.lists.is_none()
+    }
+
+    fn bytes(&self) -> u64 {
+        self.visible.device_bytes() + self.staging.as_ref().map_or(0, wgpu::Buffer::size)
     }
 }
 
@@ -96,7 +101,9 @@ impl Answers {
         drop(kept);
         let buffers = Arc::new(AnswerBuffers::new(context, instances, outputs)?);
         let mut kept = self.0.lock();
-        if buffers.may_serve_again() && kept.len() < MOST_KEPT {
+        let held: u64 = kept.iter().map(|kept| kept.buffers.bytes()).sum();
+        let has_room = kept.len() < MOST_KEPT && held + buffers.bytes() <= MOST_BYTES;
+        if buffers.may_serve_again() && has_room {
             kept.push(Kept {
                 instances: Arc::downgrade(instances),
                 outputs: *outputs,

@@ -191,7 +191,8 @@ impl Pyramid {
             no_atlas: AtomicBool::new(false),
             atlas: Locked::default(),
             reduced: Arc::default(),
-            view: RecordedUniform::new(gpu, "hiz.cull.view_uniform", KEPT_IMAGES)?,
+            // Culls read each image, or the atlas.
+            view: RecordedUniform::new(gpu, "hiz.cull.view_uniform", KEPT_IMAGES + 1)?,
             sources: Kept::new(KEPT_IMAGES),
             steps,
         })
