@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::headless::adapter::{self, ADAPTER_VARIABLE, AdapterSummary};
 use crate::headless::process::Process;
 use crate::headless::readback;
+use crate::headless::single::KeptDepth;
 use crate::host::threads::Locked;
 use crate::input::image::MAX_IMAGE_SIDE;
 
@@ -66,6 +67,8 @@ struct Shared {
     /// `uncaught`: an error that no scope caught.
     lost: Arc<Locked<Option<String>>>,
     uncaught: Arc<Locked<Option<String>>>,
+    /// What single culls keep for the next one.
+    kept_depth: Locked<Option<KeptDepth>>,
 }
 
 impl Drop for Shared {
@@ -149,6 +152,7 @@ impl Engine {
                 adapter: summary,
                 lost,
                 uncaught,
+                kept_depth: Locked::default(),
             }),
         })
     }
@@ -193,6 +197,10 @@ impl Engine {
     /// - [`Error::OtherProcess`] in a fork.
     pub fn wait(&self) -> Result<()> {
         self.scoped(|| readback::wait(self.device(), None))
+    }
+
+    pub(super) fn kept_depth(&self) -> &Locked<Option<KeptDepth>> {
+        &self.shared.kept_depth
     }
 
     pub(super) fn encoder(&self, label: &str) -> wgpu::CommandEncoder {

@@ -9,6 +9,8 @@
 //! 4. `cull` submits a cull; `culling` reads its answers, through `counts`, `explanation` and
 //!    `readback`.
 //!
+//! 5. `single` does all of that at once, for bounds that are used once.
+//!
 //! `process` guards all of them against forks.
 //! This is the only room that submits, waits and maps buffers for reading; it decides no geometry.
 //!
@@ -53,6 +55,7 @@ mod explanation;
 mod levels;
 mod process;
 pub(crate) mod readback;
+mod single;
 mod uploads;
 
 pub use adapter::{ADAPTER_VARIABLE, AdapterSummary, INSTALL_HINT, adapters};
@@ -61,3 +64,4 @@ pub use culling::Culling;
 pub use depth_image::DepthImage;
 pub use engine::Engine;
 pub use explanation::Explanation;
+pub use single::SingleCull;
