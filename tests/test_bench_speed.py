@@ -36,6 +36,7 @@ TINY = Workload(
     counts=(100, 1_000),
     sides=(16, 32),
     large=4_000,
+    small_image=(30, 40),
 )
 
 #: What is to be reached, and whether it is a lower bound, as the issue words it.
@@ -56,6 +57,9 @@ TARGETS = {
     "cull.many.groups": (2.0, False),
     "calls.beyond": (1.0, False),
     "calls.small": (3.0, False),
+    "arrays.720p.z, float32": (1.5, False),
+    "arrays.1080p.z, uint16": (1.5, False),
+    "arrays.4K.distance, float32": (1.5, False),
 }
 #: What is told beside them.
 TOLD = (
@@ -73,6 +77,8 @@ TOLD = (
     "calls.small_unread",
     "others.numpy, cull",
     "transfers.upload.Morton",
+    "arrays.4K.distance, float64",
+    "arrays.visible",
     "transfers.upload.given",
     "transfers.update.1",
     "transfers.update.100",
