@@ -9,7 +9,7 @@ struct Vertex {
 }
 
 // One copy of a mesh: the rows of clip space about the eye, in the mesh's space, with w near 1.
-// Twin: `CopyRecord` in `crates/hiz_core/src/occluders/device_raster.rs`.
+// Twin: `CopyRecord` in `crates/hiz_core/src/occluders/device_meshes.rs`.
 struct Copy {
     @location(2) clip_x: vec4<f32>,
     @location(3) clip_y: vec4<f32>,

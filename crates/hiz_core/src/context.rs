@@ -21,8 +21,9 @@ use crate::instances::update::record_update;
 use crate::instances::{InstanceOptions, Instances};
 use crate::occluders::depth::OccluderDepth;
 use crate::occluders::device_raster::record_occluders;
+use crate::occluders::drawing::OccluderOptions;
 use crate::occluders::drawing::{DrawOptions, Rasteriser, Touched};
-use crate::occluders::{OccluderOptions, Occluders};
+use crate::occluders::uploaded::Occluders;
 use crate::output::outputs::Outputs;
 use crate::output::visible::Visible;
 use crate::pyramid::reduce::record_reduce;
@@ -480,7 +481,7 @@ fn needed(have: &wgpu::Limits) -> Vec<(&'static str, u64, u64)> {
         // The verdicts of a row of records, and the row itself in its staging buffer.
         max_storage_buffer_binding_size >= 8192,
         max_buffer_size >= 65_536,
-        // Occluders: vertices and copies (`occluders/device_raster.rs`).
+        // Occluders: vertices and copies (`occluders/device_meshes.rs`).
         max_vertex_buffers >= 2,
         max_vertex_attributes >= 8,
         max_vertex_buffer_array_stride >= 88,

@@ -12,10 +12,10 @@ use crate::input::camera::Camera;
 use crate::input::depth::{Conversion, DepthInput};
 use crate::input::image::ImageSize;
 use crate::input::tolerance::DepthTolerance;
-use crate::occluders::Occluders;
 use crate::occluders::depth::OccluderDepth;
 use crate::occluders::drawing::{DepthLoad, DrawOptions, Rasteriser, Touched};
 use crate::occluders::surface::ConservativeDepthOptions;
+use crate::occluders::uploaded::Occluders;
 
 /// Bytes of an upload's staging buffer at most.
 /// Larger images are uploaded in bands of rows.

@@ -9,7 +9,8 @@ use crate::input::bounds::Bounds;
 use crate::input::mesh::MeshData;
 use crate::instances::update::record_update;
 use crate::instances::{InstanceOptions, Instances};
-use crate::occluders::{OccluderOptions, Occluders};
+use crate::occluders::drawing::OccluderOptions;
+use crate::occluders::uploaded::Occluders;
 
 impl Engine {
     /// Uploads bounding volumes.

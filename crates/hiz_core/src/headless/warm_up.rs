@@ -8,7 +8,7 @@ use crate::headless::engine::Engine;
 use crate::input::camera::Camera;
 use crate::instances::Instances;
 use crate::instances::update::record_idle_update;
-use crate::occluders::Occluders;
+use crate::occluders::uploaded::Occluders;
 use crate::output::outputs::Outputs;
 use crate::pyramid::PyramidOptions;
 

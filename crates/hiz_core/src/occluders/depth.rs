@@ -8,10 +8,10 @@ use crate::gpu::kept::Ring;
 use crate::host::threads::{Locked, cores};
 use crate::input::camera::Camera;
 use crate::input::image::{DepthConvention, ImageSize};
-use crate::occluders::Occluders;
 use crate::occluders::device_raster::{OCCLUDER_DEPTH_FORMAT, record_occluders};
 use crate::occluders::drawing::{DepthLoad, DrawOptions, Rasteriser, Touched};
 use crate::occluders::host_raster::{HostRaster, MOST_SIDE, Way};
+use crate::occluders::uploaded::Occluders;
 
 /// Staging buffers that an image keeps: two frames may be on their way.
 const STAGING_KEPT: usize = 2;

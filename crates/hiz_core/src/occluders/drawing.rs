@@ -1,7 +1,15 @@
 //! How occluders are drawn: by which rasteriser, into what, and which of them.
 
 use crate::error::{Error, Result};
+use crate::input::mesh::FaceCull;
 use crate::occluders::placement::Placement;
+
+/// How occluders are drawn, whenever they are.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct OccluderOptions {
+    /// Which triangles do not occlude; all occlude by default.
+    pub cull_mode: FaceCull,
+}
 
 /// Which rasteriser draws occluders into an [`OccluderDepth`](crate::OccluderDepth).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]

@@ -9,9 +9,9 @@ use crate::error::Result;
 use crate::headless::{Engine, readback};
 use crate::input::camera::Camera;
 use crate::instances::Instances;
-use crate::occluders::Occluders;
 use crate::occluders::device_raster::OCCLUDER_DEPTH_FORMAT;
 use crate::occluders::drawing::DrawOptions;
+use crate::occluders::uploaded::Occluders;
 use crate::output::outputs::Outputs;
 use crate::pyramid::PyramidOptions;
 

@@ -93,7 +93,7 @@ use crate::host::threads::{Locked, cores};
 use crate::input::bounds::Floats;
 use crate::input::camera::Camera;
 use crate::input::mesh::{FaceCull, MeshData};
-use crate::occluders::OccluderOptions;
+use crate::occluders::drawing::OccluderOptions;
 use crate::occluders::drawing::{DrawOptions, Touched};
 use crate::occluders::host_raster::{HostRaster, MOST_SIDE, Scene, Way};
 use crate::occluders::placement::Placement;

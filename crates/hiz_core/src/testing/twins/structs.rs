@@ -24,7 +24,7 @@ use crate::yardstick::reduce as yardstick;
 /// Structs that only a shader has: they lie in no buffer.
 const SHADER_ONLY_STRUCTS: &[&str] = &[
     "Candidate",
-    // Vertex inputs, which are found by location; see `occluders/device_raster.rs`.
+    // Vertex inputs, which are found by location; see `occluders/device_meshes.rs`.
     "Copy",
     "Vertex",
     "Extent",
