@@ -205,6 +205,13 @@ class Engine:
         options: CullOptions,
         outputs: Outputs,
     ) -> None: ...
+    def cull_once(
+        self,
+        bounds: tuple[str, Sequence[_Floats]],
+        camera: Camera,
+        depth: Pyramid | tuple[_Floats | npt.NDArray[np.uint16], str, float, Sequence[float], str],
+        options: CullOptions,
+    ) -> tuple[npt.NDArray[np.bool_], Counts]: ...
     def wait(self) -> None: ...
     def wait_without_guard(self) -> None: ...
 

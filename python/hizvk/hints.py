@@ -9,7 +9,7 @@ gets none.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
 
 import numpy as np
 
@@ -19,12 +19,12 @@ from .camera import Camera
 if TYPE_CHECKING:
     import numpy.typing as npt
 
+    from ._core import Counts
     from .bounds import Bounds
     from .options import CullOptions
     from .resources import Pyramid
-    from .stats import CullStats
 
-__all__ = ["Question", "posed_otherwise"]
+__all__ = ["Counted", "Question", "Tally", "posed_otherwise"]
 
 #: The most instances whose middles are looked at through other poses.
 MOST_MIDDLES: Final = 4096
@@ -38,6 +38,51 @@ COARSE: Final = 3
 TURNED: Final = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
+class Counted(Protocol):
+    """How many instances got which verdict, as in `CullStats`."""
+
+    @property
+    def tested(self) -> int:
+        """Instances."""
+        ...
+
+    @property
+    def outside(self) -> int:
+        """Culled: outside of the view."""
+        ...
+
+    @property
+    def occluded(self) -> int:
+        """Culled: hidden."""
+        ...
+
+    @property
+    def kept(self) -> int:
+        """Not culled."""
+        ...
+
+    @property
+    def invalid(self) -> int:
+        """Kept because their bounds are invalid."""
+        ...
+
+
+class Tally(NamedTuple):
+    """The fields of `CullStats` that hints look at."""
+
+    tested: int
+    outside: int
+    occluded: int
+    kept: int
+    invalid: int
+
+    @classmethod
+    def of(cls, counts: Counts) -> Tally:
+        """From the counts of a cull."""
+        kept = counts.visible + counts.invalid
+        return cls(counts.tested, counts.outside, counts.occluded, kept, counts.invalid)
+
+
 @dataclass(frozen=True, eq=False)
 class Question:
     """What a cull was asked, for hints."""
@@ -48,12 +93,12 @@ class Question:
     points: bool
     """Whether all bounds have size zero."""
 
-    def hints(self, stats: CullStats, bounds: Bounds | None = None) -> tuple[str, ...]:
+    def hints(self, stats: Counted, bounds: Bounds | None = None) -> tuple[str, ...]:
         """What looks like a mistake, in whole sentences; empty if nothing does.
 
         Parameters
         ----------
-        stats : CullStats
+        stats : CullStats or Tally
             The answer.
         bounds : Spheres, Boxes or OrientedBoxes, optional
             What was tested, to find the pose that was meant.

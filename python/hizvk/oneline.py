@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 from . import _arguments
 from ._processes import per_process
-from .bounds import Bounds, as_arrays
+from .bounds import Bounds, are_points, as_arrays
 from .camera import Camera
 from .depth import checked_image
 from .device import Device, maker_of
 from .errors import HizWarning
+from .hints import Counted, Question, Tally
 from .options import Outputs, cull_options
-from .resources import DepthImage
+from .resources import DepthImage, Pyramid
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -43,8 +44,8 @@ class _Default:
             return self.device
 
 
-#: The answer, and the counts that hints look at.
-_MASK_AND_COUNTS = Outputs(mask=True, verdicts=True, indices=False, draws=False)
+#: The counts that hints look at.
+_COUNTS = Outputs(mask=False, verdicts=True, indices=False, draws=False)
 
 _defaults: dict[int, _Default] = {}
 
@@ -71,6 +72,13 @@ def visible(
     False is only what is surely outside the view or surely behind the depth image.
     For many calls with the same bounds, upload them once (`Device.instances`) and use
     `Device.cull`.
+
+    The bounds are not sorted, since they are used once: ``hierarchy=None`` tests each by itself.
+    They pass through the device in parts of 65,536, so the memory for them does not grow with N.
+    The device keeps the image and its pyramid for the next call with an image of the same size.
+    That is up to 64 MiB for the image and as much again for the pyramid.
+    An image of more than 2^24 pixels is not kept.
+    Calls from several threads at once each have their own.
 
     Parameters
     ----------
@@ -124,7 +132,7 @@ def visible(
     >>> hizvk.visible(boxes, camera, depth=image, kind="z").tolist()
     [True, False]
     """
-    as_arrays("bounds", bounds)
+    kind_and_arrays = as_arrays("bounds", bounds)
     _arguments.instance("camera", camera, Camera, "a Camera")
     options = cull_options(options, keywords)
     if device is not None:
@@ -140,13 +148,32 @@ def visible(
                 got = _arguments.describe(value)
                 raise TypeError(f"{name}: expected nothing beside a DepthImage, got {got}")
         pyramid = device.pyramid(depth, scale=scale)
+        mask, counts = device._engine.cull_once(
+            kind_and_arrays, camera._inner, pyramid._inner, options
+        )
+
+        def pyramid_again() -> Pyramid:
+            return pyramid
+
     else:
         if device is not None:
             device._check_side(camera)
         image = checked_image("depth", depth, camera, kind, scale, invalid)
-        device = default_device() if device is None else device
-        pyramid = device._pyramid_of(image, camera, _arguments.stored_levels("levels", None))
-    result = device.cull(device.instances(bounds), camera, pyramid, options, _MASK_AND_COUNTS)
-    for hint in result._question.hints(result.stats, bounds):
-        warnings.warn(hint, HizWarning, stacklevel=2)
-    return result.mask.copy()
+        maker = device = default_device() if device is None else device
+        mask, counts = device._engine.cull_once(kind_and_arrays, camera._inner, image, options)
+        stored = _arguments.stored_levels("levels", None)
+
+        def pyramid_again() -> Pyramid:
+            return maker._pyramid_of(image, camera, stored)
+
+    points = options.coverage == "sample" and are_points(bounds)
+    # What hides some of the first bounds gives no cause for a hint.
+    if points or not counts.occluded:
+        tally: Counted = Tally.of(counts)
+        question = Question(camera, pyramid_again(), options, points)
+        if tally.tested < len(bounds) and not points:
+            instances = device.instances(bounds, order="given")
+            tally = device.cull(instances, camera, question.pyramid, options, _COUNTS).stats
+        for hint in question.hints(tally, bounds):
+            warnings.warn(hint, HizWarning, stacklevel=2)
+    return mask

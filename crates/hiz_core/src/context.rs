@@ -206,7 +206,7 @@ impl HizContext {
         bounds: &Bounds<'_>,
         options: &InstanceOptions,
     ) -> Result<Instances> {
-        Instances::new(&self.gpu, bounds, options, |copies, _| {
+        Instances::new(&self.gpu, bounds, options, true, |copies, _| {
             self.gpu.recorded(|| {
                 copies(encoder);
                 Ok(())

@@ -174,7 +174,7 @@ pub use error::{Error, Result};
 pub use host::linear::{Mat3, Mat4, Vec3};
 pub use input::bounds::{Bounds, BoundsKind, Floats};
 pub use input::camera::Camera;
-pub use input::depth::{ndc_from_kind, ndc_from_kind_within};
+pub use input::depth::{DepthInput, ndc_from_kind, ndc_from_kind_within};
 pub use input::depth_kind::DepthKind;
 pub use input::depth_numbers::DepthNumbers;
 pub use input::image::{DepthConvention, ImageSize, MAX_IMAGE_SIDE};

@@ -1,6 +1,8 @@
 //! Arrays and words from Python as the engine's borrowed types.
 
-use hiz_core::{Bounds, DepthConvention, DepthKind, DepthNumbers, Floats, ImageSize};
+use hiz_core::{
+    Bounds, DepthConvention, DepthInput, DepthKind, DepthNumbers, DepthTolerance, Floats, ImageSize,
+};
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -84,6 +86,25 @@ pub(crate) fn bounds<'a>(kind: &str, arrays: &'a [FloatArray<'_>]) -> PyResult<B
             arrays.len()
         ))),
     }
+}
+
+/// A depth image, and what its numbers mean.
+/// `rounding` says to which floats they were rounded before: "none", "single" or "half".
+pub(crate) fn depth_input<'a>(
+    image: &'a DepthArray<'_>,
+    kind: &str,
+    scale: f64,
+    invalid: &'a [f64],
+    rounding: &str,
+) -> PyResult<DepthInput<'a>> {
+    let tolerance = match rounding {
+        "none" => DepthTolerance::NONE,
+        "single" => DepthTolerance::SINGLE,
+        "half" => DepthTolerance::HALF,
+        other => return Err(PyValueError::new_err(format!("rounding: no rounding {other:?}"))),
+    };
+    let numbers = image.numbers(rounding == "half")?;
+    Ok(DepthInput { numbers, kind: depth_kind(kind)?, scale, invalid, tolerance })
 }
 
 /// The meaning of a depth image's numbers.

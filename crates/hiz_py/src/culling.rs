@@ -41,20 +41,7 @@ impl Culling {
     }
 
     fn counts(&self, py: Python<'_>) -> PyResult<Counts> {
-        let counts = self.0.run(py, headless::Culling::counts)?;
-        Ok(Counts {
-            tested: counts.tested,
-            outside: counts.outside,
-            occluded: counts.occluded,
-            visible: counts.visible,
-            invalid: counts.invalid,
-            demand: counts.demand,
-            written: counts.written,
-            tested_groups: counts.tested_groups,
-            tested_instances: counts.tested_instances,
-            levels: counts.levels,
-            texels_read: counts.texels_read,
-        })
+        Ok(Counts::of(&self.0.run(py, headless::Culling::counts)?))
     }
 
     /// How many instances were kept, if that is known, and how many of them are listed.
@@ -87,6 +74,24 @@ pub(crate) struct Counts {
     tested_instances: u64,
     levels: [u64; 16],
     texels_read: u64,
+}
+
+impl Counts {
+    pub(crate) fn of(counts: &headless::Counts) -> Self {
+        Self {
+            tested: counts.tested,
+            outside: counts.outside,
+            occluded: counts.occluded,
+            visible: counts.visible,
+            invalid: counts.invalid,
+            demand: counts.demand,
+            written: counts.written,
+            tested_groups: counts.tested_groups,
+            tested_instances: counts.tested_instances,
+            levels: counts.levels,
+            texels_read: counts.texels_read,
+        }
+    }
 }
 
 /// How one verdict came about.

@@ -4,18 +4,27 @@ use std::sync::Arc;
 
 use hiz_core::headless::{self, AdapterSummary};
 use hiz_core::{
-    ConservativeDepthOptions, DepthLoad, DepthTolerance, DrawOptions, FaceCull, InstanceOptions,
-    MeshData, OccluderOptions, Only, PyramidOptions, Rasteriser, StoredLevels, StoredOrder,
+    ConservativeDepthOptions, DepthLoad, DrawOptions, FaceCull, InstanceOptions, MeshData,
+    OccluderOptions, Only, PyramidOptions, Rasteriser, StoredLevels, StoredOrder,
 };
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arguments::{DepthArray, FloatArray, LevelArray, bounds, depth_kind, in_c_order};
+use crate::arguments::{DepthArray, FloatArray, LevelArray, bounds, depth_input, in_c_order};
 use crate::camera::Camera;
-use crate::culling::Culling;
+use crate::culling::{Counts, Culling};
 use crate::held::{Held, OnDevice, detached};
-use crate::options::Request;
+use crate::options::{Request, cull_options};
+
+/// The depth of a single cull.
+#[derive(FromPyObject)]
+enum SingleDepth<'py> {
+    #[pyo3(transparent, annotation = "Pyramid")]
+    Pyramid(Bound<'py, Pyramid>),
+    #[pyo3(annotation = "image, kind, scale, invalid, rounding")]
+    Image(DepthArray<'py>, String, f64, Vec<f64>, String),
+}
 
 /// Index, name, driver, version of the driver, backend, device type.
 type Summary = (usize, String, String, String, String, String);
@@ -212,19 +221,37 @@ impl Engine {
         rounding: &str,
         camera: &Camera,
     ) -> PyResult<DepthImage> {
-        let (image, kind) = (image.numbers(rounding == "half")?, depth_kind(kind)?);
-        let tolerance = match rounding {
-            "none" => DepthTolerance::NONE,
-            "single" => DepthTolerance::SINGLE,
-            "half" => DepthTolerance::HALF,
-            other => return Err(PyValueError::new_err(format!("rounding: no rounding {other:?}"))),
-        };
+        let depth = depth_input(&image, kind, scale, &invalid, rounding)?;
         let camera = &camera.0;
         self.0
-            .run(py, |engine| {
-                engine.upload_depth_of_kind(image, kind, scale, &invalid, camera, tolerance)
-            })
+            .run(py, |engine| engine.upload_depth_of_kind(&depth, camera))
             .map(|depth| DepthImage(Held::new(py, depth)))
+    }
+
+    /// The mask of bounds that are used once, and the counts of the first of them.
+    /// `depth` is what `upload_depth` takes, or a pyramid.
+    fn cull_once<'py>(
+        &self,
+        py: Python<'py>,
+        bounds: (&str, Vec<FloatArray<'_>>),
+        camera: &Camera,
+        depth: SingleDepth<'py>,
+        options: &Bound<'_, PyAny>,
+    ) -> PyResult<(Bound<'py, PyArray1<bool>>, Counts)> {
+        let bounds = self::bounds(bounds.0, &bounds.1)?;
+        let (options, camera) = (cull_options(options)?, &camera.0);
+        let answer = match &depth {
+            SingleDepth::Pyramid(pyramid) => {
+                let pyramid = pyramid.get().0.get(py)?;
+                self.0.run(py, |engine| engine.cull_once(&bounds, camera, &pyramid.1, &options))
+            }
+            SingleDepth::Image(image, kind, scale, invalid, rounding) => {
+                let depth = depth_input(image, kind, *scale, invalid, rounding)?;
+                self.0
+                    .run(py, |engine| engine.cull_once_by_depth(&bounds, camera, &depth, &options))
+            }
+        }?;
+        Ok((PyArray1::from_vec(py, answer.mask), Counts::of(&answer.first_counts)))
     }
 
     fn pyramid(&self, py: Python<'_>, depth: &DepthImage, levels: (u32, u32)) -> PyResult<Pyramid> {

@@ -21,7 +21,7 @@ impl Request {
     }
 }
 
-fn cull_options(given: &Bound<'_, PyAny>) -> PyResult<CullOptions> {
+pub(crate) fn cull_options(given: &Bound<'_, PyAny>) -> PyResult<CullOptions> {
     Ok(CullOptions {
         order: match word(given, "order")?.as_ref() {
             "stable" => Order::Stable,

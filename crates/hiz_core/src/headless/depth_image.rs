@@ -9,9 +9,7 @@ use crate::headless::readback::{self, to_u32};
 use crate::host::memory;
 use crate::host::threads::{Locked, on_threads};
 use crate::input::camera::Camera;
-use crate::input::depth::Conversion;
-use crate::input::depth_kind::DepthKind;
-use crate::input::depth_numbers::DepthNumbers;
+use crate::input::depth::{Conversion, DepthInput};
 use crate::input::image::ImageSize;
 use crate::input::tolerance::DepthTolerance;
 use crate::occluders::Occluders;
@@ -153,60 +151,85 @@ impl DepthImage {
                 ),
             ));
         }
-        engine.scoped(|| {
-            let image = Self::for_upload(engine, kind, camera)?;
-            let rows_at_once = (STAGING_BYTES / (4 * size.width)).max(1);
-            for (band, rows) in (0..).zip(ndc.chunks((rows_at_once * size.width) as usize)) {
-                image.write_rows(band * rows_at_once, rows, kind.pixels_of_texel());
-                if band > 0 {
-                    // An empty submit releases the staging buffer of the previous band.
-                    engine.queue().submit([]);
-                }
-            }
-            Ok(image)
-        })
+        let image = Self::for_upload_as(engine, kind, camera)?;
+        engine.scoped(|| image.write(ndc, kind))?;
+        Ok(image)
     }
 
-    /// An image that holds what `conversion` makes.
-    /// Each thread converts bands of rows and writes them to the image while they are in its cache.
-    fn converted(engine: &Engine, conversion: &Conversion<'_>, camera: &Camera) -> Result<Self> {
-        let (size, kind) = (camera.size(), SourceKind::Bits);
-        engine.scoped(|| {
-            let image = Self::for_upload(engine, kind, camera)?;
-            let gpu = &engine.context().gpu;
-            let rows_at_once = conversion.band_rows();
-            let bands = (0..size.height).step_by(rows_at_once as usize);
-            // One for each thread, however many bands it converts.
-            let spare_bands: Locked<Vec<Vec<f32>>> = Locked::default();
-            let failed: Locked<Option<Error>> = Locked::default();
-            on_threads(conversion.threads(), bands, |first| {
-                let mut band = spare_bands.lock().pop().unwrap_or_default();
-                band.resize((rows_at_once.min(size.height - first) * size.width) as usize, 0.0);
-                conversion.rows(first, &mut band);
-                // Error scopes belong to a thread.
-                let written =
-                    gpu.checked(|_| image.write_rows(first, &band, kind.pixels_of_texel()));
-                if let Err(error) = written {
-                    failed.lock().get_or_insert(error);
-                }
-                spare_bands.lock().push(band);
-            });
-            match failed.lock().take() {
-                Some(error) => Err(error),
-                None => Ok(Self { tolerance: conversion.left(), ..image }),
+    /// Writes all pixels in bands of rows.
+    fn write(&self, ndc: &[f32], kind: SourceKind) -> Result<()> {
+        let width = self.size().width;
+        let rows_at_once = (STAGING_BYTES / (4 * width)).max(1);
+        for (band, rows) in (0..).zip(ndc.chunks((rows_at_once * width) as usize)) {
+            self.write_rows(band * rows_at_once, rows, kind.pixels_of_texel());
+            if band > 0 {
+                // An empty submit releases the staging buffer of the previous band.
+                self.engine.queue().submit([]);
             }
-        })
+        }
+        Ok(())
+    }
+
+    /// The same image with the contents that `depth` describes.
+    pub(super) fn filled(self, depth: &DepthInput<'_>) -> Result<Self> {
+        let conversion = Conversion::new(depth, &self.camera)?;
+        let engine = self.engine.clone();
+        engine.scoped(|| match conversion.unchanged() {
+            // The numbers already are what is uploaded, so they are not copied.
+            Some(ndc) => self.write(ndc, SourceKind::Bits),
+            None => self.write_converted(&conversion),
+        })?;
+        Ok(Self { tolerance: conversion.left(), ..self })
+    }
+
+    /// Writes what `conversion` makes.
+    /// Each thread converts bands of rows and writes them while they are in its cache.
+    fn write_converted(&self, conversion: &Conversion<'_>) -> Result<()> {
+        let (size, gpu) = (self.size(), &self.engine.context().gpu);
+        let pixels_of_texel = SourceKind::Bits.pixels_of_texel();
+        let rows_at_once = conversion.band_rows();
+        let bands = (0..size.height).step_by(rows_at_once as usize);
+        // One for each thread, however many bands it converts.
+        let spare_bands: Locked<Vec<Vec<f32>>> = Locked::default();
+        let failed: Locked<Option<Error>> = Locked::default();
+        on_threads(conversion.threads(), bands, |first| {
+            let mut band = spare_bands.lock().pop().unwrap_or_default();
+            band.resize((rows_at_once.min(size.height - first) * size.width) as usize, 0.0);
+            conversion.rows(first, &mut band);
+            // Error scopes belong to a thread.
+            let written = gpu.checked(|_| self.write_rows(first, &band, pixels_of_texel));
+            if let Err(error) = written {
+                failed.lock().get_or_insert(error);
+            }
+            spare_bands.lock().push(band);
+        });
+        failed.lock().take().map_or(Ok(()), Err)
+    }
+
+    /// An image in a texture of [`DepthImage::for_upload`] that is there already.
+    pub(super) fn again(
+        engine: &Engine,
+        texture: wgpu::Texture,
+        view: wgpu::TextureView,
+        camera: &Camera,
+    ) -> Self {
+        let (engine, camera) = (engine.clone(), camera.clone());
+        Self { engine, texture, view, camera, tolerance: DepthTolerance::NONE, drawn: None }
     }
 
     /// An image without contents, to be written from the host.
-    fn for_upload(engine: &Engine, kind: SourceKind, camera: &Camera) -> Result<Self> {
+    pub(super) fn for_upload(engine: &Engine, camera: &Camera) -> Result<Self> {
+        Self::for_upload_as(engine, SourceKind::Bits, camera)
+    }
+
+    fn for_upload_as(engine: &Engine, kind: SourceKind, camera: &Camera) -> Result<Self> {
         let format = if kind == SourceKind::Bits {
             wgpu::TextureFormat::Rgba32Uint
         } else {
             wgpu::TextureFormat::R32Float
         };
         let usage = kind.usage() | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC;
-        Self::new(engine, camera, format, usage)
+        engine.scoped(|| Self::new(engine, camera, format, usage))
     }
 
     /// Writes whole rows, the first of which is row `first`.
@@ -355,26 +378,17 @@ impl Engine {
     }
 
     /// Uploads depth of any kind, and converts it on all cores on its way.
-    /// The parameters are those of [`ndc_from_kind_within`](crate::ndc_from_kind_within).
     ///
     /// # Errors
-    /// Those of [`Engine::upload_depth`] and
-    /// [`ndc_from_kind_within`](crate::ndc_from_kind_within).
-    pub fn upload_depth_of_kind<'a>(
+    /// Those of [`Engine::upload_depth`] and [`ndc_from_kind`](crate::ndc_from_kind), and
+    /// [`Error::Invalid`] for a tolerance outside 0..=0.5.
+    pub fn upload_depth_of_kind(
         &self,
-        image: impl Into<DepthNumbers<'a>>,
-        kind: DepthKind,
-        scale: f64,
-        invalid: &[f64],
+        depth: &DepthInput<'_>,
         camera: &Camera,
-        tolerance: DepthTolerance,
     ) -> Result<DepthImage> {
-        let conversion = Conversion::new(image.into(), kind, scale, invalid, camera, tolerance)?;
-        match conversion.unchanged() {
-            // The numbers already are what is uploaded, so they are not copied.
-            Some(ndc) => self.upload_depth_within(ndc, camera, tolerance),
-            None => DepthImage::converted(self, &conversion, camera),
-        }
+        self.check_process()?;
+        DepthImage::for_upload(self, camera)?.filled(depth)
     }
 
     /// [`Engine::upload_depth`] into a float texture, for tests.

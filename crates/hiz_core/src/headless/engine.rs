@@ -9,6 +9,7 @@ use crate::headless::answers::Answers;
 use crate::headless::images::Images;
 use crate::headless::process::Process;
 use crate::headless::readback;
+use crate::headless::single::KeptDepth;
 use crate::host::threads::Locked;
 use crate::input::image::MAX_IMAGE_SIDE;
 
@@ -70,6 +71,8 @@ struct Shared {
     /// `uncaught`: an error that no scope caught.
     lost: Arc<Locked<Option<String>>>,
     uncaught: Arc<Locked<Option<String>>>,
+    /// What single culls keep for the next one.
+    kept_depth: Locked<Option<KeptDepth>>,
 }
 
 impl Drop for Shared {
@@ -155,6 +158,7 @@ impl Engine {
                 adapter: summary,
                 lost,
                 uncaught,
+                kept_depth: Locked::default(),
             }),
         })
     }
@@ -209,6 +213,10 @@ impl Engine {
     /// - [`Error::OtherProcess`] in a fork.
     pub fn wait(&self) -> Result<()> {
         self.scoped(|| readback::wait(self.device(), None))
+    }
+
+    pub(super) fn kept_depth(&self) -> &Locked<Option<KeptDepth>> {
+        &self.shared.kept_depth
     }
 
     pub(super) fn encoder(&self, label: &str) -> wgpu::CommandEncoder {

@@ -37,15 +37,25 @@ impl Engine {
         self.context().gpu.check_context("depth", depth.engine.context().gpu.id())?;
         self.scoped(|| {
             let pyramid = self.context().create_pyramid(depth.size(), options)?;
-            let mut encoder = self.encoder("hiz.reduce.encoder");
-            let DepthImage { view, camera, tolerance, .. } = depth;
-            record_reduce(&self.context().gpu, &mut encoder, view, camera, &pyramid, *tolerance)?;
             if let Some(drawn) = &depth.drawn {
                 pyramid.keep_with_it(Arc::clone(drawn) as Arc<dyn Owner>);
             }
-            self.queue().submit([encoder.finish()]);
+            self.submit_reduce(depth, &pyramid)?;
             Ok(Arc::new(pyramid))
         })
+    }
+
+    /// Builds a pyramid anew from an image of its size.
+    pub(super) fn reduce(&self, depth: &DepthImage, pyramid: &Pyramid) -> Result<()> {
+        self.scoped(|| self.submit_reduce(depth, pyramid))
+    }
+
+    fn submit_reduce(&self, depth: &DepthImage, pyramid: &Pyramid) -> Result<()> {
+        let mut encoder = self.encoder("hiz.reduce.encoder");
+        let DepthImage { view, camera, tolerance, .. } = depth;
+        record_reduce(&self.context().gpu, &mut encoder, view, camera, pyramid, *tolerance)?;
+        self.queue().submit([encoder.finish()]);
+        Ok(())
     }
 
     /// Reads a level of a pyramid: one float32 per texel, sanitised NDC depth, row 0 on top.

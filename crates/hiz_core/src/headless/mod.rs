@@ -9,6 +9,7 @@
 //! 4. `cull` submits a cull into buffers of `answers`; `culling` reads them, through `counts`,
 //!    `explanation` and `readback`.
 //!
+//! `single` does all of that at once, for bounds that are used once.
 //! `warm_up` runs a frame before the first one.
 //! `process` guards all of them against forks.
 //! This is the only room that submits, waits and maps buffers for reading; it decides no geometry.
@@ -56,6 +57,7 @@ mod images;
 mod levels;
 mod process;
 pub(crate) mod readback;
+mod single;
 mod uploads;
 mod warm_up;
 
@@ -65,3 +67,4 @@ pub use culling::Culling;
 pub use depth_image::DepthImage;
 pub use engine::Engine;
 pub use explanation::Explanation;
+pub use single::SingleCull;

@@ -22,6 +22,16 @@ impl Engine {
         bounds: &Bounds<'_>,
         options: &InstanceOptions,
     ) -> Result<Arc<Instances>> {
+        self.instances_for(bounds, options, true)
+    }
+
+    /// [`Engine::instances`], without groups for a single cull that tests none.
+    pub(super) fn instances_for(
+        &self,
+        bounds: &Bounds<'_>,
+        options: &InstanceOptions,
+        has_groups: bool,
+    ) -> Result<Arc<Instances>> {
         // Waits after each piece, so that only one piece has a staging buffer at a time.
         let copy = |copies: &dyn Fn(&mut wgpu::CommandEncoder), more: bool| {
             let mut encoder = self.encoder("hiz.instances.encoder");
@@ -29,7 +39,8 @@ impl Engine {
             let submission = self.queue().submit([encoder.finish()]);
             if more { readback::wait(self.device(), Some(submission)) } else { Ok(()) }
         };
-        self.scoped(|| Instances::new(&self.context().gpu, bounds, options, copy)).map(Arc::new)
+        let gpu = &self.context().gpu;
+        self.scoped(|| Instances::new(gpu, bounds, options, has_groups, copy)).map(Arc::new)
     }
 
     /// Replaces the bounds of instances `first..first + n`: it records and submits.

@@ -3,8 +3,6 @@
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{Builder, available_parallelism, scope};
 
-use crate::error::Result;
-
 /// A value behind a lock that ignores poisoning.
 ///
 /// That is safe here: values are replaced as a whole, so a panic leaves no half-written one.
@@ -22,14 +20,12 @@ impl<T> Locked<T> {
     }
 }
 
-#[allow(dead_code, reason = "the rasteriser on the host is being built on it")]
 /// How many threads this process may run at once; asked of the system once.
 pub(crate) fn cores() -> usize {
     static CORES: OnceLock<usize> = OnceLock::new();
     *CORES.get_or_init(|| available_parallelism().map_or(1, usize::from))
 }
 
-#[allow(dead_code, reason = "the rasteriser on the host is being built on it")]
 /// Runs `work` on every part, on at most `threads` threads; this one is the first of them.
 ///
 /// The parts are handed out in their order, each to the next thread that is free.
@@ -57,38 +53,9 @@ pub(crate) fn on_threads<T: Send>(
     });
 }
 
-/// Runs `work` on both halves of a job at the same time.
-///
-/// The halves run one after the other where no thread can be spawned.
-/// Without a first half everything runs on this thread.
-/// If both halves fail, the error of the first one is returned.
-pub(crate) fn on_two_threads<T: Send>(
-    first: Option<T>,
-    second: T,
-    work: impl Fn(T) -> Result<()> + Sync,
-) -> Result<()> {
-    let is_split = first.is_some();
-    let waiting = Locked::new(first);
-    let run_first = || {
-        let half = waiting.lock().take();
-        half.map_or(Ok(()), &work)
-    };
-    scope(|scope| {
-        let thread =
-            if is_split { Builder::new().spawn_scoped(scope, run_first).ok() } else { None };
-        let result = work(second);
-        let other = match thread {
-            Some(thread) => thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
-            None => run_first(),
-        };
-        other.and(result)
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Error;
 
     #[test]
     fn every_part_is_done_once_on_any_number_of_threads() {
@@ -100,27 +67,5 @@ mod tests {
             assert_eq!(numbers, [1; 37]);
         }
         on_threads(cores(), std::iter::empty::<usize>(), |_| unreachable!());
-    }
-
-    #[test]
-    fn both_halves_are_done_and_either_error_comes_back() {
-        let mut numbers = [0; 7];
-        let (first, second) = numbers.split_at_mut(3);
-        let fill = |part: &mut [i32]| {
-            part.fill(1);
-            Ok(())
-        };
-        on_two_threads(Some(first), second, fill).unwrap();
-        assert_eq!(numbers, [1; 7]);
-        on_two_threads(None, &mut numbers[..], |part| {
-            part.fill(2);
-            Ok(())
-        })
-        .unwrap();
-        assert_eq!(numbers, [2; 7]);
-        let bad = |half| if half == 5 { Err(Error::invalid("half", "5")) } else { Ok(()) };
-        assert!(
-            on_two_threads(Some(5), 6, bad).is_err() && on_two_threads(Some(6), 5, bad).is_err()
-        );
     }
 }

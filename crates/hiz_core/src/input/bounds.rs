@@ -40,6 +40,14 @@ impl Floats<'_> {
         }
     }
 
+    /// The scalars of `range`.
+    pub(crate) fn part(&self, range: std::ops::Range<usize>) -> Self {
+        match self {
+            Self::F32(v) => Self::F32(&v[range]),
+            Self::F64(v) => Self::F64(&v[range]),
+        }
+    }
+
     #[inline]
     pub(crate) fn array<const N: usize>(&self, i: usize) -> [f64; N] {
         // Matched once per element, not per scalar: this is the inner loop of every upload.
@@ -124,7 +132,7 @@ pub enum BoundsKind {
     OrientedBox,
 }
 
-impl Bounds<'_> {
+impl<'a> Bounds<'a> {
     /// The kind of these volumes.
     pub fn kind(&self) -> BoundsKind {
         match self {
@@ -163,6 +171,23 @@ impl Bounds<'_> {
             }
         }
         Ok(n)
+    }
+
+    /// The bounds of the instances of `range`.
+    pub(crate) fn part(&self, range: &std::ops::Range<usize>) -> Self {
+        let of =
+            |array: &Floats<'a>, width: usize| array.part(width * range.start..width * range.end);
+        match self {
+            Self::Spheres { centers, radii } => {
+                Self::Spheres { centers: of(centers, 3), radii: of(radii, 1) }
+            }
+            Self::Boxes { min, max } => Self::Boxes { min: of(min, 3), max: of(max, 3) },
+            Self::OrientedBoxes { centers, half_sizes, rotations } => Self::OrientedBoxes {
+                centers: of(centers, 3),
+                half_sizes: of(half_sizes, 3),
+                rotations: of(rotations, 9),
+            },
+        }
     }
 
     /// Whether there are no instances.

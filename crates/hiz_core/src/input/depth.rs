@@ -103,7 +103,8 @@ pub fn ndc_from_kind_within<'a>(
     camera: &Camera,
     tolerance: DepthTolerance,
 ) -> Result<(Vec<f32>, DepthTolerance)> {
-    let conversion = Conversion::new(image.into(), kind, scale, invalid, camera, tolerance)?;
+    let input = DepthInput { numbers: image.into(), kind, scale, invalid, tolerance };
+    let conversion = Conversion::new(&input, camera)?;
     let mut ndc = memory::list(conversion.numbers.len(), "depth")?;
     ndc.resize(conversion.numbers.len(), 0.0);
     let bands = ndc.chunks_mut((conversion.band_rows() * conversion.size.width) as usize);
@@ -112,6 +113,22 @@ pub fn ndc_from_kind_within<'a>(
         conversion.rows(first, band);
     });
     Ok((ndc, conversion.left()))
+}
+
+/// A depth image of any kind, and what its numbers mean; the fields are the parameters of
+/// [`ndc_from_kind_within`].
+#[derive(Debug, Clone, Copy)]
+pub struct DepthInput<'a> {
+    /// One number per pixel, rows from top to bottom.
+    pub numbers: DepthNumbers<'a>,
+    /// What they are.
+    pub kind: DepthKind,
+    /// World units of one step; 1 for NDC depth.
+    pub scale: f64,
+    /// The numbers that mean "no data", before `scale`.
+    pub invalid: &'a [f64],
+    /// How far the numbers may have been rounded, before `scale`.
+    pub tolerance: DepthTolerance,
 }
 
 /// How the numbers of an image become NDC depth, rows at a time.
@@ -136,14 +153,8 @@ struct Metric {
 
 impl<'a> Conversion<'a> {
     /// Checks what was given; the errors are those of [`ndc_from_kind_within`].
-    pub(crate) fn new(
-        numbers: DepthNumbers<'a>,
-        kind: DepthKind,
-        scale: f64,
-        invalid: &[f64],
-        camera: &Camera,
-        tolerance: DepthTolerance,
-    ) -> Result<Self> {
+    pub(crate) fn new(input: &DepthInput<'a>, camera: &Camera) -> Result<Self> {
+        let DepthInput { numbers, kind, scale, invalid, tolerance } = *input;
         let (size, convention, tolerance) =
             (camera.size(), camera.convention(), tolerance.checked()?);
         if numbers.len() as u64 != size.pixels() {

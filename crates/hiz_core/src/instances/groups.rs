@@ -15,23 +15,45 @@
 //! - Once every member was moved at least once, the group is as tight as a new one.
 //! - A group that never moves, or moves as a whole, costs 88 bytes on the host.
 
-use wgpu::WriteOnly;
-
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::buffers::Mapped;
 use crate::host::memory;
-use crate::host::threads::on_two_threads;
-use crate::input::bounds::{Bounds, Floats};
+use crate::host::threads::{Locked, cores, on_threads};
+use crate::input::bounds::Bounds;
 use crate::instances::aabb::Aabb;
-use crate::instances::volume_record::{BoxRecord, OrientedBoxRecord};
+use crate::instances::batch::{Around, Batch, Boxes, Origin};
+use crate::instances::volume_record::BoxRecord;
 
 /// Members of a full group: as many as a `u64` has bits.
 /// Twin: `shaders/instances/groups.wgsl`, `GROUP`.
 pub(crate) const GROUP: usize = 64;
 
-/// From this many instances on, a second thread helps to pack.
-/// It takes tens of microseconds to start, and packing them takes hundreds.
-const PARALLEL_FROM: usize = 1 << 13;
+/// From this many instances on, more threads help to pack.
+/// One takes tens of microseconds to start, and packing them takes hundreds.
+const PARALLEL_FROM: usize = 1 << 14;
+
+/// Groups that one thread packs at a time.
+const PART: usize = 64;
+
+/// Runs `work` on the parts of `count` instances, on all cores where that pays.
+/// The first error is returned.
+fn on_parts<T: Send>(
+    count: usize,
+    parts: impl IntoIterator<Item = T, IntoIter: Send>,
+    work: impl Fn(T, &mut Batch) -> Result<()> + Sync,
+) -> Result<()> {
+    let failed: Locked<Option<Error>> = Locked::default();
+    // One for each thread, however many parts it packs.
+    let spare_batches: Locked<Vec<Box<Batch>>> = Locked::default();
+    on_threads(if count < PARALLEL_FROM { 1 } else { cores() }, parts, |part| {
+        let mut batch = spare_batches.lock().pop().unwrap_or_else(|| Box::new(Batch::new()));
+        if let Err(error) = work(part, &mut batch) {
+            failed.lock().get_or_insert(error);
+        }
+        spare_batches.lock().push(batch);
+    });
+    failed.lock().take().map_or(Ok(()), Err)
+}
 
 #[derive(Debug)]
 struct Group {
@@ -51,94 +73,6 @@ struct Group {
 pub(crate) struct Groups {
     count: usize,
     groups: Vec<Group>,
-}
-
-/// Where the instance at a place comes from.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Origin {
-    /// Its position in the given bounds.
-    pub(crate) bounds: usize,
-    /// The caller's index of the instance, relative to the piece's first.
-    pub(crate) index: u32,
-}
-
-/// Scratch memory for packing some members of one group.
-///
-/// The stored order scatters the reads over the caller's arrays.
-/// So all given numbers are fetched first, and the processor can wait for many loads at once.
-/// `threes`, `ones` and `nines` hold arrays of three, one and nine numbers per instance.
-/// The records are made here, too, and then copied as one block to the mapped staging buffer.
-struct Batch {
-    indices: [u32; GROUP],
-    threes: [[f64; 3 * GROUP]; 2],
-    ones: [f64; GROUP],
-    nines: [f64; 9 * GROUP],
-    records: [u8; GROUP * LARGEST_RECORD],
-}
-
-const LARGEST_RECORD: usize = size_of::<OrientedBoxRecord>();
-
-impl Batch {
-    fn new() -> Self {
-        Self {
-            indices: [0; GROUP],
-            threes: [[0.0; 3 * GROUP]; 2],
-            ones: [0.0; GROUP],
-            nines: [0.0; 9 * GROUP],
-            records: [0; GROUP * LARGEST_RECORD],
-        }
-    }
-
-    /// Packs the volumes `sources` of `bounds` into the beginning of `target`.
-    /// Calls `each` with the number of each volume and the box around it; `None` if its bounds are
-    /// invalid.
-    /// Returns the rest of `target`.
-    fn pack<'a>(
-        &mut self,
-        bounds: &Bounds<'_>,
-        sources: impl ExactSizeIterator<Item = Origin>,
-        target: WriteOnly<'a, [u8]>,
-        mut each: impl FnMut(usize, Option<Aabb>),
-    ) -> WriteOnly<'a, [u8]> {
-        let count = sources.len();
-        let Self { indices, threes: [first, second], ones, nines, records } = self;
-        for (k, Origin { bounds: i, index }) in sources.enumerate() {
-            indices[k] = index;
-            match bounds {
-                Bounds::Spheres { centers, radii } => {
-                    first[3 * k..3 * k + 3].copy_from_slice(&centers.array::<3>(i));
-                    ones[k] = radii.get(i);
-                }
-                Bounds::Boxes { min, max } => {
-                    first[3 * k..3 * k + 3].copy_from_slice(&min.array::<3>(i));
-                    second[3 * k..3 * k + 3].copy_from_slice(&max.array::<3>(i));
-                }
-                Bounds::OrientedBoxes { centers, half_sizes, rotations } => {
-                    first[3 * k..3 * k + 3].copy_from_slice(&centers.array::<3>(i));
-                    second[3 * k..3 * k + 3].copy_from_slice(&half_sizes.array::<3>(i));
-                    nines[9 * k..9 * k + 9].copy_from_slice(&rotations.array::<9>(i));
-                }
-            }
-        }
-        let (first, second) = (Floats::F64(first), Floats::F64(second));
-        let fetched = match bounds {
-            Bounds::Spheres { .. } => Bounds::Spheres { centers: first, radii: Floats::F64(ones) },
-            Bounds::Boxes { .. } => Bounds::Boxes { min: first, max: second },
-            Bounds::OrientedBoxes { .. } => Bounds::OrientedBoxes {
-                centers: first,
-                half_sizes: second,
-                rotations: Floats::F64(nines),
-            },
-        };
-        let record_bytes = bounds.kind().record_bytes() as usize;
-        for (k, record) in records.chunks_exact_mut(record_bytes).take(count).enumerate() {
-            let is_volume = fetched.write_record(k, indices[k], record);
-            each(k, fetched.aabb(k).filter(|_| is_volume));
-        }
-        let (mut here, rest) = target.split_at(count * record_bytes);
-        here.copy_from_slice(&records[..count * record_bytes]);
-        rest
-    }
 }
 
 impl Group {
@@ -199,27 +133,45 @@ impl Groups {
         let mut groups = memory::list(count.div_ceil(GROUP), "groups")?;
         groups.resize_with(count.div_ceil(GROUP), Group::new);
         let record_bytes = bounds.kind().record_bytes();
-        let work = |(begin, groups): (usize, &mut [Group])| -> Result<()> {
-            if groups.is_empty() {
-                return Ok(());
-            }
+        let parts = (0..).step_by(PART).zip(groups.chunks_mut(PART));
+        on_parts(count, parts, |(begin, groups): (usize, &mut [Group]), batch| {
             let (first, end) = (begin * GROUP, count.min((begin + groups.len()) * GROUP));
             let mut view = records.range(first as u64 * record_bytes..end as u64 * record_bytes)?;
             let mut rest = view.slice(..);
-            let mut batch = Batch::new();
             for (g, group) in (begin..).zip(groups) {
                 let sources = (g * GROUP..count.min((g + 1) * GROUP)).map(&source);
-                rest = batch.pack(bounds, sources, rest, |k, aabb| match aabb {
-                    Some(aabb) => group.around = group.around.union(&aabb),
-                    None => group.invalid |= 1 << k,
+                rest = batch.pack(bounds, sources, rest, Boxes::Whole, |told| match told {
+                    Around::All(aabb) | Around::One(_, Some(aabb)) => {
+                        group.around = group.around.union(&aabb);
+                    }
+                    Around::One(k, None) => group.invalid |= 1 << k,
                 });
             }
             Ok(())
-        };
-        let half = if count < PARALLEL_FROM { 0 } else { groups.len() / 2 };
-        let (first, second) = groups.split_at_mut(half);
-        on_two_threads((half > 0).then_some((0, first)), (half, second), work)?;
+        })?;
         Ok(Self { count, groups })
+    }
+
+    /// Writes the records of instances that are culled one by one, once: no groups are formed.
+    pub(crate) fn without_groups(
+        bounds: &Bounds<'_>,
+        count: usize,
+        source: impl Fn(usize) -> Origin + Sync,
+        records: &Mapped<'_>,
+    ) -> Result<Self> {
+        let record_bytes = bounds.kind().record_bytes();
+        let parts = (0..count).step_by(PART * GROUP);
+        on_parts(count, parts, |first: usize, batch| {
+            let end = count.min(first + PART * GROUP);
+            let mut view = records.range(first as u64 * record_bytes..end as u64 * record_bytes)?;
+            let mut rest = view.slice(..);
+            for first in (first..end).step_by(GROUP) {
+                let sources = (first..end.min(first + GROUP)).map(&source);
+                rest = batch.pack(bounds, sources, rest, Boxes::Whole, |_| ());
+            }
+            Ok(())
+        })?;
+        Ok(Self { count, groups: Vec::new() })
     }
 
     /// The number of groups.
@@ -265,20 +217,28 @@ impl Groups {
         let group_of = |place: u32| place as usize / GROUP;
         let record_bytes = bounds.kind().record_bytes();
         let count = self.count;
-        // Packs `places`, which begin at position `begin` of the list, into `groups`, the first of
-        // which is `first_group`.
-        let work = |half: (usize, &[u32], usize, &mut [Group])| -> Result<()> {
-            let (begin, places, first_group, groups) = half;
+        // Parts of whole groups: positions in `places`, the first group, and the groups.
+        let mut parts = memory::list(places.len().div_ceil(PART * GROUP) + 1, "update")?;
+        let (mut rest, mut begin, mut first_group) = (&mut self.groups[..], 0, 0);
+        while begin < places.len() {
+            let last = (begin + PART * GROUP).min(places.len()) - 1;
+            let end_group = group_of(places[last]) + 1;
+            let end = begin + places[begin..].partition_point(|p| group_of(*p) < end_group);
+            let (groups, behind) = rest.split_at_mut(end_group - first_group);
+            parts.push((begin, &places[begin..end], first_group, groups));
+            (rest, begin, first_group) = (behind, end, end_group);
+        }
+        on_parts(places.len(), parts, |(begin, places, first_group, groups), batch| {
             let end = begin + places.len();
             let bytes = begin as u64 * record_bytes..end as u64 * record_bytes;
             let mut view = records.range(bytes)?;
             let mut rest = view.slice(..);
-            let mut batch = Batch::new();
             for places in places.chunk_by(|a, b| group_of(*a) == group_of(*b)) {
                 let group = group_of(places[0]);
                 let (mut members, mut invalid, mut boxes) = (0, 0, [Aabb::EMPTY; GROUP]);
                 let sources = places.iter().map(|place| source(*place as usize));
-                rest = batch.pack(bounds, sources, rest, |k, aabb| {
+                rest = batch.pack(bounds, sources, rest, Boxes::Each, |told| {
+                    let Around::One(k, aabb) = told else { return };
                     let k = places[k] as usize % GROUP;
                     members |= 1 << k;
                     match aabb {
@@ -290,14 +250,7 @@ impl Groups {
                 groups[group - first_group].replace(all, members, invalid, &boxes)?;
             }
             Ok(())
-        };
-        // The second half begins with a whole group, and it is never empty.
-        let half_group =
-            if places.len() < PARALLEL_FROM { 0 } else { group_of(places[places.len() / 2]) };
-        let half = places.partition_point(|place| group_of(*place) < half_group);
-        let (first, second) = self.groups.split_at_mut(half_group);
-        let first = (half > 0).then_some((0, &places[..half], 0, first));
-        on_two_threads(first, (half, &places[half..], half_group, second), work)?;
+        })?;
         let touched = || {
             places
                 .chunk_by(|a, b| group_of(*a) == group_of(*b))

@@ -5,7 +5,7 @@
 //! 1. `piece` cuts the instances of one call into pieces that fit a binding and a dispatch.
 //! 2. `order` and `morton` choose where each instance is stored: along a curve through space.
 //! 3. `groups` and `aabb` form groups of 64 neighbours with a box around each.
-//! 4. `volume_record` and `records` write the records that the cull reads.
+//! 4. `volume_record`, `batch` and `records` write the records that the cull reads.
 //! 5. `update` replaces bounds later, and `watch` connects submitted culls with later updates.
 //!
 //! An instance has two numbers.
@@ -15,6 +15,7 @@
 //! This room records copies and dispatches; it never submits or waits.
 
 pub(crate) mod aabb;
+pub(crate) mod batch;
 pub(crate) mod groups;
 pub(crate) mod morton;
 pub(crate) mod order;
@@ -133,10 +134,12 @@ impl Instances {
     /// `copy` gets a function that records the copies of the piece into an encoder.
     /// It also learns whether more pieces follow.
     /// A caller with a queue can submit then, and release the piece's staging buffers.
+    /// Without groups, the instances are for one cull that tests none, and for no update.
     pub(crate) fn new(
         gpu: &Gpu,
         bounds: &Bounds<'_>,
         options: &InstanceOptions,
+        has_groups: bool,
         mut copy: impl FnMut(&dyn Fn(&mut wgpu::CommandEncoder), bool) -> Result<()>,
     ) -> Result<Self> {
         let n = bounds.len()?;
@@ -150,7 +153,8 @@ impl Instances {
         for index in 0..num_pieces {
             let start = index * capacity;
             let range = start..total.min(start.saturating_add(capacity));
-            let (piece, its_groups, uploads) = packed(gpu, bounds, index, range, options.order)?;
+            let (piece, its_groups, uploads) =
+                packed(gpu, bounds, index, range, options.order, has_groups)?;
             copy(
                 &|encoder| uploads.iter().for_each(|upload| upload.record(encoder)),
                 index + 1 < num_pieces,

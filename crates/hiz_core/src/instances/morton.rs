@@ -11,11 +11,11 @@
 //! So an outlier does not coarsen the cells of the others.
 //! An instance a million times as far away as all others lies in an outer cube of its own.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 use crate::error::Result;
 use crate::host::memory;
-use crate::host::threads::on_two_threads;
+use crate::host::threads::{cores, on_threads};
 use crate::input::bounds::Bounds;
 
 /// Bits of a cell's number along each axis.
@@ -34,22 +34,26 @@ const INVALID: u64 = u64::MAX;
 /// The most centres that are sampled to place the innermost cube.
 const SAMPLES: usize = 4096;
 
-/// From this many instances on, a second thread helps to sort.
-/// It takes tens of microseconds to start, and sorting them takes milliseconds.
+/// From this many instances on, more threads help to sort.
+/// One takes tens of microseconds to start, and sorting them takes milliseconds.
 const PARALLEL_FROM: usize = 1 << 15;
 
-/// The key of a cell, and the index of an instance in it.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-struct Keyed {
-    key: u64,
-    index: u32,
-}
+/// The most parts that are sorted at the same time; each reads the keys of all.
+const MOST_PARTS: usize = 16;
+
+/// Instances whose keys one thread computes at a time.
+const KEYED_AT_A_TIME: usize = 1 << 13;
+
+/// What is sorted is a word: the 40 highest bits of a key, above the index of the instance.
+/// A piece has at most 2^24 instances.
+const INDEX_BITS: u32 = 24;
 
 /// The innermost cube.
 #[derive(Debug, Clone, Copy)]
 struct Cube {
     center: [f64; 3],
-    half_size: f64,
+    /// 1 / half the size.
+    per_half_size: f64,
 }
 
 impl Cube {
@@ -74,7 +78,7 @@ impl Cube {
         }
         let samples = axes[0].len();
         if samples == 0 {
-            return Ok(Self { center: [0.0; 3], half_size: 1.0 });
+            return Ok(Self { center: [0.0; 3], per_half_size: 1.0 });
         }
         for axis in &mut axes {
             axis.sort_unstable_by(f64::total_cmp);
@@ -87,12 +91,13 @@ impl Cube {
             .find(|w| *w > 0.0);
         // An extent below 2^-100 counts as a point; from there 63 cubes still reach past 2^60.
         let half_size = width.unwrap_or(0.0).clamp(1.0 / 2.0_f64.powi(100), 2.0_f64.powi(60));
-        Ok(Self { center: axes.map(|a| a[samples / 2]), half_size })
+        Ok(Self { center: axes.map(|a| a[samples / 2]), per_half_size: half_size.recip() })
     }
 
+    #[inline]
     fn key(&self, center: [f64; 3]) -> u64 {
         let from_center: [f64; 3] =
-            std::array::from_fn(|k| (center[k] - self.center[k]) / self.half_size);
+            std::array::from_fn(|k| (center[k] - self.center[k]) * self.per_half_size);
         let distance = from_center.iter().fold(0.0, |d: f64, v| d.max(v.abs()));
         let cube = if distance < 1.0 { 0 } else { (exponent(distance) / 3 + 1).min(LAST_CUBE) };
         // The cube has 2^18 cells on each side of its centre.
@@ -100,8 +105,9 @@ impl Cube {
         let cells = f64::from(1_u32 << (AXIS_BITS - 1));
         let scale = cells / power_of_8(cube);
         let last = f64::from((1_u32 << AXIS_BITS) - 1);
+        // Processors have an instruction for this type of integer.
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-        let cell = from_center.map(|v| (v * scale + cells).clamp(0.0, last) as u64);
+        let cell = from_center.map(|v| (v * scale + cells).clamp(0.0, last) as i32 as u64);
         cube << CUBE_SHIFT | spread(cell[0]) << 2 | spread(cell[1]) << 1 | spread(cell[2])
     }
 }
@@ -127,65 +133,102 @@ fn spread(v: u64) -> u64 {
 /// The instances of `range` along the curve, as indices relative to its start.
 ///
 /// Instances with equal keys keep the caller's order, and invalid bounds come last.
-/// So the order is the same on every machine.
+/// So the order is the same on every machine, for any number of threads.
+///
+/// Every thread sorts one interval of the curve, which a sample of the keys makes about as long as
+/// the others.
 pub(crate) fn order(bounds: &Bounds<'_>, range: Range<usize>) -> Result<Vec<u32>> {
     let cube = Cube::new(bounds, &range)?;
-    let mut keyed = memory::list(range.len(), "order")?;
-    keyed.resize(range.len(), Keyed::default());
-    let mut spare = memory::collected(keyed.iter().copied(), "order")?;
-    let half = if range.len() < PARALLEL_FROM { 0 } else { range.len() / 2 };
-    let sort = |(begin, part, spare): (usize, &mut [Keyed], &mut [Keyed])| {
-        for (k, keyed) in part.iter_mut().enumerate() {
-            let key =
-                bounds.aabb(range.start + begin + k).map_or(INVALID, |e| cube.key(e.center()));
-            *keyed = Keyed { key, index: (begin + k) as u32 };
-        }
-        radix_sort(part, spare);
-        Ok(())
+    let key = |index: usize| {
+        bounds.aabb(range.start + index).map_or(INVALID, |aabb| cube.key(aabb.center()))
     };
-    let (first, second) = keyed.split_at_mut(half);
-    let (first_spare, second_spare) = spare.split_at_mut(half);
-    on_two_threads(
-        (half > 0).then_some((0, first, first_spare)),
-        (half, second, second_spare),
-        sort,
-    )?;
-    drop(spare);
+    let threads = if range.len() < PARALLEL_FROM { 1 } else { cores().min(MOST_PARTS) };
+    let mut words = memory::list(range.len(), "order")?;
+    words.resize(range.len(), 0);
+    let parts = words.chunks_mut(KEYED_AT_A_TIME).enumerate();
+    on_threads(threads, parts, |(part, words)| {
+        for (index, word) in (part * KEYED_AT_A_TIME..).zip(words) {
+            *word = key(index) >> INDEX_BITS << INDEX_BITS | index as u64;
+        }
+    });
+    let mut sorted: Vec<Result<Vec<u64>>> = (0..threads).map(|_| Ok(Vec::new())).collect();
+    let starts = starts(&words, threads)?;
+    on_threads(threads, sorted.iter_mut().enumerate(), |(part, sorted)| {
+        *sorted = sort_part(&words, starts[part]..=starts[part + 1], key);
+    });
+    drop(words);
     let mut order = memory::list(range.len(), "order")?;
-    merge(&keyed[..half], &keyed[half..], &mut order);
+    for part in sorted {
+        order.extend(part?.iter().map(|word| index_of(*word) as u32));
+    }
     Ok(order)
 }
 
-/// Merges the indices of two sorted lists in the order of their keys.
-/// Of equal keys, those of the first list come first.
-fn merge(first: &[Keyed], second: &[Keyed], order: &mut Vec<u32>) {
-    let (mut i, mut j) = (0, 0);
-    while i < first.len() && j < second.len() {
-        let take_second = second[j].key < first[i].key;
-        order.push(if take_second { second[j].index } else { first[i].index });
-        i += usize::from(!take_second);
-        j += usize::from(take_second);
+fn index_of(word: u64) -> usize {
+    (word & ((1 << INDEX_BITS) - 1)) as usize
+}
+
+/// The least word of each part by a sample, and the greatest of the last one.
+/// Words with one key are in one part.
+fn starts(words: &[u64], parts: usize) -> Result<Vec<u64>> {
+    let step = words.len().div_ceil(SAMPLES).max(1);
+    let mut sample = memory::list(SAMPLES, "order")?;
+    sample.extend(words.iter().step_by(step).map(|word| word >> INDEX_BITS << INDEX_BITS));
+    sample.sort_unstable();
+    let inner = (1..parts).map(|k| sample[k * sample.len() / parts]);
+    Ok([0].into_iter().chain(inner).chain([u64::MAX]).collect())
+}
+
+/// The words of a part, sorted by the whole keys of their instances.
+/// `part` ends with the first word of the next part, which only the last part takes.
+fn sort_part(
+    words: &[u64],
+    part: RangeInclusive<u64>,
+    key: impl Fn(usize) -> u64,
+) -> Result<Vec<u64>> {
+    let (start, end) = part.into_inner();
+    let is_last = end == u64::MAX;
+    let is_mine = |word: u64| start <= word && (word < end || is_last);
+    let count = words.iter().map(|word| usize::from(is_mine(*word))).sum();
+    let mut mine = memory::list(count + 1, "order")?;
+    mine.resize(count + 1, 0);
+    let mut filled = 0;
+    for word in words {
+        // Without a branch, which no processor could predict.
+        // What is not of this part is overwritten by the next word.
+        mine[filled] = *word;
+        filled += usize::from(is_mine(*word));
     }
-    order.extend(first[i..].iter().chain(&second[j..]).map(|k| k.index));
-}
-
-const DIGIT_BITS: u32 = 11;
-const DIGITS: usize = 64_usize.div_ceil(DIGIT_BITS as usize);
-
-fn digit(key: u64, place: usize) -> usize {
-    (key >> (place as u32 * DIGIT_BITS) & ((1 << DIGIT_BITS) - 1)) as usize
-}
-
-/// Sorts by key, least significant digit first; the sort is stable.
-/// Digits in which all keys agree are skipped.
-fn radix_sort(keyed: &mut [Keyed], spare: &mut [Keyed]) {
-    let mut counts = [[0_u32; 1 << DIGIT_BITS]; DIGITS];
-    for k in keyed.iter() {
-        for (place, counts) in counts.iter_mut().enumerate() {
-            counts[digit(k.key, place)] += 1;
+    mine.truncate(count);
+    let mut spare = memory::collected(mine.iter().copied(), "order")?;
+    radix_sort(&mut mine, &mut spare);
+    drop(spare);
+    for run in mine.chunk_by_mut(|a, b| a >> INDEX_BITS == b >> INDEX_BITS) {
+        if run.len() > 1 {
+            // The rest of the keys decides; the indices of equal keys ascend.
+            run.sort_by_cached_key(|word| key(index_of(*word)));
         }
     }
-    let (mut from, mut to) = (keyed, spare);
+    Ok(mine)
+}
+
+const DIGIT_BITS: u32 = 10;
+const DIGITS: usize = ((64 - INDEX_BITS) / DIGIT_BITS) as usize;
+
+fn digit(word: u64, place: usize) -> usize {
+    (word >> (INDEX_BITS + place as u32 * DIGIT_BITS) & ((1 << DIGIT_BITS) - 1)) as usize
+}
+
+/// Sorts by the bits above the index, least significant digit first; the sort is stable.
+/// Digits in which all words agree are skipped.
+fn radix_sort(words: &mut [u64], spare: &mut [u64]) {
+    let mut counts = [[0_u32; 1 << DIGIT_BITS]; DIGITS];
+    for word in words.iter() {
+        for (place, counts) in counts.iter_mut().enumerate() {
+            counts[digit(*word, place)] += 1;
+        }
+    }
+    let (mut from, mut to) = (words, spare);
     let mut swapped = false;
     for (place, counts) in counts.iter_mut().enumerate() {
         if counts.iter().any(|c| *c as usize == from.len()) {
@@ -195,9 +238,9 @@ fn radix_sort(keyed: &mut [Keyed], spare: &mut [Keyed]) {
         for count in counts.iter_mut() {
             begin += std::mem::replace(count, begin);
         }
-        for k in from.iter() {
-            let slot = &mut counts[digit(k.key, place)];
-            to[*slot as usize] = *k;
+        for word in from.iter() {
+            let slot = &mut counts[digit(*word, place)];
+            to[*slot as usize] = *word;
             *slot += 1;
         }
         std::mem::swap(&mut from, &mut to);
@@ -275,23 +318,47 @@ mod tests {
         assert_eq!(order(&bounds, 2..5).unwrap(), [1, 0, 2], "relative to the range's start");
     }
 
+    /// Centres far apart, centres in one cell of the 40 bits, and both.
     #[test]
-    fn one_thread_and_two_give_the_same_order() {
+    fn the_order_is_that_of_the_whole_keys() {
         let n = PARALLEL_FROM + 77;
-        let mut random = Random(5);
-        let centers: Vec<_> = (0..3 * n).map(|_| (random.unit() * 16.0).floor()).collect();
-        let (radii, order) = (vec![0.0; n], order_of(&centers));
-        let bounds = Bounds::Spheres { centers: Floats::F64(&centers), radii: Floats::F64(&radii) };
-        let cube = Cube::new(&bounds, &(0..n)).unwrap();
-        let mut expected: Vec<_> = (0..n as u32).collect();
-        expected.sort_by_key(|i| cube.key(std::array::from_fn(|k| centers[3 * *i as usize + k])));
-        assert_eq!(order, expected);
+        for (step, size) in [(1.0, 16.0), (1e-7, 1000.0), (1e-3, 1e6)] {
+            let mut random = Random(5);
+            let mut centers: Vec<_> =
+                (0..3 * n).map(|_| step * (random.unit() * size).floor()).collect();
+            centers[..3].fill(1e4);
+            let radii = vec![0.0; n];
+            let bounds =
+                Bounds::Spheres { centers: Floats::F64(&centers), radii: Floats::F64(&radii) };
+            let cube = Cube::new(&bounds, &(0..n)).unwrap();
+            let key = |i: u32| cube.key(std::array::from_fn(|k| centers[3 * i as usize + k]));
+            let mut expected: Vec<_> = (0..n as u32).collect();
+            expected.sort_by_key(|i| key(*i));
+            // Not `assert_eq`, which would print all of them.
+            assert!(order(&bounds, 0..n).unwrap() == expected, "{step} {size}");
+        }
+    }
+
+    #[test]
+    fn any_number_of_parts_gives_the_same_order() {
+        let key = |i: usize| (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 20 << 18;
+        let words: Vec<u64> =
+            (0..5000).map(|i| key(i) >> INDEX_BITS << INDEX_BITS | i as u64).collect();
+        let whole = sort_part(&words, 0..=u64::MAX, key).unwrap();
+        assert!(whole.is_sorted_by_key(|w| (key(index_of(*w)), index_of(*w))));
+        for parts in [2, 3, 7, 16] {
+            let starts = starts(&words, parts).unwrap();
+            let joined: Vec<u64> = (0..parts)
+                .flat_map(|k| sort_part(&words, starts[k]..=starts[k + 1], key).unwrap())
+                .collect();
+            assert!(joined == whole, "{parts} parts");
+        }
     }
 
     /// The order of a curve through 8 cells, written out.
     #[test]
     fn keys_follow_the_z_of_morton() {
-        let cube = Cube { center: [0.0; 3], half_size: 1.0 };
+        let cube = Cube { center: [0.0; 3], per_half_size: 1.0 };
         let corners = |scale: f64| {
             (0..8).map(move |i| {
                 [i & 4, i & 2, i & 1].map(|bit| if bit == 0 { -0.5 * scale } else { 0.5 * scale })

@@ -7,7 +7,8 @@ use crate::gpu::buffers::{Mapped, entry};
 use crate::gpu::device::Gpu;
 use crate::gpu::layouts::Binding;
 use crate::input::bounds::Bounds;
-use crate::instances::groups::{GROUP, Groups, Origin};
+use crate::instances::batch::Origin;
+use crate::instances::groups::{GROUP, Groups};
 use crate::instances::order::{PieceOrder, StoredOrder};
 use crate::instances::records::{RECORDS_PER_ROW, Records, Upload};
 use crate::instances::volume_record::BoxRecord;
@@ -86,6 +87,7 @@ pub(super) fn packed(
     index: u32,
     range: Range<u32>,
     order: StoredOrder,
+    has_groups: bool,
 ) -> Result<(Piece, Groups, [Upload; 2])> {
     let (first, count) = (range.start as usize, range.end - range.start);
     let record_bytes = bounds.kind().record_bytes();
@@ -96,13 +98,18 @@ pub(super) fn packed(
     };
     let (records, upload, groups) =
         Records::new(gpu, "hiz.instances.records", count, record_bytes, |records| {
-            Groups::packed(bounds, count as usize, source, records)
+            if has_groups {
+                Groups::packed(bounds, count as usize, source, records)
+            } else {
+                Groups::without_groups(bounds, count as usize, source, records)
+            }
         })?;
     let num_groups = groups.len() as u32;
     let box_bytes = size_of::<BoxRecord>() as u64;
     let (group_records, groups_upload, ()) =
         Records::new(gpu, "hiz.instances.groups", num_groups, box_bytes, |boxes| {
-            write_boxes(boxes, (0..groups.len()).map(|g| groups.record(g)))
+            let records = (0..groups.len()).map(|g| groups.record(g));
+            if groups.len() > 0 { write_boxes(boxes, records) } else { Ok(()) }
         })?;
     let uniform = |count: u32| {
         let words = count.div_ceil(32);

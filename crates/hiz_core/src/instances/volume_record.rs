@@ -137,6 +137,15 @@ impl Position {
 }
 
 impl SphereRecord {
+    pub(super) fn of_parts(
+        center_hi: [f32; 3],
+        radius: f32,
+        center_lo: [f32; 3],
+        index: u32,
+    ) -> Self {
+        Self { center_hi, radius, center_lo, index }
+    }
+
     fn new(center: [f64; 3], radius: f64) -> Self {
         let p = Position::new(center);
         // The stored centre is off by at most the 1-norm of the rests.
@@ -164,6 +173,15 @@ impl Record for SphereRecord {
 }
 
 impl BoxRecord {
+    pub(super) fn of_parts(
+        center_hi: [f32; 3],
+        center_lo: [f32; 3],
+        half_size: [f32; 3],
+        index: u32,
+    ) -> Self {
+        Self { center_hi, padding_0: 0.0, center_lo, index, half_size, padding_2: 0.0 }
+    }
+
     /// The record of a box, or an invalid record for `None` and for invalid bounds.
     pub(crate) fn valid_or_none(corners: Option<[[f64; 3]; 2]>) -> Self {
         let record = corners.map(|[min, max]| Self::new(min, max));
