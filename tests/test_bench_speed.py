@@ -36,6 +36,7 @@ TINY = Workload(
     counts=(100, 1_000),
     sides=(16, 32),
     large=4_000,
+    small_image=(30, 40),
 )
 
 #: What is to be reached, and whether it is a lower bound, as the issue words it.
@@ -57,6 +58,9 @@ TARGETS = {
     "calls.beyond": (1.0, False),
     "calls.small": (4.0, False),
     "calls.groups": (1.05, False),
+    "arrays.720p.z, float32": (1.5, False),
+    "arrays.1080p.z, uint16": (1.5, False),
+    "arrays.4K.distance, float32": (1.5, False),
 }
 #: What is told beside them.
 TOLD = (
@@ -76,6 +80,8 @@ TOLD = (
     "calls.groups_read",
     "others.numpy, cull",
     "transfers.upload.Morton",
+    "arrays.4K.distance, float64",
+    "arrays.visible",
     "transfers.upload.given",
     "transfers.update.1",
     "transfers.update.100",

@@ -14,7 +14,7 @@ from hizvk.commands import arguments as args
 from hizvk.commands import figure
 from hizvk.commands.progress import Progress
 
-from . import calls, culling, first_call, memory, reduction, report, scale, transfers
+from . import arrays, calls, culling, first_call, memory, reduction, report, scale, transfers
 from .figures import Found
 from .run import WORKLOADS, Run
 
@@ -35,6 +35,7 @@ PARTS: Final[dict[str, Callable[[Run], None]]] = {
     "cull": culling.measure,
     "calls": calls.measure,
     "transfers": transfers.measure,
+    "arrays": arrays.measure,
     "scale": scale.measure,
 }
 

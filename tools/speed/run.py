@@ -49,6 +49,8 @@ class Workload:
     """Of square depth images."""
     large: int | None
     """The number of instances that is compared with `crowd`."""
+    small_image: Size = (720, 1280)
+    """The size of the smallest depth image that is uploaded."""
 
 
 HD: Final = ("1080p", (1080, 1920))
