@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn invalid_values_are_those_that_can_be_stored() {
-        let values = [0.1, 5000.0, 5000.000_000_1];
+        let values = [0.1, 5000.0, 5_000.000_000_1];
         let tenth = f64::from(0.1_f32);
         assert_eq!(DepthNumbers::F32(&[]).as_stored(&values), [tenth, 5000.0, 5000.0]);
         assert_eq!(DepthNumbers::F64(&[]).as_stored(&values), values);
