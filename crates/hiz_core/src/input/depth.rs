@@ -185,7 +185,11 @@ impl<'a> Conversion<'a> {
                 Some(Metric { kind, scale, lens, quick })
             }
         };
-        let invalid = numbers.as_stored(invalid);
+        let mut invalid = numbers.as_stored(invalid);
+        if metric.as_ref().is_some_and(|metric| !metric.lens.signed) {
+            // Zero and negative numbers are far in any case.
+            invalid.retain(|v| *v > 0.0);
+        }
         Ok(Self { numbers, size, convention, invalid, tolerance, metric })
     }
 

@@ -103,7 +103,7 @@ impl Cube {
         // The cube has 2^18 cells on each side of its centre.
         // The clamp takes what lies outside the last cube.
         let cells = f64::from(1_u32 << (AXIS_BITS - 1));
-        let scale = cells / power_of_8(cube);
+        let scale = cells * per_power_of_8(cube);
         let last = f64::from((1_u32 << AXIS_BITS) - 1);
         // Processors have an instruction for this type of integer.
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
@@ -117,8 +117,9 @@ fn exponent(v: f64) -> u64 {
     (v.to_bits() >> 52) - 1023
 }
 
-fn power_of_8(power: u64) -> f64 {
-    f64::from_bits((1023 + 3 * power) << 52)
+/// 8 to the power of -`power`.
+fn per_power_of_8(power: u64) -> f64 {
+    f64::from_bits((1023 - 3 * power) << 52)
 }
 
 /// Spreads the 21 lowest bits: each is followed by two zeros.
