@@ -78,12 +78,22 @@
 //! Beyond the far plane nothing is hidden: such depths become far.
 
 mod cells;
+mod chains;
+mod coverage;
+mod facets;
+mod image;
+mod links;
+mod looks;
+mod open_pixels;
 pub(crate) mod planted_fault;
+mod projector;
+mod proof;
 mod sheets;
 mod square;
+mod squares;
+mod thresholds;
 mod topology;
 
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use crate::error::{Error, Result};
@@ -98,9 +108,11 @@ use crate::occluders::drawing::{DrawOptions, Touched};
 use crate::occluders::host_raster::{HostRaster, MOST_SIDE, Scene, Way};
 use crate::occluders::placement::Placement;
 use crate::occluders::shapes::Shapes;
-use crate::occluders::surface::cells::Cells;
+use crate::occluders::surface::facets::Rounder;
+use crate::occluders::surface::links::{Links, Standing};
+use crate::occluders::surface::looks::Placed;
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
-use crate::occluders::surface::sheets::Sheets;
+use crate::occluders::surface::projector::Projector;
 use crate::occluders::surface::topology::Topology;
 
 /// The least normal float32.
@@ -120,6 +132,12 @@ pub struct ConservativeDepthOptions {
 impl Default for ConservativeDepthOptions {
     fn default() -> Self {
         Self { refinement: 2 }
+    }
+}
+
+impl ConservativeDepthOptions {
+    fn refinement(&self) -> u32 {
+        self.refinement.min(8)
     }
 }
 
@@ -160,11 +178,17 @@ pub struct OccluderSurface {
     shapes: Shapes,
     placements: Locked<Arc<Vec<Placement>>>,
     cull_mode: FaceCull,
-    topology: OnceLock<Result<Topology>>,
-    has_moved: AtomicBool,
+    shared: OnceLock<Result<Shared>>,
     /// The meshlets that were not hidden when they were last drawn with a limit: copy and number,
     /// sorted.
     useful: Locked<Vec<(u32, u32)>>,
+}
+
+/// What is made of the meshes at the first conservative image.
+#[derive(Debug)]
+struct Shared {
+    topology: Topology,
+    links: Links,
 }
 
 impl OccluderSurface {
@@ -180,8 +204,7 @@ impl OccluderSurface {
             shapes,
             placements,
             cull_mode: options.cull_mode,
-            topology: OnceLock::new(),
-            has_moved: AtomicBool::new(false),
+            shared: OnceLock::new(),
             useful: Locked::default(),
         })
     }
@@ -225,7 +248,6 @@ impl OccluderSurface {
         let mut all = placements.to_vec();
         all.splice(begin..end, moved);
         *placements = Arc::new(all);
-        self.has_moved.store(true, Ordering::Relaxed);
         Ok(())
     }
 
@@ -250,7 +272,7 @@ impl OccluderSurface {
         camera: &Camera,
         options: &ConservativeDepthOptions,
     ) -> Result<Vec<f32>> {
-        self.conservative_depth_planted(camera, options, Planted::default())
+        self.usual_depth(camera, options, Planted::default())
     }
 
     /// Draws what `camera` sees into an image of its size; returns the rectangle around it.
@@ -315,38 +337,93 @@ impl OccluderSurface {
         options: &ConservativeDepthOptions,
         fault: Option<planted_fault::PlantedFault>,
     ) -> Result<Vec<f32>> {
-        self.conservative_depth_planted(camera, options, Planted(fault))
+        self.usual_depth(camera, options, Planted(fault))
     }
 
-    fn conservative_depth_planted(
+    /// [`OccluderSurface::conservative_depth`] by a search of every pixel, for tests.
+    ///
+    /// # Errors
+    /// As [`OccluderSurface::conservative_depth`].
+    #[cfg(feature = "testing")]
+    pub fn conservative_depth_searched(
+        &self,
+        camera: &Camera,
+        options: &ConservativeDepthOptions,
+        fault: Option<planted_fault::PlantedFault>,
+    ) -> Result<Vec<f32>> {
+        self.depth_by(camera, Planted(fault), |placed, links, rounder| {
+            image::searched(placed, links, rounder, camera, options.refinement())
+        })
+    }
+
+    /// [`OccluderSurface::conservative_depth`] with any depths for the pixels' centres, for tests.
+    ///
+    /// They are NDC depths, which choose what is tried and what is searched.
+    /// The result is right whatever they are.
+    ///
+    /// # Errors
+    /// As [`OccluderSurface::conservative_depth`].
+    ///
+    /// # Panics
+    /// If there is not one depth per pixel.
+    #[cfg(feature = "testing")]
+    pub fn conservative_depth_by_centres(
+        &self,
+        camera: &Camera,
+        options: &ConservativeDepthOptions,
+        centres: &[f32],
+        fault: Option<planted_fault::PlantedFault>,
+    ) -> Result<Vec<f32>> {
+        assert_eq!(centres.len() as u64, camera.size().pixels(), "one depth per pixel");
+        self.depth_by(camera, Planted(fault), |placed, links, rounder| {
+            image::image(placed, links, rounder, camera, options.refinement(), centres)
+        })
+    }
+
+    fn usual_depth(
         &self,
         camera: &Camera,
         options: &ConservativeDepthOptions,
         fault: Planted,
     ) -> Result<Vec<f32>> {
-        let (positions, triangles);
-
-        let moved;
-        let topology = if !self.has_moved.load(Ordering::Relaxed) {
-            self.topology
-                .get_or_init(|| {
-                    let (positions, triangles) = self.world();
-                    Topology::new(&positions, &triangles)
-                })
-                .as_ref()
-                .map_err(Clone::clone)?
-        } else {
-            (positions, triangles) = self.world();
-            moved = Topology::new(&positions, &triangles)?;
-            &moved
+        // What the rasteriser refuses is seen in float64 alone.
+        let centres = match self.depth(camera) {
+            Err(Error::Invalid { .. } | Error::Limit { .. }) => None,
+            centres => Some(centres?),
         };
+        let refinement = options.refinement();
+        self.depth_by(camera, fault, |placed, links, rounder| match &centres {
+            Some(centres) => image::image(placed, links, rounder, camera, refinement, centres),
+            None => image::searched(placed, links, rounder, camera, refinement),
+        })
+    }
+
+    /// NDC depths from the values of `far` that `image` finds.
+    fn depth_by(
+        &self,
+        camera: &Camera,
+        fault: Planted,
+        image: impl FnOnce(Placed<'_>, &Standing<'_>, &Rounder) -> Vec<f64>,
+    ) -> Result<Vec<f32>> {
+        let placements = self.placements();
+        let shared = self.shared.get_or_init(|| {
+            let topology = Topology::new(&self.shapes)?;
+            let links = Links::new(&self.shapes, &topology, &placements);
+            Ok(Shared { topology, links })
+        });
+        let Shared { topology, links } = shared.as_ref().map_err(Clone::clone)?;
+        let placed = Placed {
+            shapes: &self.shapes,
+            placements: &placements,
+            topology,
+            culled: self.cull_mode.as_seen_by(camera),
+            fault,
+        };
+        let rounder = Rounder::new(Projector::new(camera, fault));
+        let far = image(placed, &links.standing(&placements), &rounder);
         let convention = camera.convention();
-        let culled = self.cull_mode.as_seen_by(camera);
-        let cells = Cells::new(topology, camera, culled, fault);
         // The value of `far` at the far plane; reversed Z counts its depths negative.
         let beyond = if convention.is_reversed() { 0.0 } else { 1.0 };
-        let far =
-            Sheets::new(&cells, fault).image(camera.size(), beyond, options.refinement.min(8));
         #[expect(clippy::cast_possible_truncation, reason = "the fault that is planted")]
         let rounded =
             if is_planted!(fault, RoundedToNearest) { |far| far as f32 } else { round_up };
@@ -385,7 +462,7 @@ impl OccluderSurface {
 
     /// Bytes on the host, including the topology once a conservative depth image was made.
     pub fn host_bytes(&self) -> u64 {
-        let made = self.topology.get().and_then(|topology| topology.as_ref().ok());
-        self.shapes.bytes() + made.map_or(0, Topology::bytes)
+        let made = self.shared.get().and_then(|shared| shared.as_ref().ok());
+        self.shapes.bytes() + made.map_or(0, |made| made.topology.bytes() + made.links.bytes())
     }
 }
