@@ -10,10 +10,13 @@ use crate::occluders::surface::proof::Proof;
 use crate::occluders::surface::sheets::search;
 use crate::occluders::surface::thresholds;
 
-/// A pixel is searched if its distance to the far plane may grow by 1 / this at least.
+/// A pixel is searched if its distance to the far plane is less than this share of what it may be.
 ///
 /// Nothing rests on it.
 const WORTH: f32 = 0.98;
+/// In a pixel that has a depth, nothing is searched for whose distance to the far plane is less than
+/// this share of what it may be.
+const SHARE: f32 = 0.9;
 
 /// As [`image`], by a search of all pixels: slow, and what tests compare with.
 pub(super) fn searched(
@@ -26,7 +29,7 @@ pub(super) fn searched(
     let size = camera.size();
     let looks = Looks::new(&placed, camera, rounder, &Tiles::open(size));
     let open = OpenPixels::new(size, vec![true; size.pixels() as usize]);
-    let cells = Cells::new(&placed, &rounder.projector, &looks, links, &open);
+    let cells = Cells::new(&placed, &rounder.projector, &looks, links, &open, &Tiles::open(size));
     let beyond = if camera.convention().is_reversed() { 0.0 } else { 1.0 };
     let mut far = vec![beyond; size.pixels() as usize];
     search(&cells, &open, refinement, placed.fault, &mut far);
@@ -49,34 +52,48 @@ pub(super) fn image(
     let (size, convention) = (camera.size(), camera.convention());
     let beyond = if convention.is_reversed() { 0.0 } else { 1.0 };
     let slabs = thresholds::image(centres, size, convention);
-    let tiles = Tiles::new(&slabs, size);
+    let tiles = Tiles::new(slabs.iter().map(|slabs| slabs.last), size);
     let looks = &Looks::new(&placed, camera, rounder, &tiles);
     let proof = Proof { placed, rounder, looks, links, size, convention };
     let (mut far, is_open) = proof.image(&slabs, &tiles);
     let open = OpenPixels::new(size, is_open);
     let mut is_open = vec![false; far.len()];
-    let floors = proof.refine(&open, u32::from(refinement > 0), &mut far);
+    // What is farther than this is not searched for.
+    let mut bounds = far.clone();
+    let floors = proof.refine(&open, &tiles, u32::from(refinement > 0), &mut far);
     for (pixel, floor) in open.pixels().iter().zip(floors) {
         let pixel = *pixel as usize;
-        let found = beyond - far[pixel].min(beyond);
-        is_open[pixel] = if floor < beyond {
-            found < WORTH * (beyond - floor)
+        let (found, most) = (beyond - far[pixel].min(beyond), beyond - floor);
+        if floor < beyond {
+            is_open[pixel] = found < WORTH * most;
+            let least = if found > 0.0 { beyond - SHARE * most } else { beyond };
+            bounds[pixel] = far[pixel].min(least);
         } else {
             // A part that nothing is seen in shows the sky, or what no depth was tried for.
-            found <= 0.0 && slabs[pixel].has_surroundings()
-        };
+            is_open[pixel] = found <= 0.0 && slabs[pixel].has_surroundings();
+            bounds[pixel] = beyond;
+        }
     }
     if looks.has_uncertain {
         // What is too uncertain for the proof is missing at the centres, too.
-        for (is_open, far) in is_open.iter_mut().zip(&far) {
-            *is_open |= *far >= beyond;
+        for ((is_open, far), bound) in is_open.iter_mut().zip(&far).zip(&mut bounds) {
+            if *far >= beyond {
+                (*is_open, *bound) = (true, beyond);
+            }
         }
     }
-    let mut far: Vec<f64> = far.into_iter().map(f64::from).collect();
     let open = OpenPixels::new(size, is_open);
-    if !open.is_empty() {
-        let cells = Cells::new(&placed, &rounder.projector, looks, links, &open);
-        search(&cells, &open, refinement, placed.fault, &mut far);
+    if open.is_empty() {
+        return far.into_iter().map(f64::from).collect();
     }
-    far
+    let bound = |i: usize| if open.is_open(i) { bounds[i] } else { f32::NEG_INFINITY };
+    let tiles = Tiles::new((0..bounds.len()).map(bound), size);
+    let cells = Cells::new(&placed, &rounder.projector, looks, links, &open, &tiles);
+    let mut found: Vec<f64> = bounds.iter().copied().map(f64::from).collect();
+    search(&cells, &open, refinement, placed.fault, &mut found);
+    let better = |(i, far): (usize, f32)| {
+        let is_found = open.is_open(i) && found[i] < f64::from(bounds[i]);
+        if is_found { found[i] } else { f64::from(far) }
+    };
+    far.into_iter().enumerate().map(better).collect()
 }

@@ -18,7 +18,6 @@ use crate::occluders::surface::open_pixels::OpenPixels;
 use crate::occluders::surface::planted_fault::Planted;
 use crate::occluders::surface::projector::Projector;
 use crate::occluders::surface::square::Point;
-use crate::occluders::surface::thresholds::Slabs;
 use crate::occluders::surface::topology::{NO_EDGE, Topology};
 
 /// The side in pixels of the tiles by which what is hidden is found.
@@ -36,13 +35,17 @@ pub(super) struct Tiles {
 }
 
 impl Tiles {
-    pub(super) fn new(slabs: &[Slabs], size: ImageSize) -> Self {
+    /// From the farthest depth that each pixel tries.
+    pub(super) fn new(pixels: impl Iterator<Item = f32>, size: ImageSize) -> Self {
         let columns = size.width.div_ceil(TILE) as usize;
         let mut last = vec![f32::NEG_INFINITY; columns * size.height.div_ceil(TILE) as usize];
-        for (y, row) in slabs.chunks_exact(size.width as usize).enumerate() {
-            let line = &mut last[y / TILE as usize * columns..][..columns];
-            for (tile, slabs) in line.iter_mut().zip(row.chunks(TILE as usize)) {
-                *tile = slabs.iter().fold(*tile, |m, s| m.max(s.last));
+        let (mut x, mut y) = (0, 0);
+        for pixel in pixels {
+            let tile = &mut last[y / TILE as usize * columns + x / TILE as usize];
+            *tile = tile.max(pixel);
+            x += 1;
+            if x == size.width as usize {
+                (x, y) = (0, y + 1);
             }
         }
         Self { columns, last }
@@ -192,11 +195,11 @@ impl Looks {
     }
 
     /// What is left for the proof of some pixels.
-    pub(super) fn narrowed(&self, placed: &Placed<'_>, open: &OpenPixels) -> Self {
+    pub(super) fn narrowed(&self, placed: &Placed<'_>, open: &OpenPixels, tiles: &Tiles) -> Self {
         let mut all: Vec<Option<Look>> = (0..self.all.len()).map(|_| None).collect();
         on_threads(cores(), all.chunks_mut(PART).zip(self.all.chunks(PART)), |(to, from)| {
             for (to, from) in to.iter_mut().zip(from) {
-                *to = Some(from.narrowed(placed, open));
+                *to = Some(from.narrowed(placed, open, tiles));
             }
         });
         Self {
@@ -209,12 +212,14 @@ impl Looks {
 }
 
 impl Look {
-    /// Whether what is spanned by some vertices may meet an open pixel.
+    /// Whether what is spanned by some vertices may meet an open pixel that `tiles` do not hide.
     pub(super) fn meets(
         &self,
         open: &OpenPixels,
+        tiles: &Tiles,
         vertices: impl IntoIterator<Item = usize>,
     ) -> bool {
+        let mut nearest = f64::INFINITY;
         let mut extent = [i32::MAX, i32::MIN, i32::MAX, i32::MIN];
         for vertex in vertices.into_iter().map(|v| self.vertices[v]) {
             // What is cut or uncertain may meet anything.
@@ -225,12 +230,12 @@ impl Look {
                 extent[2].min(corner.y),
                 extent[3].max(corner.y),
             ];
+            nearest = nearest.min(corner.far);
         }
         let ImageSize { width, height } = open.size();
-        open.any(
-            pixels(extent[0], extent[1], width.cast_signed()),
-            pixels(extent[2], extent[3], height.cast_signed()),
-        )
+        let columns = pixels(extent[0], extent[1], width.cast_signed());
+        let rows = pixels(extent[2], extent[3], height.cast_signed());
+        open.any(columns, rows) && !tiles.hide(nearest, columns, rows)
     }
 
     /// Calls `each` for the facets and their triangles in the image.
@@ -270,14 +275,14 @@ impl Look {
     /// The same look with the facets alone that may meet an open pixel.
     ///
     /// No edge of the others meets one, so nothing is lost for the open pixels.
-    fn narrowed(&self, placed: &Placed<'_>, open: &OpenPixels) -> Self {
+    fn narrowed(&self, placed: &Placed<'_>, open: &OpenPixels, tiles: &Tiles) -> Self {
         let mut rows = self.rows;
         let (mut vertices, mut facets, mut polygons) = (Vec::new(), Vec::new(), Vec::new());
-        if self.meets(open, 0..self.vertices.len()) {
+        if self.meets(open, tiles, 0..self.vertices.len()) {
             let triangles = &placed.shapes.meshlets[self.meshlet as usize].triangles;
             let corners = placed.topology.corners(triangles);
             facets.extend(self.facets.iter().zip(corners).map(|(facet, corners)| {
-                let meets = facet.is_there() && self.meets(open, corners.map(usize::from));
+                let meets = facet.is_there() && self.meets(open, tiles, corners.map(usize::from));
                 if meets { *facet } else { Facet::default() }
             }));
             vertices.clone_from(&self.vertices);

@@ -73,8 +73,14 @@ impl Proof<'_> {
     /// Lowers `depths`.
     /// Returns, by open pixel, the farthest depth at the centres of its parts: no proof can find
     /// anything that is nearer.
-    pub(super) fn refine(&self, open: &OpenPixels, finer: u32, depths: &mut [f32]) -> Vec<f32> {
-        let looks = self.looks.narrowed(&self.placed, open);
+    pub(super) fn refine(
+        &self,
+        open: &OpenPixels,
+        tiles: &Tiles,
+        finer: u32,
+        depths: &mut [f32],
+    ) -> Vec<f32> {
+        let looks = self.looks.narrowed(&self.placed, open, tiles);
         let proof = Proof { looks: &looks, ..*self };
         let mut floors = vec![f32::INFINITY; open.pixels().len()];
         let part = (self.rows() * self.size.width) as usize;
