@@ -881,7 +881,7 @@ fn copies_share_their_edges_until_they_move() {
         assert_eq!(back, first.unwrap().conservative_depth(&camera, &options).unwrap());
     }
     println!("{deep:?} pixels with a depth");
-    assert!(deep[0] > 300 && deep[1] > 200, "{deep:?}");
+    assert!(deep[0] > 800 && deep[1] > 400, "{deep:?}");
 }
 
 #[test]
