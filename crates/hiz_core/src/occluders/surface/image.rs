@@ -14,10 +14,6 @@ use crate::occluders::surface::thresholds;
 ///
 /// Nothing rests on it.
 const WORTH: f32 = 0.98;
-/// In a pixel that has a depth, nothing is searched for whose distance to the far plane is less than
-/// this share of what it may be.
-const SHARE: f32 = 0.9;
-
 /// As [`image`], by a search of all pixels: slow, and what tests compare with.
 pub(super) fn searched(
     placed: Placed<'_>,
@@ -58,42 +54,28 @@ pub(super) fn image(
     let (mut far, is_open) = proof.image(&slabs, &tiles);
     let open = OpenPixels::new(size, is_open);
     let mut is_open = vec![false; far.len()];
-    // What is farther than this is not searched for.
-    let mut bounds = far.clone();
     let floors = proof.refine(&open, &tiles, u32::from(refinement > 0), &mut far);
     for (pixel, floor) in open.pixels().iter().zip(floors) {
         let pixel = *pixel as usize;
-        let (found, most) = (beyond - far[pixel].min(beyond), beyond - floor);
-        if floor < beyond {
-            is_open[pixel] = found < WORTH * most;
-            let least = if found > 0.0 { beyond - SHARE * most } else { beyond };
-            bounds[pixel] = far[pixel].min(least);
-        } else {
-            // A part that nothing is seen in shows the sky, or what no depth was tried for.
-            is_open[pixel] = found <= 0.0 && slabs[pixel].has_surroundings();
-            bounds[pixel] = beyond;
-        }
+        let found = beyond - far[pixel].min(beyond);
+        // Where a sample finds nothing, it may be behind all that was tried.
+        is_open[pixel] = found <= 0.0 || found < WORTH * (beyond - floor);
     }
     if looks.has_uncertain {
         // What is too uncertain for the proof is missing at the centres, too.
-        for ((is_open, far), bound) in is_open.iter_mut().zip(&far).zip(&mut bounds) {
-            if *far >= beyond {
-                (*is_open, *bound) = (true, beyond);
-            }
+        for (is_open, far) in is_open.iter_mut().zip(&far) {
+            *is_open |= *far >= beyond;
         }
     }
+    let mut far: Vec<f64> = far.into_iter().map(|far| f64::from(far.min(beyond))).collect();
     let open = OpenPixels::new(size, is_open);
-    if open.is_empty() {
-        return far.into_iter().map(f64::from).collect();
+    if !open.is_empty() {
+        // What is farther than what is known of all open pixels around is not searched for.
+        #[expect(clippy::cast_possible_truncation, reason = "they were float32 before")]
+        let bound = |i: usize| if open.is_open(i) { far[i] as f32 } else { f32::NEG_INFINITY };
+        let tiles = Tiles::new((0..far.len()).map(bound), size);
+        let cells = Cells::new(&placed, &rounder.projector, looks, links, &open, &tiles);
+        search(&cells, &open, refinement, placed.fault, &mut far);
     }
-    let bound = |i: usize| if open.is_open(i) { bounds[i] } else { f32::NEG_INFINITY };
-    let tiles = Tiles::new((0..bounds.len()).map(bound), size);
-    let cells = Cells::new(&placed, &rounder.projector, looks, links, &open, &tiles);
-    let mut found: Vec<f64> = bounds.iter().copied().map(f64::from).collect();
-    search(&cells, &open, refinement, placed.fault, &mut found);
-    let better = |(i, far): (usize, f32)| {
-        let is_found = open.is_open(i) && found[i] < f64::from(bounds[i]);
-        if is_found { found[i] } else { f64::from(far) }
-    };
-    far.into_iter().enumerate().map(better).collect()
+    far
 }

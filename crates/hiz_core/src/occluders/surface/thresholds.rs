@@ -58,11 +58,6 @@ impl Slabs {
         last: f32::NEG_INFINITY,
         front: f32::NEG_INFINITY,
     };
-
-    /// Whether something is at the centres of the pixel and of all its neighbours.
-    pub(super) fn has_surroundings(&self) -> bool {
-        self.farthest[SLABS - 1] > f32::NEG_INFINITY
-    }
 }
 
 /// The slabs of all pixels, from NDC depths at their centres.
