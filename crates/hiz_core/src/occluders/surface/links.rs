@@ -196,8 +196,8 @@ fn shared_edges(
     found
 }
 
-/// Vertices with the world position of a vertex of another copy: copy, vertex, and a number that
-/// is the same for equal positions.
+/// Vertices with the world position of a vertex of another copy: copy, vertex, and a number that is
+/// the same for equal positions.
 ///
 /// Sorted by copy and vertex.
 fn shared_vertices(

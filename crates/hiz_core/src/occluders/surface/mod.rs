@@ -21,9 +21,9 @@
 //! - Masked Software Occlusion Culling (Hasselgren, Andersson, Akenine-Moller 2016) merges by
 //!   sample coverage, and admits the error.
 //!
-//! Here pixels are covered by *sheets*, on the host in float64.
+//! Here pixels are covered by sets of triangles, on the host.
 //!
-//! **Sheets.**
+//! **Sets of triangles.**
 //! Let P be a closed square, and G a set of triangles as they appear in the image.
 //! Orient all of them the same way round.
 //! Where two triangles of G share an edge and lie on different sides of it, their borders run in
@@ -36,31 +36,39 @@
 //! times other than 0, then every point of P lies in a triangle of G**.
 //! No ray through P then gets farther than the farthest depth that the triangles of G reach in P.
 //!
-//! Nothing is assumed of G.
+//! Nothing is assumed of G, nor of the signs with which borders are added up.
 //! It may fold, overlap, intersect itself or face the wrong way.
 //! It may have triangles of area zero, or three triangles at one edge.
 //! Every choice of G gives a valid depth.
 //!
-//! **Which sheets.**
-//! `sheets` links the triangles that touch P across shared edges that meet P.
-//! Each connected component is a sheet.
-//! If a triangle is missing, its neighbour's edge stays unpaired, which spoils that sheet alone.
-//! The nearest of all sheets that cover P counts.
-//! A lamp post in front of a wall spoils its own sheet, not the wall's.
+//! The files follow the data (`image` calls them in this order):
+//!
+//! 1. `topology` knows which triangles of a mesh share edges, `links` which copies of meshes do.
+//!    Both are made once.
+//! 2. `thresholds` chooses G by depth, from the depths at the centres of the pixels around P.
+//! 3. `looks` picks the meshlets that may matter, and rounds their vertices to 1/256 pixel
+//!    (`projector`, `facets`).
+//! 4. `proof` decides in exact integers which G cover their pixels (`coverage`, `squares`,
+//!    `chains`).
+//!    Most pixels end here.
+//! 5. `sheets` searches the rest in float64, with G that are connected across shared edges that
+//!    meet P (`cells`, `square`).
+//!    Each connected component is a sheet, and the nearest of those that cover P counts.
+//!
+//! Where nothing covers P, its quarters are tried.
+//! Every ray through P goes through a quarter, so the farthest quarter counts for P.
 //!
 //! At folds and at silhouettes of closed meshes two triangles lie on the *same* side of their edge.
 //! Their borders then add up instead of cancelling.
 //! Modulo 2 they cancel again, and an odd winding covers P, too.
 //! That closes small folds.
 //!
-//! Where no sheet covers P, its quarters are tried (`refinement`).
-//! Every ray through P goes through a quarter, so the farthest quarter counts for P.
-//!
 //! **Rounding.**
 //! No step trusts a sign that float64 may have got wrong.
+//! The proof has its own account in docs/occluders.md; this is the search's.
 //!
 //! - Each projected vertex carries a bound of its error, which is a few roundings of its terms,
-//!   counted in `cells`.
+//!   counted in `projector`.
 //! - An exact edge lies within the margins of its ends from the computed edge.
 //!   It misses P if the computed edge misses P grown by the margins (`square`).
 //! - Moving all vertices from their computed to their exact places moves no border across P.
@@ -146,8 +154,8 @@ impl ConservativeDepthOptions {
 /// | memory on the host, in bytes | per vertex | per triangle |
 /// |---|---|---|
 /// | always | 24 | 12 |
-/// | from the first conservative depth image on, besides | 24 | about 42 |
-/// | while a conservative depth image is made, besides | about 110 | about 110 |
+/// | from the first conservative depth image on, besides | 6 | about 55 |
+/// | while one is made, besides, of what is looked at | about 50 | about 80 |
 ///
 /// # Examples
 /// ```

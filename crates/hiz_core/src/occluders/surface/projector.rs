@@ -99,8 +99,8 @@ impl Projector {
 
     /// The point in the image; `None` if it is too uncertain or may be in front of the near plane.
     ///
-    /// With `v` for x, y or far, the exact quotient differs from `v / w` by
-    /// `((v' - v) - (v / w) (w' - w)) / w'`.
+    /// With `v` for x, y or far, the exact quotient differs from `v / w` by `((v' - v) - (v / w)
+    /// (w' - w)) / w'`.
     /// The reciprocal of w and the product with it add two roundings; the bound takes four.
     #[inline]
     pub(super) fn point(&self, c: &Clip) -> Option<Point> {
