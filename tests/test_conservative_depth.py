@@ -395,7 +395,8 @@ def test_refinement_finds_what_two_surfaces_cover_together(
     )
 
 
-def test_refinement_never_loses(device: hizvk.Device) -> None:
+def test_refinement_hardly_ever_loses(device: hizvk.Device) -> None:
+    """A pixel whose depth is within 2 % of the best that may be found is not looked at again."""
     scene = scenes.room()
     occluders = device.occluders(scene.vertices, scene.triangles)
     view = scene.views[0].camera((45, 80))
@@ -403,5 +404,6 @@ def test_refinement_never_loses(device: hizvk.Device) -> None:
         device.render_depth(occluders, view, conservative=True, refinement=k).numpy()
         for k in range(4)
     ]
-    assert all((finer >= coarser).all() for coarser, finer in itertools.pairwise(depths))
+    assert all((finer >= 0.98 * coarser).all() for coarser, finer in itertools.pairwise(depths))
+    assert all(finer.sum() >= coarser.sum() for coarser, finer in itertools.pairwise(depths))
     assert occluders.host_bytes > 36 * len(scene.triangles)

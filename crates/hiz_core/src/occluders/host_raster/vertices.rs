@@ -149,8 +149,9 @@ impl Vertices {
                 let (up, down) =
                     (least(least(y0[i], y1[i]), y2[i]), greatest(greatest(y0[i], y1[i]), y2[i]));
                 // The first and the last centre between the extremes, rounded like the corners.
-                let first = |v: f32, half: i32| (rounded(v) + half + (HALF - 1)) >> 8;
-                let last = |v: f32, half: i32| (rounded(v) + half - HALF) >> 8;
+                // What is clipped may be anywhere, and these numbers of it are not used.
+                let first = |v: f32, half: i32| rounded(v).wrapping_add(half + HALF - 1) >> 8;
+                let last = |v: f32, half: i32| rounded(v).wrapping_add(half - HALF) >> 8;
                 let columns = (first(left, half_x), last(right, half_x));
                 let rows = (first(up, half_y), last(down, half_y));
                 let covers = (columns.0 <= columns.1)

@@ -21,9 +21,9 @@
 //! - Masked Software Occlusion Culling (Hasselgren, Andersson, Akenine-Moller 2016) merges by
 //!   sample coverage, and admits the error.
 //!
-//! Here pixels are covered by *sheets*, on the host in float64.
+//! Here pixels are covered by sets of triangles, on the host.
 //!
-//! **Sheets.**
+//! **Sets of triangles.**
 //! Let P be a closed square, and G a set of triangles as they appear in the image.
 //! Orient all of them the same way round.
 //! Where two triangles of G share an edge and lie on different sides of it, their borders run in
@@ -36,31 +36,39 @@
 //! times other than 0, then every point of P lies in a triangle of G**.
 //! No ray through P then gets farther than the farthest depth that the triangles of G reach in P.
 //!
-//! Nothing is assumed of G.
+//! Nothing is assumed of G, nor of the signs with which borders are added up.
 //! It may fold, overlap, intersect itself or face the wrong way.
 //! It may have triangles of area zero, or three triangles at one edge.
 //! Every choice of G gives a valid depth.
 //!
-//! **Which sheets.**
-//! `sheets` links the triangles that touch P across shared edges that meet P.
-//! Each connected component is a sheet.
-//! If a triangle is missing, its neighbour's edge stays unpaired, which spoils that sheet alone.
-//! The nearest of all sheets that cover P counts.
-//! A lamp post in front of a wall spoils its own sheet, not the wall's.
+//! The files follow the data (`image` calls them in this order):
+//!
+//! 1. `topology` knows which triangles of a mesh share edges, `links` which copies of meshes do.
+//!    Both are made once.
+//! 2. `thresholds` chooses G by depth, from the depths at the centres of the pixels around P.
+//! 3. `looks` picks the meshlets that may matter, and rounds their vertices to 1/256 pixel
+//!    (`projector`, `facets`).
+//! 4. `proof` decides in exact integers which G cover their pixels (`coverage`, `squares`,
+//!    `chains`).
+//!    Most pixels end here.
+//! 5. `sheets` searches the rest in float64, with G that are connected across shared edges that
+//!    meet P (`cells`, `square`).
+//!    Each connected component is a sheet, and the nearest of those that cover P counts.
+//!
+//! Where nothing covers P, its quarters are tried.
+//! Every ray through P goes through a quarter, so the farthest quarter counts for P.
 //!
 //! At folds and at silhouettes of closed meshes two triangles lie on the *same* side of their edge.
 //! Their borders then add up instead of cancelling.
 //! Modulo 2 they cancel again, and an odd winding covers P, too.
 //! That closes small folds.
 //!
-//! Where no sheet covers P, its quarters are tried (`refinement`).
-//! Every ray through P goes through a quarter, so the farthest quarter counts for P.
-//!
 //! **Rounding.**
 //! No step trusts a sign that float64 may have got wrong.
+//! The proof has its own account in docs/occluders.md; this is the search's.
 //!
 //! - Each projected vertex carries a bound of its error, which is a few roundings of its terms,
-//!   counted in `cells`.
+//!   counted in `projector`.
 //! - An exact edge lies within the margins of its ends from the computed edge.
 //!   It misses P if the computed edge misses P grown by the margins (`square`).
 //! - Moving all vertices from their computed to their exact places moves no border across P.
@@ -78,12 +86,22 @@
 //! Beyond the far plane nothing is hidden: such depths become far.
 
 mod cells;
+mod chains;
+mod coverage;
+mod facets;
+mod image;
+mod links;
+mod looks;
+mod open_pixels;
 pub(crate) mod planted_fault;
+mod projector;
+mod proof;
 mod sheets;
 mod square;
+mod squares;
+mod thresholds;
 mod topology;
 
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use crate::error::{Error, Result};
@@ -98,9 +116,11 @@ use crate::occluders::drawing::{DrawOptions, Touched};
 use crate::occluders::host_raster::{HostRaster, MOST_SIDE, Scene, Way};
 use crate::occluders::placement::Placement;
 use crate::occluders::shapes::Shapes;
-use crate::occluders::surface::cells::Cells;
+use crate::occluders::surface::facets::Rounder;
+use crate::occluders::surface::links::{Links, Standing};
+use crate::occluders::surface::looks::Placed;
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
-use crate::occluders::surface::sheets::Sheets;
+use crate::occluders::surface::projector::Projector;
 use crate::occluders::surface::topology::Topology;
 
 /// The least normal float32.
@@ -123,13 +143,19 @@ impl Default for ConservativeDepthOptions {
     }
 }
 
+impl ConservativeDepthOptions {
+    fn refinement(&self) -> u32 {
+        self.refinement.min(8)
+    }
+}
+
 /// The occluders' triangles on the host, in float64 world coordinates.
 ///
 /// | memory on the host, in bytes | per vertex | per triangle |
 /// |---|---|---|
 /// | always | 24 | 12 |
-/// | from the first conservative depth image on, besides | 24 | about 42 |
-/// | while a conservative depth image is made, besides | about 110 | about 110 |
+/// | from the first conservative depth image on, besides | 6 | about 55 |
+/// | while one is made, besides, of what is looked at | about 50 | about 80 |
 ///
 /// # Examples
 /// ```
@@ -160,11 +186,17 @@ pub struct OccluderSurface {
     shapes: Shapes,
     placements: Locked<Arc<Vec<Placement>>>,
     cull_mode: FaceCull,
-    topology: OnceLock<Result<Topology>>,
-    has_moved: AtomicBool,
+    shared: OnceLock<Result<Shared>>,
     /// The meshlets that were not hidden when they were last drawn with a limit: copy and number,
     /// sorted.
     useful: Locked<Vec<(u32, u32)>>,
+}
+
+/// What is made of the meshes at the first conservative image.
+#[derive(Debug)]
+struct Shared {
+    topology: Topology,
+    links: Links,
 }
 
 impl OccluderSurface {
@@ -180,8 +212,7 @@ impl OccluderSurface {
             shapes,
             placements,
             cull_mode: options.cull_mode,
-            topology: OnceLock::new(),
-            has_moved: AtomicBool::new(false),
+            shared: OnceLock::new(),
             useful: Locked::default(),
         })
     }
@@ -225,7 +256,6 @@ impl OccluderSurface {
         let mut all = placements.to_vec();
         all.splice(begin..end, moved);
         *placements = Arc::new(all);
-        self.has_moved.store(true, Ordering::Relaxed);
         Ok(())
     }
 
@@ -250,7 +280,7 @@ impl OccluderSurface {
         camera: &Camera,
         options: &ConservativeDepthOptions,
     ) -> Result<Vec<f32>> {
-        self.conservative_depth_planted(camera, options, Planted::default())
+        self.usual_depth(camera, options, Planted::default())
     }
 
     /// Draws what `camera` sees into an image of its size; returns the rectangle around it.
@@ -315,38 +345,93 @@ impl OccluderSurface {
         options: &ConservativeDepthOptions,
         fault: Option<planted_fault::PlantedFault>,
     ) -> Result<Vec<f32>> {
-        self.conservative_depth_planted(camera, options, Planted(fault))
+        self.usual_depth(camera, options, Planted(fault))
     }
 
-    fn conservative_depth_planted(
+    /// [`OccluderSurface::conservative_depth`] by a search of every pixel, for tests.
+    ///
+    /// # Errors
+    /// As [`OccluderSurface::conservative_depth`].
+    #[cfg(feature = "testing")]
+    pub fn conservative_depth_searched(
+        &self,
+        camera: &Camera,
+        options: &ConservativeDepthOptions,
+        fault: Option<planted_fault::PlantedFault>,
+    ) -> Result<Vec<f32>> {
+        self.depth_by(camera, Planted(fault), |placed, links, rounder| {
+            image::searched(placed, links, rounder, camera, options.refinement())
+        })
+    }
+
+    /// [`OccluderSurface::conservative_depth`] with any depths for the pixels' centres, for tests.
+    ///
+    /// They are NDC depths, which choose what is tried and what is searched.
+    /// The result is right whatever they are.
+    ///
+    /// # Errors
+    /// As [`OccluderSurface::conservative_depth`].
+    ///
+    /// # Panics
+    /// If there is not one depth per pixel.
+    #[cfg(feature = "testing")]
+    pub fn conservative_depth_by_centres(
+        &self,
+        camera: &Camera,
+        options: &ConservativeDepthOptions,
+        centres: &[f32],
+        fault: Option<planted_fault::PlantedFault>,
+    ) -> Result<Vec<f32>> {
+        assert_eq!(centres.len() as u64, camera.size().pixels(), "one depth per pixel");
+        self.depth_by(camera, Planted(fault), |placed, links, rounder| {
+            image::image(placed, links, rounder, camera, options.refinement(), centres)
+        })
+    }
+
+    fn usual_depth(
         &self,
         camera: &Camera,
         options: &ConservativeDepthOptions,
         fault: Planted,
     ) -> Result<Vec<f32>> {
-        let (positions, triangles);
-
-        let moved;
-        let topology = if !self.has_moved.load(Ordering::Relaxed) {
-            self.topology
-                .get_or_init(|| {
-                    let (positions, triangles) = self.world();
-                    Topology::new(&positions, &triangles)
-                })
-                .as_ref()
-                .map_err(Clone::clone)?
-        } else {
-            (positions, triangles) = self.world();
-            moved = Topology::new(&positions, &triangles)?;
-            &moved
+        // What the rasteriser refuses is seen in float64 alone.
+        let centres = match self.depth(camera) {
+            Err(Error::Invalid { .. } | Error::Limit { .. }) => None,
+            centres => Some(centres?),
         };
+        let refinement = options.refinement();
+        self.depth_by(camera, fault, |placed, links, rounder| match &centres {
+            Some(centres) => image::image(placed, links, rounder, camera, refinement, centres),
+            None => image::searched(placed, links, rounder, camera, refinement),
+        })
+    }
+
+    /// NDC depths from the values of `far` that `image` finds.
+    fn depth_by(
+        &self,
+        camera: &Camera,
+        fault: Planted,
+        image: impl FnOnce(Placed<'_>, &Standing<'_>, &Rounder) -> Vec<f64>,
+    ) -> Result<Vec<f32>> {
+        let placements = self.placements();
+        let shared = self.shared.get_or_init(|| {
+            let topology = Topology::new(&self.shapes)?;
+            let links = Links::new(&self.shapes, &topology, &placements);
+            Ok(Shared { topology, links })
+        });
+        let Shared { topology, links } = shared.as_ref().map_err(Clone::clone)?;
+        let placed = Placed {
+            shapes: &self.shapes,
+            placements: &placements,
+            topology,
+            culled: self.cull_mode.as_seen_by(camera),
+            fault,
+        };
+        let rounder = Rounder::new(Projector::new(camera, fault));
+        let far = image(placed, &links.standing(&placements), &rounder);
         let convention = camera.convention();
-        let culled = self.cull_mode.as_seen_by(camera);
-        let cells = Cells::new(topology, camera, culled, fault);
         // The value of `far` at the far plane; reversed Z counts its depths negative.
         let beyond = if convention.is_reversed() { 0.0 } else { 1.0 };
-        let far =
-            Sheets::new(&cells, fault).image(camera.size(), beyond, options.refinement.min(8));
         #[expect(clippy::cast_possible_truncation, reason = "the fault that is planted")]
         let rounded =
             if is_planted!(fault, RoundedToNearest) { |far| far as f32 } else { round_up };
@@ -385,7 +470,7 @@ impl OccluderSurface {
 
     /// Bytes on the host, including the topology once a conservative depth image was made.
     pub fn host_bytes(&self) -> u64 {
-        let made = self.topology.get().and_then(|topology| topology.as_ref().ok());
-        self.shapes.bytes() + made.map_or(0, Topology::bytes)
+        let made = self.shared.get().and_then(|shared| shared.as_ref().ok());
+        self.shapes.bytes() + made.map_or(0, |made| made.topology.bytes() + made.links.bytes())
     }
 }

@@ -55,4 +55,18 @@ pub enum PlantedFault {
     CutSidesJoined,
     /// A triangle faces the camera if float64 says so, without a proof.
     FacingUnproved,
+    /// In the proof by thresholds, edges that remain do not leave a pixel open.
+    BordersIgnored,
+    /// There, a triangle's depth at the pixel's centre counts for the whole pixel.
+    PlaneWithoutReach,
+    /// There, triangles on the same side of their edge count as if they were on different sides.
+    FoldsCancel,
+    /// There, an edge that misses a pixel misses it, however it was rounded.
+    NoEdgeMargin,
+    /// There, edges to triangles that were left out are no borders.
+    LeftOutNeighboursIgnored,
+    /// There, the pass over edges decides what is in a slab with planes in float32.
+    MembershipInFloat32,
+    /// Vertices are rounded to float32, and to the eye, before they are projected.
+    VerticesInFloat32,
 }

@@ -3,13 +3,16 @@
 //! A square is covered by sheets of neighbouring cells that leave no gap in it.
 //! The proof is in the documentation of the module above.
 
-use crate::input::image::ImageSize;
+use crate::host::threads::{cores, on_threads};
 use crate::occluders::surface::cells::{Cells, FOLD, NO_MATE};
+use crate::occluders::surface::open_pixels::OpenPixels;
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
 use crate::occluders::surface::square::{Side, Square, farthest, side};
 
 /// The side in pixels of the blocks that are tested as a whole first.
 const BLOCK: u32 = 8;
+/// How many pixels a thread takes at once.
+const PART: usize = 32;
 
 /// A cell that touches the square, as a member of a sheet.
 #[derive(Debug, Clone, Copy)]
@@ -34,8 +37,61 @@ struct Sums {
     far: f64,
 }
 
-/// The state of the search in one image.
-pub(super) struct Sheets<'a> {
+/// Searches the open pixels: every ray through the closed square of one is blocked at this value of
+/// `far` or before.
+///
+/// Pixels are left as they are where that cannot be shown.
+/// `refinement` is how often a pixel is quartered where it cannot be shown for the whole pixel.
+pub(super) fn search(
+    cells: &Cells,
+    open: &OpenPixels,
+    refinement: u32,
+    fault: Planted,
+    best: &mut [f64],
+) {
+    let touched = Sheets::new(cells, fault).scatter(open, best);
+    // The lists of cells by pixel are made in three steps: count, sum up, fill.
+    let still =
+        |best: &[f64], pixel: u32, cell: u32| cells.nearest[cell as usize] < best[pixel as usize];
+    let mut first = vec![0_u32; best.len() + 1];
+    for (pixel, cell) in &touched {
+        first[*pixel as usize + 1] += u32::from(still(best, *pixel, *cell));
+    }
+    for i in 1..first.len() {
+        first[i] += first[i - 1];
+    }
+    let mut lists = vec![0; first[best.len()] as usize];
+    let mut next = first.clone();
+    for (pixel, cell) in &touched {
+        if still(best, *pixel, *cell) {
+            lists[next[*pixel as usize] as usize] = *cell;
+            next[*pixel as usize] += 1;
+        }
+    }
+    drop(touched);
+    let mut found: Vec<f64> = open.pixels().iter().map(|pixel| best[*pixel as usize]).collect();
+    on_threads(
+        cores(),
+        found.chunks_mut(PART).zip(open.pixels().chunks(PART)),
+        |(found, pixels)| {
+            let mut sheets = Sheets::new(cells, fault);
+            for (far, pixel) in found.iter_mut().zip(pixels) {
+                let list =
+                    &lists[first[*pixel as usize] as usize..first[*pixel as usize + 1] as usize];
+                if !list.is_empty() {
+                    let (column, row) = (pixel % open.size().width, pixel / open.size().width);
+                    *far = sheets.blocked(list, pixel_square(column, row), *far, refinement);
+                }
+            }
+        },
+    );
+    for (far, pixel) in found.iter().zip(open.pixels()) {
+        best[*pixel as usize] = *far;
+    }
+}
+
+/// The state of the search in a part of an image.
+struct Sheets<'a> {
     cells: &'a Cells,
     /// By cell: its index in the list of members, valid where `stamps` has the current stamp.
     places: Vec<u32>,
@@ -45,63 +101,33 @@ pub(super) struct Sheets<'a> {
 }
 
 impl<'a> Sheets<'a> {
-    pub(super) fn new(cells: &'a Cells, fault: Planted) -> Self {
+    fn new(cells: &'a Cells, fault: Planted) -> Self {
         let count = cells.corners.len();
         Self { cells, places: vec![0; count], stamps: vec![0; count], stamp: 0, fault }
     }
 
-    /// For every pixel, rows from top to bottom: every ray through its closed square is blocked at
-    /// this value of `far` or before.
+    /// Lowers `best` where a single cell covers an open pixel.
     ///
-    /// `beyond` where that cannot be shown.
-    /// `refinement` is how often a pixel is quartered where it cannot be shown for the whole pixel.
-    pub(super) fn image(&mut self, size: ImageSize, beyond: f64, refinement: u32) -> Vec<f64> {
-        let mut best = vec![beyond; size.pixels() as usize];
-        let touched = self.scatter(size, &mut best);
-        // The lists of cells by pixel are made in three steps: count, sum up, fill.
-        let still = |best: &[f64], pixel: u32, cell: u32| {
-            self.cells.nearest[cell as usize] < best[pixel as usize]
-        };
-        let mut first = vec![0_u32; best.len() + 1];
-        for (pixel, cell) in &touched {
-            first[*pixel as usize + 1] += u32::from(still(&best, *pixel, *cell));
-        }
-        for i in 1..first.len() {
-            first[i] += first[i - 1];
-        }
-        let mut lists = vec![0; first[best.len()] as usize];
-        let mut next = first.clone();
-        for (pixel, cell) in &touched {
-            if still(&best, *pixel, *cell) {
-                lists[next[*pixel as usize] as usize] = *cell;
-                next[*pixel as usize] += 1;
-            }
-        }
-        drop(touched);
-        for (pixel, far) in best.iter_mut().enumerate() {
-            let list = &lists[first[pixel] as usize..first[pixel + 1] as usize];
-            if !list.is_empty() {
-                let (column, row) = (pixel as u32 % size.width, pixel as u32 / size.width);
-                *far = self.blocked(list, pixel_square(column, row), *far, refinement);
-            }
-        }
-        best
-    }
-
-    /// Lowers `best` where a single cell covers a pixel.
-    ///
-    /// Returns the other cells that touch a pixel, as (pixel, cell).
-    fn scatter(&self, size: ImageSize, best: &mut [f64]) -> Vec<(u32, u32)> {
+    /// Returns the other cells that touch an open pixel, as (pixel, cell).
+    fn scatter(&self, open: &OpenPixels, best: &mut [f64]) -> Vec<(u32, u32)> {
         // The nearest cells come first, since they leave little to do for the others.
         let nearest = &self.cells.nearest;
         let mut order: Vec<u32> = (0..nearest.len() as u32).collect();
         order.sort_unstable_by(|a, b| nearest[*a as usize].total_cmp(&nearest[*b as usize]));
         let mut touched = Vec::new();
         for cell in order {
-            let columns = self.reach(cell, 0, size.width);
-            let rows = self.reach(cell, 2, size.height);
+            let columns = self.reach(cell, 0, open.size().width);
+            let rows = self.reach(cell, 2, open.size().height);
             for block_row in (rows.start..rows.end).step_by(BLOCK as usize) {
                 for block_column in (columns.start..columns.end).step_by(BLOCK as usize) {
+                    let end_row = rows.end.min(block_row + BLOCK);
+                    let end_column = columns.end.min(block_column + BLOCK);
+                    if !open.any(
+                        [block_column, end_column - 1].map(u32::cast_signed),
+                        [block_row, end_row - 1].map(u32::cast_signed),
+                    ) {
+                        continue;
+                    }
                     let half = f64::from(BLOCK) / 2.0;
                     let block = Square {
                         x: f64::from(block_column) + half,
@@ -112,11 +138,11 @@ impl<'a> Sheets<'a> {
                     if large && matches!(self.relation(cell, block).0, Relation::Apart) {
                         continue;
                     }
-                    for row in block_row..rows.end.min(block_row + BLOCK) {
-                        for column in block_column..columns.end.min(block_column + BLOCK) {
-                            let pixel = row * size.width + column;
+                    for row in block_row..end_row {
+                        for column in block_column..end_column {
+                            let pixel = row * open.size().width + column;
                             let known = &mut best[pixel as usize];
-                            if nearest[cell as usize] >= *known {
+                            if !open.is_open(pixel as usize) || nearest[cell as usize] >= *known {
                                 continue;
                             }
                             let square = pixel_square(column, row);

@@ -1,0 +1,183 @@
+//! Which pixels a triangle or an edge of the rounded image meets, in exact integers.
+//!
+//! Coordinates are below 2^30 units in size, so every product of two differences fits 62 bits.
+
+use crate::occluders::surface::facets::{Corner, REACH, UNITS};
+
+/// Squares that are tested together where a triangle is large.
+const RUN: i32 = 8;
+
+/// A part of a grid of squares over the image.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Grid {
+    /// The side of a square is 2 to this power, in units: 8 for pixels.
+    pub(super) log2: u32,
+    /// The first and the last column and row.
+    pub(super) columns: [i32; 2],
+    pub(super) rows: [i32; 2],
+}
+
+impl Grid {
+    /// The side of a square in units.
+    #[inline]
+    fn side(&self) -> i32 {
+        1 << self.log2
+    }
+
+    /// The centre of a column or row, in units.
+    #[inline]
+    pub(super) fn centre(&self, place: i32) -> i32 {
+        (place << self.log2) + self.side() / 2
+    }
+
+    /// The squares along one axis that meet an interval of units, each grown by [`REACH`].
+    ///
+    /// `within` are the first and the last that count.
+    /// The first of the result is after the last if there are none.
+    #[inline]
+    fn met(&self, from: i32, to: i32, within: [i32; 2]) -> [i32; 2] {
+        let first = (from - self.side() - REACH + self.side() - 1) >> self.log2;
+        [first.max(within[0]), ((to + REACH) >> self.log2).min(within[1])]
+    }
+
+    /// The squares along one axis whose centres are in an interval of units.
+    #[inline]
+    fn centres(&self, from: i32, to: i32, within: [i32; 2]) -> [i32; 2] {
+        let half = self.side() / 2;
+        [((from + half - 1) >> self.log2).max(within[0]), ((to - half) >> self.log2).min(within[1])]
+    }
+
+    /// The squares of this grid that a box of units meets, each grown by [`REACH`].
+    #[inline]
+    pub(super) fn around(&self, x: [i32; 2], y: [i32; 2]) -> ([i32; 2], [i32; 2]) {
+        (self.met(x[0], x[1], self.columns), self.met(y[0], y[1], self.rows))
+    }
+
+    /// The 4^finer parts of one square of this grid.
+    #[inline]
+    pub(super) fn parts(&self, finer: u32, x: i32, y: i32) -> Self {
+        let within = |place: i32| [place << finer, ((place + 1) << finer) - 1];
+        Self { log2: self.log2 - finer, columns: within(x), rows: within(y) }
+    }
+}
+
+/// The pixels along one axis that meet an interval of units, each grown by [`REACH`].
+///
+/// The first and the last, both within the image; the first is after the last if there are none.
+#[inline]
+pub(super) fn pixels(from: i32, to: i32, size: i32) -> [i32; 2] {
+    let grid = Grid { log2: UNITS.ilog2(), columns: [0, 0], rows: [0, 0] };
+    grid.met(from, to, [0, size - 1])
+}
+
+/// Twice the area of a triangle; negative if it is counter-clockwise with y up.
+#[inline]
+pub(super) fn area([a, b, c]: [Corner; 3]) -> i64 {
+    i64::from(b.x - a.x) * i64::from(c.y - a.y) - i64::from(b.y - a.y) * i64::from(c.x - a.x)
+}
+
+/// Calls `cover` for the squares whose centres a triangle covers, by the top-left rule.
+///
+/// A centre on an edge is moved right by an infinitesimal step, and down by one that is
+/// infinitesimal against that, the same for all triangles.
+/// Runs of 8 squares, at multiples of 8, may be left out where `is_hidden` says so of the first.
+#[inline]
+pub(super) fn for_each_centre(
+    corners: [Corner; 3],
+    grid: Grid,
+    is_hidden: impl Fn(i32, i32) -> bool,
+    mut cover: impl FnMut(i32, i32),
+) {
+    let [p, q, r] = corners;
+    let columns = grid.centres(p.x.min(q.x).min(r.x), p.x.max(q.x).max(r.x), grid.columns);
+    let rows = grid.centres(p.y.min(q.y).min(r.y), p.y.max(q.y).max(r.y), grid.rows);
+    if columns[0] > columns[1] || rows[0] > rows[1] {
+        return;
+    }
+    let corners = if area(corners) < 0 { [p, r, q] } else { corners };
+    // By side: what its edge function grows by per column and row, and its value at the first
+    // centre, all divided by the side of a square.
+    let (mut right, mut down, mut value) = ([0_i64; 3], [0_i64; 3], [0_i64; 3]);
+    let start = [grid.centre(columns[0]), grid.centre(rows[0])];
+    for k in 0..3 {
+        let (a, b) = (corners[k], corners[(k + 1) % 3]);
+        right[k] = i64::from(a.y) - i64::from(b.y);
+        down[k] = i64::from(b.x) - i64::from(a.x);
+        let is_inside = right[k] > 0 || (right[k] == 0 && down[k] > 0);
+        let at_first = right[k] * (i64::from(start[0]) - i64::from(a.x))
+            + down[k] * (i64::from(start[1]) - i64::from(a.y));
+        // Floors keep the sign, and all values in a row or column differ by whole steps.
+        value[k] = (at_first - i64::from(!is_inside)) >> grid.log2;
+    }
+    let is_large = columns[1] - columns[0] >= 2 * RUN;
+    for y in rows[0]..=rows[1] {
+        let mut now = value;
+        let mut x = columns[0];
+        while x <= columns[1] {
+            if is_large && x % RUN == 0 && x + RUN - 1 <= columns[1] {
+                let misses = |k: usize| now[k].max(now[k] + i64::from(RUN - 1) * right[k]) < 0;
+                if (0..3).any(misses) || is_hidden(x, y) {
+                    for k in 0..3 {
+                        now[k] += i64::from(RUN) * right[k];
+                    }
+                    x += RUN;
+                    continue;
+                }
+            }
+            if (now[0] | now[1] | now[2]) >= 0 {
+                cover(x, y);
+            }
+            for k in 0..3 {
+                now[k] += right[k];
+            }
+            x += 1;
+        }
+        for k in 0..3 {
+            value[k] += down[k];
+        }
+    }
+}
+
+/// Calls `meet` for the squares that an edge meets, each grown by `reach`.
+///
+/// `reach` is at most [`REACH`].
+/// There are three separating axes: x, y and the edge's normal.
+#[inline]
+pub(super) fn for_each_met(
+    [a, b]: [Corner; 2],
+    reach: i32,
+    grid: Grid,
+    mut meet: impl FnMut(i32, i32),
+) {
+    let columns = grid.met(a.x.min(b.x), a.x.max(b.x), grid.columns);
+    let rows = grid.met(a.y.min(b.y), a.y.max(b.y), grid.rows);
+    let normal = [i64::from(a.y) - i64::from(b.y), i64::from(b.x) - i64::from(a.x)];
+    let most = (normal[0].abs() + normal[1].abs()) * i64::from(grid.side() / 2 + reach);
+    for y in rows[0]..=rows[1] {
+        let mut columns = columns;
+        if columns[1] - columns[0] > 4 && normal[0] != 0 {
+            // Where the edge's line is within the row, with room for the rounding of float64.
+            let slope = normal[1] as f64 / -(normal[0] as f64);
+            let at = |units: i32| f64::from(a.x) + f64::from(units - a.y) * slope;
+            let top = y << grid.log2;
+            let ends = [at(top - 2 * REACH), at(top + grid.side() + 2 * REACH)];
+            let square = |units: f64| (units / f64::from(grid.side())).floor();
+            let room = f64::from(4 * REACH);
+            let low = square(ends[0].min(ends[1]) - room).max(f64::from(columns[0]));
+            let high = square(ends[0].max(ends[1]) + room).min(f64::from(columns[1]));
+            if low > high {
+                continue;
+            }
+            #[expect(clippy::cast_possible_truncation, reason = "within the image")]
+            let within = [low as i32, high as i32];
+            columns = within;
+        }
+        let row = normal[1] * (i64::from(grid.centre(y)) - i64::from(a.y));
+        for x in columns[0]..=columns[1] {
+            let beside = normal[0] * (i64::from(grid.centre(x)) - i64::from(a.x)) + row;
+            if beside.abs() <= most {
+                meet(x, y);
+            }
+        }
+    }
+}
