@@ -6,5 +6,6 @@ pub mod shaders;
 mod twins;
 pub mod words;
 
+pub use crate::occluders::host_raster::planted_fault::RasterFault;
 pub use crate::occluders::surface::planted_fault::PlantedFault;
 pub use crate::output::lists::CANARY_WORDS;
