@@ -7,5 +7,6 @@ mod twins;
 pub mod words;
 
 pub use crate::gpu::made::Made;
+pub use crate::occluders::host_raster::planted_fault::RasterFault;
 pub use crate::occluders::surface::planted_fault::PlantedFault;
 pub use crate::output::lists::CANARY_WORDS;

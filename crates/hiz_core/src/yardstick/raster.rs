@@ -4,6 +4,8 @@ use crate::error::Result;
 use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
 use crate::occluders::drawing::DrawOptions;
+#[cfg(feature = "testing")]
+use crate::occluders::host_raster::planted_fault::{Planted, RasterFault};
 use crate::occluders::host_raster::{self, Way};
 use crate::occluders::surface::OccluderSurface;
 
@@ -18,6 +20,12 @@ impl HostRaster {
     /// An image in `bands` bands of rows; a thread draws whole bands.
     pub fn new(size: ImageSize, bands: usize) -> Self {
         Self { raster: host_raster::HostRaster::new(size, bands), size }
+    }
+
+    /// An image like [`HostRaster::new`], whose rasteriser has a planted fault.
+    #[cfg(feature = "testing")]
+    pub fn with_fault(size: ImageSize, bands: usize, fault: Option<RasterFault>) -> Self {
+        Self { raster: host_raster::HostRaster::with_fault(size, bands, Planted(fault)), size }
     }
 
     /// Clears the image and draws `surface` as `camera` sees it.

@@ -7,6 +7,7 @@ use std::ops::{Range, RangeInclusive};
 
 use crate::input::image::DepthConvention;
 use crate::occluders::host_raster::lens::{Extent, HALF, Image, UNITS, greatest, least};
+use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
 use crate::occluders::host_raster::tile::{
     CLEAR, Layer, MOST_LAYERS, Mask, PIXELS, Plane, SIDE, State, Tile, row_of_layers,
 };
@@ -57,13 +58,14 @@ struct Edges {
 
 impl Edges {
     #[inline(always)]
-    fn new(t: &Triangle) -> Self {
+    fn new(t: &Triangle, fault: Planted) -> Self {
         let next = |k: usize| if k == 2 { 0 } else { k + 1 };
         let right = std::array::from_fn(|k| t.y[k] - t.y[next(k)]);
         let down = std::array::from_fn(|k| t.x[next(k)] - t.x[k]);
         let bias = std::array::from_fn(|k| {
             let is_top_left = right[k] > 0 || (right[k] == 0 && down[k] > 0);
-            if is_top_left { 0 } else { -1 }
+            let is_top_left = is_top_left && !is_planted!(fault, EdgesOfNoSide);
+            if is_top_left || is_planted!(fault, EdgesOfBothSides) { 0 } else { -1 }
         });
         Self { right, down, bias }
     }
@@ -145,14 +147,15 @@ struct Steps {
 
 impl Steps {
     #[inline(always)]
-    fn new(t: &Triangle, edges: &Edges) -> Self {
+    fn new(t: &Triangle, edges: &Edges, fault: Planted) -> Self {
         let last = STEP - 1;
+        let middle = if is_planted!(fault, FarthestInTheMiddle) { 0.5 } else { 1.0 };
         let corner = |k: usize, is_last: bool| t.slope[k] * if is_last { last as f32 } else { 0.0 };
         Self {
             ramp: edges.right.map(|right| std::array::from_fn(|l| STEP * right * l as i32)),
             gain: std::array::from_fn(|k| last * (edges.right[k].max(0) + edges.down[k].max(0))),
             loss: std::array::from_fn(|k| last * (edges.right[k].min(0) + edges.down[k].min(0))),
-            low: std::array::from_fn(|k| corner(k, t.slope[k] < 0.0)),
+            low: std::array::from_fn(|k| corner(k, t.slope[k] < 0.0) * middle),
             high: std::array::from_fn(|k| corner(k, t.slope[k] >= 0.0)),
         }
     }
@@ -300,7 +303,8 @@ impl Band {
             let row: &[f32; LANES] = &row.as_chunks().0[column];
             std::array::from_fn(|l| least(row[l], farthest[l]))
         });
-        self.cells[cell] = farthest.into_iter().fold(f32::MAX, least);
+        let all = if is_planted!(self.image.fault, CellOfOneTile) { 1 } else { LANES };
+        self.cells[cell] = farthest.into_iter().take(all).fold(f32::MAX, least);
         self.is_cell_stale[cell] = false;
     }
 
@@ -327,6 +331,7 @@ impl Band {
             layers: &mut self.layers[index..],
             pixels: &mut self.pixels[first..],
             stride: self.stride,
+            fault: self.image.fault,
         }
     }
 
@@ -343,7 +348,7 @@ impl Band {
         if columns.0 > columns.1 || rows.0 > rows.1 {
             return;
         }
-        let edges = Edges::new(t);
+        let edges = Edges::new(t, self.image.fault);
         if columns.1 - columns.0 < LANES as i32 && right - left <= SMALL && down - up <= SMALL {
             self.draw_by_rows(t, &edges, columns, rows);
         } else {
@@ -404,7 +409,7 @@ impl Band {
         if is_large && self.hides_all(t.nearest, (begin, end), rows) {
             return;
         }
-        let steps = Steps::new(t, edges);
+        let steps = Steps::new(t, edges, self.image.fault);
         if end - begin < NARROW {
             for row in first..=last {
                 self.draw_narrow(t, edges, &steps, row, (begin, end), is_large);
@@ -538,6 +543,9 @@ impl Band {
         }
         if self.states[index] != PIXELS && (is_large || is_full) {
             let mask = if is_full { Mask::MAX } else { edges.mask(at) };
+            let shifted = u32::from(is_planted!(self.image.fault, MasksShifted));
+            // A column's rows run from its byte's highest bit.
+            let mask = mask >> shifted & (Mask::MAX / 255 * (255 >> shifted));
             if mask == 0 || self.tile(index).add_layer(mask, plane, (low, high)) {
                 return;
             }
@@ -565,6 +573,9 @@ impl Band {
                 let cell = row / LANES * (self.across / LANES) + column / LANES;
                 self.is_cell_stale[cell] = true;
                 self.tile(index).renew();
+                if is_planted!(self.image.fault, RenewedTooNear) {
+                    self.farthest[index] = self.nearest[index];
+                }
             }
         }
         self.stale = stale;
@@ -605,7 +616,10 @@ impl Band {
                 let tile = first + column;
                 let row = match self.states[tile] {
                     PIXELS => pixels.as_chunks().0[column],
-                    state => row_of_layers(state, &self.layers[tile..], count, y % SIDE),
+                    state => {
+                        let layers = &self.layers[tile..];
+                        row_of_layers(state, layers, count, y % SIDE, self.image.fault)
+                    }
                 };
                 *values = row.map(&depth_of);
             }
@@ -637,16 +651,16 @@ fn to_pixels(units: i32) -> f32 {
 #[inline(always)]
 fn span(at: &[i64; 3], gain: &[i32; 3], right: &[i32; 3], begin: i32, end: i32) -> (i32, i32) {
     let (mut first, mut last) = (begin, end);
-    if end - begin <= 3 {
-        return (first, last);
-    }
+    let count = (end - begin + 2) as f32;
+    // How many tiles from `begin` on; far outside of the row there is nothing to tell apart.
+    let tiles = |value: f32, step: f32| greatest(-2.0, least(value / step, count)) as i32;
     for k in 0..3 {
         let value = (at[k] + i64::from(gain[k])) as f32;
         let step = SIDE as f32 * right[k] as f32;
         if right[k] > 0 {
-            first = first.max(begin + ((-value / step) as i32 - 1).max(0));
+            first = first.max(begin + tiles(-value, step) - 1);
         } else if right[k] < 0 {
-            last = last.min(begin + ((value / -step) as i32 + 1).max(-1));
+            last = last.min(begin + tiles(value, -step) + 1);
         } else if value < 0.0 {
             return (begin, begin - 1);
         }

@@ -4,10 +4,12 @@
 //! Depth is **nearness**: 0 on the far plane, 1 on the near plane, greater where nearer.
 //! It is reversed NDC depth, and 1 minus NDC depth for standard Z.
 
-use crate::host::linear::{Vec3, sub};
+use crate::host::linear::{Mat4, Vec3, dot, sub};
 use crate::host::rounding::flushed;
 use crate::input::camera::Camera;
-use crate::input::image::ImageSize;
+use crate::input::image::{ImageSize, MAX_IMAGE_SIDE};
+use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
+use crate::occluders::host_raster::vertices::LEAST_W;
 use crate::occluders::placement::box_corner;
 use crate::occluders::view::PlacedView;
 
@@ -16,15 +18,17 @@ pub(super) const UNITS: i32 = 256;
 /// From a pixel's corner to its centre, in units.
 pub(super) const HALF: i32 = UNITS / 2;
 /// How far outside of the image a vertex may lie without its triangles being clipped, in pixels.
-///
-/// With the largest image, 16,384 pixels, a vertex is less than 2^22 units from the middle.
-/// float32 and [`rounded`] hold such numbers.
 const GUARD_PIXELS: f32 = 8000.0;
+/// How far from the image's middle a vertex may lie, in units: [`rounded`] holds 2^22.
+///
+/// The outermost centres of the largest image, 32,768 pixels, are half a pixel below 2^22.
+pub(super) const FARTHEST_UNIT: f32 = 4_194_304.0 - 64.0;
+const _: () = assert!((MAX_IMAGE_SIDE as i32 * UNITS - UNITS) / 2 < FARTHEST_UNIT as i32);
 
 /// Added to a float32 below 2^22 in size, this leaves its nearest integer in the lowest bits.
 const MAGIC: f32 = 12_582_912.0; // 1.5 * 2^23
 
-/// The integer nearest to `v`, ties to even, for a size below 2^22.
+/// The integer nearest to `v`, ties to even, for a size of at most 2^22.
 ///
 /// Unlike a cast it becomes one addition and one subtraction of vectors.
 /// Any number is safe; NaN and large ones give some integer.
@@ -55,6 +59,7 @@ pub(super) struct Image {
     pub(super) half: [i32; 2],
     /// Beyond this distance from the middle triangles are clipped, in units.
     pub(super) guard: [f32; 2],
+    pub(super) fault: Planted,
 }
 
 /// A camera in the space of one copy of a mesh, in float32.
@@ -67,21 +72,23 @@ pub(super) struct Lens {
     pub(super) eye_hi: [f32; 3],
     pub(super) eye_lo: [f32; 3],
     eye: Vec3,
+    /// The rows in float64.
+    exact: Mat4,
     /// Whether triangles are turned round: the copy is mirrored.
     pub(super) mirrored: bool,
 }
 
 impl Image {
-    pub(super) fn of_size(size: ImageSize) -> Self {
+    pub(super) fn of_size(size: ImageSize, fault: Planted) -> Self {
         let half = [size.width, size.height].map(|side| side as i32 * HALF);
-        let guard = half.map(|h| h as f32 + GUARD_PIXELS * UNITS as f32);
-        Self { width: size.width as i32, height: size.height as i32, half, guard }
+        let guard = half.map(|h| least(h as f32 + GUARD_PIXELS * UNITS as f32, FARTHEST_UNIT));
+        Self { width: size.width as i32, height: size.height as i32, half, guard, fault }
     }
 
     /// Columns or rows `low..=high` whose centres lie between two positions from the middle.
     #[inline(always)]
     pub(super) fn pixels(half: i32, side: i32, from: f32, to: f32) -> (i32, i32) {
-        let clamped = |v: f32| rounded(greatest(least(v, 4_190_000.0), -4_190_000.0)) + half;
+        let clamped = |v: f32| rounded(greatest(least(v, FARTHEST_UNIT), -FARTHEST_UNIT)) + half;
         ((clamped(from) >> 8).clamp(0, side - 1), (clamped(to) >> 8).clamp(0, side - 1))
     }
 }
@@ -102,7 +109,18 @@ impl Lens {
         ];
         #[expect(clippy::cast_possible_truncation, reason = "rounding to float32 is the point")]
         let rows = exact.map(|row| row.map(|v| flushed(v as f32)));
-        Self { rows, eye_hi: placed.eye_hi, eye_lo: placed.eye_lo, eye: placed.eye, mirrored }
+        let (eye_hi, eye_lo, eye) = (placed.eye_hi, placed.eye_lo, placed.eye);
+        Self { rows, eye_hi, eye_lo, eye, exact, mirrored }
+    }
+
+    /// The rows at a point in mesh coordinates, in float64.
+    pub(super) fn exact_clip(&self, p: Vec3, image: &Image) -> [f64; 4] {
+        let d = sub(p, self.eye);
+        if is_planted!(image.fault, ClippedInFloat32) {
+            #[expect(clippy::cast_possible_truncation, reason = "the fault that is planted")]
+            return self.clip(d.map(|v| v as f32)).map(f64::from);
+        }
+        self.exact.map(|r| dot([r[0], r[1], r[2]], d) + r[3])
     }
 
     /// The rows at a point relative to the eye.
@@ -136,19 +154,30 @@ pub(super) fn extent(lens: &Lens, image: &Image, min: Vec3, max: Vec3) -> Option
     let clip: [[f32; 8]; 4] = lens.rows.map(|r| {
         std::array::from_fn(|i| r[0] * at[0][i] + r[1] * at[1][i] + (r[2] * at[2][i] + r[3]))
     });
+    // What the roundings of a row amount to at most, anywhere in the box.
+    let reach = at.map(|v| v[0].abs().max(v[7].abs()));
+    let [ex, ey, en, ew] = lens.rows.map(|r| {
+        let terms = r[0].abs() * reach[0] + r[1].abs() * reach[1] + r[2].abs() * reach[2];
+        (terms + r[3].abs()) * ROW_MARGIN
+    });
     let [x, y, n, w] = clip;
     let half = image.half.map(|h| h as f32 + 2.0 * UNITS as f32);
     // How many corners are outside of each plane, and how many need clipping.
     let mut outside = [0_u32; 6];
     let mut crossing = 0;
     for i in 0..8 {
-        outside[0] += u32::from(x[i] < -half[0] * w[i]);
-        outside[1] += u32::from(x[i] > half[0] * w[i]);
-        outside[2] += u32::from(y[i] < -half[1] * w[i]);
-        outside[3] += u32::from(y[i] > half[1] * w[i]);
-        outside[4] += u32::from(n[i] > w[i] * NEAR_MARGIN);
-        outside[5] += u32::from(n[i] < 0.0);
-        crossing += u32::from(!(n[i] <= w[i] && w[i] > 0.0));
+        let far = half.map(|half| half * (w[i] + ew));
+        outside[0] += u32::from(x[i] + ex < -far[0]);
+        outside[1] += u32::from(x[i] - ex > far[0]);
+        outside[2] += u32::from(y[i] + ey < -far[1]);
+        outside[3] += u32::from(y[i] - ey > far[1]);
+        outside[4] += u32::from(n[i] - en > w[i] + ew);
+        outside[5] += u32::from(n[i] + en < 0.0);
+        // NaN counts as crossing.
+        let is_behind = (n[i] + en <= w[i] - ew)
+            & (w[i] - ew > LEAST_W)
+            & (x[i].abs() + y[i].abs() < f32::INFINITY);
+        crossing += u32::from(!is_behind);
     }
     if outside.contains(&8) {
         return None;
@@ -162,24 +191,32 @@ pub(super) fn extent(lens: &Lens, image: &Image, min: Vec3, max: Vec3) -> Option
         });
     }
     let (mut left, mut right, mut top, mut bottom) = (f32::MAX, f32::MIN, f32::MAX, f32::MIN);
-    let mut nearest = 0.0;
+    let (mut nearest, mut farthest) = (0.0, 1.0);
     for i in 0..8 {
-        let inverse = 1.0 / w[i];
-        let (px, py) = (x[i] * inverse, y[i] * inverse);
-        left = least(left, px);
-        right = greatest(right, px);
-        top = least(top, py);
-        bottom = greatest(bottom, py);
-        nearest = greatest(nearest, n[i] * inverse);
+        let inverse = [1.0 / (w[i] + ew), 1.0 / (w[i] - ew)];
+        let low = |v: f32| least(v * inverse[0], v * inverse[1]);
+        let high = |v: f32| greatest(v * inverse[0], v * inverse[1]);
+        left = least(left, low(x[i] - ex));
+        right = greatest(right, high(x[i] + ex));
+        top = least(top, low(y[i] - ey));
+        bottom = greatest(bottom, high(y[i] + ey));
+        nearest = greatest(nearest, high(n[i] + en));
+        farthest = least(farthest, n[i] * inverse[0]);
     }
-    // A pixel to spare on each side covers the roundings.
+    // A pixel to spare on each side covers the roundings that follow.
     let spare = UNITS as f32;
+    let nearest = if is_planted!(image.fault, BoxesByTheirFarthest) { farthest } else { nearest };
     Some(Extent {
-        nearest: nearest * NEAR_MARGIN,
+        nearest: greatest(nearest, 0.0) * NEAR_MARGIN,
         columns: Image::pixels(image.half[0], image.width, left - spare, right + spare),
         rows: Image::pixels(image.half[1], image.height, top - spare, bottom + spare),
     })
 }
+
+/// More than the roundings of a vertex' row, as a share of the sum of its terms' sizes.
+///
+/// A vertex rounds each difference from the eye three times, and a row six times.
+const ROW_MARGIN: f32 = 1e-6;
 
 /// A few roundings of float32 above 1.
 const NEAR_MARGIN: f32 = 1.0 + 1e-5;

@@ -29,6 +29,7 @@
 
 mod band;
 mod lens;
+pub(crate) mod planted_fault;
 mod tile;
 mod triangle;
 mod vertices;
@@ -45,9 +46,10 @@ use crate::input::mesh::FaceCull;
 use crate::occluders::drawing::{DrawOptions, Ranked, Touched, both};
 use crate::occluders::host_raster::band::Band;
 use crate::occluders::host_raster::lens::{Extent, Image, Lens, extent};
+use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
 use crate::occluders::host_raster::tile::SIDE;
-use crate::occluders::host_raster::triangle::{Corner, Triangle, clipped};
-use crate::occluders::host_raster::vertices::{CLIP, Vertices};
+use crate::occluders::host_raster::triangle::{End, Triangle, clipped};
+use crate::occluders::host_raster::vertices::Vertices;
 use crate::occluders::placement::Placement;
 use crate::occluders::shapes::Shapes;
 use crate::occluders::view::View;
@@ -105,7 +107,12 @@ pub(crate) struct Drawn {
 impl HostRaster {
     /// An empty image, in `bands` bands.
     pub(crate) fn new(size: ImageSize, bands: usize) -> Self {
-        let image = Image::of_size(size);
+        Self::with_fault(size, bands, Planted::default())
+    }
+
+    /// [`HostRaster::new`] with a planted fault, for tests.
+    pub(crate) fn with_fault(size: ImageSize, bands: usize, fault: Planted) -> Self {
+        let image = Image::of_size(size, fault);
         let rows = (image.height as usize).div_ceil(SIDE);
         let bands = bands.clamp(1, rows);
         let edge = |k: usize| (rows * k / bands * SIDE) as i32;
@@ -285,23 +292,28 @@ fn draw_meshlet(
     vertices: &mut Vertices,
 ) {
     let meshlet = &shapes.meshlets[candidate.meshlet as usize];
-    let faces = if lens.mirrored { faces.reversed() } else { faces };
+    let mirrored = lens.mirrored && !is_planted!(image.fault, MirrorsIgnored);
+    let faces = if mirrored { faces.reversed() } else { faces };
     vertices.project(&shapes.blocks, meshlet, lens, image);
     let rows = (band.top, band.bottom.min(image.height) - 1);
     vertices.select(&shapes.blocks, meshlet, faces, image, rows);
     for i in 0..vertices.num_kept() {
         let corners = vertices.corners(&shapes.blocks, meshlet, i);
-        if corners.iter().any(|v| vertices.code[*v] & CLIP != 0) {
-            let clip = corners.map(|v| vertices.clip.map(|row| row[v]));
-            clipped(clip, faces, image, |triangle| band.draw(triangle));
-        } else {
-            let corners = corners.map(|v| Corner {
-                x: vertices.x[v],
-                y: vertices.y[v],
-                nearness: vertices.nearness[v],
-            });
-            if let Some(triangle) = Triangle::new(corners, faces, image) {
-                band.draw(&triangle);
+        let projected = corners.map(|v| vertices.projected(v));
+        match projected {
+            [Some(a), Some(b), Some(c)] => {
+                if let Some(triangle) = Triangle::new([a, b, c], faces, image) {
+                    band.draw(&triangle);
+                }
+            }
+            _ => {
+                let triangle = meshlet.triangles.start as usize + vertices.kept(i);
+                let positions = shapes.triangles[triangle].map(|v| shapes.positions[v as usize]);
+                let ends = std::array::from_fn(|k| End {
+                    clip: lens.exact_clip(positions[k], image),
+                    projected: projected[k],
+                });
+                clipped(ends, faces, image, |triangle| band.draw(triangle));
             }
         }
     }

@@ -9,6 +9,7 @@
 //! its centre.
 
 use crate::occluders::host_raster::lens::{greatest, least};
+use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
 use crate::occluders::meshlets::LANES;
 
 /// Pixels along a side of a tile; a row of them is one vector.
@@ -77,6 +78,7 @@ pub(super) struct Tile<'a> {
     /// The band's pixels from the tile's first one on, and how many there are in a row.
     pub(super) pixels: &'a mut [f32],
     pub(super) stride: usize,
+    pub(super) fault: Planted,
 }
 
 /// One row of a mask: all bits of a lane for a pixel that is covered.
@@ -119,7 +121,7 @@ impl Tile<'_> {
         plane: Plane,
         (low, high): (f32, f32),
     ) -> bool {
-        let count = usize::from(*self.state);
+        let (count, fault) = (usize::from(*self.state), self.fault);
         // First see whether it is possible, then change the layers.
         for k in 0..count {
             let layer = self.layer(k);
@@ -129,7 +131,9 @@ impl Tile<'_> {
             if high > layer.least {
                 return false;
             }
-            mask &= !layer.mask;
+            if !is_planted!(fault, LayersOverlap) {
+                mask &= !layer.mask;
+            }
         }
         if mask == 0 {
             return true;
@@ -163,7 +167,7 @@ impl Tile<'_> {
     pub(super) fn expand(&mut self) {
         for row in 0..SIDE {
             *row_mut(self.pixels, row * self.stride) =
-                row_of_layers(*self.state, self.layers, self.layer_stride, row);
+                row_of_layers(*self.state, self.layers, self.layer_stride, row, self.fault);
         }
         *self.state = PIXELS;
     }
@@ -219,10 +223,15 @@ pub(super) fn row_of_layers(
     layers: &[Layer],
     layer_stride: usize,
     row: usize,
+    fault: Planted,
 ) -> [f32; SIDE] {
     match usize::from(state) {
         0 => [0.0; SIDE],
-        1 if layers[0].mask == Mask::MAX => layers[0].plane.row(row),
+        1 if layers[0].mask == Mask::MAX => {
+            // What lies beyond the far plane has no depth.
+            let least = if is_planted!(fault, BeyondFar) { f32::MIN } else { 0.0 };
+            layers[0].plane.row(row).map(|nearness| greatest(nearness, least))
+        }
         count => {
             let mut out = [0.0; SIDE];
             for k in 0..count {

@@ -5,24 +5,27 @@
 
 use crate::input::mesh::FaceCull;
 use crate::occluders::host_raster::lens::{HALF, Image, Lens, greatest, least, rounded};
+use crate::occluders::host_raster::planted_fault::is_planted;
+use crate::occluders::host_raster::triangle::Corner;
 use crate::occluders::meshlets::{Blocks, LANES, MAX_TRIANGLES, MAX_VERTICES, Meshlet};
 
 /// In a vertex' code: it needs clipping, since it is before the near plane or far outside.
-pub(super) const CLIP: u32 = 1;
+const CLIP: u32 = 1;
+
+/// Vertices with a smaller w are clipped, so that its inverse is finite.
+pub(super) const LEAST_W: f32 = 1e-30;
 
 /// One number of each vertex.
 type PerVertex<T> = [T; MAX_VERTICES];
 
 /// The vertices of one meshlet.
 pub(super) struct Vertices {
-    /// Clip coordinates as in [`Lens::rows`].
-    pub(super) clip: [PerVertex<f32>; 4],
     /// The position in the image in units, about its middle.
-    pub(super) x: PerVertex<f32>,
-    pub(super) y: PerVertex<f32>,
-    pub(super) nearness: PerVertex<f32>,
+    x: PerVertex<f32>,
+    y: PerVertex<f32>,
+    nearness: PerVertex<f32>,
     /// [`CLIP`], and a bit for each plane that the vertex is outside of.
-    pub(super) code: PerVertex<u32>,
+    code: PerVertex<u32>,
     /// Triangles that may cover a centre, and how many they are.
     kept: [u8; MAX_TRIANGLES + LANES],
     num_kept: usize,
@@ -31,7 +34,6 @@ pub(super) struct Vertices {
 impl Vertices {
     pub(super) fn new() -> Self {
         Self {
-            clip: [[0.0; MAX_VERTICES]; 4],
             x: [0.0; MAX_VERTICES],
             y: [0.0; MAX_VERTICES],
             nearness: [0.0; MAX_VERTICES],
@@ -84,21 +86,16 @@ impl Vertices {
             &mut of.as_chunks_mut().0[group]
         }
         let half = image.half.map(|h| h as f32);
-        let [cx, cy, cn, cw] = self.clip.each_mut().map(|c| part(c, group));
         let (x, y) = (part(&mut self.x, group), part(&mut self.y, group));
         let nearness = part(&mut self.nearness, group);
         let code = part(&mut self.code, group);
         for i in 0..LANES {
             let [px, py, n, w] = lens.clip([from_eye[0][i], from_eye[1][i], from_eye[2][i]]);
-            cx[i] = px;
-            cy[i] = py;
-            cn[i] = n;
-            cw[i] = w;
             // NaN fails each of these, so it is clipped, and there it is dropped.
-            let fits = (n <= w)
-                & (w > 0.0)
-                & (px.abs() <= image.guard[0] * w)
-                & (py.abs() <= image.guard[1] * w);
+            let is_behind = (n <= w) | is_planted!(image.fault, NearUnclipped);
+            let is_within = (px.abs() <= image.guard[0] * w) & (py.abs() <= image.guard[1] * w)
+                | is_planted!(image.fault, GuardClamped);
+            let fits = is_behind & is_within & (w > LEAST_W);
             code[i] = u32::from(!fits)
                 | u32::from(px < -half[0] * w) << 1
                 | u32::from(px > half[0] * w) << 2
@@ -110,6 +107,10 @@ impl Vertices {
             x[i] = px * inverse;
             y[i] = py * inverse;
             nearness[i] = n * inverse;
+            if is_planted!(image.fault, GuardClamped) {
+                x[i] = x[i].clamp(-image.guard[0], image.guard[0]);
+                y[i] = y[i].clamp(-image.guard[1], image.guard[1]);
+            }
         }
     }
 
@@ -162,11 +163,8 @@ impl Vertices {
                     & (rows.0 <= bottom);
                 let (ax, ay, bx, by) = (x1[i] - x0[i], y1[i] - y0[i], x2[i] - x0[i], y2[i] - y0[i]);
                 let (p, q) = (ax * by, ay * bx);
-                // Rounding the corners may turn a thin triangle round; those are left to the exact
-                // test.
-                let slack =
-                    (ax.abs() + ay.abs() + bx.abs() + by.abs()) * 2.0 + (p.abs() + q.abs()) * 1e-6;
-                let faces = (p - q) * sign >= -slack;
+                // What the roundings leave open is left to the exact test.
+                let faces = (p - q) * sign >= (p.abs() + q.abs()) * -1e-6;
                 keep[i] = u32::from((outside == 0) & ((clip != 0) | (covers & faces)));
             }
             for (i, keep) in (0..).zip(keep) {
@@ -186,10 +184,26 @@ impl Vertices {
         self.num_kept
     }
 
+    /// The `i`-th of these triangles, by its number in the meshlet.
+    #[inline(always)]
+    pub(super) fn kept(&self, i: usize) -> usize {
+        usize::from(self.kept[i])
+    }
+
+    /// Where a vertex is in the image; `None` if its triangles need clipping.
+    #[inline(always)]
+    pub(super) fn projected(&self, vertex: usize) -> Option<Corner> {
+        (self.code[vertex] & CLIP == 0).then(|| Corner {
+            x: self.x[vertex],
+            y: self.y[vertex],
+            nearness: self.nearness[vertex],
+        })
+    }
+
     /// The corners of the `i`-th of these triangles, as vertices.
     #[inline(always)]
     pub(super) fn corners(&self, blocks: &Blocks, meshlet: &Meshlet, i: usize) -> [usize; 3] {
-        let triangle = usize::from(self.kept[i]);
+        let triangle = self.kept(i);
         let group = &blocks.corners[meshlet.first_group as usize + triangle / LANES];
         group.each_ref().map(|corner| usize::from(corner[triangle % LANES]) % MAX_VERTICES)
     }
