@@ -10,7 +10,7 @@ use crate::input::camera::Camera;
 use crate::input::image::{DepthConvention, ImageSize};
 use crate::occluders::device_raster::{OCCLUDER_DEPTH_FORMAT, record_occluders};
 use crate::occluders::drawing::{DepthLoad, DrawOptions, Rasteriser, Touched};
-use crate::occluders::host_raster::{HostRaster, MOST_SIDE, Way};
+use crate::occluders::host_raster::{HostRaster, Way};
 use crate::occluders::uploaded::Occluders;
 
 /// Staging buffers that an image keeps: two frames may be on their way.
@@ -82,15 +82,11 @@ impl OccluderDepth {
         if size.width == 0 || size.height == 0 {
             return Err(Error::invalid("size", format!("expected at least one pixel, got {size}")));
         }
-        let side = size.width.max(size.height);
         let on_host = match rasteriser {
-            Rasteriser::Auto => gpu.is_processor() && side <= MOST_SIDE,
+            Rasteriser::Auto => gpu.is_processor(),
             Rasteriser::Device => false,
             Rasteriser::Host => true,
         };
-        if on_host && side > MOST_SIDE {
-            return Err(Error::limit("image side", side.into(), MOST_SIDE.into()));
-        }
         let common = wgpu::TextureUsages::COPY_SRC;
         let (texels, format, usage) = if on_host {
             let kind = SourceKind::Bits;
@@ -104,7 +100,7 @@ impl OccluderDepth {
             (size, OCCLUDER_DEPTH_FORMAT, usage)
         };
         // The pyramid's limit, which an image of four pixels per texel could pass here.
-        let allowed = gpu.limits().max_texture_dimension_2d;
+        let (side, allowed) = (size.width.max(size.height), gpu.limits().max_texture_dimension_2d);
         if side > allowed {
             return Err(Error::limit("max_texture_dimension_2d", side.into(), allowed.into()));
         }

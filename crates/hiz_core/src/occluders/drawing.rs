@@ -20,7 +20,6 @@ pub enum Rasteriser {
     /// The device's: a render pass.
     Device,
     /// The host's: on all cores, uploaded in the caller's encoder.
-    /// Images may have 16,384 pixels along a side; `Auto` leaves larger ones to the device.
     Host,
 }
 

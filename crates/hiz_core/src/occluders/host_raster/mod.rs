@@ -54,11 +54,6 @@ use crate::occluders::placement::Placement;
 use crate::occluders::shapes::Shapes;
 use crate::occluders::view::View;
 
-/// The largest width or height of an image that is drawn here, in pixels.
-///
-/// Positions in the image then fit float32's integers (`lens`).
-pub(crate) const MOST_SIDE: u32 = 16_384;
-
 /// A depth image on the host, in the form that the rasteriser draws into.
 #[derive(Debug)]
 pub(crate) struct HostRaster {

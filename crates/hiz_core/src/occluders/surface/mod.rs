@@ -113,7 +113,7 @@ use crate::input::camera::Camera;
 use crate::input::mesh::{FaceCull, MeshData};
 use crate::occluders::drawing::OccluderOptions;
 use crate::occluders::drawing::{DrawOptions, Touched};
-use crate::occluders::host_raster::{HostRaster, MOST_SIDE, Scene, Way};
+use crate::occluders::host_raster::{HostRaster, Scene, Way};
 use crate::occluders::placement::Placement;
 use crate::occluders::shapes::Shapes;
 use crate::occluders::surface::facets::Rounder;
@@ -316,14 +316,9 @@ impl OccluderSurface {
     ///
     /// # Errors
     /// - [`Error::Invalid`] for a camera that float32 cannot hold.
-    /// - [`Error::Limit`] for more than 16,384 pixels along a side.
     /// - [`Error::OutOfMemory`].
     pub fn depth(&self, camera: &Camera) -> Result<Vec<f32>> {
         let size = camera.size();
-        let side = size.width.max(size.height);
-        if side > MOST_SIDE {
-            return Err(Error::limit("image side", side.into(), MOST_SIDE.into()));
-        }
         let threads = cores();
         let mut raster = HostRaster::new(size, threads);
         let all = DrawOptions::default();
