@@ -8,8 +8,7 @@ use crate::host::rounding::ROUNDING;
 use crate::input::image::ImageSize;
 use crate::occluders::surface::facets::occludes;
 use crate::occluders::surface::links::Standing;
-use crate::occluders::surface::looks::{Look, Looks, Placed, Tiles};
-use crate::occluders::surface::open_pixels::OpenPixels;
+use crate::occluders::surface::looks::{Look, Looks, Placed, Wanted};
 use crate::occluders::surface::planted_fault::is_planted;
 use crate::occluders::surface::projector::{Clip, Projector, is_before};
 use crate::occluders::surface::square::{Point, UP};
@@ -39,26 +38,25 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// The cells of the triangles of `looks` that may meet an open pixel before `tiles` hide them.
+    /// The cells of the triangles of `looks` that are wanted.
     pub(super) fn new(
         placed: &Placed<'_>,
         projector: &Projector,
         looks: &Looks,
         links: &Standing<'_>,
-        open: &OpenPixels,
-        tiles: &Tiles,
+        wanted: &Wanted<'_>,
     ) -> Self {
         let mut builder = Builder {
             placed,
             projector,
             links,
-            size: open.size(),
+            size: wanted.open.size(),
             halves: Vec::new(),
             cells: Self::default(),
         };
         for look in &looks.all {
-            if look.meets(open, tiles, 0..look.vertices.len()) {
-                builder.look(look, open, tiles);
+            if look.is_wanted(wanted, 0..look.vertices.len()) {
+                builder.look(look, wanted);
             }
         }
         builder.finish()
@@ -101,7 +99,7 @@ struct Builder<'a> {
 const SHARED: u32 = u32::MAX;
 
 impl Builder<'_> {
-    fn look(&mut self, look: &Look, open: &OpenPixels, tiles: &Tiles) {
+    fn look(&mut self, look: &Look, wanted: &Wanted<'_>) {
         let placed = self.placed;
         let is_mirrored = placed.placements[look.copy as usize].mirrored;
         let vertices = placed.topology.vertices(look.meshlet);
@@ -109,7 +107,7 @@ impl Builder<'_> {
         let sides = placed.topology.sides(triangles);
         for (corners, sides) in placed.topology.corners(triangles).iter().zip(sides) {
             let corners = corners.map(usize::from);
-            if sides[0] == NO_EDGE || !look.meets(open, tiles, corners) {
+            if sides[0] == NO_EDGE || !look.is_wanted(wanted, corners) {
                 continue;
             }
             let world = corners.map(|v| placed.world(look.copy, vertices[v]));

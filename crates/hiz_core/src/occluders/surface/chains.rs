@@ -87,7 +87,7 @@ impl Tally {
     pub(super) const START: Self = Self { windings: [0; LANES], open: 0 };
 
     /// Adds a triangle that covers the pixel's centre.
-    #[inline]
+    #[inline(always)]
     pub(super) fn cover(&mut self, steps: &Steps, mask: Mask) {
         let step = &steps.0[usize::from(mask) % MASKS];
         for (winding, step) in self.windings.iter_mut().zip(step) {
@@ -98,7 +98,7 @@ impl Tally {
     /// Notes an edge that meets the pixel and that two triangles share, or one has alone.
     ///
     /// The mask of a triangle that is not there is 0.
-    #[inline]
+    #[inline(always)]
     pub(super) fn meet(&mut self, a: AtEdge, b: AtEdge, fault: Planted) {
         let front = |t: &AtEdge| if t.sign == FRONT { t.mask } else { 0 };
         let sums = |a: Mask, b: Mask, cancel: bool| if cancel { a ^ b } else { a | b };
@@ -132,7 +132,7 @@ impl Tally {
         self.open(given, fronts, turned, parity, fault);
     }
 
-    #[inline]
+    #[inline(always)]
     fn open(&mut self, given: Mask, fronts: Mask, turned: Mask, parity: Mask, fault: Planted) {
         if is_planted!(fault, BordersIgnored) {
             return;

@@ -19,7 +19,7 @@ pub(super) struct Grid {
 
 impl Grid {
     /// The side of a square in units.
-    #[inline]
+    #[inline(always)]
     fn side(&self) -> i32 {
         1 << self.log2
     }
@@ -34,7 +34,7 @@ impl Grid {
     ///
     /// `within` are the first and the last that count.
     /// The first of the result is after the last if there are none.
-    #[inline]
+    #[inline(always)]
     fn met(&self, from: i32, to: i32, within: [i32; 2]) -> [i32; 2] {
         let first = (from - self.side() - REACH + self.side() - 1) >> self.log2;
         [first.max(within[0]), ((to + REACH) >> self.log2).min(within[1])]
@@ -76,10 +76,76 @@ pub(super) fn area([a, b, c]: [Corner; 3]) -> i64 {
     i64::from(b.x - a.x) * i64::from(c.y - a.y) - i64::from(b.y - a.y) * i64::from(c.x - a.x)
 }
 
-/// Calls `cover` for the squares whose centres a triangle covers, by the top-left rule.
+/// The three edge functions of a triangle: none is negative at the points that it covers.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct EdgeFunctions {
+    /// A point of each side, and what its function grows by per unit right and down.
+    on: [Corner; 3],
+    right: [i64; 3],
+    down: [i64; 3],
+    /// 1 where a point on the side is outside.
+    bias: [i64; 3],
+}
+
+impl EdgeFunctions {
+    /// By the top-left rule: a point on a side is moved right by an infinitesimal step, and down by
+    /// one that is infinitesimal against that, the same for all triangles.
+    #[inline]
+    pub(super) fn new(corners: [Corner; 3]) -> Self {
+        let [p, q, r] = corners;
+        let on = if area(corners) < 0 { [p, r, q] } else { corners };
+        let (mut right, mut down, mut bias) = ([0_i64; 3], [0_i64; 3], [0_i64; 3]);
+        for k in 0..3 {
+            let (a, b) = (on[k], on[(k + 1) % 3]);
+            right[k] = i64::from(a.y) - i64::from(b.y);
+            down[k] = i64::from(b.x) - i64::from(a.x);
+            bias[k] = i64::from(!(right[k] > 0 || (right[k] == 0 && down[k] > 0)));
+        }
+        Self { on, right, down, bias }
+    }
+
+    /// The functions at a point.
+    #[inline]
+    fn at(&self, x: i32, y: i32) -> [i64; 3] {
+        std::array::from_fn(|k| {
+            self.right[k] * (i64::from(x) - i64::from(self.on[k].x))
+                + self.down[k] * (i64::from(y) - i64::from(self.on[k].y))
+                - self.bias[k]
+        })
+    }
+
+    /// Calls `cover` for the parts of a square whose centres the triangle covers.
+    ///
+    /// `parts` are all squares of a grid, and (x, y) is their common centre.
+    #[inline]
+    pub(super) fn for_each_part(
+        &self,
+        parts: Grid,
+        x: i32,
+        y: i32,
+        mut cover: impl FnMut(i32, i32),
+    ) {
+        let half = i64::from(parts.columns[1] - parts.columns[0] + 1) << (parts.log2 - 1);
+        let at_centre = self.at(x, y);
+        // Negative in all of the square.
+        if (0..3).any(|k| at_centre[k] + half * (self.right[k].abs() + self.down[k].abs()) < 0) {
+            return;
+        }
+        for row in parts.rows[0]..=parts.rows[1] {
+            let dy = i64::from(parts.centre(row)) - i64::from(y);
+            for column in parts.columns[0]..=parts.columns[1] {
+                let dx = i64::from(parts.centre(column)) - i64::from(x);
+                let at = |k: usize| at_centre[k] + self.right[k] * dx + self.down[k] * dy;
+                if (at(0) | at(1) | at(2)) >= 0 {
+                    cover(column, row);
+                }
+            }
+        }
+    }
+}
+
+/// Calls `cover` for the squares whose centres a triangle covers.
 ///
-/// A centre on an edge is moved right by an infinitesimal step, and down by one that is
-/// infinitesimal against that, the same for all triangles.
 /// Runs of 8 squares, at multiples of 8, may be left out where `is_hidden` says so of the first.
 #[inline]
 pub(super) fn for_each_centre(
@@ -94,21 +160,12 @@ pub(super) fn for_each_centre(
     if columns[0] > columns[1] || rows[0] > rows[1] {
         return;
     }
-    let corners = if area(corners) < 0 { [p, r, q] } else { corners };
-    // By side: what its edge function grows by per column and row, and its value at the first
-    // centre, all divided by the side of a square.
-    let (mut right, mut down, mut value) = ([0_i64; 3], [0_i64; 3], [0_i64; 3]);
-    let start = [grid.centre(columns[0]), grid.centre(rows[0])];
-    for k in 0..3 {
-        let (a, b) = (corners[k], corners[(k + 1) % 3]);
-        right[k] = i64::from(a.y) - i64::from(b.y);
-        down[k] = i64::from(b.x) - i64::from(a.x);
-        let is_inside = right[k] > 0 || (right[k] == 0 && down[k] > 0);
-        let at_first = right[k] * (i64::from(start[0]) - i64::from(a.x))
-            + down[k] * (i64::from(start[1]) - i64::from(a.y));
-        // Floors keep the sign, and all values in a row or column differ by whole steps.
-        value[k] = (at_first - i64::from(!is_inside)) >> grid.log2;
-    }
+    let functions = EdgeFunctions::new(corners);
+    let EdgeFunctions { right, down, .. } = functions;
+    // Divided by the side of a square: floors keep the sign, and all values in a row or column
+    // differ by whole steps.
+    let mut value =
+        functions.at(grid.centre(columns[0]), grid.centre(rows[0])).map(|v| v >> grid.log2);
     let is_large = columns[1] - columns[0] >= 2 * RUN;
     for y in rows[0]..=rows[1] {
         let mut now = value;

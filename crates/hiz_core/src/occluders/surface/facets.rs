@@ -247,7 +247,7 @@ impl Facet {
     ///
     /// The square has its centre at (x, y); `half` is half its side and [`REACH`], all in units.
     /// The second depth is about the nearest one, for choices alone.
-    #[inline]
+    #[inline(always)]
     pub(super) fn range(&self, x: i32, y: i32, half: f64) -> (f64, f64) {
         let far = self.plane(x, y);
         let reach = half * (self.slope[0].abs() + self.slope[1].abs()) * UP + self.slack;
@@ -258,7 +258,7 @@ impl Facet {
         )
     }
 
-    #[inline]
+    #[inline(always)]
     fn plane(&self, x: i32, y: i32) -> f64 {
         let [dx, dy] = [f64::from(x - self.at[0]), f64::from(y - self.at[1])];
         self.far + self.slope[0] * dx + self.slope[1] * dy

@@ -1,12 +1,13 @@
 //! The conservative depths of an image: thresholds, proof, finer proof, search.
 
+use crate::host::threads::{cores, on_threads};
 use crate::input::camera::Camera;
 use crate::occluders::surface::cells::Cells;
 use crate::occluders::surface::facets::Rounder;
 use crate::occluders::surface::links::Standing;
-use crate::occluders::surface::looks::{Looks, Placed, Tiles};
+use crate::occluders::surface::looks::{Looks, Placed, Tiles, Wanted};
 use crate::occluders::surface::open_pixels::OpenPixels;
-use crate::occluders::surface::proof::Proof;
+use crate::occluders::surface::proof::{Proof, band_rows, bands};
 use crate::occluders::surface::sheets::search;
 use crate::occluders::surface::thresholds;
 
@@ -25,11 +26,39 @@ pub(super) fn searched(
     let size = camera.size();
     let looks = Looks::new(&placed, camera, rounder, &Tiles::open(size));
     let open = OpenPixels::new(size, vec![true; size.pixels() as usize]);
-    let cells = Cells::new(&placed, &rounder.projector, &looks, links, &open, &Tiles::open(size));
     let beyond = if camera.convention().is_reversed() { 0.0 } else { 1.0 };
     let mut far = vec![beyond; size.pixels() as usize];
-    search(&cells, &open, refinement, placed.fault, &mut far);
+    let search = Search { placed, links, rounder, looks: &looks, refinement };
+    search.lower(&open, &Tiles::open(size), &mut far);
     far
+}
+
+/// What is searched.
+#[derive(Debug, Clone, Copy)]
+struct Search<'a> {
+    placed: Placed<'a>,
+    links: &'a Standing<'a>,
+    rounder: &'a Rounder,
+    looks: &'a Looks,
+    refinement: u32,
+}
+
+impl Search<'_> {
+    /// Lowers the values of `far` of the open pixels where a search finds nearer ones.
+    ///
+    /// What `tiles` hide is not searched for.
+    fn lower(&self, open: &OpenPixels, tiles: &Tiles, far: &mut [f64]) {
+        let (size, fault) = (open.size(), self.placed.fault);
+        let part = (band_rows(size) * size.width) as usize;
+        on_threads(cores(), far.chunks_mut(part).zip(bands(size)), |(far, rows)| {
+            if !open.of_rows(rows).is_empty() {
+                let wanted = Wanted { open, tiles, rows };
+                let projector = &self.rounder.projector;
+                let cells = Cells::new(&self.placed, projector, self.looks, self.links, &wanted);
+                search(&cells, open, rows, self.refinement, fault, far);
+            }
+        });
+    }
 }
 
 /// For every pixel, rows from top to bottom: every ray through its closed square is blocked at this
@@ -74,8 +103,7 @@ pub(super) fn image(
         #[expect(clippy::cast_possible_truncation, reason = "they were float32 before")]
         let bound = |i: usize| if open.is_open(i) { far[i] as f32 } else { f32::NEG_INFINITY };
         let tiles = Tiles::new((0..far.len()).map(bound), size);
-        let cells = Cells::new(&placed, &rounder.projector, looks, links, &open, &tiles);
-        search(&cells, &open, refinement, placed.fault, &mut far);
+        Search { placed, links, rounder, looks, refinement }.lower(&open, &tiles, &mut far);
     }
     far
 }

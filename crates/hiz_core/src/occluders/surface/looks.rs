@@ -77,6 +77,16 @@ impl Tiles {
     }
 }
 
+/// Open pixels of which the nearest facets are wanted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wanted<'a> {
+    pub(super) open: &'a OpenPixels,
+    /// What they hide is not wanted.
+    pub(super) tiles: &'a Tiles,
+    /// The first and the last row of the open pixels that count.
+    pub(super) rows: [i32; 2],
+}
+
 /// A triangle that was cut, in the rounded image.
 #[derive(Debug, Clone)]
 pub(super) struct Polygon {
@@ -195,11 +205,11 @@ impl Looks {
     }
 
     /// What is left for the proof of some pixels.
-    pub(super) fn narrowed(&self, placed: &Placed<'_>, open: &OpenPixels, tiles: &Tiles) -> Self {
+    pub(super) fn narrowed(&self, placed: &Placed<'_>, wanted: &Wanted<'_>) -> Self {
         let mut all: Vec<Option<Look>> = (0..self.all.len()).map(|_| None).collect();
         on_threads(cores(), all.chunks_mut(PART).zip(self.all.chunks(PART)), |(to, from)| {
             for (to, from) in to.iter_mut().zip(from) {
-                *to = Some(from.narrowed(placed, open, tiles));
+                *to = Some(from.narrowed(placed, wanted));
             }
         });
         Self {
@@ -212,11 +222,10 @@ impl Looks {
 }
 
 impl Look {
-    /// Whether what is spanned by some vertices may meet an open pixel that `tiles` do not hide.
-    pub(super) fn meets(
+    /// Whether what is spanned by some vertices is wanted.
+    pub(super) fn is_wanted(
         &self,
-        open: &OpenPixels,
-        tiles: &Tiles,
+        wanted: &Wanted<'_>,
         vertices: impl IntoIterator<Item = usize>,
     ) -> bool {
         let mut nearest = f64::INFINITY;
@@ -232,10 +241,11 @@ impl Look {
             ];
             nearest = nearest.min(corner.far);
         }
-        let ImageSize { width, height } = open.size();
+        let ImageSize { width, height } = wanted.open.size();
         let columns = pixels(extent[0], extent[1], width.cast_signed());
         let rows = pixels(extent[2], extent[3], height.cast_signed());
-        open.any(columns, rows) && !tiles.hide(nearest, columns, rows)
+        let rows = [rows[0].max(wanted.rows[0]), rows[1].min(wanted.rows[1])];
+        wanted.open.any(columns, rows) && !wanted.tiles.hide(nearest, columns, rows)
     }
 
     /// Calls `each` for the facets and their triangles in the image.
@@ -275,15 +285,16 @@ impl Look {
     /// The same look with the facets alone that may meet an open pixel.
     ///
     /// No edge of the others meets one, so nothing is lost for the open pixels.
-    fn narrowed(&self, placed: &Placed<'_>, open: &OpenPixels, tiles: &Tiles) -> Self {
+    fn narrowed(&self, placed: &Placed<'_>, wanted: &Wanted<'_>) -> Self {
         let mut rows = self.rows;
         let (mut vertices, mut facets, mut polygons) = (Vec::new(), Vec::new(), Vec::new());
-        if self.meets(open, tiles, 0..self.vertices.len()) {
+        if self.is_wanted(wanted, 0..self.vertices.len()) {
             let triangles = &placed.shapes.meshlets[self.meshlet as usize].triangles;
             let corners = placed.topology.corners(triangles);
             facets.extend(self.facets.iter().zip(corners).map(|(facet, corners)| {
-                let meets = facet.is_there() && self.meets(open, tiles, corners.map(usize::from));
-                if meets { *facet } else { Facet::default() }
+                let is_wanted =
+                    facet.is_there() && self.is_wanted(wanted, corners.map(usize::from));
+                if is_wanted { *facet } else { Facet::default() }
             }));
             vertices.clone_from(&self.vertices);
             polygons.clone_from(&self.polygons);

@@ -23,7 +23,7 @@ use crate::occluders::surface::chains::{AtEdge, Mask, Steps, Tally};
 use crate::occluders::surface::coverage::area;
 use crate::occluders::surface::facets::{Corner, Facet, REACH, Rounder, Segment, Vertex};
 use crate::occluders::surface::links::Standing;
-use crate::occluders::surface::looks::{Look, Looks, Placed, TILE, Tiles};
+use crate::occluders::surface::looks::{Look, Looks, Placed, TILE, Tiles, Wanted};
 use crate::occluders::surface::open_pixels::OpenPixels;
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
 use crate::occluders::surface::squares::{Place, Squares};
@@ -50,9 +50,9 @@ impl Proof<'_> {
     pub(super) fn image(&self, slabs: &[Slabs], tiles: &Tiles) -> (Vec<f32>, Vec<bool>) {
         let mut depths = vec![f32::INFINITY; slabs.len()];
         let mut is_open = vec![false; slabs.len()];
-        let part = (self.rows() * self.size.width) as usize;
+        let part = (band_rows(self.size) * self.size.width) as usize;
         let parts = depths.chunks_mut(part).zip(is_open.chunks_mut(part));
-        let bands = parts.zip(slabs.chunks(part)).zip(self.bands());
+        let bands = parts.zip(slabs.chunks(part)).zip(bands(self.size));
         on_threads(cores(), bands, |(((depths, is_open), slabs), rows)| {
             let squares = Squares::pixels(self.size.width, rows, tiles);
             let states = Band::<FRONT>::run(self, squares, slabs);
@@ -80,20 +80,20 @@ impl Proof<'_> {
         finer: u32,
         depths: &mut [f32],
     ) -> Vec<f32> {
-        let looks = self.looks.narrowed(&self.placed, open, tiles);
+        let wanted = Wanted { open, tiles, rows: [0, self.size.height.cast_signed() - 1] };
+        let looks = self.looks.narrowed(&self.placed, &wanted);
         let proof = Proof { looks: &looks, ..*self };
         let mut floors = vec![f32::INFINITY; open.pixels().len()];
-        let part = (self.rows() * self.size.width) as usize;
+        let part = (band_rows(self.size) * self.size.width) as usize;
         let mut left = &mut floors[..];
-        let floors_by_band: Vec<&mut [f32]> = self
-            .bands()
+        let floors_by_band: Vec<&mut [f32]> = bands(self.size)
             .map(|rows| {
                 let (own, rest) = std::mem::take(&mut left).split_at_mut(open.of_rows(rows).len());
                 left = rest;
                 own
             })
             .collect();
-        let bands = depths.chunks_mut(part).zip(floors_by_band).zip(self.bands());
+        let bands = depths.chunks_mut(part).zip(floors_by_band).zip(bands(self.size));
         on_threads(cores(), bands, |((depths, floors), rows)| {
             let pixels = open.of_rows(rows);
             if pixels.is_empty() {
@@ -144,18 +144,18 @@ impl Proof<'_> {
         };
         nearest.into_iter().map(ndc).collect()
     }
+}
 
-    /// The rows of a band: whole rows of tiles, and some bands more than threads.
-    fn rows(&self) -> u32 {
-        self.size.height.div_ceil(4 * cores() as u32).next_multiple_of(TILE)
-    }
+/// The rows of a band: whole rows of tiles, and some bands more than threads.
+pub(super) fn band_rows(size: ImageSize) -> u32 {
+    size.height.div_ceil(4 * cores() as u32).next_multiple_of(TILE)
+}
 
-    /// The first and the last row of each band.
-    fn bands(&self) -> impl Iterator<Item = [i32; 2]> + Send + use<> {
-        let (rows, height) = (self.rows(), self.size.height);
-        let band = move |first: u32| [first, (first + rows).min(height) - 1];
-        (0..height).step_by(rows as usize).map(move |first| band(first).map(u32::cast_signed))
-    }
+/// The first and the last row of each band.
+pub(super) fn bands(size: ImageSize) -> impl Iterator<Item = [i32; 2]> + Send + use<> {
+    let rows = band_rows(size);
+    let band = move |first: u32| [first, (first + rows).min(size.height) - 1];
+    (0..size.height).step_by(rows as usize).map(move |first| band(first).map(u32::cast_signed))
 }
 
 /// What is known of a square.

@@ -3,7 +3,6 @@
 //! A square is covered by sheets of neighbouring cells that leave no gap in it.
 //! The proof is in the documentation of the module above.
 
-use crate::host::threads::{cores, on_threads};
 use crate::occluders::surface::cells::{Cells, FOLD, NO_MATE};
 use crate::occluders::surface::open_pixels::OpenPixels;
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
@@ -11,8 +10,6 @@ use crate::occluders::surface::square::{Side, Square, farthest, side};
 
 /// The side in pixels of the blocks that are tested as a whole first.
 const BLOCK: u32 = 8;
-/// How many pixels a thread takes at once.
-const PART: usize = 32;
 
 /// A cell that touches the square, as a member of a sheet.
 #[derive(Debug, Clone, Copy)]
@@ -37,19 +34,22 @@ struct Sums {
     far: f64,
 }
 
-/// Searches the open pixels: every ray through the closed square of one is blocked at this value of
-/// `far` or before.
+/// Searches the open pixels of some rows: every ray through the closed square of one is blocked at
+/// this value of `far` or before.
 ///
-/// Pixels are left as they are where that cannot be shown.
+/// `best` are the values known for all pixels of the rows.
+/// They are left as they are where nothing better can be shown.
 /// `refinement` is how often a pixel is quartered where it cannot be shown for the whole pixel.
 pub(super) fn search(
     cells: &Cells,
     open: &OpenPixels,
+    rows: [i32; 2],
     refinement: u32,
     fault: Planted,
     best: &mut [f64],
 ) {
-    let touched = Sheets::new(cells, fault).scatter(open, best);
+    let mut sheets = Sheets::new(cells, fault);
+    let touched = sheets.scatter(open, rows, best);
     // The lists of cells by pixel are made in three steps: count, sum up, fill.
     let still =
         |best: &[f64], pixel: u32, cell: u32| cells.nearest[cell as usize] < best[pixel as usize];
@@ -69,24 +69,14 @@ pub(super) fn search(
         }
     }
     drop(touched);
-    let mut found: Vec<f64> = open.pixels().iter().map(|pixel| best[*pixel as usize]).collect();
-    on_threads(
-        cores(),
-        found.chunks_mut(PART).zip(open.pixels().chunks(PART)),
-        |(found, pixels)| {
-            let mut sheets = Sheets::new(cells, fault);
-            for (far, pixel) in found.iter_mut().zip(pixels) {
-                let list =
-                    &lists[first[*pixel as usize] as usize..first[*pixel as usize + 1] as usize];
-                if !list.is_empty() {
-                    let (column, row) = (pixel % open.size().width, pixel / open.size().width);
-                    *far = sheets.blocked(list, pixel_square(column, row), *far, refinement);
-                }
-            }
-        },
-    );
-    for (far, pixel) in found.iter().zip(open.pixels()) {
-        best[*pixel as usize] = *far;
+    let width = open.size().width;
+    for pixel in open.of_rows(rows) {
+        let (column, row) = (pixel % width, pixel / width);
+        let place = (pixel - rows[0].cast_unsigned() * width) as usize;
+        let list = &lists[first[place] as usize..first[place + 1] as usize];
+        if !list.is_empty() {
+            best[place] = sheets.blocked(list, pixel_square(column, row), best[place], refinement);
+        }
     }
 }
 
@@ -106,10 +96,16 @@ impl<'a> Sheets<'a> {
         Self { cells, places: vec![0; count], stamps: vec![0; count], stamp: 0, fault }
     }
 
-    /// Lowers `best` where a single cell covers an open pixel.
+    /// Lowers `best` where a single cell covers an open pixel of some rows.
     ///
-    /// Returns the other cells that touch an open pixel, as (pixel, cell).
-    fn scatter(&self, open: &OpenPixels, best: &mut [f64]) -> Vec<(u32, u32)> {
+    /// Returns the other cells that touch an open pixel, as (place in `best`, cell).
+    fn scatter(
+        &self,
+        open: &OpenPixels,
+        [first, last]: [i32; 2],
+        best: &mut [f64],
+    ) -> Vec<(u32, u32)> {
+        let (first, end) = (first.cast_unsigned(), last.cast_unsigned() + 1);
         // The nearest cells come first, since they leave little to do for the others.
         let nearest = &self.cells.nearest;
         let mut order: Vec<u32> = (0..nearest.len() as u32).collect();
@@ -118,6 +114,7 @@ impl<'a> Sheets<'a> {
         for cell in order {
             let columns = self.reach(cell, 0, open.size().width);
             let rows = self.reach(cell, 2, open.size().height);
+            let rows = rows.start.max(first)..rows.end.min(end);
             for block_row in (rows.start..rows.end).step_by(BLOCK as usize) {
                 for block_column in (columns.start..columns.end).step_by(BLOCK as usize) {
                     let end_row = rows.end.min(block_row + BLOCK);
@@ -138,18 +135,20 @@ impl<'a> Sheets<'a> {
                     if large && matches!(self.relation(cell, block).0, Relation::Apart) {
                         continue;
                     }
+                    let columns = [block_column, end_column - 1].map(u32::cast_signed);
                     for row in block_row..end_row {
-                        for column in block_column..end_column {
-                            let pixel = row * open.size().width + column;
-                            let known = &mut best[pixel as usize];
-                            if !open.is_open(pixel as usize) || nearest[cell as usize] >= *known {
+                        for (_, column) in open.of_row(row.cast_signed(), columns) {
+                            let column = column.cast_unsigned();
+                            let place = (row - first) * open.size().width + column;
+                            let known = &mut best[place as usize];
+                            if nearest[cell as usize] >= *known {
                                 continue;
                             }
                             let square = pixel_square(column, row);
                             match self.relation(cell, square).0 {
                                 Relation::Apart => {}
                                 Relation::Covers => *known = known.min(self.far(cell, square)),
-                                Relation::Touches => touched.push((pixel, cell)),
+                                Relation::Touches => touched.push((place, cell)),
                             }
                         }
                     }

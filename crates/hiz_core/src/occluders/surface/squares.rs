@@ -1,6 +1,6 @@
 //! The squares of the image that are proved: whole pixels, or parts of open pixels.
 
-use crate::occluders::surface::coverage::{Grid, for_each_centre, for_each_met};
+use crate::occluders::surface::coverage::{EdgeFunctions, Grid, for_each_centre, for_each_met};
 use crate::occluders::surface::facets::{Corner, Facet, REACH, UNITS};
 use crate::occluders::surface::looks::Tiles;
 use crate::occluders::surface::open_pixels::OpenPixels;
@@ -91,18 +91,15 @@ impl<'a> Squares<'a> {
                     [a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x)],
                     [a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y)],
                 );
+                let functions = EdgeFunctions::new(corners);
                 for y in rows[0]..=rows[1] {
                     for (number, x) in open.of_row(y, columns) {
                         if facet.nearest <= f64::from(last[number - first]) {
                             let parts = Parts::new(self.grid, finer, [x, y], number - first);
-                            for_each_centre(
-                                corners,
-                                parts.grid,
-                                |_, _| false,
-                                |x, y| {
-                                    cover(parts.place(x, y));
-                                },
-                            );
+                            let [x, y] = [self.grid.centre(x), self.grid.centre(y)];
+                            functions.for_each_part(parts.grid, x, y, |x, y| {
+                                cover(parts.place(x, y));
+                            });
                         }
                     }
                 }
