@@ -713,7 +713,7 @@ impl Part<'_> {
 const STEP: i32 = SIDE as i32;
 
 /// Triangles of fewer columns of tiles are drawn tile by tile.
-const NARROW: i32 = 4;
+const NARROW: i32 = 6;
 
 /// Triangles that meet fewer tiles are drawn into pixels.
 const LAYERS_FROM: i32 = 9;

@@ -188,6 +188,9 @@ impl HostRaster {
     }
 }
 
+/// Triangles of a meshlet are sorted if so many pixels of its box come to each of them.
+const SORTED_FROM: i64 = 1024;
+
 fn draw_meshlet(
     shapes: &Shapes,
     candidate: &Candidate,
@@ -203,6 +206,11 @@ fn draw_meshlet(
     vertices.project(&shapes.blocks, meshlet, lens, image);
     let rows = (band.top, band.bottom.min(image.height) - 1);
     vertices.select(&shapes.blocks, meshlet, faces, image, rows);
+    let side = |(first, last): (i32, i32)| i64::from(last - first + 1);
+    let pixels = side(candidate.extent.columns) * side(candidate.extent.rows);
+    if pixels > SORTED_FROM * vertices.num_kept() as i64 {
+        vertices.sort(&shapes.blocks, meshlet);
+    }
     for i in 0..vertices.num_kept() {
         let corners = vertices.corners(&shapes.blocks, meshlet, i);
         let projected = corners.map(|v| vertices.projected(v));
