@@ -102,16 +102,22 @@ impl Edges {
     /// Which pixels of a tile are inside, given the functions at its first pixel.
     #[inline(never)]
     fn mask(&self, at: [i32; 3]) -> Mask {
-        let mut edges = self.columns(at);
+        let columns = self.columns(at);
         // By column, a bit for each row.
         // Each row has a bit of its own, since of shifts compilers make no vectors here.
         let mut outside = [0_i32; LANES];
-        for row in 0..SIDE {
-            for l in 0..LANES {
-                let any = (edges[0][l] | edges[1][l] | edges[2][l]) >> 31;
-                outside[l] |= any & (1 << (SIDE - 1 - row));
+        for k in 0..3 {
+            // Most edges do not cross the tile.
+            if at[k] + (STEP - 1) * (self.right[k].min(0) + self.down[k].min(0)) >= 0 {
+                continue;
             }
-            self.step_down(&mut edges);
+            let mut edge = columns[k];
+            for row in 0..SIDE {
+                for l in 0..LANES {
+                    outside[l] |= (edge[l] >> 31) & (1 << (SIDE - 1 - row));
+                    edge[l] += self.down[k];
+                }
+            }
         }
         !Mask::from_le_bytes(outside.map(|bits| bits as u8))
     }
