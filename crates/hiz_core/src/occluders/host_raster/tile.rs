@@ -3,7 +3,9 @@
 //! A triangle that covers a whole tile, or an edge's side of it, costs one plane and one mask of 64
 //! bits, and no pixel is written (Greene 1996; Hasselgren, Andersson and Akenine-Moller 2016).
 //! Unlike in the masked method of 2016 no depths are merged: each plane is kept as it is.
-//! Where planes would have to be compared pixel by pixel the tile turns into pixels.
+//! Where two planes cross, their masks are split pixel by pixel.
+//! A tile that more planes share than it has room for turns into pixels, and so does one that small
+//! triangles meet.
 //!
 //! Every way gives the same numbers: a pixel holds the greatest nearness of the planes that cover
 //! its centre.
