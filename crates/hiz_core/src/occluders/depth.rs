@@ -108,7 +108,10 @@ impl OccluderDepth {
             gpu.texture("hiz.depth.image", (texels.width, texels.height), format, usage)?;
         let view = gpu.view(&texture)?;
         let host = on_host.then(|| {
-            Locked::new(HostImage { raster: HostRaster::new(size, cores()), convention: None })
+            Locked::new(HostImage {
+                raster: HostRaster::for_threads(size, cores()),
+                convention: None,
+            })
         });
         Ok(Self { context: gpu.id(), size, texture, view, host, staging: Ring::new(STAGING_KEPT) })
     }

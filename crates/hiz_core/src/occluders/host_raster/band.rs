@@ -9,7 +9,7 @@ use crate::input::image::DepthConvention;
 use crate::occluders::host_raster::lens::{Extent, HALF, Image, UNITS, greatest, least};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
 use crate::occluders::host_raster::tile::{
-    CLEAR, Layer, MOST_LAYERS, Mask, PIXELS, Plane, SIDE, State, Tile, row_of_layers,
+    CLEAR, FULL, Layers, Mask, PIXELS, Plane, Rise, SIDE, State, Tile, row_of_layers,
 };
 use crate::occluders::host_raster::triangle::Triangle;
 use crate::occluders::meshlets::LANES;
@@ -40,7 +40,11 @@ pub(super) struct Band {
     cells: Vec<f32>,
     /// By cell: a tile's `farthest` has changed since that of the cell was computed.
     is_cell_stale: Vec<bool>,
-    layers: Vec<Layer>,
+    /// By tile that is [`FULL`]: nearness at its first pixel, and where its triangle is in `rises`.
+    first: Vec<f32>,
+    risen: Vec<u32>,
+    rises: Vec<Rise>,
+    layers: Vec<Layers>,
     pixels: Vec<f32>,
 }
 
@@ -99,16 +103,22 @@ impl Edges {
     /// Which pixels of a tile are inside, given the functions at its first pixel.
     #[inline(never)]
     fn mask(&self, at: [i32; 3]) -> Mask {
-        let mut edges = self.columns(at);
+        let columns = self.columns(at);
         // By column, a bit for each row.
         // Each row has a bit of its own, since of shifts compilers make no vectors here.
         let mut outside = [0_i32; LANES];
-        for row in 0..SIDE {
-            for l in 0..LANES {
-                let any = (edges[0][l] | edges[1][l] | edges[2][l]) >> 31;
-                outside[l] |= any & (1 << (SIDE - 1 - row));
+        for k in 0..3 {
+            // Most edges do not cross the tile.
+            if at[k] + (STEP - 1) * (self.right[k].min(0) + self.down[k].min(0)) >= 0 {
+                continue;
             }
-            self.step_down(&mut edges);
+            let mut edge = columns[k];
+            for row in 0..SIDE {
+                for l in 0..LANES {
+                    outside[l] |= (edge[l] >> 31) & (1 << (SIDE - 1 - row));
+                    edge[l] += self.down[k];
+                }
+            }
         }
         !Mask::from_le_bytes(outside.map(|bits| bits as u8))
     }
@@ -245,7 +255,10 @@ impl Band {
             stale: Vec::new(),
             cells: vec![0.0; cells],
             is_cell_stale: vec![false; cells],
-            layers: vec![Layer::default(); MOST_LAYERS * count],
+            first: vec![0.0; count],
+            risen: vec![0; count],
+            rises: Vec::new(),
+            layers: vec![Layers::default(); count],
             pixels: vec![0.0; stride * (bottom - top) as usize],
         }
     }
@@ -258,6 +271,7 @@ impl Band {
         self.stale.clear();
         self.cells.fill(0.0);
         self.is_cell_stale.fill(false);
+        self.rises.clear();
     }
 
     /// Whether nothing within `extent` would show in this band.
@@ -324,15 +338,36 @@ impl Band {
     fn tile(&mut self, index: usize) -> Tile<'_> {
         let first = index / self.across * SIDE * self.stride + index % self.across * SIDE;
         Tile {
-            layer_stride: self.states.len(),
             farthest: &mut self.farthest[index],
             nearest: &mut self.nearest[index],
             state: &mut self.states[index],
-            layers: &mut self.layers[index..],
+            layers: &mut self.layers[index],
             pixels: &mut self.pixels[first..],
             stride: self.stride,
             fault: self.image.fault,
         }
+    }
+
+    /// The plane of a tile that is [`FULL`].
+    #[inline(always)]
+    fn full_plane(&self, index: usize) -> Plane {
+        Plane::at(self.first[index], &self.rises[self.risen[index] as usize])
+    }
+
+    /// Makes the plane of a tile that is [`FULL`] a layer.
+    #[inline(always)]
+    fn settle(&mut self, index: usize) {
+        if self.states[index] == FULL {
+            let plane = self.full_plane(index);
+            self.tile(index).settle(plane);
+        }
+    }
+
+    /// Turns whatever a tile is into pixels.
+    #[inline(never)]
+    fn expand(&mut self, index: usize) {
+        self.settle(index);
+        self.tile(index).expand();
     }
 
     /// Draws the part of a triangle that lies in this band.
@@ -368,7 +403,7 @@ impl Band {
                     self.stale.push(tile as u32);
                 }
                 if self.states[tile] != PIXELS {
-                    self.tile(tile).expand();
+                    self.expand(tile);
                 }
             }
         }
@@ -410,6 +445,7 @@ impl Band {
             return;
         }
         let steps = Steps::new(t, edges, self.image.fault);
+        self.rises.push(Rise { slope: t.slope, nearest: t.nearest });
         if end - begin < NARROW {
             for row in first..=last {
                 self.draw_narrow(t, edges, &steps, row, (begin, end), is_large);
@@ -441,6 +477,7 @@ impl Band {
                 // Past the row's end there may be no tile.
                 segment.open &= u32::MAX >> (31 - (last - column).min(31));
                 if segment.open != 0 {
+                    self.replace(&mut segment, tiles);
                     self.draw_segment(t, edges, &steps, &segment, tiles);
                     self.is_cell_stale[cell_row * (self.across / LANES) + cell] = true;
                 }
@@ -499,6 +536,36 @@ impl Band {
         }
     }
 
+    /// Draws a triangle where it covers whole tiles of a segment in front of everything.
+    #[inline(always)]
+    fn replace(&mut self, segment: &mut Segment, first: usize) {
+        fn part<T>(of: &mut [T], first: usize) -> &mut [T; LANES] {
+            &mut of.as_chunks_mut().0[first / LANES]
+        }
+        let nearest = part(&mut self.nearest, first);
+        let mut front = 0;
+        for l in 0..LANES {
+            front |= if segment.low[l] >= nearest[l] { 1 << l } else { 0 };
+        }
+        front &= segment.open & segment.full;
+        if front == 0 {
+            return;
+        }
+        segment.open &= !front;
+        let triangle = self.rises.len() as u32 - 1;
+        let farthest = part(&mut self.farthest, first);
+        let states = part(&mut self.states, first);
+        let (at, risen) = (part(&mut self.first, first), part(&mut self.risen, first));
+        for l in 0..LANES {
+            let is_front = front & (1 << l) != 0;
+            nearest[l] = if is_front { segment.high[l] } else { nearest[l] };
+            farthest[l] = if is_front { segment.low[l] } else { farthest[l] };
+            at[l] = if is_front { segment.nearness[l] } else { at[l] };
+            risen[l] = if is_front { triangle } else { risen[l] };
+            states[l] = if is_front { FULL } else { states[l] };
+        }
+    }
+
     /// Draws a triangle where a segment, which begins with tile `first`, is open to it.
     #[inline(always)]
     fn draw_segment(
@@ -537,8 +604,9 @@ impl Band {
         is_large: bool,
     ) {
         if is_full && low >= self.nearest[index] {
-            self.tile(index).replace(plane, (low, high));
-            self.is_stale[index] = false;
+            (self.farthest[index], self.nearest[index]) = (low, high);
+            (self.first[index], self.states[index]) = (plane.nearness, FULL);
+            self.risen[index] = self.rises.len() as u32 - 1;
             return;
         }
         if self.states[index] != PIXELS && (is_large || is_full) {
@@ -546,9 +614,13 @@ impl Band {
             let shifted = u32::from(is_planted!(self.image.fault, MasksShifted));
             // A column's rows run from its byte's highest bit.
             let mask = mask >> shifted & (Mask::MAX / 255 * (255 >> shifted));
+            self.settle(index);
             if mask == 0 || self.tile(index).add_layer(mask, plane, (low, high)) {
                 return;
             }
+        }
+        if self.states[index] != PIXELS {
+            self.expand(index);
         }
         self.nearest[index] = greatest(self.nearest[index], high);
         self.is_stale[index] = false;
@@ -568,7 +640,8 @@ impl Band {
     pub(super) fn renew(&mut self) {
         let mut stale = std::mem::take(&mut self.stale);
         for index in stale.drain(..).map(|index| index as usize) {
-            if std::mem::take(&mut self.is_stale[index]) {
+            let is_stale = std::mem::take(&mut self.is_stale[index]);
+            if is_stale && self.states[index] == PIXELS {
                 let (row, column) = (index / self.across, index % self.across);
                 let cell = row / LANES * (self.across / LANES) + column / LANES;
                 self.is_cell_stale[cell] = true;
@@ -604,30 +677,53 @@ impl Band {
         mut out: wgpu::WriteOnly<'_, [u8]>,
         pitch: usize,
         rows: Range<i32>,
-        depth_of: impl Fn(f32) -> f32,
+        depth_of: impl Fn(f32) -> f32 + Copy,
     ) {
-        let (width, count) = (self.image.width as usize, self.states.len());
+        let (width, fault) = (self.image.width as usize, self.image.fault);
         let end = width.next_multiple_of(4).min(pitch / size_of::<f32>());
-        let mut line = vec![0.0; width.next_multiple_of(SIDE)];
-        for (number, y) in rows.map(|row| (row - self.top) as usize).enumerate() {
-            let first = y / SIDE * self.across;
-            let pixels = &self.pixels[y * self.stride..][..self.stride];
-            for (column, values) in line.as_chunks_mut::<SIDE>().0.iter_mut().enumerate() {
-                let tile = first + column;
-                let row = match self.states[tile] {
-                    PIXELS => pixels.as_chunks().0[column],
-                    state => {
-                        let layers = &self.layers[tile..];
-                        row_of_layers(state, layers, count, y % SIDE, self.image.fault)
+        let wide = width.next_multiple_of(SIDE);
+        // A row of tiles, which stays in the caches.
+        let mut lines = vec![0.0; SIDE * wide];
+        let (first, last) = (rows.start - self.top, rows.end - 1 - self.top);
+        for row in first / STEP..=last / STEP {
+            for column in 0..width.div_ceil(SIDE) {
+                let (tile, left) = (row as usize * self.across + column, column * SIDE);
+                let block = (&mut lines[..], wide, column);
+                match self.states[tile] {
+                    PIXELS => {
+                        let first = row as usize * SIDE * self.stride + left;
+                        let pixels = |y| self.pixels[first + y * self.stride..].as_chunks().0[0];
+                        fill(block, |y| pixels(y).map(depth_of));
                     }
-                };
-                *values = row.map(&depth_of);
+                    FULL => {
+                        let plane = self.full_plane(tile);
+                        fill(block, |y| plane.row(y).map(depth_of));
+                    }
+                    state => {
+                        let layers = &self.layers[tile];
+                        fill(block, |y| row_of_layers(state, layers, y, fault).map(depth_of));
+                    }
+                }
             }
-            let last = line[width - 1];
-            line[width..].fill(last);
-            let bytes = bytemuck::cast_slice(&line[..end]);
-            out.slice(number * pitch..number * pitch + bytes.len()).copy_from_slice(bytes);
+            for (y, line) in (row * STEP..).zip(lines.chunks_exact_mut(wide)) {
+                if !(first..=last).contains(&y) {
+                    continue;
+                }
+                let repeated = line[width - 1];
+                line[width..].fill(repeated);
+                let bytes = bytemuck::cast_slice(&line[..end]);
+                let at = (y - first) as usize * pitch;
+                out.slice(at..at + bytes.len()).copy_from_slice(bytes);
+            }
         }
+    }
+}
+
+/// Fills the place of a tile in a row of tiles: `(numbers, numbers in a row, column of tiles)`.
+#[inline(always)]
+fn fill((lines, wide, column): (&mut [f32], usize, usize), row: impl Fn(usize) -> [f32; SIDE]) {
+    for (y, line) in lines.chunks_exact_mut(wide).enumerate() {
+        line.as_chunks_mut().0[column] = row(y);
     }
 }
 
@@ -635,7 +731,7 @@ impl Band {
 const STEP: i32 = SIDE as i32;
 
 /// Triangles of fewer columns of tiles are drawn tile by tile.
-const NARROW: i32 = 4;
+const NARROW: i32 = 6;
 
 /// Triangles that meet fewer tiles are drawn into pixels.
 const LAYERS_FROM: i32 = 9;

@@ -17,6 +17,10 @@
 //! shared edge is covered once.
 //! Depth is that of the plane through the corners as they were before that rounding, in float32,
 //! and never nearer than the nearest corner.
+//! Those corners say, too, which way a face is turned.
+//! Nothing is drawn before the near plane or beyond the far plane.
+//! Triangles across the near plane or far outside of the image are clipped in float64; a cut whose
+//! w is below 2^-33 of its triangle's size has no certain place and is left out.
 //! Skipping, the number of bands and the number of threads change no pixel.
 //! Without fused multiply-add, which Rust does not use by itself, every machine makes the same
 //! bits.
@@ -103,6 +107,17 @@ impl HostRaster {
     /// An empty image, in `bands` bands.
     pub(crate) fn new(size: ImageSize, bands: usize) -> Self {
         Self::with_fault(size, bands, Planted::default())
+    }
+
+    /// An empty image for drawing with so many threads.
+    pub(crate) fn for_threads(size: ImageSize, threads: usize) -> Self {
+        /// Parts of unequal work even out, and a meshlet on a border is projected twice.
+        const BANDS_A_THREAD: usize = 4;
+        /// Rows of tiles: thinner bands have more borders than they gain.
+        const LEAST_ROWS: usize = 8;
+        let rows = (size.height as usize).div_ceil(SIDE);
+        let bands = (BANDS_A_THREAD * threads).min(rows / LEAST_ROWS).max(threads);
+        Self::new(size, if threads > 1 { bands } else { 1 })
     }
 
     /// [`HostRaster::new`] with a planted fault, for tests.
@@ -277,6 +292,9 @@ fn within_limits(
     candidates.into_iter().zip(is_kept).filter_map(|(c, kept)| kept.then_some(c)).collect()
 }
 
+/// Triangles of a meshlet are sorted if so many pixels of its box come to each of them.
+const SORTED_FROM: i64 = 1024;
+
 fn draw_meshlet(
     shapes: &Shapes,
     candidate: &Candidate,
@@ -292,6 +310,11 @@ fn draw_meshlet(
     vertices.project(&shapes.blocks, meshlet, lens, image);
     let rows = (band.top, band.bottom.min(image.height) - 1);
     vertices.select(&shapes.blocks, meshlet, faces, image, rows);
+    let side = |(first, last): (i32, i32)| i64::from(last - first + 1);
+    let pixels = side(candidate.extent.columns) * side(candidate.extent.rows);
+    if pixels > SORTED_FROM * vertices.num_kept() as i64 {
+        vertices.sort(&shapes.blocks, meshlet);
+    }
     for i in 0..vertices.num_kept() {
         let corners = vertices.corners(&shapes.blocks, meshlet, i);
         let projected = corners.map(|v| vertices.projected(v));

@@ -3,7 +3,9 @@
 //! A triangle that covers a whole tile, or an edge's side of it, costs one plane and one mask of 64
 //! bits, and no pixel is written (Greene 1996; Hasselgren, Andersson and Akenine-Moller 2016).
 //! Unlike in the masked method of 2016 no depths are merged: each plane is kept as it is.
-//! Where planes would have to be compared pixel by pixel the tile turns into pixels.
+//! Where two planes cross, their masks are split pixel by pixel.
+//! A tile that more planes share than it has room for turns into pixels, and so does one that small
+//! triangles meet.
 //!
 //! Every way gives the same numbers: a pixel holds the greatest nearness of the planes that cover
 //! its centre.
@@ -36,15 +38,42 @@ pub(super) struct Plane {
 }
 
 impl Plane {
+    /// The plane over a tile, of whose triangle `rise` is known.
+    #[inline(always)]
+    pub(super) fn at(nearness: f32, rise: &Rise) -> Self {
+        Self { nearness, slope: rise.slope, nearest: rise.nearest }
+    }
+
     /// A row of the tile.
     ///
     /// Sums in this order are monotone in the column and in the row, rounding included.
     /// So the least and the greatest value of a tile are those of two of its corners, exactly.
     #[inline(always)]
-    fn row(&self, row: usize) -> [f32; SIDE] {
+    pub(super) fn row(&self, row: usize) -> [f32; SIDE] {
         let first = self.nearness + self.slope[1] * row as f32;
         std::array::from_fn(|l| least(self.slope[0] * l as f32 + first, self.nearest))
     }
+}
+
+/// What the planes of a triangle have in common over all tiles.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rise {
+    pub(super) slope: [f32; 2],
+    pub(super) nearest: f32,
+}
+
+/// Where the first of two planes is nearer than the second.
+#[inline(never)]
+fn nearer(plane: &Plane, other: &Plane) -> Mask {
+    // By column, as in `Edges::mask`.
+    let mut is_nearer = [0_u32; SIDE];
+    for row in 0..SIDE {
+        let (a, b) = (plane.row(row), other.row(row));
+        for l in 0..SIDE {
+            is_nearer[l] |= if a[l] > b[l] { 1 << (SIDE - 1 - row) } else { 0 };
+        }
+    }
+    Mask::from_le_bytes(is_nearer.map(|bits| bits as u8))
 }
 
 /// A plane where it is the nearest.
@@ -56,10 +85,15 @@ pub(super) struct Layer {
     greatest: f32,
 }
 
+/// The layers of a tile, of which its state counts those in use.
+pub(super) type Layers = [Layer; MOST_LAYERS];
+
 /// How the depth of a tile is kept: as so many layers, or as [`PIXELS`].
 pub(super) type State = u8;
 /// Nothing was drawn.
 pub(super) const CLEAR: State = 0;
+/// One plane in front of everything else covers the tile; the band has its nearness.
+pub(super) const FULL: State = State::MAX - 1;
 /// The tile has pixels.
 pub(super) const PIXELS: State = State::MAX;
 
@@ -70,11 +104,7 @@ pub(super) struct Tile<'a> {
     /// No pixel is nearer than this.
     pub(super) nearest: &'a mut f32,
     pub(super) state: &'a mut State,
-    /// The band's layers from the tile's first one on: layer k is `k * layer_stride` behind it.
-    ///
-    /// Most tiles have one layer at most, so the first layers of all tiles lie together.
-    pub(super) layers: &'a mut [Layer],
-    pub(super) layer_stride: usize,
+    pub(super) layers: &'a mut Layers,
     /// The band's pixels from the tile's first one on, and how many there are in a row.
     pub(super) pixels: &'a mut [f32],
     pub(super) stride: usize,
@@ -83,12 +113,12 @@ pub(super) struct Tile<'a> {
 
 /// One row of a mask: all bits of a lane for a pixel that is covered.
 #[inline(always)]
-pub(super) fn mask_row(columns: &[u32; SIDE], row: usize) -> [u32; SIDE] {
+fn mask_row(columns: &[u32; SIDE], row: usize) -> [u32; SIDE] {
     columns.map(|bits| 0_u32.wrapping_sub(bits >> (SIDE - 1 - row) & 1))
 }
 
 #[inline(always)]
-pub(super) fn columns_of(mask: Mask) -> [u32; SIDE] {
+fn columns_of(mask: Mask) -> [u32; SIDE] {
     mask.to_le_bytes().map(u32::from)
 }
 
@@ -100,39 +130,35 @@ fn row_mut(pixels: &mut [f32], at: usize) -> &mut [f32; SIDE] {
 }
 
 impl Tile<'_> {
-    /// Draws a plane that covers the whole tile, in front of everything.
+    /// Makes the plane of a tile that is [`FULL`] its first layer.
     #[inline(always)]
-    pub(super) fn replace(&mut self, plane: Plane, (low, high): (f32, f32)) {
-        self.layers[0] = Layer { mask: Mask::MAX, plane, least: low, greatest: high };
-        (*self.state, *self.farthest, *self.nearest) = (1, low, high);
-    }
-
-    #[inline(always)]
-    fn layer(&mut self, k: usize) -> &mut Layer {
-        &mut self.layers[k * self.layer_stride]
+    pub(super) fn settle(&mut self, plane: Plane) {
+        let (least, greatest) = (*self.farthest, *self.nearest);
+        self.layers[0] = Layer { mask: Mask::MAX, plane, least, greatest };
+        *self.state = 1;
     }
 
     /// Draws a plane where `mask` is set, as one more layer; false if that would need pixels.
     ///
-    /// The tile must not have pixels.
+    /// The tile must have layers.
     pub(super) fn add_layer(
         &mut self,
         mut mask: Mask,
         plane: Plane,
         (low, high): (f32, f32),
     ) -> bool {
-        let (count, fault) = (usize::from(*self.state), self.fault);
-        // First see whether it is possible, then change the layers.
-        for k in 0..count {
-            let layer = self.layer(k);
+        let count = usize::from(*self.state).min(MOST_LAYERS);
+        for layer in &self.layers[..count] {
             if layer.mask & mask == 0 || low >= layer.greatest {
                 continue;
             }
-            if high > layer.least {
-                return false;
-            }
-            if !is_planted!(fault, LayersOverlap) {
-                mask &= !layer.mask;
+            let hidden = if high > layer.least {
+                layer.mask & !nearer(&plane, &layer.plane)
+            } else {
+                layer.mask
+            };
+            if !is_planted!(self.fault, LayersOverlap) {
+                mask &= !hidden;
             }
         }
         if mask == 0 {
@@ -140,12 +166,14 @@ impl Tile<'_> {
         }
         let (mut kept, mut covered, mut farthest) = (0, mask, low);
         for k in 0..count {
-            let mut layer = *self.layer(k);
-            layer.mask &= !mask;
-            if layer.mask != 0 {
-                covered |= layer.mask;
-                farthest = least(farthest, layer.least);
-                *self.layer(kept) = layer;
+            let left = self.layers[k].mask & !mask;
+            if left != 0 {
+                covered |= left;
+                farthest = least(farthest, self.layers[k].least);
+                if kept < k {
+                    self.layers[kept] = self.layers[k];
+                }
+                self.layers[kept].mask = left;
                 kept += 1;
             }
         }
@@ -153,7 +181,7 @@ impl Tile<'_> {
         if kept == MOST_LAYERS {
             return false;
         }
-        *self.layer(kept) = Layer { mask, plane, least: low, greatest: high };
+        self.layers[kept] = Layer { mask, plane, least: low, greatest: high };
         *self.state += 1;
         *self.nearest = greatest(*self.nearest, high);
         if covered == Mask::MAX {
@@ -163,11 +191,11 @@ impl Tile<'_> {
     }
 
     /// Turns layers into pixels.
-    #[inline(never)]
+    #[inline(always)]
     pub(super) fn expand(&mut self) {
         for row in 0..SIDE {
             *row_mut(self.pixels, row * self.stride) =
-                row_of_layers(*self.state, self.layers, self.layer_stride, row, self.fault);
+                row_of_layers(*self.state, self.layers, row, self.fault);
         }
         *self.state = PIXELS;
     }
@@ -179,9 +207,6 @@ impl Tile<'_> {
         plane: &Plane,
         mut covered: impl FnMut(usize) -> [u32; SIDE],
     ) {
-        if *self.state != PIXELS {
-            self.expand();
-        }
         let mut farthest = [f32::MAX; SIDE];
         for row in 0..SIDE {
             let (covered, nearness) = (covered(row), plane.row(row));
@@ -220,8 +245,7 @@ fn least_of(v: &[f32; SIDE]) -> f32 {
 #[inline(always)]
 pub(super) fn row_of_layers(
     state: State,
-    layers: &[Layer],
-    layer_stride: usize,
+    layers: &Layers,
     row: usize,
     fault: Planted,
 ) -> [f32; SIDE] {
@@ -234,8 +258,7 @@ pub(super) fn row_of_layers(
         }
         count => {
             let mut out = [0.0; SIDE];
-            for k in 0..count {
-                let layer = &layers[k * layer_stride];
+            for layer in &layers[..count.min(MOST_LAYERS)] {
                 let covered = mask_row(&columns_of(layer.mask), row);
                 let nearness = layer.plane.row(row);
                 for l in 0..SIDE {

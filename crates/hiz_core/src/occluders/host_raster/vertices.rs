@@ -179,6 +179,24 @@ impl Vertices {
         self.num_kept = kept;
     }
 
+    /// Sorts the triangles that [`select`](Self::select) has found front to back, nearly.
+    ///
+    /// Where one of them needs clipping its place in the order is any.
+    pub(super) fn sort(&mut self, blocks: &Blocks, meshlet: &Meshlet) {
+        // The lowest byte of a key is the triangle, the others are those of its nearest corner.
+        let mut keys = [0; MAX_TRIANGLES];
+        let keys = &mut keys[..self.num_kept];
+        for (i, key) in keys.iter_mut().enumerate() {
+            let [a, b, c] = self.corners(blocks, meshlet, i).map(|v| self.nearness[v]);
+            let nearest = greatest(greatest(a, b), c);
+            *key = (!nearest.to_bits() & !0xFF) | u32::from(self.kept[i]);
+        }
+        keys.sort_unstable();
+        for (kept, key) in self.kept.iter_mut().zip(keys) {
+            *kept = *key as u8;
+        }
+    }
+
     /// How many triangles [`select`](Self::select) has found.
     pub(super) fn num_kept(&self) -> usize {
         self.num_kept

@@ -320,7 +320,7 @@ impl OccluderSurface {
     pub fn depth(&self, camera: &Camera) -> Result<Vec<f32>> {
         let size = camera.size();
         let threads = cores();
-        let mut raster = HostRaster::new(size, threads);
+        let mut raster = HostRaster::for_threads(size, threads);
         let all = DrawOptions::default();
         self.draw_into(&mut raster, camera, Way { threads, skip: true }, &all)?;
         let mut depth = memory::list(size.pixels() as usize, "depth")?;
