@@ -128,6 +128,31 @@ impl Lens {
     pub(super) fn clip(&self, d: [f32; 3]) -> [f32; 4] {
         self.rows.map(|r| r[0] * d[0] + r[1] * d[1] + (r[2] * d[2] + r[3]))
     }
+
+    /// About how many pixels triangles near `middle` take in the image, from [`Meshlet::facing`].
+    ///
+    /// An area vector is multiplied with the cross product of the gradients of x and y there.
+    /// It has a sign per triangle, which is dropped, so that this counts both faces.
+    /// Infinite at the eye and behind it.
+    ///
+    /// [`Meshlet::facing`]: crate::occluders::meshlets::Meshlet::facing
+    pub(super) fn pixels_of(&self, facing: [f32; 3], middle: Vec3) -> f32 {
+        #[expect(clippy::cast_possible_truncation, reason = "an estimate")]
+        let at = self.clip(sub(middle, self.eye).map(|v| v as f32));
+        let w = at[3];
+        if !(w > 0.0) {
+            return f32::INFINITY;
+        }
+        let gradient = |row: usize| -> [f32; 3] {
+            std::array::from_fn(|k| (self.rows[row][k] - at[row] / w * self.rows[3][k]) / w)
+        };
+        let (x, y) = (gradient(0), gradient(1));
+        let units = (0..3).map(|k| {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            (x[i] * y[j] - x[j] * y[i]).abs() * facing[k]
+        });
+        units.sum::<f32>() / (UNITS * UNITS) as f32
+    }
 }
 
 /// What the image shows of a box at most.
