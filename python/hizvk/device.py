@@ -314,7 +314,7 @@ class Device:
             So upload the copies' bounds as instances in that order.
         max_triangles : int, optional
             At most so many triangles are drawn.
-            Clusters of neighbouring triangles are chosen that take much of the image per triangle.
+            Clusters of neighbouring triangles are chosen by their solid angle per triangle.
             The host's rasteriser remembers the last drawing of these occluders with a limit.
             It begins with those that were not hidden then, and those that were come last.
             Each occluder that is left out costs hiding, and hidden ones cost little time anyway.

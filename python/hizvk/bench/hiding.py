@@ -226,7 +226,7 @@ WAYS: Final[tuple[Way, ...]] = (
     Ranked("`select_occluders`, static", _selection),
     Ranked("size and distance of the box, per view", _size_and_distance),
     Limited("`max_triangles`, first frame", 1),
-    Limited("`max_triangles`, after 8 frames", 8),
+    Limited("`max_triangles`, second frame", 2),
 )
 
 

@@ -59,7 +59,8 @@ pub struct DrawOptions<'a> {
     pub only: Only<'a>,
     /// At most so many triangles; `None`: all.
     ///
-    /// Clusters of neighbouring triangles are chosen that take much of the image per triangle.
+    /// Clusters of neighbouring triangles are chosen by their solid angle per triangle.
+    /// The device's rasteriser takes the rectangle around a cluster for it.
     /// The rasteriser on the host remembers the last drawing of these occluders with a limit.
     /// It begins with those that were not hidden then, and those that were come last.
     /// Hidden triangles cost little without a limit, so measure before you set one.
@@ -135,7 +136,7 @@ pub(super) struct Ranked {
     /// Its copy.
     pub(super) copy: u32,
     pub(super) triangles: u32,
-    /// About how much of the image it takes, in any unit.
+    /// About how much of the view it takes, in any unit.
     pub(super) area: f32,
     pub(super) last: Last,
 }
@@ -148,8 +149,8 @@ impl DrawOptions<'_> {
 
     /// Which clusters are drawn within the limits.
     ///
-    /// Copies come first: those whose clusters take most of the image, in the order of [`Last`].
-    /// Of their clusters those come first that take most of the image per triangle, until the next
+    /// Copies come first: those whose clusters take most of the view, in the order of [`Last`].
+    /// Of their clusters those come first that take most of the view per triangle, until the next
     /// one would pass the limit.
     pub(super) fn within_limits(&self, clusters: &[Ranked]) -> Vec<bool> {
         let mut is_kept = vec![true; clusters.len()];

@@ -45,7 +45,7 @@ use crate::input::image::{DepthConvention, ImageSize};
 use crate::input::mesh::FaceCull;
 use crate::occluders::drawing::{DrawOptions, Last, Ranked, Touched, both};
 use crate::occluders::host_raster::band::Band;
-use crate::occluders::host_raster::lens::{Extent, Image, Lens, extent, least};
+use crate::occluders::host_raster::lens::{Extent, Image, Lens, extent};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
 use crate::occluders::host_raster::tile::SIDE;
 use crate::occluders::host_raster::triangle::{End, Triangle, clipped};
@@ -305,9 +305,9 @@ fn within_limits(
         Ranked {
             copy: c.copy,
             triangles: triangles.len() as u32,
-            // Triangles that are large in the image take no more of it than their box.
-            area: least(
-                lenses[c.lens as usize].pixels_of(*facing, middle),
+            area: lenses[c.lens as usize].solid_angle(
+                *facing,
+                middle,
                 side(c.extent.columns) * side(c.extent.rows),
             ),
             last: last.of((c.copy, c.meshlet)),
