@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import documented
 import hizvk
 from hizvk import cli, scenes
 from hizvk.bench import (
@@ -107,6 +108,21 @@ def test_a_quick_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     for row in rows:
         assert f" {row} |" in page or f" **{row}** |" in page
     assert "What the columns mean" in page
+    way = documented.table(page, "scene", "", "once")
+    assert [row["scene"] for row in way] == sorted(row["scene"] for row in way)
+    assert {row[""] for row in way if row["scene"] == "room"} >= {
+        "boxes, 2x2, drawn by device",
+        "boxes, 2x2, drawn by host",
+        "boxes, 2x2, depth 1/2 conservative",
+        "numpy Hi-Z, float32",
+    }
+    for row in way:
+        if row[""].startswith("boxes"):
+            assert row["false culls"] == "0"
+            assert all(
+                float(row[part]) > 0.0
+                for part in ("once", "render", "reduce", "cull", "read", "sum")
+            )
     assert told["command"] in page
     if can_draw():
         assert (out / "city.png").read_bytes().startswith(b"\x89PNG\r\n")
@@ -179,6 +195,7 @@ def test_which_depth_promises_for_the_view() -> None:
         False,
         False,
     ]
+    assert DepthVariant(rasteriser="host").render_options((90, 160)) == {"rasteriser": "host"}
     assert DepthVariant(4).size((90, 161)) == (22, 40)
     assert DepthVariant(4).size((2, 1)) == (1, 1)
     assert DepthVariant().render_options((90, 160)) == {}
@@ -256,7 +273,7 @@ def test_a_spread_is_over_the_repetitions_of_each_view() -> None:
     assert spread(ms, plus=1.0) == Spread(4.5, 4.0, 15.25)
 
 
-def test_a_broken_promise_fails_the_report() -> None:
+def a_report() -> tuple[report.Report, SceneResult]:
     adapter = hizvk.Adapter(0, "a", "b", "c", "vulkan", "cpu")
     scene = SceneResult(
         key="x",
@@ -273,16 +290,38 @@ def test_a_broken_promise_fails_the_report() -> None:
         inside=1,
         one_instance_ms=0.0,
         upload_ms=0.0,
+        way_upload_ms=0.0,
         warm_up_ms=0.0,
         rows=[row_of(1.0, 0.0, Configuration(depth=DepthVariant(2)), 7), row_of(1.0, 0.0, None, 7)],
     )
     found = report.Report("hizvk bench", 1, "quick", adapter)
     assert not found.passed
     found.scenes.append(scene)
+    return found, scene
+
+
+def test_a_broken_promise_fails_the_report() -> None:
+    found, scene = a_report()
     assert found.passed
     scene.rows.append(row_of(1.0, 0.0, Configuration(), 1))
     assert not found.passed
     assert found.broken() == ["x: : 1 visible instances culled"]
+
+
+def test_rasterisers_that_keep_different_numbers_fail_the_report() -> None:
+    found, scene = a_report()
+    for kept, depth in zip((10_000, 10_010), configurations.RASTERISERS, strict=True):
+        row = row_of(1.0, 0.0, Configuration(depth=depth))
+        row.label, row.kept = str(row.configuration), kept
+        scene.rows.append(row)
+    assert found.passed
+    scene.rows[-1].kept = 9_989
+    assert not found.passed
+    assert found.broken() == ["x: 9,989 kept with the host's rasteriser, 10,000 with the device's"]
+    scene.rows[-2].kept, scene.rows[-1].kept = 3, 4  # a single instance of few is no sign
+    assert found.passed
+    scene.rows[-1].kept = 5
+    assert not found.passed
 
 
 # -- truth -----------------------------------------------------------------------------------------

@@ -37,6 +37,9 @@ TINY = Workload(
     sides=(16, 32),
     large=4_000,
     small_image=(30, 40),
+    scenes=("city", "castle"),
+    views=1,
+    plain_sizes=1,
 )
 
 #: What is to be reached, and whether it is a lower bound, as the issue words it.
@@ -61,6 +64,9 @@ TARGETS = {
     "arrays.720p.z, float32": (1.5, False),
     "arrays.1080p.z, uint16": (1.5, False),
     "arrays.4K.distance, float32": (1.5, False),
+    "occluders.city.640x360.host alone": (5.0, True),
+    "bounds.device": (1.5, False),
+    "bounds.host": (1.5, False),
 }
 #: What is told beside them.
 TOLD = (
@@ -78,6 +84,8 @@ TOLD = (
     "calls.small_unread",
     "calls.small_part.the wait",
     "calls.groups_read",
+    "occluders.city.640x360.host",
+    "occluders.city.conservative",
     "others.numpy, cull",
     "transfers.upload.Morton",
     "arrays.4K.distance, float64",

@@ -14,9 +14,9 @@ import documented
 import hizvk
 from hizvk import cli
 from hizvk.bench import hiding, occluders
-from hizvk.bench.hiding import Groups, Ranked, Stage
+from hizvk.bench.hiding import Groups, Limited, Ranked, Stage
 from hizvk.occluders import silhouettes
-from hizvk.scenes import box_mesh
+from hizvk.scenes import View, box_mesh
 from hizvk.scenes.hedge import hedge
 
 if TYPE_CHECKING:
@@ -237,6 +237,8 @@ def test_a_way_keeps_to_its_budget(stage: Stage, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(Stage, "drawn", lambda *call: drawn.append((call[2], call[1][0])))
     sizes = stage.groups.sizes
     for way in hiding.WAYS:
+        if not isinstance(way, Ranked):
+            continue
         draw = way.start(stage)
         for k in range(3):
             for budget in (0, 11, 12, 5000, 10**6):
@@ -244,6 +246,41 @@ def test_a_way_keeps_to_its_budget(stage: Stage, monkeypatch: pytest.MonkeyPatch
                 triangles = len(drawn[-1][1].triangles)
                 assert triangles <= min(budget, int(sizes[stage.in_view[k]].sum()))
     assert any(len(mesh.triangles) > 1000 for _, mesh in drawn)
+
+
+def test_a_limit_of_triangles_is_the_librarys_own_choice(stage: Stage) -> None:
+    draw = Limited("a limit", 1).start(stage)
+    sizes = stage.groups.sizes
+    for k in range(3):
+        whole = int(sizes[stage.in_view[k]].sum())
+        assert stage.hides(draw(k, whole)) == stage.hidden[k] == 1000
+        assert (draw(k, 0).numpy() == 0.0).all()  # reversed Z: nothing was drawn
+        # A clear pixel stays clear, and no other one is nearer than with all of them.
+        full, some = draw(k, whole).numpy(), draw(k, whole // 4).numpy()
+        assert 0 < (some > 0.0).sum() < (full > 0.0).sum()
+        assert (some <= full).all()
+
+
+def test_what_was_hidden_makes_room_in_the_next_frame(device: hizvk.Device) -> None:
+    """A near wall hides large boxes, and small ones stand beside it; half may be drawn."""
+    low = [[-4.0, 5.0, -4.0], *([[-3.0, 8.0 + 2.0 * k, -3.0] for k in range(4)])]
+    high = [[4.0, 5.5, 4.0], *([[3.0, 9.0 + 2.0 * k, 3.0] for k in range(4)])]
+    low += [[7.0, 10.0, -2.0 + k] for k in range(4)]
+    high += [[7.5, 10.5, -1.5 + k] for k in range(4)]
+    boxes = np.array(low), np.array(high)
+    vertices, triangles = box_mesh(*boxes)
+    seen = View("ahead", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 80.0, 0.25)
+    camera = seen.camera((90, 160))
+    meshes = [hizvk.Mesh(vertices[8 * k : 8 * k + 8], triangles[:12]) for k in range(len(boxes[0]))]
+    occluders = device.occluders(meshes)
+    full = device.render_depth(occluders, camera, rasteriser="host").numpy()
+
+    def frame() -> np.ndarray:
+        return device.render_depth(occluders, camera, rasteriser="host", max_triangles=60).numpy()
+
+    assert (frame() != full).any()  # the wall and the four that it hides: the largest
+    assert np.array_equal(frame(), full)  # the wall and the four small ones
+    assert np.array_equal(frame(), full)
 
 
 # -- the command -----------------------------------------------------------------------------------

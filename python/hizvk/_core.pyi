@@ -329,6 +329,7 @@ class Yardstick:
         cameras: Sequence[Camera],
         is_warmed: bool,
     ) -> tuple[float, list[list[float]]]: ...
+    def raster(self, occluders: Occluders, camera: Camera, threads: int) -> YardstickRaster: ...
     def cull(
         self,
         instances: Instances,
@@ -342,6 +343,10 @@ class Yardstick:
 
 @final
 class YardstickReduction:
+    def ms(self) -> float: ...
+
+@final
+class YardstickRaster:
     def ms(self) -> float: ...
 
 @final

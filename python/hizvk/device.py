@@ -314,9 +314,9 @@ class Device:
             So upload the copies' bounds as instances in that order.
         max_triangles : int, optional
             At most so many triangles are drawn.
-            Clusters of neighbouring triangles are chosen that are large in the image.
-            The host's rasteriser begins with those that were not hidden when these occluders were
-            last drawn with a limit.
+            Clusters of neighbouring triangles are chosen by their solid angle per triangle.
+            The host's rasteriser remembers the last drawing of these occluders with a limit.
+            It begins with those that were not hidden then, and those that were come last.
             Each occluder that is left out costs hiding, and hidden ones cost little time anyway.
         max_occluders : int, optional
             At most so many copies of meshes are drawn: those that are largest in the image.

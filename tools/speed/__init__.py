@@ -10,6 +10,8 @@ From a checkout with the module built for release: ``python -m tools.speed``.
 - `culling`: certified, uncertified and grouped culls; what each output costs
 - `errors`: what the culls keep, against the float64 oracle
 - `calls`: what Python adds; small calls; numpy and Embree
+- `occluders`: the host's rasteriser against the device's, and conservative depth
+- `bounds`: few and many bounds, by the whole call from meshes to a mask
 - `transfers`: uploads, updates, and when sorting again pays
 - `memory`: bytes on the device, and the peak on the host (`host_peak`)
 - `first_call`: fresh processes (`first_mask`) with the driver's shader cache cold and warm, and

@@ -14,7 +14,19 @@ from hizvk.commands import arguments as args
 from hizvk.commands import figure
 from hizvk.commands.progress import Progress
 
-from . import arrays, calls, culling, first_call, memory, reduction, report, scale, transfers
+from . import (
+    arrays,
+    bounds,
+    calls,
+    culling,
+    first_call,
+    memory,
+    occluders,
+    reduction,
+    report,
+    scale,
+    transfers,
+)
 from .figures import Found
 from .run import WORKLOADS, Run
 
@@ -34,6 +46,8 @@ PARTS: Final[dict[str, Callable[[Run], None]]] = {
     "reduction": reduction.measure,
     "cull": culling.measure,
     "calls": calls.measure,
+    "occluders": occluders.measure,
+    "bounds": bounds.measure,
     "transfers": transfers.measure,
     "arrays": arrays.measure,
     "scale": scale.measure,

@@ -17,7 +17,16 @@ if TYPE_CHECKING:
     from hizvk.measuring.spread import Spread
     from hizvk.scenes.grid import Floats
 
-__all__ = ["Error", "Figure", "FirstCall", "Found", "ImageSize", "InstanceCount", "Time"]
+__all__ = [
+    "Error",
+    "Figure",
+    "FirstCall",
+    "Found",
+    "ImageSize",
+    "InstanceCount",
+    "Time",
+    "WholeCall",
+]
 
 
 @dataclass(frozen=True)
@@ -124,6 +133,20 @@ class ImageSize:
 
 
 @dataclass(frozen=True)
+class WholeCall:
+    """A call from meshes to a mask on the host: medians in milliseconds, each part waited for."""
+
+    bounds: int
+    rasteriser: str
+    render_ms: float
+    reduce_ms: float
+    cull_ms: float
+    read_ms: float
+    whole_ms: Spread
+    kept: int
+
+
+@dataclass(frozen=True)
 class FirstCall:
     """A fresh process up to its first mask, in seconds: medians over the processes."""
 
@@ -155,6 +178,7 @@ class Found:
     first_calls: list[FirstCall] = field(default_factory=list)
     instance_counts: list[InstanceCount] = field(default_factory=list)
     image_sizes: list[ImageSize] = field(default_factory=list)
+    whole_calls: list[WholeCall] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     """What was left out, and cliffs."""
     build: str = "release"

@@ -21,6 +21,8 @@ report.json holds one object::
     first_calls      [{cache, import_s, device_s, first_s, second_s}]
     instance_counts  [{instances, pieces, upload_ms, flat_ms, groups_ms, device_bytes, texels,
                      tests}]
+    whole_calls      [{bounds, rasteriser, render_ms, reduce_ms, cull_ms, read_ms,
+                     whole_ms {median, q1, q3}, kept}]
     image_sizes      [{side, memcpy_ms, reduce_ms, groups_ms, device_bytes, texels}]
 
 `figures` says what each number is; keys of figures are the same in every run.
@@ -133,6 +135,7 @@ def _page(found: Found, plot: str | None) -> Page:
     )
     _errors(page, found)
     _first_calls(page, found)
+    _whole_calls(page, found)
     _scale(page, found, plot)
     page.heading("Times")
     page.text("Milliseconds from a submit to the end of the wait for it, or of a whole call.")
@@ -209,6 +212,40 @@ def _first_calls(page: Page, found: Found) -> None:
         "The interpreter's own start is not counted.",
     )
     page.table("shader cache | import | device | first mask | sum | once more", rows)
+
+
+def _whole_calls(page: Page, found: Found) -> None:
+    if not found.whole_calls:
+        return
+    page.heading("Few and many bounds")
+    page.text(
+        "Whole calls from occluders to a mask on the host, 512x256 pixels, 95 % hidden.",
+        "Milliseconds, medians; each part is waited for.",
+        "*over the fewest*: the whole call, over that with the fewest bounds.",
+    )
+    fewest = {
+        call.rasteriser: call.whole_ms.median
+        for call in reversed(found.whole_calls)  # the first one stays
+    }
+    page.table(
+        "rasteriser | bounds | depth | pyramid | cull | mask | whole call | quartiles "
+        "| over the fewest | kept",
+        (
+            [
+                call.rasteriser,
+                f"{call.bounds:,}",
+                f"{call.render_ms:.2f}",
+                f"{call.reduce_ms:.2f}",
+                f"{call.cull_ms:.2f}",
+                f"{call.read_ms:.2f}",
+                f"{call.whole_ms.median:.2f}",
+                call.whole_ms.quartiles(),
+                f"{call.whole_ms.median / fewest[call.rasteriser]:.2f}",
+                f"{call.kept:,}",
+            ]
+            for call in sorted(found.whole_calls, key=lambda call: call.rasteriser)
+        ),
+    )
 
 
 def _scale(page: Page, found: Found, plot: str | None) -> None:

@@ -51,6 +51,12 @@ class Workload:
     """The number of instances that is compared with `crowd`."""
     small_image: Size = (720, 1280)
     """The size of the smallest depth image that is uploaded."""
+    scenes: tuple[str, ...] = ("mountains", "city", "castle")
+    """Of `hizvk.bench.catalogue`: whose occluders are drawn."""
+    views: int = 4
+    """Of each of these scenes."""
+    plain_sizes: int = 2
+    """How many sizes of plain images are drawn."""
 
 
 HD: Final = ("1080p", (1080, 1920))
@@ -71,6 +77,9 @@ WORKLOADS: Final = {
         counts=_COUNTS[:3],
         sides=_SIDES[:2],
         large=None,
+        scenes=("city",),
+        views=1,
+        plain_sizes=1,
     ),
     "default": Workload(
         images=(HD, UHD),

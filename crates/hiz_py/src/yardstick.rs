@@ -1,9 +1,10 @@
 //! Work for benchmarks to time: submissions whose buffers were made beforehand, and the same work
 //! done in other ways.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
 
-use hiz_core::yardstick::{self, PerLevelReduction, ReductionShape};
+use hiz_core::yardstick::{self, HostRaster, PerLevelReduction, ReductionShape};
 use hiz_core::{
     CullOptions, Error, Instances, Pyramid, PyramidOptions, StoredLevels, Visible, headless,
 };
@@ -85,6 +86,22 @@ impl Yardstick {
             other => return Err(PyValueError::new_err(format!("shape: no shape {other:?}"))),
         };
         Ok(YardstickReduction(Held::new(py, Reduction { engine, depth, reducer })))
+    }
+
+    /// The rasteriser on the host alone, with the view of `camera`.
+    fn raster(
+        &self,
+        py: Python<'_>,
+        occluders: &crate::device::Occluders,
+        camera: &Camera,
+        threads: usize,
+    ) -> PyResult<YardstickRaster> {
+        let (occluders, camera) = (occluders.0.get(py)?, camera.0.clone());
+        let raster = Mutex::new(HostRaster::new(camera.size(), threads));
+        let prepare = |_: &headless::Engine| {
+            Ok(Raster { raster, occluders: Arc::clone(&occluders), camera, threads })
+        };
+        self.0.run(py, prepare).map(|raster| YardstickRaster(Held::new(py, raster)))
     }
 
     /// Frames of a renderer: the milliseconds of the warm-up, and per frame those of
@@ -172,6 +189,30 @@ impl YardstickReduction {
     }
 }
 
+/// An image on the host that can be drawn again and again.
+#[pyclass(frozen, module = "hizvk._core")]
+pub(crate) struct YardstickRaster(Held<Raster>);
+
+struct Raster {
+    raster: Mutex<HostRaster>,
+    occluders: Arc<hiz_core::Occluders>,
+    camera: hiz_core::Camera,
+    threads: usize,
+}
+
+#[pymethods]
+impl YardstickRaster {
+    /// Milliseconds of clearing the image and drawing all occluders.
+    fn ms(&self, py: Python<'_>) -> PyResult<f64> {
+        self.0.run(py, |Raster { raster, occluders, camera, threads }| {
+            let mut raster = raster.lock().unwrap_or_else(PoisonError::into_inner);
+            let start = Instant::now();
+            raster.draw(occluders.surface(), camera, *threads, true)?;
+            Ok(1e3 * start.elapsed().as_secs_f64())
+        })
+    }
+}
+
 /// A cull that can be submitted again and again.
 #[pyclass(frozen, module = "hizvk._core")]
 pub(crate) struct YardstickCull(Held<Cull>);
@@ -207,6 +248,8 @@ impl YardstickCull {
 }
 
 impl OnDevice for Reduction {}
+
+impl OnDevice for Raster {}
 
 impl OnDevice for Cull {}
 

@@ -14,7 +14,7 @@ from ..commands import arguments as args
 from ..commands import figure
 from ..commands.progress import Progress
 from ..scenes import embree
-from . import catalogue, configurations
+from . import catalogue, configurations, whole_way
 from .measure import measure
 from .report import Report
 
@@ -233,6 +233,10 @@ def _tell(found: Report, out: Path) -> None:
                 f"  {total:8.2f} ms per view, {row.ns_per_instance or 0.0:6.0f} ns per instance, "
                 f"{100.0 * row.hidden_kept:6.2f} % of the hidden kept: {row.label}"
             )
+    print("the whole way, from meshes to a mask: ms per view, kept, false culls")
+    for scene in found.scenes:
+        for key, label, *_, ms, kept, false_culls, _ in whole_way.rows(scene):
+            print(f"  {key:9}  {ms:>8}  {kept:>9}  {false_culls:>5}  {label.strip('*')}")
     for each in found.missing:
         print(f"left out {each}")
     for each in found.broken():

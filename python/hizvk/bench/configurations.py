@@ -10,10 +10,14 @@ Dimensions that depend on each other are combined in full.
 from __future__ import annotations
 
 from itertools import product
+from typing import Final
 
 from ..measuring.configuration import READS, SOME_LEVELS, Configuration, DepthVariant
 
-__all__ = ["matrix"]
+__all__ = ["RASTERISERS", "matrix"]
+
+#: The plain image of full size, by either rasteriser.
+RASTERISERS: Final = (DepthVariant(rasteriser="device"), DepthVariant(rasteriser="host"))
 
 
 def matrix(extent: str) -> tuple[Configuration, ...]:
@@ -38,6 +42,7 @@ def matrix(extent: str) -> tuple[Configuration, ...]:
             Configuration(coverage="sample"),
             Configuration(order="stable"),
         ]
+        chosen += [Configuration(depth=depth) for depth in RASTERISERS]
     else:
         chosen = _default()
     return tuple(dict.fromkeys(chosen))
@@ -59,6 +64,9 @@ def _default() -> list[Configuration]:
     chosen += [
         Configuration("boxes", *read, depth=DepthVariant(levels=some))
         for some, read in product(SOME_LEVELS, ends)
+    ]
+    chosen += [
+        Configuration("boxes", *read, depth=depth) for depth, read in product(RASTERISERS, ends)
     ]
     return chosen
 
@@ -82,5 +90,8 @@ def _full() -> list[Configuration]:
     chosen += [
         Configuration("boxes", *read, depth=DepthVariant(levels=some))
         for some, read in product(SOME_LEVELS, READS)
+    ]
+    chosen += [
+        Configuration("boxes", *read, depth=depth) for depth, read in product(RASTERISERS, READS)
     ]
     return [*chosen, Configuration(order="stable")]

@@ -2,6 +2,7 @@
 
 A row of the report is a `Way` to make a view's depth image within a budget of triangles.
 `Ranked` is the way of all rankings: groups in view are drawn in the order of their worth.
+`Limited` leaves the choice to the library, for each view and by clusters of triangles.
 Another ranking is one more entry of `WAYS`, and so is a way that makes its images by itself.
 """
 
@@ -31,6 +32,7 @@ __all__ = [
     "SHARES",
     "WAYS",
     "Groups",
+    "Limited",
     "Proxies",
     "Ranked",
     "Row",
@@ -161,6 +163,33 @@ class Ranked:
         return draw
 
 
+@dataclass(frozen=True)
+class Limited:
+    """Draws within `max_triangles` of `Device.render_depth`, by the rasteriser on the host.
+
+    The view stands still, and each image is the last of `frames`.
+    Clusters that were hidden in one frame make room for others in the next one.
+    """
+
+    label: str
+    frames: int
+
+    def start(self, stage: Stage) -> Draw:
+        """What makes the depth image of view `k` from at most `budget` triangles."""
+        meshes = stage.groups.meshes()
+
+        def draw(k: int, budget: int) -> DepthImage:
+            # Occluders remember what was hidden, and no view and budget may learn from another.
+            occluders = stage.device.occluders(meshes)
+            for _ in range(self.frames):
+                depth = stage.device.render_depth(
+                    occluders, stage.cameras[k], rasteriser="host", max_triangles=budget
+                )
+            return depth
+
+        return draw
+
+
 def _world_area(stage: Stage) -> Callable[[View], Worth]:
     """The area of all triangles of each group."""
     a, b, c = (stage.groups.vertices[stage.groups.triangles[:, k]] for k in range(3))
@@ -196,6 +225,8 @@ WAYS: Final[tuple[Way, ...]] = (
     Ranked("world area, static", _world_area),
     Ranked("`select_occluders`, static", _selection),
     Ranked("size and distance of the box, per view", _size_and_distance),
+    Limited("`max_triangles`, first frame", 1),
+    Limited("`max_triangles`, second frame", 2),
 )
 
 

@@ -16,12 +16,14 @@ report.json holds one object::
            size [height, width], repetitions, truth (how it was found what is visible),
            visible, hidden, inside (instances, summed over all views, that own a pixel, that own
            none, and that are inside the view volume),
-           one_instance_ms (a cull of one instance), upload_ms, warm_up_ms (first calls: they
-           compile and build), rows [row]
+           one_instance_ms (a cull of one instance), upload_ms (all kinds of bounds),
+           way_upload_ms (occluders and boxes), warm_up_ms (first calls: they compile and build),
+           rows [row]
 
     row:   label, configuration {volume, footprint, descent, coverage, order, fit, guard_px,
-           depth {divisor, conservative, levels}} or null for a yardstick, ms {render, reduce, cull,
-           read: spread or null}, total_ms spread or null, ns_per_instance, first_ms,
+           depth {divisor, conservative, levels, rasteriser}} or null for a yardstick,
+           ms {render, reduce, cull, read: spread or null}, total_ms spread or null,
+           ns_per_instance, first_ms,
            texels_per_instance (null where it was not measured), kept, false_culls, hairs,
            hidden_kept, hidden_kept_in_view, share_of_rectangle (shares, 0 to 1 and above), pareto
            bool
@@ -41,6 +43,7 @@ import numpy as np
 
 from ..commands import report
 from ..commands.page import Page
+from . import whole_way
 from .results import STAGES
 
 if TYPE_CHECKING:
@@ -69,8 +72,13 @@ class Report:
     seconds: float = 0.0
 
     def broken(self) -> list[str]:
-        """Configurations with the promise that culled what can be seen, in words: bugs."""
-        return [
+        """What no run may find, in words: bugs.
+
+        - configurations with the promise that culled what can be seen
+        - rasterisers whose depth makes culls keep different numbers of instances
+        """
+        differ = [(scene.key, whole_way.differing(scene)) for scene in self.scenes]
+        return [f"{key}: {words}" for key, words in differ if words] + [
             f"{scene.key}: {row.label}: {row.false_culls} visible instances culled"
             for scene in self.scenes
             for row in scene.rows
@@ -126,12 +134,25 @@ def _page(found: Report, plots: dict[str, str]) -> Page:
         "configuration of area coverage that culls as much, and its milliseconds from occluders to "
         "mask.",
         "The last row of a scene is the configuration that keeps least.",
+        "Depth is drawn by the rasteriser that `auto` chooses, unless the label names one.",
         "On another device the order may be another one.",
     )
     page.table(
         "scene | culls | configuration | ms",
         (cells for scene in found.scenes for cells in _picks(scene)),
         left=3,
+    )
+    page.heading("The whole way")
+    page.text(
+        "From meshes to a mask: milliseconds per view, and what they were bought at.",
+        "*once* is before the first view: the upload of occluders and boxes, or Embree's trees.",
+        "The two rasterisers have to keep the same instances, to 0.1 %.",
+        "*kept* is summed over the views; the other columns are those of the scenes below.",
+    )
+    page.table(
+        whole_way.HEAD,
+        (cells for scene in found.scenes for cells in whole_way.rows(scene)),
+        left=2,
     )
     for scene in found.scenes:
         _scene(page, scene, plots.get(scene.key))

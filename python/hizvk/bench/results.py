@@ -90,6 +90,9 @@ class SceneResult:
     one_instance_ms: float
     """The cull of a single instance, which is the fixed cost of a call."""
     upload_ms: float
+    """All kinds of bounds together."""
+    way_upload_ms: float
+    """The occluders and the boxes, which is what one way needs."""
     warm_up_ms: float
     """All first calls together; they compile and build."""
     rows: list[Row] = field(default_factory=list)

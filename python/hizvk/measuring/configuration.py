@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from .._arguments import Size
-    from .._types import Levels
+    from .._types import Levels, Rasteriser
     from ..options import CullOptions
 
 __all__ = ["DESCENT", "READS", "SOME_LEVELS", "Configuration", "DepthVariant"]
@@ -31,6 +31,8 @@ class DepthVariant:
 
     levels: Levels = None
     """Which levels of the pyramid are built, as in `Device.pyramid`."""
+    rasteriser: Rasteriser = "auto"
+    """What draws a plain image, as in `Device.render_depth`."""
 
     def size(self, full: Size) -> Size:
         """``(height, width)`` of the image for a view of `full` pixels."""
@@ -39,10 +41,12 @@ class DepthVariant:
     def render_options(self, full: Size) -> dict[str, Any]:
         """The keyword arguments of `Device.render_depth` for a view of `full` pixels."""
         options: dict[str, Any] = {} if self.divisor == 1 else {"size": self.size(full)}
+        options |= {} if self.rasteriser == "auto" else {"rasteriser": self.rasteriser}
         return options | ({"conservative": True} if self.conservative else {})
 
     def __str__(self) -> str:
-        return ", ".join(word for word in (self._image(), self._levels()) if word)
+        drawn = "" if self.rasteriser == "auto" else f"drawn by {self.rasteriser}"
+        return ", ".join(word for word in (self._image(), drawn, self._levels()) if word)
 
     def _image(self) -> str:
         if self.divisor == 1:
@@ -57,9 +61,9 @@ class DepthVariant:
             return f"levels >= {first}"
         return f"level {first} alone" if first == last else f"levels {first} to {last}"
 
-    def cost(self) -> tuple[int, bool, str]:
+    def cost(self) -> tuple[int, bool, str, str]:
         """A key for sorting: the largest image first, and of its pyramids that of all levels."""
-        return self.divisor, self.conservative, self._levels()
+        return self.divisor, self.conservative, self._levels(), self.rasteriser
 
 
 @dataclass(frozen=True)

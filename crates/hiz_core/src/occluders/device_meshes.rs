@@ -8,7 +8,7 @@ use crate::host::linear::Vec3;
 use crate::host::memory;
 use crate::host::rounding::split3;
 use crate::input::image::ImageSize;
-use crate::occluders::drawing::{DrawOptions, Ranked};
+use crate::occluders::drawing::{DrawOptions, Last, Ranked};
 use crate::occluders::placement::Placement;
 use crate::occluders::shapes::{Mesh, Shapes};
 use crate::occluders::view::{PlacedView, View};
@@ -218,7 +218,7 @@ pub(super) fn within_limits<'a>(seen: Vec<Seen<'a>>, options: &DrawOptions<'_>) 
             triangles: seen.part.indices.len() as u32 / 3,
             area: (x1 - x0 + 1) as f32 * (y1 - y0 + 1) as f32,
             // The device does not tell what it found hidden.
-            is_useful: false,
+            last: Last::Unknown,
         }
     });
     let is_kept = options.within_limits(&ranked.collect::<Vec<_>>());

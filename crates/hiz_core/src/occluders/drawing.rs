@@ -58,9 +58,10 @@ pub struct DrawOptions<'a> {
     pub only: Only<'a>,
     /// At most so many triangles; `None`: all.
     ///
-    /// Clusters of neighbouring triangles are chosen that are large in the image.
-    /// The rasteriser on the host begins with those that were not hidden when these occluders were
-    /// last drawn with a limit.
+    /// Clusters of neighbouring triangles are chosen by their solid angle per triangle.
+    /// The device's rasteriser takes the rectangle around a cluster for it.
+    /// The rasteriser on the host remembers the last drawing of these occluders with a limit.
+    /// It begins with those that were not hidden then, and those that were come last.
     /// Hidden triangles cost little without a limit, so measure before you set one.
     pub max_triangles: Option<u64>,
     /// At most so many copies, those that are largest in the image; `None`: all.
@@ -119,16 +120,24 @@ impl Only<'_> {
     }
 }
 
+/// What the last drawing with a limit tells of a cluster, in the order of drawing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Last {
+    Shown,
+    /// It was not looked at.
+    Unknown,
+    Hidden,
+}
+
 /// A cluster of triangles that could be drawn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ranked {
     /// Its copy.
     pub(super) copy: u32,
     pub(super) triangles: u32,
-    /// How much of the image its box takes, in any unit.
+    /// About how much of the view it takes, in any unit.
     pub(super) area: f32,
-    /// Whether it is known to have shown something.
-    pub(super) is_useful: bool,
+    pub(super) last: Last,
 }
 
 impl DrawOptions<'_> {
@@ -139,24 +148,25 @@ impl DrawOptions<'_> {
 
     /// Which clusters are drawn within the limits.
     ///
-    /// Copies come first: those whose clusters take most of the image, useful ones before others.
-    /// Of their clusters the same rule chooses until the next one would pass the limit.
+    /// Copies come first: those whose clusters take most of the view, in the order of [`Last`].
+    /// Of their clusters those come first that take most of the view per triangle, until the next
+    /// one would pass the limit.
     pub(super) fn within_limits(&self, clusters: &[Ranked]) -> Vec<bool> {
         let mut is_kept = vec![true; clusters.len()];
-        // Useful before others, then large before small, then in the given order.
-        let key = |is_useful: bool, area: f32| (!is_useful, !area.to_bits());
+        // By `Last`, then large before small, then in the given order.
+        let key = |last: Last, area: f32| (last, !area.to_bits());
         if let Some(most) = self.max_copies {
-            let mut copies: Vec<(u32, bool, f32)> = Vec::new();
+            let mut copies: Vec<(u32, Last, f32)> = Vec::new();
             for cluster in clusters {
                 match copies.last_mut().filter(|copy| copy.0 == cluster.copy) {
                     Some(copy) => {
-                        copy.1 |= cluster.is_useful;
+                        copy.1 = copy.1.min(cluster.last);
                         copy.2 += cluster.area;
                     }
-                    None => copies.push((cluster.copy, cluster.is_useful, cluster.area)),
+                    None => copies.push((cluster.copy, cluster.last, cluster.area)),
                 }
             }
-            copies.sort_by_key(|(_, is_useful, area)| key(*is_useful, *area));
+            copies.sort_by_key(|(_, last, area)| key(*last, *area));
             copies.truncate(usize::try_from(most).unwrap_or(usize::MAX));
             let mut chosen: Vec<u32> = copies.iter().map(|copy| copy.0).collect();
             chosen.sort_unstable();
@@ -166,7 +176,8 @@ impl DrawOptions<'_> {
         }
         if let Some(most) = self.max_triangles {
             let mut order: Vec<usize> = (0..clusters.len()).filter(|i| is_kept[*i]).collect();
-            order.sort_by_key(|i| key(clusters[*i].is_useful, clusters[*i].area));
+            let per_triangle = |c: &Ranked| c.area / c.triangles.max(1) as f32;
+            order.sort_by_key(|i| key(clusters[*i].last, per_triangle(&clusters[*i])));
             let mut left = most;
             for i in order {
                 let triangles = u64::from(clusters[i].triangles);
@@ -182,12 +193,13 @@ impl DrawOptions<'_> {
 mod tests {
     use super::*;
 
-    const CLUSTERS: [Ranked; 5] = [
-        Ranked { copy: 0, triangles: 10, area: 1.0, is_useful: false },
-        Ranked { copy: 0, triangles: 20, area: 5.0, is_useful: false },
-        Ranked { copy: 3, triangles: 30, area: 4.0, is_useful: false },
-        Ranked { copy: 4, triangles: 40, area: 2.0, is_useful: true },
-        Ranked { copy: 4, triangles: 50, area: 9.0, is_useful: false },
+    const CLUSTERS: [Ranked; 6] = [
+        Ranked { copy: 0, triangles: 10, area: 1.0, last: Last::Unknown },
+        Ranked { copy: 0, triangles: 20, area: 5.0, last: Last::Unknown },
+        Ranked { copy: 3, triangles: 30, area: 4.0, last: Last::Unknown },
+        Ranked { copy: 4, triangles: 40, area: 2.0, last: Last::Shown },
+        Ranked { copy: 4, triangles: 50, area: 9.0, last: Last::Unknown },
+        Ranked { copy: 5, triangles: 60, area: 99.0, last: Last::Hidden },
     ];
 
     fn kept(max_triangles: Option<u64>, max_copies: Option<u64>) -> Vec<usize> {
@@ -197,16 +209,22 @@ mod tests {
     }
 
     #[test]
-    fn useful_and_large_clusters_come_first() {
-        assert_eq!(kept(None, None), [0, 1, 2, 3, 4]);
+    fn useful_and_large_clusters_come_first_and_hidden_ones_last() {
+        assert_eq!(kept(None, None), [0, 1, 2, 3, 4, 5]);
         assert_eq!(kept(Some(0), None), [0; 0]);
-        // 40 useful ones, then the largest of the others.
-        assert_eq!(kept(Some(89), None), [3]);
-        assert_eq!(kept(Some(90), None), [3, 4]);
+        // 40 that have shown, then those that are largest per triangle.
+        assert_eq!(kept(Some(39), None), [0; 0]);
+        assert_eq!(kept(Some(59), None), [3]);
+        assert_eq!(kept(Some(60), None), [1, 3]);
+        assert_eq!(kept(Some(109), None), [1, 3]);
+        assert_eq!(kept(Some(110), None), [1, 3, 4]);
         assert_eq!(kept(Some(140), None), [1, 2, 3, 4]);
-        // Copy 4 is useful, copy 0 takes 6 of the image and copy 3 takes 4.
+        assert_eq!(kept(Some(209), None), [0, 1, 2, 3, 4]);
+        assert_eq!(kept(Some(210), None), [0, 1, 2, 3, 4, 5]);
+        // Copy 4 has shown, copy 0 takes 6 of the image, copy 3 takes 4, and copy 5 was hidden.
         assert_eq!(kept(None, Some(1)), [3, 4]);
         assert_eq!(kept(None, Some(2)), [0, 1, 3, 4]);
+        assert_eq!(kept(None, Some(3)), [0, 1, 2, 3, 4]);
         assert_eq!(kept(Some(40), Some(2)), [3]);
     }
 }

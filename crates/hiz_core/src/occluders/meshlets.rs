@@ -10,7 +10,7 @@
 use std::ops::Range;
 
 use crate::error::Result;
-use crate::host::linear::Vec3;
+use crate::host::linear::{Vec3, cross, sub};
 use crate::host::memory;
 use crate::host::rounding::split;
 
@@ -37,6 +37,8 @@ pub(crate) struct Meshlet {
     pub(crate) first_group: u32,
     /// Where its low halves begin, if any is not 0.
     pub(crate) first_low: Option<u32>,
+    /// The areas of its triangles as seen along each axis, added up.
+    pub(crate) facing: [f32; 3],
 }
 
 /// The vertices and triangles of all meshlets, as a rasteriser reads them.
@@ -144,6 +146,20 @@ struct Open {
 }
 
 impl Open {
+    /// The areas of its triangles as seen along each axis, added up.
+    fn facing(&self, positions: &[Vec3]) -> [f32; 3] {
+        let mut sum = [0.0; 3];
+        for corners in &self.corners {
+            let [a, b, c] =
+                corners.map(|corner| positions[self.vertices[usize::from(corner)] as usize]);
+            for (sum, double) in sum.iter_mut().zip(cross(sub(b, a), sub(c, a))) {
+                *sum += 0.5 * double.abs();
+            }
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "an estimate")]
+        sum.map(|area| area as f32)
+    }
+
     /// Appends it to `meshlets` and `blocks`, and begins the next one.
     fn close(
         &mut self,
@@ -170,6 +186,7 @@ impl Open {
                 })
                 .collect()
         });
+        let facing = self.facing(positions);
         let is_wide = halves.iter().flatten().any(|(_, low)| *low != 0.0);
         let first_low = is_wide.then_some(blocks.low[0].len() as u32);
         for (k, halves) in halves.iter().enumerate() {
@@ -196,6 +213,7 @@ impl Open {
             num_vertices: self.vertices.len() as u32,
             first_group,
             first_low,
+            facing,
         });
         self.vertices.clear();
         self.corners.clear();

@@ -128,6 +128,39 @@ impl Lens {
     pub(super) fn clip(&self, d: [f32; 3]) -> [f32; 4] {
         self.rows.map(|r| r[0] * d[0] + r[1] * d[1] + (r[2] * d[2] + r[3]))
     }
+
+    /// About the solid angle that triangles near `middle` take, from [`Meshlet::facing`].
+    ///
+    /// The unit is that of a pixel in the middle of the image, and both faces count.
+    /// It is at most that of their box, which takes `most` pixels.
+    ///
+    /// A small area vector times the cross product of the gradients of x and y is its area in the
+    /// image.
+    /// A pixel at an angle from the view's axis has the solid angle of cos^3 of one in the middle.
+    ///
+    /// [`Meshlet::facing`]: crate::occluders::meshlets::Meshlet::facing
+    pub(super) fn solid_angle(&self, facing: [f32; 3], middle: Vec3, most: f32) -> f32 {
+        #[expect(clippy::cast_possible_truncation, reason = "an estimate")]
+        let d = sub(middle, self.eye).map(|v| v as f32);
+        let at = self.clip(d);
+        let w = at[3];
+        if !(w > 0.0) {
+            return most;
+        }
+        let gradient = |row: usize| -> [f32; 3] {
+            std::array::from_fn(|k| (self.rows[row][k] - at[row] / w * self.rows[3][k]) / w)
+        };
+        let (x, y) = (gradient(0), gradient(1));
+        let units = (0..3).map(|k| {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            (x[i] * y[j] - x[j] * y[i]).abs() * facing[k]
+        });
+        let pixels = least(units.sum::<f32>() / (UNITS * UNITS) as f32, most);
+        // Orthographic views have no angle: the quotient is infinite or NaN.
+        let length = |v: &[f32]| v.iter().map(|v| v * v).sum::<f32>().sqrt();
+        let cosine = least(w / (length(&d) * length(&self.rows[3][..3])), 1.0);
+        pixels * cosine * cosine * cosine
+    }
 }
 
 /// What the image shows of a box at most.

@@ -47,13 +47,14 @@ use crate::host::threads::{Locked, on_threads};
 use crate::input::camera::Camera;
 use crate::input::image::{DepthConvention, ImageSize};
 use crate::input::mesh::FaceCull;
-use crate::occluders::drawing::{DrawOptions, Ranked, Touched, both};
+use crate::occluders::drawing::{DrawOptions, Last, Ranked, Touched, both};
 use crate::occluders::host_raster::band::Band;
 use crate::occluders::host_raster::lens::{Extent, Image, Lens, extent};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
 use crate::occluders::host_raster::tile::SIDE;
 use crate::occluders::host_raster::triangle::{End, Triangle, clipped};
 use crate::occluders::host_raster::vertices::Vertices;
+use crate::occluders::meshlets::Meshlet;
 use crate::occluders::placement::Placement;
 use crate::occluders::shapes::Shapes;
 use crate::occluders::view::View;
@@ -99,8 +100,32 @@ struct Candidate {
 pub(crate) struct Drawn {
     /// The smallest rectangle around the boxes of what was drawn.
     pub(crate) touched: Touched,
-    /// The meshlets that were drawn, not skipped: copy and number.
-    pub(crate) meshlets: Vec<(u32, u32)>,
+    pub(crate) told: Told,
+}
+
+/// Which meshlets were drawn, and which were skipped: copy and number.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Told {
+    shown: Vec<(u32, u32)>,
+    hidden: Vec<(u32, u32)>,
+}
+
+impl Told {
+    pub(crate) fn sort(&mut self) {
+        self.shown.sort_unstable();
+        self.hidden.sort_unstable();
+    }
+
+    fn of(&self, meshlet: (u32, u32)) -> Last {
+        let is_in = |list: &[(u32, u32)]| list.binary_search(&meshlet).is_ok();
+        if is_in(&self.shown) {
+            Last::Shown
+        } else if is_in(&self.hidden) {
+            Last::Hidden
+        } else {
+            Last::Unknown
+        }
+    }
 }
 
 impl HostRaster {
@@ -137,7 +162,7 @@ impl HostRaster {
 
     /// Draws the copies of a scene, within the limits of `options`.
     ///
-    /// `useful` are the meshlets that a limit prefers, as in [`Drawn::meshlets`] and sorted.
+    /// `last` is what a drawing with a limit has told before; its lists are sorted.
     ///
     /// # Errors
     /// [`Error::Invalid`](crate::Error::Invalid) for a camera that float32 cannot hold, and
@@ -147,11 +172,11 @@ impl HostRaster {
         scene: &Scene<'_>,
         way: Way,
         options: &DrawOptions<'_>,
-        useful: &[(u32, u32)],
+        last: &Told,
     ) -> Result<Drawn> {
         let (lenses, mut candidates) = self.candidates(scene)?;
         if options.is_limited() {
-            candidates = within_limits(scene.shapes, candidates, options, useful);
+            candidates = within_limits(scene.shapes, &lenses, candidates, options, last);
         }
         // Positive floats are ordered like their bits.
         candidates.sort_unstable_by_key(|c| (!c.extent.nearest.to_bits(), c.lens, c.meshlet));
@@ -174,14 +199,17 @@ impl HostRaster {
                 band.renew();
             }
         });
-        let shown =
-            candidates.iter().zip(&drawn).filter(|(_, drawn)| drawn.load(Ordering::Relaxed));
         let mut all = Drawn::default();
-        for (candidate, _) in shown {
+        for (candidate, drawn) in candidates.iter().zip(&drawn) {
+            let meshlet = (candidate.copy, candidate.meshlet);
+            if !drawn.load(Ordering::Relaxed) {
+                all.told.hidden.push(meshlet);
+                continue;
+            }
             let Extent { columns, rows, .. } = candidate.extent;
             let rectangle = [columns.0, rows.0, columns.1, rows.1].map(|v| v as u32);
             all.touched = both(all.touched, Some(rectangle));
-            all.meshlets.push((candidate.copy, candidate.meshlet));
+            all.told.shown.push(meshlet);
         }
         Ok(all)
     }
@@ -275,17 +303,24 @@ impl HostRaster {
 /// Those of the candidates that a limit leaves.
 fn within_limits(
     shapes: &Shapes,
+    lenses: &[Lens],
     candidates: Vec<Candidate>,
     options: &DrawOptions<'_>,
-    useful: &[(u32, u32)],
+    last: &Told,
 ) -> Vec<Candidate> {
     let ranked = candidates.iter().map(|c| {
         let side = |(first, last): (i32, i32)| (last - first + 1) as f32;
+        let Meshlet { min, max, triangles, facing, .. } = &shapes.meshlets[c.meshlet as usize];
+        let middle = std::array::from_fn(|k| 0.5 * (min[k] + max[k]));
         Ranked {
             copy: c.copy,
-            triangles: shapes.meshlets[c.meshlet as usize].triangles.len() as u32,
-            area: side(c.extent.columns) * side(c.extent.rows),
-            is_useful: useful.binary_search(&(c.copy, c.meshlet)).is_ok(),
+            triangles: triangles.len() as u32,
+            area: lenses[c.lens as usize].solid_angle(
+                *facing,
+                middle,
+                side(c.extent.columns) * side(c.extent.rows),
+            ),
+            last: last.of((c.copy, c.meshlet)),
         }
     });
     let is_kept = options.within_limits(&ranked.collect::<Vec<_>>());

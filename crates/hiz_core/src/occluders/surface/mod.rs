@@ -113,7 +113,7 @@ use crate::input::camera::Camera;
 use crate::input::mesh::{FaceCull, MeshData};
 use crate::occluders::drawing::OccluderOptions;
 use crate::occluders::drawing::{DrawOptions, Touched};
-use crate::occluders::host_raster::{HostRaster, Scene, Way};
+use crate::occluders::host_raster::{HostRaster, Scene, Told, Way};
 use crate::occluders::placement::Placement;
 use crate::occluders::shapes::Shapes;
 use crate::occluders::surface::facets::Rounder;
@@ -187,9 +187,8 @@ pub struct OccluderSurface {
     placements: Locked<Arc<Vec<Placement>>>,
     cull_mode: FaceCull,
     shared: OnceLock<Result<Shared>>,
-    /// The meshlets that were not hidden when they were last drawn with a limit: copy and number,
-    /// sorted.
-    useful: Locked<Vec<(u32, u32)>>,
+    /// What the last drawing with a limit has told of its meshlets, sorted.
+    told: Locked<Told>,
 }
 
 /// What is made of the meshes at the first conservative image.
@@ -213,7 +212,7 @@ impl OccluderSurface {
             placements,
             cull_mode: options.cull_mode,
             shared: OnceLock::new(),
-            useful: Locked::default(),
+            told: Locked::default(),
         })
     }
 
@@ -299,12 +298,12 @@ impl OccluderSurface {
             cull_mode: self.cull_mode,
         };
         if !options.is_limited() {
-            return Ok(raster.draw(&scene, way, options, &[])?.touched);
+            return Ok(raster.draw(&scene, way, options, &Told::default())?.touched);
         }
-        let useful = self.useful.lock().clone();
-        let mut drawn = raster.draw(&scene, way, options, &useful)?;
-        drawn.meshlets.sort_unstable();
-        *self.useful.lock() = drawn.meshlets;
+        let last = self.told.lock().clone();
+        let mut drawn = raster.draw(&scene, way, options, &last)?;
+        drawn.told.sort();
+        *self.told.lock() = drawn.told;
         Ok(drawn.touched)
     }
 
