@@ -144,7 +144,7 @@ impl Lens {
         let d = sub(middle, self.eye).map(|v| v as f32);
         let at = self.clip(d);
         let w = at[3];
-        if !(w > 0.0) {
+        if w.is_nan() || w <= 0.0 {
             return most;
         }
         let gradient = |row: usize| -> [f32; 3] {
