@@ -6,6 +6,7 @@
 use std::ops::{Range, RangeInclusive};
 
 use crate::input::image::DepthConvention;
+use crate::occluders::host_raster::lanes::{lanes, three};
 use crate::occluders::host_raster::lens::{Extent, HALF, Image, UNITS, greatest, least};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
 use crate::occluders::host_raster::tile::{
@@ -64,9 +65,9 @@ impl Edges {
     #[inline(always)]
     fn new(t: &Triangle, fault: Planted) -> Self {
         let next = |k: usize| if k == 2 { 0 } else { k + 1 };
-        let right = std::array::from_fn(|k| t.y[k] - t.y[next(k)]);
-        let down = std::array::from_fn(|k| t.x[next(k)] - t.x[k]);
-        let bias = std::array::from_fn(|k| {
+        let right = three(|k| t.y[k] - t.y[next(k)]);
+        let down = three(|k| t.x[next(k)] - t.x[k]);
+        let bias = three(|k| {
             let is_top_left = right[k] > 0 || (right[k] == 0 && down[k] > 0);
             let is_top_left = is_top_left && !is_planted!(fault, EdgesOfNoSide);
             if is_top_left || is_planted!(fault, EdgesOfBothSides) { 0 } else { -1 }
@@ -78,15 +79,13 @@ impl Edges {
     #[inline(always)]
     fn at_small(&self, t: &Triangle, column: i32, row: i32) -> [i32; 3] {
         let (x, y) = (column * UNITS + HALF, row * UNITS + HALF);
-        std::array::from_fn(|k| {
-            (self.right[k] * (x - t.x[k]) + self.down[k] * (y - t.y[k]) + self.bias[k]) >> 8
-        })
+        three(|k| (self.right[k] * (x - t.x[k]) + self.down[k] * (y - t.y[k]) + self.bias[k]) >> 8)
     }
 
     #[inline(always)]
     fn at(&self, t: &Triangle, column: i32, row: i32) -> [i64; 3] {
         let (x, y) = (column * UNITS + HALF, row * UNITS + HALF);
-        std::array::from_fn(|k| {
+        three(|k| {
             (i64::from(self.right[k]) * i64::from(x - t.x[k])
                 + i64::from(self.down[k]) * i64::from(y - t.y[k])
                 + i64::from(self.bias[k]))
@@ -97,7 +96,7 @@ impl Edges {
     /// The functions along the columns of a tile's first row, given those at its first pixel.
     #[inline(always)]
     fn columns(&self, at: [i32; 3]) -> [[i32; LANES]; 3] {
-        std::array::from_fn(|k| std::array::from_fn(|l| at[k] + self.right[k] * l as i32))
+        three(|k| lanes(|l| at[k] + self.right[k] * l as i32))
     }
 
     /// Which pixels of a tile are inside, given the functions at its first pixel.
@@ -120,7 +119,7 @@ impl Edges {
                 }
             }
         }
-        !Mask::from_le_bytes(outside.map(|bits| bits as u8))
+        !Mask::from_le_bytes(lanes(|l| outside[l] as u8))
     }
 
     #[inline(always)]
@@ -136,7 +135,7 @@ impl Edges {
 /// For each column: all bits set if the pixel is inside of three edges.
 #[inline(always)]
 fn inside(edges: &[[i32; LANES]; 3]) -> [u32; LANES] {
-    std::array::from_fn(|l| !((edges[0][l] | edges[1][l] | edges[2][l]) >> 31) as u32)
+    lanes(|l| !((edges[0][l] | edges[1][l] | edges[2][l]) >> 31) as u32)
 }
 
 /// Beyond this size the sign of an edge's function is the same over [`LANES`] tiles.
@@ -162,9 +161,9 @@ impl Steps {
         let middle = if is_planted!(fault, FarthestInTheMiddle) { 0.5 } else { 1.0 };
         let corner = |k: usize, is_last: bool| t.slope[k] * if is_last { last as f32 } else { 0.0 };
         Self {
-            ramp: edges.right.map(|right| std::array::from_fn(|l| STEP * right * l as i32)),
-            gain: std::array::from_fn(|k| last * (edges.right[k].max(0) + edges.down[k].max(0))),
-            loss: std::array::from_fn(|k| last * (edges.right[k].min(0) + edges.down[k].min(0))),
+            ramp: three(|k| lanes(|l| STEP * edges.right[k] * l as i32)),
+            gain: three(|k| last * (edges.right[k].max(0) + edges.down[k].max(0))),
+            loss: three(|k| last * (edges.right[k].min(0) + edges.down[k].min(0))),
             low: std::array::from_fn(|k| corner(k, t.slope[k] < 0.0) * middle),
             high: std::array::from_fn(|k| corner(k, t.slope[k] >= 0.0)),
         }
@@ -206,7 +205,7 @@ impl Segment {
         (x, y): (f32, f32),
         farthest: &[f32; LANES],
     ) {
-        let at = first.map(|value| value.clamp(-LARGE, LARGE) as i32);
+        let at = three(|k| first[k].clamp(-LARGE, LARGE) as i32);
         let (mut most, mut least_of_edges) = ([0; LANES], [0; LANES]);
         for k in 0..3 {
             for l in 0..LANES {
@@ -315,7 +314,7 @@ impl Band {
         let rows = self.farthest.chunks_exact(self.across).skip(row * LANES).take(LANES);
         let farthest = rows.fold([f32::MAX; LANES], |farthest, row| {
             let row: &[f32; LANES] = &row.as_chunks().0[column];
-            std::array::from_fn(|l| least(row[l], farthest[l]))
+            lanes(|l| least(row[l], farthest[l]))
         });
         let all = if is_planted!(self.image.fault, CellOfOneTile) { 1 } else { LANES };
         self.cells[cell] = farthest.into_iter().take(all).fold(f32::MAX, least);
@@ -411,7 +410,7 @@ impl Band {
         let x = to_pixels(columns.0 * UNITS + HALF - t.x[0]);
         let y = to_pixels(rows.0 * UNITS + HALF - t.y[0]);
         let first = t.nearness + t.slope[0] * x;
-        let along: [f32; LANES] = std::array::from_fn(|l| first + t.slope[0] * l as f32);
+        let along = lanes(|l| first + t.slope[0] * l as f32);
         let mut at = (rows.0 - self.top) as usize * self.stride + columns.0 as usize;
         for row in 0..=rows.1 - rows.0 {
             let below = t.slope[1] * (y + row as f32);
@@ -468,7 +467,7 @@ impl Band {
                 if steps.nearest_of_segment(t, x, y) <= self.cell(cell_row, cell) {
                     continue;
                 }
-                let here = std::array::from_fn(|k| {
+                let here = three(|k| {
                     at[k] + i64::from(STEP * (column - begin)) * i64::from(edges.right[k])
                 });
                 let tiles = own_row * self.across + column as usize;
@@ -528,7 +527,7 @@ impl Band {
             }
             let low = least(steps.low[0] + (nearness + steps.low[1]), t.nearest);
             let is_full = (0..3).all(|k| here[k] + i64::from(steps.loss[k]) >= 0);
-            let here = here.map(|value| value.clamp(-LARGE, LARGE) as i32);
+            let here = three(|k| here[k].clamp(-LARGE, LARGE) as i32);
             let plane = Plane { nearness, slope: t.slope, nearest: t.nearest };
             self.draw_tile(index, edges, here, plane, (low, high), is_full, is_large);
             let cell = (row - self.top / STEP) as usize / LANES * (self.across / LANES);
@@ -583,7 +582,7 @@ impl Band {
             let plane = Plane { nearness: segment.nearness[l], slope: t.slope, nearest: t.nearest };
             let range = (segment.low[l], segment.high[l]);
             let is_full = segment.full >> l & 1 == 1;
-            let at = std::array::from_fn(|k| segment.at[k] + steps.ramp[k][l]);
+            let at = three(|k| segment.at[k] + steps.ramp[k][l]);
             self.draw_tile(first + l, edges, at, plane, range, is_full, true);
         }
     }
@@ -693,15 +692,15 @@ impl Band {
                     PIXELS => {
                         let first = row as usize * SIDE * self.stride + left;
                         let pixels = |y| self.pixels[first + y * self.stride..].as_chunks().0[0];
-                        fill(block, |y| pixels(y).map(depth_of));
+                        fill(block, depth_of, pixels);
                     }
                     FULL => {
                         let plane = self.full_plane(tile);
-                        fill(block, |y| plane.row(y).map(depth_of));
+                        fill(block, depth_of, |y| plane.row(y));
                     }
                     state => {
                         let layers = &self.layers[tile];
-                        fill(block, |y| row_of_layers(state, layers, y, fault).map(depth_of));
+                        fill(block, depth_of, |y| row_of_layers(state, layers, y, fault));
                     }
                 }
             }
@@ -721,9 +720,14 @@ impl Band {
 
 /// Fills the place of a tile in a row of tiles: `(numbers, numbers in a row, column of tiles)`.
 #[inline(always)]
-fn fill((lines, wide, column): (&mut [f32], usize, usize), row: impl Fn(usize) -> [f32; SIDE]) {
+fn fill(
+    (lines, wide, column): (&mut [f32], usize, usize),
+    depth_of: impl Fn(f32) -> f32,
+    row: impl Fn(usize) -> [f32; SIDE],
+) {
     for (y, line) in lines.chunks_exact_mut(wide).enumerate() {
-        line.as_chunks_mut().0[column] = row(y);
+        let nearness = row(y);
+        line.as_chunks_mut().0[column] = lanes(|l| depth_of(nearness[l]));
     }
 }
 

@@ -32,6 +32,7 @@
 #![allow(clippy::needless_range_loop, reason = "loops over lanes read several arrays at once")]
 
 mod band;
+mod lanes;
 mod lens;
 pub(crate) mod planted_fault;
 mod tile;
@@ -49,6 +50,7 @@ use crate::input::image::{DepthConvention, ImageSize};
 use crate::input::mesh::FaceCull;
 use crate::occluders::drawing::{DrawOptions, Last, Ranked, Touched, both};
 use crate::occluders::host_raster::band::Band;
+use crate::occluders::host_raster::lanes::three;
 use crate::occluders::host_raster::lens::{Extent, Image, Lens, extent};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
 use crate::occluders::host_raster::tile::SIDE;
@@ -352,7 +354,7 @@ fn draw_meshlet(
     }
     for i in 0..vertices.num_kept() {
         let corners = vertices.corners(&shapes.blocks, meshlet, i);
-        let projected = corners.map(|v| vertices.projected(v));
+        let projected = three(|k| vertices.projected(corners[k]));
         match projected {
             [Some(a), Some(b), Some(c)] => {
                 if let Some(triangle) = Triangle::new([a, b, c], faces, image) {

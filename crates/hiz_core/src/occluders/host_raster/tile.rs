@@ -10,6 +10,7 @@
 //! Every way gives the same numbers: a pixel holds the greatest nearness of the planes that cover
 //! its centre.
 
+use crate::occluders::host_raster::lanes::lanes;
 use crate::occluders::host_raster::lens::{greatest, least};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
 use crate::occluders::meshlets::LANES;
@@ -51,7 +52,7 @@ impl Plane {
     #[inline(always)]
     pub(super) fn row(&self, row: usize) -> [f32; SIDE] {
         let first = self.nearness + self.slope[1] * row as f32;
-        std::array::from_fn(|l| least(self.slope[0] * l as f32 + first, self.nearest))
+        lanes(|l| least(self.slope[0] * l as f32 + first, self.nearest))
     }
 }
 
@@ -73,7 +74,7 @@ fn nearer(plane: &Plane, other: &Plane) -> Mask {
             is_nearer[l] |= if a[l] > b[l] { 1 << (SIDE - 1 - row) } else { 0 };
         }
     }
-    Mask::from_le_bytes(is_nearer.map(|bits| bits as u8))
+    Mask::from_le_bytes(lanes(|l| is_nearer[l] as u8))
 }
 
 /// A plane where it is the nearest.
@@ -114,12 +115,13 @@ pub(super) struct Tile<'a> {
 /// One row of a mask: all bits of a lane for a pixel that is covered.
 #[inline(always)]
 fn mask_row(columns: &[u32; SIDE], row: usize) -> [u32; SIDE] {
-    columns.map(|bits| 0_u32.wrapping_sub(bits >> (SIDE - 1 - row) & 1))
+    lanes(|l| 0_u32.wrapping_sub(columns[l] >> (SIDE - 1 - row) & 1))
 }
 
 #[inline(always)]
 fn columns_of(mask: Mask) -> [u32; SIDE] {
-    mask.to_le_bytes().map(u32::from)
+    let bytes = mask.to_le_bytes();
+    lanes(|l| u32::from(bytes[l]))
 }
 
 #[inline(always)]
@@ -237,7 +239,8 @@ impl Tile<'_> {
 /// The least of a row.
 #[inline(always)]
 fn least_of(v: &[f32; SIDE]) -> f32 {
-    let half: [f32; 4] = std::array::from_fn(|i| least(v[i], v[i + 4]));
+    let pair = |i: usize| least(v[i], v[i + 4]);
+    let half = [pair(0), pair(1), pair(2), pair(3)];
     least(least(half[0], half[2]), least(half[1], half[3]))
 }
 
@@ -254,7 +257,8 @@ pub(super) fn row_of_layers(
         1 if layers[0].mask == Mask::MAX => {
             // What lies beyond the far plane has no depth.
             let least = if is_planted!(fault, BeyondFar) { f32::MIN } else { 0.0 };
-            layers[0].plane.row(row).map(|nearness| greatest(nearness, least))
+            let nearness = layers[0].plane.row(row);
+            lanes(|l| greatest(nearness[l], least))
         }
         count => {
             let mut out = [0.0; SIDE];

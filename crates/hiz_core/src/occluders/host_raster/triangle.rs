@@ -2,12 +2,15 @@
 
 use crate::host::linear::sub;
 use crate::input::mesh::FaceCull;
+use crate::occluders::host_raster::lanes::three;
 use crate::occluders::host_raster::lens::{Image, UNITS, greatest, least, rounded};
 use crate::occluders::host_raster::planted_fault::is_planted;
 
 /// Planes that rise more from pixel to pixel are no planes.
 /// Sums over a tile stay finite below.
 const STEEPEST: f32 = 1e30;
+
+const PER_PIXEL: f64 = UNITS as f64;
 
 /// A vertex in the image.
 #[derive(Debug, Clone, Copy)]
@@ -40,15 +43,18 @@ impl Triangle {
     /// `None` for a triangle without an area, and for a face that does not occlude.
     #[inline(always)]
     pub(super) fn new(corners: [Corner; 3], culled: FaceCull, image: &Image) -> Option<Self> {
-        let x = corners.map(|c| rounded(c.x) + image.half[0]);
-        let y = corners.map(|c| rounded(c.y) + image.half[1]);
+        let x = three(|k| rounded(corners[k].x) + image.half[0]);
+        let y = three(|k| rounded(corners[k].y) + image.half[1]);
         let area = i64::from(x[1] - x[0]) * i64::from(y[2] - y[0])
             - i64::from(y[1] - y[0]) * i64::from(x[2] - x[0]);
         if area == 0 {
             return None;
         }
         // In float64 the products are exact, so that thin triangles keep their slope.
-        let [mut a, mut b, mut c] = corners.map(|c| [c.x, c.y, c.nearness].map(f64::from));
+        let [mut a, mut b, mut c] = three(|k| {
+            let Corner { x, y, nearness } = corners[k];
+            [f64::from(x), f64::from(y), f64::from(nearness)]
+        });
         if is_planted!(image.fault, PlaneOfRoundedCorners) {
             for (k, corner) in [&mut a, &mut b, &mut c].into_iter().enumerate() {
                 corner[0] = f64::from(x[k] - image.half[0]);
@@ -75,10 +81,12 @@ impl Triangle {
             [f64::from(x[0] - image.half[0]) - a[0], f64::from(y[0] - image.half[1]) - a[1]];
         let nearness = a[2] + slope[0] * moved[0] + slope[1] * moved[1];
         #[expect(clippy::cast_possible_truncation, reason = "rounding to float32 is the point")]
-        let (nearness, slope) = (nearness as f32, slope.map(|v| (v * f64::from(UNITS)) as f32));
+        let nearness = nearness as f32;
+        #[expect(clippy::cast_possible_truncation, reason = "rounding to float32 is the point")]
+        let slope = [(slope[0] * PER_PIXEL) as f32, (slope[1] * PER_PIXEL) as f32];
         // With corners on a line there is no plane; then the farthest corner counts.
         let is_plane = slope[0].abs() + slope[1].abs() < STEEPEST && nearness.is_finite();
-        let depths = corners.map(|c| c.nearness);
+        let depths = three(|k| corners[k].nearness);
         let farthest = least(least(depths[0], depths[1]), depths[2]);
         let nearest = greatest(greatest(depths[0], depths[1]), depths[2]);
         let most = if is_planted!(image.fault, NoCap) { f32::MAX } else { nearest };

@@ -4,6 +4,7 @@
 //! vectors.
 
 use crate::input::mesh::FaceCull;
+use crate::occluders::host_raster::lanes::three;
 use crate::occluders::host_raster::lens::{HALF, Image, Lens, greatest, least, rounded};
 use crate::occluders::host_raster::planted_fault::is_planted;
 use crate::occluders::host_raster::triangle::Corner;
@@ -223,6 +224,6 @@ impl Vertices {
     pub(super) fn corners(&self, blocks: &Blocks, meshlet: &Meshlet, i: usize) -> [usize; 3] {
         let triangle = self.kept(i);
         let group = &blocks.corners[meshlet.first_group as usize + triangle / LANES];
-        group.each_ref().map(|corner| usize::from(corner[triangle % LANES]) % MAX_VERTICES)
+        three(|k| usize::from(group[k][triangle % LANES]) % MAX_VERTICES)
     }
 }
