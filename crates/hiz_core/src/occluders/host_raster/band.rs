@@ -489,11 +489,14 @@ impl Band {
     #[inline(always)]
     fn hides_all(&mut self, nearest: f32, (begin, end): (i32, i32), rows: (i32, i32)) -> bool {
         let cell = |row: i32| (row - self.top) as usize / SIDE / LANES;
-        let (first, last) = (cell(rows.0), cell(rows.1));
-        (first..=last).all(|row| {
-            (begin as usize / LANES..=end as usize / LANES)
-                .all(|column| self.cell(row, column) >= nearest)
-        })
+        for row in cell(rows.0)..=cell(rows.1) {
+            for column in begin as usize / LANES..=end as usize / LANES {
+                if self.cell(row, column) < nearest {
+                    return false;
+                }
+            }
+        }
+        true
     }
 
     /// Draws a triangle into the tiles `begin..=end` of a row, one by one.
