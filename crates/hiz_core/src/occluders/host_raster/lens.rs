@@ -9,7 +9,6 @@ use crate::host::rounding::flushed;
 use crate::input::camera::Camera;
 use crate::input::image::{ImageSize, MAX_IMAGE_SIDE};
 use crate::occluders::host_raster::planted_fault::{Planted, is_planted};
-use crate::occluders::host_raster::vertices::LEAST_W;
 use crate::occluders::placement::box_corner;
 use crate::occluders::view::PlacedView;
 
@@ -24,6 +23,9 @@ const GUARD_PIXELS: f32 = 8000.0;
 /// The outermost centres of the largest image, 32,768 pixels, are half a pixel below 2^22.
 pub(super) const FARTHEST_UNIT: f32 = 4_194_304.0 - 64.0;
 const _: () = assert!((MAX_IMAGE_SIDE as i32 * UNITS - UNITS) / 2 < FARTHEST_UNIT as i32);
+
+/// Vertices with a smaller w are clipped, so that its inverse is finite.
+pub(super) const LEAST_W: f32 = 1e-30;
 
 /// Added to a float32 below 2^22 in size, this leaves its nearest integer in the lowest bits.
 const MAGIC: f32 = 12_582_912.0; // 1.5 * 2^23

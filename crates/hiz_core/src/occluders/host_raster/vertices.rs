@@ -5,16 +5,13 @@
 
 use crate::input::mesh::FaceCull;
 use crate::occluders::host_raster::lanes::three;
-use crate::occluders::host_raster::lens::{HALF, Image, Lens, greatest, least, rounded};
+use crate::occluders::host_raster::lens::{HALF, Image, LEAST_W, Lens, greatest, least, rounded};
 use crate::occluders::host_raster::planted_fault::is_planted;
 use crate::occluders::host_raster::triangle::Corner;
 use crate::occluders::meshlets::{Blocks, LANES, MAX_TRIANGLES, MAX_VERTICES, Meshlet};
 
 /// In a vertex' code: it needs clipping, since it is before the near plane or far outside.
 const CLIP: u32 = 1;
-
-/// Vertices with a smaller w are clipped, so that its inverse is finite.
-pub(super) const LEAST_W: f32 = 1e-30;
 
 /// One number of each vertex.
 type PerVertex<T> = [T; MAX_VERTICES];
