@@ -28,7 +28,8 @@ SCRIPT = textwrap.dedent("""
         hizvk.Boxes([[-2.0, -2, -9]], [[2.0, 2, -8]]), camera, depth=depth, kind="z", device=device
     )
     wall = np.array([[-9.0, -9, -2], [9, -9, -2], [0, 30, -2]])
-    drawn = device.render_depth(device.occluders(wall, np.array([[0, 1, 2]])), camera, rasteriser="device")
+    occluders = device.occluders(wall, np.array([[0, 1, 2]]))
+    drawn = device.render_depth(occluders, camera, rasteriser="device")
     print(bool(kept[0]), float(device.pyramid(drawn).level(0)[8, 8]))
 """)
 

@@ -25,6 +25,7 @@ __all__ = [
     "Pyramid",
     "Yardstick",
     "YardstickCull",
+    "YardstickRaster",
     "YardstickReduction",
     "__build__",
     "__version__",

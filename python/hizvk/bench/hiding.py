@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from ..resources import DepthImage
     from ..scenes import Scene, View
 
+    Worth: TypeAlias = npt.NDArray[np.floating]
+    #: From a view's number and a budget of triangles to its depth image.
+    Draw: TypeAlias = Callable[[int, int], DepthImage]
+
 __all__ = [
     "SHARES",
     "WAYS",
@@ -44,10 +48,6 @@ __all__ = [
 
 #: Parts of the triangles in view that are drawn.
 SHARES: Final = (0.5, 0.25, 0.125)
-
-Worth: TypeAlias = "npt.NDArray[np.floating]"
-#: From a view's number and a budget of triangles to its depth image.
-Draw: TypeAlias = "Callable[[int, int], DepthImage]"
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ use crate::gpu::device::Gpu;
 use crate::gpu::pipelines::Compute;
 use crate::gpu::shader::{Source, wgsl};
 use crate::input::bounds::BoundsKind;
-use crate::instances::groups::GROUP;
+use crate::instances::batch::GROUP;
 use crate::instances::piece::bind_records;
 
 /// Twin: `shaders/cull/explain.wgsl`, `Explanation`, which documents the fields.

@@ -16,7 +16,7 @@ use crate::host::memory;
 use crate::host::threads::Locked;
 use crate::input::camera::Camera;
 use crate::instances::Instances;
-use crate::instances::groups::GROUP;
+use crate::instances::batch::GROUP;
 use crate::instances::piece::Piece;
 use crate::instances::watch::Watch;
 use crate::output::compact::Compaction;

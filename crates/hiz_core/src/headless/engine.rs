@@ -7,9 +7,9 @@ use crate::error::{Error, Result};
 use crate::headless::adapter::{self, ADAPTER_VARIABLE, AdapterSummary};
 use crate::headless::answers::Answers;
 use crate::headless::images::Images;
+use crate::headless::kept_depth::KeptDepth;
 use crate::headless::process::Process;
 use crate::headless::readback;
-use crate::headless::single::KeptDepth;
 use crate::host::threads::Locked;
 use crate::input::image::MAX_IMAGE_SIDE;
 

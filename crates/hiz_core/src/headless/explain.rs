@@ -8,7 +8,7 @@ use crate::gpu::buffers::STORAGE;
 use crate::headless::culling::{Culling, is_hidden};
 use crate::headless::explanation::{Explanation, Told};
 use crate::headless::readback::{self, BufferRange};
-use crate::instances::groups::GROUP;
+use crate::instances::batch::GROUP;
 use crate::output::verdict::Verdict;
 
 impl Culling {

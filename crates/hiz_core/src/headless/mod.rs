@@ -54,6 +54,7 @@ pub(crate) mod engine;
 mod explain;
 mod explanation;
 mod images;
+mod kept_depth;
 mod levels;
 mod process;
 pub(crate) mod readback;

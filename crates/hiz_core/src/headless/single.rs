@@ -15,6 +15,7 @@ use crate::headless::counts::Counts;
 use crate::headless::culling::Culling;
 use crate::headless::depth_image::DepthImage;
 use crate::headless::engine::Engine;
+use crate::headless::kept_depth::KeptDepth;
 use crate::host::memory;
 use crate::input::bounds::Bounds;
 use crate::input::camera::Camera;
@@ -42,15 +43,6 @@ pub struct SingleCull {
     pub mask: Vec<bool>,
     /// The verdicts of the first instances, counted.
     pub first_counts: Counts,
-}
-
-/// The image and the pyramid of the last call, for the next one of the same size.
-#[derive(Debug)]
-pub(super) struct KeptDepth {
-    texture: wgpu::Texture,
-    view: wgpu::TextureView,
-    pyramid: Pyramid,
-    has_atlas: bool,
 }
 
 impl Engine {

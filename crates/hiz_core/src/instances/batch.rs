@@ -11,8 +11,11 @@ use wgpu::WriteOnly;
 
 use crate::input::bounds::{Bounds, Floats};
 use crate::instances::aabb::Aabb;
-use crate::instances::groups::GROUP;
 use crate::instances::volume_record::{BoxRecord, LARGEST, OrientedBoxRecord, SphereRecord};
+
+/// Members of a full group: as many as a `u64` has bits.
+/// Twin: `shaders/instances/groups.wgsl`, `GROUP`.
+pub(crate) const GROUP: usize = 64;
 
 /// Where the instance at a place comes from.
 #[derive(Debug, Clone, Copy)]

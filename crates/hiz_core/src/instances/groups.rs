@@ -21,12 +21,8 @@ use crate::host::memory;
 use crate::host::threads::{Locked, cores, on_threads};
 use crate::input::bounds::Bounds;
 use crate::instances::aabb::Aabb;
-use crate::instances::batch::{Around, Batch, Boxes, Origin};
+use crate::instances::batch::{Around, Batch, Boxes, GROUP, Origin};
 use crate::instances::volume_record::BoxRecord;
-
-/// Members of a full group: as many as a `u64` has bits.
-/// Twin: `shaders/instances/groups.wgsl`, `GROUP`.
-pub(crate) const GROUP: usize = 64;
 
 /// From this many instances on, more threads help to pack.
 /// One takes tens of microseconds to start, and packing them takes hundreds.

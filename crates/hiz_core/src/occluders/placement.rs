@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::host::linear::{Vec3, cross, dot, inverse3, mul3, sub};
 use crate::input::bounds::Floats;
+use crate::input::mesh::MeshData;
 use crate::occluders::shapes::{COORDINATE_LIMIT, Shapes};
 
 /// One copy of one mesh.
@@ -21,6 +22,18 @@ pub(crate) struct Placement {
 }
 
 impl Placement {
+    /// The copies of all `meshes`, of which `shapes` was made.
+    ///
+    /// # Errors
+    /// Those of [`Placement::of_mesh`].
+    pub(super) fn of_meshes(shapes: &Shapes, meshes: &[MeshData<'_>]) -> Result<Vec<Self>> {
+        let mut placements = Vec::new();
+        for (number, mesh) in (0..).zip(meshes) {
+            placements.extend(Self::of_mesh(shapes, number, mesh.transforms)?);
+        }
+        Ok(placements)
+    }
+
     /// The copies of mesh `number` at `transforms`; one copy in world coordinates for `None`.
     ///
     /// # Errors

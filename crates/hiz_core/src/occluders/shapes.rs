@@ -10,7 +10,6 @@ use crate::host::linear::Vec3;
 use crate::host::memory;
 use crate::input::mesh::MeshData;
 use crate::occluders::meshlets::{self, Blocks, Meshlet};
-use crate::occluders::placement::Placement;
 
 /// Positions below this size have finite halves in float32.
 pub(super) const COORDINATE_LIMIT: f64 = 1e30;
@@ -42,19 +41,18 @@ pub(crate) struct Mesh {
 }
 
 impl Shapes {
-    /// Checks `meshes`, cuts them into meshlets, and says where they stand.
+    /// Checks `meshes`, and cuts them into meshlets.
     ///
     /// # Errors
     /// - [`Error::Invalid`] for arrays of the wrong length, indices out of range and unusable
-    ///   positions or transforms.
+    ///   positions.
     /// - [`Error::Limit`] for more than 2^31 - 1 vertices or indices.
-    pub(crate) fn new(meshes: &[MeshData<'_>]) -> Result<(Self, Vec<Placement>)> {
-        let (mut shapes, mut placements) = (Self::default(), Vec::new());
-        for (number, mesh) in (0..).zip(meshes) {
+    pub(crate) fn new(meshes: &[MeshData<'_>]) -> Result<Self> {
+        let mut shapes = Self::default();
+        for mesh in meshes {
             shapes.add(mesh)?;
-            placements.extend(Placement::of_mesh(&shapes, number, mesh.transforms)?);
         }
-        Ok((shapes, placements))
+        Ok(shapes)
     }
 
     fn add(&mut self, mesh: &MeshData<'_>) -> Result<()> {

@@ -9,7 +9,8 @@ use crate::input::bounds::{Bounds, BoundsKind};
 use crate::input::camera::Camera;
 use crate::input::tolerance::DepthTolerance;
 use crate::instances::Instances;
-use crate::instances::groups::{GROUP, Groups};
+use crate::instances::batch::GROUP;
+use crate::instances::groups::Groups;
 use crate::instances::piece::Piece;
 use crate::instances::records::TEXEL_BYTES;
 

@@ -205,7 +205,8 @@ impl OccluderSurface {
     /// Those of [`HizContext::create_occluders`](crate::HizContext::create_occluders), as far as
     /// they do not concern a device.
     pub fn from_meshes(meshes: &[MeshData<'_>], options: &OccluderOptions) -> Result<Self> {
-        let (shapes, placements) = Shapes::new(meshes)?;
+        let shapes = Shapes::new(meshes)?;
+        let placements = Placement::of_meshes(&shapes, meshes)?;
         let placements = Locked::new(Arc::new(placements));
         Ok(Self {
             shapes,

@@ -326,7 +326,7 @@ mod tests {
 
     fn topology(corners: &[f64], triangles: &[u32]) -> (Shapes, Topology) {
         let mesh = MeshData { vertices: Floats::F64(corners), triangles, transforms: None };
-        let (shapes, _) = Shapes::new(&[mesh]).unwrap();
+        let shapes = Shapes::new(&[mesh]).unwrap();
         let topology = Topology::new(&shapes).unwrap();
         (shapes, topology)
     }

@@ -15,7 +15,7 @@ use crate::host::rounding::EPS;
 use crate::input::bounds::BoundsKind;
 use crate::input::image::MAX_IMAGE_SIDE;
 use crate::input::view::ERROR_ULPS;
-use crate::instances::groups::GROUP;
+use crate::instances::batch::GROUP;
 use crate::instances::piece::CULL_WORKGROUP;
 use crate::instances::records::{RECORDS_PER_ROW, TEXEL_BYTES};
 use crate::instances::update;
