@@ -265,8 +265,8 @@ def test_what_was_hidden_makes_room_in_the_next_frame(device: hizvk.Device) -> N
     """A near wall hides large boxes, and small ones stand beside it; half may be drawn."""
     low = [[-4.0, 5.0, -4.0], *([[-3.0, 8.0 + 2.0 * k, -3.0] for k in range(4)])]
     high = [[4.0, 5.5, 4.0], *([[3.0, 9.0 + 2.0 * k, 3.0] for k in range(4)])]
-    low += [[7.0, 10.0, -2.0 + k] for k in range(4)]
-    high += [[7.5, 10.5, -1.5 + k] for k in range(4)]
+    low += [[9.0, 10.0, -2.0 + k] for k in range(4)]
+    high += [[9.5, 10.5, -1.5 + k] for k in range(4)]
     boxes = np.array(low), np.array(high)
     vertices, triangles = box_mesh(*boxes)
     seen = View("ahead", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 80.0, 0.25)

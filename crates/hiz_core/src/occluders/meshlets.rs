@@ -248,6 +248,18 @@ mod tests {
     }
 
     #[test]
+    fn areas_as_seen_along_the_axes() {
+        let (positions, mut triangles) = grid(60);
+        let (mut meshlets, mut blocks) = (Vec::new(), Blocks::default());
+        cluster(&positions, &mut triangles, 0, &mut meshlets, &mut blocks).unwrap();
+        for meshlet in &meshlets {
+            let triangles = meshlet.triangles.len() as f32;
+            assert_eq!(meshlet.facing[..2], [0.0, 0.0]);
+            assert!((meshlet.facing[2] - 0.5 * triangles).abs() < 1e-3);
+        }
+    }
+
+    #[test]
     fn every_triangle_is_in_one_meshlet_whose_block_and_box_hold_it() {
         let (positions, given) = grid(60);
         let mut triangles = given.clone();

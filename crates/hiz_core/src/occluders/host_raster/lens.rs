@@ -255,3 +255,43 @@ const ROW_MARGIN: f32 = 1e-6;
 
 /// A few roundings of float32 above 1.
 const NEAR_MARGIN: f32 = 1.0 + 1e-5;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Looks along z from the origin: 100 pixels per metre at a distance of 1 m.
+    fn lens(w: [f32; 4]) -> Lens {
+        let units = 100.0 * UNITS as f32;
+        Lens {
+            rows: [[units, 0.0, 0.0, 0.0], [0.0, -units, 0.0, 0.0], [0.0, 0.0, 0.0, 0.1], w],
+            eye_hi: [0.0; 3],
+            eye_lo: [0.0; 3],
+            eye: [0.0; 3],
+            exact: [[0.0; 4]; 4],
+            mirrored: false,
+        }
+    }
+
+    #[test]
+    fn solid_angles_by_hand() {
+        let ahead = lens([0.0, 0.0, 1.0, 0.0]);
+        let close = |found: f32, expected: f32| {
+            assert!((found - expected).abs() < 1e-4 * expected, "{found}, not {expected}");
+        };
+        let wide = [0.0, 0.0, 2.0]; // 2 square metres that face the eye
+        close(ahead.solid_angle(wide, [0.0, 0.0, 10.0], 1e9), 200.0);
+        close(ahead.solid_angle(wide, [0.0, 0.0, 10.0], 50.0), 50.0);
+        assert_eq!(ahead.solid_angle([2.0, 3.0, 0.0], [0.0, 0.0, 10.0], 1e9), 0.0);
+        // 45 degrees aside: A cos / r^2 times 100^2, from the front and from the side.
+        let aside = 2.0 * 0.5_f32.sqrt() / 200.0 * 1e4;
+        close(ahead.solid_angle(wide, [10.0, 0.0, 10.0], 1e9), aside);
+        close(ahead.solid_angle([2.0, 0.0, 0.0], [10.0, 0.0, 10.0], 1e9), aside);
+        // Nothing is known of what is behind the eye, or where the eye is.
+        assert_eq!(ahead.solid_angle(wide, [0.0, 0.0, -1.0], 7.0), 7.0);
+        assert_eq!(ahead.solid_angle(wide, [0.0; 3], 7.0), 7.0);
+        // Parallel rays: its area everywhere.
+        let parallel = lens([0.0, 0.0, 0.0, 1.0]);
+        close(parallel.solid_angle(wide, [5.0, 5.0, 10.0], 1e9), 2e4);
+    }
+}
