@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from ..resources import DepthImage
     from ..scenes import Scene, View
 
-    Worth: TypeAlias = npt.NDArray[np.floating]
+    _Worth: TypeAlias = npt.NDArray[np.floating]
     #: From a view's number and a budget of triangles to its depth image.
-    Draw: TypeAlias = Callable[[int, int], DepthImage]
+    _Draw: TypeAlias = Callable[[int, int], DepthImage]
 
 __all__ = [
     "SHARES",
@@ -133,7 +133,7 @@ class Way(Protocol):
         """The row's name."""
         ...
 
-    def start(self, stage: Stage) -> Draw:
+    def start(self, stage: Stage) -> _Draw:
         """What makes the depth image of view `k` from at most `budget` triangles."""
         ...
 
@@ -143,12 +143,12 @@ class Ranked:
     """Draws the groups in view in the order of their worth, as far as the budget goes."""
 
     label: str
-    rank: Callable[[Stage], Callable[[View], Worth]]
+    rank: Callable[[Stage], Callable[[View], _Worth]]
     """Is called once for a stage, and what it returns once for an image.
 
     The worth ``(G,)`` is larger for what is drawn first, and minus infinity for what never is."""
 
-    def start(self, stage: Stage) -> Draw:
+    def start(self, stage: Stage) -> _Draw:
         """What makes the depth image of view `k` from at most `budget` triangles."""
         worth_of = self.rank(stage)
 
@@ -174,7 +174,7 @@ class Limited:
     label: str
     frames: int
 
-    def start(self, stage: Stage) -> Draw:
+    def start(self, stage: Stage) -> _Draw:
         """What makes the depth image of view `k` from at most `budget` triangles."""
         meshes = stage.groups.meshes()
 
@@ -190,15 +190,15 @@ class Limited:
         return draw
 
 
-def _world_area(stage: Stage) -> Callable[[View], Worth]:
+def _world_area(stage: Stage) -> Callable[[View], _Worth]:
     """The area of all triangles of each group."""
     a, b, c = (stage.groups.vertices[stage.groups.triangles[:, k]] for k in range(3))
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    worth: Worth = np.add.reduceat(area, stage.groups.offsets[:-1])
+    worth: _Worth = np.add.reduceat(area, stage.groups.offsets[:-1])
     return lambda _: worth
 
 
-def _selection(stage: Stage) -> Callable[[View], Worth]:
+def _selection(stage: Stage) -> Callable[[View], _Worth]:
     """The silhouette per triangle, without what `select_occluders` drops."""
     found = select_occluders(stage.groups.meshes())
     worth = np.full(len(stage.groups), -np.inf)
@@ -206,15 +206,15 @@ def _selection(stage: Stage) -> Callable[[View], Worth]:
     return lambda _: worth
 
 
-def _size_and_distance(stage: Stage) -> Callable[[View], Worth]:
+def _size_and_distance(stage: Stage) -> Callable[[View], _Worth]:
     """The diagonal of each group's box over its distance from the eye."""
     boxes = stage.groups.boxes
     low, high = (np.asarray(corner, np.float64) for corner in (boxes.min, boxes.max))
     diagonal = np.linalg.norm(high - low, axis=1)
 
-    def worth(view: View) -> Worth:
+    def worth(view: View) -> _Worth:
         outside = np.maximum(0.0, np.maximum(low - view.eye, view.eye - high))
-        found: Worth = diagonal / np.maximum(np.linalg.norm(outside, axis=1), view.near)
+        found: _Worth = diagonal / np.maximum(np.linalg.norm(outside, axis=1), view.near)
         return found
 
     return worth
