@@ -9,6 +9,7 @@ There the comparison is skipped.
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 import sys
 from pathlib import Path
@@ -20,6 +21,8 @@ import documented
 import hizvk
 from documented import page
 from hizvk.bench import command
+from tools.speed import bounds, figures
+from tools.speed.run import WORKLOADS, Run
 
 ROOT = Path(__file__).resolve().parents[1]
 CASTLE = ROOT.parent / "shared" / "judge" / "castle.npz"
@@ -95,3 +98,18 @@ def test_the_bench_still_counts_so(tmp_path: Path, scene: str) -> None:
         if ours[label][column] != committed[label][column]
     ]
     assert not different, "\n".join(different)
+
+
+def test_few_and_many_bounds_are_still_kept_so() -> None:
+    """If this is red, run `make bench-speed` and scripts/speed_docs.py."""
+    if not documented.is_of_this_driver(page("performance.md")):
+        pytest.skip("docs/performance.md was printed on another driver")
+    device = hizvk.Device()
+    found = figures.Found("", 2010, "quick", device.adapter)
+    extent = dataclasses.replace(WORKLOADS["default"], rounds=1)
+    bounds.measure(Run(device, extent, 2010, found, lambda _: None))
+    assert not found.broken()
+    ours = {(one.rasteriser, f"{one.bounds:,}"): f"{one.kept:,}" for one in found.whole_calls}
+    assert len(ours) == 2 * len(bounds.COUNTS)
+    shown = documented.table(page("performance.md"), "rasteriser", "bounds")
+    assert {(row["rasteriser"], row["bounds"]): row["kept"] for row in shown} == ours
