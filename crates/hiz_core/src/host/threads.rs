@@ -26,6 +26,14 @@ pub(crate) fn cores() -> usize {
     *CORES.get_or_init(|| available_parallelism().map_or(1, usize::from))
 }
 
+/// How many threads to use for work that takes one thread about so many nanoseconds.
+///
+/// A thread has to be scheduled, which takes milliseconds where another process is at work.
+/// So each one has to take over a quarter of a millisecond.
+pub(crate) fn worth_it(nanoseconds: u64) -> usize {
+    cores().min(1 + usize::try_from(nanoseconds / 250_000).unwrap_or(usize::MAX))
+}
+
 /// Runs `work` on every part, on at most `threads` threads; this one is the first of them.
 ///
 /// The parts are handed out in their order, each to the next thread that is free.

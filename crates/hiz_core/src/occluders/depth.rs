@@ -179,7 +179,7 @@ impl OccluderDepth {
                 }
             }
         }
-        let way = Way { threads: cores(), skip: true };
+        let way = Way { threads: None, skip: true };
         let touched = occluders.surface.draw_into(&mut image.raster, camera, way, options)?;
         // An image that is new or cleared has to come to the device as a whole.
         let is_whole = options.load == DepthLoad::Clear || image.convention.is_none();
@@ -215,7 +215,7 @@ impl OccluderDepth {
         };
         let mapped = Mapped::of(LABEL, &staging);
         let pitch = bytes_per_row as usize;
-        raster.write_rows(|part| mapped.range(part), pitch, convention, &rows, cores())?;
+        raster.write_rows(|part| mapped.range(part), pitch, convention, &rows)?;
         staging.unmap();
         gpu.recorded(|| {
             encoder.copy_buffer_to_texture(

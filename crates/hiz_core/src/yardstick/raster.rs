@@ -47,7 +47,12 @@ impl HostRaster {
         assert_eq!(camera.size(), self.size, "the camera's size");
         self.raster.clear();
         surface
-            .draw_into(&mut self.raster, camera, Way { threads, skip }, &DrawOptions::default())
+            .draw_into(
+                &mut self.raster,
+                camera,
+                Way { threads: Some(threads), skip },
+                &DrawOptions::default(),
+            )
             .map(drop)
     }
 
@@ -57,6 +62,6 @@ impl HostRaster {
     /// If `out` does not have one number per pixel.
     pub fn write(&self, out: &mut [f32], camera: &Camera, threads: usize) {
         assert_eq!(out.len() as u64, self.size.pixels(), "one number per pixel");
-        self.raster.write(out, camera.convention(), threads);
+        self.raster.write(out, camera.convention(), Some(threads));
     }
 }

@@ -44,7 +44,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::Result;
 use crate::host::memory;
-use crate::host::threads::{Locked, on_threads};
+use crate::host::threads::{Locked, on_threads, worth_it};
 use crate::input::camera::Camera;
 use crate::input::image::{DepthConvention, ImageSize};
 use crate::input::mesh::FaceCull;
@@ -83,7 +83,8 @@ pub(crate) struct Scene<'a> {
 /// How it is drawn; none of it changes a pixel.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Way {
-    pub(crate) threads: usize,
+    /// Threads; `None`: as many as the work is worth, of all there are.
+    pub(crate) threads: Option<usize>,
     /// Whether hidden meshlets are skipped.
     pub(crate) skip: bool,
 }
@@ -185,7 +186,8 @@ impl HostRaster {
         let image = self.image;
         let faces = scene.cull_mode.as_seen_by(scene.camera);
         let drawn: Vec<AtomicBool> = candidates.iter().map(|_| AtomicBool::new(false)).collect();
-        on_threads(way.threads, &mut self.bands, |band: &mut Band| {
+        let threads = way.threads.unwrap_or_else(|| worth_it(self.drawing_ns(scene, &candidates)));
+        on_threads(threads, &mut self.bands, |band: &mut Band| {
             let mut vertices = Vertices::new();
             for (candidate, drawn) in candidates.iter().zip(&drawn) {
                 let Candidate { extent, .. } = candidate;
@@ -214,6 +216,19 @@ impl HostRaster {
             all.told.shown.push(meshlet);
         }
         Ok(all)
+    }
+
+    /// About how long one thread takes to draw the candidates, in nanoseconds.
+    fn drawing_ns(&self, scene: &Scene<'_>, candidates: &[Candidate]) -> u64 {
+        let triangles = |c: &Candidate| scene.shapes.meshlets[c.meshlet as usize].triangles.len();
+        let triangles: usize = candidates.iter().map(triangles).sum();
+        // Many of the triangles are skipped, and most pixels are drawn once.
+        10 * triangles as u64 + self.image.width as u64 * self.image.height as u64
+    }
+
+    /// About how long one thread takes to write some rows, in nanoseconds.
+    fn writing_ns(&self, rows: u64) -> u64 {
+        self.image.width as u64 * rows / 2
     }
 
     /// The meshlets that may show.
@@ -247,7 +262,14 @@ impl HostRaster {
     }
 
     /// Writes the image as NDC depth, row 0 on top, one number per pixel.
-    pub(crate) fn write(&self, out: &mut [f32], convention: DepthConvention, threads: usize) {
+    pub(crate) fn write(
+        &self,
+        out: &mut [f32],
+        convention: DepthConvention,
+        threads: Option<usize>,
+    ) {
+        let threads =
+            threads.unwrap_or_else(|| worth_it(self.writing_ns(self.image.height as u64)));
         let pitch = self.image.width as usize * size_of::<f32>();
         let mut rest: &mut [u8] = bytemuck::cast_slice_mut(out);
         let parts: Vec<_> = self
@@ -277,8 +299,8 @@ impl HostRaster {
         pitch: usize,
         convention: DepthConvention,
         rows: &Range<u32>,
-        threads: usize,
     ) -> Result<()> {
+        let threads = worth_it(self.writing_ns(rows.len() as u64));
         let failed = Locked::new(None);
         let parts: Vec<_> = self.parts(rows).collect();
         on_threads(threads, parts, |(band, part)| {

@@ -319,13 +319,12 @@ impl OccluderSurface {
     /// - [`Error::OutOfMemory`].
     pub fn depth(&self, camera: &Camera) -> Result<Vec<f32>> {
         let size = camera.size();
-        let threads = cores();
-        let mut raster = HostRaster::for_threads(size, threads);
+        let mut raster = HostRaster::for_threads(size, cores());
         let all = DrawOptions::default();
-        self.draw_into(&mut raster, camera, Way { threads, skip: true }, &all)?;
+        self.draw_into(&mut raster, camera, Way { threads: None, skip: true }, &all)?;
         let mut depth = memory::list(size.pixels() as usize, "depth")?;
         depth.resize(size.pixels() as usize, 0.0);
-        raster.write(&mut depth, camera.convention(), threads);
+        raster.write(&mut depth, camera.convention(), None);
         Ok(depth)
     }
 
