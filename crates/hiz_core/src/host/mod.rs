@@ -1,8 +1,9 @@
-//! Vector algebra, rounding, memory and threads on the host.
+//! Vector algebra, the Morton curve, rounding, memory and threads on the host.
 //!
 //! This room knows numbers and the standard library alone: no camera, no instance, no device.
 //! Every other room may use it.
 
+pub(crate) mod curve;
 pub(crate) mod inverse;
 pub(crate) mod linear;
 pub(crate) mod memory;

@@ -14,6 +14,7 @@
 use std::ops::{Range, RangeInclusive};
 
 use crate::error::Result;
+use crate::host::curve::spread;
 use crate::host::memory;
 use crate::host::threads::{cores, on_threads};
 use crate::input::bounds::Bounds;
@@ -120,15 +121,6 @@ fn exponent(v: f64) -> u64 {
 /// 8 to the power of -`power`.
 fn per_power_of_8(power: u64) -> f64 {
     f64::from_bits((1023 - 3 * power) << 52)
-}
-
-/// Spreads the 21 lowest bits: each is followed by two zeros.
-fn spread(v: u64) -> u64 {
-    let v = (v | v << 32) & 0x001F_0000_0000_FFFF;
-    let v = (v | v << 16) & 0x001F_0000_FF00_00FF;
-    let v = (v | v << 8) & 0x100F_00F0_0F00_F00F;
-    let v = (v | v << 4) & 0x10C3_0C30_C30C_30C3;
-    (v | v << 2) & 0x1249_2492_4924_9249
 }
 
 /// The instances of `range` along the curve, as indices relative to its start.

@@ -10,6 +10,7 @@
 use std::ops::Range;
 
 use crate::error::Result;
+use crate::host::curve::spread;
 use crate::host::linear::{Vec3, cross, sub};
 use crate::host::memory;
 use crate::host::rounding::split;
@@ -58,15 +59,6 @@ impl Blocks {
         let floats = self.high.iter().chain(&self.low).map(Vec::len).sum::<usize>();
         (floats * size_of::<f32>() + size_of_val(&self.corners[..])) as u64
     }
-}
-
-/// Spreads the 21 lowest bits: each is followed by two zeros.
-fn spread(v: u64) -> u64 {
-    let v = (v | v << 32) & 0x001F_0000_0000_FFFF;
-    let v = (v | v << 16) & 0x001F_0000_FF00_00FF;
-    let v = (v | v << 8) & 0x100F_00F0_0F00_F00F;
-    let v = (v | v << 4) & 0x10C3_0C30_C30C_30C3;
-    (v | v << 2) & 0x1249_2492_4924_9249
 }
 
 /// The triangles along the Morton curve through their centroids, as indices.

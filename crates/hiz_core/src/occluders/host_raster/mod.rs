@@ -9,6 +9,7 @@
 //!    skipped (Greene, Kass and Miller 1993; Greene 1996).
 //! 3. `vertices`: positions in the image, and the triangles that may cover a pixel's centre.
 //! 4. `triangle`: exact edges on a grid of 1/256 pixel, and the plane of the depth.
+//!    `edges` follows them from pixel to pixel and from tile to tile.
 //! 5. `tile`: 8x8 pixels as planes with coverage masks, or as pixels.
 //!
 //! **What it promises.**
@@ -32,6 +33,7 @@
 #![allow(clippy::needless_range_loop, reason = "loops over lanes read several arrays at once")]
 
 mod band;
+mod edges;
 mod lanes;
 mod lens;
 pub(crate) mod planted_fault;
