@@ -120,6 +120,7 @@ impl DepthImage {
             ));
         };
         let engine = &self.engine;
+        let _in_order = drawn.submitting.lock();
         let mut encoder = engine.encoder("hiz.occluders.encoder");
         let touched = engine.context().record_occluder_depth(
             &mut encoder,

@@ -67,6 +67,8 @@ pub struct OccluderDepth {
     host: Option<Locked<HostImage>>,
     /// Buffers through which rows come to the texture.
     staging: Ring,
+    /// Held from the recording to the submit by those who submit, so that drawings keep their order.
+    pub(crate) submitting: Locked<()>,
 }
 
 /// What the host's rasteriser has drawn.
@@ -113,7 +115,15 @@ impl OccluderDepth {
                 convention: None,
             })
         });
-        Ok(Self { context: gpu.id(), size, texture, view, host, staging: Ring::new(STAGING_KEPT) })
+        Ok(Self {
+            context: gpu.id(),
+            size,
+            texture,
+            view,
+            host,
+            staging: Ring::new(STAGING_KEPT),
+            submitting: Locked::default(),
+        })
     }
 
     /// The image's size in pixels.
