@@ -312,7 +312,8 @@ impl HizContext {
     ///
     /// The rasteriser on the host draws in this call, on all cores, and records a copy alone.
     /// With [`DepthLoad::Load`](crate::DepthLoad::Load) it adds to what earlier calls have drawn,
-    /// so submit the recordings in their order.
+    /// so submit every recording, in their order.
+    /// After one that was dropped begin with `Clear`: otherwise rows of an older image remain.
     ///
     /// # Errors
     /// - [`Error::Mismatch`] for a camera of another size or, with `Load`, of another depth

@@ -660,3 +660,22 @@ fn images_stay_as_they_are_while_a_pyramid_or_a_handle_is_left() {
         }
     }
 }
+
+/// A drawing that is refused changes nothing, so that what is added later meets no older rows.
+#[test]
+fn refused_drawings_leave_an_image_as_it_was() {
+    let walls = walls(1.0);
+    let camera = camera_along_z(90, 60, DepthConvention::Reversed);
+    for rasteriser in RASTERISERS {
+        let only =
+            |load, list| DrawOptions { load, only: Only::Listed(list), ..Default::default() };
+        let first = only(DepthLoad::Clear, &[0, 4]);
+        let (image, _) = engine().render_depth_with(&walls, &camera, rasteriser, &first).unwrap();
+        let refused = only(DepthLoad::Clear, &[99]);
+        assert!(engine().render_depth_into(&image, &walls, &refused).is_err());
+        engine().render_depth_into(&image, &walls, &only(DepthLoad::Load, &[8])).unwrap();
+        let all = only(DepthLoad::Clear, &[0, 4, 8]);
+        let (expected, _) = engine().render_depth_with(&walls, &camera, rasteriser, &all).unwrap();
+        assert!(image.read().unwrap() == expected.read().unwrap(), "{rasteriser:?}");
+    }
+}

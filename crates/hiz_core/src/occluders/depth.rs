@@ -173,6 +173,8 @@ impl OccluderDepth {
                 ),
             ));
         }
+        // What is refused leaves the image as it was.
+        occluders.surface.check_drawing(camera, options)?;
         let mut image = host.lock();
         let convention = camera.convention();
         match options.load {
@@ -189,17 +191,21 @@ impl OccluderDepth {
                 }
             }
         }
+        // An image that is new or cleared has to come to the device as a whole.
+        // So has one whose rows could not be copied, or the texture would keep older ones.
+        let is_whole = options.load == DepthLoad::Clear || image.convention.is_none();
+        image.convention = None;
         let way = Way { threads: None, skip: true };
         let touched = occluders.surface.draw_into(&mut image.raster, camera, way, options)?;
-        // An image that is new or cleared has to come to the device as a whole.
-        let is_whole = options.load == DepthLoad::Clear || image.convention.is_none();
-        image.convention = Some(convention);
         let rows = match touched {
             _ if is_whole => 0..self.size.height,
             Some([_, y0, _, y1]) => y0..y1 + 1,
-            None => return Ok(None),
+            None => 0..0,
         };
-        self.record_rows(gpu, encoder, &image.raster, convention, rows)?;
+        if !rows.is_empty() {
+            self.record_rows(gpu, encoder, &image.raster, convention, rows)?;
+        }
+        image.convention = Some(convention);
         Ok(touched)
     }
 

@@ -122,6 +122,7 @@ use crate::occluders::surface::looks::Placed;
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
 use crate::occluders::surface::projector::Projector;
 use crate::occluders::surface::topology::Topology;
+use crate::occluders::view::View;
 
 /// The least normal float32.
 /// Depths below it, next to the far plane of reversed Z, count as far.
@@ -281,6 +282,15 @@ impl OccluderSurface {
         options: &ConservativeDepthOptions,
     ) -> Result<Vec<f32>> {
         self.usual_depth(camera, options, Planted::default())
+    }
+
+    /// Refuses what [`OccluderSurface::draw_into`] would refuse.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a camera that float32 cannot hold, and for copies that do not exist.
+    pub(super) fn check_drawing(&self, camera: &Camera, options: &DrawOptions<'_>) -> Result<()> {
+        View::new(camera)?;
+        options.only.of(&self.placements()).map(drop)
     }
 
     /// Draws what `camera` sees into an image of its size; returns the rectangle around it.
