@@ -6,7 +6,7 @@ use super::declared;
 use crate::cull::count;
 use crate::cull::explain::{self, Stage};
 use crate::cull::groups::GROUPS_OF_RUN;
-use crate::cull::pipelines::{CullKey, DepthStore, EmitKey, ReportKey};
+use crate::cull::pipelines::{CullKey, DepthStore, ReportKey};
 use crate::cull::pipelines::{classify_constants, cull_module, report_constants};
 use crate::cull::refine;
 use crate::gpu::depth_source::SourceKind;
@@ -282,6 +282,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("emit_instances", line(emit_passes::WORKGROUP)),
         ("emit_scatter", line(emit_passes::WORKGROUP)),
         ("emit_top", line(emit_passes::WORKGROUP)),
+        ("copy_records", line(SCATTER_WORKGROUP)),
         ("count", line(count::LANES)),
         ("cull", line(GROUP as u32)),
         ("cull_groups", line(CULL_WORKGROUP)),
