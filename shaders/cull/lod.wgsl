@@ -28,7 +28,8 @@ const NEEDS: u32 = 4u;
 // The products of a need lose less than 3 EPS of it, so it is never less than the exact one.
 const NEED_FACTOR: f32 = 1.0 + 4.0 * EPS;
 
-// No two points of valid bounds are farther apart than this, so no greater deviation counts as more.
+// No two points of valid bounds are farther apart than this, so no greater deviation counts as
+// more.
 // Without it, a need could overflow.
 const LARGEST_DEVIATION: f32 = 0x1p60;
 

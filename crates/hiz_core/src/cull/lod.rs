@@ -39,9 +39,11 @@ const PIXELS: std::ops::RangeInclusive<f64> = 1.0 / 1024.0..=32_768.0;
 /// let options = CullOptions { lod, ..CullOptions::default() };
 ///
 /// // LOD 1 from NDC depth 0.8 on, LOD 2 from 0.9 and LOD 3 from 0.95.
-/// let rule = LodRule::at_ndc_depths(&[0.8, 0.9, 0.95], 1.0, Some(500.0), DepthConvention::Standard)?;
+/// let depths = [0.8, 0.9, 0.95];
+/// let rule = LodRule::at_ndc_depths(&depths, 1.0, Some(500.0), DepthConvention::Standard)?;
 /// let LodRule::Distance { thresholds } = rule else { unreachable!() };
-/// assert_eq!(thresholds.iter().map(|d| (d * 100.0).round()).collect::<Vec<_>>(), [496.0, 982.0, 1927.0]);
+/// let rounded: Vec<f64> = thresholds.iter().map(|d| (d * 100.0).round() / 100.0).collect();
+/// assert_eq!(rounded, [4.96, 9.82, 19.27]);
 /// # Ok::<(), hiz_core::Error>(())
 /// ```
 #[derive(Debug, Clone, Default, PartialEq)]
