@@ -12,6 +12,8 @@ use crate::Failure;
 #[derive(Debug)]
 pub(crate) struct Gpu {
     pub(crate) adapter: wgpu::AdapterInfo,
+    /// For what a window can show.
+    pub(crate) adapter_handle: wgpu::Adapter,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
 }
@@ -86,7 +88,7 @@ impl Gpu {
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|error| format!("{}: {error}", adapter.get_info().name))?;
-        Ok(Arc::new(Self { adapter: adapter.get_info(), device, queue }))
+        Ok(Arc::new(Self { adapter: adapter.get_info(), adapter_handle: adapter, device, queue }))
     }
 
     /// The adapter and its driver, in words.

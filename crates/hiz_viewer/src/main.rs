@@ -25,6 +25,9 @@ mod renderer;
 mod scene;
 mod scene_on_device;
 mod targets;
+#[cfg(test)]
+mod tests;
+mod window;
 
 use args::{Arguments, What};
 
@@ -46,7 +49,8 @@ fn run() -> Result<(), Failure> {
     match arguments.what {
         What::Help => print!("{}", args::help()),
         What::Headless => headless::run(&arguments)?,
-        What::Window | What::Bench => return Err("not yet".into()),
+        What::Window => window::run(&arguments)?,
+        What::Bench => return Err("not yet".into()),
     }
     Ok(())
 }

@@ -62,16 +62,6 @@ impl Mesh {
         self.vertices.len() as u32 - 1
     }
 
-    /// Appends a flat triangle with vertices of its own.
-    pub(crate) fn push_triangle(&mut self, corners: [Vec3; 3], colour: [f32; 3]) {
-        let [a, b, c] = corners;
-        let normal = cross(sub(b, a), sub(c, a));
-        for corner in corners {
-            let index = self.push(corner, normal, colour);
-            self.indices.push(index);
-        }
-    }
-
     /// Appends an axis-aligned box.
     pub(crate) fn push_box(&mut self, min: Vec3, max: Vec3, colour: [f32; 3]) {
         for axis in 0..3 {
@@ -153,6 +143,15 @@ impl Mesh {
             vertex.normal[3] = lod as i8;
         }
         self
+    }
+
+    /// The radius of the largest ball around the origin that no triangle's plane cuts.
+    pub(crate) fn inner_radius(&self) -> f64 {
+        let from_origin = |[a, b, c]: [Vec3; 3]| {
+            let normal = unit(cross(sub(b, a), sub(c, a)));
+            dot(a, normal).abs()
+        };
+        self.triangles().map(from_origin).fold(f64::MAX, f64::min)
     }
 
     fn triangles(&self) -> impl Iterator<Item = [Vec3; 3]> + '_ {

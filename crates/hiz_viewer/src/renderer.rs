@@ -279,10 +279,10 @@ impl Renderer {
             ),
             format!("drawn {drawn} of {bodies}  triangles {triangles}"),
         ];
-        if let Some(level) = self.shown.level {
-            let size =
-                self.culler.pyramid().level_size(level).map_or(String::new(), |s| s.to_string());
-            lines.push(format!("level {level}: {size}"));
+        if let Some(level) = self.shown.level
+            && let Some(ImageSize { width, height }) = self.culler.pyramid().level_size(level)
+        {
+            lines.push(format!("level {level}: {width}x{height}"));
         }
         lines
     }

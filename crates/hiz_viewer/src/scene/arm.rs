@@ -24,7 +24,7 @@ pub(crate) fn scene() -> Scene {
     let mut ground = Mesh::default();
     ground.push_box([-30.0, -0.25, -30.0], [30.0, 0.0, 30.0], [0.42, 0.46, 0.40]);
     let balls = POINTS.map(|points| Mesh::sphere(points, [1.0; 3])).into();
-    let kinds = vec![Kind::of(prism), Kind::with_lods(balls, 1.0), Kind::of(ground)];
+    let kinds = vec![Kind::of(prism), Kind::of_spheres(balls), Kind::of(ground)];
 
     let mut bodies = vec![Body::at(GROUND, [0.0; 3], true)];
     for x in 0..13 {

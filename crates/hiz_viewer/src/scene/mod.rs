@@ -46,7 +46,26 @@ impl Kind {
             .enumerate()
             .map(|(i, mesh)| if i == 0 { 0.0 } else { meshes[0].deviation(mesh, size) })
             .collect();
-        let lods = meshes.into_iter().zip(errors).enumerate();
+        Self::with_errors(meshes, &errors)
+    }
+
+    /// Spheres of radius 1, from the finest to the coarsest.
+    ///
+    /// Each lies in the shell between the round sphere and the ball inside of it.
+    /// A ray from the middle meets two of them no farther apart than the thicker shell.
+    pub(crate) fn of_spheres(meshes: Vec<Mesh>) -> Self {
+        let thickness = |mesh: &Mesh| 1.0 - mesh.inner_radius();
+        let finest = thickness(&meshes[0]);
+        let errors: Vec<_> = meshes
+            .iter()
+            .enumerate()
+            .map(|(i, mesh)| if i == 0 { 0.0 } else { thickness(mesh).max(finest) })
+            .collect();
+        Self::with_errors(meshes, &errors)
+    }
+
+    fn with_errors(meshes: Vec<Mesh>, errors: &[f64]) -> Self {
+        let lods = meshes.into_iter().zip(errors.iter().copied()).enumerate();
         Self { lods: lods.map(|(i, (mesh, error))| Lod { mesh: mesh.of_lod(i), error }).collect() }
     }
 }

@@ -62,14 +62,14 @@ pub(crate) fn scene() -> Scene {
 fn height(x: f64, z: f64) -> f64 {
     let bend = [noise(x / 900.0, z / 900.0, 5), noise(x / 900.0, z / 900.0, 6)];
     let (x, z) = (x + 140.0 * bend[0], z + 140.0 * bend[1]);
-    let (mut sum, mut weight, mut size, mut tall) = (0.0, 1.0, 1300.0, 400.0);
-    for octave in 0..6 {
+    let (mut sum, mut weight, mut size, mut tall) = (0.0, 1.0, 1500.0, 380.0);
+    for octave in 0..5 {
         let ridge = 1.0 - noise(x / size, z / size, octave).abs();
         let ridge = ridge * ridge * weight;
         sum += tall * ridge;
         weight = (1.6 * ridge).clamp(0.0, 1.0);
         size *= 0.47;
-        tall *= 0.44;
+        tall *= 0.38;
     }
     let valley = 60.0 * noise(x / 700.0, z / 700.0, 77);
     (64.0 * (sum + valley - 250.0)).round() / 64.0
@@ -86,7 +86,7 @@ fn normal(x: f64, z: f64) -> Vec3 {
 /// Grass, rock where it is steep, snow on top.
 fn colour(x: f64, y: f64, z: f64, up: f64) -> [f32; 3] {
     let patchy = noise(x / 90.0, z / 90.0, 31);
-    let rock = ((0.86 - up) / 0.12 + 0.3 * patchy).clamp(0.0, 1.0);
+    let rock = ((0.80 - up) / 0.10 + 0.3 * patchy).clamp(0.0, 1.0);
     let snow =
         ((y + 30.0 * patchy - 230.0) / 40.0).clamp(0.0, 1.0) * ((up - 0.6) / 0.15).clamp(0.0, 1.0);
     let grass = [0.34 + 0.05 * patchy, 0.45 + 0.04 * patchy, 0.22];
@@ -161,7 +161,7 @@ fn trees() -> Vec<Body> {
         let [x, z] = [0; 2].map(|_| random.range(-0.97 * HALF, 0.97 * HALF));
         let grove = noise(x / 260.0, z / 260.0, 99) + 0.5 * noise(x / 90.0, z / 90.0, 98);
         let ground = height(x, z);
-        if random.range(-0.3, 0.9) > grove || normal(x, z)[1] < 0.72 || ground > 190.0 {
+        if random.range(-0.3, 0.9) > grove || normal(x, z)[1] < 0.70 || ground > 180.0 {
             continue;
         }
         let kind = if ground + random.range(-40.0, 40.0) > -20.0 { CONIFER } else { BROAD };
