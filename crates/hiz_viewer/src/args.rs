@@ -12,7 +12,8 @@ use crate::renderer::Mode;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Arguments {
     pub(crate) what: What,
-    pub(crate) scene: String,
+    /// `None`: mountains, and all scenes of the bench.
+    pub(crate) scene: Option<String>,
     pub(crate) size: ImageSize,
     pub(crate) samples: u32,
     pub(crate) mode: Mode,
@@ -33,6 +34,11 @@ pub(crate) enum What {
 }
 
 impl Arguments {
+    /// The scene that is drawn.
+    pub(crate) fn scene_name(&self) -> &str {
+        self.scene.as_deref().unwrap_or("mountains")
+    }
+
     /// Reads the arguments behind the program's name.
     ///
     /// # Errors
@@ -40,7 +46,7 @@ impl Arguments {
     pub(crate) fn parse(given: impl IntoIterator<Item = String>) -> Result<Self, Failure> {
         let mut parsed = Self {
             what: What::Window,
-            scene: "mountains".into(),
+            scene: None,
             size: ImageSize::new(960, 540),
             samples: 1,
             mode: Mode::TwoPasses,
@@ -60,7 +66,7 @@ impl Arguments {
                 "--bench" => parsed.what = What::Bench,
                 "--no-cull" => parsed.mode = Mode::Frustum,
                 "--no-lods" => parsed.lods = false,
-                "--scene" => parsed.scene = value()?,
+                "--scene" => parsed.scene = Some(value()?),
                 "--size" => parsed.size = size(&value()?)?,
                 "--samples" => parsed.samples = samples(&value()?)?,
                 "--mode" => parsed.mode = mode(&value()?)?,
@@ -113,11 +119,12 @@ pub(crate) fn help() -> String {
 
   viewer [--scene SCENE]              opens a window
   viewer --headless [--frames N]      writes frames to PNG files, without a window
-  viewer --bench                      compares frames with and without culling
+  viewer --bench                      compares frames with and without culling, in out/viewer/bench.md
 
-Scenes: mountains, arm, city, castle (whose data HIZVK_CASTLE has to name).
+Scenes: mountains, arm, city, and castle, whose data is not part of this repository:
+`HIZVK_CASTLE=castle.npz make view ARGS='--scene castle'` unpacks it first.
 
-  --scene SCENE      the scene (default: mountains)
+  --scene SCENE      the scene (default: mountains, and all of them with --bench)
   --size WxH         of the picture in pixels (default: 960x540)
   --samples 1|4      samples per pixel (default: 1)
   --mode MODE        what is left out of a frame (default: two-passes):
@@ -154,7 +161,7 @@ mod tests {
         let parsed = parse("--headless --scene arm --frames 3 --samples 4 --size 64x48 --no-cull")
             .expect("they are right");
         assert_eq!(parsed.what, What::Headless);
-        assert_eq!((parsed.scene.as_str(), parsed.frames, parsed.samples), ("arm", 3, 4));
+        assert_eq!((parsed.scene_name(), parsed.frames, parsed.samples), ("arm", 3, 4));
         assert_eq!((parsed.size, parsed.mode), (ImageSize::new(64, 48), Mode::Frustum));
         assert_eq!(parse("--keys f4,Plus,C").unwrap().keys, [Key::Level, Key::Coarser, Key::Cull]);
     }

@@ -13,7 +13,7 @@ use crate::scene::Scene;
 /// # Errors
 /// If there is no device or no such scene, and if files cannot be written.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let mut scene = Scene::by_name(&arguments.scene)?;
+    let mut scene = Scene::by_name(arguments.scene_name())?;
     if !arguments.lods {
         scene = scene.without_lods();
     }
@@ -34,7 +34,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         renderer.draw(&camera)?;
         let path = arguments.out.join(format!(
             "{}_{}_{frame:03}.png",
-            arguments.scene,
+            arguments.scene_name(),
             renderer.mode.name()
         ));
         let rgba = renderer.gpu.read_texture(&renderer.targets.picture_texture)?;

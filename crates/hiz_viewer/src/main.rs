@@ -10,8 +10,10 @@
 //! 3. `culler` calls the library: everything that is about culling.
 //! 4. `renderer` records a frame with `pipelines` into `targets`; `overlay` and `font` draw over it.
 //! 5. `picture` reads and compares; `headless`, `window` and `bench` are the three tasks.
+//!    `queries` is what `bench` compares with.
 
 mod args;
+mod bench;
 mod controls;
 mod culler;
 mod font;
@@ -21,6 +23,7 @@ mod mesh;
 mod overlay;
 mod picture;
 mod pipelines;
+mod queries;
 mod renderer;
 mod scene;
 mod scene_on_device;
@@ -50,7 +53,7 @@ fn run() -> Result<(), Failure> {
         What::Help => print!("{}", args::help()),
         What::Headless => headless::run(&arguments)?,
         What::Window => window::run(&arguments)?,
-        What::Bench => return Err("not yet".into()),
+        What::Bench => bench::run(&arguments)?,
     }
     Ok(())
 }

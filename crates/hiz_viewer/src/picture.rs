@@ -30,6 +30,8 @@ pub(crate) struct Difference {
     pub(crate) depths: usize,
     /// Pixels whose colours differ, without those of a tie.
     pub(crate) colours: usize,
+    /// Pixels whose colours or depths differ, with those of a tie.
+    pub(crate) differing_pixels: usize,
     /// Pixels of which two fragments share the nearest depth of a sample.
     /// Which of them shows depends on the order of drawing.
     pub(crate) ties: usize,
@@ -42,8 +44,10 @@ impl Picture {
         let samples = self.samples as usize;
         let pixels = self.rgba.chunks_exact(4).zip(reference.rgba.chunks_exact(4));
         let at_depth = reference.at_depth.chunks_exact(samples);
+        let depths = self.depth.chunks_exact(samples).zip(reference.depth.chunks_exact(samples));
         let mut found = Difference::default();
-        for ((a, b), fragments) in pixels.zip(at_depth) {
+        for (((a, b), fragments), (c, d)) in pixels.zip(at_depth).zip(depths) {
+            found.differing_pixels += usize::from(a != b || c != d);
             if fragments.iter().any(|n| *n > 1) {
                 found.ties += 1;
             } else if a != b {

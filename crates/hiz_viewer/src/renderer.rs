@@ -154,11 +154,7 @@ impl Renderer {
                 self.record_picture(&mut encoder, Begin::Empty, self.culler.kept(), last);
             }
             Mode::OnePass => {
-                let mut pass = self.targets.begin_depth(&mut encoder);
-                self.set_up(&mut pass);
-                pass.set_pipeline(&self.pipelines.depth);
-                self.on_device.draw_occluders(&mut pass);
-                drop(pass);
+                self.record_occluders(&mut encoder);
                 self.culler.record_one_pass(&mut encoder, camera, &self.targets)?;
                 self.record_picture(&mut encoder, Begin::Empty, self.culler.kept(), last);
             }
@@ -209,6 +205,14 @@ impl Renderer {
     pub(crate) fn set_up(&self, pass: &mut wgpu::RenderPass<'_>) {
         pass.set_bind_group(0, &self.bindings, &[]);
         self.on_device.set_buffers(pass);
+    }
+
+    /// Draws the depth of the occluders alone.
+    pub(crate) fn record_occluders(&self, encoder: &mut wgpu::CommandEncoder) {
+        let mut pass = self.targets.begin_depth(encoder);
+        self.set_up(&mut pass);
+        pass.set_pipeline(&self.pipelines.depth);
+        self.on_device.draw_occluders(&mut pass);
     }
 
     fn record_picture(

@@ -7,7 +7,7 @@ use hiz_core::{Camera, DrawTemplate};
 
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, Vertex};
-use crate::scene::{Scene, Volumes};
+use crate::scene::Scene;
 
 /// Twin: `shaders/scene.wgsl`, `Body`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -42,7 +42,7 @@ pub(crate) struct OnDevice {
     pub(crate) bodies: wgpu::Buffer,
     /// The list 0, 1, 2, ..., which draws all bodies and the proxy.
     everybody: wgpu::Buffer,
-    view: wgpu::Buffer,
+    pub(crate) view: wgpu::Buffer,
     /// Least and greatest corners of the bounds, for pictures of them.
     pub(crate) corners: wgpu::Buffer,
     /// For each kind, what each of its LODs draws.
@@ -98,7 +98,7 @@ impl OnDevice {
         };
         let occluders = (0..ranges.len()).filter(|k| is_occluder(&ranges[*k])).collect();
         // The reach of the scene decides how dense the fog is.
-        let corners = corners(&scene.volumes);
+        let corners = scene.corners();
         let reach = corners.iter().flatten().fold(0.0_f32, |most, v| most.max(v.abs()));
         let usage = BufferUsages::STORAGE;
         Self {
@@ -169,7 +169,17 @@ impl OnDevice {
     }
 
     fn draw_kind(&self, pass: &mut wgpu::RenderPass<'_>, kind: usize) {
-        draw_one(pass, &self.draws[kind][0], self.ranges[kind].clone());
+        self.draw_bodies(pass, kind, self.ranges[kind].clone());
+    }
+
+    /// Draws some bodies of one kind, each at its finest.
+    pub(crate) fn draw_bodies(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        kind: usize,
+        bodies: Range<u32>,
+    ) {
+        draw_one(pass, &self.draws[kind][0], bodies);
     }
 }
 
@@ -200,21 +210,4 @@ fn records(scene: &Scene) -> Vec<BodyRecord> {
         kind: u32::MAX,
     });
     records
-}
-
-/// The corners of the boxes around the volumes, in turns least and greatest.
-fn corners(volumes: &Volumes) -> Vec<[f32; 4]> {
-    let point = |p: [f64; 3]| [p[0] as f32, p[1] as f32, p[2] as f32, 1.0];
-    match volumes {
-        Volumes::Boxes { min, max } => min
-            .chunks_exact(3)
-            .zip(max.chunks_exact(3))
-            .flat_map(|(a, b)| [point([a[0], a[1], a[2]]), point([b[0], b[1], b[2]])])
-            .collect(),
-        Volumes::Spheres { centers, radii } => centers
-            .chunks_exact(3)
-            .zip(radii)
-            .flat_map(|(c, r)| [-r, *r].map(|r| point([c[0] + r, c[1] + r, c[2] + r])))
-            .collect(),
-    }
 }

@@ -34,7 +34,7 @@ const TURN_PER_PIXEL: f64 = 0.004;
 /// # Errors
 /// If there is no display, device or scene.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let scene = Scene::by_name(&arguments.scene)?;
+    let scene = Scene::by_name(arguments.scene_name())?;
     let scene = if arguments.lods { scene } else { scene.without_lods() };
     for folder in arguments.screenshots.iter().chain([&arguments.out]) {
         std::fs::create_dir_all(folder)

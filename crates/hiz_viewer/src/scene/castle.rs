@@ -13,7 +13,7 @@ use crate::scene::npy;
 use crate::scene::{Body, Kind, Leg, Rule, Scene, boxes};
 
 /// The folder with the castle's arrays.
-pub(crate) const FOLDER: &str = "HIZVK_CASTLE";
+pub(crate) const FOLDER: &str = "HIZVK_CASTLE_FOLDER";
 
 /// The scene.
 ///

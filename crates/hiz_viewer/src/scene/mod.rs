@@ -189,6 +189,23 @@ impl Scene {
         self.bodies.iter().map(of).sum()
     }
 
+    /// The corners of the boxes around the bounds, in turns least and greatest.
+    pub(crate) fn corners(&self) -> Vec<[f32; 4]> {
+        let point = |p: [f64; 3]| [p[0] as f32, p[1] as f32, p[2] as f32, 1.0];
+        match &self.volumes {
+            Volumes::Boxes { min, max } => min
+                .chunks_exact(3)
+                .zip(max.chunks_exact(3))
+                .flat_map(|(a, b)| [point([a[0], a[1], a[2]]), point([b[0], b[1], b[2]])])
+                .collect(),
+            Volumes::Spheres { centers, radii } => centers
+                .chunks_exact(3)
+                .zip(radii)
+                .flat_map(|(c, r)| [-r, *r].map(|r| point([c[0] + r, c[1] + r, c[2] + r])))
+                .collect(),
+        }
+    }
+
     /// The pose of frame `frame` of a path of `frames`.
     pub(crate) fn pose(&self, frame: usize, frames: usize) -> Pose {
         let per_leg = frames.div_ceil(self.legs.len()).max(1);
