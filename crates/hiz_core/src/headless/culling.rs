@@ -382,7 +382,7 @@ impl Culling {
         let gpu = &engine.context().gpu;
         let lists = engine.scoped(|| {
             let Outputs { capacity, draw, .. } = self.visible.outputs();
-            let lists = Lists::new(gpu, &self.instances, true, capacity, draw)?;
+            let lists = Lists::new(gpu, &self.instances, true, *capacity, *draw)?;
             let compaction = Compaction::new(gpu, &self.instances, &self.visible, &lists)?;
             let mut encoder = engine.encoder("hiz.compact.encoder");
             lists.record_clear(&mut encoder);
