@@ -199,6 +199,7 @@ pub use output::outputs::Outputs;
 pub use output::verdict::Verdict;
 pub use output::visible::Visible;
 pub use pyramid::atlas::AtlasUse;
+pub use pyramid::level_texels::LevelTexels;
 pub use pyramid::levels::{MAX_LEVELS, StoredLevels};
 pub use pyramid::{Pyramid, PyramidOptions};
 
