@@ -192,6 +192,7 @@ pub use occluders::surface::{ConservativeDepthOptions, OccluderSurface};
 pub use occluders::uploaded::Occluders;
 pub use output::draw::{DrawIndexedIndirect, DrawTemplate};
 pub use output::outputs::Outputs;
+pub use output::readback::{Answer, AnswerInFlight, ReadbackRing};
 pub use output::verdict::Verdict;
 pub use output::visible::Visible;
 pub use pyramid::atlas::AtlasUse;

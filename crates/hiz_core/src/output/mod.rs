@@ -4,6 +4,7 @@
 //! - `visible` has the buffers: a mask and verdicts per piece, and what `lists` and `survivors`
 //!   hold.
 //! - `compact` makes the ordered list and its length from the mask.
+//! - `readback` copies them to the host, a ring of slots at a time.
 //! - `draw`, `counters` and `verdict` have the layouts and codes that the shaders share.
 //!
 //! This room makes buffers and records commands; it never submits or waits.
@@ -13,6 +14,7 @@ pub(crate) mod counters;
 pub(crate) mod draw;
 pub(crate) mod lists;
 pub(crate) mod outputs;
+pub(crate) mod readback;
 pub(crate) mod survivors;
 pub(crate) mod verdict;
 pub(crate) mod visible;
