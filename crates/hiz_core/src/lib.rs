@@ -196,6 +196,7 @@ pub use output::draw::{DrawIndexedIndirect, DrawIndirect, DrawTemplate, VertexDr
 pub use output::emit::{Emit, Placement};
 pub use output::mesh_table::{Lod, LodDraw, MAX_LODS, MeshLods, MeshTable};
 pub use output::outputs::Outputs;
+pub use output::readback::{Answer, AnswerInFlight, ReadbackRing};
 pub use output::verdict::Verdict;
 pub use output::visible::Visible;
 pub use pyramid::atlas::AtlasUse;
