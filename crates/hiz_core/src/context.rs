@@ -26,6 +26,7 @@ use crate::occluders::drawing::{DrawOptions, Rasteriser, Touched};
 use crate::occluders::uploaded::Occluders;
 use crate::output::mesh_table::{MeshLods, MeshTable};
 use crate::output::outputs::Outputs;
+use crate::output::readback::{AnswerInFlight, ReadbackRing, record_readback};
 use crate::output::visible::Visible;
 use crate::pyramid::reduce::record_reduce;
 use crate::pyramid::{Pyramid, PyramidOptions, PyramidUniform};
@@ -437,6 +438,35 @@ impl HizContext {
             &CullInputs::new(instances, camera, pyramid, options),
             visible,
         )
+    }
+
+    /// Makes a ring of `slots` (1..=64) for answers on their way to the host.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for another number of slots.
+    pub fn create_readback(&self, slots: usize) -> Result<ReadbackRing> {
+        ReadbackRing::new(&self.gpu, slots)
+    }
+
+    /// Records the copies of what a cull leaves in `visible`: mask, list and draw arguments.
+    ///
+    /// Record it behind the cull.
+    /// After the submit the answer arrives with a poll of the device
+    /// ([`AnswerInFlight::is_ready`]); nothing here submits, polls or waits.
+    /// The whole capacity of the lists is copied.
+    /// If the encoder is never submitted, drop the answer.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] if all slots are taken: read or drop one of their answers first.
+    /// - [`Error::Mismatch`] for objects of another context.
+    /// - [`Error::OutOfMemory`].
+    pub fn record_readback(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        visible: &Visible,
+        ring: &ReadbackRing,
+    ) -> Result<AnswerInFlight> {
+        record_readback(&self.gpu, encoder, visible, ring)
     }
 
     /// Makes everything that frames like this one need, and records work that makes the driver

@@ -168,6 +168,7 @@ pub mod testing;
 pub use wgpu;
 
 pub use context::HizContext;
+pub use cull::lod::LodRule;
 pub use cull::options::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
 pub use cull::warm_up::WarmUp;
 pub use error::{Error, Result};
@@ -195,9 +196,11 @@ pub use output::draw::{DrawIndexedIndirect, DrawIndirect, DrawTemplate, VertexDr
 pub use output::emit::{Emit, Placement};
 pub use output::mesh_table::{Lod, LodDraw, MAX_LODS, MeshLods, MeshTable};
 pub use output::outputs::Outputs;
+pub use output::readback::{Answer, AnswerInFlight, ReadbackRing};
 pub use output::verdict::Verdict;
 pub use output::visible::Visible;
 pub use pyramid::atlas::AtlasUse;
+pub use pyramid::level_texels::LevelTexels;
 pub use pyramid::levels::{MAX_LEVELS, StoredLevels};
 pub use pyramid::{Pyramid, PyramidOptions};
 

@@ -1,6 +1,7 @@
 //! The pipelines of the cull: which shader files make a module, and how one pipeline differs from
 //! another.
 
+use crate::cull::lod::LodRule;
 use crate::error::Result;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::device::Gpu;
@@ -110,6 +111,11 @@ pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 6] {
         ("DESCENT", flag(key.descent)),
         ("FIT_VOLUME", flag(key.fit_volume)),
     ]
+}
+
+/// The constants of `shaders/cull/lod.wgsl`.
+pub(crate) fn lod_constants(rule: &LodRule) -> [(&'static str, f64); 1] {
+    [("LOD_RULE", f64::from(rule.code()))]
 }
 
 pub(crate) fn report_constants(key: &ReportKey) -> Vec<(&'static str, f64)> {
@@ -243,7 +249,7 @@ pub(super) const CERTIFIED: &[File] = &[wgsl!("cull/supporting_planes"), wgsl!("
 
 /// The module of an entry point that does not write down which texels were read
 /// (`shaders/cull/unexplained.wgsl`).
-pub(super) fn unexplained(store: DepthStore, kind: BoundsKind, entry: &[File]) -> Source {
+pub(crate) fn unexplained(store: DepthStore, kind: BoundsKind, entry: &[File]) -> Source {
     decision_module(store, kind, CERTIFIED, &[&[wgsl!("cull/unexplained")], entry].concat())
 }
 

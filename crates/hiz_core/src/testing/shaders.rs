@@ -14,6 +14,7 @@ use crate::occluders::device_raster::occluders_module;
 use crate::output::compact::{compact_module, copy_module};
 use crate::output::emit_passes;
 use crate::pyramid::reduce::{blocks_module, coarse_module};
+use crate::testing::lod::choose_lods_module;
 #[cfg(feature = "yardstick")]
 use crate::yardstick::{uncertified_module, yardstick_modules};
 
@@ -82,6 +83,7 @@ pub(super) fn all() -> Vec<(String, Source)> {
         all.push((format!("uncertified cull {store:?}"), uncertified_module(store)));
     }
     all.extend(KINDS.map(|kind| (format!("refine {kind:?}"), refine_module(kind))));
+    all.extend(KINDS.map(|kind| (format!("choose_lods {kind:?}"), choose_lods_module(kind))));
     all
 }
 

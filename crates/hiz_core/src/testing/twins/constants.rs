@@ -6,6 +6,7 @@ use super::declared;
 use crate::cull::count;
 use crate::cull::explain::{self, Stage};
 use crate::cull::groups::GROUPS_OF_RUN;
+use crate::cull::lod::LodRule;
 use crate::cull::pipelines::{CullKey, DepthStore, ReportKey};
 use crate::cull::pipelines::{classify_constants, cull_module, report_constants};
 use crate::cull::refine;
@@ -30,6 +31,7 @@ use crate::output::visible::VERDICT_MULTIPLE;
 use crate::pyramid::layout::{BLOCK_ALIGNMENT, BLOCK_LOG2, HEADERS, PIXELS};
 use crate::pyramid::levels::MAX_LEVELS;
 use crate::pyramid::reduce::{REDUCE_WORKGROUP, SHARED_LEVEL, TALL_SIDE};
+use crate::testing::lod;
 use crate::testing::shaders::tests::parse;
 use crate::testing::shaders::{EMITS, KINDS, all, files};
 use crate::yardstick::reduce as yardstick;
@@ -41,6 +43,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
     let bits = |v: f32| f64::from(v.to_bits());
     let verdict = |v: Verdict| int(v as u32);
     let stage = |s: Stage| int(s as u32);
+    let rule = |r: &LodRule| int(r.code());
     let texels = |kind: BoundsKind| (kind.record_bytes() / TEXEL_BYTES) as f64;
     vec![
         ("cull/certificate", "EPS", EPS),
@@ -50,6 +53,10 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/cull_groups", "WORKGROUP", int(CULL_WORKGROUP)),
         ("cull/explain", "BEHIND", int(explain::BEHIND)),
         ("cull/explain", "CLEAR", int(explain::CLEAR)),
+        ("cull/lod", "FINEST", rule(&LodRule::Finest)),
+        ("cull/lod", "BY_ERROR", rule(&LodRule::Error { pixels: 1.0 })),
+        ("cull/lod", "BY_DISTANCE", rule(&LodRule::Distance { thresholds: Vec::new() })),
+        ("cull/lod", "BY_SIZE", rule(&LodRule::Size { pixels: Vec::new() })),
         ("cull/outcome", "AT_VALIDITY", stage(Stage::Validity)),
         ("cull/outcome", "AT_FRUSTUM", stage(Stage::Frustum)),
         ("cull/outcome", "AT_EYE_PLANE", stage(Stage::EyePlane)),
@@ -107,6 +114,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("pyramid/pyramid_write", "SIDE_MASK", int(TALL_SIDE - 1)),
         ("pyramid/texels", "LEAST_NORMAL", float(f32::MIN_POSITIVE)),
         ("pyramid/texels_atlas", "HEADERS", int(HEADERS)),
+        ("testing/choose_lods", "LANES", int(lod::LANES)),
+        ("testing/choose_lods", "MAX_LODS", MAX_LODS as f64),
         ("yardstick/reduce_buffer", "WORKGROUP", int(yardstick::BUFFER_WORKGROUP)),
         ("yardstick/reduce_texture", "SIDE", int(yardstick::TEXTURE_WORKGROUP_SIDE)),
     ]
@@ -117,6 +126,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
 const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/certificate", &["ERROR_FLOOR"]),
     ("cull/classify", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
+    ("cull/lod", &["NEEDS", "NEED_FACTOR", "LARGEST_DEVIATION"]),
     ("cull/refine", &["REFINED"]),
     ("cull/refine_groups", &["LAST_TEXEL", "WITHIN"]),
     (
@@ -134,7 +144,16 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ),
     (
         "instances/bounds_box_support",
-        &["EDGES", "FACES", "CANDIDATES", "EDGES_OF_AXIS_LOG2", "BORDER_TOLERANCE"],
+        &[
+            "EDGES",
+            "FACES",
+            "CANDIDATES",
+            "EDGES_OF_AXIS_LOG2",
+            "BORDER_TOLERANCE",
+            "RADIUS_FACTOR",
+            "RADIUS_FLOOR",
+            "ROOT_FACTOR",
+        ],
     ),
     (
         "instances/bounds_sphere",
@@ -253,6 +272,14 @@ fn constants_cover_what_is_counted() {
     assert!(number("cull/certificate", "ERROR_FLOOR") >= two_to(-70));
     // Both squares, the product and the sum lose at most 6 eps.
     assert!(number("instances/bounds_sphere", "SQUARES_FACTOR") >= 1.0 + 6.0 * EPS);
+    // The three products of a need.
+    assert!(number("cull/lod", "NEED_FACTOR") >= 1.0 + 4.0 * EPS);
+    // Bounds below the coordinate limit of every camera, and a product that does not overflow.
+    let deviation = number("cull/lod", "LARGEST_DEVIATION");
+    assert!((two_to(52)..=two_to(80)).contains(&deviation));
+    // A box's radius: of a square or a sum less than 16 eps, and squares below 2^-126.
+    assert!(number("instances/bounds_box_support", "RADIUS_FACTOR") >= 1.0 + 16.0 * EPS);
+    assert!(number("instances/bounds_box_support", "RADIUS_FLOOR") >= two_to(-100));
     // Squares below 2^-126 lose what they are.
     assert!(number("instances/bounds_sphere", "SQUARES_FLOOR") >= two_to(-100));
     assert!(number("instances/bounds_sphere", "AXES") >= 3.0);
@@ -275,6 +302,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
     let line = |n: u32| [n, 1, 1];
     BTreeMap::from([
         ("begin", line(1)),
+        ("choose_lods", line(lod::LANES)),
         ("emit_bins", line(emit_passes::WORKGROUP)),
         ("emit_block", line(emit_passes::WORKGROUP)),
         // One workgroup, the largest that WebGPU promises.

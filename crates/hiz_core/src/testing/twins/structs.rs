@@ -19,6 +19,7 @@ use crate::pyramid::PyramidUniform;
 use crate::pyramid::layout::PYRAMID_CHUNKS;
 use crate::pyramid::levels::Level;
 use crate::pyramid::steps::StepUniform;
+use crate::testing::lod::LodCase;
 use crate::testing::shaders::tests::parse;
 use crate::testing::shaders::{all, files};
 use crate::yardstick::reduce as yardstick;
@@ -97,6 +98,9 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         twin!("Level", Level {
             "offset" = offset, "stride" = stride, "width" = width, "height" = height,
         }),
+        twin!("LodCase", LodCase {
+            "mesh" = mesh, "count" = count, "scale" = scale, "padding" = padding,
+        }),
         twin!("Piece", PieceUniform {
             "base" = base, "count" = count, "index" = index, "words" = words,
         }),
@@ -129,7 +133,8 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "reach" = reach, "depth_factor" = depth_factor, "size" = size,
             "runtime_zero" = runtime_zero, "reduction" = reduction,
             "descent_budget" = descent_budget, "depth_offset" = depth_offset,
-            "coordinate_limit" = coordinate_limit, "padding" = padding,
+            "coordinate_limit" = coordinate_limit, "lod_end" = lod_end,
+            "lod_needs" = lod_needs,
         }),
         twin!("YardstickLevel", yardstick::PlainLevel {
             "offset" = offset, "stride" = stride, "width" = width, "height" = height,
