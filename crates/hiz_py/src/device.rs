@@ -15,6 +15,7 @@ use crate::arguments::{DepthArray, FloatArray, LevelArray, bounds, depth_input, 
 use crate::camera::Camera;
 use crate::culling::{Counts, Culling};
 use crate::held::{Held, OnDevice, detached};
+use crate::meshes::{LodNumbers, MeshTable, mesh_table};
 use crate::options::{Request, cull_options};
 
 /// The depth of a single cull.
@@ -90,8 +91,9 @@ impl Engine {
         py: Python<'_>,
         kind: &str,
         arrays: Vec<FloatArray<'_>>,
-        strict: bool,
-        order: &str,
+        (strict, order): (bool, &str),
+        mesh_ids: Option<PyReadonlyArray1<'_, u32>>,
+        scales: Option<FloatArray<'_>>,
     ) -> PyResult<Instances> {
         let bounds = bounds(kind, &arrays)?;
         let order = match order {
@@ -100,7 +102,13 @@ impl Engine {
             other => return Err(PyValueError::new_err(format!("order: no order {other:?}"))),
         };
         #[allow(clippy::needless_update, reason = "hiz_core's `testing` adds a field")]
-        let options = InstanceOptions { strict, order, ..InstanceOptions::default() };
+        let options = InstanceOptions {
+            strict,
+            order,
+            mesh_ids: mesh_ids.as_ref().map(|ids| ids.as_slice()).transpose()?,
+            scales: scales.as_ref().map(FloatArray::floats).transpose()?,
+            ..InstanceOptions::default()
+        };
         self.0
             .run(py, |engine| engine.instances(&bounds, &options))
             .map(|instances| Instances(Held::new(py, instances)))
@@ -264,7 +272,15 @@ impl Engine {
         self.0.run(py, reduce).map(|built| Pyramid(Held::new(py, built)))
     }
 
+    /// A mesh is a list of levels of detail, each with the numbers of its draw and its error.
+    fn mesh_table(&self, py: Python<'_>, meshes: Vec<Vec<LodNumbers>>) -> PyResult<MeshTable> {
+        self.0
+            .run(py, |engine| mesh_table(engine, &meshes))
+            .map(|table| MeshTable(Held::new(py, table)))
+    }
+
     /// `options` is a `hizvk.CullOptions`, `outputs` a `hizvk.Outputs`.
+    /// `meshes` is the table of the meshes that the outputs speak of.
     /// `ahead`: its answer comes to the host by itself.
     #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn cull(
@@ -275,9 +291,11 @@ impl Engine {
         pyramid: &Pyramid,
         options: &Bound<'_, PyAny>,
         outputs: &Bound<'_, PyAny>,
+        meshes: Option<&MeshTable>,
         ahead: bool,
     ) -> PyResult<Culling> {
-        let Request { options, outputs } = Request::new(options, outputs)?;
+        let meshes = meshes.map(|table| table.0.get(py)).transpose()?;
+        let Request { options, outputs } = Request::new(options, outputs, meshes.as_deref())?;
         let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
         let cull = |engine: &headless::Engine| {
             let (camera, pyramid) = (&camera.0, &pyramid.1);
@@ -301,8 +319,10 @@ impl Engine {
         levels: (u32, u32),
         options: &Bound<'_, PyAny>,
         outputs: &Bound<'_, PyAny>,
+        meshes: Option<&MeshTable>,
     ) -> PyResult<()> {
-        let Request { options, outputs } = Request::new(options, outputs)?;
+        let meshes = meshes.map(|table| table.0.get(py)).transpose()?;
+        let Request { options, outputs } = Request::new(options, outputs, meshes.as_deref())?;
         let instances = instances.0.get(py)?;
         let occluders = occluders.map(|occluders| occluders.0.get(py)).transpose()?;
         let levels = StoredLevels { first: levels.0, last: levels.1 };

@@ -23,19 +23,16 @@ pub(super) const KINDS: [BoundsKind; 3] =
     [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
 
 /// Every way to emit the kept instances, each with a shader of its own.
-pub(super) const EMITS: [(&str, EmitKey); 3] = [
+pub(super) const EMITS: [(&str, EmitKey); 5] = [
     ("list", EmitKey::NO_LIST),
-    ("planes", EmitKey::Planes { by_index: false, bins: BinKey { sorted: true } }),
-    (
-        "bins",
-        EmitKey::Append {
-            list: true,
-            capped: true,
-            record_words: 5,
-            bins: BinKey { sorted: true },
-        },
-    ),
+    ("planes", EmitKey::Planes { by_index: false, bins: ONE_LOD }),
+    ("planes of LODs", EmitKey::Planes { by_index: false, bins: LODS }),
+    ("bins", EmitKey::Append { list: true, capped: true, record_words: 5, bins: ONE_LOD }),
+    ("bins of LODs", EmitKey::Append { list: true, capped: true, record_words: 5, bins: LODS }),
 ];
+
+const ONE_LOD: BinKey = BinKey { sorted: true, lod_rule: None };
+const LODS: BinKey = BinKey { sorted: true, lod_rule: Some(1) };
 
 /// Path below `shaders/`, without its extension, and text of every file.
 pub fn files() -> Vec<(&'static str, &'static str)> {
