@@ -540,13 +540,14 @@ fn culls_of_what_does_not_belong_are_refused_by_name() {
             context.record_update(encoder, instances, first, bounds, false)
         }) as Box<_>
     };
-    let boxes = |centers: Floats<'static>, radii: Floats<'static>, options: InstanceOptions| {
-        Box::new(move |encoder: &mut wgpu::CommandEncoder| {
-            context
-                .record_instances(encoder, &Bounds::Spheres { centers, radii }, &options)
-                .map(drop)
-        }) as Box<_>
-    };
+    let boxes =
+        |centers: Floats<'static>, radii: Floats<'static>, options: InstanceOptions<'static>| {
+            Box::new(move |encoder: &mut wgpu::CommandEncoder| {
+                context
+                    .record_instances(encoder, &Bounds::Spheres { centers, radii }, &options)
+                    .map(drop)
+            }) as Box<_>
+        };
     run(
         &world,
         &[

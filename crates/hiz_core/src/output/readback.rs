@@ -224,5 +224,13 @@ pub(crate) fn record_readback(
     }));
     let copies = gpu.recorded(|| Copies::record(gpu, encoder, &ring.pool, &ranges))?;
     let outputs = visible.outputs();
-    Ok(AnswerInFlight { copies, outputs, counts, masks, lists, draws, _slot: slot })
+    Ok(AnswerInFlight {
+        copies,
+        outputs: outputs.clone(),
+        counts,
+        masks,
+        lists,
+        draws,
+        _slot: slot,
+    })
 }
