@@ -6,18 +6,20 @@ mod common;
 use std::sync::Arc;
 
 use common::{Random, camera_along_z, ndc};
-use hiz_core::headless::Engine;
+use hiz_core::headless::{Engine, NO_LOD};
 use hiz_core::{
     ABSENT, Bounds, Camera, CullOptions, DepthConvention, DrawTemplate, Emit, Error, Floats,
-    Hierarchy, InstanceOptions, Instances, Lod, MeshLods, MeshTable, Order, Outputs, Placement,
-    Pyramid, VertexDraw, Visible, testing::CANARY_WORDS, wgpu,
+    Hierarchy, HizContext, InstanceOptions, Instances, Lod, MeshLods, MeshTable, Order, Outputs,
+    Placement, Pyramid, Verdict, VertexDraw, Visible, testing::CANARY_WORDS, wgpu,
 };
 
 const CONVENTION: DepthConvention = DepthConvention::Reversed;
 
 /// The instances choose their own LOD: the whole part of their scale, at most the last one.
-const LOD_OF_SCALE: (&str, &str) =
-    ("-> u32 {\n    return 0u;\n}", "-> u32 {\n    return min(u32(scale), count - 1u);\n}");
+const LOD_OF_SCALE: (&str, &str) = (
+    "scale: f32, count: u32) -> u32 {\n    return 0u;",
+    "scale: f32, count: u32) -> u32 {\n    return min(u32(scale), count - 1u);",
+);
 
 /// A device, a camera and the pyramid of a wall at depth 4.
 struct World {
@@ -425,7 +427,7 @@ fn any_order_fills_the_bins_of_one_mesh() {
                         let (offset, bytes) = visible.bin(p, 0, lod).unwrap();
                         let record = &draws[offset as usize / 4..][..5];
                         let count = record[1] as usize;
-                        assert_eq!(record, super_record(lod, count));
+                        assert_eq!(record, first_record(lod, count));
                         let words = &list[bytes.start as usize / 4..bytes.end as usize / 4];
                         let mut got = words[..count].to_vec();
                         got.sort_unstable();
@@ -447,8 +449,266 @@ fn any_order_fills_the_bins_of_one_mesh() {
     }
 }
 
-fn super_record(lod: u32, count: usize) -> Vec<u32> {
+/// The record of the first mesh.
+fn first_record(lod: u32, count: usize) -> Vec<u32> {
     record(true, (0, lod), count, 0)
+}
+
+/// What can be read of an engine's cull: draws, their number, bins and LODs.
+#[test]
+fn an_engines_cull_tells_its_bins() {
+    let world = World::new(&[]);
+    let mut random = Random(5);
+    let lods = [2, 1, 3];
+    let made = Crowd::random(2500, &lods, 0.5, 0.2, &mut random);
+    let crowd = Crowd::new(&world, made, Some(1024), true);
+    let kept = crowd.made.iter().filter(|m| m.is_kept()).count() as u64;
+    let absent = crowd.made.iter().filter(|m| m.mesh == ABSENT).count() as u64;
+    let indices: Vec<u32> = (0..2500).filter(|i: &u32| crowd.made[*i as usize].is_kept()).collect();
+    for emit in emits(&world.table(&lods, true)) {
+        let outputs = Outputs { emit: emit.clone(), ..Outputs::ALL };
+        let options = CullOptions::default();
+        let World { engine, camera, pyramid, .. } = &world;
+        let culling = engine.cull(&crowd.instances, camera, pyramid, &options, &outputs).unwrap();
+        let by_index = culling.lods().unwrap();
+        for (made, lod) in crowd.made.iter().zip(&by_index) {
+            assert_eq!(*lod, if made.is_kept() { made.lod as u8 } else { NO_LOD });
+        }
+        let draws = culling.draws().unwrap();
+        assert_eq!(draws.len(), 3 * culling.visible().max_draws() as usize);
+        assert_eq!(draws.iter().map(|d| u64::from(d.instance_count)).sum::<u64>(), kept);
+        let counts = culling.draw_counts().unwrap();
+        let used = draws.iter().filter(|d| d.instance_count > 0).count() as u32;
+        assert_eq!(counts.iter().sum::<u32>(), used);
+        assert_eq!(culling.demand_and_written().unwrap(), (Some(kept), kept));
+        // Mask, list and verdicts are those of any cull.
+        assert_eq!(culling.indices().unwrap(), indices);
+        assert_eq!(culling.mask().unwrap().iter().filter(|kept| **kept).count() as u64, kept);
+        let counts = culling.counts().unwrap();
+        assert_eq!((counts.absent, counts.tested, counts.visible), (absent, 2500 - absent, kept));
+        assert_eq!((counts.outside, counts.occluded), (0, 2500 - absent - kept));
+        let Emit::Binned { .. } = emit else {
+            assert!(culling.bin(0, 0).unwrap_err().to_string().contains("Emit::Instances"));
+            continue;
+        };
+        for (mesh, lods) in (0..).zip(lods) {
+            for lod in 0..lods as u32 {
+                let of_pieces = crowd.pieces();
+                let all = of_pieces.iter().flat_map(|p| crowd.bin(p, mesh, lod));
+                assert_eq!(culling.bin(mesh, lod).unwrap(), all.collect::<Vec<_>>());
+            }
+            assert!(culling.bin(mesh, lods as u32).unwrap_err().to_string().starts_with("lod: "));
+        }
+        assert!(culling.bin(3, 0).unwrap_err().to_string().starts_with("mesh: expected"));
+        // Without a mask, too, more is known than what was written.
+        let outputs = Outputs { indices: true, capacity: Some(9), emit, ..Outputs::NONE };
+        let culling = engine.cull(&crowd.instances, camera, pyramid, &options, &outputs).unwrap();
+        assert_eq!(culling.demand_and_written().unwrap(), (Some(kept), 9));
+    }
+}
+
+/// An absent instance is in no group's box, whatever its bounds are, and an update leaves it so.
+#[test]
+fn absent_instances_are_not_there() {
+    let world = World::new(&[]);
+    let World { engine, camera, pyramid, .. } = &world;
+    // One group before the wall if it were not absent, and 63 instances behind it.
+    let n = 64;
+    let centers = |absent: f32| -> Vec<f32> {
+        (0..n).flat_map(|i| [0.0, 0.0, if i == 7 { absent } else { 8.0 }]).collect()
+    };
+    let ids: Vec<u32> = (0..n).map(|i| if i == 7 { ABSENT } else { 0 }).collect();
+    let radii = vec![0.125; n];
+    for depth in [2.0, f32::NAN] {
+        let centers = centers(depth);
+        let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
+        let options =
+            InstanceOptions { strict: true, mesh_ids: Some(&ids), ..InstanceOptions::default() };
+        let instances = engine.instances(&bounds, &options).unwrap();
+        assert_eq!((instances.num_absent(), instances.invalid().unwrap().len()), (1, 0));
+        let options = CullOptions { hierarchy: Hierarchy::Always, ..CullOptions::default() };
+        for _ in 0..2 {
+            let culling =
+                engine.cull(&instances, camera, pyramid, &options, &Outputs::ALL).unwrap();
+            let counts = culling.counts().unwrap();
+            assert_eq!((counts.tested_groups, counts.tested_instances), (1, 0), "a whole group");
+            assert_eq!((counts.occluded, counts.outside, counts.absent), (63, 0, 1));
+            assert_eq!(culling.verdicts().unwrap()[7], Verdict::Outside);
+            assert!(culling.explain(7).unwrap().reason.contains("absent"));
+            assert_eq!(culling.indices().unwrap(), []);
+            engine.update(&instances, 0, &bounds, true).unwrap();
+        }
+    }
+    // All absent: the group is hidden, too.
+    let ids = [ABSENT; 64];
+    let centers = centers(2.0);
+    let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
+    let options = InstanceOptions { mesh_ids: Some(&ids), ..InstanceOptions::default() };
+    let instances = engine.instances(&bounds, &options).unwrap();
+    for hierarchy in [Hierarchy::Always, Hierarchy::Never] {
+        let options = CullOptions { hierarchy, ..CullOptions::default() };
+        let culling = engine.cull(&instances, camera, pyramid, &options, &Outputs::ALL).unwrap();
+        let counts = culling.counts().unwrap();
+        assert_eq!((counts.tested, counts.outside, counts.absent, counts.demand), (0, 0, 64, 0));
+    }
+}
+
+/// The caller's records are listed in place of indices.
+#[test]
+fn records_are_copied_in_place_of_indices() {
+    let world = World::new(&[]);
+    let mut random = Random(6);
+    for (n, piece, stride) in [(3000, Some(384), 4), (700, None, 256), (3000, Some(1024), 36)] {
+        let made = Crowd::random(n, &[1], 0.4, 0.1, &mut random);
+        let crowd = Crowd::new(&world, made, piece, true);
+        let words = stride as usize / 4;
+        let data: Vec<u32> =
+            (0..n * words).map(|i| (i as u32).wrapping_mul(2_654_435_761)).collect();
+        let records = world.engine.device().create_buffer(&wgpu::BufferDescriptor {
+            label: Some("test.records"),
+            size: 4 * data.len() as u64,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let bytes: Vec<u8> = data.iter().flat_map(|word| word.to_le_bytes()).collect();
+        world.engine.queue().write_buffer(&records, 0, &bytes);
+        let emit = Emit::Copy { records, stride };
+        for capacity in [None, Some(0), Some(100), Some(n as u32)] {
+            let outputs = Outputs { indices: true, capacity, emit: emit.clone(), ..Outputs::NONE };
+            let visible =
+                world.engine.context().create_visible(&crowd.instances, &outputs).unwrap();
+            world.cull(&crowd, &visible, &CullOptions::default()).unwrap();
+            let draws = world.words(visible.draw_arguments().unwrap());
+            let mut room = capacity.map_or(n, |c| c as usize);
+            for (p, piece) in crowd.pieces().iter().enumerate() {
+                let kept = piece.clone().filter(|i| crowd.made[*i].is_kept());
+                let kept: Vec<usize> = kept.take(room).collect();
+                room -= kept.len();
+                assert_eq!(draws[5 * p + 1] as usize, kept.len());
+                let list = world.words(visible.list(p).unwrap());
+                let want = kept.iter().flat_map(|i| &data[i * words..(i + 1) * words]);
+                let (got, behind) = list.split_at(kept.len() * words);
+                assert!(got.iter().eq(want), "{n} {stride} {capacity:?} {p}");
+                assert!(behind.iter().all(|word| *word == u32::MAX), "past the end");
+                assert!(behind.len() >= CANARY_WORDS as usize);
+            }
+            let options = CullOptions { order: Order::Any, ..CullOptions::default() };
+            let text = world.cull(&crowd, &visible, &options).unwrap_err().to_string();
+            assert!(text.starts_with("order: expected Order::Stable for Emit::Copy"), "{text}");
+        }
+    }
+}
+
+/// What cannot be used is refused by name.
+#[test]
+fn bad_tables_ids_and_records_are_refused() {
+    let world = World::new(&[]);
+    let hiz = world.engine.context();
+    let draw = DrawTemplate { index_count: 3, ..DrawTemplate::default() };
+    let lod = |error: f64| Lod::new(draw, error);
+    let refused = |lods: &[&[Lod]]| {
+        let meshes: Vec<_> = lods.iter().map(|lods| MeshLods::new(lods)).collect();
+        hiz.create_mesh_table(&meshes).unwrap_err()
+    };
+    assert_eq!(refused(&[]).to_string(), "meshes: expected at least one mesh, got none");
+    assert!(refused(&[&[]]).to_string().contains("mesh 0 has none"));
+    assert_eq!(
+        refused(&[&[lod(0.0)], &[lod(0.0); 9]]),
+        Error::Limit { name: "levels of detail of mesh 1".into(), requested: 9, allowed: 8 }
+    );
+    for error in [-1.0, f64::NAN, f64::INFINITY] {
+        let text = refused(&[&[lod(error)]]).to_string();
+        assert!(text.starts_with("error: expected errors from 0 on"), "{text}");
+    }
+    let vertices = Lod::new(VertexDraw { vertex_count: 3, first_vertex: 0 }, 0.0);
+    assert!(refused(&[&[lod(0.0)], &[vertices]]).to_string().starts_with("draw: expected"));
+    let moved = Lod::new(DrawTemplate { first_instance: 1, ..draw }, 0.0);
+    assert!(refused(&[&[moved]]).to_string().starts_with("first_instance: expected 0"));
+
+    let centers = [0.0_f32; 6];
+    let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&[1.0; 2]) };
+    let upload = |ids: Option<&[u32]>, scales: Option<&[f64]>| {
+        let scales = scales.map(Floats::F64);
+        let options = InstanceOptions { mesh_ids: ids, scales, ..InstanceOptions::default() };
+        world.engine.instances(&bounds, &options)
+    };
+    let text = upload(Some(&[0]), None).unwrap_err().to_string();
+    assert_eq!(text, "mesh_ids: expected one per instance, which are 2, got 1");
+    let text = upload(None, Some(&[1.0, -1.0])).unwrap_err().to_string();
+    assert!(text.starts_with("scales: expected numbers from 0 on") && text.ends_with("index 1"));
+    assert!(matches!(upload(Some(&[0, 1 << 20]), None), Err(Error::Limit { .. })));
+    let instances = upload(Some(&[0, 5]), None).unwrap();
+    let meshes = world.table(&[1; 5], true);
+    let visible = |instances: &Instances, emit: Emit| {
+        hiz.create_visible(instances, &Outputs { draws: true, emit, ..Outputs::NONE })
+    };
+    let binned = |placement| Emit::Binned { meshes: meshes.clone(), placement };
+    let text = visible(&instances, binned(Placement::Packed)).unwrap_err().to_string();
+    assert_eq!(text, "mesh_ids: expected ids below 5, the number of meshes, got 5");
+
+    // Bins belong to the ids of their instances, and in any order to one mesh.
+    let [first, second] = [0, 1].map(|id| upload(Some(&[id, 1]), None).unwrap());
+    let packed = visible(&first, binned(Placement::Packed)).unwrap();
+    let crowd = |instances: &Arc<Instances>| Crowd {
+        made: Vec::new(),
+        instances: Arc::clone(instances),
+        piece: 2,
+    };
+    let error = world.cull(&crowd(&second), &packed, &CullOptions::default()).unwrap_err();
+    assert!(error.to_string().starts_with("visible: expected buffers that were created for these"));
+    let any = CullOptions { order: Order::Any, ..CullOptions::default() };
+    for placement in [Placement::Packed, Placement::Reserved] {
+        let visible = visible(&first, binned(placement)).unwrap();
+        let text = world.cull(&crowd(&first), &visible, &any).unwrap_err().to_string();
+        assert!(text.starts_with("order: expected Order::Stable, got Order::Any"), "{text}");
+    }
+
+    let buffer = |size, usage| {
+        let (label, mapped_at_creation) = (None, false);
+        let descriptor = wgpu::BufferDescriptor { label, size, usage, mapped_at_creation };
+        world.engine.device().create_buffer(&descriptor)
+    };
+    let storage = wgpu::BufferUsages::STORAGE;
+    let copy = |records: wgpu::Buffer, stride| {
+        visible(&first, Emit::Copy { records, stride }).unwrap_err().to_string()
+    };
+    for stride in [0, 2, 6, 260] {
+        assert!(copy(buffer(4096, storage), stride).starts_with("stride: expected 4 to 256"));
+    }
+    assert!(copy(buffer(12, storage), 8).starts_with("records: expected 16 bytes, which are 8"));
+    let text = copy(buffer(64, wgpu::BufferUsages::VERTEX), 8);
+    assert!(text.starts_with("records: expected the usage STORAGE"), "{text}");
+}
+
+/// Without the feature, what sets `first_instance` is refused, and reserved bins work.
+#[test]
+fn packed_bins_need_first_instances() {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = wgpu::Backends::VULKAN;
+    let instance = wgpu::Instance::new(descriptor);
+    let request = wgpu::RequestAdapterOptions::default();
+    let adapter = pollster::block_on(instance.request_adapter(&request)).expect("a driver");
+    let descriptor = wgpu::DeviceDescriptor::default();
+    let (device, queue) =
+        pollster::block_on(adapter.request_device(&descriptor)).expect("a device");
+    let hiz = HizContext::new(&device).unwrap();
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let bounds = Bounds::Spheres { centers: Floats::F32(&[0.0; 3]), radii: Floats::F32(&[1.0]) };
+    let instances =
+        hiz.record_instances(&mut encoder, &bounds, &InstanceOptions::default()).unwrap();
+    queue.submit([encoder.finish()]);
+    let draw = DrawTemplate { index_count: 3, ..DrawTemplate::default() };
+    let meshes = hiz.create_mesh_table(&[MeshLods::new(&[Lod::new(draw, 0.0)])]).unwrap();
+    let visible =
+        |emit| hiz.create_visible(&instances, &Outputs { draws: true, emit, ..Outputs::NONE });
+    let packed = Emit::Binned { meshes: meshes.clone(), placement: Placement::Packed };
+    let text = visible(packed).unwrap_err().to_string();
+    assert!(text.starts_with("placement: expected a device with the feature INDIRECT_FIRST"));
+    assert!(text.ends_with("or use Placement::Reserved"), "{text}");
+    let text = visible(Emit::Instances { meshes: meshes.clone() }).unwrap_err().to_string();
+    assert!(text.starts_with("emit: expected a device with the feature INDIRECT_FIRST_INSTANCE"));
+    let reserved = Emit::Binned { meshes, placement: Placement::Reserved };
+    assert!(visible(reserved).is_ok());
 }
 
 /// Each fault must show: in a list, in the draws or in their number.

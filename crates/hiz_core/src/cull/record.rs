@@ -14,6 +14,7 @@ use crate::instances::piece::{CULL_WORKGROUP, Piece};
 use crate::output::bins::{Arrangement, Bins};
 use crate::output::compact::Compaction;
 use crate::output::emit_passes::Emission;
+use crate::output::lists::Copied;
 use crate::output::survivors::NO_SURVIVORS;
 use crate::output::visible::Visible;
 
@@ -72,7 +73,8 @@ fn bind_output<'a>(
     let mut written = [&output.mask]
         .into_iter()
         .chain(listed.into_iter().flatten())
-        .chain(binned.into_iter().flatten());
+        .chain(binned.into_iter().flatten())
+        .chain(lists.and_then(|lists| lists.copied.as_ref()).map(Copied::buffer));
     written
         .try_for_each(check_alive)
         .and_then(|()| {
@@ -262,6 +264,12 @@ fn report_key(
         }
     } else {
         let listed = visible.lists.is_some();
+        if any_order && visible.lists.as_ref().is_some_and(|lists| lists.copied.is_some()) {
+            return Err(Error::invalid(
+                "order",
+                "expected Order::Stable for Emit::Copy, got Order::Any",
+            ));
+        }
         mask |= listed && !any_order;
         EmitKey::List { append: listed && any_order, list: list && any_order, capped }
     };

@@ -48,6 +48,7 @@
 mod adapter;
 mod ahead;
 mod answers;
+mod bins;
 mod counts;
 mod cull;
 mod culling;
@@ -68,6 +69,7 @@ mod uploads;
 mod warm_up;
 
 pub use adapter::{ADAPTER_VARIABLE, AdapterSummary, INSTALL_HINT, adapters};
+pub use bins::NO_LOD;
 pub use counts::{Counts, Timings};
 pub use culling::Culling;
 pub use depth_image::DepthImage;

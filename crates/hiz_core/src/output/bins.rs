@@ -110,7 +110,7 @@ impl Bins {
         capacity: u32,
     ) -> Result<Option<Self>> {
         let (meshes, arrangement) = match emit {
-            Emit::List => return Ok(None),
+            Emit::List | Emit::Copy { .. } => return Ok(None),
             Emit::Binned { meshes, placement: Placement::Packed } => (meshes, Arrangement::Packed),
             Emit::Binned { meshes, placement: Placement::Reserved } => {
                 (meshes, Arrangement::Reserved)

@@ -46,4 +46,22 @@ pub enum Emit {
         /// The meshes that the instances' `mesh_ids` speak of.
         meshes: MeshTable,
     },
+    /// As [`Emit::List`], with the caller's own records of the kept instances in place of their
+    /// indices.
+    /// So a pipeline reads them as a vertex buffer with step mode `Instance`, without a change to
+    /// its shaders.
+    Copy {
+        /// A record per instance, by index, in a buffer with the usage `STORAGE`.
+        /// A cull copies what the records hold when it runs.
+        records: wgpu::Buffer,
+        /// Bytes of a record: 4 to 256, a multiple of 4.
+        stride: u32,
+    },
+}
+
+impl Emit {
+    /// Whether there is one list with one draw per piece.
+    pub(crate) fn is_one_list(&self) -> bool {
+        matches!(self, Self::List | Self::Copy { .. })
+    }
 }

@@ -12,7 +12,6 @@ use crate::instances::piece::Piece;
 use crate::output::bins::{Arrangement, Bins};
 use crate::output::counters::StatisticsRecord;
 use crate::output::draw::DrawIndexedIndirect;
-use crate::output::emit::Emit;
 use crate::output::lists::Lists;
 use crate::output::outputs::Outputs;
 use crate::output::survivors::GroupOutput;
@@ -107,8 +106,8 @@ impl Visible {
         Ok(Self {
             context: gpu.id(),
             pieces: pieces.collect::<Result<_>>()?,
-            lists: (listed && *emit == Emit::List)
-                .then(|| Lists::new(gpu, instances, outputs.indices, capacity, draw))
+            lists: (listed && emit.is_one_list())
+                .then(|| Lists::new(gpu, instances, outputs.indices, capacity, (emit, draw)))
                 .transpose()?,
             bins,
             statistics: OnceLock::new(),
@@ -158,7 +157,7 @@ impl Visible {
     /// They are the first ones, so this is the count for `multi_draw_indexed_indirect_count`.
     ///
     /// `None` where each bin has its record in a fixed place
-    /// ([`Placement::Reserved`](crate::Placement::Reserved)), for [`Emit::List`], and if neither
+    /// ([`Placement::Reserved`](crate::Placement::Reserved)), for [`Emit::List`](crate::Emit::List), and if neither
     /// draws nor indices were asked for.
     pub fn draw_count(&self) -> Option<&wgpu::Buffer> {
         let bins = self.bins.as_ref()?;
@@ -193,7 +192,8 @@ impl Visible {
         self.pieces.len()
     }
 
-    /// A piece's packed list of kept instances: u32 indices in the caller's numbering.
+    /// A piece's packed list of kept instances: u32 indices in the caller's numbering, or the
+    /// caller's records with [`Emit::Copy`](crate::Emit::Copy).
     /// The buffer can be used as storage and as an instance vertex buffer.
     /// `None` without [`Outputs::indices`].
     ///

@@ -11,7 +11,7 @@ use crate::gpu::shader::{FILES, Source};
 use crate::input::bounds::BoundsKind;
 use crate::instances::update::update_module;
 use crate::occluders::device_raster::occluders_module;
-use crate::output::compact::compact_module;
+use crate::output::compact::{compact_module, copy_module};
 use crate::output::emit_passes;
 use crate::pyramid::reduce::{blocks_module, coarse_module};
 use crate::testing::lod::choose_lods_module;
@@ -51,6 +51,7 @@ pub(super) fn all() -> Vec<(String, Source)> {
     let mut all = vec![
         ("refine_groups".to_owned(), refine_groups_module()),
         ("compact".to_owned(), compact_module()),
+        ("copy".to_owned(), copy_module()),
         ("emit_scan".to_owned(), emit_passes::scan_module()),
         ("emit_bins".to_owned(), emit_passes::bins_module()),
         ("emit_draws".to_owned(), emit_passes::draws_module()),

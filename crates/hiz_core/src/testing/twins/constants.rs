@@ -310,6 +310,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("emit_instances", line(emit_passes::WORKGROUP)),
         ("emit_scatter", line(emit_passes::WORKGROUP)),
         ("emit_top", line(emit_passes::WORKGROUP)),
+        ("copy_records", line(SCATTER_WORKGROUP)),
         ("count", line(count::LANES)),
         ("cull", line(GROUP as u32)),
         ("cull_groups", line(CULL_WORKGROUP)),
