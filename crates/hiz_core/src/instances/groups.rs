@@ -167,7 +167,12 @@ impl Groups {
             }
             Ok(())
         })?;
-        Ok(Self { count, groups: Vec::new() })
+        Ok(Self::unknown(count))
+    }
+
+    /// Of a piece whose group boxes are made on the device: the host knows none.
+    pub(crate) fn unknown(count: usize) -> Self {
+        Self { count, groups: Vec::new() }
     }
 
     /// The number of groups.

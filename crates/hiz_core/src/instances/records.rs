@@ -45,12 +45,21 @@ impl Records {
         record_bytes: u64,
         fill: impl FnOnce(&Mapped<'_>) -> Result<T>,
     ) -> Result<(Self, Upload, T)> {
-        let columns = count.clamp(1, RECORDS_PER_ROW).next_multiple_of(ROW_MULTIPLE);
+        let columns = Self::columns(count);
         let rows = count.div_ceil(RECORDS_PER_ROW).max(1);
         let size = u64::from(columns) * u64::from(rows) * record_bytes;
         // Without MAP_WRITE, wgpu would map a staging buffer of its own and copy it into this one.
         let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::MAP_WRITE;
         let (staging, filled) = gpu.written(label, size, usage, fill)?;
+        let records = Self::unwritten(gpu, label, count, record_bytes)?;
+        let texture = records.texture.clone();
+        Ok((records, Upload { staging, texture }, filled))
+    }
+
+    /// Makes room for `count` records, which commands write later.
+    pub(crate) fn unwritten(gpu: &Gpu, label: &str, count: u32, record_bytes: u64) -> Result<Self> {
+        let columns = Self::columns(count);
+        let rows = count.div_ceil(RECORDS_PER_ROW).max(1);
         let texture = gpu.texture(
             label,
             (columns * (record_bytes / TEXEL_BYTES) as u32, rows),
@@ -60,8 +69,12 @@ impl Records {
                 | wgpu::TextureUsages::COPY_SRC,
         )?;
         let view = gpu.view(&texture)?;
-        let records = Self { view, texture: texture.clone(), record_bytes };
-        Ok((records, Upload { staging, texture }, filled))
+        Ok(Self { view, texture, record_bytes })
+    }
+
+    /// The records in a row, of `count` in all.
+    fn columns(count: u32) -> u32 {
+        count.clamp(1, RECORDS_PER_ROW).next_multiple_of(ROW_MULTIPLE)
     }
 
     /// Texels per record.
