@@ -24,7 +24,9 @@ use crate::occluders::device_raster::record_occluders;
 use crate::occluders::drawing::OccluderOptions;
 use crate::occluders::drawing::{DrawOptions, Rasteriser, Touched};
 use crate::occluders::uploaded::Occluders;
+use crate::output::mesh_table::{MeshLods, MeshTable};
 use crate::output::outputs::Outputs;
+use crate::output::readback::{AnswerInFlight, ReadbackRing, record_readback};
 use crate::output::visible::Visible;
 use crate::pyramid::reduce::record_reduce;
 use crate::pyramid::{Pyramid, PyramidOptions, PyramidUniform};
@@ -205,7 +207,7 @@ impl HizContext {
         &self,
         encoder: &mut wgpu::CommandEncoder,
         bounds: &Bounds<'_>,
-        options: &InstanceOptions,
+        options: &InstanceOptions<'_>,
     ) -> Result<Instances> {
         Instances::new(&self.gpu, bounds, options, true, |copies, _| {
             self.gpu.recorded(|| {
@@ -261,13 +263,28 @@ impl HizContext {
         })
     }
 
+    /// Makes a table of meshes, each with its levels of detail.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] for no meshes, a mesh without a level of detail, errors that are not
+    ///   finite and at least 0, a `first_instance` other than 0, and for draws of which some have
+    ///   an index buffer and others have none.
+    /// - [`Error::Limit`] for more than [`MAX_LODS`](crate::MAX_LODS) levels of detail of a mesh,
+    ///   and for more than 65,536 meshes.
+    /// - [`Error::OutOfMemory`].
+    pub fn create_mesh_table(&self, meshes: &[MeshLods<'_>]) -> Result<MeshTable> {
+        MeshTable::new(&self.gpu, meshes)
+    }
+
     /// Makes the buffers that take what a cull of `instances` finds.
     ///
     /// # Errors
     /// - [`Error::Mismatch`] for instances of another context.
     /// - [`Error::Invalid`] for a
     ///   [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0 on a
-    ///   device without the feature `INDIRECT_FIRST_INSTANCE`.
+    ///   device without the feature `INDIRECT_FIRST_INSTANCE`, for an
+    ///   [`Emit`](crate::Emit) that needs the feature, and for mesh ids past the mesh table.
+    /// - [`Error::Limit`] for lists or draws that do not fit one binding.
     /// - [`Error::OutOfMemory`].
     /// - [`Error::Device`] if the device is lost.
     pub fn create_visible(&self, instances: &Instances, outputs: &Outputs) -> Result<Visible> {
@@ -423,6 +440,35 @@ impl HizContext {
         )
     }
 
+    /// Makes a ring of `slots` (1..=64) for answers on their way to the host.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for another number of slots.
+    pub fn create_readback(&self, slots: usize) -> Result<ReadbackRing> {
+        ReadbackRing::new(&self.gpu, slots)
+    }
+
+    /// Records the copies of what a cull leaves in `visible`: mask, list and draw arguments.
+    ///
+    /// Record it behind the cull.
+    /// After the submit the answer arrives with a poll of the device
+    /// ([`AnswerInFlight::is_ready`]); nothing here submits, polls or waits.
+    /// The whole capacity of the lists is copied.
+    /// If the encoder is never submitted, drop the answer.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] if all slots are taken: read or drop one of their answers first.
+    /// - [`Error::Mismatch`] for objects of another context.
+    /// - [`Error::OutOfMemory`].
+    pub fn record_readback(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        visible: &Visible,
+        ring: &ReadbackRing,
+    ) -> Result<AnswerInFlight> {
+        record_readback(&self.gpu, encoder, visible, ring)
+    }
+
     /// Makes everything that frames like this one need, and records work that makes the driver
     /// compile it.
     ///
@@ -469,8 +515,8 @@ fn needed(have: &wgpu::Limits) -> Vec<(&'static str, u64, u64)> {
         max_bind_groups_plus_vertex_buffers >= 4,
         // The view of a cull (`cull/pipelines.rs`, `DepthStore::layout`).
         max_bindings_per_bind_group >= 7,
-        // A depth image.
-        max_sampled_textures_per_shader_stage >= 1,
+        // A depth image; slots and mesh table of a cull that emits bins.
+        max_sampled_textures_per_shader_stage >= 3,
         max_samplers_per_shader_stage >= 1,
         // The cull of members: three chunks, mask, list, draws, statistics, survivors.
         max_storage_buffers_per_shader_stage >= 8,

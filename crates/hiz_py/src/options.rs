@@ -3,7 +3,7 @@
 //! The struct expressions name every field, so that an option without its line does not compile.
 
 use hiz_core::{
-    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, LodRule, Order, Outputs,
+    Coverage, CullOptions, DrawTemplate, Emit, Fit, Footprint, Hierarchy, LodRule, Order, Outputs,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -88,6 +88,7 @@ fn outputs(given: &Bound<'_, PyAny>, order: Order) -> PyResult<Outputs> {
         draws: listed("draws")?,
         capacity: given.getattr("capacity")?.extract()?,
         draw: draw_template(&given.getattr("draw")?)?,
+        emit: Emit::List,
     })
 }
 

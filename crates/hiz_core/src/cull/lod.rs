@@ -10,9 +10,7 @@ use crate::host::rounding::round_up;
 use crate::input::camera::Camera;
 use crate::input::image::DepthConvention;
 use crate::input::stretch::Stretch;
-
-/// How many LODs a mesh may have.
-pub const MAX_LODS: usize = 8;
+use crate::output::mesh_table::MAX_LODS;
 
 /// The largest distance that a rule may name, in world units: 2^50, past every valid bound.
 const FARTHEST: f64 = 1_125_899_906_842_624.0;

@@ -1,12 +1,13 @@
 //! The view uniform: what the shaders know of a camera and of the options.
 
-use crate::cull::lod::{LodNumbers, MAX_LODS};
+use crate::cull::lod::LodNumbers;
 use crate::cull::options::{Coverage, CullOptions};
 use crate::error::{Error, Result};
 use crate::host::rounding::{EPS, round_up};
 use crate::input::camera::Camera;
 use crate::input::tolerance::DepthTolerance;
 use crate::input::view::ViewRows;
+use crate::output::mesh_table::MAX_LODS;
 
 /// Twin: `shaders/cull/view.wgsl`, `View`, which documents the fields.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]

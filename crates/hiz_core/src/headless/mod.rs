@@ -7,7 +7,8 @@
 //! 2. `uploads` brings instances, updates and occluders to it, and `depth_image` depth images.
 //! 3. `levels` builds pyramids and reads their levels.
 //! 4. `cull` submits a cull into buffers of `answers`; `culling` reads them, through `counts`,
-//!    `explanation` and `readback`.
+//!    `explanation`, `ranges` and `readback`.
+//!    With `ahead`, `in_flight` and `slots` the answer comes while the caller does something else.
 //! 5. `single` does all of that at once, for bounds that are used once.
 //!
 //! `answers` and `images` lend what was dropped, and `warm_up` runs a frame before the first one.
@@ -45,6 +46,7 @@
 //! [`Error::OtherProcess`]: crate::Error::OtherProcess
 
 mod adapter;
+mod ahead;
 mod answers;
 mod counts;
 mod cull;
@@ -54,11 +56,14 @@ pub(crate) mod engine;
 mod explain;
 mod explanation;
 mod images;
+mod in_flight;
 mod kept_depth;
 mod levels;
 mod process;
+mod ranges;
 pub(crate) mod readback;
 mod single;
+mod slots;
 mod uploads;
 mod warm_up;
 
@@ -69,3 +74,4 @@ pub use depth_image::DepthImage;
 pub use engine::Engine;
 pub use explanation::Explanation;
 pub use single::SingleCull;
+pub use slots::CULLS_IN_FLIGHT;

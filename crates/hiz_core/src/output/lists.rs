@@ -108,7 +108,8 @@ impl Lists {
     }
 }
 
-fn filled_list(gpu: &Gpu, words: u64) -> Result<wgpu::Buffer> {
+/// A list of `words`, each 0xFFFFFFFF.
+pub(crate) fn filled_list(gpu: &Gpu, words: u64) -> Result<wgpu::Buffer> {
     const LABEL: &str = "hiz.visible.list";
     let size = 4 * words;
     let list = gpu.mapped(LABEL, size, STORAGE | wgpu::BufferUsages::VERTEX)?;

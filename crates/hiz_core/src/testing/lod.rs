@@ -1,6 +1,6 @@
 //! The LODs that the shader chooses, without a cull around it.
 
-use crate::cull::lod::{LodRule, MAX_LODS};
+use crate::cull::lod::LodRule;
 use crate::cull::pipelines::{CullKey, DepthStore, classify_constants, lod_constants, unexplained};
 use crate::error::Result;
 use crate::gpu::buffers::{STORAGE, entry};
@@ -12,6 +12,7 @@ use crate::headless::readback::{self, BufferRange};
 use crate::input::bounds::BoundsKind;
 use crate::instances::Instances;
 use crate::instances::piece::RECORD_BINDINGS;
+use crate::output::mesh_table::MAX_LODS;
 use crate::pyramid::PyramidUniform;
 
 /// Invocations of a workgroup.

@@ -6,7 +6,7 @@ use super::declared;
 use crate::cull::count;
 use crate::cull::explain::{self, Stage};
 use crate::cull::groups::GROUPS_OF_RUN;
-use crate::cull::lod::{LodRule, MAX_LODS};
+use crate::cull::lod::LodRule;
 use crate::cull::pipelines::{CullKey, DepthStore, ReportKey};
 use crate::cull::pipelines::{classify_constants, cull_module, report_constants};
 use crate::cull::refine;
@@ -20,8 +20,11 @@ use crate::instances::batch::GROUP;
 use crate::instances::piece::CULL_WORKGROUP;
 use crate::instances::records::{RECORDS_PER_ROW, TEXEL_BYTES};
 use crate::instances::update;
-use crate::instances::volume_record::{BEYOND_LIMITS, LARGEST};
+use crate::instances::volume_record::{ABSENT_CENTER, BEYOND_LIMITS, LARGEST};
+use crate::output::bins::BLOCK_WORDS;
 use crate::output::compact::SCATTER_WORKGROUP;
+use crate::output::emit_passes;
+use crate::output::mesh_table::{MAX_LODS, MESH_TEXELS};
 use crate::output::survivors::SURVIVORS_PER_ROW;
 use crate::output::verdict::{VERDICT_MASK, Verdict};
 use crate::output::visible::VERDICT_MULTIPLE;
@@ -30,7 +33,7 @@ use crate::pyramid::levels::MAX_LEVELS;
 use crate::pyramid::reduce::{REDUCE_WORKGROUP, SHARED_LEVEL, TALL_SIDE};
 use crate::testing::lod;
 use crate::testing::shaders::tests::parse;
-use crate::testing::shaders::{KINDS, all, files};
+use crate::testing::shaders::{EMITS, KINDS, all, files};
 use crate::yardstick::reduce as yardstick;
 
 /// Constants of the shaders with a twin in this crate or in Rust's `core`.
@@ -87,7 +90,15 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/record_layout", "RECORDS_PER_ROW_LOG2", int(RECORDS_PER_ROW.ilog2())),
         ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
         ("instances/update", "BEYOND_LIMITS_BITS", bits(BEYOND_LIMITS)),
+        ("cull/classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
         ("output/compact", "SCATTER_WORKGROUP", int(SCATTER_WORKGROUP)),
+        ("output/emit", "BLOCK_LOG2_WORDS", int(BLOCK_WORDS.ilog2())),
+        ("output/emit_bins", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/emit_instances", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/emit_scan", "LANES", int(emit_passes::WORKGROUP)),
+        ("output/emit_scan", "SHARE", int(BLOCK_WORDS / emit_passes::WORKGROUP)),
+        ("output/emit_scatter", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/mesh_table", "MESH_TEXELS", MESH_TEXELS as f64),
         ("output/verdict", "OUTSIDE", verdict(Verdict::Outside)),
         ("output/verdict", "OCCLUDED", verdict(Verdict::Occluded)),
         ("output/verdict", "VISIBLE", verdict(Verdict::Visible)),
@@ -117,7 +128,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/classify", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
     ("cull/lod", &["NEEDS", "NEED_FACTOR", "LARGEST_DEVIATION"]),
     ("cull/refine", &["REFINED"]),
-    ("cull/refine_groups", &["WITHIN"]),
+    ("cull/refine_groups", &["LAST_TEXEL", "WITHIN"]),
     (
         "cull/supporting_planes",
         &[
@@ -160,6 +171,9 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ),
     // One workgroup scans, however large it is.
     ("output/compact", &["LANES"]),
+    ("output/emit_draws", &["LANES"]),
+    ("output/emit_record", &["COMMON_WORDS"]),
+    ("output/mesh_table", &["ERRORS_LOG2"]),
 ];
 
 /// The constants of every file that are one number: by file and name.
@@ -240,6 +254,9 @@ fn constants_fit_each_other() {
     assert!(number("cull/supporting_planes", "BEYOND") >= f64::from(MAX_IMAGE_SIDE));
     assert_eq!(MAX_IMAGE_SIDE, 1 << (MAX_LEVELS - 1));
     assert_eq!(Stage::ALL.map(|s| s as usize), std::array::from_fn(|i| i));
+    assert!(BLOCK_WORDS.is_power_of_two());
+    // A texel for the number of a mesh's LODs, and one for each four errors.
+    assert_eq!(MESH_TEXELS - 1, MAX_LODS >> number("output/mesh_table", "ERRORS_LOG2") as u32);
     // What is beyond limits is beyond what is still valid.
     const { assert!(BEYOND_LIMITS > LARGEST) };
 }
@@ -286,6 +303,13 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
     BTreeMap::from([
         ("begin", line(1)),
         ("choose_lods", line(lod::LANES)),
+        ("emit_bins", line(emit_passes::WORKGROUP)),
+        ("emit_block", line(emit_passes::WORKGROUP)),
+        // One workgroup, the largest that WebGPU promises.
+        ("emit_draws", line(wgpu::Limits::default().max_compute_invocations_per_workgroup)),
+        ("emit_instances", line(emit_passes::WORKGROUP)),
+        ("emit_scatter", line(emit_passes::WORKGROUP)),
+        ("emit_top", line(emit_passes::WORKGROUP)),
         ("count", line(count::LANES)),
         ("cull", line(GROUP as u32)),
         ("cull_groups", line(CULL_WORKGROUP)),
@@ -338,19 +362,14 @@ fn a_cull_sets_every_override() {
             descent: false,
             fit_volume: false,
         };
-        let report = ReportKey {
-            mask: false,
-            verdicts: false,
-            append: false,
-            list: false,
-            capped: false,
-            statistics: false,
-        };
-        let set = classify_constants(&key).into_iter().chain(report_constants(&report));
-        let set: BTreeSet<String> = set.map(|(name, _)| name.to_owned()).collect();
-        let module = parse(&cull_module(store, kind).text());
-        let declared: BTreeSet<String> =
-            module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
-        assert_eq!(set, declared, "{kind:?}");
+        for (way, emit) in EMITS {
+            let report = ReportKey { mask: false, verdicts: false, emit, statistics: false };
+            let set = classify_constants(&key).into_iter().chain(report_constants(&report));
+            let set: BTreeSet<String> = set.map(|(name, _)| name.to_owned()).collect();
+            let module = parse(&cull_module(store, kind, emit).text());
+            let declared: BTreeSet<String> =
+                module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
+            assert_eq!(set, declared, "{kind:?} {way}");
+        }
     }
 }

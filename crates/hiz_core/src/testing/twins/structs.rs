@@ -10,8 +10,10 @@ use crate::input::bounds::{Bounds, Floats};
 use crate::instances::SEQUENCE_BYTES;
 use crate::instances::piece::PieceUniform;
 use crate::instances::update::UpdateUniform;
+use crate::output::bins::{BinRecord, EmitUniform, TotalRecord};
 use crate::output::counters::{CounterRecord, StatisticsRecord};
 use crate::output::draw::DrawIndexedIndirect;
+use crate::output::mesh_table::TemplateRecord;
 use crate::output::survivors::SurvivorsRecord;
 use crate::pyramid::PyramidUniform;
 use crate::pyramid::layout::PYRAMID_CHUNKS;
@@ -24,12 +26,14 @@ use crate::yardstick::reduce as yardstick;
 
 /// Structs that only a shader has: they lie in no buffer.
 const SHADER_ONLY_STRUCTS: &[&str] = &[
+    "Bin",
     "Candidate",
     // Vertex inputs, which are found by location; see `occluders/device_meshes.rs`.
     "Copy",
     "Vertex",
     "Extent",
     "Flat",
+    "MaskPlace",
     "Outcome",
     "Projected",
     "SupportingPlane",
@@ -70,6 +74,9 @@ macro_rules! twin {
 
 fn struct_twins() -> Vec<(&'static str, Layout)> {
     vec![
+        twin!("BinRange", BinRecord {
+            "begin" = begin, "count" = count, "shift" = shift, "padding" = padding,
+        }),
         twin!("Counters", CounterRecord {
             "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid,
         }),
@@ -77,6 +84,10 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "index_count" = index_count, "instance_count" = instance_count,
             "first_index" = first_index, "base_vertex" = base_vertex,
             "first_instance" = first_instance,
+        }),
+        twin!("Emit", EmitUniform {
+            "base" = base, "count" = count, "words" = words, "lods" = lods, "piece" = piece,
+            "capacity" = capacity, "records" = records, "draws_begin" = draws_begin,
         }),
         twin!("Explanation", ExplanationRecord {
             "verdict" = verdict, "stage" = stage, "level" = level,
@@ -108,6 +119,10 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
             "workgroups_z" = workgroups + 8, "count" = count,
         }),
+        twin!("Template", TemplateRecord {
+            "count" = count, "first" = first, "base_vertex" = base_vertex, "padding" = padding,
+        }),
+        twin!("Total", TotalRecord { "demand" = demand, "written" = written }),
         twin!("Update", UpdateUniform {
             "count" = count, "texels" = texels, "number" = number, "padding" = padding,
         }),
