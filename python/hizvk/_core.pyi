@@ -21,10 +21,12 @@ __all__ = [
     "Engine",
     "Explanation",
     "Instances",
+    "MeshTable",
     "Occluders",
     "Pyramid",
     "Yardstick",
     "YardstickCull",
+    "YardstickFromBuffer",
     "YardstickRaster",
     "YardstickReduction",
     "__build__",
@@ -150,9 +152,13 @@ class Engine:
         self,
         kind: str,
         arrays: Sequence[_Floats],
-        strict: bool,
-        order: str,
+        strict_and_order: tuple[bool, str],
+        mesh_ids: npt.NDArray[np.uint32] | None,
+        scales: _Floats | None,
     ) -> Instances: ...
+    def mesh_table(
+        self, meshes: Sequence[Sequence[tuple[int, int, int, int, float]]]
+    ) -> MeshTable: ...
     def update(
         self, instances: Instances, first: int, kind: str, arrays: Sequence[_Floats], strict: bool
     ) -> None: ...
@@ -196,6 +202,7 @@ class Engine:
         pyramid: Pyramid,
         options: CullOptions,
         outputs: Outputs,
+        meshes: MeshTable | None,
         ahead: bool,
     ) -> Culling: ...
     def warm_up(
@@ -206,6 +213,7 @@ class Engine:
         levels: tuple[int, int],
         options: CullOptions,
         outputs: Outputs,
+        meshes: MeshTable | None,
     ) -> None: ...
     def cull_once(
         self,
@@ -251,6 +259,8 @@ class Pyramid:
 class Counts:
     @property
     def tested(self) -> int: ...
+    @property
+    def absent(self) -> int: ...
     @property
     def outside(self) -> int: ...
     @property
@@ -302,6 +312,9 @@ class Explanation:
     def group(self) -> Explanation | None: ...
 
 @final
+class MeshTable: ...
+
+@final
 class Culling:
     def num_instances(self) -> int: ...
     def is_ready(self) -> bool: ...
@@ -310,6 +323,9 @@ class Culling:
     def verdicts(self) -> npt.NDArray[np.uint8]: ...
     def indices(self) -> npt.NDArray[np.uint32]: ...
     def draws(self) -> bytes: ...
+    def draw_counts(self) -> list[int]: ...
+    def lods(self) -> npt.NDArray[np.uint8]: ...
+    def bin(self, mesh: int, lod: int) -> npt.NDArray[np.uint32]: ...
     def counts(self) -> Counts: ...
     def demand_and_written(self) -> tuple[int | None, int]: ...
     def timings(self) -> tuple[float, float, float, float]: ...
@@ -333,6 +349,7 @@ class Yardstick:
         cameras: Sequence[Camera],
         is_warmed: bool,
     ) -> tuple[float, list[list[float]]]: ...
+    def from_buffer(self, kind: str, arrays: Sequence[_Floats]) -> YardstickFromBuffer: ...
     def raster(self, occluders: Occluders, camera: Camera, threads: int) -> YardstickRaster: ...
     def cull(
         self,
@@ -348,6 +365,11 @@ class Yardstick:
 @final
 class YardstickReduction:
     def ms(self) -> float: ...
+
+@final
+class YardstickFromBuffer:
+    def ms(self) -> float: ...
+    def copy_ms(self) -> float: ...
 
 @final
 class YardstickRaster:

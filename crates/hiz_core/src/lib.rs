@@ -183,6 +183,7 @@ pub use input::mesh::{FaceCull, MeshData};
 pub use input::projection::{Pose, Projection};
 pub use input::tolerance::DepthTolerance;
 pub use input::view::ERROR_ULPS;
+pub use instances::from_buffer::BoundsBuffer;
 pub use instances::order::StoredOrder;
 pub use instances::slots::ABSENT;
 pub use instances::{InstanceOptions, Instances};

@@ -27,6 +27,7 @@ const VALUES: &[(&str, &[f64])] = &[
     ("REVERSED", FLAG),
     ("SAMPLE_COVERAGE", FLAG),
     ("SHARED", FLAG),
+    ("SORTED", FLAG),
     ("STATISTICS", FLAG),
     ("TALL", FLAG),
     ("VERDICTS", FLAG),

@@ -91,12 +91,13 @@ impl Engine {
         py: Python<'_>,
         kind: &str,
         arrays: Vec<FloatArray<'_>>,
-        (strict, order): (bool, &str),
+        strict_and_order: (bool, String),
         mesh_ids: Option<PyReadonlyArray1<'_, u32>>,
         scales: Option<FloatArray<'_>>,
     ) -> PyResult<Instances> {
         let bounds = bounds(kind, &arrays)?;
-        let order = match order {
+        let (strict, order) = strict_and_order;
+        let order = match order.as_str() {
             "morton" => StoredOrder::Morton,
             "given" => StoredOrder::Given,
             other => return Err(PyValueError::new_err(format!("order: no order {other:?}"))),

@@ -9,6 +9,7 @@ use crate::cull::refine::{refine_groups_module, refine_module};
 use crate::gpu::depth_source::SOURCES;
 use crate::gpu::shader::{FILES, Source};
 use crate::input::bounds::BoundsKind;
+use crate::instances::from_buffer::{FROM_BUFFER_KINDS, from_buffer_module};
 use crate::instances::update::update_module;
 use crate::occluders::device_raster::occluders_module;
 use crate::output::compact::{compact_module, copy_module};
@@ -81,6 +82,8 @@ pub(super) fn all() -> Vec<(String, Source)> {
     }
     all.extend(KINDS.map(|kind| (format!("refine {kind:?}"), refine_module(kind))));
     all.extend(KINDS.map(|kind| (format!("choose_lods {kind:?}"), choose_lods_module(kind))));
+    let from_buffer = |kind| (format!("from_buffer {kind:?}"), from_buffer_module(kind));
+    all.extend(FROM_BUFFER_KINDS.map(from_buffer));
     all
 }
 

@@ -17,6 +17,7 @@ use crate::input::bounds::BoundsKind;
 use crate::input::image::MAX_IMAGE_SIDE;
 use crate::input::view::ERROR_ULPS;
 use crate::instances::batch::GROUP;
+use crate::instances::from_buffer;
 use crate::instances::piece::CULL_WORKGROUP;
 use crate::instances::records::{RECORDS_PER_ROW, TEXEL_BYTES};
 use crate::instances::update;
@@ -35,6 +36,9 @@ use crate::testing::lod;
 use crate::testing::shaders::tests::parse;
 use crate::testing::shaders::{EMITS, KINDS, all, files};
 use crate::yardstick::reduce as yardstick;
+
+/// From this magnitude on, the next float32 makes up for two flushed subnormals.
+const SMALL: f32 = 1.0 / (1_u128 << 100) as f32;
 
 /// Constants of the shaders with a twin in this crate or in Rust's `core`.
 fn twins() -> Vec<(&'static str, &'static str, f64)> {
@@ -81,6 +85,18 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/bounds_oriented_box", "RECORD_TEXELS", texels(BoundsKind::OrientedBox)),
         ("instances/bounds_oriented_box", "LAST_TEXEL", texels(BoundsKind::OrientedBox) - 1.0),
         ("instances/bounds_sphere", "RECORD_TEXELS", texels(BoundsKind::Sphere)),
+        ("instances/from_buffer", "BOX_TEXELS", texels(BoundsKind::Box)),
+        ("instances/from_buffer", "SIGN_BIT", bits(-0.0)),
+        ("instances/from_buffer", "MAGNITUDE_BITS", int(u32::MAX >> 1)),
+        ("instances/from_buffer", "LARGEST_BITS", bits(LARGEST)),
+        ("instances/from_buffer", "LARGEST_CORNER_BITS", bits(2.0 * LARGEST)),
+        ("instances/from_buffer", "SMALL_BITS", bits(SMALL)),
+        ("instances/from_buffer", "BEYOND_SMALL_BITS", bits(2.0 * SMALL)),
+        ("instances/from_buffer", "INVALID_LOW", int(u32::MIN)),
+        ("instances/from_buffer", "INVALID_HIGH", int(u32::MAX)),
+        ("instances/from_buffer", "WORKGROUP", int(from_buffer::WORKGROUP)),
+        ("instances/from_buffer_box", "RECORD_TEXELS", texels(BoundsKind::Box)),
+        ("instances/from_buffer_sphere", "RECORD_TEXELS", texels(BoundsKind::Sphere)),
         ("instances/groups", "GROUP", GROUP as f64),
         ("instances/groups", "RUN", int(GROUPS_OF_RUN)),
         ("instances/groups", "SHARE", GROUP as f64 / int(GROUPS_OF_RUN)),
@@ -88,8 +104,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/piece", "VERDICT_MULTIPLE", int(VERDICT_MULTIPLE)),
         ("instances/piece", "WORD_BITS", int(u32::BITS)),
         ("instances/record_layout", "RECORDS_PER_ROW_LOG2", int(RECORDS_PER_ROW.ilog2())),
+        ("instances/record_layout", "BEYOND_LIMITS_BITS", bits(BEYOND_LIMITS)),
         ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
-        ("instances/update", "BEYOND_LIMITS_BITS", bits(BEYOND_LIMITS)),
         ("cull/classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
         ("output/compact", "SCATTER_WORKGROUP", int(SCATTER_WORKGROUP)),
         ("output/emit", "BLOCK_LOG2_WORDS", int(BLOCK_WORDS.ilog2())),
@@ -169,6 +185,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
             "TURN",
         ],
     ),
+    ("instances/from_buffer", &["HALF"]),
     // One workgroup scans, however large it is.
     ("output/compact", &["LANES"]),
     ("output/emit_draws", &["LANES"]),
@@ -257,6 +274,8 @@ fn constants_fit_each_other() {
     assert!(BLOCK_WORDS.is_power_of_two());
     // A texel for the number of a mesh's LODs, and one for each four errors.
     assert_eq!(MESH_TEXELS - 1, MAX_LODS >> number("output/mesh_table", "ERRORS_LOG2") as u32);
+    // The spacing just below 2^-100 exceeds two flushed numbers.
+    assert!(f64::from(SMALL) * EPS / 2.0 > 2.0 * f64::from(f32::MIN_POSITIVE));
     // What is beyond limits is beyond what is still valid.
     const { assert!(BEYOND_LIMITS > LARGEST) };
 }
@@ -332,6 +351,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         // One workgroup, the largest that WebGPU promises.
         ("scan", line(wgpu::Limits::default().max_compute_invocations_per_workgroup)),
         ("scatter", line(SCATTER_WORKGROUP)),
+        ("take_bounds", line(from_buffer::WORKGROUP)),
     ])
 }
 

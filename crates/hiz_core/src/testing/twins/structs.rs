@@ -8,6 +8,7 @@ use crate::cull::explain::ExplanationRecord;
 use crate::cull::view_uniform::ViewUniform;
 use crate::input::bounds::{Bounds, Floats};
 use crate::instances::SEQUENCE_BYTES;
+use crate::instances::from_buffer::FromBufferUniform;
 use crate::instances::piece::PieceUniform;
 use crate::instances::update::UpdateUniform;
 use crate::output::bins::{BinRecord, EmitUniform, TotalRecord};
@@ -27,6 +28,8 @@ use crate::yardstick::reduce as yardstick;
 /// Structs that only a shader has: they lie in no buffer.
 const SHADER_ONLY_STRUCTS: &[&str] = &[
     "Bin",
+    "BoxTexels",
+    "Corners",
     "Candidate",
     // Vertex inputs, which are found by location; see `occluders/device_meshes.rs`.
     "Copy",
@@ -94,6 +97,9 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "farthest_bits" = farthest_bits, "pixels" = pixels, "depths" = depths, "last" = last,
             "texels_read" = texels_read, "of_footprint" = of_footprint,
             "farthest_before" = farthest_before, "any_before" = any_before,
+        }),
+        twin!("FromBuffer", FromBufferUniform {
+            "count" = count, "first" = first, "stride" = stride, "runtime_zero" = runtime_zero,
         }),
         twin!("Level", Level {
             "offset" = offset, "stride" = stride, "width" = width, "height" = height,
