@@ -45,8 +45,15 @@ struct View {
     depth_offset: f32,
     // From this size on a product could overflow, so such an instance is invalid.
     coordinate_limit: f32,
-    padding: u32,
+    // Where level 0 begins in its texture, if it is a part of it: the column, and COORDINATE_BITS
+    // higher the row.
+    source_origin: u32,
 }
+
+// Bits of a column in `source_origin`.
+// Twin: `COORDINATE_BITS` in `crates/hiz_core/src/cull/view_uniform.rs`.
+const COORDINATE_BITS: u32 = 16u;
+const COORDINATE_MASK: u32 = (1u << COORDINATE_BITS) - 1u;
 
 var<private> view: View;
 

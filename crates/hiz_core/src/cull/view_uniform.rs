@@ -30,10 +30,18 @@ pub(crate) struct ViewUniform {
     pub(crate) descent_budget: u32,
     pub(crate) depth_offset: f32,
     pub(crate) coordinate_limit: f32,
-    pub(crate) padding: u32,
+    pub(crate) source_origin: u32,
 }
 
 const _: () = assert!(size_of::<ViewUniform>() == 176);
+
+/// Bits of a column in `source_origin`; twin: `shaders/cull/view.wgsl`, `COORDINATE_BITS`.
+pub(crate) const COORDINATE_BITS: u32 = 16;
+
+/// Column and row of a pixel in one word; images have at most 2^15 pixels a side.
+pub(crate) fn packed([column, row]: [u32; 2]) -> u32 {
+    column | row << COORDINATE_BITS
+}
 
 impl ViewUniform {
     #[expect(
@@ -127,7 +135,7 @@ impl ViewUniform {
             descent_budget: options.descent,
             depth_offset,
             coordinate_limit: rows.coordinate_limit,
-            padding: 0,
+            source_origin: 0,
         })
     }
 }

@@ -5,7 +5,8 @@
 //!
 //! 1. `adapter` lists the adapters, and `engine` opens a device on one.
 //! 2. `uploads` brings instances, updates and occluders to it, and `depth_image` depth images.
-//! 3. `levels` builds pyramids and reads their levels.
+//!    `samples` takes the farthest of several samples per pixel.
+//! 3. `levels` builds pyramids and reads their levels; `renewal` renews a part of one.
 //! 4. `cull` submits a cull into buffers of `answers`; `culling` reads them, through `counts`,
 //!    `explanation` and `readback`.
 //! 5. `single` does all of that at once, for bounds that are used once.
@@ -58,6 +59,8 @@ mod kept_depth;
 mod levels;
 mod process;
 pub(crate) mod readback;
+mod renewal;
+mod samples;
 mod single;
 mod uploads;
 mod warm_up;

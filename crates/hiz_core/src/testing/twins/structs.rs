@@ -16,6 +16,7 @@ use crate::output::survivors::SurvivorsRecord;
 use crate::pyramid::PyramidUniform;
 use crate::pyramid::layout::PYRAMID_CHUNKS;
 use crate::pyramid::levels::Level;
+use crate::pyramid::resolve::{BandUniform, ResolvedUniform};
 use crate::pyramid::steps::StepUniform;
 use crate::testing::shaders::tests::parse;
 use crate::testing::shaders::{all, files};
@@ -93,12 +94,16 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "levels" = levels, "origins" = origins, "chunk_shift" = chunk_shift,
             "first_stored" = first_stored, "last_stored" = last_stored, "padding" = padding,
         }),
+        twin!("ResolvedImage", ResolvedUniform { "origin" = origin, "size" = size }),
+        twin!("Band", BandUniform {
+            "first" = first, "rows" = rows, "stride" = stride, "nearest" = nearest,
+        }),
         twin!("Statistics", StatisticsRecord {
             "levels" = levels, "texels_low" = texels_low, "texels_high" = texels_high,
         }),
         twin!("Step", StepUniform {
-            "source" = source, "last" = last, "reduction" = reduction, "padding" = padding,
-            "blocks" = blocks, "padding_1" = padding_1,
+            "source" = source, "last" = last, "end" = end, "begin" = begin, "origin" = origin,
+            "reduction" = reduction, "base" = base, "padding" = padding,
         }),
         twin!("Survivors", SurvivorsRecord {
             "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
@@ -114,7 +119,7 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "reach" = reach, "depth_factor" = depth_factor, "size" = size,
             "runtime_zero" = runtime_zero, "reduction" = reduction,
             "descent_budget" = descent_budget, "depth_offset" = depth_offset,
-            "coordinate_limit" = coordinate_limit, "padding" = padding,
+            "coordinate_limit" = coordinate_limit, "source_origin" = source_origin,
         }),
         twin!("YardstickLevel", yardstick::PlainLevel {
             "offset" = offset, "stride" = stride, "width" = width, "height" = height,
