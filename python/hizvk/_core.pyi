@@ -194,6 +194,29 @@ class Engine:
         rounding: str,
         camera: Camera,
     ) -> DepthImage: ...
+    def upload_samples(
+        self,
+        images: Sequence[_Floats | npt.NDArray[np.uint16]],
+        kind: str,
+        scale: float,
+        invalid: Sequence[float],
+        rounding: str,
+        camera: Camera,
+    ) -> DepthImage: ...
+    def renew(
+        self, pyramid: Pyramid, depth: DepthImage, rectangle: tuple[int, int, int, int]
+    ) -> None: ...
+    def replace_depth(
+        self,
+        pyramid: Pyramid,
+        depth: DepthImage,
+        rectangle: tuple[int, int, int, int],
+        images: Sequence[_Floats | npt.NDArray[np.uint16]],
+        kind: str,
+        scale: float,
+        invalid: Sequence[float],
+        rounding: str,
+    ) -> None: ...
     def pyramid(self, depth: DepthImage, levels: tuple[int, int]) -> Pyramid: ...
     def cull(
         self,
@@ -342,6 +365,10 @@ class Yardstick:
     def reduction(
         self, depth: DepthImage, shape: str, levels: tuple[int, int]
     ) -> YardstickReduction: ...
+    def region(
+        self, depth: DepthImage, rectangle: tuple[int, int, int, int]
+    ) -> YardstickReduction: ...
+    def resolve(self, camera: Camera, samples: int) -> YardstickReduction: ...
     def frames(
         self,
         instances: Instances,

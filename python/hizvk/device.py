@@ -22,14 +22,15 @@ from ._types import FaceCull, Rasteriser, StoredOrder, words
 from .adapter import Adapter
 from .bounds import Bounds, are_points, as_arrays
 from .camera import Camera
-from .depth import checked_image
 from .drawing import Drawing, chosen, limit
 from .errors import LimitError
 from .hints import Question
 from .mesh import as_meshes
 from .options import cull_request
+from .renewal import Source
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import CullResult
+from .samples import checked_samples
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -447,10 +448,12 @@ class Device:
 
         Parameters
         ----------
-        depth : DepthImage or (height, width) array
+        depth : DepthImage or (height, width) array, or (height, width, samples)
             A rendered image of this device, alone; or an array, with `camera` and `kind`.
             Arrays are float, or uint16 for the kinds ``"z"`` and ``"distance"``.
             Row 0 is the top of the image.
+            With 2, 4, 8 or 16 samples per pixel the farthest one counts.
+            A sample with "no data" makes its pixel far, and a cull takes ``coverage="area"`` alone.
             What is masked in a masked array is "no data".
 
             A cull allows for what the dtype may have rounded:
@@ -519,19 +522,30 @@ class Device:
                     f"scale: expected 1 beside a DepthImage, whose depth is NDC, got {scale:g}"
                 )
             check_owner("depth", depth, self)
-            return Pyramid(
-                self, self._engine.pyramid(depth._inner, stored), depth.camera, is_rendered=True
-            )
+            source = Source(depth._inner)
+            built = self._engine.pyramid(depth._inner, stored)
+            return Pyramid(self, built, depth.camera, source, is_rendered=True)
         camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")
         self._check_side(camera)
-        return self._pyramid_of(
-            checked_image("depth", depth, camera, kind, scale, invalid), camera, stored
-        )
+        samples = checked_samples("depth", depth, camera, kind, scale, invalid)
+        return self._pyramid_of(samples, camera, stored, invalid)
 
-    def _pyramid_of(self, image: DepthArray, camera: Camera, stored: tuple[int, int]) -> Pyramid:
-        """The pyramid of an image that was checked, with the levels `stored`."""
-        uploaded = self._engine.upload_depth(*image, camera._inner)
-        return Pyramid(self, self._engine.pyramid(uploaded, stored), camera)
+    def _pyramid_of(
+        self,
+        images: DepthArray | list[DepthArray],
+        camera: Camera,
+        stored: tuple[int, int],
+        invalid: Any = None,
+    ) -> Pyramid:
+        """The pyramid of an image that was checked, or of one per sample; with levels `stored`."""
+        given = images if isinstance(images, list) else [images]
+        if len(given) == 1:
+            uploaded = self._engine.upload_depth(*given[0], camera._inner)
+        else:
+            planes = [plane.image for plane in given]
+            uploaded = self._engine.upload_samples(planes, *given[0][1:], camera._inner)
+        source = Source.uploaded(uploaded, given, invalid)
+        return Pyramid(self, self._engine.pyramid(uploaded, stored), camera, source)
 
     def cull(
         self,
@@ -600,6 +614,12 @@ class Device:
             raise ValueError(_other_camera(camera, pyramid))
         wait = _arguments.flag("wait", wait)
         options, outputs = cull_request(options, outputs, keywords)
+        if options.coverage == "sample" and pyramid._source.samples > 1:
+            raise ValueError(
+                'coverage: expected "area" for a pyramid of the farthest of '
+                f"{pyramid._source.samples} samples per pixel, which lie beside the pixels' "
+                'centres, got "sample"'
+            )
         culling = self._engine.cull(
             instances._inner,
             camera._inner,

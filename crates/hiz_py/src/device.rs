@@ -11,7 +11,9 @@ use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethod
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arguments::{DepthArray, FloatArray, LevelArray, bounds, depth_input, in_c_order};
+use crate::arguments::{
+    DepthArray, FloatArray, LevelArray, bounds, depth_input, depth_inputs, in_c_order,
+};
 use crate::camera::Camera;
 use crate::culling::{Counts, Culling};
 use crate::held::{Held, OnDevice, detached};
@@ -235,6 +237,56 @@ impl Engine {
         self.0
             .run(py, |engine| engine.upload_depth_of_kind(&depth, camera))
             .map(|depth| DepthImage(Held::new(py, depth)))
+    }
+
+    /// As `upload_depth`, with an image for each sample of a pixel: the farthest one counts.
+    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
+    fn upload_samples(
+        &self,
+        py: Python<'_>,
+        images: Vec<DepthArray<'_>>,
+        kind: &str,
+        scale: f64,
+        invalid: Vec<f64>,
+        rounding: &str,
+        camera: &Camera,
+    ) -> PyResult<DepthImage> {
+        let samples = depth_inputs(&images, kind, scale, &invalid, rounding)?;
+        let camera = &camera.0;
+        self.0
+            .run(py, |engine| engine.upload_depth_of_samples(&samples, camera))
+            .map(|depth| DepthImage(Held::new(py, depth)))
+    }
+
+    /// Renews a pyramid within the rectangle (x0, y0, x1, y1) of its depth image.
+    fn renew(
+        &self,
+        py: Python<'_>,
+        pyramid: &Pyramid,
+        depth: &DepthImage,
+        rectangle: (u32, u32, u32, u32),
+    ) -> PyResult<()> {
+        let (pyramid, depth) = (pyramid.0.get(py)?, depth.0.get(py)?);
+        self.0.run(py, |engine| engine.renew_pyramid(&pyramid.1, &depth, rectangle.into()))
+    }
+
+    /// Replaces the rectangle of an uploaded image by whole rows, one image for each sample.
+    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
+    fn replace_depth(
+        &self,
+        py: Python<'_>,
+        pyramid: &Pyramid,
+        depth: &DepthImage,
+        rectangle: (u32, u32, u32, u32),
+        images: Vec<DepthArray<'_>>,
+        kind: &str,
+        scale: f64,
+        invalid: Vec<f64>,
+        rounding: &str,
+    ) -> PyResult<()> {
+        let rows = depth_inputs(&images, kind, scale, &invalid, rounding)?;
+        let (pyramid, depth) = (pyramid.0.get(py)?, depth.0.get(py)?);
+        self.0.run(py, |engine| engine.replace_depth(&pyramid.1, &depth, rectangle.into(), &rows))
     }
 
     /// The mask of bounds that are used once, and the counts of the first of them.

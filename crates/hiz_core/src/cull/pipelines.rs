@@ -174,9 +174,9 @@ impl DepthStore {
     pub(crate) fn code(self) -> u32 {
         match self {
             Self::Apart(source) => source as u32,
-            Self::Atlas => 3,
+            Self::Atlas => 5,
             #[cfg(feature = "headless")]
-            Self::Nowhere => 4,
+            Self::Nowhere => 6,
         }
     }
 
