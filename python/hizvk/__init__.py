@@ -91,6 +91,7 @@ from .options import CullOptions, DrawTemplate, Outputs
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import DRAW_DTYPE, CullResult
 from .stats import CullStats
+from .views import ViewsResult
 
 if TYPE_CHECKING:
     from .recommendation import Recommendation, recommend
@@ -129,6 +130,7 @@ __all__ = [
     "Spheres",
     "SplitMesh",
     "Verdict",
+    "ViewsResult",
     "__version__",
     "adapters",
     "check_bounds",

@@ -168,7 +168,9 @@ pub mod testing;
 pub use wgpu;
 
 pub use context::HizContext;
+pub use cull::among::{Among, AmongMask};
 pub use cull::options::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
+pub use cull::views::View;
 pub use cull::warm_up::WarmUp;
 pub use error::{Error, Result};
 pub use host::linear::{Mat3, Mat4, Vec3};
@@ -194,6 +196,7 @@ pub use output::draw::{DrawIndexedIndirect, DrawTemplate};
 pub use output::outputs::Outputs;
 pub use output::readback::{Answer, AnswerInFlight, ReadbackRing};
 pub use output::verdict::Verdict;
+pub use output::views::{MAX_VIEWS, ViewsOutputs, VisibleViews};
 pub use output::visible::Visible;
 pub use pyramid::atlas::AtlasUse;
 pub use pyramid::levels::{MAX_LEVELS, StoredLevels};

@@ -22,6 +22,8 @@ pub(crate) struct CullKey {
     pub(crate) footprint_log2: u32,
     pub(crate) descent: bool,
     pub(crate) fit_volume: bool,
+    /// Whether only some instances are asked for.
+    pub(crate) among: bool,
 }
 
 /// What a cull writes: the `override` constants of `shaders/output/report.wgsl`.
@@ -35,7 +37,7 @@ pub(crate) struct ReportKey {
     pub(crate) statistics: bool,
 }
 
-pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 6] {
+pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 7] {
     [
         ("REVERSED", flag(key.reversed)),
         ("CHUNKS", key.chunks as f64),
@@ -43,6 +45,7 @@ pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 6] {
         ("FOOTPRINT_LOG2", f64::from(key.footprint_log2)),
         ("DESCENT", flag(key.descent)),
         ("FIT_VOLUME", flag(key.fit_volume)),
+        ("AMONG", flag(key.among)),
     ]
 }
 
@@ -161,6 +164,8 @@ pub(crate) fn decision_module(
         ],
         bounds,
         &[
+            wgsl!("cull/among_layout"),
+            wgsl!("cull/among"),
             wgsl!("cull/certificate"),
             wgsl!("output/verdict"),
             wgsl!("cull/outcome"),
@@ -244,7 +249,7 @@ pub(crate) fn flat_pipeline(
         source,
         entry_point: "cull",
         layouts: &layouts(gpu, key.store, "hiz.cull.visible_layout", VISIBLE_BINDINGS)?,
-        constants: &[classify_constants(key), report_constants(report)].concat(),
+        constants: &[&classify_constants(key)[..], &report_constants(report)].concat(),
     })
 }
 
@@ -286,6 +291,6 @@ pub(crate) fn cull_members_pipeline(
         source: cull_members_module(key.store, key.kind),
         entry_point: "cull_members",
         layouts: &[view, records, visible, members],
-        constants: &[classify_constants(key), report_constants(report)].concat(),
+        constants: &[&classify_constants(key)[..], &report_constants(report)].concat(),
     })
 }

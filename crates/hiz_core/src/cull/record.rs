@@ -138,17 +138,19 @@ fn record_all(
         timestamp_writes: None,
     });
     pass.set_bind_group(0, &view.instances, &[]);
-    for ((piece, output), groups) in instances.pieces.iter().zip(&outputs).zip(&grouped) {
+    let of_pieces = instances.pieces.iter().zip(&outputs).zip(&grouped);
+    for (p, ((piece, output), groups)) in of_pieces.enumerate() {
         if let (Some(groups), Some(group_view)) = (groups, &view.groups) {
             pass.set_bind_group(0, group_view, &[]);
             groups.record_boxes(
                 &mut pass,
-                piece,
+                inputs.among.map_or(&piece.group_bindings, |among| among.group_records(p)),
                 workgroups(piece.groups().div_ceil(CULL_WORKGROUP)),
             );
             pass.set_bind_group(0, &view.instances, &[]);
         }
-        pass.set_bind_group(1, &piece.bindings, &[]);
+        let records = inputs.among.map_or(&piece.bindings, |among| among.records(p));
+        pass.set_bind_group(1, records, &[]);
         pass.set_bind_group(2, *output, &[]);
         if let Some(groups) = groups {
             groups.record_members(&mut pass);

@@ -4,6 +4,7 @@
 //! - `visible` has the buffers: a mask and verdicts per piece, and what `lists` and `survivors`
 //!   hold.
 //! - `compact` makes the ordered list and its length from the mask.
+//! - `views` joins the masks of several views.
 //! - `readback` copies them to the host, a ring of slots at a time.
 //! - `draw`, `counters` and `verdict` have the layouts and codes that the shaders share.
 //!
@@ -17,4 +18,5 @@ pub(crate) mod outputs;
 pub(crate) mod readback;
 pub(crate) mod survivors;
 pub(crate) mod verdict;
+pub(crate) mod views;
 pub(crate) mod visible;

@@ -1,5 +1,6 @@
 //! Every shader module that this crate makes a pipeline of.
 
+use crate::cull::among::among_order_module;
 use crate::cull::count::count_module;
 use crate::cull::explain::explain_module;
 use crate::cull::pipelines::{DepthStore, cull_groups_module, cull_members_module, cull_module};
@@ -10,6 +11,7 @@ use crate::input::bounds::BoundsKind;
 use crate::instances::update::update_module;
 use crate::occluders::device_raster::occluders_module;
 use crate::output::compact::compact_module;
+use crate::output::views::join_module;
 use crate::pyramid::reduce::{blocks_module, coarse_module};
 #[cfg(feature = "yardstick")]
 use crate::yardstick::{uncertified_module, yardstick_modules};
@@ -33,6 +35,8 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("refine_groups".to_owned(), refine_groups_module()),
         ("compact".to_owned(), compact_module()),
         ("count".to_owned(), count_module()),
+        ("among_order".to_owned(), among_order_module()),
+        ("join_views".to_owned(), join_module()),
         ("update".to_owned(), update_module()),
         ("occluders".to_owned(), occluders_module()),
     ];

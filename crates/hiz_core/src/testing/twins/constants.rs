@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::declared;
+use crate::cull::among;
 use crate::cull::count;
 use crate::cull::explain::{self, Stage};
 use crate::cull::groups::GROUPS_OF_RUN;
@@ -23,6 +24,7 @@ use crate::instances::volume_record::{BEYOND_LIMITS, LARGEST};
 use crate::output::compact::SCATTER_WORKGROUP;
 use crate::output::survivors::SURVIVORS_PER_ROW;
 use crate::output::verdict::{VERDICT_MASK, Verdict};
+use crate::output::views;
 use crate::output::visible::VERDICT_MULTIPLE;
 use crate::pyramid::layout::{BLOCK_ALIGNMENT, BLOCK_LOG2, HEADERS, PIXELS};
 use crate::pyramid::levels::MAX_LEVELS;
@@ -40,6 +42,10 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
     let stage = |s: Stage| int(s as u32);
     let texels = |kind: BoundsKind| (kind.record_bytes() / TEXEL_BYTES) as f64;
     vec![
+        ("cull/among", "AMONG_OF_GROUP", GROUP as f64 / int(u32::BITS)),
+        ("cull/among_layout", "AMONG_BITS", int(u32::BITS)),
+        ("cull/among_layout", "AMONG_PER_ROW_LOG2", int(among::WORDS_PER_ROW.ilog2())),
+        ("cull/among_order", "WORKGROUP", int(among::WORKGROUP)),
         ("cull/certificate", "EPS", EPS),
         ("cull/certificate", "ERROR_ULPS", ERROR_ULPS),
         ("cull/count", "LANES", int(count::LANES)),
@@ -81,6 +87,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
         ("instances/update", "BEYOND_LIMITS_BITS", bits(BEYOND_LIMITS)),
         ("output/compact", "SCATTER_WORKGROUP", int(SCATTER_WORKGROUP)),
+        ("output/join", "WORKGROUP", int(views::WORKGROUP)),
         ("output/verdict", "OUTSIDE", verdict(Verdict::Outside)),
         ("output/verdict", "OCCLUDED", verdict(Verdict::Occluded)),
         ("output/verdict", "VISIBLE", verdict(Verdict::Visible)),
@@ -257,12 +264,14 @@ fn constants_cover_what_is_counted() {
 fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
     let line = |n: u32| [n, 1, 1];
     BTreeMap::from([
+        ("among_order", line(among::WORKGROUP)),
         ("begin", line(1)),
         ("count", line(count::LANES)),
         ("cull", line(GROUP as u32)),
         ("cull_groups", line(CULL_WORKGROUP)),
         ("cull_members", line(GROUP as u32)),
         ("explain", line(1)),
+        ("join_views", line(views::WORKGROUP)),
         ("occluder_vertex", [0; 3]),
         ("reduce", line(REDUCE_WORKGROUP)),
         ("reduce_buffer", line(yardstick::BUFFER_WORKGROUP)),
@@ -309,6 +318,7 @@ fn a_cull_sets_every_override() {
             footprint_log2: 1,
             descent: false,
             fit_volume: false,
+            among: false,
         };
         let report = ReportKey {
             mask: false,
