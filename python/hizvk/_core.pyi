@@ -25,6 +25,7 @@ __all__ = [
     "Pyramid",
     "Yardstick",
     "YardstickCull",
+    "YardstickFromBuffer",
     "YardstickRaster",
     "YardstickReduction",
     "__build__",
@@ -356,6 +357,7 @@ class Yardstick:
         cameras: Sequence[Camera],
         is_warmed: bool,
     ) -> tuple[float, list[list[float]]]: ...
+    def from_buffer(self, kind: str, arrays: Sequence[_Floats]) -> YardstickFromBuffer: ...
     def raster(self, occluders: Occluders, camera: Camera, threads: int) -> YardstickRaster: ...
     def cull(
         self,
@@ -371,6 +373,11 @@ class Yardstick:
 @final
 class YardstickReduction:
     def ms(self) -> float: ...
+
+@final
+class YardstickFromBuffer:
+    def ms(self) -> float: ...
+    def copy_ms(self) -> float: ...
 
 @final
 class YardstickRaster:

@@ -43,7 +43,9 @@ mod _core {
     /// For benchmarks of single submits.
     #[cfg(feature = "yardstick")]
     #[pymodule_export]
-    use crate::yardstick::{Yardstick, YardstickCull, YardstickRaster, YardstickReduction};
+    use crate::yardstick::{
+        Yardstick, YardstickCull, YardstickFromBuffer, YardstickRaster, YardstickReduction,
+    };
 
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "the name is Python's")]

@@ -2,7 +2,9 @@
 //!
 //! The struct expressions name every field, so that an option without its line does not compile.
 
-use hiz_core::{Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, Order, Outputs};
+use hiz_core::{
+    Coverage, CullOptions, DrawTemplate, Emit, Fit, Footprint, Hierarchy, LodRule, Order, Outputs,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyAny;
@@ -55,7 +57,22 @@ pub(crate) fn cull_options(given: &Bound<'_, PyAny>) -> PyResult<CullOptions> {
             Some(false) => Hierarchy::Never,
         },
         statistics: given.getattr("statistics")?.extract()?,
+        lod: lod_rule(&given.getattr("lod")?)?,
     })
+}
+
+fn lod_rule(given: &Bound<'_, PyAny>) -> PyResult<LodRule> {
+    if given.is_none() {
+        return Ok(LodRule::Finest);
+    }
+    match given.get_type().name()?.to_cow()?.as_ref() {
+        "LodByError" => Ok(LodRule::Error { pixels: given.getattr("pixels")?.extract()? }),
+        "LodByDistance" => {
+            Ok(LodRule::Distance { thresholds: given.getattr("thresholds")?.extract()? })
+        }
+        "LodBySize" => Ok(LodRule::Size { pixels: given.getattr("pixels")?.extract()? }),
+        other => Err(unknown("lod", other)),
+    }
 }
 
 fn outputs(given: &Bound<'_, PyAny>, order: Order) -> PyResult<Outputs> {
@@ -71,6 +88,7 @@ fn outputs(given: &Bound<'_, PyAny>, order: Order) -> PyResult<Outputs> {
         draws: listed("draws")?,
         capacity: given.getattr("capacity")?.extract()?,
         draw: draw_template(&given.getattr("draw")?)?,
+        emit: Emit::List,
     })
 }
 

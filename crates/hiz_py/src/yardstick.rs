@@ -4,7 +4,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use hiz_core::yardstick::{self, HostRaster, PerLevelReduction, ReductionShape};
+use hiz_core::yardstick::{self, BoundsInBuffer, HostRaster, PerLevelReduction, ReductionShape};
 use hiz_core::{
     CullOptions, Error, Instances, Pyramid, PyramidOptions, StoredLevels, Visible, headless,
 };
@@ -12,7 +12,7 @@ use numpy::{PyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn, PyUntypedArrayMet
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arguments::in_c_order;
+use crate::arguments::{FloatArray, bounds, in_c_order};
 use crate::camera::Camera;
 use crate::device::{DepthImage, Engine};
 use crate::held::{Held, OnDevice, detached};
@@ -86,6 +86,20 @@ impl Yardstick {
             other => return Err(PyValueError::new_err(format!("shape: no shape {other:?}"))),
         };
         Ok(YardstickReduction(Held::new(py, Reduction { engine, depth, reducer })))
+    }
+
+    /// Spheres or boxes in a buffer on the device, as float32.
+    fn from_buffer(
+        &self,
+        py: Python<'_>,
+        kind: &str,
+        arrays: Vec<FloatArray<'_>>,
+    ) -> PyResult<YardstickFromBuffer> {
+        let bounds = bounds(kind, &arrays)?;
+        let prepare = |engine: &headless::Engine| {
+            Ok(FromBuffer { engine: engine.clone(), bounds: BoundsInBuffer::new(engine, &bounds)? })
+        };
+        self.0.run(py, prepare).map(|made| YardstickFromBuffer(Held::new(py, made)))
     }
 
     /// The rasteriser on the host alone, with the view of `camera`.
@@ -189,6 +203,35 @@ impl YardstickReduction {
     }
 }
 
+/// Bounds in a buffer that can be taken again and again.
+#[pyclass(frozen, module = "hizvk._core")]
+pub(crate) struct YardstickFromBuffer(Held<FromBuffer>);
+
+struct FromBuffer {
+    engine: headless::Engine,
+    bounds: BoundsInBuffer,
+}
+
+#[pymethods]
+impl YardstickFromBuffer {
+    /// Milliseconds of records and group boxes of all of them.
+    fn ms(&self, py: Python<'_>) -> PyResult<f64> {
+        self.0.run(py, |FromBuffer { engine, bounds }| {
+            yardstick::submitted_ms(engine, |encoder| bounds.record(engine, encoder))
+        })
+    }
+
+    /// Milliseconds of a copy of the same bytes on the device.
+    fn copy_ms(&self, py: Python<'_>) -> PyResult<f64> {
+        self.0.run(py, |FromBuffer { engine, bounds }| {
+            yardstick::submitted_ms(engine, |encoder| {
+                bounds.record_copy(encoder);
+                Ok(())
+            })
+        })
+    }
+}
+
 /// An image on the host that can be drawn again and again.
 #[pyclass(frozen, module = "hizvk._core")]
 pub(crate) struct YardstickRaster(Held<Raster>);
@@ -248,6 +291,8 @@ impl YardstickCull {
 }
 
 impl OnDevice for Reduction {}
+
+impl OnDevice for FromBuffer {}
 
 impl OnDevice for Raster {}
 

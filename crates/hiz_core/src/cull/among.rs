@@ -127,6 +127,11 @@ impl Among {
         self.pieces[p].bits.texture()
     }
 
+    /// The bits of piece `p`.
+    pub(super) fn view(&self, p: usize) -> &wgpu::TextureView {
+        &self.pieces[p].bits
+    }
+
     /// What a cull of the instances of piece `p` binds.
     pub(super) fn records(&self, p: usize) -> &wgpu::BindGroup {
         &self.pieces[p].records

@@ -22,8 +22,8 @@ pub(crate) enum Binding {
     /// Storage textures of format `Rgba32Uint`.
     ReadQuads,
     WriteQuads,
-    /// A sampled texture of format `R32Uint`.
-    SampledTexels,
+    /// A sampled texture of unsigned integers: of format `Rgba32Uint` or `R32Uint`.
+    SampledQuads,
     /// Storage textures of format `R32Uint`.
     ReadTexels,
     WriteTexels,
@@ -80,7 +80,7 @@ fn layout_entry(binding: u32, kind: Binding) -> wgpu::BindGroupLayoutEntry {
             Binding::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
             Binding::ReadQuads => quads(wgpu::StorageTextureAccess::ReadOnly),
             Binding::WriteQuads => quads(wgpu::StorageTextureAccess::WriteOnly),
-            Binding::SampledTexels => wgpu::BindingType::Texture {
+            Binding::SampledQuads => wgpu::BindingType::Texture {
                 sample_type: wgpu::TextureSampleType::Uint,
                 view_dimension: wgpu::TextureViewDimension::D2,
                 multisampled: false,

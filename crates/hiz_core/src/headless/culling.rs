@@ -24,6 +24,7 @@ use crate::instances::watch::Watch;
 use crate::output::compact::Compaction;
 use crate::output::counters::{CounterRecord, StatisticsRecord};
 use crate::output::draw::DrawIndexedIndirect;
+use crate::output::emit::Emit;
 use crate::output::lists::Lists;
 use crate::output::outputs::Outputs;
 use crate::output::survivors::{GroupOutput, SurvivorsRecord};
@@ -210,6 +211,8 @@ impl Culling {
     /// - **Occluded**: every other instance that is hidden.
     /// - **Visible** and **invalid**: every instance that is kept.
     ///
+    /// An absent instance ([`ABSENT`](crate::ABSENT)) has the verdict outside.
+    ///
     /// So a verdict does not depend on whether groups were tested, except for a few instances.
     /// A group's test hides these, and their own tests would keep them: they are occluded.
     ///
@@ -234,13 +237,17 @@ impl Culling {
         Ok(verdicts)
     }
 
-    /// The draw arguments, one record per piece.
-    /// If the cull did not write them, they are made from its mask.
+    /// The draw arguments, [`max_draws`](crate::Visible::max_draws) records per piece.
+    /// If the cull did not write them, they are made from its mask: one record per piece.
     ///
     /// # Errors
-    /// - [`Error::Mismatch`] for a cull without draws, indices and mask.
+    /// - [`Error::Mismatch`] for a cull without draws, indices and mask, and for bins of meshes
+    ///   without an index buffer.
     /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn draws(&self) -> Result<Vec<DrawIndexedIndirect>> {
+        if let Some(bins) = &self.visible.bins {
+            return self.indexed_draws(bins);
+        }
         let draws = match &self.visible.lists {
             Some(lists) => &lists.draws,
             None => &self.later_lists("draws")?.draws,
@@ -257,7 +264,7 @@ impl Culling {
     /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn indices(&self) -> Result<Vec<u32>> {
         let lists = match &self.visible.lists {
-            Some(lists) if self.visible.outputs().indices => lists,
+            Some(lists) if self.visible.outputs().indices && lists.copied.is_none() => lists,
             _ => self.later_lists("indices")?,
         };
         let bytes = self.read(&[BufferRange::first(&lists.draws, lists.draws.size())])?;
@@ -319,9 +326,12 @@ impl Culling {
             }
         }
         let demand = u64::from(record.visible) + u64::from(record.invalid);
+        // To the device, what is absent is outside.
+        let absent = self.instances.num_absent();
         Ok(Counts {
-            tested: u64::from(self.instances.len()),
-            outside: record.outside.into(),
+            tested: u64::from(self.instances.len()) - absent,
+            absent,
+            outside: u64::from(record.outside) - absent,
             occluded: record.occluded.into(),
             visible: record.visible.into(),
             invalid: record.invalid.into(),
@@ -350,6 +360,9 @@ impl Culling {
                 words.map(|word| u64::from(word.count_ones())).sum()
             })?;
             return Ok((Some(demand), capacity.min(demand)));
+        }
+        if let Some(bins) = &self.visible.bins {
+            return self.demand_and_written_of_bins(bins);
         }
         if outputs.verdicts {
             let counts = self.counts()?;
@@ -386,7 +399,7 @@ impl Culling {
         let gpu = &engine.context().gpu;
         let lists = engine.scoped(|| {
             let Outputs { capacity, draw, .. } = self.visible.outputs();
-            let lists = Lists::new(gpu, &self.instances, true, capacity, draw)?;
+            let lists = Lists::new(gpu, &self.instances, true, *capacity, (&Emit::List, *draw))?;
             let compaction = Compaction::new(gpu, &self.instances, &self.visible, &lists)?;
             let mut encoder = engine.encoder("hiz.compact.encoder");
             lists.record_clear(&mut encoder);

@@ -53,7 +53,7 @@ impl JoinedPool {
                 kept.remove(0);
             }
             let instances = Arc::downgrade(instances);
-            kept.push(Kept { instances, any: *any, joined: Arc::clone(&joined) });
+            kept.push(Kept { instances, any: any.clone(), joined: Arc::clone(&joined) });
         }
         Ok(joined)
     }

@@ -49,6 +49,7 @@
 mod adapter;
 mod ahead;
 mod answers;
+mod bins;
 mod counts;
 mod cull;
 mod culling;
@@ -71,6 +72,7 @@ mod views;
 mod warm_up;
 
 pub use adapter::{ADAPTER_VARIABLE, AdapterSummary, INSTALL_HINT, adapters};
+pub use bins::NO_LOD;
 pub use counts::{Counts, Timings};
 pub use cull::CullExtras;
 pub use culling::Culling;

@@ -12,6 +12,7 @@ use crate::gpu::pipelines::Compute;
 use crate::gpu::shader::{Source, wgsl};
 use crate::instances::Instances;
 use crate::output::compact::Compaction;
+use crate::output::emit::Emit;
 use crate::output::outputs::Outputs;
 use crate::output::visible::Visible;
 
@@ -45,13 +46,14 @@ pub(crate) fn join_module() -> Source {
 ///
 /// The default makes the mask of each view, and one list with draw arguments of what any of them
 /// keeps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ViewsOutputs {
     /// What each view leaves by itself.
     /// Its mask is made in any case.
     pub each: Outputs,
     /// What is made of the instances that any view keeps.
     /// Its mask is made in any case, and it has no verdicts.
+    /// It is emitted as [`Emit::List`].
     pub any: Outputs,
 }
 
@@ -68,8 +70,8 @@ impl ViewsOutputs {
     /// With what is made in any case.
     pub(crate) fn completed(&self) -> Self {
         Self {
-            each: Outputs { mask: true, ..self.each },
-            any: Outputs { mask: true, verdicts: false, ..self.any },
+            each: Outputs { mask: true, ..self.each.clone() },
+            any: Outputs { mask: true, verdicts: false, ..self.any.clone() },
         }
     }
 }
@@ -170,6 +172,13 @@ impl Joined {
             return Err(Error::invalid(
                 "views",
                 format!("expected 1..={MAX_VIEWS} views, got {views}"),
+            ));
+        }
+        if any.emit != Emit::List {
+            return Err(Error::invalid(
+                "any",
+                "expected Emit::List, got another way to emit: LODs and meshes are chosen for each \
+                 view; ask them of `each`",
             ));
         }
         let words = u64::from(instances.len().div_ceil(32).max(1));

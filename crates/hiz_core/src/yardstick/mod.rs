@@ -3,12 +3,14 @@
 //! - `reduce` builds a pyramid with one dispatch per level.
 //! - `cull` culls without certificates.
 //! - `raster` draws occluders on the host, without what comes before and after.
+//! - `from_buffer` copies the bounds that the library takes from a buffer.
 //! - `frames` times a renderer's frames call by call.
 //!
 //! They are for benchmarks and their tests alone.
 
 mod cull;
 mod frames;
+mod from_buffer;
 mod raster;
 pub(crate) mod reduce;
 
@@ -18,6 +20,7 @@ use std::time::Instant;
 pub(crate) use cull::uncertified_module;
 pub use cull::{read_mask, record_uncertified_cull};
 pub use frames::{FrameTimes, frames};
+pub use from_buffer::BoundsInBuffer;
 pub use raster::HostRaster;
 #[cfg(feature = "testing")]
 pub(crate) use reduce::yardstick_modules;
