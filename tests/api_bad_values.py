@@ -937,12 +937,12 @@ TABLES: dict[str, Table] = {
                 )
             ],
             "camera": [
-                *CAMERA,
-                (
-                    [camera()] * 2,
-                    TypeError,
-                    "each camera culls with the pyramid of its own depth, Device.pyramid), got",
-                ),
+                (None, TypeError, "expected a Camera or a sequence of Cameras, got None"),
+                (EYE4, TypeError, "got (4, 4) float64"),
+                ("front", TypeError, "got str 'front'"),
+                ([], ValueError, "expected 1 to 256 views, got 0"),
+                ([camera()] * 257, ValueError, "expected 1 to 256 views, got 257"),
+                ([None], TypeError, "camera[0]: expected a Camera, got None"),
                 (camera((6, 9)), ValueError, "expected the camera of the pyramid"),
                 (
                     camera().resized((3, 4)),
@@ -960,6 +960,13 @@ TABLES: dict[str, Table] = {
             ],
             "options": OPTIONS_OBJECT,
             "outputs": OUTPUTS_OBJECT,
+            "among": [
+                ("all", TypeError, "expected a bool (1,) array, a CullResult or a ViewsResult"),
+                ([0], TypeError, "got (1,) int64"),
+                ([True, False], ValueError, "got (2,) bool"),
+                ([[True]], ValueError, "got (1, 1) bool"),
+                (np.ma.masked_all(1, bool), TypeError, "got a masked array"),
+            ],
             "wait": FLAG,
             **OPTIONS,
             "capacity": CAPACITY,
@@ -1256,6 +1263,7 @@ MADE_BY_THE_PACKAGE = {
     "Instances",
 }
 MADE_BY_THE_PACKAGE |= {"BoundsCheck", "Occluders", "ProxyCheck", "Pyramid", "Recommendation"}
+MADE_BY_THE_PACKAGE |= {"ViewsResult"}
 MADE_BY_THE_PACKAGE |= {"InnerBoxes", "InnerPrisms", "OccluderSelection", "SplitMesh"}
 
 

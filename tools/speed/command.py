@@ -28,6 +28,7 @@ from . import (
     report,
     scale,
     transfers,
+    views,
 )
 from .figures import Found
 from .run import WORKLOADS, Run
@@ -50,6 +51,7 @@ PARTS: Final[dict[str, Callable[[Run], None]]] = {
     "cull": culling.measure,
     "calls": calls.measure,
     "readback": readback.measure,
+    "views": views.measure,
     "occluders": occluders.measure,
     "bounds": bounds.measure,
     "transfers": transfers.measure,
