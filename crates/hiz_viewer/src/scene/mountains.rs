@@ -16,7 +16,7 @@ const QUADS: usize = 16;
 const STEP: f64 = 12.0;
 /// Half of the terrain's side in metres.
 const HALF: f64 = PATCHES as f64 * QUADS as f64 * STEP / 2.0;
-const TREES: usize = 9000;
+const TREES: usize = 12_000;
 /// Kinds of trees behind the kinds of the patches: a conifer and a broad one.
 const CONIFER: u32 = (PATCHES * PATCHES) as u32;
 const BROAD: u32 = CONIFER + 1;
@@ -193,8 +193,8 @@ fn legs() -> Vec<Leg> {
         Leg { eyes, targets: [ahead(eyes[0], 0.0), ahead(eyes[1], turn)] }
     };
     vec![
-        flight([-900.0, 45.0, -700.0], [-600.0, 40.0, -560.0], [25.0, 0.4]),
         flight([700.0, 30.0, 900.0], [480.0, 40.0, 640.0], [5.0, -0.3]),
         flight([-200.0, 120.0, 1200.0], [-120.0, 110.0, 900.0], [60.0, 0.2]),
+        flight([-900.0, 45.0, -700.0], [-600.0, 40.0, -560.0], [25.0, 0.4]),
     ]
 }
