@@ -75,6 +75,7 @@ from .errors import (
     OutOfMemoryError,
 )
 from .explanation import Explanation, Verdict
+from .lod import LodByDistance, LodByError, LodBySize
 from .mesh import Mesh
 from .occluders import (
     InnerBoxes,
@@ -116,6 +117,9 @@ __all__ = [
     "InnerPrisms",
     "Instances",
     "LimitError",
+    "LodByDistance",
+    "LodByError",
+    "LodBySize",
     "Mesh",
     "NoAdapterError",
     "OccluderSelection",

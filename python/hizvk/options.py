@@ -16,6 +16,7 @@ import numpy as np
 
 from . import _arguments
 from ._types import Coverage, Fit, Order, Output, words
+from .lod import LodRule, lod_rule
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -190,6 +191,9 @@ class CullOptions:
         `CullResult.stats` says how many tests were spent.
     statistics : bool
         Whether to count the tests on each level and the texels that they read; this is slower.
+    lod : LodByError, LodByDistance or LodBySize, optional
+        Which level of detail of its mesh a kept instance is drawn with.
+        None: the full mesh, LOD 0.
 
     Raises
     ------
@@ -223,6 +227,7 @@ class CullOptions:
     fit: Fit = field(default="rectangle", metadata=_by(_arguments.choice, choices=words(Fit)))
     hierarchy: bool | None = field(default=None, metadata=_by(_flag_or_none))
     statistics: bool = field(default=False, metadata=_by(_arguments.flag))
+    lod: LodRule | None = field(default=None, metadata=_by(lod_rule))
 
     def __post_init__(self) -> None:
         _check_fields(self)
@@ -303,6 +308,7 @@ class OptionKeywords(TypedDict, total=False):
     fit: Fit
     hierarchy: bool | None
     statistics: bool
+    lod: LodRule | None
 
 
 class CullKeywords(OptionKeywords, total=False):

@@ -57,8 +57,22 @@ pub(crate) fn cull_options(given: &Bound<'_, PyAny>) -> PyResult<CullOptions> {
             Some(false) => Hierarchy::Never,
         },
         statistics: given.getattr("statistics")?.extract()?,
-        lod: LodRule::Finest,
+        lod: lod_rule(&given.getattr("lod")?)?,
     })
+}
+
+fn lod_rule(given: &Bound<'_, PyAny>) -> PyResult<LodRule> {
+    if given.is_none() {
+        return Ok(LodRule::Finest);
+    }
+    match given.get_type().name()?.to_cow()?.as_ref() {
+        "LodByError" => Ok(LodRule::Error { pixels: given.getattr("pixels")?.extract()? }),
+        "LodByDistance" => {
+            Ok(LodRule::Distance { thresholds: given.getattr("thresholds")?.extract()? })
+        }
+        "LodBySize" => Ok(LodRule::Size { pixels: given.getattr("pixels")?.extract()? }),
+        other => Err(unknown("lod", other)),
+    }
 }
 
 fn outputs(given: &Bound<'_, PyAny>, order: Order) -> PyResult<Outputs> {

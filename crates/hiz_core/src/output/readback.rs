@@ -223,14 +223,6 @@ pub(crate) fn record_readback(
         BufferRange::first(list, 4 * u64::from((*count).min(visible.capacity())))
     }));
     let copies = gpu.recorded(|| Copies::record(gpu, encoder, &ring.pool, &ranges))?;
-    let outputs = visible.outputs();
-    Ok(AnswerInFlight {
-        copies,
-        outputs: outputs.clone(),
-        counts,
-        masks,
-        lists,
-        draws,
-        _slot: slot,
-    })
+    let outputs = visible.outputs().clone();
+    Ok(AnswerInFlight { copies, outputs, counts, masks, lists, draws, _slot: slot })
 }
