@@ -1,4 +1,4 @@
-//! The library at work: what `hiz_core` records for each kind of frame, and the lists that it leaves.
+//! The library at work: what `hiz_core` records for each kind of frame, and what it leaves.
 //!
 //! The renderer knows of culling only what this file offers.
 
@@ -167,6 +167,7 @@ impl Culler {
             resolve: (targets.samples > 1).then(|| Resolve::new(gpu, targets)),
             options: CullOptions {
                 depth_slack: depth_slack(&gpu.adapter),
+                lod: scene.rule.clone(),
                 ..CullOptions::default()
             },
             hiz,

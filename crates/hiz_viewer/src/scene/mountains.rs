@@ -4,11 +4,11 @@
 //! Each patch is an occluder and an instance at once, so what lies behind a ridge is not drawn.
 //! After Rakos, Hierarchical-Z map based occlusion culling (2010), whose demo is called Mountains.
 
-use hiz_core::Vec3;
+use hiz_core::{LodRule, Vec3};
 
 use crate::mesh::{Mesh, unit};
 use crate::scene::random::{Random, noise};
-use crate::scene::{Body, Kind, Leg, Rule, Scene, boxes, by_kind};
+use crate::scene::{Body, Kind, Leg, Scene, boxes, by_kind};
 
 /// Patches per side, quads per side of a patch, and metres per quad.
 const PATCHES: usize = 20;
@@ -45,7 +45,7 @@ pub(crate) fn scene() -> Scene {
         bodies,
         volumes,
         proxy: None,
-        rule: Rule::Pixels(1.0),
+        rule: LodRule::Error { pixels: 1.0 },
         legs: legs(),
         fov_y: 0.85,
         near: 0.5,
