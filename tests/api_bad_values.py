@@ -1058,6 +1058,39 @@ TABLES: dict[str, Table] = {
             ]
         },
     ),
+    "Pyramid.update": Table(
+        lambda device: (
+            device.pyramid(np.ones((6, 8)), camera(), kind="z").update,
+            {"row": 1, "column": 2, "array": np.ones((3, 4))},
+        ),
+        {
+            "row": [
+                (6, ValueError, "expected an integer in 0..5, got int 6"),
+                (-1, ValueError, "got int -1"),
+                (1.0, TypeError, "got float 1.0"),
+                (None, TypeError, "got None"),
+            ],
+            "column": [
+                (8, ValueError, "expected an integer in 0..7, got int 8"),
+                ((0, 0, 1, 1), TypeError, "got tuple (0, 0, 1, 1)"),
+            ],
+            "array": [
+                (
+                    np.ones((6, 4)),
+                    ValueError,
+                    "expected float64 (height, width) with 1 <= height <= 5 and 1 <= width <= 6, "
+                    "which is what lies from row 1 and column 2 on, got (6, 4) float64",
+                ),
+                (np.ones((3, 7)), ValueError, "got (3, 7) float64"),
+                (np.ones((0, 4)), ValueError, "got (0, 4) float64"),
+                (np.ones(3), ValueError, "got (3,) float64"),
+                (np.ones((3, 4, 4)), ValueError, "got (3, 4, 4) float64"),
+                (np.ones((3, 4), np.float32), TypeError, "got (3, 4) float32"),
+                ([[1.0]], TypeError, "got list [[1.0]]"),
+                (None, TypeError, "got None"),
+            ],
+        },
+    ),
     "CullResult.hints": Table(lambda device: (device.cull(**cull_arguments(device)).hints, {}), {}),
     "CullResult.explain": Table(
         lambda device: (device.cull(**cull_arguments(device)).explain, {"index": 0}),

@@ -7,6 +7,7 @@ use crate::cull::pipelines::{
 };
 use crate::cull::refine::{refine_groups_module, refine_module};
 use crate::gpu::depth_source::SOURCES;
+use crate::gpu::depth_source::SourceKind;
 use crate::gpu::shader::{FILES, Source};
 use crate::input::bounds::BoundsKind;
 use crate::instances::from_buffer::{FROM_BUFFER_KINDS, from_buffer_module};
@@ -15,6 +16,7 @@ use crate::occluders::device_raster::occluders_module;
 use crate::output::compact::{compact_module, copy_module};
 use crate::output::emit_passes;
 use crate::pyramid::reduce::{blocks_module, coarse_module};
+use crate::pyramid::resolve::resolve_module;
 use crate::testing::lod::choose_lods_module;
 #[cfg(feature = "yardstick")]
 use crate::yardstick::{uncertified_module, yardstick_modules};
@@ -24,19 +26,16 @@ pub(super) const KINDS: [BoundsKind; 3] =
     [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
 
 /// Every way to emit the kept instances, each with a shader of its own.
-pub(super) const EMITS: [(&str, EmitKey); 3] = [
+pub(super) const EMITS: [(&str, EmitKey); 5] = [
     ("list", EmitKey::NO_LIST),
-    ("planes", EmitKey::Planes { by_index: false, bins: BinKey { sorted: true } }),
-    (
-        "bins",
-        EmitKey::Append {
-            list: true,
-            capped: true,
-            record_words: 5,
-            bins: BinKey { sorted: true },
-        },
-    ),
+    ("planes", EmitKey::Planes { by_index: false, bins: ONE_LOD }),
+    ("planes of LODs", EmitKey::Planes { by_index: false, bins: LODS }),
+    ("bins", EmitKey::Append { list: true, capped: true, record_words: 5, bins: ONE_LOD }),
+    ("bins of LODs", EmitKey::Append { list: true, capped: true, record_words: 5, bins: LODS }),
 ];
+
+const ONE_LOD: BinKey = BinKey { sorted: true, lod_rule: None };
+const LODS: BinKey = BinKey { sorted: true, lod_rule: Some(1) };
 
 /// Path below `shaders/`, without its extension, and text of every file.
 pub fn files() -> Vec<(&'static str, &'static str)> {
@@ -61,12 +60,21 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("count".to_owned(), count_module()),
         ("update".to_owned(), update_module()),
         ("occluders".to_owned(), occluders_module()),
+        ("resolve Depth".to_owned(), resolve_module(SourceKind::Depth)),
+        ("resolve Float".to_owned(), resolve_module(SourceKind::Float)),
     ];
     for source in SOURCES {
         all.push((format!("reduce {source:?}"), blocks_module(source)));
         all.push((format!("reduce_coarse {source:?}"), coarse_module(source)));
+        // Yardsticks read whole images alone.
         #[cfg(feature = "yardstick")]
-        all.extend(yardstick_modules(source).map(|(name, m)| (format!("{name} {source:?}"), m)));
+        all.extend(
+            (!source.is_part())
+                .then(|| yardstick_modules(source))
+                .into_iter()
+                .flatten()
+                .map(|(name, m)| (format!("{name} {source:?}"), m)),
+        );
     }
     let stores = SOURCES.map(DepthStore::Apart).into_iter().chain([DepthStore::Atlas]);
     for store in stores {
@@ -93,7 +101,6 @@ pub(super) fn all() -> Vec<(String, Source)> {
 #[cfg(test)]
 pub(in crate::testing) mod tests {
     use super::*;
-    use crate::gpu::depth_source::SourceKind;
     use naga::valid::{Capabilities, ValidationFlags, Validator};
 
     pub(in crate::testing) fn parse(source: &str) -> naga::Module {
