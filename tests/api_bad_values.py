@@ -451,9 +451,69 @@ OPTIONS: dict[str, list[Bad]] = {
     "fit": FIT,
     "hierarchy": FLAG_OR_NONE,
     "statistics": FLAG,
+    "lod": [
+        (1.0, TypeError, "expected a LodByError, LodByDistance, LodBySize or None, got float 1.0"),
+        ([10.0], TypeError, "got list [10.0]"),
+    ],
 }
 
+LOD_PIXELS: list[Bad] = [
+    (0.0, ValueError, "at most 32768, got float 0.0"),
+    (-1.0, ValueError, "got float -1.0"),
+    (NAN, ValueError, "got float nan"),
+    ("1", TypeError, "got str '1'"),
+    ([1.0], TypeError, "got list [1.0]"),
+]
+
+
+def lod_list(way: str, wrong_order: list[float]) -> list[Bad]:
+    return [
+        ([], ValueError, f"expected 1 to 7 {way} numbers, got list []"),
+        (list(range(1, 9)), ValueError, f"expected 1 to 7 {way} numbers"),
+        (wrong_order, ValueError, f"expected 1 to 7 {way} numbers without equal ones, got list"),
+        ([0.5, 0.5], ValueError, "without equal ones, got list [0.5, 0.5]"),
+        ([NAN], ValueError, "got float nan"),
+        ([-1.0], ValueError, "got float -1.0"),
+        (["1"], TypeError, "got str '1'"),
+        (0.5, TypeError, f"expected 1 to 7 {way} numbers, got float 0.5"),
+        (np.ones((2, 2)), ValueError, "got (2, 2) float64"),
+    ]
+
+
 TABLES: dict[str, Table] = {
+    "LodByError": Table(
+        lambda _: (hizvk.LodByError, {"pixels": 1.0}),
+        {"pixels": LOD_PIXELS},
+    ),
+    "LodByDistance": Table(
+        lambda _: (hizvk.LodByDistance, {"thresholds": [10.0, 20.0]}),
+        {"thresholds": lod_list("ascending", [20.0, 10.0])},
+    ),
+    "LodByDistance.at_ndc_depths": Table(
+        lambda _: (
+            hizvk.LodByDistance.at_ndc_depths,
+            {"depths": [0.8, 0.9], "near": 1.0, "far": 500.0, "reversed_z": False},
+        ),
+        {
+            "depths": [
+                *lod_list("ascending", [0.9, 0.8]),
+                ([1.5], ValueError, "at most 1, got float 1.5"),
+            ],
+            "near": [
+                (0.0, ValueError, "above 0, got float 0.0"),
+                ("1", TypeError, "got str '1'"),
+            ],
+            "far": [
+                (1.0, ValueError, "above 1, got float 1.0"),
+                (NAN, ValueError, "got float nan"),
+            ],
+            "reversed_z": FLAG,
+        },
+    ),
+    "LodBySize": Table(
+        lambda _: (hizvk.LodBySize, {"pixels": [20.0, 10.0]}),
+        {"pixels": lod_list("descending", [10.0, 20.0])},
+    ),
     "Spheres": Table(
         lambda _: (hizvk.Spheres, {"centers": np.zeros((2, 3)), "radii": np.ones(2)}),
         {
@@ -900,6 +960,7 @@ TABLES: dict[str, Table] = {
             ],
             "options": OPTIONS_OBJECT,
             "outputs": OUTPUTS_OBJECT,
+            "wait": FLAG,
             **OPTIONS,
             "capacity": CAPACITY,
             "draw": DRAW,

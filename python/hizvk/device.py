@@ -15,6 +15,7 @@ import numpy as np
 
 from . import _arguments
 from ._core import Engine as CoreEngine
+from ._core import MeshTable as CoreMeshTable
 from ._on_device import check_owner
 from ._processes import driver_is_asked
 from ._types import FaceCull, Rasteriser, StoredOrder, words
@@ -42,9 +43,12 @@ if TYPE_CHECKING:
     from ._types import DepthKind, Levels, Output
     from .depth import DepthArray
     from .mesh import MeshLike
-    from .options import CullKeywords, CullOptions, Outputs
+    from .options import CullKeywords, CullOptions, MeshLods, Outputs
 
 __all__ = ["Device"]
+
+#: How many tables of meshes a device keeps for further culls.
+_TABLES_KEPT = 4
 
 
 class Device:
@@ -100,6 +104,7 @@ class Device:
             adapter = str(_arguments.integer("adapter", adapter, low=0, high=2**31 - 1))
         with driver_is_asked():
             self._engine = CoreEngine(adapter)
+        self._tables: list[tuple[Sequence[MeshLods], CoreMeshTable]] = []
 
     @property
     def adapter(self) -> Adapter:
@@ -112,7 +117,13 @@ class Device:
         return self._engine.max_image_side()
 
     def instances(
-        self, bounds: Bounds, *, strict: bool = False, order: StoredOrder = "morton"
+        self,
+        bounds: Bounds,
+        *,
+        strict: bool = False,
+        order: StoredOrder = "morton",
+        mesh_ids: npt.ArrayLike | None = None,
+        scales: npt.ArrayLike | None = None,
     ) -> Instances:
         """Uploads bounds, once for any number of culls.
 
@@ -137,6 +148,16 @@ class Device:
             ``"morton"``: sorted along a curve through space (Morton 1966); the upload sorts once.
             ``"given"``: as they come, for arrays that are in such an order already.
             This needs no sort, and 8 bytes less per instance on the host.
+        mesh_ids : (N,) integer array, optional
+            The mesh of each instance, 0 to 65535, or `hizvk.ABSENT`.
+            A cull with ``meshes=`` sorts what it keeps by them.
+            An absent instance is never kept, and the box of its group does not contain it.
+            Updates replace bounds alone: upload again to change a mesh id.
+            None: all have mesh 0.
+        scales : (N,) float array, or a number; optional
+            By how much the mesh of each instance is scaled, along the axis where it is most.
+            `hizvk.LodByError` multiplies the errors of levels of detail by it.
+            None: 1 for each.
 
         Raises
         ------
@@ -149,7 +170,11 @@ class Device:
         kind, arrays = as_arrays("bounds", bounds)
         strict = _arguments.flag("strict", strict)
         stored_order = _arguments.choice("order", order, words(StoredOrder))
-        uploaded = self._engine.instances(kind, arrays, strict, stored_order)
+        ids = None if mesh_ids is None else _arguments.mesh_ids("mesh_ids", mesh_ids, len(bounds))
+        sizes = (
+            None if scales is None else _arguments.floats_or_scalar("scales", scales, len(bounds))
+        )
+        uploaded = self._engine.instances(kind, arrays, (strict, stored_order), ids, sizes)
         return Instances(self, uploaded, points=are_points(bounds))
 
     @overload
@@ -529,6 +554,8 @@ class Device:
         pyramid: Pyramid,
         options: CullOptions | None = None,
         outputs: Outputs | Collection[Output] | None = None,
+        *,
+        wait: bool = True,
         **keywords: Unpack[CullKeywords],
     ) -> CullResult:
         """Tests instances against a pyramid. What could be seen in the depth image is never culled.
@@ -548,8 +575,20 @@ class Device:
             A collection names all that is made.
             None makes mask and verdicts, and the list and the draw arguments by the time that they
             are read.
+        wait : bool
+            How the answer comes to the host; the call itself does not wait for it in either case.
+
+            - True: each read waits for the device, then copies.
+            - False: the cull's own submission copies all that `outputs` names.
+              `CullResult.ready` says whether it has arrived, and then no read waits.
+              ``await result`` lets an event loop go on meanwhile.
+
+            At most two culls with ``wait=False`` are unfinished at a time.
+            A third one waits in this call, without the interpreter lock, until the oldest is done.
+            A result that was dropped counts no more.
         **keywords
-            Any field of `CullOptions`, and `capacity` and `draw` of `Outputs`.
+            Any field of `CullOptions`, and of `Outputs` `capacity`, `draw`, `meshes`, `emit` and
+            `placement`.
             They take the place of those fields of `options` and `outputs`:
             ``cull(crowd, camera, hiz, order="any", capacity=1000)``.
 
@@ -573,6 +612,7 @@ class Device:
         check_owner("pyramid", pyramid, self)
         if camera != pyramid.camera:
             raise ValueError(_other_camera(camera, pyramid))
+        wait = _arguments.flag("wait", wait)
         options, outputs = cull_request(options, outputs, keywords)
         if options.coverage == "sample" and pyramid._source.samples > 1:
             raise ValueError(
@@ -581,7 +621,13 @@ class Device:
                 'centres, got "sample"'
             )
         culling = self._engine.cull(
-            instances._inner, camera._inner, pyramid._inner, options, outputs
+            instances._inner,
+            camera._inner,
+            pyramid._inner,
+            options,
+            outputs,
+            self._mesh_table(outputs.meshes),
+            not wait,
         )
         return CullResult(self, culling, Question(camera, pyramid, options, instances._points))
 
@@ -657,7 +703,27 @@ class Device:
         stored = _arguments.stored_levels("levels", levels)
         options, outputs = cull_request(options, outputs, keywords)
         drawn = None if occluders is None else occluders._inner
-        self._engine.warm_up(instances._inner, camera._inner, drawn, stored, options, outputs)
+        self._engine.warm_up(
+            instances._inner,
+            camera._inner,
+            drawn,
+            stored,
+            options,
+            outputs,
+            self._mesh_table(outputs.meshes),
+        )
+
+    def _mesh_table(self, meshes: Sequence[MeshLods] | None) -> CoreMeshTable | None:
+        """The table of these meshes on this device, made anew if it is not among the last ones."""
+        if meshes is None:
+            return None
+        # Equal tuples of the same objects are found without a look at their numbers.
+        for known, table in self._tables:
+            if known == meshes:
+                return table
+        table = self._engine.mesh_table([mesh._raw() for mesh in meshes])
+        self._tables = [*self._tables[1 - _TABLES_KEPT :], (meshes, table)]
+        return table
 
     def _check_side(self, camera: Camera) -> None:
         """Refuses an image that the device cannot hold, before its array is converted."""

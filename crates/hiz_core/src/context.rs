@@ -11,10 +11,11 @@ use crate::cull::record::record_cull;
 use crate::cull::warm_up::{WarmUp, record_warm_up};
 use crate::error::{Error, Result};
 use crate::gpu::device::Gpu;
-use crate::input::bounds::Bounds;
+use crate::input::bounds::{Bounds, BoundsKind};
 use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
 use crate::input::mesh::MeshData;
+use crate::instances::from_buffer::{BoundsBuffer, record_instances_from, record_update_from};
 use crate::instances::piece::CULL_WORKGROUP;
 use crate::instances::update::record_update;
 use crate::instances::{InstanceOptions, Instances};
@@ -23,7 +24,9 @@ use crate::occluders::device_raster::record_occluders;
 use crate::occluders::drawing::OccluderOptions;
 use crate::occluders::drawing::{DrawOptions, Rasteriser, Touched};
 use crate::occluders::uploaded::Occluders;
+use crate::output::mesh_table::{MeshLods, MeshTable};
 use crate::output::outputs::Outputs;
+use crate::output::readback::{AnswerInFlight, ReadbackRing, record_readback};
 use crate::output::visible::Visible;
 use crate::pyramid::reduce::record_reduce;
 use crate::pyramid::region::record_reduce_region;
@@ -207,7 +210,7 @@ impl HizContext {
         &self,
         encoder: &mut wgpu::CommandEncoder,
         bounds: &Bounds<'_>,
-        options: &InstanceOptions,
+        options: &InstanceOptions<'_>,
     ) -> Result<Instances> {
         Instances::new(&self.gpu, bounds, options, true, |copies, _| {
             self.gpu.recorded(|| {
@@ -241,7 +244,8 @@ impl HizContext {
     /// Read the verdicts of such a cull before you submit the update.
     ///
     /// # Errors
-    /// - [`Error::Mismatch`] for another kind of bounds and for instances of another context.
+    /// - [`Error::Mismatch`] for another kind of bounds, for instances of another context, and for
+    ///   instances whose bounds come from a buffer.
     /// - [`Error::Invalid`] for instances that do not exist, for arrays whose lengths disagree and,
     ///   with `strict`, for invalid bounds.
     /// - [`Error::OutOfMemory`].
@@ -263,13 +267,95 @@ impl HizContext {
         })
     }
 
+    /// Makes a table of meshes, each with its levels of detail.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] for no meshes, a mesh without a level of detail, errors that are not
+    ///   finite and at least 0, a `first_instance` other than 0, and for draws of which some have
+    ///   an index buffer and others have none.
+    /// - [`Error::Limit`] for more than [`MAX_LODS`](crate::MAX_LODS) levels of detail of a mesh,
+    ///   and for more than 65,536 meshes.
+    /// - [`Error::OutOfMemory`].
+    pub fn create_mesh_table(&self, meshes: &[MeshLods<'_>]) -> Result<MeshTable> {
+        MeshTable::new(&self.gpu, meshes)
+    }
+
+    /// Makes `count` instances whose bounds lie in the caller's buffer, and records that they are
+    /// taken from there.
+    ///
+    /// A shader of the caller's writes the buffer, and the bounds never visit the host.
+    /// [`BoundsBuffer`] has the layout of its records.
+    /// [`record_update_from`](Self::record_update_from) takes them again, for instance each frame.
+    ///
+    /// The device validates the bounds, by the same rules as the host.
+    /// Invalid ones are kept by every cull, with [`Verdict::Invalid`](crate::Verdict::Invalid).
+    /// The instances are stored in the order of the buffer, in groups of 64.
+    /// So let neighbours in the buffer be neighbours in space.
+    /// Submit these commands before the first cull, or with it.
+    ///
+    /// Instances from [`record_instances`](Self::record_instances) can take bounds from a buffer,
+    /// too.
+    /// They stay in the order in which their first bounds were sorted.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] for [`BoundsKind::OrientedBox`], for an offset or a stride that is no
+    ///   multiple of 4, for a stride shorter than a record, and for a buffer that is too short or
+    ///   lacks the usage `STORAGE`.
+    /// - [`Error::Mismatch`] for a buffer of another device and for a destroyed one.
+    /// - [`Error::Limit`] for a stride with which the records exceed one binding.
+    /// - [`Error::OutOfMemory`].
+    pub fn record_instances_from<'a>(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        source: impl Into<BoundsBuffer<'a>>,
+        kind: BoundsKind,
+        count: u32,
+    ) -> Result<Instances> {
+        record_instances_from(&self.gpu, encoder, &source.into(), kind, count)
+    }
+
+    /// Records that the bounds of all instances are taken from the caller's buffer.
+    ///
+    /// They are what the buffer holds when these commands run.
+    /// Records and group boxes are made anew on the device.
+    /// The host does nothing per instance, and from the second call with a buffer on it makes
+    /// nothing.
+    /// Commands that were submitted before see the old bounds.
+    /// Such a recording may be dropped, or submitted in another order than it was recorded.
+    ///
+    /// From the first call on, the host does not know the bounds.
+    /// So it refuses [`record_update`](Self::record_update) and [`Instances::invalid`].
+    ///
+    /// Like [`record_update`](Self::record_update), this refines the verdicts of an
+    /// [`Engine`](crate::headless::Engine)'s earlier culls.
+    ///
+    /// # Errors
+    /// - Those of [`record_instances_from`](Self::record_instances_from).
+    /// - [`Error::Mismatch`] for instances of another context, and for instances of which any is
+    ///   [`ABSENT`](crate::ABSENT).
+    pub fn record_update_from<'a>(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &Instances,
+        source: impl Into<BoundsBuffer<'a>>,
+    ) -> Result<()> {
+        record_update_from(&self.gpu, encoder, instances, &source.into(), |encoder| {
+            let watches = instances.watches();
+            watches.record_refinements(&self.gpu, encoder)?;
+            watches.note(&(0..instances.len()));
+            Ok(())
+        })
+    }
+
     /// Makes the buffers that take what a cull of `instances` finds.
     ///
     /// # Errors
     /// - [`Error::Mismatch`] for instances of another context.
     /// - [`Error::Invalid`] for a
     ///   [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0 on a
-    ///   device without the feature `INDIRECT_FIRST_INSTANCE`.
+    ///   device without the feature `INDIRECT_FIRST_INSTANCE`, for an
+    ///   [`Emit`](crate::Emit) that needs the feature, and for mesh ids past the mesh table.
+    /// - [`Error::Limit`] for lists or draws that do not fit one binding.
     /// - [`Error::OutOfMemory`].
     /// - [`Error::Device`] if the device is lost.
     pub fn create_visible(&self, instances: &Instances, outputs: &Outputs) -> Result<Visible> {
@@ -496,6 +582,35 @@ impl HizContext {
         )
     }
 
+    /// Makes a ring of `slots` (1..=64) for answers on their way to the host.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for another number of slots.
+    pub fn create_readback(&self, slots: usize) -> Result<ReadbackRing> {
+        ReadbackRing::new(&self.gpu, slots)
+    }
+
+    /// Records the copies of what a cull leaves in `visible`: mask, list and draw arguments.
+    ///
+    /// Record it behind the cull.
+    /// After the submit the answer arrives with a poll of the device
+    /// ([`AnswerInFlight::is_ready`]); nothing here submits, polls or waits.
+    /// The whole capacity of the lists is copied.
+    /// If the encoder is never submitted, drop the answer.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] if all slots are taken: read or drop one of their answers first.
+    /// - [`Error::Mismatch`] for objects of another context.
+    /// - [`Error::OutOfMemory`].
+    pub fn record_readback(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        visible: &Visible,
+        ring: &ReadbackRing,
+    ) -> Result<AnswerInFlight> {
+        record_readback(&self.gpu, encoder, visible, ring)
+    }
+
     /// Makes everything that frames like this one need, and records work that makes the driver
     /// compile it.
     ///
@@ -542,8 +657,8 @@ fn needed(have: &wgpu::Limits) -> Vec<(&'static str, u64, u64)> {
         max_bind_groups_plus_vertex_buffers >= 4,
         // The view of a cull (`cull/pipelines.rs`, `DepthStore::layout`).
         max_bindings_per_bind_group >= 7,
-        // A depth image.
-        max_sampled_textures_per_shader_stage >= 1,
+        // A depth image; slots and mesh table of a cull that emits bins.
+        max_sampled_textures_per_shader_stage >= 3,
         max_samplers_per_shader_stage >= 1,
         // The cull of members: three chunks, mask, list, draws, statistics, survivors.
         max_storage_buffers_per_shader_stage >= 8,

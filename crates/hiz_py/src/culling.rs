@@ -19,6 +19,15 @@ impl Culling {
         Ok(self.0.look(py)?.instances().len())
     }
 
+    /// Whether the answer has arrived; waits for nothing.
+    fn is_ready(&self, py: Python<'_>) -> PyResult<bool> {
+        self.0.run(py, headless::Culling::is_ready)
+    }
+
+    fn wait(&self, py: Python<'_>) -> PyResult<()> {
+        self.0.run(py, headless::Culling::wait)
+    }
+
     fn mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
         self.0.run(py, headless::Culling::mask).map(|mask| PyArray1::from_vec(py, mask))
     }
@@ -38,6 +47,27 @@ impl Culling {
         self.0
             .run(py, headless::Culling::draws)
             .map(|draws| PyBytes::new(py, bytemuck::cast_slice(&draws)))
+    }
+
+    /// How many records of each piece draw something.
+    fn draw_counts(&self, py: Python<'_>) -> PyResult<Vec<u32>> {
+        self.0.run(py, headless::Culling::draw_counts)
+    }
+
+    /// The LOD of each instance; 255 for those that are not kept.
+    fn lods<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
+        self.0.run(py, headless::Culling::lods).map(|lods| PyArray1::from_vec(py, lods))
+    }
+
+    /// The list of one bin.
+    fn bin<'py>(
+        &self,
+        py: Python<'py>,
+        mesh: u32,
+        lod: u32,
+    ) -> PyResult<Bound<'py, PyArray1<u32>>> {
+        let bin = |culling: &headless::Culling| culling.bin(mesh, lod);
+        self.0.run(py, bin).map(|indices| PyArray1::from_vec(py, indices))
     }
 
     fn counts(&self, py: Python<'_>) -> PyResult<Counts> {
@@ -64,6 +94,7 @@ impl Culling {
 #[pyclass(frozen, get_all, module = "hizvk._core")]
 pub(crate) struct Counts {
     tested: u64,
+    absent: u64,
     outside: u64,
     occluded: u64,
     visible: u64,
@@ -80,6 +111,7 @@ impl Counts {
     pub(crate) fn of(counts: &headless::Counts) -> Self {
         Self {
             tested: counts.tested,
+            absent: counts.absent,
             outside: counts.outside,
             occluded: counts.occluded,
             visible: counts.visible,

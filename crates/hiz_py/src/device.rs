@@ -17,6 +17,7 @@ use crate::arguments::{
 use crate::camera::Camera;
 use crate::culling::{Counts, Culling};
 use crate::held::{Held, OnDevice, detached};
+use crate::meshes::{LodNumbers, MeshTable, mesh_table};
 use crate::options::{Request, cull_options};
 
 /// The depth of a single cull.
@@ -92,17 +93,25 @@ impl Engine {
         py: Python<'_>,
         kind: &str,
         arrays: Vec<FloatArray<'_>>,
-        strict: bool,
-        order: &str,
+        strict_and_order: (bool, String),
+        mesh_ids: Option<PyReadonlyArray1<'_, u32>>,
+        scales: Option<FloatArray<'_>>,
     ) -> PyResult<Instances> {
         let bounds = bounds(kind, &arrays)?;
-        let order = match order {
+        let (strict, order) = strict_and_order;
+        let order = match order.as_str() {
             "morton" => StoredOrder::Morton,
             "given" => StoredOrder::Given,
             other => return Err(PyValueError::new_err(format!("order: no order {other:?}"))),
         };
         #[allow(clippy::needless_update, reason = "hiz_core's `testing` adds a field")]
-        let options = InstanceOptions { strict, order, ..InstanceOptions::default() };
+        let options = InstanceOptions {
+            strict,
+            order,
+            mesh_ids: mesh_ids.as_ref().map(|ids| ids.as_slice()).transpose()?,
+            scales: scales.as_ref().map(FloatArray::floats).transpose()?,
+            ..InstanceOptions::default()
+        };
         self.0
             .run(py, |engine| engine.instances(&bounds, &options))
             .map(|instances| Instances(Held::new(py, instances)))
@@ -316,7 +325,17 @@ impl Engine {
         self.0.run(py, reduce).map(|built| Pyramid(Held::new(py, built)))
     }
 
+    /// A mesh is a list of levels of detail, each with the numbers of its draw and its error.
+    fn mesh_table(&self, py: Python<'_>, meshes: Vec<Vec<LodNumbers>>) -> PyResult<MeshTable> {
+        self.0
+            .run(py, |engine| mesh_table(engine, &meshes))
+            .map(|table| MeshTable(Held::new(py, table)))
+    }
+
     /// `options` is a `hizvk.CullOptions`, `outputs` a `hizvk.Outputs`.
+    /// `meshes` is the table of the meshes that the outputs speak of.
+    /// `ahead`: its answer comes to the host by itself.
+    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn cull(
         &self,
         py: Python<'_>,
@@ -325,12 +344,21 @@ impl Engine {
         pyramid: &Pyramid,
         options: &Bound<'_, PyAny>,
         outputs: &Bound<'_, PyAny>,
+        meshes: Option<&MeshTable>,
+        ahead: bool,
     ) -> PyResult<Culling> {
-        let Request { options, outputs } = Request::new(options, outputs)?;
+        let meshes = meshes.map(|table| table.0.get(py)).transpose()?;
+        let Request { options, outputs } = Request::new(options, outputs, meshes.as_deref())?;
         let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
-        self.0
-            .run(py, |engine| engine.cull(&instances, &camera.0, &pyramid.1, &options, &outputs))
-            .map(|culling| Culling(Held::new(py, culling)))
+        let cull = |engine: &headless::Engine| {
+            let (camera, pyramid) = (&camera.0, &pyramid.1);
+            if ahead {
+                engine.cull_ahead(&instances, camera, pyramid, &options, &outputs)
+            } else {
+                engine.cull(&instances, camera, pyramid, &options, &outputs)
+            }
+        };
+        self.0.run(py, cull).map(|culling| Culling(Held::new(py, culling)))
     }
 
     /// As `cull`; `occluders` says where depth comes from, and `levels` what is stored.
@@ -344,8 +372,10 @@ impl Engine {
         levels: (u32, u32),
         options: &Bound<'_, PyAny>,
         outputs: &Bound<'_, PyAny>,
+        meshes: Option<&MeshTable>,
     ) -> PyResult<()> {
-        let Request { options, outputs } = Request::new(options, outputs)?;
+        let meshes = meshes.map(|table| table.0.get(py)).transpose()?;
+        let Request { options, outputs } = Request::new(options, outputs, meshes.as_deref())?;
         let instances = instances.0.get(py)?;
         let occluders = occluders.map(|occluders| occluders.0.get(py)).transpose()?;
         let levels = StoredLevels { first: levels.0, last: levels.1 };

@@ -13,6 +13,7 @@ mod culling;
 mod device;
 mod errors;
 mod held;
+mod meshes;
 mod options;
 mod reference;
 #[cfg(feature = "yardstick")]
@@ -33,6 +34,8 @@ mod _core {
     #[pymodule_export]
     use crate::held::{after_fork, before_fork, let_go};
     #[pymodule_export]
+    use crate::meshes::MeshTable;
+    #[pymodule_export]
     use crate::reference::{reference_classify, reference_pyramid};
 
     /// For tests.
@@ -43,7 +46,9 @@ mod _core {
     /// For benchmarks of single submits.
     #[cfg(feature = "yardstick")]
     #[pymodule_export]
-    use crate::yardstick::{Yardstick, YardstickCull, YardstickRaster, YardstickReduction};
+    use crate::yardstick::{
+        Yardstick, YardstickCull, YardstickFromBuffer, YardstickRaster, YardstickReduction,
+    };
 
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "the name is Python's")]

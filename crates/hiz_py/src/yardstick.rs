@@ -4,7 +4,9 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use hiz_core::yardstick::{self, HostRaster, MultisampledDepth, PerLevelReduction, ReductionShape};
+use hiz_core::yardstick::{
+    self, BoundsInBuffer, HostRaster, MultisampledDepth, PerLevelReduction, ReductionShape,
+};
 use hiz_core::{
     CullOptions, Error, Instances, Pyramid, PyramidOptions, StoredLevels, Visible, headless,
 };
@@ -12,7 +14,7 @@ use numpy::{PyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn, PyUntypedArrayMet
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arguments::in_c_order;
+use crate::arguments::{FloatArray, bounds, in_c_order};
 use crate::camera::Camera;
 use crate::device::{DepthImage, Engine};
 use crate::held::{Held, OnDevice, detached};
@@ -119,6 +121,20 @@ impl Yardstick {
         self.0.run(py, prepare).map(|work| YardstickReduction(Held::new(py, work)))
     }
 
+    /// Spheres or boxes in a buffer on the device, as float32.
+    fn from_buffer(
+        &self,
+        py: Python<'_>,
+        kind: &str,
+        arrays: Vec<FloatArray<'_>>,
+    ) -> PyResult<YardstickFromBuffer> {
+        let bounds = bounds(kind, &arrays)?;
+        let prepare = |engine: &headless::Engine| {
+            Ok(FromBuffer { engine: engine.clone(), bounds: BoundsInBuffer::new(engine, &bounds)? })
+        };
+        self.0.run(py, prepare).map(|made| YardstickFromBuffer(Held::new(py, made)))
+    }
+
     /// The rasteriser on the host alone, with the view of `camera`.
     fn raster(
         &self,
@@ -171,7 +187,7 @@ impl Yardstick {
         outputs: &Bound<'_, PyAny>,
         depth: Option<&DepthImage>,
     ) -> PyResult<YardstickCull> {
-        let Request { options, outputs } = Request::new(options, outputs)?;
+        let Request { options, outputs } = Request::new(options, outputs, None)?;
         let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
         let depth = depth.map(|depth| depth.0.get(py)).transpose()?;
         let prepare = |engine: &headless::Engine| {
@@ -220,6 +236,35 @@ impl YardstickReduction {
                     reduction.record(encoder);
                     Ok(())
                 }
+            })
+        })
+    }
+}
+
+/// Bounds in a buffer that can be taken again and again.
+#[pyclass(frozen, module = "hizvk._core")]
+pub(crate) struct YardstickFromBuffer(Held<FromBuffer>);
+
+struct FromBuffer {
+    engine: headless::Engine,
+    bounds: BoundsInBuffer,
+}
+
+#[pymethods]
+impl YardstickFromBuffer {
+    /// Milliseconds of records and group boxes of all of them.
+    fn ms(&self, py: Python<'_>) -> PyResult<f64> {
+        self.0.run(py, |FromBuffer { engine, bounds }| {
+            yardstick::submitted_ms(engine, |encoder| bounds.record(engine, encoder))
+        })
+    }
+
+    /// Milliseconds of a copy of the same bytes on the device.
+    fn copy_ms(&self, py: Python<'_>) -> PyResult<f64> {
+        self.0.run(py, |FromBuffer { engine, bounds }| {
+            yardstick::submitted_ms(engine, |encoder| {
+                bounds.record_copy(encoder);
+                Ok(())
             })
         })
     }
@@ -284,6 +329,8 @@ impl YardstickCull {
 }
 
 impl OnDevice for Reduction {}
+
+impl OnDevice for FromBuffer {}
 
 impl OnDevice for Raster {}
 

@@ -7,6 +7,7 @@
 //! 3. `groups` and `aabb` form groups of 64 neighbours with a box around each.
 //! 4. `volume_record`, `batch` and `records` write the records that the cull reads.
 //! 5. `update` replaces bounds later, and `watch` connects submitted culls with later updates.
+//! 6. `from_buffer` takes bounds that a shader of the caller's has written.
 //!
 //! An instance has two numbers.
 //! Its *index* is the caller's number, and everything public uses it.
@@ -16,44 +17,60 @@
 
 pub(crate) mod aabb;
 pub(crate) mod batch;
+pub(crate) mod from_buffer;
 pub(crate) mod groups;
 pub(crate) mod morton;
 pub(crate) mod order;
 pub(crate) mod piece;
 pub(crate) mod records;
+pub(crate) mod slots;
 pub(crate) mod update;
 pub(crate) mod volume_record;
 pub(crate) mod watch;
 
 use std::sync::MutexGuard;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, Result};
 use crate::gpu::device::{ContextId, Gpu};
 use crate::host::memory;
 use crate::host::threads::Locked;
-use crate::input::bounds::{Bounds, BoundsKind};
+use crate::input::bounds::{Bounds, BoundsKind, Floats};
 use crate::instances::groups::Groups;
 use crate::instances::order::StoredOrder;
 #[cfg(feature = "testing")]
 use crate::instances::piece::CULL_WORKGROUP;
-use crate::instances::piece::{Piece, packed, piece_capacity};
+use crate::instances::piece::{Piece, packed, piece_capacity, unwritten};
+use crate::instances::slots::{Kinds, Slots};
 use crate::instances::watch::Watches;
 
 /// How instances are uploaded.
 #[derive(Debug, Clone, Default)]
-pub struct InstanceOptions {
+pub struct InstanceOptions<'a> {
     /// Whether to refuse invalid bounds (NaN, infinite, negative radius, min > max).
     /// Otherwise they are kept visible.
     pub strict: bool,
     /// The order in which the instances of each piece are stored.
     pub order: StoredOrder,
+    /// The mesh of each instance, below 65,536, or [`ABSENT`](crate::ABSENT).
+    /// `None`: all have mesh 0.
+    ///
+    /// [`Emit`](crate::Emit) sorts the kept instances by them.
+    /// Updates replace bounds alone: to change a mesh id, or to bring an absent instance back,
+    /// upload the instances again.
+    pub mesh_ids: Option<&'a [u32]>,
+    /// The scale of each instance: a finite number from 0 on, by which the errors of its mesh's
+    /// levels of detail are multiplied.
+    /// Give the largest scale of an instance that is scaled differently along its axes.
+    /// `None`: all have scale 1.
+    pub scales: Option<Floats<'a>>,
     /// The most instances of one piece, a multiple of 128.
     /// `None`: as many as the device allows.
     #[cfg(feature = "testing")]
     pub piece_capacity: Option<u32>,
 }
 
-impl InstanceOptions {
+impl InstanceOptions<'_> {
     /// The most instances of one piece, at most `most`.
     #[cfg(feature = "testing")]
     fn checked_piece_capacity(&self, most: u32) -> Result<u32> {
@@ -77,6 +94,17 @@ impl InstanceOptions {
     }
 }
 
+/// Distinguishes instances from others of the same number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct InstancesId(u64);
+
+impl InstancesId {
+    fn next() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        Self(NEXT.fetch_add(1, Ordering::Relaxed))
+    }
+}
+
 /// The state on the host that updates change.
 #[derive(Debug)]
 pub(crate) struct Changing {
@@ -84,6 +112,8 @@ pub(crate) struct Changing {
     pub(crate) groups: Vec<Groups>,
     /// The number of the next update; the docs of `update` say what it is for.
     pub(crate) next_update: u32,
+    /// Whether bounds were taken from a buffer: then the host knows neither bounds nor groups.
+    pub(crate) on_device: bool,
 }
 
 /// Room for `Sequence` of `shaders/instances/update.wgsl`.
@@ -115,6 +145,8 @@ pub(crate) const SEQUENCE_BYTES: usize = 16;
 #[derive(Debug)]
 pub struct Instances {
     pub(crate) context: ContextId,
+    /// Distinguishes these instances from all others.
+    pub(crate) id: InstancesId,
     pub(crate) kind: BoundsKind,
     /// At least one piece, so that there is always a draw to consume.
     /// Without instances it is empty.
@@ -138,7 +170,7 @@ impl Instances {
     pub(crate) fn new(
         gpu: &Gpu,
         bounds: &Bounds<'_>,
-        options: &InstanceOptions,
+        options: &InstanceOptions<'_>,
         has_groups: bool,
         mut copy: impl FnMut(&dyn Fn(&mut wgpu::CommandEncoder), bool) -> Result<()>,
     ) -> Result<Self> {
@@ -146,6 +178,7 @@ impl Instances {
         let total = u32::try_from(n)
             .map_err(|_| Error::limit("instances", n as u64, u64::from(u32::MAX)))?;
         let kind = bounds.kind();
+        let kinds = Kinds::checked(n, options.mesh_ids, options.scales)?;
         let most = piece_capacity(kind.record_bytes(), gpu.limits());
         let capacity = options.checked_piece_capacity(most)?;
         let (mut pieces, mut groups) = (Vec::new(), Vec::new());
@@ -154,7 +187,7 @@ impl Instances {
             let start = index * capacity;
             let range = start..total.min(start.saturating_add(capacity));
             let (piece, its_groups, uploads) =
-                packed(gpu, bounds, index, range, options.order, has_groups)?;
+                packed(gpu, bounds, index, range, (options.order, &kinds), has_groups)?;
             copy(
                 &|encoder| uploads.iter().for_each(|upload| upload.record(encoder)),
                 index + 1 < num_pieces,
@@ -162,26 +195,49 @@ impl Instances {
             pieces.push(piece);
             groups.push(its_groups);
         }
-        let sequence = gpu.filled(
-            "hiz.instances.sequence",
-            &[0; SEQUENCE_BYTES],
-            wgpu::BufferUsages::STORAGE,
-        )?;
-        let changing = Locked::new(Changing { groups, next_update: 0 });
-        let this = Self {
-            context: gpu.id(),
-            kind,
-            pieces,
-            sequence,
-            changing,
-            submitting: Locked::default(),
-            watches: Locked::default(),
-        };
+        let changing = Changing { groups, next_update: 0, on_device: false };
+        let this = Self::of_pieces(gpu, kind, pieces, changing)?;
         if options.strict {
             let invalid = this.invalid()?;
             refuse_bad(n, invalid.len(), invalid.first().copied())?;
         }
         Ok(this)
+    }
+
+    /// Room for `count` instances, whose records are written on the device.
+    pub(super) fn unwritten(gpu: &Gpu, kind: BoundsKind, count: u32) -> Result<Self> {
+        let capacity = piece_capacity(kind.record_bytes(), gpu.limits());
+        let mut pieces = Vec::new();
+        for index in 0..count.div_ceil(capacity).max(1) {
+            let start = index * capacity;
+            let range = start..count.min(start.saturating_add(capacity));
+            pieces.push(unwritten(gpu, kind, index, range)?);
+        }
+        let groups = pieces.iter().map(|piece| Groups::unknown(piece.count() as usize)).collect();
+        Self::of_pieces(gpu, kind, pieces, Changing { groups, next_update: 0, on_device: true })
+    }
+
+    fn of_pieces(
+        gpu: &Gpu,
+        kind: BoundsKind,
+        pieces: Vec<Piece>,
+        changing: Changing,
+    ) -> Result<Self> {
+        let sequence = gpu.filled(
+            "hiz.instances.sequence",
+            &[0; SEQUENCE_BYTES],
+            wgpu::BufferUsages::STORAGE,
+        )?;
+        Ok(Self {
+            context: gpu.id(),
+            id: InstancesId::next(),
+            kind,
+            pieces,
+            sequence,
+            changing: Locked::new(changing),
+            submitting: Locked::default(),
+            watches: Locked::default(),
+        })
     }
 
     /// The number of instances.
@@ -208,9 +264,18 @@ impl Instances {
     /// A cull always keeps them.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`] if the host has no memory for the list.
+    /// - [`Error::Mismatch`] for instances whose bounds come from a buffer: the host does not know
+    ///   them.
+    /// - [`Error::OutOfMemory`] if the host has no memory for the list.
     pub fn invalid(&self) -> Result<Vec<u64>> {
         let changing = self.changing();
+        if changing.on_device {
+            return Err(Error::mismatch(
+                "instances",
+                "expected instances whose bounds come from the host, got some whose bounds come \
+                 from a buffer: a cull's verdicts and counts tell the invalid ones",
+            ));
+        }
         let mut invalid =
             memory::list(changing.groups.iter().map(|g| g.invalid().count()).sum(), "invalid")?;
         for (piece, groups) in self.pieces.iter().zip(&changing.groups) {
@@ -222,19 +287,46 @@ impl Instances {
         Ok(invalid)
     }
 
+    /// The number of absent instances, which no cull keeps.
+    pub fn num_absent(&self) -> u64 {
+        self.changing().groups.iter().map(Groups::num_absent).sum()
+    }
+
+    /// Whether the instance `index` is absent.
+    pub(crate) fn is_absent(&self, changing: &Changing, index: usize) -> bool {
+        let p = self.pieces.partition_point(|piece| piece.range.end as usize <= index);
+        let piece = &self.pieces[p];
+        let place = piece.order.place(index - piece.range.start as usize);
+        changing.groups[p].is_absent(place)
+    }
+
     /// Bytes on the device: one record per instance, and one box per 64 instances.
+    /// Mesh ids or scales add 24 per instance.
     pub fn device_bytes(&self) -> u64 {
-        self.pieces.iter().map(|p| p.records.size() + p.group_records.size()).sum()
+        let bytes = |p: &Piece| {
+            p.records.size() + p.group_records.size() + p.slots.as_ref().map_or(0, Slots::size)
+        };
+        self.pieces.iter().map(bytes).sum()
     }
 
     /// Bytes on the host.
     ///
     /// - 8 per instance for its place and its index; none with [`StoredOrder::Given`].
-    /// - 88 per group of 64 instances.
+    /// - 88 per group of 64 instances, and 8 more if any instance is absent; none if the bounds
+    ///   come from a buffer.
     /// - 48 per instance in those groups of which a part was updated.
     pub fn host_bytes(&self) -> u64 {
         let groups = self.changing().groups.iter().map(Groups::host_bytes).sum::<u64>();
         self.pieces.iter().map(|p| p.order.host_bytes()).sum::<u64>() + groups
+    }
+
+    /// Forgets what the host knows of the bounds, because the device writes them from now on.
+    fn bounds_are_on_device(&self) {
+        let mut changing = self.changing();
+        if !std::mem::replace(&mut changing.on_device, true) {
+            let unknown = |piece: &Piece| Groups::unknown(piece.count() as usize);
+            changing.groups = self.pieces.iter().map(unknown).collect();
+        }
     }
 
     /// The culls that were submitted.

@@ -1,17 +1,20 @@
 //! Pieces: the instances of one call, cut so that each part fits a binding and a dispatch.
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use crate::error::Result;
 use crate::gpu::buffers::{Mapped, entry};
 use crate::gpu::device::Gpu;
+use crate::gpu::kept::KeptBindings;
 use crate::gpu::layouts::Binding;
-use crate::input::bounds::Bounds;
+use crate::input::bounds::{Bounds, BoundsKind};
 use crate::instances::batch::GROUP;
 use crate::instances::batch::Origin;
 use crate::instances::groups::Groups;
 use crate::instances::order::{PieceOrder, StoredOrder};
 use crate::instances::records::{RECORDS_PER_ROW, Records, Upload};
+use crate::instances::slots::{Kinds, Slots};
 use crate::instances::volume_record::BoxRecord;
 
 /// Invocations of one workgroup of the cull of groups, and of updates.
@@ -59,6 +62,30 @@ pub(crate) struct Piece {
     /// What the cull of groups binds: its boxes, as if they were a piece of instances.
     pub(crate) group_bindings: wgpu::BindGroup,
     pub(crate) order: PieceOrder,
+    /// `None` if all instances have mesh 0 and scale 1: then their slots are their indices.
+    pub(crate) slots: Option<Slots>,
+    /// What bounds from a buffer need.
+    pub(crate) from_buffer: KeptSources,
+}
+
+/// Buffers whose bindings a piece keeps: callers often write to two or three in turns.
+const KEPT: usize = 3;
+
+/// A buffer, where the bounds of a piece begin in it, and the bytes from one to the next.
+type SourceKey = (wgpu::Buffer, u64, u64);
+
+/// What a piece keeps for bounds from a buffer (`from_buffer.rs`).
+#[derive(Debug)]
+pub(crate) struct KeptSources {
+    pub(super) bindings: KeptBindings<SourceKey>,
+    /// The index of the instance at each place, if the piece is sorted.
+    pub(super) indices: OnceLock<wgpu::Buffer>,
+}
+
+impl Default for KeptSources {
+    fn default() -> Self {
+        Self { bindings: KeptBindings::new(KEPT), indices: OnceLock::new() }
+    }
 }
 
 impl Piece {
@@ -87,41 +114,87 @@ pub(super) fn packed(
     bounds: &Bounds<'_>,
     index: u32,
     range: Range<u32>,
-    order: StoredOrder,
+    (order, kinds): (StoredOrder, &Kinds<'_>),
     has_groups: bool,
-) -> Result<(Piece, Groups, [Upload; 2])> {
+) -> Result<(Piece, Groups, Vec<Upload>)> {
     let (first, count) = (range.start as usize, range.end - range.start);
     let record_bytes = bounds.kind().record_bytes();
-    let order = PieceOrder::new(bounds, first..range.end as usize, order)?;
+    let indices = first..range.end as usize;
+    let order = PieceOrder::new(bounds, indices.clone(), order)?;
+    let absent = kinds.absent(&indices, &order)?;
+    let (slots, slots_upload) = Slots::new(gpu, kinds, &indices, &order)?.unzip();
     let source = |place: usize| Origin {
         bounds: first + order.index(place),
         index: order.index(place) as u32,
     };
     let (records, upload, groups) =
-        Records::new(gpu, "hiz.instances.records", count, record_bytes, |records| {
+        Records::new(gpu, RECORDS_LABEL, count, record_bytes, |records| {
             if has_groups {
-                Groups::packed(bounds, count as usize, source, records)
+                Groups::packed(bounds, count as usize, absent, source, records)
             } else {
                 Groups::without_groups(bounds, count as usize, source, records)
             }
         })?;
     let num_groups = groups.len() as u32;
-    let box_bytes = size_of::<BoxRecord>() as u64;
     let (group_records, groups_upload, ()) =
-        Records::new(gpu, "hiz.instances.groups", num_groups, box_bytes, |boxes| {
+        Records::new(gpu, GROUPS_LABEL, num_groups, BOX_BYTES, |boxes| {
             let records = (0..groups.len()).map(|g| groups.record(g));
             if groups.len() > 0 { write_boxes(boxes, records) } else { Ok(()) }
         })?;
+    let order = (order, slots);
+    let piece = assembled(gpu, (index, range), num_groups, records, group_records, order)?;
+    Ok((piece, groups, [upload, groups_upload].into_iter().chain(slots_upload).collect()))
+}
+
+/// Makes a piece whose records and group boxes are written on the device, in the caller's order.
+pub(super) fn unwritten(
+    gpu: &Gpu,
+    kind: BoundsKind,
+    index: u32,
+    range: Range<u32>,
+) -> Result<Piece> {
+    let count = range.end - range.start;
+    let num_groups = count.div_ceil(GROUP as u32);
+    let records = Records::unwritten(gpu, RECORDS_LABEL, count, kind.record_bytes())?;
+    let group_records = Records::unwritten(gpu, GROUPS_LABEL, num_groups, BOX_BYTES)?;
+    let order = (PieceOrder::default(), None);
+    assembled(gpu, (index, range), num_groups, records, group_records, order)
+}
+
+const RECORDS_LABEL: &str = "hiz.instances.records";
+const GROUPS_LABEL: &str = "hiz.instances.groups";
+
+/// Bytes of the record of a group's box.
+const BOX_BYTES: u64 = size_of::<BoxRecord>() as u64;
+
+fn assembled(
+    gpu: &Gpu,
+    (index, range): (u32, Range<u32>),
+    num_groups: u32,
+    records: Records,
+    group_records: Records,
+    (order, slots): (PieceOrder, Option<Slots>),
+) -> Result<Piece> {
     let uniform = |count: u32| {
         let words = count.div_ceil(32);
         gpu.uniform("hiz.instances.piece", &PieceUniform { base: range.start, count, index, words })
     };
     let uniform_of_groups = uniform(num_groups)?;
-    let uniform = uniform(count)?;
+    let uniform = uniform(range.end - range.start)?;
     let bindings = bind_records(gpu, &uniform, &records)?;
     let group_bindings = bind_records(gpu, &uniform_of_groups, &group_records)?;
-    let piece = Piece { range, records, group_records, uniform, bindings, group_bindings, order };
-    Ok((piece, groups, [upload, groups_upload]))
+    let from_buffer = KeptSources::default();
+    Ok(Piece {
+        range,
+        records,
+        group_records,
+        uniform,
+        bindings,
+        group_bindings,
+        order,
+        slots,
+        from_buffer,
+    })
 }
 
 /// Binds a piece's uniform and records for a cull.

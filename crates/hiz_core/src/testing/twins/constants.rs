@@ -6,6 +6,7 @@ use super::declared;
 use crate::cull::count;
 use crate::cull::explain::{self, Stage};
 use crate::cull::groups::GROUPS_OF_RUN;
+use crate::cull::lod::LodRule;
 use crate::cull::pipelines::{CullKey, DepthStore, ReportKey};
 use crate::cull::pipelines::{classify_constants, cull_module, report_constants};
 use crate::cull::refine;
@@ -17,11 +18,15 @@ use crate::input::bounds::BoundsKind;
 use crate::input::image::MAX_IMAGE_SIDE;
 use crate::input::view::ERROR_ULPS;
 use crate::instances::batch::GROUP;
+use crate::instances::from_buffer;
 use crate::instances::piece::CULL_WORKGROUP;
 use crate::instances::records::{RECORDS_PER_ROW, TEXEL_BYTES};
 use crate::instances::update;
-use crate::instances::volume_record::{BEYOND_LIMITS, LARGEST};
+use crate::instances::volume_record::{ABSENT_CENTER, BEYOND_LIMITS, LARGEST};
+use crate::output::bins::BLOCK_WORDS;
 use crate::output::compact::SCATTER_WORKGROUP;
+use crate::output::emit_passes;
+use crate::output::mesh_table::{MAX_LODS, MESH_TEXELS};
 use crate::output::survivors::SURVIVORS_PER_ROW;
 use crate::output::verdict::{VERDICT_MASK, Verdict};
 use crate::output::visible::VERDICT_MULTIPLE;
@@ -29,9 +34,13 @@ use crate::pyramid::layout::{BLOCK_ALIGNMENT, BLOCK_LOG2, HEADERS, PIXELS};
 use crate::pyramid::levels::MAX_LEVELS;
 use crate::pyramid::reduce::{REDUCE_WORKGROUP, SHARED_LEVEL, TALL_SIDE};
 use crate::pyramid::resolve;
+use crate::testing::lod;
 use crate::testing::shaders::tests::parse;
-use crate::testing::shaders::{KINDS, all, files};
+use crate::testing::shaders::{EMITS, KINDS, all, files};
 use crate::yardstick::reduce as yardstick;
+
+/// From this magnitude on, the next float32 makes up for two flushed subnormals.
+const SMALL: f32 = 1.0 / (1_u128 << 100) as f32;
 
 /// Constants of the shaders with a twin in this crate or in Rust's `core`.
 fn twins() -> Vec<(&'static str, &'static str, f64)> {
@@ -40,6 +49,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
     let bits = |v: f32| f64::from(v.to_bits());
     let verdict = |v: Verdict| int(v as u32);
     let stage = |s: Stage| int(s as u32);
+    let rule = |r: &LodRule| int(r.code());
     let texels = |kind: BoundsKind| (kind.record_bytes() / TEXEL_BYTES) as f64;
     vec![
         ("cull/certificate", "EPS", EPS),
@@ -49,6 +59,10 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/cull_groups", "WORKGROUP", int(CULL_WORKGROUP)),
         ("cull/explain", "BEHIND", int(explain::BEHIND)),
         ("cull/explain", "CLEAR", int(explain::CLEAR)),
+        ("cull/lod", "FINEST", rule(&LodRule::Finest)),
+        ("cull/lod", "BY_ERROR", rule(&LodRule::Error { pixels: 1.0 })),
+        ("cull/lod", "BY_DISTANCE", rule(&LodRule::Distance { thresholds: Vec::new() })),
+        ("cull/lod", "BY_SIZE", rule(&LodRule::Size { pixels: Vec::new() })),
         ("cull/outcome", "AT_VALIDITY", stage(Stage::Validity)),
         ("cull/outcome", "AT_FRUSTUM", stage(Stage::Frustum)),
         ("cull/outcome", "AT_EYE_PLANE", stage(Stage::EyePlane)),
@@ -75,6 +89,18 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/bounds_oriented_box", "RECORD_TEXELS", texels(BoundsKind::OrientedBox)),
         ("instances/bounds_oriented_box", "LAST_TEXEL", texels(BoundsKind::OrientedBox) - 1.0),
         ("instances/bounds_sphere", "RECORD_TEXELS", texels(BoundsKind::Sphere)),
+        ("instances/from_buffer", "BOX_TEXELS", texels(BoundsKind::Box)),
+        ("instances/from_buffer", "SIGN_BIT", bits(-0.0)),
+        ("instances/from_buffer", "MAGNITUDE_BITS", int(u32::MAX >> 1)),
+        ("instances/from_buffer", "LARGEST_BITS", bits(LARGEST)),
+        ("instances/from_buffer", "LARGEST_CORNER_BITS", bits(2.0 * LARGEST)),
+        ("instances/from_buffer", "SMALL_BITS", bits(SMALL)),
+        ("instances/from_buffer", "BEYOND_SMALL_BITS", bits(2.0 * SMALL)),
+        ("instances/from_buffer", "INVALID_LOW", int(u32::MIN)),
+        ("instances/from_buffer", "INVALID_HIGH", int(u32::MAX)),
+        ("instances/from_buffer", "WORKGROUP", int(from_buffer::WORKGROUP)),
+        ("instances/from_buffer_box", "RECORD_TEXELS", texels(BoundsKind::Box)),
+        ("instances/from_buffer_sphere", "RECORD_TEXELS", texels(BoundsKind::Sphere)),
         ("instances/groups", "GROUP", GROUP as f64),
         ("instances/groups", "RUN", int(GROUPS_OF_RUN)),
         ("instances/groups", "SHARE", GROUP as f64 / int(GROUPS_OF_RUN)),
@@ -82,9 +108,17 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/piece", "VERDICT_MULTIPLE", int(VERDICT_MULTIPLE)),
         ("instances/piece", "WORD_BITS", int(u32::BITS)),
         ("instances/record_layout", "RECORDS_PER_ROW_LOG2", int(RECORDS_PER_ROW.ilog2())),
+        ("instances/record_layout", "BEYOND_LIMITS_BITS", bits(BEYOND_LIMITS)),
         ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
-        ("instances/update", "BEYOND_LIMITS_BITS", bits(BEYOND_LIMITS)),
+        ("cull/classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
         ("output/compact", "SCATTER_WORKGROUP", int(SCATTER_WORKGROUP)),
+        ("output/emit", "BLOCK_LOG2_WORDS", int(BLOCK_WORDS.ilog2())),
+        ("output/emit_bins", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/emit_instances", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/emit_scan", "LANES", int(emit_passes::WORKGROUP)),
+        ("output/emit_scan", "SHARE", int(BLOCK_WORDS / emit_passes::WORKGROUP)),
+        ("output/emit_scatter", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/mesh_table", "MESH_TEXELS", MESH_TEXELS as f64),
         ("output/verdict", "OUTSIDE", verdict(Verdict::Outside)),
         ("output/verdict", "OCCLUDED", verdict(Verdict::Occluded)),
         ("output/verdict", "VISIBLE", verdict(Verdict::Visible)),
@@ -101,6 +135,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("pyramid/resolve", "WORKGROUP", int(resolve::WORKGROUP)),
         ("pyramid/texels", "LEAST_NORMAL", float(f32::MIN_POSITIVE)),
         ("pyramid/texels_atlas", "HEADERS", int(HEADERS)),
+        ("testing/choose_lods", "LANES", int(lod::LANES)),
+        ("testing/choose_lods", "MAX_LODS", MAX_LODS as f64),
         ("yardstick/reduce_buffer", "WORKGROUP", int(yardstick::BUFFER_WORKGROUP)),
         ("yardstick/reduce_texture", "SIDE", int(yardstick::TEXTURE_WORKGROUP_SIDE)),
     ]
@@ -111,8 +147,9 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
 const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/certificate", &["ERROR_FLOOR"]),
     ("cull/classify", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
+    ("cull/lod", &["NEEDS", "NEED_FACTOR", "LARGEST_DEVIATION"]),
     ("cull/refine", &["REFINED"]),
-    ("cull/refine_groups", &["WITHIN"]),
+    ("cull/refine_groups", &["LAST_TEXEL", "WITHIN"]),
     (
         "cull/supporting_planes",
         &[
@@ -128,7 +165,16 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ),
     (
         "instances/bounds_box_support",
-        &["EDGES", "FACES", "CANDIDATES", "EDGES_OF_AXIS_LOG2", "BORDER_TOLERANCE"],
+        &[
+            "EDGES",
+            "FACES",
+            "CANDIDATES",
+            "EDGES_OF_AXIS_LOG2",
+            "BORDER_TOLERANCE",
+            "RADIUS_FACTOR",
+            "RADIUS_FLOOR",
+            "ROOT_FACTOR",
+        ],
     ),
     (
         "instances/bounds_sphere",
@@ -144,8 +190,12 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
             "TURN",
         ],
     ),
+    ("instances/from_buffer", &["HALF"]),
     // One workgroup scans, however large it is.
     ("output/compact", &["LANES"]),
+    ("output/emit_draws", &["LANES"]),
+    ("output/emit_record", &["COMMON_WORDS"]),
+    ("output/mesh_table", &["ERRORS_LOG2"]),
 ];
 
 /// The constants of every file that are one number: by file and name.
@@ -226,6 +276,11 @@ fn constants_fit_each_other() {
     assert!(number("cull/supporting_planes", "BEYOND") >= f64::from(MAX_IMAGE_SIDE));
     assert_eq!(MAX_IMAGE_SIDE, 1 << (MAX_LEVELS - 1));
     assert_eq!(Stage::ALL.map(|s| s as usize), std::array::from_fn(|i| i));
+    assert!(BLOCK_WORDS.is_power_of_two());
+    // A texel for the number of a mesh's LODs, and one for each four errors.
+    assert_eq!(MESH_TEXELS - 1, MAX_LODS >> number("output/mesh_table", "ERRORS_LOG2") as u32);
+    // The spacing just below 2^-100 exceeds two flushed numbers.
+    assert!(f64::from(SMALL) * EPS / 2.0 > 2.0 * f64::from(f32::MIN_POSITIVE));
     // What is beyond limits is beyond what is still valid.
     const { assert!(BEYOND_LIMITS > LARGEST) };
 }
@@ -241,6 +296,14 @@ fn constants_cover_what_is_counted() {
     assert!(number("cull/certificate", "ERROR_FLOOR") >= two_to(-70));
     // Both squares, the product and the sum lose at most 6 eps.
     assert!(number("instances/bounds_sphere", "SQUARES_FACTOR") >= 1.0 + 6.0 * EPS);
+    // The three products of a need.
+    assert!(number("cull/lod", "NEED_FACTOR") >= 1.0 + 4.0 * EPS);
+    // Bounds below the coordinate limit of every camera, and a product that does not overflow.
+    let deviation = number("cull/lod", "LARGEST_DEVIATION");
+    assert!((two_to(52)..=two_to(80)).contains(&deviation));
+    // A box's radius: of a square or a sum less than 16 eps, and squares below 2^-126.
+    assert!(number("instances/bounds_box_support", "RADIUS_FACTOR") >= 1.0 + 16.0 * EPS);
+    assert!(number("instances/bounds_box_support", "RADIUS_FLOOR") >= two_to(-100));
     // Squares below 2^-126 lose what they are.
     assert!(number("instances/bounds_sphere", "SQUARES_FLOOR") >= two_to(-100));
     assert!(number("instances/bounds_sphere", "AXES") >= 3.0);
@@ -263,6 +326,15 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
     let line = |n: u32| [n, 1, 1];
     BTreeMap::from([
         ("begin", line(1)),
+        ("choose_lods", line(lod::LANES)),
+        ("emit_bins", line(emit_passes::WORKGROUP)),
+        ("emit_block", line(emit_passes::WORKGROUP)),
+        // One workgroup, the largest that WebGPU promises.
+        ("emit_draws", line(wgpu::Limits::default().max_compute_invocations_per_workgroup)),
+        ("emit_instances", line(emit_passes::WORKGROUP)),
+        ("emit_scatter", line(emit_passes::WORKGROUP)),
+        ("emit_top", line(emit_passes::WORKGROUP)),
+        ("copy_records", line(SCATTER_WORKGROUP)),
         ("count", line(count::LANES)),
         ("cull", line(GROUP as u32)),
         ("cull_groups", line(CULL_WORKGROUP)),
@@ -285,6 +357,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         // One workgroup, the largest that WebGPU promises.
         ("scan", line(wgpu::Limits::default().max_compute_invocations_per_workgroup)),
         ("scatter", line(SCATTER_WORKGROUP)),
+        ("take_bounds", line(from_buffer::WORKGROUP)),
     ])
 }
 
@@ -316,19 +389,14 @@ fn a_cull_sets_every_override() {
             descent: false,
             fit_volume: false,
         };
-        let report = ReportKey {
-            mask: false,
-            verdicts: false,
-            append: false,
-            list: false,
-            capped: false,
-            statistics: false,
-        };
-        let set = classify_constants(&key).into_iter().chain(report_constants(&report));
-        let set: BTreeSet<String> = set.map(|(name, _)| name.to_owned()).collect();
-        let module = parse(&cull_module(store, kind).text());
-        let declared: BTreeSet<String> =
-            module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
-        assert_eq!(set, declared, "{kind:?}");
+        for (way, emit) in EMITS {
+            let report = ReportKey { mask: false, verdicts: false, emit, statistics: false };
+            let set = classify_constants(&key).into_iter().chain(report_constants(&report));
+            let set: BTreeSet<String> = set.map(|(name, _)| name.to_owned()).collect();
+            let module = parse(&cull_module(store, kind, emit).text());
+            let declared: BTreeSet<String> =
+                module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
+            assert_eq!(set, declared, "{kind:?} {way}");
+        }
     }
 }
