@@ -360,6 +360,7 @@ class Yardstick:
         options: CullOptions,
         outputs: Outputs,
         depth: DepthImage | None,
+        meshes: MeshTable | None,
     ) -> YardstickCull: ...
 
 @final
