@@ -10,7 +10,8 @@ use hiz_core::headless::{Engine, NO_LOD};
 use hiz_core::{
     ABSENT, Bounds, Camera, CullOptions, DepthConvention, DrawTemplate, Emit, Error, Floats,
     Hierarchy, HizContext, InstanceOptions, Instances, Lod, LodRule, MeshLods, MeshTable, Order,
-    Outputs, Placement, Pyramid, Verdict, VertexDraw, Visible, testing::CANARY_WORDS, wgpu,
+    Outputs, Placement, Pyramid, PyramidOptions, Verdict, VertexDraw, Visible, WarmUp,
+    testing::CANARY_WORDS, wgpu,
 };
 
 const CONVENTION: DepthConvention = DepthConvention::Reversed;
@@ -536,7 +537,7 @@ fn absent_instances_are_not_there() {
             assert_eq!((counts.occluded, counts.outside, counts.absent), (63, 0, 1));
             assert_eq!(culling.verdicts().unwrap()[7], Verdict::Outside);
             assert!(culling.explain(7).unwrap().reason.contains("absent"));
-            assert_eq!(culling.indices().unwrap(), []);
+            assert!(culling.indices().unwrap().is_empty());
             engine.update(&instances, 0, &bounds, true).unwrap();
         }
     }
