@@ -410,6 +410,7 @@ class Yardstick:
         options: CullOptions,
         outputs: Outputs,
         depth: DepthImage | None,
+        meshes: MeshTable | None,
     ) -> YardstickCull: ...
 
 @final
