@@ -202,6 +202,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("output/compact", &["LANES"]),
     ("output/emit_draws", &["LANES"]),
     ("output/emit_record", &["COMMON_WORDS"]),
+    ("output/emit_scatter", &["FOUR", "NUMBERS"]),
     ("output/mesh_table", &["ERRORS_LOG2"]),
 ];
 

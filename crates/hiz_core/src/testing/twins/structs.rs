@@ -45,6 +45,7 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     "SupportingPlanes",
     "Value",
     "Volume",
+    "Word",
 ];
 
 /// Offsets of a WGSL struct's members, and its size.
