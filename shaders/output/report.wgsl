@@ -1,62 +1,26 @@
-// What a cull leaves behind, as far as it was asked for:
+// What a cull leaves behind about the instances that it tests:
 //
 // - a bit per instance, in the caller's numbering
 // - a verdict per instance, in the stored order
-// - the draw's list of kept instances, and its length
+//
+// What is done with those that are kept is in a file of its own: `report_alone.wgsl`, or
+// `../cull/early.wgsl` and `../cull/late.wgsl` for the two passes of a frame.
 
-// Set the bit of each instance that is kept.
-override MASK: bool;
-// Write its verdict.
+// Write the verdict of each instance.
 override VERDICTS: bool;
-// Count the kept instances in the draw arguments, in the order in which invocations arrive.
-// Otherwise `compact.wgsl` counts the mask.
-override APPEND: bool;
-// And list them.
-override LIST: bool;
-// More instances may be kept than the lists hold.
-override CAPPED: bool;
-
-// Twin: `DrawIndexedIndirect` in `crates/hiz_core/src/output/draw.rs`.
-struct DrawIndexedIndirect {
-    index_count: u32,
-    instance_count: atomic<u32>,
-    first_index: u32,
-    base_vertex: i32,
-    first_instance: u32,
-}
 
 @group(1) @binding(0) var<uniform> piece: Piece;
 // Bit i of the first words: the caller's instance i of the piece is kept.
 // From `verdicts_begin` on: a word per place, the verdict of the instance that is stored there.
 @group(2) @binding(0) var<storage, read_write> mask: array<atomic<u32>>;
-@group(2) @binding(1) var<storage, read_write> list: array<u32>;
-@group(2) @binding(2) var<storage, read_write> draws: array<DrawIndexedIndirect>;
-// .x: how many indices may be written, in all pieces together.
-@group(2) @binding(4) var<uniform> capacity: vec4<u32>;
 
-// The capacity that earlier pieces have left.
-fn room() -> u32 {
-    var left = capacity.x;
-    for (var p = 0u; p < piece.index; p += 1u) {
-        left -= min(left, atomicLoad(&draws[p].instance_count));
-    }
-    return left;
+// The bit of the mask that stands for the instance at a place.
+fn mask_bit(place: u32) -> u32 {
+    return caller_index(place);
 }
 
-// `instance_count` is also the allocator.
-// An invocation whose slot exceeds the remaining capacity undoes its increment.
-// So the count ends within the capacity, and no slot is handed out twice.
-fn append(index: u32) {
-    let slot = atomicAdd(&draws[piece.index].instance_count, 1u);
-    if CAPPED {
-        if slot >= room() {
-            atomicSub(&draws[piece.index].instance_count, 1u);
-            return;
-        }
-    }
-    if LIST {
-        list[slot] = piece.base + index;
-    }
+fn set_mask_bit(bit: u32) {
+    atomicOr(&mask[bit / WORD_BITS], 1u << (bit % WORD_BITS));
 }
 
 // Whether the instance at a place is kept; writes its verdict.
@@ -71,21 +35,10 @@ fn test(place: u32) -> bool {
     return outcome.verdict >= VISIBLE;
 }
 
-// Reports that the instance at a place is kept.
-fn report(place: u32) {
-    let index = caller_index(place);
-    if MASK {
-        atomicOr(&mask[index / WORD_BITS], 1u << (index % WORD_BITS));
-    }
-    if APPEND {
-        append(index);
-    }
-}
-
 // Tests the RUN members of a group that belong to one of its SHARE invocations.
-// Then it reports those that are kept: they are few, so the expensive part runs a few times.
-fn cull_run(group: u32, share: u32) {
-    let first = group * GROUP + share;
+// The first of them is at place `first`, and they lie SHARE places apart.
+// Bit k of what returns: member k is kept.
+fn test_run(first: u32) -> u32 {
     var kept = 0u;
     var k = 0u;
     loop {
@@ -98,7 +51,5 @@ fn cull_run(group: u32, share: u32) {
             break if k == RUN || first + k * SHARE >= piece.count;
         }
     }
-    for (; kept != 0u; kept &= kept - 1u) {
-        report(first + countTrailingZeros(kept) * SHARE);
-    }
+    return kept;
 }

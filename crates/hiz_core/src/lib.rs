@@ -168,6 +168,7 @@ pub mod testing;
 pub use wgpu;
 
 pub use context::HizContext;
+pub use cull::history::{EarlySet, Temporal};
 pub use cull::options::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
 pub use cull::warm_up::WarmUp;
 pub use error::{Error, Result};

@@ -7,18 +7,23 @@
 //! 2. `view_uniform` turns the camera and the options into the numbers that the shaders read.
 //! 3. `pipelines` picks the pipeline that fits the options.
 //! 4. `record` records the pass; `groups` adds the test of whole groups before their members.
-//! 5. `warm_up` does all of it once without workgroups, before the first frame.
-//! 6. Later, and only if they are read: `refine` completes the verdicts, `count` counts them, and
+//! 5. `history`, `early` and `late` are the two passes of a frame: the early one draws what was
+//!    visible before, and the late one tests all against the depth of that.
+//! 6. `warm_up` does all of it once without workgroups, before the first frame.
+//! 7. Later, and only if they are read: `refine` completes the verdicts, `count` counts them, and
 //!    `explain` repeats one test.
 //!
 //! This room records commands into an encoder; it never submits or waits.
 
 #[cfg(feature = "headless")]
 pub(crate) mod count;
+pub(crate) mod early;
 #[cfg(feature = "headless")]
 pub(crate) mod explain;
 pub(crate) mod groups;
+pub(crate) mod history;
 pub(crate) mod inputs;
+pub(crate) mod late;
 pub(crate) mod options;
 pub(crate) mod pipelines;
 pub(crate) mod record;

@@ -24,9 +24,98 @@ pub(crate) struct CullKey {
     pub(crate) fit_volume: bool,
 }
 
-/// What a cull writes: the `override` constants of `shaders/output/report.wgsl`.
+impl CullKey {
+    /// The key of a pass that reads no depth.
+    pub(super) fn without_depth(kind: BoundsKind, sample_coverage: bool) -> Self {
+        Self {
+            store: DepthStore::Nowhere,
+            kind,
+            sample_coverage,
+            // These have no effect, because no depth is read.
+            reversed: false,
+            chunks: 1,
+            footprint_log2: 1,
+            descent: false,
+            fit_volume: false,
+        }
+    }
+}
+
+/// Which cull of a frame this is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum FramePass {
+    /// One that is not one of two passes.
+    Alone,
+    /// The early pass, which reads no depth.
+    Early(Candidates),
+    /// The late pass.
+    Late,
+}
+
+/// Where the candidates of an early pass come from; twin: `shaders/cull/candidates.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub(crate) enum Candidates {
+    History = 0,
+    Size = 1,
+    Given = 2,
+}
+
+impl FramePass {
+    /// The files that say what is done with kept instances.
+    fn member_files(self) -> &'static [File] {
+        match self {
+            Self::Alone => &[wgsl!("output/report_alone")],
+            Self::Early(_) => {
+                &[wgsl!("cull/history"), wgsl!("cull/candidates"), wgsl!("cull/early")]
+            }
+            Self::Late => &[wgsl!("cull/history"), wgsl!("cull/late")],
+        }
+    }
+
+    /// The files that say which groups survive.
+    fn group_files(self) -> &'static [File] {
+        match self {
+            Self::Alone => &[wgsl!("cull/groups_alone")],
+            Self::Early(_) => {
+                &[wgsl!("cull/history"), wgsl!("cull/candidates"), wgsl!("cull/groups_early")]
+            }
+            Self::Late => &[wgsl!("cull/history"), wgsl!("cull/groups_late")],
+        }
+    }
+
+    /// What a cull of instances writes, and what it reads of its frame.
+    pub(super) fn member_bindings(self) -> &'static [(u32, Binding)] {
+        match self {
+            Self::Alone => VISIBLE_BINDINGS,
+            Self::Early(_) => EARLY_BINDINGS,
+            Self::Late => LATE_BINDINGS,
+        }
+    }
+
+    /// What a cull of groups writes, and what it reads of its frame.
+    pub(super) fn group_bindings(self) -> &'static [(u32, Binding)] {
+        match self {
+            Self::Alone => SURVIVOR_BINDINGS,
+            Self::Early(_) => EARLY_SURVIVOR_BINDINGS,
+            Self::Late => LATE_SURVIVOR_BINDINGS,
+        }
+    }
+
+    /// The constants that an early pass has besides.
+    fn constants(self) -> Option<(&'static str, f64)> {
+        match self {
+            Self::Early(candidates) => Some(("EARLY_SET", f64::from(candidates as u32))),
+            Self::Alone | Self::Late => None,
+        }
+    }
+}
+
+/// What a cull writes: the `override` constants of `shaders/output/report.wgsl` and of
+/// `shaders/output/report_alone.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct ReportKey {
+    pub(crate) pass: FramePass,
     pub(crate) mask: bool,
     pub(crate) verdicts: bool,
     pub(crate) append: bool,
@@ -46,15 +135,19 @@ pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 6] {
     ]
 }
 
-pub(crate) fn report_constants(key: &ReportKey) -> [(&'static str, f64); 6] {
-    [
-        ("MASK", flag(key.mask)),
-        ("VERDICTS", flag(key.verdicts)),
-        ("APPEND", flag(key.append)),
-        ("LIST", flag(key.list)),
-        ("CAPPED", flag(key.capped)),
-        ("STATISTICS", flag(key.statistics)),
-    ]
+pub(crate) fn report_constants(key: &ReportKey) -> Vec<(&'static str, f64)> {
+    let mut constants =
+        vec![("VERDICTS", flag(key.verdicts)), ("STATISTICS", flag(key.statistics))];
+    if key.pass == FramePass::Alone {
+        constants.extend([
+            ("MASK", flag(key.mask)),
+            ("APPEND", flag(key.append)),
+            ("LIST", flag(key.list)),
+            ("CAPPED", flag(key.capped)),
+        ]);
+    }
+    constants.extend(key.pass.constants());
+    constants
 }
 
 /// Where a cull reads depth.
@@ -65,7 +158,6 @@ pub(crate) enum DepthStore {
     /// All levels from one texture.
     Atlas,
     /// No depth is read: such a pass only finds what is outside.
-    #[cfg(feature = "headless")]
     Nowhere,
 }
 
@@ -75,7 +167,6 @@ impl DepthStore {
         match self {
             Self::Apart(source) => [source.files(), &[wgsl!("pyramid/texels_apart")]].concat(),
             Self::Atlas => vec![wgsl!("pyramid/texels_atlas")],
-            #[cfg(feature = "headless")]
             Self::Nowhere => vec![wgsl!("pyramid/texels_nowhere")],
         }
     }
@@ -85,7 +176,6 @@ impl DepthStore {
         match self {
             Self::Apart(source) => source as u32,
             Self::Atlas => 3,
-            #[cfg(feature = "headless")]
             Self::Nowhere => 4,
         }
     }
@@ -109,7 +199,6 @@ impl DepthStore {
             Self::Atlas => {
                 gpu.layout("hiz.cull.atlas_layout", &[(2, Uniform), (3, ReadQuads), (6, Uniform)])
             }
-            #[cfg(feature = "headless")]
             Self::Nowhere => gpu.layout("hiz.cull.no_depth_layout", &[(2, Uniform), (6, Uniform)]),
         }
     }
@@ -127,6 +216,43 @@ pub(crate) const VISIBLE_BINDINGS: &[(u32, Binding)] = &[
 /// The bindings of what a cull of groups writes.
 pub(crate) const SURVIVOR_BINDINGS: &[(u32, Binding)] =
     &[(0, Binding::Write), (1, Binding::Write), (2, Binding::WriteTexels), (3, Binding::Write)];
+
+/// The bindings of an early pass: mask, history, the caller's mask, statistics, frame.
+const EARLY_BINDINGS: &[(u32, Binding)] = &[
+    (0, Binding::Write),
+    (1, Binding::Read),
+    (2, Binding::Read),
+    (3, Binding::Write),
+    (4, Binding::Uniform),
+];
+
+/// The bindings of a late pass: mask, history, the early pass's mask, statistics, frame.
+const LATE_BINDINGS: &[(u32, Binding)] = &[
+    (0, Binding::Write),
+    (1, Binding::Write),
+    (2, Binding::Read),
+    (3, Binding::Write),
+    (4, Binding::Uniform),
+];
+
+/// The bindings of an early pass's groups: as [`SURVIVOR_BINDINGS`], then history and frame.
+const EARLY_SURVIVOR_BINDINGS: &[(u32, Binding)] = &[
+    (0, Binding::Write),
+    (1, Binding::Write),
+    (2, Binding::WriteTexels),
+    (3, Binding::Write),
+    (4, Binding::Read),
+    (5, Binding::Uniform),
+];
+
+/// The bindings of a late pass's groups: as [`SURVIVOR_BINDINGS`], then the history.
+const LATE_SURVIVOR_BINDINGS: &[(u32, Binding)] = &[
+    (0, Binding::Write),
+    (1, Binding::Write),
+    (2, Binding::WriteTexels),
+    (3, Binding::Write),
+    (4, Binding::Write),
+];
 
 /// The bindings of the survivors, which a cull of members reads.
 pub(crate) const MEMBER_BINDINGS: &[(u32, Binding)] =
@@ -183,40 +309,38 @@ pub(super) fn unexplained(store: DepthStore, kind: BoundsKind, entry: &[File]) -
 }
 
 /// The files of the flat cull, which tests each instance by itself, without the decision.
-pub(crate) const FLAT: &[File] = &[
-    wgsl!("cull/unexplained"),
-    wgsl!("instances/piece"),
-    wgsl!("instances/groups"),
-    wgsl!("output/statistics"),
-    wgsl!("output/report"),
-    wgsl!("cull/cull"),
-];
-
-/// The shader of the flat cull, for instances of one kind.
-pub(crate) fn cull_module(store: DepthStore, kind: BoundsKind) -> Source {
-    decision_module(store, kind, CERTIFIED, FLAT)
-}
-
-/// The shader of the cull of groups.
-pub(crate) fn cull_groups_module(store: DepthStore) -> Source {
-    let entry = [
+pub(crate) fn flat_files(pass: FramePass) -> Vec<File> {
+    let shared = [
+        wgsl!("cull/unexplained"),
         wgsl!("instances/piece"),
         wgsl!("instances/groups"),
         wgsl!("output/statistics"),
-        wgsl!("cull/cull_groups"),
+        wgsl!("output/report"),
     ];
+    [&shared, pass.member_files(), &[wgsl!("cull/cull")]].concat()
+}
+
+/// The shader of the flat cull, for instances of one kind.
+pub(crate) fn cull_module(store: DepthStore, kind: BoundsKind, pass: FramePass) -> Source {
+    decision_module(store, kind, CERTIFIED, &flat_files(pass))
+}
+
+/// The shader of the cull of groups.
+pub(crate) fn cull_groups_module(store: DepthStore, pass: FramePass) -> Source {
+    let shared = [wgsl!("instances/piece"), wgsl!("instances/groups"), wgsl!("output/statistics")];
+    let entry = [&shared, pass.group_files(), &[wgsl!("cull/cull_groups")]].concat();
     unexplained(store, BoundsKind::Box, &entry)
 }
 
 /// The shader of the cull of the surviving groups' members.
-pub(crate) fn cull_members_module(store: DepthStore, kind: BoundsKind) -> Source {
-    let entry = [
+pub(crate) fn cull_members_module(store: DepthStore, kind: BoundsKind, pass: FramePass) -> Source {
+    let shared = [
         wgsl!("instances/piece"),
+        wgsl!("instances/groups"),
         wgsl!("output/statistics"),
         wgsl!("output/report"),
-        wgsl!("instances/groups"),
-        wgsl!("cull/cull_members"),
     ];
+    let entry = [&shared, pass.member_files(), &[wgsl!("cull/cull_members")]].concat();
     unexplained(store, kind, &entry)
 }
 
@@ -243,8 +367,13 @@ pub(crate) fn flat_pipeline(
         label,
         source,
         entry_point: "cull",
-        layouts: &layouts(gpu, key.store, "hiz.cull.visible_layout", VISIBLE_BINDINGS)?,
-        constants: &[classify_constants(key), report_constants(report)].concat(),
+        layouts: &layouts(
+            gpu,
+            key.store,
+            "hiz.cull.visible_layout",
+            report.pass.member_bindings(),
+        )?,
+        constants: &[&classify_constants(key)[..], &report_constants(report)].concat(),
     })
 }
 
@@ -254,21 +383,26 @@ pub(crate) fn cull_pipeline(
     key: &CullKey,
     report: &ReportKey,
 ) -> Result<wgpu::ComputePipeline> {
-    flat_pipeline(gpu, "hiz.cull.pipeline", cull_module(key.store, key.kind), key, report)
+    let source = cull_module(key.store, key.kind, report.pass);
+    flat_pipeline(gpu, "hiz.cull.pipeline", source, key, report)
 }
 
-/// The cull of groups; with `statistics` it counts levels.
+/// The cull of groups.
 pub(crate) fn cull_groups_pipeline(
     gpu: &Gpu,
     key: &CullKey,
-    statistics: bool,
+    report: &ReportKey,
 ) -> Result<wgpu::ComputePipeline> {
+    let mut constants = classify_constants(key).to_vec();
+    constants.push(("STATISTICS", flag(report.statistics)));
+    constants.extend(report.pass.constants());
+    let written = report.pass.group_bindings();
     gpu.compute_pipeline(&Compute {
         label: "hiz.cull_groups.pipeline",
-        source: cull_groups_module(key.store),
+        source: cull_groups_module(key.store, report.pass),
         entry_point: "cull_groups",
-        layouts: &layouts(gpu, key.store, "hiz.cull_groups.layout", SURVIVOR_BINDINGS)?,
-        constants: &[&classify_constants(key)[..], &[("STATISTICS", flag(statistics))]].concat(),
+        layouts: &layouts(gpu, key.store, "hiz.cull_groups.layout", written)?,
+        constants: &constants,
     })
 }
 
@@ -278,14 +412,14 @@ pub(crate) fn cull_members_pipeline(
     key: &CullKey,
     report: &ReportKey,
 ) -> Result<wgpu::ComputePipeline> {
-    let [view, records, visible] =
-        layouts(gpu, key.store, "hiz.cull.visible_layout", VISIBLE_BINDINGS)?;
+    let written = report.pass.member_bindings();
+    let [view, records, visible] = layouts(gpu, key.store, "hiz.cull.visible_layout", written)?;
     let members = gpu.layout("hiz.cull_members.layout", MEMBER_BINDINGS)?;
     gpu.compute_pipeline(&Compute {
         label: "hiz.cull_members.pipeline",
-        source: cull_members_module(key.store, key.kind),
+        source: cull_members_module(key.store, key.kind, report.pass),
         entry_point: "cull_members",
         layouts: &[view, records, visible, members],
-        constants: &[classify_constants(key), report_constants(report)].concat(),
+        constants: &[&classify_constants(key)[..], &report_constants(report)].concat(),
     })
 }

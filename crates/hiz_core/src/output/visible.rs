@@ -73,6 +73,8 @@ pub struct Visible {
     capacity: u32,
     outputs: Outputs,
     counts: Vec<u32>,
+    /// Whether a `Temporal` owns these buffers.
+    of_two_passes: bool,
 }
 
 impl Visible {
@@ -104,7 +106,22 @@ impl Visible {
             capacity: capacity.unwrap_or(instances.len()),
             outputs: *outputs,
             counts: instances.pieces.iter().map(Piece::count).collect(),
+            of_two_passes: false,
         })
+    }
+
+    /// The buffers of one of the two passes of a frame.
+    pub(crate) fn of_two_passes(
+        gpu: &Gpu,
+        instances: &Instances,
+        outputs: &Outputs,
+    ) -> Result<Self> {
+        Ok(Self { of_two_passes: true, ..Self::new(gpu, instances, outputs)? })
+    }
+
+    /// Whether they are those of one of the two passes of a frame, which no other cull may fill.
+    pub(crate) fn is_of_two_passes(&self) -> bool {
+        self.of_two_passes
     }
 
     /// What culls leave in these buffers.

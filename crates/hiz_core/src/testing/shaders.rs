@@ -2,7 +2,9 @@
 
 use crate::cull::count::count_module;
 use crate::cull::explain::explain_module;
-use crate::cull::pipelines::{DepthStore, cull_groups_module, cull_members_module, cull_module};
+use crate::cull::pipelines::{
+    Candidates, DepthStore, FramePass, cull_groups_module, cull_members_module, cull_module,
+};
 use crate::cull::refine::{refine_groups_module, refine_module};
 use crate::gpu::depth_source::SOURCES;
 use crate::gpu::shader::{FILES, Source};
@@ -10,6 +12,7 @@ use crate::input::bounds::BoundsKind;
 use crate::instances::update::update_module;
 use crate::occluders::device_raster::occluders_module;
 use crate::output::compact::compact_module;
+use crate::output::cut::cut_module;
 use crate::pyramid::reduce::{blocks_module, coarse_module};
 #[cfg(feature = "yardstick")]
 use crate::yardstick::{uncertified_module, yardstick_modules};
@@ -32,6 +35,7 @@ pub(super) fn all() -> Vec<(String, Source)> {
     let mut all = vec![
         ("refine_groups".to_owned(), refine_groups_module()),
         ("compact".to_owned(), compact_module()),
+        ("cut".to_owned(), cut_module()),
         ("count".to_owned(), count_module()),
         ("update".to_owned(), update_module()),
         ("occluders".to_owned(), occluders_module()),
@@ -43,13 +47,21 @@ pub(super) fn all() -> Vec<(String, Source)> {
         all.extend(yardstick_modules(source).map(|(name, m)| (format!("{name} {source:?}"), m)));
     }
     let stores = SOURCES.map(DepthStore::Apart).into_iter().chain([DepthStore::Atlas]);
-    for store in stores {
-        all.push((format!("cull_groups {store:?}"), cull_groups_module(store)));
+    let against_depth = [FramePass::Alone, FramePass::Late];
+    let passes = stores.clone().flat_map(|store| against_depth.map(|pass| (store, pass)));
+    // The sets of an early pass differ in a constant.
+    let early = (DepthStore::Nowhere, FramePass::Early(Candidates::History));
+    for (store, pass) in passes.chain([early]) {
+        all.push((format!("cull_groups {store:?} {pass:?}"), cull_groups_module(store, pass)));
         for kind in KINDS {
-            let named = |name: &str| format!("{name} {store:?} {kind:?}");
-            all.push((named("cull"), cull_module(store, kind)));
-            all.push((named("cull_members"), cull_members_module(store, kind)));
-            all.push((named("explain"), explain_module(store, kind)));
+            let named = |name: &str| format!("{name} {store:?} {pass:?} {kind:?}");
+            all.push((named("cull"), cull_module(store, kind, pass)));
+            all.push((named("cull_members"), cull_members_module(store, kind, pass)));
+        }
+    }
+    for store in stores {
+        for kind in KINDS {
+            all.push((format!("explain {store:?} {kind:?}"), explain_module(store, kind)));
         }
         #[cfg(feature = "yardstick")]
         all.push((format!("uncertified cull {store:?}"), uncertified_module(store)));
@@ -99,7 +111,9 @@ pub(in crate::testing) mod tests {
     #[test]
     fn bars_stand_where_a_compiler_could_fold_what_cancels() {
         for kind in KINDS {
-            let module = parse(&cull_module(DepthStore::Apart(SourceKind::Depth), kind).text());
+            let module = parse(
+                &cull_module(DepthStore::Apart(SourceKind::Depth), kind, FramePass::Alone).text(),
+            );
             for bar in ["bar", "bar2", "bar3"] {
                 let (_, function) = module
                     .functions
@@ -140,12 +154,14 @@ pub(in crate::testing) mod tests {
     #[test]
     fn single_pixels_of_every_source_are_sanitized() {
         for source in SOURCES {
-            let module = parse(&cull_module(DepthStore::Apart(source), BoundsKind::Box).text());
+            let module = parse(
+                &cull_module(DepthStore::Apart(source), BoundsKind::Box, FramePass::Alone).text(),
+            );
             assert_eq!(calls(&module, "source_bits", "sanitized"), 1, "{source:?}");
         }
         assert_eq!(
             calls(
-                &parse(&cull_module(DepthStore::Atlas, BoundsKind::Box).text()),
+                &parse(&cull_module(DepthStore::Atlas, BoundsKind::Box, FramePass::Alone).text()),
                 "texel",
                 "sanitized"
             ),
@@ -157,7 +173,9 @@ pub(in crate::testing) mod tests {
     #[test]
     fn every_plane_and_side_is_certified() {
         for kind in KINDS {
-            let module = parse(&cull_module(DepthStore::Apart(SourceKind::Depth), kind).text());
+            let module = parse(
+                &cull_module(DepthStore::Apart(SourceKind::Depth), kind, FramePass::Alone).text(),
+            );
             assert_eq!(
                 calls(&module, "supporting_planes", "surely_above"),
                 1,

@@ -6,7 +6,8 @@ use super::declared;
 use crate::cull::count;
 use crate::cull::explain::{self, Stage};
 use crate::cull::groups::GROUPS_OF_RUN;
-use crate::cull::pipelines::{CullKey, DepthStore, ReportKey};
+use crate::cull::history::HISTORY_BEGIN;
+use crate::cull::pipelines::{Candidates, CullKey, DepthStore, FramePass, ReportKey};
 use crate::cull::pipelines::{classify_constants, cull_module, report_constants};
 use crate::cull::refine;
 use crate::gpu::depth_source::SourceKind;
@@ -21,6 +22,7 @@ use crate::instances::records::{RECORDS_PER_ROW, TEXEL_BYTES};
 use crate::instances::update;
 use crate::instances::volume_record::{BEYOND_LIMITS, LARGEST};
 use crate::output::compact::SCATTER_WORKGROUP;
+use crate::output::cut::CUT_WORKGROUP;
 use crate::output::survivors::SURVIVORS_PER_ROW;
 use crate::output::verdict::{VERDICT_MASK, Verdict};
 use crate::output::visible::VERDICT_MULTIPLE;
@@ -40,6 +42,9 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
     let stage = |s: Stage| int(s as u32);
     let texels = |kind: BoundsKind| (kind.record_bytes() / TEXEL_BYTES) as f64;
     vec![
+        ("cull/candidates", "BY_HISTORY", int(Candidates::History as u32)),
+        ("cull/candidates", "BY_SIZE", int(Candidates::Size as u32)),
+        ("cull/candidates", "GIVEN", int(Candidates::Given as u32)),
         ("cull/certificate", "EPS", EPS),
         ("cull/certificate", "ERROR_ULPS", ERROR_ULPS),
         ("cull/count", "LANES", int(count::LANES)),
@@ -47,6 +52,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/cull_groups", "WORKGROUP", int(CULL_WORKGROUP)),
         ("cull/explain", "BEHIND", int(explain::BEHIND)),
         ("cull/explain", "CLEAR", int(explain::CLEAR)),
+        ("cull/history", "HISTORY_BEGIN", int(HISTORY_BEGIN)),
         ("cull/outcome", "AT_VALIDITY", stage(Stage::Validity)),
         ("cull/outcome", "AT_FRUSTUM", stage(Stage::Frustum)),
         ("cull/outcome", "AT_EYE_PLANE", stage(Stage::EyePlane)),
@@ -81,6 +87,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
         ("instances/update", "BEYOND_LIMITS_BITS", bits(BEYOND_LIMITS)),
         ("output/compact", "SCATTER_WORKGROUP", int(SCATTER_WORKGROUP)),
+        ("output/cut", "WORKGROUP", int(CUT_WORKGROUP)),
         ("output/verdict", "OUTSIDE", verdict(Verdict::Outside)),
         ("output/verdict", "OCCLUDED", verdict(Verdict::Occluded)),
         ("output/verdict", "VISIBLE", verdict(Verdict::Visible)),
@@ -106,6 +113,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
 const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/certificate", &["ERROR_FLOOR"]),
     ("cull/classify", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
+    // All bits of a run.
+    ("cull/early", &["WHOLE_RUN"]),
     ("cull/refine", &["REFINED"]),
     ("cull/refine_groups", &["WITHIN"]),
     (
@@ -262,6 +271,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("cull", line(GROUP as u32)),
         ("cull_groups", line(CULL_WORKGROUP)),
         ("cull_members", line(GROUP as u32)),
+        ("cut", line(CUT_WORKGROUP)),
         ("explain", line(1)),
         ("occluder_vertex", [0; 3]),
         ("reduce", line(REDUCE_WORKGROUP)),
@@ -310,19 +320,23 @@ fn a_cull_sets_every_override() {
             descent: false,
             fit_volume: false,
         };
-        let report = ReportKey {
-            mask: false,
-            verdicts: false,
-            append: false,
-            list: false,
-            capped: false,
-            statistics: false,
-        };
-        let set = classify_constants(&key).into_iter().chain(report_constants(&report));
-        let set: BTreeSet<String> = set.map(|(name, _)| name.to_owned()).collect();
-        let module = parse(&cull_module(store, kind).text());
-        let declared: BTreeSet<String> =
-            module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
-        assert_eq!(set, declared, "{kind:?}");
+        let passes = [FramePass::Alone, FramePass::Early(Candidates::History), FramePass::Late];
+        for pass in passes {
+            let report = ReportKey {
+                pass,
+                mask: false,
+                verdicts: false,
+                append: false,
+                list: false,
+                capped: false,
+                statistics: false,
+            };
+            let set = classify_constants(&key).into_iter().chain(report_constants(&report));
+            let set: BTreeSet<String> = set.map(|(name, _)| name.to_owned()).collect();
+            let module = parse(&cull_module(store, kind, pass).text());
+            let declared: BTreeSet<String> =
+                module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
+            assert_eq!(set, declared, "{kind:?} {pass:?}");
+        }
     }
 }
