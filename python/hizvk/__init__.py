@@ -91,6 +91,7 @@ from .options import CullOptions, DrawTemplate, Outputs
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import DRAW_DTYPE, CullResult
 from .stats import CullStats
+from .temporal import PassResult, Temporal
 
 if TYPE_CHECKING:
     from .recommendation import Recommendation, recommend
@@ -123,11 +124,13 @@ __all__ = [
     "OrientedBoxes",
     "OutOfMemoryError",
     "Outputs",
+    "PassResult",
     "ProxyCheck",
     "Pyramid",
     "Recommendation",
     "Spheres",
     "SplitMesh",
+    "Temporal",
     "Verdict",
     "__version__",
     "adapters",

@@ -15,6 +15,7 @@ mod errors;
 mod held;
 mod options;
 mod reference;
+mod two_passes;
 #[cfg(feature = "yardstick")]
 mod yardstick;
 
@@ -34,6 +35,8 @@ mod _core {
     use crate::held::{after_fork, before_fork, let_go};
     #[pymodule_export]
     use crate::reference::{reference_classify, reference_pyramid};
+    #[pymodule_export]
+    use crate::two_passes::{PassAnswer, TwoPasses};
 
     /// For tests.
     #[cfg(feature = "testing")]

@@ -472,7 +472,7 @@ const BITS: [[bool; 8]; 256] = {
 };
 
 /// Writes the first bits of `bytes` into `bits`, lowest first, a byte at a time.
-fn spread_bits(bytes: &[u8], bits: &mut [bool]) {
+pub(super) fn spread_bits(bytes: &[u8], bits: &mut [bool]) {
     let mut eights = bits.chunks_exact_mut(8);
     let mut rest = bytes.iter();
     for (eight, byte) in eights.by_ref().zip(rest.by_ref()) {
@@ -485,7 +485,7 @@ fn spread_bits(bytes: &[u8], bits: &mut [bool]) {
 }
 
 /// The masks of all pieces.
-fn mask_ranges<'a>(instances: &Instances, visible: &'a Visible) -> Vec<BufferRange<'a>> {
+pub(super) fn mask_ranges<'a>(instances: &Instances, visible: &'a Visible) -> Vec<BufferRange<'a>> {
     let sizes = instances.pieces.iter().map(mask_bytes);
     visible
         .pieces

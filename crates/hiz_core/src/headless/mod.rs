@@ -8,7 +8,8 @@
 //! 3. `levels` builds pyramids and reads their levels.
 //! 4. `cull` submits a cull into buffers of `answers`; `culling` reads them, through `counts`,
 //!    `explanation` and `readback`.
-//! 5. `single` does all of that at once, for bounds that are used once.
+//! 5. `two_passes` does that for the early and the late pass of a frame.
+//! 6. `single` does all of that at once, for bounds that are used once.
 //!
 //! `answers` and `images` lend what was dropped, and `warm_up` runs a frame before the first one.
 //! `process` guards all of them against forks.
@@ -59,6 +60,7 @@ mod levels;
 mod process;
 pub(crate) mod readback;
 mod single;
+mod two_passes;
 mod uploads;
 mod warm_up;
 
@@ -69,3 +71,4 @@ pub use depth_image::DepthImage;
 pub use engine::Engine;
 pub use explanation::Explanation;
 pub use single::SingleCull;
+pub use two_passes::{EarlyMask, PassAnswer, TwoPasses};
