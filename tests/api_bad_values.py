@@ -900,6 +900,7 @@ TABLES: dict[str, Table] = {
             ],
             "options": OPTIONS_OBJECT,
             "outputs": OUTPUTS_OBJECT,
+            "wait": FLAG,
             **OPTIONS,
             "capacity": CAPACITY,
             "draw": DRAW,

@@ -32,6 +32,8 @@ LAST_LINES = {
     "many_views.py": "seen from 24 views: 0 inside, 60 around",
     # At a distance of 20 m the wall of 6 x 6 m hides 12 x 12 m, and there are 8 x 8 m.
     "polygon_soup.py": "kept: 100 % of the wall, 0 % of what it hides",
+    # The answer is that of a blocking read.
+    "readback.py": "8 of 8 masks are those of a blocking read",
     # x is -9, -7, ... 9: a ball of 0.5 m is hidden up to 3.5 m from the middle.
     "updates.py": "the walker is hidden in frames 3, 4, 5, 6",
 }

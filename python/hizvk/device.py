@@ -518,6 +518,8 @@ class Device:
         pyramid: Pyramid,
         options: CullOptions | None = None,
         outputs: Outputs | Collection[Output] | None = None,
+        *,
+        wait: bool = True,
         **keywords: Unpack[CullKeywords],
     ) -> CullResult:
         """Tests instances against a pyramid. What could be seen in the depth image is never culled.
@@ -537,6 +539,17 @@ class Device:
             A collection names all that is made.
             None makes mask and verdicts, and the list and the draw arguments by the time that they
             are read.
+        wait : bool
+            How the answer comes to the host; the call itself does not wait for it in either case.
+
+            - True: each read waits for the device, then copies.
+            - False: the cull's own submission copies all that `outputs` names.
+              `CullResult.ready` says whether it has arrived, and then no read waits.
+              ``await result`` lets an event loop go on meanwhile.
+
+            At most two culls with ``wait=False`` are unfinished at a time.
+            A third one waits in this call, without the interpreter lock, until the oldest is done.
+            A result that was dropped counts no more.
         **keywords
             Any field of `CullOptions`, and `capacity` and `draw` of `Outputs`.
             They take the place of those fields of `options` and `outputs`:
@@ -562,9 +575,10 @@ class Device:
         check_owner("pyramid", pyramid, self)
         if camera != pyramid.camera:
             raise ValueError(_other_camera(camera, pyramid))
+        wait = _arguments.flag("wait", wait)
         options, outputs = cull_request(options, outputs, keywords)
         culling = self._engine.cull(
-            instances._inner, camera._inner, pyramid._inner, options, outputs
+            instances._inner, camera._inner, pyramid._inner, options, outputs, not wait
         )
         return CullResult(self, culling, Question(camera, pyramid, options, instances._points))
 

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _arguments
+from ._awaited import Awaited
 from ._core import Counts as CoreCounts
 from ._core import Culling as CoreCulling
-from ._on_device import OnDevice
 from ._processes import cached_property
 from .explanation import explanation_of
 from .stats import CullStats
@@ -73,10 +73,26 @@ def shared(array: npt.NDArray[np.generic]) -> Any:
     return shared
 
 
-class CullResult(OnDevice[CoreCulling]):
+class CullResult(Awaited[CoreCulling]):
     """The answer of `Device.cull`; reading any part of it waits for the device.
 
     It is made by `Device.cull` alone, and may be read from any thread.
+    Whoever must not wait asks `ready` first, or awaits it.
+
+    Examples
+    --------
+    >>> import numpy as np, hizvk
+    >>> device = hizvk.Device()
+    >>> crowd = device.instances(hizvk.Spheres(np.zeros((1000, 3)), 0.5))
+    >>> camera = hizvk.Camera.look_at(
+    ...     (0, 0, 9), (0, 0, 0), fov_y_deg=60, size=(90, 160), near=0.1
+    ... )
+    >>> pyramid = device.pyramid(np.full(camera.size, 20.0), camera, kind="z")
+    >>> seen = device.cull(crowd, camera, pyramid, outputs=["mask"], wait=False)
+    >>> while not seen.ready():
+    ...     pass  # work of your own
+    >>> seen.mask.sum()  # waits for nothing
+    np.int64(1000)
     """
 
     def __init__(self, device: Maker, culling: CoreCulling, question: Question) -> None:

@@ -2,10 +2,10 @@
 // Any set is right (docs/accuracy.md), so what lies outside of the view is left out.
 // Its mask is the set that the late pass does not draw again.
 
-@group(2) @binding(1) var<storage, read> history: array<u32>;
-// Bit i: the caller's instance i may be drawn.
-@group(2) @binding(2) var<storage, read> given: array<u32>;
+@group(2) @binding(2) var<storage, read> history: array<u32>;
 @group(2) @binding(4) var<uniform> frame: Frame;
+// Bit i: the caller's instance i may be drawn.
+@group(2) @binding(5) var<storage, read> given: array<u32>;
 
 const WHOLE_RUN: u32 = (1u << RUN) - 1u;
 
@@ -37,6 +37,6 @@ fn cull_run(group: u32, share: u32) {
         }
     }
     for (; kept != 0u; kept &= kept - 1u) {
-        set_mask_bit(mask_bit(first + countTrailingZeros(kept) * SHARE));
+        report(first + countTrailingZeros(kept) * SHARE);
     }
 }

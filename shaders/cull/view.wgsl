@@ -45,7 +45,12 @@ struct View {
     depth_offset: f32,
     // From this size on a product could overflow, so such an instance is invalid.
     coordinate_limit: f32,
-    padding: u32,
+    // One more than the coarsest LOD that the rule can choose.
+    lod_end: u32,
+    // What w has to exceed, of LODs 0 to 7 in turn.
+    // By error: .x of the first is a factor of the error, for all LODs.
+    // By size: a factor of the radius.
+    lod_needs: array<vec4<f32>, 2>,
 }
 
 var<private> view: View;

@@ -1,12 +1,16 @@
-// What a cull leaves behind about the instances that it tests:
+// What a cull leaves behind, as far as it was asked for:
 //
 // - a bit per instance, in the caller's numbering
 // - a verdict per instance, in the stored order
+// - what `emit` leaves, which is in a file of its own for each way to emit:
+//   `report_list.wgsl`, `report_planes.wgsl`, `report_bins.wgsl` or `report_mask.wgsl`
 //
-// What is done with those that are kept is in a file of its own: `report_alone.wgsl`, or
+// Which instances are tested and reported is in a file of its own, too: `../cull/run.wgsl`, or
 // `../cull/early.wgsl` and `../cull/late.wgsl` for the two passes of a frame.
 
-// Write the verdict of each instance.
+// Set the bit of each instance that is kept.
+override MASK: bool;
+// Write its verdict.
 override VERDICTS: bool;
 
 @group(1) @binding(0) var<uniform> piece: Piece;
@@ -14,13 +18,14 @@ override VERDICTS: bool;
 // From `verdicts_begin` on: a word per place, the verdict of the instance that is stored there.
 @group(2) @binding(0) var<storage, read_write> mask: array<atomic<u32>>;
 
-// The bit of the mask that stands for the instance at a place.
-fn mask_bit(place: u32) -> u32 {
-    return caller_index(place);
+// Where a mask holds an instance.
+struct MaskPlace {
+    word: u32,
+    bit: u32,
 }
 
-fn set_mask_bit(bit: u32) {
-    atomicOr(&mask[bit / WORD_BITS], 1u << (bit % WORD_BITS));
+fn mask_place(index: u32) -> MaskPlace {
+    return MaskPlace(index / WORD_BITS, 1u << (index % WORD_BITS));
 }
 
 // Whether the instance at a place is kept; writes its verdict.
@@ -33,6 +38,16 @@ fn test(place: u32) -> bool {
         count_texels(outcome.level, outcome.texels_read);
     }
     return outcome.verdict >= VISIBLE;
+}
+
+// Reports that the instance at a place is kept.
+fn report(place: u32) {
+    let index = caller_index(place);
+    if MASK {
+        let at = mask_place(index);
+        atomicOr(&mask[at.word], at.bit);
+    }
+    emit(place, index);
 }
 
 // Tests the RUN members of a group that belong to one of its SHARE invocations.

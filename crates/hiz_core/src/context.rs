@@ -27,7 +27,9 @@ use crate::occluders::device_raster::record_occluders;
 use crate::occluders::drawing::OccluderOptions;
 use crate::occluders::drawing::{DrawOptions, Rasteriser, Touched};
 use crate::occluders::uploaded::Occluders;
+use crate::output::mesh_table::{MeshLods, MeshTable};
 use crate::output::outputs::Outputs;
+use crate::output::readback::{AnswerInFlight, ReadbackRing, record_readback};
 use crate::output::visible::Visible;
 use crate::pyramid::reduce::record_reduce;
 use crate::pyramid::{Pyramid, PyramidOptions, PyramidUniform};
@@ -208,7 +210,7 @@ impl HizContext {
         &self,
         encoder: &mut wgpu::CommandEncoder,
         bounds: &Bounds<'_>,
-        options: &InstanceOptions,
+        options: &InstanceOptions<'_>,
     ) -> Result<Instances> {
         Instances::new(&self.gpu, bounds, options, true, |copies, _| {
             self.gpu.recorded(|| {
@@ -264,13 +266,28 @@ impl HizContext {
         })
     }
 
+    /// Makes a table of meshes, each with its levels of detail.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] for no meshes, a mesh without a level of detail, errors that are not
+    ///   finite and at least 0, a `first_instance` other than 0, and for draws of which some have
+    ///   an index buffer and others have none.
+    /// - [`Error::Limit`] for more than [`MAX_LODS`](crate::MAX_LODS) levels of detail of a mesh,
+    ///   and for more than 65,536 meshes.
+    /// - [`Error::OutOfMemory`].
+    pub fn create_mesh_table(&self, meshes: &[MeshLods<'_>]) -> Result<MeshTable> {
+        MeshTable::new(&self.gpu, meshes)
+    }
+
     /// Makes the buffers that take what a cull of `instances` finds.
     ///
     /// # Errors
     /// - [`Error::Mismatch`] for instances of another context.
     /// - [`Error::Invalid`] for a
     ///   [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0 on a
-    ///   device without the feature `INDIRECT_FIRST_INSTANCE`.
+    ///   device without the feature `INDIRECT_FIRST_INSTANCE`, for an
+    ///   [`Emit`](crate::Emit) that needs the feature, and for mesh ids past the mesh table.
+    /// - [`Error::Limit`] for lists or draws that do not fit one binding.
     /// - [`Error::OutOfMemory`].
     /// - [`Error::Device`] if the device is lost.
     pub fn create_visible(&self, instances: &Instances, outputs: &Outputs) -> Result<Visible> {
@@ -453,6 +470,9 @@ impl HizContext {
     /// Then the image equals that of all instances, whatever the early pass drew.
     /// `docs/accuracy.md` has the proof and its conditions.
     ///
+    /// `options` are those of the late pass.
+    /// Of them only the hierarchy, the rule of LODs and the errors of the transform count here.
+    ///
     /// A frame whose early pass is dropped, or never recorded, draws some instances twice and loses
     /// none.
     ///
@@ -460,7 +480,8 @@ impl HizContext {
     /// - [`Error::Mismatch`] for objects of another context, for instances of other numbers than
     ///   `temporal` was made for, and for destroyed buffers.
     /// - [`Error::Invalid`] for a mask without room for all instances or without the usage
-    ///   `STORAGE`, and for a camera that float32 cannot hold.
+    ///   `STORAGE`, for [`Order::Any`](crate::Order::Any), for unusable options, and for a camera
+    ///   that float32 cannot hold.
     /// - [`Error::OutOfMemory`].
     ///
     /// # Examples
@@ -504,7 +525,8 @@ impl HizContext {
     ///     engine.update(&instances, 0, &moved, false)?;
     ///
     ///     let mut encoder = device.create_command_encoder(&Default::default());
-    ///     hiz.record_early(&mut encoder, &instances, &camera, &passes, EarlySet::LastVisible)?;
+    ///     let set = EarlySet::LastVisible;
+    ///     hiz.record_early(&mut encoder, &instances, &camera, &passes, set, &options)?;
     ///     # queue.submit([encoder.finish()]);
     ///     # let mut encoder = device.create_command_encoder(&Default::default());
     ///     # let early = read(passes.early());
@@ -529,8 +551,9 @@ impl HizContext {
         camera: &Camera,
         temporal: &Temporal,
         set: EarlySet<'_>,
+        options: &CullOptions,
     ) -> Result<()> {
-        record_early(&self.gpu, encoder, instances, camera, temporal, set)
+        record_early(&self.gpu, encoder, instances, camera, temporal, set, options)
     }
 
     /// Records the late pass of a frame: [`Temporal::late`] takes what is visible and was not drawn
@@ -548,8 +571,8 @@ impl HizContext {
     ///
     /// # Errors
     /// - Those of [`record_cull`](Self::record_cull).
-    /// - [`Error::Mismatch`] for another camera, for other instances, or for instances that were
-    ///   updated since `record_early`.
+    /// - [`Error::Mismatch`] for another camera or rule of LODs, for other instances, or for
+    ///   instances that were updated since `record_early`.
     /// - [`Error::Invalid`] for [`Order::Any`](crate::Order::Any), and for sample coverage without
     ///   a guard.
     pub fn record_late(
@@ -563,6 +586,35 @@ impl HizContext {
     ) -> Result<()> {
         let inputs = CullInputs::new(instances, camera, pyramid, options);
         record_late(&self.gpu, encoder, &inputs, temporal)
+    }
+
+    /// Makes a ring of `slots` (1..=64) for answers on their way to the host.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for another number of slots.
+    pub fn create_readback(&self, slots: usize) -> Result<ReadbackRing> {
+        ReadbackRing::new(&self.gpu, slots)
+    }
+
+    /// Records the copies of what a cull leaves in `visible`: mask, list and draw arguments.
+    ///
+    /// Record it behind the cull.
+    /// After the submit the answer arrives with a poll of the device
+    /// ([`AnswerInFlight::is_ready`]); nothing here submits, polls or waits.
+    /// The whole capacity of the lists is copied.
+    /// If the encoder is never submitted, drop the answer.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] if all slots are taken: read or drop one of their answers first.
+    /// - [`Error::Mismatch`] for objects of another context.
+    /// - [`Error::OutOfMemory`].
+    pub fn record_readback(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        visible: &Visible,
+        ring: &ReadbackRing,
+    ) -> Result<AnswerInFlight> {
+        record_readback(&self.gpu, encoder, visible, ring)
     }
 
     /// Makes everything that frames like this one need, and records work that makes the driver
@@ -611,8 +663,8 @@ fn needed(have: &wgpu::Limits) -> Vec<(&'static str, u64, u64)> {
         max_bind_groups_plus_vertex_buffers >= 4,
         // The view of a cull (`cull/pipelines.rs`, `DepthStore::layout`).
         max_bindings_per_bind_group >= 7,
-        // A depth image.
-        max_sampled_textures_per_shader_stage >= 1,
+        // A depth image; slots and mesh table of a cull that emits bins.
+        max_sampled_textures_per_shader_stage >= 3,
         max_samplers_per_shader_stage >= 1,
         // The cull of members: three chunks, mask, list, draws, statistics, survivors.
         max_storage_buffers_per_shader_stage >= 8,

@@ -10,9 +10,10 @@ mod drawn_boxes;
 use common::{Random, engine};
 use drawn_boxes::{Body, BoxRenderer, Difference, NUM_INDICES, Target};
 use hiz_core::{
-    Bounds, Camera, Coverage, CullOptions, DepthConvention, DrawTemplate, EarlySet, Error, Floats,
-    Hierarchy, HizContext, ImageSize, InstanceOptions, Instances, Order, Outputs, Pose, Projection,
-    Pyramid, PyramidOptions, StoredOrder, Temporal, Vec3, wgpu,
+    ABSENT, Bounds, Camera, Coverage, CullOptions, DepthConvention, DrawTemplate, EarlySet, Emit,
+    Error, Floats, Hierarchy, HizContext, ImageSize, InstanceOptions, Instances, Lod, MeshLods,
+    Order, Outputs, Placement, Pose, Projection, Pyramid, PyramidOptions, StoredOrder, Temporal,
+    Vec3, wgpu,
 };
 
 const SIZE: ImageSize = ImageSize { width: 192, height: 108 };
@@ -160,6 +161,17 @@ struct Way {
     uploads: bool,
     /// The late pass tests against the depth of the frame before: a fault.
     is_behind: bool,
+    emit: Lists,
+}
+
+/// How lists are emitted.
+#[derive(Clone, Copy, PartialEq)]
+enum Lists {
+    One,
+    Packed,
+    Reserved,
+    Each,
+    Copied,
 }
 
 const PLAIN: Way = Way {
@@ -169,6 +181,7 @@ const PLAIN: Way = Way {
     piece_capacity: None,
     uploads: false,
     is_behind: false,
+    emit: Lists::One,
 };
 
 /// What a series of frames showed.
@@ -214,19 +227,38 @@ impl Stage {
     fn instances(&self, bodies: &[Body], way: &Way) -> Instances {
         let (min, max) = corners(bodies);
         let bounds = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };
-        let options =
-            InstanceOptions { piece_capacity: way.piece_capacity, ..InstanceOptions::default() };
+        // Three meshes that look alike.
+        let mesh_ids: Vec<u32> = (0..bodies.len() as u32).map(|i| i % 3).collect();
+        let has_meshes = ![Lists::One, Lists::Copied].contains(&way.emit);
+        let options = InstanceOptions {
+            piece_capacity: way.piece_capacity,
+            mesh_ids: has_meshes.then_some(&mesh_ids),
+            ..InstanceOptions::default()
+        };
         let mut encoder = self.encoder();
         let instances = self.context.record_instances(&mut encoder, &bounds, &options).unwrap();
         self.submit(encoder);
         instances
     }
 
+    fn emit(&self, way: &Way) -> Emit {
+        let draw = DrawTemplate { index_count: NUM_INDICES, ..DrawTemplate::default() };
+        let lods = [Lod { draw: draw.into(), error: 0.0 }];
+        let mesh = || MeshLods::new(&lods);
+        let meshes = || self.context.create_mesh_table(&[mesh(), mesh(), mesh()]).unwrap();
+        match way.emit {
+            Lists::One => Emit::List,
+            Lists::Packed => Emit::Binned { meshes: meshes(), placement: Placement::Packed },
+            Lists::Reserved => Emit::Binned { meshes: meshes(), placement: Placement::Reserved },
+            Lists::Each => Emit::Instances { meshes: meshes() },
+            // The records are the numbers themselves.
+            Lists::Copied => Emit::Copy { records: self.renderer.numbers().clone(), stride: 4 },
+        }
+    }
+
     fn temporal(&self, instances: &Instances, way: &Way) -> Temporal {
-        let outputs = Outputs { capacity: way.capacity, ..listed() };
-        let mut temporal = self.context.create_temporal(instances, &outputs).unwrap();
-        temporal.set_hierarchy(way.hierarchy);
-        temporal
+        let outputs = Outputs { capacity: way.capacity, emit: self.emit(way), ..listed() };
+        self.context.create_temporal(instances, &outputs).unwrap()
     }
 
     /// Draws frames in one way, and compares each with the picture of everything.
@@ -292,7 +324,9 @@ impl Stage {
             let has_early =
                 !(frame % 3 == 2 && [Early::Dropped, Early::Missing].contains(&way.early));
             if has_early || way.early == Early::Dropped {
-                context.record_early(&mut encoder, &instances, &camera, &temporal, set).unwrap();
+                context
+                    .record_early(&mut encoder, &instances, &camera, &temporal, set, &options)
+                    .unwrap();
             }
             if has_early {
                 renderer.draw(&mut encoder, target, Some(temporal.early()), true);
@@ -361,6 +395,23 @@ fn ways() -> Vec<(&'static str, Way)> {
         ("pieces, a list of 70", Way { piece_capacity: Some(512), capacity: Some(70), ..PLAIN }),
         ("pieces and a mask", Way { piece_capacity: Some(384), early: Early::Mask, ..PLAIN }),
         ("uploads", Way { uploads: true, ..PLAIN }),
+        ("packed bins", Way { emit: Lists::Packed, ..PLAIN }),
+        (
+            "packed bins, a list of 20, pieces",
+            Way { emit: Lists::Packed, capacity: Some(20), piece_capacity: Some(640), ..PLAIN },
+        ),
+        (
+            "reserved bins and a mask, a list of 30",
+            Way {
+                emit: Lists::Reserved,
+                early: Early::Mask,
+                capacity: Some(30),
+                hierarchy: Hierarchy::Never,
+                ..PLAIN
+            },
+        ),
+        ("a draw each, of 25", Way { emit: Lists::Each, capacity: Some(25), ..PLAIN }),
+        ("copied records, a list of 35", Way { emit: Lists::Copied, capacity: Some(35), ..PLAIN }),
     ]
 }
 
@@ -369,7 +420,9 @@ fn early_and_late_show_what_all_show() {
     let stage = Stage::new(&[]);
     let (mut pixels, mut ties) = (0, 0);
     for (name, way) in ways() {
-        let seen = stage.run(&way, frames());
+        // Thousands of draws take their time.
+        let frames = if way.emit == Lists::Each { 16 } else { frames() };
+        let seen = stage.run(&way, frames);
         let mean = |counts: &[u32]| f64::from(counts.iter().sum::<u32>()) / counts.len() as f64;
         eprintln!(
             "{name}: {} frames, early {:.0}, drawn {:.0}, best {:.0}, {:?}",
@@ -445,18 +498,28 @@ const FAULTS: &[Fault] = &[
     ),
     (
         "the early set by place instead of by index",
-        &[("if !is_drawn(bit) {", "if !is_drawn(first + countTrailingZeros(kept) * SHARE) {")],
+        &[("if !is_drawn(caller_index(place)) {", "if !is_drawn(place) {")],
         PLAIN,
     ),
     (
         "neighbours skipped by word",
         &[(
-            "(early[bit / WORD_BITS] >> (bit % WORD_BITS) & 1u) != 0u",
-            "early[bit / WORD_BITS] != 0u",
+            "(atomicLoad(&mask[early_begin() + at.word]) & at.bit) != 0u",
+            "atomicLoad(&mask[early_begin() + at.word]) != 0u",
         )],
         PLAIN,
     ),
     ("the pyramid of the frame before", &[], Way { is_behind: true, ..PLAIN }),
+    (
+        "bins that are drawn before the capacity is known",
+        &[("if rank >= written {", "if rank >= written && written == 0u {")],
+        Way { emit: Lists::Packed, capacity: Some(13), ..PLAIN },
+    ),
+    (
+        "bins that are cut by slot",
+        &[("if SORTED && !BY_INDEX {", "if false {")],
+        Way { emit: Lists::Packed, capacity: Some(13), ..PLAIN },
+    ),
 ];
 
 #[test]
@@ -495,7 +558,7 @@ fn what_a_door_hides_shows_when_it_opens() {
         let bounds = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };
         context.record_update(&mut encoder, &instances, 0, &bounds, false).unwrap();
         let set = EarlySet::LastVisible;
-        context.record_early(&mut encoder, &instances, &camera, &temporal, set).unwrap();
+        context.record_early(&mut encoder, &instances, &camera, &temporal, set, &options).unwrap();
         renderer.draw(&mut encoder, target, Some(temporal.early()), true);
         context.record_reduce(&mut encoder, &target.depth_view, &camera, pyramid).unwrap();
         context
@@ -609,7 +672,9 @@ fn frames_make_nothing_anew() {
             }
             let (camera, mut encoder) = (walk(frame), stage.encoder());
             let set = EarlySet::LastVisible;
-            context.record_early(&mut encoder, &instances, &camera, &temporal, set).unwrap();
+            context
+                .record_early(&mut encoder, &instances, &camera, &temporal, set, &options)
+                .unwrap();
             context.record_reduce(&mut encoder, &target.depth_view, &camera, pyramid).unwrap();
             context
                 .record_late(&mut encoder, &instances, &camera, pyramid, &temporal, &options)
@@ -638,8 +703,9 @@ fn what_is_refused_is_named() {
     let (here, there) = (walk(0), walk(1));
     let mut encoder = stage.encoder();
     context.record_reduce(&mut encoder, &target.depth_view, &here, pyramid).unwrap();
+    let plain = CullOptions::default();
     let early = |instances: &Instances, set: EarlySet<'_>| {
-        context.record_early(&mut stage.encoder(), instances, &here, &temporal, set)
+        context.record_early(&mut stage.encoder(), instances, &here, &temporal, set, &plain)
     };
     let late = |instances: &Instances, camera: &Camera, options: &CullOptions| {
         context.record_late(&mut stage.encoder(), instances, camera, pyramid, &temporal, options)
@@ -650,7 +716,6 @@ fn what_is_refused_is_named() {
         }
         other => panic!("expected a refusal, got {other:?}"),
     };
-    let plain = CullOptions::default();
 
     let (parameter, message) =
         said(late(&instances, &here, &CullOptions { order: Order::Any, ..plain.clone() }));
@@ -706,7 +771,54 @@ fn renderer_mask(stage: &Stage, size: u64, usage: wgpu::BufferUsages) -> wgpu::B
     stage.renderer.engine.device().create_buffer(&wgpu::BufferDescriptor {
         label: None,
         size,
-        usage,
+        usage: usage | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     })
+}
+
+/// An absent instance is in no pass, whatever asks for it.
+#[test]
+fn absent_instances_are_never_listed() {
+    let stage = Stage::new(&[]);
+    let Stage { context, renderer, target, pyramid, .. } = &stage;
+    let (bodies, camera, plain) = (Town::new(9).standing(), walk(2), options(Hierarchy::Always));
+    let is_absent = |i: usize| i % 5 == 0 || (640..900).contains(&i);
+    let ids: Vec<u32> = (0..BODIES).map(|i| if is_absent(i) { ABSENT } else { 0 }).collect();
+    let (min, max) = corners(&bodies);
+    let bounds = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };
+    let mut encoder = stage.encoder();
+    let given = InstanceOptions { mesh_ids: Some(&ids), ..InstanceOptions::default() };
+    let instances = context.record_instances(&mut encoder, &bounds, &given).unwrap();
+    let outputs = Outputs { mask: true, ..Outputs::NONE };
+    let temporal = context.create_temporal(&instances, &outputs).unwrap();
+    let all = renderer_mask(&stage, 4 * BODIES.div_ceil(32) as u64, wgpu::BufferUsages::STORAGE);
+    let queue = renderer.engine.queue();
+    queue.write_buffer(&all, 0, &vec![0xFF; all.size() as usize]);
+    let noise = vec![0xFF_u8; temporal.history(0).size() as usize - 16];
+    renderer.clear(&mut encoder, target);
+    context.record_reduce(&mut encoder, &target.depth_view, &camera, pyramid).unwrap();
+    stage.submit(encoder);
+    for set in [
+        EarlySet::Given(&all),
+        EarlySet::LastVisible,
+        EarlySet::Largest { pixels: 1 },
+        EarlySet::Largest { pixels: 10_000 },
+    ] {
+        queue.write_buffer(temporal.history(0), 16, &noise);
+        let mut encoder = stage.encoder();
+        context.record_early(&mut encoder, &instances, &camera, &temporal, set, &plain).unwrap();
+        context.record_late(&mut encoder, &instances, &camera, pyramid, &temporal, &plain).unwrap();
+        stage.submit(encoder);
+        let mut drawn = 0;
+        for visible in [temporal.early(), temporal.late()] {
+            let mask = renderer.words(visible.mask(0).unwrap());
+            let bits = (0..BODIES).filter(|i| mask[i / 32] >> (i % 32) & 1 == 1);
+            for index in bits {
+                assert!(!is_absent(index), "{set:?}: {index}");
+                drawn += 1;
+            }
+        }
+        // The depth is empty: all that is in the view is drawn, once.
+        assert!(drawn > 100, "{set:?}: {drawn}");
+    }
 }

@@ -22,6 +22,7 @@ const VALUES: &[(&str, &[f64])] = &[
     ("FOOTPRINT_LOG2", ONE_TO_THREE),
     ("FROM_SOURCE", FLAG),
     ("LIST", FLAG),
+    ("LOD_RULE", &[0.0, 1.0, 2.0, 3.0]),
     ("MASK", FLAG),
     ("REVERSED", FLAG),
     ("SAMPLE_COVERAGE", FLAG),

@@ -19,6 +19,15 @@ impl Culling {
         Ok(self.0.look(py)?.instances().len())
     }
 
+    /// Whether the answer has arrived; waits for nothing.
+    fn is_ready(&self, py: Python<'_>) -> PyResult<bool> {
+        self.0.run(py, headless::Culling::is_ready)
+    }
+
+    fn wait(&self, py: Python<'_>) -> PyResult<()> {
+        self.0.run(py, headless::Culling::wait)
+    }
+
     fn mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
         self.0.run(py, headless::Culling::mask).map(|mask| PyArray1::from_vec(py, mask))
     }

@@ -265,6 +265,8 @@ impl Engine {
     }
 
     /// `options` is a `hizvk.CullOptions`, `outputs` a `hizvk.Outputs`.
+    /// `ahead`: its answer comes to the host by itself.
+    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn cull(
         &self,
         py: Python<'_>,
@@ -273,12 +275,19 @@ impl Engine {
         pyramid: &Pyramid,
         options: &Bound<'_, PyAny>,
         outputs: &Bound<'_, PyAny>,
+        ahead: bool,
     ) -> PyResult<Culling> {
         let Request { options, outputs } = Request::new(options, outputs)?;
         let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
-        self.0
-            .run(py, |engine| engine.cull(&instances, &camera.0, &pyramid.1, &options, &outputs))
-            .map(|culling| Culling(Held::new(py, culling)))
+        let cull = |engine: &headless::Engine| {
+            let (camera, pyramid) = (&camera.0, &pyramid.1);
+            if ahead {
+                engine.cull_ahead(&instances, camera, pyramid, &options, &outputs)
+            } else {
+                engine.cull(&instances, camera, pyramid, &options, &outputs)
+            }
+        };
+        self.0.run(py, cull).map(|culling| Culling(Held::new(py, culling)))
     }
 
     /// As `cull`; `occluders` says where depth comes from, and `levels` what is stored.

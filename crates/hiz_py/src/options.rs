@@ -2,7 +2,9 @@
 //!
 //! The struct expressions name every field, so that an option without its line does not compile.
 
-use hiz_core::{Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, Order, Outputs};
+use hiz_core::{
+    Coverage, CullOptions, DrawTemplate, Emit, Fit, Footprint, Hierarchy, LodRule, Order, Outputs,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyAny;
@@ -55,6 +57,7 @@ pub(crate) fn cull_options(given: &Bound<'_, PyAny>) -> PyResult<CullOptions> {
             Some(false) => Hierarchy::Never,
         },
         statistics: given.getattr("statistics")?.extract()?,
+        lod: LodRule::Finest,
     })
 }
 
@@ -71,6 +74,7 @@ fn outputs(given: &Bound<'_, PyAny>, order: Order) -> PyResult<Outputs> {
         draws: listed("draws")?,
         capacity: given.getattr("capacity")?.extract()?,
         draw: draw_template(&given.getattr("draw")?)?,
+        emit: Emit::List,
     })
 }
 

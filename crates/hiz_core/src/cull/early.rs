@@ -2,11 +2,9 @@
 
 use crate::cull::groups::{NO_STATISTICS, bind_survivors, is_grouped};
 use crate::cull::history::{EarlySet, FrameUniform, Temporal};
-use crate::cull::options::CullOptions;
-use crate::cull::pipelines::{
-    Candidates, CullKey, DepthStore, FramePass, ReportKey, cull_pipeline,
-};
-use crate::cull::record::{PieceTarget, Target, Tests, check_visible, check_written};
+use crate::cull::options::{CullOptions, Order};
+use crate::cull::pipelines::{Candidates, CullKey, DepthStore, FramePass, cull_pipeline};
+use crate::cull::record::{Target, Tests, bound_planes, check_visible, check_written, pass_report};
 use crate::cull::view_uniform::ViewUniform;
 use crate::error::{Error, Result};
 use crate::gpu::buffers::{check_alive, entry, made};
@@ -15,8 +13,9 @@ use crate::gpu::numbers::{Copy, UNIFORM_ALIGNMENT};
 use crate::input::camera::Camera;
 use crate::input::tolerance::DepthTolerance;
 use crate::instances::Instances;
-use crate::output::compact::Compaction;
-use crate::output::cut::{CUT_WORKGROUP, bind_cut, cut_pipeline};
+use crate::instances::piece::Piece;
+use crate::output::cut::Cut;
+use crate::output::visible::PieceOutput;
 use crate::pyramid::PyramidUniform;
 
 /// The number of a reduction, which no depth store without depth has.
@@ -69,19 +68,21 @@ pub(crate) fn record_early(
     camera: &Camera,
     temporal: &Temporal,
     set: EarlySet<'_>,
+    options: &CullOptions,
 ) -> Result<()> {
     gpu.check_context("temporal", temporal.context)?;
     gpu.check_context("instances", instances.context)?;
     check_visible(gpu, "temporal", instances, &temporal.early)?;
     let set = Chosen::new(temporal.set_or_largest(set, instances), instances)?;
-    let options = CullOptions { hierarchy: temporal.hierarchy, ..CullOptions::default() };
-    let view = ViewUniform::new(camera, NO_REDUCTION, &options, DepthTolerance::NONE)?;
+    check_order(options)?;
+    let view = ViewUniform::new(camera, NO_REDUCTION, options, DepthTolerance::NONE)?;
     let number = temporal.next_number();
     gpu.recorded(|| {
-        let target = target(gpu, instances, &options, temporal, &set)?;
+        let target = target(gpu, instances, options, temporal, &set)?;
         let key = CullKey::without_depth(instances.kind, false);
         let tests = Tests::new(gpu, key, &target, cull_pipeline)?;
-        let cuts = cuts(gpu, instances, temporal)?;
+        let bindings = temporal.pieces.iter().map(|history| &history.cut);
+        let cut = Cut::new(gpu, instances, &temporal.early, bindings)?;
         let view_bindings = made(&temporal.view_bindings, || bind_view(gpu, temporal))?;
         let frame = FrameUniform {
             early: number,
@@ -90,16 +91,21 @@ pub(crate) fn record_early(
         };
         record_numbers(gpu, encoder, temporal, &view, &frame)?;
         tests.record(gpu, encoder, instances, [view_bindings, view_bindings], false, |pass| {
-            let Some((pipeline, pieces)) = &cuts else { return };
-            pass.set_pipeline(pipeline);
-            for (piece, bindings) in instances.pieces.iter().zip(pieces) {
-                pass.set_bind_group(0, bindings, &[]);
-                pass.dispatch_workgroups(piece.words().div_ceil(CUT_WORKGROUP), 1, 1);
+            if let Some(cut) = &cut {
+                cut.record(pass);
             }
         })
     })?;
-    temporal.note_early(number, instances, camera);
+    temporal.note_early(number, instances, camera, options);
     Ok(())
+}
+
+/// Refuses an order that masks cannot give.
+pub(super) fn check_order(options: &CullOptions) -> Result<()> {
+    if options.order == Order::Stable {
+        return Ok(());
+    }
+    Err(Error::invalid("order", "expected Stable, because two passes list from masks, got Any"))
 }
 
 fn target<'a>(
@@ -109,39 +115,31 @@ fn target<'a>(
     temporal: &'a Temporal,
     set: &Chosen<'_>,
 ) -> Result<Target<'a>> {
-    let report = ReportKey {
-        pass: FramePass::Early(set.candidates),
-        mask: true,
-        verdicts: false,
-        append: false,
-        list: false,
-        capped: false,
-        statistics: false,
-    };
     let visible = &temporal.early;
-    let mut pieces = Vec::new();
-    for (p, (piece, history)) in instances.pieces.iter().zip(&temporal.pieces).enumerate() {
+    let report = pass_report(instances, visible, FramePass::Early(set.candidates), false);
+    let given = match set.given {
+        Some(given) => given.clone(),
+        None => gpu.stand_in("hiz.no_given")?,
+    };
+    let bind = |p: usize, piece: &Piece, output: &PieceOutput| {
         check_written(visible, p)?;
-        let given = match set.given {
-            Some(given) => given.clone(),
-            None => gpu.stand_in("hiz.no_given")?,
-        };
-        let members = history.early.get(given.clone(), || {
-            let statistics = gpu.stand_in(NO_STATISTICS)?;
+        let history = &temporal.pieces[p];
+        let outputs = history.early.get(given.clone(), || {
             gpu.bind_group(
                 "hiz.early.outputs",
                 &gpu.layout("hiz.early.layout", report.pass.member_bindings())?,
                 &[
-                    entry(0, visible.pieces[p].mask.as_entire_binding()),
-                    entry(1, history.words.as_entire_binding()),
-                    entry(2, given.as_entire_binding()),
-                    entry(3, statistics.as_entire_binding()),
+                    entry(0, output.mask.as_entire_binding()),
+                    entry(1, bound_planes(gpu, visible, p)?.as_entire_binding()),
+                    entry(2, history.words.as_entire_binding()),
+                    entry(3, gpu.stand_in(NO_STATISTICS)?.as_entire_binding()),
                     entry(4, temporal.frame.as_entire_binding()),
+                    entry(5, given.as_entire_binding()),
                 ],
             )
         })?;
         let groups = if is_grouped(piece, options) {
-            let output = visible.pieces[p].groups_or_new(gpu, piece)?;
+            let output = output.groups_or_new(gpu, piece)?;
             let more = [
                 entry(4, history.words.as_entire_binding()),
                 entry(5, temporal.frame.as_entire_binding()),
@@ -151,30 +149,9 @@ fn target<'a>(
         } else {
             None
         };
-        pieces.push(PieceTarget { members, groups });
-    }
-    let compaction = match &visible.lists {
-        Some(lists) => Some(Compaction::new(gpu, instances, visible, lists)?),
-        None => None,
+        Ok((outputs, groups))
     };
-    Ok(Target { visible, report, pieces, compaction })
-}
-
-/// The pipeline and the bindings of the cuts, if the list may be too short.
-fn cuts(
-    gpu: &Gpu,
-    instances: &Instances,
-    temporal: &Temporal,
-) -> Result<Option<(wgpu::ComputePipeline, Vec<wgpu::BindGroup>)>> {
-    let visible = &temporal.early;
-    let Some(lists) = visible.lists.as_ref().filter(|_| visible.is_capped()) else {
-        return Ok(None);
-    };
-    let pieces = instances.pieces.iter().zip(&visible.pieces).zip(&temporal.pieces).enumerate();
-    let bindings = pieces.map(|(p, ((piece, output), history))| {
-        made(&history.cut, || bind_cut(gpu, piece, output, (lists, p))).cloned()
-    });
-    Ok(Some((cut_pipeline(gpu)?, bindings.collect::<Result<_>>()?)))
+    Target::new(gpu, instances, options, visible, report, bind)
 }
 
 /// What an early pass binds as its view: the camera, and a pyramid that is never read.

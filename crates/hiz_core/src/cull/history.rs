@@ -14,16 +14,17 @@
 use std::sync::OnceLock;
 
 use crate::cull::groups::GROUPS_OF_RUN;
-use crate::cull::options::Hierarchy;
+use crate::cull::lod::LodRule;
+use crate::cull::options::CullOptions;
 use crate::error::{Error, Result};
 use crate::gpu::buffers::STORAGE;
 use crate::gpu::device::{ContextId, Gpu};
 use crate::gpu::kept::KeptBindings;
 use crate::host::threads::Locked;
 use crate::input::camera::Camera;
-use crate::instances::Instances;
 use crate::instances::batch::GROUP;
 use crate::instances::piece::Piece;
+use crate::instances::{Instances, InstancesId};
 use crate::output::outputs::Outputs;
 use crate::output::visible::Visible;
 
@@ -89,8 +90,6 @@ pub struct Temporal {
     /// The view of an early pass, and what binds it.
     pub(super) view: wgpu::Buffer,
     pub(super) view_bindings: OnceLock<wgpu::BindGroup>,
-    /// Whether early passes test groups first.
-    pub(super) hierarchy: Hierarchy,
     state: Locked<State>,
 }
 
@@ -112,9 +111,8 @@ pub(super) struct History {
 struct State {
     /// The number of the last early pass; 0 before the first.
     number: u32,
-    /// The instances that the last late pass tested, by the buffer that each has of its own.
-    /// `None` after a reset.
-    tested: Option<wgpu::Buffer>,
+    /// The instances that the last late pass tested; `None` after a reset.
+    tested: Option<InstancesId>,
     /// The early pass that no late pass has followed.
     early: Option<Early>,
 }
@@ -124,7 +122,8 @@ struct State {
 struct Early {
     number: u32,
     camera: Camera,
-    instances: wgpu::Buffer,
+    lod: LodRule,
+    instances: InstancesId,
     /// The number of the next update.
     next_update: u32,
 }
@@ -139,8 +138,8 @@ impl Temporal {
                 ),
             ));
         }
-        let early = Outputs { verdicts: false, ..*outputs };
-        let late = Outputs { capacity: None, ..*outputs };
+        let early = Outputs { verdicts: false, ..outputs.clone() };
+        let late = Outputs { capacity: None, ..outputs.clone() };
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let size = size_of::<crate::cull::view_uniform::ViewUniform>() as u64;
         Ok(Self {
@@ -155,7 +154,6 @@ impl Temporal {
             frame: gpu.empty("hiz.temporal.frame", size_of::<FrameUniform>() as u64, usage)?,
             view: gpu.empty("hiz.temporal.early_view", size, usage)?,
             view_bindings: OnceLock::new(),
-            hierarchy: Hierarchy::Auto,
             state: Locked::default(),
         })
     }
@@ -185,12 +183,6 @@ impl Temporal {
         self.early.device_bytes() + self.late.device_bytes() + histories
     }
 
-    /// Whether early passes test groups first, for tests with few instances.
-    #[cfg(feature = "testing")]
-    pub fn set_hierarchy(&mut self, hierarchy: Hierarchy) {
-        self.hierarchy = hierarchy;
-    }
-
     /// The history of a piece, for tests that overwrite it.
     /// From word 4 on, bit k of word `8 g + s` is the place `64 g + s + 8 k`.
     #[cfg(feature = "testing")]
@@ -204,7 +196,7 @@ impl Temporal {
         set: EarlySet<'a>,
         instances: &Instances,
     ) -> EarlySet<'a> {
-        let is_known = self.state.lock().tested.as_ref() == Some(&instances.sequence);
+        let is_known = self.state.lock().tested == Some(instances.id);
         match set {
             EarlySet::LastVisible if !is_known => EarlySet::Largest { pixels: FIRST_PIXELS },
             other => other,
@@ -220,12 +212,19 @@ impl Temporal {
     }
 
     /// Notes that an early pass was recorded.
-    pub(super) fn note_early(&self, number: u32, instances: &Instances, camera: &Camera) {
+    pub(super) fn note_early(
+        &self,
+        number: u32,
+        instances: &Instances,
+        camera: &Camera,
+        options: &CullOptions,
+    ) {
         let next_update = instances.changing().next_update;
         self.state.lock().early = Some(Early {
             number,
             camera: camera.clone(),
-            instances: instances.sequence.clone(),
+            lod: options.lod.clone(),
+            instances: instances.id,
             next_update,
         });
     }
@@ -234,10 +233,15 @@ impl Temporal {
     ///
     /// # Errors
     /// [`Error::Mismatch`] if the late pass sees another scene or another view.
-    pub(super) fn followed(&self, instances: &Instances, camera: &Camera) -> Result<u32> {
+    pub(super) fn followed(
+        &self,
+        instances: &Instances,
+        camera: &Camera,
+        options: &CullOptions,
+    ) -> Result<u32> {
         let state = self.state.lock();
         let Some(early) = &state.early else { return Ok(0) };
-        if early.instances != instances.sequence {
+        if early.instances != instances.id {
             return Err(Error::mismatch(
                 "instances",
                 "expected those of this frame's `record_early`, got others; upload before it",
@@ -256,6 +260,15 @@ impl Temporal {
                 "expected that of this frame's `record_early`, jitter included, got another one",
             ));
         }
+        if early.lod != options.lod {
+            return Err(Error::mismatch(
+                "lod",
+                format!(
+                    "expected that of this frame's `record_early`, {:?}, got {:?}",
+                    early.lod, options.lod
+                ),
+            ));
+        }
         Ok(early.number)
     }
 
@@ -263,7 +276,7 @@ impl Temporal {
     pub(super) fn note_late(&self, instances: &Instances) {
         let mut state = self.state.lock();
         state.early = None;
-        state.tested = Some(instances.sequence.clone());
+        state.tested = Some(instances.id);
     }
 }
 

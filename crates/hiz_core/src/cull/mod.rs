@@ -5,6 +5,7 @@
 //! 1. `options` has the caller's choices, and `inputs` gathers instances, camera, pyramid and
 //!    options.
 //! 2. `view_uniform` turns the camera and the options into the numbers that the shaders read.
+//!    `lod` adds those that choose levels of detail.
 //! 3. `pipelines` picks the pipeline that fits the options.
 //! 4. `record` records the pass; `groups` adds the test of whole groups before their members.
 //! 5. `history`, `early` and `late` are the two passes of a frame: the early one draws what was
@@ -24,6 +25,7 @@ pub(crate) mod groups;
 pub(crate) mod history;
 pub(crate) mod inputs;
 pub(crate) mod late;
+pub(crate) mod lod;
 pub(crate) mod options;
 pub(crate) mod pipelines;
 pub(crate) mod record;

@@ -1,6 +1,7 @@
 //! The pipelines of the cull: which shader files make a module, and how one pipeline differs from
 //! another.
 
+use crate::cull::lod::LodRule;
 use crate::error::Result;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::device::Gpu;
@@ -41,6 +42,16 @@ impl CullKey {
     }
 }
 
+/// What a cull writes: the `override` constants of `shaders/output/report.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct ReportKey {
+    pub(crate) mask: bool,
+    pub(crate) verdicts: bool,
+    pub(crate) emit: EmitKey,
+    pub(crate) statistics: bool,
+    pub(crate) pass: FramePass,
+}
+
 /// Which cull of a frame this is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum FramePass {
@@ -62,10 +73,10 @@ pub(crate) enum Candidates {
 }
 
 impl FramePass {
-    /// The files that say what is done with kept instances.
+    /// The files that say which instances are tested and reported.
     fn member_files(self) -> &'static [File] {
         match self {
-            Self::Alone => &[wgsl!("output/report_alone")],
+            Self::Alone => &[wgsl!("cull/run")],
             Self::Early(_) => {
                 &[wgsl!("cull/history"), wgsl!("cull/candidates"), wgsl!("cull/early")]
             }
@@ -102,8 +113,8 @@ impl FramePass {
         }
     }
 
-    /// The constants that an early pass has besides.
-    fn constants(self) -> Option<(&'static str, f64)> {
+    /// The constant that an early pass has besides.
+    fn constant(self) -> Option<(&'static str, f64)> {
         match self {
             Self::Early(candidates) => Some(("EARLY_SET", f64::from(candidates as u32))),
             Self::Alone | Self::Late => None,
@@ -111,18 +122,77 @@ impl FramePass {
     }
 }
 
-/// What a cull writes: the `override` constants of `shaders/output/report.wgsl` and of
-/// `shaders/output/report_alone.wgsl`.
+/// How a cull emits the kept instances: a shader file with its constants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) struct ReportKey {
-    pub(crate) pass: FramePass,
-    pub(crate) mask: bool,
-    pub(crate) verdicts: bool,
-    pub(crate) append: bool,
-    pub(crate) list: bool,
-    pub(crate) capped: bool,
-    pub(crate) statistics: bool,
+pub(crate) enum EmitKey {
+    /// Nothing but the mask and the verdicts.
+    Mask,
+    /// One list, or none.
+    List { append: bool, list: bool, capped: bool },
+    /// Bit planes, of which bins are made later.
+    Planes { by_index: bool, bins: BinKey },
+    /// The bins of one mesh, in any order.
+    Append { list: bool, capped: bool, record_words: u32, bins: BinKey },
 }
+
+/// How the bin of an instance is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct BinKey {
+    /// Whether the instances have mesh ids or scales.
+    pub(crate) sorted: bool,
+}
+
+impl EmitKey {
+    /// Nothing but the mask and the verdicts.
+    pub(crate) const NO_LIST: Self = Self::List { append: false, list: false, capped: false };
+
+    /// The shader files that emit.
+    pub(crate) fn files(self) -> Vec<File> {
+        let bins = [wgsl!("output/mesh_table"), wgsl!("output/bin"), wgsl!("cull/lod_finest")];
+        match self {
+            Self::Mask => vec![wgsl!("output/report_mask")],
+            Self::List { .. } => vec![wgsl!("output/report_list")],
+            Self::Planes { .. } => [&bins[..], &[wgsl!("output/report_planes")]].concat(),
+            Self::Append { .. } => {
+                [&bins[..], &[wgsl!("output/emit"), wgsl!("output/report_bins")]].concat()
+            }
+        }
+    }
+
+    fn constants(self) -> Vec<(&'static str, f64)> {
+        match self {
+            Self::Mask => Vec::new(),
+            Self::List { append, list, capped } => {
+                vec![("APPEND", flag(append)), ("LIST", flag(list)), ("CAPPED", flag(capped))]
+            }
+            Self::Planes { by_index, bins } => {
+                vec![("BY_INDEX", flag(by_index)), ("SORTED", flag(bins.sorted))]
+            }
+            Self::Append { list, capped, record_words, bins } => vec![
+                ("LIST", flag(list)),
+                ("CAPPED", flag(capped)),
+                ("RECORD_WORDS", f64::from(record_words)),
+                ("SORTED", flag(bins.sorted)),
+            ],
+        }
+    }
+
+    /// The bindings of the instances.
+    fn record_bindings(self) -> &'static [(u32, Binding)] {
+        match self {
+            Self::Mask | Self::List { .. } => RECORD_BINDINGS,
+            Self::Planes { .. } | Self::Append { .. } => BINNED_BINDINGS,
+        }
+    }
+}
+
+/// The bindings of the instances of a cull that emits bins: with slots and the mesh table.
+pub(crate) const BINNED_BINDINGS: &[(u32, Binding)] = &[
+    (0, Binding::Uniform),
+    (1, Binding::ReadQuads),
+    (2, Binding::SampledQuads),
+    (3, Binding::SampledQuads),
+];
 
 pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 6] {
     [
@@ -135,18 +205,19 @@ pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 6] {
     ]
 }
 
+/// The constants of `shaders/cull/lod.wgsl`.
+pub(crate) fn lod_constants(rule: &LodRule) -> [(&'static str, f64); 1] {
+    [("LOD_RULE", f64::from(rule.code()))]
+}
+
 pub(crate) fn report_constants(key: &ReportKey) -> Vec<(&'static str, f64)> {
-    let mut constants =
-        vec![("VERDICTS", flag(key.verdicts)), ("STATISTICS", flag(key.statistics))];
-    if key.pass == FramePass::Alone {
-        constants.extend([
-            ("MASK", flag(key.mask)),
-            ("APPEND", flag(key.append)),
-            ("LIST", flag(key.list)),
-            ("CAPPED", flag(key.capped)),
-        ]);
-    }
-    constants.extend(key.pass.constants());
+    let mut constants = vec![
+        ("MASK", flag(key.mask)),
+        ("VERDICTS", flag(key.verdicts)),
+        ("STATISTICS", flag(key.statistics)),
+    ];
+    constants.extend(key.emit.constants());
+    constants.extend(key.pass.constant());
     constants
 }
 
@@ -217,23 +288,18 @@ pub(crate) const VISIBLE_BINDINGS: &[(u32, Binding)] = &[
 pub(crate) const SURVIVOR_BINDINGS: &[(u32, Binding)] =
     &[(0, Binding::Write), (1, Binding::Write), (2, Binding::WriteTexels), (3, Binding::Write)];
 
-/// The bindings of an early pass: mask, history, the caller's mask, statistics, frame.
+/// The bindings of an early pass: mask, planes, history, statistics, frame, the caller's mask.
 const EARLY_BINDINGS: &[(u32, Binding)] = &[
-    (0, Binding::Write),
-    (1, Binding::Read),
-    (2, Binding::Read),
-    (3, Binding::Write),
-    (4, Binding::Uniform),
-];
-
-/// The bindings of a late pass: mask, history, the early pass's mask, statistics, frame.
-const LATE_BINDINGS: &[(u32, Binding)] = &[
     (0, Binding::Write),
     (1, Binding::Write),
     (2, Binding::Read),
     (3, Binding::Write),
     (4, Binding::Uniform),
+    (5, Binding::Read),
 ];
+
+/// The bindings of a late pass: mask, planes, history, statistics, frame.
+const LATE_BINDINGS: &[(u32, Binding)] = VISIBLE_BINDINGS;
 
 /// The bindings of an early pass's groups: as [`SURVIVOR_BINDINGS`], then history and frame.
 const EARLY_SURVIVOR_BINDINGS: &[(u32, Binding)] = &[
@@ -304,12 +370,12 @@ pub(super) const CERTIFIED: &[File] = &[wgsl!("cull/supporting_planes"), wgsl!("
 
 /// The module of an entry point that does not write down which texels were read
 /// (`shaders/cull/unexplained.wgsl`).
-pub(super) fn unexplained(store: DepthStore, kind: BoundsKind, entry: &[File]) -> Source {
+pub(crate) fn unexplained(store: DepthStore, kind: BoundsKind, entry: &[File]) -> Source {
     decision_module(store, kind, CERTIFIED, &[&[wgsl!("cull/unexplained")], entry].concat())
 }
 
 /// The files of the flat cull, which tests each instance by itself, without the decision.
-pub(crate) fn flat_files(pass: FramePass) -> Vec<File> {
+pub(crate) fn flat_files(emit: EmitKey, pass: FramePass) -> Vec<File> {
     let shared = [
         wgsl!("cull/unexplained"),
         wgsl!("instances/piece"),
@@ -317,12 +383,17 @@ pub(crate) fn flat_files(pass: FramePass) -> Vec<File> {
         wgsl!("output/statistics"),
         wgsl!("output/report"),
     ];
-    [&shared, pass.member_files(), &[wgsl!("cull/cull")]].concat()
+    [&shared[..], &emit.files(), pass.member_files(), &[wgsl!("cull/cull")]].concat()
 }
 
 /// The shader of the flat cull, for instances of one kind.
-pub(crate) fn cull_module(store: DepthStore, kind: BoundsKind, pass: FramePass) -> Source {
-    decision_module(store, kind, CERTIFIED, &flat_files(pass))
+pub(crate) fn flat_module(
+    store: DepthStore,
+    kind: BoundsKind,
+    emit: EmitKey,
+    pass: FramePass,
+) -> Source {
+    decision_module(store, kind, CERTIFIED, &flat_files(emit, pass))
 }
 
 /// The shader of the cull of groups.
@@ -333,14 +404,20 @@ pub(crate) fn cull_groups_module(store: DepthStore, pass: FramePass) -> Source {
 }
 
 /// The shader of the cull of the surviving groups' members.
-pub(crate) fn cull_members_module(store: DepthStore, kind: BoundsKind, pass: FramePass) -> Source {
+pub(crate) fn cull_members_module(
+    store: DepthStore,
+    kind: BoundsKind,
+    emit: EmitKey,
+    pass: FramePass,
+) -> Source {
     let shared = [
         wgsl!("instances/piece"),
-        wgsl!("instances/groups"),
         wgsl!("output/statistics"),
         wgsl!("output/report"),
+        wgsl!("instances/groups"),
     ];
-    let entry = [&shared, pass.member_files(), &[wgsl!("cull/cull_members")]].concat();
+    let entry =
+        [&shared[..], &emit.files(), pass.member_files(), &[wgsl!("cull/cull_members")]].concat();
     unexplained(store, kind, &entry)
 }
 
@@ -348,10 +425,10 @@ pub(crate) fn cull_members_module(store: DepthStore, kind: BoundsKind, pass: Fra
 pub(super) fn layouts(
     gpu: &Gpu,
     store: DepthStore,
-    label: &str,
-    written: &[(u32, Binding)],
+    records: &[(u32, Binding)],
+    (label, written): (&str, &[(u32, Binding)]),
 ) -> Result<[wgpu::BindGroupLayout; 3]> {
-    let records = gpu.layout("hiz.cull.instances_layout", RECORD_BINDINGS)?;
+    let records = gpu.layout("hiz.cull.instances_layout", records)?;
     Ok([store.layout(gpu)?, records, gpu.layout(label, written)?])
 }
 
@@ -370,8 +447,8 @@ pub(crate) fn flat_pipeline(
         layouts: &layouts(
             gpu,
             key.store,
-            "hiz.cull.visible_layout",
-            report.pass.member_bindings(),
+            report.emit.record_bindings(),
+            ("hiz.cull.visible_layout", report.pass.member_bindings()),
         )?,
         constants: &[&classify_constants(key)[..], &report_constants(report)].concat(),
     })
@@ -383,8 +460,8 @@ pub(crate) fn cull_pipeline(
     key: &CullKey,
     report: &ReportKey,
 ) -> Result<wgpu::ComputePipeline> {
-    let source = cull_module(key.store, key.kind, report.pass);
-    flat_pipeline(gpu, "hiz.cull.pipeline", source, key, report)
+    let module = flat_module(key.store, key.kind, report.emit, report.pass);
+    flat_pipeline(gpu, "hiz.cull.pipeline", module, key, report)
 }
 
 /// The cull of groups.
@@ -395,13 +472,13 @@ pub(crate) fn cull_groups_pipeline(
 ) -> Result<wgpu::ComputePipeline> {
     let mut constants = classify_constants(key).to_vec();
     constants.push(("STATISTICS", flag(report.statistics)));
-    constants.extend(report.pass.constants());
-    let written = report.pass.group_bindings();
+    constants.extend(report.pass.constant());
+    let written = ("hiz.cull_groups.layout", report.pass.group_bindings());
     gpu.compute_pipeline(&Compute {
         label: "hiz.cull_groups.pipeline",
         source: cull_groups_module(key.store, report.pass),
         entry_point: "cull_groups",
-        layouts: &layouts(gpu, key.store, "hiz.cull_groups.layout", written)?,
+        layouts: &layouts(gpu, key.store, RECORD_BINDINGS, written)?,
         constants: &constants,
     })
 }
@@ -412,12 +489,12 @@ pub(crate) fn cull_members_pipeline(
     key: &CullKey,
     report: &ReportKey,
 ) -> Result<wgpu::ComputePipeline> {
-    let written = report.pass.member_bindings();
-    let [view, records, visible] = layouts(gpu, key.store, "hiz.cull.visible_layout", written)?;
+    let written = ("hiz.cull.visible_layout", report.pass.member_bindings());
+    let [view, records, visible] = layouts(gpu, key.store, report.emit.record_bindings(), written)?;
     let members = gpu.layout("hiz.cull_members.layout", MEMBER_BINDINGS)?;
     gpu.compute_pipeline(&Compute {
         label: "hiz.cull_members.pipeline",
-        source: cull_members_module(key.store, key.kind, report.pass),
+        source: cull_members_module(key.store, key.kind, report.emit, report.pass),
         entry_point: "cull_members",
         layouts: &[view, records, visible, members],
         constants: &[&classify_constants(key)[..], &report_constants(report)].concat(),

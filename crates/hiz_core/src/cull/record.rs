@@ -6,13 +6,19 @@
 use crate::cull::groups::{GROUPS_OF_RUN, GroupCull, NO_STATISTICS, bind_survivors, is_grouped};
 use crate::cull::inputs::{CullInputs, PreparedView, check_contexts};
 use crate::cull::options::{CullOptions, Order};
-use crate::cull::pipelines::{CullKey, FramePass, ReportKey, VISIBLE_BINDINGS, cull_pipeline};
+use crate::cull::pipelines::{
+    BINNED_BINDINGS, BinKey, CullKey, EmitKey, FramePass, ReportKey, VISIBLE_BINDINGS,
+    cull_pipeline,
+};
 use crate::error::{Error, Result};
 use crate::gpu::buffers::{check_alive, entry, made};
 use crate::gpu::device::Gpu;
 use crate::instances::Instances;
 use crate::instances::piece::{CULL_WORKGROUP, Piece};
+use crate::output::bins::{Arrangement, Bins};
 use crate::output::compact::Compaction;
+use crate::output::emit_passes::Emission;
+use crate::output::lists::Copied;
 use crate::output::survivors::NO_SURVIVORS;
 use crate::output::visible::{PieceOutput, Visible};
 
@@ -20,20 +26,20 @@ use crate::output::visible::{PieceOutput, Visible};
 pub(super) struct Target<'a> {
     pub(super) visible: &'a Visible,
     pub(super) report: ReportKey,
-    /// What the tests of each piece bind as their outputs.
     pub(super) pieces: Vec<PieceTarget>,
-    /// What makes the ordered list, if there is one.
-    pub(super) compaction: Option<Compaction>,
+    compaction: Option<Compaction>,
+    emission: Option<Emission>,
 }
 
-/// Where the answers about a piece go.
+/// What the tests of a piece bind.
 pub(super) struct PieceTarget {
-    pub(super) members: wgpu::BindGroup,
-    /// `None` if no groups are tested.
-    pub(super) groups: Option<wgpu::BindGroup>,
+    records: wgpu::BindGroup,
+    /// The outputs of tests of instances, and of groups; `None` if no groups are tested.
+    outputs: wgpu::BindGroup,
+    groups: Option<wgpu::BindGroup>,
 }
 
-/// Checks that `visible` was made for `instances`, or others of as many.
+/// Checks that `visible` was made for these instances, or others of as many.
 pub(super) fn check_visible(
     gpu: &Gpu,
     parameter: &str,
@@ -41,20 +47,34 @@ pub(super) fn check_visible(
     visible: &Visible,
 ) -> Result<()> {
     gpu.check_context(parameter, visible.context)?;
-    if visible.counts().iter().copied().eq(instances.pieces.iter().map(Piece::count)) {
-        return Ok(());
+    if !visible.counts().iter().copied().eq(instances.pieces.iter().map(Piece::count)) {
+        return Err(Error::mismatch(
+            parameter,
+            "expected buffers that were created for these instances, got others",
+        ));
     }
-    Err(Error::mismatch(
-        parameter,
-        "expected buffers that were created for these instances, got others",
-    ))
+    if visible.bins.as_ref().is_some_and(|bins| bins.instances != instances.id) {
+        return Err(Error::mismatch(
+            parameter,
+            "expected buffers that were created for these instances, got others: bins belong to \
+             the mesh ids of their instances",
+        ));
+    }
+    Ok(())
 }
 
-/// Checks that the buffers of a piece have not been destroyed.
+/// Checks that what a cull writes about a piece has not been destroyed.
 /// A bind group does not tell that one of its buffers was.
 pub(super) fn check_written(visible: &Visible, p: usize) -> Result<()> {
-    let listed = visible.lists.as_ref().map(|lists| [&lists.draws, lists.pieces[p].bound()]);
-    let mut written = [&visible.pieces[p].mask].into_iter().chain(listed.into_iter().flatten());
+    let (lists, bins) = (visible.lists.as_ref(), visible.bins.as_ref());
+    let listed = lists.map(|lists| [&lists.draws, lists.pieces[p].bound()]);
+    let binned =
+        bins.map(|bins| [&bins.draws, &bins.draw_counts].into_iter().chain(&bins.pieces[p].list));
+    let mut written = [&visible.pieces[p].mask]
+        .into_iter()
+        .chain(listed.into_iter().flatten())
+        .chain(binned.into_iter().flatten())
+        .chain(lists.and_then(|lists| lists.copied.as_ref()).map(Copied::buffer));
     written.try_for_each(check_alive).map_err(|error| match error {
         Error::Device(why) => Error::mismatch(
             "visible",
@@ -70,22 +90,32 @@ fn bind_output<'a>(
     piece: &Piece,
     visible: &'a Visible,
     p: usize,
-    statistics: bool,
+    report: &ReportKey,
 ) -> Result<&'a wgpu::BindGroup> {
-    let lists = visible.lists.as_ref();
+    let (lists, bins) = (visible.lists.as_ref(), visible.bins.as_ref());
+    let appends = matches!(report.emit, EmitKey::Append { .. });
     let output = &visible.pieces[p];
     let bind = || {
-        let list = match lists {
-            Some(lists) => lists.pieces[p].bound().clone(),
-            None => gpu.stand_in("hiz.no_list")?,
+        let list = match (lists, bins) {
+            (Some(lists), _) => lists.pieces[p].bound().clone(),
+            (None, Some(bins)) if !appends => bins.pieces[p].planes.clone(),
+            (None, Some(Bins { pieces, .. })) if pieces[p].list.is_some() => {
+                pieces[p].list.clone().expect("it is there")
+            }
+            _ => gpu.stand_in("hiz.no_list")?,
         };
-        let draws = match lists {
-            Some(lists) => lists.draws.clone(),
-            None => gpu.stand_in("hiz.no_draws")?,
+        let draws = match (lists, bins) {
+            (Some(lists), _) => lists.draws.clone(),
+            (None, Some(bins)) if appends => bins.draws.clone(),
+            _ => gpu.stand_in("hiz.no_draws")?,
         };
         // If nothing is listed, any uniform can be bound.
-        let capacity = lists.map_or(&piece.uniform, |lists| &lists.capacity_uniform);
-        let statistics = if statistics {
+        let capacity = match (lists, bins) {
+            (Some(lists), _) => &lists.capacity_uniform,
+            (None, Some(bins)) => &bins.pieces[p].uniform,
+            (None, None) => &piece.uniform,
+        };
+        let statistics = if report.statistics {
             visible.statistics_or_new(gpu)?.clone()
         } else {
             gpu.stand_in(NO_STATISTICS)?
@@ -103,74 +133,31 @@ fn bind_output<'a>(
         )
     };
     check_written(visible, p)?;
-    made(&output.bindings[usize::from(statistics)], bind)
+    made(&output.bindings[usize::from(report.statistics) + 2 * usize::from(appends)], bind)
 }
 
-impl<'a> Target<'a> {
-    /// The target of a cull that is not one of two passes.
-    fn new(
-        gpu: &Gpu,
-        instances: &Instances,
-        options: &CullOptions,
-        visible: &'a Visible,
-    ) -> Result<Self> {
-        let report = report_key(visible, options);
-        let statistics =
-            if report.statistics { Some(visible.statistics_or_new(gpu)?) } else { None };
-        let mut pieces = Vec::new();
-        for (p, (piece, output)) in instances.pieces.iter().zip(&visible.pieces).enumerate() {
-            let members = bind_output(gpu, piece, visible, p, report.statistics)?.clone();
-            let groups = if is_grouped(piece, options) {
-                let output = output.groups_or_new(gpu, piece)?;
-                let bind = || bind_survivors(gpu, output, statistics, report.pass, &[]);
-                Some(made(&output.bindings[usize::from(report.statistics)], bind)?.clone())
-            } else {
-                None
-            };
-            pieces.push(PieceTarget { members, groups });
-        }
-        let compaction = match visible.lists.as_ref().filter(|_| options.order == Order::Stable) {
-            Some(lists) => Some(Compaction::new(gpu, instances, visible, lists)?),
-            None => None,
-        };
-        Ok(Self { visible, report, pieces, compaction })
-    }
-
-    /// Whether the groups of any piece are tested.
-    fn is_grouped(&self) -> bool {
-        self.pieces.iter().any(|piece| piece.groups.is_some())
-    }
-
-    /// Clears whatever is counted, appended to or set bit by bit.
-    fn record_clears(
-        &self,
-        gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
-        instances: &Instances,
-    ) -> Result<()> {
-        let Self { visible, report, .. } = self;
-        if let Some(lists) = &visible.lists {
-            lists.record_clear(encoder);
-        }
-        if report.statistics {
-            encoder.clear_buffer(visible.statistics_or_new(gpu)?, 0, None);
-        }
-        for ((piece, output), target) in
-            instances.pieces.iter().zip(&visible.pieces).zip(&self.pieces)
-        {
-            if report.mask {
-                encoder.clear_buffer(&output.mask, 0, Some(4 * u64::from(piece.words().max(1))));
-            }
-            if target.groups.is_some() {
-                let contents = bytemuck::bytes_of(&NO_SURVIVORS);
-                let from =
-                    gpu.constant("hiz.cull.no_survivors", contents, wgpu::BufferUsages::COPY_SRC)?;
-                let to = &output.groups_or_new(gpu, piece)?.survivors;
-                encoder.copy_buffer_to_buffer(&from, 0, to, 0, from.size());
-            }
-        }
-        Ok(())
-    }
+/// The bindings of a piece's records, with slots and mesh table for a cull that emits bins.
+fn bind_records<'a>(
+    gpu: &Gpu,
+    piece: &'a Piece,
+    visible: &'a Visible,
+    p: usize,
+) -> Result<&'a wgpu::BindGroup> {
+    let Some(bins) = &visible.bins else { return Ok(&piece.bindings) };
+    made(&bins.pieces[p].records_bindings, || {
+        let table = bins.meshes.view();
+        let slots = piece.slots.as_ref().map_or(table, |slots| &slots.of_places.view);
+        gpu.bind_group(
+            "hiz.cull.binned_instances",
+            &gpu.layout("hiz.cull.binned_instances_layout", BINNED_BINDINGS)?,
+            &[
+                entry(0, piece.uniform.as_entire_binding()),
+                entry(1, wgpu::BindingResource::TextureView(&piece.records.view)),
+                entry(2, wgpu::BindingResource::TextureView(slots)),
+                entry(3, wgpu::BindingResource::TextureView(table)),
+            ],
+        )
+    })
 }
 
 /// A function that makes the pipeline of the flat cull.
@@ -214,9 +201,22 @@ fn record_all(
              `record_early` and `record_late` fill",
         ));
     }
+    let report = report_key(instances, visible, options)?;
     // Make everything before recording anything: an object that cannot be made would invalidate the
     // caller's encoder.
-    let target = Target::new(gpu, instances, options, visible)?;
+    let statistics = if report.statistics { Some(visible.statistics_or_new(gpu)?) } else { None };
+    let bind = |p: usize, piece: &Piece, output: &PieceOutput| {
+        let outputs = bind_output(gpu, piece, visible, p, &report)?.clone();
+        let groups = if is_grouped(piece, options) {
+            let groups = output.groups_or_new(gpu, piece)?;
+            let bind = || bind_survivors(gpu, groups, statistics, report.pass, &[]);
+            Some(made(&groups.bindings[usize::from(report.statistics)], bind)?.clone())
+        } else {
+            None
+        };
+        Ok((outputs, groups))
+    };
+    let target = Target::new(gpu, instances, options, visible, report, bind)?;
     record_against_pyramid(gpu, encoder, inputs, &target, flat, |_| ())
 }
 
@@ -233,12 +233,82 @@ pub(super) fn record_against_pyramid(
 ) -> Result<()> {
     let CullInputs { instances, pyramid, .. } = *inputs;
     let seen = PreparedView::new(gpu, inputs, Some(encoder))?;
-    let mut view = seen.bind(gpu, pyramid, target.is_grouped())?;
+    let is_grouped = target.pieces.iter().any(|piece| piece.groups.is_some());
+    let mut view = seen.bind(gpu, pyramid, is_grouped)?;
     let tests = Tests::new(gpu, seen.key, target, flat)?;
     view.record(encoder, pyramid);
     before(encoder);
     let views = [&view.instances, view.groups.as_ref().unwrap_or(&view.instances)];
     tests.record(gpu, encoder, instances, views, inputs.idle, |_| ())
+}
+
+impl<'a> Target<'a> {
+    /// `bind` gives what a piece's tests of instances bind as their outputs, and its tests of
+    /// groups, if there are any.
+    pub(super) fn new(
+        gpu: &Gpu,
+        instances: &Instances,
+        options: &CullOptions,
+        visible: &'a Visible,
+        report: ReportKey,
+        bind: impl Fn(usize, &Piece, &PieceOutput) -> Result<(wgpu::BindGroup, Option<wgpu::BindGroup>)>,
+    ) -> Result<Self> {
+        let mut pieces = Vec::new();
+        for (p, (piece, output)) in instances.pieces.iter().zip(&visible.pieces).enumerate() {
+            let (outputs, groups) = bind(p, piece, output)?;
+            let records = bind_records(gpu, piece, visible, p)?.clone();
+            pieces.push(PieceTarget { records, outputs, groups });
+        }
+        let planes = matches!(report.emit, EmitKey::Planes { .. });
+        let emission = match visible.bins.as_ref().filter(|_| planes) {
+            Some(bins) => Some(Emission::new(gpu, instances, bins)?),
+            None => None,
+        };
+        let compaction = match visible.lists.as_ref().filter(|_| options.order == Order::Stable) {
+            Some(lists) => Some(Compaction::new(gpu, instances, visible, lists)?),
+            None => None,
+        };
+        Ok(Self { visible, report, pieces, compaction, emission })
+    }
+
+    /// Clears whatever is counted, appended to or set bit by bit.
+    fn record_clears(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &Instances,
+        idle: bool,
+    ) -> Result<()> {
+        let Self { visible, report, .. } = self;
+        if let Some(lists) = &visible.lists {
+            lists.record_clear(encoder);
+        }
+        if let Some(bins) = &visible.bins {
+            let appends = matches!(report.emit, EmitKey::Append { .. });
+            bins.record_clear(encoder, appends, idle);
+            if !appends {
+                bins.record_clear_planes(encoder);
+            }
+            bins.meshes.record(encoder);
+        }
+        if report.statistics {
+            encoder.clear_buffer(visible.statistics_or_new(gpu)?, 0, None);
+        }
+        let pieces = instances.pieces.iter().zip(&visible.pieces).zip(&self.pieces);
+        for ((piece, output), target) in pieces {
+            if report.mask {
+                encoder.clear_buffer(&output.mask, 0, Some(4 * u64::from(piece.words().max(1))));
+            }
+            if target.groups.is_some() {
+                let contents = bytemuck::bytes_of(&NO_SURVIVORS);
+                let from =
+                    gpu.constant("hiz.cull.no_survivors", contents, wgpu::BufferUsages::COPY_SRC)?;
+                let to = &output.groups_or_new(gpu, piece)?.survivors;
+                encoder.copy_buffer_to_buffer(&from, 0, to, 0, from.size());
+            }
+        }
+        Ok(())
+    }
 }
 
 /// The pipelines of the tests of a cull.
@@ -277,9 +347,9 @@ impl<'a> Tests<'a> {
         Ok(Self { target, groups, flat })
     }
 
-    /// Records the clears, the tests and the compaction; `after` ends the pass.
+    /// Records the clears, the tests and what makes lists; `after` ends the pass.
     ///
-    /// `views`: what tests of instances bind as their view, and tests of groups.
+    /// `view`, `group_view`: what tests of instances bind as their view, and tests of groups.
     pub(super) fn record(
         &self,
         gpu: &Gpu,
@@ -290,15 +360,14 @@ impl<'a> Tests<'a> {
         after: impl FnOnce(&mut wgpu::ComputePass<'_>),
     ) -> Result<()> {
         let workgroups = |count: u32| if idle { 0 } else { count };
-        self.target.record_clears(gpu, encoder, instances)?;
+        self.target.record_clears(gpu, encoder, instances, idle)?;
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("hiz.cull.pass"),
             timestamp_writes: None,
         });
         pass.set_bind_group(0, view, &[]);
-        for ((piece, target), groups) in
-            instances.pieces.iter().zip(&self.target.pieces).zip(&self.groups)
-        {
+        let pieces = instances.pieces.iter().zip(&self.target.pieces).zip(&self.groups);
+        for ((piece, target), groups) in pieces {
             if let Some(groups) = groups {
                 pass.set_bind_group(0, group_view, &[]);
                 groups.record_boxes(
@@ -308,8 +377,8 @@ impl<'a> Tests<'a> {
                 );
                 pass.set_bind_group(0, view, &[]);
             }
-            pass.set_bind_group(1, &piece.bindings, &[]);
-            pass.set_bind_group(2, &target.members, &[]);
+            pass.set_bind_group(1, &target.records, &[]);
+            pass.set_bind_group(2, &target.outputs, &[]);
             if let Some(groups) = groups {
                 groups.record_members(&mut pass);
             } else if let Some(flat) = &self.flat {
@@ -320,24 +389,87 @@ impl<'a> Tests<'a> {
         if let Some(compaction) = &self.target.compaction {
             compaction.record(&mut pass, idle);
         }
+        if let Some(emission) = &self.target.emission {
+            emission.record(&mut pass, idle);
+        }
         after(&mut pass);
         Ok(())
     }
 }
 
 /// What the cull's own pass writes.
-/// An ordered list is made from the mask instead.
-fn report_key(visible: &Visible, options: &CullOptions) -> ReportKey {
+/// An ordered list is made from the mask instead, and ordered bins are made from planes.
+fn report_key(
+    instances: &Instances,
+    visible: &Visible,
+    options: &CullOptions,
+) -> Result<ReportKey> {
     let outputs = visible.outputs();
-    let listed = outputs.indices || outputs.draws;
-    let ordered = listed && options.order == Order::Stable;
-    ReportKey {
-        pass: FramePass::Alone,
-        mask: outputs.mask || ordered,
-        verdicts: outputs.verdicts,
-        append: listed && !ordered,
-        list: outputs.indices && !ordered,
-        capped: visible.is_capped(),
-        statistics: options.statistics,
+    let any_order = options.order == Order::Any;
+    let (list, capped) = (outputs.indices, visible.is_capped());
+    let mut mask = outputs.mask;
+    let emit = if let Some(bins) = &visible.bins {
+        let of_bins = bin_key(instances);
+        match (any_order, bins.can_append()) {
+            (false, _) => EmitKey::Planes {
+                by_index: bins.arrangement == Arrangement::Instances,
+                bins: of_bins,
+            },
+            (true, true) => EmitKey::Append {
+                list,
+                capped,
+                record_words: (bins.record_bytes() / 4) as u32,
+                bins: of_bins,
+            },
+            (true, false) => {
+                return Err(Error::invalid(
+                    "order",
+                    "expected Order::Stable, got Order::Any: bins in any order are for one mesh \
+                     with Placement::Reserved",
+                ));
+            }
+        }
+    } else {
+        let listed = visible.lists.is_some();
+        if any_order && visible.lists.as_ref().is_some_and(|lists| lists.copied.is_some()) {
+            return Err(Error::invalid(
+                "order",
+                "expected Order::Stable for Emit::Copy, got Order::Any",
+            ));
+        }
+        mask |= listed && !any_order;
+        EmitKey::List { append: listed && any_order, list: list && any_order, capped }
+    };
+    let (verdicts, statistics) = (outputs.verdicts, options.statistics);
+    Ok(ReportKey { mask, verdicts, emit, statistics, pass: FramePass::Alone })
+}
+
+fn bin_key(instances: &Instances) -> BinKey {
+    BinKey { sorted: instances.pieces.iter().any(|p| p.slots.is_some()) }
+}
+
+/// What one of the two passes of a frame writes.
+/// Lists are made from its mask, and bins from planes.
+pub(super) fn pass_report(
+    instances: &Instances,
+    visible: &Visible,
+    pass: FramePass,
+    statistics: bool,
+) -> ReportKey {
+    let emit = match &visible.bins {
+        Some(bins) => EmitKey::Planes {
+            by_index: bins.arrangement == Arrangement::Instances,
+            bins: bin_key(instances),
+        },
+        None => EmitKey::Mask,
+    };
+    ReportKey { mask: true, verdicts: visible.outputs().verdicts, emit, statistics, pass }
+}
+
+/// What a pass binds where bins have their planes.
+pub(super) fn bound_planes(gpu: &Gpu, visible: &Visible, p: usize) -> Result<wgpu::Buffer> {
+    match &visible.bins {
+        Some(bins) => Ok(bins.pieces[p].planes.clone()),
+        None => gpu.stand_in("hiz.no_list"),
     }
 }

@@ -19,6 +19,7 @@ use crate::input::bounds::BoundsKind;
 use crate::input::camera::Camera;
 use crate::input::tolerance::DepthTolerance;
 use crate::instances::Instances;
+use crate::instances::piece::RECORD_BINDINGS;
 use crate::instances::watch::Refine;
 use crate::output::visible::Visible;
 use crate::pyramid::Pyramid;
@@ -68,7 +69,7 @@ fn without_depth(
         label,
         source,
         entry_point,
-        layouts: &layouts(gpu, key.store, "hiz.storage_layout", TWO_STORAGES)?,
+        layouts: &layouts(gpu, key.store, RECORD_BINDINGS, ("hiz.storage_layout", TWO_STORAGES))?,
         constants: &classify_constants(&key),
     })
 }

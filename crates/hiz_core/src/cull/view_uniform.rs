@@ -1,11 +1,13 @@
 //! The view uniform: what the shaders know of a camera and of the options.
 
+use crate::cull::lod::LodNumbers;
 use crate::cull::options::{Coverage, CullOptions};
 use crate::error::{Error, Result};
 use crate::host::rounding::{EPS, round_up};
 use crate::input::camera::Camera;
 use crate::input::tolerance::DepthTolerance;
 use crate::input::view::ViewRows;
+use crate::output::mesh_table::MAX_LODS;
 
 /// Twin: `shaders/cull/view.wgsl`, `View`, which documents the fields.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -30,10 +32,11 @@ pub(crate) struct ViewUniform {
     pub(crate) descent_budget: u32,
     pub(crate) depth_offset: f32,
     pub(crate) coordinate_limit: f32,
-    pub(crate) padding: u32,
+    pub(crate) lod_end: u32,
+    pub(crate) lod_needs: [f32; MAX_LODS],
 }
 
-const _: () = assert!(size_of::<ViewUniform>() == 176);
+const _: () = assert!(size_of::<ViewUniform>() == 208);
 
 impl ViewUniform {
     #[expect(
@@ -105,6 +108,7 @@ impl ViewUniform {
                 ),
                 _ => error,
             })?;
+        let LodNumbers { end: lod_end, needs: lod_needs } = LodNumbers::new(camera, &options.lod)?;
         let size = camera.size();
         let all = [rows.x, rows.y, rows.z, rows.w];
         Ok(Self {
@@ -127,7 +131,8 @@ impl ViewUniform {
             descent_budget: options.descent,
             depth_offset,
             coordinate_limit: rows.coordinate_limit,
-            padding: 0,
+            lod_end,
+            lod_needs,
         })
     }
 }

@@ -22,6 +22,8 @@ pub(crate) enum Binding {
     /// Storage textures of format `Rgba32Uint`.
     ReadQuads,
     WriteQuads,
+    /// A sampled texture of format `Rgba32Uint`.
+    SampledQuads,
     /// Storage textures of format `R32Uint`.
     ReadTexels,
     WriteTexels,
@@ -78,6 +80,11 @@ fn layout_entry(binding: u32, kind: Binding) -> wgpu::BindGroupLayoutEntry {
             Binding::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
             Binding::ReadQuads => quads(wgpu::StorageTextureAccess::ReadOnly),
             Binding::WriteQuads => quads(wgpu::StorageTextureAccess::WriteOnly),
+            Binding::SampledQuads => wgpu::BindingType::Texture {
+                sample_type: wgpu::TextureSampleType::Uint,
+                view_dimension: wgpu::TextureViewDimension::D2,
+                multisampled: false,
+            },
             Binding::ReadTexels => texels(wgpu::StorageTextureAccess::ReadOnly),
             Binding::WriteTexels => texels(wgpu::StorageTextureAccess::WriteOnly),
             #[cfg(feature = "yardstick")]

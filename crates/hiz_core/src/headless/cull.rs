@@ -9,6 +9,7 @@ use crate::cull::record::record_cull;
 use crate::cull::refine::Refinement;
 use crate::error::{Error, Result};
 use crate::gpu::pipelines::PipelinesMade;
+use crate::headless::ahead::Ahead;
 use crate::headless::counts::{Timings, milliseconds};
 use crate::headless::culling::Culling;
 use crate::headless::engine::Engine;
@@ -38,6 +39,19 @@ impl Engine {
         options: &CullOptions,
         outputs: &Outputs,
     ) -> Result<Culling> {
+        self.cull_with(instances, camera, pyramid, options, outputs, false)
+    }
+
+    /// [`Engine::cull`]; `ahead`: its submission also copies the answer ([`Engine::cull_ahead`]).
+    pub(super) fn cull_with(
+        &self,
+        instances: &Arc<Instances>,
+        camera: &Camera,
+        pyramid: &Arc<Pyramid>,
+        options: &CullOptions,
+        outputs: &Outputs,
+        ahead: bool,
+    ) -> Result<Culling> {
         self.check_process()?;
         let gpu = &self.context().gpu;
         let attempt = || {
@@ -47,8 +61,16 @@ impl Engine {
             let inputs = CullInputs::new(instances, camera, pyramid, options);
             let mut encoder = self.encoder("hiz.cull.encoder");
             record_cull(gpu, &mut encoder, &inputs, &visible)?;
-            let staged_mask = Culling::stage_mask(&mut encoder, instances, &buffers);
-            let refinement = Refinement::new(instances, camera, pyramid, options, &visible)?;
+            let mut refinement = Refinement::new(instances, camera, pyramid, options, &visible)?;
+            let (mut staged_mask, mut copied) = (None, None);
+            if ahead {
+                if let Some(refinement) = refinement.take() {
+                    refinement.record(gpu, &mut encoder)?;
+                }
+                copied = Some(Ahead::record(self, &mut encoder, instances, &visible, options)?);
+            } else {
+                staged_mask = Culling::stage_mask(&mut encoder, instances, &buffers);
+            }
             let watch = Watch::new(refinement.map(|left| Box::new(left) as Box<dyn Refine>));
             let done = Arc::new(OnceLock::new());
             let when_done = Arc::clone(&done);
@@ -77,6 +99,7 @@ impl Engine {
                 buffers,
                 visible,
                 staged_mask: Locked::new(staged_mask),
+                ahead: copied,
                 later: OnceLock::new(),
                 watch,
                 submission,

@@ -7,7 +7,8 @@
 //! 2. `uploads` brings instances, updates and occluders to it, and `depth_image` depth images.
 //! 3. `levels` builds pyramids and reads their levels.
 //! 4. `cull` submits a cull into buffers of `answers`; `culling` reads them, through `counts`,
-//!    `explanation` and `readback`.
+//!    `explanation`, `ranges` and `readback`.
+//!    With `ahead`, `in_flight` and `slots` the answer comes while the caller does something else.
 //! 5. `two_passes` does that for the early and the late pass of a frame.
 //! 6. `single` does all of that at once, for bounds that are used once.
 //!
@@ -46,7 +47,9 @@
 //! [`Error::OtherProcess`]: crate::Error::OtherProcess
 
 mod adapter;
+mod ahead;
 mod answers;
+mod bins;
 mod counts;
 mod cull;
 mod culling;
@@ -55,20 +58,25 @@ pub(crate) mod engine;
 mod explain;
 mod explanation;
 mod images;
+mod in_flight;
 mod kept_depth;
 mod levels;
 mod process;
+mod ranges;
 pub(crate) mod readback;
 mod single;
+mod slots;
 mod two_passes;
 mod uploads;
 mod warm_up;
 
 pub use adapter::{ADAPTER_VARIABLE, AdapterSummary, INSTALL_HINT, adapters};
+pub use bins::NO_LOD;
 pub use counts::{Counts, Timings};
 pub use culling::Culling;
 pub use depth_image::DepthImage;
 pub use engine::Engine;
 pub use explanation::Explanation;
 pub use single::SingleCull;
+pub use slots::CULLS_IN_FLIGHT;
 pub use two_passes::{EarlyMask, PassAnswer, TwoPasses};

@@ -1,21 +1,8 @@
 //! Readback, from the device to the host: copies into staging buffers, waits, and maps them.
 
 use crate::error::{Error, Result};
+pub(crate) use crate::gpu::copies::BufferRange;
 use crate::host::memory;
-
-/// The part of a buffer to copy.
-pub(crate) struct BufferRange<'a> {
-    pub(crate) buffer: &'a wgpu::Buffer,
-    pub(crate) offset: u64,
-    pub(crate) size: u64,
-}
-
-impl<'a> BufferRange<'a> {
-    /// The first `size` bytes (a multiple of 4).
-    pub(crate) fn first(buffer: &'a wgpu::Buffer, size: u64) -> Self {
-        Self { buffer, offset: 0, size }
-    }
-}
 
 /// Bytes of a staging buffer at most.
 /// Larger ranges are read in bands.

@@ -3,11 +3,13 @@
 use std::sync::Arc;
 
 use crate::cull::history::{EarlySet, Temporal};
+use crate::cull::lod::LodRule;
 use crate::cull::options::CullOptions;
 use crate::error::{Error, Result};
 use crate::headless::answers::mask_bytes;
-use crate::headless::culling::{mask_ranges, spread_bits};
+use crate::headless::culling::spread_bits;
 use crate::headless::engine::Engine;
+use crate::headless::ranges::mask_ranges;
 use crate::headless::readback::Staged;
 use crate::host::memory;
 use crate::host::threads::Locked;
@@ -122,6 +124,7 @@ impl TwoPasses {
     /// - [`Error::Invalid`] for a mask of another length.
     /// - [`Error::DeviceLost`].
     pub fn early(&self, camera: &Camera, set: EarlyMask<'_>) -> Result<PassAnswer> {
+        let options = CullOptions::default();
         let given = match set {
             EarlyMask::Given(mask) => Some(self.mask_buffer(mask)?),
             EarlyMask::LastVisible | EarlyMask::Largest { .. } => None,
@@ -133,7 +136,8 @@ impl TwoPasses {
         };
         self.submit(self.temporal.early(), |encoder| {
             let context = self.engine.context();
-            context.record_early(encoder, &self.instances, camera, &self.temporal, set)
+            let temporal = &self.temporal;
+            context.record_early(encoder, &self.instances, camera, temporal, set, &options)
         })
     }
 
@@ -148,9 +152,11 @@ impl TwoPasses {
         pyramid: &Arc<Pyramid>,
         options: &CullOptions,
     ) -> Result<PassAnswer> {
+        // Masks do not say which level of detail is drawn.
+        let options = CullOptions { lod: LodRule::Finest, ..options.clone() };
         self.submit(self.temporal.late(), |encoder| {
             let (context, temporal) = (self.engine.context(), &self.temporal);
-            context.record_late(encoder, &self.instances, camera, pyramid, temporal, options)
+            context.record_late(encoder, &self.instances, camera, pyramid, temporal, &options)
         })
     }
 

@@ -12,6 +12,7 @@ use crate::instances::batch::Origin;
 use crate::instances::groups::Groups;
 use crate::instances::order::{PieceOrder, StoredOrder};
 use crate::instances::records::{RECORDS_PER_ROW, Records, Upload};
+use crate::instances::slots::{Kinds, Slots};
 use crate::instances::volume_record::BoxRecord;
 
 /// Invocations of one workgroup of the cull of groups, and of updates.
@@ -59,6 +60,8 @@ pub(crate) struct Piece {
     /// What the cull of groups binds: its boxes, as if they were a piece of instances.
     pub(crate) group_bindings: wgpu::BindGroup,
     pub(crate) order: PieceOrder,
+    /// `None` if all instances have mesh 0 and scale 1: then their slots are their indices.
+    pub(crate) slots: Option<Slots>,
 }
 
 impl Piece {
@@ -87,12 +90,15 @@ pub(super) fn packed(
     bounds: &Bounds<'_>,
     index: u32,
     range: Range<u32>,
-    order: StoredOrder,
+    (order, kinds): (StoredOrder, &Kinds<'_>),
     has_groups: bool,
-) -> Result<(Piece, Groups, [Upload; 2])> {
+) -> Result<(Piece, Groups, Vec<Upload>)> {
     let (first, count) = (range.start as usize, range.end - range.start);
     let record_bytes = bounds.kind().record_bytes();
-    let order = PieceOrder::new(bounds, first..range.end as usize, order)?;
+    let indices = first..range.end as usize;
+    let order = PieceOrder::new(bounds, indices.clone(), order)?;
+    let absent = kinds.absent(&indices, &order)?;
+    let (slots, slots_upload) = Slots::new(gpu, kinds, &indices, &order)?.unzip();
     let source = |place: usize| Origin {
         bounds: first + order.index(place),
         index: order.index(place) as u32,
@@ -100,7 +106,7 @@ pub(super) fn packed(
     let (records, upload, groups) =
         Records::new(gpu, "hiz.instances.records", count, record_bytes, |records| {
             if has_groups {
-                Groups::packed(bounds, count as usize, source, records)
+                Groups::packed(bounds, count as usize, absent, source, records)
             } else {
                 Groups::without_groups(bounds, count as usize, source, records)
             }
@@ -120,8 +126,9 @@ pub(super) fn packed(
     let uniform = uniform(count)?;
     let bindings = bind_records(gpu, &uniform, &records)?;
     let group_bindings = bind_records(gpu, &uniform_of_groups, &group_records)?;
-    let piece = Piece { range, records, group_records, uniform, bindings, group_bindings, order };
-    Ok((piece, groups, [upload, groups_upload]))
+    let piece =
+        Piece { range, records, group_records, uniform, bindings, group_bindings, order, slots };
+    Ok((piece, groups, [upload, groups_upload].into_iter().chain(slots_upload).collect()))
 }
 
 /// Binds a piece's uniform and records for a cull.

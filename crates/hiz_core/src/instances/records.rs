@@ -30,6 +30,7 @@ pub(crate) struct Records {
 }
 
 /// Records in a staging buffer, to be copied to the texture that the cull reads.
+#[derive(Debug)]
 pub(crate) struct Upload {
     staging: wgpu::Buffer,
     texture: wgpu::Texture,
@@ -45,6 +46,29 @@ impl Records {
         record_bytes: u64,
         fill: impl FnOnce(&Mapped<'_>) -> Result<T>,
     ) -> Result<(Self, Upload, T)> {
+        let usage = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_SRC;
+        Self::of_usage(gpu, label, (count, record_bytes), usage, fill)
+    }
+
+    /// Records as [`Records::new`] makes them, in a texture that shaders sample.
+    pub(crate) fn sampled<T>(
+        gpu: &Gpu,
+        label: &str,
+        count: u32,
+        record_bytes: u64,
+        fill: impl FnOnce(&Mapped<'_>) -> Result<T>,
+    ) -> Result<(Self, Upload, T)> {
+        let usage = wgpu::TextureUsages::TEXTURE_BINDING;
+        Self::of_usage(gpu, label, (count, record_bytes), usage, fill)
+    }
+
+    fn of_usage<T>(
+        gpu: &Gpu,
+        label: &str,
+        (count, record_bytes): (u32, u64),
+        texture_usage: wgpu::TextureUsages,
+        fill: impl FnOnce(&Mapped<'_>) -> Result<T>,
+    ) -> Result<(Self, Upload, T)> {
         let columns = count.clamp(1, RECORDS_PER_ROW).next_multiple_of(ROW_MULTIPLE);
         let rows = count.div_ceil(RECORDS_PER_ROW).max(1);
         let size = u64::from(columns) * u64::from(rows) * record_bytes;
@@ -55,9 +79,7 @@ impl Records {
             label,
             (columns * (record_bytes / TEXEL_BYTES) as u32, rows),
             FORMAT,
-            wgpu::TextureUsages::STORAGE_BINDING
-                | wgpu::TextureUsages::COPY_DST
-                | wgpu::TextureUsages::COPY_SRC,
+            texture_usage | wgpu::TextureUsages::COPY_DST,
         )?;
         let view = gpu.view(&texture)?;
         let records = Self { view, texture: texture.clone(), record_bytes };

@@ -13,6 +13,7 @@
 pub(crate) mod atlas;
 pub(crate) mod built;
 pub(crate) mod layout;
+pub(crate) mod level_texels;
 pub(crate) mod levels;
 pub(crate) mod reduce;
 pub(crate) mod steps;

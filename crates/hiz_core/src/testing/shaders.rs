@@ -3,7 +3,8 @@
 use crate::cull::count::count_module;
 use crate::cull::explain::explain_module;
 use crate::cull::pipelines::{
-    Candidates, DepthStore, FramePass, cull_groups_module, cull_members_module, cull_module,
+    BinKey, Candidates, DepthStore, EmitKey, FramePass, cull_groups_module, cull_members_module,
+    flat_module,
 };
 use crate::cull::refine::{refine_groups_module, refine_module};
 use crate::gpu::depth_source::SOURCES;
@@ -11,15 +12,35 @@ use crate::gpu::shader::{FILES, Source};
 use crate::input::bounds::BoundsKind;
 use crate::instances::update::update_module;
 use crate::occluders::device_raster::occluders_module;
-use crate::output::compact::compact_module;
-use crate::output::cut::cut_module;
+use crate::output::compact::{compact_module, copy_module};
+use crate::output::cut::{cut_module, emit_cut_module};
+use crate::output::emit_passes;
 use crate::pyramid::reduce::{blocks_module, coarse_module};
+use crate::testing::lod::choose_lods_module;
 #[cfg(feature = "yardstick")]
 use crate::yardstick::{uncertified_module, yardstick_modules};
 
 /// All kinds of bounds.
 pub(super) const KINDS: [BoundsKind; 3] =
     [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
+
+/// Every way to emit the kept instances, each with a shader of its own.
+pub(super) const EMITS: [(&str, EmitKey); 3] = [
+    ("list", EmitKey::NO_LIST),
+    ("planes", EmitKey::Planes { by_index: false, bins: BinKey { sorted: true } }),
+    (
+        "bins",
+        EmitKey::Append {
+            list: true,
+            capped: true,
+            record_words: 5,
+            bins: BinKey { sorted: true },
+        },
+    ),
+];
+
+/// Every way to emit what one of the two passes of a frame reports.
+pub(super) const EMITS_OF_TWO: [(&str, EmitKey); 2] = [("mask", EmitKey::Mask), EMITS[1]];
 
 /// Path below `shaders/`, without its extension, and text of every file.
 pub fn files() -> Vec<(&'static str, &'static str)> {
@@ -35,7 +56,14 @@ pub(super) fn all() -> Vec<(String, Source)> {
     let mut all = vec![
         ("refine_groups".to_owned(), refine_groups_module()),
         ("compact".to_owned(), compact_module()),
+        ("copy".to_owned(), copy_module()),
         ("cut".to_owned(), cut_module()),
+        ("emit_cut".to_owned(), emit_cut_module()),
+        ("emit_scan".to_owned(), emit_passes::scan_module()),
+        ("emit_bins".to_owned(), emit_passes::bins_module()),
+        ("emit_draws".to_owned(), emit_passes::draws_module()),
+        ("emit_scatter".to_owned(), emit_passes::scatter_module()),
+        ("emit_instances".to_owned(), emit_passes::instances_module()),
         ("count".to_owned(), count_module()),
         ("update".to_owned(), update_module()),
         ("occluders".to_owned(), occluders_module()),
@@ -47,16 +75,19 @@ pub(super) fn all() -> Vec<(String, Source)> {
         all.extend(yardstick_modules(source).map(|(name, m)| (format!("{name} {source:?}"), m)));
     }
     let stores = SOURCES.map(DepthStore::Apart).into_iter().chain([DepthStore::Atlas]);
-    let against_depth = [FramePass::Alone, FramePass::Late];
-    let passes = stores.clone().flat_map(|store| against_depth.map(|pass| (store, pass)));
     // The sets of an early pass differ in a constant.
     let early = (DepthStore::Nowhere, FramePass::Early(Candidates::History));
+    let passes = [FramePass::Alone, FramePass::Late];
+    let passes = stores.clone().flat_map(|store| passes.map(|pass| (store, pass)));
     for (store, pass) in passes.chain([early]) {
         all.push((format!("cull_groups {store:?} {pass:?}"), cull_groups_module(store, pass)));
-        for kind in KINDS {
-            let named = |name: &str| format!("{name} {store:?} {pass:?} {kind:?}");
-            all.push((named("cull"), cull_module(store, kind, pass)));
-            all.push((named("cull_members"), cull_members_module(store, kind, pass)));
+        let emits: &[_] = if pass == FramePass::Alone { &EMITS } else { &EMITS_OF_TWO };
+        for (kind, (way, emit)) in
+            KINDS.into_iter().flat_map(|k| emits.iter().map(move |e| (k, *e)))
+        {
+            let named = |name: &str| format!("{name} {way} {store:?} {pass:?} {kind:?}");
+            all.push((named("cull"), flat_module(store, kind, emit, pass)));
+            all.push((named("cull_members"), cull_members_module(store, kind, emit, pass)));
         }
     }
     for store in stores {
@@ -67,6 +98,7 @@ pub(super) fn all() -> Vec<(String, Source)> {
         all.push((format!("uncertified cull {store:?}"), uncertified_module(store)));
     }
     all.extend(KINDS.map(|kind| (format!("refine {kind:?}"), refine_module(kind))));
+    all.extend(KINDS.map(|kind| (format!("choose_lods {kind:?}"), choose_lods_module(kind))));
     all
 }
 
@@ -75,6 +107,11 @@ pub(in crate::testing) mod tests {
     use super::*;
     use crate::gpu::depth_source::SourceKind;
     use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+    /// The flat cull that is not one of two passes.
+    fn cull_module(store: DepthStore, kind: BoundsKind, emit: EmitKey) -> Source {
+        flat_module(store, kind, emit, FramePass::Alone)
+    }
 
     pub(in crate::testing) fn parse(source: &str) -> naga::Module {
         let module = naga::front::wgsl::parse_str(source)
@@ -112,7 +149,7 @@ pub(in crate::testing) mod tests {
     fn bars_stand_where_a_compiler_could_fold_what_cancels() {
         for kind in KINDS {
             let module = parse(
-                &cull_module(DepthStore::Apart(SourceKind::Depth), kind, FramePass::Alone).text(),
+                &cull_module(DepthStore::Apart(SourceKind::Depth), kind, EmitKey::NO_LIST).text(),
             );
             for bar in ["bar", "bar2", "bar3"] {
                 let (_, function) = module
@@ -155,13 +192,13 @@ pub(in crate::testing) mod tests {
     fn single_pixels_of_every_source_are_sanitized() {
         for source in SOURCES {
             let module = parse(
-                &cull_module(DepthStore::Apart(source), BoundsKind::Box, FramePass::Alone).text(),
+                &cull_module(DepthStore::Apart(source), BoundsKind::Box, EmitKey::NO_LIST).text(),
             );
             assert_eq!(calls(&module, "source_bits", "sanitized"), 1, "{source:?}");
         }
         assert_eq!(
             calls(
-                &parse(&cull_module(DepthStore::Atlas, BoundsKind::Box, FramePass::Alone).text()),
+                &parse(&cull_module(DepthStore::Atlas, BoundsKind::Box, EmitKey::NO_LIST).text()),
                 "texel",
                 "sanitized"
             ),
@@ -174,7 +211,7 @@ pub(in crate::testing) mod tests {
     fn every_plane_and_side_is_certified() {
         for kind in KINDS {
             let module = parse(
-                &cull_module(DepthStore::Apart(SourceKind::Depth), kind, FramePass::Alone).text(),
+                &cull_module(DepthStore::Apart(SourceKind::Depth), kind, EmitKey::NO_LIST).text(),
             );
             assert_eq!(
                 calls(&module, "supporting_planes", "surely_above"),

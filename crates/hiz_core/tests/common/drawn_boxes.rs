@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use hiz_core::headless::Engine;
-use hiz_core::{Camera, ImageSize, Visible, wgpu};
+use hiz_core::{Camera, Emit, ImageSize, Placement, Visible, wgpu};
 
 const SHADER: &str = "
 struct Body { center: vec4<f32>, half: vec4<f32> }
@@ -96,7 +96,8 @@ impl BoxRenderer {
         let camera = buffer(64, wgpu::BufferUsages::UNIFORM);
         let bodies = buffer(32 * u64::from(count), wgpu::BufferUsages::STORAGE);
         let triangles = buffer(2 * TRIANGLES.len() as u64, wgpu::BufferUsages::INDEX);
-        let all = buffer(4 * u64::from(count), wgpu::BufferUsages::VERTEX);
+        let usages = wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::STORAGE;
+        let all = buffer(4 * u64::from(count), usages);
         engine.queue().write_buffer(&triangles, 0, bytemuck::cast_slice(&TRIANGLES));
         let numbers: Vec<u32> = (0..count).collect();
         engine.queue().write_buffer(&all, 0, bytemuck::cast_slice(&numbers));
@@ -207,9 +208,24 @@ impl BoxRenderer {
         };
         let draws = visible.draw_arguments().expect("asked for");
         for piece in 0..visible.num_pieces() {
-            pass.set_vertex_buffer(0, visible.list(piece).expect("asked for").slice(..));
-            pass.draw_indexed_indirect(draws, visible.draw_offset(piece));
+            let list = visible.list(piece).expect("asked for");
+            let reserved = |draw| visible.bin(piece, draw, 0);
+            for draw in 0..visible.max_draws() {
+                // The meshes have one LOD, so a draw is a mesh.
+                let bin = reserved_of(visible).then(|| reserved(draw)).flatten();
+                let (offset, bytes) = bin
+                    .unwrap_or((visible.draw_offset(piece) + 20 * u64::from(draw), 0..list.size()));
+                if !bytes.is_empty() {
+                    pass.set_vertex_buffer(0, list.slice(bytes));
+                    pass.draw_indexed_indirect(draws, offset);
+                }
+            }
         }
+    }
+
+    /// A buffer with the numbers from 0 on.
+    pub(crate) fn numbers(&self) -> &wgpu::Buffer {
+        &self.all
     }
 
     /// Records the clearing of a target.
@@ -265,6 +281,12 @@ impl BoxRenderer {
         let draws = self.words(visible.draw_arguments().expect("asked for"));
         draws.chunks_exact(5).map(|draw| draw[1]).sum()
     }
+}
+
+/// Whether each draw has a part of the list of its own.
+fn reserved_of(visible: &Visible) -> bool {
+    let reserved = Placement::Reserved;
+    matches!(&visible.outputs().emit, Emit::Binned { placement, .. } if *placement == reserved)
 }
 
 fn begin<'a>(

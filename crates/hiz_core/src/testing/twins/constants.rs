@@ -7,8 +7,9 @@ use crate::cull::count;
 use crate::cull::explain::{self, Stage};
 use crate::cull::groups::GROUPS_OF_RUN;
 use crate::cull::history::HISTORY_BEGIN;
+use crate::cull::lod::LodRule;
 use crate::cull::pipelines::{Candidates, CullKey, DepthStore, FramePass, ReportKey};
-use crate::cull::pipelines::{classify_constants, cull_module, report_constants};
+use crate::cull::pipelines::{classify_constants, flat_module, report_constants};
 use crate::cull::refine;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::shader::FILES;
@@ -20,17 +21,21 @@ use crate::instances::batch::GROUP;
 use crate::instances::piece::CULL_WORKGROUP;
 use crate::instances::records::{RECORDS_PER_ROW, TEXEL_BYTES};
 use crate::instances::update;
-use crate::instances::volume_record::{BEYOND_LIMITS, LARGEST};
+use crate::instances::volume_record::{ABSENT_CENTER, BEYOND_LIMITS, LARGEST};
+use crate::output::bins::BLOCK_WORDS;
 use crate::output::compact::SCATTER_WORKGROUP;
 use crate::output::cut::CUT_WORKGROUP;
+use crate::output::emit_passes;
+use crate::output::mesh_table::{MAX_LODS, MESH_TEXELS};
 use crate::output::survivors::SURVIVORS_PER_ROW;
 use crate::output::verdict::{VERDICT_MASK, Verdict};
 use crate::output::visible::VERDICT_MULTIPLE;
 use crate::pyramid::layout::{BLOCK_ALIGNMENT, BLOCK_LOG2, HEADERS, PIXELS};
 use crate::pyramid::levels::MAX_LEVELS;
 use crate::pyramid::reduce::{REDUCE_WORKGROUP, SHARED_LEVEL, TALL_SIDE};
+use crate::testing::lod;
 use crate::testing::shaders::tests::parse;
-use crate::testing::shaders::{KINDS, all, files};
+use crate::testing::shaders::{EMITS, EMITS_OF_TWO, KINDS, all, files};
 use crate::yardstick::reduce as yardstick;
 
 /// Constants of the shaders with a twin in this crate or in Rust's `core`.
@@ -40,6 +45,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
     let bits = |v: f32| f64::from(v.to_bits());
     let verdict = |v: Verdict| int(v as u32);
     let stage = |s: Stage| int(s as u32);
+    let rule = |r: &LodRule| int(r.code());
     let texels = |kind: BoundsKind| (kind.record_bytes() / TEXEL_BYTES) as f64;
     vec![
         ("cull/candidates", "BY_HISTORY", int(Candidates::History as u32)),
@@ -52,6 +58,10 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/cull_groups", "WORKGROUP", int(CULL_WORKGROUP)),
         ("cull/explain", "BEHIND", int(explain::BEHIND)),
         ("cull/explain", "CLEAR", int(explain::CLEAR)),
+        ("cull/lod", "FINEST", rule(&LodRule::Finest)),
+        ("cull/lod", "BY_ERROR", rule(&LodRule::Error { pixels: 1.0 })),
+        ("cull/lod", "BY_DISTANCE", rule(&LodRule::Distance { thresholds: Vec::new() })),
+        ("cull/lod", "BY_SIZE", rule(&LodRule::Size { pixels: Vec::new() })),
         ("cull/history", "HISTORY_BEGIN", int(HISTORY_BEGIN)),
         ("cull/outcome", "AT_VALIDITY", stage(Stage::Validity)),
         ("cull/outcome", "AT_FRUSTUM", stage(Stage::Frustum)),
@@ -86,8 +96,17 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/record_layout", "RECORDS_PER_ROW_LOG2", int(RECORDS_PER_ROW.ilog2())),
         ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
         ("instances/update", "BEYOND_LIMITS_BITS", bits(BEYOND_LIMITS)),
+        ("cull/classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
         ("output/compact", "SCATTER_WORKGROUP", int(SCATTER_WORKGROUP)),
+        ("output/emit", "BLOCK_LOG2_WORDS", int(BLOCK_WORDS.ilog2())),
+        ("output/emit_bins", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/emit_instances", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/emit_scan", "LANES", int(emit_passes::WORKGROUP)),
+        ("output/emit_scan", "SHARE", int(BLOCK_WORDS / emit_passes::WORKGROUP)),
+        ("output/emit_scatter", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/mesh_table", "MESH_TEXELS", MESH_TEXELS as f64),
         ("output/cut", "WORKGROUP", int(CUT_WORKGROUP)),
+        ("output/emit_cut", "WORKGROUP", int(CUT_WORKGROUP)),
         ("output/verdict", "OUTSIDE", verdict(Verdict::Outside)),
         ("output/verdict", "OCCLUDED", verdict(Verdict::Occluded)),
         ("output/verdict", "VISIBLE", verdict(Verdict::Visible)),
@@ -103,6 +122,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("pyramid/pyramid_write", "SIDE_MASK", int(TALL_SIDE - 1)),
         ("pyramid/texels", "LEAST_NORMAL", float(f32::MIN_POSITIVE)),
         ("pyramid/texels_atlas", "HEADERS", int(HEADERS)),
+        ("testing/choose_lods", "LANES", int(lod::LANES)),
+        ("testing/choose_lods", "MAX_LODS", MAX_LODS as f64),
         ("yardstick/reduce_buffer", "WORKGROUP", int(yardstick::BUFFER_WORKGROUP)),
         ("yardstick/reduce_texture", "SIDE", int(yardstick::TEXTURE_WORKGROUP_SIDE)),
     ]
@@ -113,10 +134,11 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
 const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/certificate", &["ERROR_FLOOR"]),
     ("cull/classify", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
+    ("cull/lod", &["NEEDS", "NEED_FACTOR", "LARGEST_DEVIATION"]),
     // All bits of a run.
     ("cull/early", &["WHOLE_RUN"]),
     ("cull/refine", &["REFINED"]),
-    ("cull/refine_groups", &["WITHIN"]),
+    ("cull/refine_groups", &["LAST_TEXEL", "WITHIN"]),
     (
         "cull/supporting_planes",
         &[
@@ -132,7 +154,16 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ),
     (
         "instances/bounds_box_support",
-        &["EDGES", "FACES", "CANDIDATES", "EDGES_OF_AXIS_LOG2", "BORDER_TOLERANCE"],
+        &[
+            "EDGES",
+            "FACES",
+            "CANDIDATES",
+            "EDGES_OF_AXIS_LOG2",
+            "BORDER_TOLERANCE",
+            "RADIUS_FACTOR",
+            "RADIUS_FLOOR",
+            "ROOT_FACTOR",
+        ],
     ),
     (
         "instances/bounds_sphere",
@@ -150,6 +181,9 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ),
     // One workgroup scans, however large it is.
     ("output/compact", &["LANES"]),
+    ("output/emit_draws", &["LANES"]),
+    ("output/emit_record", &["COMMON_WORDS"]),
+    ("output/mesh_table", &["ERRORS_LOG2"]),
 ];
 
 /// The constants of every file that are one number: by file and name.
@@ -230,6 +264,9 @@ fn constants_fit_each_other() {
     assert!(number("cull/supporting_planes", "BEYOND") >= f64::from(MAX_IMAGE_SIDE));
     assert_eq!(MAX_IMAGE_SIDE, 1 << (MAX_LEVELS - 1));
     assert_eq!(Stage::ALL.map(|s| s as usize), std::array::from_fn(|i| i));
+    assert!(BLOCK_WORDS.is_power_of_two());
+    // A texel for the number of a mesh's LODs, and one for each four errors.
+    assert_eq!(MESH_TEXELS - 1, MAX_LODS >> number("output/mesh_table", "ERRORS_LOG2") as u32);
     // What is beyond limits is beyond what is still valid.
     const { assert!(BEYOND_LIMITS > LARGEST) };
 }
@@ -245,6 +282,14 @@ fn constants_cover_what_is_counted() {
     assert!(number("cull/certificate", "ERROR_FLOOR") >= two_to(-70));
     // Both squares, the product and the sum lose at most 6 eps.
     assert!(number("instances/bounds_sphere", "SQUARES_FACTOR") >= 1.0 + 6.0 * EPS);
+    // The three products of a need.
+    assert!(number("cull/lod", "NEED_FACTOR") >= 1.0 + 4.0 * EPS);
+    // Bounds below the coordinate limit of every camera, and a product that does not overflow.
+    let deviation = number("cull/lod", "LARGEST_DEVIATION");
+    assert!((two_to(52)..=two_to(80)).contains(&deviation));
+    // A box's radius: of a square or a sum less than 16 eps, and squares below 2^-126.
+    assert!(number("instances/bounds_box_support", "RADIUS_FACTOR") >= 1.0 + 16.0 * EPS);
+    assert!(number("instances/bounds_box_support", "RADIUS_FLOOR") >= two_to(-100));
     // Squares below 2^-126 lose what they are.
     assert!(number("instances/bounds_sphere", "SQUARES_FLOOR") >= two_to(-100));
     assert!(number("instances/bounds_sphere", "AXES") >= 3.0);
@@ -267,11 +312,21 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
     let line = |n: u32| [n, 1, 1];
     BTreeMap::from([
         ("begin", line(1)),
+        ("choose_lods", line(lod::LANES)),
+        ("cut", line(CUT_WORKGROUP)),
+        ("emit_bins", line(emit_passes::WORKGROUP)),
+        ("emit_block", line(emit_passes::WORKGROUP)),
+        // One workgroup, the largest that WebGPU promises.
+        ("emit_cut", line(CUT_WORKGROUP)),
+        ("emit_draws", line(wgpu::Limits::default().max_compute_invocations_per_workgroup)),
+        ("emit_instances", line(emit_passes::WORKGROUP)),
+        ("emit_scatter", line(emit_passes::WORKGROUP)),
+        ("emit_top", line(emit_passes::WORKGROUP)),
+        ("copy_records", line(SCATTER_WORKGROUP)),
         ("count", line(count::LANES)),
         ("cull", line(GROUP as u32)),
         ("cull_groups", line(CULL_WORKGROUP)),
         ("cull_members", line(GROUP as u32)),
-        ("cut", line(CUT_WORKGROUP)),
         ("explain", line(1)),
         ("occluder_vertex", [0; 3]),
         ("reduce", line(REDUCE_WORKGROUP)),
@@ -320,23 +375,18 @@ fn a_cull_sets_every_override() {
             descent: false,
             fit_volume: false,
         };
-        let passes = [FramePass::Alone, FramePass::Early(Candidates::History), FramePass::Late];
-        for pass in passes {
-            let report = ReportKey {
-                pass,
-                mask: false,
-                verdicts: false,
-                append: false,
-                list: false,
-                capped: false,
-                statistics: false,
-            };
+        let alone = EMITS.map(|emit| (emit, FramePass::Alone));
+        let of_two = [FramePass::Early(Candidates::History), FramePass::Late]
+            .into_iter()
+            .flat_map(|pass| EMITS_OF_TWO.map(|emit| (emit, pass)));
+        for ((way, emit), pass) in alone.into_iter().chain(of_two) {
+            let report = ReportKey { mask: false, verdicts: false, emit, statistics: false, pass };
             let set = classify_constants(&key).into_iter().chain(report_constants(&report));
             let set: BTreeSet<String> = set.map(|(name, _)| name.to_owned()).collect();
-            let module = parse(&cull_module(store, kind, pass).text());
+            let module = parse(&flat_module(store, kind, emit, pass).text());
             let declared: BTreeSet<String> =
                 module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
-            assert_eq!(set, declared, "{kind:?} {pass:?}");
+            assert_eq!(set, declared, "{kind:?} {way} {pass:?}");
         }
     }
 }

@@ -11,25 +11,30 @@ use crate::input::bounds::{Bounds, Floats};
 use crate::instances::SEQUENCE_BYTES;
 use crate::instances::piece::PieceUniform;
 use crate::instances::update::UpdateUniform;
+use crate::output::bins::{BinRecord, EmitUniform, TotalRecord};
 use crate::output::counters::{CounterRecord, StatisticsRecord};
 use crate::output::draw::DrawIndexedIndirect;
+use crate::output::mesh_table::TemplateRecord;
 use crate::output::survivors::SurvivorsRecord;
 use crate::pyramid::PyramidUniform;
 use crate::pyramid::layout::PYRAMID_CHUNKS;
 use crate::pyramid::levels::Level;
 use crate::pyramid::steps::StepUniform;
+use crate::testing::lod::LodCase;
 use crate::testing::shaders::tests::parse;
 use crate::testing::shaders::{all, files};
 use crate::yardstick::reduce as yardstick;
 
 /// Structs that only a shader has: they lie in no buffer.
 const SHADER_ONLY_STRUCTS: &[&str] = &[
+    "Bin",
     "Candidate",
     // Vertex inputs, which are found by location; see `occluders/device_meshes.rs`.
     "Copy",
     "Vertex",
     "Extent",
     "Flat",
+    "MaskPlace",
     "Outcome",
     "Projected",
     "SupportingPlane",
@@ -70,6 +75,9 @@ macro_rules! twin {
 
 fn struct_twins() -> Vec<(&'static str, Layout)> {
     vec![
+        twin!("BinRange", BinRecord {
+            "begin" = begin, "count" = count, "shift" = shift, "padding" = padding,
+        }),
         twin!("Counters", CounterRecord {
             "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid,
         }),
@@ -77,6 +85,10 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "index_count" = index_count, "instance_count" = instance_count,
             "first_index" = first_index, "base_vertex" = base_vertex,
             "first_instance" = first_instance,
+        }),
+        twin!("Emit", EmitUniform {
+            "base" = base, "count" = count, "words" = words, "lods" = lods, "piece" = piece,
+            "capacity" = capacity, "records" = records, "draws_begin" = draws_begin,
         }),
         twin!("Explanation", ExplanationRecord {
             "verdict" = verdict, "stage" = stage, "level" = level,
@@ -89,6 +101,9 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         }),
         twin!("Level", Level {
             "offset" = offset, "stride" = stride, "width" = width, "height" = height,
+        }),
+        twin!("LodCase", LodCase {
+            "mesh" = mesh, "count" = count, "scale" = scale, "padding" = padding,
         }),
         twin!("Piece", PieceUniform {
             "base" = base, "count" = count, "index" = index, "words" = words,
@@ -108,6 +123,10 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
             "workgroups_z" = workgroups + 8, "count" = count,
         }),
+        twin!("Template", TemplateRecord {
+            "count" = count, "first" = first, "base_vertex" = base_vertex, "padding" = padding,
+        }),
+        twin!("Total", TotalRecord { "demand" = demand, "written" = written }),
         twin!("Update", UpdateUniform {
             "count" = count, "texels" = texels, "number" = number, "padding" = padding,
         }),
@@ -118,7 +137,8 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "reach" = reach, "depth_factor" = depth_factor, "size" = size,
             "runtime_zero" = runtime_zero, "reduction" = reduction,
             "descent_budget" = descent_budget, "depth_offset" = depth_offset,
-            "coordinate_limit" = coordinate_limit, "padding" = padding,
+            "coordinate_limit" = coordinate_limit, "lod_end" = lod_end,
+            "lod_needs" = lod_needs,
         }),
         twin!("YardstickLevel", yardstick::PlainLevel {
             "offset" = offset, "stride" = stride, "width" = width, "height" = height,

@@ -1,10 +1,5 @@
-// What a cull that is not one of two passes does with the instances that it keeps:
-//
-// - it sets their bits in the mask
-// - it lists them for the draw, and counts the list
+// How a cull emits one list of kept instances and its length.
 
-// Set the bit of each instance that is kept.
-override MASK: bool;
 // Count the kept instances in the draw arguments, in the order in which invocations arrive.
 // Otherwise `compact.wgsl` counts the mask.
 override APPEND: bool;
@@ -52,21 +47,8 @@ fn append(index: u32) {
     }
 }
 
-// Reports that the instance at a place is kept.
-fn report(place: u32) {
-    if MASK {
-        set_mask_bit(mask_bit(place));
-    }
+fn emit(place: u32, index: u32) {
     if APPEND {
-        append(caller_index(place));
-    }
-}
-
-// Tests the members of a group that belong to one of its invocations.
-// Then it reports those that are kept: they are few, so the expensive part runs a few times.
-fn cull_run(group: u32, share: u32) {
-    let first = group * GROUP + share;
-    for (var kept = test_run(first); kept != 0u; kept &= kept - 1u) {
-        report(first + countTrailingZeros(kept) * SHARE);
+        append(index);
     }
 }

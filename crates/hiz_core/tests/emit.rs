@@ -1,0 +1,757 @@
+//! Bins by mesh and level of detail: lists, draw arguments and their number.
+//! Expectations come from loops over what each instance was made to be.
+
+mod common;
+
+use std::sync::Arc;
+
+use common::{Random, camera_along_z, ndc};
+use hiz_core::headless::{Engine, NO_LOD};
+use hiz_core::{
+    ABSENT, Bounds, Camera, CullOptions, DepthConvention, DrawTemplate, Emit, Error, Floats,
+    Hierarchy, HizContext, InstanceOptions, Instances, Lod, MeshLods, MeshTable, Order, Outputs,
+    Placement, Pyramid, Verdict, VertexDraw, Visible, testing::CANARY_WORDS, wgpu,
+};
+
+const CONVENTION: DepthConvention = DepthConvention::Reversed;
+
+/// The instances choose their own LOD: the whole part of their scale, at most the last one.
+const LOD_OF_SCALE: (&str, &str) = (
+    "scale: f32, count: u32) -> u32 {\n    return 0u;",
+    "scale: f32, count: u32) -> u32 {\n    return min(u32(scale), count - 1u);",
+);
+
+/// A device, a camera and the pyramid of a wall at depth 4.
+struct World {
+    engine: Engine,
+    camera: Camera,
+    pyramid: Arc<Pyramid>,
+}
+
+impl World {
+    fn new(faults: &[(&str, &str)]) -> Self {
+        let faults = [&[LOD_OF_SCALE], faults].concat();
+        let engine = Engine::with_planted_faults(None, &faults).expect("a Vulkan driver");
+        let adapter = engine.adapter().to_string();
+        eprintln!("adapter: {adapter}");
+        if let Ok(expected) = std::env::var("HIZVK_EXPECT_ADAPTER") {
+            assert!(adapter.to_lowercase().contains(&expected.to_lowercase()), "{adapter}");
+        }
+        let camera = camera_along_z(64, 64, CONVENTION);
+        let wall = engine.upload_depth(&[ndc(4.0, CONVENTION); 64 * 64], &camera).unwrap();
+        let pyramid = engine.pyramid(&wall).unwrap();
+        Self { engine, camera, pyramid }
+    }
+
+    fn table(&self, lods: &[usize], indexed: bool) -> MeshTable {
+        let draw = |m: usize, l: usize| {
+            let (count, first) = ((100 * m + l + 1) as u32, (7 * m + l) as u32);
+            if indexed {
+                let base_vertex = -(m as i32) - 1;
+                let draw = DrawTemplate {
+                    index_count: count,
+                    first_index: first,
+                    base_vertex,
+                    ..Default::default()
+                };
+                Lod::new(draw, l as f64)
+            } else {
+                Lod::new(VertexDraw { vertex_count: count, first_vertex: first }, l as f64)
+            }
+        };
+        let all: Vec<Vec<Lod>> =
+            lods.iter().enumerate().map(|(m, n)| (0..*n).map(|l| draw(m, l)).collect()).collect();
+        let meshes: Vec<_> = all.iter().map(|lods| MeshLods::new(lods)).collect();
+        self.engine.context().create_mesh_table(&meshes).unwrap()
+    }
+
+    fn words(&self, buffer: &wgpu::Buffer) -> Vec<u32> {
+        let (device, queue) = (self.engine.device(), self.engine.queue());
+        let staging = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("test.staging"),
+            size: buffer.size(),
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
+        queue.submit([encoder.finish()]);
+        staging.map_async(wgpu::MapMode::Read, .., |result| result.unwrap());
+        device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+        let view = staging.get_mapped_range(..).unwrap();
+        view.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect()
+    }
+
+    fn cull(&self, crowd: &Crowd, visible: &Visible, options: &CullOptions) -> Result<(), Error> {
+        let descriptor = wgpu::CommandEncoderDescriptor::default();
+        let mut encoder = self.engine.device().create_command_encoder(&descriptor);
+        let (hiz, instances) = (self.engine.context(), &crowd.instances);
+        hiz.record_cull(&mut encoder, instances, &self.camera, &self.pyramid, visible, options)?;
+        self.engine.queue().submit([encoder.finish()]);
+        Ok(())
+    }
+}
+
+/// What an instance is made to be.
+#[derive(Debug, Clone, Copy)]
+struct Made {
+    mesh: u32,
+    lod: u32,
+    /// Before the wall; behind it otherwise.
+    shows: bool,
+}
+
+impl Made {
+    fn is_kept(&self) -> bool {
+        self.shows && self.mesh != ABSENT
+    }
+}
+
+struct Crowd {
+    made: Vec<Made>,
+    instances: Arc<Instances>,
+    piece: usize,
+}
+
+impl Crowd {
+    /// Without `with_ids`, all must have mesh 0 and LOD 0.
+    fn new(world: &World, made: Vec<Made>, piece: Option<u32>, with_ids: bool) -> Self {
+        let centers: Vec<f32> =
+            made.iter().flat_map(|m| [0.0, 0.0, if m.shows { 2.0 } else { 8.0 }]).collect();
+        let radii = vec![0.125_f32; made.len()];
+        let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
+        let ids: Vec<u32> = made.iter().map(|m| m.mesh).collect();
+        let scales: Vec<f32> = made.iter().map(|m| m.lod as f32 + 0.5).collect();
+        let options = InstanceOptions {
+            piece_capacity: piece,
+            mesh_ids: with_ids.then_some(&ids),
+            scales: with_ids.then_some(Floats::F32(&scales)),
+            ..InstanceOptions::default()
+        };
+        let instances = world.engine.instances(&bounds, &options).unwrap();
+        let piece = piece.map_or(made.len().max(1), |piece| piece as usize);
+        Self { made, instances, piece }
+    }
+
+    fn random(n: usize, lods: &[usize], share: f64, absent: f64, random: &mut Random) -> Vec<Made> {
+        let make = |_| {
+            let mesh = (random.unit() * lods.len() as f64) as usize;
+            let lod = (random.unit() * lods[mesh] as f64) as u32;
+            let mesh = if random.unit() < absent { ABSENT } else { mesh as u32 };
+            Made { mesh, lod, shows: random.unit() < share }
+        };
+        (0..n).map(make).collect()
+    }
+
+    /// The indices of each piece.
+    fn pieces(&self) -> Vec<std::ops::Range<usize>> {
+        let n = self.made.len();
+        (0..n.max(1)).step_by(self.piece).map(|first| first..n.min(first + self.piece)).collect()
+    }
+
+    /// What a piece keeps of one bin, ascending.
+    fn bin(&self, piece: &std::ops::Range<usize>, mesh: u32, lod: u32) -> Vec<u32> {
+        let is_in = |i: &usize| {
+            let made = self.made[*i];
+            made.is_kept() && made.mesh == mesh && made.lod == lod
+        };
+        piece.clone().filter(is_in).map(|i| i as u32).collect()
+    }
+}
+
+/// A list of 0xFFFFFFFF into which bins are written, and the bins.
+struct Expected {
+    list: Vec<u32>,
+    draws: Vec<u32>,
+    count: u32,
+    written: usize,
+}
+
+/// The words of a draw record of `World::table`.
+fn record(indexed: bool, (mesh, lod): (u32, u32), count: usize, first_instance: usize) -> Vec<u32> {
+    let (total, first) = (100 * mesh + lod + 1, 7 * mesh + lod);
+    let (count, first_instance) = (count as u32, first_instance as u32);
+    if indexed {
+        vec![total, count, first, (-(mesh as i32) - 1).cast_unsigned(), first_instance]
+    } else {
+        vec![total, count, first, first_instance]
+    }
+}
+
+/// What `crowd` should leave of one piece, with room for `room` more indices.
+fn expected(
+    crowd: &Crowd,
+    piece: &std::ops::Range<usize>,
+    lods: &[usize],
+    (emit, indexed): (&Emit, bool),
+    (capacity, room): (usize, usize),
+) -> Expected {
+    let most = lods.iter().copied().max().unwrap();
+    let words = if indexed { 5 } else { 4 };
+    let size = match emit {
+        Emit::Binned { placement: Placement::Reserved, .. } => most * piece.len(),
+        _ => piece.len().min(capacity),
+    };
+    let mut list = vec![u32::MAX; size + CANARY_WORDS as usize];
+    if let Emit::Instances { .. } = emit {
+        let largest = crowd.pieces().iter().map(std::iter::ExactSizeIterator::len).max().unwrap();
+        let kept = piece.clone().filter(|i| crowd.made[*i].is_kept());
+        let kept: Vec<_> = kept.take(room).collect();
+        let mut draws = Vec::new();
+        for (k, i) in kept.iter().enumerate() {
+            list[k] = *i as u32;
+            draws.extend(record(indexed, (crowd.made[*i].mesh, crowd.made[*i].lod), 1, k));
+        }
+        draws.resize(largest.min(capacity).max(1) * words, 0);
+        return Expected { list, draws, count: kept.len() as u32, written: kept.len() };
+    }
+    // Where each bin lies, and what of it is written: LOD 0 of all meshes first.
+    let mut written = 0;
+    let mut bins = std::collections::BTreeMap::new();
+    for lod in 0..most as u32 {
+        let mut slot = 0;
+        for mesh in 0..lods.len() as u32 {
+            let all = crowd.bin(piece, mesh, lod);
+            let part = &all[..all.len().min(room - written)];
+            let is_of_mesh = |i: &usize| crowd.made[*i].mesh == mesh;
+            let members = piece.clone().filter(is_of_mesh).count();
+            let begin = match emit {
+                Emit::Binned { placement: Placement::Reserved, .. } => {
+                    lod as usize * piece.len() + slot
+                }
+                _ => written,
+            };
+            list[begin..begin + part.len()].copy_from_slice(part);
+            bins.insert((mesh, lod), (begin, part.len()));
+            written += part.len();
+            slot += members;
+        }
+    }
+    let mut draws = Vec::new();
+    let mut count = 0;
+    for mesh in 0..lods.len() as u32 {
+        for lod in 0..most as u32 {
+            let (begin, len) = bins[&(mesh, lod)];
+            match emit {
+                Emit::Binned { placement: Placement::Reserved, .. } => {
+                    let exists = (lod as usize) < lods[mesh as usize];
+                    let record = record(indexed, (mesh, lod), len, 0);
+                    draws.extend(if exists { record } else { vec![0; words] });
+                }
+                _ if len > 0 => {
+                    draws.extend(record(indexed, (mesh, lod), len, begin));
+                    count += 1;
+                }
+                _ => {}
+            }
+        }
+    }
+    draws.resize(lods.len() * most * words, 0);
+    Expected { list, draws, count, written }
+}
+
+/// Culls `crowd`, and compares everything that the cull leaves with `expected`.
+fn check(
+    world: &World,
+    crowd: &Crowd,
+    lods: &[usize],
+    emit: &Emit,
+    capacity: Option<u32>,
+    indexed: bool,
+) -> Result<(), String> {
+    let outputs = Outputs {
+        mask: true,
+        indices: true,
+        draws: true,
+        capacity,
+        emit: emit.clone(),
+        ..Outputs::NONE
+    };
+    let visible = world.engine.context().create_visible(&crowd.instances, &outputs).unwrap();
+    let draws = visible.draw_arguments().unwrap();
+    // The second cull finds what the first one left.
+    for hierarchy in [Hierarchy::Never, Hierarchy::Always] {
+        let garbage = vec![0xFF_u8; draws.size() as usize];
+        world.engine.queue().write_buffer(draws, 0, &garbage);
+        let options = CullOptions { hierarchy, ..CullOptions::default() };
+        world.cull(crowd, &visible, &options).unwrap();
+        let limit = capacity.map_or(crowd.made.len(), |c| c as usize);
+        let mut room = limit;
+        let (all_draws, counts) =
+            (world.words(draws), visible.draw_count().map(|b| world.words(b)));
+        for (p, piece) in crowd.pieces().iter().enumerate() {
+            let want = expected(crowd, piece, lods, (emit, indexed), (limit, room));
+            room -= want.written;
+            let what = format!(
+                "{n} instances, {m} meshes, piece {p}, capacity {capacity:?}, {hierarchy:?}",
+                n = crowd.made.len(),
+                m = lods.len(),
+            );
+            let list = world.words(visible.list(p).unwrap());
+            if list != want.list {
+                let at = list.iter().zip(&want.list).position(|(a, b)| a != b);
+                return Err(format!("{what}: the lists differ at {at:?}"));
+            }
+            let at = visible.draw_offset(p) as usize / 4;
+            let got = &all_draws[at..at + want.draws.len()];
+            if got != want.draws {
+                let at = got.iter().zip(&want.draws).position(|(a, b)| a != b);
+                return Err(format!("{what}: the draws differ at word {at:?}"));
+            }
+            assert_eq!(
+                visible.max_draws() as usize * if indexed { 5 } else { 4 },
+                want.draws.len()
+            );
+            if let Some(counts) = &counts {
+                let at = visible.draw_count_offset(p) as usize / 4;
+                if counts[at] != want.count {
+                    return Err(format!("{what}: {} draws, not {}", counts[at], want.count));
+                }
+            }
+            let mask = world.words(visible.mask(p).unwrap());
+            for (k, i) in piece.clone().enumerate() {
+                if (mask[k / 32] >> (k % 32) & 1 == 1) != crowd.made[i].is_kept() {
+                    return Err(format!("{what}: the mask of {i}"));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn emits(meshes: &MeshTable) -> [Emit; 3] {
+    let binned = |placement| Emit::Binned { meshes: meshes.clone(), placement };
+    [
+        binned(Placement::Packed),
+        binned(Placement::Reserved),
+        Emit::Instances { meshes: meshes.clone() },
+    ]
+}
+
+/// The sizes at which the passes change: words, blocks, pieces, capacities.
+#[test]
+fn bins_hold_what_a_loop_finds() {
+    let world = World::new(&[]);
+    let mut random = Random(1);
+    // Levels of detail per mesh, instances, share kept, share absent, pieces.
+    let cases: [(&[usize], usize, f64, f64, Option<u32>); 12] = [
+        (&[1], 1, 1.0, 0.0, None),
+        (&[1], 1000, 0.3, 0.1, None),
+        (&[4], 5000, 0.5, 0.1, None),
+        (&[1; 40], 33, 1.0, 0.0, None),
+        (&[2, 1, 8, 3], 3000, 0.5, 0.3, Some(1024)),
+        (&[1, 4, 2], 3000, 0.5, 0.0, Some(384)),
+        (&[3; 7], 2000, 0.4, 1.0, None),
+        (&[3; 7], 2000, 0.0, 0.0, None),
+        // A mesh per instance, and a word beside a block of 1024 words.
+        (&[1; 2000], 2000, 0.6, 0.1, None),
+        (&[2, 2], 32 * 1024 - 1, 0.3, 0.05, None),
+        (&[2, 2], 32 * 1024, 1.0, 0.0, None),
+        (&[2, 2], 32 * 1024 + 1, 0.3, 0.05, None),
+    ];
+    for (lods, n, share, absent, piece) in cases {
+        let crowd =
+            Crowd::new(&world, Crowd::random(n, lods, share, absent, &mut random), piece, true);
+        let kept = crowd.made.iter().filter(|m| m.is_kept()).count() as u32;
+        for indexed in [true, false] {
+            let meshes = world.table(lods, indexed);
+            for emit in emits(&meshes) {
+                for capacity in [None, Some(0), Some(1), Some(kept / 2), Some(kept + 1)] {
+                    check(&world, &crowd, lods, &emit, capacity, indexed).unwrap();
+                }
+            }
+        }
+    }
+}
+
+/// Meshes that no instance has lie before, between and behind those that are used.
+#[test]
+fn empty_meshes_have_no_draws() {
+    let world = World::new(&[]);
+    let lods = [2; 9];
+    let made = |i: u32| Made { mesh: [2, 5][(i % 2) as usize], lod: i / 2 % 2, shows: true };
+    let crowd = Crowd::new(&world, (0..101).map(made).collect(), None, true);
+    let meshes = world.table(&lods, true);
+    for emit in emits(&meshes) {
+        check(&world, &crowd, &lods, &emit, None, true).unwrap();
+    }
+}
+
+/// Without mesh ids and scales all have mesh 0, and their slots are their indices.
+#[test]
+fn instances_without_ids_have_mesh_0() {
+    let world = World::new(&[]);
+    let mut random = Random(2);
+    // The scale is 1, so the LOD is 1 where there are two.
+    for (lods, lod) in [(&[1][..], 0), (&[2, 1][..], 1)] {
+        let make = |_| Made { mesh: 0, lod, shows: random.unit() < 0.4 };
+        let crowd = Crowd::new(&world, (0..3000).map(make).collect(), Some(1024), false);
+        let meshes = world.table(lods, true);
+        for emit in emits(&meshes) {
+            for capacity in [None, Some(700)] {
+                check(&world, &crowd, lods, &emit, capacity, true).unwrap();
+            }
+        }
+    }
+}
+
+/// Bins of one mesh in any order: the same sets, each within its reserved words.
+#[test]
+fn any_order_fills_the_bins_of_one_mesh() {
+    let world = World::new(&[]);
+    let mut random = Random(3);
+    let lods = [4];
+    for piece in [None, Some(1024)] {
+        let made = Crowd::random(3000, &lods, 0.5, 0.1, &mut random);
+        let crowd = Crowd::new(&world, made, piece, true);
+        let meshes = world.table(&lods, true);
+        let emit = Emit::Binned { meshes, placement: Placement::Reserved };
+        for capacity in [None, Some(0), Some(1), Some(700), Some(3000)] {
+            let outputs = Outputs {
+                mask: true,
+                indices: true,
+                capacity,
+                emit: emit.clone(),
+                ..Outputs::NONE
+            };
+            let visible =
+                world.engine.context().create_visible(&crowd.instances, &outputs).unwrap();
+            let options = CullOptions { order: Order::Any, ..CullOptions::default() };
+            for _ in 0..2 {
+                world.cull(&crowd, &visible, &options).unwrap();
+                let draws = world.words(visible.draw_arguments().unwrap());
+                let mut total = 0;
+                for (p, piece) in crowd.pieces().iter().enumerate() {
+                    let list = world.words(visible.list(p).unwrap());
+                    for lod in 0..4 {
+                        let (offset, bytes) = visible.bin(p, 0, lod).unwrap();
+                        let record = &draws[offset as usize / 4..][..5];
+                        let count = record[1] as usize;
+                        assert_eq!(record, first_record(lod, count));
+                        let words = &list[bytes.start as usize / 4..bytes.end as usize / 4];
+                        let mut got = words[..count].to_vec();
+                        got.sort_unstable();
+                        let want = crowd.bin(piece, 0, lod);
+                        if capacity.is_none_or(|c| c >= 3000) {
+                            assert_eq!(got, want, "piece {p}, LOD {lod}");
+                        }
+                        assert!(got.iter().all(|i| want.contains(i)), "piece {p}, LOD {lod}");
+                        got.dedup();
+                        assert_eq!(got.len(), count, "piece {p}, LOD {lod}: listed twice");
+                        total += count;
+                    }
+                    assert!(list[4 * piece.len()..].iter().all(|word| *word == u32::MAX));
+                }
+                let kept = crowd.made.iter().filter(|m| m.is_kept()).count();
+                assert_eq!(total, kept.min(capacity.unwrap_or(3000) as usize), "{capacity:?}");
+            }
+        }
+    }
+}
+
+/// The record of the first mesh.
+fn first_record(lod: u32, count: usize) -> Vec<u32> {
+    record(true, (0, lod), count, 0)
+}
+
+/// What can be read of an engine's cull: draws, their number, bins and LODs.
+#[test]
+fn an_engines_cull_tells_its_bins() {
+    let world = World::new(&[]);
+    let mut random = Random(5);
+    let lods = [2, 1, 3];
+    let made = Crowd::random(2500, &lods, 0.5, 0.2, &mut random);
+    let crowd = Crowd::new(&world, made, Some(1024), true);
+    let kept = crowd.made.iter().filter(|m| m.is_kept()).count() as u64;
+    let absent = crowd.made.iter().filter(|m| m.mesh == ABSENT).count() as u64;
+    let indices: Vec<u32> = (0..2500).filter(|i: &u32| crowd.made[*i as usize].is_kept()).collect();
+    for emit in emits(&world.table(&lods, true)) {
+        let outputs = Outputs { emit: emit.clone(), ..Outputs::ALL };
+        let options = CullOptions::default();
+        let World { engine, camera, pyramid, .. } = &world;
+        let culling = engine.cull(&crowd.instances, camera, pyramid, &options, &outputs).unwrap();
+        let by_index = culling.lods().unwrap();
+        for (made, lod) in crowd.made.iter().zip(&by_index) {
+            assert_eq!(*lod, if made.is_kept() { made.lod as u8 } else { NO_LOD });
+        }
+        let draws = culling.draws().unwrap();
+        assert_eq!(draws.len(), 3 * culling.visible().max_draws() as usize);
+        assert_eq!(draws.iter().map(|d| u64::from(d.instance_count)).sum::<u64>(), kept);
+        let counts = culling.draw_counts().unwrap();
+        let used = draws.iter().filter(|d| d.instance_count > 0).count() as u32;
+        assert_eq!(counts.iter().sum::<u32>(), used);
+        assert_eq!(culling.demand_and_written().unwrap(), (Some(kept), kept));
+        // Mask, list and verdicts are those of any cull.
+        assert_eq!(culling.indices().unwrap(), indices);
+        assert_eq!(culling.mask().unwrap().iter().filter(|kept| **kept).count() as u64, kept);
+        let counts = culling.counts().unwrap();
+        assert_eq!((counts.absent, counts.tested, counts.visible), (absent, 2500 - absent, kept));
+        assert_eq!((counts.outside, counts.occluded), (0, 2500 - absent - kept));
+        let Emit::Binned { .. } = emit else {
+            assert!(culling.bin(0, 0).unwrap_err().to_string().contains("Emit::Instances"));
+            continue;
+        };
+        for (mesh, lods) in (0..).zip(lods) {
+            for lod in 0..lods as u32 {
+                let of_pieces = crowd.pieces();
+                let all = of_pieces.iter().flat_map(|p| crowd.bin(p, mesh, lod));
+                assert_eq!(culling.bin(mesh, lod).unwrap(), all.collect::<Vec<_>>());
+            }
+            assert!(culling.bin(mesh, lods as u32).unwrap_err().to_string().starts_with("lod: "));
+        }
+        assert!(culling.bin(3, 0).unwrap_err().to_string().starts_with("mesh: expected"));
+        // Without a mask, too, more is known than what was written.
+        let outputs = Outputs { indices: true, capacity: Some(9), emit, ..Outputs::NONE };
+        let culling = engine.cull(&crowd.instances, camera, pyramid, &options, &outputs).unwrap();
+        assert_eq!(culling.demand_and_written().unwrap(), (Some(kept), 9));
+    }
+}
+
+/// An absent instance is in no group's box, whatever its bounds are, and an update leaves it so.
+#[test]
+fn absent_instances_are_not_there() {
+    let world = World::new(&[]);
+    let World { engine, camera, pyramid, .. } = &world;
+    // One group before the wall if it were not absent, and 63 instances behind it.
+    let n = 64;
+    let centers = |absent: f32| -> Vec<f32> {
+        (0..n).flat_map(|i| [0.0, 0.0, if i == 7 { absent } else { 8.0 }]).collect()
+    };
+    let ids: Vec<u32> = (0..n).map(|i| if i == 7 { ABSENT } else { 0 }).collect();
+    let radii = vec![0.125; n];
+    for depth in [2.0, f32::NAN] {
+        let centers = centers(depth);
+        let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
+        let options =
+            InstanceOptions { strict: true, mesh_ids: Some(&ids), ..InstanceOptions::default() };
+        let instances = engine.instances(&bounds, &options).unwrap();
+        assert_eq!((instances.num_absent(), instances.invalid().unwrap().len()), (1, 0));
+        let options = CullOptions { hierarchy: Hierarchy::Always, ..CullOptions::default() };
+        for _ in 0..2 {
+            let culling =
+                engine.cull(&instances, camera, pyramid, &options, &Outputs::ALL).unwrap();
+            let counts = culling.counts().unwrap();
+            assert_eq!((counts.tested_groups, counts.tested_instances), (1, 0), "a whole group");
+            assert_eq!((counts.occluded, counts.outside, counts.absent), (63, 0, 1));
+            assert_eq!(culling.verdicts().unwrap()[7], Verdict::Outside);
+            assert!(culling.explain(7).unwrap().reason.contains("absent"));
+            assert_eq!(culling.indices().unwrap(), []);
+            engine.update(&instances, 0, &bounds, true).unwrap();
+        }
+    }
+    // All absent: the group is hidden, too.
+    let ids = [ABSENT; 64];
+    let centers = centers(2.0);
+    let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
+    let options = InstanceOptions { mesh_ids: Some(&ids), ..InstanceOptions::default() };
+    let instances = engine.instances(&bounds, &options).unwrap();
+    for hierarchy in [Hierarchy::Always, Hierarchy::Never] {
+        let options = CullOptions { hierarchy, ..CullOptions::default() };
+        let culling = engine.cull(&instances, camera, pyramid, &options, &Outputs::ALL).unwrap();
+        let counts = culling.counts().unwrap();
+        assert_eq!((counts.tested, counts.outside, counts.absent, counts.demand), (0, 0, 64, 0));
+    }
+}
+
+/// The caller's records are listed in place of indices.
+#[test]
+fn records_are_copied_in_place_of_indices() {
+    let world = World::new(&[]);
+    let mut random = Random(6);
+    for (n, piece, stride) in [(3000, Some(384), 4), (700, None, 256), (3000, Some(1024), 36)] {
+        let made = Crowd::random(n, &[1], 0.4, 0.1, &mut random);
+        let crowd = Crowd::new(&world, made, piece, true);
+        let words = stride as usize / 4;
+        let data: Vec<u32> =
+            (0..n * words).map(|i| (i as u32).wrapping_mul(2_654_435_761)).collect();
+        let records = world.engine.device().create_buffer(&wgpu::BufferDescriptor {
+            label: Some("test.records"),
+            size: 4 * data.len() as u64,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let bytes: Vec<u8> = data.iter().flat_map(|word| word.to_le_bytes()).collect();
+        world.engine.queue().write_buffer(&records, 0, &bytes);
+        let emit = Emit::Copy { records, stride };
+        for capacity in [None, Some(0), Some(100), Some(n as u32)] {
+            let outputs = Outputs { indices: true, capacity, emit: emit.clone(), ..Outputs::NONE };
+            let visible =
+                world.engine.context().create_visible(&crowd.instances, &outputs).unwrap();
+            world.cull(&crowd, &visible, &CullOptions::default()).unwrap();
+            let draws = world.words(visible.draw_arguments().unwrap());
+            let mut room = capacity.map_or(n, |c| c as usize);
+            for (p, piece) in crowd.pieces().iter().enumerate() {
+                let kept = piece.clone().filter(|i| crowd.made[*i].is_kept());
+                let kept: Vec<usize> = kept.take(room).collect();
+                room -= kept.len();
+                assert_eq!(draws[5 * p + 1] as usize, kept.len());
+                let list = world.words(visible.list(p).unwrap());
+                let want = kept.iter().flat_map(|i| &data[i * words..(i + 1) * words]);
+                let (got, behind) = list.split_at(kept.len() * words);
+                assert!(got.iter().eq(want), "{n} {stride} {capacity:?} {p}");
+                assert!(behind.iter().all(|word| *word == u32::MAX), "past the end");
+                assert!(behind.len() >= CANARY_WORDS as usize);
+            }
+            let options = CullOptions { order: Order::Any, ..CullOptions::default() };
+            let text = world.cull(&crowd, &visible, &options).unwrap_err().to_string();
+            assert!(text.starts_with("order: expected Order::Stable for Emit::Copy"), "{text}");
+        }
+    }
+}
+
+/// What cannot be used is refused by name.
+#[test]
+fn bad_tables_ids_and_records_are_refused() {
+    let world = World::new(&[]);
+    let hiz = world.engine.context();
+    let draw = DrawTemplate { index_count: 3, ..DrawTemplate::default() };
+    let lod = |error: f64| Lod::new(draw, error);
+    let refused = |lods: &[&[Lod]]| {
+        let meshes: Vec<_> = lods.iter().map(|lods| MeshLods::new(lods)).collect();
+        hiz.create_mesh_table(&meshes).unwrap_err()
+    };
+    assert_eq!(refused(&[]).to_string(), "meshes: expected at least one mesh, got none");
+    assert!(refused(&[&[]]).to_string().contains("mesh 0 has none"));
+    assert_eq!(
+        refused(&[&[lod(0.0)], &[lod(0.0); 9]]),
+        Error::Limit { name: "levels of detail of mesh 1".into(), requested: 9, allowed: 8 }
+    );
+    for error in [-1.0, f64::NAN, f64::INFINITY] {
+        let text = refused(&[&[lod(error)]]).to_string();
+        assert!(text.starts_with("error: expected errors from 0 on"), "{text}");
+    }
+    let vertices = Lod::new(VertexDraw { vertex_count: 3, first_vertex: 0 }, 0.0);
+    assert!(refused(&[&[lod(0.0)], &[vertices]]).to_string().starts_with("draw: expected"));
+    let moved = Lod::new(DrawTemplate { first_instance: 1, ..draw }, 0.0);
+    assert!(refused(&[&[moved]]).to_string().starts_with("first_instance: expected 0"));
+
+    let centers = [0.0_f32; 6];
+    let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&[1.0; 2]) };
+    let upload = |ids: Option<&[u32]>, scales: Option<&[f64]>| {
+        let scales = scales.map(Floats::F64);
+        let options = InstanceOptions { mesh_ids: ids, scales, ..InstanceOptions::default() };
+        world.engine.instances(&bounds, &options)
+    };
+    let text = upload(Some(&[0]), None).unwrap_err().to_string();
+    assert_eq!(text, "mesh_ids: expected one per instance, which are 2, got 1");
+    let text = upload(None, Some(&[1.0, -1.0])).unwrap_err().to_string();
+    assert!(text.starts_with("scales: expected numbers from 0 on") && text.ends_with("index 1"));
+    assert!(matches!(upload(Some(&[0, 1 << 20]), None), Err(Error::Limit { .. })));
+    let instances = upload(Some(&[0, 5]), None).unwrap();
+    let meshes = world.table(&[1; 5], true);
+    let visible = |instances: &Instances, emit: Emit| {
+        hiz.create_visible(instances, &Outputs { draws: true, emit, ..Outputs::NONE })
+    };
+    let binned = |placement| Emit::Binned { meshes: meshes.clone(), placement };
+    let text = visible(&instances, binned(Placement::Packed)).unwrap_err().to_string();
+    assert_eq!(text, "mesh_ids: expected ids below 5, the number of meshes, got 5");
+
+    // Bins belong to the ids of their instances, and in any order to one mesh.
+    let [first, second] = [0, 1].map(|id| upload(Some(&[id, 1]), None).unwrap());
+    let packed = visible(&first, binned(Placement::Packed)).unwrap();
+    let crowd = |instances: &Arc<Instances>| Crowd {
+        made: Vec::new(),
+        instances: Arc::clone(instances),
+        piece: 2,
+    };
+    let error = world.cull(&crowd(&second), &packed, &CullOptions::default()).unwrap_err();
+    assert!(error.to_string().starts_with("visible: expected buffers that were created for these"));
+    let any = CullOptions { order: Order::Any, ..CullOptions::default() };
+    for placement in [Placement::Packed, Placement::Reserved] {
+        let visible = visible(&first, binned(placement)).unwrap();
+        let text = world.cull(&crowd(&first), &visible, &any).unwrap_err().to_string();
+        assert!(text.starts_with("order: expected Order::Stable, got Order::Any"), "{text}");
+    }
+
+    let buffer = |size, usage| {
+        let (label, mapped_at_creation) = (None, false);
+        let descriptor = wgpu::BufferDescriptor { label, size, usage, mapped_at_creation };
+        world.engine.device().create_buffer(&descriptor)
+    };
+    let storage = wgpu::BufferUsages::STORAGE;
+    let copy = |records: wgpu::Buffer, stride| {
+        visible(&first, Emit::Copy { records, stride }).unwrap_err().to_string()
+    };
+    for stride in [0, 2, 6, 260] {
+        assert!(copy(buffer(4096, storage), stride).starts_with("stride: expected 4 to 256"));
+    }
+    assert!(copy(buffer(12, storage), 8).starts_with("records: expected 16 bytes, which are 8"));
+    let text = copy(buffer(64, wgpu::BufferUsages::VERTEX), 8);
+    assert!(text.starts_with("records: expected the usage STORAGE"), "{text}");
+}
+
+/// Without the feature, what sets `first_instance` is refused, and reserved bins work.
+#[test]
+fn packed_bins_need_first_instances() {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = wgpu::Backends::VULKAN;
+    let instance = wgpu::Instance::new(descriptor);
+    let request = wgpu::RequestAdapterOptions::default();
+    let adapter = pollster::block_on(instance.request_adapter(&request)).expect("a driver");
+    let descriptor = wgpu::DeviceDescriptor::default();
+    let (device, queue) =
+        pollster::block_on(adapter.request_device(&descriptor)).expect("a device");
+    let hiz = HizContext::new(&device).unwrap();
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let bounds = Bounds::Spheres { centers: Floats::F32(&[0.0; 3]), radii: Floats::F32(&[1.0]) };
+    let instances =
+        hiz.record_instances(&mut encoder, &bounds, &InstanceOptions::default()).unwrap();
+    queue.submit([encoder.finish()]);
+    let draw = DrawTemplate { index_count: 3, ..DrawTemplate::default() };
+    let meshes = hiz.create_mesh_table(&[MeshLods::new(&[Lod::new(draw, 0.0)])]).unwrap();
+    let visible =
+        |emit| hiz.create_visible(&instances, &Outputs { draws: true, emit, ..Outputs::NONE });
+    let packed = Emit::Binned { meshes: meshes.clone(), placement: Placement::Packed };
+    let text = visible(packed).unwrap_err().to_string();
+    assert!(text.starts_with("placement: expected a device with the feature INDIRECT_FIRST"));
+    assert!(text.ends_with("or use Placement::Reserved"), "{text}");
+    let text = visible(Emit::Instances { meshes: meshes.clone() }).unwrap_err().to_string();
+    assert!(text.starts_with("emit: expected a device with the feature INDIRECT_FIRST_INSTANCE"));
+    let reserved = Emit::Binned { meshes, placement: Placement::Reserved };
+    assert!(visible(reserved).is_ok());
+}
+
+/// Each fault must show: in a list, in the draws or in their number.
+#[test]
+fn planted_faults_are_seen() {
+    let faults: [(&str, &str, usize); 11] = [
+        ("starts off by one", "rank(lod, starts[mesh])", 0),
+        ("the end of a bin", "starts[mesh + 1u]), written)", 0),
+        ("a rank without its block", "return blocks[w >> BLOCK_LOG2_WORDS] + before[w]", 0),
+        ("a scatter without its block", "var rank = blocks[w >> BLOCK_LOG2_WORDS] + before[w];", 0),
+        ("a list past its capacity", "while bits != 0u && rank < written {", 0),
+        ("the capacity that is left", "min(through, room())", 0),
+        ("slots as indices", "index = index_of[index];", 0),
+        ("the plane", "bin.lod * piece.words + at.word", 0),
+        ("the tail of the draws", "write_draw(empty, Template(), 0u, 0u);", 0),
+        ("the number of draws", "draw_counts[emit.piece] = count;", 0),
+        ("the shift of a bin", "lod * emit.count + starts[mesh] - begin", 1),
+    ];
+    let by = [
+        "rank(lod, starts[mesh] + 1u)",
+        "starts[mesh + 1u] + 1u), written)",
+        "return before[w]",
+        "var rank = before[w];",
+        "while bits != 0u {",
+        "min(through, emit.capacity)",
+        "",
+        "at.word",
+        "",
+        "draw_counts[emit.piece] = emit.records;",
+        "lod * emit.count + starts[mesh]",
+    ];
+    for ((name, what, way), by) in faults.into_iter().zip(by) {
+        let world = World::new(&[(what, by)]);
+        let mut random = Random(4);
+        let lods = [2, 3, 1];
+        // Two pieces, of which the first has more than one block of words.
+        let made = Crowd::random(40_000, &lods, 0.9, 0.1, &mut random);
+        let crowd = Crowd::new(&world, made, Some(36_864), true);
+        let emit = emits(&world.table(&lods, true))[way].clone();
+        let kept = crowd.made.iter().filter(|m| m.is_kept()).count() as u32;
+        let seen = [None, Some(kept - 10), Some(kept / 2)]
+            .into_iter()
+            .any(|capacity| check(&world, &crowd, &lods, &emit, capacity, true).is_err());
+        assert!(seen, "{name}: nothing shows it");
+    }
+}
