@@ -21,10 +21,12 @@ __all__ = [
     "Engine",
     "Explanation",
     "Instances",
+    "MeshTable",
     "Occluders",
     "Pyramid",
     "Yardstick",
     "YardstickCull",
+    "YardstickFromBuffer",
     "YardstickRaster",
     "YardstickReduction",
     "__build__",
@@ -150,9 +152,13 @@ class Engine:
         self,
         kind: str,
         arrays: Sequence[_Floats],
-        strict: bool,
-        order: str,
+        strict_and_order: tuple[bool, str],
+        mesh_ids: npt.NDArray[np.uint32] | None,
+        scales: _Floats | None,
     ) -> Instances: ...
+    def mesh_table(
+        self, meshes: Sequence[Sequence[tuple[int, int, int, int, float]]]
+    ) -> MeshTable: ...
     def update(
         self, instances: Instances, first: int, kind: str, arrays: Sequence[_Floats], strict: bool
     ) -> None: ...
@@ -188,6 +194,29 @@ class Engine:
         rounding: str,
         camera: Camera,
     ) -> DepthImage: ...
+    def upload_samples(
+        self,
+        images: Sequence[_Floats | npt.NDArray[np.uint16]],
+        kind: str,
+        scale: float,
+        invalid: Sequence[float],
+        rounding: str,
+        camera: Camera,
+    ) -> DepthImage: ...
+    def renew(
+        self, pyramid: Pyramid, depth: DepthImage, rectangle: tuple[int, int, int, int]
+    ) -> None: ...
+    def replace_depth(
+        self,
+        pyramid: Pyramid,
+        depth: DepthImage,
+        rectangle: tuple[int, int, int, int],
+        images: Sequence[_Floats | npt.NDArray[np.uint16]],
+        kind: str,
+        scale: float,
+        invalid: Sequence[float],
+        rounding: str,
+    ) -> None: ...
     def pyramid(self, depth: DepthImage, levels: tuple[int, int]) -> Pyramid: ...
     def cull(
         self,
@@ -196,8 +225,20 @@ class Engine:
         pyramid: Pyramid,
         options: CullOptions,
         outputs: Outputs,
+        meshes: MeshTable | None,
+        among: npt.NDArray[np.bool_] | Culling | ViewsCulling | None,
         ahead: bool,
     ) -> Culling: ...
+    def cull_views(
+        self,
+        instances: Instances,
+        cameras: Sequence[Camera],
+        pyramids: Sequence[Pyramid],
+        options: CullOptions,
+        outputs: Outputs,
+        among: npt.NDArray[np.bool_] | Culling | ViewsCulling | None,
+        ahead: bool,
+    ) -> ViewsCulling: ...
     def warm_up(
         self,
         instances: Instances,
@@ -206,6 +247,7 @@ class Engine:
         levels: tuple[int, int],
         options: CullOptions,
         outputs: Outputs,
+        meshes: MeshTable | None,
     ) -> None: ...
     def cull_once(
         self,
@@ -251,6 +293,8 @@ class Pyramid:
 class Counts:
     @property
     def tested(self) -> int: ...
+    @property
+    def absent(self) -> int: ...
     @property
     def outside(self) -> int: ...
     @property
@@ -302,6 +346,9 @@ class Explanation:
     def group(self) -> Explanation | None: ...
 
 @final
+class MeshTable: ...
+
+@final
 class Culling:
     def num_instances(self) -> int: ...
     def is_ready(self) -> bool: ...
@@ -310,6 +357,9 @@ class Culling:
     def verdicts(self) -> npt.NDArray[np.uint8]: ...
     def indices(self) -> npt.NDArray[np.uint32]: ...
     def draws(self) -> bytes: ...
+    def draw_counts(self) -> list[int]: ...
+    def lods(self) -> npt.NDArray[np.uint8]: ...
+    def bin(self, mesh: int, lod: int) -> npt.NDArray[np.uint32]: ...
     def counts(self) -> Counts: ...
     def demand_and_written(self) -> tuple[int | None, int]: ...
     def timings(self) -> tuple[float, float, float, float]: ...
@@ -331,6 +381,18 @@ class PassAnswer:
     def mask(self) -> npt.NDArray[np.bool_]: ...
 
 @final
+class ViewsCulling:
+    def num_instances(self) -> int: ...
+    def num_views(self) -> int: ...
+    def is_ready(self) -> bool: ...
+    def wait(self) -> None: ...
+    def masks(self) -> npt.NDArray[np.bool_]: ...
+    def any(self) -> npt.NDArray[np.bool_]: ...
+    def any_indices(self) -> npt.NDArray[np.uint32]: ...
+    def any_draws(self) -> bytes: ...
+    def view(self, view: int) -> Culling: ...
+
+@final
 class Yardstick:
     def __new__(cls, engine: Engine) -> Self: ...
     @staticmethod
@@ -341,6 +403,10 @@ class Yardstick:
     def reduction(
         self, depth: DepthImage, shape: str, levels: tuple[int, int]
     ) -> YardstickReduction: ...
+    def region(
+        self, depth: DepthImage, rectangle: tuple[int, int, int, int]
+    ) -> YardstickReduction: ...
+    def resolve(self, camera: Camera, samples: int) -> YardstickReduction: ...
     def frames(
         self,
         instances: Instances,
@@ -348,6 +414,7 @@ class Yardstick:
         cameras: Sequence[Camera],
         is_warmed: bool,
     ) -> tuple[float, list[list[float]]]: ...
+    def from_buffer(self, kind: str, arrays: Sequence[_Floats]) -> YardstickFromBuffer: ...
     def raster(self, occluders: Occluders, camera: Camera, threads: int) -> YardstickRaster: ...
     def cull(
         self,
@@ -358,11 +425,17 @@ class Yardstick:
         options: CullOptions,
         outputs: Outputs,
         depth: DepthImage | None,
+        meshes: MeshTable | None,
     ) -> YardstickCull: ...
 
 @final
 class YardstickReduction:
     def ms(self) -> float: ...
+
+@final
+class YardstickFromBuffer:
+    def ms(self) -> float: ...
+    def copy_ms(self) -> float: ...
 
 @final
 class YardstickRaster:

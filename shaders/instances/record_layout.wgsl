@@ -12,3 +12,8 @@ fn record_position(i: u32, k: u32, texels: u32) -> vec2<u32> {
     let column = i % (1u << RECORDS_PER_ROW_LOG2);
     return vec2<u32>(column * texels + k, i >> RECORDS_PER_ROW_LOG2);
 }
+
+// The bits of 2^62, beyond every camera's coordinate limit.
+// A record of such numbers is invalid, whatever its kind.
+// Twin: `BEYOND_LIMITS` in `crates/hiz_core/src/instances/volume_record.rs`.
+const BEYOND_LIMITS_BITS: u32 = 0x5e800000u;

@@ -15,14 +15,6 @@ struct Update {
     padding: u32,
 }
 
-// What the device knows about the order in which updates ran.
-struct Sequence {
-    // The number of the next update.
-    next: u32,
-    // Not 0: an update was left out or overtaken.
-    broken: u32,
-}
-
 @group(0) @binding(0) var<uniform> update: Update;
 @group(0) @binding(1) var<storage, read> places: array<u32>;
 @group(0) @binding(2) var<storage, read> fresh: array<vec4<u32>>;
@@ -31,11 +23,6 @@ struct Sequence {
 
 // Twin: `WORKGROUP` in `crates/hiz_core/src/instances/update.rs`.
 const WORKGROUP: u32 = 128u;
-
-// The bits of 2^62, beyond every camera's coordinate limit.
-// A record of such numbers is invalid, whatever its kind.
-// Twin: `BEYOND_LIMITS` in `crates/hiz_core/src/instances/volume_record.rs`.
-const BEYOND_LIMITS_BITS: u32 = 0x5e800000u;
 
 fn replace(id: u32, k: u32, texel: vec4<u32>) {
     textureStore(records, record_position(places[id], k, update.texels), texel);

@@ -1,4 +1,4 @@
-"""The way in: uploads, updates, and when a new upload, which sorts again, pays."""
+"""The way in: uploads, updates, bounds from a buffer, and when a new upload, which sorts, pays."""
 
 from __future__ import annotations
 
@@ -7,14 +7,20 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from hizvk.bounds import Boxes
+from hizvk.bounds import Boxes, Spheres
 
 from .rounds import in_turns
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    import numpy.typing as npt
+
+    from hizvk.resources import Instances
+
     from .run import Run
+
+    Floats32 = npt.NDArray[np.float32]
 
 __all__ = ["measure"]
 
@@ -32,6 +38,8 @@ def measure(run: Run) -> None:
     """Measures boxes in contiguous float32, 95 % hidden."""
     run.step("uploads and updates")
     _uploads(run)
+    run.step("bounds from a buffer")
+    _from_buffer(run)
     run.step("culls after instances have moved")
     _moved(run)
 
@@ -86,6 +94,54 @@ def _uploads(run: Run) -> None:
         run.found.spread(
             f"transfers.update.{100 * share:g}", f"{way}, per moved instance", each, "ns"
         )
+
+
+def _from_buffer(run: Run) -> None:
+    """Bounds that a shader has written: records and group boxes, beside copies of their bytes."""
+    scene, device = run.town(run.extent.crowd, 0.95), run.device
+    count = len(scene.boxes)
+    centers = 0.5 * (scene.low + scene.high)
+    radii = 0.5 * np.linalg.norm(scene.high - scene.low, axis=1).astype(np.float32)
+    kinds: tuple[tuple[str, str, tuple[Floats32, Floats32], Spheres | Boxes], ...] = (
+        ("spheres", "sphere", (centers, radii), Spheres(centers, radii)),
+        ("boxes", "box", (scene.low, scene.high), scene.boxes),
+    )
+    for name, kind, arrays, bounds in kinds:
+        on_device = run.yardstick.from_buffer(kind, arrays)
+        resident = device.instances(bounds, order="given")
+        copies = [np.empty_like(part) for part in arrays]
+
+        def memcpy(
+            arrays: tuple[Floats32, Floats32] = arrays, copies: list[Floats32] = copies
+        ) -> float:
+            pairs = zip(arrays, copies, strict=True)
+            return sum(run.yardstick.memcpy_ms(part, copy) for part, copy in pairs)
+
+        def update(resident: Instances = resident, bounds: Spheres | Boxes = bounds) -> None:
+            resident.update(0, bounds)
+
+        ways = {
+            "memcpy of the input": memcpy,
+            "copy on the device": on_device.copy_ms,
+            "from a buffer": on_device.ms,
+            "update from the host": _waited(run, update),
+        }
+        ms = in_turns(ways, run.extent.rounds)
+        run.found.timed(f"bounds from a buffer: {name}", ms)
+        way = f"{count:,} {name} from a buffer"
+        run.found.spread(
+            f"transfers.from_buffer.{name}",
+            f"{way}, per instance",
+            1e6 * ms["from a buffer"] / count,
+            "ns",
+        )
+        for other in ("memcpy of the input", "copy on the device", "update from the host"):
+            run.found.ratio(
+                f"transfers.from_buffer.{name}.{other}",
+                f"{way} / {other}",
+                ms["from a buffer"],
+                ms[other],
+            )
 
 
 def _moved(run: Run) -> None:

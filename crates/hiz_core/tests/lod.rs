@@ -13,15 +13,20 @@
 
 mod common;
 
+#[path = "common/campaign/mod.rs"]
+mod campaign;
 #[path = "common/lod_cases.rs"]
 mod lod_cases;
+#[path = "common/mirror/mod.rs"]
+mod mirror;
 
 use common::{Random, engine};
 use hiz_core::headless::Engine;
 use hiz_core::testing::words;
 use hiz_core::{BoundsKind, CullOptions, LodRule};
 use hiz_ref::LodRule as Exact;
-use lod_cases::{Cases, KINDS, SETTINGS, Setting};
+use lod_cases::{Case, Cases, KINDS, SETTINGS, Setting};
+use mirror::{Arithmetic, LodMirror, NEED_FACTOR, Need, STYLES, WILDEST};
 
 /// The words of the view's uniform from which on the needs follow (`shaders/cull/view.wgsl`).
 const NEEDS_WORD: usize = 44;
@@ -300,6 +305,99 @@ fn needs_are_never_too_small() {
         assert!(tally.coarse > 0 && tally.coarse < tally.cases, "{tally:?}");
         assert_eq!(tally.coarser == 0, is_right, "{planted:?}: {tally:?}");
     }
+}
+
+/// How often a LOD is allowed that float64 does not allow, over all styles of arithmetic.
+///
+/// By error, the need is that of tight cases.
+/// By size, the limit in pixels is made for each case, to lie some ulps from its width.
+fn allowed_in_vain(count: usize, margin: f32, need_factor: f32) -> [usize; 2] {
+    let mut in_vain = [0; 2];
+    for (s, setting) in SETTINGS.iter().map(|make| make()).enumerate() {
+        // Float64 has rounded positions that are far from the origin.
+        let room = 1.0 + if s == 4 { 1e-8 } else { 1e-12 };
+        for (k, kind) in KINDS.into_iter().enumerate() {
+            let cases = Cases::tight(&setting, kind, count, 61 + 10 * s as u64 + k as u64);
+            let mut random = Random(62);
+            let rule = LodRule::Error { pixels: setting.pixels };
+            let by_error = LodMirror::new(&view_words(&setting, &rule), NEEDS_WORD);
+            let records = cases.records();
+            let stretch = hiz_ref::greatest_stretch(&setting.view);
+            for (i, (case, record)) in cases.all.iter().zip(records).enumerate() {
+                let w = hiz_ref::least_w(&setting.view, &case.volume);
+                let limit = 2.0 * hiz_ref::radius(&case.volume) * stretch / w;
+                let ulps = random.range(-1.0, 1.0) * random.pick(&[2.0, 8.0, 100.0]);
+                let limit = limit * (1.0 + ulps / 8_388_608.0);
+                let by_size = (1e-2..3e4).contains(&limit).then(|| {
+                    let rule = LodRule::Size { pixels: vec![limit] };
+                    LodMirror::new(&view_words(&setting, &rule), NEEDS_WORD)
+                });
+                for style in STYLES.iter().chain([&WILDEST]) {
+                    let mut arithmetic = Arithmetic::new(*style, i as u64);
+                    for (lod, error) in cases.errors_of(i).into_iter().enumerate().skip(1) {
+                        let need = Need::Error(error as f32, case.scale);
+                        let factors = (margin, need_factor);
+                        let exact = error * f64::from(case.scale) * stretch / setting.pixels;
+                        let nearly = (exact / w - 1.0).abs() < 1e-3;
+                        if nearly
+                            && by_error.allows((kind, &record), need, factors, &mut arithmetic)
+                        {
+                            in_vain[0] += usize::from(exact > w * room);
+                            assert!(lod < case.lods);
+                        }
+                    }
+                    let size = by_size.as_ref().is_some_and(|by_size| {
+                        let factors = (margin, need_factor);
+                        by_size.allows((kind, &record), Need::Size, factors, &mut arithmetic)
+                    });
+                    let exact = 2.0 * hiz_ref::radius(&case.volume) * stretch / limit;
+                    in_vain[1] += usize::from(size && exact > w * room);
+                }
+            }
+        }
+    }
+    in_vain
+}
+
+/// The margin covers every arithmetic that WGSL permits, and a margin of nothing does not.
+#[test]
+fn no_arithmetic_allows_too_much() {
+    let whole = allowed_in_vain(300, 24.0, NEED_FACTOR);
+    let nothing = allowed_in_vain(300, 0.0, 1.0);
+    eprintln!("allowed in vain by error and by size: {whole:?}; without a margin: {nothing:?}");
+    assert_eq!(whole, [0, 0]);
+    assert!(nothing.iter().all(|in_vain| *in_vain > 20), "{nothing:?}");
+}
+
+/// Rounding to nearest, the mirror allows what the device allows.
+#[test]
+fn the_mirror_agrees_with_the_device() {
+    let mut different = 0;
+    for setting in SETTINGS.iter().map(|make| make()) {
+        for kind in KINDS {
+            let cases = Cases::tight(&setting, kind, 1_000, 71);
+            let rule = LodRule::Error { pixels: setting.pixels };
+            let view = view_words(&setting, &rule);
+            let mirror = LodMirror::new(&view, NEEDS_WORD);
+            let chosen = cases.choose(&engine(), (&rule, &view));
+            let lod_of = |i: usize, case: &Case, record: &[u32]| {
+                let allows = |error: &f64| {
+                    let need = Need::Error(*error as f32, case.scale);
+                    let arithmetic = &mut Arithmetic::new(STYLES[0], 0);
+                    mirror.allows((kind, record), need, (24.0, NEED_FACTOR), arithmetic)
+                };
+                cases.errors_of(i)[1..].iter().take_while(|error| allows(error)).count()
+            };
+            let records = cases.all.iter().zip(cases.records()).enumerate();
+            different += records
+                .zip(chosen)
+                .filter(|((i, (case, record)), chosen)| lod_of(*i, case, record) != *chosen)
+                .count();
+        }
+    }
+    eprintln!("different LODs: {different} of {}", 1_000 * KINDS.len() * SETTINGS.len());
+    // A compiler may order sums in another way.
+    assert!(different < 1_000 * KINDS.len() * SETTINGS.len() / 100, "{different}");
 }
 
 /// Bounds that cross the plane of the eye, and those behind it, get LOD 0 from every rule.

@@ -4,16 +4,19 @@
 
 mod common;
 
+#[path = "common/exact.rs"]
+mod exact;
+
 use std::sync::Arc;
 
 use common::{Random, camera_along_z, engine, ndc};
+use exact::Exact;
 use hiz_core::headless::Culling;
 use hiz_core::testing::words::GroupWords;
 use hiz_core::{
     Bounds, BoundsKind, CullOptions, DepthConvention, Floats, InstanceOptions, Instances, Order,
     Outputs, StoredOrder, testing::words,
 };
-use num_bigint::BigInt;
 
 const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
 const ORDERS: [StoredOrder; 2] = [StoredOrder::Morton, StoredOrder::Given];
@@ -109,36 +112,6 @@ impl Crowd {
             Exact::new(corners[0][k]).is_at_most(&low)
                 && high.is_at_most(&Exact::new(corners[1][k]))
         })
-    }
-}
-
-/// An integer times 2^-2400, as every sum of products of two float64 is.
-struct Exact(BigInt);
-
-impl Exact {
-    fn new(v: f64) -> Self {
-        let bits = v.to_bits();
-        let (exponent, fraction) = ((bits >> 52 & 0x7FF) as i64, bits & ((1 << 52) - 1));
-        let mantissa = if exponent == 0 { fraction } else { fraction | 1 << 52 };
-        let shift = 2400 + exponent.max(1) - 1075;
-        let magnitude = BigInt::from(mantissa) << shift;
-        Self(if v < 0.0 { -magnitude } else { magnitude })
-    }
-
-    fn plus(&self, other: &Self) -> Self {
-        Self(&self.0 + &other.0)
-    }
-
-    fn minus(&self, other: &Self) -> Self {
-        Self(&self.0 - &other.0)
-    }
-
-    fn times(&self, other: &Self) -> Self {
-        Self((&self.0 * &other.0) >> 2400)
-    }
-
-    fn is_at_most(&self, other: &Self) -> bool {
-        self.0 <= other.0
     }
 }
 

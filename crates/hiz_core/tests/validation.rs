@@ -100,6 +100,15 @@ impl World {
         self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
 
+    fn bounds_buffer(&self, size: u64) -> wgpu::Buffer {
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("test.bounds"),
+            size,
+            usage: wgpu::BufferUsages::STORAGE,
+            mapped_at_creation: false,
+        })
+    }
+
     /// A texture of the image's size, with what `change` makes different.
     fn texture_but(
         &self,
@@ -330,17 +339,17 @@ fn depth_images_that_cannot_be_reduced_are_refused_by_name() {
             ),
             (
                 "mips",
-                "depth: expected a 2D texture of one mip level",
+                "depth: expected which of 2 mip levels, got none",
                 but(Format::R32Float, SAMPLED, &|d| d.mip_level_count = 2),
             ),
             (
                 "layers",
-                "depth: expected a 2D texture of one mip level, sample and layer",
+                "depth: expected which of 3 layers, got none",
                 but(Format::R32Float, SAMPLED, &|d| d.size.depth_or_array_layers = 3),
             ),
             (
                 "samples",
-                "depth: expected a 2D texture of one mip level, sample and layer",
+                "depth: expected one sample per pixel, got 4; record_resolve",
                 but(Format::Depth32Float, both, &|d| d.sample_count = 4),
             ),
             (
@@ -548,6 +557,7 @@ fn culls_of_what_does_not_belong_are_refused_by_name() {
                     .map(drop)
             }) as Box<_>
         };
+    let stranger = other.bounds_buffer(48);
     run(
         &world,
         &[
@@ -605,6 +615,11 @@ fn culls_of_what_does_not_belong_are_refused_by_name() {
                 "an update of another kind",
                 "bounds: expected the instances' kind",
                 update(instances, 0, &theirs),
+            ),
+            (
+                "another device's buffer",
+                "buffer: expected a buffer of this device that has not been destroyed",
+                Box::new(|encoder| context.record_update_from(encoder, instances, &stranger)),
             ),
             (
                 "an update past the end",
@@ -800,6 +815,7 @@ fn nothing_at_all_is_drawn_reduced_and_culled() {
 fn a_lost_device_ends_nothing() {
     let (world, wall) = culled(World::new(), AtlasUse::Never);
     let (view, mut encoder) = (plain(&wall), world.encoder());
+    let buffer = world.bounds_buffer(48);
     world.device.destroy();
     let World { context, instances, occluders, camera, .. } = &world;
     let outcomes = [
@@ -809,6 +825,7 @@ fn a_lost_device_ends_nothing() {
             .record_occluders(&mut encoder, occluders, camera, &view, &DrawOptions::default())
             .map(drop),
         context.record_update(&mut encoder, instances, 0, &TWO_BOXES, true),
+        context.record_update_from(&mut encoder, instances, &buffer),
         context.record_instances(&mut encoder, &TWO_BOXES, &InstanceOptions::default()).map(drop),
         context.create_occluders(&[WALL], &OccluderOptions::default()).map(drop),
         context.create_pyramid(camera.size(), &PyramidOptions::default()).map(drop),
@@ -841,7 +858,8 @@ fn encoders_that_cannot_be_used_are_told_of() {
     let World { context, instances, occluders, camera, .. } = &world;
     let view = plain(&wall);
     type Act<'a> = &'a dyn Fn(&mut wgpu::CommandEncoder) -> Result<()>;
-    let acts: [Act<'_>; 5] = [
+    let buffer = world.bounds_buffer(48);
+    let acts: [Act<'_>; 6] = [
         &|encoder| world.reduce(encoder, &view),
         &|encoder| world.cull(encoder, &CullOptions::default()),
         &|encoder| {
@@ -853,6 +871,7 @@ fn encoders_that_cannot_be_used_are_told_of() {
         &|encoder| {
             context.record_instances(encoder, &TWO_BOXES, &InstanceOptions::default()).map(drop)
         },
+        &|encoder| context.record_update_from(encoder, instances, &buffer),
     ];
     for (i, act) in acts.iter().enumerate() {
         let mut encoder = world.encoder();
@@ -860,7 +879,7 @@ fn encoders_that_cannot_be_used_are_told_of() {
             encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()).forget_lifetime();
         let outcome = act(&mut encoder);
         // Where copies are recorded first, wgpu reports it later.
-        if [2, 3].contains(&i) {
+        if [2, 3, 5].contains(&i) {
             let text = outcome.unwrap_err().to_string();
             assert!(
                 text.starts_with("encoder: expected one of this device without an open pass, but"),
@@ -884,7 +903,7 @@ fn least() -> wgpu::Limits {
         max_bind_groups: 4,
         max_bind_groups_plus_vertex_buffers: 4,
         max_bindings_per_bind_group: 7,
-        max_sampled_textures_per_shader_stage: 3,
+        max_sampled_textures_per_shader_stage: 4,
         max_samplers_per_shader_stage: 1,
         max_storage_buffers_per_shader_stage: 8,
         max_storage_textures_per_shader_stage: 3,
@@ -994,6 +1013,11 @@ fn the_least_limits_are_enough_for_everything() {
         let instances =
             context.record_instances(&mut encoder, &bounds, &InstanceOptions::default()).unwrap();
         context.record_update(&mut encoder, &instances, 0, &bounds, false).unwrap();
+        if kind != BoundsKind::OrientedBox {
+            let buffer = world.bounds_buffer(8192);
+            let count = 8192 / 24;
+            context.record_instances_from(&mut encoder, &buffer, kind, count).unwrap();
+        }
         let visible = context.create_visible(&instances, &Outputs::default()).unwrap();
         for atlas in [AtlasUse::Never, AtlasUse::Always] {
             let options = PyramidOptions { atlas, ..PyramidOptions::default() };

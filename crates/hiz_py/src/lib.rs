@@ -13,6 +13,7 @@ mod culling;
 mod device;
 mod errors;
 mod held;
+mod meshes;
 mod options;
 mod reference;
 mod two_passes;
@@ -28,11 +29,13 @@ mod _core {
     #[pymodule_export]
     use crate::containment::{check_bounds, check_proxy};
     #[pymodule_export]
-    use crate::culling::{Counts, Culling, Explanation};
+    use crate::culling::{Counts, Culling, Explanation, ViewsCulling};
     #[pymodule_export]
     use crate::device::{DepthImage, Engine, Instances, Occluders, Pyramid, adapters};
     #[pymodule_export]
     use crate::held::{after_fork, before_fork, let_go};
+    #[pymodule_export]
+    use crate::meshes::MeshTable;
     #[pymodule_export]
     use crate::reference::{reference_classify, reference_pyramid};
     #[pymodule_export]
@@ -46,7 +49,9 @@ mod _core {
     /// For benchmarks of single submits.
     #[cfg(feature = "yardstick")]
     #[pymodule_export]
-    use crate::yardstick::{Yardstick, YardstickCull, YardstickRaster, YardstickReduction};
+    use crate::yardstick::{
+        Yardstick, YardstickCull, YardstickFromBuffer, YardstickRaster, YardstickReduction,
+    };
 
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "the name is Python's")]

@@ -89,7 +89,7 @@ mod volume;
 
 pub use containment::{MeshError, Protrusion, TriangleMesh, check_bounds, check_proxy, contains};
 pub use depth::{DepthBounds, DepthKind, DepthMeaning, depth_bounds};
-pub use lod::{LodRule, coarsest_lod, greatest_stretch, least_w, pixel_shift, stretch_at};
+pub use lod::{LodRule, coarsest_lod, greatest_stretch, least_w, pixel_shift, radius, stretch_at};
 pub use pyramid::{Level, pyramid, sanitized_depth};
 pub use view::{Coverage, View};
 pub use volume::Volume;

@@ -110,7 +110,8 @@ pub fn least_w(view: &View, volume: &Volume) -> f64 {
 }
 
 /// The greatest distance of a point of a volume from its centre.
-fn radius(volume: &Volume) -> f64 {
+#[must_use]
+pub fn radius(volume: &Volume) -> f64 {
     match *volume {
         Volume::Sphere { radius, .. } => radius,
         Volume::Box { min, max } => 0.5 * length([0, 1, 2].map(|k| max[k] - min[k])),

@@ -116,7 +116,7 @@ fn target<'a>(
     set: &Chosen<'_>,
 ) -> Result<Target<'a>> {
     let visible = &temporal.early;
-    let report = pass_report(instances, visible, FramePass::Early(set.candidates), false);
+    let report = pass_report(instances, visible, options, FramePass::Early(set.candidates));
     let given = match set.given {
         Some(given) => given.clone(),
         None => gpu.stand_in("hiz.no_given")?,
@@ -151,7 +151,7 @@ fn target<'a>(
         };
         Ok((outputs, groups))
     };
-    Target::new(gpu, instances, options, visible, report, bind)
+    Target::new(gpu, (instances, options, None), visible, report, bind)
 }
 
 /// What an early pass binds as its view: the camera, and a pyramid that is never read.

@@ -74,7 +74,7 @@ fn record_copies(encoder: &mut wgpu::CommandEncoder, instances: &Instances, temp
 fn target<'a>(gpu: &Gpu, inputs: &CullInputs<'_>, temporal: &'a Temporal) -> Result<Target<'a>> {
     let CullInputs { instances, options, .. } = *inputs;
     let visible = &temporal.late;
-    let report = pass_report(instances, visible, FramePass::Late, options.statistics);
+    let report = pass_report(instances, visible, options, FramePass::Late);
     let statistics = if report.statistics { Some(visible.statistics_or_new(gpu)?) } else { None };
     let way = usize::from(report.statistics);
     let bind = |p: usize, piece: &Piece, output: &PieceOutput| {
@@ -108,5 +108,5 @@ fn target<'a>(gpu: &Gpu, inputs: &CullInputs<'_>, temporal: &'a Temporal) -> Res
         };
         Ok((outputs.clone(), groups))
     };
-    Target::new(gpu, instances, options, visible, report, bind)
+    Target::new(gpu, (instances, options, None), visible, report, bind)
 }

@@ -23,6 +23,8 @@ pub(crate) struct CullKey {
     pub(crate) footprint_log2: u32,
     pub(crate) descent: bool,
     pub(crate) fit_volume: bool,
+    /// Whether only some instances are asked for.
+    pub(crate) among: bool,
 }
 
 impl CullKey {
@@ -38,6 +40,7 @@ impl CullKey {
             footprint_log2: 1,
             descent: false,
             fit_volume: false,
+            among: false,
         }
     }
 }
@@ -140,6 +143,22 @@ pub(crate) enum EmitKey {
 pub(crate) struct BinKey {
     /// Whether the instances have mesh ids or scales.
     pub(crate) sorted: bool,
+    /// The code of the rule that chooses LODs; `None` where LOD 0 is the only one that it can
+    /// choose.
+    pub(crate) lod_rule: Option<u32>,
+}
+
+impl BinKey {
+    fn files(self) -> [File; 3] {
+        let lod =
+            if self.lod_rule.is_some() { wgsl!("cull/lod") } else { wgsl!("cull/lod_finest") };
+        [wgsl!("output/mesh_table"), wgsl!("output/bin"), lod]
+    }
+
+    fn constants(self) -> impl Iterator<Item = (&'static str, f64)> {
+        let rule = self.lod_rule.map(|code| ("LOD_RULE", f64::from(code)));
+        [("SORTED", flag(self.sorted))].into_iter().chain(rule)
+    }
 }
 
 impl EmitKey {
@@ -148,13 +167,14 @@ impl EmitKey {
 
     /// The shader files that emit.
     pub(crate) fn files(self) -> Vec<File> {
-        let bins = [wgsl!("output/mesh_table"), wgsl!("output/bin"), wgsl!("cull/lod_finest")];
         match self {
             Self::Mask => vec![wgsl!("output/report_mask")],
             Self::List { .. } => vec![wgsl!("output/report_list")],
-            Self::Planes { .. } => [&bins[..], &[wgsl!("output/report_planes")]].concat(),
-            Self::Append { .. } => {
-                [&bins[..], &[wgsl!("output/emit"), wgsl!("output/report_bins")]].concat()
+            Self::Planes { bins, .. } => {
+                [&bins.files()[..], &[wgsl!("output/report_planes")]].concat()
+            }
+            Self::Append { bins, .. } => {
+                [&bins.files()[..], &[wgsl!("output/emit"), wgsl!("output/report_bins")]].concat()
             }
         }
     }
@@ -166,14 +186,16 @@ impl EmitKey {
                 vec![("APPEND", flag(append)), ("LIST", flag(list)), ("CAPPED", flag(capped))]
             }
             Self::Planes { by_index, bins } => {
-                vec![("BY_INDEX", flag(by_index)), ("SORTED", flag(bins.sorted))]
+                bins.constants().chain([("BY_INDEX", flag(by_index))]).collect()
             }
-            Self::Append { list, capped, record_words, bins } => vec![
-                ("LIST", flag(list)),
-                ("CAPPED", flag(capped)),
-                ("RECORD_WORDS", f64::from(record_words)),
-                ("SORTED", flag(bins.sorted)),
-            ],
+            Self::Append { list, capped, record_words, bins } => bins
+                .constants()
+                .chain([
+                    ("LIST", flag(list)),
+                    ("CAPPED", flag(capped)),
+                    ("RECORD_WORDS", f64::from(record_words)),
+                ])
+                .collect(),
         }
     }
 
@@ -192,9 +214,10 @@ pub(crate) const BINNED_BINDINGS: &[(u32, Binding)] = &[
     (1, Binding::ReadQuads),
     (2, Binding::SampledQuads),
     (3, Binding::SampledQuads),
+    (4, Binding::SampledQuads),
 ];
 
-pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 6] {
+pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 7] {
     [
         ("REVERSED", flag(key.reversed)),
         ("CHUNKS", key.chunks as f64),
@@ -202,6 +225,7 @@ pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 6] {
         ("FOOTPRINT_LOG2", f64::from(key.footprint_log2)),
         ("DESCENT", flag(key.descent)),
         ("FIT_VOLUME", flag(key.fit_volume)),
+        ("AMONG", flag(key.among)),
     ]
 }
 
@@ -246,8 +270,8 @@ impl DepthStore {
     pub(crate) fn code(self) -> u32 {
         match self {
             Self::Apart(source) => source as u32,
-            Self::Atlas => 3,
-            Self::Nowhere => 4,
+            Self::Atlas => 5,
+            Self::Nowhere => 6,
         }
     }
 
@@ -353,6 +377,8 @@ pub(crate) fn decision_module(
         ],
         bounds,
         &[
+            wgsl!("cull/among_layout"),
+            wgsl!("cull/among"),
             wgsl!("cull/certificate"),
             wgsl!("output/verdict"),
             wgsl!("cull/outcome"),

@@ -3,8 +3,10 @@
 //! [`Target`] says where the answers go, and [`Tests`] has the pipelines.
 //! The two passes of a frame (`early.rs`, `late.rs`) have targets of their own.
 
+use crate::cull::among::Among;
 use crate::cull::groups::{GROUPS_OF_RUN, GroupCull, NO_STATISTICS, bind_survivors, is_grouped};
 use crate::cull::inputs::{CullInputs, PreparedView, check_contexts};
+use crate::cull::lod::LodRule;
 use crate::cull::options::{CullOptions, Order};
 use crate::cull::pipelines::{
     BINNED_BINDINGS, BinKey, CullKey, EmitKey, FramePass, ReportKey, VISIBLE_BINDINGS,
@@ -34,10 +36,14 @@ pub(super) struct Target<'a> {
 /// What the tests of a piece bind.
 pub(super) struct PieceTarget {
     records: wgpu::BindGroup,
+    group_records: wgpu::BindGroup,
     /// The outputs of tests of instances, and of groups; `None` if no groups are tested.
     outputs: wgpu::BindGroup,
     groups: Option<wgpu::BindGroup>,
 }
+
+/// What tests of a piece's instances bind as their outputs, and tests of groups.
+pub(super) type Bound = (wgpu::BindGroup, Option<wgpu::BindGroup>);
 
 /// Checks that `visible` was made for these instances, or others of as many.
 pub(super) fn check_visible(
@@ -137,14 +143,17 @@ fn bind_output<'a>(
 }
 
 /// The bindings of a piece's records, with slots and mesh table for a cull that emits bins.
-fn bind_records<'a>(
+fn bind_records(
     gpu: &Gpu,
-    piece: &'a Piece,
-    visible: &'a Visible,
+    piece: &Piece,
+    visible: &Visible,
     p: usize,
-) -> Result<&'a wgpu::BindGroup> {
-    let Some(bins) = &visible.bins else { return Ok(&piece.bindings) };
-    made(&bins.pieces[p].records_bindings, || {
+    among: Option<&Among>,
+) -> Result<wgpu::BindGroup> {
+    let Some(bins) = &visible.bins else {
+        return Ok(among.map_or(&piece.bindings, |among| among.records(p)).clone());
+    };
+    let bind = |asked: &wgpu::TextureView| {
         let table = bins.meshes.view();
         let slots = piece.slots.as_ref().map_or(table, |slots| &slots.of_places.view);
         gpu.bind_group(
@@ -155,9 +164,14 @@ fn bind_records<'a>(
                 entry(1, wgpu::BindingResource::TextureView(&piece.records.view)),
                 entry(2, wgpu::BindingResource::TextureView(slots)),
                 entry(3, wgpu::BindingResource::TextureView(table)),
+                entry(4, wgpu::BindingResource::TextureView(asked)),
             ],
         )
-    })
+    };
+    match among {
+        Some(among) => bind(among.view(p)),
+        None => made(&bins.pieces[p].records_bindings, || bind(gpu.no_texels()?)).cloned(),
+    }
 }
 
 /// A function that makes the pipeline of the flat cull.
@@ -216,7 +230,7 @@ fn record_all(
         };
         Ok((outputs, groups))
     };
-    let target = Target::new(gpu, instances, options, visible, report, bind)?;
+    let target = Target::new(gpu, (instances, options, inputs.among), visible, report, bind)?;
     record_against_pyramid(gpu, encoder, inputs, &target, flat, |_| ())
 }
 
@@ -247,17 +261,18 @@ impl<'a> Target<'a> {
     /// groups, if there are any.
     pub(super) fn new(
         gpu: &Gpu,
-        instances: &Instances,
-        options: &CullOptions,
+        (instances, options, among): (&Instances, &CullOptions, Option<&Among>),
         visible: &'a Visible,
         report: ReportKey,
-        bind: impl Fn(usize, &Piece, &PieceOutput) -> Result<(wgpu::BindGroup, Option<wgpu::BindGroup>)>,
+        bind: impl Fn(usize, &Piece, &PieceOutput) -> Result<Bound>,
     ) -> Result<Self> {
         let mut pieces = Vec::new();
         for (p, (piece, output)) in instances.pieces.iter().zip(&visible.pieces).enumerate() {
             let (outputs, groups) = bind(p, piece, output)?;
-            let records = bind_records(gpu, piece, visible, p)?.clone();
-            pieces.push(PieceTarget { records, outputs, groups });
+            let records = bind_records(gpu, piece, visible, p, among)?;
+            let group_records =
+                among.map_or(&piece.group_bindings, |among| among.group_records(p)).clone();
+            pieces.push(PieceTarget { records, group_records, outputs, groups });
         }
         let planes = matches!(report.emit, EmitKey::Planes { .. });
         let emission = match visible.bins.as_ref().filter(|_| planes) {
@@ -372,7 +387,7 @@ impl<'a> Tests<'a> {
                 pass.set_bind_group(0, group_view, &[]);
                 groups.record_boxes(
                     &mut pass,
-                    piece,
+                    &target.group_records,
                     workgroups(piece.groups().div_ceil(CULL_WORKGROUP)),
                 );
                 pass.set_bind_group(0, view, &[]);
@@ -409,7 +424,7 @@ fn report_key(
     let (list, capped) = (outputs.indices, visible.is_capped());
     let mut mask = outputs.mask;
     let emit = if let Some(bins) = &visible.bins {
-        let of_bins = bin_key(instances);
+        let of_bins = bin_key(instances, bins, options);
         match (any_order, bins.can_append()) {
             (false, _) => EmitKey::Planes {
                 by_index: bins.arrangement == Arrangement::Instances,
@@ -444,8 +459,12 @@ fn report_key(
     Ok(ReportKey { mask, verdicts, emit, statistics, pass: FramePass::Alone })
 }
 
-fn bin_key(instances: &Instances) -> BinKey {
-    BinKey { sorted: instances.pieces.iter().any(|p| p.slots.is_some()) }
+fn bin_key(instances: &Instances, bins: &Bins, options: &CullOptions) -> BinKey {
+    let has_lods = bins.meshes.most_lods() > 1 && options.lod != LodRule::Finest;
+    BinKey {
+        sorted: instances.pieces.iter().any(|p| p.slots.is_some()),
+        lod_rule: has_lods.then(|| options.lod.code()),
+    }
 }
 
 /// What one of the two passes of a frame writes.
@@ -453,13 +472,14 @@ fn bin_key(instances: &Instances) -> BinKey {
 pub(super) fn pass_report(
     instances: &Instances,
     visible: &Visible,
+    options: &CullOptions,
     pass: FramePass,
-    statistics: bool,
 ) -> ReportKey {
+    let statistics = options.statistics && pass == FramePass::Late;
     let emit = match &visible.bins {
         Some(bins) => EmitKey::Planes {
             by_index: bins.arrangement == Arrangement::Instances,
-            bins: bin_key(instances),
+            bins: bin_key(instances, bins, options),
         },
         None => EmitKey::Mask,
     };

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use crate::error::Result;
 use crate::headless::engine::Engine;
 use crate::headless::readback;
-use crate::input::bounds::Bounds;
+use crate::input::bounds::{Bounds, BoundsKind};
 use crate::input::mesh::MeshData;
+use crate::instances::from_buffer::{BoundsBuffer, record_instances_from, record_update_from};
 use crate::instances::update::record_update;
 use crate::instances::{InstanceOptions, Instances};
 use crate::occluders::drawing::OccluderOptions;
@@ -76,6 +77,53 @@ impl Engine {
             self.queue().submit(before.into_iter().chain([encoder.finish()]));
             watches.all_refined();
             watches.note(&updated);
+            Ok(())
+        })
+    }
+
+    /// Makes `count` instances whose bounds lie in a buffer of this engine's device.
+    ///
+    /// # Errors
+    /// Those of
+    /// [`HizContext::record_instances_from`](crate::HizContext::record_instances_from), and
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost).
+    pub fn instances_from<'a>(
+        &self,
+        source: impl Into<BoundsBuffer<'a>>,
+        kind: BoundsKind,
+        count: u32,
+    ) -> Result<Arc<Instances>> {
+        self.scoped(|| {
+            let mut encoder = self.encoder("hiz.instances.encoder");
+            let gpu = &self.context().gpu;
+            let made = record_instances_from(gpu, &mut encoder, &source.into(), kind, count)?;
+            self.queue().submit([encoder.finish()]);
+            Ok(Arc::new(made))
+        })
+    }
+
+    /// Takes the bounds of all instances from a buffer of this engine's device: it records and
+    /// submits.
+    ///
+    /// # Errors
+    /// Those of [`HizContext::record_update_from`](crate::HizContext::record_update_from), and
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost).
+    pub fn update_from<'a>(
+        &self,
+        instances: &Instances,
+        source: impl Into<BoundsBuffer<'a>>,
+    ) -> Result<()> {
+        self.scoped(|| {
+            let _in_order = instances.submitting.lock();
+            let gpu = &self.context().gpu;
+            let mut encoder = self.encoder("hiz.update.encoder");
+            let watches = instances.watches();
+            record_update_from(gpu, &mut encoder, instances, &source.into(), |encoder| {
+                watches.record_refinements(gpu, encoder).map(drop)
+            })?;
+            self.queue().submit([encoder.finish()]);
+            watches.all_refined();
+            watches.note(&(0..instances.len()));
             Ok(())
         })
     }

@@ -173,7 +173,12 @@ impl Groups {
             }
             Ok(())
         })?;
-        Ok(Self { count, groups: Vec::new(), absent: Vec::new() })
+        Ok(Self::unknown(count))
+    }
+
+    /// Of a piece whose group boxes are made on the device: the host knows none.
+    pub(crate) fn unknown(count: usize) -> Self {
+        Self { count, groups: Vec::new(), absent: Vec::new() }
     }
 
     /// The number of groups.

@@ -7,6 +7,7 @@
 //! 3. `groups` and `aabb` form groups of 64 neighbours with a box around each.
 //! 4. `volume_record`, `batch` and `records` write the records that the cull reads.
 //! 5. `update` replaces bounds later, and `watch` connects submitted culls with later updates.
+//! 6. `from_buffer` takes bounds that a shader of the caller's has written.
 //!
 //! An instance has two numbers.
 //! Its *index* is the caller's number, and everything public uses it.
@@ -16,6 +17,7 @@
 
 pub(crate) mod aabb;
 pub(crate) mod batch;
+pub(crate) mod from_buffer;
 pub(crate) mod groups;
 pub(crate) mod morton;
 pub(crate) mod order;
@@ -38,7 +40,7 @@ use crate::instances::groups::Groups;
 use crate::instances::order::StoredOrder;
 #[cfg(feature = "testing")]
 use crate::instances::piece::CULL_WORKGROUP;
-use crate::instances::piece::{Piece, packed, piece_capacity};
+use crate::instances::piece::{Piece, packed, piece_capacity, unwritten};
 use crate::instances::slots::{Kinds, Slots};
 use crate::instances::watch::Watches;
 
@@ -110,6 +112,8 @@ pub(crate) struct Changing {
     pub(crate) groups: Vec<Groups>,
     /// The number of the next update; the docs of `update` say what it is for.
     pub(crate) next_update: u32,
+    /// Whether bounds were taken from a buffer: then the host knows neither bounds nor groups.
+    pub(crate) on_device: bool,
 }
 
 /// Room for `Sequence` of `shaders/instances/update.wgsl`.
@@ -191,27 +195,49 @@ impl Instances {
             pieces.push(piece);
             groups.push(its_groups);
         }
-        let sequence = gpu.filled(
-            "hiz.instances.sequence",
-            &[0; SEQUENCE_BYTES],
-            wgpu::BufferUsages::STORAGE,
-        )?;
-        let changing = Locked::new(Changing { groups, next_update: 0 });
-        let this = Self {
-            context: gpu.id(),
-            id: InstancesId::next(),
-            kind,
-            pieces,
-            sequence,
-            changing,
-            submitting: Locked::default(),
-            watches: Locked::default(),
-        };
+        let changing = Changing { groups, next_update: 0, on_device: false };
+        let this = Self::of_pieces(gpu, kind, pieces, changing)?;
         if options.strict {
             let invalid = this.invalid()?;
             refuse_bad(n, invalid.len(), invalid.first().copied())?;
         }
         Ok(this)
+    }
+
+    /// Room for `count` instances, whose records are written on the device.
+    pub(super) fn unwritten(gpu: &Gpu, kind: BoundsKind, count: u32) -> Result<Self> {
+        let capacity = piece_capacity(kind.record_bytes(), gpu.limits());
+        let mut pieces = Vec::new();
+        for index in 0..count.div_ceil(capacity).max(1) {
+            let start = index * capacity;
+            let range = start..count.min(start.saturating_add(capacity));
+            pieces.push(unwritten(gpu, kind, index, range)?);
+        }
+        let groups = pieces.iter().map(|piece| Groups::unknown(piece.count() as usize)).collect();
+        Self::of_pieces(gpu, kind, pieces, Changing { groups, next_update: 0, on_device: true })
+    }
+
+    fn of_pieces(
+        gpu: &Gpu,
+        kind: BoundsKind,
+        pieces: Vec<Piece>,
+        changing: Changing,
+    ) -> Result<Self> {
+        let sequence = gpu.filled(
+            "hiz.instances.sequence",
+            &[0; SEQUENCE_BYTES],
+            wgpu::BufferUsages::STORAGE,
+        )?;
+        Ok(Self {
+            context: gpu.id(),
+            id: InstancesId::next(),
+            kind,
+            pieces,
+            sequence,
+            changing: Locked::new(changing),
+            submitting: Locked::default(),
+            watches: Locked::default(),
+        })
     }
 
     /// The number of instances.
@@ -238,9 +264,18 @@ impl Instances {
     /// A cull always keeps them.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`] if the host has no memory for the list.
+    /// - [`Error::Mismatch`] for instances whose bounds come from a buffer: the host does not know
+    ///   them.
+    /// - [`Error::OutOfMemory`] if the host has no memory for the list.
     pub fn invalid(&self) -> Result<Vec<u64>> {
         let changing = self.changing();
+        if changing.on_device {
+            return Err(Error::mismatch(
+                "instances",
+                "expected instances whose bounds come from the host, got some whose bounds come \
+                 from a buffer: a cull's verdicts and counts tell the invalid ones",
+            ));
+        }
         let mut invalid =
             memory::list(changing.groups.iter().map(|g| g.invalid().count()).sum(), "invalid")?;
         for (piece, groups) in self.pieces.iter().zip(&changing.groups) {
@@ -277,11 +312,21 @@ impl Instances {
     /// Bytes on the host.
     ///
     /// - 8 per instance for its place and its index; none with [`StoredOrder::Given`].
-    /// - 88 per group of 64 instances, and 8 more if any instance is absent.
+    /// - 88 per group of 64 instances, and 8 more if any instance is absent; none if the bounds
+    ///   come from a buffer.
     /// - 48 per instance in those groups of which a part was updated.
     pub fn host_bytes(&self) -> u64 {
         let groups = self.changing().groups.iter().map(Groups::host_bytes).sum::<u64>();
         self.pieces.iter().map(|p| p.order.host_bytes()).sum::<u64>() + groups
+    }
+
+    /// Forgets what the host knows of the bounds, because the device writes them from now on.
+    fn bounds_are_on_device(&self) {
+        let mut changing = self.changing();
+        if !std::mem::replace(&mut changing.on_device, true) {
+            let unknown = |piece: &Piece| Groups::unknown(piece.count() as usize);
+            changing.groups = self.pieces.iter().map(unknown).collect();
+        }
     }
 
     /// The culls that were submitted.

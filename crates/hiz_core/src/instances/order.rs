@@ -50,6 +50,11 @@ impl PieceOrder {
         self.indices.is_empty()
     }
 
+    /// The index of the instance at each place; empty if the order is the caller's.
+    pub(super) fn indices(&self) -> &[u32] {
+        &self.indices
+    }
+
     /// The index of the instance that is stored at `place`, relative to the piece's first.
     pub(crate) fn index(&self, place: usize) -> usize {
         self.indices.get(place).map_or(place, |index| *index as usize)

@@ -1,12 +1,14 @@
 //! Pieces: the instances of one call, cut so that each part fits a binding and a dispatch.
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use crate::error::Result;
 use crate::gpu::buffers::{Mapped, entry};
 use crate::gpu::device::Gpu;
+use crate::gpu::kept::KeptBindings;
 use crate::gpu::layouts::Binding;
-use crate::input::bounds::Bounds;
+use crate::input::bounds::{Bounds, BoundsKind};
 use crate::instances::batch::GROUP;
 use crate::instances::batch::Origin;
 use crate::instances::groups::Groups;
@@ -55,6 +57,8 @@ pub(crate) struct Piece {
     /// One `BoxRecord` per group.
     pub(crate) group_records: Records,
     pub(crate) uniform: wgpu::Buffer,
+    /// The same for the boxes of the groups.
+    pub(crate) group_uniform: wgpu::Buffer,
     /// What the cull of instances binds.
     pub(crate) bindings: wgpu::BindGroup,
     /// What the cull of groups binds: its boxes, as if they were a piece of instances.
@@ -62,6 +66,28 @@ pub(crate) struct Piece {
     pub(crate) order: PieceOrder,
     /// `None` if all instances have mesh 0 and scale 1: then their slots are their indices.
     pub(crate) slots: Option<Slots>,
+    /// What bounds from a buffer need.
+    pub(crate) from_buffer: KeptSources,
+}
+
+/// Buffers whose bindings a piece keeps: callers often write to two or three in turns.
+const KEPT: usize = 3;
+
+/// A buffer, where the bounds of a piece begin in it, and the bytes from one to the next.
+type SourceKey = (wgpu::Buffer, u64, u64);
+
+/// What a piece keeps for bounds from a buffer (`from_buffer.rs`).
+#[derive(Debug)]
+pub(crate) struct KeptSources {
+    pub(super) bindings: KeptBindings<SourceKey>,
+    /// The index of the instance at each place, if the piece is sorted.
+    pub(super) indices: OnceLock<wgpu::Buffer>,
+}
+
+impl Default for KeptSources {
+    fn default() -> Self {
+        Self { bindings: KeptBindings::new(KEPT), indices: OnceLock::new() }
+    }
 }
 
 impl Piece {
@@ -81,8 +107,9 @@ impl Piece {
 }
 
 /// The bindings of a piece's uniform and records in every cull.
+/// The last one says which instances are asked for (`shaders/cull/among.wgsl`).
 pub(crate) const RECORD_BINDINGS: &[(u32, Binding)] =
-    &[(0, Binding::Uniform), (1, Binding::ReadQuads)];
+    &[(0, Binding::Uniform), (1, Binding::ReadQuads), (4, Binding::SampledQuads)];
 
 /// Makes a piece, its groups, and the uploads that bring both to the device.
 pub(super) fn packed(
@@ -104,7 +131,7 @@ pub(super) fn packed(
         index: order.index(place) as u32,
     };
     let (records, upload, groups) =
-        Records::new(gpu, "hiz.instances.records", count, record_bytes, |records| {
+        Records::new(gpu, RECORDS_LABEL, count, record_bytes, |records| {
             if has_groups {
                 Groups::packed(bounds, count as usize, absent, source, records)
             } else {
@@ -112,30 +139,83 @@ pub(super) fn packed(
             }
         })?;
     let num_groups = groups.len() as u32;
-    let box_bytes = size_of::<BoxRecord>() as u64;
     let (group_records, groups_upload, ()) =
-        Records::new(gpu, "hiz.instances.groups", num_groups, box_bytes, |boxes| {
+        Records::new(gpu, GROUPS_LABEL, num_groups, BOX_BYTES, |boxes| {
             let records = (0..groups.len()).map(|g| groups.record(g));
             if groups.len() > 0 { write_boxes(boxes, records) } else { Ok(()) }
         })?;
+    let order = (order, slots);
+    let piece = assembled(gpu, (index, range), num_groups, records, group_records, order)?;
+    Ok((piece, groups, [upload, groups_upload].into_iter().chain(slots_upload).collect()))
+}
+
+/// Makes a piece whose records and group boxes are written on the device, in the caller's order.
+pub(super) fn unwritten(
+    gpu: &Gpu,
+    kind: BoundsKind,
+    index: u32,
+    range: Range<u32>,
+) -> Result<Piece> {
+    let count = range.end - range.start;
+    let num_groups = count.div_ceil(GROUP as u32);
+    let records = Records::unwritten(gpu, RECORDS_LABEL, count, kind.record_bytes())?;
+    let group_records = Records::unwritten(gpu, GROUPS_LABEL, num_groups, BOX_BYTES)?;
+    let order = (PieceOrder::default(), None);
+    assembled(gpu, (index, range), num_groups, records, group_records, order)
+}
+
+const RECORDS_LABEL: &str = "hiz.instances.records";
+const GROUPS_LABEL: &str = "hiz.instances.groups";
+
+/// Bytes of the record of a group's box.
+const BOX_BYTES: u64 = size_of::<BoxRecord>() as u64;
+
+fn assembled(
+    gpu: &Gpu,
+    (index, range): (u32, Range<u32>),
+    num_groups: u32,
+    records: Records,
+    group_records: Records,
+    (order, slots): (PieceOrder, Option<Slots>),
+) -> Result<Piece> {
     let uniform = |count: u32| {
         let words = count.div_ceil(32);
         gpu.uniform("hiz.instances.piece", &PieceUniform { base: range.start, count, index, words })
     };
     let uniform_of_groups = uniform(num_groups)?;
-    let uniform = uniform(count)?;
+    let uniform = uniform(range.end - range.start)?;
     let bindings = bind_records(gpu, &uniform, &records)?;
     let group_bindings = bind_records(gpu, &uniform_of_groups, &group_records)?;
-    let piece =
-        Piece { range, records, group_records, uniform, bindings, group_bindings, order, slots };
-    Ok((piece, groups, [upload, groups_upload].into_iter().chain(slots_upload).collect()))
+    let from_buffer = KeptSources::default();
+    Ok(Piece {
+        range,
+        records,
+        group_records,
+        uniform,
+        group_uniform: uniform_of_groups,
+        bindings,
+        group_bindings,
+        order,
+        slots,
+        from_buffer,
+    })
 }
 
-/// Binds a piece's uniform and records for a cull.
+/// Binds a piece's uniform and records for a cull of all instances.
 pub(crate) fn bind_records(
     gpu: &Gpu,
     uniform: &wgpu::Buffer,
     records: &Records,
+) -> Result<wgpu::BindGroup> {
+    bind_records_among(gpu, uniform, records, gpu.no_texels()?)
+}
+
+/// Binds a piece's uniform and records for a cull that reads which instances it asks for.
+pub(crate) fn bind_records_among(
+    gpu: &Gpu,
+    uniform: &wgpu::Buffer,
+    records: &Records,
+    among: &wgpu::TextureView,
 ) -> Result<wgpu::BindGroup> {
     gpu.bind_group(
         "hiz.cull.instances",
@@ -143,6 +223,7 @@ pub(crate) fn bind_records(
         &[
             entry(0, uniform.as_entire_binding()),
             entry(1, wgpu::BindingResource::TextureView(&records.view)),
+            entry(4, wgpu::BindingResource::TextureView(among)),
         ],
     )
 }

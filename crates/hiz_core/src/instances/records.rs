@@ -21,6 +21,10 @@ const ROW_MULTIPLE: u32 = 16;
 /// The format of the texture.
 pub(crate) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 
+/// The usage of records that culls read as storage, beside that as the target of copies.
+const STORED: wgpu::TextureUsages =
+    wgpu::TextureUsages::STORAGE_BINDING.union(wgpu::TextureUsages::COPY_SRC);
+
 /// Records, one after the other, in rows of [`RECORDS_PER_ROW`].
 #[derive(Debug)]
 pub(crate) struct Records {
@@ -46,8 +50,7 @@ impl Records {
         record_bytes: u64,
         fill: impl FnOnce(&Mapped<'_>) -> Result<T>,
     ) -> Result<(Self, Upload, T)> {
-        let usage = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_SRC;
-        Self::of_usage(gpu, label, (count, record_bytes), usage, fill)
+        Self::of_usage(gpu, label, (count, record_bytes), STORED, fill)
     }
 
     /// Records as [`Records::new`] makes them, in a texture that shaders sample.
@@ -69,12 +72,30 @@ impl Records {
         texture_usage: wgpu::TextureUsages,
         fill: impl FnOnce(&Mapped<'_>) -> Result<T>,
     ) -> Result<(Self, Upload, T)> {
-        let columns = count.clamp(1, RECORDS_PER_ROW).next_multiple_of(ROW_MULTIPLE);
+        let columns = Self::columns(count);
         let rows = count.div_ceil(RECORDS_PER_ROW).max(1);
         let size = u64::from(columns) * u64::from(rows) * record_bytes;
         // Without MAP_WRITE, wgpu would map a staging buffer of its own and copy it into this one.
         let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::MAP_WRITE;
         let (staging, filled) = gpu.written(label, size, usage, fill)?;
+        let records = Self::made(gpu, label, (count, record_bytes), texture_usage)?;
+        let texture = records.texture.clone();
+        Ok((records, Upload { staging, texture }, filled))
+    }
+
+    /// Makes room for `count` records, which commands write later.
+    pub(crate) fn unwritten(gpu: &Gpu, label: &str, count: u32, record_bytes: u64) -> Result<Self> {
+        Self::made(gpu, label, (count, record_bytes), STORED)
+    }
+
+    fn made(
+        gpu: &Gpu,
+        label: &str,
+        (count, record_bytes): (u32, u64),
+        texture_usage: wgpu::TextureUsages,
+    ) -> Result<Self> {
+        let columns = Self::columns(count);
+        let rows = count.div_ceil(RECORDS_PER_ROW).max(1);
         let texture = gpu.texture(
             label,
             (columns * (record_bytes / TEXEL_BYTES) as u32, rows),
@@ -82,8 +103,12 @@ impl Records {
             texture_usage | wgpu::TextureUsages::COPY_DST,
         )?;
         let view = gpu.view(&texture)?;
-        let records = Self { view, texture: texture.clone(), record_bytes };
-        Ok((records, Upload { staging, texture }, filled))
+        Ok(Self { view, texture, record_bytes })
+    }
+
+    /// The records in a row, of `count` in all.
+    fn columns(count: u32) -> u32 {
+        count.clamp(1, RECORDS_PER_ROW).next_multiple_of(ROW_MULTIPLE)
     }
 
     /// Texels per record.

@@ -52,7 +52,11 @@ const BINDINGS: &[(u32, Binding)] = &[
 
 /// The shader that replaces records and group boxes.
 pub(crate) fn update_module() -> Source {
-    Source::of(&[&[wgsl!("instances/record_layout"), wgsl!("instances/update")]])
+    Source::of(&[&[
+        wgsl!("instances/record_layout"),
+        wgsl!("instances/sequence"),
+        wgsl!("instances/update"),
+    ]])
 }
 
 fn update_pipeline(gpu: &Gpu, entry_point: &'static str) -> Result<wgpu::ComputePipeline> {
@@ -87,6 +91,13 @@ pub(crate) fn record_update(
 ) -> Result<()> {
     gpu.check_context("instances", instances.context)?;
     let n = bounds.len()?;
+    if instances.changing().on_device {
+        return Err(Error::mismatch(
+            "instances",
+            "expected instances whose bounds come from the host, got some whose bounds \
+             `record_update_from` takes from a buffer: write the buffer instead",
+        ));
+    }
     if bounds.kind() != instances.kind {
         return Err(Error::mismatch(
             "bounds",

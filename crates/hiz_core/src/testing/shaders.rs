@@ -1,5 +1,6 @@
 //! Every shader module that this crate makes a pipeline of.
 
+use crate::cull::among::among_order_module;
 use crate::cull::count::count_module;
 use crate::cull::explain::explain_module;
 use crate::cull::pipelines::{
@@ -8,14 +9,18 @@ use crate::cull::pipelines::{
 };
 use crate::cull::refine::{refine_groups_module, refine_module};
 use crate::gpu::depth_source::SOURCES;
+use crate::gpu::depth_source::SourceKind;
 use crate::gpu::shader::{FILES, Source};
 use crate::input::bounds::BoundsKind;
+use crate::instances::from_buffer::{FROM_BUFFER_KINDS, from_buffer_module};
 use crate::instances::update::update_module;
 use crate::occluders::device_raster::occluders_module;
 use crate::output::compact::{compact_module, copy_module};
 use crate::output::cut::{cut_module, emit_cut_module};
 use crate::output::emit_passes;
+use crate::output::views::join_module;
 use crate::pyramid::reduce::{blocks_module, coarse_module};
+use crate::pyramid::resolve::resolve_module;
 use crate::testing::lod::choose_lods_module;
 #[cfg(feature = "yardstick")]
 use crate::yardstick::{uncertified_module, yardstick_modules};
@@ -25,22 +30,19 @@ pub(super) const KINDS: [BoundsKind; 3] =
     [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
 
 /// Every way to emit the kept instances, each with a shader of its own.
-pub(super) const EMITS: [(&str, EmitKey); 3] = [
+pub(super) const EMITS: [(&str, EmitKey); 5] = [
     ("list", EmitKey::NO_LIST),
-    ("planes", EmitKey::Planes { by_index: false, bins: BinKey { sorted: true } }),
-    (
-        "bins",
-        EmitKey::Append {
-            list: true,
-            capped: true,
-            record_words: 5,
-            bins: BinKey { sorted: true },
-        },
-    ),
+    ("planes", EmitKey::Planes { by_index: false, bins: ONE_LOD }),
+    ("planes of LODs", EmitKey::Planes { by_index: false, bins: LODS }),
+    ("bins", EmitKey::Append { list: true, capped: true, record_words: 5, bins: ONE_LOD }),
+    ("bins of LODs", EmitKey::Append { list: true, capped: true, record_words: 5, bins: LODS }),
 ];
 
+const ONE_LOD: BinKey = BinKey { sorted: true, lod_rule: None };
+const LODS: BinKey = BinKey { sorted: true, lod_rule: Some(1) };
+
 /// Every way to emit what one of the two passes of a frame reports.
-pub(super) const EMITS_OF_TWO: [(&str, EmitKey); 2] = [("mask", EmitKey::Mask), EMITS[1]];
+pub(super) const EMITS_OF_TWO: [(&str, EmitKey); 3] = [("mask", EmitKey::Mask), EMITS[1], EMITS[2]];
 
 /// Path below `shaders/`, without its extension, and text of every file.
 pub fn files() -> Vec<(&'static str, &'static str)> {
@@ -65,14 +67,25 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("emit_scatter".to_owned(), emit_passes::scatter_module()),
         ("emit_instances".to_owned(), emit_passes::instances_module()),
         ("count".to_owned(), count_module()),
+        ("among_order".to_owned(), among_order_module()),
+        ("join_views".to_owned(), join_module()),
         ("update".to_owned(), update_module()),
         ("occluders".to_owned(), occluders_module()),
+        ("resolve Depth".to_owned(), resolve_module(SourceKind::Depth)),
+        ("resolve Float".to_owned(), resolve_module(SourceKind::Float)),
     ];
     for source in SOURCES {
         all.push((format!("reduce {source:?}"), blocks_module(source)));
         all.push((format!("reduce_coarse {source:?}"), coarse_module(source)));
+        // Yardsticks read whole images alone.
         #[cfg(feature = "yardstick")]
-        all.extend(yardstick_modules(source).map(|(name, m)| (format!("{name} {source:?}"), m)));
+        all.extend(
+            (!source.is_part())
+                .then(|| yardstick_modules(source))
+                .into_iter()
+                .flatten()
+                .map(|(name, m)| (format!("{name} {source:?}"), m)),
+        );
     }
     let stores = SOURCES.map(DepthStore::Apart).into_iter().chain([DepthStore::Atlas]);
     // The sets of an early pass differ in a constant.
@@ -99,13 +112,14 @@ pub(super) fn all() -> Vec<(String, Source)> {
     }
     all.extend(KINDS.map(|kind| (format!("refine {kind:?}"), refine_module(kind))));
     all.extend(KINDS.map(|kind| (format!("choose_lods {kind:?}"), choose_lods_module(kind))));
+    let from_buffer = |kind| (format!("from_buffer {kind:?}"), from_buffer_module(kind));
+    all.extend(FROM_BUFFER_KINDS.map(from_buffer));
     all
 }
 
 #[cfg(test)]
 pub(in crate::testing) mod tests {
     use super::*;
-    use crate::gpu::depth_source::SourceKind;
     use naga::valid::{Capabilities, ValidationFlags, Validator};
 
     /// The flat cull that is not one of two passes.

@@ -37,6 +37,42 @@ pub fn instances(bounds: &Bounds<'_>) -> Result<Vec<u32>> {
     Ok(bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
 }
 
+/// The records of one piece as they lie on the device, as 32-bit words.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PieceWords {
+    /// The caller's index of the instance at each place.
+    pub indices: Vec<u32>,
+    /// The records of the instances, in stored order.
+    pub records: Vec<u32>,
+    /// The records of the groups' boxes.
+    pub groups: Vec<u32>,
+}
+
+/// The records of all pieces, after everything that was submitted.
+///
+/// # Errors
+/// [`Error::DeviceLost`](crate::Error::DeviceLost).
+pub fn pieces(engine: &Engine, instances: &Instances) -> Result<Vec<PieceWords>> {
+    let words = |texture: &wgpu::Texture, count: usize| -> Result<Vec<u32>> {
+        let row = u64::from(texture.width()) * TEXEL_BYTES;
+        let bytes = readback::read_texture(engine.device(), engine.queue(), texture, row)?;
+        Ok(bytemuck::pod_collect_to_vec::<u8, u32>(&bytes)[..count].to_vec())
+    };
+    let of_piece = |p: &Piece| {
+        let count = p.count() as usize;
+        let record_words = |kind: BoundsKind| kind.record_bytes() as usize / 4;
+        Ok(PieceWords {
+            indices: (0..count).map(|i| p.range.start + p.order.index(i) as u32).collect(),
+            records: words(p.records.texture(), count * record_words(instances.kind))?,
+            groups: words(
+                p.group_records.texture(),
+                p.groups() as usize * record_words(BoundsKind::Box),
+            )?,
+        })
+    };
+    instances.pieces.iter().map(of_piece).collect()
+}
+
 /// What is known of a group of 64 instances that are stored one after the other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupWords {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use hiz_core::headless::Engine;
 use hiz_core::testing::lod::{LodCase, choose_lods};
+use hiz_core::testing::words;
 use hiz_core::{
     Bounds, BoundsKind, Camera, DepthConvention, Floats, ImageSize, InstanceOptions, Instances,
     LodRule, MAX_LODS, Pose, Projection, StoredOrder, Vec3,
@@ -351,6 +352,17 @@ impl Cases {
     }
 
     fn instances(&self, engine: &Engine) -> Arc<Instances> {
+        let options = InstanceOptions { order: StoredOrder::Given, ..InstanceOptions::default() };
+        self.with_bounds(|bounds| engine.instances(bounds, &options).expect("valid bounds"))
+    }
+
+    /// The words of each record.
+    pub(crate) fn records(&self) -> Vec<Vec<u32>> {
+        let words = self.with_bounds(|bounds| words::instances(bounds).expect("valid bounds"));
+        words.chunks_exact(self.kind.record_bytes() as usize / 4).map(<[u32]>::to_vec).collect()
+    }
+
+    fn with_bounds<T>(&self, take: impl FnOnce(&Bounds<'_>) -> T) -> T {
         let mut arrays: [Vec<f64>; 3] = Default::default();
         for case in &self.all {
             match case.volume {
@@ -377,8 +389,7 @@ impl Cases {
                 Bounds::OrientedBoxes { centers: a, half_sizes: b, rotations: c }
             }
         };
-        let options = InstanceOptions { order: StoredOrder::Given, ..InstanceOptions::default() };
-        engine.instances(&bounds, &options).expect("valid bounds")
+        take(&bounds)
     }
 }
 

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::declared;
+use crate::cull::among;
 use crate::cull::count;
 use crate::cull::explain::{self, Stage};
 use crate::cull::groups::GROUPS_OF_RUN;
@@ -11,6 +12,7 @@ use crate::cull::lod::LodRule;
 use crate::cull::pipelines::{Candidates, CullKey, DepthStore, FramePass, ReportKey};
 use crate::cull::pipelines::{classify_constants, flat_module, report_constants};
 use crate::cull::refine;
+use crate::cull::view_uniform::COORDINATE_BITS;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::shader::FILES;
 use crate::host::rounding::EPS;
@@ -18,6 +20,7 @@ use crate::input::bounds::BoundsKind;
 use crate::input::image::MAX_IMAGE_SIDE;
 use crate::input::view::ERROR_ULPS;
 use crate::instances::batch::GROUP;
+use crate::instances::from_buffer;
 use crate::instances::piece::CULL_WORKGROUP;
 use crate::instances::records::{RECORDS_PER_ROW, TEXEL_BYTES};
 use crate::instances::update;
@@ -29,14 +32,19 @@ use crate::output::emit_passes;
 use crate::output::mesh_table::{MAX_LODS, MESH_TEXELS};
 use crate::output::survivors::SURVIVORS_PER_ROW;
 use crate::output::verdict::{VERDICT_MASK, Verdict};
+use crate::output::views;
 use crate::output::visible::VERDICT_MULTIPLE;
 use crate::pyramid::layout::{BLOCK_ALIGNMENT, BLOCK_LOG2, HEADERS, PIXELS};
 use crate::pyramid::levels::MAX_LEVELS;
 use crate::pyramid::reduce::{REDUCE_WORKGROUP, SHARED_LEVEL, TALL_SIDE};
+use crate::pyramid::resolve;
 use crate::testing::lod;
 use crate::testing::shaders::tests::parse;
 use crate::testing::shaders::{EMITS, EMITS_OF_TWO, KINDS, all, files};
 use crate::yardstick::reduce as yardstick;
+
+/// From this magnitude on, the next float32 makes up for two flushed subnormals.
+const SMALL: f32 = 1.0 / (1_u128 << 100) as f32;
 
 /// Constants of the shaders with a twin in this crate or in Rust's `core`.
 fn twins() -> Vec<(&'static str, &'static str, f64)> {
@@ -48,6 +56,10 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
     let rule = |r: &LodRule| int(r.code());
     let texels = |kind: BoundsKind| (kind.record_bytes() / TEXEL_BYTES) as f64;
     vec![
+        ("cull/among", "AMONG_OF_GROUP", GROUP as f64 / int(u32::BITS)),
+        ("cull/among_layout", "AMONG_BITS", int(u32::BITS)),
+        ("cull/among_layout", "AMONG_PER_ROW_LOG2", int(among::WORDS_PER_ROW.ilog2())),
+        ("cull/among_order", "WORKGROUP", int(among::WORKGROUP)),
         ("cull/candidates", "BY_HISTORY", int(Candidates::History as u32)),
         ("cull/candidates", "BY_SIZE", int(Candidates::Size as u32)),
         ("cull/candidates", "GIVEN", int(Candidates::Given as u32)),
@@ -74,6 +86,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/refine", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/refine_groups", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/supporting_planes", "LARGEST_BITS", bits(LARGEST)),
+        ("cull/view", "COORDINATE_BITS", int(COORDINATE_BITS)),
+        ("cull/view", "COORDINATE_MASK", int((1 << COORDINATE_BITS) - 1)),
         ("gpu/depth_bits", "ONE_BITS", bits(1.0)),
         ("gpu/depth_bits", "LEAST_NORMAL_BITS", bits(f32::MIN_POSITIVE)),
         ("gpu/depth_bits", "NEGATIVE_ZERO_BITS", bits(-0.0)),
@@ -87,6 +101,18 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/bounds_oriented_box", "RECORD_TEXELS", texels(BoundsKind::OrientedBox)),
         ("instances/bounds_oriented_box", "LAST_TEXEL", texels(BoundsKind::OrientedBox) - 1.0),
         ("instances/bounds_sphere", "RECORD_TEXELS", texels(BoundsKind::Sphere)),
+        ("instances/from_buffer", "BOX_TEXELS", texels(BoundsKind::Box)),
+        ("instances/from_buffer", "SIGN_BIT", bits(-0.0)),
+        ("instances/from_buffer", "MAGNITUDE_BITS", int(u32::MAX >> 1)),
+        ("instances/from_buffer", "LARGEST_BITS", bits(LARGEST)),
+        ("instances/from_buffer", "LARGEST_CORNER_BITS", bits(2.0 * LARGEST)),
+        ("instances/from_buffer", "SMALL_BITS", bits(SMALL)),
+        ("instances/from_buffer", "BEYOND_SMALL_BITS", bits(2.0 * SMALL)),
+        ("instances/from_buffer", "INVALID_LOW", int(u32::MIN)),
+        ("instances/from_buffer", "INVALID_HIGH", int(u32::MAX)),
+        ("instances/from_buffer", "WORKGROUP", int(from_buffer::WORKGROUP)),
+        ("instances/from_buffer_box", "RECORD_TEXELS", texels(BoundsKind::Box)),
+        ("instances/from_buffer_sphere", "RECORD_TEXELS", texels(BoundsKind::Sphere)),
         ("instances/groups", "GROUP", GROUP as f64),
         ("instances/groups", "RUN", int(GROUPS_OF_RUN)),
         ("instances/groups", "SHARE", GROUP as f64 / int(GROUPS_OF_RUN)),
@@ -94,10 +120,11 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/piece", "VERDICT_MULTIPLE", int(VERDICT_MULTIPLE)),
         ("instances/piece", "WORD_BITS", int(u32::BITS)),
         ("instances/record_layout", "RECORDS_PER_ROW_LOG2", int(RECORDS_PER_ROW.ilog2())),
+        ("instances/record_layout", "BEYOND_LIMITS_BITS", bits(BEYOND_LIMITS)),
         ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
-        ("instances/update", "BEYOND_LIMITS_BITS", bits(BEYOND_LIMITS)),
         ("cull/classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
         ("output/compact", "SCATTER_WORKGROUP", int(SCATTER_WORKGROUP)),
+        ("output/join", "WORKGROUP", int(views::WORKGROUP)),
         ("output/emit", "BLOCK_LOG2_WORDS", int(BLOCK_WORDS.ilog2())),
         ("output/emit_bins", "WORKGROUP", int(emit_passes::WORKGROUP)),
         ("output/emit_instances", "WORKGROUP", int(emit_passes::WORKGROUP)),
@@ -120,6 +147,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("pyramid/pyramid_write", "SIDE_LOG2", int(TALL_SIDE.ilog2())),
         ("pyramid/pyramid_write", "SIDE", int(TALL_SIDE)),
         ("pyramid/pyramid_write", "SIDE_MASK", int(TALL_SIDE - 1)),
+        ("pyramid/resolve", "WORKGROUP", int(resolve::WORKGROUP)),
         ("pyramid/texels", "LEAST_NORMAL", float(f32::MIN_POSITIVE)),
         ("pyramid/texels_atlas", "HEADERS", int(HEADERS)),
         ("testing/choose_lods", "LANES", int(lod::LANES)),
@@ -179,6 +207,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
             "TURN",
         ],
     ),
+    ("instances/from_buffer", &["HALF"]),
     // One workgroup scans, however large it is.
     ("output/compact", &["LANES"]),
     ("output/emit_draws", &["LANES"]),
@@ -267,6 +296,8 @@ fn constants_fit_each_other() {
     assert!(BLOCK_WORDS.is_power_of_two());
     // A texel for the number of a mesh's LODs, and one for each four errors.
     assert_eq!(MESH_TEXELS - 1, MAX_LODS >> number("output/mesh_table", "ERRORS_LOG2") as u32);
+    // The spacing just below 2^-100 exceeds two flushed numbers.
+    assert!(f64::from(SMALL) * EPS / 2.0 > 2.0 * f64::from(f32::MIN_POSITIVE));
     // What is beyond limits is beyond what is still valid.
     const { assert!(BEYOND_LIMITS > LARGEST) };
 }
@@ -311,6 +342,7 @@ fn constants_cover_what_is_counted() {
 fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
     let line = |n: u32| [n, 1, 1];
     BTreeMap::from([
+        ("among_order", line(among::WORKGROUP)),
         ("begin", line(1)),
         ("choose_lods", line(lod::LANES)),
         ("cut", line(CUT_WORKGROUP)),
@@ -328,6 +360,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("cull_groups", line(CULL_WORKGROUP)),
         ("cull_members", line(GROUP as u32)),
         ("explain", line(1)),
+        ("join_views", line(views::WORKGROUP)),
         ("occluder_vertex", [0; 3]),
         ("reduce", line(REDUCE_WORKGROUP)),
         ("reduce_buffer", line(yardstick::BUFFER_WORKGROUP)),
@@ -341,9 +374,11 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("refine_groups", line(refine::WORKGROUP)),
         ("replace_groups", line(update::WORKGROUP)),
         ("replace_records", line(update::WORKGROUP)),
+        ("resolve", line(resolve::WORKGROUP)),
         // One workgroup, the largest that WebGPU promises.
         ("scan", line(wgpu::Limits::default().max_compute_invocations_per_workgroup)),
         ("scatter", line(SCATTER_WORKGROUP)),
+        ("take_bounds", line(from_buffer::WORKGROUP)),
     ])
 }
 
@@ -374,6 +409,7 @@ fn a_cull_sets_every_override() {
             footprint_log2: 1,
             descent: false,
             fit_volume: false,
+            among: false,
         };
         let alone = EMITS.map(|emit| (emit, FramePass::Alone));
         let of_two = [FramePass::Early(Candidates::History), FramePass::Late]
