@@ -11,7 +11,8 @@
 //!    `explanation`, `ranges` and `readback`.
 //!    With `ahead`, `in_flight` and `slots` the answer comes while the caller does something else.
 //!    `views` culls for several cameras, with buffers of `joined`.
-//! 5. `single` does all of that at once, for bounds that are used once.
+//! 5. `two_passes` does that for the early and the late pass of a frame.
+//! 6. `single` does all of that at once, for bounds that are used once.
 //!
 //! `answers` and `images` lend what was dropped, and `warm_up` runs a frame before the first one.
 //! `process` guards all of them against forks.
@@ -70,6 +71,7 @@ mod renewal;
 mod samples;
 mod single;
 mod slots;
+mod two_passes;
 mod uploads;
 mod views;
 mod warm_up;
@@ -84,4 +86,5 @@ pub use engine::Engine;
 pub use explanation::Explanation;
 pub use single::SingleCull;
 pub use slots::CULLS_IN_FLIGHT;
+pub use two_passes::{EarlyMask, PassAnswer, TwoPasses};
 pub use views::{AmongSource, ViewsCulling};
