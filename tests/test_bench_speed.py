@@ -90,6 +90,8 @@ TOLD = (
     "readback.after",
     "readback.beyond.a frame late",
     "readback.lost",
+    "views.calls",
+    "views.among.a scattered share, flat",
     "occluders.city.640x360.host",
     "occluders.city.conservative",
     "others.numpy, cull",

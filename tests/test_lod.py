@@ -1,13 +1,16 @@
 """Rules for levels of detail: what Python takes, and what arrives in the engine.
 
-What they choose is tested in ``crates/hiz_core/tests/lod.rs``.
+What they choose is tested against their definitions, in numpy.
+``crates/hiz_core/tests/lod.rs`` has the cases that only some ulps decide.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 import hizvk
@@ -80,3 +83,74 @@ def test_distances_need_a_perspective_camera() -> None:
         device.cull(crowd, camera, pyramid, lod=hizvk.LodByDistance([1.0]))
     for rule in (hizvk.LodByError(1.0), hizvk.LodBySize([10.0]), None):
         assert device.cull(crowd, camera, pyramid, lod=rule).mask.tolist() == [True]
+
+
+ERRORS = [[0.0, 0.004, 0.03, 0.2], [0.0, 0.1]]
+CROWD = 3000
+
+
+def crowd() -> tuple[npt.NDArray[Any], ...]:
+    """Centres, radii, mesh ids and scales of spheres in view, at depths over two decades."""
+    random = np.random.default_rng(5)
+    depth = 10 ** random.uniform(0.0, 2.3, CROWD)
+    aside = random.uniform(-0.5, 0.5, (2, CROWD)) * depth
+    centers = np.stack([aside[0], aside[1], -depth], axis=1)
+    radii = 10 ** random.uniform(-2.0, 0.3, CROWD)
+    return centers, radii, random.integers(0, 2, CROWD), random.uniform(0.2, 3.0, CROWD)
+
+
+def greatest_stretch(camera: hizvk.Camera) -> float:
+    """Pixels times w per unit of length, at the image's corner where they are most."""
+    height, width = camera.size
+    rows = camera.clip_from_world[:, :3]
+    x, y, w = rows[0] * width / 2, -rows[1] * height / 2, rows[3]
+    corners = [(tx, ty) for tx in (-width / 2, width / 2) for ty in (-height / 2, height / 2)]
+    return max(float(np.linalg.norm([x - tx * w, y - ty * w], 2)) for tx, ty in corners)
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [
+        hizvk.LodByError(1.0),
+        hizvk.LodByError(0.25),
+        hizvk.LodByDistance([4.96, 9.82, 19.27]),
+        hizvk.LodBySize([100.0, 20.0, 5.0]),
+        None,
+    ],
+    ids=repr,
+)
+def test_what_a_cull_chooses(rule: hizvk.lod.LodRule | None) -> None:
+    """The coarsest LOD that the definition allows; a finer one only within 1e-4 of a bound."""
+    centers, radii, mesh_ids, scales = crowd()
+    camera = hizvk.Camera.look_at(
+        (0, 0, 0), (0, 0, -1), fov_y_deg=80, size=(360, 640), near=0.1, far=1e4
+    )
+    device = hizvk.Device()
+    pyramid = device.pyramid(np.full((360, 640), np.inf), camera, kind="z")
+    draws = [hizvk.DrawTemplate(36)] * 4
+    meshes = [hizvk.MeshLods(draws[: len(errors)], errors=errors) for errors in ERRORS]
+    bounds = hizvk.Spheres(centers, radii)
+    instances = device.instances(bounds, mesh_ids=mesh_ids.astype(np.uint32), scales=scales)
+    seen = device.cull(instances, camera, pyramid, meshes=meshes, lod=rule)
+
+    stretch = greatest_stretch(camera)
+    least_w = -centers[:, 2] - radii
+    got = seen.lods
+    assert (got[~seen.mask] == hizvk.NO_LOD).all()
+    chosen = set()
+    for i in np.flatnonzero(seen.mask):
+        errors = np.array(ERRORS[mesh_ids[i]][1:])
+        needs = np.full(len(errors), np.inf)
+        if isinstance(rule, hizvk.LodByError):
+            needs = errors * scales[i] * stretch / rule.pixels
+        elif isinstance(rule, hizvk.LodByDistance):
+            needs = np.array(rule.thresholds[: len(errors)])
+        elif isinstance(rule, hizvk.LodBySize):
+            needs = 2.0 * radii[i] * stretch / np.array(rule.pixels[: len(errors)])
+        allowed, surely = (
+            int(np.cumprod(least_w[i] > needs * factor).sum()) if least_w[i] > 0.0 else 0
+            for factor in (1.0, 1.0001)
+        )
+        assert surely <= got[i] <= allowed, (i, got[i], surely, allowed)
+        chosen.add(int(got[i]))
+    assert chosen == ({0} if rule is None else {0, 1, 2, 3})

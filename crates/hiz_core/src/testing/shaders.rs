@@ -1,5 +1,6 @@
 //! Every shader module that this crate makes a pipeline of.
 
+use crate::cull::among::among_order_module;
 use crate::cull::count::count_module;
 use crate::cull::explain::explain_module;
 use crate::cull::pipelines::{
@@ -15,6 +16,7 @@ use crate::instances::update::update_module;
 use crate::occluders::device_raster::occluders_module;
 use crate::output::compact::{compact_module, copy_module};
 use crate::output::emit_passes;
+use crate::output::views::join_module;
 use crate::pyramid::reduce::{blocks_module, coarse_module};
 use crate::pyramid::resolve::resolve_module;
 use crate::testing::lod::choose_lods_module;
@@ -58,6 +60,8 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("emit_scatter".to_owned(), emit_passes::scatter_module()),
         ("emit_instances".to_owned(), emit_passes::instances_module()),
         ("count".to_owned(), count_module()),
+        ("among_order".to_owned(), among_order_module()),
+        ("join_views".to_owned(), join_module()),
         ("update".to_owned(), update_module()),
         ("occluders".to_owned(), occluders_module()),
         ("resolve Depth".to_owned(), resolve_module(SourceKind::Depth)),

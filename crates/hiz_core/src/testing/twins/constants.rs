@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::declared;
+use crate::cull::among;
 use crate::cull::count;
 use crate::cull::explain::{self, Stage};
 use crate::cull::groups::GROUPS_OF_RUN;
@@ -29,6 +30,7 @@ use crate::output::emit_passes;
 use crate::output::mesh_table::{MAX_LODS, MESH_TEXELS};
 use crate::output::survivors::SURVIVORS_PER_ROW;
 use crate::output::verdict::{VERDICT_MASK, Verdict};
+use crate::output::views;
 use crate::output::visible::VERDICT_MULTIPLE;
 use crate::pyramid::layout::{BLOCK_ALIGNMENT, BLOCK_LOG2, HEADERS, PIXELS};
 use crate::pyramid::levels::MAX_LEVELS;
@@ -52,6 +54,10 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
     let rule = |r: &LodRule| int(r.code());
     let texels = |kind: BoundsKind| (kind.record_bytes() / TEXEL_BYTES) as f64;
     vec![
+        ("cull/among", "AMONG_OF_GROUP", GROUP as f64 / int(u32::BITS)),
+        ("cull/among_layout", "AMONG_BITS", int(u32::BITS)),
+        ("cull/among_layout", "AMONG_PER_ROW_LOG2", int(among::WORDS_PER_ROW.ilog2())),
+        ("cull/among_order", "WORKGROUP", int(among::WORKGROUP)),
         ("cull/certificate", "EPS", EPS),
         ("cull/certificate", "ERROR_ULPS", ERROR_ULPS),
         ("cull/count", "LANES", int(count::LANES)),
@@ -112,6 +118,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
         ("cull/classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
         ("output/compact", "SCATTER_WORKGROUP", int(SCATTER_WORKGROUP)),
+        ("output/join", "WORKGROUP", int(views::WORKGROUP)),
         ("output/emit", "BLOCK_LOG2_WORDS", int(BLOCK_WORDS.ilog2())),
         ("output/emit_bins", "WORKGROUP", int(emit_passes::WORKGROUP)),
         ("output/emit_instances", "WORKGROUP", int(emit_passes::WORKGROUP)),
@@ -195,6 +202,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("output/compact", &["LANES"]),
     ("output/emit_draws", &["LANES"]),
     ("output/emit_record", &["COMMON_WORDS"]),
+    ("output/emit_scatter", &["FOUR", "NUMBERS"]),
     ("output/mesh_table", &["ERRORS_LOG2"]),
 ];
 
@@ -325,6 +333,7 @@ fn constants_cover_what_is_counted() {
 fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
     let line = |n: u32| [n, 1, 1];
     BTreeMap::from([
+        ("among_order", line(among::WORKGROUP)),
         ("begin", line(1)),
         ("choose_lods", line(lod::LANES)),
         ("emit_bins", line(emit_passes::WORKGROUP)),
@@ -340,6 +349,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("cull_groups", line(CULL_WORKGROUP)),
         ("cull_members", line(GROUP as u32)),
         ("explain", line(1)),
+        ("join_views", line(views::WORKGROUP)),
         ("occluder_vertex", [0; 3]),
         ("reduce", line(REDUCE_WORKGROUP)),
         ("reduce_buffer", line(yardstick::BUFFER_WORKGROUP)),
@@ -388,6 +398,7 @@ fn a_cull_sets_every_override() {
             footprint_log2: 1,
             descent: false,
             fit_volume: false,
+            among: false,
         };
         for (way, emit) in EMITS {
             let report = ReportKey { mask: false, verdicts: false, emit, statistics: false };

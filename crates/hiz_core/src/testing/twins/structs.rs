@@ -16,6 +16,7 @@ use crate::output::counters::{CounterRecord, StatisticsRecord};
 use crate::output::draw::DrawIndexedIndirect;
 use crate::output::mesh_table::TemplateRecord;
 use crate::output::survivors::SurvivorsRecord;
+use crate::output::views::JoinUniform;
 use crate::pyramid::PyramidUniform;
 use crate::pyramid::layout::PYRAMID_CHUNKS;
 use crate::pyramid::levels::Level;
@@ -44,6 +45,7 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     "SupportingPlanes",
     "Value",
     "Volume",
+    "Word",
 ];
 
 /// Offsets of a WGSL struct's members, and its size.
@@ -88,6 +90,9 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "index_count" = index_count, "instance_count" = instance_count,
             "first_index" = first_index, "base_vertex" = base_vertex,
             "first_instance" = first_instance,
+        }),
+        twin!("Join", JoinUniform {
+            "view" = view, "stride" = stride, "begin" = begin, "words" = words,
         }),
         twin!("Emit", EmitUniform {
             "base" = base, "count" = count, "words" = words, "lods" = lods, "piece" = piece,
