@@ -508,10 +508,10 @@ impl HizContext {
     /// Records the resolve of multisampled depth of `camera`: one depth per pixel, the farthest of
     /// its samples, the nearest or both ([`ResolveOptions`]).
     ///
-    /// `depth` is a texture with several samples per pixel and the usage `TEXTURE_BINDING`, or a view
-    /// of one, or a part of one as [`DepthSource`] describes it.
-    /// Its format is a depth format, `R32Float` or `R16Float`.
-    /// The result is [`DepthResolve::farthest`], which [`record_reduce`](Self::record_reduce) takes.
+    /// `depth` is a texture with several samples per pixel, or a view or a part of one as
+    /// [`DepthSource`] describes it.
+    /// It has the usage `TEXTURE_BINDING`, and a depth format, `R32Float` or `R16Float`.
+    /// The result is [`DepthResolve::farthest`], for [`record_reduce`](Self::record_reduce).
     ///
     /// Samples without a depth (NaN, outside of 0..=1) count as the reduction treats them: as far.
     /// For the nearest depth they count as near.
@@ -532,10 +532,10 @@ impl HizContext {
 
     /// Records the reduction of a changed rectangle of a depth image into `pyramid`.
     ///
-    /// The pyramid must have been built from `depth`, by [`record_reduce`](Self::record_reduce) or by
-    /// this method, and no pixel may have changed since except those of the rectangle.
-    /// `rectangle` is `[x0, y0, x1, y1]`: columns `x0..=x1` and rows `y0..=y1` of the image, row 0 on
-    /// top.
+    /// The pyramid must have been built from `depth`, by [`record_reduce`](Self::record_reduce) or
+    /// by this method, and no pixel may have changed since except those of the rectangle.
+    /// `rectangle` is `[x0, y0, x1, y1]`: columns `x0..=x1` and rows `y0..=y1` of the image, row 0
+    /// on top.
     /// It is what [`record_occluder_depth`](Self::record_occluder_depth) returns.
     /// The levels are then what a reduction of the whole image makes, bit for bit.
     ///
