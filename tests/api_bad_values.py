@@ -966,12 +966,12 @@ TABLES: dict[str, Table] = {
                 )
             ],
             "camera": [
-                *CAMERA,
-                (
-                    [camera()] * 2,
-                    TypeError,
-                    "each camera culls with the pyramid of its own depth, Device.pyramid), got",
-                ),
+                (None, TypeError, "expected a Camera or a sequence of Cameras, got None"),
+                (EYE4, TypeError, "got (4, 4) float64"),
+                ("front", TypeError, "got str 'front'"),
+                ([], ValueError, "expected 1 to 256 views, got 0"),
+                ([camera()] * 257, ValueError, "expected 1 to 256 views, got 257"),
+                ([None], TypeError, "camera[0]: expected a Camera, got None"),
                 (camera((6, 9)), ValueError, "expected the camera of the pyramid"),
                 (
                     camera().resized((3, 4)),
@@ -989,6 +989,13 @@ TABLES: dict[str, Table] = {
             ],
             "options": OPTIONS_OBJECT,
             "outputs": OUTPUTS_OBJECT,
+            "among": [
+                ("all", TypeError, "expected a bool (1,) array, a CullResult or a ViewsResult"),
+                ([0], TypeError, "got (1,) int64"),
+                ([True, False], ValueError, "got (2,) bool"),
+                ([[True]], ValueError, "got (1, 1) bool"),
+                (np.ma.masked_all(1, bool), TypeError, "got a masked array"),
+            ],
             "wait": FLAG,
             **OPTIONS,
             "capacity": CAPACITY,
@@ -1115,6 +1122,39 @@ TABLES: dict[str, Table] = {
                 (-1, IndexError, "expected a level in 0..3, got -1"),
                 (0.0, TypeError, "got float 0.0"),
             ]
+        },
+    ),
+    "Pyramid.update": Table(
+        lambda device: (
+            device.pyramid(np.ones((6, 8)), camera(), kind="z").update,
+            {"row": 1, "column": 2, "array": np.ones((3, 4))},
+        ),
+        {
+            "row": [
+                (6, ValueError, "expected an integer in 0..5, got int 6"),
+                (-1, ValueError, "got int -1"),
+                (1.0, TypeError, "got float 1.0"),
+                (None, TypeError, "got None"),
+            ],
+            "column": [
+                (8, ValueError, "expected an integer in 0..7, got int 8"),
+                ((0, 0, 1, 1), TypeError, "got tuple (0, 0, 1, 1)"),
+            ],
+            "array": [
+                (
+                    np.ones((6, 4)),
+                    ValueError,
+                    "expected float64 (height, width) with 1 <= height <= 5 and 1 <= width <= 6, "
+                    "which is what lies from row 1 and column 2 on, got (6, 4) float64",
+                ),
+                (np.ones((3, 7)), ValueError, "got (3, 7) float64"),
+                (np.ones((0, 4)), ValueError, "got (0, 4) float64"),
+                (np.ones(3), ValueError, "got (3,) float64"),
+                (np.ones((3, 4, 4)), ValueError, "got (3, 4, 4) float64"),
+                (np.ones((3, 4), np.float32), TypeError, "got (3, 4) float32"),
+                ([[1.0]], TypeError, "got list [[1.0]]"),
+                (None, TypeError, "got None"),
+            ],
         },
     ),
     "CullResult.hints": Table(lambda device: (device.cull(**cull_arguments(device)).hints, {}), {}),
@@ -1302,6 +1342,7 @@ MADE_BY_THE_PACKAGE = {
     "Instances",
 }
 MADE_BY_THE_PACKAGE |= {"BoundsCheck", "Occluders", "ProxyCheck", "Pyramid", "Recommendation"}
+MADE_BY_THE_PACKAGE |= {"ViewsResult"}
 MADE_BY_THE_PACKAGE |= {"InnerBoxes", "InnerPrisms", "OccluderSelection", "SplitMesh"}
 
 

@@ -92,6 +92,7 @@ from .options import CullOptions, DrawTemplate, MeshLods, Outputs
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import ABSENT, DRAW_DTYPE, NO_LOD, CullResult
 from .stats import CullStats
+from .views import ViewsResult
 
 if TYPE_CHECKING:
     from .recommendation import Recommendation, recommend
@@ -136,6 +137,7 @@ __all__ = [
     "Spheres",
     "SplitMesh",
     "Verdict",
+    "ViewsResult",
     "__version__",
     "adapters",
     "check_bounds",

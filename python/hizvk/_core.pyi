@@ -194,6 +194,29 @@ class Engine:
         rounding: str,
         camera: Camera,
     ) -> DepthImage: ...
+    def upload_samples(
+        self,
+        images: Sequence[_Floats | npt.NDArray[np.uint16]],
+        kind: str,
+        scale: float,
+        invalid: Sequence[float],
+        rounding: str,
+        camera: Camera,
+    ) -> DepthImage: ...
+    def renew(
+        self, pyramid: Pyramid, depth: DepthImage, rectangle: tuple[int, int, int, int]
+    ) -> None: ...
+    def replace_depth(
+        self,
+        pyramid: Pyramid,
+        depth: DepthImage,
+        rectangle: tuple[int, int, int, int],
+        images: Sequence[_Floats | npt.NDArray[np.uint16]],
+        kind: str,
+        scale: float,
+        invalid: Sequence[float],
+        rounding: str,
+    ) -> None: ...
     def pyramid(self, depth: DepthImage, levels: tuple[int, int]) -> Pyramid: ...
     def cull(
         self,
@@ -203,8 +226,19 @@ class Engine:
         options: CullOptions,
         outputs: Outputs,
         meshes: MeshTable | None,
+        among: npt.NDArray[np.bool_] | Culling | ViewsCulling | None,
         ahead: bool,
     ) -> Culling: ...
+    def cull_views(
+        self,
+        instances: Instances,
+        cameras: Sequence[Camera],
+        pyramids: Sequence[Pyramid],
+        options: CullOptions,
+        outputs: Outputs,
+        among: npt.NDArray[np.bool_] | Culling | ViewsCulling | None,
+        ahead: bool,
+    ) -> ViewsCulling: ...
     def warm_up(
         self,
         instances: Instances,
@@ -332,6 +366,18 @@ class Culling:
     def explain(self, index: int) -> Explanation: ...
 
 @final
+class ViewsCulling:
+    def num_instances(self) -> int: ...
+    def num_views(self) -> int: ...
+    def is_ready(self) -> bool: ...
+    def wait(self) -> None: ...
+    def masks(self) -> npt.NDArray[np.bool_]: ...
+    def any(self) -> npt.NDArray[np.bool_]: ...
+    def any_indices(self) -> npt.NDArray[np.uint32]: ...
+    def any_draws(self) -> bytes: ...
+    def view(self, view: int) -> Culling: ...
+
+@final
 class Yardstick:
     def __new__(cls, engine: Engine) -> Self: ...
     @staticmethod
@@ -342,6 +388,10 @@ class Yardstick:
     def reduction(
         self, depth: DepthImage, shape: str, levels: tuple[int, int]
     ) -> YardstickReduction: ...
+    def region(
+        self, depth: DepthImage, rectangle: tuple[int, int, int, int]
+    ) -> YardstickReduction: ...
+    def resolve(self, camera: Camera, samples: int) -> YardstickReduction: ...
     def frames(
         self,
         instances: Instances,

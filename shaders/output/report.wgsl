@@ -47,13 +47,41 @@ fn report(place: u32) {
     emit(place, index);
 }
 
+// Which members of a run are asked for: bit k stands for the place `first + k * SHARE`.
+// The others are outside.
+// It is for culls of some instances alone.
+fn asked_of_run(first: u32) -> u32 {
+    var asked = 0u;
+    if AMONG {
+        for (var k = 0u; k < RUN && first + k * SHARE < piece.count; k += 1u) {
+            let place = first + k * SHARE;
+            if is_among(place) {
+                asked |= 1u << k;
+            } else if VERDICTS {
+                atomicStore(&mask[verdicts_begin(piece.words) + place], OUTSIDE);
+            }
+        }
+    }
+    return asked;
+}
+
 // Tests the RUN members of a group that belong to one of its SHARE invocations.
 // Then it reports those that are kept: they are few, so the expensive part runs a few times.
 fn cull_run(group: u32, share: u32) {
     let first = group * GROUP + share;
     var kept = 0u;
+    var asked = asked_of_run(first);
     var k = 0u;
     loop {
+        // Software drivers skip no branch but end a loop.
+        // So the loop goes from one that is asked for to the next.
+        if AMONG {
+            if asked == 0u {
+                break;
+            }
+            k = countTrailingZeros(asked);
+            asked &= asked - 1u;
+        }
         let place = first + k * SHARE;
         if place < piece.count && test(place) {
             kept |= 1u << k;

@@ -19,6 +19,7 @@ from . import (
     bounds,
     calls,
     culling,
+    depth_in,
     emit,
     first_call,
     memory,
@@ -28,6 +29,7 @@ from . import (
     report,
     scale,
     transfers,
+    views,
 )
 from .figures import Found
 from .run import WORKLOADS, Run
@@ -46,10 +48,12 @@ PARTS: Final[dict[str, Callable[[Run], None]]] = {
     "first-call": first_call.measure,
     "memory": memory.measure,
     "reduction": reduction.measure,
+    "depth-in": depth_in.measure,
     "cull": culling.measure,
     "emit": emit.measure,
     "calls": calls.measure,
     "readback": readback.measure,
+    "views": views.measure,
     "occluders": occluders.measure,
     "bounds": bounds.measure,
     "transfers": transfers.measure,

@@ -168,8 +168,10 @@ pub mod testing;
 pub use wgpu;
 
 pub use context::HizContext;
+pub use cull::among::{Among, AmongMask};
 pub use cull::lod::LodRule;
 pub use cull::options::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
+pub use cull::views::View;
 pub use cull::warm_up::WarmUp;
 pub use error::{Error, Result};
 pub use host::linear::{Mat3, Mat4, Vec3};
@@ -199,10 +201,13 @@ pub use output::mesh_table::{Lod, LodDraw, MAX_LODS, MeshLods, MeshTable};
 pub use output::outputs::Outputs;
 pub use output::readback::{Answer, AnswerInFlight, ReadbackRing};
 pub use output::verdict::Verdict;
+pub use output::views::{MAX_VIEWS, ViewsOutputs, VisibleViews};
 pub use output::visible::Visible;
 pub use pyramid::atlas::AtlasUse;
 pub use pyramid::level_texels::LevelTexels;
 pub use pyramid::levels::{MAX_LEVELS, StoredLevels};
+pub use pyramid::resolve::{DepthResolve, ResolveOptions, ResolvedDepths};
+pub use pyramid::source::DepthSource;
 pub use pyramid::{Pyramid, PyramidOptions};
 
 /// Compiles and runs the program in the README with the tests.

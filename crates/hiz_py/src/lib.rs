@@ -28,7 +28,7 @@ mod _core {
     #[pymodule_export]
     use crate::containment::{check_bounds, check_proxy};
     #[pymodule_export]
-    use crate::culling::{Counts, Culling, Explanation};
+    use crate::culling::{Counts, Culling, Explanation, ViewsCulling};
     #[pymodule_export]
     use crate::device::{DepthImage, Engine, Instances, Occluders, Pyramid, adapters};
     #[pymodule_export]

@@ -8,12 +8,14 @@
 //!    `lod` adds those that choose levels of detail.
 //! 3. `pipelines` picks the pipeline that fits the options.
 //! 4. `record` records the pass; `groups` adds the test of whole groups before their members.
+//!    `among` restricts it to some of the instances, and `views` culls for several cameras.
 //! 5. `warm_up` does all of it once without workgroups, before the first frame.
 //! 6. Later, and only if they are read: `refine` completes the verdicts, `count` counts them, and
 //!    `explain` repeats one test.
 //!
 //! This room records commands into an encoder; it never submits or waits.
 
+pub(crate) mod among;
 #[cfg(feature = "headless")]
 pub(crate) mod count;
 #[cfg(feature = "headless")]
@@ -27,4 +29,5 @@ pub(crate) mod record;
 #[cfg(feature = "headless")]
 pub(crate) mod refine;
 pub(crate) mod view_uniform;
+pub(crate) mod views;
 pub(crate) mod warm_up;

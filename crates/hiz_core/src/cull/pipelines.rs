@@ -23,6 +23,8 @@ pub(crate) struct CullKey {
     pub(crate) footprint_log2: u32,
     pub(crate) descent: bool,
     pub(crate) fit_volume: bool,
+    /// Whether only some instances are asked for.
+    pub(crate) among: bool,
 }
 
 /// What a cull writes: the `override` constants of `shaders/output/report.wgsl`.
@@ -119,9 +121,10 @@ pub(crate) const BINNED_BINDINGS: &[(u32, Binding)] = &[
     (1, Binding::ReadQuads),
     (2, Binding::SampledQuads),
     (3, Binding::SampledQuads),
+    (4, Binding::SampledQuads),
 ];
 
-pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 6] {
+pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 7] {
     [
         ("REVERSED", flag(key.reversed)),
         ("CHUNKS", key.chunks as f64),
@@ -129,6 +132,7 @@ pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 6] {
         ("FOOTPRINT_LOG2", f64::from(key.footprint_log2)),
         ("DESCENT", flag(key.descent)),
         ("FIT_VOLUME", flag(key.fit_volume)),
+        ("AMONG", flag(key.among)),
     ]
 }
 
@@ -174,9 +178,9 @@ impl DepthStore {
     pub(crate) fn code(self) -> u32 {
         match self {
             Self::Apart(source) => source as u32,
-            Self::Atlas => 3,
+            Self::Atlas => 5,
             #[cfg(feature = "headless")]
-            Self::Nowhere => 4,
+            Self::Nowhere => 6,
         }
     }
 
@@ -251,6 +255,8 @@ pub(crate) fn decision_module(
         ],
         bounds,
         &[
+            wgsl!("cull/among_layout"),
+            wgsl!("cull/among"),
             wgsl!("cull/certificate"),
             wgsl!("output/verdict"),
             wgsl!("cull/outcome"),

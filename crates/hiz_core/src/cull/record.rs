@@ -1,5 +1,6 @@
 //! The pass of a cull: it clears the buffers, tests, and compacts.
 
+use crate::cull::among::Among;
 use crate::cull::groups::{GROUPS_OF_RUN, GroupCull, NO_STATISTICS, is_grouped};
 use crate::cull::inputs::{CullInputs, PreparedView, check_contexts};
 use crate::cull::lod::LodRule;
@@ -91,14 +92,17 @@ fn bind_output<'a>(
 }
 
 /// The bindings of a piece's records, with slots and mesh table for a cull that emits bins.
-fn bind_records<'a>(
+fn bind_records(
     gpu: &Gpu,
-    piece: &'a Piece,
-    visible: &'a Visible,
+    piece: &Piece,
+    visible: &Visible,
     p: usize,
-) -> Result<&'a wgpu::BindGroup> {
-    let Some(bins) = &visible.bins else { return Ok(&piece.bindings) };
-    made(&bins.pieces[p].records_bindings, || {
+    among: Option<&Among>,
+) -> Result<wgpu::BindGroup> {
+    let Some(bins) = &visible.bins else {
+        return Ok(among.map_or(&piece.bindings, |among| among.records(p)).clone());
+    };
+    let bind = |asked: &wgpu::TextureView| {
         let table = bins.meshes.view();
         let slots = piece.slots.as_ref().map_or(table, |slots| &slots.of_places.view);
         gpu.bind_group(
@@ -109,9 +113,14 @@ fn bind_records<'a>(
                 entry(1, wgpu::BindingResource::TextureView(&piece.records.view)),
                 entry(2, wgpu::BindingResource::TextureView(slots)),
                 entry(3, wgpu::BindingResource::TextureView(table)),
+                entry(4, wgpu::BindingResource::TextureView(asked)),
             ],
         )
-    })
+    };
+    match among {
+        Some(among) => bind(among.view(p)),
+        None => made(&bins.pieces[p].records_bindings, || bind(gpu.no_texels()?)).cloned(),
+    }
 }
 
 /// A function that makes the pipeline of the flat cull.
@@ -162,7 +171,7 @@ fn record_all(
         .enumerate()
         .map(|(p, (piece, _))| {
             let written = bind_output(gpu, piece, visible, p, &report)?;
-            Ok((bind_records(gpu, piece, visible, p)?, written))
+            Ok((bind_records(gpu, piece, visible, p, inputs.among)?, written))
         })
         .collect::<Result<Vec<_>>>()?;
     let planes = matches!(report.emit, EmitKey::Planes { .. });
@@ -195,18 +204,18 @@ fn record_all(
         timestamp_writes: None,
     });
     pass.set_bind_group(0, &view.instances, &[]);
-    for ((piece, (records, output)), groups) in instances.pieces.iter().zip(&outputs).zip(&grouped)
-    {
+    let of_pieces = instances.pieces.iter().zip(&outputs).zip(&grouped);
+    for (p, ((piece, (records, output)), groups)) in of_pieces.enumerate() {
         if let (Some(groups), Some(group_view)) = (groups, &view.groups) {
             pass.set_bind_group(0, group_view, &[]);
             groups.record_boxes(
                 &mut pass,
-                piece,
+                inputs.among.map_or(&piece.group_bindings, |among| among.group_records(p)),
                 workgroups(piece.groups().div_ceil(CULL_WORKGROUP)),
             );
             pass.set_bind_group(0, &view.instances, &[]);
         }
-        pass.set_bind_group(1, *records, &[]);
+        pass.set_bind_group(1, records, &[]);
         pass.set_bind_group(2, *output, &[]);
         if let Some(groups) = groups {
             groups.record_members(&mut pass);

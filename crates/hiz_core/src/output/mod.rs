@@ -6,6 +6,7 @@
 //! - `emit` says how kept instances are listed, and `mesh_table` has the meshes of bins.
 //! - `bins` has the buffers of bins, and `emit_passes` fills them from bit planes.
 //! - `compact` makes the ordered list and its length from the mask.
+//! - `views` joins the masks of several views.
 //! - `readback` copies them to the host, a ring of slots at a time.
 //! - `draw`, `counters` and `verdict` have the layouts and codes that the shaders share.
 //!
@@ -23,4 +24,5 @@ pub(crate) mod outputs;
 pub(crate) mod readback;
 pub(crate) mod survivors;
 pub(crate) mod verdict;
+pub(crate) mod views;
 pub(crate) mod visible;

@@ -1,5 +1,6 @@
 //! Every shader module that this crate makes a pipeline of.
 
+use crate::cull::among::among_order_module;
 use crate::cull::count::count_module;
 use crate::cull::explain::explain_module;
 use crate::cull::pipelines::{
@@ -7,6 +8,7 @@ use crate::cull::pipelines::{
 };
 use crate::cull::refine::{refine_groups_module, refine_module};
 use crate::gpu::depth_source::SOURCES;
+use crate::gpu::depth_source::SourceKind;
 use crate::gpu::shader::{FILES, Source};
 use crate::input::bounds::BoundsKind;
 use crate::instances::from_buffer::{FROM_BUFFER_KINDS, from_buffer_module};
@@ -14,7 +16,9 @@ use crate::instances::update::update_module;
 use crate::occluders::device_raster::occluders_module;
 use crate::output::compact::{compact_module, copy_module};
 use crate::output::emit_passes;
+use crate::output::views::join_module;
 use crate::pyramid::reduce::{blocks_module, coarse_module};
+use crate::pyramid::resolve::resolve_module;
 use crate::testing::lod::choose_lods_module;
 #[cfg(feature = "yardstick")]
 use crate::yardstick::{uncertified_module, yardstick_modules};
@@ -56,14 +60,25 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("emit_scatter".to_owned(), emit_passes::scatter_module()),
         ("emit_instances".to_owned(), emit_passes::instances_module()),
         ("count".to_owned(), count_module()),
+        ("among_order".to_owned(), among_order_module()),
+        ("join_views".to_owned(), join_module()),
         ("update".to_owned(), update_module()),
         ("occluders".to_owned(), occluders_module()),
+        ("resolve Depth".to_owned(), resolve_module(SourceKind::Depth)),
+        ("resolve Float".to_owned(), resolve_module(SourceKind::Float)),
     ];
     for source in SOURCES {
         all.push((format!("reduce {source:?}"), blocks_module(source)));
         all.push((format!("reduce_coarse {source:?}"), coarse_module(source)));
+        // Yardsticks read whole images alone.
         #[cfg(feature = "yardstick")]
-        all.extend(yardstick_modules(source).map(|(name, m)| (format!("{name} {source:?}"), m)));
+        all.extend(
+            (!source.is_part())
+                .then(|| yardstick_modules(source))
+                .into_iter()
+                .flatten()
+                .map(|(name, m)| (format!("{name} {source:?}"), m)),
+        );
     }
     let stores = SOURCES.map(DepthStore::Apart).into_iter().chain([DepthStore::Atlas]);
     for store in stores {
@@ -90,7 +105,6 @@ pub(super) fn all() -> Vec<(String, Source)> {
 #[cfg(test)]
 pub(in crate::testing) mod tests {
     use super::*;
-    use crate::gpu::depth_source::SourceKind;
     use naga::valid::{Capabilities, ValidationFlags, Validator};
 
     pub(in crate::testing) fn parse(source: &str) -> naga::Module {

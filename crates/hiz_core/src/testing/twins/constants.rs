@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::declared;
+use crate::cull::among;
 use crate::cull::count;
 use crate::cull::explain::{self, Stage};
 use crate::cull::groups::GROUPS_OF_RUN;
@@ -10,6 +11,7 @@ use crate::cull::lod::LodRule;
 use crate::cull::pipelines::{CullKey, DepthStore, ReportKey};
 use crate::cull::pipelines::{classify_constants, cull_module, report_constants};
 use crate::cull::refine;
+use crate::cull::view_uniform::COORDINATE_BITS;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::shader::FILES;
 use crate::host::rounding::EPS;
@@ -28,10 +30,12 @@ use crate::output::emit_passes;
 use crate::output::mesh_table::{MAX_LODS, MESH_TEXELS};
 use crate::output::survivors::SURVIVORS_PER_ROW;
 use crate::output::verdict::{VERDICT_MASK, Verdict};
+use crate::output::views;
 use crate::output::visible::VERDICT_MULTIPLE;
 use crate::pyramid::layout::{BLOCK_ALIGNMENT, BLOCK_LOG2, HEADERS, PIXELS};
 use crate::pyramid::levels::MAX_LEVELS;
 use crate::pyramid::reduce::{REDUCE_WORKGROUP, SHARED_LEVEL, TALL_SIDE};
+use crate::pyramid::resolve;
 use crate::testing::lod;
 use crate::testing::shaders::tests::parse;
 use crate::testing::shaders::{EMITS, KINDS, all, files};
@@ -50,6 +54,10 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
     let rule = |r: &LodRule| int(r.code());
     let texels = |kind: BoundsKind| (kind.record_bytes() / TEXEL_BYTES) as f64;
     vec![
+        ("cull/among", "AMONG_OF_GROUP", GROUP as f64 / int(u32::BITS)),
+        ("cull/among_layout", "AMONG_BITS", int(u32::BITS)),
+        ("cull/among_layout", "AMONG_PER_ROW_LOG2", int(among::WORDS_PER_ROW.ilog2())),
+        ("cull/among_order", "WORKGROUP", int(among::WORKGROUP)),
         ("cull/certificate", "EPS", EPS),
         ("cull/certificate", "ERROR_ULPS", ERROR_ULPS),
         ("cull/count", "LANES", int(count::LANES)),
@@ -72,6 +80,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/refine", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/refine_groups", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/supporting_planes", "LARGEST_BITS", bits(LARGEST)),
+        ("cull/view", "COORDINATE_BITS", int(COORDINATE_BITS)),
+        ("cull/view", "COORDINATE_MASK", int((1 << COORDINATE_BITS) - 1)),
         ("gpu/depth_bits", "ONE_BITS", bits(1.0)),
         ("gpu/depth_bits", "LEAST_NORMAL_BITS", bits(f32::MIN_POSITIVE)),
         ("gpu/depth_bits", "NEGATIVE_ZERO_BITS", bits(-0.0)),
@@ -108,6 +118,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
         ("cull/classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
         ("output/compact", "SCATTER_WORKGROUP", int(SCATTER_WORKGROUP)),
+        ("output/join", "WORKGROUP", int(views::WORKGROUP)),
         ("output/emit", "BLOCK_LOG2_WORDS", int(BLOCK_WORDS.ilog2())),
         ("output/emit_bins", "WORKGROUP", int(emit_passes::WORKGROUP)),
         ("output/emit_instances", "WORKGROUP", int(emit_passes::WORKGROUP)),
@@ -128,6 +139,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("pyramid/pyramid_write", "SIDE_LOG2", int(TALL_SIDE.ilog2())),
         ("pyramid/pyramid_write", "SIDE", int(TALL_SIDE)),
         ("pyramid/pyramid_write", "SIDE_MASK", int(TALL_SIDE - 1)),
+        ("pyramid/resolve", "WORKGROUP", int(resolve::WORKGROUP)),
         ("pyramid/texels", "LEAST_NORMAL", float(f32::MIN_POSITIVE)),
         ("pyramid/texels_atlas", "HEADERS", int(HEADERS)),
         ("testing/choose_lods", "LANES", int(lod::LANES)),
@@ -321,6 +333,7 @@ fn constants_cover_what_is_counted() {
 fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
     let line = |n: u32| [n, 1, 1];
     BTreeMap::from([
+        ("among_order", line(among::WORKGROUP)),
         ("begin", line(1)),
         ("choose_lods", line(lod::LANES)),
         ("emit_bins", line(emit_passes::WORKGROUP)),
@@ -336,6 +349,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("cull_groups", line(CULL_WORKGROUP)),
         ("cull_members", line(GROUP as u32)),
         ("explain", line(1)),
+        ("join_views", line(views::WORKGROUP)),
         ("occluder_vertex", [0; 3]),
         ("reduce", line(REDUCE_WORKGROUP)),
         ("reduce_buffer", line(yardstick::BUFFER_WORKGROUP)),
@@ -349,6 +363,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("refine_groups", line(refine::WORKGROUP)),
         ("replace_groups", line(update::WORKGROUP)),
         ("replace_records", line(update::WORKGROUP)),
+        ("resolve", line(resolve::WORKGROUP)),
         // One workgroup, the largest that WebGPU promises.
         ("scan", line(wgpu::Limits::default().max_compute_invocations_per_workgroup)),
         ("scatter", line(SCATTER_WORKGROUP)),
@@ -383,6 +398,7 @@ fn a_cull_sets_every_override() {
             footprint_log2: 1,
             descent: false,
             fit_volume: false,
+            among: false,
         };
         for (way, emit) in EMITS {
             let report = ReportKey { mask: false, verdicts: false, emit, statistics: false };

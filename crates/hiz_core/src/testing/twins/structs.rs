@@ -16,9 +16,11 @@ use crate::output::counters::{CounterRecord, StatisticsRecord};
 use crate::output::draw::DrawIndexedIndirect;
 use crate::output::mesh_table::TemplateRecord;
 use crate::output::survivors::SurvivorsRecord;
+use crate::output::views::JoinUniform;
 use crate::pyramid::PyramidUniform;
 use crate::pyramid::layout::PYRAMID_CHUNKS;
 use crate::pyramid::levels::Level;
+use crate::pyramid::resolve::{BandUniform, ResolvedUniform};
 use crate::pyramid::steps::StepUniform;
 use crate::testing::lod::LodCase;
 use crate::testing::shaders::tests::parse;
@@ -89,6 +91,9 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "first_index" = first_index, "base_vertex" = base_vertex,
             "first_instance" = first_instance,
         }),
+        twin!("Join", JoinUniform {
+            "view" = view, "stride" = stride, "begin" = begin, "words" = words,
+        }),
         twin!("Emit", EmitUniform {
             "base" = base, "count" = count, "words" = words, "lods" = lods, "piece" = piece,
             "capacity" = capacity, "records" = records, "draws_begin" = draws_begin,
@@ -115,12 +120,16 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "levels" = levels, "origins" = origins, "chunk_shift" = chunk_shift,
             "first_stored" = first_stored, "last_stored" = last_stored, "padding" = padding,
         }),
+        twin!("ResolvedImage", ResolvedUniform { "origin" = origin, "size" = size }),
+        twin!("Band", BandUniform {
+            "first" = first, "rows" = rows, "stride" = stride, "nearest" = nearest,
+        }),
         twin!("Statistics", StatisticsRecord {
             "levels" = levels, "texels_low" = texels_low, "texels_high" = texels_high,
         }),
         twin!("Step", StepUniform {
-            "source" = source, "last" = last, "reduction" = reduction, "padding" = padding,
-            "blocks" = blocks, "padding_1" = padding_1,
+            "source" = source, "last" = last, "end" = end, "begin" = begin, "origin" = origin,
+            "reduction" = reduction, "base" = base, "padding" = padding,
         }),
         twin!("Survivors", SurvivorsRecord {
             "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
@@ -142,6 +151,7 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "descent_budget" = descent_budget, "depth_offset" = depth_offset,
             "coordinate_limit" = coordinate_limit, "lod_end" = lod_end,
             "lod_needs" = lod_needs,
+            "source_origin" = source_origin, "padding_0" = padding_0, "padding_1" = padding_1,
         }),
         twin!("YardstickLevel", yardstick::PlainLevel {
             "offset" = offset, "stride" = stride, "width" = width, "height" = height,
