@@ -207,7 +207,7 @@ class MeshLods:
         if not draws:
             raise ValueError(f"draws: expected 1 to {MAX_LODS} levels of detail, got none")
         if len(draws) > MAX_LODS:
-            raise LimitError("levels of detail of a mesh", len(draws), MAX_LODS)
+            raise LimitError("draws", len(draws), MAX_LODS)
         if errors is None:
             errors = (0.0,) * len(draws)
         if isinstance(errors, str) or not isinstance(errors, (Sequence, np.ndarray)):
