@@ -92,6 +92,7 @@ from .options import CullOptions, DrawTemplate, Outputs
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import DRAW_DTYPE, CullResult
 from .stats import CullStats
+from .timing import StageTime, StageTimes
 from .views import ViewsResult
 
 if TYPE_CHECKING:
@@ -133,6 +134,8 @@ __all__ = [
     "Recommendation",
     "Spheres",
     "SplitMesh",
+    "StageTime",
+    "StageTimes",
     "Verdict",
     "ViewsResult",
     "__version__",

@@ -31,6 +31,7 @@ const VALUES: &[(&str, &[f64])] = &[
     ("SHARED", FLAG),
     ("SORTED", FLAG),
     ("STATISTICS", FLAG),
+    ("STEPS", ONE_TO_THREE),
     ("TALL", FLAG),
     ("TEXELS", ONE_TO_THREE),
     ("VERDICTS", FLAG),

@@ -10,6 +10,7 @@ use crate::cull::pipelines::{
 use crate::error::{Error, Result};
 use crate::gpu::buffers::{check_alive, entry, made};
 use crate::gpu::device::Gpu;
+use crate::gpu::stage_times::StagePasses;
 use crate::instances::Instances;
 use crate::instances::piece::{CULL_WORKGROUP, Piece};
 use crate::output::bins::{Arrangement, Bins};
@@ -198,36 +199,37 @@ fn record_all(
     let workgroups = |count: u32| if inputs.idle { 0 } else { count };
     view.record(encoder, pyramid);
     record_clears(gpu, encoder, inputs, visible, report)?;
-    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-        label: Some("hiz.cull.pass"),
-        timestamp_writes: None,
-    });
-    pass.set_bind_group(0, &view.instances, &[]);
+    let mut passes = StagePasses::begin(encoder, "hiz.cull.pass");
     let of_pieces = instances.pieces.iter().zip(&outputs).zip(&grouped);
     for (p, ((piece, (records, output)), groups)) in of_pieces.enumerate() {
         if let (Some(groups), Some(group_view)) = (groups, &view.groups) {
-            pass.set_bind_group(0, group_view, &[]);
-            groups.record_boxes(
-                &mut pass,
-                inputs.among.map_or(&piece.group_bindings, |among| among.group_records(p)),
-                workgroups(piece.groups().div_ceil(CULL_WORKGROUP)),
-            );
+            let records =
+                inputs.among.map_or(&piece.group_bindings, |among| among.group_records(p));
+            let count = workgroups(piece.groups().div_ceil(CULL_WORKGROUP));
+            passes.record("cull groups", |pass| {
+                pass.set_bind_group(0, group_view, &[]);
+                groups.record_boxes(pass, records, count);
+            });
+        }
+        let stage = if groups.is_some() { "cull members" } else { "cull" };
+        passes.record(stage, |pass| {
             pass.set_bind_group(0, &view.instances, &[]);
-        }
-        pass.set_bind_group(1, records, &[]);
-        pass.set_bind_group(2, *output, &[]);
-        if let Some(groups) = groups {
-            groups.record_members(&mut pass);
-        } else if let Some(flat) = &flat {
-            pass.set_pipeline(flat);
-            pass.dispatch_workgroups(workgroups(piece.groups().div_ceil(GROUPS_OF_RUN)), 1, 1);
-        }
+            pass.set_bind_group(1, records, &[]);
+            pass.set_bind_group(2, *output, &[]);
+            if let Some(groups) = groups {
+                groups.record_members(pass);
+            } else if let Some(flat) = &flat {
+                let count = workgroups(piece.groups().div_ceil(GROUPS_OF_RUN));
+                pass.set_pipeline(flat);
+                pass.dispatch_workgroups(count, 1, 1);
+            }
+        });
     }
     if let Some(compaction) = compaction {
-        compaction.record(&mut pass, inputs.idle);
+        passes.record("list", |pass| compaction.record(pass, inputs.idle));
     }
     if let Some(emission) = emission {
-        emission.record(&mut pass, inputs.idle);
+        passes.record("list", |pass| emission.record(pass, inputs.idle));
     }
     Ok(())
 }

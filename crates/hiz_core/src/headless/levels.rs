@@ -50,7 +50,10 @@ impl Engine {
     fn submit_reduce(&self, depth: &DepthImage, pyramid: &Pyramid) -> Result<()> {
         let mut encoder = self.encoder("hiz.reduce.encoder");
         let DepthImage { view, camera, tolerance, .. } = depth;
-        record_reduce(&self.context().gpu, &mut encoder, view, camera, pyramid, *tolerance)?;
+        let gpu = &self.context().gpu;
+        self.timed(&mut encoder, |encoder| {
+            record_reduce(gpu, encoder, view, camera, pyramid, *tolerance)
+        })?;
         if let Some(drawn) = &depth.drawn {
             pyramid.keep_with_it(Arc::clone(drawn) as Arc<dyn Owner>);
         }

@@ -12,6 +12,7 @@
 //!    `views` culls for several cameras, with buffers of `joined`.
 //! 5. `single` does all of that at once, for bounds that are used once.
 //!
+//! `timing` and `clock` take the times of stages.
 //! `answers` and `images` lend what was dropped, and `warm_up` runs a frame before the first one.
 //! `process` guards all of them against forks.
 //! This is the only room that submits, waits and maps buffers for reading; it decides no geometry.
@@ -50,6 +51,7 @@ mod adapter;
 mod ahead;
 mod answers;
 mod bins;
+mod clock;
 mod counts;
 mod cull;
 mod culling;
@@ -67,6 +69,7 @@ mod ranges;
 pub(crate) mod readback;
 mod single;
 mod slots;
+mod timing;
 mod uploads;
 mod views;
 mod warm_up;

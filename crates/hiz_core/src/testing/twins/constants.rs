@@ -11,6 +11,7 @@ use crate::cull::lod::LodRule;
 use crate::cull::pipelines::{CullKey, DepthStore, ReportKey};
 use crate::cull::pipelines::{classify_constants, cull_module, report_constants};
 use crate::cull::refine;
+use crate::gpu::clock_check;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::shader::FILES;
 use crate::host::rounding::EPS;
@@ -78,6 +79,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/refine", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/refine_groups", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/supporting_planes", "LARGEST_BITS", bits(LARGEST)),
+        ("gpu/clock_check", "WORKGROUP", int(clock_check::WORKGROUP)),
         ("gpu/depth_bits", "ONE_BITS", bits(1.0)),
         ("gpu/depth_bits", "LEAST_NORMAL_BITS", bits(f32::MIN_POSITIVE)),
         ("gpu/depth_bits", "NEGATIVE_ZERO_BITS", bits(-0.0)),
@@ -151,6 +153,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/classify", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
     ("cull/lod", &["NEEDS", "NEED_FACTOR", "LARGEST_DEVIATION"]),
     ("cull/refine", &["REFINED"]),
+    ("gpu/clock_check", &["LEFT", "RIGHT", "LEFT_AGAIN"]),
     ("cull/refine_groups", &["LAST_TEXEL", "WITHIN"]),
     (
         "cull/supporting_planes",
@@ -360,6 +363,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         // One workgroup, the largest that WebGPU promises.
         ("scan", line(wgpu::Limits::default().max_compute_invocations_per_workgroup)),
         ("scatter", line(SCATTER_WORKGROUP)),
+        ("spin", line(clock_check::WORKGROUP)),
         ("take_bounds", line(from_buffer::WORKGROUP)),
     ])
 }
