@@ -2,7 +2,8 @@
 .DEFAULT_GOAL := help
 # Arguments of the viewer, such as ARGS='--scene arm'.
 ARGS ?=
-.PHONY: help setup demo view bench-view test test-swiftshader soak lint bench bench-speed docs wheel package
+.PHONY: help setup demo view bench-view test test-swiftshader soak lint bench bench-speed docs
+.PHONY: wheel package
 
 help: ## This list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | \

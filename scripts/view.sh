@@ -23,8 +23,9 @@ for argument in "$@"; do
   # Times are those of a release build.
   [ "$argument" != --bench ] || profile=(--release)
 done
+# With hiz_py among the packages, the dependencies have the features of the tests' build.
 step "building the viewer (the first time takes some minutes)" \
-  cargo build --quiet -p hiz_viewer "${profile[@]}" "${LOCKED[@]}"
+  cargo build --quiet -p hiz_py -p hiz_viewer --bin viewer "${profile[@]}" "${LOCKED[@]}"
 folder=debug
 [ ${#profile[@]} -eq 0 ] || folder=release
 exec "${CARGO_TARGET_DIR:-$ROOT/target}/$folder/viewer" "$@"

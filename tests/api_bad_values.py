@@ -424,6 +424,21 @@ LIMIT: list[Bad] = [
     (1.5, TypeError, "got float 1.5"),
     (True, TypeError, "got bool True"),
 ]
+OF_MESHES: BadValues = {
+    "meshes": [
+        (36, TypeError, "expected a sequence of MeshLods or None, got int 36"),
+        ([], ValueError, "expected at least one MeshLods, got none"),
+        ([36], TypeError, "expected a MeshLods for each mesh, got int 36"),
+    ],
+    "emit": [
+        ("list", ValueError, 'expected one of "bins", "instances", got str \'list\''),
+        (None, TypeError, "got None"),
+    ],
+    "placement": [
+        ("loose", ValueError, 'expected one of "packed", "reserved", got str \'loose\''),
+        (None, TypeError, "got None"),
+    ],
+}
 DRAW: list[Bad] = [((36,), TypeError, "expected a DrawTemplate or None, got tuple (36,)")]
 OPTIONS_OBJECT: list[Bad] = [
     ({"order": "any"}, TypeError, "expected a CullOptions or None, got dict {'order': 'any'}"),
@@ -819,6 +834,20 @@ TABLES: dict[str, Table] = {
                 ("sorted", ValueError, 'expected one of "morton", "given", got str \'sorted\''),
                 (None, TypeError, "got None"),
             ],
+            "mesh_ids": [
+                ([0.0, 1.0], TypeError, "expected integer (2,), got (2,) float64"),
+                ([0], ValueError, "expected integer (2,), got (1,) int64"),
+                ([0, -1], ValueError, "expected mesh ids from 0 on, or hizvk.ABSENT, got -1"),
+                ([0, 2**32], ValueError, "or hizvk.ABSENT, got 4294967296"),
+                ([0, 2**20], hizvk.LimitError, "mesh_ids: requested 1048577, the device allows"),
+                ("mesh", TypeError, "got str 'mesh'"),
+            ],
+            "scales": [
+                ([1.0], ValueError, "scales: expected"),
+                ([1.0, -1.0], ValueError, "expected numbers from 0 on below 2^60, got -1"),
+                ([1.0, NAN], ValueError, "got NaN at index 1"),
+                ("large", TypeError, "got str 'large'"),
+            ],
         },
     ),
     "Occluders.move": Table(
@@ -971,6 +1000,7 @@ TABLES: dict[str, Table] = {
             **OPTIONS,
             "capacity": CAPACITY,
             "draw": DRAW,
+            **OF_MESHES,
         },
     ),
     "Device.warm_up": Table(
@@ -1000,6 +1030,7 @@ TABLES: dict[str, Table] = {
             **OPTIONS,
             "capacity": CAPACITY,
             "draw": DRAW,
+            **OF_MESHES,
         },
     ),
     "CullOptions": Table(lambda _: (hizvk.CullOptions, {}), OPTIONS),
@@ -1012,6 +1043,34 @@ TABLES: dict[str, Table] = {
             "draws": FLAG_OR_NONE,
             "capacity": CAPACITY,
             "draw": DRAW,
+            **OF_MESHES,
+        },
+    ),
+    "MeshLods": Table(
+        lambda _: (hizvk.MeshLods, {"draws": [hizvk.DrawTemplate(3)] * 2}),
+        {
+            "draws": [
+                (hizvk.DrawTemplate(3), TypeError, "expected a sequence of DrawTemplate, got"),
+                ([36], TypeError, "expected a DrawTemplate for each level, got int 36"),
+                ([], ValueError, "expected 1 to 8 levels of detail, got none"),
+                (
+                    [hizvk.DrawTemplate(3, first_instance=7)],
+                    ValueError,
+                    "expected first_instance 0, which the cull sets, got 7",
+                ),
+                (
+                    [hizvk.DrawTemplate(3)] * 9,
+                    hizvk.LimitError,
+                    "levels of detail of a mesh: requested 9, the device allows 8",
+                ),
+            ],
+            "errors": [
+                ([0.0], ValueError, "expected one for each of 2 levels of detail, got 1"),
+                ([0.0, -1.0], ValueError, "got float -1.0"),
+                ([0.0, NAN], ValueError, "got float nan"),
+                ([0.0, "far"], TypeError, "got str 'far'"),
+                (0.5, TypeError, "expected a sequence of numbers or None, got float 0.5"),
+            ],
         },
     ),
     "check_proxy": Table(
@@ -1066,7 +1125,60 @@ TABLES: dict[str, Table] = {
             ]
         },
     ),
+    "Pyramid.update": Table(
+        lambda device: (
+            device.pyramid(np.ones((6, 8)), camera(), kind="z").update,
+            {"row": 1, "column": 2, "array": np.ones((3, 4))},
+        ),
+        {
+            "row": [
+                (6, ValueError, "expected an integer in 0..5, got int 6"),
+                (-1, ValueError, "got int -1"),
+                (1.0, TypeError, "got float 1.0"),
+                (None, TypeError, "got None"),
+            ],
+            "column": [
+                (8, ValueError, "expected an integer in 0..7, got int 8"),
+                ((0, 0, 1, 1), TypeError, "got tuple (0, 0, 1, 1)"),
+            ],
+            "array": [
+                (
+                    np.ones((6, 4)),
+                    ValueError,
+                    "expected float64 (height, width) with 1 <= height <= 5 and 1 <= width <= 6, "
+                    "which is what lies from row 1 and column 2 on, got (6, 4) float64",
+                ),
+                (np.ones((3, 7)), ValueError, "got (3, 7) float64"),
+                (np.ones((0, 4)), ValueError, "got (0, 4) float64"),
+                (np.ones(3), ValueError, "got (3,) float64"),
+                (np.ones((3, 4, 4)), ValueError, "got (3, 4, 4) float64"),
+                (np.ones((3, 4), np.float32), TypeError, "got (3, 4) float32"),
+                ([[1.0]], TypeError, "got list [[1.0]]"),
+                (None, TypeError, "got None"),
+            ],
+        },
+    ),
     "CullResult.hints": Table(lambda device: (device.cull(**cull_arguments(device)).hints, {}), {}),
+    "CullResult.bin": Table(
+        lambda device: (
+            device.cull(
+                **cull_arguments(device), meshes=[hizvk.MeshLods([hizvk.DrawTemplate(3)])]
+            ).bin,
+            {"mesh": 0, "lod": 0},
+        ),
+        {
+            "mesh": [
+                (1, ValueError, "expected a mesh below 1, got 1"),
+                (-1, ValueError, "got int -1"),
+                (0.0, TypeError, "got float 0.0"),
+            ],
+            "lod": [
+                (1, ValueError, "expected a level below 1 for mesh 0, got 1"),
+                (8, ValueError, "in 0..7, got int 8"),
+                ("0", TypeError, "got str '0'"),
+            ],
+        },
+    ),
     "CullResult.explain": Table(
         lambda device: (device.cull(**cull_arguments(device)).explain, {"index": 0}),
         {

@@ -53,6 +53,7 @@ TARGETS = {
     "reduction.4K.rendered.levels >= 2": (1.5, False),
     "reduction.1080p.rendered.buffer": (1.8, True),
     "reduction.1080p.rendered.textures": (4.0, True),
+    "depth_in.1080p.resolve": (4.0, False),
     "cull.hidden95.flat_over_uncertified": (1.25, False),
     "cull.hidden95.differing": (0.001, False),
     "cull.hidden0.groups_over_flat": (1.1, False),
@@ -72,6 +73,8 @@ TARGETS = {
 TOLD = (
     "reduction.1080p.uploaded.levels >= 3",
     "reduction.1080p.uploaded.level 5 alone",
+    "depth_in.1080p.rendered.region",
+    "depth_in.1080p.uploaded.region",
     "cull.hidden95.share",
     "cull.hidden50.groups_over_flat",
     "cull.hidden95.ns.boxes, flat",

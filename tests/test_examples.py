@@ -28,6 +28,8 @@ LAST_LINES = {
     "cube_map.py": "lit: 500 in the room, 300 behind the door, 0 behind walls",
     # Ten boxes each.
     "depth_image.py": "kept 10 before the wall, 0 behind it, 10 without data",
+    # The scene's own count; what is left out would not have shown.
+    "front_to_back.py": "depth as of all boxes: True",
     # Half of the balls in front of the wall, the others in its shadow.
     "first_cull.py": "kept 5,000 of 5,000 in front and 0 behind the wall",
     # 600 balls in front of the wall; the other four numbers are the script's own.

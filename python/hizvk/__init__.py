@@ -88,9 +88,9 @@ from .occluders import (
     split_mesh,
 )
 from .oneline import visible
-from .options import CullOptions, DrawTemplate, Outputs
+from .options import CullOptions, DrawTemplate, MeshLods, Outputs
 from .resources import DepthImage, Instances, Occluders, Pyramid
-from .result import DRAW_DTYPE, CullResult
+from .result import ABSENT, DRAW_DTYPE, NO_LOD, CullResult
 from .stats import CullStats
 from .timing import StageTime, StageTimes
 from .views import ViewsResult
@@ -99,7 +99,9 @@ if TYPE_CHECKING:
     from .recommendation import Recommendation, recommend
 
 __all__ = [
+    "ABSENT",
     "DRAW_DTYPE",
+    "NO_LOD",
     "Adapter",
     "BoundsCheck",
     "Boxes",
@@ -123,6 +125,7 @@ __all__ = [
     "LodByError",
     "LodBySize",
     "Mesh",
+    "MeshLods",
     "NoAdapterError",
     "OccluderSelection",
     "Occluders",

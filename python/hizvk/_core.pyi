@@ -21,6 +21,7 @@ __all__ = [
     "Engine",
     "Explanation",
     "Instances",
+    "MeshTable",
     "Occluders",
     "Pyramid",
     "Yardstick",
@@ -151,9 +152,13 @@ class Engine:
         self,
         kind: str,
         arrays: Sequence[_Floats],
-        strict: bool,
-        order: str,
+        strict_and_order: tuple[bool, str],
+        mesh_ids: npt.NDArray[np.uint32] | None,
+        scales: _Floats | None,
     ) -> Instances: ...
+    def mesh_table(
+        self, meshes: Sequence[Sequence[tuple[int, int, int, int, float]]]
+    ) -> MeshTable: ...
     def update(
         self, instances: Instances, first: int, kind: str, arrays: Sequence[_Floats], strict: bool
     ) -> None: ...
@@ -189,6 +194,29 @@ class Engine:
         rounding: str,
         camera: Camera,
     ) -> DepthImage: ...
+    def upload_samples(
+        self,
+        images: Sequence[_Floats | npt.NDArray[np.uint16]],
+        kind: str,
+        scale: float,
+        invalid: Sequence[float],
+        rounding: str,
+        camera: Camera,
+    ) -> DepthImage: ...
+    def renew(
+        self, pyramid: Pyramid, depth: DepthImage, rectangle: tuple[int, int, int, int]
+    ) -> None: ...
+    def replace_depth(
+        self,
+        pyramid: Pyramid,
+        depth: DepthImage,
+        rectangle: tuple[int, int, int, int],
+        images: Sequence[_Floats | npt.NDArray[np.uint16]],
+        kind: str,
+        scale: float,
+        invalid: Sequence[float],
+        rounding: str,
+    ) -> None: ...
     def pyramid(self, depth: DepthImage, levels: tuple[int, int]) -> Pyramid: ...
     def cull(
         self,
@@ -197,6 +225,7 @@ class Engine:
         pyramid: Pyramid,
         options: CullOptions,
         outputs: Outputs,
+        meshes: MeshTable | None,
         among: npt.NDArray[np.bool_] | Culling | ViewsCulling | None,
         ahead: bool,
     ) -> Culling: ...
@@ -218,6 +247,7 @@ class Engine:
         levels: tuple[int, int],
         options: CullOptions,
         outputs: Outputs,
+        meshes: MeshTable | None,
     ) -> None: ...
     def cull_once(
         self,
@@ -265,6 +295,8 @@ class Pyramid:
 class Counts:
     @property
     def tested(self) -> int: ...
+    @property
+    def absent(self) -> int: ...
     @property
     def outside(self) -> int: ...
     @property
@@ -316,6 +348,9 @@ class Explanation:
     def group(self) -> Explanation | None: ...
 
 @final
+class MeshTable: ...
+
+@final
 class Culling:
     def num_instances(self) -> int: ...
     def is_ready(self) -> bool: ...
@@ -324,6 +359,9 @@ class Culling:
     def verdicts(self) -> npt.NDArray[np.uint8]: ...
     def indices(self) -> npt.NDArray[np.uint32]: ...
     def draws(self) -> bytes: ...
+    def draw_counts(self) -> list[int]: ...
+    def lods(self) -> npt.NDArray[np.uint8]: ...
+    def bin(self, mesh: int, lod: int) -> npt.NDArray[np.uint32]: ...
     def counts(self) -> Counts: ...
     def demand_and_written(self) -> tuple[int | None, int]: ...
     def timings(self) -> tuple[float, float, float, float]: ...
@@ -353,6 +391,10 @@ class Yardstick:
     def reduction(
         self, depth: DepthImage, shape: str, levels: tuple[int, int]
     ) -> YardstickReduction: ...
+    def region(
+        self, depth: DepthImage, rectangle: tuple[int, int, int, int]
+    ) -> YardstickReduction: ...
+    def resolve(self, camera: Camera, samples: int) -> YardstickReduction: ...
     def frames(
         self,
         instances: Instances,
@@ -371,6 +413,7 @@ class Yardstick:
         options: CullOptions,
         outputs: Outputs,
         depth: DepthImage | None,
+        meshes: MeshTable | None,
     ) -> YardstickCull: ...
 
 @final

@@ -15,20 +15,22 @@ import numpy as np
 
 from . import _arguments
 from ._core import Engine as CoreEngine
+from ._core import MeshTable as CoreMeshTable
 from ._on_device import check_owner
 from ._processes import driver_is_asked
 from ._types import FaceCull, Rasteriser, StoredOrder, words
 from .adapter import Adapter
 from .bounds import Bounds, are_points, as_arrays
 from .camera import Camera
-from .depth import checked_image
 from .drawing import Drawing, chosen, limit
 from .errors import LimitError
 from .hints import Question
 from .mesh import as_meshes
 from .options import cull_request
+from .renewal import Source
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import CullResult
+from .samples import checked_samples
 from .timing import StageTimes
 from .views import ViewsResult, among_of, pairs
 
@@ -43,10 +45,13 @@ if TYPE_CHECKING:
     from ._types import DepthKind, Levels, Output
     from .depth import DepthArray
     from .mesh import MeshLike
-    from .options import CullKeywords, CullOptions, Outputs
+    from .options import CullKeywords, CullOptions, MeshLods, Outputs
     from .views import AmongLike
 
 __all__ = ["Device"]
+
+#: How many tables of meshes a device keeps for further culls.
+_TABLES_KEPT = 4
 
 
 class Device:
@@ -102,6 +107,7 @@ class Device:
             adapter = str(_arguments.integer("adapter", adapter, low=0, high=2**31 - 1))
         with driver_is_asked():
             self._engine = CoreEngine(adapter)
+        self._tables: list[tuple[Sequence[MeshLods], CoreMeshTable]] = []
 
     @property
     def adapter(self) -> Adapter:
@@ -114,7 +120,13 @@ class Device:
         return self._engine.max_image_side()
 
     def instances(
-        self, bounds: Bounds, *, strict: bool = False, order: StoredOrder = "morton"
+        self,
+        bounds: Bounds,
+        *,
+        strict: bool = False,
+        order: StoredOrder = "morton",
+        mesh_ids: npt.ArrayLike | None = None,
+        scales: npt.ArrayLike | None = None,
     ) -> Instances:
         """Uploads bounds, once for any number of culls.
 
@@ -139,6 +151,16 @@ class Device:
             ``"morton"``: sorted along a curve through space (Morton 1966); the upload sorts once.
             ``"given"``: as they come, for arrays that are in such an order already.
             This needs no sort, and 8 bytes less per instance on the host.
+        mesh_ids : (N,) integer array, optional
+            The mesh of each instance, 0 to 65535, or `hizvk.ABSENT`.
+            A cull with ``meshes=`` sorts what it keeps by them.
+            An absent instance is never kept, and the box of its group does not contain it.
+            Updates replace bounds alone: upload again to change a mesh id.
+            None: all have mesh 0.
+        scales : (N,) float array, or a number; optional
+            By how much the mesh of each instance is scaled, along the axis where it is most.
+            `hizvk.LodByError` multiplies the errors of levels of detail by it.
+            None: 1 for each.
 
         Raises
         ------
@@ -151,7 +173,11 @@ class Device:
         kind, arrays = as_arrays("bounds", bounds)
         strict = _arguments.flag("strict", strict)
         stored_order = _arguments.choice("order", order, words(StoredOrder))
-        uploaded = self._engine.instances(kind, arrays, strict, stored_order)
+        ids = None if mesh_ids is None else _arguments.mesh_ids("mesh_ids", mesh_ids, len(bounds))
+        sizes = (
+            None if scales is None else _arguments.floats_or_scalar("scales", scales, len(bounds))
+        )
+        uploaded = self._engine.instances(kind, arrays, (strict, stored_order), ids, sizes)
         return Instances(self, uploaded, points=are_points(bounds))
 
     @overload
@@ -425,10 +451,12 @@ class Device:
 
         Parameters
         ----------
-        depth : DepthImage or (height, width) array
+        depth : DepthImage or (height, width) array, or (height, width, samples)
             A rendered image of this device, alone; or an array, with `camera` and `kind`.
             Arrays are float, or uint16 for the kinds ``"z"`` and ``"distance"``.
             Row 0 is the top of the image.
+            With 2, 4, 8 or 16 samples per pixel the farthest one counts.
+            A sample with "no data" makes its pixel far, and a cull takes ``coverage="area"`` alone.
             What is masked in a masked array is "no data".
 
             A cull allows for what the dtype may have rounded:
@@ -497,19 +525,30 @@ class Device:
                     f"scale: expected 1 beside a DepthImage, whose depth is NDC, got {scale:g}"
                 )
             check_owner("depth", depth, self)
-            return Pyramid(
-                self, self._engine.pyramid(depth._inner, stored), depth.camera, is_rendered=True
-            )
+            source = Source(depth._inner)
+            built = self._engine.pyramid(depth._inner, stored)
+            return Pyramid(self, built, depth.camera, source, is_rendered=True)
         camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")
         self._check_side(camera)
-        return self._pyramid_of(
-            checked_image("depth", depth, camera, kind, scale, invalid), camera, stored
-        )
+        samples = checked_samples("depth", depth, camera, kind, scale, invalid)
+        return self._pyramid_of(samples, camera, stored, invalid)
 
-    def _pyramid_of(self, image: DepthArray, camera: Camera, stored: tuple[int, int]) -> Pyramid:
-        """The pyramid of an image that was checked, with the levels `stored`."""
-        uploaded = self._engine.upload_depth(*image, camera._inner)
-        return Pyramid(self, self._engine.pyramid(uploaded, stored), camera)
+    def _pyramid_of(
+        self,
+        images: DepthArray | list[DepthArray],
+        camera: Camera,
+        stored: tuple[int, int],
+        invalid: Any = None,
+    ) -> Pyramid:
+        """The pyramid of an image that was checked, or of one per sample; with levels `stored`."""
+        given = images if isinstance(images, list) else [images]
+        if len(given) == 1:
+            uploaded = self._engine.upload_depth(*given[0], camera._inner)
+        else:
+            planes = [plane.image for plane in given]
+            uploaded = self._engine.upload_samples(planes, *given[0][1:], camera._inner)
+        source = Source.uploaded(uploaded, given, invalid)
+        return Pyramid(self, self._engine.pyramid(uploaded, stored), camera, source)
 
     @overload
     def cull(
@@ -591,7 +630,8 @@ class Device:
             A third one waits in this call, without the interpreter lock, until the oldest is done.
             A result that was dropped counts no more.
         **keywords
-            Any field of `CullOptions`, and `capacity` and `draw` of `Outputs`.
+            Any field of `CullOptions`, and of `Outputs` `capacity`, `draw`, `meshes`, `emit` and
+            `placement`.
             They take the place of those fields of `options` and `outputs`:
             ``cull(crowd, camera, hiz, order="any", capacity=1000)``.
 
@@ -619,12 +659,14 @@ class Device:
             check_owner("pyramid", pyramid, self)
             if camera != pyramid.camera:
                 raise ValueError(_other_camera("camera", camera, pyramid))
+            _check_coverage("coverage", options, pyramid)
             culling = self._engine.cull(
                 instances._inner,
                 camera._inner,
                 pyramid._inner,
                 options,
                 outputs,
+                self._mesh_table(outputs.meshes),
                 restriction,
                 not wait,
             )
@@ -633,6 +675,12 @@ class Device:
         for number, (one, of) in enumerate(zip(cameras, pyramids, strict=True)):
             if one != of.camera:
                 raise ValueError(_other_camera(f"camera[{number}]", one, of))
+            _check_coverage("coverage", options, of)
+        if outputs.meshes is not None:
+            raise ValueError(
+                f"meshes: expected None beside several cameras, got {len(outputs.meshes)}: levels "
+                "of detail are chosen for each view, so cull them one by one"
+            )
         culled = self._engine.cull_views(
             instances._inner,
             [one._inner for one in cameras],
@@ -720,7 +768,27 @@ class Device:
         stored = _arguments.stored_levels("levels", levels)
         options, outputs = cull_request(options, outputs, keywords)
         drawn = None if occluders is None else occluders._inner
-        self._engine.warm_up(instances._inner, camera._inner, drawn, stored, options, outputs)
+        self._engine.warm_up(
+            instances._inner,
+            camera._inner,
+            drawn,
+            stored,
+            options,
+            outputs,
+            self._mesh_table(outputs.meshes),
+        )
+
+    def _mesh_table(self, meshes: Sequence[MeshLods] | None) -> CoreMeshTable | None:
+        """The table of these meshes on this device, made anew if it is not among the last ones."""
+        if meshes is None:
+            return None
+        # Equal tuples of the same objects are found without a look at their numbers.
+        for known, table in self._tables:
+            if known == meshes:
+                return table
+        table = self._engine.mesh_table([mesh._raw() for mesh in meshes])
+        self._tables = [*self._tables[1 - _TABLES_KEPT :], (meshes, table)]
+        return table
 
     def _check_side(self, camera: Camera) -> None:
         """Refuses an image that the device cannot hold, before its array is converted."""
@@ -783,6 +851,15 @@ def maker_of(thing: OnDevice[Any]) -> Device:
     device = thing.device
     assert isinstance(device, Device)
     return device
+
+
+def _check_coverage(name: str, options: CullOptions, pyramid: Pyramid) -> None:
+    """Refuses sample coverage for the farthest of several samples."""
+    if options.coverage == "sample" and pyramid._source.samples > 1:
+        raise ValueError(
+            f'{name}: expected "area" for a pyramid of the farthest of {pyramid._source.samples} '
+            'samples per pixel, which lie beside the pixels\' centres, got "sample"'
+        )
 
 
 def _other_camera(name: str, camera: Camera, pyramid: Pyramid) -> str:

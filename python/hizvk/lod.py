@@ -12,16 +12,16 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from . import _arguments
 
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
 __all__ = ["LodByDistance", "LodByError", "LodBySize", "LodRule"]
+
+_Numbers: TypeAlias = Sequence[float] | npt.NDArray[Any]
 
 #: Twins: `MAX_LODS`, `PIXELS` and `FARTHEST` in ``crates/hiz_core/src/cull/lod.rs``.
 _MAX_LODS: Final = 8
@@ -117,18 +117,16 @@ class LodByDistance:
     LodByDistance(thresholds=(10.0, 20.0, 40.0))
     """
 
-    thresholds: Sequence[float]
+    thresholds: tuple[float, ...]
 
-    def __post_init__(self) -> None:
-        thresholds = _list(
-            "thresholds", self.thresholds, at_least=0.0, at_most=_FARTHEST, ascending=True
-        )
-        object.__setattr__(self, "thresholds", thresholds)
+    def __init__(self, thresholds: _Numbers) -> None:
+        checked = _list("thresholds", thresholds, at_least=0.0, at_most=_FARTHEST, ascending=True)
+        object.__setattr__(self, "thresholds", checked)
 
     @classmethod
     def at_ndc_depths(
         cls,
-        depths: npt.ArrayLike,
+        depths: _Numbers,
         *,
         near: float,
         far: float | None = None,
@@ -199,13 +197,13 @@ class LodBySize:
     LodBySize(pixels=(200.0, 50.0, 12.0))
     """
 
-    pixels: Sequence[float]
+    pixels: tuple[float, ...]
 
-    def __post_init__(self) -> None:
-        pixels = _list(
-            "pixels", self.pixels, at_least=_LEAST_PIXELS, at_most=_MOST_PIXELS, ascending=False
+    def __init__(self, pixels: _Numbers) -> None:
+        checked = _list(
+            "pixels", pixels, at_least=_LEAST_PIXELS, at_most=_MOST_PIXELS, ascending=False
         )
-        object.__setattr__(self, "pixels", pixels)
+        object.__setattr__(self, "pixels", checked)
 
 
 LodRule: TypeAlias = LodByError | LodByDistance | LodBySize

@@ -7,7 +7,7 @@ Later reads get the same arrays, so they are read-only.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ._core import Counts as CoreCounts
 from ._core import Culling as CoreCulling
 from ._processes import cached_property
 from .explanation import explanation_of
+from .options import MAX_LODS
 from .stats import CullStats
 from .timing import sum_of, table_of
 
@@ -27,7 +28,13 @@ if TYPE_CHECKING:
     from .explanation import Explanation
     from .hints import Question
 
-__all__ = ["DRAW_DTYPE", "CullResult"]
+__all__ = ["ABSENT", "DRAW_DTYPE", "NO_LOD", "CullResult"]
+
+#: The mesh id of an instance that is not there.
+ABSENT: Final = 2**32 - 1
+
+#: The level of detail of an instance that a cull did not keep.
+NO_LOD: Final = 255
 
 #: One record of Vulkan's ``VkDrawIndexedIndirectCommand`` (``DrawIndexedIndirect`` of WebGPU).
 #: It has 20 bytes.
@@ -128,8 +135,52 @@ class CullResult(Awaited[CoreCulling]):
         """``(D,)`` of `DRAW_DTYPE`: the indirect draw arguments.
 
         There is one record for each piece of the instances (`Instances.num_pieces`).
+        With ``meshes=``, each piece has as many records as it could need, and zeros follow those
+        that draw something (`draw_count`).
         """
         return np.frombuffer(self._inner.draws(), dtype=DRAW_DTYPE)
+
+    @property
+    def draw_count(self) -> int:
+        """How many records of `draws` draw something, in all pieces together.
+
+        They are the first ones of each piece, unless ``placement="reserved"`` gives each bin a
+        fixed place.
+        """
+        return sum(self._inner.draw_counts())
+
+    @cached_property
+    def lods(self) -> npt.NDArray[np.uint8]:
+        """``(N,)`` uint8: the level of detail of each instance; `hizvk.NO_LOD` if it is culled.
+
+        Raises
+        ------
+        ValueError
+            If the cull was not given ``meshes=``, or had ``order="any"``.
+        """
+        return shared(self._inner.lods())  # type: ignore[no-any-return]
+
+    def bin(self, *, mesh: int, lod: int) -> npt.NDArray[np.uint32]:
+        """``(count,)`` uint32: what was listed of a mesh at one level of detail.
+
+        It ascends for ``order="stable"``.
+
+        Parameters
+        ----------
+        mesh : int
+            Its place in ``meshes=``.
+        lod : int
+            The level of detail, from 0 on.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came; also if the cull was not given
+            ``meshes=``, or had ``emit="instances"``.
+        """
+        mesh = _arguments.integer("mesh", mesh, low=0, high=2**16 - 1)
+        lod = _arguments.integer("lod", lod, low=0, high=MAX_LODS - 1)
+        return self._inner.bin(mesh, lod)
 
     @cached_property
     def _counts(self) -> CoreCounts:
@@ -175,6 +226,7 @@ class CullResult(Awaited[CoreCulling]):
         stages = table_of(self._inner.stage_times() or ())
         return CullStats(
             tested=counts.tested,
+            absent=counts.absent,
             outside=counts.outside,
             occluded=counts.occluded,
             kept=counts.visible + counts.invalid,

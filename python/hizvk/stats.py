@@ -57,6 +57,8 @@ class CullStats:
     Also None where the device has no timestamps that can be trusted."""
     stages: tuple[StageTime, ...]
     """The stages of the cull; empty outside of a block of `Device.timed`."""
+    absent: int = 0
+    """Instances that are absent (`hizvk.ABSENT`); no other number counts them."""
 
     @property
     def comparisons(self) -> int:

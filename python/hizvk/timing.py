@@ -21,8 +21,9 @@ class StageTime:
     """What one stage took."""
 
     stage: str
-    """``"raster"``, ``"reduce"``, ``"cull groups"``, ``"cull members"``, ``"cull"`` (without
-    groups), ``"list"``, ``"join"`` (of views), ``"among"``, ``"update"`` or ``"refine"``.
+    """``"raster"``, ``"resolve"`` (of samples), ``"reduce"``, ``"cull groups"``,
+    ``"cull members"``, ``"cull"`` (without groups), ``"list"``, ``"join"`` (of views), ``"among"``,
+    ``"update"`` or ``"refine"``.
 
     The host's rasteriser has no stage: its time is the host's own."""
     passes: int

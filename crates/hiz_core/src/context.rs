@@ -18,7 +18,6 @@ use crate::input::bounds::{Bounds, BoundsKind};
 use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
 use crate::input::mesh::MeshData;
-use crate::input::tolerance::DepthTolerance;
 use crate::instances::from_buffer::{BoundsBuffer, record_instances_from, record_update_from};
 use crate::instances::piece::CULL_WORKGROUP;
 use crate::instances::update::record_update;
@@ -34,6 +33,9 @@ use crate::output::readback::{AnswerInFlight, ReadbackRing, record_readback};
 use crate::output::views::{ViewsOutputs, VisibleViews};
 use crate::output::visible::Visible;
 use crate::pyramid::reduce::record_reduce;
+use crate::pyramid::region::record_reduce_region;
+use crate::pyramid::resolve::{DepthResolve, ResolveOptions, record_resolve};
+use crate::pyramid::source::DepthSource;
 use crate::pyramid::{Pyramid, PyramidOptions, PyramidUniform};
 
 /// Everything that is made once per device.
@@ -447,9 +449,12 @@ impl HizContext {
 
     /// Records the reduction of a depth image of `camera` into `pyramid`.
     ///
-    /// `depth` is a view of a 2D texture with one mip level, one sample per pixel and one layer.
-    /// The whole depth of the texture is read, whatever part of it the view shows.
-    /// So the default view of a texture with a stencil will do.
+    /// `depth` is a 2D texture with one sample per pixel, or a view of one, or a part of one as
+    /// [`DepthSource`] describes it.
+    /// A view does not say which part of its texture it shows, so the depth of all of it is read.
+    /// So the default view of a texture with a stencil will do, and a texture of several layers or
+    /// mip levels needs a [`DepthSource`].
+    /// Multisampled depth goes through [`record_resolve`](Self::record_resolve) first.
     /// These formats and usages are accepted:
     ///
     /// - Any depth format, `R32Float` or `R16Float`, with `TEXTURE_BINDING`.
@@ -471,16 +476,84 @@ impl HizContext {
     ///
     /// # Errors
     /// - [`Error::Mismatch`] for sizes or devices that disagree and for a destroyed texture.
-    /// - [`Error::Invalid`] for other formats and usages.
+    /// - [`Error::Invalid`] for other formats and usages, and for several layers, mip levels or
+    ///   samples of which none is named.
     /// - [`Error::OutOfMemory`].
-    pub fn record_reduce(
+    pub fn record_reduce<'a>(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        depth: &wgpu::TextureView,
+        depth: impl Into<DepthSource<'a>>,
         camera: &Camera,
         pyramid: &Pyramid,
     ) -> Result<()> {
-        record_reduce(&self.gpu, encoder, depth, camera, pyramid, DepthTolerance::NONE)
+        record_reduce(&self.gpu, encoder, &depth.into(), camera, pyramid)
+    }
+
+    /// Makes what multisampled depth of `size` pixels is resolved into.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] for a size of 0.
+    /// - [`Error::Limit`] for a size beyond the device's textures.
+    /// - [`Error::OutOfMemory`].
+    pub fn create_depth_resolve(
+        &self,
+        size: ImageSize,
+        options: &ResolveOptions,
+    ) -> Result<DepthResolve> {
+        DepthResolve::new(&self.gpu, size, options)
+    }
+
+    /// Records the resolve of multisampled depth of `camera`: one depth per pixel, the farthest of
+    /// its samples, the nearest or both ([`ResolveOptions`]).
+    ///
+    /// `depth` is a texture with several samples per pixel and the usage `TEXTURE_BINDING`, or a view
+    /// of one, or a part of one as [`DepthSource`] describes it.
+    /// Its format is a depth format, `R32Float` or `R16Float`.
+    /// The result is [`DepthResolve::farthest`], which [`record_reduce`](Self::record_reduce) takes.
+    ///
+    /// Samples without a depth (NaN, outside of 0..=1) count as the reduction treats them: as far.
+    /// For the nearest depth they count as near.
+    ///
+    /// # Errors
+    /// - [`Error::Mismatch`] for sizes or devices that disagree and for a destroyed texture.
+    /// - [`Error::Invalid`] for one sample per pixel, and for other formats and usages.
+    /// - [`Error::OutOfMemory`].
+    pub fn record_resolve<'a>(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        depth: impl Into<DepthSource<'a>>,
+        camera: &Camera,
+        resolve: &DepthResolve,
+    ) -> Result<()> {
+        record_resolve(&self.gpu, encoder, &depth.into(), camera, resolve)
+    }
+
+    /// Records the reduction of a changed rectangle of a depth image into `pyramid`.
+    ///
+    /// The pyramid must have been built from `depth`, by [`record_reduce`](Self::record_reduce) or by
+    /// this method, and no pixel may have changed since except those of the rectangle.
+    /// `rectangle` is `[x0, y0, x1, y1]`: columns `x0..=x1` and rows `y0..=y1` of the image, row 0 on
+    /// top.
+    /// It is what [`record_occluder_depth`](Self::record_occluder_depth) returns.
+    /// The levels are then what a reduction of the whole image makes, bit for bit.
+    ///
+    /// Submit it after the reduction that came before.
+    /// If that one never ran, culls keep everything until the whole image is reduced again.
+    /// So do culls that were recorded before this reduction and run after it.
+    ///
+    /// # Errors
+    /// - [`Error::Mismatch`] for a pyramid that was never built, for another depth image and for a
+    ///   destroyed texture.
+    /// - [`Error::Invalid`] for a rectangle that is empty or reaches past the image.
+    /// - [`Error::OutOfMemory`].
+    pub fn record_reduce_region<'a>(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        depth: impl Into<DepthSource<'a>>,
+        rectangle: [u32; 4],
+        pyramid: &Pyramid,
+    ) -> Result<()> {
+        record_reduce_region(&self.gpu, encoder, &depth.into(), rectangle, pyramid)
     }
 
     /// Records the cull of `instances` against `pyramid`; the buffers of `visible` take what it

@@ -207,6 +207,8 @@ pub use output::visible::Visible;
 pub use pyramid::atlas::AtlasUse;
 pub use pyramid::level_texels::LevelTexels;
 pub use pyramid::levels::{MAX_LEVELS, StoredLevels};
+pub use pyramid::resolve::{DepthResolve, ResolveOptions, ResolvedDepths};
+pub use pyramid::source::DepthSource;
 pub use pyramid::{Pyramid, PyramidOptions};
 
 /// Compiles and runs the program in the README with the tests.

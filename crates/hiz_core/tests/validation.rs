@@ -339,17 +339,17 @@ fn depth_images_that_cannot_be_reduced_are_refused_by_name() {
             ),
             (
                 "mips",
-                "depth: expected a 2D texture of one mip level",
+                "depth: expected which of 2 mip levels, got none",
                 but(Format::R32Float, SAMPLED, &|d| d.mip_level_count = 2),
             ),
             (
                 "layers",
-                "depth: expected a 2D texture of one mip level, sample and layer",
+                "depth: expected which of 3 layers, got none",
                 but(Format::R32Float, SAMPLED, &|d| d.size.depth_or_array_layers = 3),
             ),
             (
                 "samples",
-                "depth: expected a 2D texture of one mip level, sample and layer",
+                "depth: expected one sample per pixel, got 4; record_resolve",
                 but(Format::Depth32Float, both, &|d| d.sample_count = 4),
             ),
             (

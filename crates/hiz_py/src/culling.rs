@@ -59,6 +59,27 @@ impl Culling {
             .map(|draws| PyBytes::new(py, bytemuck::cast_slice(&draws)))
     }
 
+    /// How many records of each piece draw something.
+    fn draw_counts(&self, py: Python<'_>) -> PyResult<Vec<u32>> {
+        self.0.run(py, |culling| culling.draw_counts())
+    }
+
+    /// The LOD of each instance; 255 for those that are not kept.
+    fn lods<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
+        self.0.run(py, |culling| culling.lods()).map(|lods| PyArray1::from_vec(py, lods))
+    }
+
+    /// The list of one bin.
+    fn bin<'py>(
+        &self,
+        py: Python<'py>,
+        mesh: u32,
+        lod: u32,
+    ) -> PyResult<Bound<'py, PyArray1<u32>>> {
+        let bin = |culling: &Arc<headless::Culling>| culling.bin(mesh, lod);
+        self.0.run(py, bin).map(|indices| PyArray1::from_vec(py, indices))
+    }
+
     fn counts(&self, py: Python<'_>) -> PyResult<Counts> {
         Ok(Counts::of(&self.0.run(py, |culling| culling.counts())?))
     }
@@ -141,6 +162,7 @@ impl ViewsCulling {
 #[pyclass(frozen, get_all, module = "hizvk._core")]
 pub(crate) struct Counts {
     tested: u64,
+    absent: u64,
     outside: u64,
     occluded: u64,
     visible: u64,
@@ -157,6 +179,7 @@ impl Counts {
     pub(crate) fn of(counts: &headless::Counts) -> Self {
         Self {
             tested: counts.tested,
+            absent: counts.absent,
             outside: counts.outside,
             occluded: counts.occluded,
             visible: counts.visible,

@@ -12,10 +12,13 @@ use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethod
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arguments::{DepthArray, FloatArray, LevelArray, bounds, depth_input, in_c_order};
+use crate::arguments::{
+    DepthArray, FloatArray, LevelArray, bounds, depth_input, depth_inputs, in_c_order,
+};
 use crate::camera::Camera;
 use crate::culling::{Counts, Culling, StageTime, ViewsCulling, stage_time};
 use crate::held::{Held, OnDevice, detached};
+use crate::meshes::{LodNumbers, MeshTable, mesh_table};
 use crate::options::{Request, cull_options};
 
 /// The depth of a single cull.
@@ -102,17 +105,25 @@ impl Engine {
         py: Python<'_>,
         kind: &str,
         arrays: Vec<FloatArray<'_>>,
-        strict: bool,
-        order: &str,
+        strict_and_order: (bool, String),
+        mesh_ids: Option<PyReadonlyArray1<'_, u32>>,
+        scales: Option<FloatArray<'_>>,
     ) -> PyResult<Instances> {
         let bounds = bounds(kind, &arrays)?;
-        let order = match order {
+        let (strict, order) = strict_and_order;
+        let order = match order.as_str() {
             "morton" => StoredOrder::Morton,
             "given" => StoredOrder::Given,
             other => return Err(PyValueError::new_err(format!("order: no order {other:?}"))),
         };
         #[allow(clippy::needless_update, reason = "hiz_core's `testing` adds a field")]
-        let options = InstanceOptions { strict, order, ..InstanceOptions::default() };
+        let options = InstanceOptions {
+            strict,
+            order,
+            mesh_ids: mesh_ids.as_ref().map(|ids| ids.as_slice()).transpose()?,
+            scales: scales.as_ref().map(FloatArray::floats).transpose()?,
+            ..InstanceOptions::default()
+        };
         self.0
             .run(py, |engine| engine.instances(&bounds, &options))
             .map(|instances| Instances(Held::new(py, instances)))
@@ -240,6 +251,56 @@ impl Engine {
             .map(|depth| DepthImage(Held::new(py, depth)))
     }
 
+    /// As `upload_depth`, with an image for each sample of a pixel: the farthest one counts.
+    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
+    fn upload_samples(
+        &self,
+        py: Python<'_>,
+        images: Vec<DepthArray<'_>>,
+        kind: &str,
+        scale: f64,
+        invalid: Vec<f64>,
+        rounding: &str,
+        camera: &Camera,
+    ) -> PyResult<DepthImage> {
+        let samples = depth_inputs(&images, kind, scale, &invalid, rounding)?;
+        let camera = &camera.0;
+        self.0
+            .run(py, |engine| engine.upload_depth_of_samples(&samples, camera))
+            .map(|depth| DepthImage(Held::new(py, depth)))
+    }
+
+    /// Renews a pyramid within the rectangle (x0, y0, x1, y1) of its depth image.
+    fn renew(
+        &self,
+        py: Python<'_>,
+        pyramid: &Pyramid,
+        depth: &DepthImage,
+        rectangle: (u32, u32, u32, u32),
+    ) -> PyResult<()> {
+        let (pyramid, depth) = (pyramid.0.get(py)?, depth.0.get(py)?);
+        self.0.run(py, |engine| engine.renew_pyramid(&pyramid.1, &depth, rectangle.into()))
+    }
+
+    /// Replaces the rectangle of an uploaded image by whole rows, one image for each sample.
+    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
+    fn replace_depth(
+        &self,
+        py: Python<'_>,
+        pyramid: &Pyramid,
+        depth: &DepthImage,
+        rectangle: (u32, u32, u32, u32),
+        images: Vec<DepthArray<'_>>,
+        kind: &str,
+        scale: f64,
+        invalid: Vec<f64>,
+        rounding: &str,
+    ) -> PyResult<()> {
+        let rows = depth_inputs(&images, kind, scale, &invalid, rounding)?;
+        let (pyramid, depth) = (pyramid.0.get(py)?, depth.0.get(py)?);
+        self.0.run(py, |engine| engine.replace_depth(&pyramid.1, &depth, rectangle.into(), &rows))
+    }
+
     /// The mask of bounds that are used once, and the counts of the first of them.
     /// `depth` is what `upload_depth` takes, or a pyramid.
     fn cull_once<'py>(
@@ -276,7 +337,15 @@ impl Engine {
         self.0.run(py, reduce).map(|built| Pyramid(Held::new(py, built)))
     }
 
+    /// A mesh is a list of levels of detail, each with the numbers of its draw and its error.
+    fn mesh_table(&self, py: Python<'_>, meshes: Vec<Vec<LodNumbers>>) -> PyResult<MeshTable> {
+        self.0
+            .run(py, |engine| mesh_table(engine, &meshes))
+            .map(|table| MeshTable(Held::new(py, table)))
+    }
+
     /// `options` is a `hizvk.CullOptions`, `outputs` a `hizvk.Outputs`.
+    /// `meshes` is the table of the meshes that the outputs speak of.
     /// `among`: a mask, or an earlier answer; `ahead`: the answer comes to the host by itself.
     #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn cull(
@@ -287,10 +356,12 @@ impl Engine {
         pyramid: &Pyramid,
         options: &Bound<'_, PyAny>,
         outputs: &Bound<'_, PyAny>,
+        meshes: Option<&MeshTable>,
         among: Option<AmongArgument<'_>>,
         ahead: bool,
     ) -> PyResult<Culling> {
-        let Request { options, outputs } = Request::new(options, outputs)?;
+        let meshes = meshes.map(|table| table.0.get(py)).transpose()?;
+        let Request { options, outputs } = Request::new(options, outputs, meshes.as_deref())?;
         let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
         let among = self.among(py, &instances, among)?;
         let cull = |engine: &headless::Engine| {
@@ -313,7 +384,7 @@ impl Engine {
         among: Option<AmongArgument<'_>>,
         ahead: bool,
     ) -> PyResult<ViewsCulling> {
-        let Request { options, outputs: any } = Request::new(options, outputs)?;
+        let Request { options, outputs: any } = Request::new(options, outputs, None)?;
         let outputs = ViewsOutputs {
             each: Outputs { mask: true, verdicts: any.verdicts, ..Outputs::NONE },
             any,
@@ -345,8 +416,10 @@ impl Engine {
         levels: (u32, u32),
         options: &Bound<'_, PyAny>,
         outputs: &Bound<'_, PyAny>,
+        meshes: Option<&MeshTable>,
     ) -> PyResult<()> {
-        let Request { options, outputs } = Request::new(options, outputs)?;
+        let meshes = meshes.map(|table| table.0.get(py)).transpose()?;
+        let Request { options, outputs } = Request::new(options, outputs, meshes.as_deref())?;
         let instances = instances.0.get(py)?;
         let occluders = occluders.map(|occluders| occluders.0.get(py)).transpose()?;
         let levels = StoredLevels { first: levels.0, last: levels.1 };

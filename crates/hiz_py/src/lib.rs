@@ -13,6 +13,7 @@ mod culling;
 mod device;
 mod errors;
 mod held;
+mod meshes;
 mod options;
 mod reference;
 #[cfg(feature = "yardstick")]
@@ -32,6 +33,8 @@ mod _core {
     use crate::device::{DepthImage, Engine, Instances, Occluders, Pyramid, adapters};
     #[pymodule_export]
     use crate::held::{after_fork, before_fork, let_go};
+    #[pymodule_export]
+    use crate::meshes::MeshTable;
     #[pymodule_export]
     use crate::reference::{reference_classify, reference_pyramid};
 

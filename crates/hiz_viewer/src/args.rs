@@ -119,7 +119,7 @@ pub(crate) fn help() -> String {
 
   viewer [--scene SCENE]              opens a window
   viewer --headless [--frames N]      writes frames to PNG files, without a window
-  viewer --bench                      compares frames with and without culling, in out/viewer/bench.md
+  viewer --bench                      compares frames with and without culling
 
 Scenes: mountains, arm, city, and castle, whose data is not part of this repository:
 `HIZVK_CASTLE=castle.npz make view ARGS='--scene castle'` unpacks it first.

@@ -1,11 +1,12 @@
-//! The library at work: what `hiz_core` records for each kind of frame, and the lists that it leaves.
+//! The library at work: what `hiz_core` records for each kind of frame, and what it leaves.
 //!
 //! The renderer knows of culling only what this file offers.
 
 use hiz_core::wgpu::{self, BufferUsages};
 use hiz_core::{
-    Bounds, Camera, CullOptions, Floats, HizContext, ImageSize, InstanceOptions, Instances,
-    OCCLUDER_DEPTH_FORMAT, Outputs, Pyramid, PyramidOptions, Visible,
+    Bounds, Camera, CullOptions, Emit, Floats, HizContext, ImageSize, InstanceOptions, Instances,
+    Lod, MeshLods, MeshTable, OCCLUDER_DEPTH_FORMAT, Outputs, Placement, Pyramid, PyramidOptions,
+    Visible,
 };
 
 use crate::Failure;
@@ -74,7 +75,6 @@ pub(crate) struct Culler {
     /// With several samples per pixel.
     resolve: Option<Resolve>,
     max_draws: u32,
-    kept: Lists,
     early: Lists,
     late: Lists,
 }
@@ -97,10 +97,22 @@ impl Culler {
             }
         };
         let mut encoder = gpu.encoder("viewer.upload");
-        let options = InstanceOptions { strict: true, ..InstanceOptions::default() };
+        let mesh_ids: Vec<u32> = scene.bodies.iter().map(|body| body.kind).collect();
+        let scales: Vec<f32> = scene.bodies.iter().map(|body| body.scale).collect();
+        let options = InstanceOptions {
+            strict: true,
+            mesh_ids: Some(&mesh_ids),
+            scales: Some(Floats::F32(&scales)),
+            ..InstanceOptions::default()
+        };
         let crowd = hiz.record_instances(&mut encoder, &bounds, &options)?;
         gpu.submit(encoder);
-        let visible = hiz.create_visible(&crowd, &Outputs { mask: true, ..Outputs::NONE })?;
+        let emit = Emit::Binned {
+            meshes: mesh_table(&hiz, scene, on_device)?,
+            placement: Placement::Packed,
+        };
+        let outputs = Outputs { mask: true, indices: true, draws: true, emit, ..Outputs::NONE };
+        let visible = hiz.create_visible(&crowd, &outputs)?;
         let mask = visible.mask(0).ok_or("a mask was asked for")?.clone();
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         let [before, none] =
@@ -148,7 +160,6 @@ impl Culler {
             Lists { list, arguments, bindings }
         };
         Ok(Self {
-            kept: lists(&mask, &none),
             early: lists(&before, &none),
             late: lists(&mask, &before),
             pyramid: hiz.create_pyramid(size, &PyramidOptions::default())?,
@@ -156,6 +167,7 @@ impl Culler {
             resolve: (targets.samples > 1).then(|| Resolve::new(gpu, targets)),
             options: CullOptions {
                 depth_slack: depth_slack(&gpu.adapter),
+                lod: scene.rule.clone(),
                 ..CullOptions::default()
             },
             hiz,
@@ -183,9 +195,7 @@ impl Culler {
         encoder: &mut wgpu::CommandEncoder,
         camera: &Camera,
     ) -> Result<(), Failure> {
-        self.record_cull(encoder, camera, &self.nothing)?;
-        self.record_lists(encoder, &self.kept);
-        Ok(())
+        self.record_cull(encoder, camera, &self.nothing)
     }
 
     /// Lists what the depth image of occluders does not hide.
@@ -196,9 +206,7 @@ impl Culler {
         targets: &Targets,
     ) -> Result<(), Failure> {
         self.record_resolve(encoder);
-        self.record_cull(encoder, camera, self.image(targets))?;
-        self.record_lists(encoder, &self.kept);
-        Ok(())
+        self.record_cull(encoder, camera, self.image(targets))
     }
 
     /// Lists what the frame before has kept.
@@ -275,7 +283,7 @@ impl Culler {
 
     /// What a frame of one pass draws.
     pub(crate) fn kept(&self) -> DrawList<'_> {
-        self.draw_list(&self.kept)
+        of_visible(&self.visible)
     }
 
     /// What the first of two passes draws.
@@ -298,6 +306,29 @@ impl Culler {
     pub(crate) fn pyramid(&self) -> &Pyramid {
         &self.pyramid
     }
+}
+
+/// The list that a cull has left, with its draws.
+fn of_visible(visible: &Visible) -> DrawList<'_> {
+    DrawList {
+        list: visible.list(0).expect("indices were asked for"),
+        arguments: visible.draw_arguments().expect("draws were asked for"),
+        max_draws: visible.max_draws(),
+    }
+}
+
+/// What each LOD of each kind draws, and how far it is from the finest.
+fn mesh_table(hiz: &HizContext, scene: &Scene, on_device: &OnDevice) -> Result<MeshTable, Failure> {
+    let lods: Vec<Vec<Lod>> = scene
+        .kinds
+        .iter()
+        .zip(&on_device.draws)
+        .map(|(kind, draws)| {
+            kind.lods.iter().zip(draws).map(|(lod, draw)| Lod::new(*draw, lod.error)).collect()
+        })
+        .collect();
+    let meshes: Vec<_> = lods.iter().map(|lods| MeshLods::new(lods)).collect();
+    Ok(hiz.create_mesh_table(&meshes)?)
 }
 
 /// A depth image of nothing: reversed Z, so 0 is far.

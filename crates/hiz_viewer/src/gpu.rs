@@ -97,10 +97,6 @@ impl Gpu {
         format!("{name} ({driver} {driver_info})")
     }
 
-    pub(crate) fn has(&self, feature: wgpu::Features) -> bool {
-        self.device.features().contains(feature)
-    }
-
     pub(crate) fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
         self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) })
     }

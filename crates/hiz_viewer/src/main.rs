@@ -8,7 +8,8 @@
 //! 1. `args` reads the command line, and `controls` has the keys.
 //! 2. `scene` describes meshes, bodies and a camera's path; `scene_on_device` uploads them.
 //! 3. `culler` calls the library: everything that is about culling.
-//! 4. `renderer` records a frame with `pipelines` into `targets`; `overlay` and `font` draw over it.
+//! 4. `renderer` records a frame with `pipelines` into `targets`.
+//!    `overlay` and `font` draw over it.
 //! 5. `picture` reads and compares; `headless`, `window` and `bench` are the three tasks.
 //!    `queries` is what `bench` compares with.
 

@@ -13,7 +13,6 @@ pub(crate) struct Targets {
     pub(crate) samples: u32,
     /// With several samples; `None`: the picture is drawn directly.
     colour: Option<wgpu::TextureView>,
-    pub(crate) depth_texture: wgpu::Texture,
     pub(crate) depth: wgpu::TextureView,
     pub(crate) picture_texture: wgpu::Texture,
     pub(crate) picture: wgpu::TextureView,
@@ -41,7 +40,6 @@ impl Targets {
             samples,
             colour,
             depth: view(&depth_texture),
-            depth_texture,
             picture: view(&picture_texture),
             picture_texture,
         }

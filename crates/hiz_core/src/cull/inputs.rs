@@ -7,8 +7,8 @@ use crate::cull::among::Among;
 use crate::cull::groups::group_descent;
 use crate::cull::options::{Coverage, CullOptions, Fit};
 use crate::cull::pipelines::{CullKey, DepthStore};
-use crate::cull::view_uniform::ViewUniform;
-use crate::error::Result;
+use crate::cull::view_uniform::{ViewUniform, packed};
+use crate::error::{Error, Result};
 use crate::gpu::buffers::entry;
 use crate::gpu::device::Gpu;
 use crate::gpu::numbers::Numbers;
@@ -54,6 +54,20 @@ pub(super) fn check_contexts(gpu: &Gpu, inputs: &CullInputs<'_>) -> Result<()> {
     gpu.check_context("pyramid", inputs.pyramid.context)
 }
 
+/// Refuses sample coverage where a pixel's depth belongs to several samples.
+fn check_coverage(built: &Built, options: &CullOptions) -> Result<()> {
+    if options.coverage == Coverage::Sample && built.part.samples > 1 {
+        return Err(Error::invalid(
+            "coverage",
+            format!(
+                "expected Coverage::Area for a pyramid of the farthest of {} samples per pixel,                  which lie beside the pixels' centres, got Coverage::Sample",
+                built.part.samples
+            ),
+        ));
+    }
+    Ok(())
+}
+
 /// What the shaders know of camera and pyramid, and the key of the pipelines that read it.
 #[derive(Debug)]
 pub(super) struct PreparedView {
@@ -97,7 +111,11 @@ impl PreparedView {
             None => pyramid.built_for(camera)?,
         };
         // Bad options are refused before anything is recorded.
-        let view = ViewUniform::new(camera, built.reduction, options, built.tolerance)?;
+        let view = ViewUniform {
+            source_origin: packed(built.part.origin),
+            ..ViewUniform::new(camera, built.reduction, options, built.part.tolerance)?
+        };
+        check_coverage(&built, options)?;
         Pyramid::check_source(gpu, &built)?;
         let atlas = match encoder.filter(|_| pyramid.wants_atlas(gpu, &built, instances.len())) {
             Some(encoder) => pyramid.record_atlas(gpu, encoder, &built)?,
@@ -107,7 +125,7 @@ impl PreparedView {
             store: if atlas.is_some() {
                 DepthStore::Atlas
             } else {
-                DepthStore::Apart(built.source_kind)
+                DepthStore::Apart(built.part.kind)
             },
             kind: instances.kind,
             reversed: camera.convention().is_reversed(),

@@ -211,8 +211,8 @@ impl LodNumbers {
             LodRule::Distance { .. } if camera.is_orthographic() => {
                 return Err(Error::invalid(
                     "lod",
-                    "expected LodRule::Error or LodRule::Size for an orthographic camera, whose \
-                     view shows nothing smaller from farther away, got LodRule::Distance",
+                    "expected a rule by error or by size for an orthographic camera, which shows \
+                     nothing smaller from farther away, got one by distance",
                 ));
             }
             LodRule::Distance { thresholds } => {
@@ -300,7 +300,7 @@ mod tests {
         .unwrap();
         let rule = LodRule::Distance { thresholds: vec![1.0] };
         let text = LodNumbers::new(&camera, &rule).unwrap_err().to_string();
-        assert!(text.starts_with("lod: expected LodRule::Error or LodRule::Size"), "{text}");
+        assert!(text.starts_with("lod: expected a rule by error or by size"), "{text}");
         for rule in [LodRule::Error { pixels: 1.0 }, LodRule::Size { pixels: vec![1.0] }] {
             assert!(LodNumbers::new(&camera, &rule).is_ok());
         }

@@ -52,6 +52,22 @@ pub(crate) enum EmitKey {
 pub(crate) struct BinKey {
     /// Whether the instances have mesh ids or scales.
     pub(crate) sorted: bool,
+    /// The code of the rule that chooses LODs; `None` where LOD 0 is the only one that it can
+    /// choose.
+    pub(crate) lod_rule: Option<u32>,
+}
+
+impl BinKey {
+    fn files(self) -> [File; 3] {
+        let lod =
+            if self.lod_rule.is_some() { wgsl!("cull/lod") } else { wgsl!("cull/lod_finest") };
+        [wgsl!("output/mesh_table"), wgsl!("output/bin"), lod]
+    }
+
+    fn constants(self) -> impl Iterator<Item = (&'static str, f64)> {
+        let rule = self.lod_rule.map(|code| ("LOD_RULE", f64::from(code)));
+        [("SORTED", flag(self.sorted))].into_iter().chain(rule)
+    }
 }
 
 impl EmitKey {
@@ -60,12 +76,13 @@ impl EmitKey {
 
     /// The shader files that emit.
     pub(crate) fn files(self) -> Vec<File> {
-        let bins = [wgsl!("output/mesh_table"), wgsl!("output/bin"), wgsl!("cull/lod_finest")];
         match self {
             Self::List { .. } => vec![wgsl!("output/report_list")],
-            Self::Planes { .. } => [&bins[..], &[wgsl!("output/report_planes")]].concat(),
-            Self::Append { .. } => {
-                [&bins[..], &[wgsl!("output/emit"), wgsl!("output/report_bins")]].concat()
+            Self::Planes { bins, .. } => {
+                [&bins.files()[..], &[wgsl!("output/report_planes")]].concat()
+            }
+            Self::Append { bins, .. } => {
+                [&bins.files()[..], &[wgsl!("output/emit"), wgsl!("output/report_bins")]].concat()
             }
         }
     }
@@ -76,14 +93,16 @@ impl EmitKey {
                 vec![("APPEND", flag(append)), ("LIST", flag(list)), ("CAPPED", flag(capped))]
             }
             Self::Planes { by_index, bins } => {
-                vec![("BY_INDEX", flag(by_index)), ("SORTED", flag(bins.sorted))]
+                bins.constants().chain([("BY_INDEX", flag(by_index))]).collect()
             }
-            Self::Append { list, capped, record_words, bins } => vec![
-                ("LIST", flag(list)),
-                ("CAPPED", flag(capped)),
-                ("RECORD_WORDS", f64::from(record_words)),
-                ("SORTED", flag(bins.sorted)),
-            ],
+            Self::Append { list, capped, record_words, bins } => bins
+                .constants()
+                .chain([
+                    ("LIST", flag(list)),
+                    ("CAPPED", flag(capped)),
+                    ("RECORD_WORDS", f64::from(record_words)),
+                ])
+                .collect(),
         }
     }
 
@@ -159,9 +178,9 @@ impl DepthStore {
     pub(crate) fn code(self) -> u32 {
         match self {
             Self::Apart(source) => source as u32,
-            Self::Atlas => 3,
+            Self::Atlas => 5,
             #[cfg(feature = "headless")]
-            Self::Nowhere => 4,
+            Self::Nowhere => 6,
         }
     }
 

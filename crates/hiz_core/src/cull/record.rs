@@ -3,6 +3,7 @@
 use crate::cull::among::Among;
 use crate::cull::groups::{GROUPS_OF_RUN, GroupCull, NO_STATISTICS, is_grouped};
 use crate::cull::inputs::{CullInputs, PreparedView, check_contexts};
+use crate::cull::lod::LodRule;
 use crate::cull::options::{CullOptions, Order};
 use crate::cull::pipelines::{
     BINNED_BINDINGS, BinKey, CullKey, EmitKey, ReportKey, VISIBLE_BINDINGS, cull_pipeline,
@@ -253,7 +254,11 @@ fn report_key(
                  to the mesh ids of their instances",
             ));
         }
-        let of_bins = BinKey { sorted: instances.pieces.iter().any(|p| p.slots.is_some()) };
+        let has_lods = bins.meshes.most_lods() > 1 && options.lod != LodRule::Finest;
+        let of_bins = BinKey {
+            sorted: instances.pieces.iter().any(|p| p.slots.is_some()),
+            lod_rule: has_lods.then(|| options.lod.code()),
+        };
         match (any_order, bins.can_append()) {
             (false, _) => EmitKey::Planes {
                 by_index: bins.arrangement == Arrangement::Instances,

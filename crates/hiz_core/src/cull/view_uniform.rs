@@ -34,9 +34,20 @@ pub(crate) struct ViewUniform {
     pub(crate) coordinate_limit: f32,
     pub(crate) lod_end: u32,
     pub(crate) lod_needs: [f32; MAX_LODS],
+    pub(crate) source_origin: u32,
+    pub(crate) padding_0: u32,
+    pub(crate) padding_1: [u32; 2],
 }
 
-const _: () = assert!(size_of::<ViewUniform>() == 208);
+const _: () = assert!(size_of::<ViewUniform>() == 224);
+
+/// Bits of a column in `source_origin`; twin: `shaders/cull/view.wgsl`, `COORDINATE_BITS`.
+pub(crate) const COORDINATE_BITS: u32 = 16;
+
+/// Column and row of a pixel in one word; images have at most 2^15 pixels a side.
+pub(crate) fn packed([column, row]: [u32; 2]) -> u32 {
+    column | row << COORDINATE_BITS
+}
 
 impl ViewUniform {
     #[expect(
@@ -133,6 +144,9 @@ impl ViewUniform {
             coordinate_limit: rows.coordinate_limit,
             lod_end,
             lod_needs,
+            source_origin: 0,
+            padding_0: 0,
+            padding_1: [0; 2],
         })
     }
 }

@@ -11,6 +11,8 @@ use crate::host::threads::Locked;
 pub(crate) enum Binding {
     /// A depth image.
     Depth(SourceKind),
+    /// A multisampled depth image.
+    Samples(SourceKind),
     /// The sampler for a depth image.
     Sampler,
     Uniform,
@@ -73,7 +75,8 @@ fn layout_entry(binding: u32, kind: Binding) -> wgpu::BindGroupLayoutEntry {
             wgpu::ShaderStages::COMPUTE
         },
         ty: match kind {
-            Binding::Depth(source) => source.binding(),
+            Binding::Depth(source) => source.binding(false),
+            Binding::Samples(source) => source.binding(true),
             Binding::Sampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering),
             Binding::Uniform | Binding::VertexUniform => buffer(wgpu::BufferBindingType::Uniform),
             Binding::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }),

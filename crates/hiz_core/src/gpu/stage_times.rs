@@ -212,8 +212,8 @@ impl StageTimer {
 /// What a stage took.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StageTime {
-    /// `"raster"`, `"reduce"`, `"cull groups"`, `"cull members"`, `"cull"` (without groups),
-    /// `"list"`, `"join"` (of views), `"among"`, `"update"`, `"refine"` or `"count"`.
+    /// `"raster"`, `"resolve"` (of samples), `"reduce"`, `"cull groups"`, `"cull members"`, `"cull"`
+    /// (without groups), `"list"`, `"join"` (of views), `"among"`, `"update"` or `"refine"`.
     pub stage: &'static str,
     /// How many passes it had.
     pub passes: u32,

@@ -48,11 +48,11 @@ impl Engine {
     }
 
     fn submit_reduce(&self, depth: &DepthImage, pyramid: &Pyramid) -> Result<()> {
+        let _in_order = pyramid.submitting.lock();
         let mut encoder = self.encoder("hiz.reduce.encoder");
-        let DepthImage { view, camera, tolerance, .. } = depth;
         let gpu = &self.context().gpu;
         self.timed(&mut encoder, |encoder| {
-            record_reduce(gpu, encoder, view, camera, pyramid, *tolerance)
+            record_reduce(gpu, encoder, &depth.source(), &depth.camera, pyramid)
         })?;
         if let Some(drawn) = &depth.drawn {
             pyramid.keep_with_it(Arc::clone(drawn) as Arc<dyn Owner>);
@@ -92,7 +92,8 @@ impl Engine {
             )
         })?;
         if level == 0 {
-            let format = built.source.texture().format();
+            let part = &built.part;
+            let format = part.subresource.texture.format();
             if !atlas::travels(format) {
                 return Err(Error::invalid(
                     "level",
@@ -102,9 +103,17 @@ impl Engine {
                     ),
                 ));
             }
-            let row = 4 * u64::from(layout.width);
+            let [x, y] = part.origin.map(u64::from);
+            let crop = readback::Crop {
+                skip: 4 * x,
+                row: 4 * u64::from(layout.width),
+                first: y,
+                rows: u64::from(layout.height),
+            };
+            let of = &part.subresource;
             let bytes = self.scoped(|| {
-                readback::read_texture(self.device(), self.queue(), built.source.texture(), row)
+                let copied = (of.as_image_copy(), of.texels());
+                readback::read_texels(self.device(), self.queue(), copied, &crop)
             })?;
             let convention = built.camera.convention();
             return memory::collected(

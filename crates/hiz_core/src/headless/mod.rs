@@ -5,7 +5,8 @@
 //!
 //! 1. `adapter` lists the adapters, and `engine` opens a device on one.
 //! 2. `uploads` brings instances, updates and occluders to it, and `depth_image` depth images.
-//! 3. `levels` builds pyramids and reads their levels.
+//!    `samples` takes the farthest of several samples per pixel.
+//! 3. `levels` builds pyramids and reads their levels; `renewal` renews a part of one.
 //! 4. `cull` submits a cull into buffers of `answers`; `culling` reads them, through `counts`,
 //!    `explanation`, `ranges` and `readback`.
 //!    With `ahead`, `in_flight` and `slots` the answer comes while the caller does something else.
@@ -67,6 +68,8 @@ mod levels;
 mod process;
 mod ranges;
 pub(crate) mod readback;
+mod renewal;
+mod samples;
 mod single;
 mod slots;
 mod timing;

@@ -11,6 +11,7 @@ use crate::gpu::copies::{BufferRange, Copies, StagingPool};
 use crate::gpu::device::{ContextId, Gpu};
 use crate::host::memory;
 use crate::output::draw::DrawIndexedIndirect;
+use crate::output::emit::Emit;
 use crate::output::outputs::Outputs;
 use crate::output::visible::Visible;
 
@@ -207,6 +208,13 @@ pub(crate) fn record_readback(
 ) -> Result<AnswerInFlight> {
     gpu.check_context("visible", visible.context)?;
     gpu.check_context("ring", ring.context)?;
+    if visible.outputs().emit != Emit::List && visible.draw_arguments().is_some() {
+        return Err(Error::invalid(
+            "visible",
+            "expected outputs with Emit::List, or with a mask alone: bins and copied records are \
+             for the device's draws",
+        ));
+    }
     let slot = Slot::take(ring)?;
     let pieces = 0..visible.num_pieces();
     let masks: Vec<_> = pieces.clone().filter_map(|p| visible.mask(p)).cloned().collect();

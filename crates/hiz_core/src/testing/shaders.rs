@@ -9,6 +9,7 @@ use crate::cull::pipelines::{
 use crate::cull::refine::{refine_groups_module, refine_module};
 use crate::gpu::clock_check::clock_check_module;
 use crate::gpu::depth_source::SOURCES;
+use crate::gpu::depth_source::SourceKind;
 use crate::gpu::shader::{FILES, Source};
 use crate::input::bounds::BoundsKind;
 use crate::instances::from_buffer::{FROM_BUFFER_KINDS, from_buffer_module};
@@ -18,6 +19,7 @@ use crate::output::compact::{compact_module, copy_module};
 use crate::output::emit_passes;
 use crate::output::views::join_module;
 use crate::pyramid::reduce::{blocks_module, coarse_module};
+use crate::pyramid::resolve::resolve_module;
 use crate::testing::lod::choose_lods_module;
 #[cfg(feature = "yardstick")]
 use crate::yardstick::{uncertified_module, yardstick_modules};
@@ -27,19 +29,16 @@ pub(super) const KINDS: [BoundsKind; 3] =
     [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
 
 /// Every way to emit the kept instances, each with a shader of its own.
-pub(super) const EMITS: [(&str, EmitKey); 3] = [
+pub(super) const EMITS: [(&str, EmitKey); 5] = [
     ("list", EmitKey::NO_LIST),
-    ("planes", EmitKey::Planes { by_index: false, bins: BinKey { sorted: true } }),
-    (
-        "bins",
-        EmitKey::Append {
-            list: true,
-            capped: true,
-            record_words: 5,
-            bins: BinKey { sorted: true },
-        },
-    ),
+    ("planes", EmitKey::Planes { by_index: false, bins: ONE_LOD }),
+    ("planes of LODs", EmitKey::Planes { by_index: false, bins: LODS }),
+    ("bins", EmitKey::Append { list: true, capped: true, record_words: 5, bins: ONE_LOD }),
+    ("bins of LODs", EmitKey::Append { list: true, capped: true, record_words: 5, bins: LODS }),
 ];
+
+const ONE_LOD: BinKey = BinKey { sorted: true, lod_rule: None };
+const LODS: BinKey = BinKey { sorted: true, lod_rule: Some(1) };
 
 /// Path below `shaders/`, without its extension, and text of every file.
 pub fn files() -> Vec<(&'static str, &'static str)> {
@@ -67,12 +66,21 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("clock_check".to_owned(), clock_check_module()),
         ("update".to_owned(), update_module()),
         ("occluders".to_owned(), occluders_module()),
+        ("resolve Depth".to_owned(), resolve_module(SourceKind::Depth)),
+        ("resolve Float".to_owned(), resolve_module(SourceKind::Float)),
     ];
     for source in SOURCES {
         all.push((format!("reduce {source:?}"), blocks_module(source)));
         all.push((format!("reduce_coarse {source:?}"), coarse_module(source)));
+        // Yardsticks read whole images alone.
         #[cfg(feature = "yardstick")]
-        all.extend(yardstick_modules(source).map(|(name, m)| (format!("{name} {source:?}"), m)));
+        all.extend(
+            (!source.is_part())
+                .then(|| yardstick_modules(source))
+                .into_iter()
+                .flatten()
+                .map(|(name, m)| (format!("{name} {source:?}"), m)),
+        );
     }
     let stores = SOURCES.map(DepthStore::Apart).into_iter().chain([DepthStore::Atlas]);
     for store in stores {
@@ -99,7 +107,6 @@ pub(super) fn all() -> Vec<(String, Source)> {
 #[cfg(test)]
 pub(in crate::testing) mod tests {
     use super::*;
-    use crate::gpu::depth_source::SourceKind;
     use naga::valid::{Capabilities, ValidationFlags, Validator};
 
     pub(in crate::testing) fn parse(source: &str) -> naga::Module {

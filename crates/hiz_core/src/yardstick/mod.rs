@@ -1,6 +1,7 @@
 //! Yardsticks: reference work that the library is measured against.
 //!
 //! - `reduce` builds a pyramid with one dispatch per level.
+//! - `multisampled` resolves multisampled depth.
 //! - `cull` culls without certificates.
 //! - `raster` draws occluders on the host, without what comes before and after.
 //! - `from_buffer` copies the bounds that the library takes from a buffer.
@@ -11,6 +12,7 @@
 mod cull;
 mod frames;
 mod from_buffer;
+mod multisampled;
 mod raster;
 pub(crate) mod reduce;
 
@@ -21,10 +23,11 @@ pub(crate) use cull::uncertified_module;
 pub use cull::{read_mask, record_uncertified_cull};
 pub use frames::{FrameTimes, frames};
 pub use from_buffer::BoundsInBuffer;
+pub use multisampled::MultisampledDepth;
 pub use raster::HostRaster;
 #[cfg(feature = "testing")]
 pub(crate) use reduce::yardstick_modules;
-pub use reduce::{PerLevelReduction, ReductionShape, reduce};
+pub use reduce::{PerLevelReduction, ReductionShape, reduce, reduce_region};
 
 use crate::error::Result;
 use crate::headless::{Engine, readback};

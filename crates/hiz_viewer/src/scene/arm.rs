@@ -4,18 +4,22 @@
 //! source code.
 //! Spheres have 24, 20, 16 and 12 points on each circle, by view depth.
 
+use hiz_core::{DepthConvention, LodRule};
+
 use crate::mesh::Mesh;
 use crate::scene::random::Random;
-use crate::scene::{Body, Kind, Leg, MAX_LODS, Rule, Scene, Volumes, by_kind};
+use crate::scene::{Body, Kind, Leg, Scene, Volumes, by_kind};
 
 const PRISM: u32 = 0;
 const BALL: u32 = 1;
 const GROUND: u32 = 2;
 
 /// Points on a circle of each LOD.
-const POINTS: [u32; MAX_LODS] = [24, 20, 16, 12];
-/// View depths at which the LOD changes: ARM's 0.8, 0.9 and 0.95 of the depth range, in metres.
-const DEPTHS: [f64; MAX_LODS - 1] = [4.96, 9.82, 19.27];
+const POINTS: [u32; 4] = [24, 20, 16, 12];
+/// NDC depths at which the LOD changes, with ARM's standard Z.
+const DEPTHS: [f64; POINTS.len() - 1] = [0.8, 0.9, 0.95];
+const NEAR: f64 = 1.0;
+const FAR: Option<f64> = Some(500.0);
 
 /// The scene.
 pub(crate) fn scene() -> Scene {
@@ -51,6 +55,8 @@ pub(crate) fn scene() -> Scene {
     }
     let bodies = by_kind(bodies);
     let volumes = spheres(&bodies);
+    let rule = LodRule::at_ndc_depths(&DEPTHS, NEAR, FAR, DepthConvention::Standard)
+        .expect("the depths ascend");
     let leg = |eyes, targets| Leg { eyes, targets };
     Scene {
         name: "arm",
@@ -58,16 +64,18 @@ pub(crate) fn scene() -> Scene {
         bodies,
         volumes,
         proxy: None,
-        rule: Rule::Depths(DEPTHS.into()),
+        rule,
         legs: vec![
             // ARM's eye, turning.
             leg([[0.0, 2.0, 0.0]; 2], [[0.0, 1.4, -8.0], [7.0, 1.4, -4.0]]),
-            leg([[-10.4, 1.5, 1.6], [-6.2, 1.5, 1.5]], [[0.0, 1.2, 1.2], [4.0, 1.2, 1.4]]),
-            leg([[16.0, 5.0, 17.0], [12.0, 4.0, 15.0]], [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]),
+            // Along a corridor between prisms.
+            leg([[1.5, 1.7, 15.0], [1.5, 1.6, 11.0]], [[1.5, 1.5, 0.0], [3.0, 1.5, 0.0]]),
+            // From a corner, over the prisms.
+            leg([[24.0, 12.0, 24.0], [22.0, 11.0, 24.0]], [[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]]),
         ],
         fov_y: std::f64::consts::FRAC_PI_3,
-        near: 1.0,
-        far: Some(500.0),
+        near: NEAR,
+        far: FAR,
         speed: 4.0,
     }
 }

@@ -5,12 +5,12 @@
 
 use std::path::PathBuf;
 
-use hiz_core::Vec3;
+use hiz_core::{LodRule, Vec3};
 
 use crate::Failure;
 use crate::mesh::{Mesh, cross, sub, unit};
 use crate::scene::npy;
-use crate::scene::{Body, Kind, Leg, Rule, Scene, boxes};
+use crate::scene::{Body, Kind, Leg, Scene, boxes};
 
 /// The folder with the castle's arrays.
 pub(crate) const FOLDER: &str = "HIZVK_CASTLE_FOLDER";
@@ -58,7 +58,7 @@ pub(crate) fn scene() -> Result<Scene, Failure> {
         bodies,
         volumes,
         proxy: Some(proxy),
-        rule: Rule::Pixels(1.0),
+        rule: LodRule::Error { pixels: 1.0 },
         legs,
         fov_y: fov_y[0],
         near: 0.1,

@@ -1,10 +1,10 @@
 //! A city from a seed: buildings hide cars, lamps, people and trees, and one another.
 
-use hiz_core::Vec3;
+use hiz_core::{LodRule, Vec3};
 
 use crate::mesh::Mesh;
 use crate::scene::random::Random;
-use crate::scene::{Body, Kind, Leg, Rule, Scene, boxes, by_kind};
+use crate::scene::{Body, Kind, Leg, Scene, boxes, by_kind};
 
 /// Blocks per side, metres from street to street, and the width of a street.
 const BLOCKS: usize = 10;
@@ -50,7 +50,7 @@ pub(crate) fn scene() -> Scene {
         bodies,
         volumes,
         proxy: None,
-        rule: Rule::Pixels(1.0),
+        rule: LodRule::Error { pixels: 1.0 },
         legs: vec![
             leg(
                 [[street(2.0), EYE, 60.0], [street(2.0) + 2.0, EYE, 110.0]],

@@ -10,13 +10,10 @@ pub(crate) mod mountains;
 mod npy;
 mod random;
 
-use hiz_core::{Camera, DepthConvention, ImageSize, Pose, Projection, Vec3};
+use hiz_core::{Camera, DepthConvention, ImageSize, LodRule, Pose, Projection, Vec3};
 
 use crate::Failure;
 use crate::mesh::Mesh;
-
-/// The most LODs of a kind.
-pub(crate) const MAX_LODS: usize = 4;
 
 /// One of the meshes that can be drawn for a body.
 #[derive(Debug)]
@@ -109,15 +106,6 @@ pub(crate) enum Volumes {
     Spheres { centers: Vec<f64>, radii: Vec<f64> },
 }
 
-/// How a LOD is chosen.
-#[derive(Debug, Clone)]
-pub(crate) enum Rule {
-    /// The coarsest whose error stays below so many pixels.
-    Pixels(f64),
-    /// One coarser from each of these view depths on.
-    Depths(Vec<f64>),
-}
-
 /// A piece of a path: the camera moves from one pose to another.
 /// Between two legs it jumps.
 #[derive(Debug, Clone, Copy)]
@@ -137,7 +125,8 @@ pub(crate) struct Scene {
     /// Triangles that hide, and are never seen: they lie inside of what is drawn.
     /// A cull of one pass reads them in place of the bodies that are occluders.
     pub(crate) proxy: Option<Mesh>,
-    pub(crate) rule: Rule,
+    /// How a LOD is chosen.
+    pub(crate) rule: LodRule,
     pub(crate) legs: Vec<Leg>,
     /// Vertical, in radians.
     pub(crate) fov_y: f64,

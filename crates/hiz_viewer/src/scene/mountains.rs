@@ -4,11 +4,11 @@
 //! Each patch is an occluder and an instance at once, so what lies behind a ridge is not drawn.
 //! After Rakos, Hierarchical-Z map based occlusion culling (2010), whose demo is called Mountains.
 
-use hiz_core::Vec3;
+use hiz_core::{LodRule, Vec3};
 
 use crate::mesh::{Mesh, unit};
 use crate::scene::random::{Random, noise};
-use crate::scene::{Body, Kind, Leg, Rule, Scene, boxes, by_kind};
+use crate::scene::{Body, Kind, Leg, Scene, boxes, by_kind};
 
 /// Patches per side, quads per side of a patch, and metres per quad.
 const PATCHES: usize = 20;
@@ -16,7 +16,7 @@ const QUADS: usize = 16;
 const STEP: f64 = 12.0;
 /// Half of the terrain's side in metres.
 const HALF: f64 = PATCHES as f64 * QUADS as f64 * STEP / 2.0;
-const TREES: usize = 9000;
+const TREES: usize = 12_000;
 /// Kinds of trees behind the kinds of the patches: a conifer and a broad one.
 const CONIFER: u32 = (PATCHES * PATCHES) as u32;
 const BROAD: u32 = CONIFER + 1;
@@ -45,7 +45,7 @@ pub(crate) fn scene() -> Scene {
         bodies,
         volumes,
         proxy: None,
-        rule: Rule::Pixels(1.0),
+        rule: LodRule::Error { pixels: 1.0 },
         legs: legs(),
         fov_y: 0.85,
         near: 0.5,
@@ -193,8 +193,8 @@ fn legs() -> Vec<Leg> {
         Leg { eyes, targets: [ahead(eyes[0], 0.0), ahead(eyes[1], turn)] }
     };
     vec![
-        flight([-900.0, 45.0, -700.0], [-600.0, 40.0, -560.0], [25.0, 0.4]),
         flight([700.0, 30.0, 900.0], [480.0, 40.0, 640.0], [5.0, -0.3]),
         flight([-200.0, 120.0, 1200.0], [-120.0, 110.0, 900.0], [60.0, 0.2]),
+        flight([-900.0, 45.0, -700.0], [-600.0, 40.0, -560.0], [25.0, 0.4]),
     ]
 }

@@ -11,6 +11,7 @@ use crate::cull::lod::LodRule;
 use crate::cull::pipelines::{CullKey, DepthStore, ReportKey};
 use crate::cull::pipelines::{classify_constants, cull_module, report_constants};
 use crate::cull::refine;
+use crate::cull::view_uniform::COORDINATE_BITS;
 use crate::gpu::clock_check;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::shader::FILES;
@@ -35,6 +36,7 @@ use crate::output::visible::VERDICT_MULTIPLE;
 use crate::pyramid::layout::{BLOCK_ALIGNMENT, BLOCK_LOG2, HEADERS, PIXELS};
 use crate::pyramid::levels::MAX_LEVELS;
 use crate::pyramid::reduce::{REDUCE_WORKGROUP, SHARED_LEVEL, TALL_SIDE};
+use crate::pyramid::resolve;
 use crate::testing::lod;
 use crate::testing::shaders::tests::parse;
 use crate::testing::shaders::{EMITS, KINDS, all, files};
@@ -79,6 +81,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/refine", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/refine_groups", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/supporting_planes", "LARGEST_BITS", bits(LARGEST)),
+        ("cull/view", "COORDINATE_BITS", int(COORDINATE_BITS)),
+        ("cull/view", "COORDINATE_MASK", int((1 << COORDINATE_BITS) - 1)),
         ("gpu/clock_check", "WORKGROUP", int(clock_check::WORKGROUP)),
         ("gpu/depth_bits", "ONE_BITS", bits(1.0)),
         ("gpu/depth_bits", "LEAST_NORMAL_BITS", bits(f32::MIN_POSITIVE)),
@@ -137,6 +141,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("pyramid/pyramid_write", "SIDE_LOG2", int(TALL_SIDE.ilog2())),
         ("pyramid/pyramid_write", "SIDE", int(TALL_SIDE)),
         ("pyramid/pyramid_write", "SIDE_MASK", int(TALL_SIDE - 1)),
+        ("pyramid/resolve", "WORKGROUP", int(resolve::WORKGROUP)),
         ("pyramid/texels", "LEAST_NORMAL", float(f32::MIN_POSITIVE)),
         ("pyramid/texels_atlas", "HEADERS", int(HEADERS)),
         ("testing/choose_lods", "LANES", int(lod::LANES)),
@@ -360,6 +365,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("refine_groups", line(refine::WORKGROUP)),
         ("replace_groups", line(update::WORKGROUP)),
         ("replace_records", line(update::WORKGROUP)),
+        ("resolve", line(resolve::WORKGROUP)),
         // One workgroup, the largest that WebGPU promises.
         ("scan", line(wgpu::Limits::default().max_compute_invocations_per_workgroup)),
         ("scatter", line(SCATTER_WORKGROUP)),

@@ -20,6 +20,7 @@ use crate::output::views::JoinUniform;
 use crate::pyramid::PyramidUniform;
 use crate::pyramid::layout::PYRAMID_CHUNKS;
 use crate::pyramid::levels::Level;
+use crate::pyramid::resolve::{BandUniform, ResolvedUniform};
 use crate::pyramid::steps::StepUniform;
 use crate::testing::lod::LodCase;
 use crate::testing::shaders::tests::parse;
@@ -118,12 +119,16 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "levels" = levels, "origins" = origins, "chunk_shift" = chunk_shift,
             "first_stored" = first_stored, "last_stored" = last_stored, "padding" = padding,
         }),
+        twin!("ResolvedImage", ResolvedUniform { "origin" = origin, "size" = size }),
+        twin!("Band", BandUniform {
+            "first" = first, "rows" = rows, "stride" = stride, "nearest" = nearest,
+        }),
         twin!("Statistics", StatisticsRecord {
             "levels" = levels, "texels_low" = texels_low, "texels_high" = texels_high,
         }),
         twin!("Step", StepUniform {
-            "source" = source, "last" = last, "reduction" = reduction, "padding" = padding,
-            "blocks" = blocks, "padding_1" = padding_1,
+            "source" = source, "last" = last, "end" = end, "begin" = begin, "origin" = origin,
+            "reduction" = reduction, "base" = base, "padding" = padding,
         }),
         twin!("Survivors", SurvivorsRecord {
             "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
@@ -145,6 +150,7 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "descent_budget" = descent_budget, "depth_offset" = depth_offset,
             "coordinate_limit" = coordinate_limit, "lod_end" = lod_end,
             "lod_needs" = lod_needs,
+            "source_origin" = source_origin, "padding_0" = padding_0, "padding_1" = padding_1,
         }),
         twin!("YardstickLevel", yardstick::PlainLevel {
             "offset" = offset, "stride" = stride, "width" = width, "height" = height,
