@@ -90,11 +90,11 @@ class StageTimes:
         """A table: a stage a line, then what the clock on the wall says."""
 
         def told(ms: float | None) -> str:
-            return "no clock" if ms is None else f"{ms:8.3f}"
+            return "   no clock" if ms is None else f"{ms:8.3f} ms"
 
-        lines = [f"{one.stage:14}{one.passes:4} x{told(one.gpu_ms)} ms" for one in self._stages]
-        lines.append(f"{'all on device':20}{told(self.gpu_ms)} ms")
-        lines.append(f"{'on the wall':20}{told(self._wall_ms)} ms")
+        lines = [f"{one.stage:14}{one.passes:4} x {told(one.gpu_ms)}" for one in self._stages]
+        lines.append(f"{'all on device':21}{told(self.gpu_ms)}")
+        lines.append(f"{'on the wall':21}{told(self._wall_ms)}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
