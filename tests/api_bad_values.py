@@ -1112,6 +1112,7 @@ TABLES: dict[str, Table] = {
             ],
         },
     ),
+    "Device.timed": Table(lambda device: (device.timed, {}), {}),
     "Device.wait": Table(lambda device: (device.wait, {}), {}),
     "DepthImage.numpy": Table(lambda device: (device.wait, {}), {}),
     "Pyramid.level": Table(
@@ -1342,7 +1343,7 @@ MADE_BY_THE_PACKAGE = {
     "Instances",
 }
 MADE_BY_THE_PACKAGE |= {"BoundsCheck", "Occluders", "ProxyCheck", "Pyramid", "Recommendation"}
-MADE_BY_THE_PACKAGE |= {"ViewsResult"}
+MADE_BY_THE_PACKAGE |= {"StageTime", "StageTimes", "ViewsResult"}
 MADE_BY_THE_PACKAGE |= {"InnerBoxes", "InnerPrisms", "OccluderSelection", "SplitMesh"}
 
 

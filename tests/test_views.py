@@ -4,6 +4,7 @@ import asyncio
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -292,3 +293,74 @@ def test_what_does_not_belong_together_is_refused(device: hizvk.Device) -> None:
     others, its = eyes(other)
     with pytest.raises(ValueError, match=r"pyramid\[0\]: expected Pyramid of this device"):
         device.cull(instances, others, its)
+
+
+# -- times of the stages ---------------------------------------------------------------------------
+
+
+def a_frame(device: hizvk.Device, rasteriser: Any = "device") -> hizvk.CullResult:
+    """Raster, reduction, update, and a cull in groups with a list."""
+    camera = view((90, 160))
+    corners = np.array([[-9, -9, -8], [0, -9, -8], [0, 9, -8], [-9, 9, -8]], float)
+    walls = device.occluders(corners, np.array([[0, 1, 2], [0, 2, 3]]))
+    instances = device.instances(crowd(20_000)[0])
+    instances.update(0, hizvk.Spheres(np.zeros((5, 3)), 0.01))
+    pyramid = device.pyramid(device.render_depth(walls, camera, rasteriser=rasteriser))
+    seen = device.cull(
+        instances, camera, pyramid, outputs=["mask", "verdicts", "indices"], hierarchy=True
+    )
+    return seen.result()
+
+
+def test_stages_are_named_and_timed_if_the_clock_can_be_trusted() -> None:
+    """Behind a render pass: Mesa 22.3's software driver has no trustworthy timestamps there."""
+    device = hizvk.Device()
+    a_frame(device)  # compiles
+    with device.timed() as times:
+        seen = a_frame(device)
+    names = [one.stage for one in times.stages]
+    assert names == ["update", "raster", "reduce", "cull groups", "cull members", "list"]
+    assert [one.stage for one in seen.stats.stages] == names[3:]
+    assert times.wall_ms > 0.0
+    assert seen.stats.wall_ms > 0.0
+    told = [one.gpu_ms for one in times.stages]
+    if times.gpu_ms is None:
+        assert set(told) == {None}
+        assert seen.stats.gpu_ms is None
+        assert "no clock" in str(times)
+    else:
+        assert all(ms is not None and ms >= 0.0 for ms in told)
+        assert 0.0 < times.gpu_ms <= 1.05 * times.wall_ms
+        assert 0.0 < (seen.stats.gpu_ms or 0.0) <= times.gpu_ms
+    if "Mesa 22." in str(device.adapter) and "llvmpipe" in str(device.adapter):
+        assert times.gpu_ms is None
+    untimed = a_frame(device)
+    assert (untimed.stats.gpu_ms, untimed.stats.stages) == (None, ())
+    assert untimed.stats.wall_ms > 0.0
+
+
+def test_views_are_timed_in_their_stages(device: hizvk.Device) -> None:
+    cameras, pyramids = eyes(device)
+    spheres, _ = crowd(3000)
+    instances = device.instances(spheres)
+    with device.timed() as times:
+        seen = device.cull(
+            instances, cameras, pyramids, outputs=["mask", "indices"], among=np.ones(3000, bool)
+        )
+        np.testing.assert_array_equal(seen.mask, seen_by(spheres))
+    counts = {one.stage: one.passes for one in times.stages}
+    assert counts == {"among": 1, "cull": 3, "join": 1, "list": 1}
+
+
+def test_one_block_of_times_at_a_time(device: hizvk.Device) -> None:
+    with device.timed() as times:
+        second = device.timed()
+        with pytest.raises(ValueError, match="timing: expected one at a time"):
+            second.__enter__()
+    assert times.stages == ()
+    assert times.gpu_ms is None
+    with pytest.raises(RuntimeError, match="an error within"), device.timed():
+        raise RuntimeError("an error within")
+    with device.timed() as times:
+        pass
+    assert times.wall_ms >= 0.0

@@ -93,6 +93,7 @@ from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import ABSENT, DRAW_DTYPE, NO_LOD, CullResult
 from .stats import CullStats
 from .temporal import PassResult, Temporal
+from .timing import StageTime, StageTimes
 from .views import ViewsResult
 
 if TYPE_CHECKING:
@@ -138,6 +139,8 @@ __all__ = [
     "Recommendation",
     "Spheres",
     "SplitMesh",
+    "StageTime",
+    "StageTimes",
     "Temporal",
     "Verdict",
     "ViewsResult",

@@ -19,6 +19,7 @@ from ._processes import cached_property
 from .explanation import explanation_of
 from .options import MAX_LODS
 from .stats import CullStats
+from .timing import sum_of, table_of
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -222,6 +223,7 @@ class CullResult(Awaited[CoreCulling]):
         counts = self._counts
         counted = self._question.options.statistics
         record_ms, compile_ms, wall_ms, readback_ms = self._inner.timings()
+        stages = table_of(self._inner.stage_times() or ())
         return CullStats(
             tested=counts.tested,
             absent=counts.absent,
@@ -237,6 +239,8 @@ class CullResult(Awaited[CoreCulling]):
             compile_ms=compile_ms,
             wall_ms=wall_ms,
             readback_ms=readback_ms,
+            gpu_ms=sum_of(stages),
+            stages=stages,
         )
 
     def hints(self) -> tuple[str, ...]:

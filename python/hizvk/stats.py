@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .timing import StageTime
 
 __all__ = ["CullStats"]
 
@@ -13,7 +17,7 @@ class CullStats:
 
     ``tested = outside + occluded + kept``, and `invalid` of the kept ones have invalid bounds.
     These are the counts of `CullResult.verdicts`.
-    The four times are wall-clock times.
+    The times are wall-clock times, except `gpu_ms`.
     """
 
     tested: int
@@ -48,6 +52,11 @@ class CullStats:
     So time that passes before the first of these counts, too."""
     readback_ms: float
     """Milliseconds spent so far on copying results to the host."""
+    gpu_ms: float | None
+    """Milliseconds of all stages on the device; None outside of a block of `Device.timed`.
+    Also None where the device has no timestamps that can be trusted."""
+    stages: tuple[StageTime, ...]
+    """The stages of the cull; empty outside of a block of `Device.timed`."""
     absent: int = 0
     """Instances that are absent (`hizvk.ABSENT`); no other number counts them."""
 

@@ -16,6 +16,7 @@ use crate::cull::views::{View, ViewsInputs, record_cull_views};
 use crate::cull::warm_up::{WarmUp, record_warm_up};
 use crate::error::{Error, Result};
 use crate::gpu::device::Gpu;
+use crate::gpu::stage_times::{StageTimer, StageTimesInFlight, record_stage_times};
 use crate::input::bounds::{Bounds, BoundsKind};
 use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
@@ -861,6 +862,33 @@ impl HizContext {
     ) -> Result<()> {
         let inputs = ViewsInputs { instances, views, among, options, idle: false };
         record_cull_views(&self.gpu, encoder, &inputs, &visible.each(), visible.joined())
+    }
+
+    /// Makes a timer of stages.
+    ///
+    /// It needs a device with the feature `TIMESTAMP_QUERY`, and `queue`, whose period the
+    /// timestamps count in.
+    /// Without the feature it names the stages, and every time is `None`.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn create_stage_timer(&self, queue: &wgpu::Queue) -> Result<StageTimer> {
+        StageTimer::new(&self.gpu, queue.get_timestamp_period())
+    }
+
+    /// Records the copies of what `timer` has timed since the last call.
+    ///
+    /// Record it in the encoder of the stages, behind them.
+    /// The times arrive with a poll of the device after the submit.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] for a timer of another context, and [`Error::OutOfMemory`].
+    pub fn record_stage_times(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        timer: &StageTimer,
+    ) -> Result<StageTimesInFlight> {
+        record_stage_times(&self.gpu, encoder, timer)
     }
 
     /// Makes a ring of `slots` (1..=64) for answers on their way to the host.

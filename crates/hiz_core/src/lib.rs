@@ -175,6 +175,7 @@ pub use cull::options::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order}
 pub use cull::views::View;
 pub use cull::warm_up::WarmUp;
 pub use error::{Error, Result};
+pub use gpu::stage_times::{StageTime, StageTimer, StageTimesInFlight};
 pub use host::linear::{Mat3, Mat4, Vec3};
 pub use input::bounds::{Bounds, BoundsKind, Floats};
 pub use input::camera::Camera;

@@ -35,6 +35,7 @@ const VALUES: &[(&str, &[f64])] = &[
     ("SHARED", FLAG),
     ("SORTED", FLAG),
     ("STATISTICS", FLAG),
+    ("STEPS", ONE_TO_THREE),
     ("TALL", FLAG),
     ("TEXELS", ONE_TO_THREE),
     ("VERDICTS", FLAG),

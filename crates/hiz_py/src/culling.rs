@@ -9,6 +9,13 @@ use pyo3::types::PyBytes;
 
 use crate::held::{Held, OnDevice};
 
+/// Name, number of passes, milliseconds on the device.
+pub(crate) type StageTime = (&'static str, u32, Option<f64>);
+
+pub(crate) fn stage_time(stage: &hiz_core::StageTime) -> StageTime {
+    (stage.stage, stage.passes, stage.gpu_ms)
+}
+
 /// A submitted cull.
 #[pyclass(frozen, module = "hizvk._core")]
 pub(crate) struct Culling(pub(crate) Held<Arc<headless::Culling>>);
@@ -86,6 +93,12 @@ impl Culling {
     fn timings(&self, py: Python<'_>) -> PyResult<(f64, f64, f64, f64)> {
         let timings = self.0.get(py)?.timings();
         Ok((timings.record_ms, timings.compile_ms, timings.wall_ms, timings.readback_ms))
+    }
+
+    /// The stages with their numbers of passes and milliseconds on the device.
+    fn stage_times(&self, py: Python<'_>) -> PyResult<Option<Vec<StageTime>>> {
+        let stages = self.0.run(py, |culling| culling.stage_times())?;
+        Ok(stages.map(|stages| stages.iter().map(stage_time).collect()))
     }
 
     fn explain(&self, py: Python<'_>, index: u64) -> PyResult<Explanation> {

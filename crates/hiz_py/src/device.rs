@@ -16,7 +16,7 @@ use crate::arguments::{
     DepthArray, FloatArray, LevelArray, bounds, depth_input, depth_inputs, in_c_order,
 };
 use crate::camera::Camera;
-use crate::culling::{Counts, Culling, ViewsCulling};
+use crate::culling::{Counts, Culling, StageTime, ViewsCulling, stage_time};
 use crate::held::{Held, OnDevice, detached};
 use crate::meshes::{LodNumbers, MeshTable, mesh_table};
 use crate::options::{Request, cull_options};
@@ -428,6 +428,15 @@ impl Engine {
             let occluders = occluders.as_deref().map(Arc::as_ref);
             engine.warm_up(&instances, &camera.0, occluders, &levels, &options, &outputs)
         })
+    }
+
+    fn start_timing(&self, py: Python<'_>) -> PyResult<()> {
+        self.0.run(py, headless::Engine::start_timing)
+    }
+
+    /// The stages since `start_timing`, with their numbers of passes and milliseconds.
+    fn stop_timing(&self, py: Python<'_>) -> PyResult<Vec<StageTime>> {
+        Ok(self.0.run(py, headless::Engine::stop_timing)?.iter().map(stage_time).collect())
     }
 
     fn wait(&self, py: Python<'_>) -> PyResult<()> {

@@ -10,6 +10,7 @@ use crate::gpu::device::{ContextId, Gpu};
 use crate::gpu::layouts::Binding;
 use crate::gpu::pipelines::Compute;
 use crate::gpu::shader::{Source, wgsl};
+use crate::gpu::stage_times::stage_pass;
 use crate::input::bounds::BoundsKind;
 use crate::instances::Instances;
 use crate::instances::batch::GROUP;
@@ -231,10 +232,7 @@ pub(crate) fn record_among(
         })
         .collect::<Result<Vec<_>>>()?;
     gpu.recorded(|| {
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some("hiz.among.pass"),
-            timestamp_writes: None,
-        });
+        let mut pass = stage_pass(encoder, "hiz.among.pass", "among");
         pass.set_pipeline(&pipeline);
         for (piece, bindings) in instances.pieces.iter().zip(&bindings) {
             let words = piece.groups().max(1) * (GROUP as u32 / u32::BITS);

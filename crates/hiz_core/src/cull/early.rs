@@ -90,9 +90,9 @@ pub(crate) fn record_early(
             ..FrameUniform::default()
         };
         record_numbers(gpu, encoder, temporal, &view, &frame)?;
-        tests.record(gpu, encoder, instances, [view_bindings, view_bindings], false, |pass| {
+        tests.record(gpu, encoder, instances, [view_bindings, view_bindings], false, |passes| {
             if let Some(cut) = &cut {
-                cut.record(pass);
+                passes.record("list", |pass| cut.record(pass));
             }
         })
     })?;

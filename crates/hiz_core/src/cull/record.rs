@@ -15,6 +15,7 @@ use crate::cull::pipelines::{
 use crate::error::{Error, Result};
 use crate::gpu::buffers::{check_alive, entry, made};
 use crate::gpu::device::Gpu;
+use crate::gpu::stage_times::StagePasses;
 use crate::instances::Instances;
 use crate::instances::piece::{CULL_WORKGROUP, Piece};
 use crate::output::bins::{Arrangement, Bins};
@@ -362,7 +363,7 @@ impl<'a> Tests<'a> {
         Ok(Self { target, groups, flat })
     }
 
-    /// Records the clears, the tests and what makes lists; `after` ends the pass.
+    /// Records the clears, the tests and what makes lists; `after` adds stages.
     ///
     /// `view`, `group_view`: what tests of instances bind as their view, and tests of groups.
     pub(super) fn record(
@@ -372,42 +373,41 @@ impl<'a> Tests<'a> {
         instances: &Instances,
         [view, group_view]: [&wgpu::BindGroup; 2],
         idle: bool,
-        after: impl FnOnce(&mut wgpu::ComputePass<'_>),
+        after: impl FnOnce(&mut StagePasses<'_>),
     ) -> Result<()> {
         let workgroups = |count: u32| if idle { 0 } else { count };
         self.target.record_clears(gpu, encoder, instances, idle)?;
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some("hiz.cull.pass"),
-            timestamp_writes: None,
-        });
-        pass.set_bind_group(0, view, &[]);
+        let mut passes = StagePasses::begin(encoder, "hiz.cull.pass");
         let pieces = instances.pieces.iter().zip(&self.target.pieces).zip(&self.groups);
         for ((piece, target), groups) in pieces {
             if let Some(groups) = groups {
-                pass.set_bind_group(0, group_view, &[]);
-                groups.record_boxes(
-                    &mut pass,
-                    &target.group_records,
-                    workgroups(piece.groups().div_ceil(CULL_WORKGROUP)),
-                );
+                let count = workgroups(piece.groups().div_ceil(CULL_WORKGROUP));
+                passes.record("cull groups", |pass| {
+                    pass.set_bind_group(0, group_view, &[]);
+                    groups.record_boxes(pass, &target.group_records, count);
+                });
+            }
+            let stage = if groups.is_some() { "cull members" } else { "cull" };
+            passes.record(stage, |pass| {
                 pass.set_bind_group(0, view, &[]);
-            }
-            pass.set_bind_group(1, &target.records, &[]);
-            pass.set_bind_group(2, &target.outputs, &[]);
-            if let Some(groups) = groups {
-                groups.record_members(&mut pass);
-            } else if let Some(flat) = &self.flat {
-                pass.set_pipeline(flat);
-                pass.dispatch_workgroups(workgroups(piece.groups().div_ceil(GROUPS_OF_RUN)), 1, 1);
-            }
+                pass.set_bind_group(1, &target.records, &[]);
+                pass.set_bind_group(2, &target.outputs, &[]);
+                if let Some(groups) = groups {
+                    groups.record_members(pass);
+                } else if let Some(flat) = &self.flat {
+                    let count = workgroups(piece.groups().div_ceil(GROUPS_OF_RUN));
+                    pass.set_pipeline(flat);
+                    pass.dispatch_workgroups(count, 1, 1);
+                }
+            });
         }
         if let Some(compaction) = &self.target.compaction {
-            compaction.record(&mut pass, idle);
+            passes.record("list", |pass| compaction.record(pass, idle));
         }
         if let Some(emission) = &self.target.emission {
-            emission.record(&mut pass, idle);
+            passes.record("list", |pass| emission.record(pass, idle));
         }
-        after(&mut pass);
+        after(&mut passes);
         Ok(())
     }
 }

@@ -16,6 +16,7 @@ use crate::gpu::buffers::entry;
 use crate::gpu::device::Gpu;
 use crate::gpu::pipelines::Compute;
 use crate::gpu::shader::{Source, wgsl};
+use crate::gpu::stage_times::stage_pass;
 use crate::input::bounds::BoundsKind;
 use crate::input::camera::Camera;
 use crate::input::tolerance::DepthTolerance;
@@ -134,10 +135,7 @@ impl Refine for Refinement {
             refine_groups_pipeline(gpu)?,
             refine_pipeline(gpu, instances.kind, is_sample, self.among.is_some())?,
         );
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some("hiz.refine.pass"),
-            timestamp_writes: None,
-        });
+        let mut pass = stage_pass(encoder, "hiz.refine.pass", "refine");
         pass.set_bind_group(0, &view, &[]);
         for (p, (piece, output)) in instances.pieces.iter().zip(&self.visible.pieces).enumerate() {
             let Some(groups) = output.groups().filter(|_| is_grouped(piece, &self.options)) else {

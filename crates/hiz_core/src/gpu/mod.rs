@@ -6,6 +6,7 @@
 
 pub(crate) mod buffers;
 mod checked;
+pub(crate) mod clock_check;
 pub(crate) mod copies;
 pub(crate) mod depth_source;
 pub(crate) mod device;
@@ -16,3 +17,4 @@ pub(crate) mod numbers;
 pub(crate) mod pipelines;
 pub(crate) mod recorded_uniform;
 pub(crate) mod shader;
+pub(crate) mod stage_times;

@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::gpu::pipelines::PipelinesMade;
 use crate::headless::ahead::Ahead;
 use crate::headless::answers::AnswerBuffers;
+use crate::headless::clock::Timed;
 use crate::headless::counts::{Timings, milliseconds};
 use crate::headless::culling::Culling;
 use crate::headless::engine::Engine;
@@ -68,6 +69,7 @@ pub(super) struct Submission {
     pub(super) at: Instant,
     pub(super) done: Arc<OnceLock<Instant>>,
     pub(super) timings: Timings,
+    pub(super) times: Option<Timed>,
 }
 
 impl Question<'_> {
@@ -105,7 +107,7 @@ impl Question<'_> {
         submission: &Submission,
     ) -> Culling {
         let Recorded { buffers, staged_mask, ahead, watch } = recorded;
-        let Submission { index, at, done, timings } = submission.clone();
+        let Submission { index, at, done, timings, times } = submission.clone();
         Culling {
             engine: engine.clone(),
             instances: Arc::clone(self.instances),
@@ -123,6 +125,7 @@ impl Question<'_> {
             submitted: at,
             done,
             timings: Locked::new(timings),
+            times,
         }
     }
 }
@@ -176,7 +179,8 @@ impl Engine {
                 ..CullInputs::new(instances, camera, pyramid, options)
             };
             let mut encoder = self.encoder("hiz.cull.encoder");
-            record_cull(gpu, &mut encoder, &inputs, &visible)?;
+            let ((), times) =
+                self.timed(&mut encoder, |encoder| record_cull(gpu, encoder, &inputs, &visible))?;
             let recorded = question.record_reading(self, &mut encoder, buffers, reading)?;
             let done = tell_when_done(&encoder);
             let timings = self.compiled((start, made_before), |encoder| {
@@ -186,7 +190,7 @@ impl Engine {
             let at = Instant::now();
             let index = self.queue().submit([encoder.finish()]);
             watches.add(&recorded.watch);
-            Ok(question.submitted(self, recorded, &Submission { index, at, done, timings }))
+            Ok(question.submitted(self, recorded, &Submission { index, at, done, timings, times }))
         };
         let culling = self.scoped(attempt);
         let Err(error) = &culling else { return culling };

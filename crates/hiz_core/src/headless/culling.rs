@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::gpu::buffers::STORAGE;
 use crate::headless::ahead::Ahead;
 use crate::headless::answers::AnswerBuffers;
+use crate::headless::clock::Timed;
 use crate::headless::counts::{Counts, Timings, milliseconds};
 use crate::headless::engine::Engine;
 use crate::headless::ranges::{count_ranges, groups_of, mask_ranges, verdict_ranges};
@@ -95,6 +96,7 @@ pub struct Culling {
     /// When the device was first seen to be done.
     pub(super) done: Arc<OnceLock<Instant>>,
     pub(super) timings: Locked<Timings>,
+    pub(super) times: Option<Timed>,
 }
 
 impl Culling {

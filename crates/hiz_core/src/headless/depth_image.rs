@@ -132,13 +132,10 @@ impl DepthImage {
         let engine = &self.engine;
         let _in_order = drawn.submitting.lock();
         let mut encoder = engine.encoder("hiz.occluders.encoder");
-        let touched = engine.context().record_occluder_depth(
-            &mut encoder,
-            occluders,
-            &self.camera,
-            drawn,
-            options,
-        )?;
+        let hiz = engine.context();
+        let (touched, _) = engine.timed(&mut encoder, |encoder| {
+            hiz.record_occluder_depth(encoder, occluders, &self.camera, drawn, options)
+        })?;
         engine.queue().submit([encoder.finish()]);
         Ok(touched)
     }

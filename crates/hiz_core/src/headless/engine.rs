@@ -1,12 +1,13 @@
 //! The engine: a device, its queue and its errors.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::context::HizContext;
 use crate::error::{Error, Result};
 use crate::gpu::copies::StagingPool;
 use crate::headless::adapter::{self, ADAPTER_VARIABLE, AdapterSummary};
 use crate::headless::answers::Answers;
+use crate::headless::clock::Timing;
 use crate::headless::images::Images;
 use crate::headless::joined::JoinedPool;
 use crate::headless::kept_depth::KeptDepth;
@@ -72,6 +73,9 @@ struct Shared {
     images: Images,
     slots: Locked<Slots>,
     joined: JoinedPool,
+    timing: Locked<Option<Timing>>,
+    /// Whether the device's timestamps can be trusted, once that was checked.
+    clock: OnceLock<bool>,
     /// For answers that are copied by their cull's own submission.
     staging: StagingPool,
     device: wgpu::Device,
@@ -136,7 +140,8 @@ impl Engine {
                 request.map_or_else(|| "was found".to_owned(), |r| format!("matches {r:?}"));
             return Err(adapter::no_adapter(request, &seen));
         };
-        let features = adapter.features() & wgpu::Features::INDIRECT_FIRST_INSTANCE;
+        let features = adapter.features()
+            & (wgpu::Features::INDIRECT_FIRST_INSTANCE | wgpu::Features::TIMESTAMP_QUERY);
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("hiz.device"),
             required_features: features,
@@ -165,6 +170,8 @@ impl Engine {
                 images: Images::default(),
                 slots: Locked::default(),
                 joined: JoinedPool::default(),
+                timing: Locked::default(),
+                clock: OnceLock::new(),
                 staging: StagingPool::new(STAGING_KEPT),
                 device,
                 queue,
@@ -212,6 +219,15 @@ impl Engine {
     /// The culls that were submitted ahead of their reads.
     pub(super) fn slots(&self) -> &Locked<Slots> {
         &self.shared.slots
+    }
+
+    /// The times that are being taken, if any.
+    pub(super) fn timing(&self) -> &Locked<Option<Timing>> {
+        &self.shared.timing
+    }
+
+    pub(super) fn clock(&self) -> &OnceLock<bool> {
+        &self.shared.clock
     }
 
     /// What joins the masks of several views.

@@ -31,9 +31,11 @@ impl Engine {
     /// waits.
     /// Lists and draw arguments that were not asked for are made when they are read.
     ///
-    /// At most [`CULLS_IN_FLIGHT`](crate::headless::CULLS_IN_FLIGHT) such culls of an engine are unfinished at a time.
+    /// At most [`CULLS_IN_FLIGHT`] such culls of an engine are unfinished at a time.
     /// One more waits in this call until the oldest of them is done.
     /// A cull whose [`Culling`] was dropped counts no more.
+    ///
+    /// [`CULLS_IN_FLIGHT`]: crate::headless::CULLS_IN_FLIGHT
     ///
     /// # Errors
     /// Those of [`Engine::cull`].
@@ -115,14 +117,19 @@ impl Engine {
 
     /// Waits until the callback of copies has run whose submission is done.
     pub(super) fn await_copies(&self, copies: &Copies) -> Result<()> {
+        self.await_callback(|| copies.is_ready())
+    }
+
+    /// Polls until a callback of a submission that is done has run.
+    pub(super) fn await_callback(&self, has_run: impl Fn() -> bool) -> Result<()> {
         let start = Instant::now();
         // Another thread's poll may be running the callback at this moment.
-        while !copies.is_ready() {
+        while !has_run() {
             if start.elapsed() > CALLBACK {
                 let why = "hiz.readback.staging was not mapped within a minute".to_owned();
                 return Err(Error::Device(why));
             }
-            self.scoped(|| readback::look(self.device()))?;
+            readback::look(self.device())?;
             std::thread::yield_now();
         }
         Ok(())

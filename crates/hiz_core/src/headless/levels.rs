@@ -50,7 +50,10 @@ impl Engine {
     fn submit_reduce(&self, depth: &DepthImage, pyramid: &Pyramid) -> Result<()> {
         let _in_order = pyramid.submitting.lock();
         let mut encoder = self.encoder("hiz.reduce.encoder");
-        record_reduce(&self.context().gpu, &mut encoder, &depth.source(), &depth.camera, pyramid)?;
+        let gpu = &self.context().gpu;
+        self.timed(&mut encoder, |encoder| {
+            record_reduce(gpu, encoder, &depth.source(), &depth.camera, pyramid)
+        })?;
         if let Some(drawn) = &depth.drawn {
             pyramid.keep_with_it(Arc::clone(drawn) as Arc<dyn Owner>);
         }

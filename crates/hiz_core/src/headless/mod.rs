@@ -14,6 +14,7 @@
 //! 5. `two_passes` does that for the early and the late pass of a frame.
 //! 6. `single` does all of that at once, for bounds that are used once.
 //!
+//! `timing` and `clock` take the times of stages.
 //! `answers` and `images` lend what was dropped, and `warm_up` runs a frame before the first one.
 //! `process` guards all of them against forks.
 //! This is the only room that submits, waits and maps buffers for reading; it decides no geometry.
@@ -52,6 +53,7 @@ mod adapter;
 mod ahead;
 mod answers;
 mod bins;
+mod clock;
 mod counts;
 mod cull;
 mod culling;
@@ -71,6 +73,7 @@ mod renewal;
 mod samples;
 mod single;
 mod slots;
+mod timing;
 mod two_passes;
 mod uploads;
 mod views;

@@ -66,9 +66,11 @@ impl Engine {
             let gpu = &self.context().gpu;
             let mut encoder = self.encoder("hiz.update.encoder");
             let mut updated = 0..0;
-            record_update(gpu, &mut encoder, instances, first, bounds, strict, |_, range| {
-                updated = range;
-                Ok(())
+            self.timed(&mut encoder, |encoder| {
+                record_update(gpu, encoder, instances, first, bounds, strict, |_, range| {
+                    updated = range;
+                    Ok(())
+                })
             })?;
             // Taken late, so that culls on other threads need not wait for the packing above.
             let watches = instances.watches();
@@ -118,8 +120,10 @@ impl Engine {
             let gpu = &self.context().gpu;
             let mut encoder = self.encoder("hiz.update.encoder");
             let watches = instances.watches();
-            record_update_from(gpu, &mut encoder, instances, &source.into(), |encoder| {
-                watches.record_refinements(gpu, encoder).map(drop)
+            self.timed(&mut encoder, |encoder| {
+                record_update_from(gpu, encoder, instances, &source.into(), |encoder| {
+                    watches.record_refinements(gpu, encoder).map(drop)
+                })
             })?;
             self.queue().submit([encoder.finish()]);
             watches.all_refined();

@@ -118,7 +118,9 @@ impl Engine {
         self.scoped(|| {
             let among = Among::new(gpu, instances)?;
             let mut encoder = self.encoder("hiz.among.encoder");
-            record_among(gpu, &mut encoder, instances, &mask, &among)?;
+            self.timed(&mut encoder, |encoder| {
+                record_among(gpu, encoder, instances, &mask, &among)
+            })?;
             self.queue().submit([encoder.finish()]);
             Ok(Arc::new(among))
         })
@@ -185,7 +187,9 @@ impl Engine {
             idle: false,
         };
         let mut encoder = self.encoder("hiz.views.encoder");
-        record_cull_views(gpu, &mut encoder, &inputs, &visible, &joined)?;
+        let ((), times) = self.timed(&mut encoder, |encoder| {
+            record_cull_views(gpu, encoder, &inputs, &visible, &joined)
+        })?;
         let questions: Vec<_> = views
             .iter()
             .map(|(camera, pyramid)| Question {
@@ -214,7 +218,7 @@ impl Engine {
         let watches = &mut instances.watches();
         let at = Instant::now();
         let index = self.queue().submit([encoder.finish()]);
-        let submission = Submission { index, at, done, timings };
+        let submission = Submission { index, at, done, timings, times };
         let each = questions.iter().zip(recorded).map(|(question, recorded)| {
             watches.add(&recorded.watch);
             Arc::new(question.submitted(self, recorded, &submission))

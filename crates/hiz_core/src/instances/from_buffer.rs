@@ -20,6 +20,7 @@ use crate::gpu::device::Gpu;
 use crate::gpu::layouts::Binding;
 use crate::gpu::pipelines::{Compute, flag};
 use crate::gpu::shader::{Source, wgsl};
+use crate::gpu::stage_times::stage_pass;
 use crate::input::bounds::BoundsKind;
 use crate::instances::Instances;
 use crate::instances::piece::Piece;
@@ -234,10 +235,7 @@ pub(crate) fn record_update_from(
     before(encoder)?;
     instances.bounds_are_on_device();
     gpu.recorded(|| {
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some("hiz.instances.from_buffer"),
-            timestamp_writes: None,
-        });
+        let mut pass = stage_pass(encoder, "hiz.instances.from_buffer", "update");
         for (pipeline, bindings, workgroups) in &prepared {
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, bindings, &[]);

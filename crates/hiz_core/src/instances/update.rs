@@ -19,6 +19,7 @@ use crate::gpu::device::Gpu;
 use crate::gpu::layouts::Binding;
 use crate::gpu::pipelines::Compute;
 use crate::gpu::shader::{Source, wgsl};
+use crate::gpu::stage_times::stage_pass;
 use crate::input::bounds::Bounds;
 use crate::instances::batch::GROUP;
 use crate::instances::batch::Origin;
@@ -137,10 +138,7 @@ pub(crate) fn record_update(
     let number = changing.next_update;
     changing.next_update = number.wrapping_add(1);
     let result = gpu.recorded(|| {
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some("hiz.update.pass"),
-            timestamp_writes: None,
-        });
+        let mut pass = stage_pass(encoder, "hiz.update.pass", "update");
         let mut begun = false;
         let mut dispatch = |replacement: &Replacement<'_>, entry_point| -> Result<()> {
             let (bind_group, pipeline) =

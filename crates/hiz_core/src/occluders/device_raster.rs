@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::gpu::device::Gpu;
 use crate::gpu::pipelines::{Depth, DepthState};
 use crate::gpu::shader::{Source, wgsl};
+use crate::gpu::stage_times::{TimedPass, timed_pass};
 use crate::input::camera::Camera;
 use crate::input::image::DepthConvention;
 use crate::input::mesh::FaceCull;
@@ -137,8 +138,10 @@ pub(crate) fn record_occluders(
         other => other,
     })?;
     gpu.recorded(|| {
+        let timed = timed_pass("raster");
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("hiz.occluders.pass"),
+            timestamp_writes: timed.as_ref().and_then(TimedPass::of_render_pass),
             color_attachments: &[],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: target,

@@ -25,8 +25,8 @@ use crate::output::visible::Visible;
 ///
 /// ```
 /// # use hiz_core::headless::Engine;
-/// # use hiz_core::{Bounds, Camera, CullOptions, DepthConvention, Floats, ImageSize, InstanceOptions};
-/// # use hiz_core::{Outputs, Pose, Projection, PyramidOptions, wgpu};
+/// # use hiz_core::{Bounds, Camera, CullOptions, DepthConvention, Floats, ImageSize};
+/// # use hiz_core::{InstanceOptions, Outputs, Pose, Projection, PyramidOptions, wgpu};
 /// # let engine = Engine::new(None)?;
 /// # let (device, queue, hiz) = (engine.device(), engine.queue(), engine.context());
 /// # let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };

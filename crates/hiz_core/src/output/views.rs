@@ -10,6 +10,7 @@ use crate::gpu::layouts::Binding;
 use crate::gpu::numbers::UNIFORM_ALIGNMENT;
 use crate::gpu::pipelines::Compute;
 use crate::gpu::shader::{Source, wgsl};
+use crate::gpu::stage_times::StagePasses;
 use crate::instances::Instances;
 use crate::output::compact::Compaction;
 use crate::output::emit::Emit;
@@ -271,17 +272,16 @@ impl Join<'_> {
         if let Some(lists) = &self.joined.any.lists {
             lists.record_clear(encoder);
         }
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some("hiz.views.pass"),
-            timestamp_writes: None,
+        let mut passes = StagePasses::begin(encoder, "hiz.views.pass");
+        passes.record("join", |pass| {
+            pass.set_pipeline(&self.pipeline);
+            for (bindings, workgroups) in &self.steps {
+                pass.set_bind_group(0, bindings, &[]);
+                pass.dispatch_workgroups(if idle { 0 } else { *workgroups }, 1, 1);
+            }
         });
-        pass.set_pipeline(&self.pipeline);
-        for (bindings, workgroups) in &self.steps {
-            pass.set_bind_group(0, bindings, &[]);
-            pass.dispatch_workgroups(if idle { 0 } else { *workgroups }, 1, 1);
-        }
         if let Some(compaction) = &self.compaction {
-            compaction.record(&mut pass, idle);
+            passes.record("list", |pass| compaction.record(pass, idle));
         }
     }
 }

@@ -13,6 +13,7 @@ use crate::gpu::device::Gpu;
 use crate::gpu::layouts::Binding;
 use crate::gpu::pipelines::{Compute, flag};
 use crate::gpu::shader::{File, Source, wgsl};
+use crate::gpu::stage_times::stage_pass;
 use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
 use crate::pyramid::Pyramid;
@@ -170,9 +171,7 @@ impl Prepared {
         steps: &Steps,
         workgroups: impl Fn([u32; 2]) -> [u32; 2],
     ) {
-        let descriptor =
-            wgpu::ComputePassDescriptor { label: Some("hiz.reduce.pass"), timestamp_writes: None };
-        let mut pass = encoder.begin_compute_pass(&descriptor);
+        let mut pass = stage_pass(encoder, "hiz.reduce.pass", "reduce");
         pass.set_bind_group(0, &self.source, &[]);
         for ((pipeline, of_step), step) in self.dispatches.iter().zip(&steps.bindings) {
             let [columns, rows] = workgroups(*of_step);

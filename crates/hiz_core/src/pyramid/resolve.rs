@@ -13,6 +13,7 @@ use crate::gpu::layouts::Binding;
 use crate::gpu::numbers::Copy;
 use crate::gpu::pipelines::{Compute, flag};
 use crate::gpu::shader::{Source, wgsl};
+use crate::gpu::stage_times::stage_pass;
 use crate::host::threads::Locked;
 use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
@@ -394,10 +395,7 @@ fn record_band(
 ) {
     let BandUniform { first, rows, stride, nearest } = band.numbers;
     let vectors = resolve.size.width.div_ceil(PIXELS);
-    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-        label: Some("hiz.resolve.pass"),
-        timestamp_writes: None,
-    });
+    let mut pass = stage_pass(encoder, "hiz.resolve.pass", "resolve");
     pass.set_pipeline(pipeline);
     pass.set_bind_group(0, samples, &[]);
     pass.set_bind_group(1, &band.bindings, &[]);

@@ -8,6 +8,7 @@ use crate::cull::pipelines::{
     flat_module,
 };
 use crate::cull::refine::{refine_groups_module, refine_module};
+use crate::gpu::clock_check::clock_check_module;
 use crate::gpu::depth_source::SOURCES;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::shader::{FILES, Source};
@@ -69,6 +70,7 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("count".to_owned(), count_module()),
         ("among_order".to_owned(), among_order_module()),
         ("join_views".to_owned(), join_module()),
+        ("clock_check".to_owned(), clock_check_module()),
         ("update".to_owned(), update_module()),
         ("occluders".to_owned(), occluders_module()),
         ("resolve Depth".to_owned(), resolve_module(SourceKind::Depth)),

@@ -13,6 +13,7 @@ use crate::cull::pipelines::{Candidates, CullKey, DepthStore, FramePass, ReportK
 use crate::cull::pipelines::{classify_constants, flat_module, report_constants};
 use crate::cull::refine;
 use crate::cull::view_uniform::COORDINATE_BITS;
+use crate::gpu::clock_check;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::shader::FILES;
 use crate::host::rounding::EPS;
@@ -88,6 +89,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/supporting_planes", "LARGEST_BITS", bits(LARGEST)),
         ("cull/view", "COORDINATE_BITS", int(COORDINATE_BITS)),
         ("cull/view", "COORDINATE_MASK", int((1 << COORDINATE_BITS) - 1)),
+        ("gpu/clock_check", "WORKGROUP", int(clock_check::WORKGROUP)),
         ("gpu/depth_bits", "ONE_BITS", bits(1.0)),
         ("gpu/depth_bits", "LEAST_NORMAL_BITS", bits(f32::MIN_POSITIVE)),
         ("gpu/depth_bits", "NEGATIVE_ZERO_BITS", bits(-0.0)),
@@ -166,6 +168,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     // All bits of a run.
     ("cull/early", &["WHOLE_RUN"]),
     ("cull/refine", &["REFINED"]),
+    ("gpu/clock_check", &["LEFT", "RIGHT", "LEFT_AGAIN"]),
     ("cull/refine_groups", &["LAST_TEXEL", "WITHIN"]),
     (
         "cull/supporting_planes",
@@ -379,6 +382,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         // One workgroup, the largest that WebGPU promises.
         ("scan", line(wgpu::Limits::default().max_compute_invocations_per_workgroup)),
         ("scatter", line(SCATTER_WORKGROUP)),
+        ("spin", line(clock_check::WORKGROUP)),
         ("take_bounds", line(from_buffer::WORKGROUP)),
     ])
 }
