@@ -1,6 +1,9 @@
 # Every recipe is one script in scripts/, which says what it does and why.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-swiftshader soak lint bench bench-speed docs wheel package
+# Arguments of the viewer, such as ARGS='--scene arm'.
+ARGS ?=
+.PHONY: help setup demo view bench-view test test-swiftshader soak lint bench bench-speed docs
+.PHONY: wheel package
 
 help: ## This list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | \
@@ -11,6 +14,9 @@ setup: ## Install what is missing (system packages, .venv) and build the Python 
 
 demo: ## Cull a real mountain scene on the GPU; leaves pictures and a report in out/
 	@scripts/demo.sh
+
+view: ## Open a window on a scene that is drawn from the lists; ARGS='--help' lists what it takes
+	@scripts/view.sh $(ARGS)
 
 test: ## All tests on Mesa's lavapipe (or on the driver that HIZVK_EXPECT_ADAPTER names)
 	@scripts/test.sh
@@ -29,6 +35,9 @@ bench: ## Measure speed and error of every configuration; leaves report and plot
 
 bench-speed: ## Measure times against yardsticks and targets; leaves report and plot in out/speed
 	@scripts/bench_speed.sh
+
+bench-view: ## Whole frames with and without culling, as a table
+	@scripts/view.sh --bench $(ARGS)
 
 docs: ## The HTML documentation, in docs/_build/html
 	@scripts/docs.sh

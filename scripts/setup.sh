@@ -86,6 +86,37 @@ system_packages() {
   [ ${#missing[@]} -eq 0 ] || apt_install "${missing[@]}"
 }
 
+has_library() {
+  local file
+  for file in /usr/lib{/*,64,}/"$1" /usr/local/lib/"$1"; do
+    [ -e "$file" ] && return
+  done
+  return 1
+}
+
+# What the viewer's window needs, and its test: an X server without a screen, and keys for it.
+# The test skips itself without them, so nothing ends here.
+window_packages() {
+  local missing=() pair line
+  for pair in Xvfb:xvfb xdotool:xdotool; do
+    have "${pair%%:*}" || missing+=("${pair#*:}")
+  done
+  for pair in libX11.so.6:libx11-6 libX11-xcb.so.1:libx11-xcb1 libXcursor.so.1:libxcursor1 \
+    libXi.so.6:libxi6 libXrandr.so.2:libxrandr2 libxkbcommon-x11.so.0:libxkbcommon-x11-0; do
+    has_library "${pair%%:*}" || missing+=("${pair#*:}")
+  done
+  # What could not be installed once is not tried again.
+  if [ ${#missing[@]} -eq 0 ] || [ "${missing[*]}" = "$(cat "$STAMPS/window" 2>/dev/null)" ]; then
+    return
+  fi
+  printf '%s\n' "${missing[*]}" >"$STAMPS/window"
+  line="apt-get update && apt-get install -y ${missing[*]}"
+  if ! have apt-get || ! can_be_root || ! (apt_install "${missing[@]}"); then
+    printf 'note: the test of the window is skipped without these packages: %s\n' \
+      "sudo sh -c '$line'" >&2
+  fi
+}
+
 check_rust() {
   local wanted found
   wanted=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
@@ -160,6 +191,7 @@ check_rust
 system_packages
 make_venv
 mkdir -p "$STAMPS"
+window_packages
 for group in dev "$@"; do
   install_group "$group"
 done

@@ -61,6 +61,7 @@ OTHERS: dict[str, tuple[Any, str]] = {
     "fit": ("volume", "fit: Volume"),
     "hierarchy": (np.bool_(False), "hierarchy: Never"),
     "statistics": (True, "statistics: true"),
+    "lod": (hizvk.LodByError(0.5), "lod: Error { pixels: 0.5 }"),
     "mask": (False, "mask: false"),
     "verdicts": (False, "verdicts: false"),
     "indices": (True, "indices: true"),

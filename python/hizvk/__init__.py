@@ -75,6 +75,7 @@ from .errors import (
     OutOfMemoryError,
 )
 from .explanation import Explanation, Verdict
+from .lod import LodByDistance, LodByError, LodBySize
 from .mesh import Mesh
 from .occluders import (
     InnerBoxes,
@@ -87,16 +88,19 @@ from .occluders import (
     split_mesh,
 )
 from .oneline import visible
-from .options import CullOptions, DrawTemplate, Outputs
+from .options import CullOptions, DrawTemplate, MeshLods, Outputs
 from .resources import DepthImage, Instances, Occluders, Pyramid
-from .result import DRAW_DTYPE, CullResult
+from .result import ABSENT, DRAW_DTYPE, NO_LOD, CullResult
 from .stats import CullStats
+from .views import ViewsResult
 
 if TYPE_CHECKING:
     from .recommendation import Recommendation, recommend
 
 __all__ = [
+    "ABSENT",
     "DRAW_DTYPE",
+    "NO_LOD",
     "Adapter",
     "BoundsCheck",
     "Boxes",
@@ -116,7 +120,11 @@ __all__ = [
     "InnerPrisms",
     "Instances",
     "LimitError",
+    "LodByDistance",
+    "LodByError",
+    "LodBySize",
     "Mesh",
+    "MeshLods",
     "NoAdapterError",
     "OccluderSelection",
     "Occluders",
@@ -129,6 +137,7 @@ __all__ = [
     "Spheres",
     "SplitMesh",
     "Verdict",
+    "ViewsResult",
     "__version__",
     "adapters",
     "check_bounds",

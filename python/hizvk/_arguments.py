@@ -491,6 +491,22 @@ def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
     return copied(name, array, np.bool_)
 
 
+def mesh_ids(name: str, value: object, count: int) -> npt.NDArray[np.uint32]:
+    """``(count,)`` mesh ids as uint32; any integer dtype comes in."""
+    expected = f"integer ({count},)"
+    array = _as_array(name, expected, value)
+    if array.size == 0 and not hasattr(value, "dtype"):
+        array = array.astype(np.uint32)
+    if array.dtype.kind not in "iu":
+        got = describe(array if array.ndim else value)
+        raise TypeError(f"{name}: expected {expected}, got {got}")
+    _check_shape(name, expected, array, (count,))
+    if array.size and not (int(array.min()) >= 0 and int(array.max()) < 2**32):
+        wrong = int(array.min()) if array.min() < 0 else int(array.max())
+        raise ValueError(f"{name}: expected mesh ids from 0 on, or hizvk.ABSENT, got {wrong}")
+    return copied(name, array, np.uint32)
+
+
 def triangles(name: str, value: object, vertex_count: int) -> npt.NDArray[np.uint32]:
     """``(T, 3)`` indices of vertices, as uint32; any integer dtype comes in."""
     expected = "integer (T, 3)"

@@ -34,6 +34,10 @@ Coverage: TypeAlias = Literal["area"] | Literal["sample"]
 Fit: TypeAlias = Literal["rectangle"] | Literal["volume"]
 #: What a cull can make; see `Outputs`.
 Output: TypeAlias = Literal["mask"] | Literal["verdicts"] | Literal["indices"] | Literal["draws"]
+#: How a cull lists what it keeps of several meshes; see `Outputs`.
+Emit: TypeAlias = Literal["bins"] | Literal["instances"]
+#: Where bins lie in the list; see `Outputs`.
+Placement: TypeAlias = Literal["packed"] | Literal["reserved"]
 #: Which depth of the bounds a pixel of the oracle is compared with.
 OwnDepth: TypeAlias = Literal["nearest"] | Literal["pixel"]
 

@@ -15,20 +15,23 @@ import numpy as np
 
 from . import _arguments
 from ._core import Engine as CoreEngine
+from ._core import MeshTable as CoreMeshTable
 from ._on_device import check_owner
 from ._processes import driver_is_asked
 from ._types import FaceCull, Rasteriser, StoredOrder, words
 from .adapter import Adapter
 from .bounds import Bounds, are_points, as_arrays
 from .camera import Camera
-from .depth import checked_image
 from .drawing import Drawing, chosen, limit
 from .errors import LimitError
 from .hints import Question
 from .mesh import as_meshes
 from .options import cull_request
+from .renewal import Source
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import CullResult
+from .samples import checked_samples
+from .views import ViewsResult, among_of, pairs
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -41,9 +44,13 @@ if TYPE_CHECKING:
     from ._types import DepthKind, Levels, Output
     from .depth import DepthArray
     from .mesh import MeshLike
-    from .options import CullKeywords, CullOptions, Outputs
+    from .options import CullKeywords, CullOptions, MeshLods, Outputs
+    from .views import AmongLike
 
 __all__ = ["Device"]
+
+#: How many tables of meshes a device keeps for further culls.
+_TABLES_KEPT = 4
 
 
 class Device:
@@ -99,6 +106,7 @@ class Device:
             adapter = str(_arguments.integer("adapter", adapter, low=0, high=2**31 - 1))
         with driver_is_asked():
             self._engine = CoreEngine(adapter)
+        self._tables: list[tuple[Sequence[MeshLods], CoreMeshTable]] = []
 
     @property
     def adapter(self) -> Adapter:
@@ -111,7 +119,13 @@ class Device:
         return self._engine.max_image_side()
 
     def instances(
-        self, bounds: Bounds, *, strict: bool = False, order: StoredOrder = "morton"
+        self,
+        bounds: Bounds,
+        *,
+        strict: bool = False,
+        order: StoredOrder = "morton",
+        mesh_ids: npt.ArrayLike | None = None,
+        scales: npt.ArrayLike | None = None,
     ) -> Instances:
         """Uploads bounds, once for any number of culls.
 
@@ -136,6 +150,16 @@ class Device:
             ``"morton"``: sorted along a curve through space (Morton 1966); the upload sorts once.
             ``"given"``: as they come, for arrays that are in such an order already.
             This needs no sort, and 8 bytes less per instance on the host.
+        mesh_ids : (N,) integer array, optional
+            The mesh of each instance, 0 to 65535, or `hizvk.ABSENT`.
+            A cull with ``meshes=`` sorts what it keeps by them.
+            An absent instance is never kept, and the box of its group does not contain it.
+            Updates replace bounds alone: upload again to change a mesh id.
+            None: all have mesh 0.
+        scales : (N,) float array, or a number; optional
+            By how much the mesh of each instance is scaled, along the axis where it is most.
+            `hizvk.LodByError` multiplies the errors of levels of detail by it.
+            None: 1 for each.
 
         Raises
         ------
@@ -148,7 +172,11 @@ class Device:
         kind, arrays = as_arrays("bounds", bounds)
         strict = _arguments.flag("strict", strict)
         stored_order = _arguments.choice("order", order, words(StoredOrder))
-        uploaded = self._engine.instances(kind, arrays, strict, stored_order)
+        ids = None if mesh_ids is None else _arguments.mesh_ids("mesh_ids", mesh_ids, len(bounds))
+        sizes = (
+            None if scales is None else _arguments.floats_or_scalar("scales", scales, len(bounds))
+        )
+        uploaded = self._engine.instances(kind, arrays, (strict, stored_order), ids, sizes)
         return Instances(self, uploaded, points=are_points(bounds))
 
     @overload
@@ -422,10 +450,12 @@ class Device:
 
         Parameters
         ----------
-        depth : DepthImage or (height, width) array
+        depth : DepthImage or (height, width) array, or (height, width, samples)
             A rendered image of this device, alone; or an array, with `camera` and `kind`.
             Arrays are float, or uint16 for the kinds ``"z"`` and ``"distance"``.
             Row 0 is the top of the image.
+            With 2, 4, 8 or 16 samples per pixel the farthest one counts.
+            A sample with "no data" makes its pixel far, and a cull takes ``coverage="area"`` alone.
             What is masked in a masked array is "no data".
 
             A cull allows for what the dtype may have rounded:
@@ -494,20 +524,32 @@ class Device:
                     f"scale: expected 1 beside a DepthImage, whose depth is NDC, got {scale:g}"
                 )
             check_owner("depth", depth, self)
-            return Pyramid(
-                self, self._engine.pyramid(depth._inner, stored), depth.camera, is_rendered=True
-            )
+            source = Source(depth._inner)
+            built = self._engine.pyramid(depth._inner, stored)
+            return Pyramid(self, built, depth.camera, source, is_rendered=True)
         camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")
         self._check_side(camera)
-        return self._pyramid_of(
-            checked_image("depth", depth, camera, kind, scale, invalid), camera, stored
-        )
+        samples = checked_samples("depth", depth, camera, kind, scale, invalid)
+        return self._pyramid_of(samples, camera, stored, invalid)
 
-    def _pyramid_of(self, image: DepthArray, camera: Camera, stored: tuple[int, int]) -> Pyramid:
-        """The pyramid of an image that was checked, with the levels `stored`."""
-        uploaded = self._engine.upload_depth(*image, camera._inner)
-        return Pyramid(self, self._engine.pyramid(uploaded, stored), camera)
+    def _pyramid_of(
+        self,
+        images: DepthArray | list[DepthArray],
+        camera: Camera,
+        stored: tuple[int, int],
+        invalid: Any = None,
+    ) -> Pyramid:
+        """The pyramid of an image that was checked, or of one per sample; with levels `stored`."""
+        given = images if isinstance(images, list) else [images]
+        if len(given) == 1:
+            uploaded = self._engine.upload_depth(*given[0], camera._inner)
+        else:
+            planes = [plane.image for plane in given]
+            uploaded = self._engine.upload_samples(planes, *given[0][1:], camera._inner)
+        source = Source.uploaded(uploaded, given, invalid)
+        return Pyramid(self, self._engine.pyramid(uploaded, stored), camera, source)
 
+    @overload
     def cull(
         self,
         instances: Instances,
@@ -515,18 +557,51 @@ class Device:
         pyramid: Pyramid,
         options: CullOptions | None = None,
         outputs: Outputs | Collection[Output] | None = None,
+        *,
+        among: AmongLike | None = None,
+        wait: bool = True,
         **keywords: Unpack[CullKeywords],
-    ) -> CullResult:
+    ) -> CullResult: ...
+
+    @overload
+    def cull(
+        self,
+        instances: Instances,
+        camera: Sequence[Camera],
+        pyramid: Sequence[Pyramid],
+        options: CullOptions | None = None,
+        outputs: Outputs | Collection[Output] | None = None,
+        *,
+        among: AmongLike | None = None,
+        wait: bool = True,
+        **keywords: Unpack[CullKeywords],
+    ) -> ViewsResult: ...
+
+    def cull(
+        self,
+        instances: Instances,
+        camera: Camera | Sequence[Camera],
+        pyramid: Pyramid | Sequence[Pyramid],
+        options: CullOptions | None = None,
+        outputs: Outputs | Collection[Output] | None = None,
+        *,
+        among: AmongLike | None = None,
+        wait: bool = True,
+        **keywords: Unpack[CullKeywords],
+    ) -> CullResult | ViewsResult:
         """Tests instances against a pyramid. What could be seen in the depth image is never culled.
 
         Parameters
         ----------
         instances : Instances
             Of this device.
-        camera : Camera
+        camera : Camera, or a sequence of V cameras
             The camera of the pyramid: `Pyramid.camera`, or one equal to it.
-        pyramid : Pyramid
-            Of this device.
+            Several cameras cull in one submission, with one readback: the eyes of a headset, the
+            faces of a cube map, the cascades of a shadow.
+        pyramid : Pyramid, or a sequence of V pyramids
+            Of this device; one for each camera, of its own depth.
+            Sizes and conventions may differ.
         options : CullOptions, optional
             How the cull decides; None takes the defaults.
         outputs : Outputs, or a collection of "mask", "verdicts", "indices", "draws"; optional
@@ -534,14 +609,34 @@ class Device:
             A collection names all that is made.
             None makes mask and verdicts, and the list and the draw arguments by the time that they
             are read.
+            For several cameras indices and draws are those of what any of them keeps, and made only
+            if they are named here.
+        among : (N,) bool array, CullResult or ViewsResult; optional
+            The instances that are asked for: a mask, what an earlier cull of them has kept, or what
+            any of its views has kept.
+            An earlier result stays on the device, and it must have a mask.
+            All others are not kept, their verdict is `Verdict.OUTSIDE`, and they cost no test.
+            None: all.
+        wait : bool
+            How the answer comes to the host; the call itself does not wait for it in either case.
+
+            - True: each read waits for the device, then copies.
+            - False: the cull's own submission copies all that `outputs` names.
+              `CullResult.ready` says whether it has arrived, and then no read waits.
+              ``await result`` lets an event loop go on meanwhile.
+
+            At most two culls with ``wait=False`` are unfinished at a time.
+            A third one waits in this call, without the interpreter lock, until the oldest is done.
+            A result that was dropped counts no more.
         **keywords
-            Any field of `CullOptions`, and `capacity` and `draw` of `Outputs`.
+            Any field of `CullOptions`, and of `Outputs` `capacity`, `draw`, `meshes`, `emit` and
+            `placement`.
             They take the place of those fields of `options` and `outputs`:
             ``cull(crowd, camera, hiz, order="any", capacity=1000)``.
 
         Returns
         -------
-        CullResult
+        CullResult, or ViewsResult for several cameras
             The cull is recorded and submitted; reading the result waits for it.
 
         Raises
@@ -554,16 +649,51 @@ class Device:
         """
         _arguments.instance("instances", instances, Instances, "Instances of Device.instances")
         check_owner("instances", instances, self)
-        _arguments.instance("camera", camera, Camera, _ONE_CAMERA)
-        _arguments.instance("pyramid", pyramid, Pyramid, "a Pyramid of Device.pyramid")
-        check_owner("pyramid", pyramid, self)
-        if camera != pyramid.camera:
-            raise ValueError(_other_camera(camera, pyramid))
         options, outputs = cull_request(options, outputs, keywords)
-        culling = self._engine.cull(
-            instances._inner, camera._inner, pyramid._inner, options, outputs
+        wait = _arguments.flag("wait", wait)
+        restriction = among_of(among, instances, self)
+        if isinstance(camera, Camera):
+            _arguments.instance("pyramid", pyramid, Pyramid, "a Pyramid of Device.pyramid")
+            assert isinstance(pyramid, Pyramid)
+            check_owner("pyramid", pyramid, self)
+            if camera != pyramid.camera:
+                raise ValueError(_other_camera("camera", camera, pyramid))
+            _check_coverage("coverage", options, pyramid)
+            culling = self._engine.cull(
+                instances._inner,
+                camera._inner,
+                pyramid._inner,
+                options,
+                outputs,
+                self._mesh_table(outputs.meshes),
+                restriction,
+                not wait,
+            )
+            return CullResult(self, culling, Question(camera, pyramid, options, instances._points))
+        cameras, pyramids = pairs(camera, pyramid, self)
+        for number, (one, of) in enumerate(zip(cameras, pyramids, strict=True)):
+            if one != of.camera:
+                raise ValueError(_other_camera(f"camera[{number}]", one, of))
+            _check_coverage("coverage", options, of)
+        if outputs.meshes is not None:
+            raise ValueError(
+                f"meshes: expected None beside several cameras, got {len(outputs.meshes)}: levels "
+                "of detail are chosen for each view, so cull them one by one"
+            )
+        culled = self._engine.cull_views(
+            instances._inner,
+            [one._inner for one in cameras],
+            [one._inner for one in pyramids],
+            options,
+            outputs,
+            restriction,
+            not wait,
         )
-        return CullResult(self, culling, Question(camera, pyramid, options, instances._points))
+        questions = [
+            Question(one, of, options, instances._points)
+            for one, of in zip(cameras, pyramids, strict=True)
+        ]
+        return ViewsResult(self, culled, questions)
 
     def warm_up(
         self,
@@ -637,7 +767,27 @@ class Device:
         stored = _arguments.stored_levels("levels", levels)
         options, outputs = cull_request(options, outputs, keywords)
         drawn = None if occluders is None else occluders._inner
-        self._engine.warm_up(instances._inner, camera._inner, drawn, stored, options, outputs)
+        self._engine.warm_up(
+            instances._inner,
+            camera._inner,
+            drawn,
+            stored,
+            options,
+            outputs,
+            self._mesh_table(outputs.meshes),
+        )
+
+    def _mesh_table(self, meshes: Sequence[MeshLods] | None) -> CoreMeshTable | None:
+        """The table of these meshes on this device, made anew if it is not among the last ones."""
+        if meshes is None:
+            return None
+        # Equal tuples of the same objects are found without a look at their numbers.
+        for known, table in self._tables:
+            if known == meshes:
+                return table
+        table = self._engine.mesh_table([mesh._raw() for mesh in meshes])
+        self._tables = [*self._tables[1 - _TABLES_KEPT :], (meshes, table)]
+        return table
 
     def _check_side(self, camera: Camera) -> None:
         """Refuses an image that the device cannot hold, before its array is converted."""
@@ -660,12 +810,16 @@ def maker_of(thing: OnDevice[Any]) -> Device:
     return device
 
 
-_ONE_CAMERA = (
-    "a Camera (one a call: each camera culls with the pyramid of its own depth, Device.pyramid)"
-)
+def _check_coverage(name: str, options: CullOptions, pyramid: Pyramid) -> None:
+    """Refuses sample coverage for the farthest of several samples."""
+    if options.coverage == "sample" and pyramid._source.samples > 1:
+        raise ValueError(
+            f'{name}: expected "area" for a pyramid of the farthest of {pyramid._source.samples} '
+            'samples per pixel, which lie beside the pixels\' centres, got "sample"'
+        )
 
 
-def _other_camera(camera: Camera, pyramid: Pyramid) -> str:
+def _other_camera(name: str, camera: Camera, pyramid: Pyramid) -> str:
     """Why a camera cannot cull with the pyramid of another one, and the way out."""
     way = "depth of one camera says nothing about another one"
     if camera.resized(pyramid.size) == pyramid.camera:
@@ -673,4 +827,4 @@ def _other_camera(camera: Camera, pyramid: Pyramid) -> str:
             f"pass camera.resized({pyramid.size}), the same view; "
             "the promise is about an image of that size"
         )
-    return f"camera: expected the camera of the pyramid, {pyramid.camera!r}, got {camera!r}; {way}"
+    return f"{name}: expected the camera of the pyramid, {pyramid.camera!r}, got {camera!r}; {way}"

@@ -7,7 +7,7 @@ objects whole (``crates/hiz_py/src/options.rs``).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypedDict, TypeVar
@@ -15,21 +15,28 @@ from typing import TYPE_CHECKING, Any, Final, TypedDict, TypeVar
 import numpy as np
 
 from . import _arguments
-from ._types import Coverage, Fit, Order, Output, words
+from ._types import Coverage, Emit, Fit, Order, Output, Placement, words
+from .errors import LimitError
+from .lod import LodRule, lod_rule
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    import numpy.typing as npt
 
 __all__ = [
     "Coverage",
     "CullKeywords",
     "CullOptions",
     "DrawTemplate",
+    "Emit",
     "Fit",
+    "MeshLods",
     "OptionKeywords",
     "Order",
     "Output",
     "Outputs",
+    "Placement",
 ]
 
 #: How many texels per side a test may read of one level.
@@ -98,6 +105,19 @@ def _draw(name: str, value: object) -> DrawTemplate | None:
     return _arguments.instance(name, value, DrawTemplate, "a DrawTemplate or None")
 
 
+def _meshes(name: str, value: object) -> tuple[MeshLods, ...] | None:
+    if value is None:
+        return None
+    if isinstance(value, (str, MeshLods)) or not isinstance(value, Sequence):
+        got = _arguments.describe(value)
+        raise TypeError(f"{name}: expected a sequence of MeshLods or None, got {got}")
+    if not value:
+        raise ValueError(f"{name}: expected at least one MeshLods, got none")
+    for mesh in value:
+        _arguments.instance(name, mesh, MeshLods, "a MeshLods for each mesh")
+    return tuple(value)
+
+
 @dataclass(frozen=True)
 class DrawTemplate:
     """The numbers of a draw of the kept instances that a cull does not find out.
@@ -130,6 +150,84 @@ class DrawTemplate:
 
     def __post_init__(self) -> None:
         _check_fields(self)
+
+
+#: The most levels of detail of a mesh.
+MAX_LODS: Final = 8
+
+
+@dataclass(frozen=True, init=False)
+class MeshLods:
+    """The levels of detail (LODs) of one mesh, from the finest to the coarsest.
+
+    Parameters
+    ----------
+    draws : sequence of DrawTemplate
+        How each level is drawn; 1 to 8 of them, and the first is the full mesh.
+        Their ``first_instance`` is 0, because the cull writes it.
+    errors : sequence of float, optional
+        How far the surface of each level is from that of the full mesh at scale 1, at most, in
+        world units.
+        None: 0 for each.
+
+    Raises
+    ------
+    TypeError, ValueError
+        They name the parameter, what it expects and what came.
+    LimitError
+        For more than 8 levels.
+
+    Examples
+    --------
+    >>> import hizvk
+    >>> fine, coarse = hizvk.DrawTemplate(3600), hizvk.DrawTemplate(300, first_index=3600)
+    >>> tree = hizvk.MeshLods([fine, coarse], errors=[0.0, 0.02])
+    >>> len(tree.draws)
+    2
+    """
+
+    draws: tuple[DrawTemplate, ...]
+    errors: tuple[float, ...]
+
+    def __init__(
+        self,
+        draws: Sequence[DrawTemplate],
+        errors: Sequence[float] | npt.NDArray[np.floating] | None = None,
+    ) -> None:
+        if isinstance(draws, str) or not isinstance(draws, Sequence):
+            got = _arguments.describe(draws)
+            raise TypeError(f"draws: expected a sequence of DrawTemplate, got {got}")
+        for draw in draws:
+            _arguments.instance("draws", draw, DrawTemplate, "a DrawTemplate for each level")
+            if draw.first_instance != 0:
+                got = f"{draw.first_instance}"
+                raise ValueError(
+                    f"draws: expected first_instance 0, which the cull sets, got {got}"
+                )
+        if not draws:
+            raise ValueError(f"draws: expected 1 to {MAX_LODS} levels of detail, got none")
+        if len(draws) > MAX_LODS:
+            raise LimitError("levels of detail of a mesh", len(draws), MAX_LODS)
+        if errors is None:
+            errors = (0.0,) * len(draws)
+        if isinstance(errors, str) or not isinstance(errors, (Sequence, np.ndarray)):
+            got = _arguments.describe(errors)
+            raise TypeError(f"errors: expected a sequence of numbers or None, got {got}")
+        if len(errors) != len(draws):
+            expected = f"one for each of {len(draws)} levels of detail"
+            raise ValueError(f"errors: expected {expected}, got {len(errors)}")
+        checked = (
+            _arguments.number("errors", error, at_least=0.0, at_most=2.0**59) for error in errors
+        )
+        object.__setattr__(self, "draws", tuple(draws))
+        object.__setattr__(self, "errors", tuple(checked))
+
+    def _raw(self) -> list[tuple[int, int, int, int, float]]:
+        """The levels as the compiled module takes them."""
+        return [
+            (draw.index_count, draw.first_index, draw.base_vertex, draw.first_instance, error)
+            for draw, error in zip(self.draws, self.errors, strict=True)
+        ]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,6 +288,9 @@ class CullOptions:
         `CullResult.stats` says how many tests were spent.
     statistics : bool
         Whether to count the tests on each level and the texels that they read; this is slower.
+    lod : LodByError, LodByDistance or LodBySize, optional
+        Which level of detail of its mesh a kept instance is drawn with.
+        None: the full mesh, LOD 0.
 
     Raises
     ------
@@ -223,6 +324,7 @@ class CullOptions:
     fit: Fit = field(default="rectangle", metadata=_by(_arguments.choice, choices=words(Fit)))
     hierarchy: bool | None = field(default=None, metadata=_by(_flag_or_none))
     statistics: bool = field(default=False, metadata=_by(_arguments.flag))
+    lod: LodRule | None = field(default=None, metadata=_by(lod_rule))
 
     def __post_init__(self) -> None:
         _check_fields(self)
@@ -253,6 +355,19 @@ class Outputs:
         Too small a capacity shows as ``count < demand``; mask and verdicts stay complete.
     draw : DrawTemplate, optional
         The other numbers of the draw arguments; None leaves them 0.
+    meshes : sequence of MeshLods, optional
+        The meshes that the ``mesh_ids`` of the instances name.
+        What is kept is then sorted by mesh and level of detail (LOD), with a draw for each.
+        None: one list with one draw.
+    emit : "bins" or "instances"
+        What a draw is, beside `meshes`.
+        ``"bins"``: all that is kept of one mesh at one LOD.
+        ``"instances"``: one kept instance; the draws ascend by index.
+    placement : "packed" or "reserved"
+        Where the bins lie in the list.
+        ``"packed"``: one behind the other; the draws of bins without instances are left out.
+        ``"reserved"``: each has room for all instances of its mesh, and its draw has a fixed place.
+        A cull with ``order="any"`` has bins for one mesh alone, and needs ``"reserved"``.
 
     Raises
     ------
@@ -272,6 +387,11 @@ class Outputs:
     draws: bool | None = field(default=None, metadata=_by(_flag_or_none))
     capacity: int | None = field(default=None, metadata=_by(_capacity))
     draw: DrawTemplate | None = field(default=None, metadata=_by(_draw))
+    meshes: Sequence[MeshLods] | None = field(default=None, metadata=_by(_meshes))
+    emit: Emit = field(default="bins", metadata=_by(_arguments.choice, choices=words(Emit)))
+    placement: Placement = field(
+        default="packed", metadata=_by(_arguments.choice, choices=words(Placement))
+    )
 
     def __post_init__(self) -> None:
         _check_fields(self)
@@ -303,13 +423,17 @@ class OptionKeywords(TypedDict, total=False):
     fit: Fit
     hierarchy: bool | None
     statistics: bool
+    lod: LodRule | None
 
 
 class CullKeywords(OptionKeywords, total=False):
-    """The keywords of `Device.cull`: those of `CullOptions`, and these two of `Outputs`."""
+    """The keywords of `Device.cull`: those of `CullOptions`, and these of `Outputs`."""
 
     capacity: int | None
     draw: DrawTemplate | None
+    meshes: Sequence[MeshLods] | None
+    emit: Emit
+    placement: Placement
 
 
 _OPTIONS: Final = CullOptions()
@@ -332,7 +456,8 @@ def cull_request(
 ) -> tuple[CullOptions, Outputs]:
     """Both objects of a cull, from what `Device.cull` was given."""
     _arguments.refuse_unknown(keywords, CullKeywords.__annotations__)
-    of_outputs = {name: keywords[name] for name in ("capacity", "draw") if name in keywords}
+    names = ("capacity", "draw", "meshes", "emit", "placement")
+    of_outputs = {name: keywords[name] for name in names if name in keywords}
     of_options = {name: keywords[name] for name in keywords if name not in of_outputs}
     if outputs is None:
         outputs = _OUTPUTS

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, overload
 
 from . import _arguments
 from ._core import DepthImage as CoreDepthImage
 from ._core import Instances as CoreInstances
 from ._core import Occluders as CoreOccluders
 from ._core import Pyramid as CorePyramid
-from ._on_device import Allocated, OnDevice
+from ._on_device import Allocated, OnDevice, check_owner
 from .bounds import Bounds, are_points, as_arrays
 from .mesh import placed
+from .renewal import rectangle, replacement
 
 if TYPE_CHECKING:
     import numpy as np
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from ._on_device import Maker
     from ._types import DepthKind
     from .camera import Camera
+    from .renewal import Source
 
 __all__ = ["DepthImage", "Instances", "Occluders", "Pyramid"]
 
@@ -229,10 +231,17 @@ class Pyramid(_Seen, Allocated[CorePyramid]):
     """
 
     def __init__(
-        self, device: Maker, inner: CorePyramid, camera: Camera, *, is_rendered: bool = False
+        self,
+        device: Maker,
+        inner: CorePyramid,
+        camera: Camera,
+        source: Source,
+        *,
+        is_rendered: bool = False,
     ) -> None:
         super().__init__(device, inner)
         self._camera = camera
+        self._source = source
         self._is_rendered = is_rendered
 
     @property
@@ -270,6 +279,81 @@ class Pyramid(_Seen, Allocated[CorePyramid]):
             raise IndexError(f"k: expected 0 or a level that is stored, {self._stored()}, got {k}")
         size, texels = self._inner.read_level(k)
         return texels.reshape(size)
+
+    @overload
+    def update(self, row: int, column: int, array: npt.NDArray[Any]) -> None: ...
+
+    @overload
+    def update(self, row: DepthImage, column: tuple[int, int, int, int] | None) -> None: ...
+
+    def update(self, row: Any, column: Any = None, array: Any = None) -> None:
+        """Renews the levels where the depth image has changed, and nowhere else.
+
+        Afterwards the levels are those of a pyramid that is built anew, bit for bit.
+        A cull that was submitted before keeps its answer.
+        Its `CullResult.explain` reads the depth as it is now.
+
+        There are two forms:
+
+        - ``hiz.update(row, column, array)`` puts an array into the depth image.
+          It is for a pyramid that was built from an array.
+        - ``hiz.update(depth, rectangle)`` is for a pyramid of a `DepthImage` that was drawn into
+          since (``render_depth(..., into=depth)`` returns the rectangle).
+          Outside of the rectangle nothing may have changed.
+
+        Parameters
+        ----------
+        row : int; or DepthImage
+            The row of the image where the array begins; or the image that the pyramid was built
+            from.
+        column : int; or (x0, y0, x1, y1) or None
+            The column where the array begins; or the rectangle that was touched, both ends
+            included.
+            None: nothing was touched.
+        array : (height, width) array, or (height, width, samples)
+            The new depth, which ends within the image.
+            Its numbers mean what those of the pyramid's own array mean: `kind`, `scale` and
+            `invalid` are the same, and so is the dtype.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+
+        Examples
+        --------
+        >>> import numpy as np, hizvk
+        >>> device = hizvk.Device()
+        >>> camera = hizvk.Camera.look_at(
+        ...     (0, 0, 9), (0, 0, 0), fov_y_deg=60, size=(90, 160), near=0.1
+        ... )
+        >>> depth = np.full(camera.size, 20.0)
+        >>> hiz = device.pyramid(depth, camera, kind="z")
+        >>> hiz.update(10, 30, np.full((5, 8), 3.0))
+        >>> depth[10:15, 30:38] = 3.0
+        >>> anew = device.pyramid(depth, camera, kind="z")
+        >>> all(np.array_equal(hiz.level(k), anew.level(k)) for k in range(hiz.num_levels))
+        True
+        """
+        engine = self._device._engine
+        if isinstance(row, DepthImage):
+            if array is not None:
+                got = _arguments.describe(array)
+                raise TypeError(f"array: expected nothing beside a DepthImage, got {got}")
+            check_owner("depth", row, self._device)
+            if row._inner is not self._source.image:
+                raise ValueError(
+                    f"depth: expected the DepthImage that the pyramid was built from, got {row!r}; "
+                    "Device.pyramid builds one from it"
+                )
+            touched = rectangle("rectangle", column, self.size)
+            if touched is not None:
+                engine.renew(self._inner, row._inner, touched)
+            return
+        touched, rows = replacement(self._source, self._camera, row, column, array)
+        images = [plane.image for plane in rows]
+        meaning = rows[0][1:]
+        engine.replace_depth(self._inner, self._source.image, touched, images, *meaning)
 
     def _stored(self) -> str:
         first, last = self.levels[0], self.levels[-1]

@@ -7,16 +7,17 @@ Later reads get the same arrays, so they are read-only.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from . import _arguments
+from ._awaited import Awaited
 from ._core import Counts as CoreCounts
 from ._core import Culling as CoreCulling
-from ._on_device import OnDevice
 from ._processes import cached_property
 from .explanation import explanation_of
+from .options import MAX_LODS
 from .stats import CullStats
 
 if TYPE_CHECKING:
@@ -26,7 +27,13 @@ if TYPE_CHECKING:
     from .explanation import Explanation
     from .hints import Question
 
-__all__ = ["DRAW_DTYPE", "CullResult"]
+__all__ = ["ABSENT", "DRAW_DTYPE", "NO_LOD", "CullResult"]
+
+#: The mesh id of an instance that is not there.
+ABSENT: Final = 2**32 - 1
+
+#: The level of detail of an instance that a cull did not keep.
+NO_LOD: Final = 255
 
 #: One record of Vulkan's ``VkDrawIndexedIndirectCommand`` (``DrawIndexedIndirect`` of WebGPU).
 #: It has 20 bytes.
@@ -67,16 +74,33 @@ class SharedArray(np.ndarray):
         return repr(self.view(np.ndarray))
 
 
-def _shared(array: npt.NDArray[np.generic]) -> Any:
+def shared(array: npt.NDArray[np.generic]) -> Any:
+    """The array as one that every read returns."""
     shared = array.view(SharedArray)
     shared.setflags(write=False)
     return shared
 
 
-class CullResult(OnDevice[CoreCulling]):
+class CullResult(Awaited[CoreCulling]):
     """The answer of `Device.cull`; reading any part of it waits for the device.
 
     It is made by `Device.cull` alone, and may be read from any thread.
+    Whoever must not wait asks `ready` first, or awaits it.
+
+    Examples
+    --------
+    >>> import numpy as np, hizvk
+    >>> device = hizvk.Device()
+    >>> crowd = device.instances(hizvk.Spheres(np.zeros((1000, 3)), 0.5))
+    >>> camera = hizvk.Camera.look_at(
+    ...     (0, 0, 9), (0, 0, 0), fov_y_deg=60, size=(90, 160), near=0.1
+    ... )
+    >>> pyramid = device.pyramid(np.full(camera.size, 20.0), camera, kind="z")
+    >>> seen = device.cull(crowd, camera, pyramid, outputs=["mask"], wait=False)
+    >>> while not seen.ready():
+    ...     pass  # work of your own
+    >>> seen.mask.sum()  # waits for nothing
+    np.int64(1000)
     """
 
     def __init__(self, device: Maker, culling: CoreCulling, question: Question) -> None:
@@ -93,25 +117,69 @@ class CullResult(OnDevice[CoreCulling]):
 
         They are about the bounds that were tested, also if these were updated before the read.
         """
-        return _shared(self._inner.verdicts())  # type: ignore[no-any-return]
+        return shared(self._inner.verdicts())  # type: ignore[no-any-return]
 
     @cached_property
     def mask(self) -> npt.NDArray[np.bool_]:
         """``(N,)`` bool: True for what is kept; complete, whatever the capacity of the list."""
-        return _shared(self._inner.mask())  # type: ignore[no-any-return]
+        return shared(self._inner.mask())  # type: ignore[no-any-return]
 
     @cached_property
     def indices(self) -> npt.NDArray[np.uint32]:
         """``(count,)`` uint32: the list of kept instances; ascending for ``order="stable"``."""
-        return _shared(self._inner.indices())  # type: ignore[no-any-return]
+        return shared(self._inner.indices())  # type: ignore[no-any-return]
 
     @cached_property
     def draws(self) -> npt.NDArray[np.void]:
         """``(D,)`` of `DRAW_DTYPE`: the indirect draw arguments.
 
         There is one record for each piece of the instances (`Instances.num_pieces`).
+        With ``meshes=``, each piece has as many records as it could need, and zeros follow those
+        that draw something (`draw_count`).
         """
         return np.frombuffer(self._inner.draws(), dtype=DRAW_DTYPE)
+
+    @property
+    def draw_count(self) -> int:
+        """How many records of `draws` draw something, in all pieces together.
+
+        They are the first ones of each piece, unless ``placement="reserved"`` gives each bin a
+        fixed place.
+        """
+        return sum(self._inner.draw_counts())
+
+    @cached_property
+    def lods(self) -> npt.NDArray[np.uint8]:
+        """``(N,)`` uint8: the level of detail of each instance; `hizvk.NO_LOD` if it is culled.
+
+        Raises
+        ------
+        ValueError
+            If the cull was not given ``meshes=``, or had ``order="any"``.
+        """
+        return shared(self._inner.lods())  # type: ignore[no-any-return]
+
+    def bin(self, *, mesh: int, lod: int) -> npt.NDArray[np.uint32]:
+        """``(count,)`` uint32: what was listed of a mesh at one level of detail.
+
+        It ascends for ``order="stable"``.
+
+        Parameters
+        ----------
+        mesh : int
+            Its place in ``meshes=``.
+        lod : int
+            The level of detail, from 0 on.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came; also if the cull was not given
+            ``meshes=``, or had ``emit="instances"``.
+        """
+        mesh = _arguments.integer("mesh", mesh, low=0, high=2**16 - 1)
+        lod = _arguments.integer("lod", lod, low=0, high=MAX_LODS - 1)
+        return self._inner.bin(mesh, lod)
 
     @cached_property
     def _counts(self) -> CoreCounts:
@@ -156,6 +224,7 @@ class CullResult(OnDevice[CoreCulling]):
         record_ms, compile_ms, wall_ms, readback_ms = self._inner.timings()
         return CullStats(
             tested=counts.tested,
+            absent=counts.absent,
             outside=counts.outside,
             occluded=counts.occluded,
             kept=counts.visible + counts.invalid,

@@ -48,6 +48,8 @@ class CullStats:
     So time that passes before the first of these counts, too."""
     readback_ms: float
     """Milliseconds spent so far on copying results to the host."""
+    absent: int = 0
+    """Instances that are absent (`hizvk.ABSENT`); no other number counts them."""
 
     @property
     def comparisons(self) -> int:

@@ -24,6 +24,11 @@ override DESCENT: bool;
 // Otherwise a texel is compared with the volume's rectangle at the volume's nearest depth.
 override FIT_VOLUME: bool;
 
+// An instance that is absent has its centre below this, on the first axis.
+// No other centre is there, relative to any reference point: both are below 2^60 in magnitude.
+// Half of `ABSENT_CENTER` in `crates/hiz_core/src/instances/volume_record.rs`.
+const ABSENT_BELOW: f32 = -0x1p61;
+
 // Below this w a ratio could overflow, as rows stay below 2^59.
 // The margins alone reach 2^-70, so this keeps next to nothing visible.
 const LEAST_W: f32 = 0x1p-66;
@@ -166,6 +171,9 @@ fn classify(i: u32) -> Outcome {
     var out = Outcome(INVALID, AT_VALIDITY, vec4<i32>(0), 0u, vec4<u32>(0u), 0u, 0u);
     let volume = load_volume(i);
     if !(volume.size < view.coordinate_limit) {
+        if volume.center.x < ABSENT_BELOW {
+            out.verdict = OUTSIDE;
+        }
         return out;
     }
     let errors = errors_of(volume);

@@ -30,6 +30,10 @@ fn cull_groups(@builtin(global_invocation_id) id: vec3<u32>) {
     if group >= groups.count {
         return;
     }
+    if !any_among(group) {
+        group_verdicts[group] = OUTSIDE;
+        return;
+    }
     let outcome = classify(group);
     let verdict = outcome.verdict;
     if STATISTICS {

@@ -6,6 +6,9 @@
 // Twin: `WORKGROUP` in `crates/hiz_core/src/cull/refine.rs`.
 const WORKGROUP: u32 = 64u;
 
+// The texel of a box's record in which the fourth word says that a member is absent.
+const LAST_TEXEL: u32 = 2u;
+
 // A flag beside the verdict of such a group; REFINED of `refine.wgsl` is another.
 const WITHIN: u32 = 8u;
 
@@ -39,7 +42,9 @@ fn refine_groups(@builtin(global_invocation_id) id: vec3<u32>) {
     if group >= groups.count || group_verdicts[group] != OCCLUDED {
         return;
     }
-    if is_within(group) {
+    // The verdict of an absent member is not that of its group.
+    let has_absent = record_texel(group, LAST_TEXEL).w != 0u;
+    if !has_absent && is_within(group) {
         group_verdicts[group] = OCCLUDED | WITHIN;
     }
 }

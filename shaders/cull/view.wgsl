@@ -45,8 +45,23 @@ struct View {
     depth_offset: f32,
     // From this size on a product could overflow, so such an instance is invalid.
     coordinate_limit: f32,
-    padding: u32,
+    // One more than the coarsest LOD that the rule can choose.
+    lod_end: u32,
+    // What w has to exceed, of LODs 0 to 7 in turn.
+    // By error: .x of the first is a factor of the error, for all LODs.
+    // By size: a factor of the radius.
+    lod_needs: array<vec4<f32>, 2>,
+    // Where level 0 begins in its texture, if it is a part of it: the column, and COORDINATE_BITS
+    // higher the row.
+    source_origin: u32,
+    padding_0: u32,
+    padding_1: vec2<u32>,
 }
+
+// Bits of a column in `source_origin`.
+// Twin: `COORDINATE_BITS` in `crates/hiz_core/src/cull/view_uniform.rs`.
+const COORDINATE_BITS: u32 = 16u;
+const COORDINATE_MASK: u32 = (1u << COORDINATE_BITS) - 1u;
 
 var<private> view: View;
 

@@ -1,9 +1,10 @@
-// Level 0 is a color texture of one float channel (r32float).
+// Level 0 is a color texture of one float channel (r32float, r16float).
 
 @group(0) @binding(0) var source: texture_2d<f32>;
 
 fn source_bits(x: u32, y: u32) -> u32 {
-    return sanitized(bitcast<u32>(textureLoad(source, vec2<u32>(x, y), 0).x));
+    let at = vec2<u32>(x, y) + source_origin();
+    return sanitized(bitcast<u32>(textureLoad(source, at, 0).x));
 }
 
 // The four pixels around a point, in the order of a gather:

@@ -1,18 +1,9 @@
 // Level 0 is a texture that is sampled (`source_depth.wgsl`, `source_float.wgsl`).
 // One gather reads the four pixels around a corner.
+// `source_whole.wgsl` or `source_part.wgsl` says where the image begins in its texture, and reads
+// single quads.
 
 @group(0) @binding(1) var source_sampler: sampler;
-
-// The common corner of the pixels (2x, 2y) to (2x + 1, 2y + 1), in units of the image.
-// It is half a pixel from where a gather would take other pixels, so its rounding is harmless.
-fn quad_corner(x: u32, y: u32) -> vec2<f32> {
-    return vec2<f32>(f32(2u * x + 1u), f32(2u * y + 1u)) / vec2<f32>(textureDimensions(source));
-}
-
-// The farthest depth of these four pixels; pixels past the edge are replaced by pixels at the edge.
-fn quad(x: u32, y: u32) -> u32 {
-    return farthest_sanitized4(gathered(quad_corner(x, y)));
-}
 
 // Four such quads: columns 4x to 4x + 3 of row y of quads.
 fn source_quad_row(x: u32, y: u32) -> vec4<u32> {
@@ -44,7 +35,8 @@ fn source_quads(block: vec2<u32>) -> array<vec4<u32>, BLOCK_QUADS> {
 // One gather reads the four pixels around their common corner.
 // Where two columns or rows are the same, the gather has also read a neighbour, which is replaced.
 fn source_corners(t: vec4<u32>) -> vec4<u32> {
-    let corner = vec2<f32>(f32(t.x + 1u), f32(t.y + 1u)) / vec2<f32>(textureDimensions(source));
+    let at = t.xy + source_origin() + vec2<u32>(1u);
+    let corner = vec2<f32>(at) / vec2<f32>(textureDimensions(source));
     // From the order of a gather to rows.
     let pixels = gathered(corner).wzxy;
     let columns = select(pixels.xxzz, pixels, t.x < t.z);

@@ -19,6 +19,33 @@ fn exceeds_support(center: f32, half: vec3<f32>) -> bool {
     return center > support(half);
 }
 
+// The square of a radius is raised by 32 EPS, and a sum of half axes as well.
+// At most 16 are lost of either.
+const RADIUS_FACTOR: f32 = 1.0 + 32.0 * EPS;
+// Components below 2^-63 may lose their squares, which are less than this in all.
+const RADIUS_FLOOR: f32 = 0x1p-100;
+// Makes a root large enough that its square passes the check.
+const ROOT_FACTOR: f32 = 1.0 + 8.0 * EPS;
+
+// No point is farther from the centre than this: half of the longest of the four diagonals.
+//
+// The root is a guess that its square checks.
+// If it fails, all half axes added will do.
+fn radius_of(volume: Volume) -> f32 {
+    let sum = volume.half_axis_0 + volume.half_axis_1;
+    let difference = volume.half_axis_0 - volume.half_axis_1;
+    let a = sum + volume.half_axis_2;
+    let b = sum - volume.half_axis_2;
+    let c = difference + volume.half_axis_2;
+    let d = difference - volume.half_axis_2;
+    let longest = max(max(dot(a, a), dot(b, b)), max(dot(c, c), dot(d, d)));
+    let square = longest * RADIUS_FACTOR + RADIUS_FLOOR;
+    let root = sqrt(square) * ROOT_FACTOR;
+    let added = sum_abs(volume.half_axis_0) + sum_abs(volume.half_axis_1)
+        + sum_abs(volume.half_axis_2);
+    return select(added * RADIUS_FACTOR, root, root * root >= square);
+}
+
 // The least and greatest r / w, and what is proved about them.
 struct Extent {
     low: f32,

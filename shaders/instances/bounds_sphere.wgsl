@@ -37,6 +37,11 @@ fn load_volume(i: u32) -> Volume {
     return Volume(d_hi + d_lo, size_of(d_hi, AXES * radius), radius);
 }
 
+// No point is farther from the centre than this.
+fn radius_of(volume: Volume) -> f32 {
+    return volume.radius;
+}
+
 fn on_half_axes(m: vec3<f32>, volume: Volume) -> vec3<f32> {
     return m * volume.radius;
 }

@@ -2,61 +2,27 @@
 //
 // - a bit per instance, in the caller's numbering
 // - a verdict per instance, in the stored order
-// - the draw's list of kept instances, and its length
+// - what `emit` leaves, which is in a file of its own for each way to emit:
+//   `report_list.wgsl`, `report_planes.wgsl` or `report_bins.wgsl`
 
 // Set the bit of each instance that is kept.
 override MASK: bool;
 // Write its verdict.
 override VERDICTS: bool;
-// Count the kept instances in the draw arguments, in the order in which invocations arrive.
-// Otherwise `compact.wgsl` counts the mask.
-override APPEND: bool;
-// And list them.
-override LIST: bool;
-// More instances may be kept than the lists hold.
-override CAPPED: bool;
-
-// Twin: `DrawIndexedIndirect` in `crates/hiz_core/src/output/draw.rs`.
-struct DrawIndexedIndirect {
-    index_count: u32,
-    instance_count: atomic<u32>,
-    first_index: u32,
-    base_vertex: i32,
-    first_instance: u32,
-}
 
 @group(1) @binding(0) var<uniform> piece: Piece;
 // Bit i of the first words: the caller's instance i of the piece is kept.
 // From `verdicts_begin` on: a word per place, the verdict of the instance that is stored there.
 @group(2) @binding(0) var<storage, read_write> mask: array<atomic<u32>>;
-@group(2) @binding(1) var<storage, read_write> list: array<u32>;
-@group(2) @binding(2) var<storage, read_write> draws: array<DrawIndexedIndirect>;
-// .x: how many indices may be written, in all pieces together.
-@group(2) @binding(4) var<uniform> capacity: vec4<u32>;
 
-// The capacity that earlier pieces have left.
-fn room() -> u32 {
-    var left = capacity.x;
-    for (var p = 0u; p < piece.index; p += 1u) {
-        left -= min(left, atomicLoad(&draws[p].instance_count));
-    }
-    return left;
+// Where a mask holds an instance.
+struct MaskPlace {
+    word: u32,
+    bit: u32,
 }
 
-// `instance_count` is also the allocator.
-// An invocation whose slot exceeds the remaining capacity undoes its increment.
-// So the count ends within the capacity, and no slot is handed out twice.
-fn append(index: u32) {
-    let slot = atomicAdd(&draws[piece.index].instance_count, 1u);
-    if CAPPED {
-        if slot >= room() {
-            atomicSub(&draws[piece.index].instance_count, 1u);
-            return;
-        }
-    }
-    if LIST {
-        list[slot] = piece.base + index;
-    }
+fn mask_place(index: u32) -> MaskPlace {
+    return MaskPlace(index / WORD_BITS, 1u << (index % WORD_BITS));
 }
 
 // Whether the instance at a place is kept; writes its verdict.
@@ -75,11 +41,28 @@ fn test(place: u32) -> bool {
 fn report(place: u32) {
     let index = caller_index(place);
     if MASK {
-        atomicOr(&mask[index / WORD_BITS], 1u << (index % WORD_BITS));
+        let at = mask_place(index);
+        atomicOr(&mask[at.word], at.bit);
     }
-    if APPEND {
-        append(index);
+    emit(place, index);
+}
+
+// Which members of a run are asked for: bit k stands for the place `first + k * SHARE`.
+// The others are outside.
+// It is for culls of some instances alone.
+fn asked_of_run(first: u32) -> u32 {
+    var asked = 0u;
+    if AMONG {
+        for (var k = 0u; k < RUN && first + k * SHARE < piece.count; k += 1u) {
+            let place = first + k * SHARE;
+            if is_among(place) {
+                asked |= 1u << k;
+            } else if VERDICTS {
+                atomicStore(&mask[verdicts_begin(piece.words) + place], OUTSIDE);
+            }
+        }
     }
+    return asked;
 }
 
 // Tests the RUN members of a group that belong to one of its SHARE invocations.
@@ -87,8 +70,18 @@ fn report(place: u32) {
 fn cull_run(group: u32, share: u32) {
     let first = group * GROUP + share;
     var kept = 0u;
+    var asked = asked_of_run(first);
     var k = 0u;
     loop {
+        // Software drivers skip no branch but end a loop.
+        // So the loop goes from one that is asked for to the next.
+        if AMONG {
+            if asked == 0u {
+                break;
+            }
+            k = countTrailingZeros(asked);
+            asked &= asked - 1u;
+        }
         let place = first + k * SHARE;
         if place < piece.count && test(place) {
             kept |= 1u << k;

@@ -11,13 +11,36 @@ struct Step {
     // The level that is read, and the last of the levels above it that are written.
     source: u32,
     last: u32,
+    // The columns and rows of blocks that are read: from `begin` to before `end`.
+    // All of a level ends at a multiple of VECTOR columns, so rows are whole vectors on the third
+    // level, too.
+    end: vec2<u32>,
+    begin: vec2<u32>,
+    // Where level 0 begins in its texture, if it is a part of it.
+    origin: vec2<u32>,
     // The number of this reduction, for the header; 0: this step writes no header.
     reduction: u32,
-    padding: u32,
-    // How many blocks the level has, in columns and rows.
-    // The columns are a multiple of VECTOR, so rows are whole vectors on the third level too.
-    blocks: vec2<u32>,
-    padding_1: vec2<u32>,
+    // The number of the reduction of which this one renews a part; 0: it renews everything.
+    base: u32,
+    padding: vec2<u32>,
+}
+
+// Numbers the pyramid; one invocation of the first step calls this.
+//
+// A part alone is not enough where the rest does not come from the reduction that was expected.
+// The number is 0 then, which no cull expects, until everything is renewed.
+fn write_header() {
+    let follows = step.base == 0u || chunk_0[0].x == step.base;
+    chunk_0[0] = vec4<u32>(select(0u, step.reduction, follows), 0u, 0u, 0u);
+}
+
+// Where level 0 begins in its texture, and its last pixel; only `source_part.wgsl` asks.
+fn part_origin() -> vec2<u32> {
+    return step.origin;
+}
+
+fn part_edge() -> vec2<u32> {
+    return vec2<u32>(pyramid.levels[0].width, pyramid.levels[0].height) - vec2<u32>(1u);
 }
 
 // True: neighbouring invocations read blocks below each other.

@@ -84,11 +84,12 @@ fn reduce_block(source_number: u32, last: u32, block: vec2<u32>) {
 
 @compute @workgroup_size(WORKGROUP, 1)
 fn reduce(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let block = place_of(workgroup.xy, lane);
-    if step.reduction != 0u && block.x == 0u && block.y == 0u {
-        chunk_0[0] = vec4<u32>(step.reduction, 0u, 0u, 0u);
+    let place = place_of(workgroup.xy, lane);
+    if step.reduction != 0u && place.x == 0u && place.y == 0u {
+        write_header();
     }
-    if block.x < step.blocks.x && block.y < step.blocks.y {
+    let block = step.begin + place;
+    if block.x < step.end.x && block.y < step.end.y {
         reduce_block(step.source, step.last, block);
     }
 }
@@ -96,14 +97,21 @@ fn reduce(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
 // All levels that are left, made by one workgroup: they are less work than another dispatch.
 @compute @workgroup_size(WORKGROUP, 1)
 fn reduce_tail(@builtin(local_invocation_index) lane: u32) {
-    var blocks = step.blocks;
+    var begin = step.begin;
+    var end = step.end;
     for (var source_number = step.source; source_number < step.last; source_number += BLOCK_LOG2) {
-        for (var i = lane; i < blocks.x * blocks.y; i += WORKGROUP) {
-            reduce_block(source_number, step.last, vec2<u32>(i % blocks.x, i / blocks.x));
+        let size = end - begin;
+        for (var i = lane; i < size.x * size.y; i += WORKGROUP) {
+            let at = begin + vec2<u32>(i % size.x, i / size.x);
+            reduce_block(source_number, step.last, at);
         }
         storageBarrier();
         // The blocks of the level that was written last, as `passes` in `layout.rs` counts them.
-        blocks = (blocks + vec2<u32>(BLOCK - 1u)) / BLOCK;
-        blocks.x = (blocks.x + VECTOR_MASK) & ~VECTOR_MASK;
+        // Behind its last column the padding follows.
+        let columns = pyramid.levels[min(source_number + BLOCK_LOG2, step.last)].width;
+        let all = (columns + (BLOCK - 1u)) / BLOCK;
+        begin /= BLOCK;
+        end = (end + vec2<u32>(BLOCK - 1u)) / BLOCK;
+        end.x = select(end.x, (all + VECTOR_MASK) & ~VECTOR_MASK, end.x >= all);
     }
 }

@@ -36,27 +36,28 @@ fn reduce_coarse(
     @builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32,
 ) {
     if lane == 0u && group.x == 0u && group.y == 0u {
-        chunk_0[0] = vec4<u32>(step.reduction, 0u, 0u, 0u);
+        write_header();
     }
     let level = pyramid.levels[step.last];
     // Blocks along a side of a texel.
     let side = 1u << (step.last - BLOCK_LOG2);
     if !SHARED {
-        let at = place_of(group.xy, lane);
-        if at.x < step.blocks.x && at.y < step.blocks.y {
+        let at = step.begin + place_of(group.xy, lane);
+        if at.x < step.end.x && at.y < step.end.y {
             store(level.offset + at.y * level.stride + at.x, farthest_of(at * side, side));
         }
         return;
     }
     // Each invocation takes one of SIDE x SIDE parts of the texel.
     let part = side >> SIDE_LOG2;
-    parts[lane] = farthest_of(group.xy * side + place_in_square(lane) * part, part);
+    let texel = step.begin + group.xy;
+    parts[lane] = farthest_of(texel * side + place_in_square(lane) * part, part);
     workgroupBarrier();
     if lane == 0u {
         var bits = parts[0];
         for (var i = 1u; i < WORKGROUP; i += 1u) {
             bits = farthest(bits, parts[i]);
         }
-        store(level.offset + group.y * level.stride + group.x, bits);
+        store(level.offset + texel.y * level.stride + texel.x, bits);
     }
 }

@@ -4,6 +4,15 @@
 @group(0) @binding(4) var<storage, read> chunk_1: array<u32>;
 @group(0) @binding(5) var<storage, read> chunk_2: array<u32>;
 
+// Where level 0 begins in its texture, and its last pixel; only `source_part.wgsl` asks.
+fn part_origin() -> vec2<u32> {
+    return vec2<u32>(view.source_origin & COORDINATE_MASK, view.source_origin >> COORDINATE_BITS);
+}
+
+fn part_edge() -> vec2<u32> {
+    return vec2<u32>(view.size) - vec2<u32>(1u);
+}
+
 fn stored_bits(index: u32) -> u32 {
     let chunk = select(index >> pyramid.chunk_shift, 0u, CHUNKS == 1u);
     let i = index - (chunk << pyramid.chunk_shift);

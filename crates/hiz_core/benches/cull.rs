@@ -177,11 +177,11 @@ fn outputs<'a>(
     let [(_, boxes), ..] = crowd.bounds();
     let instances = engine.instances(&boxes, &InstanceOptions::default()).expect("instances");
     let draws = Outputs { draws: true, ..Outputs::NONE };
-    let indices = Outputs { indices: true, ..draws };
+    let indices = Outputs { indices: true, ..draws.clone() };
     [
         ("everything, stable", Order::Stable, Outputs::ALL),
         ("everything, any order", Order::Any, Outputs::ALL),
-        ("indices, stable", Order::Stable, indices),
+        ("indices, stable", Order::Stable, indices.clone()),
         ("indices, any order", Order::Any, indices),
         ("draws", Order::Any, draws),
         ("verdicts", Order::Stable, Outputs { verdicts: true, ..Outputs::NONE }),

@@ -5,9 +5,11 @@
 
 use std::sync::Arc;
 
+use crate::cull::among::{Among, AmongMask, record_among};
 use crate::cull::inputs::CullInputs;
 use crate::cull::options::CullOptions;
 use crate::cull::record::record_cull;
+use crate::cull::views::{View, ViewsInputs, record_cull_views};
 use crate::cull::warm_up::{WarmUp, record_warm_up};
 use crate::error::{Error, Result};
 use crate::gpu::device::Gpu;
@@ -15,7 +17,6 @@ use crate::input::bounds::{Bounds, BoundsKind};
 use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
 use crate::input::mesh::MeshData;
-use crate::input::tolerance::DepthTolerance;
 use crate::instances::from_buffer::{BoundsBuffer, record_instances_from, record_update_from};
 use crate::instances::piece::CULL_WORKGROUP;
 use crate::instances::update::record_update;
@@ -25,9 +26,15 @@ use crate::occluders::device_raster::record_occluders;
 use crate::occluders::drawing::OccluderOptions;
 use crate::occluders::drawing::{DrawOptions, Rasteriser, Touched};
 use crate::occluders::uploaded::Occluders;
+use crate::output::mesh_table::{MeshLods, MeshTable};
 use crate::output::outputs::Outputs;
+use crate::output::readback::{AnswerInFlight, ReadbackRing, record_readback};
+use crate::output::views::{ViewsOutputs, VisibleViews};
 use crate::output::visible::Visible;
 use crate::pyramid::reduce::record_reduce;
+use crate::pyramid::region::record_reduce_region;
+use crate::pyramid::resolve::{DepthResolve, ResolveOptions, record_resolve};
+use crate::pyramid::source::DepthSource;
 use crate::pyramid::{Pyramid, PyramidOptions, PyramidUniform};
 
 /// Everything that is made once per device.
@@ -206,7 +213,7 @@ impl HizContext {
         &self,
         encoder: &mut wgpu::CommandEncoder,
         bounds: &Bounds<'_>,
-        options: &InstanceOptions,
+        options: &InstanceOptions<'_>,
     ) -> Result<Instances> {
         Instances::new(&self.gpu, bounds, options, true, |copies, _| {
             self.gpu.recorded(|| {
@@ -263,6 +270,19 @@ impl HizContext {
         })
     }
 
+    /// Makes a table of meshes, each with its levels of detail.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] for no meshes, a mesh without a level of detail, errors that are not
+    ///   finite and at least 0, a `first_instance` other than 0, and for draws of which some have
+    ///   an index buffer and others have none.
+    /// - [`Error::Limit`] for more than [`MAX_LODS`](crate::MAX_LODS) levels of detail of a mesh,
+    ///   and for more than 65,536 meshes.
+    /// - [`Error::OutOfMemory`].
+    pub fn create_mesh_table(&self, meshes: &[MeshLods<'_>]) -> Result<MeshTable> {
+        MeshTable::new(&self.gpu, meshes)
+    }
+
     /// Makes `count` instances whose bounds lie in the caller's buffer, and records that they are
     /// taken from there.
     ///
@@ -314,7 +334,8 @@ impl HizContext {
     ///
     /// # Errors
     /// - Those of [`record_instances_from`](Self::record_instances_from).
-    /// - [`Error::Mismatch`] for instances of another context.
+    /// - [`Error::Mismatch`] for instances of another context, and for instances of which any is
+    ///   [`ABSENT`](crate::ABSENT).
     pub fn record_update_from<'a>(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -335,7 +356,9 @@ impl HizContext {
     /// - [`Error::Mismatch`] for instances of another context.
     /// - [`Error::Invalid`] for a
     ///   [`DrawTemplate::first_instance`](crate::DrawTemplate::first_instance) other than 0 on a
-    ///   device without the feature `INDIRECT_FIRST_INSTANCE`.
+    ///   device without the feature `INDIRECT_FIRST_INSTANCE`, for an
+    ///   [`Emit`](crate::Emit) that needs the feature, and for mesh ids past the mesh table.
+    /// - [`Error::Limit`] for lists or draws that do not fit one binding.
     /// - [`Error::OutOfMemory`].
     /// - [`Error::Device`] if the device is lost.
     pub fn create_visible(&self, instances: &Instances, outputs: &Outputs) -> Result<Visible> {
@@ -425,9 +448,12 @@ impl HizContext {
 
     /// Records the reduction of a depth image of `camera` into `pyramid`.
     ///
-    /// `depth` is a view of a 2D texture with one mip level, one sample per pixel and one layer.
-    /// The whole depth of the texture is read, whatever part of it the view shows.
-    /// So the default view of a texture with a stencil will do.
+    /// `depth` is a 2D texture with one sample per pixel, or a view of one, or a part of one as
+    /// [`DepthSource`] describes it.
+    /// A view does not say which part of its texture it shows, so the depth of all of it is read.
+    /// So the default view of a texture with a stencil will do, and a texture of several layers or
+    /// mip levels needs a [`DepthSource`].
+    /// Multisampled depth goes through [`record_resolve`](Self::record_resolve) first.
     /// These formats and usages are accepted:
     ///
     /// - Any depth format, `R32Float` or `R16Float`, with `TEXTURE_BINDING`.
@@ -449,16 +475,84 @@ impl HizContext {
     ///
     /// # Errors
     /// - [`Error::Mismatch`] for sizes or devices that disagree and for a destroyed texture.
-    /// - [`Error::Invalid`] for other formats and usages.
+    /// - [`Error::Invalid`] for other formats and usages, and for several layers, mip levels or
+    ///   samples of which none is named.
     /// - [`Error::OutOfMemory`].
-    pub fn record_reduce(
+    pub fn record_reduce<'a>(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        depth: &wgpu::TextureView,
+        depth: impl Into<DepthSource<'a>>,
         camera: &Camera,
         pyramid: &Pyramid,
     ) -> Result<()> {
-        record_reduce(&self.gpu, encoder, depth, camera, pyramid, DepthTolerance::NONE)
+        record_reduce(&self.gpu, encoder, &depth.into(), camera, pyramid)
+    }
+
+    /// Makes what multisampled depth of `size` pixels is resolved into.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] for a size of 0.
+    /// - [`Error::Limit`] for a size beyond the device's textures.
+    /// - [`Error::OutOfMemory`].
+    pub fn create_depth_resolve(
+        &self,
+        size: ImageSize,
+        options: &ResolveOptions,
+    ) -> Result<DepthResolve> {
+        DepthResolve::new(&self.gpu, size, options)
+    }
+
+    /// Records the resolve of multisampled depth of `camera`: one depth per pixel, the farthest of
+    /// its samples, the nearest or both ([`ResolveOptions`]).
+    ///
+    /// `depth` is a texture with several samples per pixel and the usage `TEXTURE_BINDING`, or a view
+    /// of one, or a part of one as [`DepthSource`] describes it.
+    /// Its format is a depth format, `R32Float` or `R16Float`.
+    /// The result is [`DepthResolve::farthest`], which [`record_reduce`](Self::record_reduce) takes.
+    ///
+    /// Samples without a depth (NaN, outside of 0..=1) count as the reduction treats them: as far.
+    /// For the nearest depth they count as near.
+    ///
+    /// # Errors
+    /// - [`Error::Mismatch`] for sizes or devices that disagree and for a destroyed texture.
+    /// - [`Error::Invalid`] for one sample per pixel, and for other formats and usages.
+    /// - [`Error::OutOfMemory`].
+    pub fn record_resolve<'a>(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        depth: impl Into<DepthSource<'a>>,
+        camera: &Camera,
+        resolve: &DepthResolve,
+    ) -> Result<()> {
+        record_resolve(&self.gpu, encoder, &depth.into(), camera, resolve)
+    }
+
+    /// Records the reduction of a changed rectangle of a depth image into `pyramid`.
+    ///
+    /// The pyramid must have been built from `depth`, by [`record_reduce`](Self::record_reduce) or by
+    /// this method, and no pixel may have changed since except those of the rectangle.
+    /// `rectangle` is `[x0, y0, x1, y1]`: columns `x0..=x1` and rows `y0..=y1` of the image, row 0 on
+    /// top.
+    /// It is what [`record_occluder_depth`](Self::record_occluder_depth) returns.
+    /// The levels are then what a reduction of the whole image makes, bit for bit.
+    ///
+    /// Submit it after the reduction that came before.
+    /// If that one never ran, culls keep everything until the whole image is reduced again.
+    /// So do culls that were recorded before this reduction and run after it.
+    ///
+    /// # Errors
+    /// - [`Error::Mismatch`] for a pyramid that was never built, for another depth image and for a
+    ///   destroyed texture.
+    /// - [`Error::Invalid`] for a rectangle that is empty or reaches past the image.
+    /// - [`Error::OutOfMemory`].
+    pub fn record_reduce_region<'a>(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        depth: impl Into<DepthSource<'a>>,
+        rectangle: [u32; 4],
+        pyramid: &Pyramid,
+    ) -> Result<()> {
+        record_reduce_region(&self.gpu, encoder, &depth.into(), rectangle, pyramid)
     }
 
     /// Records the cull of `instances` against `pyramid`; the buffers of `visible` take what it
@@ -489,6 +583,165 @@ impl HizContext {
             &CullInputs::new(instances, camera, pyramid, options),
             visible,
         )
+    }
+
+    /// Makes room for the instances that culls of `instances` may be restricted to; none at first.
+    ///
+    /// # Errors
+    /// - [`Error::Mismatch`] for instances of another context.
+    /// - [`Error::OutOfMemory`].
+    pub fn create_among(&self, instances: &Instances) -> Result<Among> {
+        Among::new(&self.gpu, instances)
+    }
+
+    /// Records a pass that fills `among` with the instances of a mask.
+    ///
+    /// A mask on the device never visits the host: the shadow casters of a cascade are those that
+    /// the light's cull has kept and that lie in the cascade's slice.
+    ///
+    /// # Errors
+    /// - [`Error::Mismatch`] for objects of another context or of other instances, and for a cull
+    ///   without a mask.
+    /// - [`Error::Invalid`] for another number of words.
+    /// - [`Error::OutOfMemory`].
+    pub fn record_among(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &Instances,
+        mask: &AmongMask<'_>,
+        among: &Among,
+    ) -> Result<()> {
+        record_among(&self.gpu, encoder, instances, mask, among)
+    }
+
+    /// [`record_cull`](Self::record_cull) of the instances `among` alone.
+    ///
+    /// The others are not kept, and not tested: groups without one that is asked for cost as much
+    /// as hidden ones.
+    ///
+    /// # Errors
+    /// Those of `record_cull`, and [`Error::Mismatch`] for an `among` of other instances.
+    #[expect(clippy::too_many_arguments, reason = "as record_cull, and among")]
+    pub fn record_cull_among(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &Instances,
+        among: &Among,
+        camera: &Camera,
+        pyramid: &Pyramid,
+        visible: &Visible,
+        options: &CullOptions,
+    ) -> Result<()> {
+        let inputs = CullInputs::new(instances, camera, pyramid, options);
+        record_cull(&self.gpu, encoder, &CullInputs { among: Some(among), ..inputs }, visible)
+    }
+
+    /// Makes the buffers that take what culls for `views` views find, of 1..=[`MAX_VIEWS`].
+    ///
+    /// [`MAX_VIEWS`]: crate::MAX_VIEWS
+    ///
+    /// # Errors
+    /// Those of [`HizContext::create_visible`], and [`Error::Invalid`] for another number of views.
+    pub fn create_visible_views(
+        &self,
+        instances: &Instances,
+        views: usize,
+        outputs: &ViewsOutputs,
+    ) -> Result<VisibleViews> {
+        VisibleViews::new(&self.gpu, instances, views, outputs)
+    }
+
+    /// Records the culls of several views in one go, and joins what they keep.
+    ///
+    /// Each view has a camera and a pyramid of its own; sizes and conventions may differ.
+    /// Nothing that one view hides is taken from another one.
+    /// `among`: only these instances are asked for, in all views.
+    ///
+    /// # Errors
+    /// Those of [`record_cull`](Self::record_cull), and [`Error::Mismatch`] for another number of
+    /// views than the buffers are for.
+    ///
+    /// # Examples
+    /// Two eyes, and one list for both:
+    ///
+    /// ```
+    /// # use hiz_core::headless::Engine;
+    /// # use hiz_core::{Bounds, Camera, DepthConvention, Floats, ImageSize, InstanceOptions};
+    /// # use hiz_core::{Pose, Projection};
+    /// use hiz_core::{CullOptions, View, ViewsOutputs, wgpu};
+    /// # let engine = Engine::new(None)?;
+    /// # let (device, queue, hiz) = (engine.device(), engine.queue(), engine.context());
+    /// # let eye = |x| {
+    /// #     let pose = Pose { eye: [x, 0.0, 0.0], target: [x, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
+    /// #     let (fov_y, convention) = (1.0, DepthConvention::Reversed);
+    /// #     let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
+    /// #     Camera::look_at(&pose, &projection, ImageSize::new(64, 64))
+    /// # };
+    /// # let (left, right) = (eye(-0.03)?, eye(0.03)?);
+    /// # let pyramid = |camera| engine.pyramid(&engine.upload_depth(&[0.01; 64 * 64], camera)?);
+    /// # let (hiz_left, hiz_right) = (pyramid(&left)?, pyramid(&right)?);
+    /// # let (centers, radii) = ([0.0, 0.0, -5.0, 0.0, 0.0, -20.0], [0.5, 0.5]);
+    /// # let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
+    /// # let instances = engine.instances(&bounds, &InstanceOptions::default())?;
+    /// # let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    /// let eyes = [
+    ///     View { camera: &left, pyramid: &hiz_left },
+    ///     View { camera: &right, pyramid: &hiz_right },
+    /// ];
+    /// let views = hiz.create_visible_views(&instances, 2, &ViewsOutputs::default())?;
+    /// let options = CullOptions::default();
+    /// hiz.record_cull_views(&mut encoder, &instances, &eyes, None, &views, &options)?;
+    /// // Both eyes draw `views.any()`, and a shader finds the bit of each in `views.masks()`.
+    /// let draws = views.any().draw_arguments().expect("asked for by default");
+    /// # queue.submit([encoder.finish()]);
+    /// # let (told, answer) = std::sync::mpsc::channel();
+    /// # wgpu::util::DownloadBuffer::read_buffer(device, queue, &draws.slice(..), move |bytes| {
+    /// #     told.send(bytes.unwrap().to_vec()).unwrap();
+    /// # });
+    /// # engine.wait()?;
+    /// # assert_eq!(answer.recv().unwrap()[4..8], 1_u32.to_le_bytes());
+    /// # Ok::<(), hiz_core::Error>(())
+    /// ```
+    pub fn record_cull_views(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &Instances,
+        views: &[View<'_>],
+        among: Option<&Among>,
+        visible: &VisibleViews,
+        options: &CullOptions,
+    ) -> Result<()> {
+        let inputs = ViewsInputs { instances, views, among, options, idle: false };
+        record_cull_views(&self.gpu, encoder, &inputs, &visible.each(), visible.joined())
+    }
+
+    /// Makes a ring of `slots` (1..=64) for answers on their way to the host.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for another number of slots.
+    pub fn create_readback(&self, slots: usize) -> Result<ReadbackRing> {
+        ReadbackRing::new(&self.gpu, slots)
+    }
+
+    /// Records the copies of what a cull leaves in `visible`: mask, list and draw arguments.
+    ///
+    /// Record it behind the cull.
+    /// After the submit the answer arrives with a poll of the device
+    /// ([`AnswerInFlight::is_ready`]); nothing here submits, polls or waits.
+    /// The whole capacity of the lists is copied.
+    /// If the encoder is never submitted, drop the answer.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] if all slots are taken: read or drop one of their answers first.
+    /// - [`Error::Mismatch`] for objects of another context.
+    /// - [`Error::OutOfMemory`].
+    pub fn record_readback(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        visible: &Visible,
+        ring: &ReadbackRing,
+    ) -> Result<AnswerInFlight> {
+        record_readback(&self.gpu, encoder, visible, ring)
     }
 
     /// Makes everything that frames like this one need, and records work that makes the driver
@@ -537,8 +790,9 @@ fn needed(have: &wgpu::Limits) -> Vec<(&'static str, u64, u64)> {
         max_bind_groups_plus_vertex_buffers >= 4,
         // The view of a cull (`cull/pipelines.rs`, `DepthStore::layout`).
         max_bindings_per_bind_group >= 7,
-        // A depth image.
-        max_sampled_textures_per_shader_stage >= 1,
+        // A depth image; slots and mesh table of a cull that emits bins; which instances are asked
+        // for.
+        max_sampled_textures_per_shader_stage >= 4,
         max_samplers_per_shader_stage >= 1,
         // The cull of members: three chunks, mask, list, draws, statistics, survivors.
         max_storage_buffers_per_shader_stage >= 8,

@@ -165,11 +165,11 @@ fn faults_of_coarse_levels_are_seen() {
             &alone,
         ),
         // A tail's blocks and lanes are left out.
-        (("(blocks + vec2<u32>(BLOCK - 1u)) / BLOCK;", "(blocks + vec2<u32>(3u)) / BLOCK;"), &all),
+        (("(end + vec2<u32>(BLOCK - 1u)) / BLOCK;", "(end + vec2<u32>(3u)) / BLOCK;"), &all),
         (
             (
-                "i < blocks.x * blocks.y; i += WORKGROUP",
-                "i < min(blocks.x * blocks.y, WORKGROUP); i += WORKGROUP",
+                "i < size.x * size.y; i += WORKGROUP",
+                "i < min(size.x * size.y, WORKGROUP); i += WORKGROUP",
             ),
             &all,
         ),

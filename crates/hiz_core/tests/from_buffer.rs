@@ -14,7 +14,7 @@ use exact::Exact;
 use hiz_core::headless::{Culling, Engine};
 use hiz_core::testing::words::{self, PieceWords};
 use hiz_core::{
-    Bounds, BoundsBuffer, BoundsKind, CullOptions, DepthConvention, Fit, Floats, Hierarchy,
+    ABSENT, Bounds, BoundsBuffer, BoundsKind, CullOptions, DepthConvention, Fit, Floats, Hierarchy,
     HizContext, InstanceOptions, Instances, Order, Outputs, StoredOrder, wgpu,
 };
 
@@ -476,6 +476,19 @@ fn what_only_the_host_could_do_is_refused() {
         instances.invalid().unwrap_err().to_string(),
         format!("{refused}come from a buffer: a cull's verdicts and counts tell the invalid ones")
     );
+}
+
+/// The records of absent instances say that they are absent, so no buffer may overwrite them.
+#[test]
+fn absent_instances_take_no_bounds_from_a_buffer() {
+    let engine = engine();
+    let given = Given::ordinary(BoundsKind::Sphere, 3, &mut Random(7));
+    let mesh_ids = [0, ABSENT, 0];
+    let options = InstanceOptions { mesh_ids: Some(&mesh_ids), ..InstanceOptions::default() };
+    let instances = given.with_bounds(|bounds| engine.instances(bounds, &options)).unwrap();
+    let refused = engine.update_from(&instances, &given.packed(&engine)).unwrap_err().to_string();
+    let expected = "instances: expected instances of which none is absent, got 1 absent ones";
+    assert!(refused.starts_with(expected), "{refused}");
 }
 
 /// An update from the host that is overtaken by bounds from a buffer, with the groups' records.

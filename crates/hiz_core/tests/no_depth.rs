@@ -230,8 +230,8 @@ fn pixels_that_nobody_cleans_hide_something() {
             Source::Float,
             AtlasUse::Never,
             (
-                "sanitized(bitcast<u32>(textureLoad(source, vec2<u32>(x, y), 0).x))",
-                "bitcast<u32>(textureLoad(source, vec2<u32>(x, y), 0).x)",
+                "sanitized(bitcast<u32>(textureLoad(source, at, 0).x))",
+                "bitcast<u32>(textureLoad(source, at, 0).x)",
             ),
         ),
         (Source::Bits, AtlasUse::Always, ("sanitized(textureLoad(atlas,", "(textureLoad(atlas,")),

@@ -13,22 +13,29 @@ const ONE_TO_THREE: &[f64] = &[1.0, 2.0, 3.0];
 
 /// The values that pipelines give each override.
 const VALUES: &[(&str, &[f64])] = &[
+    ("AMONG", FLAG),
     ("APPEND", FLAG),
     ("CAPPED", FLAG),
     ("CHUNKS", ONE_TO_THREE),
     ("DESCENT", FLAG),
+    ("FARTHEST", FLAG),
     ("FIRST", ONE_TO_THREE),
     ("FIT_VOLUME", FLAG),
     ("FOOTPRINT_LOG2", ONE_TO_THREE),
     ("FROM_SOURCE", FLAG),
+    ("INDEX_TEXEL", ONE_TO_THREE),
     ("LIST", FLAG),
+    ("LOD_RULE", &[0.0, 1.0, 2.0, 3.0]),
     ("MASK", FLAG),
+    ("NEAREST", FLAG),
     ("REVERSED", FLAG),
+    ("SAMPLES", &[2.0, 4.0, 8.0]),
     ("SAMPLE_COVERAGE", FLAG),
     ("SHARED", FLAG),
     ("SORTED", FLAG),
     ("STATISTICS", FLAG),
     ("TALL", FLAG),
+    ("TEXELS", ONE_TO_THREE),
     ("VERDICTS", FLAG),
 ];
 

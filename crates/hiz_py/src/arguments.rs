@@ -107,6 +107,17 @@ pub(crate) fn depth_input<'a>(
     Ok(DepthInput { numbers, kind: depth_kind(kind)?, scale, invalid, tolerance })
 }
 
+/// [`depth_input`] of the image of each sample.
+pub(crate) fn depth_inputs<'a>(
+    images: &'a [DepthArray<'_>],
+    kind: &str,
+    scale: f64,
+    invalid: &'a [f64],
+    rounding: &str,
+) -> PyResult<Vec<DepthInput<'a>>> {
+    images.iter().map(|image| depth_input(image, kind, scale, invalid, rounding)).collect()
+}
+
 /// The meaning of a depth image's numbers.
 pub(crate) fn depth_kind(kind: &str) -> PyResult<DepthKind> {
     match kind {

@@ -2,19 +2,23 @@
 
 use std::sync::Arc;
 
-use hiz_core::headless::{self, AdapterSummary};
+use hiz_core::headless::{self, AdapterSummary, AmongSource, CullExtras};
 use hiz_core::{
     ConservativeDepthOptions, DepthLoad, DrawOptions, FaceCull, InstanceOptions, MeshData,
-    OccluderOptions, Only, PyramidOptions, Rasteriser, StoredLevels, StoredOrder,
+    OccluderOptions, Only, Outputs, PyramidOptions, Rasteriser, StoredLevels, StoredOrder,
+    ViewsOutputs,
 };
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arguments::{DepthArray, FloatArray, LevelArray, bounds, depth_input, in_c_order};
+use crate::arguments::{
+    DepthArray, FloatArray, LevelArray, bounds, depth_input, depth_inputs, in_c_order,
+};
 use crate::camera::Camera;
-use crate::culling::{Counts, Culling};
+use crate::culling::{Counts, Culling, ViewsCulling};
 use crate::held::{Held, OnDevice, detached};
+use crate::meshes::{LodNumbers, MeshTable, mesh_table};
 use crate::options::{Request, cull_options};
 
 /// The depth of a single cull.
@@ -24,6 +28,17 @@ enum SingleDepth<'py> {
     Pyramid(Bound<'py, Pyramid>),
     #[pyo3(annotation = "image, kind, scale, invalid, rounding")]
     Image(DepthArray<'py>, String, f64, Vec<f64>, String),
+}
+
+/// Which instances a cull is restricted to.
+#[derive(FromPyObject)]
+enum AmongArgument<'py> {
+    #[pyo3(transparent, annotation = "Culling")]
+    Kept(Bound<'py, Culling>),
+    #[pyo3(transparent, annotation = "ViewsCulling")]
+    KeptByAny(Bound<'py, ViewsCulling>),
+    #[pyo3(transparent, annotation = "bool array")]
+    Mask(PyReadonlyArray1<'py, bool>),
 }
 
 /// Index, name, driver, version of the driver, backend, device type.
@@ -90,17 +105,25 @@ impl Engine {
         py: Python<'_>,
         kind: &str,
         arrays: Vec<FloatArray<'_>>,
-        strict: bool,
-        order: &str,
+        strict_and_order: (bool, String),
+        mesh_ids: Option<PyReadonlyArray1<'_, u32>>,
+        scales: Option<FloatArray<'_>>,
     ) -> PyResult<Instances> {
         let bounds = bounds(kind, &arrays)?;
-        let order = match order {
+        let (strict, order) = strict_and_order;
+        let order = match order.as_str() {
             "morton" => StoredOrder::Morton,
             "given" => StoredOrder::Given,
             other => return Err(PyValueError::new_err(format!("order: no order {other:?}"))),
         };
         #[allow(clippy::needless_update, reason = "hiz_core's `testing` adds a field")]
-        let options = InstanceOptions { strict, order, ..InstanceOptions::default() };
+        let options = InstanceOptions {
+            strict,
+            order,
+            mesh_ids: mesh_ids.as_ref().map(|ids| ids.as_slice()).transpose()?,
+            scales: scales.as_ref().map(FloatArray::floats).transpose()?,
+            ..InstanceOptions::default()
+        };
         self.0
             .run(py, |engine| engine.instances(&bounds, &options))
             .map(|instances| Instances(Held::new(py, instances)))
@@ -228,6 +251,56 @@ impl Engine {
             .map(|depth| DepthImage(Held::new(py, depth)))
     }
 
+    /// As `upload_depth`, with an image for each sample of a pixel: the farthest one counts.
+    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
+    fn upload_samples(
+        &self,
+        py: Python<'_>,
+        images: Vec<DepthArray<'_>>,
+        kind: &str,
+        scale: f64,
+        invalid: Vec<f64>,
+        rounding: &str,
+        camera: &Camera,
+    ) -> PyResult<DepthImage> {
+        let samples = depth_inputs(&images, kind, scale, &invalid, rounding)?;
+        let camera = &camera.0;
+        self.0
+            .run(py, |engine| engine.upload_depth_of_samples(&samples, camera))
+            .map(|depth| DepthImage(Held::new(py, depth)))
+    }
+
+    /// Renews a pyramid within the rectangle (x0, y0, x1, y1) of its depth image.
+    fn renew(
+        &self,
+        py: Python<'_>,
+        pyramid: &Pyramid,
+        depth: &DepthImage,
+        rectangle: (u32, u32, u32, u32),
+    ) -> PyResult<()> {
+        let (pyramid, depth) = (pyramid.0.get(py)?, depth.0.get(py)?);
+        self.0.run(py, |engine| engine.renew_pyramid(&pyramid.1, &depth, rectangle.into()))
+    }
+
+    /// Replaces the rectangle of an uploaded image by whole rows, one image for each sample.
+    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
+    fn replace_depth(
+        &self,
+        py: Python<'_>,
+        pyramid: &Pyramid,
+        depth: &DepthImage,
+        rectangle: (u32, u32, u32, u32),
+        images: Vec<DepthArray<'_>>,
+        kind: &str,
+        scale: f64,
+        invalid: Vec<f64>,
+        rounding: &str,
+    ) -> PyResult<()> {
+        let rows = depth_inputs(&images, kind, scale, &invalid, rounding)?;
+        let (pyramid, depth) = (pyramid.0.get(py)?, depth.0.get(py)?);
+        self.0.run(py, |engine| engine.replace_depth(&pyramid.1, &depth, rectangle.into(), &rows))
+    }
+
     /// The mask of bounds that are used once, and the counts of the first of them.
     /// `depth` is what `upload_depth` takes, or a pyramid.
     fn cull_once<'py>(
@@ -264,7 +337,17 @@ impl Engine {
         self.0.run(py, reduce).map(|built| Pyramid(Held::new(py, built)))
     }
 
+    /// A mesh is a list of levels of detail, each with the numbers of its draw and its error.
+    fn mesh_table(&self, py: Python<'_>, meshes: Vec<Vec<LodNumbers>>) -> PyResult<MeshTable> {
+        self.0
+            .run(py, |engine| mesh_table(engine, &meshes))
+            .map(|table| MeshTable(Held::new(py, table)))
+    }
+
     /// `options` is a `hizvk.CullOptions`, `outputs` a `hizvk.Outputs`.
+    /// `meshes` is the table of the meshes that the outputs speak of.
+    /// `among`: a mask, or an earlier answer; `ahead`: the answer comes to the host by itself.
+    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn cull(
         &self,
         py: Python<'_>,
@@ -273,12 +356,53 @@ impl Engine {
         pyramid: &Pyramid,
         options: &Bound<'_, PyAny>,
         outputs: &Bound<'_, PyAny>,
+        meshes: Option<&MeshTable>,
+        among: Option<AmongArgument<'_>>,
+        ahead: bool,
     ) -> PyResult<Culling> {
-        let Request { options, outputs } = Request::new(options, outputs)?;
+        let meshes = meshes.map(|table| table.0.get(py)).transpose()?;
+        let Request { options, outputs } = Request::new(options, outputs, meshes.as_deref())?;
         let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
-        self.0
-            .run(py, |engine| engine.cull(&instances, &camera.0, &pyramid.1, &options, &outputs))
-            .map(|culling| Culling(Held::new(py, culling)))
+        let among = self.among(py, &instances, among)?;
+        let cull = |engine: &headless::Engine| {
+            let extras = CullExtras { among: among.as_ref(), ahead };
+            engine.cull_given(&instances, &camera.0, &pyramid.1, &options, &outputs, &extras)
+        };
+        self.0.run(py, cull).map(|culling| Culling(Held::new(py, Arc::new(culling))))
+    }
+
+    /// As `cull`, for several views; the lists of `outputs` are those of what any view keeps.
+    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
+    fn cull_views(
+        &self,
+        py: Python<'_>,
+        instances: &Instances,
+        cameras: Vec<PyRef<'_, Camera>>,
+        pyramids: Vec<PyRef<'_, Pyramid>>,
+        options: &Bound<'_, PyAny>,
+        outputs: &Bound<'_, PyAny>,
+        among: Option<AmongArgument<'_>>,
+        ahead: bool,
+    ) -> PyResult<ViewsCulling> {
+        let Request { options, outputs: any } = Request::new(options, outputs, None)?;
+        let outputs = ViewsOutputs {
+            each: Outputs { mask: true, verdicts: any.verdicts, ..Outputs::NONE },
+            any,
+        };
+        let instances = instances.0.get(py)?;
+        let pyramids =
+            pyramids.iter().map(|pyramid| pyramid.0.get(py)).collect::<PyResult<Vec<_>>>()?;
+        let views: Vec<_> = cameras
+            .iter()
+            .zip(&pyramids)
+            .map(|(camera, pyramid)| (&camera.0, &pyramid.1))
+            .collect();
+        let among = self.among(py, &instances, among)?;
+        let cull = |engine: &headless::Engine| {
+            let extras = CullExtras { among: among.as_ref(), ahead };
+            engine.cull_views(&instances, &views, &options, &outputs, &extras)
+        };
+        self.0.run(py, cull).map(|culling| ViewsCulling(Held::new(py, culling)))
     }
 
     /// As `cull`; `occluders` says where depth comes from, and `levels` what is stored.
@@ -292,8 +416,10 @@ impl Engine {
         levels: (u32, u32),
         options: &Bound<'_, PyAny>,
         outputs: &Bound<'_, PyAny>,
+        meshes: Option<&MeshTable>,
     ) -> PyResult<()> {
-        let Request { options, outputs } = Request::new(options, outputs)?;
+        let meshes = meshes.map(|table| table.0.get(py)).transpose()?;
+        let Request { options, outputs } = Request::new(options, outputs, meshes.as_deref())?;
         let instances = instances.0.get(py)?;
         let occluders = occluders.map(|occluders| occluders.0.get(py)).transpose()?;
         let levels = StoredLevels { first: levels.0, last: levels.1 };
@@ -313,6 +439,32 @@ impl Engine {
     fn wait_without_guard(&self, py: Python<'_>) -> PyResult<()> {
         let engine = headless::Engine::clone(&*self.0.look(py)?);
         detached(py, move || engine.wait())
+    }
+}
+
+impl Engine {
+    fn among(
+        &self,
+        py: Python<'_>,
+        instances: &Arc<hiz_core::Instances>,
+        among: Option<AmongArgument<'_>>,
+    ) -> PyResult<Option<Arc<hiz_core::Among>>> {
+        let made = match among {
+            None => return Ok(None),
+            Some(AmongArgument::Kept(culling)) => {
+                let culling = culling.get().0.get(py)?;
+                self.0.run(py, |engine| engine.among(instances, &AmongSource::Kept(&culling)))
+            }
+            Some(AmongArgument::KeptByAny(views)) => {
+                let views = views.get().0.get(py)?;
+                self.0.run(py, |engine| engine.among(instances, &AmongSource::KeptByAny(&views)))
+            }
+            Some(AmongArgument::Mask(mask)) => {
+                let mask = mask.as_slice()?;
+                self.0.run(py, |engine| engine.among(instances, &AmongSource::Mask(mask)))
+            }
+        };
+        made.map(Some)
     }
 }
 

@@ -13,6 +13,7 @@ mod culling;
 mod device;
 mod errors;
 mod held;
+mod meshes;
 mod options;
 mod reference;
 #[cfg(feature = "yardstick")]
@@ -27,11 +28,13 @@ mod _core {
     #[pymodule_export]
     use crate::containment::{check_bounds, check_proxy};
     #[pymodule_export]
-    use crate::culling::{Counts, Culling, Explanation};
+    use crate::culling::{Counts, Culling, Explanation, ViewsCulling};
     #[pymodule_export]
     use crate::device::{DepthImage, Engine, Instances, Occluders, Pyramid, adapters};
     #[pymodule_export]
     use crate::held::{after_fork, before_fork, let_go};
+    #[pymodule_export]
+    use crate::meshes::MeshTable;
     #[pymodule_export]
     use crate::reference::{reference_classify, reference_pyramid};
 

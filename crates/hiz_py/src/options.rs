@@ -2,10 +2,15 @@
 //!
 //! The struct expressions name every field, so that an option without its line does not compile.
 
-use hiz_core::{Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, Order, Outputs};
+use hiz_core::{
+    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, LodRule, MeshTable, Order,
+    Outputs,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyAny;
+
+use crate::meshes::emit;
 
 /// What a cull is asked, taken whole from the two Python objects.
 pub(crate) struct Request {
@@ -14,9 +19,14 @@ pub(crate) struct Request {
 }
 
 impl Request {
-    pub(crate) fn new(options: &Bound<'_, PyAny>, outputs: &Bound<'_, PyAny>) -> PyResult<Self> {
+    /// `meshes`: the table that the outputs speak of.
+    pub(crate) fn new(
+        options: &Bound<'_, PyAny>,
+        outputs: &Bound<'_, PyAny>,
+        meshes: Option<&MeshTable>,
+    ) -> PyResult<Self> {
         let options = cull_options(options)?;
-        let outputs = self::outputs(outputs, options.order)?;
+        let outputs = self::outputs(outputs, options.order, meshes)?;
         Ok(Self { options, outputs })
     }
 }
@@ -55,12 +65,32 @@ pub(crate) fn cull_options(given: &Bound<'_, PyAny>) -> PyResult<CullOptions> {
             Some(false) => Hierarchy::Never,
         },
         statistics: given.getattr("statistics")?.extract()?,
+        lod: lod_rule(&given.getattr("lod")?)?,
     })
 }
 
-fn outputs(given: &Bound<'_, PyAny>, order: Order) -> PyResult<Outputs> {
-    // An ordered list can be made from the mask later; one in the order of the device cannot.
-    let by_default = order == Order::Any;
+fn lod_rule(given: &Bound<'_, PyAny>) -> PyResult<LodRule> {
+    if given.is_none() {
+        return Ok(LodRule::Finest);
+    }
+    match given.get_type().name()?.to_cow()?.as_ref() {
+        "LodByError" => Ok(LodRule::Error { pixels: given.getattr("pixels")?.extract()? }),
+        "LodByDistance" => {
+            Ok(LodRule::Distance { thresholds: given.getattr("thresholds")?.extract()? })
+        }
+        "LodBySize" => Ok(LodRule::Size { pixels: given.getattr("pixels")?.extract()? }),
+        other => Err(unknown("lod", other)),
+    }
+}
+
+fn outputs(
+    given: &Bound<'_, PyAny>,
+    order: Order,
+    meshes: Option<&MeshTable>,
+) -> PyResult<Outputs> {
+    // An ordered list can be made from the mask later.
+    // One in the order of the device cannot, and bins cannot.
+    let by_default = order == Order::Any || meshes.is_some();
     let listed = |name| -> PyResult<bool> {
         Ok(given.getattr(name)?.extract::<Option<bool>>()?.unwrap_or(by_default))
     };
@@ -71,6 +101,7 @@ fn outputs(given: &Bound<'_, PyAny>, order: Order) -> PyResult<Outputs> {
         draws: listed("draws")?,
         capacity: given.getattr("capacity")?.extract()?,
         draw: draw_template(&given.getattr("draw")?)?,
+        emit: emit(given, meshes)?,
     })
 }
 
@@ -103,7 +134,9 @@ pub(crate) fn options_text(
     outputs: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(String, String)> {
     let options = options.map_or_else(|| Ok(CullOptions::default()), cull_options)?;
-    let outputs = outputs
-        .map_or_else(|| Ok(Outputs::default()), |given| self::outputs(given, options.order))?;
+    let outputs = outputs.map_or_else(
+        || Ok(Outputs::default()),
+        |given| self::outputs(given, options.order, None),
+    )?;
     Ok((format!("{options:?}"), format!("{outputs:?}")))
 }

@@ -4,7 +4,9 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use hiz_core::yardstick::{self, BoundsInBuffer, HostRaster, PerLevelReduction, ReductionShape};
+use hiz_core::yardstick::{
+    self, BoundsInBuffer, HostRaster, MultisampledDepth, PerLevelReduction, ReductionShape,
+};
 use hiz_core::{
     CullOptions, Error, Instances, Pyramid, PyramidOptions, StoredLevels, Visible, headless,
 };
@@ -16,6 +18,7 @@ use crate::arguments::{FloatArray, bounds, in_c_order};
 use crate::camera::Camera;
 use crate::device::{DepthImage, Engine};
 use crate::held::{Held, OnDevice, detached};
+use crate::meshes::MeshTable;
 use crate::options::Request;
 
 /// Wall-clock milliseconds of single submissions to one device.
@@ -79,13 +82,44 @@ impl Yardstick {
             "own" => {
                 let levels = StoredLevels { first: levels.0, last: levels.1 };
                 let options = PyramidOptions { levels, ..PyramidOptions::default() };
-                Reducer::Own(detached(py, || engine.pyramid_with(&depth, &options))?)
+                let pyramid = detached(py, || engine.pyramid_with(&depth, &options))?;
+                Reducer::Own(depth, pyramid)
             }
             "buffer" => per_level(ReductionShape::Buffer)?,
             "textures" => per_level(ReductionShape::Textures)?,
             other => return Err(PyValueError::new_err(format!("shape: no shape {other:?}"))),
         };
-        Ok(YardstickReduction(Held::new(py, Reduction { engine, depth, reducer })))
+        Ok(YardstickReduction(Held::new(py, Reduction { engine, reducer })))
+    }
+
+    /// A reduction of a rectangle (x0, y0, x1, y1) of `depth` into a pyramid of all levels.
+    fn region(
+        &self,
+        py: Python<'_>,
+        depth: &DepthImage,
+        rectangle: (u32, u32, u32, u32),
+    ) -> PyResult<YardstickReduction> {
+        let depth = headless::DepthImage::clone(&*depth.0.get(py)?);
+        let prepare = |engine: &headless::Engine| {
+            let pyramid = engine.pyramid(&depth)?;
+            let reducer = Reducer::Region(depth, pyramid, rectangle.into());
+            Ok(Reduction { engine: engine.clone(), reducer })
+        };
+        self.0.run(py, prepare).map(|work| YardstickReduction(Held::new(py, work)))
+    }
+
+    /// A resolve of multisampled depth of the camera's size to the farthest samples.
+    fn resolve(
+        &self,
+        py: Python<'_>,
+        camera: &Camera,
+        samples: u32,
+    ) -> PyResult<YardstickReduction> {
+        let prepare = |engine: &headless::Engine| {
+            let depth = MultisampledDepth::new(engine, &camera.0, samples)?;
+            Ok(Reduction { engine: engine.clone(), reducer: Reducer::Resolve(depth) })
+        };
+        self.0.run(py, prepare).map(|work| YardstickReduction(Held::new(py, work)))
     }
 
     /// Spheres or boxes in a buffer on the device, as float32.
@@ -153,8 +187,10 @@ impl Yardstick {
         options: &Bound<'_, PyAny>,
         outputs: &Bound<'_, PyAny>,
         depth: Option<&DepthImage>,
+        meshes: Option<&MeshTable>,
     ) -> PyResult<YardstickCull> {
-        let Request { options, outputs } = Request::new(options, outputs)?;
+        let meshes = meshes.map(|table| table.0.get(py)).transpose()?;
+        let Request { options, outputs } = Request::new(options, outputs, meshes.as_deref())?;
         let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
         let depth = depth.map(|depth| depth.0.get(py)).transpose()?;
         let prepare = |engine: &headless::Engine| {
@@ -174,7 +210,9 @@ impl Yardstick {
 }
 
 enum Reducer {
-    Own(Arc<Pyramid>),
+    Own(headless::DepthImage, Arc<Pyramid>),
+    Region(headless::DepthImage, Arc<Pyramid>, [u32; 4]),
+    Resolve(MultisampledDepth),
     PerLevel(PerLevelReduction),
 }
 
@@ -184,16 +222,19 @@ pub(crate) struct YardstickReduction(Held<Reduction>);
 
 struct Reduction {
     engine: headless::Engine,
-    depth: headless::DepthImage,
     reducer: Reducer,
 }
 
 #[pymethods]
 impl YardstickReduction {
     fn ms(&self, py: Python<'_>) -> PyResult<f64> {
-        self.0.run(py, |Reduction { engine, depth, reducer }| {
+        self.0.run(py, |Reduction { engine, reducer }| {
             yardstick::submitted_ms(engine, |encoder| match reducer {
-                Reducer::Own(pyramid) => yardstick::reduce(engine, encoder, depth, pyramid),
+                Reducer::Own(depth, pyramid) => yardstick::reduce(engine, encoder, depth, pyramid),
+                Reducer::Region(depth, pyramid, rectangle) => {
+                    yardstick::reduce_region(engine, encoder, depth, *rectangle, pyramid)
+                }
+                Reducer::Resolve(depth) => depth.record(engine, encoder),
                 Reducer::PerLevel(reduction) => {
                     reduction.record(encoder);
                     Ok(())
@@ -275,6 +316,15 @@ struct Cull {
 impl YardstickCull {
     fn ms(&self, py: Python<'_>) -> PyResult<f64> {
         self.0.run(py, |cull| yardstick::submitted_ms(&cull.engine, |encoder| cull.record(encoder)))
+    }
+
+    /// Milliseconds of what follows the marking: lists and draws of what `ms` has marked.
+    fn emit_ms(&self, py: Python<'_>) -> PyResult<f64> {
+        self.0.run(py, |Cull { engine, instances, visible, .. }| {
+            yardstick::submitted_ms(engine, |encoder| {
+                yardstick::record_emission(engine, encoder, instances, visible)
+            })
+        })
     }
 
     /// The mask of the last submission.

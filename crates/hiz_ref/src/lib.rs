@@ -33,6 +33,9 @@
 //!   pixels.
 //! - [`check_proxy`] says whether an occluder proxy lies inside its mesh.
 //! - [`check_bounds`] says whether bounds contain their mesh.
+//! - [`pixel_shift`] says how far two points are apart in the image, and [`coarsest_lod`] which
+//!   level of detail a rule allows.
+//!   Both are in float64 alone.
 //!
 //! # How it decides
 //!
@@ -49,8 +52,8 @@
 //! volume meets half-spaces.
 //! `search` looks through the image for a pixel that proves a volume visible.
 //! `scalar` and `dyadic` have the two arithmetics.
-//! `depth` converts depth kinds, `pyramid` builds levels, and `containment` checks proxies and
-//! bounds.
+//! `depth` converts depth kinds, `pyramid` builds levels, `containment` checks proxies and
+//! bounds, and `lod` judges levels of detail.
 //!
 //! # Example
 //!
@@ -77,6 +80,7 @@ mod containment;
 mod depth;
 mod dyadic;
 mod feasibility;
+mod lod;
 mod pyramid;
 mod scalar;
 mod search;
@@ -85,6 +89,7 @@ mod volume;
 
 pub use containment::{MeshError, Protrusion, TriangleMesh, check_bounds, check_proxy, contains};
 pub use depth::{DepthBounds, DepthKind, DepthMeaning, depth_bounds};
+pub use lod::{LodRule, coarsest_lod, greatest_stretch, least_w, pixel_shift, radius, stretch_at};
 pub use pyramid::{Level, pyramid, sanitized_depth};
 pub use view::{Coverage, View};
 pub use volume::Volume;

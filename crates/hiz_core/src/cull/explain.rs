@@ -12,7 +12,7 @@ use crate::gpu::pipelines::Compute;
 use crate::gpu::shader::{Source, wgsl};
 use crate::input::bounds::BoundsKind;
 use crate::instances::batch::GROUP;
-use crate::instances::piece::bind_records;
+use crate::instances::piece::{RECORD_BINDINGS, bind_records};
 
 /// Twin: `shaders/cull/explain.wgsl`, `Explanation`, which documents the fields.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -98,7 +98,7 @@ fn explain_pipeline(gpu: &Gpu, key: &CullKey) -> Result<wgpu::ComputePipeline> {
         label: "hiz.explain.pipeline",
         source: explain_module(key.store, key.kind),
         entry_point: "explain",
-        layouts: &layouts(gpu, key.store, "hiz.storage_layout", TWO_STORAGES)?,
+        layouts: &layouts(gpu, key.store, RECORD_BINDINGS, ("hiz.storage_layout", TWO_STORAGES))?,
         constants: &classify_constants(key),
     })
 }
@@ -121,7 +121,8 @@ pub(crate) fn record_explain(
             format!("expected an instance below {}, got {index}", instances.len()),
         )
     })?;
-    let mut seen = PreparedView::new(gpu, inputs, None)?;
+    // The test of an instance is explained whether or not it was asked for.
+    let mut seen = PreparedView::new(gpu, &CullInputs { among: None, ..*inputs }, None)?;
     let place = piece.order.place((index - piece.range.start) as usize);
     let mut view = seen.bind(gpu, inputs.pyramid, whole_group)?;
     let (which, records) = if whole_group {

@@ -106,11 +106,11 @@ impl<'a> GroupCull<'a> {
     pub(super) fn record_boxes(
         &self,
         pass: &mut wgpu::ComputePass<'_>,
-        piece: &Piece,
+        records: &wgpu::BindGroup,
         workgroups: u32,
     ) {
         pass.set_pipeline(&self.boxes.0);
-        pass.set_bind_group(1, &piece.group_bindings, &[]);
+        pass.set_bind_group(1, records, &[]);
         pass.set_bind_group(2, &self.boxes.1, &[]);
         pass.dispatch_workgroups(workgroups, 1, 1);
     }

@@ -3,11 +3,12 @@
 //! Here each option goes one of two ways.
 //! A number goes into the view uniform, and a choice into the key of the pipelines.
 
+use crate::cull::among::Among;
 use crate::cull::groups::group_descent;
 use crate::cull::options::{Coverage, CullOptions, Fit};
 use crate::cull::pipelines::{CullKey, DepthStore};
-use crate::cull::view_uniform::ViewUniform;
-use crate::error::Result;
+use crate::cull::view_uniform::{ViewUniform, packed};
+use crate::error::{Error, Result};
 use crate::gpu::buffers::entry;
 use crate::gpu::device::Gpu;
 use crate::gpu::numbers::Numbers;
@@ -24,6 +25,8 @@ pub(crate) struct CullInputs<'a> {
     pub(crate) camera: &'a Camera,
     pub(crate) pyramid: &'a Pyramid,
     pub(crate) options: &'a CullOptions,
+    /// The instances that are asked for; `None`: all of them.
+    pub(crate) among: Option<&'a Among>,
     /// Whether every dispatch has zero workgroups.
     /// Nothing is culled then, but a driver that compiles at the first dispatch does so.
     pub(crate) idle: bool,
@@ -39,13 +42,30 @@ impl<'a> CullInputs<'a> {
         pyramid: &'a Pyramid,
         options: &'a CullOptions,
     ) -> Self {
-        Self { instances, camera, pyramid, options, idle: false, built: None }
+        Self { instances, camera, pyramid, options, among: None, idle: false, built: None }
     }
 }
 
 pub(super) fn check_contexts(gpu: &Gpu, inputs: &CullInputs<'_>) -> Result<()> {
     gpu.check_context("instances", inputs.instances.context)?;
+    if let Some(among) = inputs.among {
+        among.check(gpu, inputs.instances)?;
+    }
     gpu.check_context("pyramid", inputs.pyramid.context)
+}
+
+/// Refuses sample coverage where a pixel's depth belongs to several samples.
+fn check_coverage(built: &Built, options: &CullOptions) -> Result<()> {
+    if options.coverage == Coverage::Sample && built.part.samples > 1 {
+        return Err(Error::invalid(
+            "coverage",
+            format!(
+                "expected Coverage::Area for a pyramid of the farthest of {} samples per pixel,                  which lie beside the pixels' centres, got Coverage::Sample",
+                built.part.samples
+            ),
+        ));
+    }
+    Ok(())
 }
 
 /// What the shaders know of camera and pyramid, and the key of the pipelines that read it.
@@ -91,7 +111,11 @@ impl PreparedView {
             None => pyramid.built_for(camera)?,
         };
         // Bad options are refused before anything is recorded.
-        let view = ViewUniform::new(camera, built.reduction, options, built.tolerance)?;
+        let view = ViewUniform {
+            source_origin: packed(built.part.origin),
+            ..ViewUniform::new(camera, built.reduction, options, built.part.tolerance)?
+        };
+        check_coverage(&built, options)?;
         Pyramid::check_source(gpu, &built)?;
         let atlas = match encoder.filter(|_| pyramid.wants_atlas(gpu, &built, instances.len())) {
             Some(encoder) => pyramid.record_atlas(gpu, encoder, &built)?,
@@ -101,7 +125,7 @@ impl PreparedView {
             store: if atlas.is_some() {
                 DepthStore::Atlas
             } else {
-                DepthStore::Apart(built.source_kind)
+                DepthStore::Apart(built.part.kind)
             },
             kind: instances.kind,
             reversed: camera.convention().is_reversed(),
@@ -110,6 +134,7 @@ impl PreparedView {
             footprint_log2: options.footprint.log2(),
             descent: options.descent > 0,
             fit_volume: options.fit == Fit::Volume,
+            among: inputs.among.is_some(),
         };
         Ok(Self { built, atlas, view, key })
     }

@@ -5,24 +5,29 @@
 //! 1. `options` has the caller's choices, and `inputs` gathers instances, camera, pyramid and
 //!    options.
 //! 2. `view_uniform` turns the camera and the options into the numbers that the shaders read.
+//!    `lod` adds those that choose levels of detail.
 //! 3. `pipelines` picks the pipeline that fits the options.
 //! 4. `record` records the pass; `groups` adds the test of whole groups before their members.
+//!    `among` restricts it to some of the instances, and `views` culls for several cameras.
 //! 5. `warm_up` does all of it once without workgroups, before the first frame.
 //! 6. Later, and only if they are read: `refine` completes the verdicts, `count` counts them, and
 //!    `explain` repeats one test.
 //!
 //! This room records commands into an encoder; it never submits or waits.
 
+pub(crate) mod among;
 #[cfg(feature = "headless")]
 pub(crate) mod count;
 #[cfg(feature = "headless")]
 pub(crate) mod explain;
 pub(crate) mod groups;
 pub(crate) mod inputs;
+pub(crate) mod lod;
 pub(crate) mod options;
 pub(crate) mod pipelines;
 pub(crate) mod record;
 #[cfg(feature = "headless")]
 pub(crate) mod refine;
 pub(crate) mod view_uniform;
+pub(crate) mod views;
 pub(crate) mod warm_up;

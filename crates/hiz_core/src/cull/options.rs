@@ -1,5 +1,6 @@
 //! The options of a cull, all chosen by the caller.
 
+use crate::cull::lod::LodRule;
 use crate::host::rounding::EPS;
 
 /// In which order the indices of the kept instances are listed.
@@ -146,6 +147,8 @@ pub struct CullOptions {
     pub hierarchy: Hierarchy,
     /// Whether to count the depth tests of each level and the texels read.
     pub statistics: bool,
+    /// Which level of detail of its mesh a kept instance is drawn with.
+    pub lod: LodRule,
 }
 
 impl Default for CullOptions {
@@ -162,6 +165,7 @@ impl Default for CullOptions {
             fit: Fit::Rectangle,
             hierarchy: Hierarchy::Auto,
             statistics: false,
+            lod: LodRule::Finest,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The pipelines of the cull: which shader files make a module, and how one pipeline differs from
 //! another.
 
+use crate::cull::lod::LodRule;
 use crate::error::Result;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::device::Gpu;
@@ -22,6 +23,8 @@ pub(crate) struct CullKey {
     pub(crate) footprint_log2: u32,
     pub(crate) descent: bool,
     pub(crate) fit_volume: bool,
+    /// Whether only some instances are asked for.
+    pub(crate) among: bool,
 }
 
 /// What a cull writes: the `override` constants of `shaders/output/report.wgsl`.
@@ -29,13 +32,99 @@ pub(crate) struct CullKey {
 pub(crate) struct ReportKey {
     pub(crate) mask: bool,
     pub(crate) verdicts: bool,
-    pub(crate) append: bool,
-    pub(crate) list: bool,
-    pub(crate) capped: bool,
+    pub(crate) emit: EmitKey,
     pub(crate) statistics: bool,
 }
 
-pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 6] {
+/// How a cull emits the kept instances: a shader file with its constants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum EmitKey {
+    /// One list, or none.
+    List { append: bool, list: bool, capped: bool },
+    /// Bit planes, of which bins are made later.
+    Planes { by_index: bool, bins: BinKey },
+    /// The bins of one mesh, in any order.
+    Append { list: bool, capped: bool, record_words: u32, bins: BinKey },
+}
+
+/// How the bin of an instance is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct BinKey {
+    /// Whether the instances have mesh ids or scales.
+    pub(crate) sorted: bool,
+    /// The code of the rule that chooses LODs; `None` where LOD 0 is the only one that it can
+    /// choose.
+    pub(crate) lod_rule: Option<u32>,
+}
+
+impl BinKey {
+    fn files(self) -> [File; 3] {
+        let lod =
+            if self.lod_rule.is_some() { wgsl!("cull/lod") } else { wgsl!("cull/lod_finest") };
+        [wgsl!("output/mesh_table"), wgsl!("output/bin"), lod]
+    }
+
+    fn constants(self) -> impl Iterator<Item = (&'static str, f64)> {
+        let rule = self.lod_rule.map(|code| ("LOD_RULE", f64::from(code)));
+        [("SORTED", flag(self.sorted))].into_iter().chain(rule)
+    }
+}
+
+impl EmitKey {
+    /// Nothing but the mask and the verdicts.
+    pub(crate) const NO_LIST: Self = Self::List { append: false, list: false, capped: false };
+
+    /// The shader files that emit.
+    pub(crate) fn files(self) -> Vec<File> {
+        match self {
+            Self::List { .. } => vec![wgsl!("output/report_list")],
+            Self::Planes { bins, .. } => {
+                [&bins.files()[..], &[wgsl!("output/report_planes")]].concat()
+            }
+            Self::Append { bins, .. } => {
+                [&bins.files()[..], &[wgsl!("output/emit"), wgsl!("output/report_bins")]].concat()
+            }
+        }
+    }
+
+    fn constants(self) -> Vec<(&'static str, f64)> {
+        match self {
+            Self::List { append, list, capped } => {
+                vec![("APPEND", flag(append)), ("LIST", flag(list)), ("CAPPED", flag(capped))]
+            }
+            Self::Planes { by_index, bins } => {
+                bins.constants().chain([("BY_INDEX", flag(by_index))]).collect()
+            }
+            Self::Append { list, capped, record_words, bins } => bins
+                .constants()
+                .chain([
+                    ("LIST", flag(list)),
+                    ("CAPPED", flag(capped)),
+                    ("RECORD_WORDS", f64::from(record_words)),
+                ])
+                .collect(),
+        }
+    }
+
+    /// The bindings of the instances.
+    fn record_bindings(self) -> &'static [(u32, Binding)] {
+        match self {
+            Self::List { .. } => RECORD_BINDINGS,
+            Self::Planes { .. } | Self::Append { .. } => BINNED_BINDINGS,
+        }
+    }
+}
+
+/// The bindings of the instances of a cull that emits bins: with slots and the mesh table.
+pub(crate) const BINNED_BINDINGS: &[(u32, Binding)] = &[
+    (0, Binding::Uniform),
+    (1, Binding::ReadQuads),
+    (2, Binding::SampledQuads),
+    (3, Binding::SampledQuads),
+    (4, Binding::SampledQuads),
+];
+
+pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 7] {
     [
         ("REVERSED", flag(key.reversed)),
         ("CHUNKS", key.chunks as f64),
@@ -43,18 +132,23 @@ pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 6] {
         ("FOOTPRINT_LOG2", f64::from(key.footprint_log2)),
         ("DESCENT", flag(key.descent)),
         ("FIT_VOLUME", flag(key.fit_volume)),
+        ("AMONG", flag(key.among)),
     ]
 }
 
-pub(crate) fn report_constants(key: &ReportKey) -> [(&'static str, f64); 6] {
-    [
+/// The constants of `shaders/cull/lod.wgsl`.
+pub(crate) fn lod_constants(rule: &LodRule) -> [(&'static str, f64); 1] {
+    [("LOD_RULE", f64::from(rule.code()))]
+}
+
+pub(crate) fn report_constants(key: &ReportKey) -> Vec<(&'static str, f64)> {
+    let mut constants = vec![
         ("MASK", flag(key.mask)),
         ("VERDICTS", flag(key.verdicts)),
-        ("APPEND", flag(key.append)),
-        ("LIST", flag(key.list)),
-        ("CAPPED", flag(key.capped)),
         ("STATISTICS", flag(key.statistics)),
-    ]
+    ];
+    constants.extend(key.emit.constants());
+    constants
 }
 
 /// Where a cull reads depth.
@@ -84,9 +178,9 @@ impl DepthStore {
     pub(crate) fn code(self) -> u32 {
         match self {
             Self::Apart(source) => source as u32,
-            Self::Atlas => 3,
+            Self::Atlas => 5,
             #[cfg(feature = "headless")]
-            Self::Nowhere => 4,
+            Self::Nowhere => 6,
         }
     }
 
@@ -161,6 +255,8 @@ pub(crate) fn decision_module(
         ],
         bounds,
         &[
+            wgsl!("cull/among_layout"),
+            wgsl!("cull/among"),
             wgsl!("cull/certificate"),
             wgsl!("output/verdict"),
             wgsl!("cull/outcome"),
@@ -178,23 +274,25 @@ pub(super) const CERTIFIED: &[File] = &[wgsl!("cull/supporting_planes"), wgsl!("
 
 /// The module of an entry point that does not write down which texels were read
 /// (`shaders/cull/unexplained.wgsl`).
-pub(super) fn unexplained(store: DepthStore, kind: BoundsKind, entry: &[File]) -> Source {
+pub(crate) fn unexplained(store: DepthStore, kind: BoundsKind, entry: &[File]) -> Source {
     decision_module(store, kind, CERTIFIED, &[&[wgsl!("cull/unexplained")], entry].concat())
 }
 
 /// The files of the flat cull, which tests each instance by itself, without the decision.
-pub(crate) const FLAT: &[File] = &[
-    wgsl!("cull/unexplained"),
-    wgsl!("instances/piece"),
-    wgsl!("instances/groups"),
-    wgsl!("output/statistics"),
-    wgsl!("output/report"),
-    wgsl!("cull/cull"),
-];
+pub(crate) fn flat_files(emit: EmitKey) -> Vec<File> {
+    let shared = [
+        wgsl!("cull/unexplained"),
+        wgsl!("instances/piece"),
+        wgsl!("instances/groups"),
+        wgsl!("output/statistics"),
+        wgsl!("output/report"),
+    ];
+    [&shared[..], &emit.files(), &[wgsl!("cull/cull")]].concat()
+}
 
 /// The shader of the flat cull, for instances of one kind.
-pub(crate) fn cull_module(store: DepthStore, kind: BoundsKind) -> Source {
-    decision_module(store, kind, CERTIFIED, FLAT)
+pub(crate) fn cull_module(store: DepthStore, kind: BoundsKind, emit: EmitKey) -> Source {
+    decision_module(store, kind, CERTIFIED, &flat_files(emit))
 }
 
 /// The shader of the cull of groups.
@@ -209,25 +307,24 @@ pub(crate) fn cull_groups_module(store: DepthStore) -> Source {
 }
 
 /// The shader of the cull of the surviving groups' members.
-pub(crate) fn cull_members_module(store: DepthStore, kind: BoundsKind) -> Source {
-    let entry = [
+pub(crate) fn cull_members_module(store: DepthStore, kind: BoundsKind, emit: EmitKey) -> Source {
+    let shared = [
         wgsl!("instances/piece"),
         wgsl!("output/statistics"),
         wgsl!("output/report"),
         wgsl!("instances/groups"),
-        wgsl!("cull/cull_members"),
     ];
-    unexplained(store, kind, &entry)
+    unexplained(store, kind, &[&shared[..], &emit.files(), &[wgsl!("cull/cull_members")]].concat())
 }
 
 /// The layouts of a cull's view, of its records and of what it writes.
 pub(super) fn layouts(
     gpu: &Gpu,
     store: DepthStore,
-    label: &str,
-    written: &[(u32, Binding)],
+    records: &[(u32, Binding)],
+    (label, written): (&str, &[(u32, Binding)]),
 ) -> Result<[wgpu::BindGroupLayout; 3]> {
-    let records = gpu.layout("hiz.cull.instances_layout", RECORD_BINDINGS)?;
+    let records = gpu.layout("hiz.cull.instances_layout", records)?;
     Ok([store.layout(gpu)?, records, gpu.layout(label, written)?])
 }
 
@@ -243,8 +340,13 @@ pub(crate) fn flat_pipeline(
         label,
         source,
         entry_point: "cull",
-        layouts: &layouts(gpu, key.store, "hiz.cull.visible_layout", VISIBLE_BINDINGS)?,
-        constants: &[classify_constants(key), report_constants(report)].concat(),
+        layouts: &layouts(
+            gpu,
+            key.store,
+            report.emit.record_bindings(),
+            ("hiz.cull.visible_layout", VISIBLE_BINDINGS),
+        )?,
+        constants: &[&classify_constants(key)[..], &report_constants(report)].concat(),
     })
 }
 
@@ -254,7 +356,8 @@ pub(crate) fn cull_pipeline(
     key: &CullKey,
     report: &ReportKey,
 ) -> Result<wgpu::ComputePipeline> {
-    flat_pipeline(gpu, "hiz.cull.pipeline", cull_module(key.store, key.kind), key, report)
+    let module = cull_module(key.store, key.kind, report.emit);
+    flat_pipeline(gpu, "hiz.cull.pipeline", module, key, report)
 }
 
 /// The cull of groups; with `statistics` it counts levels.
@@ -267,7 +370,12 @@ pub(crate) fn cull_groups_pipeline(
         label: "hiz.cull_groups.pipeline",
         source: cull_groups_module(key.store),
         entry_point: "cull_groups",
-        layouts: &layouts(gpu, key.store, "hiz.cull_groups.layout", SURVIVOR_BINDINGS)?,
+        layouts: &layouts(
+            gpu,
+            key.store,
+            RECORD_BINDINGS,
+            ("hiz.cull_groups.layout", SURVIVOR_BINDINGS),
+        )?,
         constants: &[&classify_constants(key)[..], &[("STATISTICS", flag(statistics))]].concat(),
     })
 }
@@ -278,14 +386,14 @@ pub(crate) fn cull_members_pipeline(
     key: &CullKey,
     report: &ReportKey,
 ) -> Result<wgpu::ComputePipeline> {
-    let [view, records, visible] =
-        layouts(gpu, key.store, "hiz.cull.visible_layout", VISIBLE_BINDINGS)?;
+    let written = ("hiz.cull.visible_layout", VISIBLE_BINDINGS);
+    let [view, records, visible] = layouts(gpu, key.store, report.emit.record_bindings(), written)?;
     let members = gpu.layout("hiz.cull_members.layout", MEMBER_BINDINGS)?;
     gpu.compute_pipeline(&Compute {
         label: "hiz.cull_members.pipeline",
-        source: cull_members_module(key.store, key.kind),
+        source: cull_members_module(key.store, key.kind, report.emit),
         entry_point: "cull_members",
         layouts: &[view, records, visible, members],
-        constants: &[classify_constants(key), report_constants(report)].concat(),
+        constants: &[&classify_constants(key)[..], &report_constants(report)].concat(),
     })
 }

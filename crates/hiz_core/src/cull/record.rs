@@ -1,14 +1,22 @@
 //! The pass of a cull: it clears the buffers, tests, and compacts.
 
+use crate::cull::among::Among;
 use crate::cull::groups::{GROUPS_OF_RUN, GroupCull, NO_STATISTICS, is_grouped};
 use crate::cull::inputs::{CullInputs, PreparedView, check_contexts};
+use crate::cull::lod::LodRule;
 use crate::cull::options::{CullOptions, Order};
-use crate::cull::pipelines::{CullKey, ReportKey, VISIBLE_BINDINGS, cull_pipeline};
+use crate::cull::pipelines::{
+    BINNED_BINDINGS, BinKey, CullKey, EmitKey, ReportKey, VISIBLE_BINDINGS, cull_pipeline,
+};
 use crate::error::{Error, Result};
 use crate::gpu::buffers::{check_alive, entry, made};
 use crate::gpu::device::Gpu;
+use crate::instances::Instances;
 use crate::instances::piece::{CULL_WORKGROUP, Piece};
+use crate::output::bins::{Arrangement, Bins};
 use crate::output::compact::Compaction;
+use crate::output::emit_passes::Emission;
+use crate::output::lists::Copied;
 use crate::output::survivors::NO_SURVIVORS;
 use crate::output::visible::Visible;
 
@@ -18,22 +26,32 @@ fn bind_output<'a>(
     piece: &Piece,
     visible: &'a Visible,
     p: usize,
-    statistics: bool,
+    report: &ReportKey,
 ) -> Result<&'a wgpu::BindGroup> {
-    let lists = visible.lists.as_ref();
+    let (lists, bins) = (visible.lists.as_ref(), visible.bins.as_ref());
+    let appends = matches!(report.emit, EmitKey::Append { .. });
     let output = &visible.pieces[p];
     let bind = || {
-        let list = match lists {
-            Some(lists) => lists.pieces[p].bound().clone(),
-            None => gpu.stand_in("hiz.no_list")?,
+        let list = match (lists, bins) {
+            (Some(lists), _) => lists.pieces[p].bound().clone(),
+            (None, Some(bins)) if !appends => bins.pieces[p].planes.clone(),
+            (None, Some(Bins { pieces, .. })) if pieces[p].list.is_some() => {
+                pieces[p].list.clone().expect("it is there")
+            }
+            _ => gpu.stand_in("hiz.no_list")?,
         };
-        let draws = match lists {
-            Some(lists) => lists.draws.clone(),
-            None => gpu.stand_in("hiz.no_draws")?,
+        let draws = match (lists, bins) {
+            (Some(lists), _) => lists.draws.clone(),
+            (None, Some(bins)) if appends => bins.draws.clone(),
+            _ => gpu.stand_in("hiz.no_draws")?,
         };
         // If nothing is listed, any uniform can be bound.
-        let capacity = lists.map_or(&piece.uniform, |lists| &lists.capacity_uniform);
-        let statistics = if statistics {
+        let capacity = match (lists, bins) {
+            (Some(lists), _) => &lists.capacity_uniform,
+            (None, Some(bins)) => &bins.pieces[p].uniform,
+            (None, None) => &piece.uniform,
+        };
+        let statistics = if report.statistics {
             visible.statistics_or_new(gpu)?.clone()
         } else {
             gpu.stand_in(NO_STATISTICS)?
@@ -52,10 +70,18 @@ fn bind_output<'a>(
     };
     // A bind group does not tell that one of its buffers was destroyed since.
     let listed = lists.map(|lists| [&lists.draws, lists.pieces[p].bound()]);
-    let mut written = [&output.mask].into_iter().chain(listed.into_iter().flatten());
+    let binned =
+        bins.map(|bins| [&bins.draws, &bins.draw_counts].into_iter().chain(&bins.pieces[p].list));
+    let mut written = [&output.mask]
+        .into_iter()
+        .chain(listed.into_iter().flatten())
+        .chain(binned.into_iter().flatten())
+        .chain(lists.and_then(|lists| lists.copied.as_ref()).map(Copied::buffer));
     written
         .try_for_each(check_alive)
-        .and_then(|()| made(&output.bindings[usize::from(statistics)], bind))
+        .and_then(|()| {
+            made(&output.bindings[usize::from(report.statistics) + 2 * usize::from(appends)], bind)
+        })
         .map_err(|error| match error {
             Error::Device(why) => Error::mismatch(
                 "visible",
@@ -63,6 +89,38 @@ fn bind_output<'a>(
             ),
             other => other,
         })
+}
+
+/// The bindings of a piece's records, with slots and mesh table for a cull that emits bins.
+fn bind_records(
+    gpu: &Gpu,
+    piece: &Piece,
+    visible: &Visible,
+    p: usize,
+    among: Option<&Among>,
+) -> Result<wgpu::BindGroup> {
+    let Some(bins) = &visible.bins else {
+        return Ok(among.map_or(&piece.bindings, |among| among.records(p)).clone());
+    };
+    let bind = |asked: &wgpu::TextureView| {
+        let table = bins.meshes.view();
+        let slots = piece.slots.as_ref().map_or(table, |slots| &slots.of_places.view);
+        gpu.bind_group(
+            "hiz.cull.binned_instances",
+            &gpu.layout("hiz.cull.binned_instances_layout", BINNED_BINDINGS)?,
+            &[
+                entry(0, piece.uniform.as_entire_binding()),
+                entry(1, wgpu::BindingResource::TextureView(&piece.records.view)),
+                entry(2, wgpu::BindingResource::TextureView(slots)),
+                entry(3, wgpu::BindingResource::TextureView(table)),
+                entry(4, wgpu::BindingResource::TextureView(asked)),
+            ],
+        )
+    };
+    match among {
+        Some(among) => bind(among.view(p)),
+        None => made(&bins.pieces[p].records_bindings, || bind(gpu.no_texels()?)).cloned(),
+    }
 }
 
 /// A function that makes the pipeline of the flat cull.
@@ -105,14 +163,22 @@ fn record_all(
             "expected buffers that were created for these instances, got others",
         ));
     }
-    let report = report_key(visible, options);
+    let report = report_key(instances, visible, options)?;
     let pieces = || instances.pieces.iter().zip(&visible.pieces);
     // Make everything before recording anything: an object that cannot be made would invalidate the
     // caller's encoder.
     let outputs = pieces()
         .enumerate()
-        .map(|(p, (piece, _))| bind_output(gpu, piece, visible, p, report.statistics))
+        .map(|(p, (piece, _))| {
+            let written = bind_output(gpu, piece, visible, p, &report)?;
+            Ok((bind_records(gpu, piece, visible, p, inputs.among)?, written))
+        })
         .collect::<Result<Vec<_>>>()?;
+    let planes = matches!(report.emit, EmitKey::Planes { .. });
+    let emission = match visible.bins.as_ref().filter(|_| planes) {
+        Some(bins) => Some(Emission::new(gpu, instances, bins)?),
+        None => None,
+    };
     let compaction = match visible.lists.as_ref().filter(|_| options.order == Order::Stable) {
         Some(lists) => Some(Compaction::new(gpu, instances, visible, lists)?),
         None => None,
@@ -138,17 +204,18 @@ fn record_all(
         timestamp_writes: None,
     });
     pass.set_bind_group(0, &view.instances, &[]);
-    for ((piece, output), groups) in instances.pieces.iter().zip(&outputs).zip(&grouped) {
+    let of_pieces = instances.pieces.iter().zip(&outputs).zip(&grouped);
+    for (p, ((piece, (records, output)), groups)) in of_pieces.enumerate() {
         if let (Some(groups), Some(group_view)) = (groups, &view.groups) {
             pass.set_bind_group(0, group_view, &[]);
             groups.record_boxes(
                 &mut pass,
-                piece,
+                inputs.among.map_or(&piece.group_bindings, |among| among.group_records(p)),
                 workgroups(piece.groups().div_ceil(CULL_WORKGROUP)),
             );
             pass.set_bind_group(0, &view.instances, &[]);
         }
-        pass.set_bind_group(1, &piece.bindings, &[]);
+        pass.set_bind_group(1, records, &[]);
         pass.set_bind_group(2, *output, &[]);
         if let Some(groups) = groups {
             groups.record_members(&mut pass);
@@ -160,23 +227,68 @@ fn record_all(
     if let Some(compaction) = compaction {
         compaction.record(&mut pass, inputs.idle);
     }
+    if let Some(emission) = emission {
+        emission.record(&mut pass, inputs.idle);
+    }
     Ok(())
 }
 
 /// What the cull's own pass writes.
-/// An ordered list is made from the mask instead.
-fn report_key(visible: &Visible, options: &CullOptions) -> ReportKey {
+/// An ordered list is made from the mask instead, and ordered bins are made from planes.
+fn report_key(
+    instances: &Instances,
+    visible: &Visible,
+    options: &CullOptions,
+) -> Result<ReportKey> {
     let outputs = visible.outputs();
-    let listed = outputs.indices || outputs.draws;
-    let ordered = listed && options.order == Order::Stable;
-    ReportKey {
-        mask: outputs.mask || ordered,
-        verdicts: outputs.verdicts,
-        append: listed && !ordered,
-        list: outputs.indices && !ordered,
-        capped: visible.is_capped(),
-        statistics: options.statistics,
-    }
+    let any_order = options.order == Order::Any;
+    let (list, capped) = (outputs.indices, visible.is_capped());
+    let mut mask = outputs.mask;
+    let emit = if let Some(bins) = &visible.bins {
+        if bins.instances != instances.id {
+            return Err(Error::mismatch(
+                "visible",
+                "expected buffers that were created for these instances, got others: bins belong \
+                 to the mesh ids of their instances",
+            ));
+        }
+        let has_lods = bins.meshes.most_lods() > 1 && options.lod != LodRule::Finest;
+        let of_bins = BinKey {
+            sorted: instances.pieces.iter().any(|p| p.slots.is_some()),
+            lod_rule: has_lods.then(|| options.lod.code()),
+        };
+        match (any_order, bins.can_append()) {
+            (false, _) => EmitKey::Planes {
+                by_index: bins.arrangement == Arrangement::Instances,
+                bins: of_bins,
+            },
+            (true, true) => EmitKey::Append {
+                list,
+                capped,
+                record_words: (bins.record_bytes() / 4) as u32,
+                bins: of_bins,
+            },
+            (true, false) => {
+                return Err(Error::invalid(
+                    "order",
+                    "expected Order::Stable, got Order::Any: bins in any order are for one mesh \
+                     with Placement::Reserved",
+                ));
+            }
+        }
+    } else {
+        let listed = visible.lists.is_some();
+        if any_order && visible.lists.as_ref().is_some_and(|lists| lists.copied.is_some()) {
+            return Err(Error::invalid(
+                "order",
+                "expected Order::Stable for Emit::Copy, got Order::Any",
+            ));
+        }
+        mask |= listed && !any_order;
+        EmitKey::List { append: listed && any_order, list: list && any_order, capped }
+    };
+    let (verdicts, statistics) = (outputs.verdicts, options.statistics);
+    Ok(ReportKey { mask, verdicts, emit, statistics })
 }
 
 /// Clears whatever is counted, appended to or set bit by bit.
@@ -189,6 +301,14 @@ fn record_clears(
 ) -> Result<()> {
     if let Some(lists) = &visible.lists {
         lists.record_clear(encoder);
+    }
+    if let Some(bins) = &visible.bins {
+        let appends = matches!(report.emit, EmitKey::Append { .. });
+        bins.record_clear(encoder, appends, inputs.idle);
+        if !appends {
+            bins.record_clear_planes(encoder);
+        }
+        bins.meshes.record(encoder);
     }
     if report.statistics {
         encoder.clear_buffer(visible.statistics_or_new(gpu)?, 0, None);

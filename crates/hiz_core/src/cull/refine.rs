@@ -4,6 +4,7 @@
 
 use std::sync::Arc;
 
+use crate::cull::among::Among;
 use crate::cull::groups::is_grouped;
 use crate::cull::options::{Coverage, CullOptions};
 use crate::cull::pipelines::{
@@ -19,6 +20,7 @@ use crate::input::bounds::BoundsKind;
 use crate::input::camera::Camera;
 use crate::input::tolerance::DepthTolerance;
 use crate::instances::Instances;
+use crate::instances::piece::RECORD_BINDINGS;
 use crate::instances::watch::Refine;
 use crate::output::visible::Visible;
 use crate::pyramid::Pyramid;
@@ -43,9 +45,10 @@ fn refine_pipeline(
     gpu: &Gpu,
     kind: BoundsKind,
     sample_coverage: bool,
+    among: bool,
 ) -> Result<wgpu::ComputePipeline> {
     let source = refine_module(kind);
-    without_depth(gpu, "hiz.refine.pipeline", source, "refine", (kind, sample_coverage))
+    without_depth(gpu, "hiz.refine.pipeline", source, "refine", (kind, sample_coverage, among))
 }
 
 /// The pipeline that refines groups.
@@ -53,7 +56,7 @@ fn refine_pipeline(
 fn refine_groups_pipeline(gpu: &Gpu) -> Result<wgpu::ComputePipeline> {
     let label = "hiz.refine_groups.pipeline";
     let kind = BoundsKind::Box;
-    without_depth(gpu, label, refine_groups_module(), "refine_groups", (kind, false))
+    without_depth(gpu, label, refine_groups_module(), "refine_groups", (kind, false, false))
 }
 
 fn without_depth(
@@ -61,7 +64,7 @@ fn without_depth(
     label: &'static str,
     source: Source,
     entry_point: &'static str,
-    (kind, sample_coverage): (BoundsKind, bool),
+    (kind, sample_coverage, among): (BoundsKind, bool, bool),
 ) -> Result<wgpu::ComputePipeline> {
     let key = CullKey {
         store: DepthStore::Nowhere,
@@ -73,12 +76,13 @@ fn without_depth(
         footprint_log2: 1,
         descent: false,
         fit_volume: false,
+        among,
     };
     gpu.compute_pipeline(&Compute {
         label,
         source,
         entry_point,
-        layouts: &layouts(gpu, key.store, "hiz.storage_layout", TWO_STORAGES)?,
+        layouts: &layouts(gpu, key.store, RECORD_BINDINGS, ("hiz.storage_layout", TWO_STORAGES))?,
         constants: &classify_constants(&key),
     })
 }
@@ -92,6 +96,7 @@ pub(crate) struct Refinement {
     /// The shader asks its layout which level a test would read.
     pyramid: Arc<Pyramid>,
     visible: Arc<Visible>,
+    among: Option<Arc<Among>>,
 }
 
 impl Refinement {
@@ -103,6 +108,7 @@ impl Refinement {
         pyramid: &Arc<Pyramid>,
         options: &CullOptions,
         visible: &Arc<Visible>,
+        among: Option<&Arc<Among>>,
     ) -> Result<Option<Self>> {
         let is_needed =
             visible.outputs().verdicts && instances.pieces.iter().any(|p| is_grouped(p, options));
@@ -117,6 +123,7 @@ impl Refinement {
             instances: Arc::clone(instances),
             pyramid: Arc::clone(pyramid),
             visible: Arc::clone(visible),
+            among: among.cloned(),
         }))
     }
 }
@@ -134,14 +141,16 @@ impl Refine for Refinement {
             ],
         )?;
         let is_sample = self.options.coverage == Coverage::Sample;
-        let (of_groups, of_members) =
-            (refine_groups_pipeline(gpu)?, refine_pipeline(gpu, instances.kind, is_sample)?);
+        let (of_groups, of_members) = (
+            refine_groups_pipeline(gpu)?,
+            refine_pipeline(gpu, instances.kind, is_sample, self.among.is_some())?,
+        );
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("hiz.refine.pass"),
             timestamp_writes: None,
         });
         pass.set_bind_group(0, &view, &[]);
-        for (piece, output) in instances.pieces.iter().zip(&self.visible.pieces) {
+        for (p, (piece, output)) in instances.pieces.iter().zip(&self.visible.pieces).enumerate() {
             let Some(groups) = output.groups().filter(|_| is_grouped(piece, &self.options)) else {
                 continue;
             };
@@ -160,7 +169,8 @@ impl Refine for Refinement {
                 pass.dispatch_workgroups(piece.groups().div_ceil(WORKGROUP), 1, 1);
             }
             pass.set_pipeline(&of_members);
-            pass.set_bind_group(1, &piece.bindings, &[]);
+            let records = self.among.as_ref().map_or(&piece.bindings, |among| among.records(p));
+            pass.set_bind_group(1, records, &[]);
             pass.dispatch_workgroups(piece.groups().div_ceil(WORKGROUP), 1, 1);
         }
         Ok(())

@@ -1,11 +1,13 @@
 //! The view uniform: what the shaders know of a camera and of the options.
 
+use crate::cull::lod::LodNumbers;
 use crate::cull::options::{Coverage, CullOptions};
 use crate::error::{Error, Result};
 use crate::host::rounding::{EPS, round_up};
 use crate::input::camera::Camera;
 use crate::input::tolerance::DepthTolerance;
 use crate::input::view::ViewRows;
+use crate::output::mesh_table::MAX_LODS;
 
 /// Twin: `shaders/cull/view.wgsl`, `View`, which documents the fields.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -30,10 +32,22 @@ pub(crate) struct ViewUniform {
     pub(crate) descent_budget: u32,
     pub(crate) depth_offset: f32,
     pub(crate) coordinate_limit: f32,
-    pub(crate) padding: u32,
+    pub(crate) lod_end: u32,
+    pub(crate) lod_needs: [f32; MAX_LODS],
+    pub(crate) source_origin: u32,
+    pub(crate) padding_0: u32,
+    pub(crate) padding_1: [u32; 2],
 }
 
-const _: () = assert!(size_of::<ViewUniform>() == 176);
+const _: () = assert!(size_of::<ViewUniform>() == 224);
+
+/// Bits of a column in `source_origin`; twin: `shaders/cull/view.wgsl`, `COORDINATE_BITS`.
+pub(crate) const COORDINATE_BITS: u32 = 16;
+
+/// Column and row of a pixel in one word; images have at most 2^15 pixels a side.
+pub(crate) fn packed([column, row]: [u32; 2]) -> u32 {
+    column | row << COORDINATE_BITS
+}
 
 impl ViewUniform {
     #[expect(
@@ -105,6 +119,7 @@ impl ViewUniform {
                 ),
                 _ => error,
             })?;
+        let LodNumbers { end: lod_end, needs: lod_needs } = LodNumbers::new(camera, &options.lod)?;
         let size = camera.size();
         let all = [rows.x, rows.y, rows.z, rows.w];
         Ok(Self {
@@ -127,7 +142,11 @@ impl ViewUniform {
             descent_budget: options.descent,
             depth_offset,
             coordinate_limit: rows.coordinate_limit,
-            padding: 0,
+            lod_end,
+            lod_needs,
+            source_origin: 0,
+            padding_0: 0,
+            padding_1: [0; 2],
         })
     }
 }

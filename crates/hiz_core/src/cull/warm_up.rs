@@ -55,7 +55,7 @@ pub(crate) fn record_warm_up(
     if let Some(occluders) = frame.occluders {
         record_occluders(gpu, encoder, occluders, camera, depth, &DrawOptions::default())?;
     }
-    let built = record_idle_reduce(gpu, encoder, depth, camera, pyramid)?;
+    let built = record_idle_reduce(gpu, encoder, &depth.into(), camera, pyramid)?;
     let inputs = CullInputs {
         idle: true,
         built: Some(&built),

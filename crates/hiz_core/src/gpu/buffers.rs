@@ -80,6 +80,17 @@ pub(crate) fn check_alive(buffer: &wgpu::Buffer) -> Result<()> {
     }
 }
 
+/// What wgpu's message contains for objects of another device.
+const OF_ANOTHER_DEVICE: &str = "doesn't match";
+
+fn depth_aspect(texture: &wgpu::Texture) -> wgpu::TextureAspect {
+    if texture.format().is_combined_depth_stencil_format() {
+        wgpu::TextureAspect::DepthOnly
+    } else {
+        wgpu::TextureAspect::All
+    }
+}
+
 /// What wgpu's message contains for a buffer that exists.
 const NOT_MAPPED: &str = "is not mapped";
 
@@ -93,6 +104,15 @@ impl Gpu {
     pub(crate) fn stand_in(&self, label: &'static str) -> Result<wgpu::Buffer> {
         let usage = wgpu::BufferUsages::STORAGE;
         self.buffers.get(label, || self.empty(label, STAND_IN_BYTES, usage))
+    }
+
+    /// A texture of format `R32Uint` to bind where a call samples none.
+    pub(crate) fn no_texels(&self) -> Result<&wgpu::TextureView> {
+        made(&self.no_texels, || {
+            let usage = wgpu::TextureUsages::TEXTURE_BINDING;
+            let format = wgpu::TextureFormat::R32Uint;
+            self.view(&self.texture("hiz.no_texels", (1, 1), format, usage)?)
+        })
     }
 
     /// The buffer with this label, which the first call fills with `contents`.
@@ -232,13 +252,55 @@ impl Gpu {
 
     /// The view of a whole texture of this device; of its depth alone if it has a stencil as well.
     pub(crate) fn view(&self, texture: &wgpu::Texture) -> Result<wgpu::TextureView> {
-        let aspect = if texture.format().is_combined_depth_stencil_format() {
-            wgpu::TextureAspect::DepthOnly
-        } else {
-            wgpu::TextureAspect::All
-        };
-        let descriptor = wgpu::TextureViewDescriptor { aspect, ..Default::default() };
+        let descriptor =
+            wgpu::TextureViewDescriptor { aspect: depth_aspect(texture), ..Default::default() };
         self.checked(|_| texture.create_view(&descriptor))
+    }
+
+    /// The view of one layer of one mip level of a 2D texture of this device; of its depth alone if
+    /// it has a stencil as well.
+    pub(crate) fn view_of(
+        &self,
+        texture: &wgpu::Texture,
+        mip_level: u32,
+        array_layer: u32,
+    ) -> Result<wgpu::TextureView> {
+        let descriptor = wgpu::TextureViewDescriptor {
+            aspect: depth_aspect(texture),
+            dimension: Some(wgpu::TextureViewDimension::D2),
+            base_mip_level: mip_level,
+            mip_level_count: Some(1),
+            base_array_layer: array_layer,
+            array_layer_count: Some(1),
+            ..Default::default()
+        };
+        self.checked(|_| texture.create_view(&descriptor))
+    }
+
+    /// Checks that a texture belongs to this device.
+    ///
+    /// A copy of it is recorded into an encoder that is thrown away.
+    /// wgpu offers no other way to find it out without an error on the texture's own device.
+    ///
+    /// # Errors
+    /// [`Error::Device`] with wgpu's words for a texture of another device.
+    pub(crate) fn check_owned(&self, texture: &wgpu::Texture) -> Result<()> {
+        let copied = self.checked(|device| {
+            let mut encoder =
+                device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let extent = wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 };
+            encoder.copy_texture_to_texture(
+                texture.as_image_copy(),
+                texture.as_image_copy(),
+                extent,
+            );
+            drop(encoder.finish());
+        });
+        match copied {
+            Err(error) if error.to_string().contains(OF_ANOTHER_DEVICE) => Err(error),
+            // It may well be refused for its usage, or because it is copied onto itself.
+            _ => Ok(()),
+        }
     }
 
     pub(crate) fn bind_group(

@@ -13,29 +13,40 @@ pub(crate) enum SourceKind {
     Float,
     /// A texture of float32 bits, with four pixels of a row per texel.
     Bits,
+    /// A rectangle of a depth texture.
+    DepthPart,
+    /// A rectangle of a float colour texture with one channel.
+    FloatPart,
 }
+
+const DEPTH: File = wgsl!("gpu/source_depth");
+const FLOAT: File = wgsl!("gpu/source_float");
+const SAMPLED: File = wgsl!("gpu/source_sampled");
+const WHOLE: File = wgsl!("gpu/source_whole");
+const PART: File = wgsl!("gpu/source_part");
 
 impl SourceKind {
     /// The shader files that read this kind.
     pub(crate) fn files(self) -> &'static [File] {
         match self {
-            Self::Depth => &[wgsl!("gpu/source_depth"), wgsl!("gpu/source_sampled")],
-            Self::Float => &[wgsl!("gpu/source_float"), wgsl!("gpu/source_sampled")],
+            Self::Depth => &[DEPTH, SAMPLED, WHOLE],
+            Self::Float => &[FLOAT, SAMPLED, WHOLE],
+            Self::DepthPart => &[DEPTH, SAMPLED, PART],
+            Self::FloatPart => &[FLOAT, SAMPLED, PART],
             Self::Bits => &[wgsl!("gpu/source_bits")],
         }
     }
 
-    /// The type of its binding.
-    pub(crate) fn binding(self) -> wgpu::BindingType {
+    /// The type of its binding; `multisampled`: of a texture with several samples per pixel.
+    pub(crate) fn binding(self, multisampled: bool) -> wgpu::BindingType {
         let view_dimension = wgpu::TextureViewDimension::D2;
-        let sampled = |sample_type| wgpu::BindingType::Texture {
-            sample_type,
-            view_dimension,
-            multisampled: false,
-        };
+        let sampled =
+            |sample_type| wgpu::BindingType::Texture { sample_type, view_dimension, multisampled };
         match self {
-            Self::Depth => sampled(wgpu::TextureSampleType::Depth),
-            Self::Float => sampled(wgpu::TextureSampleType::Float { filterable: false }),
+            Self::Depth | Self::DepthPart => sampled(wgpu::TextureSampleType::Depth),
+            Self::Float | Self::FloatPart => {
+                sampled(wgpu::TextureSampleType::Float { filterable: false })
+            }
             Self::Bits => wgpu::BindingType::StorageTexture {
                 access: wgpu::StorageTextureAccess::ReadOnly,
                 format: wgpu::TextureFormat::Rgba32Uint,
@@ -47,7 +58,9 @@ impl SourceKind {
     /// The usage that its texture needs to be bound.
     pub(crate) fn usage(self) -> wgpu::TextureUsages {
         match self {
-            Self::Depth | Self::Float => wgpu::TextureUsages::TEXTURE_BINDING,
+            Self::Depth | Self::Float | Self::DepthPart | Self::FloatPart => {
+                wgpu::TextureUsages::TEXTURE_BINDING
+            }
             Self::Bits => wgpu::TextureUsages::STORAGE_BINDING,
         }
     }
@@ -62,7 +75,31 @@ impl SourceKind {
         ImageSize::new(image.width.div_ceil(self.pixels_of_texel()), image.height)
     }
 
-    /// The kind for a texture format; `None` for formats that no pyramid can be built from.
+    /// The kind that reads a rectangle of such a texture; none for [`SourceKind::Bits`].
+    pub(crate) fn part(self) -> Option<Self> {
+        match self {
+            Self::Depth | Self::DepthPart => Some(Self::DepthPart),
+            Self::Float | Self::FloatPart => Some(Self::FloatPart),
+            Self::Bits => None,
+        }
+    }
+
+    /// The kind that reads all of such a texture.
+    pub(crate) fn whole(self) -> Self {
+        match self {
+            Self::DepthPart => Self::Depth,
+            Self::FloatPart => Self::Float,
+            whole => whole,
+        }
+    }
+
+    /// Whether a rectangle of the texture is read, and not all of it.
+    pub(crate) fn is_part(self) -> bool {
+        matches!(self, Self::DepthPart | Self::FloatPart)
+    }
+
+    /// The kind for all of a texture of this format; `None` for formats that no pyramid can be
+    /// built from.
     pub(crate) fn of(format: wgpu::TextureFormat) -> Option<Self> {
         match format {
             wgpu::TextureFormat::R32Float | wgpu::TextureFormat::R16Float => Some(Self::Float),
@@ -75,5 +112,10 @@ impl SourceKind {
 
 /// All kinds of source, in the order of their declaration.
 #[cfg(feature = "testing")]
-pub(crate) const SOURCES: [SourceKind; 3] =
-    [SourceKind::Depth, SourceKind::Float, SourceKind::Bits];
+pub(crate) const SOURCES: [SourceKind; 5] = [
+    SourceKind::Depth,
+    SourceKind::Float,
+    SourceKind::Bits,
+    SourceKind::DepthPart,
+    SourceKind::FloatPart,
+];

@@ -11,6 +11,8 @@ use crate::host::threads::Locked;
 pub(crate) enum Binding {
     /// A depth image.
     Depth(SourceKind),
+    /// A multisampled depth image.
+    Samples(SourceKind),
     /// The sampler for a depth image.
     Sampler,
     Uniform,
@@ -22,6 +24,8 @@ pub(crate) enum Binding {
     /// Storage textures of format `Rgba32Uint`.
     ReadQuads,
     WriteQuads,
+    /// A sampled texture of unsigned integers: of format `Rgba32Uint` or `R32Uint`.
+    SampledQuads,
     /// Storage textures of format `R32Uint`.
     ReadTexels,
     WriteTexels,
@@ -71,13 +75,19 @@ fn layout_entry(binding: u32, kind: Binding) -> wgpu::BindGroupLayoutEntry {
             wgpu::ShaderStages::COMPUTE
         },
         ty: match kind {
-            Binding::Depth(source) => source.binding(),
+            Binding::Depth(source) => source.binding(false),
+            Binding::Samples(source) => source.binding(true),
             Binding::Sampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering),
             Binding::Uniform | Binding::VertexUniform => buffer(wgpu::BufferBindingType::Uniform),
             Binding::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
             Binding::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
             Binding::ReadQuads => quads(wgpu::StorageTextureAccess::ReadOnly),
             Binding::WriteQuads => quads(wgpu::StorageTextureAccess::WriteOnly),
+            Binding::SampledQuads => wgpu::BindingType::Texture {
+                sample_type: wgpu::TextureSampleType::Uint,
+                view_dimension: wgpu::TextureViewDimension::D2,
+                multisampled: false,
+            },
             Binding::ReadTexels => texels(wgpu::StorageTextureAccess::ReadOnly),
             Binding::WriteTexels => texels(wgpu::StorageTextureAccess::WriteOnly),
             #[cfg(feature = "yardstick")]

@@ -6,6 +6,7 @@
 
 pub(crate) mod buffers;
 mod checked;
+pub(crate) mod copies;
 pub(crate) mod depth_source;
 pub(crate) mod device;
 pub(crate) mod kept;

@@ -17,7 +17,7 @@ use crate::gpu::device::Gpu;
 use crate::gpu::kept::Ring;
 
 /// Bytes of a staging buffer: two uniforms at offsets that every device allows.
-const STAGING_BYTES: u64 = 2 * UNIFORM_ALIGNMENT;
+pub(crate) const STAGING_BYTES: u64 = 2 * UNIFORM_ALIGNMENT;
 
 /// An offset of uniforms that every device allows, in bytes.
 pub(crate) const UNIFORM_ALIGNMENT: u64 = 256;

@@ -48,7 +48,7 @@ impl AnswerBuffers {
 
     /// Lists start as 0xFFFFFFFF, which only new ones do.
     fn may_serve_again(&self) -> bool {
-        self.visible.lists.is_none()
+        self.visible.lists.is_none() && self.visible.bins.is_none()
     }
 
     fn bytes(&self) -> u64 {
@@ -106,7 +106,7 @@ impl Answers {
         if buffers.may_serve_again() && has_room {
             kept.push(Kept {
                 instances: Arc::downgrade(instances),
-                outputs: *outputs,
+                outputs: outputs.clone(),
                 buffers: Arc::clone(&buffers),
             });
         }

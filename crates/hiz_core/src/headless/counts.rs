@@ -5,8 +5,10 @@ use std::time::Instant;
 /// ([`Culling::verdicts`](crate::headless::Culling::verdicts)), and how many were tested.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// All instances of the cull.
+    /// All instances of the cull, without those that are absent.
     pub tested: u64,
+    /// Absent instances ([`ABSENT`](crate::ABSENT)), which no other number counts.
+    pub absent: u64,
     /// Outside the frustum, or in sample coverage between all pixel centres.
     pub outside: u64,
     /// Hidden by the depth image, and not outside.

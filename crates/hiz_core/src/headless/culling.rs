@@ -3,14 +3,16 @@
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
+use crate::cull::among::Among;
 use crate::cull::count::record_count;
-use crate::cull::groups::is_grouped;
 use crate::cull::options::CullOptions;
 use crate::error::{Error, Result};
 use crate::gpu::buffers::STORAGE;
-use crate::headless::answers::{AnswerBuffers, mask_bytes};
+use crate::headless::ahead::Ahead;
+use crate::headless::answers::AnswerBuffers;
 use crate::headless::counts::{Counts, Timings, milliseconds};
 use crate::headless::engine::Engine;
+use crate::headless::ranges::{count_ranges, groups_of, mask_ranges, verdict_ranges};
 use crate::headless::readback::{self, BufferRange, Staged, to_u32};
 use crate::host::memory;
 use crate::host::threads::Locked;
@@ -22,11 +24,12 @@ use crate::instances::watch::Watch;
 use crate::output::compact::Compaction;
 use crate::output::counters::{CounterRecord, StatisticsRecord};
 use crate::output::draw::DrawIndexedIndirect;
+use crate::output::emit::Emit;
 use crate::output::lists::Lists;
 use crate::output::outputs::Outputs;
 use crate::output::survivors::{GroupOutput, SurvivorsRecord};
 use crate::output::verdict::Verdict;
-use crate::output::visible::{PieceOutput, Visible, verdicts_offset};
+use crate::output::visible::{PieceOutput, Visible};
 use crate::pyramid::Pyramid;
 
 /// The most instances of a cull whose end is asked for again and again before a thread sleeps.
@@ -76,11 +79,14 @@ pub struct Culling {
     pub(super) pyramid: Arc<Pyramid>,
     pub(super) camera: Camera,
     pub(super) options: CullOptions,
+    pub(super) among: Option<Arc<Among>>,
     /// Lent by [`Engine::answers`] until this is dropped.
     pub(super) buffers: Arc<AnswerBuffers>,
     pub(super) visible: Arc<Visible>,
     /// The copy of a mask that is not large, made by the cull's own submit.
     pub(super) staged_mask: Locked<Option<Staged>>,
+    /// What the cull's own submit copied, for [`Engine::cull_ahead`](Engine::cull_ahead).
+    pub(super) ahead: Option<Ahead>,
     pub(super) later: OnceLock<Lists>,
     /// Where updates note what they changed, and find the refinement that must run before them.
     pub(super) watch: Arc<Watch>,
@@ -103,7 +109,7 @@ impl Culling {
         &self.instances
     }
 
-    /// Waits until the device has run the cull.
+    /// Waits until the device has run the cull, and until what it copied ahead has arrived.
     ///
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost).
@@ -122,7 +128,7 @@ impl Culling {
         })?;
         // The wait itself has called back, unless another thread is about to.
         self.done.get_or_init(Instant::now);
-        Ok(())
+        self.arrived().map(drop)
     }
 
     /// The times of this cull so far.
@@ -165,6 +171,11 @@ impl Culling {
     pub(super) fn read(&self, ranges: &[BufferRange<'_>]) -> Result<Vec<Vec<u8>>> {
         self.wait()?;
         let start = Instant::now();
+        let ahead = self.arrived()?.map(|ahead| ahead.read(ranges)).transpose()?.flatten();
+        if let Some(bytes) = ahead {
+            self.timings.lock().readback_ms += milliseconds(start, Instant::now());
+            return Ok(bytes);
+        }
         let bytes = self
             .engine
             .scoped(|| readback::read_buffers(self.engine.device(), self.engine.queue(), ranges))?;
@@ -196,8 +207,11 @@ impl Culling {
     ///
     /// - **Outside**: outside the frustum, by a certificate of its own or of its group's box.
     ///   In sample coverage also: between all pixel centres.
+    ///   In a cull of some instances also: not asked for.
     /// - **Occluded**: every other instance that is hidden.
     /// - **Visible** and **invalid**: every instance that is kept.
+    ///
+    /// An absent instance ([`ABSENT`](crate::ABSENT)) has the verdict outside.
     ///
     /// So a verdict does not depend on whether groups were tested, except for a few instances.
     /// A group's test hides these, and their own tests would keep them: they are occluded.
@@ -211,11 +225,7 @@ impl Culling {
     pub fn verdicts(&self) -> Result<Vec<Verdict>> {
         self.require("verdicts", self.visible.outputs().verdicts)?;
         self.refine()?;
-        let of_places = self.read(&self.ranges(|piece, output| BufferRange {
-            buffer: &output.mask,
-            offset: verdicts_offset(piece),
-            size: 4 * u64::from(piece.count()),
-        }))?;
+        let of_places = self.read(&verdict_ranges(&self.instances, &self.visible))?;
         let mut verdicts = memory::list(self.instances.len() as usize, "verdicts")?;
         verdicts.resize(self.instances.len() as usize, Verdict::Visible);
         for (piece, words) in self.instances.pieces.iter().zip(of_places) {
@@ -227,13 +237,17 @@ impl Culling {
         Ok(verdicts)
     }
 
-    /// The draw arguments, one record per piece.
-    /// If the cull did not write them, they are made from its mask.
+    /// The draw arguments, [`max_draws`](crate::Visible::max_draws) records per piece.
+    /// If the cull did not write them, they are made from its mask: one record per piece.
     ///
     /// # Errors
-    /// - [`Error::Mismatch`] for a cull without draws, indices and mask.
+    /// - [`Error::Mismatch`] for a cull without draws, indices and mask, and for bins of meshes
+    ///   without an index buffer.
     /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn draws(&self) -> Result<Vec<DrawIndexedIndirect>> {
+        if let Some(bins) = &self.visible.bins {
+            return self.indexed_draws(bins);
+        }
         let draws = match &self.visible.lists {
             Some(lists) => &lists.draws,
             None => &self.later_lists("draws")?.draws,
@@ -250,7 +264,7 @@ impl Culling {
     /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn indices(&self) -> Result<Vec<u32>> {
         let lists = match &self.visible.lists {
-            Some(lists) if self.visible.outputs().indices => lists,
+            Some(lists) if self.visible.outputs().indices && lists.copied.is_none() => lists,
             _ => self.later_lists("indices")?,
         };
         let bytes = self.read(&[BufferRange::first(&lists.draws, lists.draws.size())])?;
@@ -279,34 +293,15 @@ impl Culling {
     pub fn counts(&self) -> Result<Counts> {
         self.require("verdicts", self.visible.outputs().verdicts)?;
         self.refine()?;
-        let engine = &self.engine;
-        let gpu = &engine.context().gpu;
-        let size = size_of::<CounterRecord>() as u64;
-        let counters = engine.scoped(|| {
-            let counters = gpu.empty("hiz.count.counters", size, STORAGE)?;
-            let mut encoder = engine.encoder("hiz.count.encoder");
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            record_count(gpu, &mut pass, &self.instances, &self.visible, &counters)?;
-            drop(pass);
-            self.finish(encoder)?;
-            Ok(counters)
-        })?;
-        let mut ranges = vec![BufferRange::first(&counters, size)];
-        ranges.extend(self.ranges(|piece, output| match self.groups(piece, output) {
-            Some(groups) => BufferRange::first(&groups.survivors, groups.survivors.size()),
-            None => BufferRange::first(&output.mask, 0),
-        }));
-        // The last group may have fewer members than 64.
-        ranges.extend(self.ranges(|piece, output| match self.groups(piece, output) {
-            Some(groups) => BufferRange {
-                buffer: &groups.verdicts,
-                offset: groups.verdicts.size() - 4,
-                size: 4,
-            },
-            None => BufferRange::first(&output.mask, 0),
-        }));
-        let statistics = self.visible.statistics().filter(|_| self.options.statistics);
-        ranges.extend(statistics.map(|buffer| BufferRange::first(buffer, buffer.size())));
+        let made;
+        let counters = match self.ahead.as_ref().and_then(|ahead| ahead.counters.as_ref()) {
+            Some(counters) => counters,
+            None => {
+                made = self.count_verdicts()?;
+                &made
+            }
+        };
+        let ranges = count_ranges(&self.instances, &self.visible, &self.options, counters);
         let bytes = self.read(&ranges)?;
         let record: CounterRecord = bytemuck::pod_read_unaligned(&bytes[0]);
         let (survivors, rest) = bytes[1..].split_at(self.instances.num_pieces());
@@ -331,9 +326,12 @@ impl Culling {
             }
         }
         let demand = u64::from(record.visible) + u64::from(record.invalid);
+        // To the device, what is absent is outside.
+        let absent = self.instances.num_absent();
         Ok(Counts {
-            tested: u64::from(self.instances.len()),
-            outside: record.outside.into(),
+            tested: u64::from(self.instances.len()) - absent,
+            absent,
+            outside: u64::from(record.outside) - absent,
             occluded: record.occluded.into(),
             visible: record.visible.into(),
             invalid: record.invalid.into(),
@@ -363,6 +361,9 @@ impl Culling {
             })?;
             return Ok((Some(demand), capacity.min(demand)));
         }
+        if let Some(bins) = &self.visible.bins {
+            return self.demand_and_written_of_bins(bins);
+        }
         if outputs.verdicts {
             let counts = self.counts()?;
             return Ok((Some(counts.demand), counts.written));
@@ -370,6 +371,22 @@ impl Culling {
         let written = self.draws()?.iter().map(|draw| u64::from(draw.instance_count)).sum();
         // Lists that had room for all hold as many as are kept.
         Ok(((written < capacity || !self.visible.is_capped()).then_some(written), written))
+    }
+
+    /// Counts the verdicts on the device: a `CounterRecord`.
+    fn count_verdicts(&self) -> Result<wgpu::Buffer> {
+        let engine = &self.engine;
+        let gpu = &engine.context().gpu;
+        let size = size_of::<CounterRecord>() as u64;
+        engine.scoped(|| {
+            let counters = gpu.empty("hiz.count.counters", size, STORAGE)?;
+            let mut encoder = engine.encoder("hiz.count.encoder");
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            record_count(gpu, &mut pass, &self.instances, &self.visible, &counters)?;
+            drop(pass);
+            self.finish(encoder)?;
+            Ok(counters)
+        })
     }
 
     /// The lists that the cull did not write, made from its mask when they are first asked for.
@@ -382,7 +399,7 @@ impl Culling {
         let gpu = &engine.context().gpu;
         let lists = engine.scoped(|| {
             let Outputs { capacity, draw, .. } = self.visible.outputs();
-            let lists = Lists::new(gpu, &self.instances, true, capacity, draw)?;
+            let lists = Lists::new(gpu, &self.instances, true, *capacity, (&Emit::List, *draw))?;
             let compaction = Compaction::new(gpu, &self.instances, &self.visible, &lists)?;
             let mut encoder = engine.encoder("hiz.compact.encoder");
             lists.record_clear(&mut encoder);
@@ -439,19 +456,7 @@ impl Culling {
         piece: &Piece,
         output: &'a PieceOutput,
     ) -> Option<&'a GroupOutput> {
-        output.groups().filter(|_| is_grouped(piece, &self.options))
-    }
-
-    fn ranges<'a>(
-        &'a self,
-        of: impl Fn(&Piece, &'a PieceOutput) -> BufferRange<'a>,
-    ) -> Vec<BufferRange<'a>> {
-        self.instances
-            .pieces
-            .iter()
-            .zip(&self.visible.pieces)
-            .map(|(piece, output)| of(piece, output))
-            .collect()
+        groups_of(piece, output, &self.options)
     }
 }
 
@@ -472,7 +477,7 @@ const BITS: [[bool; 8]; 256] = {
 };
 
 /// Writes the first bits of `bytes` into `bits`, lowest first, a byte at a time.
-fn spread_bits(bytes: &[u8], bits: &mut [bool]) {
+pub(super) fn spread_bits(bytes: &[u8], bits: &mut [bool]) {
     let mut eights = bits.chunks_exact_mut(8);
     let mut rest = bytes.iter();
     for (eight, byte) in eights.by_ref().zip(rest.by_ref()) {
@@ -482,15 +487,4 @@ fn spread_bits(bytes: &[u8], bits: &mut [bool]) {
     if let Some(byte) = rest.next() {
         last.copy_from_slice(&BITS[usize::from(*byte)][..last.len()]);
     }
-}
-
-/// The masks of all pieces.
-fn mask_ranges<'a>(instances: &Instances, visible: &'a Visible) -> Vec<BufferRange<'a>> {
-    let sizes = instances.pieces.iter().map(mask_bytes);
-    visible
-        .pieces
-        .iter()
-        .zip(sizes)
-        .map(|(output, size)| BufferRange::first(&output.mask, size))
-        .collect()
 }

@@ -16,6 +16,7 @@ use crate::occluders::depth::OccluderDepth;
 use crate::occluders::drawing::{DepthLoad, DrawOptions, Rasteriser, Touched};
 use crate::occluders::surface::ConservativeDepthOptions;
 use crate::occluders::uploaded::Occluders;
+use crate::pyramid::source::DepthSource;
 
 /// Bytes of an upload's staging buffer at most.
 /// Larger images are uploaded in bands of rows.
@@ -29,6 +30,8 @@ pub struct DepthImage {
     pub(super) view: wgpu::TextureView,
     pub(super) camera: Camera,
     pub(super) tolerance: DepthTolerance,
+    /// How many samples of each pixel the depth is the farthest of.
+    pub(super) samples: u32,
     /// What draws occluders into it; none for an uploaded image.
     pub(super) drawn: Option<Arc<OccluderDepth>>,
 }
@@ -62,6 +65,12 @@ impl DepthImage {
             self.engine.images().keep_apart(drawn);
         }
         &self.texture
+    }
+
+    /// What a reduction reads.
+    pub(super) fn source(&self) -> DepthSource<'_> {
+        let Self { tolerance, samples, .. } = *self;
+        DepthSource { tolerance, samples, ..DepthSource::from(&self.texture) }
     }
 
     /// The NDC depths as they were given, one per pixel, row 0 on top.
@@ -103,6 +112,7 @@ impl DepthImage {
             view,
             camera: camera.clone(),
             tolerance: DepthTolerance::NONE,
+            samples: 1,
             drawn: None,
         })
     }
@@ -178,25 +188,32 @@ impl DepthImage {
         engine.scoped(|| match conversion.unchanged() {
             // The numbers already are what is uploaded, so they are not copied.
             Some(ndc) => self.write(ndc, SourceKind::Bits),
-            None => self.write_converted(&conversion),
+            None => {
+                let (rows, threads) = (conversion.band_rows(), conversion.threads());
+                self.write_bands(rows, threads, |first, band| conversion.rows(first, band))
+            }
         })?;
         Ok(Self { tolerance: conversion.left(), ..self })
     }
 
-    /// Writes what `conversion` makes.
-    /// Each thread converts bands of rows and writes them while they are in its cache.
-    fn write_converted(&self, conversion: &Conversion<'_>) -> Result<()> {
+    /// Writes the rows that `fill` makes, which gets the first row of a band and room for it.
+    /// Each thread makes bands of rows and writes them while they are in its cache.
+    pub(super) fn write_bands(
+        &self,
+        rows_at_once: u32,
+        threads: usize,
+        fill: impl Fn(u32, &mut [f32]) + Sync,
+    ) -> Result<()> {
         let (size, gpu) = (self.size(), &self.engine.context().gpu);
         let pixels_of_texel = SourceKind::Bits.pixels_of_texel();
-        let rows_at_once = conversion.band_rows();
         let bands = (0..size.height).step_by(rows_at_once as usize);
         // One for each thread, however many bands it converts.
         let spare_bands: Locked<Vec<Vec<f32>>> = Locked::default();
         let failed: Locked<Option<Error>> = Locked::default();
-        on_threads(conversion.threads(), bands, |first| {
+        on_threads(threads, bands, |first| {
             let mut band = spare_bands.lock().pop().unwrap_or_default();
             band.resize((rows_at_once.min(size.height - first) * size.width) as usize, 0.0);
-            conversion.rows(first, &mut band);
+            fill(first, &mut band);
             // Error scopes belong to a thread.
             let written = gpu.checked(|_| self.write_rows(first, &band, pixels_of_texel));
             if let Err(error) = written {
@@ -215,7 +232,8 @@ impl DepthImage {
         camera: &Camera,
     ) -> Self {
         let (engine, camera) = (engine.clone(), camera.clone());
-        Self { engine, texture, view, camera, tolerance: DepthTolerance::NONE, drawn: None }
+        let tolerance = DepthTolerance::NONE;
+        Self { engine, texture, view, camera, tolerance, samples: 1, drawn: None }
     }
 
     /// An image without contents, to be written from the host.
@@ -304,6 +322,7 @@ impl Engine {
                 view: drawn.view().clone(),
                 camera: camera.clone(),
                 tolerance: DepthTolerance::NONE,
+                samples: 1,
                 drawn: Some(drawn),
             };
             let options = DrawOptions { load: DepthLoad::Clear, ..*options };

@@ -4,14 +4,20 @@ use std::sync::Arc;
 
 use crate::context::HizContext;
 use crate::error::{Error, Result};
+use crate::gpu::copies::StagingPool;
 use crate::headless::adapter::{self, ADAPTER_VARIABLE, AdapterSummary};
 use crate::headless::answers::Answers;
 use crate::headless::images::Images;
+use crate::headless::joined::JoinedPool;
 use crate::headless::kept_depth::KeptDepth;
 use crate::headless::process::Process;
 use crate::headless::readback;
+use crate::headless::slots::Slots;
 use crate::host::threads::Locked;
 use crate::input::image::MAX_IMAGE_SIDE;
+
+/// Staging buffers of answers that are kept at most.
+const STAGING_KEPT: usize = 4;
 
 /// A device, its queue and the pipelines on it.
 /// The last clone waits until the device is idle, and releases it.
@@ -64,6 +70,10 @@ struct Shared {
     context: HizContext,
     answers: Answers,
     images: Images,
+    slots: Locked<Slots>,
+    joined: JoinedPool,
+    /// For answers that are copied by their cull's own submission.
+    staging: StagingPool,
     device: wgpu::Device,
     queue: wgpu::Queue,
     adapter: AdapterSummary,
@@ -153,6 +163,9 @@ impl Engine {
                 context,
                 answers: Answers::default(),
                 images: Images::default(),
+                slots: Locked::default(),
+                joined: JoinedPool::default(),
+                staging: StagingPool::new(STAGING_KEPT),
                 device,
                 queue,
                 adapter: summary,
@@ -194,6 +207,20 @@ impl Engine {
     /// The depth images that may be lent again.
     pub(super) fn images(&self) -> &Images {
         &self.shared.images
+    }
+
+    /// The culls that were submitted ahead of their reads.
+    pub(super) fn slots(&self) -> &Locked<Slots> {
+        &self.shared.slots
+    }
+
+    /// What joins the masks of several views.
+    pub(super) fn joined(&self) -> &JoinedPool {
+        &self.shared.joined
+    }
+
+    pub(super) fn staging(&self) -> &StagingPool {
+        &self.shared.staging
     }
 
     /// The buffers of the last answers.

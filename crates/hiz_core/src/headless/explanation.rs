@@ -115,6 +115,9 @@ impl Told<'_> {
         let verdict = Verdict::of_word(record.verdict);
         let is_hidden = verdict == Verdict::Occluded;
         match record.stage() {
+            Stage::Validity if verdict == Verdict::Outside => {
+                End::new("absent: its mesh id says that there is no such instance")
+            }
             Stage::Validity => {
                 End::new("the bounds are not finite, negative, or too large for this camera: kept")
             }

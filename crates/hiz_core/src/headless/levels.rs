@@ -48,9 +48,9 @@ impl Engine {
     }
 
     fn submit_reduce(&self, depth: &DepthImage, pyramid: &Pyramid) -> Result<()> {
+        let _in_order = pyramid.submitting.lock();
         let mut encoder = self.encoder("hiz.reduce.encoder");
-        let DepthImage { view, camera, tolerance, .. } = depth;
-        record_reduce(&self.context().gpu, &mut encoder, view, camera, pyramid, *tolerance)?;
+        record_reduce(&self.context().gpu, &mut encoder, &depth.source(), &depth.camera, pyramid)?;
         if let Some(drawn) = &depth.drawn {
             pyramid.keep_with_it(Arc::clone(drawn) as Arc<dyn Owner>);
         }
@@ -89,7 +89,8 @@ impl Engine {
             )
         })?;
         if level == 0 {
-            let format = built.source.texture().format();
+            let part = &built.part;
+            let format = part.subresource.texture.format();
             if !atlas::travels(format) {
                 return Err(Error::invalid(
                     "level",
@@ -99,9 +100,17 @@ impl Engine {
                     ),
                 ));
             }
-            let row = 4 * u64::from(layout.width);
+            let [x, y] = part.origin.map(u64::from);
+            let crop = readback::Crop {
+                skip: 4 * x,
+                row: 4 * u64::from(layout.width),
+                first: y,
+                rows: u64::from(layout.height),
+            };
+            let of = &part.subresource;
             let bytes = self.scoped(|| {
-                readback::read_texture(self.device(), self.queue(), built.source.texture(), row)
+                let copied = (of.as_image_copy(), of.texels());
+                readback::read_texels(self.device(), self.queue(), copied, &crop)
             })?;
             let convention = built.camera.convention();
             return memory::collected(

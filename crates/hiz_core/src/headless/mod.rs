@@ -5,9 +5,12 @@
 //!
 //! 1. `adapter` lists the adapters, and `engine` opens a device on one.
 //! 2. `uploads` brings instances, updates and occluders to it, and `depth_image` depth images.
-//! 3. `levels` builds pyramids and reads their levels.
+//!    `samples` takes the farthest of several samples per pixel.
+//! 3. `levels` builds pyramids and reads their levels; `renewal` renews a part of one.
 //! 4. `cull` submits a cull into buffers of `answers`; `culling` reads them, through `counts`,
-//!    `explanation` and `readback`.
+//!    `explanation`, `ranges` and `readback`.
+//!    With `ahead`, `in_flight` and `slots` the answer comes while the caller does something else.
+//!    `views` culls for several cameras, with buffers of `joined`.
 //! 5. `single` does all of that at once, for bounds that are used once.
 //!
 //! `answers` and `images` lend what was dropped, and `warm_up` runs a frame before the first one.
@@ -45,7 +48,9 @@
 //! [`Error::OtherProcess`]: crate::Error::OtherProcess
 
 mod adapter;
+mod ahead;
 mod answers;
+mod bins;
 mod counts;
 mod cull;
 mod culling;
@@ -54,18 +59,29 @@ pub(crate) mod engine;
 mod explain;
 mod explanation;
 mod images;
+mod in_flight;
+mod joined;
 mod kept_depth;
 mod levels;
 mod process;
+mod ranges;
 pub(crate) mod readback;
+mod renewal;
+mod samples;
 mod single;
+mod slots;
 mod uploads;
+mod views;
 mod warm_up;
 
 pub use adapter::{ADAPTER_VARIABLE, AdapterSummary, INSTALL_HINT, adapters};
+pub use bins::NO_LOD;
 pub use counts::{Counts, Timings};
+pub use cull::CullExtras;
 pub use culling::Culling;
 pub use depth_image::DepthImage;
 pub use engine::Engine;
 pub use explanation::Explanation;
 pub use single::SingleCull;
+pub use slots::CULLS_IN_FLIGHT;
+pub use views::{AmongSource, ViewsCulling};

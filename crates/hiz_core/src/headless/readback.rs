@@ -1,21 +1,9 @@
 //! Readback, from the device to the host: copies into staging buffers, waits, and maps them.
 
 use crate::error::{Error, Result};
+pub(crate) use crate::gpu::copies::BufferRange;
 use crate::host::memory;
-
-/// The part of a buffer to copy.
-pub(crate) struct BufferRange<'a> {
-    pub(crate) buffer: &'a wgpu::Buffer,
-    pub(crate) offset: u64,
-    pub(crate) size: u64,
-}
-
-impl<'a> BufferRange<'a> {
-    /// The first `size` bytes (a multiple of 4).
-    pub(crate) fn first(buffer: &'a wgpu::Buffer, size: u64) -> Self {
-        Self { buffer, offset: 0, size }
-    }
-}
+use crate::input::image::ImageSize;
 
 /// Bytes of a staging buffer at most.
 /// Larger ranges are read in bands.
@@ -118,14 +106,40 @@ pub(crate) fn read_texture(
     texture: &wgpu::Texture,
     row: u64,
 ) -> Result<Vec<u8>> {
-    let height = texture.height();
-    let padded = row.next_multiple_of(u64::from(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT));
+    let size = ImageSize::new(texture.width(), texture.height());
+    let crop = Crop { skip: 0, row, first: 0, rows: u64::from(size.height) };
+    read_texels(device, queue, (texture.as_image_copy(), size), &crop)
+}
+
+/// What is kept of the rows that were copied.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Crop {
+    /// Bytes of a row before those that are kept, and how many are kept.
+    pub(crate) skip: u64,
+    pub(crate) row: u64,
+    /// The first row that is kept, and how many are.
+    pub(crate) first: u64,
+    pub(crate) rows: u64,
+}
+
+/// Reads a part of one layer of one mip level, which has `texels`.
+/// The level is copied as a whole, since depth allows nothing else.
+pub(crate) fn read_texels(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    (source, texels): (wgpu::TexelCopyTextureInfo<'_>, ImageSize),
+    crop: &Crop,
+) -> Result<Vec<u8>> {
+    let ImageSize { width, height } = texels;
+    let texel = source.texture.format().block_copy_size(None).unwrap_or(4);
+    let padded = (u64::from(texel) * u64::from(width))
+        .next_multiple_of(u64::from(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT));
     let staging = staging(device, padded * u64::from(height));
     let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
         label: Some("hiz.readback.encoder"),
     });
     encoder.copy_texture_to_buffer(
-        texture.as_image_copy(),
+        source,
         wgpu::TexelCopyBufferInfo {
             buffer: &staging,
             layout: wgpu::TexelCopyBufferLayout {
@@ -137,13 +151,16 @@ pub(crate) fn read_texture(
                 rows_per_image: None,
             },
         },
-        texture.size(),
+        wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
     );
     let submission = queue.submit([encoder.finish()]);
     with_mapped(device, &staging, submission, |bytes| {
-        let mut out = memory::list((row * u64::from(height)) as usize, "readback")?;
-        for line in bytes.chunks_exact(padded as usize) {
-            out.extend_from_slice(&line[..row as usize]);
+        let Crop { skip, row, first, rows } = *crop;
+        let mut out = memory::list((row * rows) as usize, "readback")?;
+        let kept = skip as usize..(skip + row) as usize;
+        let lines = bytes.chunks_exact(padded as usize).skip(first as usize);
+        for line in lines.take(rows as usize) {
+            out.extend_from_slice(&line[kept.clone()]);
         }
         Ok(out)
     })?

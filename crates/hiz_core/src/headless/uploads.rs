@@ -22,7 +22,7 @@ impl Engine {
     pub fn instances(
         &self,
         bounds: &Bounds<'_>,
-        options: &InstanceOptions,
+        options: &InstanceOptions<'_>,
     ) -> Result<Arc<Instances>> {
         self.instances_for(bounds, options, true)
     }
@@ -31,7 +31,7 @@ impl Engine {
     pub(super) fn instances_for(
         &self,
         bounds: &Bounds<'_>,
-        options: &InstanceOptions,
+        options: &InstanceOptions<'_>,
         has_groups: bool,
     ) -> Result<Arc<Instances>> {
         // Waits after each piece, so that only one piece has a staging buffer at a time.

@@ -134,6 +134,8 @@ pub struct DepthInput<'a> {
 /// How the numbers of an image become NDC depth, rows at a time.
 pub(crate) struct Conversion<'a> {
     numbers: DepthNumbers<'a>,
+    /// The row of the image that the numbers begin with.
+    first_row: u32,
     size: ImageSize,
     convention: DepthConvention,
     /// The invalid values as the image's type holds them.
@@ -154,17 +156,31 @@ struct Metric {
 impl<'a> Conversion<'a> {
     /// Checks what was given; the errors are those of [`ndc_from_kind_within`].
     pub(crate) fn new(input: &DepthInput<'a>, camera: &Camera) -> Result<Self> {
-        let DepthInput { numbers, kind, scale, invalid, tolerance } = *input;
-        let (size, convention, tolerance) =
-            (camera.size(), camera.convention(), tolerance.checked()?);
-        if numbers.len() as u64 != size.pixels() {
+        let size = camera.size();
+        if input.numbers.len() as u64 != size.pixels() {
             return Err(Error::invalid(
                 "depth",
                 format!(
                     "expected the camera's size {size} = {} numbers, got {}",
                     size.pixels(),
-                    numbers.len()
+                    input.numbers.len()
                 ),
+            ));
+        }
+        Self::of_rows(input, camera, 0)
+    }
+
+    /// [`Conversion::new`] of whole rows of an image, from row `first_row` on.
+    pub(crate) fn of_rows(input: &DepthInput<'a>, camera: &Camera, first_row: u32) -> Result<Self> {
+        let DepthInput { numbers, kind, scale, invalid, tolerance } = *input;
+        let (size, convention, tolerance) =
+            (camera.size(), camera.convention(), tolerance.checked()?);
+        let (given, row) = (numbers.len() as u64, u64::from(size.width));
+        let left = u64::from(size.height.saturating_sub(first_row));
+        if given % row != 0 || given / row > left {
+            return Err(Error::invalid(
+                "depth",
+                format!("expected at most {left} rows of {row} numbers each, got {given} numbers"),
             ));
         }
         let metric = match kind {
@@ -190,7 +206,7 @@ impl<'a> Conversion<'a> {
             // Zero and negative numbers are far in any case.
             invalid.retain(|v| *v > 0.0);
         }
-        Ok(Self { numbers, size, convention, invalid, tolerance, metric })
+        Ok(Self { numbers, first_row, size, convention, invalid, tolerance, metric })
     }
 
     /// The tolerance that the NDC depth still has.
@@ -218,7 +234,7 @@ impl<'a> Conversion<'a> {
 
     /// Converts whole rows, the first of which is row `first`.
     pub(crate) fn rows(&self, first: u32, out: &mut [f32]) {
-        let begin = first as usize * self.size.width as usize;
+        let begin = (first - self.first_row) as usize * self.size.width as usize;
         let range = begin..begin + out.len();
         match self.numbers {
             DepthNumbers::F32(numbers) => {

@@ -11,7 +11,9 @@ use wgpu::WriteOnly;
 
 use crate::input::bounds::{Bounds, Floats};
 use crate::instances::aabb::Aabb;
-use crate::instances::volume_record::{BoxRecord, LARGEST, OrientedBoxRecord, SphereRecord};
+use crate::instances::volume_record::{
+    BoxRecord, LARGEST, OrientedBoxRecord, SphereRecord, write_absent,
+};
 
 /// Members of a full group: as many as a `u64` has bits.
 /// Twin: `shaders/instances/groups.wgsl`, `GROUP`.
@@ -28,7 +30,8 @@ pub(crate) struct Origin {
 
 /// A box around some of the volumes of a batch.
 pub(super) enum Around {
-    /// Around the volume of this number; `None` if its bounds are invalid.
+    /// Around the volume of this number; `None` if its bounds are invalid, and empty if it is
+    /// absent.
     One(usize, Option<Aabb>),
     /// Around all volumes of the batch, none of which is invalid.
     All(Aabb),
@@ -73,14 +76,15 @@ impl Batch {
     }
 
     /// Packs the volumes `sources` of `bounds` into the beginning of `target`.
-    /// Calls `tell` with the boxes around them.
+    /// Bit k of `absent`: number k is absent, whatever its bounds are.
+    /// Calls `tell` with the boxes around them; that of an absent one is empty.
     /// Returns the rest of `target`.
     pub(super) fn pack<'a>(
         &mut self,
         bounds: &Bounds<'_>,
         sources: impl ExactSizeIterator<Item = Origin>,
         target: WriteOnly<'a, [u8]>,
-        boxes: Boxes,
+        (boxes, absent): (Boxes, u64),
         mut tell: impl FnMut(Around),
     ) -> WriteOnly<'a, [u8]> {
         let count = sources.len();
@@ -105,6 +109,7 @@ impl Batch {
             }
         }
         let are_plain = match bounds {
+            _ if absent != 0 => false,
             Bounds::Boxes { .. } => plain_boxes(first, second, indices, count, records),
             Bounds::Spheres { .. } => plain_spheres(first, ones, indices, count, records),
             Bounds::OrientedBoxes { .. } => false,
@@ -132,6 +137,11 @@ impl Batch {
             (0..count).for_each(|k| tell(Around::One(k, fetched.aabb(k))));
         } else {
             for (k, record) in records.chunks_exact_mut(record_bytes).take(count).enumerate() {
+                if absent >> k & 1 == 1 {
+                    write_absent(bounds.kind(), indices[k], record);
+                    tell(Around::One(k, Some(Aabb::EMPTY)));
+                    continue;
+                }
                 let is_volume = fetched.write_record(k, indices[k], record);
                 tell(Around::One(k, fetched.aabb(k).filter(|_| is_volume)));
             }

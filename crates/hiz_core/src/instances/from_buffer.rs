@@ -207,6 +207,16 @@ pub(crate) fn record_update_from(
     before: impl FnOnce(&mut wgpu::CommandEncoder) -> Result<()>,
 ) -> Result<()> {
     gpu.check_context("instances", instances.context)?;
+    if instances.num_absent() > 0 {
+        return Err(Error::mismatch(
+            "instances",
+            format!(
+                "expected instances of which none is absent, got {} absent ones: their records \
+                 would be overwritten; give them a mesh, and bounds outside of the view",
+                instances.num_absent()
+            ),
+        ));
+    }
     let kind = instances.kind;
     let stride = checked(source, kind, instances.len())?;
     let pieces = instances.pieces.iter().filter(|piece| piece.count() > 0);

@@ -69,6 +69,8 @@ struct Group {
 pub(crate) struct Groups {
     count: usize,
     groups: Vec<Group>,
+    /// A word per group, with a bit for each absent member; empty if none is absent.
+    absent: Vec<u64>,
 }
 
 impl Group {
@@ -120,9 +122,11 @@ impl Groups {
     /// Writes the records of a piece's instances to `records` in stored order, and forms their
     /// groups.
     /// `source` says which instance is stored at a place of the piece.
+    /// `absent` has a word per group, with a bit for each absent member, or no word at all.
     pub(crate) fn packed(
         bounds: &Bounds<'_>,
         count: usize,
+        absent: Vec<u64>,
         source: impl Fn(usize) -> Origin + Sync,
         records: &Mapped<'_>,
     ) -> Result<Self> {
@@ -136,7 +140,9 @@ impl Groups {
             let mut rest = view.slice(..);
             for (g, group) in (begin..).zip(groups) {
                 let sources = (g * GROUP..count.min((g + 1) * GROUP)).map(&source);
-                rest = batch.pack(bounds, sources, rest, Boxes::Whole, |told| match told {
+                let absent = absent.get(g).copied().unwrap_or(0);
+                let boxes = (Boxes::Whole, absent);
+                rest = batch.pack(bounds, sources, rest, boxes, |told| match told {
                     Around::All(aabb) | Around::One(_, Some(aabb)) => {
                         group.around = group.around.union(&aabb);
                     }
@@ -145,7 +151,7 @@ impl Groups {
             }
             Ok(())
         })?;
-        Ok(Self { count, groups })
+        Ok(Self { count, groups, absent })
     }
 
     /// Writes the records of instances that are culled one by one, once: no groups are formed.
@@ -163,7 +169,7 @@ impl Groups {
             let mut rest = view.slice(..);
             for first in (first..end).step_by(GROUP) {
                 let sources = (first..end.min(first + GROUP)).map(&source);
-                rest = batch.pack(bounds, sources, rest, Boxes::Whole, |_| ());
+                rest = batch.pack(bounds, sources, rest, (Boxes::Whole, 0), |_| ());
             }
             Ok(())
         })?;
@@ -172,7 +178,7 @@ impl Groups {
 
     /// Of a piece whose group boxes are made on the device: the host knows none.
     pub(crate) fn unknown(count: usize) -> Self {
-        Self { count, groups: Vec::new() }
+        Self { count, groups: Vec::new(), absent: Vec::new() }
     }
 
     /// The number of groups.
@@ -195,13 +201,30 @@ impl Groups {
 
     /// The record of a group for the device.
     pub(crate) fn record(&self, group: usize) -> BoxRecord {
-        BoxRecord::valid_or_none(self.aabb(group).map(|aabb| [aabb.min, aabb.max]))
+        let absent = self.absent.get(group).copied().unwrap_or(0);
+        if absent == all_members(self.count, group) {
+            return BoxRecord::of_absent_group();
+        }
+        let record = BoxRecord::valid_or_none(self.aabb(group).map(|aabb| [aabb.min, aabb.max]));
+        if absent == 0 { record } else { record.with_absent_member() }
+    }
+
+    /// Whether the instance at a place is absent.
+    pub(crate) fn is_absent(&self, place: usize) -> bool {
+        self.absent.get(place / GROUP).is_some_and(|word| word >> (place % GROUP) & 1 == 1)
+    }
+
+    /// How many instances are absent.
+    pub(crate) fn num_absent(&self) -> u64 {
+        self.absent.iter().map(|word| u64::from(word.count_ones())).sum()
     }
 
     /// Bytes on the host.
     pub(crate) fn host_bytes(&self) -> u64 {
         let boxes = self.groups.iter().map(|g| g.boxes.capacity()).sum::<usize>();
-        (self.groups.capacity() * size_of::<Group>() + boxes * size_of::<Aabb>()) as u64
+        let groups = self.groups.capacity() * size_of::<Group>();
+        let absent = self.absent.capacity() * size_of::<u64>();
+        (groups + absent + boxes * size_of::<Aabb>()) as u64
     }
 
     /// Takes new bounds for the instances at `places`, which ascend without repetition.
@@ -217,7 +240,7 @@ impl Groups {
     ) -> Result<Vec<u32>> {
         let group_of = |place: u32| place as usize / GROUP;
         let record_bytes = bounds.kind().record_bytes();
-        let count = self.count;
+        let (count, all_absent) = (self.count, &self.absent);
         // Parts of whole groups: positions in `places`, the first group, and the groups.
         let mut parts = memory::list(places.len().div_ceil(PART * GROUP) + 1, "update")?;
         let (mut rest, mut begin, mut first_group) = (&mut self.groups[..], 0, 0);
@@ -238,7 +261,10 @@ impl Groups {
                 let group = group_of(places[0]);
                 let (mut members, mut invalid, mut boxes) = (0, 0, [Aabb::EMPTY; GROUP]);
                 let sources = places.iter().map(|place| source(*place as usize));
-                rest = batch.pack(bounds, sources, rest, Boxes::Each, |told| {
+                let word = all_absent.get(group).copied().unwrap_or(0);
+                let absent = |place: &u32| word >> (*place as usize % GROUP) & 1;
+                let absent = (0..).zip(places).fold(0, |all, (k, p)| all | absent(p) << k);
+                rest = batch.pack(bounds, sources, rest, (Boxes::Each, absent), |told| {
                     let Around::One(k, aabb) = told else { return };
                     let k = places[k] as usize % GROUP;
                     members |= 1 << k;

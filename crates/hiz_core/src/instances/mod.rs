@@ -23,39 +23,54 @@ pub(crate) mod morton;
 pub(crate) mod order;
 pub(crate) mod piece;
 pub(crate) mod records;
+pub(crate) mod slots;
 pub(crate) mod update;
 pub(crate) mod volume_record;
 pub(crate) mod watch;
 
 use std::sync::MutexGuard;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, Result};
 use crate::gpu::device::{ContextId, Gpu};
 use crate::host::memory;
 use crate::host::threads::Locked;
-use crate::input::bounds::{Bounds, BoundsKind};
+use crate::input::bounds::{Bounds, BoundsKind, Floats};
 use crate::instances::groups::Groups;
 use crate::instances::order::StoredOrder;
 #[cfg(feature = "testing")]
 use crate::instances::piece::CULL_WORKGROUP;
 use crate::instances::piece::{Piece, packed, piece_capacity, unwritten};
+use crate::instances::slots::{Kinds, Slots};
 use crate::instances::watch::Watches;
 
 /// How instances are uploaded.
 #[derive(Debug, Clone, Default)]
-pub struct InstanceOptions {
+pub struct InstanceOptions<'a> {
     /// Whether to refuse invalid bounds (NaN, infinite, negative radius, min > max).
     /// Otherwise they are kept visible.
     pub strict: bool,
     /// The order in which the instances of each piece are stored.
     pub order: StoredOrder,
+    /// The mesh of each instance, below 65,536, or [`ABSENT`](crate::ABSENT).
+    /// `None`: all have mesh 0.
+    ///
+    /// [`Emit`](crate::Emit) sorts the kept instances by them.
+    /// Updates replace bounds alone: to change a mesh id, or to bring an absent instance back,
+    /// upload the instances again.
+    pub mesh_ids: Option<&'a [u32]>,
+    /// The scale of each instance: a finite number from 0 on, by which the errors of its mesh's
+    /// levels of detail are multiplied.
+    /// Give the largest scale of an instance that is scaled differently along its axes.
+    /// `None`: all have scale 1.
+    pub scales: Option<Floats<'a>>,
     /// The most instances of one piece, a multiple of 128.
     /// `None`: as many as the device allows.
     #[cfg(feature = "testing")]
     pub piece_capacity: Option<u32>,
 }
 
-impl InstanceOptions {
+impl InstanceOptions<'_> {
     /// The most instances of one piece, at most `most`.
     #[cfg(feature = "testing")]
     fn checked_piece_capacity(&self, most: u32) -> Result<u32> {
@@ -76,6 +91,17 @@ impl InstanceOptions {
     #[expect(clippy::unnecessary_wraps, clippy::unused_self, reason = "as with the feature")]
     fn checked_piece_capacity(&self, most: u32) -> Result<u32> {
         Ok(most)
+    }
+}
+
+/// Distinguishes instances from others of the same number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct InstancesId(u64);
+
+impl InstancesId {
+    fn next() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        Self(NEXT.fetch_add(1, Ordering::Relaxed))
     }
 }
 
@@ -119,6 +145,8 @@ pub(crate) const SEQUENCE_BYTES: usize = 16;
 #[derive(Debug)]
 pub struct Instances {
     pub(crate) context: ContextId,
+    /// Distinguishes these instances from all others.
+    pub(crate) id: InstancesId,
     pub(crate) kind: BoundsKind,
     /// At least one piece, so that there is always a draw to consume.
     /// Without instances it is empty.
@@ -142,7 +170,7 @@ impl Instances {
     pub(crate) fn new(
         gpu: &Gpu,
         bounds: &Bounds<'_>,
-        options: &InstanceOptions,
+        options: &InstanceOptions<'_>,
         has_groups: bool,
         mut copy: impl FnMut(&dyn Fn(&mut wgpu::CommandEncoder), bool) -> Result<()>,
     ) -> Result<Self> {
@@ -150,6 +178,7 @@ impl Instances {
         let total = u32::try_from(n)
             .map_err(|_| Error::limit("instances", n as u64, u64::from(u32::MAX)))?;
         let kind = bounds.kind();
+        let kinds = Kinds::checked(n, options.mesh_ids, options.scales)?;
         let most = piece_capacity(kind.record_bytes(), gpu.limits());
         let capacity = options.checked_piece_capacity(most)?;
         let (mut pieces, mut groups) = (Vec::new(), Vec::new());
@@ -158,7 +187,7 @@ impl Instances {
             let start = index * capacity;
             let range = start..total.min(start.saturating_add(capacity));
             let (piece, its_groups, uploads) =
-                packed(gpu, bounds, index, range, options.order, has_groups)?;
+                packed(gpu, bounds, index, range, (options.order, &kinds), has_groups)?;
             copy(
                 &|encoder| uploads.iter().for_each(|upload| upload.record(encoder)),
                 index + 1 < num_pieces,
@@ -201,6 +230,7 @@ impl Instances {
         )?;
         Ok(Self {
             context: gpu.id(),
+            id: InstancesId::next(),
             kind,
             pieces,
             sequence,
@@ -257,15 +287,33 @@ impl Instances {
         Ok(invalid)
     }
 
+    /// The number of absent instances, which no cull keeps.
+    pub fn num_absent(&self) -> u64 {
+        self.changing().groups.iter().map(Groups::num_absent).sum()
+    }
+
+    /// Whether the instance `index` is absent.
+    pub(crate) fn is_absent(&self, changing: &Changing, index: usize) -> bool {
+        let p = self.pieces.partition_point(|piece| piece.range.end as usize <= index);
+        let piece = &self.pieces[p];
+        let place = piece.order.place(index - piece.range.start as usize);
+        changing.groups[p].is_absent(place)
+    }
+
     /// Bytes on the device: one record per instance, and one box per 64 instances.
+    /// Mesh ids or scales add 24 per instance.
     pub fn device_bytes(&self) -> u64 {
-        self.pieces.iter().map(|p| p.records.size() + p.group_records.size()).sum()
+        let bytes = |p: &Piece| {
+            p.records.size() + p.group_records.size() + p.slots.as_ref().map_or(0, Slots::size)
+        };
+        self.pieces.iter().map(bytes).sum()
     }
 
     /// Bytes on the host.
     ///
     /// - 8 per instance for its place and its index; none with [`StoredOrder::Given`].
-    /// - 88 per group of 64 instances; none if the bounds come from a buffer.
+    /// - 88 per group of 64 instances, and 8 more if any instance is absent; none if the bounds
+    ///   come from a buffer.
     /// - 48 per instance in those groups of which a part was updated.
     pub fn host_bytes(&self) -> u64 {
         let groups = self.changing().groups.iter().map(Groups::host_bytes).sum::<u64>();

@@ -14,6 +14,7 @@ use crate::instances::batch::Origin;
 use crate::instances::groups::Groups;
 use crate::instances::order::{PieceOrder, StoredOrder};
 use crate::instances::records::{RECORDS_PER_ROW, Records, Upload};
+use crate::instances::slots::{Kinds, Slots};
 use crate::instances::volume_record::BoxRecord;
 
 /// Invocations of one workgroup of the cull of groups, and of updates.
@@ -56,11 +57,15 @@ pub(crate) struct Piece {
     /// One `BoxRecord` per group.
     pub(crate) group_records: Records,
     pub(crate) uniform: wgpu::Buffer,
+    /// The same for the boxes of the groups.
+    pub(crate) group_uniform: wgpu::Buffer,
     /// What the cull of instances binds.
     pub(crate) bindings: wgpu::BindGroup,
     /// What the cull of groups binds: its boxes, as if they were a piece of instances.
     pub(crate) group_bindings: wgpu::BindGroup,
     pub(crate) order: PieceOrder,
+    /// `None` if all instances have mesh 0 and scale 1: then their slots are their indices.
+    pub(crate) slots: Option<Slots>,
     /// What bounds from a buffer need.
     pub(crate) from_buffer: KeptSources,
 }
@@ -102,8 +107,9 @@ impl Piece {
 }
 
 /// The bindings of a piece's uniform and records in every cull.
+/// The last one says which instances are asked for (`shaders/cull/among.wgsl`).
 pub(crate) const RECORD_BINDINGS: &[(u32, Binding)] =
-    &[(0, Binding::Uniform), (1, Binding::ReadQuads)];
+    &[(0, Binding::Uniform), (1, Binding::ReadQuads), (4, Binding::SampledQuads)];
 
 /// Makes a piece, its groups, and the uploads that bring both to the device.
 pub(super) fn packed(
@@ -111,12 +117,15 @@ pub(super) fn packed(
     bounds: &Bounds<'_>,
     index: u32,
     range: Range<u32>,
-    order: StoredOrder,
+    (order, kinds): (StoredOrder, &Kinds<'_>),
     has_groups: bool,
-) -> Result<(Piece, Groups, [Upload; 2])> {
+) -> Result<(Piece, Groups, Vec<Upload>)> {
     let (first, count) = (range.start as usize, range.end - range.start);
     let record_bytes = bounds.kind().record_bytes();
-    let order = PieceOrder::new(bounds, first..range.end as usize, order)?;
+    let indices = first..range.end as usize;
+    let order = PieceOrder::new(bounds, indices.clone(), order)?;
+    let absent = kinds.absent(&indices, &order)?;
+    let (slots, slots_upload) = Slots::new(gpu, kinds, &indices, &order)?.unzip();
     let source = |place: usize| Origin {
         bounds: first + order.index(place),
         index: order.index(place) as u32,
@@ -124,7 +133,7 @@ pub(super) fn packed(
     let (records, upload, groups) =
         Records::new(gpu, RECORDS_LABEL, count, record_bytes, |records| {
             if has_groups {
-                Groups::packed(bounds, count as usize, source, records)
+                Groups::packed(bounds, count as usize, absent, source, records)
             } else {
                 Groups::without_groups(bounds, count as usize, source, records)
             }
@@ -135,8 +144,9 @@ pub(super) fn packed(
             let records = (0..groups.len()).map(|g| groups.record(g));
             if groups.len() > 0 { write_boxes(boxes, records) } else { Ok(()) }
         })?;
+    let order = (order, slots);
     let piece = assembled(gpu, (index, range), num_groups, records, group_records, order)?;
-    Ok((piece, groups, [upload, groups_upload]))
+    Ok((piece, groups, [upload, groups_upload].into_iter().chain(slots_upload).collect()))
 }
 
 /// Makes a piece whose records and group boxes are written on the device, in the caller's order.
@@ -150,7 +160,7 @@ pub(super) fn unwritten(
     let num_groups = count.div_ceil(GROUP as u32);
     let records = Records::unwritten(gpu, RECORDS_LABEL, count, kind.record_bytes())?;
     let group_records = Records::unwritten(gpu, GROUPS_LABEL, num_groups, BOX_BYTES)?;
-    let order = PieceOrder::default();
+    let order = (PieceOrder::default(), None);
     assembled(gpu, (index, range), num_groups, records, group_records, order)
 }
 
@@ -166,7 +176,7 @@ fn assembled(
     num_groups: u32,
     records: Records,
     group_records: Records,
-    order: PieceOrder,
+    (order, slots): (PieceOrder, Option<Slots>),
 ) -> Result<Piece> {
     let uniform = |count: u32| {
         let words = count.div_ceil(32);
@@ -182,18 +192,30 @@ fn assembled(
         records,
         group_records,
         uniform,
+        group_uniform: uniform_of_groups,
         bindings,
         group_bindings,
         order,
+        slots,
         from_buffer,
     })
 }
 
-/// Binds a piece's uniform and records for a cull.
+/// Binds a piece's uniform and records for a cull of all instances.
 pub(crate) fn bind_records(
     gpu: &Gpu,
     uniform: &wgpu::Buffer,
     records: &Records,
+) -> Result<wgpu::BindGroup> {
+    bind_records_among(gpu, uniform, records, gpu.no_texels()?)
+}
+
+/// Binds a piece's uniform and records for a cull that reads which instances it asks for.
+pub(crate) fn bind_records_among(
+    gpu: &Gpu,
+    uniform: &wgpu::Buffer,
+    records: &Records,
+    among: &wgpu::TextureView,
 ) -> Result<wgpu::BindGroup> {
     gpu.bind_group(
         "hiz.cull.instances",
@@ -201,6 +223,7 @@ pub(crate) fn bind_records(
         &[
             entry(0, uniform.as_entire_binding()),
             entry(1, wgpu::BindingResource::TextureView(&records.view)),
+            entry(4, wgpu::BindingResource::TextureView(among)),
         ],
     )
 }

@@ -21,6 +21,10 @@ const ROW_MULTIPLE: u32 = 16;
 /// The format of the texture.
 pub(crate) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 
+/// The usage of records that culls read as storage, beside that as the target of copies.
+const STORED: wgpu::TextureUsages =
+    wgpu::TextureUsages::STORAGE_BINDING.union(wgpu::TextureUsages::COPY_SRC);
+
 /// Records, one after the other, in rows of [`RECORDS_PER_ROW`].
 #[derive(Debug)]
 pub(crate) struct Records {
@@ -30,6 +34,7 @@ pub(crate) struct Records {
 }
 
 /// Records in a staging buffer, to be copied to the texture that the cull reads.
+#[derive(Debug)]
 pub(crate) struct Upload {
     staging: wgpu::Buffer,
     texture: wgpu::Texture,
@@ -45,28 +50,57 @@ impl Records {
         record_bytes: u64,
         fill: impl FnOnce(&Mapped<'_>) -> Result<T>,
     ) -> Result<(Self, Upload, T)> {
+        Self::of_usage(gpu, label, (count, record_bytes), STORED, fill)
+    }
+
+    /// Records as [`Records::new`] makes them, in a texture that shaders sample.
+    pub(crate) fn sampled<T>(
+        gpu: &Gpu,
+        label: &str,
+        count: u32,
+        record_bytes: u64,
+        fill: impl FnOnce(&Mapped<'_>) -> Result<T>,
+    ) -> Result<(Self, Upload, T)> {
+        let usage = wgpu::TextureUsages::TEXTURE_BINDING;
+        Self::of_usage(gpu, label, (count, record_bytes), usage, fill)
+    }
+
+    fn of_usage<T>(
+        gpu: &Gpu,
+        label: &str,
+        (count, record_bytes): (u32, u64),
+        texture_usage: wgpu::TextureUsages,
+        fill: impl FnOnce(&Mapped<'_>) -> Result<T>,
+    ) -> Result<(Self, Upload, T)> {
         let columns = Self::columns(count);
         let rows = count.div_ceil(RECORDS_PER_ROW).max(1);
         let size = u64::from(columns) * u64::from(rows) * record_bytes;
         // Without MAP_WRITE, wgpu would map a staging buffer of its own and copy it into this one.
         let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::MAP_WRITE;
         let (staging, filled) = gpu.written(label, size, usage, fill)?;
-        let records = Self::unwritten(gpu, label, count, record_bytes)?;
+        let records = Self::made(gpu, label, (count, record_bytes), texture_usage)?;
         let texture = records.texture.clone();
         Ok((records, Upload { staging, texture }, filled))
     }
 
     /// Makes room for `count` records, which commands write later.
     pub(crate) fn unwritten(gpu: &Gpu, label: &str, count: u32, record_bytes: u64) -> Result<Self> {
+        Self::made(gpu, label, (count, record_bytes), STORED)
+    }
+
+    fn made(
+        gpu: &Gpu,
+        label: &str,
+        (count, record_bytes): (u32, u64),
+        texture_usage: wgpu::TextureUsages,
+    ) -> Result<Self> {
         let columns = Self::columns(count);
         let rows = count.div_ceil(RECORDS_PER_ROW).max(1);
         let texture = gpu.texture(
             label,
             (columns * (record_bytes / TEXEL_BYTES) as u32, rows),
             FORMAT,
-            wgpu::TextureUsages::STORAGE_BINDING
-                | wgpu::TextureUsages::COPY_DST
-                | wgpu::TextureUsages::COPY_SRC,
+            texture_usage | wgpu::TextureUsages::COPY_DST,
         )?;
         let view = gpu.view(&texture)?;
         Ok(Self { view, texture, record_bytes })

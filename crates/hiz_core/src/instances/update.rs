@@ -118,7 +118,11 @@ pub(crate) fn record_update(
     }
     if strict {
         let mut record = vec![0; instances.kind.record_bytes() as usize];
-        let mut bad = (0..n).filter(|i| !bounds.write_record(*i, 0, &mut record));
+        let changing = instances.changing();
+        let mut bad = (0..n).filter(|i| {
+            let is_absent = instances.is_absent(&changing, first as usize + i);
+            !is_absent && !bounds.write_record(*i, 0, &mut record)
+        });
         let first_bad = bad.next();
         refuse_bad(n, usize::from(first_bad.is_some()) + bad.count(), first_bad.map(|i| i as u64))?;
     }

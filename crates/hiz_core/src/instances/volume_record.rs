@@ -42,6 +42,18 @@ impl Bounds<'_> {
     }
 }
 
+/// Writes the record of an absent instance of a kind into `out`, with the caller's `index`.
+pub(super) fn write_absent(kind: BoundsKind, index: u32, out: &mut [u8]) {
+    fn write<R: Record>(out: &mut [u8], index: u32) {
+        out.copy_from_slice(bytemuck::bytes_of(&R::ABSENT.numbered(index)));
+    }
+    match kind {
+        BoundsKind::Sphere => write::<SphereRecord>(out, index),
+        BoundsKind::Box => write::<BoxRecord>(out, index),
+        BoundsKind::OrientedBox => write::<OrientedBoxRecord>(out, index),
+    }
+}
+
 fn write<R: Record>(out: &mut [u8], index: u32, record: R) -> bool {
     let is_valid = record.is_valid();
     let record = if is_valid { record } else { R::INVALID };
@@ -59,7 +71,16 @@ pub(crate) const LARGEST: f32 = 1_152_921_504_606_846_976.0;
 /// The shader need not recognise NaN or infinity, which a compiler may assume to be absent.
 pub(crate) const BEYOND_LIMITS: f32 = 4.0 * LARGEST;
 
+/// The centre in the record of an absent instance, on the first axis.
+///
+/// It is farther from every reference point than a valid centre can be.
+/// The shader asks for a centre below half of it (`shaders/cull/classify.wgsl`, `ABSENT_BELOW`).
+pub(crate) const ABSENT_CENTER: f32 = -BEYOND_LIMITS;
+
 trait Record: bytemuck::Pod {
+    /// The record that is stored for an absent instance.
+    const ABSENT: Self;
+
     /// The record that is stored for invalid bounds.
     const INVALID: Self;
 
@@ -93,6 +114,7 @@ pub(crate) struct BoxRecord {
     center_lo: [f32; 3],
     index: u32,
     half_size: [f32; 3],
+    /// Not 0 in the box of a group: a member is absent.
     padding_2: f32,
 }
 
@@ -157,6 +179,9 @@ impl SphereRecord {
 }
 
 impl Record for SphereRecord {
+    const ABSENT: Self =
+        Self { center_hi: [ABSENT_CENTER, 0.0, 0.0], radius: 0.0, ..Self::INVALID };
+
     const INVALID: Self =
         Self { center_hi: [0.0; 3], radius: BEYOND_LIMITS, center_lo: [0.0; 3], index: 0 };
 
@@ -188,6 +213,16 @@ impl BoxRecord {
         record.filter(Self::is_valid).unwrap_or(Self::INVALID)
     }
 
+    /// The record of a group without any member that is there.
+    pub(crate) fn of_absent_group() -> Self {
+        Self::ABSENT
+    }
+
+    /// The same box around a group of which a member is absent (`shaders/cull/refine_groups.wgsl`).
+    pub(crate) fn with_absent_member(self) -> Self {
+        Self { padding_2: 1.0, ..self }
+    }
+
     fn new(min: [f64; 3], max: [f64; 3]) -> Self {
         // Halved first, because min + max may overflow.
         let center: [f64; 3] = std::array::from_fn(|k| 0.5 * min[k] + 0.5 * max[k]);
@@ -213,6 +248,9 @@ impl BoxRecord {
 }
 
 impl Record for BoxRecord {
+    const ABSENT: Self =
+        Self { center_hi: [ABSENT_CENTER, 0.0, 0.0], half_size: [0.0; 3], ..Self::INVALID };
+
     const INVALID: Self = Self {
         center_hi: [0.0; 3],
         padding_0: 0.0,
@@ -270,6 +308,9 @@ impl OrientedBoxRecord {
 }
 
 impl Record for OrientedBoxRecord {
+    const ABSENT: Self =
+        Self { center_hi: [ABSENT_CENTER, 0.0, 0.0], half_axis_0: [0.0; 3], ..Self::INVALID };
+
     const INVALID: Self = Self {
         center_hi: [0.0; 3],
         half_axis_2_x: 0.0,

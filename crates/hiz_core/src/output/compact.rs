@@ -1,13 +1,13 @@
 //! The ordered compaction: from the mask to an ascending list and the draw's instance count.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::buffers::{entry, made};
 use crate::gpu::device::Gpu;
 use crate::gpu::layouts::Binding;
 use crate::gpu::pipelines::Compute;
 use crate::gpu::shader::{Source, wgsl};
 use crate::instances::Instances;
-use crate::output::lists::Lists;
+use crate::output::lists::{Copied, Lists};
 use crate::output::visible::Visible;
 
 /// Words of the mask that one workgroup of `scatter` turns into indices;
@@ -26,19 +26,42 @@ const BINDINGS: &[(u32, Binding)] = &[
     (5, Binding::Uniform),
 ];
 
+/// The bindings of a compaction that copies the caller's records.
+const COPY_BINDINGS: &[(u32, Binding)] = &[
+    (0, Binding::Uniform),
+    (1, Binding::Read),
+    (2, Binding::Write),
+    (3, Binding::Write),
+    (4, Binding::Write),
+    (5, Binding::Uniform),
+    (6, Binding::Read),
+];
+
 /// The shader of the ordered compaction.
 pub(crate) fn compact_module() -> Source {
     Source::of(&[&[wgsl!("instances/piece"), wgsl!("output/compact")]])
 }
 
-fn compact_pipeline(gpu: &Gpu, entry_point: &'static str) -> Result<wgpu::ComputePipeline> {
-    gpu.compute_pipeline(&Compute {
-        label: "hiz.compact.pipeline",
-        source: compact_module(),
-        entry_point,
-        layouts: &[gpu.layout(LAYOUT, BINDINGS)?],
-        constants: &[],
-    })
+/// The shader of the ordered compaction that copies the caller's records.
+pub(crate) fn copy_module() -> Source {
+    let files = [wgsl!("instances/piece"), wgsl!("output/compact"), wgsl!("output/copy")];
+    Source::of(&[&files])
+}
+
+fn compact_pipeline(
+    gpu: &Gpu,
+    entry_point: &'static str,
+    copied: Option<&Copied>,
+) -> Result<wgpu::ComputePipeline> {
+    let (label, constants) = ("hiz.compact.pipeline", &[][..]);
+    let Some(copied) = copied else {
+        let layouts = &[gpu.layout(LAYOUT, BINDINGS)?];
+        let source = compact_module();
+        return gpu.compute_pipeline(&Compute { label, source, entry_point, layouts, constants });
+    };
+    let constants = &[("RECORD_WORDS", f64::from(copied.stride / 4))];
+    let layouts = &[gpu.layout(LAYOUT, COPY_BINDINGS)?];
+    gpu.compute_pipeline(&Compute { label, source: copy_module(), entry_point, layouts, constants })
 }
 
 /// The pipelines and bindings of the compaction of all pieces that have instances.
@@ -60,27 +83,35 @@ impl Compaction {
         let pieces =
             of_pieces.filter(|((piece, _), _)| piece.count() > 0).map(|((piece, output), list)| {
                 let bind = || {
-                    gpu.bind_group(
-                        "hiz.compact.piece",
-                        &gpu.layout(LAYOUT, BINDINGS)?,
-                        &[
-                            entry(0, piece.uniform.as_entire_binding()),
-                            entry(1, output.mask.as_entire_binding()),
-                            entry(2, list.bound().as_entire_binding()),
-                            entry(3, lists.draws.as_entire_binding()),
-                            entry(4, list.before.as_entire_binding()),
-                            entry(5, lists.capacity_uniform.as_entire_binding()),
-                        ],
-                    )
+                    let mut entries = vec![
+                        entry(0, piece.uniform.as_entire_binding()),
+                        entry(1, output.mask.as_entire_binding()),
+                        entry(2, list.bound().as_entire_binding()),
+                        entry(3, lists.draws.as_entire_binding()),
+                        entry(4, list.before.as_entire_binding()),
+                        entry(5, lists.capacity_uniform.as_entire_binding()),
+                    ];
+                    let Some(copied) = &lists.copied else {
+                        let layout = gpu.layout(LAYOUT, BINDINGS)?;
+                        return gpu.bind_group("hiz.compact.piece", &layout, &entries);
+                    };
+                    entries.push(entry(6, copied.of_piece(piece)));
+                    let layout = gpu.layout(LAYOUT, COPY_BINDINGS)?;
+                    gpu.bind_group("hiz.compact.piece", &layout, &entries).map_err(|error| {
+                        let message = format!("expected a buffer of this device, but {error}");
+                        Error::mismatch("records", message)
+                    })
                 };
                 Ok((
                     made(&list.bindings, bind)?.clone(),
                     list.indices.as_ref().map(|_| piece.words().div_ceil(SCATTER_WORKGROUP)),
                 ))
             });
+        let copied = lists.copied.as_ref();
+        let scatter = if copied.is_some() { "copy_records" } else { "scatter" };
         Ok(Self {
-            scan: compact_pipeline(gpu, "scan")?,
-            scatter: compact_pipeline(gpu, "scatter")?,
+            scan: compact_pipeline(gpu, "scan", copied)?,
+            scatter: compact_pipeline(gpu, scatter, copied)?,
             pieces: pieces.collect::<Result<_>>()?,
         })
     }

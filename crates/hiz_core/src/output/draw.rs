@@ -31,3 +31,29 @@ pub struct DrawTemplate {
     /// See [`DrawIndexedIndirect::first_instance`].
     pub first_instance: u32,
 }
+
+/// The arguments of `draw_indirect`, 16 bytes, as the device reads them.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct DrawIndirect {
+    /// How many vertices the mesh has.
+    pub vertex_count: u32,
+    /// How many instances to draw; the cull writes it.
+    pub instance_count: u32,
+    /// The first vertex.
+    pub first_vertex: u32,
+    /// The first instance.
+    /// A number other than 0 needs the feature `INDIRECT_FIRST_INSTANCE`.
+    pub first_instance: u32,
+}
+
+const _: () = assert!(size_of::<DrawIndirect>() == 16);
+
+/// The constant part of a [`DrawIndirect`].
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub struct VertexDraw {
+    /// See [`DrawIndirect::vertex_count`].
+    pub vertex_count: u32,
+    /// See [`DrawIndirect::first_vertex`].
+    pub first_vertex: u32,
+}

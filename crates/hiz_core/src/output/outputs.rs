@@ -1,6 +1,7 @@
 //! Outputs: what a cull is asked to leave behind.
 
 use crate::output::draw::DrawTemplate;
+use crate::output::emit::Emit;
 
 /// What a cull leaves behind.
 /// Anything that is not asked for is neither computed nor stored.
@@ -39,7 +40,7 @@ use crate::output::draw::DrawTemplate;
 /// assert_eq!(culling.draws()?, [draw]);
 /// # Ok::<(), hiz_core::Error>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Outputs {
     /// One bit per instance: kept or not.
     pub mask: bool,
@@ -55,8 +56,10 @@ pub struct Outputs {
     /// How many indices are written at most, in all pieces together.
     /// `None`: as many as there are instances.
     pub capacity: Option<u32>,
-    /// The constant part of the draw arguments.
+    /// The constant part of the draw arguments of [`Emit::List`].
     pub draw: DrawTemplate,
+    /// How indices and draw arguments are arranged.
+    pub emit: Emit,
 }
 
 impl Outputs {
@@ -68,10 +71,18 @@ impl Outputs {
         draws: false,
         capacity: None,
         draw: DrawTemplate { index_count: 0, first_index: 0, base_vertex: 0, first_instance: 0 },
+        emit: Emit::List,
     };
     /// Everything, for all instances.
-    pub const ALL: Self =
-        Self { mask: true, verdicts: true, indices: true, draws: true, ..Self::NONE };
+    pub const ALL: Self = Self {
+        mask: true,
+        verdicts: true,
+        indices: true,
+        draws: true,
+        capacity: None,
+        draw: DrawTemplate { index_count: 0, first_index: 0, base_vertex: 0, first_instance: 0 },
+        emit: Emit::List,
+    };
 }
 
 impl std::fmt::Display for Outputs {

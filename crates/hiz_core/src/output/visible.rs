@@ -2,11 +2,14 @@
 
 use std::sync::OnceLock;
 
+use std::ops::Range;
+
 use crate::error::{Error, Result};
 use crate::gpu::buffers::{STORAGE, made};
 use crate::gpu::device::{ContextId, Gpu};
 use crate::instances::Instances;
 use crate::instances::piece::Piece;
+use crate::output::bins::{Arrangement, Bins};
 use crate::output::counters::StatisticsRecord;
 use crate::output::draw::DrawIndexedIndirect;
 use crate::output::lists::Lists;
@@ -24,8 +27,9 @@ pub(crate) struct PieceOutput {
     pub(crate) mask: wgpu::Buffer,
     /// Made by the first cull that tests groups.
     groups: OnceLock<GroupOutput>,
-    /// What culls bind, without and with the count of levels; made by the first of either.
-    pub(crate) bindings: [OnceLock<wgpu::BindGroup>; 2],
+    /// What culls bind, made by the first of each kind.
+    /// Culls that count levels come second, and those of bins in any order come last.
+    pub(crate) bindings: [OnceLock<wgpu::BindGroup>; 4],
 }
 
 /// What a cull finds, on the device.
@@ -66,8 +70,10 @@ pub(crate) struct PieceOutput {
 pub struct Visible {
     pub(crate) context: ContextId,
     pub(crate) pieces: Vec<PieceOutput>,
-    /// `None` if neither indices nor draws are asked for.
+    /// `None` if neither indices nor draws are asked for, or if they are those of bins.
     pub(crate) lists: Option<Lists>,
+    /// `None` likewise, or if there is one list.
+    pub(crate) bins: Option<Bins>,
     /// Made by the first cull that counts levels.
     statistics: OnceLock<wgpu::Buffer>,
     capacity: u32,
@@ -77,7 +83,7 @@ pub struct Visible {
 
 impl Visible {
     pub(crate) fn new(gpu: &Gpu, instances: &Instances, outputs: &Outputs) -> Result<Self> {
-        let Outputs { capacity, draw, .. } = *outputs;
+        let Outputs { capacity, draw, ref emit, .. } = *outputs;
         gpu.check_context("instances", instances.context)?;
         if draw.first_instance != 0
             && !gpu.device().features().contains(wgpu::Features::INDIRECT_FIRST_INSTANCE)
@@ -94,34 +100,91 @@ impl Visible {
         let pieces =
             instances.pieces.iter().map(|piece| PieceOutput::new(gpu, piece, outputs.verdicts));
         let listed = outputs.indices || outputs.draws;
+        let most = capacity.unwrap_or(instances.len());
+        let bins =
+            if listed { Bins::new(gpu, instances, emit, outputs.indices, most)? } else { None };
         Ok(Self {
             context: gpu.id(),
             pieces: pieces.collect::<Result<_>>()?,
-            lists: listed
-                .then(|| Lists::new(gpu, instances, outputs.indices, capacity, draw))
+            lists: (listed && emit.is_one_list())
+                .then(|| Lists::new(gpu, instances, outputs.indices, capacity, (emit, draw)))
                 .transpose()?,
+            bins,
             statistics: OnceLock::new(),
-            capacity: capacity.unwrap_or(instances.len()),
-            outputs: *outputs,
+            capacity: most,
+            outputs: outputs.clone(),
             counts: instances.pieces.iter().map(Piece::count).collect(),
         })
     }
 
     /// What culls leave in these buffers.
-    pub fn outputs(&self) -> Outputs {
-        self.outputs
+    pub fn outputs(&self) -> &Outputs {
+        &self.outputs
     }
 
-    /// The draw arguments, one [`DrawIndexedIndirect`] per piece.
-    /// Pass the buffer and [`Visible::draw_offset`] to `draw_indexed_indirect`.
+    /// The draw arguments: [`Visible::max_draws`] records per piece.
+    /// Pass the buffer and [`Visible::draw_offset`] to `draw_indexed_indirect` or
+    /// `multi_draw_indexed_indirect`.
     /// `None` if neither [`Outputs::draws`] nor [`Outputs::indices`] was asked for.
+    ///
+    /// The records are [`DrawIndexedIndirect`]s, or [`DrawIndirect`](crate::DrawIndirect)s for
+    /// meshes without indices.
     pub fn draw_arguments(&self) -> Option<&wgpu::Buffer> {
-        self.lists.as_ref().map(|lists| &lists.draws)
+        match &self.bins {
+            Some(bins) => Some(&bins.draws),
+            None => self.lists.as_ref().map(|lists| &lists.draws),
+        }
     }
 
-    /// The offset of a piece's draw arguments in bytes.
+    /// The offset of a piece's first draw record in bytes.
     pub fn draw_offset(&self, piece: usize) -> u64 {
-        (piece * size_of::<DrawIndexedIndirect>()) as u64
+        let bytes = match &self.bins {
+            Some(bins) => bins.piece_bytes(),
+            None => size_of::<DrawIndexedIndirect>() as u64,
+        };
+        piece as u64 * bytes
+    }
+
+    /// How many draw records a piece has.
+    ///
+    /// Records without a draw are zeros, or have 0 instances: all of them may be drawn.
+    pub fn max_draws(&self) -> u32 {
+        self.bins.as_ref().map_or(1, |bins| bins.records)
+    }
+
+    /// How many of a piece's draw records draw something: a u32 per piece, at
+    /// [`Visible::draw_count_offset`].
+    /// They are the first ones, so this is the count for `multi_draw_indexed_indirect_count`.
+    ///
+    /// `None` where each bin has its record in a fixed place
+    /// ([`Placement::Reserved`](crate::Placement::Reserved)), for [`Emit::List`](crate::Emit::List), and if neither
+    /// draws nor indices were asked for.
+    pub fn draw_count(&self) -> Option<&wgpu::Buffer> {
+        let bins = self.bins.as_ref()?;
+        (bins.arrangement != Arrangement::Reserved).then_some(&bins.draw_counts)
+    }
+
+    /// The offset of a piece's number of draws in bytes.
+    pub fn draw_count_offset(&self, piece: usize) -> u64 {
+        4 * piece as u64
+    }
+
+    /// Where the bin of a mesh and LOD lies with [`Placement::Reserved`](crate::Placement::Reserved):
+    /// the offset of its draw record in [`Visible::draw_arguments`], and its bytes in
+    /// [`Visible::list`].
+    /// `None` with any other way to emit.
+    ///
+    /// Set the list's bytes as the vertex buffer, and draw the record.
+    ///
+    /// # Panics
+    /// If `piece`, `mesh` or `lod` is not below what there are.
+    pub fn bin(&self, piece: usize, mesh: u32, lod: u32) -> Option<(u64, Range<u64>)> {
+        let bins = self.bins.as_ref()?;
+        assert!(lod < bins.meshes.lods(mesh), "LOD {lod} of mesh {mesh}");
+        let (begin, words) = bins.reserved(piece, mesh, lod)?;
+        let record = u64::from(mesh * bins.meshes.most_lods() + lod);
+        let bytes = 4 * u64::from(begin)..4 * (u64::from(begin) + u64::from(words));
+        Some((self.draw_offset(piece) + record * bins.record_bytes(), bytes))
     }
 
     /// The number of pieces, which is also the number of lists, masks and draws.
@@ -129,13 +192,17 @@ impl Visible {
         self.pieces.len()
     }
 
-    /// A piece's packed list of kept instances: u32 indices in the caller's numbering.
+    /// A piece's packed list of kept instances: u32 indices in the caller's numbering, or the
+    /// caller's records with [`Emit::Copy`](crate::Emit::Copy).
     /// The buffer can be used as storage and as an instance vertex buffer.
     /// `None` without [`Outputs::indices`].
     ///
     /// # Panics
     /// If `piece` is not below [`Visible::num_pieces`].
     pub fn list(&self, piece: usize) -> Option<&wgpu::Buffer> {
+        if let Some(bins) = &self.bins {
+            return bins.pieces[piece].list.as_ref();
+        }
         self.lists.as_ref()?.pieces[piece].indices.as_ref()
     }
 
@@ -159,6 +226,7 @@ impl Visible {
     pub fn device_bytes(&self) -> u64 {
         self.pieces.iter().map(PieceOutput::size).sum::<u64>()
             + self.lists.as_ref().map_or(0, Lists::size)
+            + self.bins.as_ref().map_or(0, Bins::size)
             + self.statistics.get().map_or(0, wgpu::Buffer::size)
     }
 

@@ -14,6 +14,7 @@ use crate::input::image::ImageSize;
 use crate::pyramid::built::Built;
 use crate::pyramid::layout::{AtlasLayout, HEADERS, PIXELS, PyramidLayout};
 use crate::pyramid::levels::Level;
+use crate::pyramid::source::Part;
 
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 
@@ -29,6 +30,7 @@ const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 ///   [`R32Float`](wgpu::TextureFormat::R32Float) or
 ///   [`Rgba32Uint`](wgpu::TextureFormat::Rgba32Uint).
 /// - It has the usage [`COPY_SRC`](wgpu::TextureUsages::COPY_SRC).
+/// - It is all of its mip level, and no rectangle of it ([`DepthSource`](crate::DepthSource)).
 /// - The stored levels fit one storage binding.
 /// - The atlas fits a texture of the device, and the depth image a buffer to copy it through.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -55,13 +57,13 @@ pub(crate) struct Atlas {
     contents: Arc<AtomicU32>,
 }
 
-/// Whether these levels and the depth image `source` can be copied into an atlas.
-pub(crate) fn is_possible(
-    layout: &PyramidLayout,
-    source: &wgpu::Texture,
-    limits: &wgpu::Limits,
-) -> bool {
+/// Whether these levels and the depth image `part` can be copied into an atlas.
+///
+/// A rectangle of a texture cannot: a copy of depth takes all of a mip level.
+pub(crate) fn is_possible(layout: &PyramidLayout, part: &Part, limits: &wgpu::Limits) -> bool {
+    let source = &part.subresource.texture;
     travels(source.format())
+        && !part.kind.is_part()
         && source.usage().contains(wgpu::TextureUsages::COPY_SRC)
         && layout.chunk_sizes().len() == 1
         && layout.atlas.fits(limits)
@@ -132,10 +134,13 @@ impl Atlas {
         stored: &wgpu::Buffer,
         built: &Built,
     ) -> Result<()> {
-        let source = built.source.texture();
+        let source = &built.part.subresource;
+        let format = source.texture.format();
+        let texels = source.texels();
+        let extent =
+            wgpu::Extent3d { width: texels.width, height: texels.height, depth_or_array_layers: 1 };
         // Everything that can fail comes before the first command is recorded.
-        let staging =
-            if source.format() == FORMAT { None } else { Some(self.staging_or_new(gpu, layout)?) };
+        let staging = if format == FORMAT { None } else { Some(self.staging_or_new(gpu, layout)?) };
         let of_image = gpu.numbers(bytemuck::cast_slice(&[built.reduction, 0, 0, 0]))?;
         of_image.record_with(encoder, |encoder, of_image| {
             for (column, buffer) in (layout.atlas.width - HEADERS..).zip([of_image, stored]) {
@@ -156,7 +161,7 @@ impl Atlas {
             encoder.copy_texture_to_texture(
                 source.as_image_copy(),
                 self.texture.as_image_copy(),
-                source.size(),
+                extent,
             );
             return Ok(());
         };
@@ -166,7 +171,7 @@ impl Atlas {
         encoder.copy_texture_to_buffer(
             source.as_image_copy(),
             wgpu::TexelCopyBufferInfo { buffer: &staging, layout: copy_layout(0, pitch) },
-            source.size(),
+            extent,
         );
         self.record_rows(encoder, &staging, [0; 4], Rows { offset: 0, pitch, width, height });
         Ok(())

@@ -4,9 +4,8 @@
 
 use std::sync::Arc;
 
-use crate::gpu::depth_source::SourceKind;
 use crate::input::camera::Camera;
-use crate::input::tolerance::DepthTolerance;
+use crate::pyramid::source::Part;
 
 /// Whatever keeps a depth image from being drawn again while it is alive.
 pub(crate) trait Owner: std::fmt::Debug + Send + Sync {}
@@ -18,10 +17,9 @@ pub(crate) struct Built {
     /// The number of the reduction; once that has run, the pyramid's header holds it.
     pub(crate) reduction: u32,
     pub(crate) source: wgpu::TextureView,
-    pub(crate) source_kind: SourceKind,
+    /// Where the image lies in its texture, and what was rounded in it: every cull counts that.
+    pub(crate) part: Part,
     pub(crate) camera: Camera,
-    /// The rounding of the image's depths, which every cull takes into account.
-    pub(crate) tolerance: DepthTolerance,
     /// Keeps the image as it is for those who read it later.
     pub(crate) owner: Option<Arc<dyn Owner>>,
 }

@@ -2,25 +2,35 @@
 //!
 //! Data flows through the room in this order:
 //!
-//! 1. `layout` plans levels, offsets and dispatches without a device; `levels` says what is stored.
+//! 1. `layout` plans levels, offsets and dispatches without a device; `levels` says what is stored,
+//!    and `blocks` what a step reads.
 //! 2. [`Pyramid`] holds the buffers of the stored levels.
-//! 3. `reduce` records the passes that fill them from a depth image; `steps` holds what the passes
-//!    bind, and `built` remembers the image.
+//! 3. `resolve` makes one depth per pixel of multisampled depth.
+//!    `source` says where a depth image lies in a texture.
+//!    `reduce` records the passes that fill the levels from it; `steps` holds what the passes bind,
+//!    and `built` remembers the image.
+//!    `region` does the same for a part that has changed.
 //! 4. `atlas` copies all levels into one texture for large culls.
 //!
 //! Passes are recorded into the caller's encoder; nothing here submits, waits or reads back.
 
 pub(crate) mod atlas;
+pub(crate) mod blocks;
 pub(crate) mod built;
 pub(crate) mod layout;
+pub(crate) mod level_texels;
 pub(crate) mod levels;
 pub(crate) mod reduce;
+pub(crate) mod region;
+pub(crate) mod resolve;
+pub(crate) mod source;
 pub(crate) mod steps;
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use crate::error::{Error, Result};
+use crate::gpu::depth_source::SourceKind;
 use crate::gpu::device::{ContextId, Gpu};
 use crate::gpu::kept::Kept;
 use crate::gpu::recorded_uniform::RecordedUniform;
@@ -32,6 +42,7 @@ use crate::pyramid::atlas::{Atlas, AtlasUse};
 use crate::pyramid::built::{Built, Owner};
 use crate::pyramid::layout::{PYRAMID_CHUNKS, PyramidLayout, chunk_shift};
 use crate::pyramid::levels::{Level, MAX_LEVELS, StoredLevels};
+use crate::pyramid::source::Subresource;
 use crate::pyramid::steps::Steps;
 
 /// Twin of `Pyramid` in `shaders/pyramid/pyramid.wgsl`.
@@ -129,14 +140,19 @@ pub struct Pyramid {
     /// Set once there was no memory for an atlas.
     no_atlas: AtomicBool,
     atlas: Locked<Option<Atlas>>,
+    /// Held while reductions that build on each other are recorded and submitted.
+    #[cfg(feature = "headless")]
+    pub(crate) submitting: Locked<()>,
     /// The last reduction that is known to have run; one that was only recorded may never run.
     reduced: Arc<AtomicU32>,
     /// The view of a cull, for instances and for groups.
     pub(crate) view: RecordedUniform,
     /// What reductions bind for a depth image, and the view of it that they bind.
-    pub(crate) sources: Kept<wgpu::Texture, (wgpu::BindGroup, wgpu::TextureView)>,
+    pub(crate) sources: Kept<(Subresource, SourceKind), (wgpu::BindGroup, wgpu::TextureView)>,
     /// What the steps of a reduction bind.
     pub(crate) steps: Steps,
+    /// The same for reductions of a part; made by the first of them.
+    pub(crate) part_steps: OnceLock<Steps>,
 }
 
 impl Pyramid {
@@ -190,11 +206,14 @@ impl Pyramid {
             atlas_use: options.atlas,
             no_atlas: AtomicBool::new(false),
             atlas: Locked::default(),
+            #[cfg(feature = "headless")]
+            submitting: Locked::default(),
             reduced: Arc::default(),
             // Culls read each image, or the atlas.
             view: RecordedUniform::new(gpu, "hiz.cull.view_uniform", KEPT_IMAGES + 1)?,
             sources: Kept::new(KEPT_IMAGES),
             steps,
+            part_steps: OnceLock::new(),
         })
     }
 
@@ -235,7 +254,7 @@ impl Pyramid {
     pub(crate) fn wants_atlas(&self, gpu: &Gpu, built: &Built, instances: u32) -> bool {
         self.atlas_use.pays(&self.layout, instances)
             && !self.no_atlas.load(Ordering::Relaxed)
-            && atlas::is_possible(&self.layout, built.source.texture(), gpu.limits())
+            && atlas::is_possible(&self.layout, &built.part, gpu.limits())
     }
 
     /// Releases everything that was made for culls, after an error on the device.
@@ -314,7 +333,7 @@ impl Pyramid {
     /// `None` before the first reduction.
     /// Every cull counts it, beside the slack of its options.
     pub fn tolerance(&self) -> Option<DepthTolerance> {
-        self.built().map(|b| b.tolerance)
+        self.built().map(|b| b.part.tolerance)
     }
 
     /// Checks that the depth image of `built` has not been destroyed.

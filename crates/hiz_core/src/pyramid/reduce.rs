@@ -15,11 +15,12 @@ use crate::gpu::pipelines::{Compute, flag};
 use crate::gpu::shader::{File, Source, wgsl};
 use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
-use crate::input::tolerance::DepthTolerance;
 use crate::pyramid::Pyramid;
+use crate::pyramid::blocks::Blocks;
 use crate::pyramid::built::Built;
 use crate::pyramid::layout::Step;
-use crate::pyramid::steps::STEP_BINDINGS;
+use crate::pyramid::source::{DepthSource, Part, Sampling};
+use crate::pyramid::steps::{Recording, STEP_BINDINGS, Staged, Steps};
 
 /// The bindings of the depth image and the pyramid.
 const fn bindings(source: SourceKind) -> [(u32, Binding); 6] {
@@ -104,7 +105,7 @@ const PAGE_PIXELS: u32 = 1024;
 pub(crate) const SHARED_LEVEL: u32 = 6;
 
 /// A reduction whose pipelines and bindings are made.
-struct Prepared {
+pub(super) struct Prepared {
     source: wgpu::BindGroup,
     /// The pipeline and the workgroups of each step.
     dispatches: Vec<(wgpu::ComputePipeline, [u32; 2])>,
@@ -112,86 +113,46 @@ struct Prepared {
 }
 
 impl Prepared {
-    /// Checks the arguments of [`record_reduce`], and makes what the reduction `number` needs.
-    fn new(
+    /// Makes what the reduction `number` needs, which reads these blocks in each step.
+    pub(super) fn new(
         gpu: &Gpu,
-        depth: &wgpu::TextureView,
+        (part, camera, number): (Part, Camera, u32),
+        blocks: &[Blocks],
+        pyramid: &Pyramid,
+    ) -> Result<Self> {
+        let kind = part.kind;
+        let (source, view) = source_bindings(gpu, &part, pyramid)?;
+        let built = Built { reduction: number, source: view, part, camera, owner: None };
+        let dispatch = |(step, blocks): (&Step, &Blocks)| {
+            let tall = step.source == 0 && reads_tall(step, kind, pyramid.size());
+            let (shape, workgroups) = shape_of(step, blocks.size(), tall);
+            let constants = (built.camera.convention().is_reversed(), tall, pyramid.chunks.len());
+            Ok((reduce_pipeline(gpu, kind, shape, constants)?, workgroups))
+        };
+        let dispatches =
+            pyramid.layout.steps.iter().zip(blocks).map(dispatch).collect::<Result<_>>()?;
+        Ok(Self { source, dispatches, built })
+    }
+
+    /// Checks the arguments of [`record_reduce`], and makes what the reduction `number` needs.
+    fn of_all(
+        gpu: &Gpu,
+        depth: &DepthSource<'_>,
         camera: &Camera,
         pyramid: &Pyramid,
-        uploaded: DepthTolerance,
         number: u32,
     ) -> Result<Self> {
         gpu.check_context("pyramid", pyramid.context)?;
-        let texture = depth.texture();
-        let format = texture.format();
-        let (Some(source_kind), Some(of_format)) =
-            (SourceKind::of(format), DepthTolerance::of(format))
-        else {
-            return Err(Error::invalid(
-                "depth",
-                format!(
-                    "expected a depth format, R32Float, R16Float or Rgba32Uint (the bits of four \
-                     pixels), got {format:?}"
-                ),
-            ));
-        };
-        let (size, texels) = (pyramid.size(), ImageSize::new(texture.width(), texture.height()));
-        let expected = source_kind.texture_size(size);
-        if texels != expected {
-            let packed = if expected == size {
-                String::new()
-            } else {
-                format!(" as {expected} texels of four pixels")
-            };
-            return Err(Error::mismatch(
-                "depth",
-                format!("expected the pyramid's size {size}{packed}, got {texels}"),
-            ));
-        }
+        let size = pyramid.size();
+        let part = Part::new(depth, Sampling::Single, size, "pyramid")?;
         if size != camera.size() {
             return Err(Error::mismatch(
                 "camera",
                 format!("expected the depth image's size {size}, got {}", camera.size()),
             ));
         }
-        // A view does not say which part of its texture it shows, so only one may exist.
-        let parts =
-            (texture.mip_level_count(), texture.sample_count(), texture.depth_or_array_layers());
-        if parts != (1, 1, 1) || texture.dimension() != wgpu::TextureDimension::D2 {
-            return Err(Error::invalid(
-                "depth",
-                format!(
-                    "expected a 2D texture of one mip level, sample and layer, got {:?} with {} mip \
-                     levels, {} samples, {} layers",
-                    texture.dimension(),
-                    parts.0,
-                    parts.1,
-                    parts.2
-                ),
-            ));
-        }
-        let needed = source_kind.usage();
-        if !texture.usage().contains(needed) {
-            let name =
-                if source_kind == SourceKind::Bits { "STORAGE_BINDING" } else { "TEXTURE_BINDING" };
-            return Err(Error::invalid(
-                "depth",
-                format!("expected the usage {name}, got {:?}", texture.usage()),
-            ));
-        }
-        let (source, view) = source_bindings(gpu, depth, source_kind, pyramid)?;
-        let dispatch = |step: &Step| {
-            let tall = step.source == 0 && reads_tall(step, source_kind, size);
-            let (shape, workgroups) = shape_of(step, tall);
-            let constants = (camera.convention().is_reversed(), tall, pyramid.chunks.len());
-            Ok((reduce_pipeline(gpu, source_kind, shape, constants)?, workgroups))
-        };
-        let dispatches = pyramid.layout.steps.iter().map(dispatch).collect::<Result<_>>()?;
-        let tolerance = of_format.after(uploaded);
-        let camera = camera.clone();
-        let built =
-            Built { reduction: number, source: view, source_kind, camera, tolerance, owner: None };
-        Ok(Self { source, dispatches, built })
+        let blocks: Vec<_> = pyramid.layout.steps.iter().map(Blocks::all).collect();
+        Self::new(gpu, (part, camera.clone(), number), &blocks, pyramid)
     }
 
     /// Records the pass.
@@ -199,14 +160,14 @@ impl Prepared {
     fn record(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        pyramid: &Pyramid,
+        steps: &Steps,
         workgroups: impl Fn([u32; 2]) -> [u32; 2],
     ) {
         let descriptor =
             wgpu::ComputePassDescriptor { label: Some("hiz.reduce.pass"), timestamp_writes: None };
         let mut pass = encoder.begin_compute_pass(&descriptor);
         pass.set_bind_group(0, &self.source, &[]);
-        for ((pipeline, of_step), step) in self.dispatches.iter().zip(&pyramid.steps.bindings) {
+        for ((pipeline, of_step), step) in self.dispatches.iter().zip(&steps.bindings) {
             let [columns, rows] = workgroups(*of_step);
             pass.set_pipeline(pipeline);
             pass.set_bind_group(1, step, &[]);
@@ -215,31 +176,40 @@ impl Prepared {
     }
 }
 
-/// Records the reduction of `depth` into `pyramid`; all of the texture's first mip level is read.
-///
-/// `uploaded` is the rounding of the depths before they were uploaded into the texture.
+/// Records the reduction of `depth` into `pyramid`.
 ///
 /// # Errors
 /// As [`HizContext::record_reduce`](crate::HizContext::record_reduce).
 pub(crate) fn record_reduce(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
-    depth: &wgpu::TextureView,
+    depth: &DepthSource<'_>,
     camera: &Camera,
     pyramid: &Pyramid,
-    uploaded: DepthTolerance,
 ) -> Result<()> {
     // Everything that can fail comes before the first command is recorded.
     let reduction = next_reduction();
-    let prepared = Prepared::new(gpu, depth, camera, pyramid, uploaded, reduction)?;
-    let number = gpu.numbers(&reduction.to_ne_bytes())?;
+    let prepared = Prepared::of_all(gpu, depth, camera, pyramid, reduction)?;
+    let numbers = Recording { reduction, base: 0, origin: prepared.built.part.origin };
+    let staged = Steps::numbers(gpu, &pyramid.layout.steps, &numbers)?;
+    finish(gpu, encoder, pyramid, prepared, (&pyramid.steps, staged))
+}
+
+/// Records a reduction that is prepared, and notes what the pyramid is built from.
+pub(super) fn finish(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    pyramid: &Pyramid,
+    prepared: Prepared,
+    (steps, staged): (&Steps, Staged),
+) -> Result<()> {
     gpu.recorded(|| {
-        pyramid.steps.record(encoder, &pyramid.layout.steps, number);
+        steps.record(encoder, staged);
         // At least one workgroup, which writes the header even if nothing is stored.
-        prepared.record(encoder, pyramid, |workgroups| workgroups.map(|n| n.max(1)));
+        prepared.record(encoder, steps, |workgroups| workgroups.map(|n| n.max(1)));
         Ok(())
     })?;
-    let reduced = pyramid.reduced();
+    let (reduced, reduction) = (pyramid.reduced(), prepared.built.reduction);
     encoder.on_submitted_work_done(move || reduced.store(reduction, Ordering::Release));
     pyramid.set_built(prepared.built);
     Ok(())
@@ -253,37 +223,36 @@ pub(crate) fn record_reduce(
 pub(crate) fn record_idle_reduce(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
-    depth: &wgpu::TextureView,
+    depth: &DepthSource<'_>,
     camera: &Camera,
     pyramid: &Pyramid,
 ) -> Result<Built> {
-    let prepared = Prepared::new(gpu, depth, camera, pyramid, DepthTolerance::NONE, 0)?;
+    let prepared = Prepared::of_all(gpu, depth, camera, pyramid, 0)?;
     gpu.recorded(|| {
-        prepared.record(encoder, pyramid, |_| [0, 0]);
+        prepared.record(encoder, &pyramid.steps, |_| [0, 0]);
         Ok(())
     })?;
     Ok(prepared.built)
 }
 
 /// The bind group of the reduction and the view of the depth image that it binds, kept from an
-/// earlier reduction of the same texture if there was one.
+/// earlier reduction of the same image if there was one.
 fn source_bindings(
     gpu: &Gpu,
-    depth: &wgpu::TextureView,
-    source_kind: SourceKind,
+    part: &Part,
     pyramid: &Pyramid,
 ) -> Result<(wgpu::BindGroup, wgpu::TextureView)> {
-    let Some(kept) = pyramid.sources.find(depth.texture()) else {
-        let bound = bind_source(gpu, depth, source_kind, pyramid)?;
-        return pyramid.sources.get(depth.texture().clone(), || Ok(bound));
+    let Some(kept) = pyramid.sources.find(&(part.subresource.clone(), part.kind)) else {
+        let bound = bind_source(gpu, part, pyramid).map_err(refused)?;
+        return pyramid.sources.get((part.subresource.clone(), part.kind), || Ok(bound));
     };
     // A bind group does not tell that its texture was destroyed since, but a new view does.
-    gpu.view(depth.texture()).map_err(refused)?;
+    gpu.view(&part.subresource.texture).map_err(refused)?;
     Ok(kept)
 }
 
 /// The error for a depth image that wgpu refuses.
-fn refused(error: Error) -> Error {
+pub(super) fn refused(error: Error) -> Error {
     match error {
         Error::Device(why) => Error::mismatch(
             "depth",
@@ -297,52 +266,34 @@ fn refused(error: Error) -> Error {
 }
 
 /// The bind group of the reduction, and the view of the depth image that it binds.
-///
-/// That is the caller's view if it can be bound.
-/// If not, as with the default view of a texture with a stencil, it is a view of the whole depth.
 fn bind_source(
     gpu: &Gpu,
-    depth: &wgpu::TextureView,
-    source_kind: SourceKind,
+    part: &Part,
     pyramid: &Pyramid,
 ) -> Result<(wgpu::BindGroup, wgpu::TextureView)> {
-    let layout = gpu.layout("hiz.reduce.layout", &bindings(source_kind))?;
+    let layout = gpu.layout("hiz.reduce.layout", &bindings(part.kind))?;
     let chunks = [pyramid.chunk(gpu, 0)?, pyramid.chunk(gpu, 1)?, pyramid.chunk(gpu, 2)?];
-    let bind = |view: &wgpu::TextureView| {
-        gpu.bind_group(
-            "hiz.reduce.pyramid",
-            &layout,
-            &[
-                entry(0, wgpu::BindingResource::TextureView(view)),
-                entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
-                entry(2, pyramid.uniform.as_entire_binding()),
-                entry(3, chunks[0].as_entire_binding()),
-                entry(4, chunks[1].as_entire_binding()),
-                entry(5, chunks[2].as_entire_binding()),
-            ],
-        )
-    };
-    let error = match bind(depth) {
-        Ok(bound) => return Ok((bound, depth.clone())),
-        Err(error) => error,
-    };
-    // A view of another device's texture would report its errors to that device, whose handler may
-    // end the process.
-    if error.to_string().contains(OF_ANOTHER_DEVICE) {
-        return Err(refused(error));
-    }
-    let view = gpu.view(depth.texture()).map_err(refused)?;
-    Ok((bind(&view).map_err(refused)?, view))
+    let view = part.subresource.view(gpu)?;
+    let bound = gpu.bind_group(
+        "hiz.reduce.pyramid",
+        &layout,
+        &[
+            entry(0, wgpu::BindingResource::TextureView(&view)),
+            entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
+            entry(2, pyramid.uniform.as_entire_binding()),
+            entry(3, chunks[0].as_entire_binding()),
+            entry(4, chunks[1].as_entire_binding()),
+            entry(5, chunks[2].as_entire_binding()),
+        ],
+    )?;
+    Ok((bound, view))
 }
 
-/// What wgpu's message contains for objects of another device.
-const OF_ANOTHER_DEVICE: &str = "doesn't match";
-
-/// The shader of a step, and its workgroups.
-fn shape_of(step: &Step, tall: bool) -> (Shape, [u32; 2]) {
-    let [columns, rows] = step.blocks;
+/// The shader of a step, and its workgroups for so many columns and rows of blocks.
+fn shape_of(step: &Step, blocks: [u32; 2], tall: bool) -> (Shape, [u32; 2]) {
+    let [columns, rows] = blocks;
     let of_places = if tall {
-        step.blocks.map(|n| n.div_ceil(TALL_SIDE))
+        blocks.map(|n| n.div_ceil(TALL_SIDE))
     } else {
         [columns.div_ceil(REDUCE_WORKGROUP), rows]
     };
@@ -369,7 +320,7 @@ fn reads_tall(step: &Step, source: SourceKind, size: ImageSize) -> bool {
 }
 
 /// A new number for a reduction, never 0.
-fn next_reduction() -> u32 {
+pub(super) fn next_reduction() -> u32 {
     static NEXT: AtomicU32 = AtomicU32::new(1);
     NEXT.fetch_add(1, Ordering::Relaxed).max(1)
 }

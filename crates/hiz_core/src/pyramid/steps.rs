@@ -4,7 +4,8 @@ use crate::error::Result;
 use crate::gpu::buffers::entry;
 use crate::gpu::device::Gpu;
 use crate::gpu::layouts::Binding;
-use crate::gpu::numbers::{Copy, Numbers, UNIFORM_ALIGNMENT};
+use crate::gpu::numbers::{Copy, Numbers, STAGING_BYTES, UNIFORM_ALIGNMENT};
+use crate::pyramid::blocks::Blocks;
 use crate::pyramid::layout::Step;
 
 /// The binding of one step.
@@ -16,30 +17,58 @@ pub(super) const STEP_BINDINGS: &[(u32, Binding)] = &[(0, Binding::Uniform)];
 pub(crate) struct StepUniform {
     pub(crate) source: u32,
     pub(crate) last: u32,
+    pub(crate) end: [u32; 2],
+    pub(crate) begin: [u32; 2],
+    pub(crate) origin: [u32; 2],
     pub(crate) reduction: u32,
-    pub(crate) padding: u32,
-    pub(crate) blocks: [u32; 2],
-    pub(crate) padding_1: [u32; 2],
+    pub(crate) base: u32,
+    pub(crate) padding: [u32; 2],
 }
 
-const _: () = assert!(size_of::<StepUniform>() == 32);
+const UNIFORM_BYTES: usize = size_of::<StepUniform>();
+const _: () = assert!(UNIFORM_BYTES == 48);
+
+/// The most steps that a pyramid has: one for three levels each, or one for a coarse level first.
+const MOST_STEPS: usize = 6;
+const _: () = assert!(MOST_STEPS * UNIFORM_BYTES <= STAGING_BYTES as usize);
+
+/// The numbers of one recording.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Recording {
+    /// The number of the reduction, for the header.
+    pub(super) reduction: u32,
+    /// The number of the reduction of which it renews a part; 0: it renews everything.
+    pub(super) base: u32,
+    /// Where level 0 begins in its texture.
+    pub(super) origin: [u32; 2],
+}
 
 impl StepUniform {
-    /// The numbers of a step, without that of a reduction.
-    fn of(step: &Step) -> Self {
+    /// The numbers of a step that reads `blocks`, without those of a recording.
+    fn of(step: &Step, blocks: &Blocks) -> Self {
         Self {
             source: step.source,
             last: step.last,
+            end: blocks.end,
+            begin: blocks.begin,
+            origin: [0; 2],
             reduction: 0,
-            padding: 0,
-            blocks: step.blocks,
-            padding_1: [0; 2],
+            base: 0,
+            padding: [0; 2],
         }
+    }
+
+    /// The same for one recording; a step that reads the depth image writes the header.
+    fn recorded(self, numbers: &Recording) -> Self {
+        if self.source > 0 {
+            return self;
+        }
+        let Recording { reduction, base, origin } = *numbers;
+        Self { origin, reduction, base, ..self }
     }
 }
 
 /// What the steps of a pyramid's reductions bind.
-/// Only the number of the reduction changes, and each recording copies its own.
 #[derive(Debug)]
 pub(crate) struct Steps {
     /// A [`StepUniform`] at each multiple of [`UNIFORM_ALIGNMENT`].
@@ -49,11 +78,12 @@ pub(crate) struct Steps {
 
 impl Steps {
     pub(super) fn new(gpu: &Gpu, steps: &[Step]) -> Result<Self> {
+        debug_assert!(steps.len() <= MOST_STEPS, "{} steps", steps.len());
         let stride = UNIFORM_ALIGNMENT as usize;
         let mut contents = vec![0; stride * steps.len().max(1)];
         for (place, step) in contents.chunks_exact_mut(stride).zip(steps) {
-            place[..size_of::<StepUniform>()]
-                .copy_from_slice(bytemuck::bytes_of(&StepUniform::of(step)));
+            place[..UNIFORM_BYTES]
+                .copy_from_slice(bytemuck::bytes_of(&StepUniform::of(step, &Blocks::all(step))));
         }
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let uniform = gpu.filled("hiz.reduce.steps", &contents, usage)?;
@@ -62,7 +92,7 @@ impl Steps {
             let part = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
                 buffer: &uniform,
                 offset: step as u64 * UNIFORM_ALIGNMENT,
-                size: wgpu::BufferSize::new(size_of::<StepUniform>() as u64),
+                size: wgpu::BufferSize::new(UNIFORM_BYTES as u64),
             });
             gpu.bind_group("hiz.reduce.step", &layout, &[entry(0, part)])
         };
@@ -70,23 +100,62 @@ impl Steps {
         Ok(Self { uniform, bindings })
     }
 
-    /// Records the copies of `number`, that of a reduction, to the steps that write the header.
-    pub(super) fn record(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
+    /// Stages what a reduction of everything changes: the numbers of the steps that read the image.
+    pub(super) fn numbers(gpu: &Gpu, steps: &[Step], recording: &Recording) -> Result<Staged> {
+        let mut staged = Staged::default();
+        for (place, step) in steps.iter().enumerate().filter(|(_, step)| step.source == 0) {
+            let uniform = StepUniform::of(step, &Blocks::all(step)).recorded(recording);
+            staged.add(place, &uniform);
+        }
+        staged.write(gpu)
+    }
+
+    /// Stages all that a reduction of a part changes: the blocks of every step, too.
+    pub(super) fn numbers_of_part(
+        gpu: &Gpu,
         steps: &[Step],
-        number: Numbers,
-    ) {
-        const FIELD: u64 = std::mem::offset_of!(StepUniform, reduction) as u64;
-        let writes_header = steps.iter().enumerate().filter(|(_, step)| step.source == 0);
-        let copies: Vec<_> = writes_header
-            .map(|(step, _)| Copy {
-                from: 0,
+        blocks: &[Blocks],
+        recording: &Recording,
+    ) -> Result<Staged> {
+        let mut staged = Staged::default();
+        for (place, (step, blocks)) in steps.iter().zip(blocks).enumerate() {
+            staged.add(place, &StepUniform::of(step, blocks).recorded(recording));
+        }
+        staged.write(gpu)
+    }
+
+    /// Records the copies of a recording's numbers into the uniforms of its steps.
+    pub(super) fn record(&self, encoder: &mut wgpu::CommandEncoder, staged: Staged) {
+        let Some(numbers) = staged.numbers else { return };
+        let copies: Vec<_> = (0..)
+            .zip(&staged.places)
+            .map(|(i, place)| Copy {
+                from: i * UNIFORM_BYTES as u64,
                 target: &self.uniform,
-                to: step as u64 * UNIFORM_ALIGNMENT + FIELD,
-                size: number.len(),
+                to: *place as u64 * UNIFORM_ALIGNMENT,
+                size: UNIFORM_BYTES as u64,
             })
             .collect();
-        number.record(encoder, &copies);
+        numbers.record(encoder, &copies);
+    }
+}
+
+/// The uniforms of some steps, on their way to the device.
+#[derive(Debug, Default)]
+pub(super) struct Staged {
+    places: Vec<usize>,
+    bytes: Vec<u8>,
+    numbers: Option<Numbers>,
+}
+
+impl Staged {
+    fn add(&mut self, place: usize, uniform: &StepUniform) {
+        self.places.push(place);
+        self.bytes.extend_from_slice(bytemuck::bytes_of(uniform));
+    }
+
+    fn write(self, gpu: &Gpu) -> Result<Self> {
+        let numbers = Some(gpu.numbers(&self.bytes)?);
+        Ok(Self { numbers, ..self })
     }
 }

@@ -1,6 +1,7 @@
 //! What tests of this library need and its users do not: planted faults, the words on the device,
 //! and the shaders.
 
+pub mod lod;
 pub mod shaders;
 #[cfg(test)]
 mod twins;

@@ -1,23 +1,43 @@
 //! Every shader module that this crate makes a pipeline of.
 
+use crate::cull::among::among_order_module;
 use crate::cull::count::count_module;
 use crate::cull::explain::explain_module;
-use crate::cull::pipelines::{DepthStore, cull_groups_module, cull_members_module, cull_module};
+use crate::cull::pipelines::{
+    BinKey, DepthStore, EmitKey, cull_groups_module, cull_members_module, cull_module,
+};
 use crate::cull::refine::{refine_groups_module, refine_module};
 use crate::gpu::depth_source::SOURCES;
+use crate::gpu::depth_source::SourceKind;
 use crate::gpu::shader::{FILES, Source};
 use crate::input::bounds::BoundsKind;
 use crate::instances::from_buffer::{FROM_BUFFER_KINDS, from_buffer_module};
 use crate::instances::update::update_module;
 use crate::occluders::device_raster::occluders_module;
-use crate::output::compact::compact_module;
+use crate::output::compact::{compact_module, copy_module};
+use crate::output::emit_passes;
+use crate::output::views::join_module;
 use crate::pyramid::reduce::{blocks_module, coarse_module};
+use crate::pyramid::resolve::resolve_module;
+use crate::testing::lod::choose_lods_module;
 #[cfg(feature = "yardstick")]
 use crate::yardstick::{uncertified_module, yardstick_modules};
 
 /// All kinds of bounds.
 pub(super) const KINDS: [BoundsKind; 3] =
     [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
+
+/// Every way to emit the kept instances, each with a shader of its own.
+pub(super) const EMITS: [(&str, EmitKey); 5] = [
+    ("list", EmitKey::NO_LIST),
+    ("planes", EmitKey::Planes { by_index: false, bins: ONE_LOD }),
+    ("planes of LODs", EmitKey::Planes { by_index: false, bins: LODS }),
+    ("bins", EmitKey::Append { list: true, capped: true, record_words: 5, bins: ONE_LOD }),
+    ("bins of LODs", EmitKey::Append { list: true, capped: true, record_words: 5, bins: LODS }),
+];
+
+const ONE_LOD: BinKey = BinKey { sorted: true, lod_rule: None };
+const LODS: BinKey = BinKey { sorted: true, lod_rule: Some(1) };
 
 /// Path below `shaders/`, without its extension, and text of every file.
 pub fn files() -> Vec<(&'static str, &'static str)> {
@@ -33,29 +53,50 @@ pub(super) fn all() -> Vec<(String, Source)> {
     let mut all = vec![
         ("refine_groups".to_owned(), refine_groups_module()),
         ("compact".to_owned(), compact_module()),
+        ("copy".to_owned(), copy_module()),
+        ("emit_scan".to_owned(), emit_passes::scan_module()),
+        ("emit_bins".to_owned(), emit_passes::bins_module()),
+        ("emit_draws".to_owned(), emit_passes::draws_module()),
+        ("emit_scatter".to_owned(), emit_passes::scatter_module()),
+        ("emit_instances".to_owned(), emit_passes::instances_module()),
         ("count".to_owned(), count_module()),
+        ("among_order".to_owned(), among_order_module()),
+        ("join_views".to_owned(), join_module()),
         ("update".to_owned(), update_module()),
         ("occluders".to_owned(), occluders_module()),
+        ("resolve Depth".to_owned(), resolve_module(SourceKind::Depth)),
+        ("resolve Float".to_owned(), resolve_module(SourceKind::Float)),
     ];
     for source in SOURCES {
         all.push((format!("reduce {source:?}"), blocks_module(source)));
         all.push((format!("reduce_coarse {source:?}"), coarse_module(source)));
+        // Yardsticks read whole images alone.
         #[cfg(feature = "yardstick")]
-        all.extend(yardstick_modules(source).map(|(name, m)| (format!("{name} {source:?}"), m)));
+        all.extend(
+            (!source.is_part())
+                .then(|| yardstick_modules(source))
+                .into_iter()
+                .flatten()
+                .map(|(name, m)| (format!("{name} {source:?}"), m)),
+        );
     }
     let stores = SOURCES.map(DepthStore::Apart).into_iter().chain([DepthStore::Atlas]);
     for store in stores {
         all.push((format!("cull_groups {store:?}"), cull_groups_module(store)));
         for kind in KINDS {
             let named = |name: &str| format!("{name} {store:?} {kind:?}");
-            all.push((named("cull"), cull_module(store, kind)));
-            all.push((named("cull_members"), cull_members_module(store, kind)));
+            for (way, emit) in EMITS {
+                let named = |name: &str| named(&format!("{name} {way}"));
+                all.push((named("cull"), cull_module(store, kind, emit)));
+                all.push((named("cull_members"), cull_members_module(store, kind, emit)));
+            }
             all.push((named("explain"), explain_module(store, kind)));
         }
         #[cfg(feature = "yardstick")]
         all.push((format!("uncertified cull {store:?}"), uncertified_module(store)));
     }
     all.extend(KINDS.map(|kind| (format!("refine {kind:?}"), refine_module(kind))));
+    all.extend(KINDS.map(|kind| (format!("choose_lods {kind:?}"), choose_lods_module(kind))));
     let from_buffer = |kind| (format!("from_buffer {kind:?}"), from_buffer_module(kind));
     all.extend(FROM_BUFFER_KINDS.map(from_buffer));
     all
@@ -64,7 +105,6 @@ pub(super) fn all() -> Vec<(String, Source)> {
 #[cfg(test)]
 pub(in crate::testing) mod tests {
     use super::*;
-    use crate::gpu::depth_source::SourceKind;
     use naga::valid::{Capabilities, ValidationFlags, Validator};
 
     pub(in crate::testing) fn parse(source: &str) -> naga::Module {
@@ -102,7 +142,9 @@ pub(in crate::testing) mod tests {
     #[test]
     fn bars_stand_where_a_compiler_could_fold_what_cancels() {
         for kind in KINDS {
-            let module = parse(&cull_module(DepthStore::Apart(SourceKind::Depth), kind).text());
+            let module = parse(
+                &cull_module(DepthStore::Apart(SourceKind::Depth), kind, EmitKey::NO_LIST).text(),
+            );
             for bar in ["bar", "bar2", "bar3"] {
                 let (_, function) = module
                     .functions
@@ -143,12 +185,14 @@ pub(in crate::testing) mod tests {
     #[test]
     fn single_pixels_of_every_source_are_sanitized() {
         for source in SOURCES {
-            let module = parse(&cull_module(DepthStore::Apart(source), BoundsKind::Box).text());
+            let module = parse(
+                &cull_module(DepthStore::Apart(source), BoundsKind::Box, EmitKey::NO_LIST).text(),
+            );
             assert_eq!(calls(&module, "source_bits", "sanitized"), 1, "{source:?}");
         }
         assert_eq!(
             calls(
-                &parse(&cull_module(DepthStore::Atlas, BoundsKind::Box).text()),
+                &parse(&cull_module(DepthStore::Atlas, BoundsKind::Box, EmitKey::NO_LIST).text()),
                 "texel",
                 "sanitized"
             ),
@@ -160,7 +204,9 @@ pub(in crate::testing) mod tests {
     #[test]
     fn every_plane_and_side_is_certified() {
         for kind in KINDS {
-            let module = parse(&cull_module(DepthStore::Apart(SourceKind::Depth), kind).text());
+            let module = parse(
+                &cull_module(DepthStore::Apart(SourceKind::Depth), kind, EmitKey::NO_LIST).text(),
+            );
             assert_eq!(
                 calls(&module, "supporting_planes", "surely_above"),
                 1,

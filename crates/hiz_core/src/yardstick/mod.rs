@@ -1,7 +1,9 @@
 //! Yardsticks: reference work that the library is measured against.
 //!
 //! - `reduce` builds a pyramid with one dispatch per level.
+//! - `multisampled` resolves multisampled depth.
 //! - `cull` culls without certificates.
+//! - `emit` makes lists and draws without a cull.
 //! - `raster` draws occluders on the host, without what comes before and after.
 //! - `from_buffer` copies the bounds that the library takes from a buffer.
 //! - `frames` times a renderer's frames call by call.
@@ -9,8 +11,10 @@
 //! They are for benchmarks and their tests alone.
 
 mod cull;
+mod emit;
 mod frames;
 mod from_buffer;
+mod multisampled;
 mod raster;
 pub(crate) mod reduce;
 
@@ -19,12 +23,14 @@ use std::time::Instant;
 #[cfg(feature = "testing")]
 pub(crate) use cull::uncertified_module;
 pub use cull::{read_mask, record_uncertified_cull};
+pub use emit::record_emission;
 pub use frames::{FrameTimes, frames};
 pub use from_buffer::BoundsInBuffer;
+pub use multisampled::MultisampledDepth;
 pub use raster::HostRaster;
 #[cfg(feature = "testing")]
 pub(crate) use reduce::yardstick_modules;
-pub use reduce::{PerLevelReduction, ReductionShape, reduce};
+pub use reduce::{PerLevelReduction, ReductionShape, reduce, reduce_region};
 
 use crate::error::Result;
 use crate::headless::{Engine, readback};

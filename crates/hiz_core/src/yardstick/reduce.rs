@@ -185,6 +185,21 @@ pub fn reduce(
     engine.context().record_reduce(encoder, &view, depth.camera(), pyramid)
 }
 
+/// Records the library's own reduction of a rectangle of `depth` into `pyramid`, which was built
+/// from it.
+///
+/// # Errors
+/// Those of [`HizContext::record_reduce_region`](crate::HizContext::record_reduce_region).
+pub fn reduce_region(
+    engine: &Engine,
+    encoder: &mut wgpu::CommandEncoder,
+    depth: &DepthImage,
+    rectangle: [u32; 4],
+    pyramid: &Pyramid,
+) -> Result<()> {
+    engine.context().record_reduce_region(encoder, depth.texture(), rectangle, pyramid)
+}
+
 fn levels(size: ImageSize) -> Vec<PlainLevel> {
     let mut levels =
         vec![PlainLevel { offset: 0, stride: 0, width: size.width, height: size.height }];

@@ -55,7 +55,7 @@ fn texture_of(
 
 /// A depth texture whose pixels are written by fragments.
 /// The driver decides what becomes of NaN.
-fn drawn(engine: &Engine, (width, height): (u32, u32), depth: &[f32]) -> wgpu::Texture {
+pub(crate) fn drawn(engine: &Engine, (width, height): (u32, u32), depth: &[f32]) -> wgpu::Texture {
     let device = engine.device();
     let bits = texture_of(
         engine,

@@ -3,12 +3,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::declared;
+use crate::cull::among;
 use crate::cull::count;
 use crate::cull::explain::{self, Stage};
 use crate::cull::groups::GROUPS_OF_RUN;
+use crate::cull::lod::LodRule;
 use crate::cull::pipelines::{CullKey, DepthStore, ReportKey};
 use crate::cull::pipelines::{classify_constants, cull_module, report_constants};
 use crate::cull::refine;
+use crate::cull::view_uniform::COORDINATE_BITS;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::shader::FILES;
 use crate::host::rounding::EPS;
@@ -20,16 +23,22 @@ use crate::instances::from_buffer;
 use crate::instances::piece::CULL_WORKGROUP;
 use crate::instances::records::{RECORDS_PER_ROW, TEXEL_BYTES};
 use crate::instances::update;
-use crate::instances::volume_record::{BEYOND_LIMITS, LARGEST};
+use crate::instances::volume_record::{ABSENT_CENTER, BEYOND_LIMITS, LARGEST};
+use crate::output::bins::BLOCK_WORDS;
 use crate::output::compact::SCATTER_WORKGROUP;
+use crate::output::emit_passes;
+use crate::output::mesh_table::{MAX_LODS, MESH_TEXELS};
 use crate::output::survivors::SURVIVORS_PER_ROW;
 use crate::output::verdict::{VERDICT_MASK, Verdict};
+use crate::output::views;
 use crate::output::visible::VERDICT_MULTIPLE;
 use crate::pyramid::layout::{BLOCK_ALIGNMENT, BLOCK_LOG2, HEADERS, PIXELS};
 use crate::pyramid::levels::MAX_LEVELS;
 use crate::pyramid::reduce::{REDUCE_WORKGROUP, SHARED_LEVEL, TALL_SIDE};
+use crate::pyramid::resolve;
+use crate::testing::lod;
 use crate::testing::shaders::tests::parse;
-use crate::testing::shaders::{KINDS, all, files};
+use crate::testing::shaders::{EMITS, KINDS, all, files};
 use crate::yardstick::reduce as yardstick;
 
 /// From this magnitude on, the next float32 makes up for two flushed subnormals.
@@ -42,8 +51,13 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
     let bits = |v: f32| f64::from(v.to_bits());
     let verdict = |v: Verdict| int(v as u32);
     let stage = |s: Stage| int(s as u32);
+    let rule = |r: &LodRule| int(r.code());
     let texels = |kind: BoundsKind| (kind.record_bytes() / TEXEL_BYTES) as f64;
     vec![
+        ("cull/among", "AMONG_OF_GROUP", GROUP as f64 / int(u32::BITS)),
+        ("cull/among_layout", "AMONG_BITS", int(u32::BITS)),
+        ("cull/among_layout", "AMONG_PER_ROW_LOG2", int(among::WORDS_PER_ROW.ilog2())),
+        ("cull/among_order", "WORKGROUP", int(among::WORKGROUP)),
         ("cull/certificate", "EPS", EPS),
         ("cull/certificate", "ERROR_ULPS", ERROR_ULPS),
         ("cull/count", "LANES", int(count::LANES)),
@@ -51,6 +65,10 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/cull_groups", "WORKGROUP", int(CULL_WORKGROUP)),
         ("cull/explain", "BEHIND", int(explain::BEHIND)),
         ("cull/explain", "CLEAR", int(explain::CLEAR)),
+        ("cull/lod", "FINEST", rule(&LodRule::Finest)),
+        ("cull/lod", "BY_ERROR", rule(&LodRule::Error { pixels: 1.0 })),
+        ("cull/lod", "BY_DISTANCE", rule(&LodRule::Distance { thresholds: Vec::new() })),
+        ("cull/lod", "BY_SIZE", rule(&LodRule::Size { pixels: Vec::new() })),
         ("cull/outcome", "AT_VALIDITY", stage(Stage::Validity)),
         ("cull/outcome", "AT_FRUSTUM", stage(Stage::Frustum)),
         ("cull/outcome", "AT_EYE_PLANE", stage(Stage::EyePlane)),
@@ -62,6 +80,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/refine", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/refine_groups", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/supporting_planes", "LARGEST_BITS", bits(LARGEST)),
+        ("cull/view", "COORDINATE_BITS", int(COORDINATE_BITS)),
+        ("cull/view", "COORDINATE_MASK", int((1 << COORDINATE_BITS) - 1)),
         ("gpu/depth_bits", "ONE_BITS", bits(1.0)),
         ("gpu/depth_bits", "LEAST_NORMAL_BITS", bits(f32::MIN_POSITIVE)),
         ("gpu/depth_bits", "NEGATIVE_ZERO_BITS", bits(-0.0)),
@@ -96,7 +116,16 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/record_layout", "RECORDS_PER_ROW_LOG2", int(RECORDS_PER_ROW.ilog2())),
         ("instances/record_layout", "BEYOND_LIMITS_BITS", bits(BEYOND_LIMITS)),
         ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
+        ("cull/classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
         ("output/compact", "SCATTER_WORKGROUP", int(SCATTER_WORKGROUP)),
+        ("output/join", "WORKGROUP", int(views::WORKGROUP)),
+        ("output/emit", "BLOCK_LOG2_WORDS", int(BLOCK_WORDS.ilog2())),
+        ("output/emit_bins", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/emit_instances", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/emit_scan", "LANES", int(emit_passes::WORKGROUP)),
+        ("output/emit_scan", "SHARE", int(BLOCK_WORDS / emit_passes::WORKGROUP)),
+        ("output/emit_scatter", "WORKGROUP", int(emit_passes::WORKGROUP)),
+        ("output/mesh_table", "MESH_TEXELS", MESH_TEXELS as f64),
         ("output/verdict", "OUTSIDE", verdict(Verdict::Outside)),
         ("output/verdict", "OCCLUDED", verdict(Verdict::Occluded)),
         ("output/verdict", "VISIBLE", verdict(Verdict::Visible)),
@@ -110,8 +139,11 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("pyramid/pyramid_write", "SIDE_LOG2", int(TALL_SIDE.ilog2())),
         ("pyramid/pyramid_write", "SIDE", int(TALL_SIDE)),
         ("pyramid/pyramid_write", "SIDE_MASK", int(TALL_SIDE - 1)),
+        ("pyramid/resolve", "WORKGROUP", int(resolve::WORKGROUP)),
         ("pyramid/texels", "LEAST_NORMAL", float(f32::MIN_POSITIVE)),
         ("pyramid/texels_atlas", "HEADERS", int(HEADERS)),
+        ("testing/choose_lods", "LANES", int(lod::LANES)),
+        ("testing/choose_lods", "MAX_LODS", MAX_LODS as f64),
         ("yardstick/reduce_buffer", "WORKGROUP", int(yardstick::BUFFER_WORKGROUP)),
         ("yardstick/reduce_texture", "SIDE", int(yardstick::TEXTURE_WORKGROUP_SIDE)),
     ]
@@ -122,8 +154,9 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
 const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/certificate", &["ERROR_FLOOR"]),
     ("cull/classify", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
+    ("cull/lod", &["NEEDS", "NEED_FACTOR", "LARGEST_DEVIATION"]),
     ("cull/refine", &["REFINED"]),
-    ("cull/refine_groups", &["WITHIN"]),
+    ("cull/refine_groups", &["LAST_TEXEL", "WITHIN"]),
     (
         "cull/supporting_planes",
         &[
@@ -139,7 +172,16 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ),
     (
         "instances/bounds_box_support",
-        &["EDGES", "FACES", "CANDIDATES", "EDGES_OF_AXIS_LOG2", "BORDER_TOLERANCE"],
+        &[
+            "EDGES",
+            "FACES",
+            "CANDIDATES",
+            "EDGES_OF_AXIS_LOG2",
+            "BORDER_TOLERANCE",
+            "RADIUS_FACTOR",
+            "RADIUS_FLOOR",
+            "ROOT_FACTOR",
+        ],
     ),
     (
         "instances/bounds_sphere",
@@ -158,6 +200,10 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("instances/from_buffer", &["HALF"]),
     // One workgroup scans, however large it is.
     ("output/compact", &["LANES"]),
+    ("output/emit_draws", &["LANES"]),
+    ("output/emit_record", &["COMMON_WORDS"]),
+    ("output/emit_scatter", &["FOUR", "NUMBERS"]),
+    ("output/mesh_table", &["ERRORS_LOG2"]),
 ];
 
 /// The constants of every file that are one number: by file and name.
@@ -238,6 +284,9 @@ fn constants_fit_each_other() {
     assert!(number("cull/supporting_planes", "BEYOND") >= f64::from(MAX_IMAGE_SIDE));
     assert_eq!(MAX_IMAGE_SIDE, 1 << (MAX_LEVELS - 1));
     assert_eq!(Stage::ALL.map(|s| s as usize), std::array::from_fn(|i| i));
+    assert!(BLOCK_WORDS.is_power_of_two());
+    // A texel for the number of a mesh's LODs, and one for each four errors.
+    assert_eq!(MESH_TEXELS - 1, MAX_LODS >> number("output/mesh_table", "ERRORS_LOG2") as u32);
     // The spacing just below 2^-100 exceeds two flushed numbers.
     assert!(f64::from(SMALL) * EPS / 2.0 > 2.0 * f64::from(f32::MIN_POSITIVE));
     // What is beyond limits is beyond what is still valid.
@@ -255,6 +304,14 @@ fn constants_cover_what_is_counted() {
     assert!(number("cull/certificate", "ERROR_FLOOR") >= two_to(-70));
     // Both squares, the product and the sum lose at most 6 eps.
     assert!(number("instances/bounds_sphere", "SQUARES_FACTOR") >= 1.0 + 6.0 * EPS);
+    // The three products of a need.
+    assert!(number("cull/lod", "NEED_FACTOR") >= 1.0 + 4.0 * EPS);
+    // Bounds below the coordinate limit of every camera, and a product that does not overflow.
+    let deviation = number("cull/lod", "LARGEST_DEVIATION");
+    assert!((two_to(52)..=two_to(80)).contains(&deviation));
+    // A box's radius: of a square or a sum less than 16 eps, and squares below 2^-126.
+    assert!(number("instances/bounds_box_support", "RADIUS_FACTOR") >= 1.0 + 16.0 * EPS);
+    assert!(number("instances/bounds_box_support", "RADIUS_FLOOR") >= two_to(-100));
     // Squares below 2^-126 lose what they are.
     assert!(number("instances/bounds_sphere", "SQUARES_FLOOR") >= two_to(-100));
     assert!(number("instances/bounds_sphere", "AXES") >= 3.0);
@@ -276,12 +333,23 @@ fn constants_cover_what_is_counted() {
 fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
     let line = |n: u32| [n, 1, 1];
     BTreeMap::from([
+        ("among_order", line(among::WORKGROUP)),
         ("begin", line(1)),
+        ("choose_lods", line(lod::LANES)),
+        ("emit_bins", line(emit_passes::WORKGROUP)),
+        ("emit_block", line(emit_passes::WORKGROUP)),
+        // One workgroup, the largest that WebGPU promises.
+        ("emit_draws", line(wgpu::Limits::default().max_compute_invocations_per_workgroup)),
+        ("emit_instances", line(emit_passes::WORKGROUP)),
+        ("emit_scatter", line(emit_passes::WORKGROUP)),
+        ("emit_top", line(emit_passes::WORKGROUP)),
+        ("copy_records", line(SCATTER_WORKGROUP)),
         ("count", line(count::LANES)),
         ("cull", line(GROUP as u32)),
         ("cull_groups", line(CULL_WORKGROUP)),
         ("cull_members", line(GROUP as u32)),
         ("explain", line(1)),
+        ("join_views", line(views::WORKGROUP)),
         ("occluder_vertex", [0; 3]),
         ("reduce", line(REDUCE_WORKGROUP)),
         ("reduce_buffer", line(yardstick::BUFFER_WORKGROUP)),
@@ -295,6 +363,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("refine_groups", line(refine::WORKGROUP)),
         ("replace_groups", line(update::WORKGROUP)),
         ("replace_records", line(update::WORKGROUP)),
+        ("resolve", line(resolve::WORKGROUP)),
         // One workgroup, the largest that WebGPU promises.
         ("scan", line(wgpu::Limits::default().max_compute_invocations_per_workgroup)),
         ("scatter", line(SCATTER_WORKGROUP)),
@@ -329,20 +398,16 @@ fn a_cull_sets_every_override() {
             footprint_log2: 1,
             descent: false,
             fit_volume: false,
+            among: false,
         };
-        let report = ReportKey {
-            mask: false,
-            verdicts: false,
-            append: false,
-            list: false,
-            capped: false,
-            statistics: false,
-        };
-        let set = classify_constants(&key).into_iter().chain(report_constants(&report));
-        let set: BTreeSet<String> = set.map(|(name, _)| name.to_owned()).collect();
-        let module = parse(&cull_module(store, kind).text());
-        let declared: BTreeSet<String> =
-            module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
-        assert_eq!(set, declared, "{kind:?}");
+        for (way, emit) in EMITS {
+            let report = ReportKey { mask: false, verdicts: false, emit, statistics: false };
+            let set = classify_constants(&key).into_iter().chain(report_constants(&report));
+            let set: BTreeSet<String> = set.map(|(name, _)| name.to_owned()).collect();
+            let module = parse(&cull_module(store, kind, emit).text());
+            let declared: BTreeSet<String> =
+                module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
+            assert_eq!(set, declared, "{kind:?} {way}");
+        }
     }
 }

@@ -11,19 +11,25 @@ use crate::instances::SEQUENCE_BYTES;
 use crate::instances::from_buffer::FromBufferUniform;
 use crate::instances::piece::PieceUniform;
 use crate::instances::update::UpdateUniform;
+use crate::output::bins::{BinRecord, EmitUniform, TotalRecord};
 use crate::output::counters::{CounterRecord, StatisticsRecord};
 use crate::output::draw::DrawIndexedIndirect;
+use crate::output::mesh_table::TemplateRecord;
 use crate::output::survivors::SurvivorsRecord;
+use crate::output::views::JoinUniform;
 use crate::pyramid::PyramidUniform;
 use crate::pyramid::layout::PYRAMID_CHUNKS;
 use crate::pyramid::levels::Level;
+use crate::pyramid::resolve::{BandUniform, ResolvedUniform};
 use crate::pyramid::steps::StepUniform;
+use crate::testing::lod::LodCase;
 use crate::testing::shaders::tests::parse;
 use crate::testing::shaders::{all, files};
 use crate::yardstick::reduce as yardstick;
 
 /// Structs that only a shader has: they lie in no buffer.
 const SHADER_ONLY_STRUCTS: &[&str] = &[
+    "Bin",
     "BoxTexels",
     "Corners",
     "Candidate",
@@ -32,12 +38,14 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     "Vertex",
     "Extent",
     "Flat",
+    "MaskPlace",
     "Outcome",
     "Projected",
     "SupportingPlane",
     "SupportingPlanes",
     "Value",
     "Volume",
+    "Word",
 ];
 
 /// Offsets of a WGSL struct's members, and its size.
@@ -72,6 +80,9 @@ macro_rules! twin {
 
 fn struct_twins() -> Vec<(&'static str, Layout)> {
     vec![
+        twin!("BinRange", BinRecord {
+            "begin" = begin, "count" = count, "shift" = shift, "padding" = padding,
+        }),
         twin!("Counters", CounterRecord {
             "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid,
         }),
@@ -79,6 +90,13 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "index_count" = index_count, "instance_count" = instance_count,
             "first_index" = first_index, "base_vertex" = base_vertex,
             "first_instance" = first_instance,
+        }),
+        twin!("Join", JoinUniform {
+            "view" = view, "stride" = stride, "begin" = begin, "words" = words,
+        }),
+        twin!("Emit", EmitUniform {
+            "base" = base, "count" = count, "words" = words, "lods" = lods, "piece" = piece,
+            "capacity" = capacity, "records" = records, "draws_begin" = draws_begin,
         }),
         twin!("Explanation", ExplanationRecord {
             "verdict" = verdict, "stage" = stage, "level" = level,
@@ -92,6 +110,9 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         twin!("Level", Level {
             "offset" = offset, "stride" = stride, "width" = width, "height" = height,
         }),
+        twin!("LodCase", LodCase {
+            "mesh" = mesh, "count" = count, "scale" = scale, "padding" = padding,
+        }),
         twin!("Piece", PieceUniform {
             "base" = base, "count" = count, "index" = index, "words" = words,
         }),
@@ -99,17 +120,25 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "levels" = levels, "origins" = origins, "chunk_shift" = chunk_shift,
             "first_stored" = first_stored, "last_stored" = last_stored, "padding" = padding,
         }),
+        twin!("ResolvedImage", ResolvedUniform { "origin" = origin, "size" = size }),
+        twin!("Band", BandUniform {
+            "first" = first, "rows" = rows, "stride" = stride, "nearest" = nearest,
+        }),
         twin!("Statistics", StatisticsRecord {
             "levels" = levels, "texels_low" = texels_low, "texels_high" = texels_high,
         }),
         twin!("Step", StepUniform {
-            "source" = source, "last" = last, "reduction" = reduction, "padding" = padding,
-            "blocks" = blocks, "padding_1" = padding_1,
+            "source" = source, "last" = last, "end" = end, "begin" = begin, "origin" = origin,
+            "reduction" = reduction, "base" = base, "padding" = padding,
         }),
         twin!("Survivors", SurvivorsRecord {
             "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
             "workgroups_z" = workgroups + 8, "count" = count,
         }),
+        twin!("Template", TemplateRecord {
+            "count" = count, "first" = first, "base_vertex" = base_vertex, "padding" = padding,
+        }),
+        twin!("Total", TotalRecord { "demand" = demand, "written" = written }),
         twin!("Update", UpdateUniform {
             "count" = count, "texels" = texels, "number" = number, "padding" = padding,
         }),
@@ -120,7 +149,9 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "reach" = reach, "depth_factor" = depth_factor, "size" = size,
             "runtime_zero" = runtime_zero, "reduction" = reduction,
             "descent_budget" = descent_budget, "depth_offset" = depth_offset,
-            "coordinate_limit" = coordinate_limit, "padding" = padding,
+            "coordinate_limit" = coordinate_limit, "lod_end" = lod_end,
+            "lod_needs" = lod_needs,
+            "source_origin" = source_origin, "padding_0" = padding_0, "padding_1" = padding_1,
         }),
         twin!("YardstickLevel", yardstick::PlainLevel {
             "offset" = offset, "stride" = stride, "width" = width, "height" = height,

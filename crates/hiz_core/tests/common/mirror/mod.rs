@@ -7,6 +7,7 @@
 mod arithmetic;
 mod extent;
 mod guesses;
+mod lod;
 mod loss;
 mod planes;
 mod volume;
@@ -19,6 +20,7 @@ pub(crate) use arithmetic::{
     Arithmetic, MARGIN_FIRST, STYLES, Style, WILDEST, WITHOUT_BARS, WITHOUT_SLOPE_BARS,
 };
 use extent::Extent;
+pub(crate) use lod::{LodMirror, NEED_FACTOR, Need};
 pub(crate) use loss::{Losses, texel_loss};
 use planes::Projected;
 use volume::Volume;

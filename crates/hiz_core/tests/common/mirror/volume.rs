@@ -10,8 +10,8 @@ pub(super) struct Volume {
     pub(super) center: [f32; 3],
     pub(super) size: f32,
     /// For spheres: the radius on each axis.
-    half_axes: [[f32; 3]; 3],
-    kind: BoundsKind,
+    pub(super) half_axes: [[f32; 3]; 3],
+    pub(super) kind: BoundsKind,
 }
 
 impl Volume {

@@ -1,0 +1,82 @@
+//! Where the answers of a cull lie on the device: which ranges a read copies.
+
+use crate::cull::groups::is_grouped;
+use crate::cull::options::CullOptions;
+use crate::gpu::copies::BufferRange;
+use crate::headless::answers::mask_bytes;
+use crate::instances::Instances;
+use crate::instances::piece::Piece;
+use crate::output::survivors::GroupOutput;
+use crate::output::visible::{PieceOutput, Visible, verdicts_offset};
+
+/// What a cull with these options left of a piece's groups, if it tested them.
+pub(super) fn groups_of<'a>(
+    piece: &Piece,
+    output: &'a PieceOutput,
+    options: &CullOptions,
+) -> Option<&'a GroupOutput> {
+    output.groups().filter(|_| is_grouped(piece, options))
+}
+
+fn of_pieces<'a>(
+    instances: &Instances,
+    visible: &'a Visible,
+    of: impl Fn(&Piece, &'a PieceOutput) -> BufferRange<'a>,
+) -> Vec<BufferRange<'a>> {
+    let pieces = instances.pieces.iter().zip(&visible.pieces);
+    pieces.map(|(piece, output)| of(piece, output)).collect()
+}
+
+/// The verdicts of all pieces.
+pub(super) fn verdict_ranges<'a>(
+    instances: &Instances,
+    visible: &'a Visible,
+) -> Vec<BufferRange<'a>> {
+    of_pieces(instances, visible, |piece, output| BufferRange {
+        buffer: &output.mask,
+        offset: verdicts_offset(piece),
+        size: 4 * u64::from(piece.count()),
+    })
+}
+
+/// What the counts are made from: the counters, the survivors and the last group's verdict of each
+/// piece, and the statistics if there are any.
+pub(super) fn count_ranges<'a>(
+    instances: &Instances,
+    visible: &'a Visible,
+    options: &CullOptions,
+    counters: &'a wgpu::Buffer,
+) -> Vec<BufferRange<'a>> {
+    let mut ranges = vec![BufferRange::first(counters, counters.size())];
+    ranges.extend(of_pieces(instances, visible, |piece, output| {
+        match groups_of(piece, output, options) {
+            Some(groups) => BufferRange::first(&groups.survivors, groups.survivors.size()),
+            None => BufferRange::first(&output.mask, 0),
+        }
+    }));
+    // The last group may have fewer members than 64.
+    ranges.extend(of_pieces(instances, visible, |piece, output| {
+        match groups_of(piece, output, options) {
+            Some(groups) => BufferRange {
+                buffer: &groups.verdicts,
+                offset: groups.verdicts.size() - 4,
+                size: 4,
+            },
+            None => BufferRange::first(&output.mask, 0),
+        }
+    }));
+    let statistics = visible.statistics().filter(|_| options.statistics);
+    ranges.extend(statistics.map(|buffer| BufferRange::first(buffer, buffer.size())));
+    ranges
+}
+
+/// The masks of all pieces.
+pub(super) fn mask_ranges<'a>(instances: &Instances, visible: &'a Visible) -> Vec<BufferRange<'a>> {
+    let sizes = instances.pieces.iter().map(mask_bytes);
+    visible
+        .pieces
+        .iter()
+        .zip(sizes)
+        .map(|(output, size)| BufferRange::first(&output.mask, size))
+        .collect()
+}

@@ -1,0 +1,158 @@
+//! Frames with culling equal those without: depth bit for bit, and colour where no depths tie.
+//!
+//! `HIZVK_VIEWER_FRAMES` says how many frames the long tests draw of each scene (default: 300).
+
+use std::sync::Arc;
+
+use hiz_core::{HizContext, ImageSize};
+
+use crate::gpu::{Gpu, IndirectChecks, instance};
+use crate::picture::{Difference, Picture, read};
+use crate::renderer::{Mode, Renderer};
+use crate::scene::{NAMES, Scene};
+
+const SIZE: ImageSize = ImageSize { width: 192, height: 108 };
+
+fn gpu() -> Arc<Gpu> {
+    let gpu = Gpu::open(&instance(IndirectChecks::On), None).expect("a Vulkan device");
+    if let Ok(expected) = std::env::var("HIZVK_EXPECT_ADAPTER") {
+        assert!(gpu.words().contains(&expected), "expected {expected}, got {}", gpu.words());
+    }
+    gpu
+}
+
+fn scene(name: &str) -> Scene {
+    Scene::by_name(name).expect("it needs no data")
+}
+
+/// Two renderers of one scene: one culls, the other draws the reference.
+struct Pair {
+    culling: Renderer,
+    reference: Renderer,
+}
+
+/// What was found over some frames.
+#[derive(Debug, Default)]
+struct Found {
+    differing: Vec<(usize, Difference)>,
+    ties: usize,
+    drawn: u64,
+    in_view: u64,
+}
+
+impl Pair {
+    fn new(gpu: &Arc<Gpu>, name: &str, lods: bool, samples: u32, faults: &[(&str, &str)]) -> Self {
+        let build = |faults| {
+            let scene = if lods { scene(name) } else { scene(name).without_lods() };
+            let hiz = HizContext::with_planted_faults(&gpu.device, faults).expect("a context");
+            Renderer::with_context(Arc::clone(gpu), hiz, scene, SIZE, samples).expect("a renderer")
+        };
+        Self { culling: build(faults), reference: build(&[]) }
+    }
+
+    /// Draws a path in two ways and compares.
+    fn compare(&mut self, mode: Mode, reference: Mode, frames: usize) -> Found {
+        let mut found = Found::default();
+        self.culling.mode = mode;
+        self.reference.mode = reference;
+        for frame in 0..frames {
+            let pose = self.culling.scene.pose(frame, frames);
+            let camera = self.culling.scene.camera(&pose, SIZE).expect("a camera");
+            let [seen, expected] = [&mut self.culling, &mut self.reference].map(|renderer| {
+                renderer.draw(&camera).expect("a frame");
+                read(renderer).expect("a picture")
+            });
+            check_is_a_picture(&expected);
+            let difference = seen.difference(&expected);
+            found.ties += difference.ties;
+            found.drawn += u64::from(self.culling.counts.drawn.iter().sum::<u32>());
+            found.in_view += u64::from(self.reference.counts.drawn.iter().sum::<u32>());
+            if difference.depths > 0 || difference.colours > 0 {
+                found.differing.push((frame, difference));
+            }
+        }
+        eprintln!(
+            "{} {}: {frames} frames, {} of {} drawn, {} ties, differing: {:?}",
+            self.culling.scene.name,
+            mode.name(),
+            found.drawn,
+            found.in_view,
+            found.ties,
+            found.differing
+        );
+        found
+    }
+}
+
+/// Something shows, and each sample has a fragment of its depth, so that ties are found.
+fn check_is_a_picture(picture: &Picture) {
+    let [shown, unmatched] = picture.shown_and_unmatched();
+    assert!(shown > picture.depth.len() / 10, "{shown} samples show something");
+    assert_eq!(unmatched, 0, "of {shown}");
+}
+
+/// Frames of all scenes, in a way of culling; the reference has the same LODs.
+fn equal_pictures(mode: Mode, lods: bool, samples: u32, frames: usize) {
+    let gpu = gpu();
+    for name in NAMES {
+        let mut pair = Pair::new(&gpu, name, lods, samples, &[]);
+        let found = pair.compare(mode, Mode::Frustum, frames);
+        assert!(found.differing.is_empty(), "{name}: {:?}", found.differing);
+        // Equal pictures prove nothing where nothing is hidden, or hardly a tie is excepted.
+        assert!(4 * found.drawn < 3 * found.in_view, "{name}: {found:?}");
+        let pixels = SIZE.width as usize * SIZE.height as usize * frames;
+        assert!(found.ties < pixels / 20, "{name}: {} ties", found.ties);
+    }
+}
+
+#[test]
+fn two_passes_show_what_all_show() {
+    equal_pictures(Mode::TwoPasses, true, 1, 12);
+}
+
+#[test]
+fn two_passes_show_what_all_show_with_four_samples() {
+    equal_pictures(Mode::TwoPasses, true, 4, 6);
+}
+
+#[test]
+fn one_pass_shows_what_all_show() {
+    equal_pictures(Mode::OnePass, true, 1, 6);
+}
+
+/// What the frustum alone leaves out is not seen either.
+#[test]
+fn what_is_outside_of_the_view_does_not_show() {
+    let gpu = gpu();
+    for name in ["mountains", "city"] {
+        let mut pair = Pair::new(&gpu, name, false, 1, &[]);
+        let found = pair.compare(Mode::TwoPasses, Mode::All, 3);
+        assert!(found.differing.is_empty(), "{name}: {:?}", found.differing);
+    }
+}
+
+/// The comparison would notice a false cull: here the pyramid holds the nearest depths.
+#[test]
+fn a_pyramid_upside_down_is_seen() {
+    let fault =
+        ("select(max(a, b), min(a, b), REVERSED)", "select(min(a, b), max(a, b), REVERSED)");
+    let mut pair = Pair::new(&gpu(), "city", true, 1, &[fault]);
+    let found = pair.compare(Mode::OnePass, Mode::Frustum, 3);
+    assert!(!found.differing.is_empty());
+}
+
+fn soak_frames() -> usize {
+    std::env::var("HIZVK_VIEWER_FRAMES").map_or(300, |n| n.parse().expect("a number of frames"))
+}
+
+#[test]
+#[ignore = "minutes: make soak"]
+fn two_passes_show_what_all_show_in_hundreds_of_frames() {
+    equal_pictures(Mode::TwoPasses, true, 1, soak_frames());
+}
+
+#[test]
+#[ignore = "minutes: make soak"]
+fn two_passes_show_what_all_show_in_hundreds_of_frames_with_four_samples() {
+    equal_pictures(Mode::TwoPasses, true, 4, soak_frames());
+}
