@@ -101,6 +101,8 @@ TOLD = (
     "transfers.upload.given",
     "transfers.update.1",
     "transfers.update.100",
+    "transfers.from_buffer.spheres",
+    "transfers.from_buffer.boxes",
     "moved.10 % gone elsewhere",
     "moved.tests.all moved by up to 1 m",
     "memory.host_input.given",

@@ -102,12 +102,12 @@ def _from_buffer(run: Run) -> None:
     count = len(scene.boxes)
     centers = 0.5 * (scene.low + scene.high)
     radii = 0.5 * np.linalg.norm(scene.high - scene.low, axis=1).astype(np.float32)
-    kinds: tuple[tuple[str, str, tuple[Floats32, Floats32], Spheres | Boxes], ...] = (
-        ("spheres", "sphere", (centers, radii), Spheres(centers, radii)),
-        ("boxes", "box", (scene.low, scene.high), scene.boxes),
+    kinds: tuple[tuple[str, tuple[Floats32, Floats32], Spheres | Boxes], ...] = (
+        ("spheres", (centers, radii), Spheres(centers, radii)),
+        ("boxes", (scene.low, scene.high), scene.boxes),
     )
-    for name, kind, arrays, bounds in kinds:
-        on_device = run.yardstick.from_buffer(kind, arrays)
+    for name, arrays, bounds in kinds:
+        on_device = run.yardstick.from_buffer(name, arrays)
         resident = device.instances(bounds, order="given")
         copies = [np.empty_like(part) for part in arrays]
 

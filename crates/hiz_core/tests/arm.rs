@@ -88,7 +88,7 @@ fn conservative_depth_of_256_pixels_hides_nothing_that_a_larger_picture_shows() 
 #[test]
 fn spheres_that_a_shader_moves_are_kept_while_rays_see_them() {
     for (from, frames) in [(From::Buffer, 60), (From::Host, 8)] {
-        let tally = culled::moving(&engine(), from, frames, PICTURE).unwrap();
+        let tally = culled::moving(&engine(), from, frames, ImageSize::new(960, 540)).unwrap();
         eprintln!("{from:?}: {tally:?}");
         assert_eq!((tally.false_culls, tally.invalid_culls), (0, 0));
         assert_eq!(tally.invalid, frames as usize * 28);

@@ -1,5 +1,7 @@
 """``hizvk demo``: culls trees in the mountains, draws what happened, and checks the cull.
 
+``hizvk demo --scene arm`` does so with ARM's spheres among prisms.
+
 Each view makes the library's three calls: `Device.render_depth` of the terrain, `Device.pyramid`,
 and `Device.cull` of the trees' boxes.
 Then the truth is found without the library (`hizvk.scenes.truth`).
@@ -7,6 +9,7 @@ The exit code is 1 if a visible tree was culled.
 
 - `command`: the command line
 - `run`: all views: cull, check, pictures, report
+- `arm`: ARM's scene, its check and its report; `arm_pictures` draws bounds
 - `report`: the numbers, and the page that tells them
 - `pictures`: the pictures of a view; `shading` colours what the rays have seen
 """

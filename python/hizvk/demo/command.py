@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from .. import _core
 from ..commands import arguments as args
+from .arm import run_arm
 from .run import run
 
 if TYPE_CHECKING:
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from .arm import ArmReport
     from .report import Report
 
 __all__ = ["main"]
@@ -20,26 +22,41 @@ __all__ = ["main"]
 PROG: Final = "hizvk demo"
 DEFAULTS: Final = {"views": 12, "size": (540, 960), "trees": 20_000}
 QUICK: Final = {"views": 3, "size": (180, 320), "trees": 3_000}
+ARM_DEFAULTS: Final = {"views": 8, "size": (720, 1280)}
+ARM_QUICK: Final = {"views": 2, "size": (360, 640)}
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = args.parser(
         PROG,
-        "Culls trees in the mountains of a real elevation model, draws the result, and checks that "
-        "no visible tree was culled (exit code 1 otherwise).",
+        "Culls trees in the mountains of a real elevation model, or the spheres of ARM's scene, "
+        "draws the result, and checks that nothing visible was culled (exit code 1 otherwise).",
         out="out",
         holds="pictures and report",
     )
     parser.add_argument(
+        "--scene",
+        choices=("mountains", "arm"),
+        default="mountains",
+        help="mountains: trees behind ridges; arm: spheres among prisms, depth of 256x256 pixels "
+        "(default: mountains)",
+    )
+    parser.add_argument(
         "--views",
         type=args.count,
-        help=f"stations of the flight (default: {DEFAULTS['views']})",
+        help=f"stations of the flight (default: {DEFAULTS['views']}), or with arm: directions "
+        f"({ARM_DEFAULTS['views']})",
     )
     parser.add_argument(
-        "--size", type=args.size, metavar="WIDTHxHEIGHT", help="of the images (default: 960x540)"
+        "--size",
+        type=args.size,
+        metavar="WIDTHxHEIGHT",
+        help="of the images (default: 960x540, with arm: 1280x720)",
     )
     parser.add_argument(
-        "--trees", type=args.count, help=f"instances (default: {DEFAULTS['trees']})"
+        "--trees",
+        type=args.count,
+        help=f"instances of the mountains (default: {DEFAULTS['trees']})",
     )
     parser.add_argument(
         "--quick", action="store_true", help="few trees and views, small images, fewer pictures"
@@ -49,10 +66,23 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command; exit code 1: a visible tree was culled, or it cannot run."""
-    parsed = _parser().parse_args(arguments)
-    chosen = {**DEFAULTS, **(QUICK if parsed.quick else {})}
-    given = {name: getattr(parsed, name) for name in DEFAULTS}
+    parser = _parser()
+    parsed = parser.parse_args(arguments)
+    is_arm = parsed.scene == "arm"
+    if is_arm and parsed.trees is not None:
+        parser.error("argument --trees: the scene arm has spheres, always 13,824")
+    defaults, quick = (ARM_DEFAULTS, ARM_QUICK) if is_arm else (DEFAULTS, QUICK)
+    chosen = {**defaults, **(quick if parsed.quick else {})}
+    given = {name: getattr(parsed, name) for name in defaults}
     chosen.update({name: value for name, value in given.items() if value is not None})
+    if is_arm:
+        return args.execute(
+            PROG,
+            lambda: run_arm(parsed.out, pictures=not parsed.quick, **chosen),  # type: ignore[arg-type]
+            lambda found: _tell_arm(found, parsed.out),
+            as_json=parsed.json,
+            refusals=(ImportError,),
+        )
     return args.execute(
         PROG,
         lambda: run(parsed.out, pictures=not parsed.quick, **chosen),  # type: ignore[arg-type]
@@ -60,6 +90,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         as_json=parsed.json,
         refusals=(ImportError,),
     )
+
+
+def _tell_arm(found: ArmReport, out: Path) -> None:
+    print(*found.lines(), sep="\n")
+    print(f"look at  {out / 'arm_00.png'} and {out / 'report.md'}  ({found.seconds:.0f} s)")
 
 
 def _tell(found: Report, out: Path) -> None:

@@ -13,6 +13,7 @@ The ray caster that checks a cull therefore starts from the same numbers as the 
 - `storeroom`: `room`: crates behind walls
 - `city`: a street-level city from a seed
 - `boulders`: lumps of thousands of triangles
+- `arm`: spheres among prisms, with rays of its own
 - `hedge`: where ranking occluders by size and distance fails
 - `houses`: `village`: turned houses with gable roofs
 - `doors`: doors that open and close and a bus that drives by
