@@ -424,6 +424,21 @@ LIMIT: list[Bad] = [
     (1.5, TypeError, "got float 1.5"),
     (True, TypeError, "got bool True"),
 ]
+OF_MESHES: BadValues = {
+    "meshes": [
+        (36, TypeError, "expected a sequence of MeshLods or None, got int 36"),
+        ([], ValueError, "expected at least one MeshLods, got none"),
+        ([36], TypeError, "expected a MeshLods for each mesh, got int 36"),
+    ],
+    "emit": [
+        ("list", ValueError, 'expected one of "bins", "instances", got str \'list\''),
+        (None, TypeError, "got None"),
+    ],
+    "placement": [
+        ("loose", ValueError, 'expected one of "packed", "reserved", got str \'loose\''),
+        (None, TypeError, "got None"),
+    ],
+}
 DRAW: list[Bad] = [((36,), TypeError, "expected a DrawTemplate or None, got tuple (36,)")]
 OPTIONS_OBJECT: list[Bad] = [
     ({"order": "any"}, TypeError, "expected a CullOptions or None, got dict {'order': 'any'}"),
@@ -819,6 +834,20 @@ TABLES: dict[str, Table] = {
                 ("sorted", ValueError, 'expected one of "morton", "given", got str \'sorted\''),
                 (None, TypeError, "got None"),
             ],
+            "mesh_ids": [
+                ([0.0, 1.0], TypeError, "expected integer (2,), got (2,) float64"),
+                ([0], ValueError, "expected integer (2,), got (1,) int64"),
+                ([0, -1], ValueError, "expected mesh ids from 0 on, or hizvk.ABSENT, got -1"),
+                ([0, 2**32], ValueError, "or hizvk.ABSENT, got 4294967296"),
+                ([0, 2**20], hizvk.LimitError, "mesh_ids: requested 1048577, the device allows"),
+                ("mesh", TypeError, "got str 'mesh'"),
+            ],
+            "scales": [
+                ([1.0], ValueError, "scales: expected"),
+                ([1.0, -1.0], ValueError, "expected numbers from 0 on below 2^60, got -1"),
+                ([1.0, NAN], ValueError, "got NaN at index 1"),
+                ("large", TypeError, "got str 'large'"),
+            ],
         },
     ),
     "Occluders.move": Table(
@@ -937,12 +966,12 @@ TABLES: dict[str, Table] = {
                 )
             ],
             "camera": [
-                *CAMERA,
-                (
-                    [camera()] * 2,
-                    TypeError,
-                    "each camera culls with the pyramid of its own depth, Device.pyramid), got",
-                ),
+                (None, TypeError, "expected a Camera or a sequence of Cameras, got None"),
+                (EYE4, TypeError, "got (4, 4) float64"),
+                ("front", TypeError, "got str 'front'"),
+                ([], ValueError, "expected 1 to 256 views, got 0"),
+                ([camera()] * 257, ValueError, "expected 1 to 256 views, got 257"),
+                ([None], TypeError, "camera[0]: expected a Camera, got None"),
                 (camera((6, 9)), ValueError, "expected the camera of the pyramid"),
                 (
                     camera().resized((3, 4)),
@@ -960,10 +989,18 @@ TABLES: dict[str, Table] = {
             ],
             "options": OPTIONS_OBJECT,
             "outputs": OUTPUTS_OBJECT,
+            "among": [
+                ("all", TypeError, "expected a bool (1,) array, a CullResult or a ViewsResult"),
+                ([0], TypeError, "got (1,) int64"),
+                ([True, False], ValueError, "got (2,) bool"),
+                ([[True]], ValueError, "got (1, 1) bool"),
+                (np.ma.masked_all(1, bool), TypeError, "got a masked array"),
+            ],
             "wait": FLAG,
             **OPTIONS,
             "capacity": CAPACITY,
             "draw": DRAW,
+            **OF_MESHES,
         },
     ),
     "Device.warm_up": Table(
@@ -993,6 +1030,7 @@ TABLES: dict[str, Table] = {
             **OPTIONS,
             "capacity": CAPACITY,
             "draw": DRAW,
+            **OF_MESHES,
         },
     ),
     "CullOptions": Table(lambda _: (hizvk.CullOptions, {}), OPTIONS),
@@ -1005,6 +1043,34 @@ TABLES: dict[str, Table] = {
             "draws": FLAG_OR_NONE,
             "capacity": CAPACITY,
             "draw": DRAW,
+            **OF_MESHES,
+        },
+    ),
+    "MeshLods": Table(
+        lambda _: (hizvk.MeshLods, {"draws": [hizvk.DrawTemplate(3)] * 2}),
+        {
+            "draws": [
+                (hizvk.DrawTemplate(3), TypeError, "expected a sequence of DrawTemplate, got"),
+                ([36], TypeError, "expected a DrawTemplate for each level, got int 36"),
+                ([], ValueError, "expected 1 to 8 levels of detail, got none"),
+                (
+                    [hizvk.DrawTemplate(3, first_instance=7)],
+                    ValueError,
+                    "expected first_instance 0, which the cull sets, got 7",
+                ),
+                (
+                    [hizvk.DrawTemplate(3)] * 9,
+                    hizvk.LimitError,
+                    "levels of detail of a mesh: requested 9, the device allows 8",
+                ),
+            ],
+            "errors": [
+                ([0.0], ValueError, "expected one for each of 2 levels of detail, got 1"),
+                ([0.0, -1.0], ValueError, "got float -1.0"),
+                ([0.0, NAN], ValueError, "got float nan"),
+                ([0.0, "far"], TypeError, "got str 'far'"),
+                (0.5, TypeError, "expected a sequence of numbers or None, got float 0.5"),
+            ],
         },
     ),
     "check_proxy": Table(
@@ -1092,6 +1158,26 @@ TABLES: dict[str, Table] = {
         },
     ),
     "CullResult.hints": Table(lambda device: (device.cull(**cull_arguments(device)).hints, {}), {}),
+    "CullResult.bin": Table(
+        lambda device: (
+            device.cull(
+                **cull_arguments(device), meshes=[hizvk.MeshLods([hizvk.DrawTemplate(3)])]
+            ).bin,
+            {"mesh": 0, "lod": 0},
+        ),
+        {
+            "mesh": [
+                (1, ValueError, "expected a mesh below 1, got 1"),
+                (-1, ValueError, "got int -1"),
+                (0.0, TypeError, "got float 0.0"),
+            ],
+            "lod": [
+                (1, ValueError, "expected a level below 1 for mesh 0, got 1"),
+                (8, ValueError, "in 0..7, got int 8"),
+                ("0", TypeError, "got str '0'"),
+            ],
+        },
+    ),
     "CullResult.explain": Table(
         lambda device: (device.cull(**cull_arguments(device)).explain, {"index": 0}),
         {
@@ -1256,6 +1342,7 @@ MADE_BY_THE_PACKAGE = {
     "Instances",
 }
 MADE_BY_THE_PACKAGE |= {"BoundsCheck", "Occluders", "ProxyCheck", "Pyramid", "Recommendation"}
+MADE_BY_THE_PACKAGE |= {"ViewsResult"}
 MADE_BY_THE_PACKAGE |= {"InnerBoxes", "InnerPrisms", "OccluderSelection", "SplitMesh"}
 
 

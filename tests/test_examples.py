@@ -16,12 +16,16 @@ GUARD_S = 120
 
 #: The last line of each, as a pattern; how the numbers come about is said beside them.
 LAST_LINES = {
+    # The light's verdict and the slice's, by masks of numpy.
+    "cascades.py": "lit AND in the slice: True",
     # An exact oracle has the last word, and how much a way keeps in vain is no promise.
     "check_against_truth.py": r"0 false culls; false keeps: \d+, \d+, \d+",
     # A small pixel is 13 cm wide at 10 m, and its centre 6 cm off the middle of the 2 cm gap.
     # A large pixel is 1 cm wide.
     "conservative.py": "the ball behind the gap: "
     "large keeps, small hides, small and conservative keeps",
+    # The walls are closed but for the door.
+    "cube_map.py": "lit: 500 in the room, 300 behind the door, 0 behind walls",
     # Ten boxes each.
     "depth_image.py": "kept 10 before the wall, 0 behind it, 10 without data",
     # The scene's own count; what is left out would not have shown.
@@ -36,6 +40,8 @@ LAST_LINES = {
     "polygon_soup.py": "kept: 100 % of the wall, 0 % of what it hides",
     # The answer is that of a blocking read.
     "readback.py": "8 of 8 masks are those of a blocking read",
+    # Each eye sees past its own side of the pillar.
+    "stereo.py": "a list of one eye would lose balls of the other: True",
     # x is -9, -7, ... 9: a ball of 0.5 m is hidden up to 3.5 m from the middle.
     "updates.py": "the walker is hidden in frames 3, 4, 5, 6",
 }

@@ -153,3 +153,142 @@ def test_threads_get_their_own_answers(device: hizvk.Device) -> None:
 
     with ThreadPoolExecutor(4) as pool:
         assert all(pool.map(work, range(8)))
+
+
+# -- several views in one call ---------------------------------------------------------------------
+
+
+def eyes(device: hizvk.Device) -> tuple[list[hizvk.Camera], list[hizvk.Pyramid]]:
+    """Three views of different sizes and conventions: wall on the left, on the right, nowhere."""
+    cameras = [
+        hizvk.Camera.look_at(
+            (0, 0, 0), (0, 0, -1), fov_y_deg=90, size=size, near=0.1, reversed_z=reversed_z
+        )
+        for size, reversed_z in (((48, 64), True), ((33, 40), False), ((20, 90), True))
+    ]
+    pyramids = []
+    for number, one in enumerate(cameras):
+        image = np.full(one.size, np.inf)
+        half = one.size[1] // 2
+        if number == 0:
+            image[:, :half] = 8.0
+        elif number == 1:
+            image[:, half:] = 8.0
+        pyramids.append(device.pyramid(image, one, kind="z"))
+    return cameras, pyramids
+
+
+def seen_by(spheres: hizvk.Spheres) -> npt.NDArray[np.bool_]:
+    """Which spheres of `crowd` each of the `eyes` sees, worked out without a cull."""
+    x, _, z = np.asarray(spheres.centers).T
+    far = z == -16.0
+    return np.stack([~(far & (x < 0)), ~(far & (x > 0)), np.ones(len(x), bool)])
+
+
+@pytest.mark.parametrize("count", [0, 1, 777, 40_000])
+@pytest.mark.parametrize("wait", [True, False])
+def test_each_view_decides_for_itself(device: hizvk.Device, count: int, wait: bool) -> None:
+    spheres, _ = crowd(count)
+    cameras, pyramids = eyes(device)
+    expected = seen_by(spheres)
+    seen = device.cull(device.instances(spheres), cameras, pyramids, wait=wait)
+    assert (len(seen), seen.num_instances) == (3, count)
+    np.testing.assert_array_equal(seen.mask, expected)
+    np.testing.assert_array_equal(seen.any, expected.any(axis=0))
+    np.testing.assert_array_equal(seen.counts, expected.sum(axis=1))
+    for number, one in enumerate(seen):
+        np.testing.assert_array_equal(one.mask, expected[number])
+        np.testing.assert_array_equal(one.indices, np.flatnonzero(expected[number]))
+        assert one.stats.kept == expected[number].sum()
+    assert seen[-1] is seen[2]
+    two = device.cull(
+        device.instances(spheres),
+        cameras[:2],
+        pyramids[:2],
+        outputs=["indices", "draws"],
+        draw=hizvk.DrawTemplate(36),
+        wait=wait,
+    )
+    np.testing.assert_array_equal(two.indices, np.flatnonzero(expected[:2].any(axis=0)))
+    assert two.draws["instance_count"].sum() == expected[:2].any(axis=0).sum()
+    assert (two.draws["index_count"] == 36).all()
+
+
+def test_lists_of_views_that_were_not_asked_for(device: hizvk.Device) -> None:
+    cameras, pyramids = eyes(device)
+    seen = device.cull(device.instances(crowd(10)[0]), cameras, pyramids)
+    with pytest.raises(ValueError, match="outputs: expected a cull that was asked for indices"):
+        _ = seen.indices
+    with pytest.raises(ValueError, match="outputs: expected a cull that was asked for draws"):
+        _ = seen.draws
+    with pytest.raises(IndexError, match=r"view: expected an integer in -3\.\.2, got 3"):
+        _ = seen[3]
+    assert repr(seen) == "<ViewsResult: 3 views of 10 instances>"
+
+
+def test_views_may_be_awaited(device: hizvk.Device) -> None:
+    spheres, _ = crowd(3000)
+    cameras, pyramids = eyes(device)
+    instances = device.instances(spheres)
+
+    async def all_of_them() -> list[hizvk.ViewsResult]:
+        async def one() -> hizvk.ViewsResult:
+            return await device.cull(instances, cameras, pyramids, wait=False)
+
+        return await asyncio.gather(*(one() for _ in range(5)))
+
+    for seen in asyncio.run(all_of_them()):
+        assert seen.ready()
+        np.testing.assert_array_equal(seen.mask, seen_by(spheres))
+
+
+def test_among_is_a_mask_or_an_earlier_result(device: hizvk.Device) -> None:
+    spheres, _ = crowd(30_000)
+    cameras, pyramids = eyes(device)
+    expected, instances = seen_by(spheres), device.instances(spheres)
+    asked = np.random.default_rng(9).random(30_000) < 0.1
+    asked[:8000] = False  # whole groups of the caller's order, if not of the stored one
+    one = device.cull(instances, cameras[0], pyramids[0], among=asked, statistics=True)
+    np.testing.assert_array_equal(one.mask, expected[0] & asked)
+    np.testing.assert_array_equal(one.verdicts[~asked], hizvk.Verdict.OUTSIDE)
+    all_of_them = device.cull(instances, cameras[0], pyramids[0], statistics=True)
+    assert (one.stats.texels_read or 0) < (all_of_them.stats.texels_read or 0) / 4
+    hidden = int(np.flatnonzero(~asked & expected[0])[0])
+    told = one.explain(hidden)
+    assert told.verdict == hizvk.Verdict.OUTSIDE
+    assert told.reason.startswith("not among the instances that were asked for")
+
+    # Verdict of the first view AND verdict of the second: a cascade of the first one's answer.
+    both = device.cull(instances, cameras[1], pyramids[1], among=one)
+    np.testing.assert_array_equal(both.mask, expected[0] & expected[1] & asked)
+    views = device.cull(instances, cameras, pyramids, among=both, wait=False)
+    np.testing.assert_array_equal(views.mask, expected & both.mask)
+    any_of = device.cull(instances, cameras[2], pyramids[2], among=views)
+    np.testing.assert_array_equal(any_of.mask, both.mask)
+    half = device.cull(instances, cameras[2], pyramids[2], among=np.repeat(asked, 2)[::2])
+    np.testing.assert_array_equal(half.mask, asked)
+
+
+def test_what_does_not_belong_together_is_refused(device: hizvk.Device) -> None:
+    cameras, pyramids = eyes(device)
+    instances, fewer = device.instances(crowd(10)[0]), device.instances(crowd(9)[0])
+    with pytest.raises(ValueError, match="pyramid: expected 3, one for each camera, got 2"):
+        device.cull(instances, cameras, pyramids[:2])
+    with pytest.raises(ValueError, match=r"camera\[1\]: expected the camera of the pyramid"):
+        device.cull(instances, [cameras[0], cameras[2]], pyramids[:2])
+    with pytest.raises(TypeError, match=r"pyramid\[1\]: expected a Pyramid, got Camera"):
+        device.cull(instances, cameras[:2], [pyramids[0], cameras[1]])  # type: ignore[list-item]
+    with pytest.raises(ValueError, match="among: expected a result of 10 instances, got one of 9"):
+        device.cull(
+            instances,
+            cameras[0],
+            pyramids[0],
+            among=device.cull(fewer, cameras[0], pyramids[0]),
+        )
+    no_mask = device.cull(instances, cameras[0], pyramids[0], outputs=["draws"])
+    with pytest.raises(ValueError, match="among: expected a cull that was asked for mask"):
+        device.cull(instances, cameras[0], pyramids[0], among=no_mask)
+    other = hizvk.Device()
+    others, its = eyes(other)
+    with pytest.raises(ValueError, match=r"pyramid\[0\]: expected Pyramid of this device"):
+        device.cull(instances, others, its)

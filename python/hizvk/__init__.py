@@ -92,6 +92,8 @@ from .options import CullOptions, DrawTemplate, MeshLods, Outputs
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import ABSENT, DRAW_DTYPE, NO_LOD, CullResult
 from .stats import CullStats
+from .temporal import PassResult, Temporal
+from .views import ViewsResult
 
 if TYPE_CHECKING:
     from .recommendation import Recommendation, recommend
@@ -130,12 +132,15 @@ __all__ = [
     "OrientedBoxes",
     "OutOfMemoryError",
     "Outputs",
+    "PassResult",
     "ProxyCheck",
     "Pyramid",
     "Recommendation",
     "Spheres",
     "SplitMesh",
+    "Temporal",
     "Verdict",
+    "ViewsResult",
     "__version__",
     "adapters",
     "check_bounds",

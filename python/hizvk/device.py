@@ -16,6 +16,7 @@ import numpy as np
 from . import _arguments
 from ._core import Engine as CoreEngine
 from ._core import MeshTable as CoreMeshTable
+from ._core import TwoPasses as CoreTwoPasses
 from ._on_device import check_owner
 from ._processes import driver_is_asked
 from ._types import FaceCull, Rasteriser, StoredOrder, words
@@ -30,7 +31,9 @@ from .options import cull_request
 from .renewal import Source
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import CullResult
+from .temporal import PassResult, Temporal
 from .samples import checked_samples
+from .views import ViewsResult, among_of, pairs
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -44,6 +47,7 @@ if TYPE_CHECKING:
     from .depth import DepthArray
     from .mesh import MeshLike
     from .options import CullKeywords, CullOptions, MeshLods, Outputs
+    from .views import AmongLike
 
 __all__ = ["Device"]
 
@@ -247,7 +251,7 @@ class Device:
         refinement: int = 2,
         rasteriser: Rasteriser = "auto",
         into: None = None,
-        only: CullResult | npt.ArrayLike | None = None,
+        only: CullResult | PassResult | npt.ArrayLike | None = None,
         max_triangles: int | None = None,
         max_occluders: int | None = None,
     ) -> DepthImage: ...
@@ -259,7 +263,7 @@ class Device:
         camera: Camera | None = None,
         *,
         into: DepthImage,
-        only: CullResult | npt.ArrayLike | None = None,
+        only: CullResult | PassResult | npt.ArrayLike | None = None,
         max_triangles: int | None = None,
         max_occluders: int | None = None,
     ) -> tuple[int, int, int, int] | None: ...
@@ -274,7 +278,7 @@ class Device:
         refinement: int = 2,
         rasteriser: Rasteriser = "auto",
         into: DepthImage | None = None,
-        only: CullResult | npt.ArrayLike | None = None,
+        only: CullResult | PassResult | npt.ArrayLike | None = None,
         max_triangles: int | None = None,
         max_occluders: int | None = None,
     ) -> DepthImage | tuple[int, int, int, int] | None:
@@ -334,8 +338,9 @@ class Device:
             Draws more occluders into this image, which `render_depth` has made, and returns the
             rectangle that was touched.
             Build its pyramid again afterwards.
-        only : CullResult, (K,) bool array or integer array, optional
-            Which of the K copies of meshes are drawn: all that a cull kept, a mask, or numbers.
+        only : CullResult, PassResult, (K,) bool array or integer array, optional
+            Which of the K copies of meshes are drawn: all that a cull kept or a pass of `Temporal`
+            names, a mask, or numbers.
             Copies are numbered through all meshes, in the order of the upload.
             So upload the copies' bounds as instances in that order.
         max_triangles : int, optional
@@ -547,6 +552,7 @@ class Device:
         source = Source.uploaded(uploaded, given, invalid)
         return Pyramid(self, self._engine.pyramid(uploaded, stored), camera, source)
 
+    @overload
     def cull(
         self,
         instances: Instances,
@@ -555,19 +561,50 @@ class Device:
         options: CullOptions | None = None,
         outputs: Outputs | Collection[Output] | None = None,
         *,
+        among: AmongLike | None = None,
         wait: bool = True,
         **keywords: Unpack[CullKeywords],
-    ) -> CullResult:
+    ) -> CullResult: ...
+
+    @overload
+    def cull(
+        self,
+        instances: Instances,
+        camera: Sequence[Camera],
+        pyramid: Sequence[Pyramid],
+        options: CullOptions | None = None,
+        outputs: Outputs | Collection[Output] | None = None,
+        *,
+        among: AmongLike | None = None,
+        wait: bool = True,
+        **keywords: Unpack[CullKeywords],
+    ) -> ViewsResult: ...
+
+    def cull(
+        self,
+        instances: Instances,
+        camera: Camera | Sequence[Camera],
+        pyramid: Pyramid | Sequence[Pyramid],
+        options: CullOptions | None = None,
+        outputs: Outputs | Collection[Output] | None = None,
+        *,
+        among: AmongLike | None = None,
+        wait: bool = True,
+        **keywords: Unpack[CullKeywords],
+    ) -> CullResult | ViewsResult:
         """Tests instances against a pyramid. What could be seen in the depth image is never culled.
 
         Parameters
         ----------
         instances : Instances
             Of this device.
-        camera : Camera
+        camera : Camera, or a sequence of V cameras
             The camera of the pyramid: `Pyramid.camera`, or one equal to it.
-        pyramid : Pyramid
-            Of this device.
+            Several cameras cull in one submission, with one readback: the eyes of a headset, the
+            faces of a cube map, the cascades of a shadow.
+        pyramid : Pyramid, or a sequence of V pyramids
+            Of this device; one for each camera, of its own depth.
+            Sizes and conventions may differ.
         options : CullOptions, optional
             How the cull decides; None takes the defaults.
         outputs : Outputs, or a collection of "mask", "verdicts", "indices", "draws"; optional
@@ -575,6 +612,14 @@ class Device:
             A collection names all that is made.
             None makes mask and verdicts, and the list and the draw arguments by the time that they
             are read.
+            For several cameras indices and draws are those of what any of them keeps, and made only
+            if they are named here.
+        among : (N,) bool array, CullResult or ViewsResult; optional
+            The instances that are asked for: a mask, what an earlier cull of them has kept, or what
+            any of its views has kept.
+            An earlier result stays on the device, and it must have a mask.
+            All others are not kept, their verdict is `Verdict.OUTSIDE`, and they cost no test.
+            None: all.
         wait : bool
             How the answer comes to the host; the call itself does not wait for it in either case.
 
@@ -594,7 +639,7 @@ class Device:
 
         Returns
         -------
-        CullResult
+        CullResult, or ViewsResult for several cameras
             The cull is recorded and submitted; reading the result waits for it.
 
         Raises
@@ -607,29 +652,80 @@ class Device:
         """
         _arguments.instance("instances", instances, Instances, "Instances of Device.instances")
         check_owner("instances", instances, self)
-        _arguments.instance("camera", camera, Camera, _ONE_CAMERA)
-        _arguments.instance("pyramid", pyramid, Pyramid, "a Pyramid of Device.pyramid")
-        check_owner("pyramid", pyramid, self)
-        if camera != pyramid.camera:
-            raise ValueError(_other_camera(camera, pyramid))
-        wait = _arguments.flag("wait", wait)
         options, outputs = cull_request(options, outputs, keywords)
-        if options.coverage == "sample" and pyramid._source.samples > 1:
-            raise ValueError(
-                'coverage: expected "area" for a pyramid of the farthest of '
-                f"{pyramid._source.samples} samples per pixel, which lie beside the pixels' "
-                'centres, got "sample"'
+        wait = _arguments.flag("wait", wait)
+        restriction = among_of(among, instances, self)
+        if isinstance(camera, Camera):
+            _arguments.instance("pyramid", pyramid, Pyramid, "a Pyramid of Device.pyramid")
+            assert isinstance(pyramid, Pyramid)
+            check_owner("pyramid", pyramid, self)
+            if camera != pyramid.camera:
+                raise ValueError(_other_camera("camera", camera, pyramid))
+            _check_coverage("coverage", options, pyramid)
+            culling = self._engine.cull(
+                instances._inner,
+                camera._inner,
+                pyramid._inner,
+                options,
+                outputs,
+                self._mesh_table(outputs.meshes),
+                restriction,
+                not wait,
             )
-        culling = self._engine.cull(
+            return CullResult(self, culling, Question(camera, pyramid, options, instances._points))
+        cameras, pyramids = pairs(camera, pyramid, self)
+        for number, (one, of) in enumerate(zip(cameras, pyramids, strict=True)):
+            if one != of.camera:
+                raise ValueError(_other_camera(f"camera[{number}]", one, of))
+            _check_coverage("coverage", options, of)
+        if outputs.meshes is not None:
+            raise ValueError(
+                f"meshes: expected None beside several cameras, got {len(outputs.meshes)}: levels "
+                "of detail are chosen for each view, so cull them one by one"
+            )
+        culled = self._engine.cull_views(
             instances._inner,
-            camera._inner,
-            pyramid._inner,
+            [one._inner for one in cameras],
+            [one._inner for one in pyramids],
             options,
             outputs,
-            self._mesh_table(outputs.meshes),
+            restriction,
             not wait,
         )
-        return CullResult(self, culling, Question(camera, pyramid, options, instances._points))
+        questions = [
+            Question(one, of, options, instances._points)
+            for one, of in zip(cameras, pyramids, strict=True)
+        ]
+        return ViewsResult(self, culled, questions)
+
+    def temporal(self, instances: Instances, *, early_capacity: int | None = None) -> Temporal:
+        """Makes the two passes of a view, which draw each frame what was visible, then the rest.
+
+        Make one for each view; `Temporal` says how a frame goes, and has an example.
+
+        Parameters
+        ----------
+        instances : Instances
+            Of this device.
+            They may be updated between frames.
+        early_capacity : int, optional
+            The most instances that an early pass draws, 0 to 2^32 - 1; None: all that it names.
+            What exceeds it is drawn by the late pass, if it is visible.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+        OutOfMemoryError
+            If the device cannot hold the masks.
+        """
+        _arguments.instance("instances", instances, Instances, "Instances of Device.instances")
+        check_owner("instances", instances, self)
+        if early_capacity is not None:
+            high = 2**32 - 1
+            early_capacity = _arguments.integer("early_capacity", early_capacity, low=0, high=high)
+        passes = CoreTwoPasses(self._engine, instances._inner, early_capacity)
+        return Temporal(self, passes, instances)
 
     def warm_up(
         self,
@@ -746,12 +842,16 @@ def maker_of(thing: OnDevice[Any]) -> Device:
     return device
 
 
-_ONE_CAMERA = (
-    "a Camera (one a call: each camera culls with the pyramid of its own depth, Device.pyramid)"
-)
+def _check_coverage(name: str, options: CullOptions, pyramid: Pyramid) -> None:
+    """Refuses sample coverage for the farthest of several samples."""
+    if options.coverage == "sample" and pyramid._source.samples > 1:
+        raise ValueError(
+            f'{name}: expected "area" for a pyramid of the farthest of {pyramid._source.samples} '
+            'samples per pixel, which lie beside the pixels\' centres, got "sample"'
+        )
 
 
-def _other_camera(camera: Camera, pyramid: Pyramid) -> str:
+def _other_camera(name: str, camera: Camera, pyramid: Pyramid) -> str:
     """Why a camera cannot cull with the pyramid of another one, and the way out."""
     way = "depth of one camera says nothing about another one"
     if camera.resized(pyramid.size) == pyramid.camera:
@@ -759,4 +859,4 @@ def _other_camera(camera: Camera, pyramid: Pyramid) -> str:
             f"pass camera.resized({pyramid.size}), the same view; "
             "the promise is about an image of that size"
         )
-    return f"camera: expected the camera of the pyramid, {pyramid.camera!r}, got {camera!r}; {way}"
+    return f"{name}: expected the camera of the pyramid, {pyramid.camera!r}, got {camera!r}; {way}"

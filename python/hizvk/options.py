@@ -22,6 +22,8 @@ from .lod import LodRule, lod_rule
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    import numpy.typing as npt
+
 __all__ = [
     "Coverage",
     "CullKeywords",
@@ -188,7 +190,9 @@ class MeshLods:
     errors: tuple[float, ...]
 
     def __init__(
-        self, draws: Sequence[DrawTemplate], errors: Sequence[float] | None = None
+        self,
+        draws: Sequence[DrawTemplate],
+        errors: Sequence[float] | npt.NDArray[np.floating] | None = None,
     ) -> None:
         if isinstance(draws, str) or not isinstance(draws, Sequence):
             got = _arguments.describe(draws)

@@ -74,7 +74,8 @@ class SharedArray(np.ndarray):
         return repr(self.view(np.ndarray))
 
 
-def _shared(array: npt.NDArray[np.generic]) -> Any:
+def shared(array: npt.NDArray[np.generic]) -> Any:
+    """The array as one that every read returns."""
     shared = array.view(SharedArray)
     shared.setflags(write=False)
     return shared
@@ -116,17 +117,17 @@ class CullResult(Awaited[CoreCulling]):
 
         They are about the bounds that were tested, also if these were updated before the read.
         """
-        return _shared(self._inner.verdicts())  # type: ignore[no-any-return]
+        return shared(self._inner.verdicts())  # type: ignore[no-any-return]
 
     @cached_property
     def mask(self) -> npt.NDArray[np.bool_]:
         """``(N,)`` bool: True for what is kept; complete, whatever the capacity of the list."""
-        return _shared(self._inner.mask())  # type: ignore[no-any-return]
+        return shared(self._inner.mask())  # type: ignore[no-any-return]
 
     @cached_property
     def indices(self) -> npt.NDArray[np.uint32]:
         """``(count,)`` uint32: the list of kept instances; ascending for ``order="stable"``."""
-        return _shared(self._inner.indices())  # type: ignore[no-any-return]
+        return shared(self._inner.indices())  # type: ignore[no-any-return]
 
     @cached_property
     def draws(self) -> npt.NDArray[np.void]:
@@ -156,7 +157,7 @@ class CullResult(Awaited[CoreCulling]):
         ValueError
             If the cull was not given ``meshes=``, or had ``order="any"``.
         """
-        return _shared(self._inner.lods())  # type: ignore[no-any-return]
+        return shared(self._inner.lods())  # type: ignore[no-any-return]
 
     def bin(self, *, mesh: int, lod: int) -> npt.NDArray[np.uint32]:
         """``(count,)`` uint32: what was listed of a mesh at one level of detail.

@@ -6,6 +6,7 @@
 // - Members of a group that is outside are outside.
 // - Members of a group that is hidden by depth are outside if their own certificates say so, and
 //   occluded otherwise.
+// - Members that were not asked for are outside (`among.wgsl`).
 //
 // The group is marked as told.
 // Another run, with other bounds even, changes nothing.
@@ -37,7 +38,7 @@ fn refine(@builtin(global_invocation_id) id: vec3<u32>) {
     let verdicts = verdicts_begin(piece.words);
     let end = min(first + GROUP, piece.count);
     for (var place = first; place < end; place += 1u) {
-        mask[verdicts + place] = of_group;
+        mask[verdicts + place] = select(OUTSIDE, of_group, is_among(place));
     }
     // `refine_groups.wgsl` adds a flag to OCCLUDED for groups that lie within the view.
     // Tuning for software drivers: a loop of its own, since they skip no branch but end a loop.

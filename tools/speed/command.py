@@ -20,6 +20,7 @@ from . import (
     calls,
     culling,
     depth_in,
+    emit,
     first_call,
     memory,
     occluders,
@@ -28,6 +29,7 @@ from . import (
     report,
     scale,
     transfers,
+    views,
 )
 from .figures import Found
 from .run import WORKLOADS, Run
@@ -48,8 +50,10 @@ PARTS: Final[dict[str, Callable[[Run], None]]] = {
     "reduction": reduction.measure,
     "depth-in": depth_in.measure,
     "cull": culling.measure,
+    "emit": emit.measure,
     "calls": calls.measure,
     "readback": readback.measure,
+    "views": views.measure,
     "occluders": occluders.measure,
     "bounds": bounds.measure,
     "transfers": transfers.measure,

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from hizvk._arguments import Size
     from hizvk.camera import Camera
     from hizvk.device import Device
+    from hizvk.lod import LodRule
     from hizvk.resources import DepthImage, Instances, Pyramid
 
     from .figures import Found
@@ -141,15 +142,22 @@ class Run:
         order: str = "stable",
         outputs: tuple[bool, bool, bool, bool] = MASK,
         depth: DepthImage | None = None,
+        bins: Outputs | None = None,
+        lod: LodRule | None = None,
     ) -> _core.YardstickCull:
-        """A cull that was recorded into buffers of its own; ``.ms()`` submits it and waits."""
+        """A cull that was recorded into buffers of its own; ``.ms()`` submits it and waits.
+
+        `bins` says what it makes of meshes, in place of `outputs`.
+        """
         mask, verdicts, indices, draws = outputs
+        made = Outputs(mask=mask, verdicts=verdicts, indices=indices, draws=draws)
         return self.yardstick.cull(
             instances._inner,
             camera._inner,
             pyramid._inner,
             certified,
-            CullOptions(order=order, hierarchy=groups),  # type: ignore[arg-type]
-            Outputs(mask=mask, verdicts=verdicts, indices=indices, draws=draws),
+            CullOptions(order=order, hierarchy=groups, lod=lod),  # type: ignore[arg-type]
+            made if bins is None else bins,
             None if depth is None else depth._inner,
+            None if bins is None else self.device._mesh_table(bins.meshes),
         )

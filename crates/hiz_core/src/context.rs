@@ -5,9 +5,14 @@
 
 use std::sync::Arc;
 
+use crate::cull::among::{Among, AmongMask, record_among};
+use crate::cull::early::record_early;
+use crate::cull::history::{EarlySet, Temporal};
 use crate::cull::inputs::CullInputs;
+use crate::cull::late::record_late;
 use crate::cull::options::CullOptions;
 use crate::cull::record::record_cull;
+use crate::cull::views::{View, ViewsInputs, record_cull_views};
 use crate::cull::warm_up::{WarmUp, record_warm_up};
 use crate::error::{Error, Result};
 use crate::gpu::device::Gpu;
@@ -27,6 +32,7 @@ use crate::occluders::uploaded::Occluders;
 use crate::output::mesh_table::{MeshLods, MeshTable};
 use crate::output::outputs::Outputs;
 use crate::output::readback::{AnswerInFlight, ReadbackRing, record_readback};
+use crate::output::views::{ViewsOutputs, VisibleViews};
 use crate::output::visible::Visible;
 use crate::pyramid::reduce::record_reduce;
 use crate::pyramid::region::record_reduce_region;
@@ -582,6 +588,281 @@ impl HizContext {
         )
     }
 
+    /// Makes the two passes of a view: the buffers that they fill, and its history.
+    ///
+    /// The capacity of `outputs` is that of the early pass's list.
+    /// What exceeds it is not drawn early, and the late pass draws what of it is visible.
+    /// The late pass's list has room for all instances.
+    /// Verdicts are those of the late pass.
+    ///
+    /// # Errors
+    /// Those of [`create_visible`](Self::create_visible), and [`Error::Invalid`] for outputs without
+    /// mask, indices and draws.
+    pub fn create_temporal(&self, instances: &Instances, outputs: &Outputs) -> Result<Temporal> {
+        Temporal::new(&self.gpu, instances, outputs)
+    }
+
+    /// Records the early pass of a frame, which needs no depth image: [`Temporal::early`] takes
+    /// what is drawn first.
+    ///
+    /// A frame goes on like this:
+    ///
+    /// 1. Draw [`Temporal::early`] into an empty depth buffer.
+    /// 2. [`record_reduce`](Self::record_reduce) that depth buffer.
+    /// 3. [`record_late`](Self::record_late), and draw [`Temporal::late`] into the same depth
+    ///    buffer.
+    ///
+    /// Then the image equals that of all instances, whatever the early pass drew.
+    /// `docs/accuracy.md` has the proof and its conditions.
+    ///
+    /// `options` are those of the late pass.
+    /// Of them only the hierarchy, the rule of LODs and the errors of the transform count here.
+    ///
+    /// A frame whose early pass is dropped, or never recorded, draws some instances twice and loses
+    /// none.
+    ///
+    /// # Errors
+    /// - [`Error::Mismatch`] for objects of another context, for instances of other numbers than
+    ///   `temporal` was made for, and for destroyed buffers.
+    /// - [`Error::Invalid`] for a mask without room for all instances or without the usage
+    ///   `STORAGE`, for [`Order::Any`](crate::Order::Any), for unusable options, and for a camera
+    ///   that float32 cannot hold.
+    /// - [`Error::OutOfMemory`].
+    ///
+    /// # Examples
+    /// A wall that hides a ball, and slides away in the second frame:
+    ///
+    /// ```
+    /// # use hiz_core::headless::Engine;
+    /// use hiz_core::{Bounds, CullOptions, EarlySet, Floats, InstanceOptions, Outputs};
+    /// # use hiz_core::{Camera, DepthConvention, ImageSize, Pose, Projection, PyramidOptions, wgpu};
+    /// # let engine = Engine::new(None)?;
+    /// # let (device, queue, hiz) = (engine.device(), engine.queue(), engine.context());
+    /// # let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
+    /// # let (fov_y, convention) = (std::f64::consts::FRAC_PI_2, DepthConvention::Reversed);
+    /// # let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
+    /// # let camera = Camera::look_at(&pose, &projection, ImageSize::new(64, 64))?;
+    /// # let pyramid = hiz.create_pyramid(camera.size(), &PyramidOptions::default())?;
+    /// # let bounds = |x: f32| -> ([f32; 6], [f32; 6]) {
+    /// #     ([x - 20.0, -20.0, -10.5, -0.5, -0.5, -20.5], [x + 20.0, 20.0, -10.0, 0.5, 0.5, -20.0])
+    /// # };
+    /// # // What the renderer draws of the two boxes: the wall's front is at z = -10.
+    /// # let draw = |is_wall: bool| {
+    /// #     engine.upload_depth(&[if is_wall { 0.01 } else { 0.0 }; 64 * 64], &camera)
+    /// # };
+    /// # let read = |visible: &hiz_core::Visible| {
+    /// #     let (told, answer) = std::sync::mpsc::channel();
+    /// #     let mask = visible.mask(0).unwrap().slice(..4);
+    /// #     wgpu::util::DownloadBuffer::read_buffer(device, queue, &mask, move |bytes| {
+    /// #         told.send(bytes.unwrap()[0]).unwrap();
+    /// #     });
+    /// #     engine.wait().unwrap();
+    /// #     answer.recv().unwrap()
+    /// # };
+    /// let (min, max) = bounds(0.0);
+    /// let bounds_0 = Bounds::Boxes { min: Floats::F32(&min), max: Floats::F32(&max) };
+    /// let instances = engine.instances(&bounds_0, &InstanceOptions::default())?;
+    /// let passes = hiz.create_temporal(&instances, &Outputs { mask: true, ..Outputs::NONE })?;
+    /// let options = CullOptions::default();
+    /// for (frame, x) in [0.0, 0.0, 100.0].into_iter().enumerate() {
+    ///     let (min, max) = bounds(x);
+    ///     let moved = Bounds::Boxes { min: Floats::F32(&min), max: Floats::F32(&max) };
+    ///     engine.update(&instances, 0, &moved, false)?;
+    ///
+    ///     let mut encoder = device.create_command_encoder(&Default::default());
+    ///     let set = EarlySet::LastVisible;
+    ///     hiz.record_early(&mut encoder, &instances, &camera, &passes, set, &options)?;
+    ///     # queue.submit([encoder.finish()]);
+    ///     # let mut encoder = device.create_command_encoder(&Default::default());
+    ///     # let early = read(passes.early());
+    ///     # let depth_image = draw(early & 1 != 0 && x == 0.0)?;
+    ///     # let depth = depth_image.texture().create_view(&Default::default());
+    ///     // Draw passes.early() into the depth buffer.
+    ///     hiz.record_reduce(&mut encoder, &depth, &camera, &pyramid)?;
+    ///     hiz.record_late(&mut encoder, &instances, &camera, &pyramid, &passes, &options)?;
+    ///     // Draw passes.late() into the same depth buffer.
+    ///     queue.submit([encoder.finish()]);
+    ///     # let late = read(passes.late());
+    ///     # // The first frame begins by size: wall and ball are both larger than 12 pixels or not.
+    ///     # if frame == 1 { assert_eq!((early, late), (0b01, 0)); }
+    ///     # if frame == 2 { assert_eq!((early, late), (0, 0b10)); }
+    /// }
+    /// # Ok::<(), hiz_core::Error>(())
+    /// ```
+    pub fn record_early(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &Instances,
+        camera: &Camera,
+        temporal: &Temporal,
+        set: EarlySet<'_>,
+        options: &CullOptions,
+    ) -> Result<()> {
+        record_early(&self.gpu, encoder, instances, camera, temporal, set, options)
+    }
+
+    /// Records the late pass of a frame: [`Temporal::late`] takes what is visible and was not drawn
+    /// by the early pass.
+    ///
+    /// `pyramid` was built from the depth that the early pass's list left, and camera and instances
+    /// are those of [`record_early`](Self::record_early).
+    /// Without an early pass since the last late one, nothing counts as drawn.
+    ///
+    /// The depth of the early pass comes from the renderer's own rasteriser.
+    /// So sample coverage needs an explicit guard here: at least half the driver's sub-pixel step,
+    /// and 0.002 px more.
+    /// 9/256 px covers the 4 bits that Vulkan asks for, which `SwiftShader` has; 1/256 px covers 8
+    /// bits.
+    ///
+    /// # Errors
+    /// - Those of [`record_cull`](Self::record_cull).
+    /// - [`Error::Mismatch`] for another camera or rule of LODs, for other instances, or for
+    ///   instances that were updated since `record_early`.
+    /// - [`Error::Invalid`] for [`Order::Any`](crate::Order::Any), and for sample coverage without
+    ///   a guard.
+    pub fn record_late(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &Instances,
+        camera: &Camera,
+        pyramid: &Pyramid,
+        temporal: &Temporal,
+        options: &CullOptions,
+    ) -> Result<()> {
+        let inputs = CullInputs::new(instances, camera, pyramid, options);
+        record_late(&self.gpu, encoder, &inputs, temporal)
+    }
+
+    /// Makes room for the instances that culls of `instances` may be restricted to; none at first.
+    ///
+    /// # Errors
+    /// - [`Error::Mismatch`] for instances of another context.
+    /// - [`Error::OutOfMemory`].
+    pub fn create_among(&self, instances: &Instances) -> Result<Among> {
+        Among::new(&self.gpu, instances)
+    }
+
+    /// Records a pass that fills `among` with the instances of a mask.
+    ///
+    /// A mask on the device never visits the host: the shadow casters of a cascade are those that
+    /// the light's cull has kept and that lie in the cascade's slice.
+    ///
+    /// # Errors
+    /// - [`Error::Mismatch`] for objects of another context or of other instances, and for a cull
+    ///   without a mask.
+    /// - [`Error::Invalid`] for another number of words.
+    /// - [`Error::OutOfMemory`].
+    pub fn record_among(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &Instances,
+        mask: &AmongMask<'_>,
+        among: &Among,
+    ) -> Result<()> {
+        record_among(&self.gpu, encoder, instances, mask, among)
+    }
+
+    /// [`record_cull`](Self::record_cull) of the instances `among` alone.
+    ///
+    /// The others are not kept, and not tested: groups without one that is asked for cost as much
+    /// as hidden ones.
+    ///
+    /// # Errors
+    /// Those of `record_cull`, and [`Error::Mismatch`] for an `among` of other instances.
+    #[expect(clippy::too_many_arguments, reason = "as record_cull, and among")]
+    pub fn record_cull_among(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &Instances,
+        among: &Among,
+        camera: &Camera,
+        pyramid: &Pyramid,
+        visible: &Visible,
+        options: &CullOptions,
+    ) -> Result<()> {
+        let inputs = CullInputs::new(instances, camera, pyramid, options);
+        record_cull(&self.gpu, encoder, &CullInputs { among: Some(among), ..inputs }, visible)
+    }
+
+    /// Makes the buffers that take what culls for `views` views find, of 1..=[`MAX_VIEWS`].
+    ///
+    /// [`MAX_VIEWS`]: crate::MAX_VIEWS
+    ///
+    /// # Errors
+    /// Those of [`HizContext::create_visible`], and [`Error::Invalid`] for another number of views.
+    pub fn create_visible_views(
+        &self,
+        instances: &Instances,
+        views: usize,
+        outputs: &ViewsOutputs,
+    ) -> Result<VisibleViews> {
+        VisibleViews::new(&self.gpu, instances, views, outputs)
+    }
+
+    /// Records the culls of several views in one go, and joins what they keep.
+    ///
+    /// Each view has a camera and a pyramid of its own; sizes and conventions may differ.
+    /// Nothing that one view hides is taken from another one.
+    /// `among`: only these instances are asked for, in all views.
+    ///
+    /// # Errors
+    /// Those of [`record_cull`](Self::record_cull), and [`Error::Mismatch`] for another number of
+    /// views than the buffers are for.
+    ///
+    /// # Examples
+    /// Two eyes, and one list for both:
+    ///
+    /// ```
+    /// # use hiz_core::headless::Engine;
+    /// # use hiz_core::{Bounds, Camera, DepthConvention, Floats, ImageSize, InstanceOptions};
+    /// # use hiz_core::{Pose, Projection};
+    /// use hiz_core::{CullOptions, View, ViewsOutputs, wgpu};
+    /// # let engine = Engine::new(None)?;
+    /// # let (device, queue, hiz) = (engine.device(), engine.queue(), engine.context());
+    /// # let eye = |x| {
+    /// #     let pose = Pose { eye: [x, 0.0, 0.0], target: [x, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
+    /// #     let (fov_y, convention) = (1.0, DepthConvention::Reversed);
+    /// #     let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
+    /// #     Camera::look_at(&pose, &projection, ImageSize::new(64, 64))
+    /// # };
+    /// # let (left, right) = (eye(-0.03)?, eye(0.03)?);
+    /// # let pyramid = |camera| engine.pyramid(&engine.upload_depth(&[0.01; 64 * 64], camera)?);
+    /// # let (hiz_left, hiz_right) = (pyramid(&left)?, pyramid(&right)?);
+    /// # let (centers, radii) = ([0.0, 0.0, -5.0, 0.0, 0.0, -20.0], [0.5, 0.5]);
+    /// # let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
+    /// # let instances = engine.instances(&bounds, &InstanceOptions::default())?;
+    /// # let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    /// let eyes = [
+    ///     View { camera: &left, pyramid: &hiz_left },
+    ///     View { camera: &right, pyramid: &hiz_right },
+    /// ];
+    /// let views = hiz.create_visible_views(&instances, 2, &ViewsOutputs::default())?;
+    /// let options = CullOptions::default();
+    /// hiz.record_cull_views(&mut encoder, &instances, &eyes, None, &views, &options)?;
+    /// // Both eyes draw `views.any()`, and a shader finds the bit of each in `views.masks()`.
+    /// let draws = views.any().draw_arguments().expect("asked for by default");
+    /// # queue.submit([encoder.finish()]);
+    /// # let (told, answer) = std::sync::mpsc::channel();
+    /// # wgpu::util::DownloadBuffer::read_buffer(device, queue, &draws.slice(..), move |bytes| {
+    /// #     told.send(bytes.unwrap().to_vec()).unwrap();
+    /// # });
+    /// # engine.wait()?;
+    /// # assert_eq!(answer.recv().unwrap()[4..8], 1_u32.to_le_bytes());
+    /// # Ok::<(), hiz_core::Error>(())
+    /// ```
+    pub fn record_cull_views(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &Instances,
+        views: &[View<'_>],
+        among: Option<&Among>,
+        visible: &VisibleViews,
+        options: &CullOptions,
+    ) -> Result<()> {
+        let inputs = ViewsInputs { instances, views, among, options, idle: false };
+        record_cull_views(&self.gpu, encoder, &inputs, &visible.each(), visible.joined())
+    }
+
     /// Makes a ring of `slots` (1..=64) for answers on their way to the host.
     ///
     /// # Errors
@@ -657,8 +938,9 @@ fn needed(have: &wgpu::Limits) -> Vec<(&'static str, u64, u64)> {
         max_bind_groups_plus_vertex_buffers >= 4,
         // The view of a cull (`cull/pipelines.rs`, `DepthStore::layout`).
         max_bindings_per_bind_group >= 7,
-        // A depth image; slots and mesh table of a cull that emits bins.
-        max_sampled_textures_per_shader_stage >= 3,
+        // A depth image; slots and mesh table of a cull that emits bins; which instances are asked
+        // for.
+        max_sampled_textures_per_shader_stage >= 4,
         max_samplers_per_shader_stage >= 1,
         // The cull of members: three chunks, mask, list, draws, statistics, survivors.
         max_storage_buffers_per_shader_stage >= 8,

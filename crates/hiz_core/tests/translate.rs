@@ -13,6 +13,7 @@ const ONE_TO_THREE: &[f64] = &[1.0, 2.0, 3.0];
 
 /// The values that pipelines give each override.
 const VALUES: &[(&str, &[f64])] = &[
+    ("AMONG", FLAG),
     ("APPEND", FLAG),
     ("CAPPED", FLAG),
     ("CHUNKS", ONE_TO_THREE),
@@ -22,6 +23,7 @@ const VALUES: &[(&str, &[f64])] = &[
     ("FIT_VOLUME", FLAG),
     ("FOOTPRINT_LOG2", ONE_TO_THREE),
     ("FROM_SOURCE", FLAG),
+    ("INDEX_TEXEL", ONE_TO_THREE),
     ("LIST", FLAG),
     ("LOD_RULE", &[0.0, 1.0, 2.0, 3.0]),
     ("MASK", FLAG),
@@ -33,6 +35,7 @@ const VALUES: &[(&str, &[f64])] = &[
     ("SORTED", FLAG),
     ("STATISTICS", FLAG),
     ("TALL", FLAG),
+    ("TEXELS", ONE_TO_THREE),
     ("VERDICTS", FLAG),
 ];
 

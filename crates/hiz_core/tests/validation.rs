@@ -903,7 +903,7 @@ fn least() -> wgpu::Limits {
         max_bind_groups: 4,
         max_bind_groups_plus_vertex_buffers: 4,
         max_bindings_per_bind_group: 7,
-        max_sampled_textures_per_shader_stage: 3,
+        max_sampled_textures_per_shader_stage: 4,
         max_samplers_per_shader_stage: 1,
         max_storage_buffers_per_shader_stage: 8,
         max_storage_textures_per_shader_stage: 3,

@@ -5,10 +5,10 @@ mod common;
 use std::sync::Arc;
 
 use common::{camera_along_z, engine, ndc};
-use hiz_core::headless::{CULLS_IN_FLIGHT, Engine};
+use hiz_core::headless::{AmongSource, CULLS_IN_FLIGHT, CullExtras, Engine};
 use hiz_core::{
-    Bounds, CullOptions, DepthConvention, Error, Floats, Hierarchy, InstanceOptions, Instances,
-    Outputs, Pyramid, Verdict, wgpu,
+    AmongMask, Bounds, Camera, CullOptions, DepthConvention, Error, Floats, Hierarchy,
+    InstanceOptions, Instances, Outputs, Pyramid, Verdict, View, ViewsOutputs, wgpu,
 };
 
 const CONVENTION: DepthConvention = DepthConvention::Reversed;
@@ -70,7 +70,7 @@ fn expected_mask(count: usize) -> Vec<bool> {
     (0..count).map(|i| verdict(i) == Verdict::Visible).collect()
 }
 
-// -- answers that come by themselves ---------------------------------------------------------------
+// -- answers that come by themselves --------------------------------------------------------------
 
 #[test]
 fn what_was_copied_ahead_is_what_the_cull_found() {
@@ -217,4 +217,398 @@ fn a_ring_brings_answers_and_refuses_one_too_many() {
         let error = hiz.record_readback(&mut encoder(), &visible, &elsewhere).unwrap_err();
         assert!(matches!(error, Error::Mismatch { .. }), "{error}");
     }
+}
+
+// -- several views in one call --------------------------------------------------------------------
+
+/// Which half of a view's image a wall at depth 8 covers.
+#[derive(Clone, Copy, PartialEq)]
+enum Wall {
+    Left,
+    Right,
+    Nowhere,
+}
+
+/// A view: its image, its convention and its wall.
+type Seen = ((u32, u32), DepthConvention, Wall);
+
+/// Two eyes that differ in everything, and a third view that hides what the first one hides.
+const VIEWS: [Seen; 3] = [
+    ((64, 48), DepthConvention::Reversed, Wall::Left),
+    ((35, 21), DepthConvention::Standard, Wall::Right),
+    ((16, 80), DepthConvention::Reversed, Wall::Left),
+];
+
+fn is_kept(i: usize, wall: Wall) -> bool {
+    match place(i) {
+        Place::Before => true,
+        Place::Behind => wall != Wall::Left,
+        Place::Beside => wall != Wall::Right,
+        Place::Outside => false,
+    }
+}
+
+fn camera_of((size, convention, _): Seen) -> Camera {
+    camera_along_z(size.0, size.1, convention)
+}
+
+fn pyramid_of(engine: &Engine, seen: Seen) -> Arc<Pyramid> {
+    let ((width, height), convention, wall) = seen;
+    let pixel = |i: u32| {
+        let is_left = 2 * (i % width) < width;
+        let is_wall = match wall {
+            Wall::Left => is_left,
+            Wall::Right => !is_left || 2 * (i % width) + 1 == width,
+            Wall::Nowhere => false,
+        };
+        let far = if convention == DepthConvention::Standard { 1.0 } else { 0.0 };
+        if is_wall { ndc(8.0, convention) } else { far }
+    };
+    let image: Vec<f32> = (0..width * height).map(pixel).collect();
+    engine.pyramid(&engine.upload_depth(&image, &camera_of(seen)).unwrap()).unwrap()
+}
+
+fn bytes_of(engine: &Engine, buffer: &wgpu::Buffer) -> Vec<u8> {
+    let (told, answer) = std::sync::mpsc::channel();
+    let (device, queue) = (engine.device(), engine.queue());
+    wgpu::util::DownloadBuffer::read_buffer(device, queue, &buffer.slice(..), move |bytes| {
+        told.send(bytes.unwrap().to_vec()).unwrap();
+    });
+    engine.wait().unwrap();
+    answer.recv().unwrap()
+}
+
+fn bit(bytes: &[u8], i: usize) -> bool {
+    bytes[i / 8] >> (i % 8) & 1 == 1
+}
+
+/// What `record_cull_views` leaves for these views: a mask per view, and the list of any.
+fn recorded_views(
+    engine: &Engine,
+    views: &[Seen],
+    count: usize,
+    pieces: Option<u32>,
+    among: Option<&[u32]>,
+) -> (Vec<Vec<bool>>, Vec<u32>) {
+    let (device, hiz) = (engine.device(), engine.context());
+    let instances = upload(engine, count, pieces);
+    let cameras: Vec<_> = views.iter().map(|seen| camera_of(*seen)).collect();
+    let pyramids: Vec<_> = views.iter().map(|seen| pyramid_of(engine, *seen)).collect();
+    let of_views: Vec<_> =
+        cameras.iter().zip(&pyramids).map(|(camera, pyramid)| View { camera, pyramid }).collect();
+    let visible =
+        hiz.create_visible_views(&instances, views.len(), &ViewsOutputs::default()).unwrap();
+    let restricted = hiz.create_among(&instances).unwrap();
+    // What an earlier recording has left must not show.
+    let junk = vec![0xFF_u8; visible.any().mask(0).unwrap().size() as usize];
+    engine.queue().write_buffer(visible.any().mask(0).unwrap(), 0, &junk);
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    if let Some(bits) = among {
+        let mask = AmongMask::Bits(bits);
+        hiz.record_among(&mut encoder, &instances, &mask, &restricted).unwrap();
+    }
+    let among = among.map(|_| &restricted);
+    let options = CullOptions::default();
+    hiz.record_cull_views(&mut encoder, &instances, &of_views, among, &visible, &options).unwrap();
+    let ring = hiz.create_readback(1).unwrap();
+    let any = hiz.record_readback(&mut encoder, visible.any(), &ring).unwrap();
+    engine.queue().submit([encoder.finish()]);
+    engine.wait().unwrap();
+    assert_eq!(visible.mask_stride() % 256, 0);
+    let rows = bytes_of(engine, visible.masks());
+    let rows: Vec<Vec<bool>> = rows
+        .chunks_exact(visible.mask_stride() as usize)
+        .map(|row| (0..count).map(|i| bit(row, i)).collect())
+        .collect();
+    assert_eq!((rows.len(), visible.num_views()), (views.len(), views.len()));
+    for (view, row) in rows.iter().enumerate() {
+        let mut own = Vec::new();
+        for piece in 0..visible.view(view).num_pieces() {
+            let bytes = bytes_of(engine, visible.view(view).mask(piece).unwrap());
+            let left = count - own.len();
+            let here = pieces.map_or(left, |most| left.min(most as usize));
+            own.extend((0..here).map(|i| bit(&bytes, i)));
+        }
+        if own != *row {
+            // As where a fault is planted.
+            return (vec![own], Vec::new());
+        }
+    }
+    (rows, any.answer().unwrap().indices)
+}
+
+fn expected_views(
+    views: &[Seen],
+    count: usize,
+    among: impl Fn(usize) -> bool,
+) -> (Vec<Vec<bool>>, Vec<u32>) {
+    let row = |(_, _, wall): &Seen| (0..count).map(|i| among(i) && is_kept(i, *wall)).collect();
+    let rows: Vec<Vec<bool>> = views.iter().map(row).collect();
+    let any = (0..count as u32).filter(|i| rows.iter().any(|row| row[*i as usize]));
+    (rows.clone(), any.collect())
+}
+
+/// Each view decides for itself, whatever its size and convention, and the list is of their union.
+/// A list of what one eye sees lacks what only the other one sees: a fault that engines have had.
+#[test]
+fn views_keep_what_each_of_them_sees() {
+    let engine = engine();
+    for (count, pieces) in [(0, None), (1, None), (33, None), (700, None), (700, Some(128))] {
+        for views in [&VIEWS[..], &VIEWS[..1], &VIEWS[1..], &[VIEWS[0], VIEWS[0], VIEWS[2]]] {
+            let found = recorded_views(&engine, views, count, pieces, None);
+            assert!(found == expected_views(views, count, |_| true), "{count} {pieces:?}");
+        }
+    }
+    let one_eye = expected_views(&VIEWS[..1], 700, |_| true);
+    assert_ne!(one_eye.1, expected_views(&VIEWS, 700, |_| true).1, "the eyes differ");
+}
+
+#[test]
+fn views_in_groups_keep_the_same() {
+    let engine = engine();
+    let found = recorded_views(&engine, &VIEWS, 40_000, None, None);
+    assert!(found == expected_views(&VIEWS, 40_000, |_| true));
+}
+
+/// Bits of a mask without a pattern of groups.
+fn asked(i: usize) -> bool {
+    (i * i / 5 + i / 64) % 3 == 0 && i / 128 != 2
+}
+
+fn words_of(count: usize, asked: impl Fn(usize) -> bool) -> Vec<u32> {
+    let word = |w: usize| {
+        (0..32).filter(|k| 32 * w + k < count && asked(32 * w + k)).fold(0, |word, k| word | 1 << k)
+    };
+    (0..count.div_ceil(32)).map(word).collect()
+}
+
+#[test]
+fn views_of_some_instances_keep_none_of_the_others() {
+    let engine = engine();
+    for (count, pieces) in [(0, None), (65, None), (700, Some(128)), (40_000, None)] {
+        let words = words_of(count, asked);
+        let found = recorded_views(&engine, &VIEWS, count, pieces, Some(&words));
+        assert!(found == expected_views(&VIEWS, count, asked), "{count} {pieces:?}");
+    }
+}
+
+/// Faults of the masks, the union and the restriction; each must lose or add an instance.
+#[test]
+fn planted_faults_of_views_are_found() {
+    let faults = [
+        ("join.view * join.stride", "join.view * join.words", "a stride without alignment"),
+        ("masks[join.view", "masks[(join.view / 2u)", "each view writes where another does"),
+        ("joined |= any_mask[word]", "joined &= any_mask[word]", "OR as AND"),
+        ("joined |= any_mask[word]", "joined = any_mask[word]", "one eye decides for both"),
+        ("if join.view > 0u", "if join.view >= 0u", "the union of an earlier recording"),
+        (
+            "textureLoad(records, record_position(first + k, INDEX_TEXEL, TEXELS)).w",
+            "first + k",
+            "places taken for indices",
+        ),
+        ("(word) | among_word(word + 1u)) != 0u", "(word)) != 0u", "half of a group forgotten"),
+        ("(place % AMONG_BITS)", "((place + 1u) % AMONG_BITS)", "a place beside"),
+        ("if is_among(place) {", "if is_among(place) || place >= 0u {", "all are asked for"),
+    ];
+    // Only the second half of a group is asked for where there is one.
+    let asked = |i: usize| if i < 20_000 { asked(i) } else { i % 64 >= 32 && i % 640 < 64 };
+    let count = 40_000;
+    let words = words_of(count, asked);
+    let whole = engine();
+    let expected = expected_views(&VIEWS, count, asked);
+    assert!(recorded_views(&whole, &VIEWS, count, None, Some(&words)) == expected);
+    for (what, by, name) in faults {
+        let engine = Engine::with_planted_faults(None, &[(what, by)]).unwrap();
+        let found = recorded_views(&engine, &VIEWS, count, None, Some(&words));
+        assert!(found != expected, "{name}");
+    }
+}
+
+/// Verdicts, counts, texels and explanations of a cull of some instances.
+#[test]
+fn what_is_not_asked_for_is_outside_and_costs_no_test() {
+    let engine = engine();
+    let (camera, pyramid) = (camera_of(VIEWS[0]), pyramid_of(&engine, VIEWS[0]));
+    for (count, pieces) in [(700, None), (700, Some(128)), (1, None)] {
+        let instances = upload(&engine, count, pieces);
+        let flags: Vec<bool> = (0..count).map(asked).collect();
+        let among = engine.among(&instances, &AmongSource::Mask(&flags)).unwrap();
+        for (hierarchy, ahead) in
+            [(Hierarchy::Never, false), (Hierarchy::Always, false), (Hierarchy::Always, true)]
+        {
+            let what = format!("{count} {pieces:?} {hierarchy:?} {ahead}");
+            let options = CullOptions { hierarchy, statistics: true, ..CullOptions::default() };
+            let extras = CullExtras { among: Some(&among), ahead };
+            let cull = |outputs| {
+                engine
+                    .cull_given(&instances, &camera, &pyramid, &options, outputs, &extras)
+                    .unwrap()
+            };
+            // Buffers are lent again, so the verdicts of another cull lie there before.
+            engine.cull(&instances, &camera, &pyramid, &options, &Outputs::ALL).unwrap();
+            let culling = cull(&Outputs::ALL);
+            let expected = |i: usize| if asked(i) { verdict(i) } else { Verdict::Outside };
+            assert!(culling.verdicts().unwrap() == (0..count).map(expected).collect::<Vec<_>>());
+            let kept: Vec<u32> =
+                (0..count).filter(|i| expected(*i) == Verdict::Visible).map(|i| i as u32).collect();
+            assert_eq!(culling.indices().unwrap(), kept, "{what}");
+            let counts = culling.counts().unwrap();
+            assert_eq!(counts.visible as usize, kept.len(), "{what}");
+            if hierarchy == Hierarchy::Never {
+                // Each that is asked for and in view is compared with depth once, no other.
+                let compared = (0..count).filter(|i| asked(*i) && place(*i) != Place::Outside);
+                assert_eq!(counts.levels.iter().sum::<u64>() as usize, compared.count(), "{what}");
+            }
+            let other = (0..count).find(|i| !asked(*i) && place(*i) == Place::Before);
+            if let Some(i) = other {
+                let told = culling.explain(i as u64).unwrap();
+                assert_eq!(told.verdict, Verdict::Outside);
+                assert!(told.reason.starts_with("not among the instances"), "{}", told.reason);
+            }
+            // What this cull has kept restricts the next one: the mask never visits the host.
+            let next = engine.among(&instances, &AmongSource::Kept(&culling)).unwrap();
+            let extras = CullExtras { among: Some(&next), ahead };
+            let (camera, pyramid) = (camera_of(VIEWS[1]), pyramid_of(&engine, VIEWS[1]));
+            let both = engine
+                .cull_given(&instances, &camera, &pyramid, &options, &Outputs::ALL, &extras)
+                .unwrap();
+            let in_both = |i: usize| asked(i) && is_kept(i, Wall::Left) && is_kept(i, Wall::Right);
+            assert!(both.mask().unwrap() == (0..count).map(in_both).collect::<Vec<_>>(), "{what}");
+        }
+        let nobody = engine.among(&instances, &AmongSource::Mask(&vec![false; count])).unwrap();
+        let options = CullOptions { statistics: true, ..CullOptions::default() };
+        let extras = CullExtras { among: Some(&nobody), ahead: false };
+        let culling = engine
+            .cull_given(&instances, &camera, &pyramid, &options, &Outputs::ALL, &extras)
+            .unwrap();
+        assert_eq!(culling.counts().unwrap().texels_read, 0);
+        assert_eq!(culling.indices().unwrap(), []);
+    }
+    // Invalid bounds are kept, but only where they are asked for.
+    let (centers, radii) = ([f32::NAN; 6], [1.0; 2]);
+    let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
+    let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
+    let among = engine.among(&instances, &AmongSource::Mask(&[false, true])).unwrap();
+    let extras = CullExtras { among: Some(&among), ahead: false };
+    let (options, outputs) = (CullOptions::default(), Outputs::ALL);
+    let culling =
+        engine.cull_given(&instances, &camera, &pyramid, &options, &outputs, &extras).unwrap();
+    assert_eq!(culling.verdicts().unwrap(), [Verdict::Outside, Verdict::Invalid]);
+}
+
+#[test]
+fn all_kinds_of_bounds_are_restricted_in_stored_order() {
+    let engine = engine();
+    let (camera, pyramid) = (camera_of(VIEWS[0]), pyramid_of(&engine, VIEWS[0]));
+    let count = 700;
+    let (centers, _) = spheres(count);
+    let corner = |sign: f32| centers.iter().map(|c| c + 0.005 * sign).collect::<Vec<_>>();
+    let (low, high) = (corner(-1.0), corner(1.0));
+    let rotations: Vec<f32> =
+        (0..count).flat_map(|_| [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]).collect();
+    let half = vec![0.005; 3 * count];
+    let boxes = Bounds::Boxes { min: Floats::F32(&low), max: Floats::F32(&high) };
+    let oriented = Bounds::OrientedBoxes {
+        centers: Floats::F32(&centers),
+        half_sizes: Floats::F32(&half),
+        rotations: Floats::F32(&rotations),
+    };
+    let flags: Vec<bool> = (0..count).map(asked).collect();
+    for bounds in [boxes, oriented] {
+        let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
+        let among = engine.among(&instances, &AmongSource::Mask(&flags)).unwrap();
+        let extras = CullExtras { among: Some(&among), ahead: false };
+        let (options, outputs) = (CullOptions::default(), Outputs::ALL);
+        let culling =
+            engine.cull_given(&instances, &camera, &pyramid, &options, &outputs, &extras).unwrap();
+        let expected = |i: usize| asked(i) && is_kept(i, Wall::Left);
+        assert!(culling.mask().unwrap() == (0..count).map(expected).collect::<Vec<_>>());
+    }
+}
+
+#[test]
+fn views_without_a_renderer_answer_in_one_readback() {
+    let engine = engine();
+    let cameras: Vec<_> = VIEWS.iter().map(|seen| camera_of(*seen)).collect();
+    let pyramids: Vec<_> = VIEWS.iter().map(|seen| pyramid_of(&engine, *seen)).collect();
+    let views: Vec<_> = cameras.iter().zip(&pyramids).collect();
+    for (count, pieces) in [(0, None), (700, None), (700, Some(128)), (40_000, None)] {
+        let instances = upload(&engine, count, pieces);
+        let (rows, any) = expected_views(&VIEWS, count, |_| true);
+        for ahead in [false, true, true] {
+            let outputs = ViewsOutputs {
+                each: Outputs { mask: true, verdicts: true, ..Outputs::NONE },
+                ..ViewsOutputs::default()
+            };
+            let extras = CullExtras { ahead, ..CullExtras::default() };
+            let options = CullOptions::default();
+            let culling =
+                engine.cull_views(&instances, &views, &options, &outputs, &extras).unwrap();
+            while !culling.is_ready().unwrap() {
+                std::thread::yield_now();
+            }
+            assert!(culling.masks().unwrap() == rows.concat());
+            assert_eq!(culling.any_indices().unwrap(), any);
+            let kept: Vec<u32> = (0..count as u32)
+                .zip(culling.any().unwrap())
+                .filter_map(|(i, kept)| kept.then_some(i))
+                .collect();
+            assert_eq!(kept, any);
+            let drawn: u32 = culling.any_draws().unwrap().iter().map(|d| d.instance_count).sum();
+            assert_eq!(drawn as usize, any.len());
+            for (view, row) in rows.iter().enumerate() {
+                let one = culling.view(view);
+                assert!(one.mask().unwrap() == *row);
+                let kept = row.iter().filter(|kept| **kept).count();
+                assert_eq!(one.counts().unwrap().visible as usize, kept);
+                assert_eq!(one.indices().unwrap().len(), kept);
+            }
+            // Those that any view has kept are all that the next call asks for.
+            let among = engine.among(&instances, &AmongSource::KeptByAny(&culling)).unwrap();
+            let extras = CullExtras { among: Some(&among), ahead };
+            let empty = ((9, 9), DepthConvention::Reversed, Wall::Nowhere);
+            let (camera, pyramid) = (camera_of(empty), pyramid_of(&engine, empty));
+            let (one, outputs) = ([(&camera, &pyramid)], ViewsOutputs::default());
+            let next = engine.cull_views(&instances, &one, &options, &outputs, &extras).unwrap();
+            assert_eq!(next.any_indices().unwrap(), any);
+        }
+    }
+}
+
+#[test]
+fn views_that_do_not_belong_together_are_refused() {
+    let engine = engine();
+    let hiz = engine.context();
+    let (instances, others) = (upload(&engine, 100, None), upload(&engine, 90, None));
+    let (camera, pyramid) = (camera_of(VIEWS[0]), pyramid_of(&engine, VIEWS[0]));
+    let outputs = ViewsOutputs::default();
+    for views in [0, 257] {
+        let error = hiz.create_visible_views(&instances, views, &outputs).unwrap_err().to_string();
+        assert!(error.contains("views: expected 1..=256 views"), "{error}");
+    }
+    let visible = hiz.create_visible_views(&instances, 2, &outputs).unwrap();
+    let view = View { camera: &camera, pyramid: &pyramid };
+    let descriptor = wgpu::CommandEncoderDescriptor::default();
+    let mut encoder = engine.device().create_command_encoder(&descriptor);
+    let mut record =
+        |instances: &Instances, views: &[View<'_>], among: Option<&hiz_core::Among>| {
+            let options = CullOptions::default();
+            hiz.record_cull_views(&mut encoder, instances, views, among, &visible, &options)
+                .map_or_else(|error| error.to_string(), |()| "no error".to_owned())
+        };
+    assert!(record(&instances, &[view], None).contains("views: expected 2 views"));
+    assert!(record(&others, &[view; 2], None).contains("visible: expected buffers that were"));
+    let among = hiz.create_among(&others).unwrap();
+    let error = record(&instances, &[view; 2], Some(&among));
+    assert!(error.contains("among: expected one of these 100 instances, got one of 90"), "{error}");
+    assert_eq!(record(&instances, &[view; 2], None), "no error");
+    let bits = AmongMask::Bits(&[0]);
+    let among = hiz.create_among(&instances).unwrap();
+    let error = hiz.record_among(&mut encoder, &instances, &bits, &among).unwrap_err().to_string();
+    assert!(error.contains("mask: expected 4 words for 100 instances, got 1"), "{error}");
+    let no_mask = hiz.create_visible(&instances, &Outputs { draws: true, ..Outputs::NONE });
+    let kept = no_mask.unwrap();
+    let error =
+        hiz.record_among(&mut encoder, &instances, &AmongMask::Kept(&kept), &among).unwrap_err();
+    assert!(error.to_string().contains("expected a cull that was asked for mask"), "{error}");
 }

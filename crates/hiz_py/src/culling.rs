@@ -1,5 +1,7 @@
 //! The answer of a cull, which is read on request.
 
+use std::sync::Arc;
+
 use hiz_core::{Verdict, headless};
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -9,9 +11,9 @@ use crate::held::{Held, OnDevice};
 
 /// A submitted cull.
 #[pyclass(frozen, module = "hizvk._core")]
-pub(crate) struct Culling(pub(crate) Held<headless::Culling>);
+pub(crate) struct Culling(pub(crate) Held<Arc<headless::Culling>>);
 
-impl OnDevice for headless::Culling {}
+impl OnDevice for Arc<headless::Culling> {}
 
 #[pymethods]
 impl Culling {
@@ -21,42 +23,43 @@ impl Culling {
 
     /// Whether the answer has arrived; waits for nothing.
     fn is_ready(&self, py: Python<'_>) -> PyResult<bool> {
-        self.0.run(py, headless::Culling::is_ready)
+        self.0.run(py, |culling| culling.is_ready())
     }
 
     fn wait(&self, py: Python<'_>) -> PyResult<()> {
-        self.0.run(py, headless::Culling::wait)
+        self.0.run(py, |culling| culling.wait())
     }
 
     fn mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        self.0.run(py, headless::Culling::mask).map(|mask| PyArray1::from_vec(py, mask))
+        self.0.run(py, |culling| culling.mask()).map(|mask| PyArray1::from_vec(py, mask))
     }
 
     fn verdicts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
-        let codes =
-            |culling: &headless::Culling| culling.verdicts().map(bytemuck::cast_vec::<Verdict, u8>);
+        let codes = |culling: &Arc<headless::Culling>| {
+            culling.verdicts().map(bytemuck::cast_vec::<Verdict, u8>)
+        };
         self.0.run(py, codes).map(|verdicts| PyArray1::from_vec(py, verdicts))
     }
 
     fn indices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
-        self.0.run(py, headless::Culling::indices).map(|indices| PyArray1::from_vec(py, indices))
+        self.0.run(py, |culling| culling.indices()).map(|indices| PyArray1::from_vec(py, indices))
     }
 
     /// The records one after the other, 20 bytes each.
     fn draws<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         self.0
-            .run(py, headless::Culling::draws)
+            .run(py, |culling| culling.draws())
             .map(|draws| PyBytes::new(py, bytemuck::cast_slice(&draws)))
     }
 
     /// How many records of each piece draw something.
     fn draw_counts(&self, py: Python<'_>) -> PyResult<Vec<u32>> {
-        self.0.run(py, headless::Culling::draw_counts)
+        self.0.run(py, |culling| culling.draw_counts())
     }
 
     /// The LOD of each instance; 255 for those that are not kept.
     fn lods<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
-        self.0.run(py, headless::Culling::lods).map(|lods| PyArray1::from_vec(py, lods))
+        self.0.run(py, |culling| culling.lods()).map(|lods| PyArray1::from_vec(py, lods))
     }
 
     /// The list of one bin.
@@ -66,17 +69,17 @@ impl Culling {
         mesh: u32,
         lod: u32,
     ) -> PyResult<Bound<'py, PyArray1<u32>>> {
-        let bin = |culling: &headless::Culling| culling.bin(mesh, lod);
+        let bin = |culling: &Arc<headless::Culling>| culling.bin(mesh, lod);
         self.0.run(py, bin).map(|indices| PyArray1::from_vec(py, indices))
     }
 
     fn counts(&self, py: Python<'_>) -> PyResult<Counts> {
-        Ok(Counts::of(&self.0.run(py, headless::Culling::counts)?))
+        Ok(Counts::of(&self.0.run(py, |culling| culling.counts())?))
     }
 
     /// How many instances were kept, if that is known, and how many of them are listed.
     fn demand_and_written(&self, py: Python<'_>) -> PyResult<(Option<u64>, u64)> {
-        self.0.run(py, headless::Culling::demand_and_written)
+        self.0.run(py, |culling| culling.demand_and_written())
     }
 
     /// Milliseconds for recording, for compiling, until the device was done, and for readback.
@@ -87,6 +90,58 @@ impl Culling {
 
     fn explain(&self, py: Python<'_>, index: u64) -> PyResult<Explanation> {
         self.0.run(py, |culling| culling.explain(index)).map(Explanation)
+    }
+}
+
+/// A submitted cull for several views.
+#[pyclass(frozen, module = "hizvk._core")]
+pub(crate) struct ViewsCulling(pub(crate) Held<headless::ViewsCulling>);
+
+impl OnDevice for headless::ViewsCulling {}
+
+#[pymethods]
+impl ViewsCulling {
+    fn num_instances(&self, py: Python<'_>) -> PyResult<u32> {
+        Ok(self.0.look(py)?.instances().len())
+    }
+
+    fn num_views(&self, py: Python<'_>) -> PyResult<usize> {
+        Ok(self.0.look(py)?.num_views())
+    }
+
+    fn is_ready(&self, py: Python<'_>) -> PyResult<bool> {
+        self.0.run(py, headless::ViewsCulling::is_ready)
+    }
+
+    fn wait(&self, py: Python<'_>) -> PyResult<()> {
+        self.0.run(py, headless::ViewsCulling::wait)
+    }
+
+    /// The masks one after the other.
+    fn masks<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        self.0.run(py, headless::ViewsCulling::masks).map(|masks| PyArray1::from_vec(py, masks))
+    }
+
+    fn any<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        self.0.run(py, headless::ViewsCulling::any).map(|any| PyArray1::from_vec(py, any))
+    }
+
+    fn any_indices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
+        self.0
+            .run(py, headless::ViewsCulling::any_indices)
+            .map(|indices| PyArray1::from_vec(py, indices))
+    }
+
+    /// The records one after the other, 20 bytes each.
+    fn any_draws<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        self.0
+            .run(py, headless::ViewsCulling::any_draws)
+            .map(|draws| PyBytes::new(py, bytemuck::cast_slice(&draws)))
+    }
+
+    fn view(&self, py: Python<'_>, view: usize) -> PyResult<Culling> {
+        let culling = Arc::clone(self.0.look(py)?.view(view));
+        Ok(Culling(Held::new(py, culling)))
     }
 }
 

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use hiz_core::headless::{self, AdapterSummary};
+use hiz_core::headless::{self, AdapterSummary, AmongSource, CullExtras};
 use hiz_core::{
     ConservativeDepthOptions, DepthLoad, DrawOptions, FaceCull, InstanceOptions, MeshData,
-    OccluderOptions, Only, PyramidOptions, Rasteriser, StoredLevels, StoredOrder,
+    OccluderOptions, Only, Outputs, PyramidOptions, Rasteriser, StoredLevels, StoredOrder,
+    ViewsOutputs,
 };
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -15,7 +16,7 @@ use crate::arguments::{
     DepthArray, FloatArray, LevelArray, bounds, depth_input, depth_inputs, in_c_order,
 };
 use crate::camera::Camera;
-use crate::culling::{Counts, Culling};
+use crate::culling::{Counts, Culling, ViewsCulling};
 use crate::held::{Held, OnDevice, detached};
 use crate::meshes::{LodNumbers, MeshTable, mesh_table};
 use crate::options::{Request, cull_options};
@@ -27,6 +28,17 @@ enum SingleDepth<'py> {
     Pyramid(Bound<'py, Pyramid>),
     #[pyo3(annotation = "image, kind, scale, invalid, rounding")]
     Image(DepthArray<'py>, String, f64, Vec<f64>, String),
+}
+
+/// Which instances a cull is restricted to.
+#[derive(FromPyObject)]
+enum AmongArgument<'py> {
+    #[pyo3(transparent, annotation = "Culling")]
+    Kept(Bound<'py, Culling>),
+    #[pyo3(transparent, annotation = "ViewsCulling")]
+    KeptByAny(Bound<'py, ViewsCulling>),
+    #[pyo3(transparent, annotation = "bool array")]
+    Mask(PyReadonlyArray1<'py, bool>),
 }
 
 /// Index, name, driver, version of the driver, backend, device type.
@@ -334,7 +346,7 @@ impl Engine {
 
     /// `options` is a `hizvk.CullOptions`, `outputs` a `hizvk.Outputs`.
     /// `meshes` is the table of the meshes that the outputs speak of.
-    /// `ahead`: its answer comes to the host by itself.
+    /// `among`: a mask, or an earlier answer; `ahead`: the answer comes to the host by itself.
     #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn cull(
         &self,
@@ -345,20 +357,52 @@ impl Engine {
         options: &Bound<'_, PyAny>,
         outputs: &Bound<'_, PyAny>,
         meshes: Option<&MeshTable>,
+        among: Option<AmongArgument<'_>>,
         ahead: bool,
     ) -> PyResult<Culling> {
         let meshes = meshes.map(|table| table.0.get(py)).transpose()?;
         let Request { options, outputs } = Request::new(options, outputs, meshes.as_deref())?;
         let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
+        let among = self.among(py, &instances, among)?;
         let cull = |engine: &headless::Engine| {
-            let (camera, pyramid) = (&camera.0, &pyramid.1);
-            if ahead {
-                engine.cull_ahead(&instances, camera, pyramid, &options, &outputs)
-            } else {
-                engine.cull(&instances, camera, pyramid, &options, &outputs)
-            }
+            let extras = CullExtras { among: among.as_ref(), ahead };
+            engine.cull_given(&instances, &camera.0, &pyramid.1, &options, &outputs, &extras)
         };
-        self.0.run(py, cull).map(|culling| Culling(Held::new(py, culling)))
+        self.0.run(py, cull).map(|culling| Culling(Held::new(py, Arc::new(culling))))
+    }
+
+    /// As `cull`, for several views; the lists of `outputs` are those of what any view keeps.
+    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
+    fn cull_views(
+        &self,
+        py: Python<'_>,
+        instances: &Instances,
+        cameras: Vec<PyRef<'_, Camera>>,
+        pyramids: Vec<PyRef<'_, Pyramid>>,
+        options: &Bound<'_, PyAny>,
+        outputs: &Bound<'_, PyAny>,
+        among: Option<AmongArgument<'_>>,
+        ahead: bool,
+    ) -> PyResult<ViewsCulling> {
+        let Request { options, outputs: any } = Request::new(options, outputs, None)?;
+        let outputs = ViewsOutputs {
+            each: Outputs { mask: true, verdicts: any.verdicts, ..Outputs::NONE },
+            any,
+        };
+        let instances = instances.0.get(py)?;
+        let pyramids =
+            pyramids.iter().map(|pyramid| pyramid.0.get(py)).collect::<PyResult<Vec<_>>>()?;
+        let views: Vec<_> = cameras
+            .iter()
+            .zip(&pyramids)
+            .map(|(camera, pyramid)| (&camera.0, &pyramid.1))
+            .collect();
+        let among = self.among(py, &instances, among)?;
+        let cull = |engine: &headless::Engine| {
+            let extras = CullExtras { among: among.as_ref(), ahead };
+            engine.cull_views(&instances, &views, &options, &outputs, &extras)
+        };
+        self.0.run(py, cull).map(|culling| ViewsCulling(Held::new(py, culling)))
     }
 
     /// As `cull`; `occluders` says where depth comes from, and `levels` what is stored.
@@ -395,6 +439,32 @@ impl Engine {
     fn wait_without_guard(&self, py: Python<'_>) -> PyResult<()> {
         let engine = headless::Engine::clone(&*self.0.look(py)?);
         detached(py, move || engine.wait())
+    }
+}
+
+impl Engine {
+    fn among(
+        &self,
+        py: Python<'_>,
+        instances: &Arc<hiz_core::Instances>,
+        among: Option<AmongArgument<'_>>,
+    ) -> PyResult<Option<Arc<hiz_core::Among>>> {
+        let made = match among {
+            None => return Ok(None),
+            Some(AmongArgument::Kept(culling)) => {
+                let culling = culling.get().0.get(py)?;
+                self.0.run(py, |engine| engine.among(instances, &AmongSource::Kept(&culling)))
+            }
+            Some(AmongArgument::KeptByAny(views)) => {
+                let views = views.get().0.get(py)?;
+                self.0.run(py, |engine| engine.among(instances, &AmongSource::KeptByAny(&views)))
+            }
+            Some(AmongArgument::Mask(mask)) => {
+                let mask = mask.as_slice()?;
+                self.0.run(py, |engine| engine.among(instances, &AmongSource::Mask(mask)))
+            }
+        };
+        made.map(Some)
     }
 }
 

@@ -18,6 +18,7 @@ use crate::arguments::{FloatArray, bounds, in_c_order};
 use crate::camera::Camera;
 use crate::device::{DepthImage, Engine};
 use crate::held::{Held, OnDevice, detached};
+use crate::meshes::MeshTable;
 use crate::options::Request;
 
 /// Wall-clock milliseconds of single submissions to one device.
@@ -186,8 +187,10 @@ impl Yardstick {
         options: &Bound<'_, PyAny>,
         outputs: &Bound<'_, PyAny>,
         depth: Option<&DepthImage>,
+        meshes: Option<&MeshTable>,
     ) -> PyResult<YardstickCull> {
-        let Request { options, outputs } = Request::new(options, outputs, None)?;
+        let meshes = meshes.map(|table| table.0.get(py)).transpose()?;
+        let Request { options, outputs } = Request::new(options, outputs, meshes.as_deref())?;
         let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
         let depth = depth.map(|depth| depth.0.get(py)).transpose()?;
         let prepare = |engine: &headless::Engine| {

@@ -121,7 +121,8 @@ pub(crate) fn record_explain(
             format!("expected an instance below {}, got {index}", instances.len()),
         )
     })?;
-    let mut seen = PreparedView::new(gpu, inputs, None)?;
+    // The test of an instance is explained whether or not it was asked for.
+    let mut seen = PreparedView::new(gpu, &CullInputs { among: None, ..*inputs }, None)?;
     let place = piece.order.place((index - piece.range.start) as usize);
     let mut view = seen.bind(gpu, inputs.pyramid, whole_group)?;
     let (which, records) = if whole_group {

@@ -3,6 +3,7 @@
 //! Here each option goes one of two ways.
 //! A number goes into the view uniform, and a choice into the key of the pipelines.
 
+use crate::cull::among::Among;
 use crate::cull::groups::group_descent;
 use crate::cull::options::{Coverage, CullOptions, Fit};
 use crate::cull::pipelines::{CullKey, DepthStore};
@@ -24,6 +25,8 @@ pub(crate) struct CullInputs<'a> {
     pub(crate) camera: &'a Camera,
     pub(crate) pyramid: &'a Pyramid,
     pub(crate) options: &'a CullOptions,
+    /// The instances that are asked for; `None`: all of them.
+    pub(crate) among: Option<&'a Among>,
     /// Whether every dispatch has zero workgroups.
     /// Nothing is culled then, but a driver that compiles at the first dispatch does so.
     pub(crate) idle: bool,
@@ -39,12 +42,15 @@ impl<'a> CullInputs<'a> {
         pyramid: &'a Pyramid,
         options: &'a CullOptions,
     ) -> Self {
-        Self { instances, camera, pyramid, options, idle: false, built: None }
+        Self { instances, camera, pyramid, options, among: None, idle: false, built: None }
     }
 }
 
 pub(super) fn check_contexts(gpu: &Gpu, inputs: &CullInputs<'_>) -> Result<()> {
     gpu.check_context("instances", inputs.instances.context)?;
+    if let Some(among) = inputs.among {
+        among.check(gpu, inputs.instances)?;
+    }
     gpu.check_context("pyramid", inputs.pyramid.context)
 }
 
@@ -128,6 +134,7 @@ impl PreparedView {
             footprint_log2: options.footprint.log2(),
             descent: options.descent > 0,
             fit_volume: options.fit == Fit::Volume,
+            among: inputs.among.is_some(),
         };
         Ok(Self { built, atlas, view, key })
     }

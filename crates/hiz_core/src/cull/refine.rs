@@ -4,6 +4,7 @@
 
 use std::sync::Arc;
 
+use crate::cull::among::Among;
 use crate::cull::groups::is_grouped;
 use crate::cull::options::{Coverage, CullOptions};
 use crate::cull::pipelines::{
@@ -44,9 +45,10 @@ fn refine_pipeline(
     gpu: &Gpu,
     kind: BoundsKind,
     sample_coverage: bool,
+    among: bool,
 ) -> Result<wgpu::ComputePipeline> {
     let source = refine_module(kind);
-    without_depth(gpu, "hiz.refine.pipeline", source, "refine", (kind, sample_coverage))
+    without_depth(gpu, "hiz.refine.pipeline", source, "refine", (kind, sample_coverage, among))
 }
 
 /// The pipeline that refines groups.
@@ -54,7 +56,7 @@ fn refine_pipeline(
 fn refine_groups_pipeline(gpu: &Gpu) -> Result<wgpu::ComputePipeline> {
     let label = "hiz.refine_groups.pipeline";
     let kind = BoundsKind::Box;
-    without_depth(gpu, label, refine_groups_module(), "refine_groups", (kind, false))
+    without_depth(gpu, label, refine_groups_module(), "refine_groups", (kind, false, false))
 }
 
 fn without_depth(
@@ -62,19 +64,9 @@ fn without_depth(
     label: &'static str,
     source: Source,
     entry_point: &'static str,
-    (kind, sample_coverage): (BoundsKind, bool),
+    (kind, sample_coverage, among): (BoundsKind, bool, bool),
 ) -> Result<wgpu::ComputePipeline> {
-    let key = CullKey {
-        store: DepthStore::Nowhere,
-        kind,
-        sample_coverage,
-        // These have no effect, because no depth is read.
-        reversed: false,
-        chunks: 1,
-        footprint_log2: 1,
-        descent: false,
-        fit_volume: false,
-    };
+    let key = CullKey { among, ..CullKey::without_depth(kind, sample_coverage) };
     gpu.compute_pipeline(&Compute {
         label,
         source,
@@ -93,6 +85,7 @@ pub(crate) struct Refinement {
     /// The shader asks its layout which level a test would read.
     pyramid: Arc<Pyramid>,
     visible: Arc<Visible>,
+    among: Option<Arc<Among>>,
 }
 
 impl Refinement {
@@ -104,6 +97,7 @@ impl Refinement {
         pyramid: &Arc<Pyramid>,
         options: &CullOptions,
         visible: &Arc<Visible>,
+        among: Option<&Arc<Among>>,
     ) -> Result<Option<Self>> {
         let is_needed =
             visible.outputs().verdicts && instances.pieces.iter().any(|p| is_grouped(p, options));
@@ -118,6 +112,7 @@ impl Refinement {
             instances: Arc::clone(instances),
             pyramid: Arc::clone(pyramid),
             visible: Arc::clone(visible),
+            among: among.cloned(),
         }))
     }
 }
@@ -135,14 +130,16 @@ impl Refine for Refinement {
             ],
         )?;
         let is_sample = self.options.coverage == Coverage::Sample;
-        let (of_groups, of_members) =
-            (refine_groups_pipeline(gpu)?, refine_pipeline(gpu, instances.kind, is_sample)?);
+        let (of_groups, of_members) = (
+            refine_groups_pipeline(gpu)?,
+            refine_pipeline(gpu, instances.kind, is_sample, self.among.is_some())?,
+        );
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("hiz.refine.pass"),
             timestamp_writes: None,
         });
         pass.set_bind_group(0, &view, &[]);
-        for (piece, output) in instances.pieces.iter().zip(&self.visible.pieces) {
+        for (p, (piece, output)) in instances.pieces.iter().zip(&self.visible.pieces).enumerate() {
             let Some(groups) = output.groups().filter(|_| is_grouped(piece, &self.options)) else {
                 continue;
             };
@@ -161,7 +158,8 @@ impl Refine for Refinement {
                 pass.dispatch_workgroups(piece.groups().div_ceil(WORKGROUP), 1, 1);
             }
             pass.set_pipeline(&of_members);
-            pass.set_bind_group(1, &piece.bindings, &[]);
+            let records = self.among.as_ref().map_or(&piece.bindings, |among| among.records(p));
+            pass.set_bind_group(1, records, &[]);
             pass.dispatch_workgroups(piece.groups().div_ceil(WORKGROUP), 1, 1);
         }
         Ok(())

@@ -106,6 +106,15 @@ impl Gpu {
         self.buffers.get(label, || self.empty(label, STAND_IN_BYTES, usage))
     }
 
+    /// A texture of format `R32Uint` to bind where a call samples none.
+    pub(crate) fn no_texels(&self) -> Result<&wgpu::TextureView> {
+        made(&self.no_texels, || {
+            let usage = wgpu::TextureUsages::TEXTURE_BINDING;
+            let format = wgpu::TextureFormat::R32Uint;
+            self.view(&self.texture("hiz.no_texels", (1, 1), format, usage)?)
+        })
+    }
+
     /// The buffer with this label, which the first call fills with `contents`.
     pub(crate) fn constant(
         &self,

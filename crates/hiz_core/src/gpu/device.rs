@@ -1,5 +1,6 @@
 //! The device, and the objects that are made on it once.
 
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, Result};
@@ -40,6 +41,8 @@ pub(crate) struct Gpu {
     pub(super) pipelines: Pipelines,
     pub(super) buffers: KeptBuffers,
     pub(super) ring: Ring,
+    /// Bound in place of a sampled texture that a call does not read.
+    pub(super) no_texels: OnceLock<wgpu::TextureView>,
     pub(crate) making: Making,
     /// Texts of the shaders that are replaced, as (what, by what).
     #[cfg(feature = "testing")]
@@ -66,6 +69,7 @@ impl Gpu {
             pipelines: Pipelines::default(),
             buffers: KeptBuffers::default(),
             ring: Ring::new(STAGING_KEPT),
+            no_texels: OnceLock::new(),
             making: Making::default(),
             #[cfg(feature = "testing")]
             faults: Vec::new(),

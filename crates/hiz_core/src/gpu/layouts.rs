@@ -24,7 +24,7 @@ pub(crate) enum Binding {
     /// Storage textures of format `Rgba32Uint`.
     ReadQuads,
     WriteQuads,
-    /// A sampled texture of format `Rgba32Uint`.
+    /// A sampled texture of unsigned integers: of format `Rgba32Uint` or `R32Uint`.
     SampledQuads,
     /// Storage textures of format `R32Uint`.
     ReadTexels,

@@ -3,6 +3,7 @@
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
+use crate::cull::among::Among;
 use crate::cull::inputs::CullInputs;
 use crate::cull::options::CullOptions;
 use crate::cull::record::record_cull;
@@ -10,17 +11,131 @@ use crate::cull::refine::Refinement;
 use crate::error::{Error, Result};
 use crate::gpu::pipelines::PipelinesMade;
 use crate::headless::ahead::Ahead;
+use crate::headless::answers::AnswerBuffers;
 use crate::headless::counts::{Timings, milliseconds};
 use crate::headless::culling::Culling;
 use crate::headless::engine::Engine;
-use crate::headless::readback;
+use crate::headless::readback::{self, Staged};
 use crate::host::threads::Locked;
 use crate::input::camera::Camera;
 use crate::instances::Instances;
 use crate::instances::watch::{Refine, Watch};
 use crate::output::outputs::Outputs;
-use crate::output::visible::Visible;
 use crate::pyramid::Pyramid;
+
+/// What a cull is asked.
+#[derive(Clone, Copy)]
+pub(super) struct Question<'a> {
+    pub(super) instances: &'a Arc<Instances>,
+    pub(super) camera: &'a Camera,
+    pub(super) pyramid: &'a Arc<Pyramid>,
+    pub(super) options: &'a CullOptions,
+    pub(super) among: Option<&'a Arc<Among>>,
+}
+
+/// How the answer comes to the host.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Reading {
+    /// The mask is staged unless it is large; the rest is copied when it is read.
+    Staged,
+    /// Everything that was asked for is staged.
+    Ahead,
+    /// Everything is copied when it is read.
+    Later,
+}
+
+/// What a cull may be given beside its options; nothing by default.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct CullExtras<'a> {
+    /// The instances that are asked for ([`Engine::among`]); `None`: all.
+    pub among: Option<&'a Arc<Among>>,
+    /// Whether the cull's own submission copies the answer, as [`Engine::cull_ahead`] says.
+    pub ahead: bool,
+}
+
+/// What follows a cull in its encoder, up to the submit.
+pub(super) struct Recorded {
+    buffers: Arc<AnswerBuffers>,
+    staged_mask: Option<Staged>,
+    ahead: Option<Ahead>,
+    pub(super) watch: Arc<Watch>,
+}
+
+/// When a submission was made, and how to see that it is done.
+#[derive(Clone)]
+pub(super) struct Submission {
+    pub(super) index: wgpu::SubmissionIndex,
+    pub(super) at: Instant,
+    pub(super) done: Arc<OnceLock<Instant>>,
+    pub(super) timings: Timings,
+}
+
+impl Question<'_> {
+    /// Records what reads the answer of a cull, behind the cull itself.
+    pub(super) fn record_reading(
+        &self,
+        engine: &Engine,
+        encoder: &mut wgpu::CommandEncoder,
+        buffers: Arc<AnswerBuffers>,
+        reading: Reading,
+    ) -> Result<Recorded> {
+        let Self { instances, camera, pyramid, options, among } = *self;
+        let visible = &buffers.visible;
+        let mut refinement = Refinement::new(instances, camera, pyramid, options, visible, among)?;
+        let (mut staged_mask, mut ahead) = (None, None);
+        match reading {
+            Reading::Ahead => {
+                if let Some(refinement) = refinement.take() {
+                    refinement.record(&engine.context().gpu, encoder)?;
+                }
+                ahead = Some(Ahead::record(engine, encoder, instances, visible, options)?);
+            }
+            Reading::Staged => staged_mask = Culling::stage_mask(encoder, instances, &buffers),
+            Reading::Later => {}
+        }
+        let watch = Watch::new(refinement.map(|left| Box::new(left) as Box<dyn Refine>));
+        Ok(Recorded { buffers, staged_mask, ahead, watch })
+    }
+
+    /// The cull, once it is submitted.
+    pub(super) fn submitted(
+        &self,
+        engine: &Engine,
+        recorded: Recorded,
+        submission: &Submission,
+    ) -> Culling {
+        let Recorded { buffers, staged_mask, ahead, watch } = recorded;
+        let Submission { index, at, done, timings } = submission.clone();
+        Culling {
+            engine: engine.clone(),
+            instances: Arc::clone(self.instances),
+            pyramid: Arc::clone(self.pyramid),
+            camera: self.camera.clone(),
+            options: self.options.clone(),
+            among: self.among.cloned(),
+            visible: Arc::clone(&buffers.visible),
+            buffers,
+            staged_mask: Locked::new(staged_mask),
+            ahead,
+            later: OnceLock::new(),
+            watch,
+            submission: index,
+            submitted: at,
+            done,
+            timings: Locked::new(timings),
+        }
+    }
+}
+
+/// Lets `done` tell when the submission of `encoder` was first seen to be done.
+pub(super) fn tell_when_done(encoder: &wgpu::CommandEncoder) -> Arc<OnceLock<Instant>> {
+    let done = Arc::new(OnceLock::new());
+    let when_done = Arc::clone(&done);
+    encoder.on_submitted_work_done(move || {
+        when_done.get_or_init(Instant::now);
+    });
+    done
+}
 
 impl Engine {
     /// Culls: it records and submits, and reading an answer waits.
@@ -39,74 +154,39 @@ impl Engine {
         options: &CullOptions,
         outputs: &Outputs,
     ) -> Result<Culling> {
-        self.cull_with(instances, camera, pyramid, options, outputs, false)
+        let question = Question { instances, camera, pyramid, options, among: None };
+        self.cull_with(&question, outputs, Reading::Staged)
     }
 
-    /// [`Engine::cull`]; `ahead`: its submission also copies the answer ([`Engine::cull_ahead`]).
     pub(super) fn cull_with(
         &self,
-        instances: &Arc<Instances>,
-        camera: &Camera,
-        pyramid: &Arc<Pyramid>,
-        options: &CullOptions,
+        question: &Question<'_>,
         outputs: &Outputs,
-        ahead: bool,
+        reading: Reading,
     ) -> Result<Culling> {
         self.check_process()?;
+        let Question { instances, camera, pyramid, options, among } = *question;
         let gpu = &self.context().gpu;
         let attempt = || {
             let (start, made_before) = (Instant::now(), PipelinesMade::so_far());
             let buffers = self.answers().lend(self.context(), instances, outputs)?;
             let visible = Arc::clone(&buffers.visible);
-            let inputs = CullInputs::new(instances, camera, pyramid, options);
+            let inputs = CullInputs {
+                among: among.map(Arc::as_ref),
+                ..CullInputs::new(instances, camera, pyramid, options)
+            };
             let mut encoder = self.encoder("hiz.cull.encoder");
             record_cull(gpu, &mut encoder, &inputs, &visible)?;
-            let mut refinement = Refinement::new(instances, camera, pyramid, options, &visible)?;
-            let (mut staged_mask, mut copied) = (None, None);
-            if ahead {
-                if let Some(refinement) = refinement.take() {
-                    refinement.record(gpu, &mut encoder)?;
-                }
-                copied = Some(Ahead::record(self, &mut encoder, instances, &visible, options)?);
-            } else {
-                staged_mask = Culling::stage_mask(&mut encoder, instances, &buffers);
-            }
-            let watch = Watch::new(refinement.map(|left| Box::new(left) as Box<dyn Refine>));
-            let done = Arc::new(OnceLock::new());
-            let when_done = Arc::clone(&done);
-            encoder.on_submitted_work_done(move || {
-                when_done.get_or_init(Instant::now);
-            });
-            let made = PipelinesMade::so_far().since(made_before);
-            let mut record_ms = milliseconds(start, Instant::now());
-            let mut compile_ms = 0.0;
-            if made.count > 0 {
-                let making_ms = 1e3 * made.time.as_secs_f64();
-                record_ms -= making_ms;
-                compile_ms =
-                    making_ms + self.compile(&CullInputs { idle: true, ..inputs }, &visible)?;
-            }
+            let recorded = question.record_reading(self, &mut encoder, buffers, reading)?;
+            let done = tell_when_done(&encoder);
+            let timings = self.compiled((start, made_before), |encoder| {
+                record_cull(gpu, encoder, &CullInputs { idle: true, ..inputs }, &visible)
+            })?;
             let watches = &mut instances.watches();
-            let submitted = Instant::now();
-            let submission = self.queue().submit([encoder.finish()]);
-            watches.add(&watch);
-            Ok(Culling {
-                engine: self.clone(),
-                instances: Arc::clone(instances),
-                pyramid: Arc::clone(pyramid),
-                camera: camera.clone(),
-                options: options.clone(),
-                buffers,
-                visible,
-                staged_mask: Locked::new(staged_mask),
-                ahead: copied,
-                later: OnceLock::new(),
-                watch,
-                submission,
-                submitted,
-                done,
-                timings: Locked::new(Timings { record_ms, compile_ms, ..Timings::default() }),
-            })
+            let at = Instant::now();
+            let index = self.queue().submit([encoder.finish()]);
+            watches.add(&recorded.watch);
+            Ok(question.submitted(self, recorded, &Submission { index, at, done, timings }))
         };
         let culling = self.scoped(attempt);
         let Err(error) = &culling else { return culling };
@@ -120,17 +200,30 @@ impl Engine {
         culling
     }
 
-    /// Makes the driver compile what it would leave to the first dispatch of a pipeline.
+    /// The times of a recording that began at `start`, when so many pipelines had been made.
     ///
-    /// Submits the same work with no workgroups, and waits.
-    /// Returns the milliseconds that this took, without the wait for earlier submissions.
-    fn compile(&self, inputs: &CullInputs<'_>, visible: &Visible) -> Result<f64> {
-        readback::wait(self.device(), None)?;
-        let start = Instant::now();
-        let mut encoder = self.encoder("hiz.cull.compile");
-        record_cull(&self.context().gpu, &mut encoder, inputs, visible)?;
-        let submission = self.queue().submit([encoder.finish()]);
-        readback::wait(self.device(), Some(submission))?;
-        Ok(milliseconds(start, Instant::now()))
+    /// If it has made any, the driver compiles what it would leave to their first dispatch:
+    /// `record_idle` records the same work with no workgroups, which is submitted and waited for.
+    pub(super) fn compiled(
+        &self,
+        (start, made_before): (Instant, PipelinesMade),
+        record_idle: impl FnOnce(&mut wgpu::CommandEncoder) -> Result<()>,
+    ) -> Result<Timings> {
+        let made = PipelinesMade::so_far().since(made_before);
+        let mut record_ms = milliseconds(start, Instant::now());
+        let mut compile_ms = 0.0;
+        if made.count > 0 {
+            let making_ms = 1e3 * made.time.as_secs_f64();
+            record_ms -= making_ms;
+            // Without the wait for earlier submissions.
+            readback::wait(self.device(), None)?;
+            let start = Instant::now();
+            let mut encoder = self.encoder("hiz.cull.compile");
+            record_idle(&mut encoder)?;
+            let submission = self.queue().submit([encoder.finish()]);
+            readback::wait(self.device(), Some(submission))?;
+            compile_ms = making_ms + milliseconds(start, Instant::now());
+        }
+        Ok(Timings { record_ms, compile_ms, ..Timings::default() })
     }
 }

@@ -3,6 +3,7 @@
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
+use crate::cull::among::Among;
 use crate::cull::count::record_count;
 use crate::cull::options::CullOptions;
 use crate::error::{Error, Result};
@@ -78,6 +79,7 @@ pub struct Culling {
     pub(super) pyramid: Arc<Pyramid>,
     pub(super) camera: Camera,
     pub(super) options: CullOptions,
+    pub(super) among: Option<Arc<Among>>,
     /// Lent by [`Engine::answers`] until this is dropped.
     pub(super) buffers: Arc<AnswerBuffers>,
     pub(super) visible: Arc<Visible>,
@@ -205,6 +207,7 @@ impl Culling {
     ///
     /// - **Outside**: outside the frustum, by a certificate of its own or of its group's box.
     ///   In sample coverage also: between all pixel centres.
+    ///   In a cull of some instances also: not asked for.
     /// - **Occluded**: every other instance that is hidden.
     /// - **Visible** and **invalid**: every instance that is kept.
     ///
@@ -474,7 +477,7 @@ const BITS: [[bool; 8]; 256] = {
 };
 
 /// Writes the first bits of `bytes` into `bits`, lowest first, a byte at a time.
-fn spread_bits(bytes: &[u8], bits: &mut [bool]) {
+pub(super) fn spread_bits(bytes: &[u8], bits: &mut [bool]) {
     let mut eights = bits.chunks_exact_mut(8);
     let mut rest = bytes.iter();
     for (eight, byte) in eights.by_ref().zip(rest.by_ref()) {

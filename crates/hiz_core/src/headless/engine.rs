@@ -8,6 +8,7 @@ use crate::gpu::copies::StagingPool;
 use crate::headless::adapter::{self, ADAPTER_VARIABLE, AdapterSummary};
 use crate::headless::answers::Answers;
 use crate::headless::images::Images;
+use crate::headless::joined::JoinedPool;
 use crate::headless::kept_depth::KeptDepth;
 use crate::headless::process::Process;
 use crate::headless::readback;
@@ -70,6 +71,7 @@ struct Shared {
     answers: Answers,
     images: Images,
     slots: Locked<Slots>,
+    joined: JoinedPool,
     /// For answers that are copied by their cull's own submission.
     staging: StagingPool,
     device: wgpu::Device,
@@ -162,6 +164,7 @@ impl Engine {
                 answers: Answers::default(),
                 images: Images::default(),
                 slots: Locked::default(),
+                joined: JoinedPool::default(),
                 staging: StagingPool::new(STAGING_KEPT),
                 device,
                 queue,
@@ -209,6 +212,11 @@ impl Engine {
     /// The culls that were submitted ahead of their reads.
     pub(super) fn slots(&self) -> &Locked<Slots> {
         &self.shared.slots
+    }
+
+    /// What joins the masks of several views.
+    pub(super) fn joined(&self) -> &JoinedPool {
+        &self.shared.joined
     }
 
     pub(super) fn staging(&self) -> &StagingPool {

@@ -25,6 +25,12 @@ impl Culling {
     pub fn explain(&self, index: u64) -> Result<Explanation> {
         let index = u32::try_from(index).unwrap_or(u32::MAX);
         let mut told = self.test(index, false)?;
+        if !self.is_among(index)? {
+            told.verdict = Verdict::Outside;
+            told.reason =
+                format!("not among the instances that were asked for; by itself: {}", told.reason);
+            return Ok(told);
+        }
         told.stale = self.watch.is_updated(&(index..index.saturating_add(1)));
         if told.stale {
             told.reason =
@@ -43,6 +49,21 @@ impl Culling {
         );
         told.group = Some(Box::new(group));
         Ok(told)
+    }
+
+    /// Whether an instance that exists was asked for.
+    fn is_among(&self, index: u32) -> Result<bool> {
+        let Some(among) = &self.among else { return Ok(true) };
+        let mut pieces = self.instances.pieces.iter().enumerate();
+        let Some((p, piece)) = pieces.find(|(_, piece)| piece.range.contains(&index)) else {
+            return Ok(true);
+        };
+        let place = piece.order.place((index - piece.range.start) as usize);
+        let (engine, bits) = (&self.engine, among.bits(p));
+        let row = 4 * u64::from(bits.width());
+        let bytes =
+            engine.scoped(|| readback::read_texture(engine.device(), engine.queue(), bits, row))?;
+        Ok(bytes[place / 8] >> (place % 8) & 1 == 1)
     }
 
     /// Repeats the test of an instance, or of the box around its group.

@@ -8,7 +8,9 @@ use std::time::{Duration, Instant};
 
 use crate::cull::options::CullOptions;
 use crate::error::{Error, Result};
+use crate::gpu::copies::Copies;
 use crate::headless::ahead::Ahead;
+use crate::headless::cull::{CullExtras, Question, Reading};
 use crate::headless::culling::Culling;
 use crate::headless::engine::Engine;
 use crate::headless::readback;
@@ -66,19 +68,64 @@ impl Engine {
         options: &CullOptions,
         outputs: &Outputs,
     ) -> Result<Culling> {
+        let extras = CullExtras { ahead: true, ..CullExtras::default() };
+        self.cull_given(instances, camera, pyramid, options, outputs, &extras)
+    }
+
+    /// [`Engine::cull`] with extras: a restriction to some instances, or an answer that comes by
+    /// itself.
+    ///
+    /// # Errors
+    /// Those of [`Engine::cull`], and [`Error::Mismatch`] for an `among` of other instances.
+    pub fn cull_given(
+        &self,
+        instances: &Arc<Instances>,
+        camera: &Camera,
+        pyramid: &Arc<Pyramid>,
+        options: &CullOptions,
+        outputs: &Outputs,
+        extras: &CullExtras<'_>,
+    ) -> Result<Culling> {
+        let question = Question { instances, camera, pyramid, options, among: extras.among };
+        if !extras.ahead {
+            return self.cull_with(&question, outputs, Reading::Staged);
+        }
+        self.in_a_slot(
+            || self.cull_with(&question, outputs, Reading::Ahead),
+            |culling| culling.ahead.as_ref().map(|ahead| culling.taken(&ahead.slot)),
+        )
+    }
+
+    /// Waits for a free slot, submits, and takes the slot for what was submitted.
+    pub(super) fn in_a_slot<T>(
+        &self,
+        submit: impl FnOnce() -> Result<T>,
+        taken: impl FnOnce(&T) -> Option<Taken>,
+    ) -> Result<T> {
         self.check_process()?;
         // Held until the cull is noted, so that threads do not submit one too many.
         let mut slots = self.slots().lock();
         slots.make_room(|oldest| self.scoped(|| readback::wait(self.device(), Some(oldest))))?;
-        let culling = self.cull_with(instances, camera, pyramid, options, outputs, true)?;
-        if let Some(ahead) = &culling.ahead {
-            slots.take(Taken {
-                answer: Arc::downgrade(&ahead.slot),
-                done: Arc::clone(&culling.done),
-                submission: culling.submission.clone(),
-            });
+        let submitted = submit()?;
+        if let Some(taken) = taken(&submitted) {
+            slots.take(taken);
         }
-        Ok(culling)
+        Ok(submitted)
+    }
+
+    /// Waits until the callback of copies has run whose submission is done.
+    pub(super) fn await_copies(&self, copies: &Copies) -> Result<()> {
+        let start = Instant::now();
+        // Another thread's poll may be running the callback at this moment.
+        while !copies.is_ready() {
+            if start.elapsed() > CALLBACK {
+                let why = "hiz.readback.staging was not mapped within a minute".to_owned();
+                return Err(Error::Device(why));
+            }
+            self.scoped(|| readback::look(self.device()))?;
+            std::thread::yield_now();
+        }
+        Ok(())
     }
 }
 
@@ -104,20 +151,17 @@ impl Culling {
         }
     }
 
+    /// The slot that this cull takes as long as `answer` lives.
+    pub(super) fn taken(&self, answer: &Arc<()>) -> Taken {
+        let (done, submission) = (Arc::clone(&self.done), self.submission.clone());
+        Taken { answer: Arc::downgrade(answer), done, submission }
+    }
+
     /// What was copied ahead, once it has arrived; `None` for another cull.
     /// The cull itself must be done.
     pub(super) fn arrived(&self) -> Result<Option<&Ahead>> {
         let Some(ahead) = &self.ahead else { return Ok(None) };
-        let start = Instant::now();
-        // Another thread's poll may be running the callback at this moment.
-        while !ahead.copies.is_ready() {
-            if start.elapsed() > CALLBACK {
-                let why = "hiz.readback.staging was not mapped within a minute".to_owned();
-                return Err(Error::Device(why));
-            }
-            self.engine.scoped(|| readback::look(self.engine.device()))?;
-            std::thread::yield_now();
-        }
+        self.engine.await_copies(&ahead.copies)?;
         Ok(Some(ahead))
     }
 }

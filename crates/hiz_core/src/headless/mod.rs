@@ -10,7 +10,9 @@
 //! 4. `cull` submits a cull into buffers of `answers`; `culling` reads them, through `counts`,
 //!    `explanation`, `ranges` and `readback`.
 //!    With `ahead`, `in_flight` and `slots` the answer comes while the caller does something else.
-//! 5. `single` does all of that at once, for bounds that are used once.
+//!    `views` culls for several cameras, with buffers of `joined`.
+//! 5. `two_passes` does that for the early and the late pass of a frame.
+//! 6. `single` does all of that at once, for bounds that are used once.
 //!
 //! `answers` and `images` lend what was dropped, and `warm_up` runs a frame before the first one.
 //! `process` guards all of them against forks.
@@ -59,6 +61,7 @@ mod explain;
 mod explanation;
 mod images;
 mod in_flight;
+mod joined;
 mod kept_depth;
 mod levels;
 mod process;
@@ -68,15 +71,20 @@ mod renewal;
 mod samples;
 mod single;
 mod slots;
+mod two_passes;
 mod uploads;
+mod views;
 mod warm_up;
 
 pub use adapter::{ADAPTER_VARIABLE, AdapterSummary, INSTALL_HINT, adapters};
 pub use bins::NO_LOD;
 pub use counts::{Counts, Timings};
+pub use cull::CullExtras;
 pub use culling::Culling;
 pub use depth_image::DepthImage;
 pub use engine::Engine;
 pub use explanation::Explanation;
 pub use single::SingleCull;
 pub use slots::CULLS_IN_FLIGHT;
+pub use two_passes::{EarlyMask, PassAnswer, TwoPasses};
+pub use views::{AmongSource, ViewsCulling};

@@ -57,6 +57,8 @@ pub(crate) struct Piece {
     /// One `BoxRecord` per group.
     pub(crate) group_records: Records,
     pub(crate) uniform: wgpu::Buffer,
+    /// The same for the boxes of the groups.
+    pub(crate) group_uniform: wgpu::Buffer,
     /// What the cull of instances binds.
     pub(crate) bindings: wgpu::BindGroup,
     /// What the cull of groups binds: its boxes, as if they were a piece of instances.
@@ -105,8 +107,9 @@ impl Piece {
 }
 
 /// The bindings of a piece's uniform and records in every cull.
+/// The last one says which instances are asked for (`shaders/cull/among.wgsl`).
 pub(crate) const RECORD_BINDINGS: &[(u32, Binding)] =
-    &[(0, Binding::Uniform), (1, Binding::ReadQuads)];
+    &[(0, Binding::Uniform), (1, Binding::ReadQuads), (4, Binding::SampledQuads)];
 
 /// Makes a piece, its groups, and the uploads that bring both to the device.
 pub(super) fn packed(
@@ -189,6 +192,7 @@ fn assembled(
         records,
         group_records,
         uniform,
+        group_uniform: uniform_of_groups,
         bindings,
         group_bindings,
         order,
@@ -197,11 +201,21 @@ fn assembled(
     })
 }
 
-/// Binds a piece's uniform and records for a cull.
+/// Binds a piece's uniform and records for a cull of all instances.
 pub(crate) fn bind_records(
     gpu: &Gpu,
     uniform: &wgpu::Buffer,
     records: &Records,
+) -> Result<wgpu::BindGroup> {
+    bind_records_among(gpu, uniform, records, gpu.no_texels()?)
+}
+
+/// Binds a piece's uniform and records for a cull that reads which instances it asks for.
+pub(crate) fn bind_records_among(
+    gpu: &Gpu,
+    uniform: &wgpu::Buffer,
+    records: &Records,
+    among: &wgpu::TextureView,
 ) -> Result<wgpu::BindGroup> {
     gpu.bind_group(
         "hiz.cull.instances",
@@ -209,6 +223,7 @@ pub(crate) fn bind_records(
         &[
             entry(0, uniform.as_entire_binding()),
             entry(1, wgpu::BindingResource::TextureView(&records.view)),
+            entry(4, wgpu::BindingResource::TextureView(among)),
         ],
     )
 }

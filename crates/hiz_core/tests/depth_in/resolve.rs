@@ -146,7 +146,7 @@ fn drawn(
         let mut pass = commands.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("test.samples"),
             color_attachments: if is_depth { &[] } else { &color },
-            depth_stencil_attachment: is_depth.then(|| wgpu::RenderPassDepthStencilAttachment {
+            depth_stencil_attachment: is_depth.then_some(wgpu::RenderPassDepthStencilAttachment {
                 view: &view,
                 depth_ops: Some(wgpu::Operations {
                     load: wgpu::LoadOp::Load,

@@ -5,6 +5,7 @@ use std::mem::offset_of;
 
 use super::declared;
 use crate::cull::explain::ExplanationRecord;
+use crate::cull::history::FrameUniform;
 use crate::cull::view_uniform::ViewUniform;
 use crate::input::bounds::{Bounds, Floats};
 use crate::instances::SEQUENCE_BYTES;
@@ -16,6 +17,7 @@ use crate::output::counters::{CounterRecord, StatisticsRecord};
 use crate::output::draw::DrawIndexedIndirect;
 use crate::output::mesh_table::TemplateRecord;
 use crate::output::survivors::SurvivorsRecord;
+use crate::output::views::JoinUniform;
 use crate::pyramid::PyramidUniform;
 use crate::pyramid::layout::PYRAMID_CHUNKS;
 use crate::pyramid::levels::Level;
@@ -89,6 +91,9 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "first_index" = first_index, "base_vertex" = base_vertex,
             "first_instance" = first_instance,
         }),
+        twin!("Join", JoinUniform {
+            "view" = view, "stride" = stride, "begin" = begin, "words" = words,
+        }),
         twin!("Emit", EmitUniform {
             "base" = base, "count" = count, "words" = words, "lods" = lods, "piece" = piece,
             "capacity" = capacity, "records" = records, "draws_begin" = draws_begin,
@@ -98,6 +103,9 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "farthest_bits" = farthest_bits, "pixels" = pixels, "depths" = depths, "last" = last,
             "texels_read" = texels_read, "of_footprint" = of_footprint,
             "farthest_before" = farthest_before, "any_before" = any_before,
+        }),
+        twin!("Frame", FrameUniform {
+            "early" = early, "least_pixels" = least_pixels, "padding" = padding,
         }),
         twin!("FromBuffer", FromBufferUniform {
             "count" = count, "first" = first, "stride" = stride, "runtime_zero" = runtime_zero,
