@@ -78,6 +78,11 @@ impl Stage {
         if lods { &mut self.with_lods } else { &mut self.without_lods }
     }
 
+    fn cut(&self) {
+        self.with_lods.culler.cut();
+        self.without_lods.culler.cut();
+    }
+
     /// Draws a frame in a way and returns its milliseconds.
     fn draw(&mut self, way: Way, camera: &hiz_core::Camera) -> Result<f64, Failure> {
         let begin = Instant::now();
@@ -160,7 +165,11 @@ fn measured(stages: &mut [Stage; 2], arguments: &Arguments) -> Result<Vec<Found>
     let has_lods = stages[0].with_lods.scene.kinds.iter().any(|kind| kind.lods.len() > 1);
     // Drivers compile in the first frames.
     for frame in 0..frames + 2 {
-        let pose = stages[0].without_lods.scene.pose(frame.saturating_sub(2), frames);
+        let place = frame.saturating_sub(2);
+        let pose = stages[0].without_lods.scene.pose(place, frames);
+        if stages[0].without_lods.scene.is_cut(place, frames) {
+            stages.iter().for_each(Stage::cut);
+        }
         let camera = stages[0].without_lods.scene.camera(&pose, arguments.size)?;
         let mut references: [Option<Picture>; 2] = [None, None];
         for ((way, _), found) in WAYS.iter().zip(&mut found) {

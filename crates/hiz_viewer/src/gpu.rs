@@ -49,6 +49,18 @@ impl Gpu {
         instance: &wgpu::Instance,
         surface: Option<&wgpu::Surface<'_>>,
     ) -> Result<Arc<Self>, Failure> {
+        // Packed lists need the first, and the second saves records without a draw.
+        let useful =
+            wgpu::Features::INDIRECT_FIRST_INSTANCE | wgpu::Features::MULTI_DRAW_INDIRECT_COUNT;
+        Self::with_features(instance, surface, useful)
+    }
+
+    /// [`Gpu::open`] with those of the features that the adapter has.
+    pub(crate) fn with_features(
+        instance: &wgpu::Instance,
+        surface: Option<&wgpu::Surface<'_>>,
+        useful: wgpu::Features,
+    ) -> Result<Arc<Self>, Failure> {
         let wanted = std::env::var("HIZVK_ADAPTER").unwrap_or_default().to_lowercase();
         let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::VULKAN));
         let seen: Vec<_> = adapters.iter().map(|a| a.get_info().name).collect();
@@ -71,11 +83,6 @@ impl Gpu {
             .ok_or_else(|| {
                 format!("no Vulkan adapter fits ({}); {INSTALL_HINT}", seen.join(", "))
             })?;
-        // Packed lists need the first; the second saves empty draws, the third gives times.
-        let useful = wgpu::Features::INDIRECT_FIRST_INSTANCE
-            | wgpu::Features::MULTI_DRAW_INDIRECT_COUNT
-            | wgpu::Features::TIMESTAMP_QUERY
-            | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("viewer.device"),
             required_features: HizContext::required_features() | (adapter.features() & useful),

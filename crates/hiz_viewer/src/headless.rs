@@ -30,6 +30,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     for frame in 0..arguments.frames {
         let pose = renderer.scene.pose(frame, arguments.frames);
+        if renderer.scene.is_cut(frame, arguments.frames) {
+            renderer.culler.cut();
+        }
         let camera = renderer.scene.camera(&pose, arguments.size)?;
         renderer.draw(&camera)?;
         let path = arguments.out.join(format!(

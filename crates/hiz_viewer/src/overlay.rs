@@ -58,13 +58,16 @@ pub(crate) struct Overlay {
 }
 
 impl Overlay {
-    pub(crate) fn new(gpu: &Gpu) -> Self {
+    /// For frames of `samples` samples per pixel.
+    pub(crate) fn new(gpu: &Gpu, samples: u32) -> Self {
+        let image = if samples > 1 { LEVEL_SAMPLES } else { LEVEL_IMAGE };
+        let level = format!("{LEVEL}{image}");
         let boxes = gpu.device.create_shader_module(wgpu::include_wgsl!("shaders/boxes.wgsl"));
         let lines = wgpu::PrimitiveTopology::LineList;
         let ends = [(&boxes, "box_vertex"), (&boxes, "box_fragment")];
         Self {
             boxes: flat_pipeline(gpu, "viewer.boxes", ends, lines, COLOUR_FORMAT),
-            level: screen_pipeline(gpu, LEVEL, "level_fragment", COLOUR_FORMAT),
+            level: screen_pipeline(gpu, &level, "level_fragment", COLOUR_FORMAT),
             copy: screen_pipeline(gpu, COPY, "copy_fragment", COLOUR_FORMAT),
             no_texels: gpu.buffer("viewer.no_texels", &[0_u32; 8], BufferUsages::STORAGE),
         }
@@ -80,7 +83,7 @@ impl Overlay {
     ) {
         let view = BoxView { clip_from_eye: clip_from_eye(camera), eye: eye(camera), padding: 0.0 };
         let view = gpu.buffer("viewer.box_view", &[view], BufferUsages::UNIFORM);
-        let [drawn, drawn_too] = renderer.culler.drawn();
+        let [drawn, drawn_too] = renderer.drawn();
         let bindings = gpu.bind_group(
             "viewer.boxes",
             &self.boxes.get_bind_group_layout(0),
@@ -131,7 +134,7 @@ impl Overlay {
             &[
                 constants.as_entire_binding(),
                 texels.as_entire_binding(),
-                wgpu::BindingResource::TextureView(renderer.culler.image(&renderer.targets)),
+                wgpu::BindingResource::TextureView(&renderer.targets.depth),
             ],
         );
         let picture = &renderer.targets.picture;
@@ -227,6 +230,8 @@ fn copy_texture(
 const SCREEN: &str = include_str!("shaders/screen.wgsl");
 const COPY: &str = include_str!("shaders/copy.wgsl");
 const LEVEL: &str = include_str!("shaders/level.wgsl");
+const LEVEL_IMAGE: &str = include_str!("shaders/level_image.wgsl");
+const LEVEL_SAMPLES: &str = include_str!("shaders/level_samples.wgsl");
 
 /// A pipeline whose triangle covers the target.
 fn screen_pipeline(

@@ -110,7 +110,7 @@ impl Renderer {
         Ok(Self {
             bindings: on_device.bind_group(&gpu, &pipelines.layout),
             culler: Culler::new(&gpu, hiz, &scene, &on_device, &targets)?,
-            overlay: Overlay::new(&gpu),
+            overlay: Overlay::new(&gpu, samples),
             mode: Mode::TwoPasses,
             shown: Shown { tint: true, in_vain: false, boxes: false, level: None, numbers: false },
             counts: Counts { bodies: on_device.num_bodies, ..Counts::default() },
@@ -236,6 +236,15 @@ impl Renderer {
         }
     }
 
+    /// Bits of the bodies that the frame drew; those of either buffer.
+    pub(crate) fn drawn(&self) -> [&wgpu::Buffer; 2] {
+        match self.mode {
+            Mode::TwoPasses => self.culler.drawn_in_two(),
+            Mode::All => self.culler.drawn_in_all(),
+            Mode::Frustum | Mode::OnePass => self.culler.drawn_in_one(),
+        }
+    }
+
     /// Draws all of the frame once more, with the pipeline that is set.
     pub(crate) fn draw_again(&self, pass: &mut wgpu::RenderPass<'_>) {
         if self.mode == Mode::All {
@@ -254,9 +263,9 @@ impl Renderer {
             triangles = self.scene.num_triangles();
         }
         for (list, drawn) in self.lists().iter().zip(&mut drawn) {
-            let bytes = self.gpu.read_buffer(list.arguments)?;
+            let bytes = self.gpu.read_buffer(list.arguments())?;
             let draws: Vec<DrawIndexedIndirect> = bytemuck::pod_collect_to_vec(&bytes);
-            for draw in draws.iter().take(list.max_draws as usize) {
+            for draw in &draws {
                 *drawn += draw.instance_count;
                 triangles += u64::from(draw.index_count / 3) * u64::from(draw.instance_count);
             }

@@ -195,9 +195,18 @@ impl Scene {
         }
     }
 
+    /// Whether the camera jumps to frame `frame` of a path of `frames`.
+    pub(crate) fn is_cut(&self, frame: usize, frames: usize) -> bool {
+        frame.is_multiple_of(self.frames_per_leg(frames))
+    }
+
+    fn frames_per_leg(&self, frames: usize) -> usize {
+        frames.div_ceil(self.legs.len()).max(1)
+    }
+
     /// The pose of frame `frame` of a path of `frames`.
     pub(crate) fn pose(&self, frame: usize, frames: usize) -> Pose {
-        let per_leg = frames.div_ceil(self.legs.len()).max(1);
+        let per_leg = self.frames_per_leg(frames);
         let leg = &self.legs[frame / per_leg % self.legs.len()];
         let t = (frame % per_leg) as f64 / per_leg as f64;
         let mix = |[a, b]: [Vec3; 2]| [0, 1, 2].map(|k| a[k] + t * (b[k] - a[k]));

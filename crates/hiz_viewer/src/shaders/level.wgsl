@@ -1,4 +1,5 @@
 // Shows a level of the pyramid: view depth on a logarithmic scale, bright is near.
+// Level 0 comes from `level_image.wgsl` or `level_samples.wgsl`.
 
 // Twin: `overlay.rs`, `LevelView`.
 struct LevelView {
@@ -20,14 +21,13 @@ struct LevelView {
 
 @group(0) @binding(0) var<uniform> level: LevelView;
 @group(0) @binding(1) var<storage, read> texels: array<f32>;
-@group(0) @binding(2) var image: texture_depth_2d;
 
 @fragment
 fn level_fragment(@builtin(position) p: vec4<f32>) -> @location(0) vec4<f32> {
     let texel = min(vec2<u32>(p.xy / level.pixels_per_texel), level.size - 1u);
     var depth: f32;
     if level.is_image == 1u {
-        depth = textureLoad(image, vec2<i32>(texel), 0);
+        depth = farthest_of_image(vec2<i32>(texel));
     } else {
         depth = texels[level.offset + texel.y * level.stride + texel.x];
     }
