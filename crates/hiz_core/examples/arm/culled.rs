@@ -105,6 +105,7 @@ pub(crate) fn at_rest(
 }
 
 /// Where the instances come from.
+#[allow(dead_code, reason = "the example takes one way, its test both")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum From {
     /// The buffer: they are stored as the shader writes them.
