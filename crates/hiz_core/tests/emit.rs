@@ -855,18 +855,17 @@ fn lods_follow_the_rule() {
 
 #[test]
 fn faults_in_the_choice_of_lods_are_seen() {
-    for (name, what, by) in [
-        ("the scale dropped", "scale = bitcast<f32>(texel.z);", ""),
+    for (name, fault) in [
+        ("the scale dropped", ("scale = bitcast<f32>(texel.z);", "")),
         (
             "the group's first member",
-            "lod_of(load_volume(place)",
-            "lod_of(load_volume(place & ~63u)",
+            ("lod_of(load_volume(place)", "lod_of(load_volume(place & ~63u)"),
         ),
-        ("the errors of mesh 0", "mesh, scale, lods_of(mesh)", "0u, scale, lods_of(mesh)"),
-        ("the number of LODs", "scale, lods_of(mesh)", "scale, 8u"),
-        ("the second four errors", "let k = 1u + (l >> ERRORS_LOG2);", "let k = 1u;"),
+        ("the errors of mesh 0", ("mesh, scale, lods_of(mesh)", "0u, scale, lods_of(mesh)")),
+        ("the number of LODs", ("scale, lods_of(mesh)", "scale, 8u")),
+        ("the second four errors", ("let k = 1u + (l >> ERRORS_LOG2);", "let k = 1u;")),
     ] {
-        let seen = std::panic::catch_unwind(|| lods_by_rule(&open_world(&[(what, by)])));
+        let seen = std::panic::catch_unwind(|| lods_by_rule(&open_world(&[fault])));
         assert!(!matches!(seen, Ok(Ok(()))), "{name}: nothing shows it");
     }
 }
