@@ -61,6 +61,7 @@ impl Picture {
     /// How many samples show something, and how many of those no fragment has the depth of.
     ///
     /// The second is 0 if all pipelines compute the same depth, without which ties are not found.
+    #[cfg(test)]
     pub(crate) fn shown_and_unmatched(&self) -> [usize; 2] {
         let samples = || self.depth.iter().zip(&self.at_depth).filter(|(bits, _)| **bits != 0);
         [samples().count(), samples().filter(|(_, fragments)| **fragments == 0).count()]
