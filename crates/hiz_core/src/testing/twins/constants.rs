@@ -62,7 +62,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/among_layout", "AMONG_PER_ROW_LOG2", int(among::WORDS_PER_ROW.ilog2())),
         ("cull/among_order", "WORKGROUP", int(among::WORKGROUP)),
         ("cull/candidates", "BY_HISTORY", int(Candidates::History as u32)),
-        ("cull/candidates", "BY_SIZE", int(Candidates::Size as u32)),
+        ("cull/candidates", "OF_SIZE", int(Candidates::Size as u32)),
         ("cull/candidates", "GIVEN", int(Candidates::Given as u32)),
         ("cull/certificate", "EPS", EPS),
         ("cull/certificate", "ERROR_ULPS", ERROR_ULPS),
