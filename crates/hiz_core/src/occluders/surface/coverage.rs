@@ -219,40 +219,40 @@ pub(super) fn for_each_centre(
 ///
 /// `reach` is at most [`REACH`].
 /// There are three separating axes: x, y and the edge's normal.
-/// Squares are left out where `is_wanted` is false.
+/// `wanted` says of which columns of a row, from a first to a last one, squares are wanted at all.
 #[inline]
-pub(super) fn for_each_met(
+pub(super) fn for_each_met<Columns: Iterator<Item = i32>>(
     [a, b]: [Corner; 2],
     reach: i32,
     grid: Grid,
-    is_wanted: impl Fn(i32, i32) -> bool,
+    wanted: impl Fn(i32, [i32; 2]) -> Columns,
     mut meet: impl FnMut(i32, i32),
 ) {
     let columns = grid.met(a.x.min(b.x), a.x.max(b.x), grid.columns);
     let rows = grid.met(a.y.min(b.y), a.y.max(b.y), grid.rows);
     let normal = [i64::from(a.y) - i64::from(b.y), i64::from(b.x) - i64::from(a.x)];
     let most = (normal[0].abs() + normal[1].abs()) * i64::from(grid.side() / 2 + reach);
+    let is_long = columns[1] - columns[0] > 4 && normal[0] != 0;
+    let slope = if is_long { normal[1] as f64 / -(normal[0] as f64) } else { 0.0 };
     for y in rows[0]..=rows[1] {
         let mut columns = columns;
-        if columns[1] - columns[0] > 4 && normal[0] != 0 {
-            // Where the edge's line is within the row, with room for the rounding of float64.
-            let slope = normal[1] as f64 / -(normal[0] as f64);
+        if is_long {
+            // Where the edge's line is within the row, with room for roundings.
             let at = |units: i32| f64::from(a.x) + f64::from(units - a.y) * slope;
             let top = y << grid.log2;
             let ends = [at(top - 2 * REACH), at(top + grid.side() + 2 * REACH)];
-            let square = |units: f64| (units / f64::from(grid.side())).floor();
+            let (low, high) =
+                if ends[0] < ends[1] { (ends[0], ends[1]) } else { (ends[1], ends[0]) };
             let room = f64::from(4 * REACH);
-            let low = square(ends[0].min(ends[1]) - room).max(f64::from(columns[0]));
-            let high = square(ends[0].max(ends[1]) + room).min(f64::from(columns[1]));
-            if low > high {
-                continue;
-            }
-            #[expect(clippy::cast_possible_truncation, reason = "within the image")]
-            let within = [low as i32, high as i32];
-            columns = within;
+            #[expect(clippy::cast_possible_truncation, reason = "`as` saturates")]
+            let square = |units: f64| units as i32 >> grid.log2;
+            columns = [square(low - room).max(columns[0]), square(high + room).min(columns[1])];
+        }
+        if columns[0] > columns[1] {
+            continue;
         }
         let row = normal[1] * (i64::from(grid.centre(y)) - i64::from(a.y));
-        for x in (columns[0]..=columns[1]).filter(|x| is_wanted(*x, y)) {
+        for x in wanted(y, columns) {
             let beside = normal[0] * (i64::from(grid.centre(x)) - i64::from(a.x)) + row;
             if beside.abs() <= most {
                 meet(x, y);

@@ -10,7 +10,7 @@ use crate::occluders::surface::open_pixels::OpenPixels;
 use crate::occluders::surface::proof::{band_rows, bands, proved};
 use crate::occluders::surface::search::search;
 use crate::occluders::surface::sheets;
-use crate::occluders::surface::thresholds::{self, Slabs};
+use crate::occluders::surface::thresholds::{Centres, Slabs};
 use crate::occluders::surface::walk::Walk;
 
 /// As [`image`], by a search of all pixels: slow, and what tests compare with.
@@ -79,8 +79,8 @@ pub(super) fn image(
 ) -> Vec<f64> {
     let (size, convention) = (camera.size(), camera.convention());
     let beyond: f32 = if convention.is_reversed() { 0.0 } else { 1.0 };
-    let slabs = thresholds::image(centres, size, convention);
-    let tried = Tiles::new(slabs.iter().map(|slabs| slabs.last), size);
+    let centres = Centres { depths: centres, size, convention };
+    let (slabs, tried) = centres.slabs();
     let looks =
         Looks::new(&placed, camera, rounder, &Sought { tiles: &tried, open: None, known: None });
     let has_uncertain = looks.has_uncertain;
@@ -89,12 +89,15 @@ pub(super) fn image(
     let is_open = |(far, slabs): (&f32, &Slabs)| *far == f32::INFINITY && *slabs != Slabs::NONE;
     let open = OpenPixels::new(size, far.iter().zip(&slabs).map(is_open).collect());
     if !open.is_empty() {
-        let bound = |i: usize| if open.is_open(i) { slabs[i].searched } else { f32::NEG_INFINITY };
-        let tiles = Tiles::new((0..far.len()).map(bound), size);
+        let pixels = open.of_rows([0, size.height.cast_signed() - 1]);
+        let bound = |pixel: &u32| centres.bounds(*pixel, &slabs[*pixel as usize]);
+        let bounds: Vec<[f32; 2]> = pixels.iter().map(bound).collect();
+        let last = pixels.iter().zip(&bounds).map(|(pixel, bounds)| (*pixel, bounds[1]));
+        let tiles = Tiles::of(last, size);
         let sought = Sought { tiles: &tiles, open: Some(&open), known: Some(&looks) };
         let looks = Looks::new(&placed, camera, rounder, &sought);
         let walk = Walk { looks: &looks, ..walk };
-        search(&walk, &open, &slabs, beyond, refinement, &mut far);
+        search(&walk, &open, &bounds, beyond, refinement, &mut far);
     }
     let mut far: Vec<f64> = far.into_iter().map(|far| f64::from(far.min(beyond))).collect();
     if has_uncertain {

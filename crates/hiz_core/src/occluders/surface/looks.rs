@@ -35,20 +35,26 @@ pub(super) struct Tiles {
 }
 
 impl Tiles {
-    /// From the farthest depth that each pixel tries.
-    pub(super) fn new(pixels: impl Iterator<Item = f32>, size: ImageSize) -> Self {
-        let columns = size.width.div_ceil(TILE) as usize;
-        let mut last = vec![f32::NEG_INFINITY; columns * size.height.div_ceil(TILE) as usize];
-        let (mut x, mut y) = (0, 0);
-        for pixel in pixels {
-            let tile = &mut last[y / TILE as usize * columns + x / TILE as usize];
-            *tile = tile.max(pixel);
-            x += 1;
-            if x == size.width as usize {
-                (x, y) = (0, y + 1);
-            }
+    /// Tiles whose pixels try nothing.
+    pub(super) fn closed(size: ImageSize) -> Self {
+        let [columns, rows] = [size.width, size.height].map(|side| side.div_ceil(TILE) as usize);
+        Self { columns, last: vec![f32::NEG_INFINITY; columns * rows] }
+    }
+
+    /// From the farthest depths that some pixels try.
+    pub(super) fn of(pixels: impl Iterator<Item = (u32, f32)>, size: ImageSize) -> Self {
+        let mut tiles = Self::closed(size);
+        for (pixel, last) in pixels {
+            let [x, y] = [pixel % size.width, pixel / size.width].map(|v| (v / TILE) as usize);
+            let tile = &mut tiles.last[y * tiles.columns + x];
+            *tile = tile.max(last);
         }
-        Self { columns, last }
+        tiles
+    }
+
+    /// The rows of tiles.
+    pub(super) fn lines_mut(&mut self) -> impl Iterator<Item = &mut [f32]> + Send {
+        self.last.chunks_mut(self.columns)
     }
 
     /// Tiles that hide nothing.

@@ -36,8 +36,8 @@ pub(super) struct Edge {
 pub(super) struct Meeting<'a> {
     walk: &'a Walk<'a>,
     squares: Squares<'a>,
-    /// By pixel: what comes after this is left out.
-    bounds: &'a [f32],
+    /// By pixel: what comes after the second value is left out.
+    bounds: &'a [[f32; 2]],
     /// By the number of a facet: its piece, or [`NO_PIECE`].
     by_number: Vec<u32>,
     pub(super) pieces: Vec<Piece<'a>>,
@@ -89,7 +89,7 @@ impl<'a> Meeting<'a> {
         walk: &'a Walk<'a>,
         open: &'a OpenPixels,
         rows: [i32; 2],
-        bounds: &'a [f32],
+        bounds: &'a [[f32; 2]],
     ) -> Self {
         let mut meeting = Self {
             walk,
@@ -182,7 +182,7 @@ impl<'a> Meeting<'a> {
         let (number, borders) = (self.edges.len() as u32, &mut self.borders);
         let (bounds, nearest) = (self.bounds, one.facet.nearest.min(other.facet.nearest));
         self.squares.for_each_met([a, b], reach(self.walk.placed.fault), |square| {
-            if nearest < f64::from(bounds[square.number]) {
+            if nearest < f64::from(bounds[square.number][1]) {
                 borders.push((square.number as u32, number));
             }
         });
@@ -199,7 +199,7 @@ impl Visitor for Meeting<'_> {
     fn cover(&mut self, met: Met<'_>, corners: [Corner; 3]) {
         let first = self.covers.len();
         let (covers, bounds, nearest) = (&mut self.covers, self.bounds, met.facet.nearest);
-        let is_wanted = |number: usize| nearest < f64::from(bounds[number]);
+        let is_wanted = |number: usize| nearest < f64::from(bounds[number][1]);
         self.squares.for_each_covered(met.facet, corners, is_wanted, |square| {
             covers.push((square.number as u32, 0));
         });

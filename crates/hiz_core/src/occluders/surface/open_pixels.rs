@@ -7,7 +7,6 @@ use crate::input::image::ImageSize;
 pub(super) struct OpenPixels {
     size: ImageSize,
     pixels: Vec<u32>,
-    is_open: Vec<bool>,
     /// By pixel: how many open ones come before it; one more entry for all of them.
     before: Vec<u32>,
     /// Corner (x, y) of a grid with one line more each way: how many are left of x and above y.
@@ -31,12 +30,7 @@ impl OpenPixels {
             }
         }
         before.push(pixels.len() as u32);
-        Self { size, pixels, is_open, before, sums }
-    }
-
-    #[inline]
-    pub(super) fn is_open(&self, pixel: usize) -> bool {
-        self.is_open[pixel]
+        Self { size, pixels, before, sums }
     }
 
     /// How many open pixels come before a pixel, in rows from top to bottom.
@@ -63,11 +57,6 @@ impl OpenPixels {
         let at = |x: i32| self.before[row + x as usize] as usize;
         let numbers = if first > last { 0..0 } else { at(first)..at(last + 1) };
         numbers.map(move |number| (number, self.pixels[number].cast_signed() - row as i32))
-    }
-
-    #[inline]
-    pub(super) fn is_open_at(&self, x: i32, y: i32) -> bool {
-        self.is_open[y as usize * self.size.width as usize + x as usize]
     }
 
     pub(super) fn size(&self) -> ImageSize {

@@ -118,7 +118,7 @@ impl Visitor for Band<'_> {
         let own = if area(corners) < 0 { -1 } else { 1 };
         let steps = Steps::of(facet.sign, own);
         let (slabs, states, half, fault) = (self.slabs, &mut self.states, self.half, self.fault);
-        let is_wanted = |number: usize| facet.nearest <= f64::from(slabs[number].last);
+        let is_wanted = |number: usize| facet.nearest <= f64::from(slabs[number].last());
         self.squares.for_each_covered(facet, corners, is_wanted, |square| {
             let (mask, far) = is_in(facet, &square, half, &slabs[square.number], fault);
             if mask != 0 {
@@ -144,7 +144,7 @@ impl Visitor for Band<'_> {
         let nearest = one.nearest.min(other.nearest);
         self.squares.for_each_met(ends, reach(fault), |square| {
             let slabs = &all_slabs[square.number];
-            if nearest > f64::from(slabs.last) {
+            if nearest > f64::from(slabs.last()) {
                 return;
             }
             let (first, far) = is_in(one, &square, half, slabs, fault);
@@ -200,9 +200,7 @@ fn is_in(facet: &Facet, square: &Place, half: f64, slabs: &Slabs, fault: Planted
     let (far, near) = facet.range(square.centre[0], square.centre[1], half);
     #[expect(clippy::cast_possible_truncation, reason = "for a choice alone")]
     let (far, near) = (Facet::rounded(far, fault), near as f32);
-    let mut mask = 0;
-    for slab in 0..SLABS {
-        mask |= Mask::from(far <= slabs.farthest[slab] && near >= slabs.nearest[slab]) << slab;
-    }
+    let [first, second] = slabs.farthest.map(|farthest| far <= farthest);
+    let mask = Mask::from(first) | Mask::from(second && near >= slabs.nearest) << 1;
     (mask, far)
 }

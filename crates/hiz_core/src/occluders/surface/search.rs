@@ -17,7 +17,6 @@ use crate::occluders::surface::meeting::{Meeting, NO_PIECE};
 use crate::occluders::surface::open_pixels::OpenPixels;
 use crate::occluders::surface::planted_fault::is_planted;
 use crate::occluders::surface::proof::{band_rows, bands, reach};
-use crate::occluders::surface::thresholds::Slabs;
 use crate::occluders::surface::walk::Walk;
 
 /// Quarters are asked where they may bring the distance to the far plane below this share of what
@@ -29,11 +28,13 @@ const WORTH: f32 = 0.98;
 /// Lowers the values of `far` of the open pixels: every ray through the closed square of a pixel is
 /// blocked there or before.
 ///
+/// By open pixel, `bounds` are the values at which the search stops at first, and if it has found
+/// nothing then.
 /// `beyond` is the value at the far plane, and `refinement` how often a pixel is quartered.
 pub(super) fn search(
     walk: &Walk<'_>,
     open: &OpenPixels,
-    slabs: &[Slabs],
+    bounds: &[[f32; 2]],
     beyond: f32,
     refinement: u32,
     far: &mut [f32],
@@ -45,8 +46,8 @@ pub(super) fn search(
         if pixels.is_empty() {
             return;
         }
-        let bounds: Vec<f32> = pixels.iter().map(|pixel| slabs[*pixel as usize].searched).collect();
-        let meeting = Meeting::new(walk, open, rows, &bounds);
+        let bounds = &bounds[open.number(0, rows[0])..][..pixels.len()];
+        let meeting = Meeting::new(walk, open, rows, bounds);
         let [covers, borders] = meeting.lists(pixels.len());
         let mut search = Search::new(walk, &meeting, beyond);
         for (i, pixel) in pixels.iter().enumerate() {
@@ -57,9 +58,7 @@ pub(super) fn search(
                 continue;
             }
             let square = Square { centre, half: UNITS / 2 };
-            // Most sheets behind one another cannot matter.
-            let slabs = &slabs[*pixel as usize];
-            for bound in [slabs.likely, slabs.searched] {
+            for bound in bounds[i] {
                 let found = search.blocked(0, (square, 0), bound, refinement);
                 if found < bound {
                     *far = found;

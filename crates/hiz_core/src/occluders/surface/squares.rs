@@ -109,18 +109,15 @@ impl<'a> Squares<'a> {
     #[inline]
     pub(super) fn for_each_met(&self, edge: [Corner; 2], reach: i32, mut meet: impl FnMut(Place)) {
         match self.kind {
-            Kind::All(_) => for_each_met(
-                edge,
-                reach,
-                self.grid,
-                |_, _| true,
-                |x, y| {
+            Kind::All(_) => {
+                let all = |_, [first, last]: [i32; 2]| first..=last;
+                for_each_met(edge, reach, self.grid, all, |x, y| {
                     meet(self.place(x, y, self.number(x, y)));
-                },
-            ),
+                });
+            }
             Kind::Open { open, first } => {
-                let is_open = |x, y| open.is_open_at(x, y);
-                for_each_met(edge, reach, self.grid, is_open, |x, y| {
+                let wanted = |y, columns| open.of_row(y, columns).map(|(_, x)| x);
+                for_each_met(edge, reach, self.grid, wanted, |x, y| {
                     meet(self.place(x, y, open.number(x, y) - first));
                 });
             }

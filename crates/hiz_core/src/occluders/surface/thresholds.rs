@@ -13,9 +13,8 @@
 
 use crate::host::threads::{cores, on_threads};
 use crate::input::image::{DepthConvention, ImageSize};
+use crate::occluders::surface::looks::{TILE, Tiles};
 
-/// How many rows of pixels a thread takes at once.
-const PART: usize = 16;
 /// How many slabs a pixel has.
 pub(super) const SLABS: usize = 2;
 /// Distances to the far plane are compared by their ratio.
@@ -38,84 +37,123 @@ const NEARER: f32 = 1.03;
 pub(super) struct Slabs {
     /// By slab: what reaches beyond is not in it; minus infinity for a slab without anything.
     pub(super) farthest: [f32; SLABS],
-    /// By slab: what comes before is not in it.
-    pub(super) nearest: [f32; SLABS],
-    /// The greatest of `farthest`.
-    pub(super) last: f32,
-    /// What comes after these is searched only if nothing else covers, or never.
-    pub(super) likely: f32,
-    pub(super) searched: f32,
+    /// What comes before is not in the second slab.
+    pub(super) nearest: f32,
 }
 
 impl Slabs {
     /// A pixel at whose centre there is nothing.
-    pub(super) const NONE: Self = Self {
-        farthest: [f32::NEG_INFINITY; SLABS],
-        nearest: [f32::INFINITY; SLABS],
-        last: f32::NEG_INFINITY,
-        likely: f32::NEG_INFINITY,
-        searched: f32::NEG_INFINITY,
-    };
+    pub(super) const NONE: Self =
+        Self { farthest: [f32::NEG_INFINITY; SLABS], nearest: f32::INFINITY };
+
+    /// What comes after this is in no slab.
+    #[inline(always)]
+    pub(super) fn last(&self) -> f32 {
+        let [a, b] = self.farthest;
+        if a > b { a } else { b }
+    }
 }
 
-/// The slabs of all pixels, from NDC depths at their centres.
-pub(super) fn image(centres: &[f32], size: ImageSize, convention: DepthConvention) -> Vec<Slabs> {
-    let width = size.width as usize;
-    let mut slabs = vec![Slabs::NONE; centres.len()];
-    let last = size.height as usize - 1;
-    let row = |y: usize| &centres[y * width..][..width];
-    on_threads(
-        cores(),
-        slabs.chunks_mut(PART * width).zip((0_usize..).step_by(PART)),
-        |(rows, first)| {
-            for (slabs, y) in rows.chunks_exact_mut(width).zip(first..) {
-                let lines = [row(y.saturating_sub(1)), row(y), row((y + 1).min(last))];
-                choose(lines, convention, slabs);
+/// NDC depths at the pixels' centres.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Centres<'a> {
+    pub(super) depths: &'a [f32],
+    pub(super) size: ImageSize,
+    pub(super) convention: DepthConvention,
+}
+
+impl Centres<'_> {
+    /// The slabs of all pixels, and what their tiles try.
+    pub(super) fn slabs(&self) -> (Vec<Slabs>, Tiles) {
+        let width = self.size.width as usize;
+        let mut slabs = vec![Slabs::NONE; self.depths.len()];
+        let mut tiles = Tiles::closed(self.size);
+        let rows = TILE as usize * width;
+        let parts = slabs.chunks_mut(rows).zip(tiles.lines_mut());
+        on_threads(cores(), parts.zip((0..).step_by(TILE as usize)), |((part, tiles), first)| {
+            for (slabs, y) in part.chunks_exact_mut(width).zip(first..) {
+                self.choose(y, slabs);
+                for (slabs, tile) in slabs.chunks(TILE as usize).zip(tiles.iter_mut()) {
+                    for last in slabs.iter().map(Slabs::last) {
+                        *tile = if last > *tile { last } else { *tile };
+                    }
+                }
             }
-        },
-    );
-    slabs
-}
+        });
+        (slabs, tiles)
+    }
 
-/// Chooses the slabs of a row of pixels.
-///
-/// `above`, `row` and `below` are NDC depths at the centres; at the image's border a row repeats.
-fn choose([above, row, below]: [&[f32]; 3], convention: DepthConvention, slabs: &mut [Slabs]) {
-    let reversed = convention.is_reversed();
-    // With more for nearer, and 0 at the far plane.
-    let near = |depth: f32| if reversed { depth } else { 1.0 - depth };
-    let far = |near: f32| if reversed { -near } else { 1.0 - near };
-    let last = row.len() - 1;
-    for (x, slabs) in slabs.iter_mut().enumerate() {
-        let centre = near(row[x]);
-        if centre <= 0.0 {
-            *slabs = Slabs::NONE;
-            continue;
-        }
+    /// What comes after the first value seldom covers an open pixel, and nearly never what comes
+    /// after the second one.
+    pub(super) fn bounds(&self, pixel: u32, slabs: &Slabs) -> [f32; 2] {
+        let (x, y) = (pixel % self.size.width, pixel / self.size.width);
+        let lines = self.lines(y as usize);
+        let nine = self.nine(lines, x as usize);
+        let there = nine.into_iter().filter(|near| *near > 0.0);
+        let farthest = |room: f32| {
+            let least = there.clone().fold(f32::INFINITY, f32::min);
+            self.far(room * least).max(slabs.last())
+        };
+        let sees_nothing = nine.iter().any(|near| *near <= 0.0);
+        [farthest(LIKELY), if sees_nothing { f32::INFINITY } else { farthest(ROOM) }]
+    }
+
+    /// With more for nearer, and 0 at the far plane.
+    #[inline(always)]
+    fn near(&self, depth: f32) -> f32 {
+        if self.convention.is_reversed() { depth } else { 1.0 - depth }
+    }
+
+    #[inline(always)]
+    fn far(&self, near: f32) -> f32 {
+        if self.convention.is_reversed() { -near } else { 1.0 - near }
+    }
+
+    /// The row above, a row, and the row below; at the image's border a row repeats.
+    fn lines(&self, y: usize) -> [&[f32]; 3] {
+        let (width, last) = (self.size.width as usize, self.size.height as usize - 1);
+        let row = |y: usize| &self.depths[y * width..][..width];
+        [row(y.saturating_sub(1)), row(y), row((y + 1).min(last))]
+    }
+
+    /// How near a pixel and its neighbours are.
+    #[inline(always)]
+    fn nine(&self, lines: [&[f32]; 3], x: usize) -> [f32; 9] {
+        let last = lines[1].len() - 1;
         let columns = [x.saturating_sub(1), x, (x + 1).min(last)];
         let mut nine = [0.0; 9];
-        for (k, line) in [above, row, below].into_iter().enumerate() {
+        for (k, line) in lines.into_iter().enumerate() {
             for (j, column) in columns.into_iter().enumerate() {
-                nine[3 * k + j] = near(line[column]);
+                nine[3 * k + j] = self.near(line[column]);
             }
         }
-        let slope = |a: f32, b: f32| (a - centre).abs().min((b - centre).abs());
-        let slopes = slope(nine[3], nine[5]) + slope(nine[1], nine[7]);
-        let cluster = Cluster::new(&mut nine, centre);
-        let slab = |farthest: f32, nearest: f32| {
-            let nearest = if nearest.is_finite() { far(NEARER * nearest) } else { -nearest };
-            if farthest > 0.0 { (far(farthest), nearest) } else { (f32::NEG_INFINITY, nearest) }
-        };
-        let room = (cluster.end - BEYOND * (centre - cluster.end)) * HAIR;
-        let chosen =
-            [slab((centre - SLOPE * slopes) * HAIR, f32::INFINITY), slab(room, cluster.first)];
-        slabs.farthest = chosen.map(|slab| slab.0);
-        slabs.nearest = chosen.map(|slab| slab.1);
-        slabs.last = if chosen[0].0 > chosen[1].0 { chosen[0].0 } else { chosen[1].0 };
-        slabs.likely = far(LIKELY * cluster.least).max(slabs.last);
-        let sees_nothing = nine.iter().any(|v| *v <= 0.0);
-        slabs.searched =
-            if sees_nothing { f32::INFINITY } else { far(ROOM * cluster.least).max(slabs.last) };
+        nine
+    }
+
+    /// Chooses the slabs of a row of pixels, which have nothing so far.
+    fn choose(&self, y: usize, slabs: &mut [Slabs]) {
+        let lines = self.lines(y);
+        for (x, slabs) in slabs.iter_mut().enumerate() {
+            let centre = self.near(lines[1][x]);
+            if centre <= 0.0 {
+                continue;
+            }
+            let mut nine = self.nine(lines, x);
+            let slope = |a: f32, b: f32| {
+                let (a, b) = ((a - centre).abs(), (b - centre).abs());
+                if a < b { a } else { b }
+            };
+            let slopes = slope(nine[3], nine[5]) + slope(nine[1], nine[7]);
+            let cluster = Cluster::new(&mut nine, centre);
+            let farthest = |near: f32| if near > 0.0 { self.far(near) } else { f32::NEG_INFINITY };
+            let room = (cluster.end - BEYOND * (centre - cluster.end)) * HAIR;
+            slabs.farthest = [farthest((centre - SLOPE * slopes) * HAIR), farthest(room)];
+            slabs.nearest = if cluster.first < f32::INFINITY {
+                self.far(NEARER * cluster.first)
+            } else {
+                f32::NEG_INFINITY
+            };
+        }
     }
 }
 
@@ -124,8 +162,6 @@ struct Cluster {
     /// The nearest, or infinity where nothing comes before it, and the farthest.
     first: f32,
     end: f32,
-    /// The farthest of all nine where there is anything.
-    least: f32,
 }
 
 impl Cluster {
@@ -137,7 +173,7 @@ impl Cluster {
             most = if *v > most { *v } else { most };
         }
         if least >= STEP * most {
-            return Self { first: f32::INFINITY, end: least, least };
+            return Self { first: f32::INFINITY, end: least };
         }
         nine.sort_unstable_by(|a, b| b.total_cmp(a));
         let (mut first, mut end) = (f32::INFINITY, centre);
@@ -151,10 +187,7 @@ impl Cluster {
             } else if start >= centre {
                 end = *v;
             }
-            if *v > 0.0 {
-                least = *v;
-            }
         }
-        Self { first, end, least }
+        Self { first, end }
     }
 }
