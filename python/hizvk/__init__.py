@@ -92,6 +92,7 @@ from .options import CullOptions, DrawTemplate, MeshLods, Outputs
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import ABSENT, DRAW_DTYPE, NO_LOD, CullResult
 from .stats import CullStats
+from .temporal import PassResult, Temporal
 from .timing import StageTime, StageTimes
 from .views import ViewsResult
 
@@ -132,6 +133,7 @@ __all__ = [
     "OrientedBoxes",
     "OutOfMemoryError",
     "Outputs",
+    "PassResult",
     "ProxyCheck",
     "Pyramid",
     "Recommendation",
@@ -139,6 +141,7 @@ __all__ = [
     "SplitMesh",
     "StageTime",
     "StageTimes",
+    "Temporal",
     "Verdict",
     "ViewsResult",
     "__version__",

@@ -494,7 +494,14 @@ def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
 def mesh_ids(name: str, value: object, count: int) -> npt.NDArray[np.uint32]:
     """``(count,)`` mesh ids as uint32; any integer dtype comes in."""
     expected = f"integer ({count},)"
-    array = _as_array(name, expected, value)
+    if is_masked(value) or isinstance(value, (str, bytes)):
+        raise _wrong_type(name, expected, value)
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(
+            f"{name}: expected {expected}, got a sequence that is no array ({error})"
+        ) from None
     if array.size == 0 and not hasattr(value, "dtype"):
         array = array.astype(np.uint32)
     if array.dtype.kind not in "iu":

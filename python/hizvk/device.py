@@ -16,6 +16,7 @@ import numpy as np
 from . import _arguments
 from ._core import Engine as CoreEngine
 from ._core import MeshTable as CoreMeshTable
+from ._core import TwoPasses as CoreTwoPasses
 from ._on_device import check_owner
 from ._processes import driver_is_asked
 from ._types import FaceCull, Rasteriser, StoredOrder, words
@@ -30,6 +31,7 @@ from .options import cull_request
 from .renewal import Source
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import CullResult
+from .temporal import PassResult, Temporal
 from .samples import checked_samples
 from .timing import StageTimes
 from .views import ViewsResult, among_of, pairs
@@ -250,7 +252,7 @@ class Device:
         refinement: int = 2,
         rasteriser: Rasteriser = "auto",
         into: None = None,
-        only: CullResult | npt.ArrayLike | None = None,
+        only: CullResult | PassResult | npt.ArrayLike | None = None,
         max_triangles: int | None = None,
         max_occluders: int | None = None,
     ) -> DepthImage: ...
@@ -262,7 +264,7 @@ class Device:
         camera: Camera | None = None,
         *,
         into: DepthImage,
-        only: CullResult | npt.ArrayLike | None = None,
+        only: CullResult | PassResult | npt.ArrayLike | None = None,
         max_triangles: int | None = None,
         max_occluders: int | None = None,
     ) -> tuple[int, int, int, int] | None: ...
@@ -277,7 +279,7 @@ class Device:
         refinement: int = 2,
         rasteriser: Rasteriser = "auto",
         into: DepthImage | None = None,
-        only: CullResult | npt.ArrayLike | None = None,
+        only: CullResult | PassResult | npt.ArrayLike | None = None,
         max_triangles: int | None = None,
         max_occluders: int | None = None,
     ) -> DepthImage | tuple[int, int, int, int] | None:
@@ -337,8 +339,9 @@ class Device:
             Draws more occluders into this image, which `render_depth` has made, and returns the
             rectangle that was touched.
             Build its pyramid again afterwards.
-        only : CullResult, (K,) bool array or integer array, optional
-            Which of the K copies of meshes are drawn: all that a cull kept, a mask, or numbers.
+        only : CullResult, PassResult, (K,) bool array or integer array, optional
+            Which of the K copies of meshes are drawn: all that a cull kept or a pass of `Temporal`
+            names, a mask, or numbers.
             Copies are numbered through all meshes, in the order of the upload.
             So upload the copies' bounds as instances in that order.
         max_triangles : int, optional
@@ -695,6 +698,35 @@ class Device:
             for one, of in zip(cameras, pyramids, strict=True)
         ]
         return ViewsResult(self, culled, questions)
+
+    def temporal(self, instances: Instances, *, early_capacity: int | None = None) -> Temporal:
+        """Makes the two passes of a view, which draw each frame what was visible, then the rest.
+
+        Make one for each view; `Temporal` says how a frame goes, and has an example.
+
+        Parameters
+        ----------
+        instances : Instances
+            Of this device.
+            They may be updated between frames.
+        early_capacity : int, optional
+            The most instances that an early pass draws, 0 to 2^32 - 1; None: all that it names.
+            What exceeds it is drawn by the late pass, if it is visible.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+        OutOfMemoryError
+            If the device cannot hold the masks.
+        """
+        _arguments.instance("instances", instances, Instances, "Instances of Device.instances")
+        check_owner("instances", instances, self)
+        if early_capacity is not None:
+            high = 2**32 - 1
+            early_capacity = _arguments.integer("early_capacity", early_capacity, low=0, high=high)
+        passes = CoreTwoPasses(self._engine, instances._inner, early_capacity)
+        return Temporal(self, passes, instances)
 
     def warm_up(
         self,

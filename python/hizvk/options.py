@@ -207,7 +207,7 @@ class MeshLods:
         if not draws:
             raise ValueError(f"draws: expected 1 to {MAX_LODS} levels of detail, got none")
         if len(draws) > MAX_LODS:
-            raise LimitError("levels of detail of a mesh", len(draws), MAX_LODS)
+            raise LimitError("draws", len(draws), MAX_LODS)
         if errors is None:
             errors = (0.0,) * len(draws)
         if isinstance(errors, str) or not isinstance(errors, (Sequence, np.ndarray)):
@@ -249,7 +249,8 @@ class CullOptions:
         The latter is right for an image with one sample per pixel, the same viewport and no jitter.
 
         A plain depth image speaks for the centres of its pixels in either case.
-        Multisampling and jitter need ``"area"`` and conservative depth (`Device.render_depth`).
+        Multisampling needs ``"area"`` and all samples (`Device.pyramid`).
+        Jitter needs ``"area"`` and conservative depth (`Device.render_depth`).
     guard_px : float, optional
         Pixels by which bounds grow in the image: a multiple of 1/256, at most 16.
         None: 0 for ``coverage="area"``, 1/64 for ``coverage="sample"``.

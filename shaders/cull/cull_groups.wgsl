@@ -1,6 +1,10 @@
 // The cull of whole groups: one invocation tests the box around the members of a group.
 // It uses the same certificates as a test of an instance, and what hides the box hides all members.
 // The surviving groups are packed into a list, for `cull_members.wgsl`.
+//
+// Which groups can survive differs in the two passes of a frame: `groups_alone.wgsl`,
+// `groups_early.wgsl` and `groups_late.wgsl` have functions of the same names for it.
+//
 // Source: Akenine-Moller, Haines and others, "Real-Time Rendering", section "Hierarchical
 // Z-Buffering".
 
@@ -27,7 +31,7 @@ struct Survivors {
 fn cull_groups(@builtin(global_invocation_id) id: vec3<u32>) {
     begin();
     let group = id.x;
-    if group >= groups.count {
+    if group >= groups.count || !has_candidates(group) {
         return;
     }
     if !any_among(group) {
@@ -40,11 +44,13 @@ fn cull_groups(@builtin(global_invocation_id) id: vec3<u32>) {
         count_texels(outcome.level, outcome.texels_read);
     }
     group_verdicts[group] = verdict;
-    if verdict >= VISIBLE {
+    if is_candidate(outcome) {
         let slot = atomicAdd(&survivors.count, 1u);
         textureStore(survivor_list, survivor_position(slot), vec4<u32>(group));
         if slot % RUN == 0u {
             atomicAdd(&survivors.workgroups, 1u);
         }
+    } else {
+        forget(group);
     }
 }

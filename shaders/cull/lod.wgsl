@@ -16,10 +16,10 @@
 // Which rule chooses.
 // Twins: `LodRule::code` in `crates/hiz_core/src/cull/lod.rs`.
 override LOD_RULE: u32;
-const FINEST: u32 = 0u;
-const BY_ERROR: u32 = 1u;
-const BY_DISTANCE: u32 = 2u;
-const BY_SIZE: u32 = 3u;
+const LOD_FINEST: u32 = 0u;
+const LOD_BY_ERROR: u32 = 1u;
+const LOD_BY_DISTANCE: u32 = 2u;
+const LOD_BY_SIZE: u32 = 3u;
 
 // LODs in a vector of `View.lod_needs`.
 const NEEDS: u32 = 4u;
@@ -42,14 +42,14 @@ fn surely_farther(w: Value, need: f32) -> bool {
 //
 // Error and scale are at least the least normal number, because a device may flush smaller ones.
 fn lod_need(radius: f32, mesh: u32, scale: f32, lod: u32) -> f32 {
-    if LOD_RULE == BY_ERROR {
+    if LOD_RULE == LOD_BY_ERROR {
         let deviation = max(lod_error(mesh, lod), LEAST_NORMAL) * max(scale, LEAST_NORMAL);
         return min(deviation, LARGEST_DEVIATION) * view.lod_needs[0].x * NEED_FACTOR;
     }
     // From the uniform itself.
     // A private copy that is indexed by a variable would leave the registers.
     let need = view_uniform.lod_needs[lod / NEEDS][lod % NEEDS];
-    if LOD_RULE == BY_SIZE {
+    if LOD_RULE == LOD_BY_SIZE {
         return radius * need * NEED_FACTOR;
     }
     return need;
@@ -59,12 +59,12 @@ fn lod_need(radius: f32, mesh: u32, scale: f32, lod: u32) -> f32 {
 // LOD 0 needs nothing: it is the answer wherever no other is proved.
 // So it is for bounds that cross the plane of the eye, and for invalid ones.
 fn lod_of(volume: Volume, mesh: u32, scale: f32, count: u32) -> u32 {
-    if LOD_RULE == FINEST {
+    if LOD_RULE == LOD_FINEST {
         return 0u;
     }
     let w = value_of(view.w, errors_of(volume).w, volume);
     var radius = 0.0;
-    if LOD_RULE == BY_SIZE {
+    if LOD_RULE == LOD_BY_SIZE {
         radius = radius_of(volume);
     }
     let end = select(1u, min(count, view.lod_end), volume.size < view.coordinate_limit);

@@ -3,7 +3,10 @@
 // - a bit per instance, in the caller's numbering
 // - a verdict per instance, in the stored order
 // - what `emit` leaves, which is in a file of its own for each way to emit:
-//   `report_list.wgsl`, `report_planes.wgsl` or `report_bins.wgsl`
+//   `report_list.wgsl`, `report_planes.wgsl`, `report_bins.wgsl` or `report_mask.wgsl`
+//
+// Which instances are tested and reported is in a file of its own, too: `../cull/run.wgsl`, or
+// `../cull/early.wgsl` and `../cull/late.wgsl` for the two passes of a frame.
 
 // Set the bit of each instance that is kept.
 override MASK: bool;
@@ -66,9 +69,9 @@ fn asked_of_run(first: u32) -> u32 {
 }
 
 // Tests the RUN members of a group that belong to one of its SHARE invocations.
-// Then it reports those that are kept: they are few, so the expensive part runs a few times.
-fn cull_run(group: u32, share: u32) {
-    let first = group * GROUP + share;
+// The first of them is at place `first`, and they lie SHARE places apart.
+// Bit k of what returns: member k is kept.
+fn test_run(first: u32) -> u32 {
     var kept = 0u;
     var asked = asked_of_run(first);
     var k = 0u;
@@ -91,7 +94,5 @@ fn cull_run(group: u32, share: u32) {
             break if k == RUN || first + k * SHARE >= piece.count;
         }
     }
-    for (; kept != 0u; kept &= kept - 1u) {
-        report(first + countTrailingZeros(kept) * SHARE);
-    }
+    return kept;
 }

@@ -88,7 +88,7 @@ fn reduce(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
     if step.reduction != 0u && place.x == 0u && place.y == 0u {
         write_header();
     }
-    let block = step.begin + place;
+    let block = first_block() + place;
     if block.x < step.end.x && block.y < step.end.y {
         reduce_block(step.source, step.last, block);
     }
@@ -97,7 +97,7 @@ fn reduce(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation
 // All levels that are left, made by one workgroup: they are less work than another dispatch.
 @compute @workgroup_size(WORKGROUP, 1)
 fn reduce_tail(@builtin(local_invocation_index) lane: u32) {
-    var begin = step.begin;
+    var begin = first_block();
     var end = step.end;
     for (var source_number = step.source; source_number < step.last; source_number += BLOCK_LOG2) {
         let size = end - begin;

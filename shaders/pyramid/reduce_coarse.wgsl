@@ -42,7 +42,7 @@ fn reduce_coarse(
     // Blocks along a side of a texel.
     let side = 1u << (step.last - BLOCK_LOG2);
     if !SHARED {
-        let at = step.begin + place_of(group.xy, lane);
+        let at = first_block() + place_of(group.xy, lane);
         if at.x < step.end.x && at.y < step.end.y {
             store(level.offset + at.y * level.stride + at.x, farthest_of(at * side, side));
         }
@@ -50,7 +50,7 @@ fn reduce_coarse(
     }
     // Each invocation takes one of SIDE x SIDE parts of the texel.
     let part = side >> SIDE_LOG2;
-    let texel = step.begin + group.xy;
+    let texel = first_block() + group.xy;
     parts[lane] = farthest_of(texel * side + place_in_square(lane) * part, part);
     workgroupBarrier();
     if lane == 0u {

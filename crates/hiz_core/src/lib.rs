@@ -169,6 +169,7 @@ pub use wgpu;
 
 pub use context::HizContext;
 pub use cull::among::{Among, AmongMask};
+pub use cull::history::{EarlySet, Temporal};
 pub use cull::lod::LodRule;
 pub use cull::options::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
 pub use cull::views::View;

@@ -716,36 +716,50 @@ fn packed_bins_need_first_instances() {
 /// Each fault must show: in a list, in the draws or in their number.
 #[test]
 fn planted_faults_are_seen() {
-    let faults: [(&str, &str, usize); 11] = [
-        ("starts off by one", "rank(lod, starts[mesh])", 0),
-        ("the end of a bin", "starts[mesh + 1u]), written)", 0),
-        ("a rank without its block", "return blocks[w >> BLOCK_LOG2_WORDS] + before[w]", 0),
-        ("a scatter without its block", "var rank = blocks[w >> BLOCK_LOG2_WORDS] + before[w];", 0),
-        ("a list past its capacity", "while bits != 0u && rank < written {", 0),
-        ("the capacity that is left", "min(through, room())", 0),
-        ("slots as indices", "index = index_of[index];", 0),
-        ("the plane", "bin.lod * piece.words + at.word", 0),
-        ("the tail of the draws", "write_draw(empty, Template(), 0u, 0u);", 0),
-        ("the number of draws", "draw_counts[emit.piece] = count;", 0),
-        ("the shift of a bin", "lod * emit.count + starts[mesh] - begin", 1),
-    ];
-    let by = [
-        "rank(lod, starts[mesh] + 1u)",
-        "starts[mesh + 1u] + 1u), written)",
-        "return before[w]",
-        "var rank = before[w];",
-        "while bits != 0u {",
-        "min(through, emit.capacity)",
-        "",
-        "at.word",
-        "",
-        "draw_counts[emit.piece] = emit.records;",
-        "lod * emit.count + starts[mesh]",
-    ];
-    for ((name, what, way), by) in faults.into_iter().zip(by) {
+    for (name, way, what, by) in [
+        ("starts off by one", 0, "rank(lod, starts[mesh])", "rank(lod, starts[mesh] + 1u)"),
+        (
+            "the end of a bin",
+            0,
+            "starts[mesh + 1u]), written)",
+            "starts[mesh + 1u] + 1u), written)",
+        ),
+        (
+            "a rank without its block",
+            0,
+            "return blocks[w >> BLOCK_LOG2_WORDS] + before[w]",
+            "return before[w]",
+        ),
+        (
+            "a scatter without its block",
+            0,
+            "blocks[at >> BLOCK_LOG2_WORDS] + before[at]);",
+            "before[at]);",
+        ),
+        ("a list past its capacity", 0, "if rank < written {", "if true {"),
+        ("the capacity that is left", 0, "min(through, room())", "min(through, emit.capacity)"),
+        ("slots as indices", 0, "index = index_of[index];", ""),
+        ("the plane", 0, "bin.lod * piece.words + at.word", "at.word"),
+        ("the ranks of the last planes", 0, "high.ranks += high_ones;", ""),
+        ("the tail of the draws", 0, "write_draw(empty, Template(), 0u, 0u);", ""),
+        (
+            "the number of draws",
+            0,
+            "draw_counts[emit.piece] = count;",
+            "draw_counts[emit.piece] = emit.records;",
+        ),
+        (
+            "the shift of a bin",
+            1,
+            "lod * emit.count + starts[mesh] - begin",
+            "lod * emit.count + starts[mesh]",
+        ),
+        ("a level of the last planes", 1, "NUMBERS + FOUR", "NUMBERS"),
+        ("a draw of another level", 2, "lod = l;", ""),
+    ] {
         let world = World::new(&[(what, by)]);
         let mut random = Random(4);
-        let lods = [2, 3, 1];
+        let lods = [6, 3, 1];
         // Two pieces, of which the first has more than one block of words.
         let made = Crowd::random(40_000, &lods, 0.9, 0.1, &mut random);
         let crowd = Crowd::new(&world, made, Some(36_864), true);

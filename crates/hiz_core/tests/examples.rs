@@ -1,13 +1,16 @@
-//! Runs the example `simple`; `tests/renderer.rs` runs the other renderer.
+//! Runs the examples `simple` and `frames`; `tests/renderer.rs` runs the other renderer.
 
 mod common;
+#[path = "../examples/frames.rs"]
+#[allow(dead_code, reason = "the program's own device, and its report")]
+mod frames;
 #[path = "../examples/simple.rs"]
 #[allow(dead_code, reason = "the program's own device, and its report")]
 mod simple;
 
 use common::engine;
-use hiz_core::DrawIndexedIndirect;
 use hiz_core::wgpu::{self, util::DownloadBuffer};
+use hiz_core::{DrawIndexedIndirect, DrawIndirect, EarlySet, Visible};
 
 /// 256 pixels of one byte: as many as `copy_texture_to_buffer` wants in a row.
 const SIDE: u32 = 256;
@@ -20,6 +23,27 @@ fn read(device: &wgpu::Device, queue: &wgpu::Queue, buffer: &wgpu::Buffer) -> Ve
     });
     device.poll(wgpu::PollType::wait_indefinitely()).expect("the device answers");
     answer.recv().expect("the callback ran")
+}
+
+/// The bytes of a picture of 256 x 256 pixels.
+fn read_picture(device: &wgpu::Device, queue: &wgpu::Queue, picture: &wgpu::Texture) -> Vec<u8> {
+    let texel = picture.format().block_copy_size(None).expect("one plane");
+    let pixels = device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: u64::from(SIDE * SIDE * texel),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+        mapped_at_creation: false,
+    });
+    let mut encoder = device.create_command_encoder(&Default::default());
+    let bytes_per_row = Some(SIDE * texel);
+    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row, rows_per_image: None };
+    encoder.copy_texture_to_buffer(
+        picture.as_image_copy(),
+        wgpu::TexelCopyBufferInfo { buffer: &pixels, layout },
+        picture.size(),
+    );
+    queue.submit([encoder.finish()]);
+    read(device, queue, &pixels)
 }
 
 /// A metre at 16 m is 8 pixels of the 256, because the view is 90 degrees wide.
@@ -36,22 +60,7 @@ fn simple_draws_what_the_wall_does_not_hide() {
     let draw = DrawIndexedIndirect { index_count: 6, instance_count: 200, ..Default::default() };
     assert_eq!(draws, [draw]);
 
-    let pixels = device.create_buffer(&wgpu::BufferDescriptor {
-        label: None,
-        size: u64::from(SIDE * SIDE),
-        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
-        mapped_at_creation: false,
-    });
-    let mut encoder = device.create_command_encoder(&Default::default());
-    let layout =
-        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(SIDE), rows_per_image: None };
-    encoder.copy_texture_to_buffer(
-        picture.as_image_copy(),
-        wgpu::TexelCopyBufferInfo { buffer: &pixels, layout },
-        picture.size(),
-    );
-    queue.submit([encoder.finish()]);
-    let pixels = read(device, queue, &pixels);
+    let pixels = read_picture(device, queue, &picture);
     for (i, pixel) in (0_u32..).zip(&pixels) {
         let (column, row) = (i % SIDE, i / SIDE);
         // From the middle, squares cover pixels 2 to 5 of every 8, and there are 10 each way.
@@ -65,4 +74,45 @@ fn simple_draws_what_the_wall_does_not_hide() {
 #[test]
 fn simple_runs() {
     simple::main().unwrap();
+}
+
+/// Two passes give depth and picture of all discs, bit for bit, and draw fewer.
+///
+/// Row r lies at depth 4 + 1.4 r, and its discs reach 0.2 towards the eye.
+/// A polygon of n corners is off by 0.2 (1 - cos(pi / n)), and G is 128 sqrt(3).
+/// At half a pixel, 8 corners will do beyond 6.75, and 4 beyond 25.97.
+/// So rows 0 to 2 have the first level, rows 3 to 15 the second, and the last four the third.
+#[test]
+fn frames_draw_the_picture_of_all_discs() {
+    let engine = engine();
+    let (device, queue) = (engine.device(), engine.queue());
+    let counts = |visible: &Visible| {
+        let draws = read(device, queue, visible.draw_arguments().unwrap());
+        let draws: Vec<DrawIndirect> = bytemuck::pod_collect_to_vec(&draws);
+        draws.into_iter().map(|draw| draw.instance_count).collect::<Vec<u32>>()
+    };
+    // Everything is larger than nothing, so the early pass draws all.
+    let all = EarlySet::Largest { pixels: 0 };
+    let drawn = [all, EarlySet::LastVisible].map(|set| {
+        let (targets, passes) = frames::draw_frames(device, queue, set).unwrap();
+        let targets = targets.map(|target| read_picture(device, queue, &target));
+        (targets, counts(passes.early()), counts(passes.late()))
+    });
+    let [(expected, of_all, _), (got, early, late)] = drawn;
+    assert!(got == expected, "depth or picture differ");
+    assert!(expected[1].iter().any(|pixel| *pixel > 0), "nothing is drawn");
+    assert_eq!(of_all, [60, 260, 80, 1, 0, 0]);
+    assert_eq!(late, [0; 6], "nothing has come into view");
+    // The diamond hides discs of each row in the middle, and no others.
+    let hidden: Vec<u32> = of_all.iter().zip(&early).map(|(all, early)| all - early).collect();
+    assert!(
+        hidden[0] < 60 && hidden[1] > 30 && hidden[2] < 80 && hidden[3..] == [0; 3],
+        "{early:?}"
+    );
+}
+
+/// The program itself, on a device that it opens.
+#[test]
+fn frames_runs() {
+    frames::main().unwrap();
 }

@@ -28,6 +28,7 @@ const VALUES: &[(&str, &[f64])] = &[
     ("LOD_RULE", &[0.0, 1.0, 2.0, 3.0]),
     ("MASK", FLAG),
     ("NEAREST", FLAG),
+    ("REGION", FLAG),
     ("REVERSED", FLAG),
     ("SAMPLES", &[2.0, 4.0, 8.0]),
     ("SAMPLE_COVERAGE", FLAG),

@@ -16,6 +16,7 @@ mod held;
 mod meshes;
 mod options;
 mod reference;
+mod two_passes;
 #[cfg(feature = "yardstick")]
 mod yardstick;
 
@@ -37,6 +38,8 @@ mod _core {
     use crate::meshes::MeshTable;
     #[pymodule_export]
     use crate::reference::{reference_classify, reference_pyramid};
+    #[pymodule_export]
+    use crate::two_passes::{PassAnswer, TwoPasses};
 
     /// For tests.
     #[cfg(feature = "testing")]

@@ -318,6 +318,15 @@ impl YardstickCull {
         self.0.run(py, |cull| yardstick::submitted_ms(&cull.engine, |encoder| cull.record(encoder)))
     }
 
+    /// Milliseconds of what follows the marking: lists and draws of what `ms` has marked.
+    fn emit_ms(&self, py: Python<'_>) -> PyResult<f64> {
+        self.0.run(py, |Cull { engine, instances, visible, .. }| {
+            yardstick::submitted_ms(engine, |encoder| {
+                yardstick::record_emission(engine, encoder, instances, visible)
+            })
+        })
+    }
+
     /// The mask of the last submission.
     fn mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
         self.0

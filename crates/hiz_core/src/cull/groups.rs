@@ -2,8 +2,7 @@
 
 use crate::cull::options::{CullOptions, Hierarchy};
 use crate::cull::pipelines::{
-    CullKey, MEMBER_BINDINGS, ReportKey, SURVIVOR_BINDINGS, cull_groups_pipeline,
-    cull_members_pipeline,
+    CullKey, FramePass, MEMBER_BINDINGS, ReportKey, cull_groups_pipeline, cull_members_pipeline,
 };
 use crate::error::Result;
 use crate::gpu::buffers::{entry, made};
@@ -11,7 +10,6 @@ use crate::gpu::device::Gpu;
 use crate::input::bounds::BoundsKind;
 use crate::instances::piece::Piece;
 use crate::output::survivors::GroupOutput;
-use crate::output::visible::PieceOutput;
 
 /// The label of the buffer that is bound if levels are not counted.
 pub(super) const NO_STATISTICS: &str = "hiz.no_statistics";
@@ -61,32 +59,40 @@ pub(super) struct GroupCull<'a> {
     members: (wgpu::ComputePipeline, wgpu::BindGroup),
 }
 
+/// What the cull of a piece's groups binds as its outputs: those of every cull, and `more`.
+pub(super) fn bind_survivors(
+    gpu: &Gpu,
+    output: &GroupOutput,
+    statistics: Option<&wgpu::Buffer>,
+    pass: FramePass,
+    more: &[wgpu::BindGroupEntry<'_>],
+) -> Result<wgpu::BindGroup> {
+    let counted = match statistics {
+        Some(statistics) => statistics.clone(),
+        None => gpu.stand_in(NO_STATISTICS)?,
+    };
+    let mut entries = vec![
+        entry(0, output.survivors.as_entire_binding()),
+        entry(1, output.verdicts.as_entire_binding()),
+        entry(2, wgpu::BindingResource::TextureView(&output.survivor_list)),
+        entry(3, counted.as_entire_binding()),
+    ];
+    entries.extend_from_slice(more);
+    gpu.bind_group(
+        "hiz.cull.groups",
+        &gpu.layout("hiz.cull_groups.layout", pass.group_bindings())?,
+        &entries,
+    )
+}
+
 impl<'a> GroupCull<'a> {
-    /// `statistics`: the buffer in which levels are counted, if they are.
+    /// `survivors`: what [`bind_survivors`] has made for it.
     pub(super) fn new(
         gpu: &Gpu,
         (key, report): (CullKey, ReportKey),
-        piece: &Piece,
-        output: &'a PieceOutput,
-        statistics: Option<&wgpu::Buffer>,
+        output: &'a GroupOutput,
+        survivors: wgpu::BindGroup,
     ) -> Result<Self> {
-        let output = output.groups_or_new(gpu, piece)?;
-        let left = made(&output.bindings[usize::from(statistics.is_some())], || {
-            let counted = match statistics {
-                Some(statistics) => statistics.clone(),
-                None => gpu.stand_in(NO_STATISTICS)?,
-            };
-            gpu.bind_group(
-                "hiz.cull.groups",
-                &gpu.layout("hiz.cull_groups.layout", SURVIVOR_BINDINGS)?,
-                &[
-                    entry(0, output.survivors.as_entire_binding()),
-                    entry(1, output.verdicts.as_entire_binding()),
-                    entry(2, wgpu::BindingResource::TextureView(&output.survivor_list)),
-                    entry(3, counted.as_entire_binding()),
-                ],
-            )
-        })?;
         let members = made(&output.member_bindings, || {
             gpu.bind_group(
                 "hiz.cull.survivors",
@@ -97,9 +103,9 @@ impl<'a> GroupCull<'a> {
                 ],
             )
         })?;
-        let of_boxes = cull_groups_pipeline(gpu, &group_key(key), statistics.is_some())?;
+        let of_boxes = cull_groups_pipeline(gpu, &group_key(key), &report)?;
         let of_members = cull_members_pipeline(gpu, &key, &report)?;
-        Ok(Self { output, boxes: (of_boxes, left.clone()), members: (of_members, members.clone()) })
+        Ok(Self { output, boxes: (of_boxes, survivors), members: (of_members, members.clone()) })
     }
 
     /// Records the test of the boxes, in so many `workgroups`.

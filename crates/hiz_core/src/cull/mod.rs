@@ -9,8 +9,10 @@
 //! 3. `pipelines` picks the pipeline that fits the options.
 //! 4. `record` records the pass; `groups` adds the test of whole groups before their members.
 //!    `among` restricts it to some of the instances, and `views` culls for several cameras.
-//! 5. `warm_up` does all of it once without workgroups, before the first frame.
-//! 6. Later, and only if they are read: `refine` completes the verdicts, `count` counts them, and
+//! 5. `history`, `early` and `late` are the two passes of a frame: the early one draws what was
+//!    visible before, and the late one tests all against the depth of that.
+//! 6. `warm_up` does all of it once without workgroups, before the first frame.
+//! 7. Later, and only if they are read: `refine` completes the verdicts, `count` counts them, and
 //!    `explain` repeats one test.
 //!
 //! This room records commands into an encoder; it never submits or waits.
@@ -18,10 +20,13 @@
 pub(crate) mod among;
 #[cfg(feature = "headless")]
 pub(crate) mod count;
+pub(crate) mod early;
 #[cfg(feature = "headless")]
 pub(crate) mod explain;
 pub(crate) mod groups;
+pub(crate) mod history;
 pub(crate) mod inputs;
+pub(crate) mod late;
 pub(crate) mod lod;
 pub(crate) mod options;
 pub(crate) mod pipelines;

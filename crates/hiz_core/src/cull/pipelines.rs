@@ -27,6 +27,24 @@ pub(crate) struct CullKey {
     pub(crate) among: bool,
 }
 
+impl CullKey {
+    /// The key of a pass that reads no depth.
+    pub(super) fn without_depth(kind: BoundsKind, sample_coverage: bool) -> Self {
+        Self {
+            store: DepthStore::Nowhere,
+            kind,
+            sample_coverage,
+            // These have no effect, because no depth is read.
+            reversed: false,
+            chunks: 1,
+            footprint_log2: 1,
+            descent: false,
+            fit_volume: false,
+            among: false,
+        }
+    }
+}
+
 /// What a cull writes: the `override` constants of `shaders/output/report.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct ReportKey {
@@ -34,11 +52,84 @@ pub(crate) struct ReportKey {
     pub(crate) verdicts: bool,
     pub(crate) emit: EmitKey,
     pub(crate) statistics: bool,
+    pub(crate) pass: FramePass,
+}
+
+/// Which cull of a frame this is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum FramePass {
+    /// One that is not one of two passes.
+    Alone,
+    /// The early pass, which reads no depth.
+    Early(Candidates),
+    /// The late pass.
+    Late,
+}
+
+/// Where the candidates of an early pass come from; twin: `shaders/cull/candidates.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub(crate) enum Candidates {
+    History = 0,
+    Size = 1,
+    Given = 2,
+}
+
+impl FramePass {
+    /// The files that say which instances are tested and reported.
+    fn member_files(self) -> &'static [File] {
+        match self {
+            Self::Alone => &[wgsl!("cull/run")],
+            Self::Early(_) => {
+                &[wgsl!("cull/history"), wgsl!("cull/candidates"), wgsl!("cull/early")]
+            }
+            Self::Late => &[wgsl!("cull/history"), wgsl!("cull/late")],
+        }
+    }
+
+    /// The files that say which groups survive.
+    fn group_files(self) -> &'static [File] {
+        match self {
+            Self::Alone => &[wgsl!("cull/groups_alone")],
+            Self::Early(_) => {
+                &[wgsl!("cull/history"), wgsl!("cull/candidates"), wgsl!("cull/groups_early")]
+            }
+            Self::Late => &[wgsl!("cull/history"), wgsl!("cull/groups_late")],
+        }
+    }
+
+    /// What a cull of instances writes, and what it reads of its frame.
+    pub(super) fn member_bindings(self) -> &'static [(u32, Binding)] {
+        match self {
+            Self::Alone => VISIBLE_BINDINGS,
+            Self::Early(_) => EARLY_BINDINGS,
+            Self::Late => LATE_BINDINGS,
+        }
+    }
+
+    /// What a cull of groups writes, and what it reads of its frame.
+    pub(super) fn group_bindings(self) -> &'static [(u32, Binding)] {
+        match self {
+            Self::Alone => SURVIVOR_BINDINGS,
+            Self::Early(_) => EARLY_SURVIVOR_BINDINGS,
+            Self::Late => LATE_SURVIVOR_BINDINGS,
+        }
+    }
+
+    /// The constant that an early pass has besides.
+    fn constant(self) -> Option<(&'static str, f64)> {
+        match self {
+            Self::Early(candidates) => Some(("EARLY_SET", f64::from(candidates as u32))),
+            Self::Alone | Self::Late => None,
+        }
+    }
 }
 
 /// How a cull emits the kept instances: a shader file with its constants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum EmitKey {
+    /// Nothing but the mask and the verdicts.
+    Mask,
     /// One list, or none.
     List { append: bool, list: bool, capped: bool },
     /// Bit planes, of which bins are made later.
@@ -77,6 +168,7 @@ impl EmitKey {
     /// The shader files that emit.
     pub(crate) fn files(self) -> Vec<File> {
         match self {
+            Self::Mask => vec![wgsl!("output/report_mask")],
             Self::List { .. } => vec![wgsl!("output/report_list")],
             Self::Planes { bins, .. } => {
                 [&bins.files()[..], &[wgsl!("output/report_planes")]].concat()
@@ -89,6 +181,7 @@ impl EmitKey {
 
     fn constants(self) -> Vec<(&'static str, f64)> {
         match self {
+            Self::Mask => Vec::new(),
             Self::List { append, list, capped } => {
                 vec![("APPEND", flag(append)), ("LIST", flag(list)), ("CAPPED", flag(capped))]
             }
@@ -109,7 +202,7 @@ impl EmitKey {
     /// The bindings of the instances.
     fn record_bindings(self) -> &'static [(u32, Binding)] {
         match self {
-            Self::List { .. } => RECORD_BINDINGS,
+            Self::Mask | Self::List { .. } => RECORD_BINDINGS,
             Self::Planes { .. } | Self::Append { .. } => BINNED_BINDINGS,
         }
     }
@@ -148,6 +241,7 @@ pub(crate) fn report_constants(key: &ReportKey) -> Vec<(&'static str, f64)> {
         ("STATISTICS", flag(key.statistics)),
     ];
     constants.extend(key.emit.constants());
+    constants.extend(key.pass.constant());
     constants
 }
 
@@ -159,7 +253,6 @@ pub(crate) enum DepthStore {
     /// All levels from one texture.
     Atlas,
     /// No depth is read: such a pass only finds what is outside.
-    #[cfg(feature = "headless")]
     Nowhere,
 }
 
@@ -169,7 +262,6 @@ impl DepthStore {
         match self {
             Self::Apart(source) => [source.files(), &[wgsl!("pyramid/texels_apart")]].concat(),
             Self::Atlas => vec![wgsl!("pyramid/texels_atlas")],
-            #[cfg(feature = "headless")]
             Self::Nowhere => vec![wgsl!("pyramid/texels_nowhere")],
         }
     }
@@ -179,7 +271,6 @@ impl DepthStore {
         match self {
             Self::Apart(source) => source as u32,
             Self::Atlas => 5,
-            #[cfg(feature = "headless")]
             Self::Nowhere => 6,
         }
     }
@@ -203,7 +294,6 @@ impl DepthStore {
             Self::Atlas => {
                 gpu.layout("hiz.cull.atlas_layout", &[(2, Uniform), (3, ReadQuads), (6, Uniform)])
             }
-            #[cfg(feature = "headless")]
             Self::Nowhere => gpu.layout("hiz.cull.no_depth_layout", &[(2, Uniform), (6, Uniform)]),
         }
     }
@@ -221,6 +311,38 @@ pub(crate) const VISIBLE_BINDINGS: &[(u32, Binding)] = &[
 /// The bindings of what a cull of groups writes.
 pub(crate) const SURVIVOR_BINDINGS: &[(u32, Binding)] =
     &[(0, Binding::Write), (1, Binding::Write), (2, Binding::WriteTexels), (3, Binding::Write)];
+
+/// The bindings of an early pass: mask, planes, history, statistics, frame, the caller's mask.
+const EARLY_BINDINGS: &[(u32, Binding)] = &[
+    (0, Binding::Write),
+    (1, Binding::Write),
+    (2, Binding::Read),
+    (3, Binding::Write),
+    (4, Binding::Uniform),
+    (5, Binding::Read),
+];
+
+/// The bindings of a late pass: mask, planes, history, statistics, frame.
+const LATE_BINDINGS: &[(u32, Binding)] = VISIBLE_BINDINGS;
+
+/// The bindings of an early pass's groups: as [`SURVIVOR_BINDINGS`], then history and frame.
+const EARLY_SURVIVOR_BINDINGS: &[(u32, Binding)] = &[
+    (0, Binding::Write),
+    (1, Binding::Write),
+    (2, Binding::WriteTexels),
+    (3, Binding::Write),
+    (4, Binding::Read),
+    (5, Binding::Uniform),
+];
+
+/// The bindings of a late pass's groups: as [`SURVIVOR_BINDINGS`], then the history.
+const LATE_SURVIVOR_BINDINGS: &[(u32, Binding)] = &[
+    (0, Binding::Write),
+    (1, Binding::Write),
+    (2, Binding::WriteTexels),
+    (3, Binding::Write),
+    (4, Binding::Write),
+];
 
 /// The bindings of the survivors, which a cull of members reads.
 pub(crate) const MEMBER_BINDINGS: &[(u32, Binding)] =
@@ -279,7 +401,7 @@ pub(crate) fn unexplained(store: DepthStore, kind: BoundsKind, entry: &[File]) -
 }
 
 /// The files of the flat cull, which tests each instance by itself, without the decision.
-pub(crate) fn flat_files(emit: EmitKey) -> Vec<File> {
+pub(crate) fn flat_files(emit: EmitKey, pass: FramePass) -> Vec<File> {
     let shared = [
         wgsl!("cull/unexplained"),
         wgsl!("instances/piece"),
@@ -287,34 +409,42 @@ pub(crate) fn flat_files(emit: EmitKey) -> Vec<File> {
         wgsl!("output/statistics"),
         wgsl!("output/report"),
     ];
-    [&shared[..], &emit.files(), &[wgsl!("cull/cull")]].concat()
+    [&shared[..], &emit.files(), pass.member_files(), &[wgsl!("cull/cull")]].concat()
 }
 
 /// The shader of the flat cull, for instances of one kind.
-pub(crate) fn cull_module(store: DepthStore, kind: BoundsKind, emit: EmitKey) -> Source {
-    decision_module(store, kind, CERTIFIED, &flat_files(emit))
+pub(crate) fn flat_module(
+    store: DepthStore,
+    kind: BoundsKind,
+    emit: EmitKey,
+    pass: FramePass,
+) -> Source {
+    decision_module(store, kind, CERTIFIED, &flat_files(emit, pass))
 }
 
 /// The shader of the cull of groups.
-pub(crate) fn cull_groups_module(store: DepthStore) -> Source {
-    let entry = [
-        wgsl!("instances/piece"),
-        wgsl!("instances/groups"),
-        wgsl!("output/statistics"),
-        wgsl!("cull/cull_groups"),
-    ];
+pub(crate) fn cull_groups_module(store: DepthStore, pass: FramePass) -> Source {
+    let shared = [wgsl!("instances/piece"), wgsl!("instances/groups"), wgsl!("output/statistics")];
+    let entry = [&shared, pass.group_files(), &[wgsl!("cull/cull_groups")]].concat();
     unexplained(store, BoundsKind::Box, &entry)
 }
 
 /// The shader of the cull of the surviving groups' members.
-pub(crate) fn cull_members_module(store: DepthStore, kind: BoundsKind, emit: EmitKey) -> Source {
+pub(crate) fn cull_members_module(
+    store: DepthStore,
+    kind: BoundsKind,
+    emit: EmitKey,
+    pass: FramePass,
+) -> Source {
     let shared = [
         wgsl!("instances/piece"),
         wgsl!("output/statistics"),
         wgsl!("output/report"),
         wgsl!("instances/groups"),
     ];
-    unexplained(store, kind, &[&shared[..], &emit.files(), &[wgsl!("cull/cull_members")]].concat())
+    let entry =
+        [&shared[..], &emit.files(), pass.member_files(), &[wgsl!("cull/cull_members")]].concat();
+    unexplained(store, kind, &entry)
 }
 
 /// The layouts of a cull's view, of its records and of what it writes.
@@ -344,7 +474,7 @@ pub(crate) fn flat_pipeline(
             gpu,
             key.store,
             report.emit.record_bindings(),
-            ("hiz.cull.visible_layout", VISIBLE_BINDINGS),
+            ("hiz.cull.visible_layout", report.pass.member_bindings()),
         )?,
         constants: &[&classify_constants(key)[..], &report_constants(report)].concat(),
     })
@@ -356,27 +486,26 @@ pub(crate) fn cull_pipeline(
     key: &CullKey,
     report: &ReportKey,
 ) -> Result<wgpu::ComputePipeline> {
-    let module = cull_module(key.store, key.kind, report.emit);
+    let module = flat_module(key.store, key.kind, report.emit, report.pass);
     flat_pipeline(gpu, "hiz.cull.pipeline", module, key, report)
 }
 
-/// The cull of groups; with `statistics` it counts levels.
+/// The cull of groups.
 pub(crate) fn cull_groups_pipeline(
     gpu: &Gpu,
     key: &CullKey,
-    statistics: bool,
+    report: &ReportKey,
 ) -> Result<wgpu::ComputePipeline> {
+    let mut constants = classify_constants(key).to_vec();
+    constants.push(("STATISTICS", flag(report.statistics)));
+    constants.extend(report.pass.constant());
+    let written = ("hiz.cull_groups.layout", report.pass.group_bindings());
     gpu.compute_pipeline(&Compute {
         label: "hiz.cull_groups.pipeline",
-        source: cull_groups_module(key.store),
+        source: cull_groups_module(key.store, report.pass),
         entry_point: "cull_groups",
-        layouts: &layouts(
-            gpu,
-            key.store,
-            RECORD_BINDINGS,
-            ("hiz.cull_groups.layout", SURVIVOR_BINDINGS),
-        )?,
-        constants: &[&classify_constants(key)[..], &[("STATISTICS", flag(statistics))]].concat(),
+        layouts: &layouts(gpu, key.store, RECORD_BINDINGS, written)?,
+        constants: &constants,
     })
 }
 
@@ -386,12 +515,12 @@ pub(crate) fn cull_members_pipeline(
     key: &CullKey,
     report: &ReportKey,
 ) -> Result<wgpu::ComputePipeline> {
-    let written = ("hiz.cull.visible_layout", VISIBLE_BINDINGS);
+    let written = ("hiz.cull.visible_layout", report.pass.member_bindings());
     let [view, records, visible] = layouts(gpu, key.store, report.emit.record_bindings(), written)?;
     let members = gpu.layout("hiz.cull_members.layout", MEMBER_BINDINGS)?;
     gpu.compute_pipeline(&Compute {
         label: "hiz.cull_members.pipeline",
-        source: cull_members_module(key.store, key.kind, report.emit),
+        source: cull_members_module(key.store, key.kind, report.emit, report.pass),
         entry_point: "cull_members",
         layouts: &[view, records, visible, members],
         constants: &[&classify_constants(key)[..], &report_constants(report)].concat(),

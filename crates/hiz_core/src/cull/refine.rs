@@ -67,18 +67,7 @@ fn without_depth(
     entry_point: &'static str,
     (kind, sample_coverage, among): (BoundsKind, bool, bool),
 ) -> Result<wgpu::ComputePipeline> {
-    let key = CullKey {
-        store: DepthStore::Nowhere,
-        kind,
-        sample_coverage,
-        // These have no effect, because no depth is read.
-        reversed: false,
-        chunks: 1,
-        footprint_log2: 1,
-        descent: false,
-        fit_volume: false,
-        among,
-    };
+    let key = CullKey { among, ..CullKey::without_depth(kind, sample_coverage) };
     gpu.compute_pipeline(&Compute {
         label,
         source,

@@ -11,7 +11,8 @@
 //!    `explanation`, `ranges` and `readback`.
 //!    With `ahead`, `in_flight` and `slots` the answer comes while the caller does something else.
 //!    `views` culls for several cameras, with buffers of `joined`.
-//! 5. `single` does all of that at once, for bounds that are used once.
+//! 5. `two_passes` does that for the early and the late pass of a frame.
+//! 6. `single` does all of that at once, for bounds that are used once.
 //!
 //! `timing` and `clock` take the times of stages.
 //! `answers` and `images` lend what was dropped, and `warm_up` runs a frame before the first one.
@@ -73,6 +74,7 @@ mod samples;
 mod single;
 mod slots;
 mod timing;
+mod two_passes;
 mod uploads;
 mod views;
 mod warm_up;
@@ -87,4 +89,5 @@ pub use engine::Engine;
 pub use explanation::Explanation;
 pub use single::SingleCull;
 pub use slots::CULLS_IN_FLIGHT;
+pub use two_passes::{EarlyMask, PassAnswer, TwoPasses};
 pub use views::{AmongSource, ViewsCulling};

@@ -252,11 +252,12 @@ fn add_bins(
             [planes, before, blocks, &bins.totals, &output.bins, &index_of, &mesh_of, list];
         SCATTER.bind(gpu, uniform, &buffers)
     })?;
-    let sorted = ("SORTED", flag(slots.is_some()));
+    let (sorted, lods) = (flag(slots.is_some()), f64::from(bins.meshes.most_lods()));
+    let constants = [reserved, ("SORTED", sorted), ("LODS", lods)];
     steps.push(Step {
-        pipeline: SCATTER.pipeline(gpu, "emit_scatter", &[reserved, sorted])?,
+        pipeline: SCATTER.pipeline(gpu, "emit_scatter", &constants)?,
         bindings: bindings.clone(),
-        workgroups: (output.words * bins.meshes.most_lods()).div_ceil(WORKGROUP),
+        workgroups: output.words.div_ceil(WORKGROUP),
     });
     Ok(())
 }

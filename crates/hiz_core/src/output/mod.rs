@@ -5,7 +5,8 @@
 //!   hold.
 //! - `emit` says how kept instances are listed, and `mesh_table` has the meshes of bins.
 //! - `bins` has the buffers of bins, and `emit_passes` fills them from bit planes.
-//! - `compact` makes the ordered list and its length from the mask.
+//! - `compact` makes the ordered list and its length from the mask, and `cut` clears the bits that
+//!   the list has no room for.
 //! - `views` joins the masks of several views.
 //! - `readback` copies them to the host, a ring of slots at a time.
 //! - `draw`, `counters` and `verdict` have the layouts and codes that the shaders share.
@@ -15,6 +16,7 @@
 pub(crate) mod bins;
 pub(crate) mod compact;
 pub(crate) mod counters;
+pub(crate) mod cut;
 pub(crate) mod draw;
 pub(crate) mod emit;
 pub(crate) mod emit_passes;

@@ -79,10 +79,31 @@ pub struct Visible {
     capacity: u32,
     outputs: Outputs,
     counts: Vec<u32>,
+    /// Whether a `Temporal` owns these buffers.
+    of_two_passes: bool,
 }
 
 impl Visible {
     pub(crate) fn new(gpu: &Gpu, instances: &Instances, outputs: &Outputs) -> Result<Self> {
+        Self::with_tail(gpu, instances, outputs, false)
+    }
+
+    /// The buffers of one of the two passes of a frame.
+    /// Behind the verdicts of each piece they have room for another mask.
+    pub(crate) fn of_two_passes(
+        gpu: &Gpu,
+        instances: &Instances,
+        outputs: &Outputs,
+    ) -> Result<Self> {
+        Self::with_tail(gpu, instances, outputs, true)
+    }
+
+    fn with_tail(
+        gpu: &Gpu,
+        instances: &Instances,
+        outputs: &Outputs,
+        of_two_passes: bool,
+    ) -> Result<Self> {
         let Outputs { capacity, draw, ref emit, .. } = *outputs;
         gpu.check_context("instances", instances.context)?;
         if draw.first_instance != 0
@@ -97,8 +118,10 @@ impl Visible {
                 ),
             ));
         }
-        let pieces =
-            instances.pieces.iter().map(|piece| PieceOutput::new(gpu, piece, outputs.verdicts));
+        let pieces = instances
+            .pieces
+            .iter()
+            .map(|piece| PieceOutput::new(gpu, piece, outputs.verdicts, of_two_passes));
         let listed = outputs.indices || outputs.draws;
         let most = capacity.unwrap_or(instances.len());
         let bins =
@@ -114,7 +137,13 @@ impl Visible {
             capacity: most,
             outputs: outputs.clone(),
             counts: instances.pieces.iter().map(Piece::count).collect(),
+            of_two_passes,
         })
+    }
+
+    /// Whether they are those of one of the two passes of a frame, which no other cull may fill.
+    pub(crate) fn is_of_two_passes(&self) -> bool {
+        self.of_two_passes
     }
 
     /// What culls leave in these buffers.
@@ -253,10 +282,9 @@ impl Visible {
 }
 
 impl PieceOutput {
-    fn new(gpu: &Gpu, piece: &Piece, has_verdicts: bool) -> Result<Self> {
-        let verdicts =
-            if has_verdicts { piece.count().max(1).next_multiple_of(VERDICT_MULTIPLE) } else { 0 };
-        let size = verdicts_offset(piece).max(16) + 4 * u64::from(verdicts);
+    fn new(gpu: &Gpu, piece: &Piece, has_verdicts: bool, has_tail: bool) -> Result<Self> {
+        let tail = if has_tail { 4 * u64::from(piece.words()) } else { 0 };
+        let size = (early_offset(piece, has_verdicts) + tail).max(32);
         Ok(Self {
             mask: gpu.empty("hiz.visible.mask", size, STORAGE)?,
             groups: OnceLock::new(),
@@ -284,4 +312,11 @@ impl PieceOutput {
 /// `verdicts_begin`.
 pub(crate) fn verdicts_offset(piece: &Piece) -> u64 {
     4 * u64::from(piece.words().next_multiple_of(VERDICT_MULTIPLE))
+}
+
+/// Where the copy of an early pass's mask begins behind the verdicts, in bytes;
+/// `shaders/cull/late.wgsl`, `early_begin`.
+pub(crate) fn early_offset(piece: &Piece, has_verdicts: bool) -> u64 {
+    let verdicts = if has_verdicts { piece.count() } else { 0 };
+    verdicts_offset(piece) + 4 * u64::from(verdicts.next_multiple_of(VERDICT_MULTIPLE))
 }

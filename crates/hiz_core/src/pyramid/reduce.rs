@@ -59,15 +59,20 @@ pub(crate) fn coarse_module(source: SourceKind) -> Source {
     reduce_module(source, wgsl!("pyramid/reduce_coarse"))
 }
 
-/// `tall`: neighbouring invocations read below each other.
+/// `tall`: neighbouring invocations read below each other; `region`: not all blocks are read.
 fn reduce_pipeline(
     gpu: &Gpu,
     source: SourceKind,
     shape: Shape,
-    (reversed, tall, chunks): (bool, bool, usize),
+    (reversed, chunks): (bool, usize),
+    (tall, region): (bool, bool),
 ) -> Result<wgpu::ComputePipeline> {
-    let mut constants =
-        vec![("REVERSED", flag(reversed)), ("CHUNKS", chunks as f64), ("TALL", flag(tall))];
+    let mut constants = vec![
+        ("REVERSED", flag(reversed)),
+        ("CHUNKS", chunks as f64),
+        ("TALL", flag(tall)),
+        ("REGION", flag(region)),
+    ];
     let (module, entry_point) = match shape {
         Shape::Blocks { from_source, first } => {
             constants.extend([("FROM_SOURCE", flag(from_source)), ("FIRST", f64::from(first))]);
@@ -115,10 +120,11 @@ pub(super) struct Prepared {
 
 impl Prepared {
     /// Makes what the reduction `number` needs, which reads these blocks in each step.
+    /// `region`: they need not be all of them.
     pub(super) fn new(
         gpu: &Gpu,
         (part, camera, number): (Part, Camera, u32),
-        blocks: &[Blocks],
+        (blocks, region): (&[Blocks], bool),
         pyramid: &Pyramid,
     ) -> Result<Self> {
         let kind = part.kind;
@@ -127,8 +133,9 @@ impl Prepared {
         let dispatch = |(step, blocks): (&Step, &Blocks)| {
             let tall = step.source == 0 && reads_tall(step, kind, pyramid.size());
             let (shape, workgroups) = shape_of(step, blocks.size(), tall);
-            let constants = (built.camera.convention().is_reversed(), tall, pyramid.chunks.len());
-            Ok((reduce_pipeline(gpu, kind, shape, constants)?, workgroups))
+            let constants = (built.camera.convention().is_reversed(), pyramid.chunks.len());
+            let pipeline = reduce_pipeline(gpu, kind, shape, constants, (tall, region))?;
+            Ok((pipeline, workgroups))
         };
         let dispatches =
             pyramid.layout.steps.iter().zip(blocks).map(dispatch).collect::<Result<_>>()?;
@@ -153,7 +160,7 @@ impl Prepared {
             ));
         }
         let blocks: Vec<_> = pyramid.layout.steps.iter().map(Blocks::all).collect();
-        Self::new(gpu, (part, camera.clone(), number), &blocks, pyramid)
+        Self::new(gpu, (part, camera.clone(), number), (&blocks, false), pyramid)
     }
 
     /// Records the pass.

@@ -47,7 +47,7 @@ pub(crate) fn record_reduce_region(
     let blocks = touched_blocks(layout, rectangle);
     let steps = made(&pyramid.part_steps, || Steps::new(gpu, &layout.steps))?;
     let renewed = (part, built.camera, numbers.reduction);
-    let prepared = Prepared::new(gpu, renewed, &blocks, pyramid)?;
+    let prepared = Prepared::new(gpu, renewed, (&blocks, true), pyramid)?;
     let staged = Steps::numbers_of_part(gpu, &layout.steps, &blocks, &numbers)?;
     finish(gpu, encoder, pyramid, prepared, (steps, staged))?;
     if let Some(owner) = built.owner {

@@ -1,7 +1,7 @@
 //! Multisampled depth: the farthest of each pixel's samples, the nearest, or both.
 //!
-//! `shaders/pyramid/resolve.wgsl` writes rows into a buffer, which are copied into a texture of four
-//! pixels per texel (`Rgba32Uint`), as uploads have it.
+//! `shaders/pyramid/resolve.wgsl` writes rows into a buffer.
+//! They are copied into a texture of four pixels per texel (`Rgba32Uint`), as uploads have it.
 //! Images that are larger than the buffer go through it in bands of rows.
 
 use crate::error::{Error, Result};
@@ -234,7 +234,8 @@ impl DepthResolve {
         self.resolved.lock().ok_or_else(|| {
             Error::mismatch(
                 "resolve",
-                "expected one that depth was resolved into, got one without; record_resolve does it",
+                "expected one that depth was resolved into, got one that never was; record_resolve \
+                 does it",
             )
         })
     }

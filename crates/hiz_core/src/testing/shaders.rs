@@ -4,7 +4,8 @@ use crate::cull::among::among_order_module;
 use crate::cull::count::count_module;
 use crate::cull::explain::explain_module;
 use crate::cull::pipelines::{
-    BinKey, DepthStore, EmitKey, cull_groups_module, cull_members_module, cull_module,
+    BinKey, Candidates, DepthStore, EmitKey, FramePass, cull_groups_module, cull_members_module,
+    flat_module,
 };
 use crate::cull::refine::{refine_groups_module, refine_module};
 use crate::gpu::clock_check::clock_check_module;
@@ -16,6 +17,7 @@ use crate::instances::from_buffer::{FROM_BUFFER_KINDS, from_buffer_module};
 use crate::instances::update::update_module;
 use crate::occluders::device_raster::occluders_module;
 use crate::output::compact::{compact_module, copy_module};
+use crate::output::cut::{cut_module, emit_cut_module};
 use crate::output::emit_passes;
 use crate::output::views::join_module;
 use crate::pyramid::reduce::{blocks_module, coarse_module};
@@ -40,6 +42,9 @@ pub(super) const EMITS: [(&str, EmitKey); 5] = [
 const ONE_LOD: BinKey = BinKey { sorted: true, lod_rule: None };
 const LODS: BinKey = BinKey { sorted: true, lod_rule: Some(1) };
 
+/// Every way to emit what one of the two passes of a frame reports.
+pub(super) const EMITS_OF_TWO: [(&str, EmitKey); 3] = [("mask", EmitKey::Mask), EMITS[1], EMITS[2]];
+
 /// Path below `shaders/`, without its extension, and text of every file.
 pub fn files() -> Vec<(&'static str, &'static str)> {
     FILES.iter().map(|file| (file.path, file.text)).collect()
@@ -55,6 +60,8 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("refine_groups".to_owned(), refine_groups_module()),
         ("compact".to_owned(), compact_module()),
         ("copy".to_owned(), copy_module()),
+        ("cut".to_owned(), cut_module()),
+        ("emit_cut".to_owned(), emit_cut_module()),
         ("emit_scan".to_owned(), emit_passes::scan_module()),
         ("emit_bins".to_owned(), emit_passes::bins_module()),
         ("emit_draws".to_owned(), emit_passes::draws_module()),
@@ -83,16 +90,24 @@ pub(super) fn all() -> Vec<(String, Source)> {
         );
     }
     let stores = SOURCES.map(DepthStore::Apart).into_iter().chain([DepthStore::Atlas]);
+    // The sets of an early pass differ in a constant.
+    let early = (DepthStore::Nowhere, FramePass::Early(Candidates::History));
+    let passes = [FramePass::Alone, FramePass::Late];
+    let passes = stores.clone().flat_map(|store| passes.map(|pass| (store, pass)));
+    for (store, pass) in passes.chain([early]) {
+        all.push((format!("cull_groups {store:?} {pass:?}"), cull_groups_module(store, pass)));
+        let emits: &[_] = if pass == FramePass::Alone { &EMITS } else { &EMITS_OF_TWO };
+        for (kind, (way, emit)) in
+            KINDS.into_iter().flat_map(|k| emits.iter().map(move |e| (k, *e)))
+        {
+            let named = |name: &str| format!("{name} {way} {store:?} {pass:?} {kind:?}");
+            all.push((named("cull"), flat_module(store, kind, emit, pass)));
+            all.push((named("cull_members"), cull_members_module(store, kind, emit, pass)));
+        }
+    }
     for store in stores {
-        all.push((format!("cull_groups {store:?}"), cull_groups_module(store)));
         for kind in KINDS {
-            let named = |name: &str| format!("{name} {store:?} {kind:?}");
-            for (way, emit) in EMITS {
-                let named = |name: &str| named(&format!("{name} {way}"));
-                all.push((named("cull"), cull_module(store, kind, emit)));
-                all.push((named("cull_members"), cull_members_module(store, kind, emit)));
-            }
-            all.push((named("explain"), explain_module(store, kind)));
+            all.push((format!("explain {store:?} {kind:?}"), explain_module(store, kind)));
         }
         #[cfg(feature = "yardstick")]
         all.push((format!("uncertified cull {store:?}"), uncertified_module(store)));
@@ -108,6 +123,11 @@ pub(super) fn all() -> Vec<(String, Source)> {
 pub(in crate::testing) mod tests {
     use super::*;
     use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+    /// The flat cull that is not one of two passes.
+    fn cull_module(store: DepthStore, kind: BoundsKind, emit: EmitKey) -> Source {
+        flat_module(store, kind, emit, FramePass::Alone)
+    }
 
     pub(in crate::testing) fn parse(source: &str) -> naga::Module {
         let module = naga::front::wgsl::parse_str(source)

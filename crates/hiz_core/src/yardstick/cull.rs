@@ -3,7 +3,7 @@
 use crate::cull::inputs::CullInputs;
 use crate::cull::options::{CullOptions, Hierarchy};
 use crate::cull::pipelines::{
-    CullKey, DepthStore, EmitKey, ReportKey, decision_module, flat_files, flat_pipeline,
+    CullKey, DepthStore, EmitKey, FramePass, ReportKey, decision_module, flat_files, flat_pipeline,
 };
 use crate::cull::record::record_cull_by;
 use crate::error::{Error, Result};
@@ -21,7 +21,12 @@ use crate::pyramid::Pyramid;
 pub(crate) fn uncertified_module(store: DepthStore) -> Source {
     // The bounds' shader files use the types of the supporting planes, which this cull never tests.
     let classify = [wgsl!("cull/supporting_planes"), wgsl!("yardstick/classify_uncertified")];
-    decision_module(store, BoundsKind::Box, &classify, &flat_files(EmitKey::NO_LIST))
+    decision_module(
+        store,
+        BoundsKind::Box,
+        &classify,
+        &flat_files(EmitKey::NO_LIST, FramePass::Alone),
+    )
 }
 
 fn uncertified_pipeline(

@@ -3,6 +3,7 @@
 //! - `reduce` builds a pyramid with one dispatch per level.
 //! - `multisampled` resolves multisampled depth.
 //! - `cull` culls without certificates.
+//! - `emit` makes lists and draws without a cull.
 //! - `raster` draws occluders on the host, without what comes before and after.
 //! - `from_buffer` copies the bounds that the library takes from a buffer.
 //! - `frames` times a renderer's frames call by call.
@@ -10,6 +11,7 @@
 //! They are for benchmarks and their tests alone.
 
 mod cull;
+mod emit;
 mod frames;
 mod from_buffer;
 mod multisampled;
@@ -21,6 +23,7 @@ use std::time::Instant;
 #[cfg(feature = "testing")]
 pub(crate) use cull::uncertified_module;
 pub use cull::{read_mask, record_uncertified_cull};
+pub use emit::record_emission;
 pub use frames::{FrameTimes, frames};
 pub use from_buffer::BoundsInBuffer;
 pub use multisampled::MultisampledDepth;

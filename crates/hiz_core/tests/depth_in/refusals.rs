@@ -77,8 +77,8 @@ fn parts_that_are_not_there_are_refused_by_name() {
         ),
         (
             "a larger level without a size",
-            "depth: expected the pyramid's size (height 16, width 16), got (height 32, width 32); set \
-             DepthSource::size",
+            "depth: expected the pyramid's size (height 16, width 16), got (height 32, width 32); \
+             set DepthSource::size",
             DepthSource { size: None, ..part },
         ),
         (

@@ -32,7 +32,7 @@ const SIZES: [(u32, u32); 17] = [
     (1920, 1080),
 ];
 
-/// How the image lies in its texture: alone, four pixels per texel, or in the middle of a larger one.
+/// How the image lies in its texture: alone, four pixels per texel, or within a larger one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Kind {
     Whole,
@@ -235,12 +235,12 @@ fn planted_faults_of_regions_show() {
             ("one texel of a coarse level short", four, padded),
         ),
         (
-            "let block = step.begin + place;",
+            "let block = first_block() + place;",
             "let block = place;",
             ("the rectangle at the corner", all, padded),
         ),
         (
-            "let texel = step.begin + group.xy;",
+            "let texel = first_block() + group.xy;",
             "let texel = group.xy;",
             ("the same of shared texels", six, padded),
         ),

@@ -22,7 +22,7 @@ pub(super) type Mask = u8;
 
 /// Sums with a winding number of their own; parity has that of the first one modulo 2.
 const SUMS: usize = 3;
-const LANES: usize = 16;
+const LANES: usize = 8;
 const MASKS: usize = 1 << SLABS;
 const GIVEN: usize = 0;
 const FRONTS: usize = 1;
@@ -36,7 +36,7 @@ pub(super) struct Tally {
     /// Lane `SLABS * sum + slab`: how often the sum winds about the centre, modulo 256.
     windings: [i8; LANES],
     /// The same bits, then those of the parities: an edge that remains may meet the pixel.
-    open: u16,
+    open: u8,
 }
 
 /// By mask: what a triangle adds to the windings of a pixel.
@@ -137,10 +137,8 @@ impl Tally {
         if is_planted!(fault, BordersIgnored) {
             return;
         }
-        self.open |= u16::from(given)
-            | u16::from(fronts) << SLABS
-            | u16::from(turned) << (SLABS * TURNED)
-            | u16::from(parity) << (SLABS * SUMS);
+        self.open |=
+            given | fronts << SLABS | turned << (SLABS * TURNED) | parity << (SLABS * SUMS);
     }
 
     /// Whether the triangles of a slab cover every point of the pixel.

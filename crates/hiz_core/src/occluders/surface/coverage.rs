@@ -52,13 +52,6 @@ impl Grid {
     pub(super) fn around(&self, x: [i32; 2], y: [i32; 2]) -> ([i32; 2], [i32; 2]) {
         (self.met(x[0], x[1], self.columns), self.met(y[0], y[1], self.rows))
     }
-
-    /// The 4^finer parts of one square of this grid.
-    #[inline]
-    pub(super) fn parts(&self, finer: u32, x: i32, y: i32) -> Self {
-        let within = |place: i32| [place << finer, ((place + 1) << finer) - 1];
-        Self { log2: self.log2 - finer, columns: within(x), rows: within(y) }
-    }
 }
 
 /// The pixels along one axis that meet an interval of units, each grown by [`REACH`].
@@ -113,36 +106,63 @@ impl EdgeFunctions {
                 - self.bias[k]
         })
     }
+}
 
-    /// Calls `cover` for the parts of a square whose centres the triangle covers.
-    ///
-    /// `parts` are all squares of a grid, and (x, y) is their common centre.
+/// The sides of a triangle about a point, to ask how it winds there and nearby.
+///
+/// The rule for points on a side is that of [`EdgeFunctions`].
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sides {
+    /// None is negative if the triangle covers the point.
+    value: [i64; 3],
+    /// What they grow by per unit right and down.
+    right: [i64; 3],
+    down: [i64; 3],
+    sense: i32,
+}
+
+impl Sides {
     #[inline]
-    pub(super) fn for_each_part(
-        &self,
-        parts: Grid,
-        x: i32,
-        y: i32,
-        mut cover: impl FnMut(i32, i32),
-    ) {
-        let half = i64::from(parts.columns[1] - parts.columns[0] + 1) << (parts.log2 - 1);
-        let at_centre = self.at(x, y);
-        // Negative in all of the square.
-        if (0..3).any(|k| at_centre[k] + half * (self.right[k].abs() + self.down[k].abs()) < 0) {
-            return;
+    pub(super) fn new(corners: &[[i32; 2]; 3], point: [i32; 2]) -> Self {
+        let c = corners.map(|c| [0, 1].map(|k| i64::from(c[k]) - i64::from(point[k])));
+        // Twice the areas of the point and a side.
+        let beside = |a: [i64; 2], b: [i64; 2]| a[0] * b[1] - a[1] * b[0];
+        let areas = [beside(c[0], c[1]), beside(c[1], c[2]), beside(c[2], c[0])];
+        let sense = if areas[0] + areas[1] + areas[2] < 0 { -1_i64 } else { 1 };
+        let (mut value, mut right, mut down) = ([0; 3], [0; 3], [0; 3]);
+        for k in 0..3 {
+            let (a, b) = (c[k], c[(k + 1) % 3]);
+            right[k] = sense * (a[1] - b[1]);
+            down[k] = sense * (b[0] - a[0]);
+            let bias = i64::from(!(right[k] > 0 || (right[k] == 0 && down[k] > 0)));
+            value[k] = sense * areas[k] - bias;
         }
-        for row in parts.rows[0]..=parts.rows[1] {
-            let dy = i64::from(parts.centre(row)) - i64::from(y);
-            for column in parts.columns[0]..=parts.columns[1] {
-                let dx = i64::from(parts.centre(column)) - i64::from(x);
-                let at = |k: usize| at_centre[k] + self.right[k] * dx + self.down[k] * dy;
-                if (at(0) | at(1) | at(2)) >= 0 {
-                    cover(column, row);
-                }
-            }
-        }
+        Self { value, right, down, sense: sense as i32 }
+    }
+
+    /// How the triangle winds about the point: +1 or -1 by its own sense if it covers it, or 0.
+    #[inline]
+    pub(super) fn winding(&self) -> i32 {
+        let [a, b, c] = self.value;
+        if (a | b | c) >= 0 { self.sense } else { 0 }
+    }
+
+    /// The same for the points that are so many units left or right and above or below.
+    ///
+    /// They are in the order of [`QUARTERS`].
+    #[inline]
+    pub(super) fn windings(&self, units: i32) -> [i32; 4] {
+        let units = i64::from(units);
+        let (right, down) = (self.right.map(|v| units * v), self.down.map(|v| units * v));
+        QUARTERS.map(|[x, y]| {
+            let at = |k: usize| self.value[k] + i64::from(x) * right[k] + i64::from(y) * down[k];
+            if (at(0) | at(1) | at(2)) >= 0 { self.sense } else { 0 }
+        })
     }
 }
+
+/// Where the quarters of a square are from its centre.
+pub(super) const QUARTERS: [[i32; 2]; 4] = [[-1, -1], [1, -1], [-1, 1], [1, 1]];
 
 /// Calls `cover` for the squares whose centres a triangle covers.
 ///
@@ -199,11 +219,13 @@ pub(super) fn for_each_centre(
 ///
 /// `reach` is at most [`REACH`].
 /// There are three separating axes: x, y and the edge's normal.
+/// Squares are left out where `is_wanted` is false.
 #[inline]
 pub(super) fn for_each_met(
     [a, b]: [Corner; 2],
     reach: i32,
     grid: Grid,
+    is_wanted: impl Fn(i32, i32) -> bool,
     mut meet: impl FnMut(i32, i32),
 ) {
     let columns = grid.met(a.x.min(b.x), a.x.max(b.x), grid.columns);
@@ -230,11 +252,56 @@ pub(super) fn for_each_met(
             columns = within;
         }
         let row = normal[1] * (i64::from(grid.centre(y)) - i64::from(a.y));
-        for x in columns[0]..=columns[1] {
+        for x in (columns[0]..=columns[1]).filter(|x| is_wanted(*x, y)) {
             let beside = normal[0] * (i64::from(grid.centre(x)) - i64::from(a.x)) + row;
             if beside.abs() <= most {
                 meet(x, y);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_ways_to_cover_a_point_agree() {
+        let mut state = 1_u32;
+        let mut below = |n: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            ((state >> 16) % n).cast_signed()
+        };
+        let grid = Grid { log2: UNITS.ilog2(), columns: [0, 3], rows: [0, 3] };
+        let mut covered = [0; 2];
+        for _ in 0..20_000 {
+            // Many sides run through centres, which are odd multiples of 128.
+            let corners = [0; 3].map(|_| [below(12) * 128 - 256, below(12) * 128 - 256]);
+            let [a, b, c] = corners.map(|[x, y]| Corner { x, y, far: 0.0 });
+            let mut found = [[false; 4]; 4];
+            for_each_centre(
+                [a, b, c],
+                grid,
+                |_, _| false,
+                |x, y| {
+                    found[y as usize][x as usize] = true;
+                },
+            );
+            let sense = if area([a, b, c]) < 0 { -1 } else { 1 };
+            for (y, row) in (0..).zip(found) {
+                for (x, found) in (0..).zip(row) {
+                    let expected = if found { sense } else { 0 };
+                    let [x, y] = [x, y].map(|place| grid.centre(place));
+                    let sides = Sides::new(&corners, [x, y]);
+                    assert_eq!(sides.winding(), expected, "{corners:?} {x} {y}");
+                    for (k, [dx, dy]) in QUARTERS.into_iter().enumerate() {
+                        let nearby = Sides::new(&corners, [x - 64 * dx, y - 64 * dy]);
+                        assert_eq!(nearby.windings(64)[k], expected, "{corners:?} {x} {y}");
+                    }
+                    covered[usize::from(found)] += 1;
+                }
+            }
+        }
+        assert!(covered[1] > 10_000, "{covered:?}");
     }
 }

@@ -16,7 +16,7 @@
 //! How well f fits is a matter of quality alone.
 
 use crate::host::linear::Vec3;
-use crate::host::rounding::ROUNDING;
+use crate::host::rounding::{ROUNDING, round_up};
 use crate::input::mesh::FaceCull;
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
 use crate::occluders::surface::projector::{Clip, Projector, is_before};
@@ -160,7 +160,7 @@ impl Rounder {
 }
 
 /// A triangle in the rounded image, or what is left of it.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Facet {
     /// The plane at the point `at`, and its slopes per unit.
     far: f64,
@@ -179,6 +179,18 @@ pub(super) struct Facet {
 }
 
 impl Facet {
+    /// A triangle that is left out.
+    pub(super) const NOTHING: Self = Self {
+        far: 0.0,
+        slope: [0.0; 2],
+        slack: 0.0,
+        farthest: 0.0,
+        nearest: f64::INFINITY,
+        at: [0; 2],
+        sign: 0,
+        is_cut: false,
+    };
+
     /// The facet of a polygon, or `None` if that is empty.
     pub(super) fn new(corners: &[Corner], size: [i32; 2]) -> Self {
         let first = corners[0];
@@ -256,6 +268,16 @@ impl Facet {
             if most < self.farthest { most } else { self.farthest },
             if least > self.nearest { least } else { self.nearest },
         )
+    }
+
+    /// A depth of [`Facet::range`] as a float32, rounded towards far.
+    #[inline(always)]
+    pub(super) fn rounded(far: f64, fault: Planted) -> f32 {
+        if is_planted!(fault, RoundedToNearest) {
+            #[expect(clippy::cast_possible_truncation, reason = "the fault that is planted")]
+            return far as f32;
+        }
+        round_up(far)
     }
 
     #[inline(always)]

@@ -1,20 +1,18 @@
-//! The conservative depths of an image: thresholds, proof, finer proof, search.
+//! The conservative depths of an image: thresholds, proof, search.
 
 use crate::host::threads::{cores, on_threads};
 use crate::input::camera::Camera;
 use crate::occluders::surface::cells::Cells;
 use crate::occluders::surface::facets::Rounder;
 use crate::occluders::surface::links::Standing;
-use crate::occluders::surface::looks::{Looks, Placed, Tiles, Wanted};
+use crate::occluders::surface::looks::{Looks, Placed, Sought, Tiles, Wanted};
 use crate::occluders::surface::open_pixels::OpenPixels;
-use crate::occluders::surface::proof::{Proof, band_rows, bands};
-use crate::occluders::surface::sheets::search;
-use crate::occluders::surface::thresholds;
+use crate::occluders::surface::proof::{band_rows, bands, proved};
+use crate::occluders::surface::search::search;
+use crate::occluders::surface::sheets;
+use crate::occluders::surface::thresholds::{self, Slabs};
+use crate::occluders::surface::walk::Walk;
 
-/// A pixel is searched if its distance to the far plane is less than this share of what it may be.
-///
-/// Nothing rests on it.
-const WORTH: f32 = 0.98;
 /// As [`image`], by a search of all pixels: slow, and what tests compare with.
 pub(super) fn searched(
     placed: Placed<'_>,
@@ -24,7 +22,12 @@ pub(super) fn searched(
     refinement: u32,
 ) -> Vec<f64> {
     let size = camera.size();
-    let looks = Looks::new(&placed, camera, rounder, &Tiles::open(size));
+    let looks = Looks::new(
+        &placed,
+        camera,
+        rounder,
+        &Sought { tiles: &Tiles::open(size), open: None, known: None },
+    );
     let open = OpenPixels::new(size, vec![true; size.pixels() as usize]);
     let beyond = if camera.convention().is_reversed() { 0.0 } else { 1.0 };
     let mut far = vec![beyond; size.pixels() as usize];
@@ -55,7 +58,7 @@ impl Search<'_> {
                 let wanted = Wanted { open, tiles, rows };
                 let projector = &self.rounder.projector;
                 let cells = Cells::new(&self.placed, projector, self.looks, self.links, &wanted);
-                search(&cells, open, rows, self.refinement, fault, far);
+                sheets::search(&cells, open, rows, self.refinement, fault, far);
             }
         });
     }
@@ -75,34 +78,36 @@ pub(super) fn image(
     centres: &[f32],
 ) -> Vec<f64> {
     let (size, convention) = (camera.size(), camera.convention());
-    let beyond = if convention.is_reversed() { 0.0 } else { 1.0 };
+    let beyond: f32 = if convention.is_reversed() { 0.0 } else { 1.0 };
     let slabs = thresholds::image(centres, size, convention);
-    let tiles = Tiles::new(slabs.iter().map(|slabs| slabs.last), size);
-    let looks = &Looks::new(&placed, camera, rounder, &tiles);
-    let proof = Proof { placed, rounder, looks, links, size, convention };
-    let (mut far, is_open) = proof.image(&slabs, &tiles);
-    let open = OpenPixels::new(size, is_open);
-    let mut is_open = vec![false; far.len()];
-    let floors = proof.refine(&open, &tiles, u32::from(refinement > 0), &mut far);
-    for (pixel, floor) in open.pixels().iter().zip(floors) {
-        let pixel = *pixel as usize;
-        let found = beyond - far[pixel].min(beyond);
-        // Where a sample finds nothing, it may be behind all that was tried.
-        is_open[pixel] = found <= 0.0 || found < WORTH * (beyond - floor);
-    }
-    if looks.has_uncertain {
-        // What is too uncertain for the proof is missing at the centres, too.
-        for (is_open, far) in is_open.iter_mut().zip(&far) {
-            *is_open |= *far >= beyond;
-        }
+    let tried = Tiles::new(slabs.iter().map(|slabs| slabs.last), size);
+    let looks =
+        Looks::new(&placed, camera, rounder, &Sought { tiles: &tried, open: None, known: None });
+    let has_uncertain = looks.has_uncertain;
+    let walk = Walk { placed, rounder, looks: &looks, links };
+    let mut far = proved(&walk, &slabs, &tried, size);
+    let is_open = |(far, slabs): (&f32, &Slabs)| *far == f32::INFINITY && *slabs != Slabs::NONE;
+    let open = OpenPixels::new(size, far.iter().zip(&slabs).map(is_open).collect());
+    if !open.is_empty() {
+        let bound = |i: usize| if open.is_open(i) { slabs[i].searched } else { f32::NEG_INFINITY };
+        let tiles = Tiles::new((0..far.len()).map(bound), size);
+        let sought = Sought { tiles: &tiles, open: Some(&open), known: Some(&looks) };
+        let looks = Looks::new(&placed, camera, rounder, &sought);
+        let walk = Walk { looks: &looks, ..walk };
+        search(&walk, &open, &slabs, beyond, refinement, &mut far);
     }
     let mut far: Vec<f64> = far.into_iter().map(|far| f64::from(far.min(beyond))).collect();
-    let open = OpenPixels::new(size, is_open);
-    if !open.is_empty() {
-        // What is farther than what is known of all open pixels around is not searched for.
-        #[expect(clippy::cast_possible_truncation, reason = "they were float32 before")]
-        let bound = |i: usize| if open.is_open(i) { far[i] as f32 } else { f32::NEG_INFINITY };
-        let tiles = Tiles::new((0..far.len()).map(bound), size);
+    if has_uncertain {
+        // What is too uncertain for integers is missing everywhere so far.
+        let beyond = f64::from(beyond);
+        let open = OpenPixels::new(size, far.iter().map(|far| *far >= beyond).collect());
+        let tiles = Tiles::open(size);
+        let looks = &Looks::new(
+            &placed,
+            camera,
+            rounder,
+            &Sought { tiles: &tiles, open: None, known: None },
+        );
         Search { placed, links, rounder, looks, refinement }.lower(&open, &tiles, &mut far);
     }
     far

@@ -117,6 +117,14 @@ pub(super) struct Standing<'a> {
 }
 
 impl Standing<'_> {
+    /// Whether a copy shares any edge.
+    #[inline]
+    pub(super) fn has_any(&self, copy: u32) -> bool {
+        let before = self.before[copy as usize];
+        let of_copy = before.and_then(|before| self.links.of_copy.get(before as usize));
+        of_copy.is_some_and(|own| !own.is_empty())
+    }
+
     /// The number of a shared edge, if this edge of a copy is shared.
     #[inline]
     pub(super) fn number(&self, copy: u32, edge: u32) -> Option<u32> {

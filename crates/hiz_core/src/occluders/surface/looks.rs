@@ -61,7 +61,7 @@ impl Tiles {
     ///
     /// Columns and rows of pixels are the least and the greatest, both within the image.
     #[inline]
-    fn hide(&self, far: f64, [x0, x1]: [i32; 2], [y0, y1]: [i32; 2]) -> bool {
+    pub(super) fn hide(&self, far: f64, [x0, x1]: [i32; 2], [y0, y1]: [i32; 2]) -> bool {
         let tile = |v: i32| v.cast_unsigned() as usize / TILE as usize;
         (tile(y0)..=tile(y1)).all(|row| {
             let line = &self.last[row * self.columns..][..self.columns];
@@ -74,6 +74,28 @@ impl Tiles {
     pub(super) fn last(&self, x: i32, y: i32) -> f32 {
         let tile = |v: i32| v.cast_unsigned() as usize / TILE as usize;
         self.last[tile(y) * self.columns + tile(x)]
+    }
+}
+
+/// What is looked at.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sought<'a> {
+    /// What they hide is not.
+    pub(super) tiles: &'a Tiles,
+    /// Only what may meet one of these pixels is, if there are any.
+    pub(super) open: Option<&'a OpenPixels>,
+    /// Whose vertices are not rounded again.
+    pub(super) known: Option<&'a Looks>,
+}
+
+impl Sought<'_> {
+    /// Whether something as near as `far` is left out.
+    ///
+    /// Columns and rows of pixels are the least and the greatest, both within the image.
+    #[inline]
+    fn excludes(&self, far: f64, columns: [i32; 2], rows: [i32; 2]) -> bool {
+        self.open.is_some_and(|open| !open.any(columns, rows))
+            || self.tiles.hide(far, columns, rows)
     }
 }
 
@@ -104,6 +126,12 @@ impl Polygon {
         &self.corners[..usize::from(self.count)]
     }
 
+    /// Its triangles.
+    pub(super) fn fan(&self) -> impl Iterator<Item = [Corner; 3]> {
+        let corners = self.corners();
+        corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]])
+    }
+
     /// The sides without a neighbour.
     pub(super) fn cuts(&self) -> impl Iterator<Item = [Corner; 2]> {
         let count = usize::from(self.count);
@@ -119,11 +147,14 @@ pub(super) struct Look {
     /// The copy of a mesh, by its place in the list of placements.
     pub(super) copy: u32,
     pub(super) meshlet: u32,
-    /// The first and the last row of pixels that its facets and their edges may meet.
+    /// The first and the last column and row of pixels that its facets and their edges may meet.
+    pub(super) columns: [i32; 2],
     pub(super) rows: [i32; 2],
     pub(super) vertices: Vec<Vertex>,
     /// By triangle of the meshlet.
     pub(super) facets: Vec<Facet>,
+    /// Bit k: facet k is there.
+    there: u128,
     pub(super) polygons: Vec<Polygon>,
 }
 
@@ -134,6 +165,8 @@ pub(super) struct Looks {
     /// By copy: where its meshlets begin in `by_meshlet`, less the number of its first meshlet.
     of_copy: Vec<u32>,
     by_meshlet: Vec<u32>,
+    /// By look: the number of its first facet; one more entry for all of them.
+    first_facet: Vec<u32>,
     /// Whether a triangle was left out since float64 is not sure enough of it.
     pub(super) has_uncertain: bool,
 }
@@ -158,36 +191,36 @@ impl Placed<'_> {
 }
 
 impl Looks {
-    /// Looks at what is in the view of `camera` and not behind everything that `tiles` try.
+    /// Looks at what is in the view of `camera` and sought.
     pub(super) fn new(
         placed: &Placed<'_>,
         camera: &Camera,
         rounder: &Rounder,
-        tiles: &Tiles,
+        sought: &Sought<'_>,
     ) -> Self {
         let size = camera.size();
         let (mut all, mut of_copy) = (Vec::new(), Vec::new());
-        let mut by_meshlet = Vec::new();
+        let (mut by_meshlet, mut first_facet) = (Vec::new(), vec![0]);
         for (copy, placement) in (0..).zip(placed.placements) {
             let lens = Lens::new(&rounder.projector, placement, size);
             let meshlets = &placed.shapes.meshes[placement.mesh as usize].meshlets;
             of_copy.push((by_meshlet.len() as u32).wrapping_sub(meshlets.start));
             for meshlet in meshlets.clone() {
                 let it = &placed.shapes.meshlets[meshlet as usize];
-                let is_seen = lens.sees(it.min, it.max, tiles);
+                let is_seen = lens.sees(it.min, it.max, sought);
                 by_meshlet.push(if is_seen { all.len() as u32 } else { NO_LOOK });
                 if is_seen {
-                    let (vertices, facets, polygons) = (Vec::new(), Vec::new(), Vec::new());
-                    all.push(Look { copy, meshlet, rows: [0, -1], vertices, facets, polygons });
+                    first_facet.push(first_facet[all.len()] + it.triangles.len() as u32);
+                    all.push(Look::new(copy, meshlet));
                 }
             }
         }
         on_threads(cores(), all.chunks_mut(PART), |part| {
-            part.iter_mut().for_each(|look| look.fill(placed, rounder, tiles, size));
+            part.iter_mut().for_each(|look| look.fill(placed, rounder, sought, size));
         });
         let is_uncertain = |vertex: &Vertex| matches!(vertex, Vertex::Uncertain);
         let has_uncertain = all.iter().any(|look| look.vertices.iter().any(is_uncertain));
-        Self { all, of_copy, by_meshlet, has_uncertain }
+        Self { all, of_copy, by_meshlet, first_facet, has_uncertain }
     }
 
     /// The place of a meshlet of a copy in the list of all, if it is looked at.
@@ -197,31 +230,39 @@ impl Looks {
         Some(self.by_meshlet[place as usize]).filter(|look| *look != NO_LOOK)
     }
 
-    /// The facet of a triangle of a meshlet of a copy, if it is there.
+    /// The number of the facet of a triangle of a look.
     #[inline]
-    pub(super) fn facet(&self, copy: u32, meshlet: u32, triangle: u8) -> Option<&Facet> {
-        let facets = &self.all[self.find(copy, meshlet)? as usize].facets;
-        facets.get(usize::from(triangle)).filter(|facet| facet.is_there())
+    pub(super) fn number(&self, look: u32, triangle: u8) -> u32 {
+        self.first_facet[look as usize] + u32::from(triangle)
     }
 
-    /// What is left for the proof of some pixels.
-    pub(super) fn narrowed(&self, placed: &Placed<'_>, wanted: &Wanted<'_>) -> Self {
-        let mut all: Vec<Option<Look>> = (0..self.all.len()).map(|_| None).collect();
-        on_threads(cores(), all.chunks_mut(PART).zip(self.all.chunks(PART)), |(to, from)| {
-            for (to, from) in to.iter_mut().zip(from) {
-                *to = Some(from.narrowed(placed, wanted));
-            }
-        });
-        Self {
-            all: all.into_iter().flatten().collect(),
-            of_copy: self.of_copy.clone(),
-            by_meshlet: self.by_meshlet.clone(),
-            has_uncertain: self.has_uncertain,
-        }
+    /// The look and the triangle of the facet with a number.
+    pub(super) fn of_number(&self, number: u32) -> (&Look, u8) {
+        let look = self.first_facet.partition_point(|first| *first <= number) - 1;
+        (&self.all[look], (number - self.first_facet[look]) as u8)
+    }
+
+    /// How many numbers there are.
+    pub(super) fn num_facets(&self) -> usize {
+        self.first_facet[self.all.len()] as usize
     }
 }
 
 impl Look {
+    fn new(copy: u32, meshlet: u32) -> Self {
+        let (vertices, facets, polygons) = (Vec::new(), Vec::new(), Vec::new());
+        Self {
+            copy,
+            meshlet,
+            columns: [0, -1],
+            rows: [0, -1],
+            vertices,
+            facets,
+            polygons,
+            there: 0,
+        }
+    }
+
     /// Whether what is spanned by some vertices is wanted.
     pub(super) fn is_wanted(
         &self,
@@ -248,33 +289,71 @@ impl Look {
         wanted.open.any(columns, rows) && !wanted.tiles.hide(nearest, columns, rows)
     }
 
-    /// Calls `each` for the facets and their triangles in the image.
+    /// Calls `each` for the triangles of the facets in the image.
+    ///
+    /// A facet is told by its triangle in the meshlet.
     #[inline]
     pub(super) fn for_each_triangle(
         &self,
         placed: &Placed<'_>,
-        mut each: impl FnMut(&Facet, [Corner; 3]),
+        mut each: impl FnMut(u8, &Facet, [Corner; 3]),
     ) {
         let triangles = &placed.shapes.meshlets[self.meshlet as usize].triangles;
         let is_mirrored = placed.placements[self.copy as usize].mirrored;
-        for (facet, corners) in self.facets.iter().zip(placed.topology.corners(triangles)) {
-            if !facet.is_there() || facet.is_cut {
+        let corners = placed.topology.corners(triangles);
+        let mut left = self.there;
+        while left != 0 {
+            let triangle = left.trailing_zeros() as u8;
+            left &= left - 1;
+            let facet = &self.facets[usize::from(triangle)];
+            if facet.is_cut {
                 continue;
             }
-            let corners = corners.map(|v| self.vertices[usize::from(v)]);
-            if let [Vertex::Inside(a), Vertex::Inside(b), Vertex::Inside(c)] = corners {
-                each(facet, if is_mirrored { [a, c, b] } else { [a, b, c] });
+            if let Some(corners) = self.corners(corners[usize::from(triangle)], is_mirrored) {
+                each(triangle, facet, corners);
             }
         }
         for polygon in &self.polygons {
             let facet = &self.facets[usize::from(polygon.triangle)];
-            let corners = polygon.corners();
             if facet.is_there() {
-                for pair in corners[1..].windows(2) {
-                    each(facet, [corners[0], pair[0], pair[1]]);
-                }
+                polygon.fan().for_each(|corners| each(polygon.triangle, facet, corners));
             }
         }
+    }
+
+    /// As [`Look::for_each_triangle`], for one facet that is there.
+    pub(super) fn for_each_part(
+        &self,
+        placed: &Placed<'_>,
+        triangle: u8,
+        mut each: impl FnMut([Corner; 3]),
+    ) {
+        if self.facets[usize::from(triangle)].is_cut {
+            let own = self.polygons.iter().filter(|polygon| polygon.triangle == triangle);
+            own.for_each(|polygon| polygon.fan().for_each(&mut each));
+            return;
+        }
+        let triangles = &placed.shapes.meshlets[self.meshlet as usize].triangles;
+        let corners = placed.topology.corners(triangles)[usize::from(triangle)];
+        let is_mirrored = placed.placements[self.copy as usize].mirrored;
+        self.corners(corners, is_mirrored).into_iter().for_each(each);
+    }
+
+    /// The corners of a triangle, none of which is cut off.
+    #[inline]
+    fn corners(&self, corners: [u8; 3], is_mirrored: bool) -> Option<[Corner; 3]> {
+        match corners.map(|v| &self.vertices[usize::from(v)]) {
+            [Vertex::Inside(a), Vertex::Inside(b), Vertex::Inside(c)] => {
+                Some(if is_mirrored { [*a, *c, *b] } else { [*a, *b, *c] })
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether the facet of a triangle of the meshlet is there.
+    #[inline]
+    pub(super) fn has(&self, triangle: u8) -> bool {
+        self.there >> (triangle & 127) & 1 != 0
     }
 
     /// Whether it meets any row from the first to the last one.
@@ -282,54 +361,43 @@ impl Look {
         self.rows[0] <= last && self.rows[1] >= first
     }
 
-    /// The same look with the facets alone that may meet an open pixel.
-    ///
-    /// No edge of the others meets one, so nothing is lost for the open pixels.
-    fn narrowed(&self, placed: &Placed<'_>, wanted: &Wanted<'_>) -> Self {
-        let mut rows = self.rows;
-        let (mut vertices, mut facets, mut polygons) = (Vec::new(), Vec::new(), Vec::new());
-        if self.is_wanted(wanted, 0..self.vertices.len()) {
-            let triangles = &placed.shapes.meshlets[self.meshlet as usize].triangles;
-            let corners = placed.topology.corners(triangles);
-            facets.extend(self.facets.iter().zip(corners).map(|(facet, corners)| {
-                let is_wanted =
-                    facet.is_there() && self.is_wanted(wanted, corners.map(usize::from));
-                if is_wanted { *facet } else { Facet::default() }
-            }));
-            vertices.clone_from(&self.vertices);
-            polygons.clone_from(&self.polygons);
-        }
-        if !facets.iter().any(Facet::is_there) {
-            rows = [0, -1];
-        }
-        Self { copy: self.copy, meshlet: self.meshlet, rows, vertices, facets, polygons }
-    }
-
     /// Rounds the vertices and makes the facets.
-    fn fill(&mut self, placed: &Placed<'_>, rounder: &Rounder, tiles: &Tiles, size: ImageSize) {
+    fn fill(
+        &mut self,
+        placed: &Placed<'_>,
+        rounder: &Rounder,
+        sought: &Sought<'_>,
+        size: ImageSize,
+    ) {
         let placement = &placed.placements[self.copy as usize];
         let size = [size.width, size.height].map(u32::cast_signed);
         let world = |v: &u32| placement.world(placed.shapes.positions[*v as usize]);
         let vertices = placed.topology.vertices(self.meshlet);
         let mut points: Vec<Point> = Vec::new();
-        self.vertices.reserve_exact(vertices.len());
-        for vertex in vertices.iter().map(world) {
-            let (vertex, point) = rounder.vertex(vertex);
-            self.vertices.push(vertex);
-            if placed.culled != FaceCull::None {
-                points.push(point);
+        let known = sought.known.filter(|_| placed.culled == FaceCull::None);
+        let known = known.and_then(|looks| Some((looks, looks.find(self.copy, self.meshlet)?)));
+        if let Some((looks, look)) = known {
+            self.vertices.clone_from(&looks.all[look as usize].vertices);
+        } else {
+            self.vertices.reserve_exact(vertices.len());
+            for vertex in vertices.iter().map(world) {
+                let (vertex, point) = rounder.vertex(vertex);
+                self.vertices.push(vertex);
+                if placed.culled != FaceCull::None {
+                    points.push(point);
+                }
             }
         }
         let triangles = &placed.shapes.meshlets[self.meshlet as usize].triangles;
         let sides = placed.topology.sides(triangles);
         self.facets.reserve_exact(sides.len());
-        let mut rows = [i32::MAX, i32::MIN];
+        let mut extent = Extent::NOTHING;
         for (t, (corners, sides)) in
             placed.topology.corners(triangles).iter().zip(sides).enumerate()
         {
             let [a, b, c] = *corners;
             let [a, b, c] = if placement.mirrored { [a, c, b] } else { [a, b, c] }.map(usize::from);
-            let mut facet = Facet::default();
+            let mut facet = Facet::NOTHING;
             match [a, b, c].map(|v| self.vertices[v]) {
                 _ if sides[0] == NO_EDGE => {}
                 [Vertex::Inside(p), Vertex::Inside(q), Vertex::Inside(r)] => {
@@ -337,7 +405,8 @@ impl Look {
                         placed.culled == FaceCull::None
                             || occludes([a, b, c].map(|v| &points[v]), placed.culled, placed.fault)
                     };
-                    if is_met([p, q, r], size, tiles, &mut rows) && faces() {
+                    if is_met([p, q, r], size, sought) && faces() {
+                        extent.add(&[p, q, r]);
                         facet = Facet::new(&[p, q, r], size);
                     }
                 }
@@ -348,33 +417,47 @@ impl Look {
                     {
                         facet = Facet::new(polygon.corners(), size);
                         facet.is_cut = true;
-                        for corner in polygon.corners() {
-                            rows = [rows[0].min(corner.y), rows[1].max(corner.y)];
-                        }
+                        extent.add(polygon.corners());
                         self.polygons.push(polygon);
                     }
                 }
             }
+            self.there |= u128::from(facet.is_there()) << t;
             self.facets.push(facet);
         }
-        if rows[0] <= rows[1] {
-            self.rows = pixels(rows[0], rows[1], size[1]);
+        let Extent { x, y } = extent;
+        if x[0] <= x[1] {
+            self.columns = pixels(x[0], x[1], size[0]);
+            self.rows = pixels(y[0], y[1], size[1]);
         }
     }
 }
 
-/// Whether a triangle may meet the image where it is not hidden; notes its rows then.
-#[inline]
-fn is_met(corners: [Corner; 3], size: [i32; 2], tiles: &Tiles, rows: &mut [i32; 2]) -> bool {
-    let [p, q, r] = corners;
-    let (y0, y1) = (p.y.min(q.y).min(r.y), p.y.max(q.y).max(r.y));
-    let x = pixels(p.x.min(q.x).min(r.x), p.x.max(q.x).max(r.x), size[0]);
-    let y = pixels(y0, y1, size[1]);
-    if x[0] > x[1] || y[0] > y[1] || tiles.hide(p.far.min(q.far).min(r.far), x, y) {
-        return false;
+/// The least and the greatest coordinates of some corners.
+#[derive(Debug, Clone, Copy)]
+struct Extent {
+    x: [i32; 2],
+    y: [i32; 2],
+}
+
+impl Extent {
+    const NOTHING: Self = Self { x: [i32::MAX, i32::MIN], y: [i32::MAX, i32::MIN] };
+
+    #[inline]
+    fn add(&mut self, corners: &[Corner]) {
+        for corner in corners {
+            self.x = [self.x[0].min(corner.x), self.x[1].max(corner.x)];
+            self.y = [self.y[0].min(corner.y), self.y[1].max(corner.y)];
+        }
     }
-    *rows = [rows[0].min(y0), rows[1].max(y1)];
-    true
+}
+
+/// Whether a triangle may meet the image where it is not hidden.
+#[inline]
+fn is_met([p, q, r]: [Corner; 3], size: [i32; 2], sought: &Sought<'_>) -> bool {
+    let x = pixels(p.x.min(q.x).min(r.x), p.x.max(q.x).max(r.x), size[0]);
+    let y = pixels(p.y.min(q.y).min(r.y), p.y.max(q.y).max(r.y), size[1]);
+    x[0] <= x[1] && y[0] <= y[1] && !sought.excludes(p.far.min(q.far).min(r.far), x, y)
 }
 
 /// What is left of a triangle with corners outside, from what is left of its sides.
@@ -451,8 +534,8 @@ impl Lens {
         Self { rows, near: projector.clipped(), half: projector.half, size }
     }
 
-    /// Whether something in a box may be seen in front of what `tiles` try.
-    fn sees(&self, min: Vec3, max: Vec3, tiles: &Tiles) -> bool {
+    /// Whether something in a box may be seen and is sought.
+    fn sees(&self, min: Vec3, max: Vec3, sought: &Sought<'_>) -> bool {
         let mut outside = [0_u32; 5];
         let mut extent = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY];
         let (mut nearest, mut is_cut) = (f64::INFINITY, false);
@@ -480,7 +563,7 @@ impl Lens {
             && extent[0] < f64::from(columns) + room
             && extent[3] > -room
             && extent[2] < f64::from(rows) + room
-            && !tiles.hide(
+            && !sought.excludes(
                 nearest - 1e-9 * nearest.abs(),
                 [pixel(extent[0] - room, columns - 1), pixel(extent[1] + room, columns - 1)],
                 [pixel(extent[2] - room, rows - 1), pixel(extent[3] + room, rows - 1)],

@@ -48,14 +48,18 @@
 //! 2. `thresholds` chooses G by depth, from the depths at the centres of the pixels around P.
 //! 3. `looks` picks the meshlets that may matter, and rounds their vertices to 1/256 pixel
 //!    (`projector`, `facets`).
+//!    `walk` hands out their triangles and edges.
 //! 4. `proof` decides in exact integers which G cover their pixels (`coverage`, `squares`,
 //!    `chains`).
-//!    Most pixels end here.
-//! 5. `sheets` searches the rest in float64, with G that are connected across shared edges that
-//!    meet P (`cells`, `square`).
+//!    Nearly all pixels end here.
+//! 5. `search` decides the rest by the same integers, with G that are connected across shared edges
+//!    that meet P (`meeting`).
 //!    Each connected component is a sheet, and the nearest of those that cover P counts.
+//! 6. `sheets` is the same search in float64, for vertices that are too uncertain for integers
+//!    (`cells`, `square`).
+//!    Tests compare all pixels with it.
 //!
-//! Where nothing covers P, its quarters are tried.
+//! Where a sheet covers only a part of P, its quarters are tried.
 //! Every ray through P goes through a quarter, so the farthest quarter counts for P.
 //!
 //! At folds and at silhouettes of closed meshes two triangles lie on the *same* side of their edge.
@@ -65,7 +69,7 @@
 //!
 //! **Rounding.**
 //! No step trusts a sign that float64 may have got wrong.
-//! The proof has its own account in docs/occluders.md; this is the search's.
+//! Integers have their own account in docs/occluders.md; this is that of `sheets`.
 //!
 //! - Each projected vertex carries a bound of its error, which is a few roundings of its terms,
 //!   counted in `projector`.
@@ -92,15 +96,18 @@ mod facets;
 mod image;
 mod links;
 mod looks;
+mod meeting;
 mod open_pixels;
 pub(crate) mod planted_fault;
 mod projector;
 mod proof;
+mod search;
 mod sheets;
 mod square;
 mod squares;
 mod thresholds;
 mod topology;
+mod walk;
 
 use std::sync::{Arc, OnceLock};
 

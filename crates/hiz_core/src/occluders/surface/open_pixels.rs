@@ -70,10 +70,6 @@ impl OpenPixels {
         self.is_open[y as usize * self.size.width as usize + x as usize]
     }
 
-    pub(super) fn pixels(&self) -> &[u32] {
-        &self.pixels
-    }
-
     pub(super) fn size(&self) -> ImageSize {
         self.size
     }

@@ -16,134 +16,33 @@
 //! So as the vertices move from their rounded to their exact places, no edge that remains crosses
 //! P, and the winding number stays.
 
-use crate::host::rounding::round_up;
 use crate::host::threads::{cores, on_threads};
-use crate::input::image::{DepthConvention, ImageSize};
+use crate::input::image::ImageSize;
 use crate::occluders::surface::chains::{AtEdge, Mask, Steps, Tally};
 use crate::occluders::surface::coverage::area;
-use crate::occluders::surface::facets::{Corner, Facet, REACH, Rounder, Segment, Vertex};
-use crate::occluders::surface::links::Standing;
-use crate::occluders::surface::looks::{Look, Looks, Placed, TILE, Tiles, Wanted};
-use crate::occluders::surface::open_pixels::OpenPixels;
+use crate::occluders::surface::facets::{Corner, Facet, REACH};
+use crate::occluders::surface::looks::{TILE, Tiles};
 use crate::occluders::surface::planted_fault::{Planted, is_planted};
 use crate::occluders::surface::squares::{Place, Squares};
-use crate::occluders::surface::thresholds::{self, FRONT, SLABS, Slabs};
-use crate::occluders::surface::topology::Edge;
+use crate::occluders::surface::thresholds::{SLABS, Slabs};
+use crate::occluders::surface::walk::{Met, Visitor, Walk};
 
-/// What the proof is about.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Proof<'a> {
-    pub(super) placed: Placed<'a>,
-    pub(super) rounder: &'a Rounder,
-    pub(super) looks: &'a Looks,
-    pub(super) links: &'a Standing<'a>,
-    pub(super) size: ImageSize,
-    pub(super) convention: DepthConvention,
-}
-
-impl Proof<'_> {
-    /// For every pixel, rows from top to bottom: every ray through its closed square is blocked at
-    /// this value of `far` or before.
-    ///
-    /// Infinity where that cannot be shown.
-    /// The flags tell which pixels have no proof of one of their first [`FRONT`] slabs.
-    pub(super) fn image(&self, slabs: &[Slabs], tiles: &Tiles) -> (Vec<f32>, Vec<bool>) {
-        let mut depths = vec![f32::INFINITY; slabs.len()];
-        let mut is_open = vec![false; slabs.len()];
-        let part = (band_rows(self.size) * self.size.width) as usize;
-        let parts = depths.chunks_mut(part).zip(is_open.chunks_mut(part));
-        let bands = parts.zip(slabs.chunks(part)).zip(bands(self.size));
-        on_threads(cores(), bands, |(((depths, is_open), slabs), rows)| {
-            let squares = Squares::pixels(self.size.width, rows, tiles);
-            let states = Band::<FRONT>::run(self, squares, slabs);
-            let pixels = depths.iter_mut().zip(is_open).zip(slabs);
-            for (((depth, is_open), slabs), state) in pixels.zip(&states) {
-                let (far, slab) = state.depth();
-                *depth = far;
-                *is_open = slab >= FRONT && *slabs != Slabs::NONE;
-            }
-        });
-        (depths, is_open)
-    }
-
-    /// Proves open pixels by their parts: 4^finer of them.
-    ///
-    /// Every ray through a pixel goes through a part of it, so the farthest part counts.
-    ///
-    /// Lowers `depths`.
-    /// Returns, by open pixel, the farthest depth at the centres of its parts: no proof can find
-    /// anything that is nearer.
-    pub(super) fn refine(
-        &self,
-        open: &OpenPixels,
-        tiles: &Tiles,
-        finer: u32,
-        depths: &mut [f32],
-    ) -> Vec<f32> {
-        let wanted = Wanted { open, tiles, rows: [0, self.size.height.cast_signed() - 1] };
-        let looks = self.looks.narrowed(&self.placed, &wanted);
-        let proof = Proof { looks: &looks, ..*self };
-        let mut floors = vec![f32::INFINITY; open.pixels().len()];
-        let part = (band_rows(self.size) * self.size.width) as usize;
-        let mut left = &mut floors[..];
-        let floors_by_band: Vec<&mut [f32]> = bands(self.size)
-            .map(|rows| {
-                let (own, rest) = std::mem::take(&mut left).split_at_mut(open.of_rows(rows).len());
-                left = rest;
-                own
-            })
-            .collect();
-        let bands = depths.chunks_mut(part).zip(floors_by_band).zip(bands(self.size));
-        on_threads(cores(), bands, |((depths, floors), rows)| {
-            let pixels = open.of_rows(rows);
-            if pixels.is_empty() {
-                return;
-            }
-            let parts = 1 << (2 * finer);
-            let samples = proof.samples(open, rows, finer);
-            let mut slabs = vec![Slabs::NONE; samples.len()];
-            let mut last = vec![f32::NEG_INFINITY; pixels.len()];
-            for (i, samples) in samples.chunks_exact(parts).enumerate() {
-                let slabs = &mut slabs[i * parts..][..parts];
-                thresholds::of_parts(samples, 1 << finer, self.convention, slabs);
-                last[i] = slabs.iter().fold(f32::NEG_INFINITY, |m, s| m.max(s.last));
-                let far = |depth: f32| if self.convention.is_reversed() { -depth } else { depth };
-                floors[i] = samples.iter().fold(f32::NEG_INFINITY, |m, v| m.max(far(*v)));
-            }
-            let states =
-                Band::<SLABS>::run(&proof, Squares::parts(open, rows, finer, &last), &slabs);
-            let first = rows[0] as u32 * self.size.width;
-            for (pixel, states) in pixels.iter().zip(states.chunks_exact(parts)) {
-                let far = states.iter().fold(f32::NEG_INFINITY, |m, state| m.max(state.depth().0));
-                let depth = &mut depths[(pixel - first) as usize];
-                *depth = depth.min(far);
-            }
-        });
-        floors
-    }
-
-    /// NDC depths at the centres of the parts of open pixels; far where there is nothing.
-    fn samples(&self, open: &OpenPixels, rows: [i32; 2], finer: u32) -> Vec<f32> {
-        let last = vec![f32::INFINITY; open.of_rows(rows).len()];
-        let squares = Squares::parts(open, rows, finer, &last);
-        let mut nearest = vec![f64::INFINITY; last.len() << (2 * finer)];
-        for look in self.looks.all.iter().filter(|look| look.is_in_rows(rows)) {
-            look.for_each_triangle(&self.placed, |facet, corners| {
-                squares.for_each_covered(facet, corners, |square| {
-                    let [x, y] = square.centre;
-                    let nearest = &mut nearest[square.number];
-                    *nearest = nearest.min(facet.at_point(x, y));
-                });
-            });
+/// For every pixel, rows from top to bottom: every ray through its closed square is blocked at this
+/// value of `far` or before.
+///
+/// Infinity where that cannot be shown.
+pub(super) fn proved(walk: &Walk<'_>, slabs: &[Slabs], tiles: &Tiles, size: ImageSize) -> Vec<f32> {
+    let mut depths = vec![f32::INFINITY; slabs.len()];
+    let part = (band_rows(size) * size.width) as usize;
+    let bands = depths.chunks_mut(part).zip(slabs.chunks(part)).zip(bands(size));
+    on_threads(cores(), bands, |((depths, slabs), rows)| {
+        let mut band = Band::new(Squares::all(size.width, rows, tiles), slabs, walk.placed.fault);
+        walk.visit(|look| look.is_in_rows(rows), &mut band);
+        for (depth, state) in depths.iter_mut().zip(&band.states) {
+            *depth = state.depth();
         }
-        #[expect(clippy::cast_possible_truncation, reason = "for choices alone")]
-        let ndc = |far: f64| match (far < f64::INFINITY, self.convention.is_reversed()) {
-            (false, _) => self.convention.far(),
-            (true, true) => -far as f32,
-            (true, false) => far as f32,
-        };
-        nearest.into_iter().map(ndc).collect()
-    }
+    });
+    depths
 }
 
 /// The rows of a band: whole rows of tiles, and some bands more than threads.
@@ -169,14 +68,12 @@ struct State {
 impl State {
     const START: Self = Self { tally: Tally::START, far: [f32::NEG_INFINITY; SLABS] };
 
-    /// The nearest depth of the slabs that cover the square, and which it is.
-    ///
-    /// Infinity without one.
-    fn depth(&self) -> (f32, usize) {
-        let mut nearest = (f32::INFINITY, SLABS);
+    /// The nearest depth of the slabs that cover the square; infinity without one.
+    fn depth(&self) -> f32 {
+        let mut nearest = f32::INFINITY;
         for (slab, far) in self.far.iter().enumerate() {
-            if self.tally.is_covered(slab) && *far < nearest.0 {
-                nearest = (*far, slab);
+            if self.tally.is_covered(slab) && *far < nearest {
+                nearest = *far;
             }
         }
         nearest
@@ -184,192 +81,80 @@ impl State {
 
     /// Counts the facets of `mask` as reaching as far as `far`.
     #[inline(always)]
-    fn reaches<const N: usize>(&mut self, far: f32, mask: Mask) {
-        for (slab, farthest) in self.far[..N].iter_mut().enumerate() {
+    fn reaches(&mut self, far: f32, mask: Mask) {
+        for (slab, farthest) in self.far.iter_mut().enumerate() {
             let far = if mask >> slab & 1 != 0 { far } else { f32::NEG_INFINITY };
             *farthest = if far > *farthest { far } else { *farthest };
         }
     }
 }
 
-/// The proof of some squares, by their first N slabs.
-struct Band<'a, const N: usize> {
-    proof: &'a Proof<'a>,
+/// The proof of the pixels of some rows.
+struct Band<'a> {
     squares: Squares<'a>,
-    /// By square.
+    /// By pixel.
     slabs: &'a [Slabs],
     states: Vec<State>,
-    /// Half the side of a square, and [`REACH`], in units.
+    /// Half the side of a pixel, and [`REACH`], in units.
     half: f64,
-    /// The facets at an edge where more than two meet.
-    around: Vec<(Facet, bool)>,
+    fault: Planted,
+    /// Of the facets at an edge where more than two meet.
+    around: Vec<AtEdge>,
 }
 
-impl<'a, const N: usize> Band<'a, N> {
-    /// Both passes.
-    fn run(proof: &'a Proof<'a>, squares: Squares<'a>, slabs: &'a [Slabs]) -> Vec<State> {
-        let half = squares.half();
-        let half = if is_planted!(proof.placed.fault, PlaneWithoutReach) { 0.0 } else { half };
-        let (states, around) = (vec![State::START; slabs.len()], Vec::new());
-        let mut band = Self { proof, squares, slabs, states, half, around };
-        for (number, look) in (0..).zip(&proof.looks.all) {
-            if look.is_in_rows(band.squares.rows()) {
-                look.for_each_triangle(&proof.placed, |facet, corners| band.cover(facet, corners));
-                for polygon in &look.polygons {
-                    let facet = look.facets[usize::from(polygon.triangle)];
-                    for [a, b] in polygon.cuts() {
-                        band.border(a, b, &facet, &Facet::default(), false);
-                    }
-                }
-                for edge in proof.placed.topology.edges(look.meshlet) {
-                    band.edge(number, look, edge);
-                }
-            }
-        }
-        band.states
+impl<'a> Band<'a> {
+    fn new(squares: Squares<'a>, slabs: &'a [Slabs], fault: Planted) -> Self {
+        let half = if is_planted!(fault, PlaneWithoutReach) { 0.0 } else { Squares::HALF };
+        let states = vec![State::START; slabs.len()];
+        Self { squares, slabs, states, half, fault, around: Vec::new() }
     }
+}
 
-    /// Adds a triangle to the windings of the squares whose centres it covers.
-    ///
-    /// It is a facet, or a part of one.
-    fn cover(&mut self, facet: &Facet, corners: [Corner; 3]) {
+impl Visitor for Band<'_> {
+    /// Adds a triangle to the windings of the pixels whose centres it covers.
+    #[inline]
+    fn cover(&mut self, met: Met<'_>, corners: [Corner; 3]) {
+        let facet = met.facet;
         let own = if area(corners) < 0 { -1 } else { 1 };
         let steps = Steps::of(facet.sign, own);
-        let (slabs, states, half) = (self.slabs, &mut self.states, self.half);
-        self.squares.for_each_covered(facet, corners, |square| {
-            let slabs = &slabs[square.number];
-            if facet.nearest <= last_of::<N>(slabs) {
-                let (mask, far) = is_in::<N>(facet, &square, half, slabs);
+        let (slabs, states, half, fault) = (self.slabs, &mut self.states, self.half, self.fault);
+        let is_wanted = |number: usize| facet.nearest <= f64::from(slabs[number].last);
+        self.squares.for_each_covered(facet, corners, is_wanted, |square| {
+            let (mask, far) = is_in(facet, &square, half, &slabs[square.number], fault);
+            if mask != 0 {
                 let state = &mut states[square.number];
                 state.tally.cover(steps, mask);
-                state.reaches::<N>(far, mask);
+                state.reaches(far, mask);
             }
         });
     }
 
-    /// Finds the facets at an edge.
-    fn edge(&mut self, number: u32, look: &Look, edge: &Edge) {
-        let proof = self.proof;
-        let placed = &proof.placed;
-        let facet = &look.facets[usize::from(edge.triangle)];
-        let neighbours = placed.topology.neighbours(edge);
-        let is_linked = proof.links.number(look.copy, edge.id).is_some();
-        if let ([], false) = (neighbours, is_linked) {
-            self.sides(look, edge, facet, &Facet::default(), false);
-        } else if let ([neighbour], false) = (neighbours, is_linked) {
-            let mut other = Facet::default();
-            if neighbour.meshlet == look.meshlet {
-                other = look.facets[usize::from(neighbour.triangle)];
-            } else if let Some(place) = proof.looks.find(look.copy, neighbour.meshlet) {
-                let facets = &proof.looks.all[place as usize].facets;
-                if let Some(facet) = facets.get(usize::from(neighbour.triangle)) {
-                    other = *facet;
-                }
-                // That meshlet has the edge in its list, too.
-                if place < number && other.is_there() {
-                    return;
-                }
-            }
-            if is_planted!(placed.fault, LeftOutNeighboursIgnored) && !other.is_there() {
-                return;
-            }
-            self.sides(look, edge, facet, &other, neighbour.is_along);
-        } else {
-            self.many(look, edge, facet);
-        }
-    }
-
-    /// An edge that two facets share.
+    /// Notes an edge of one or two facets in the pixels that it meets.
     #[inline]
-    fn sides(&mut self, look: &Look, edge: &Edge, one: &Facet, other: &Facet, is_along: bool) {
-        if !(one.is_there() || other.is_there()) {
-            return;
-        }
-        if let Some([a, b]) = self.ends(look, edge) {
-            self.border(a, b, one, other, is_along);
-        }
-    }
-
-    /// What is left of an edge: the same two points for all its triangles.
-    #[inline]
-    fn ends(&self, look: &Look, edge: &Edge) -> Option<[Corner; 2]> {
-        match edge.ends.map(|v| look.vertices[usize::from(v)]) {
-            [Vertex::Inside(a), Vertex::Inside(b)] => Some([a, b]),
-            // Then none of the edge's triangles is there.
-            [Vertex::Uncertain, _] | [_, Vertex::Uncertain] => None,
-            _ => {
-                let placed = &self.proof.placed;
-                let vertices = placed.topology.vertices(look.meshlet);
-                let [a, b] = edge.ends.map(|v| placed.world(look.copy, vertices[usize::from(v)]));
-                match self.proof.rounder.segment(a, b) {
-                    Segment::Between(a, b) => Some([a, b]),
-                    Segment::Nothing | Segment::Uncertain => None,
-                }
-            }
-        }
-    }
-
-    /// An edge at which more than two triangles may meet.
-    #[cold]
-    fn many(&mut self, look: &Look, edge: &Edge, facet: &Facet) {
-        let proof = self.proof;
-        let mut around = std::mem::take(&mut self.around);
-        around.clear();
-        around.push((*facet, true));
-        let mut add = |copy: u32, meshlet: u32, triangle: u8, is_along: bool| {
-            if let Some(facet) = proof.looks.facet(copy, meshlet, triangle) {
-                around.push((*facet, is_along));
-            }
-        };
-        for neighbour in proof.placed.topology.neighbours(edge) {
-            add(look.copy, neighbour.meshlet, neighbour.triangle, neighbour.is_along);
-        }
-        proof.links.for_each(look, edge, &proof.placed, &mut add);
-        if let Some(ends) = self.ends(look, edge) {
-            let mut triangles = Vec::with_capacity(around.len());
-            let (half, fault) = (self.half, proof.placed.fault);
-            let (all_slabs, states) = (self.slabs, &mut self.states);
-            self.squares.for_each_met(ends, reach(fault), |square| {
-                triangles.clear();
-                let state = &mut states[square.number];
-                for (facet, is_along) in &around {
-                    let (mask, far) = if is_planted!(fault, MembershipInFloat32) {
-                        is_in::<N>(&facet.in_float32(), &square, half, &all_slabs[square.number])
-                    } else {
-                        is_in::<N>(facet, &square, half, &all_slabs[square.number])
-                    };
-                    state.reaches::<N>(far, mask);
-                    triangles.push(AtEdge { sign: facet.sign, is_along: *is_along, mask });
-                }
-                state.tally.meet_many(&triangles, fault);
-            });
-        }
-        self.around = around;
-    }
-
-    /// Notes an edge of one or two facets in the squares that it meets.
-    fn border(&mut self, a: Corner, b: Corner, one: &Facet, other: &Facet, is_along: bool) {
-        let (half, fault) = (self.half, self.proof.placed.fault);
+    fn border(&mut self, ends: [Corner; 2], one: Met<'_>, other: Met<'_>, is_along: bool) {
+        let (half, fault) = (self.half, self.fault);
         let (all_slabs, states) = (self.slabs, &mut self.states);
         let float32;
         let [one, other] = if is_planted!(fault, MembershipInFloat32) {
-            float32 = [one, other].map(Facet::in_float32);
+            float32 = [one, other].map(|met| met.facet.in_float32());
             float32.each_ref()
         } else {
-            [one, other]
+            [one.facet, other.facet]
         };
-        let depth = |facet: &Facet| if facet.is_there() { facet.nearest } else { f64::INFINITY };
-        let nearest = depth(one).min(depth(other));
-        self.squares.for_each_met([a, b], reach(fault), |square| {
+        let nearest = one.nearest.min(other.nearest);
+        self.squares.for_each_met(ends, reach(fault), |square| {
             let slabs = &all_slabs[square.number];
-            if nearest > last_of::<N>(slabs) {
+            if nearest > f64::from(slabs.last) {
                 return;
             }
-            let (first, far) = is_in::<N>(one, &square, half, slabs);
-            let (second, other_far) = is_in::<N>(other, &square, half, slabs);
+            let (first, far) = is_in(one, &square, half, slabs, fault);
+            let (second, other_far) = is_in(other, &square, half, slabs, fault);
+            if first | second == 0 {
+                return;
+            }
             let state = &mut states[square.number];
-            state.reaches::<N>(far, first);
-            state.reaches::<N>(other_far, second);
+            state.reaches(far, first);
+            state.reaches(other_far, second);
             state.tally.meet(
                 AtEdge { sign: one.sign, is_along: true, mask: first },
                 AtEdge { sign: other.sign, is_along, mask: second },
@@ -377,16 +162,30 @@ impl<'a, const N: usize> Band<'a, N> {
             );
         });
     }
-}
 
-/// What is nearest to the eye in a facet and beyond this is in none of the first N slabs.
-#[inline(always)]
-fn last_of<const N: usize>(slabs: &Slabs) -> f64 {
-    f64::from(if N <= FRONT { slabs.front } else { slabs.last })
+    #[cold]
+    fn many(&mut self, ends: [Corner; 2], around: &[(Met<'_>, bool)]) {
+        let (half, fault) = (self.half, self.fault);
+        let (all_slabs, states, at_edge) = (self.slabs, &mut self.states, &mut self.around);
+        self.squares.for_each_met(ends, reach(fault), |square| {
+            at_edge.clear();
+            let (slabs, state) = (&all_slabs[square.number], &mut states[square.number]);
+            for (met, is_along) in around {
+                let (mask, far) = if is_planted!(fault, MembershipInFloat32) {
+                    is_in(&met.facet.in_float32(), &square, half, slabs, fault)
+                } else {
+                    is_in(met.facet, &square, half, slabs, fault)
+                };
+                state.reaches(far, mask);
+                at_edge.push(AtEdge { sign: met.facet.sign, is_along: *is_along, mask });
+            }
+            state.tally.meet_many(at_edge, fault);
+        });
+    }
 }
 
 /// How far squares are grown where edges are tested, in units.
-fn reach(fault: Planted) -> i32 {
+pub(super) fn reach(fault: Planted) -> i32 {
     if is_planted!(fault, NoEdgeMargin) { 0 } else { REACH }
 }
 
@@ -394,15 +193,15 @@ fn reach(fault: Planted) -> i32 {
 ///
 /// What is not there is in none.
 #[inline(always)]
-fn is_in<const N: usize>(facet: &Facet, square: &Place, half: f64, slabs: &Slabs) -> (Mask, f32) {
+fn is_in(facet: &Facet, square: &Place, half: f64, slabs: &Slabs, fault: Planted) -> (Mask, f32) {
     if !facet.is_there() {
         return (0, f32::NEG_INFINITY);
     }
     let (far, near) = facet.range(square.centre[0], square.centre[1], half);
     #[expect(clippy::cast_possible_truncation, reason = "for a choice alone")]
-    let (far, near) = (round_up(far), near as f32);
+    let (far, near) = (Facet::rounded(far, fault), near as f32);
     let mut mask = 0;
-    for slab in 0..N {
+    for slab in 0..SLABS {
         mask |= Mask::from(far <= slabs.farthest[slab] && near >= slabs.nearest[slab]) << slab;
     }
     (mask, far)

@@ -1,4 +1,6 @@
-//! How far every ray through a square of the image can get.
+//! How far every ray through a square of the image can get, in float64.
+//!
+//! This is for vertices that are too uncertain for integers, and for tests; see `search`.
 //!
 //! A square is covered by sheets of neighbouring cells that leave no gap in it.
 //! The proof is in the documentation of the module above.

@@ -7,9 +7,10 @@ use crate::cull::among;
 use crate::cull::count;
 use crate::cull::explain::{self, Stage};
 use crate::cull::groups::GROUPS_OF_RUN;
+use crate::cull::history::HISTORY_BEGIN;
 use crate::cull::lod::LodRule;
-use crate::cull::pipelines::{CullKey, DepthStore, ReportKey};
-use crate::cull::pipelines::{classify_constants, cull_module, report_constants};
+use crate::cull::pipelines::{Candidates, CullKey, DepthStore, FramePass, ReportKey};
+use crate::cull::pipelines::{classify_constants, flat_module, report_constants};
 use crate::cull::refine;
 use crate::cull::view_uniform::COORDINATE_BITS;
 use crate::gpu::clock_check;
@@ -27,6 +28,7 @@ use crate::instances::update;
 use crate::instances::volume_record::{ABSENT_CENTER, BEYOND_LIMITS, LARGEST};
 use crate::output::bins::BLOCK_WORDS;
 use crate::output::compact::SCATTER_WORKGROUP;
+use crate::output::cut::CUT_WORKGROUP;
 use crate::output::emit_passes;
 use crate::output::mesh_table::{MAX_LODS, MESH_TEXELS};
 use crate::output::survivors::SURVIVORS_PER_ROW;
@@ -39,7 +41,7 @@ use crate::pyramid::reduce::{REDUCE_WORKGROUP, SHARED_LEVEL, TALL_SIDE};
 use crate::pyramid::resolve;
 use crate::testing::lod;
 use crate::testing::shaders::tests::parse;
-use crate::testing::shaders::{EMITS, KINDS, all, files};
+use crate::testing::shaders::{EMITS, EMITS_OF_TWO, KINDS, all, files};
 use crate::yardstick::reduce as yardstick;
 
 /// From this magnitude on, the next float32 makes up for two flushed subnormals.
@@ -59,6 +61,9 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/among_layout", "AMONG_BITS", int(u32::BITS)),
         ("cull/among_layout", "AMONG_PER_ROW_LOG2", int(among::WORDS_PER_ROW.ilog2())),
         ("cull/among_order", "WORKGROUP", int(among::WORKGROUP)),
+        ("cull/candidates", "BY_HISTORY", int(Candidates::History as u32)),
+        ("cull/candidates", "BY_SIZE", int(Candidates::Size as u32)),
+        ("cull/candidates", "GIVEN", int(Candidates::Given as u32)),
         ("cull/certificate", "EPS", EPS),
         ("cull/certificate", "ERROR_ULPS", ERROR_ULPS),
         ("cull/count", "LANES", int(count::LANES)),
@@ -66,10 +71,11 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/cull_groups", "WORKGROUP", int(CULL_WORKGROUP)),
         ("cull/explain", "BEHIND", int(explain::BEHIND)),
         ("cull/explain", "CLEAR", int(explain::CLEAR)),
-        ("cull/lod", "FINEST", rule(&LodRule::Finest)),
-        ("cull/lod", "BY_ERROR", rule(&LodRule::Error { pixels: 1.0 })),
-        ("cull/lod", "BY_DISTANCE", rule(&LodRule::Distance { thresholds: Vec::new() })),
-        ("cull/lod", "BY_SIZE", rule(&LodRule::Size { pixels: Vec::new() })),
+        ("cull/lod", "LOD_FINEST", rule(&LodRule::Finest)),
+        ("cull/lod", "LOD_BY_ERROR", rule(&LodRule::Error { pixels: 1.0 })),
+        ("cull/lod", "LOD_BY_DISTANCE", rule(&LodRule::Distance { thresholds: Vec::new() })),
+        ("cull/lod", "LOD_BY_SIZE", rule(&LodRule::Size { pixels: Vec::new() })),
+        ("cull/history", "HISTORY_BEGIN", int(HISTORY_BEGIN)),
         ("cull/outcome", "AT_VALIDITY", stage(Stage::Validity)),
         ("cull/outcome", "AT_FRUSTUM", stage(Stage::Frustum)),
         ("cull/outcome", "AT_EYE_PLANE", stage(Stage::EyePlane)),
@@ -128,6 +134,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("output/emit_scan", "SHARE", int(BLOCK_WORDS / emit_passes::WORKGROUP)),
         ("output/emit_scatter", "WORKGROUP", int(emit_passes::WORKGROUP)),
         ("output/mesh_table", "MESH_TEXELS", MESH_TEXELS as f64),
+        ("output/cut", "WORKGROUP", int(CUT_WORKGROUP)),
+        ("output/emit_cut", "WORKGROUP", int(CUT_WORKGROUP)),
         ("output/verdict", "OUTSIDE", verdict(Verdict::Outside)),
         ("output/verdict", "OCCLUDED", verdict(Verdict::Occluded)),
         ("output/verdict", "VISIBLE", verdict(Verdict::Visible)),
@@ -157,6 +165,8 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/certificate", &["ERROR_FLOOR"]),
     ("cull/classify", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
     ("cull/lod", &["NEEDS", "NEED_FACTOR", "LARGEST_DEVIATION"]),
+    // All bits of a run.
+    ("cull/early", &["WHOLE_RUN"]),
     ("cull/refine", &["REFINED"]),
     ("gpu/clock_check", &["LEFT", "RIGHT", "LEFT_AGAIN"]),
     ("cull/refine_groups", &["LAST_TEXEL", "WITHIN"]),
@@ -205,6 +215,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("output/compact", &["LANES"]),
     ("output/emit_draws", &["LANES"]),
     ("output/emit_record", &["COMMON_WORDS"]),
+    ("output/emit_scatter", &["FOUR", "NUMBERS"]),
     ("output/mesh_table", &["ERRORS_LOG2"]),
 ];
 
@@ -338,9 +349,11 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("among_order", line(among::WORKGROUP)),
         ("begin", line(1)),
         ("choose_lods", line(lod::LANES)),
+        ("cut", line(CUT_WORKGROUP)),
         ("emit_bins", line(emit_passes::WORKGROUP)),
         ("emit_block", line(emit_passes::WORKGROUP)),
         // One workgroup, the largest that WebGPU promises.
+        ("emit_cut", line(CUT_WORKGROUP)),
         ("emit_draws", line(wgpu::Limits::default().max_compute_invocations_per_workgroup)),
         ("emit_instances", line(emit_passes::WORKGROUP)),
         ("emit_scatter", line(emit_passes::WORKGROUP)),
@@ -403,14 +416,18 @@ fn a_cull_sets_every_override() {
             fit_volume: false,
             among: false,
         };
-        for (way, emit) in EMITS {
-            let report = ReportKey { mask: false, verdicts: false, emit, statistics: false };
+        let alone = EMITS.map(|emit| (emit, FramePass::Alone));
+        let of_two = [FramePass::Early(Candidates::History), FramePass::Late]
+            .into_iter()
+            .flat_map(|pass| EMITS_OF_TWO.map(|emit| (emit, pass)));
+        for ((way, emit), pass) in alone.into_iter().chain(of_two) {
+            let report = ReportKey { mask: false, verdicts: false, emit, statistics: false, pass };
             let set = classify_constants(&key).into_iter().chain(report_constants(&report));
             let set: BTreeSet<String> = set.map(|(name, _)| name.to_owned()).collect();
-            let module = parse(&cull_module(store, kind, emit).text());
+            let module = parse(&flat_module(store, kind, emit, pass).text());
             let declared: BTreeSet<String> =
                 module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
-            assert_eq!(set, declared, "{kind:?} {way}");
+            assert_eq!(set, declared, "{kind:?} {way} {pass:?}");
         }
     }
 }

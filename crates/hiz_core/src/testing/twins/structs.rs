@@ -5,6 +5,7 @@ use std::mem::offset_of;
 
 use super::declared;
 use crate::cull::explain::ExplanationRecord;
+use crate::cull::history::FrameUniform;
 use crate::cull::view_uniform::ViewUniform;
 use crate::input::bounds::{Bounds, Floats};
 use crate::instances::SEQUENCE_BYTES;
@@ -45,6 +46,7 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     "SupportingPlanes",
     "Value",
     "Volume",
+    "Word",
 ];
 
 /// Offsets of a WGSL struct's members, and its size.
@@ -102,6 +104,9 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "farthest_bits" = farthest_bits, "pixels" = pixels, "depths" = depths, "last" = last,
             "texels_read" = texels_read, "of_footprint" = of_footprint,
             "farthest_before" = farthest_before, "any_before" = any_before,
+        }),
+        twin!("Frame", FrameUniform {
+            "early" = early, "least_pixels" = least_pixels, "padding" = padding,
         }),
         twin!("FromBuffer", FromBufferUniform {
             "count" = count, "first" = first, "stride" = stride, "runtime_zero" = runtime_zero,

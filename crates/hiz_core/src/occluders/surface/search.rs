@@ -1,0 +1,408 @@
+//! How far every ray through an open pixel can get: a search for sheets of facets.
+//!
+//! Facets that meet at an edge which meets the square belong together.
+//! A sheet is a component of what belongs together.
+//! Where no border of it meets the square, and it winds about the centre, it covers the square.
+//! The same integers and planes decide this as in the proof, see `proof`.
+//!
+//! Folds count as borders first.
+//! Then sheets are joined across them, and what winds an odd number of times covers.
+//!
+//! Where a nearer sheet covers a part alone, the quarters are asked.
+
+use crate::host::threads::{cores, on_threads};
+use crate::occluders::surface::coverage::QUARTERS;
+use crate::occluders::surface::facets::{Facet, REACH, UNITS};
+use crate::occluders::surface::meeting::{Meeting, NO_PIECE};
+use crate::occluders::surface::open_pixels::OpenPixels;
+use crate::occluders::surface::planted_fault::is_planted;
+use crate::occluders::surface::proof::{band_rows, bands, reach};
+use crate::occluders::surface::thresholds::Slabs;
+use crate::occluders::surface::walk::Walk;
+
+/// Quarters are asked where they may bring the distance to the far plane below this share of what
+/// it may be at most.
+///
+/// Nothing rests on it.
+const WORTH: f32 = 0.98;
+
+/// Lowers the values of `far` of the open pixels: every ray through the closed square of a pixel is
+/// blocked there or before.
+///
+/// `beyond` is the value at the far plane, and `refinement` how often a pixel is quartered.
+pub(super) fn search(
+    walk: &Walk<'_>,
+    open: &OpenPixels,
+    slabs: &[Slabs],
+    beyond: f32,
+    refinement: u32,
+    far: &mut [f32],
+) {
+    let size = open.size();
+    let part = (band_rows(size) * size.width) as usize;
+    on_threads(cores(), far.chunks_mut(part).zip(bands(size)), |(far, rows)| {
+        let pixels = open.of_rows(rows);
+        if pixels.is_empty() {
+            return;
+        }
+        let bounds: Vec<f32> = pixels.iter().map(|pixel| slabs[*pixel as usize].searched).collect();
+        let meeting = Meeting::new(walk, open, rows, &bounds);
+        let [covers, borders] = meeting.lists(pixels.len());
+        let mut search = Search::new(walk, &meeting, beyond);
+        for (i, pixel) in pixels.iter().enumerate() {
+            let (column, row) = (pixel % size.width, pixel / size.width);
+            let centre = [column, row].map(|v| v.cast_signed() * UNITS + UNITS / 2);
+            let far = &mut far[(pixel - rows[0].cast_unsigned() * size.width) as usize];
+            if !search.begin(centre, covers.of(i), borders.of(i)) {
+                continue;
+            }
+            let square = Square { centre, half: UNITS / 2 };
+            // Most sheets behind one another cannot matter.
+            let slabs = &slabs[*pixel as usize];
+            for bound in [slabs.likely, slabs.searched] {
+                let found = search.blocked(0, (square, 0), bound, refinement);
+                if found < bound {
+                    *far = found;
+                    break;
+                }
+            }
+        }
+    });
+}
+
+/// A pixel or a part of one, in units.
+#[derive(Debug, Clone, Copy)]
+struct Square {
+    centre: [i32; 2],
+    half: i32,
+}
+
+impl Square {
+    fn quarters(self) -> [Self; 4] {
+        let half = self.half / 2;
+        let [x, y] = self.centre;
+        QUARTERS.map(|[dx, dy]| Self { centre: [x + dx * half, y + dy * half], half })
+    }
+
+    /// Whether an edge meets it, grown by `reach`: three separating axes.
+    #[inline]
+    fn is_met(self, [a, b]: [[i32; 2]; 2], reach: i32) -> bool {
+        let grown = self.half + reach;
+        let is_beside = |k: usize| {
+            let (low, high) = if a[k] < b[k] { (a[k], b[k]) } else { (b[k], a[k]) };
+            high < self.centre[k] - grown || low > self.centre[k] + grown
+        };
+        if is_beside(0) || is_beside(1) {
+            return false;
+        }
+        let normal = [i64::from(a[1]) - i64::from(b[1]), i64::from(b[0]) - i64::from(a[0])];
+        let from_a = [0, 1].map(|k| i64::from(self.centre[k]) - i64::from(a[k]));
+        let most = (normal[0].abs() + normal[1].abs()) * i64::from(grown);
+        (normal[0] * from_a[0] + normal[1] * from_a[1]).abs() <= most
+    }
+}
+
+/// A piece in a square, as a member of a sheet.
+#[derive(Debug, Clone, Copy)]
+struct Member {
+    piece: u32,
+    /// Its parent among the members, for union-find; a head is its own parent.
+    parent: u32,
+    /// About the nearest depth in the square.
+    near: f32,
+    own: Sums,
+    /// Whether it covers the centre or has an edge that meets the square.
+    is_met: bool,
+    /// Whether its sheet covers the square.
+    covers: bool,
+}
+
+/// What decides about a sheet, for one member or summed over all of them.
+#[derive(Debug, Clone, Copy)]
+struct Sums {
+    winding: i32,
+    /// Whether a border meets the square, and whether a fold does.
+    is_open: bool,
+    is_folded: bool,
+    /// The farthest depth in the square.
+    far: f32,
+}
+
+impl Sums {
+    const NOTHING: Self =
+        Self { winding: 0, is_open: false, is_folded: false, far: f32::NEG_INFINITY };
+}
+
+/// What is known at one level of quartering.
+#[derive(Debug, Default)]
+struct Level {
+    /// What may meet the square: pieces, and how they wind about the centres of four of these
+    /// squares.
+    pieces: Vec<(u32, [i32; 4])>,
+    edges: Vec<u32>,
+    members: Vec<Member>,
+    /// By member: the sums of its sheet, if it is the head.
+    sheets: Vec<Sums>,
+    /// The edges that meet the square, and the members at folds among them.
+    met: Vec<u32>,
+    folds: Vec<[u32; 2]>,
+}
+
+/// The search in the open pixels of some rows.
+struct Search<'a> {
+    meeting: &'a Meeting<'a>,
+    beyond: f32,
+    reach: i32,
+    walk: &'a Walk<'a>,
+    levels: Vec<Level>,
+    /// By piece: its member, valid where `stamps` has the current stamp.
+    places: Vec<u32>,
+    stamps: Vec<u32>,
+    stamp: u32,
+    /// By piece of the pixel: how it winds about the centres of the pixel's quarters.
+    quarters: Vec<[i32; 4]>,
+}
+
+impl<'a> Search<'a> {
+    fn new(walk: &'a Walk<'a>, meeting: &'a Meeting<'a>, beyond: f32) -> Self {
+        let count = meeting.pieces.len();
+        Self {
+            meeting,
+            beyond,
+            reach: reach(walk.placed.fault),
+            walk,
+            levels: Vec::new(),
+            places: vec![0; count],
+            stamps: vec![0; count],
+            stamp: 0,
+            quarters: vec![[0; 4]; count],
+        }
+    }
+
+    /// Takes the pieces that cover a pixel's centre, and the edges that meet the pixel.
+    ///
+    /// Returns whether something covers the centres of all quarters, as any sheet has to that covers
+    /// the pixel.
+    fn begin(&mut self, centre: [i32; 2], covers: &[u32], borders: &[u32]) -> bool {
+        let mut is_anything = [false; 4];
+        if self.levels.is_empty() {
+            self.levels.push(Level::default());
+        }
+        self.stamp += 1;
+        let level = &mut self.levels[0];
+        level.pieces.clear();
+        level.edges.clear();
+        level.edges.extend_from_slice(borders);
+        let at_edges = borders.iter().flat_map(|e| self.meeting.edges[*e as usize].pieces);
+        for piece in covers.iter().copied().chain(at_edges).filter(|piece| *piece != NO_PIECE) {
+            let stamp = &mut self.stamps[piece as usize];
+            if *stamp != self.stamp {
+                *stamp = self.stamp;
+                let (winding, quarters) = self.meeting.windings(piece, centre, UNITS / 4);
+                level.pieces.push((piece, [winding; 4]));
+                self.quarters[piece as usize] = quarters;
+                for (is_any, winding) in is_anything.iter_mut().zip(quarters) {
+                    *is_any |= winding != 0;
+                }
+            }
+        }
+        is_anything == [true; 4]
+    }
+
+    /// The value of `far` at or before which every ray through `square` is blocked.
+    ///
+    /// `which` of the four squares of its level it is.
+    /// The result is at most `bound`, which the caller knows to hold.
+    fn blocked(
+        &mut self,
+        depth: usize,
+        (square, which): (Square, usize),
+        bound: f32,
+        refinement: u32,
+    ) -> f32 {
+        let mut level = std::mem::take(&mut self.levels[depth]);
+        self.find_members(&mut level, (square, which), bound);
+        let best = level.nearest_sheet(bound);
+        // A quarter has sides of 2 units at least.
+        let best = if refinement > 0 && square.half > 1 {
+            self.by_quarters(depth, &level, square, best, (best < bound, refinement))
+        } else {
+            best
+        };
+        self.levels[depth] = level;
+        best
+    }
+
+    /// Finds the members in a square, and joins those that meet at an edge in it.
+    fn find_members(&mut self, level: &mut Level, (square, which): (Square, usize), bound: f32) {
+        let Level { pieces, edges, members, met, folds, .. } = level;
+        members.clear();
+        met.clear();
+        folds.clear();
+        self.stamp += 1;
+        let fault = self.walk.placed.fault;
+        let half = f64::from(square.half + REACH);
+        let at_centre = is_planted!(fault, DepthAtCentre) || is_planted!(fault, PlaneWithoutReach);
+        let half = if at_centre { 0.0 } else { half };
+        for (piece, windings) in pieces.iter().copied() {
+            let facet = self.meeting.pieces[piece as usize].facet;
+            if facet.nearest >= f64::from(bound) {
+                continue;
+            }
+            let (far, near) = facet.range(square.centre[0], square.centre[1], half);
+            #[expect(clippy::cast_possible_truncation, reason = "for a choice alone")]
+            let near = near as f32;
+            if near >= bound {
+                continue;
+            }
+            let winding = windings[which];
+            let own = Sums { winding, far: Facet::rounded(far, fault), ..Sums::NOTHING };
+            let parent = members.len() as u32;
+            self.places[piece as usize] = parent;
+            self.stamps[piece as usize] = self.stamp;
+            members.push(Member { piece, parent, near, own, is_met: winding != 0, covers: false });
+        }
+        for number in edges.iter().copied() {
+            let edge = &self.meeting.edges[number as usize];
+            let known = |piece: u32| piece != NO_PIECE && self.stamps[piece as usize] == self.stamp;
+            let is_known = edge.pieces.map(known);
+            if is_known == [false; 2] || !square.is_met(edge.ends, self.reach) {
+                continue;
+            }
+            met.push(number);
+            let place = |k: usize| self.places[edge.pieces[k] as usize];
+            if is_known == [true; 2] {
+                let both = [place(0), place(1)];
+                both.iter().for_each(|i| members[*i as usize].is_met = true);
+                if !edge.is_fold || is_planted!(fault, FoldsIgnored) {
+                    unite(members, both);
+                } else {
+                    both.iter().for_each(|i| members[*i as usize].own.is_folded = true);
+                    folds.push(both);
+                }
+            } else {
+                let member = &mut members[place(usize::from(is_known[1])) as usize];
+                member.is_met = true;
+                member.own.is_open |=
+                    !is_planted!(fault, ContoursIgnored) && !is_planted!(fault, BordersIgnored);
+            }
+        }
+    }
+
+    /// The farthest of the quarters, if that is nearer than `best`, which holds for all of them.
+    fn by_quarters(
+        &mut self,
+        depth: usize,
+        level: &Level,
+        square: Square,
+        best: f32,
+        (is_found, refinement): (bool, u32),
+    ) -> f32 {
+        let is_hopeful = |m: &&Member| m.is_met && m.near < best;
+        if !level.members.iter().filter(is_hopeful).any(|m| !m.covers) {
+            return best;
+        }
+        if self.levels.len() == depth + 1 {
+            self.levels.push(Level::default());
+        }
+        let next = &mut self.levels[depth + 1];
+        next.pieces.clear();
+        // What covers a quarter covers its centre, so nothing is shown that is nearer than this.
+        let squares = square.quarters();
+        let mut floors = [f32::INFINITY; 4];
+        for member in level.members.iter().filter(is_hopeful) {
+            let windings = if depth == 0 {
+                self.quarters[member.piece as usize]
+            } else {
+                self.meeting.windings(member.piece, square.centre, square.half / 2).1
+            };
+            next.pieces.push((member.piece, windings));
+            let facet = self.meeting.pieces[member.piece as usize].facet;
+            for k in 0..4 {
+                if windings[k] != 0 {
+                    let [x, y] = squares[k].centre;
+                    #[expect(clippy::cast_possible_truncation, reason = "for a choice alone")]
+                    let at = facet.at_point(x, y) as f32;
+                    floors[k] = floors[k].min(at);
+                }
+            }
+        }
+        // The farthest comes first, since it decides.
+        let mut order = [0, 1, 2, 3];
+        order.sort_unstable_by(|a, b| floors[*b].total_cmp(&floors[*a]));
+        let floor = floors[order[0]];
+        let is_worth_it = self.beyond - best < WORTH * (self.beyond - floor);
+        if floor >= best || (is_found && !is_worth_it) {
+            return best;
+        }
+        next.edges.clone_from(&level.met);
+        let mut most = f32::NEG_INFINITY;
+        for k in order {
+            let far = self.blocked(depth + 1, (squares[k], k), best, refinement - 1);
+            if far >= best {
+                return best;
+            }
+            most = most.max(far);
+        }
+        most
+    }
+}
+
+impl Level {
+    /// The depth of the nearest sheet that covers the square, if it is nearer than `bound`.
+    fn nearest_sheet(&mut self, bound: f32) -> f32 {
+        let closed = |sums: &Sums| !sums.is_open && !sums.is_folded && sums.winding != 0;
+        let best = bound.min(self.nearest(closed));
+        if self.folds.is_empty() {
+            return best;
+        }
+        for pair in &self.folds {
+            unite(&mut self.members, *pair);
+        }
+        // Across folds the senses disagree, so only the winding's parity is constant.
+        best.min(self.nearest(|sums| !sums.is_open && sums.winding % 2 != 0))
+    }
+
+    /// The least depth of the sheets for which `covers` holds; marks their members.
+    fn nearest(&mut self, covers: impl Fn(&Sums) -> bool) -> f32 {
+        let members = &mut self.members;
+        self.sheets.clear();
+        self.sheets.resize(members.len(), Sums::NOTHING);
+        for i in 0..members.len() as u32 {
+            let head = head(members, i);
+            let (own, sum) = (members[i as usize].own, &mut self.sheets[head as usize]);
+            sum.winding += own.winding;
+            sum.is_open |= own.is_open;
+            sum.is_folded |= own.is_folded;
+            sum.far = sum.far.max(own.far);
+        }
+        let mut least = f32::INFINITY;
+        for i in 0..members.len() as u32 {
+            let sheet = &self.sheets[head(members, i) as usize];
+            if covers(sheet) {
+                members[i as usize].covers = true;
+                least = least.min(sheet.far);
+            }
+        }
+        least
+    }
+}
+
+/// The head of a member's sheet; shortens the way to it.
+fn head(members: &mut [Member], mut i: u32) -> u32 {
+    loop {
+        let parent = members[i as usize].parent;
+        if parent == i {
+            return i;
+        }
+        let next = members[parent as usize].parent;
+        members[i as usize].parent = next;
+        i = next;
+    }
+}
+
+/// The lower index becomes the head; lists are too short to need ranks.
+fn unite(members: &mut [Member], pair: [u32; 2]) {
+    let [a, b] = pair.map(|i| head(members, i));
+    members[a.max(b) as usize].parent = a.min(b);
+}

@@ -1,0 +1,17 @@
+// The groups of an early pass: it looks into those that hold a candidate.
+
+@group(2) @binding(4) var<storage, read> history: array<u32>;
+@group(2) @binding(5) var<uniform> frame: Frame;
+
+fn has_candidates(group: u32) -> bool {
+    if EARLY_SET != BY_HISTORY {
+        return true;
+    }
+    var any = 0u;
+    for (var share = 0u; share < SHARE; share += 1u) {
+        any |= history[history_word(group, share)];
+    }
+    return any != 0u;
+}
+
+fn forget(group: u32) {}
