@@ -782,7 +782,7 @@ fn absent_instances_are_never_listed() {
     let stage = Stage::new(&[]);
     let Stage { context, renderer, target, pyramid, .. } = &stage;
     let (bodies, camera, plain) = (Town::new(9).standing(), walk(2), options(Hierarchy::Always));
-    let is_absent = |i: usize| i % 5 == 0 || (640..900).contains(&i);
+    let is_absent = |i: usize| i.is_multiple_of(5) || (640..900).contains(&i);
     let ids: Vec<u32> = (0..BODIES).map(|i| if is_absent(i) { ABSENT } else { 0 }).collect();
     let (min, max) = corners(&bodies);
     let bounds = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };

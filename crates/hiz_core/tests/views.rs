@@ -373,7 +373,7 @@ fn views_in_groups_keep_the_same() {
 
 /// Bits of a mask without a pattern of groups.
 fn asked(i: usize) -> bool {
-    (i * i / 5 + i / 64) % 3 == 0 && i / 128 != 2
+    (i * i / 5 + i / 64).is_multiple_of(3) && i / 128 != 2
 }
 
 fn words_of(count: usize, asked: impl Fn(usize) -> bool) -> Vec<u32> {

@@ -90,11 +90,8 @@ pub(crate) fn record_early(
             ..FrameUniform::default()
         };
         record_numbers(gpu, encoder, temporal, &view, &frame)?;
-        tests.record(gpu, encoder, instances, [view_bindings, view_bindings], false, |passes| {
-            if let Some(cut) = &cut {
-                passes.record("list", |pass| cut.record(pass));
-            }
-        })
+        let views = [view_bindings, view_bindings];
+        tests.record(gpu, encoder, instances, views, false, cut.as_ref())
     })?;
     temporal.note_early(number, instances, camera, options);
     Ok(())

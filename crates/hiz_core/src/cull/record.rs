@@ -20,6 +20,7 @@ use crate::instances::Instances;
 use crate::instances::piece::{CULL_WORKGROUP, Piece};
 use crate::output::bins::{Arrangement, Bins};
 use crate::output::compact::Compaction;
+use crate::output::cut::Cut;
 use crate::output::emit_passes::Emission;
 use crate::output::lists::Copied;
 use crate::output::survivors::NO_SURVIVORS;
@@ -254,7 +255,7 @@ pub(super) fn record_against_pyramid(
     view.record(encoder, pyramid);
     before(encoder);
     let views = [&view.instances, view.groups.as_ref().unwrap_or(&view.instances)];
-    tests.record(gpu, encoder, instances, views, inputs.idle, |_| ())
+    tests.record(gpu, encoder, instances, views, inputs.idle, None)
 }
 
 impl<'a> Target<'a> {
@@ -363,7 +364,7 @@ impl<'a> Tests<'a> {
         Ok(Self { target, groups, flat })
     }
 
-    /// Records the clears, the tests and what makes lists; `after` adds stages.
+    /// Records the clears, the tests, what makes lists, and what is cut from them.
     ///
     /// `view`, `group_view`: what tests of instances bind as their view, and tests of groups.
     pub(super) fn record(
@@ -373,7 +374,7 @@ impl<'a> Tests<'a> {
         instances: &Instances,
         [view, group_view]: [&wgpu::BindGroup; 2],
         idle: bool,
-        after: impl FnOnce(&mut StagePasses<'_>),
+        cut: Option<&Cut>,
     ) -> Result<()> {
         let workgroups = |count: u32| if idle { 0 } else { count };
         self.target.record_clears(gpu, encoder, instances, idle)?;
@@ -407,7 +408,9 @@ impl<'a> Tests<'a> {
         if let Some(emission) = &self.target.emission {
             passes.record("list", |pass| emission.record(pass, idle));
         }
-        after(&mut passes);
+        if let Some(cut) = cut {
+            passes.record("list", |pass| cut.record(pass));
+        }
         Ok(())
     }
 }

@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 use crate::gpu::device::Gpu;
 use crate::input::camera::Camera;
 use crate::instances::Instances;
+use crate::instances::piece::Piece;
 use crate::output::views::Joined;
 use crate::output::visible::Visible;
 use crate::pyramid::Pyramid;
@@ -49,7 +50,7 @@ pub(crate) fn record_cull_views(
             format!("expected {} views, as the buffers are for, got {}", joined.views, views.len()),
         ));
     }
-    if !joined.any.counts().iter().copied().eq(instances.pieces.iter().map(|p| p.count())) {
+    if !joined.any.counts().iter().copied().eq(instances.pieces.iter().map(Piece::count)) {
         return Err(Error::mismatch(
             "visible",
             "expected buffers that were created for these instances, got others",

@@ -137,6 +137,7 @@ pub(crate) fn stage_pass<'e>(
 }
 
 /// Several stages: in one compute pass, or in one each if they are timed.
+#[expect(clippy::large_enum_variant, reason = "one at a time, on the stack")]
 pub(crate) enum StagePasses<'e> {
     /// Not timed.
     One(wgpu::ComputePass<'e>),

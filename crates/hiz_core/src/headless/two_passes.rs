@@ -190,7 +190,7 @@ impl TwoPasses {
         let _order = self.submitting.lock();
         engine.scoped(|| {
             let mut encoder = engine.encoder("hiz.two_passes.encoder");
-            record(&mut encoder)?;
+            engine.timed(&mut encoder, record)?;
             let staged = if bytes == 0 {
                 None
             } else {
