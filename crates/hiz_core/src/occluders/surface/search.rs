@@ -180,8 +180,8 @@ impl<'a> Search<'a> {
 
     /// Takes the pieces that cover a pixel's centre, and the edges that meet the pixel.
     ///
-    /// Returns whether something covers the centres of all quarters, as any sheet has to that covers
-    /// the pixel.
+    /// Returns whether something covers the centres of all quarters.
+    /// A sheet that covers the pixel has to.
     fn begin(&mut self, centre: [i32; 2], covers: &[u32], borders: &[u32]) -> bool {
         let mut is_anything = [false; 4];
         if self.levels.is_empty() {
