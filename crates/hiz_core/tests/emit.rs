@@ -330,13 +330,16 @@ fn emits(meshes: &MeshTable) -> [Emit; 3] {
     ]
 }
 
+/// Levels of detail per mesh, instances, the share before the wall, the share absent, and how many
+/// instances a piece has.
+type Case<'a> = (&'a [usize], usize, f64, f64, Option<u32>);
+
 /// The sizes at which the passes change: words, blocks, pieces, capacities.
 #[test]
 fn bins_hold_what_a_loop_finds() {
     let world = World::new(&[]);
     let mut random = Random(1);
-    // Levels of detail per mesh, instances, share kept, share absent, pieces.
-    let cases: [(&[usize], usize, f64, f64, Option<u32>); 12] = [
+    let cases: [Case<'_>; 12] = [
         (&[1], 1, 1.0, 0.0, None),
         (&[1], 1000, 0.3, 0.1, None),
         (&[4], 5000, 0.5, 0.1, None),
