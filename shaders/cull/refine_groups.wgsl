@@ -43,8 +43,10 @@ fn refine_groups(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     // The verdict of an absent member is not that of its group.
-    let has_absent = record_texel(group, LAST_TEXEL).w != 0u;
-    if !has_absent && is_within(group) {
+    if record_texel(group, LAST_TEXEL).w != 0u {
+        return;
+    }
+    if is_within(group) {
         group_verdicts[group] = OCCLUDED | WITHIN;
     }
 }

@@ -330,13 +330,16 @@ fn emits(meshes: &MeshTable) -> [Emit; 3] {
     ]
 }
 
+/// Levels of detail per mesh, instances, the share before the wall, the share absent, and how many
+/// instances a piece has.
+type Case<'a> = (&'a [usize], usize, f64, f64, Option<u32>);
+
 /// The sizes at which the passes change: words, blocks, pieces, capacities.
 #[test]
 fn bins_hold_what_a_loop_finds() {
     let world = World::new(&[]);
     let mut random = Random(1);
-    // Levels of detail per mesh, instances, share kept, share absent, pieces.
-    let cases: [(&[usize], usize, f64, f64, Option<u32>); 12] = [
+    let cases: [Case<'_>; 12] = [
         (&[1], 1, 1.0, 0.0, None),
         (&[1], 1000, 0.3, 0.1, None),
         (&[4], 5000, 0.5, 0.1, None),
@@ -716,46 +719,46 @@ fn packed_bins_need_first_instances() {
 /// Each fault must show: in a list, in the draws or in their number.
 #[test]
 fn planted_faults_are_seen() {
-    for (name, way, what, by) in [
-        ("starts off by one", 0, "rank(lod, starts[mesh])", "rank(lod, starts[mesh] + 1u)"),
+    for (what, by, name, way) in [
+        ("rank(lod, starts[mesh])", "rank(lod, starts[mesh] + 1u)", "starts off by one", 0),
         (
-            "the end of a bin",
-            0,
             "starts[mesh + 1u]), written)",
             "starts[mesh + 1u] + 1u), written)",
+            "the end of a bin",
+            0,
         ),
         (
-            "a rank without its block",
-            0,
             "return blocks[w >> BLOCK_LOG2_WORDS] + before[w]",
             "return before[w]",
+            "a rank without its block",
+            0,
         ),
         (
-            "a scatter without its block",
-            0,
             "blocks[at >> BLOCK_LOG2_WORDS] + before[at]);",
             "before[at]);",
-        ),
-        ("a list past its capacity", 0, "if rank < written {", "if true {"),
-        ("the capacity that is left", 0, "min(through, room())", "min(through, emit.capacity)"),
-        ("slots as indices", 0, "index = index_of[index];", ""),
-        ("the plane", 0, "bin.lod * piece.words + at.word", "at.word"),
-        ("the ranks of the last planes", 0, "high.ranks += high_ones;", ""),
-        ("the tail of the draws", 0, "write_draw(empty, Template(), 0u, 0u);", ""),
-        (
-            "the number of draws",
+            "a scatter without its block",
             0,
+        ),
+        ("if rank < written {", "if true {", "a list past its capacity", 0),
+        ("min(through, room())", "min(through, emit.capacity)", "the capacity that is left", 0),
+        ("index = index_of[index];", "", "slots as indices", 0),
+        ("bin.lod * piece.words + at.word", "at.word", "the plane", 0),
+        ("high.ranks += high_ones;", "", "the ranks of the last planes", 0),
+        ("write_draw(empty, Template(), 0u, 0u);", "", "the tail of the draws", 0),
+        (
             "draw_counts[emit.piece] = count;",
             "draw_counts[emit.piece] = emit.records;",
+            "the number of draws",
+            0,
         ),
         (
-            "the shift of a bin",
-            1,
             "lod * emit.count + starts[mesh] - begin",
             "lod * emit.count + starts[mesh]",
+            "the shift of a bin",
+            1,
         ),
-        ("a level of the last planes", 1, "NUMBERS + FOUR", "NUMBERS"),
-        ("a draw of another level", 2, "lod = l;", ""),
+        ("NUMBERS + FOUR", "NUMBERS", "a level of the last planes", 1),
+        ("lod = l;", "", "a draw of another level", 2),
     ] {
         let world = World::new(&[(what, by)]);
         let mut random = Random(4);
