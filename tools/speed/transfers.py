@@ -107,7 +107,7 @@ def _from_buffer(run: Run) -> None:
         ("boxes", (scene.low, scene.high), scene.boxes),
     )
     for name, arrays, bounds in kinds:
-        on_device = run.yardstick.from_buffer(name, arrays)
+        on_device = run.yardstick.bounds_in_buffer(name, arrays)
         resident = device.instances(bounds, order="given")
         copies = [np.empty_like(part) for part in arrays]
 

@@ -86,7 +86,7 @@ impl Given {
             let center: [f32; 3] = std::array::from_fn(|_| number(-1.0));
             match kind {
                 BoundsKind::Sphere => {
-                    numbers.extend([center[0], center[1], center[2], number(0.0)])
+                    numbers.extend([center[0], center[1], center[2], number(0.0)]);
                 }
                 _ => {
                     let flat = number(0.0) == 0.0;

@@ -123,7 +123,7 @@ impl Yardstick {
     }
 
     /// Spheres or boxes in a buffer on the device, as float32.
-    fn from_buffer(
+    fn bounds_in_buffer(
         &self,
         py: Python<'_>,
         kind: &str,
