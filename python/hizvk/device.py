@@ -31,8 +31,8 @@ from .options import cull_request
 from .renewal import Source
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import CullResult
-from .temporal import PassResult, Temporal
 from .samples import checked_samples
+from .temporal import PassResult, Temporal
 from .views import ViewsResult, among_of, pairs
 
 if TYPE_CHECKING:
