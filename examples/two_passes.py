@@ -5,8 +5,6 @@ Last frame's answer as this frame's loses what the door has hidden.
 As an early set it loses nothing, since the late pass tests all the others.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 import hizvk
@@ -47,6 +45,7 @@ def main() -> None:
     drawn = device.occluders(hizvk.Mesh(CORNERS, TRIANGLES, transforms(center, half)))
     culler = device.temporal(crowd)
     seen = np.ones(len(crowd), bool)
+    lost = np.zeros(3, int)
 
     for frame in range(FRAMES):
         center, half = boxes(frame)
@@ -68,12 +67,12 @@ def main() -> None:
         device.render_depth(drawn, into=by_hand, only=kept & ~seen)
         seen = kept
 
-        differing = [int((image.numpy() != all_of_it).sum()) for image in (depth, by_hand, stale)]
-        print(
-            f"frame {frame}: {early.count} drawn early and {late.count} late of {len(crowd)}; "
-            f"pixels that differ: {differing[0]}, by hand {differing[1]}, "
-            f"with the stale answer {differing[2]}"
-        )
+        lost += [int((image.numpy() != all_of_it).sum()) for image in (depth, by_hand, stale)]
+        print(f"frame {frame}: {early.count} drawn early and {late.count} late of {len(crowd)}")
+    print(
+        f"pixels lost: {lost[0]} by two passes, {lost[1]} by hand; "
+        f"the stale answer loses some: {lost[2] > 0}"
+    )
 
 
 if __name__ == "__main__":

@@ -1003,6 +1003,55 @@ TABLES: dict[str, Table] = {
             **OF_MESHES,
         },
     ),
+    "Device.temporal": Table(
+        lambda device: (device.temporal, {"instances": device.instances(spheres())}),
+        {
+            "instances": [
+                (spheres(), TypeError, "expected Instances of Device.instances, got Spheres")
+            ],
+            "early_capacity": [
+                (-1, ValueError, "expected an integer in 0..4294967295, got int -1"),
+                (2.0, TypeError, "got float 2.0"),
+            ],
+        },
+    ),
+    "Temporal.early": Table(
+        lambda device: (
+            device.temporal(device.instances(spheres())).early,
+            {"camera": camera()},
+        ),
+        {
+            "camera": CAMERA,
+            "only": [
+                ([True, False], ValueError, "expected bool (1,), got (2,) bool"),
+                ([1], ValueError, "expected numbers of instances in 0..0, got 1"),
+                ("all", TypeError, "got str 'all'"),
+            ],
+            "largest_px": [
+                (-1, ValueError, "expected an integer in 0..2147483647, got int -1"),
+                (1.5, TypeError, "got float 1.5"),
+            ],
+        },
+    ),
+    "Temporal.late": Table(
+        lambda device: (
+            device.temporal(device.instances(spheres())).late,
+            {"camera": camera(), "depth": np.ones((6, 8)), "kind": "z"},
+        ),
+        {
+            "camera": CAMERA,
+            "depth": [*IMAGE, (None, TypeError, "got None")],
+            "kind": KIND,
+            "scale": SCALE,
+            "invalid": INVALID,
+            "levels": LEVELS,
+            "options": OPTIONS_OBJECT,
+            **OPTIONS,
+        },
+    ),
+    "Temporal.reset": Table(
+        lambda device: (device.temporal(device.instances(spheres())).reset, {}), {}
+    ),
     "Device.warm_up": Table(
         lambda device: (
             device.warm_up,
@@ -1344,6 +1393,7 @@ MADE_BY_THE_PACKAGE = {
 }
 MADE_BY_THE_PACKAGE |= {"BoundsCheck", "Occluders", "ProxyCheck", "Pyramid", "Recommendation"}
 MADE_BY_THE_PACKAGE |= {"StageTime", "StageTimes", "ViewsResult"}
+MADE_BY_THE_PACKAGE |= {"PassResult", "Temporal"}
 MADE_BY_THE_PACKAGE |= {"InnerBoxes", "InnerPrisms", "OccluderSelection", "SplitMesh"}
 
 

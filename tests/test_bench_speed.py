@@ -44,6 +44,7 @@ TINY = Workload(
 
 #: What is to be reached, and whether it is a lower bound, as the issue words it.
 TARGETS = {
+    "temporal.two": (1.3, False),
     "memory.device": (1.5, False),
     "memory.host.morton": (1.0, False),
     "memory.host.given": (1.0, False),

@@ -42,6 +42,8 @@ LAST_LINES = {
     "readback.py": "8 of 8 masks are those of a blocking read",
     # Each eye sees past its own side of the pillar.
     "stereo.py": "a list of one eye would lose balls of the other: True",
+    # The stale answer lacks what the door has hidden.
+    "two_passes.py": "pixels lost: 0 by two passes, 0 by hand; the stale answer loses some: True",
     # x is -9, -7, ... 9: a ball of 0.5 m is hidden up to 3.5 m from the middle.
     "updates.py": "the walker is hidden in frames 3, 4, 5, 6",
 }

@@ -195,6 +195,7 @@ class Temporal(Allocated[CoreTwoPasses]):
         options : CullOptions, optional
             How the cull decides; None takes the defaults.
             ``order="any"`` is refused, because two passes list from their masks.
+            `CullOptions.lod` has no effect, because masks do not tell levels of detail.
         **keywords
             Any field of `CullOptions`, which takes the place of that of `options`.
 

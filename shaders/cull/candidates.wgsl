@@ -4,16 +4,16 @@
 // Twin: `Candidates` in `crates/hiz_core/src/cull/pipelines.rs`.
 override EARLY_SET: u32;
 // What the last late pass found visible.
-const BY_HISTORY: u32 = 0u;
+const SET_BY_HISTORY: u32 = 0u;
 // What is large in the image.
-const OF_SIZE: u32 = 1u;
+const SET_BY_SIZE: u32 = 1u;
 // What the caller's mask names.
-const GIVEN: u32 = 2u;
+const SET_GIVEN: u32 = 2u;
 
 // Whether an early pass draws, or looks into, what has this outcome of a test without depth.
 // By size that is an estimate, as any set is right.
 fn is_candidate(outcome: Outcome) -> bool {
-    if EARLY_SET == OF_SIZE {
+    if EARLY_SET == SET_BY_SIZE {
         let sides = outcome.pixels.zw - outcome.pixels.xy + vec2<i32>(1);
         let is_large = max(sides.x, sides.y) >= frame.least_pixels;
         // What crosses the plane of the eye has no rectangle, and is near.

@@ -11,10 +11,10 @@ const WHOLE_RUN: u32 = (1u << RUN) - 1u;
 
 // Bit k: member k of the run at place `first` is a candidate.
 fn candidates(group: u32, share: u32, first: u32) -> u32 {
-    if EARLY_SET == BY_HISTORY {
+    if EARLY_SET == SET_BY_HISTORY {
         return history[history_word(group, share)] & WHOLE_RUN;
     }
-    if EARLY_SET == GIVEN {
+    if EARLY_SET == SET_GIVEN {
         var found = 0u;
         for (var k = 0u; k < RUN && first + k * SHARE < piece.count; k += 1u) {
             let index = piece.base + caller_index(first + k * SHARE);

@@ -4,7 +4,7 @@
 @group(2) @binding(5) var<uniform> frame: Frame;
 
 fn has_candidates(group: u32) -> bool {
-    if EARLY_SET != BY_HISTORY {
+    if EARLY_SET != SET_BY_HISTORY {
         return true;
     }
     var any = 0u;

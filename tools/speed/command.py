@@ -28,6 +28,7 @@ from . import (
     reduction,
     report,
     scale,
+    temporal,
     transfers,
     views,
 )
@@ -52,6 +53,7 @@ PARTS: Final[dict[str, Callable[[Run], None]]] = {
     "cull": culling.measure,
     "emit": emit.measure,
     "calls": calls.measure,
+    "temporal": temporal.measure,
     "readback": readback.measure,
     "views": views.measure,
     "occluders": occluders.measure,

@@ -11,9 +11,9 @@ use common::{Random, engine};
 use drawn_boxes::{Body, BoxRenderer, Difference, NUM_INDICES, Target};
 use hiz_core::{
     ABSENT, Bounds, Camera, Coverage, CullOptions, DepthConvention, DrawTemplate, EarlySet, Emit,
-    Error, Floats, Hierarchy, HizContext, ImageSize, InstanceOptions, Instances, Lod, MeshLods,
-    Order, Outputs, Placement, Pose, Projection, Pyramid, PyramidOptions, StoredOrder, Temporal,
-    Vec3, wgpu,
+    Error, Floats, Hierarchy, HizContext, ImageSize, InstanceOptions, Instances, Lod, LodRule,
+    MeshLods, Order, Outputs, Placement, Pose, Projection, Pyramid, PyramidOptions, StoredOrder,
+    Temporal, Vec3, wgpu,
 };
 
 const SIZE: ImageSize = ImageSize { width: 192, height: 108 };
@@ -169,6 +169,8 @@ struct Way {
 enum Lists {
     One,
     Packed,
+    /// With two LODs each.
+    PackedLods,
     Reserved,
     Each,
     Copied,
@@ -243,12 +245,17 @@ impl Stage {
 
     fn emit(&self, way: &Way) -> Emit {
         let draw = DrawTemplate { index_count: NUM_INDICES, ..DrawTemplate::default() };
-        let lods = [Lod { draw: draw.into(), error: 0.0 }];
+        let mut lods = vec![Lod::new(draw, 0.0)];
+        if way.emit == Lists::PackedLods {
+            lods.push(Lod::new(draw, 0.05));
+        }
         let mesh = || MeshLods::new(&lods);
         let meshes = || self.context.create_mesh_table(&[mesh(), mesh(), mesh()]).unwrap();
         match way.emit {
             Lists::One => Emit::List,
-            Lists::Packed => Emit::Binned { meshes: meshes(), placement: Placement::Packed },
+            Lists::Packed | Lists::PackedLods => {
+                Emit::Binned { meshes: meshes(), placement: Placement::Packed }
+            }
             Lists::Reserved => Emit::Binned { meshes: meshes(), placement: Placement::Reserved },
             Lists::Each => Emit::Instances { meshes: meshes() },
             // The records are the numbers themselves.
@@ -267,7 +274,11 @@ impl Stage {
         let (mut town, mut random, mut seen) = (Town::new(5), Random(7), Seen::default());
         let mut instances = self.instances(&town.standing(), way);
         let temporal = self.temporal(&instances, way);
-        let options = options(way.hierarchy);
+        let lod = match way.emit {
+            Lists::PackedLods => LodRule::Error { pixels: 1.0 },
+            _ => LodRule::Finest,
+        };
+        let options = CullOptions { lod, ..options(way.hierarchy) };
         let mask = renderer.engine.device().create_buffer(&wgpu::BufferDescriptor {
             label: None,
             size: 4 * BODIES.div_ceil(32) as u64,
@@ -395,6 +406,10 @@ fn ways() -> Vec<(&'static str, Way)> {
         ("pieces, a list of 70", Way { piece_capacity: Some(512), capacity: Some(70), ..PLAIN }),
         ("pieces and a mask", Way { piece_capacity: Some(384), early: Early::Mask, ..PLAIN }),
         ("uploads", Way { uploads: true, ..PLAIN }),
+        (
+            "packed bins of LODs, a list of 20",
+            Way { emit: Lists::PackedLods, capacity: Some(20), ..PLAIN },
+        ),
         ("packed bins", Way { emit: Lists::Packed, ..PLAIN }),
         (
             "packed bins, a list of 20, pieces",
@@ -737,6 +752,12 @@ fn what_is_refused_is_named() {
     let (min, max) = corners(&bodies[..1]);
     let bounds = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };
     context.record_update(&mut encoder, &instances, 0, &bounds, false).unwrap();
+    let (parameter, message) = said(late(&instances, &here, &plain));
+    assert!(parameter == "instances" && message.contains("update before"), "{message}");
+    // Bounds from a buffer are an update, too.
+    early(&instances, EarlySet::LastVisible).unwrap();
+    let source = renderer_mask(&stage, 24 * BODIES as u64, wgpu::BufferUsages::STORAGE);
+    context.record_update_from(&mut encoder, &instances, &source).unwrap();
     let (parameter, message) = said(late(&instances, &here, &plain));
     assert!(parameter == "instances" && message.contains("update before"), "{message}");
     // A refused late pass leaves the early one as it was, and a new early one helps.

@@ -18,8 +18,19 @@ use crate::output::cut::Cut;
 use crate::output::visible::PieceOutput;
 use crate::pyramid::PyramidUniform;
 
-/// The number of a reduction, which no depth store without depth has.
+/// The number of a reduction, which an empty atlas does not have.
+/// So every test ends before it reads depth.
 const NO_REDUCTION: u32 = 1;
+
+/// Where depth would be read.
+///
+/// Mesa 22.3's lavapipe compiles a cull that binds no depth anew at each dispatch, for 60 ms or
+/// for 1 ms from its cache on disk.
+/// With an atlas it compiles once.
+const STORE: DepthStore = DepthStore::Atlas;
+
+/// Texels of the empty atlas: room for its headers.
+const ATLAS_TEXELS: u32 = 4;
 
 /// An early pass, as the shaders are told.
 struct Chosen<'a> {
@@ -79,7 +90,7 @@ pub(crate) fn record_early(
     let number = temporal.next_number();
     gpu.recorded(|| {
         let target = target(gpu, instances, options, temporal, &set)?;
-        let key = CullKey::without_depth(instances.kind, false);
+        let key = CullKey { store: STORE, ..CullKey::without_depth(instances.kind, false) };
         let tests = Tests::new(gpu, key, &target, cull_pipeline)?;
         let bindings = temporal.pieces.iter().map(|history| &history.cut);
         let cut = Cut::new(gpu, instances, &temporal.early, bindings)?;
@@ -155,10 +166,20 @@ fn target<'a>(
 fn bind_view(gpu: &Gpu, temporal: &Temporal) -> Result<wgpu::BindGroup> {
     let zeros = [0; size_of::<PyramidUniform>()];
     let pyramid = gpu.constant("hiz.no_pyramid", &zeros, wgpu::BufferUsages::UNIFORM)?;
+    let atlas = gpu.view(&gpu.texture(
+        "hiz.early.no_atlas",
+        (ATLAS_TEXELS, 1),
+        wgpu::TextureFormat::Rgba32Uint,
+        wgpu::TextureUsages::STORAGE_BINDING,
+    )?)?;
     gpu.bind_group(
         "hiz.early.view",
-        &DepthStore::Nowhere.layout(gpu)?,
-        &[entry(2, pyramid.as_entire_binding()), entry(6, temporal.view.as_entire_binding())],
+        &STORE.layout(gpu)?,
+        &[
+            entry(2, pyramid.as_entire_binding()),
+            entry(3, wgpu::BindingResource::TextureView(&atlas)),
+            entry(6, temporal.view.as_entire_binding()),
+        ],
     )
 }
 

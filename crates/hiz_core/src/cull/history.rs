@@ -16,6 +16,7 @@ use std::sync::OnceLock;
 use crate::cull::groups::GROUPS_OF_RUN;
 use crate::cull::lod::LodRule;
 use crate::cull::options::CullOptions;
+use crate::cull::view_uniform::ViewUniform;
 use crate::error::{Error, Result};
 use crate::gpu::buffers::STORAGE;
 use crate::gpu::device::{ContextId, Gpu};
@@ -124,8 +125,8 @@ struct Early {
     camera: Camera,
     lod: LodRule,
     instances: InstancesId,
-    /// The number of the next update.
-    next_update: u32,
+    /// What [`Instances::changes`] said.
+    changes: [u32; 2],
 }
 
 impl Temporal {
@@ -134,14 +135,15 @@ impl Temporal {
             return Err(Error::invalid(
                 "outputs",
                 format!(
-                    "expected mask, indices or draws, which an early pass is drawn from, got {outputs}"
+                    "expected mask, indices or draws, which an early pass is drawn from, got \
+                     {outputs}"
                 ),
             ));
         }
         let early = Outputs { verdicts: false, ..outputs.clone() };
         let late = Outputs { capacity: None, ..outputs.clone() };
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
-        let size = size_of::<crate::cull::view_uniform::ViewUniform>() as u64;
+        let size = size_of::<ViewUniform>() as u64;
         Ok(Self {
             context: gpu.id(),
             early: Visible::of_two_passes(gpu, instances, &early)?,
@@ -219,13 +221,13 @@ impl Temporal {
         camera: &Camera,
         options: &CullOptions,
     ) {
-        let next_update = instances.changing().next_update;
+        let changes = instances.changes();
         self.state.lock().early = Some(Early {
             number,
             camera: camera.clone(),
             lod: options.lod.clone(),
             instances: instances.id,
-            next_update,
+            changes,
         });
     }
 
@@ -247,7 +249,7 @@ impl Temporal {
                 "expected those of this frame's `record_early`, got others; upload before it",
             ));
         }
-        if early.next_update != instances.changing().next_update {
+        if early.changes != instances.changes() {
             return Err(Error::mismatch(
                 "instances",
                 "expected no update between `record_early` and `record_late`, which show one \

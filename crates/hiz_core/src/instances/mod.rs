@@ -114,6 +114,8 @@ pub(crate) struct Changing {
     pub(crate) next_update: u32,
     /// Whether bounds were taken from a buffer: then the host knows neither bounds nor groups.
     pub(crate) on_device: bool,
+    /// How often bounds were taken from a buffer.
+    pub(crate) renewals: u32,
 }
 
 /// Room for `Sequence` of `shaders/instances/update.wgsl`.
@@ -195,7 +197,7 @@ impl Instances {
             pieces.push(piece);
             groups.push(its_groups);
         }
-        let changing = Changing { groups, next_update: 0, on_device: false };
+        let changing = Changing { groups, next_update: 0, on_device: false, renewals: 0 };
         let this = Self::of_pieces(gpu, kind, pieces, changing)?;
         if options.strict {
             let invalid = this.invalid()?;
@@ -214,7 +216,12 @@ impl Instances {
             pieces.push(unwritten(gpu, kind, index, range)?);
         }
         let groups = pieces.iter().map(|piece| Groups::unknown(piece.count() as usize)).collect();
-        Self::of_pieces(gpu, kind, pieces, Changing { groups, next_update: 0, on_device: true })
+        Self::of_pieces(
+            gpu,
+            kind,
+            pieces,
+            Changing { groups, next_update: 0, on_device: true, renewals: 0 },
+        )
     }
 
     fn of_pieces(
@@ -323,10 +330,17 @@ impl Instances {
     /// Forgets what the host knows of the bounds, because the device writes them from now on.
     fn bounds_are_on_device(&self) {
         let mut changing = self.changing();
+        changing.renewals = changing.renewals.wrapping_add(1);
         if !std::mem::replace(&mut changing.on_device, true) {
             let unknown = |piece: &Piece| Groups::unknown(piece.count() as usize);
             changing.groups = self.pieces.iter().map(unknown).collect();
         }
+    }
+
+    /// Numbers that differ once bounds have been replaced: of updates, and of renewals.
+    pub(crate) fn changes(&self) -> [u32; 2] {
+        let changing = self.changing();
+        [changing.next_update, changing.renewals]
     }
 
     /// The culls that were submitted.

@@ -91,7 +91,7 @@ pub(super) fn all() -> Vec<(String, Source)> {
     }
     let stores = SOURCES.map(DepthStore::Apart).into_iter().chain([DepthStore::Atlas]);
     // The sets of an early pass differ in a constant.
-    let early = (DepthStore::Nowhere, FramePass::Early(Candidates::History));
+    let early = (DepthStore::Atlas, FramePass::Early(Candidates::History));
     let passes = [FramePass::Alone, FramePass::Late];
     let passes = stores.clone().flat_map(|store| passes.map(|pass| (store, pass)));
     for (store, pass) in passes.chain([early]) {
