@@ -4,6 +4,7 @@
 #   bounds, from seed HIZVK_SOAK_SEED on;
 # - the certificates in every arithmetic that WGSL permits;
 # - the example's scenes with and without culling, by 1000 random cameras (HIZVK_SOAK_CAMERAS) each;
+# - the viewer's scenes with and without culling, 300 frames (HIZVK_VIEWER_FRAMES) each;
 # - 2000 processes each of Rust and Python that use a device and end.
 # The adversarial cases may be stopped at any time.
 # The next run with the same settings continues there.

@@ -40,7 +40,7 @@ pub(crate) struct OnDevice {
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
     pub(crate) bodies: wgpu::Buffer,
-    /// The list 0, 1, 2, ..., which draws all bodies and the proxy.
+    /// The list 0, 1, 2, ..., which draws all bodies.
     everybody: wgpu::Buffer,
     pub(crate) view: wgpu::Buffer,
     /// Least and greatest corners of the bounds, for pictures of them.
@@ -51,7 +51,6 @@ pub(crate) struct OnDevice {
     pub(crate) ranges: Vec<Range<u32>>,
     /// Kinds of which all bodies are occluders.
     occluders: Vec<usize>,
-    proxy: Option<DrawTemplate>,
     pub(crate) num_bodies: u32,
     /// The greatest coordinate of all bounds: how far there is something to see.
     pub(crate) reach: f32,
@@ -88,10 +87,6 @@ impl OnDevice {
             .map(|kind| kind.lods.iter().map(|lod| append(&lod.mesh)).collect())
             .collect();
         let num_bodies = scene.bodies.len() as u32;
-        let proxy = scene
-            .proxy
-            .as_ref()
-            .map(|mesh| DrawTemplate { first_instance: num_bodies, ..append(mesh) });
         let ranges: Vec<_> = (0..scene.kinds.len()).map(|kind| scene.range_of(kind)).collect();
         let is_occluder = |range: &Range<u32>| {
             scene.bodies[range.start as usize..range.end as usize].iter().all(|b| b.occluder)
@@ -107,7 +102,7 @@ impl OnDevice {
             bodies: gpu.buffer("viewer.bodies", &records(scene), usage),
             everybody: gpu.buffer(
                 "viewer.everybody",
-                &(0..=num_bodies).collect::<Vec<_>>(),
+                &(0..num_bodies).collect::<Vec<_>>(),
                 BufferUsages::VERTEX,
             ),
             view: gpu.empty(
@@ -119,7 +114,6 @@ impl OnDevice {
             draws,
             ranges,
             occluders,
-            proxy,
             num_bodies,
             reach,
         }
@@ -160,9 +154,6 @@ impl OnDevice {
 
     /// Draws what hides before a cull of one pass.
     pub(crate) fn draw_occluders(&self, pass: &mut wgpu::RenderPass<'_>) {
-        if let Some(draw) = &self.proxy {
-            return draw_one(pass, draw, draw.first_instance..draw.first_instance + 1);
-        }
         for kind in &self.occluders {
             self.draw_kind(pass, *kind);
         }
@@ -188,10 +179,10 @@ fn draw_one(pass: &mut wgpu::RenderPass<'_>, draw: &DrawTemplate, bodies: Range<
     pass.draw_indexed(indices, draw.base_vertex, bodies);
 }
 
-/// The records of the bodies, and behind them one for the proxy.
+/// The records of the bodies.
 fn records(scene: &Scene) -> Vec<BodyRecord> {
     let byte = |tint: f32| (127.5 * tint.clamp(0.0, 2.0)).round() as u8;
-    let mut records: Vec<_> = scene
+    scene
         .bodies
         .iter()
         .map(|body| BodyRecord {
@@ -201,13 +192,5 @@ fn records(scene: &Scene) -> Vec<BodyRecord> {
             tint: [byte(body.tint[0]), byte(body.tint[1]), byte(body.tint[2]), 0],
             kind: body.kind,
         })
-        .collect();
-    records.push(BodyRecord {
-        position: [0.0; 3],
-        scale: 1.0,
-        turn: [0.0, 1.0],
-        tint: [128; 4],
-        kind: u32::MAX,
-    });
-    records
+        .collect()
 }

@@ -63,7 +63,6 @@ pub(crate) fn scene() -> Scene {
         kinds,
         bodies,
         volumes,
-        proxy: None,
         rule,
         legs: vec![
             // ARM's eye, turning.

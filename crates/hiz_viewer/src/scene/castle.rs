@@ -1,8 +1,9 @@
-//! Intel's castle: 1,999 meshes of a million triangles, with an artist's occluders inside.
+//! Intel's castle: 1,999 meshes of a million triangles, and walls that hide them.
 //!
 //! Its data is Intel's (Apache-2.0), and not part of this repository.
 //! `scripts/view.sh` unpacks it to the folder that `$HIZVK_CASTLE` names.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use hiz_core::{LodRule, Vec3};
@@ -11,6 +12,9 @@ use crate::Failure;
 use crate::mesh::{Mesh, cross, sub, unit};
 use crate::scene::npy;
 use crate::scene::{Body, Kind, Leg, Scene, boxes};
+
+/// The side of a cell that walls are cut into, in metres.
+const CELL: f64 = 10.0;
 
 /// The folder with the castle's arrays.
 pub(crate) const FOLDER: &str = "HIZVK_CASTLE_FOLDER";
@@ -34,9 +38,16 @@ pub(crate) fn scene() -> Result<Scene, Failure> {
     for (number, range) in first.windows(2).enumerate() {
         let triangles = &triangles[range[0] as usize..range[1] as usize];
         kinds.push(Kind::of(one_mesh(&vertices, triangles, shade(number))));
-        bodies.push(Body::at(number as u32, [0.0; 3], true));
+        bodies.push(Body::at(number as u32, [0.0; 3], false));
     }
-    let proxy = one_mesh(&points("occluder_vertices")?, &points("occluder_triangles")?, [1.0; 3]);
+    let owners = array("occluder_instance")?;
+    let triangles = points("occluder_triangles")?;
+    // Those of an instance lie inside of it, and the others are walls that are seen.
+    let walls = triangles.iter().zip(&owners).filter(|(_, owner)| **owner < 0.0);
+    for part in in_cells(&points("occluder_vertices")?, walls.map(|(t, _)| *t)) {
+        bodies.push(Body::at(kinds.len() as u32, [0.0; 3], true));
+        kinds.push(Kind::of(part));
+    }
     let volumes = boxes(&kinds, &bodies);
     let [eyes, targets] = [points("camera_eye")?, points("camera_target")?];
     let fov_y = array("camera_fov_y")?;
@@ -57,7 +68,6 @@ pub(crate) fn scene() -> Result<Scene, Failure> {
         kinds,
         bodies,
         volumes,
-        proxy: Some(proxy),
         rule: LodRule::Error { pixels: 1.0 },
         legs,
         fov_y: fov_y[0],
@@ -80,6 +90,16 @@ fn one_mesh(vertices: &[Vec3], triangles: &[Vec3], colour: [f32; 3]) -> Mesh {
         }
     }
     mesh
+}
+
+/// Triangles as one mesh per cell of a grid, so that walls hide walls.
+fn in_cells(vertices: &[Vec3], triangles: impl Iterator<Item = Vec3>) -> Vec<Mesh> {
+    let mut cells: BTreeMap<[i64; 3], Vec<Vec3>> = BTreeMap::new();
+    for triangle in triangles {
+        let corner = vertices[triangle[0] as usize];
+        cells.entry(corner.map(|v| (v / CELL).floor() as i64)).or_default().push(triangle);
+    }
+    cells.values().map(|part| one_mesh(vertices, part, [0.62, 0.58, 0.5])).collect()
 }
 
 /// A colour of stone that differs between neighbours.

@@ -49,7 +49,6 @@ pub(crate) fn scene() -> Scene {
         kinds,
         bodies,
         volumes,
-        proxy: None,
         rule: LodRule::Error { pixels: 1.0 },
         legs: vec![
             leg(

@@ -122,9 +122,6 @@ pub(crate) struct Scene {
     /// In ascending order of their kinds.
     pub(crate) bodies: Vec<Body>,
     pub(crate) volumes: Volumes,
-    /// Triangles that hide, and are never seen: they lie inside of what is drawn.
-    /// A cull of one pass reads them in place of the bodies that are occluders.
-    pub(crate) proxy: Option<Mesh>,
     /// How a LOD is chosen.
     pub(crate) rule: LodRule,
     pub(crate) legs: Vec<Leg>,

@@ -44,7 +44,6 @@ pub(crate) fn scene() -> Scene {
         kinds,
         bodies,
         volumes,
-        proxy: None,
         rule: LodRule::Error { pixels: 1.0 },
         legs: legs(),
         fov_y: 0.85,
