@@ -102,7 +102,7 @@ def test_the_interpreter_runs_while_the_device_works(device: hizvk.Device) -> No
             # One call each between the two times; none of them comes back to Python on its way.
             start = time.perf_counter()
             instances = device._engine.instances(
-                "spheres", (bounds.centers, bounds.radii), False, "morton"
+                "spheres", (bounds.centers, bounds.radii), (False, "morton"), None, None
             )
             calls.append((start, time.perf_counter()))
             del instances

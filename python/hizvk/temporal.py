@@ -102,9 +102,9 @@ class Temporal(Allocated[CoreTwoPasses]):
     >>> camera = hizvk.Camera.look_at(
     ...     (0, 0, 9), (0, 0, 0), fov_y_deg=60, size=(90, 160), near=0.1
     ... )
-    >>> low, high = np.array([[-3, -3, 0], [-1, -1, -9]]), np.array([[3, 3, 1], [1, 1, -8]])
+    >>> low, high = np.array([[-3, -3, 0], [-2, -2, -9]]), np.array([[3, 3, 1], [2, 2, -8]])
     >>> crowd = device.instances(hizvk.Boxes(low * 1.0, high * 1.0))
-    >>> corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    >>> corners = 1.0 * np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     >>> sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     >>> triangles = [side[i] for side in sides for i in (0, 1, 2, 0, 2, 3)]
     >>> drawn = device.occluders(
