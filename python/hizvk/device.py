@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from .depth import DepthArray
     from .mesh import MeshLike
     from .options import CullKeywords, CullOptions, MeshLods, Outputs
-    from .views import AmongLike
+    from .views import _AmongLike
 
 __all__ = ["Device"]
 
@@ -562,7 +562,7 @@ class Device:
         options: CullOptions | None = None,
         outputs: Outputs | Collection[Output] | None = None,
         *,
-        among: AmongLike | None = None,
+        among: _AmongLike | None = None,
         wait: bool = True,
         **keywords: Unpack[CullKeywords],
     ) -> CullResult: ...
@@ -576,7 +576,7 @@ class Device:
         options: CullOptions | None = None,
         outputs: Outputs | Collection[Output] | None = None,
         *,
-        among: AmongLike | None = None,
+        among: _AmongLike | None = None,
         wait: bool = True,
         **keywords: Unpack[CullKeywords],
     ) -> ViewsResult: ...
@@ -589,7 +589,7 @@ class Device:
         options: CullOptions | None = None,
         outputs: Outputs | Collection[Output] | None = None,
         *,
-        among: AmongLike | None = None,
+        among: _AmongLike | None = None,
         wait: bool = True,
         **keywords: Unpack[CullKeywords],
     ) -> CullResult | ViewsResult:

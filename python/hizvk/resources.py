@@ -284,9 +284,11 @@ class Pyramid(_Seen, Allocated[CorePyramid]):
     def update(self, row: int, column: int, array: npt.NDArray[Any]) -> None: ...
 
     @overload
-    def update(self, row: DepthImage, column: tuple[int, int, int, int] | None) -> None: ...
+    def update(
+        self, row: DepthImage, column: tuple[int, int, int, int] | None, array: None = None
+    ) -> None: ...
 
-    def update(self, row: Any, column: Any = None, array: Any = None) -> None:
+    def update(self, row: Any, column: Any, array: Any = None) -> None:
         """Renews the levels where the depth image has changed, and nowhere else.
 
         Afterwards the levels are those of a pyramid that is built anew, bit for bit.

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from .hints import Question
     from .resources import Instances
 
-    AmongLike: TypeAlias = "npt.ArrayLike | CullResult | ViewsResult"
+    _AmongLike: TypeAlias = "npt.ArrayLike | CullResult | ViewsResult"
 
 __all__ = ["ViewsResult", "among_of", "pairs"]
 
@@ -180,7 +180,7 @@ def pairs(
 
 
 def among_of(
-    among: AmongLike | None, instances: Instances, device: object
+    among: _AmongLike | None, instances: Instances, device: object
 ) -> npt.NDArray[np.bool_] | CoreCulling | CoreViews | None:
     """What `among` names, as the compiled module takes it."""
     count = len(instances)

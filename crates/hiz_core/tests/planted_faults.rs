@@ -505,7 +505,7 @@ fn refined_verdicts() {
         ("half of the members", ("let end = min(first + GROUP,", "let end = min(first + 32u,")),
         ("the group's verdict for all", ("classify(place).verdict == OUTSIDE", "false")),
         ("nobody is occluded", ("if classify(place).verdict == OUTSIDE", "if may_be_outside")),
-        ("all are within the view", ("!has_absent && is_within(group)", "true")),
+        ("all are within the view", ("if is_within(group)", "if true")),
     ] {
         let contradictions = run(&[(what, by)]);
         eprintln!("{name}: {contradictions} contradictions");

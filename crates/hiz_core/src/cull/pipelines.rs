@@ -1,6 +1,7 @@
 //! The pipelines of the cull: which shader files make a module, and how one pipeline differs from
 //! another.
 
+#[cfg(feature = "testing")]
 use crate::cull::lod::LodRule;
 use crate::error::Result;
 use crate::gpu::depth_source::SourceKind;
@@ -163,6 +164,7 @@ impl BinKey {
 
 impl EmitKey {
     /// Nothing but the mask and the verdicts.
+    #[cfg(any(feature = "testing", feature = "yardstick"))]
     pub(crate) const NO_LIST: Self = Self::List { append: false, list: false, capped: false };
 
     /// The shader files that emit.
@@ -230,6 +232,7 @@ pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 7] {
 }
 
 /// The constants of `shaders/cull/lod.wgsl`.
+#[cfg(feature = "testing")]
 pub(crate) fn lod_constants(rule: &LodRule) -> [(&'static str, f64); 1] {
     [("LOD_RULE", f64::from(rule.code()))]
 }

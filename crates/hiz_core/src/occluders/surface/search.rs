@@ -241,8 +241,8 @@ impl<'a> Search<'a> {
         self.stamp += 1;
         let fault = self.walk.placed.fault;
         let half = f64::from(square.half + REACH);
-        let at_centre = is_planted!(fault, DepthAtCentre) || is_planted!(fault, PlaneWithoutReach);
-        let half = if at_centre { 0.0 } else { half };
+        let half = if is_planted!(fault, DepthAtCentre) { 0.0 } else { half };
+        let half = if is_planted!(fault, PlaneWithoutReach) { 0.0 } else { half };
         for (piece, windings) in pieces.iter().copied() {
             let facet = self.meeting.pieces[piece as usize].facet;
             if facet.nearest >= f64::from(bound) {
@@ -282,8 +282,9 @@ impl<'a> Search<'a> {
             } else {
                 let member = &mut members[place(usize::from(is_known[1])) as usize];
                 member.is_met = true;
-                member.own.is_open |=
-                    !is_planted!(fault, ContoursIgnored) && !is_planted!(fault, BordersIgnored);
+                let is_left_out =
+                    [is_planted!(fault, ContoursIgnored), is_planted!(fault, BordersIgnored)];
+                member.own.is_open |= !is_left_out.contains(&true);
             }
         }
     }
