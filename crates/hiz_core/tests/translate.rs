@@ -19,6 +19,7 @@ const VALUES: &[(&str, &[f64])] = &[
     ("CAPPED", FLAG),
     ("CHUNKS", ONE_TO_THREE),
     ("DESCENT", FLAG),
+    ("EARLY_SET", &[0.0, 1.0, 2.0]),
     ("FARTHEST", FLAG),
     ("FIRST", ONE_TO_THREE),
     ("FIT_VOLUME", FLAG),
