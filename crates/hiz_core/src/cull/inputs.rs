@@ -60,7 +60,8 @@ fn check_coverage(built: &Built, options: &CullOptions) -> Result<()> {
         return Err(Error::invalid(
             "coverage",
             format!(
-                "expected Coverage::Area for a pyramid of the farthest of {} samples per pixel,                  which lie beside the pixels' centres, got Coverage::Sample",
+                "expected Coverage::Area for a pyramid of the farthest of {} samples per \
+                 pixel, which lie beside the pixels' centres, got Coverage::Sample",
                 built.part.samples
             ),
         ));

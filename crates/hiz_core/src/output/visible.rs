@@ -186,8 +186,8 @@ impl Visible {
     /// They are the first ones, so this is the count for `multi_draw_indexed_indirect_count`.
     ///
     /// `None` where each bin has its record in a fixed place
-    /// ([`Placement::Reserved`](crate::Placement::Reserved)), for [`Emit::List`](crate::Emit::List), and if neither
-    /// draws nor indices were asked for.
+    /// ([`Placement::Reserved`](crate::Placement::Reserved)), for [`Emit::List`](crate::Emit::List),
+    /// and if neither draws nor indices were asked for.
     pub fn draw_count(&self) -> Option<&wgpu::Buffer> {
         let bins = self.bins.as_ref()?;
         (bins.arrangement != Arrangement::Reserved).then_some(&bins.draw_counts)
