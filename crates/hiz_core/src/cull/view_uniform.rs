@@ -226,7 +226,8 @@ mod tests {
                     let options =
                         CullOptions { depth_slack, depth_slack_abs, ..CullOptions::default() };
                     let tolerance = DepthTolerance::of(format).unwrap();
-                    let view = ViewUniform::new(&camera, BoundsKind::Box, 0, &options, tolerance).unwrap();
+                    let view =
+                        ViewUniform::new(&camera, BoundsKind::Box, 0, &options, tolerance).unwrap();
                     let (factor, offset) =
                         (f64::from(view.depth_factor), f64::from(view.depth_offset));
                     let (moved, offset) = if convention.is_reversed() {

@@ -104,7 +104,10 @@ mod tests {
         assert_eq!(kind(&[f64::NAN, f64::INFINITY, 1e300]), BoundsKind::Point);
         let positions = Floats::F32(&[0.1, 0.2, 0.3]);
         assert_eq!(Bounds::Points { positions }.kind(), BoundsKind::Point);
-        assert_eq!((BoundsKind::Point.record_bytes(), BoundsKind::WidePoint.record_bytes()), (16, 32));
+        assert_eq!(
+            (BoundsKind::Point.record_bytes(), BoundsKind::WidePoint.record_bytes()),
+            (16, 32)
+        );
     }
 
     /// Both halves together are the position, to within 2^-48 of it, and nothing moves a narrow one.
