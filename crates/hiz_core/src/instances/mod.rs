@@ -6,7 +6,7 @@
 //! 2. `order` and `morton` choose where each instance is stored: along a curve through space.
 //! 3. `groups` and `aabb` form groups of 64 neighbours with a box around each.
 //!    `tiers` forms boxes around 64 of these boxes each, and so on.
-//! 4. `volume_record`, `batch` and `records` write the records that the cull reads.
+//! 4. `volume_record`, `point`, `batch` and `records` write the records that the cull reads.
 //! 5. `update` replaces bounds later, and `watch` connects submitted culls with later updates.
 //! 6. `from_buffer` takes bounds that a shader of the caller's has written.
 //!
@@ -24,6 +24,7 @@ pub(crate) mod groups;
 pub(crate) mod morton;
 pub(crate) mod order;
 pub(crate) mod piece;
+pub(crate) mod point;
 pub(crate) mod records;
 pub(crate) mod slots;
 pub(crate) mod tiers;
@@ -193,7 +194,7 @@ impl Instances {
             let start = index * capacity;
             let range = start..total.min(start.saturating_add(capacity));
             let (piece, its_groups, uploads) =
-                packed(gpu, bounds, index, range, (options.order, &kinds), has_groups)?;
+                packed(gpu, (bounds, kind), index, range, (options.order, &kinds), has_groups)?;
             let forming = Forming::all(gpu, &piece)?;
             let record = |encoder: &mut wgpu::CommandEncoder| {
                 uploads.iter().for_each(|upload| upload.record(encoder));

@@ -104,6 +104,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/bounds_oriented_box", "RECORD_TEXELS", texels(BoundsKind::OrientedBox)),
         ("instances/bounds_oriented_box", "LAST_TEXEL", texels(BoundsKind::OrientedBox) - 1.0),
         ("instances/bounds_sphere", "RECORD_TEXELS", texels(BoundsKind::Sphere)),
+        ("instances/bounds_point", "RECORD_TEXELS", texels(BoundsKind::Point)),
+        ("instances/bounds_wide_point", "RECORD_TEXELS", texels(BoundsKind::WidePoint)),
         ("instances/corners", "BOX_TEXELS", texels(BoundsKind::Box)),
         ("instances/corners", "SIGN_BIT", bits(-0.0)),
         ("instances/corners", "MAGNITUDE_BITS", int(u32::MAX >> 1)),
@@ -115,6 +117,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/corners", "INVALID_HIGH", int(u32::MAX)),
         ("instances/from_buffer", "WORKGROUP", int(from_buffer::WORKGROUP)),
         ("instances/from_buffer_box", "RECORD_TEXELS", texels(BoundsKind::Box)),
+        ("instances/from_buffer_point", "RECORD_TEXELS", texels(BoundsKind::Point)),
         ("instances/from_buffer_sphere", "RECORD_TEXELS", texels(BoundsKind::Sphere)),
         ("instances/form_tier", "WORKGROUP", int(tiers::WORKGROUP)),
         ("instances/groups", "ACCEPTED", int(1 << 31)),
@@ -174,6 +177,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/early", &["WHOLE_RUN"]),
     ("cull/refine", &["REFINED"]),
     ("instances/groups", &["NEAREST", "UNOCCLUDED"]),
+    ("cull/unoccluded", &["HALF_PIXEL"]),
     ("gpu/clock_check", &["LEFT", "RIGHT", "LEFT_AGAIN"]),
     ("cull/refine_groups", &["LAST_TEXEL", "WITHIN"]),
     (
@@ -217,6 +221,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
         ],
     ),
     ("instances/corners", &["HALF"]),
+    ("instances/bounds_point_support", &["CANDIDATES"]),
     // One workgroup scans, however large it is.
     ("output/compact", &["LANES"]),
     ("output/emit_draws", &["LANES"]),
