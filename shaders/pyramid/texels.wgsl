@@ -39,6 +39,20 @@ fn footprint(level: u32, t: vec4<u32>) -> u32 {
     return bits;
 }
 
+override NEAREST: bool = false;
+
+fn nearest(a: u32, b: u32) -> u32 {
+    return select(min(a, b), max(a, b), REVERSED);
+}
+
+fn nearest_texel(level: u32, x: u32, y: u32) -> u32 {
+    return near_bits();
+}
+
+fn nearest_footprint(level: u32, t: vec4<u32>) -> u32 {
+    return near_bits();
+}
+
 const LEAST_NORMAL: f32 = 0x1p-126;
 
 // The depth that a certificate takes for a stored one: moved by the slack, away from subnormals.

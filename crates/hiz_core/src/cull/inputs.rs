@@ -135,6 +135,7 @@ impl PreparedView {
             footprint_log2: options.footprint.log2(),
             descent: options.descent > 0,
             fit_volume: options.fit == Fit::Volume,
+            nearest: false,
             among: inputs.among.is_some(),
         };
         Ok(Self { built, atlas, view, key })

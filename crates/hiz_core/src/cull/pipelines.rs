@@ -24,6 +24,8 @@ pub(crate) struct CullKey {
     pub(crate) footprint_log2: u32,
     pub(crate) descent: bool,
     pub(crate) fit_volume: bool,
+    /// Whether the pyramid has both ends, so that an instance may surely show.
+    pub(crate) nearest: bool,
     /// Whether only some instances are asked for.
     pub(crate) among: bool,
 }
@@ -41,6 +43,7 @@ impl CullKey {
             footprint_log2: 1,
             descent: false,
             fit_volume: false,
+            nearest: false,
             among: false,
         }
     }
@@ -219,7 +222,7 @@ pub(crate) const BINNED_BINDINGS: &[(u32, Binding)] = &[
     (4, Binding::SampledQuads),
 ];
 
-pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 7] {
+pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 8] {
     [
         ("REVERSED", flag(key.reversed)),
         ("CHUNKS", key.chunks as f64),
@@ -227,6 +230,7 @@ pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 7] {
         ("FOOTPRINT_LOG2", f64::from(key.footprint_log2)),
         ("DESCENT", flag(key.descent)),
         ("FIT_VOLUME", flag(key.fit_volume)),
+        ("NEAREST", flag(key.nearest)),
         ("AMONG", flag(key.among)),
     ]
 }
@@ -395,7 +399,8 @@ pub(crate) fn decision_module(
 }
 
 /// The files of the decision by certificates; a yardstick replaces them.
-pub(super) const CERTIFIED: &[File] = &[wgsl!("cull/supporting_planes"), wgsl!("cull/classify")];
+pub(super) const CERTIFIED: &[File] =
+    &[wgsl!("cull/supporting_planes"), wgsl!("cull/unoccluded"), wgsl!("cull/classify")];
 
 /// The module of an entry point that does not write down which texels were read
 /// (`shaders/cull/unexplained.wgsl`).

@@ -93,6 +93,7 @@ pub fn choose_lods(
         footprint_log2: 1,
         descent: false,
         fit_volume: false,
+        nearest: false,
         among: false,
     };
     let pipeline = gpu.compute_pipeline(&Compute {

@@ -189,6 +189,13 @@ pub(in crate::testing) mod tests {
                 "the depth that slack has moved"
             );
             assert_eq!(calls(&module, "classify", "bar"), 2, "-A and 1 - A");
+            assert_eq!(calls(&module, "surely_in_front", "bar"), 1, "d - A");
+            assert_eq!(
+                calls(&module, "revealing_depth", "bar"),
+                1,
+                "the depth that slack has moved towards the eye"
+            );
+            assert_eq!(calls(&module, "surely_inside", "bar"), 2, "-A and 1 - A");
             if kind != BoundsKind::Sphere {
                 assert_eq!(calls(&module, "extent_of", "bar"), 2, "low and high");
                 assert_eq!(calls(&module, "surely_after", "bar"), 1, "the edge");

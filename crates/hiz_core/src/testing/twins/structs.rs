@@ -86,6 +86,7 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         }),
         twin!("Counters", CounterRecord {
             "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid,
+            "unoccluded" = unoccluded,
         }),
         twin!("DrawIndexedIndirect", DrawIndexedIndirect {
             "index_count" = index_count, "instance_count" = instance_count,
@@ -104,6 +105,7 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "farthest_bits" = farthest_bits, "pixels" = pixels, "depths" = depths, "last" = last,
             "texels_read" = texels_read, "of_footprint" = of_footprint,
             "farthest_before" = farthest_before, "any_before" = any_before,
+            "nearest_bits" = nearest_bits, "padding" = padding,
         }),
         twin!("Frame", FrameUniform {
             "early" = early, "least_pixels" = least_pixels, "padding" = padding,
