@@ -26,6 +26,10 @@ pub(crate) struct CullKey {
     pub(crate) fit_volume: bool,
     /// Whether only some instances are asked for.
     pub(crate) among: bool,
+    /// Whether the pyramid has nearest depths, too.
+    pub(crate) nearest: bool,
+    /// Whether the pyramid leaves out background.
+    pub(crate) receivers: bool,
 }
 
 impl CullKey {
@@ -42,6 +46,8 @@ impl CullKey {
             descent: false,
             fit_volume: false,
             among: false,
+            nearest: false,
+            receivers: false,
         }
     }
 }
@@ -219,7 +225,7 @@ pub(crate) const BINNED_BINDINGS: &[(u32, Binding)] = &[
     (4, Binding::SampledQuads),
 ];
 
-pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 7] {
+pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 9] {
     [
         ("REVERSED", flag(key.reversed)),
         ("CHUNKS", key.chunks as f64),
@@ -228,6 +234,8 @@ pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 7] {
         ("DESCENT", flag(key.descent)),
         ("FIT_VOLUME", flag(key.fit_volume)),
         ("AMONG", flag(key.among)),
+        ("NEAREST", flag(key.nearest)),
+        ("RECEIVERS", flag(key.receivers)),
     ]
 }
 
@@ -263,7 +271,9 @@ impl DepthStore {
     /// The shader files that read it.
     pub(crate) fn files(self) -> Vec<File> {
         match self {
-            Self::Apart(source) => [source.files(), &[wgsl!("pyramid/texels_apart")]].concat(),
+            Self::Apart(source) => {
+                [source.files(), &[wgsl!("gpu/ends_one"), wgsl!("pyramid/texels_apart")]].concat()
+            }
             Self::Atlas => vec![wgsl!("pyramid/texels_atlas")],
             Self::Nowhere => vec![wgsl!("pyramid/texels_nowhere")],
         }

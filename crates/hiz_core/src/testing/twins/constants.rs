@@ -415,6 +415,8 @@ fn a_cull_sets_every_override() {
             descent: false,
             fit_volume: false,
             among: false,
+            nearest: false,
+            receivers: false,
         };
         let alone = EMITS.map(|emit| (emit, FramePass::Alone));
         let of_two = [FramePass::Early(Candidates::History), FramePass::Late]
