@@ -17,6 +17,7 @@ use crate::input::camera::Camera;
 use crate::instances::Instances;
 use crate::pyramid::Pyramid;
 use crate::pyramid::built::Built;
+use crate::pyramid::ends::check_culled;
 
 /// What a cull reads.
 #[derive(Debug, Clone, Copy)]
@@ -116,6 +117,7 @@ impl PreparedView {
             source_origin: packed(built.part.origin),
             ..ViewUniform::new(camera, built.reduction, options, built.part.tolerance)?
         };
+        check_culled(pyramid.depths())?;
         check_coverage(&built, options)?;
         Pyramid::check_source(gpu, &built)?;
         let atlas = match encoder.filter(|_| pyramid.wants_atlas(gpu, &built, instances.len())) {
@@ -135,8 +137,9 @@ impl PreparedView {
             footprint_log2: options.footprint.log2(),
             descent: options.descent > 0,
             fit_volume: options.fit == Fit::Volume,
-            nearest: false,
             among: inputs.among.is_some(),
+            nearest: pyramid.has_nearest(),
+            receivers: false,
         };
         Ok(Self { built, atlas, view, key })
     }

@@ -24,10 +24,12 @@ pub(crate) struct CullKey {
     pub(crate) footprint_log2: u32,
     pub(crate) descent: bool,
     pub(crate) fit_volume: bool,
-    /// Whether the pyramid has both ends, so that an instance may surely show.
-    pub(crate) nearest: bool,
     /// Whether only some instances are asked for.
     pub(crate) among: bool,
+    /// Whether the pyramid has nearest depths, too, so that an instance may surely show.
+    pub(crate) nearest: bool,
+    /// Whether the pyramid leaves out background.
+    pub(crate) receivers: bool,
 }
 
 impl CullKey {
@@ -43,8 +45,9 @@ impl CullKey {
             footprint_log2: 1,
             descent: false,
             fit_volume: false,
-            nearest: false,
             among: false,
+            nearest: false,
+            receivers: false,
         }
     }
 }
@@ -222,7 +225,7 @@ pub(crate) const BINNED_BINDINGS: &[(u32, Binding)] = &[
     (4, Binding::SampledQuads),
 ];
 
-pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 8] {
+pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 9] {
     [
         ("REVERSED", flag(key.reversed)),
         ("CHUNKS", key.chunks as f64),
@@ -230,8 +233,9 @@ pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 8] {
         ("FOOTPRINT_LOG2", f64::from(key.footprint_log2)),
         ("DESCENT", flag(key.descent)),
         ("FIT_VOLUME", flag(key.fit_volume)),
-        ("NEAREST", flag(key.nearest)),
         ("AMONG", flag(key.among)),
+        ("NEAREST", flag(key.nearest)),
+        ("RECEIVERS", flag(key.receivers)),
     ]
 }
 
@@ -267,7 +271,9 @@ impl DepthStore {
     /// The shader files that read it.
     pub(crate) fn files(self) -> Vec<File> {
         match self {
-            Self::Apart(source) => [source.files(), &[wgsl!("pyramid/texels_apart")]].concat(),
+            Self::Apart(source) => {
+                [source.files(), &[wgsl!("gpu/ends_one"), wgsl!("pyramid/texels_apart")]].concat()
+            }
             Self::Atlas => vec![wgsl!("pyramid/texels_atlas")],
             Self::Nowhere => vec![wgsl!("pyramid/texels_nowhere")],
         }

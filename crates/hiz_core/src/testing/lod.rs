@@ -93,8 +93,9 @@ pub fn choose_lods(
         footprint_log2: 1,
         descent: false,
         fit_volume: false,
-        nearest: false,
         among: false,
+        nearest: false,
+        receivers: false,
     };
     let pipeline = gpu.compute_pipeline(&Compute {
         label: "hiz.choose_lods.pipeline",

@@ -417,8 +417,9 @@ fn a_cull_sets_every_override() {
             footprint_log2: 1,
             descent: false,
             fit_volume: false,
-            nearest: false,
             among: false,
+            nearest: false,
+            receivers: false,
         };
         let alone = EMITS.map(|emit| (emit, FramePass::Alone));
         let of_two = [FramePass::Early(Candidates::History), FramePass::Late]

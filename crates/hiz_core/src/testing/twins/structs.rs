@@ -37,6 +37,9 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     // Vertex inputs, which are found by location; see `occluders/device_meshes.rs`.
     "Copy",
     "Vertex",
+    "Ends",
+    "Ends2",
+    "Ends4",
     "Extent",
     "Flat",
     "MaskPlace",
@@ -124,7 +127,7 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         }),
         twin!("Pyramid", PyramidUniform {
             "levels" = levels, "origins" = origins, "chunk_shift" = chunk_shift,
-            "first_stored" = first_stored, "last_stored" = last_stored, "padding" = padding,
+            "first_stored" = first_stored, "last_stored" = last_stored, "nearest" = nearest,
         }),
         twin!("ResolvedImage", ResolvedUniform { "origin" = origin, "size" = size }),
         twin!("Band", BandUniform {
@@ -157,8 +160,8 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "descent_budget" = descent_budget, "depth_offset" = depth_offset,
             "coordinate_limit" = coordinate_limit, "lod_end" = lod_end,
             "lod_needs" = lod_needs,
-            "source_origin" = source_origin, "padding_0" = padding_0, "near_factor" = near_factor,
-            "near_offset" = near_offset,
+            "source_origin" = source_origin, "near_factor" = near_factor,
+            "near_offset" = near_offset, "padding" = padding,
         }),
         twin!("YardstickLevel", yardstick::PlainLevel {
             "offset" = offset, "stride" = stride, "width" = width, "height" = height,
