@@ -211,7 +211,8 @@ impl Culling {
     ///   In sample coverage also: between all pixel centres.
     ///   In a cull of some instances also: not asked for.
     /// - **Occluded**: every other instance that is hidden.
-    /// - **Visible** and **invalid**: every instance that is kept.
+    /// - **Visible**, **unoccluded** and **invalid**: every instance that is kept.
+    ///   Unoccluded are those that surely show as a whole, if the pyramid has both ends.
     ///
     /// An absent instance ([`ABSENT`](crate::ABSENT)) has the verdict outside.
     ///
@@ -327,7 +328,8 @@ impl Culling {
                 tested_instances -= u64::from(piece.groups()) * GROUP as u64 - count;
             }
         }
-        let demand = u64::from(record.visible) + u64::from(record.invalid);
+        let kept = [record.visible, record.unoccluded, record.invalid];
+        let demand = kept.map(u64::from).iter().sum();
         // To the device, what is absent is outside.
         let absent = self.instances.num_absent();
         Ok(Counts {
@@ -336,6 +338,7 @@ impl Culling {
             outside: u64::from(record.outside) - absent,
             occluded: record.occluded.into(),
             visible: record.visible.into(),
+            unoccluded: record.unoccluded.into(),
             invalid: record.invalid.into(),
             demand,
             written: demand.min(u64::from(self.visible.capacity())),
