@@ -37,7 +37,8 @@ pub(crate) struct ViewUniform {
     pub(crate) lod_needs: [f32; MAX_LODS],
     pub(crate) source_origin: u32,
     pub(crate) padding_0: u32,
-    pub(crate) padding_1: [u32; 2],
+    pub(crate) near_factor: f32,
+    pub(crate) near_offset: f32,
 }
 
 const _: () = assert!(size_of::<ViewUniform>() == 224);
@@ -115,6 +116,13 @@ impl ViewUniform {
         let depth_offset = if slack_abs > 0.0 { round_up(slack_abs + EPS) } else { 0.0 };
         let depth_offset =
             if camera.convention().is_reversed() { -depth_offset } else { depth_offset };
+        // The same numbers, towards near.
+        let near_factor = if camera.convention().is_reversed() {
+            round_up(1.0 + slack)
+        } else {
+            -round_up(slack - 1.0)
+        };
+        let near_offset = -depth_offset;
         let rows =
             ViewRows::new(camera, kappa).map_err(|error| match ViewRows::new(camera, 0.0) {
                 Ok(_) if kappa > 0.0 => Error::invalid(
@@ -152,7 +160,8 @@ impl ViewUniform {
             lod_needs,
             source_origin: 0,
             padding_0: 0,
-            padding_1: [0; 2],
+            near_factor,
+            near_offset,
         })
     }
 }

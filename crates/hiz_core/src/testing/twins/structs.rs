@@ -155,7 +155,8 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "descent_budget" = descent_budget, "depth_offset" = depth_offset,
             "coordinate_limit" = coordinate_limit, "lod_end" = lod_end,
             "lod_needs" = lod_needs,
-            "source_origin" = source_origin, "padding_0" = padding_0, "padding_1" = padding_1,
+            "source_origin" = source_origin, "padding_0" = padding_0, "near_factor" = near_factor,
+            "near_offset" = near_offset,
         }),
         twin!("YardstickLevel", yardstick::PlainLevel {
             "offset" = offset, "stride" = stride, "width" = width, "height" = height,
