@@ -464,7 +464,10 @@ OPTIONS: dict[str, list[Bad]] = {
     "footprint": FOOTPRINT,
     "descent": DESCENT,
     "fit": FIT,
-    "hierarchy": FLAG_OR_NONE,
+    "hierarchy": [
+        ("auto", TypeError, "expected True, False, None or a number of tiers, got str"),
+        (4, ValueError, "expected an integer in 0..3, got int 4"),
+    ],
     "statistics": FLAG,
     "lod": [
         (1.0, TypeError, "expected a LodByError, LodByDistance, LodBySize or None, got float 1.0"),

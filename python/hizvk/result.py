@@ -242,6 +242,8 @@ class CullResult(Awaited[CoreCulling]):
             readback_ms=readback_ms,
             gpu_ms=sum_of(stages),
             stages=stages,
+            tested_boxes=tuple(counts.tested_boxes),
+            accepted_instances=counts.accepted_instances,
         )
 
     def hints(self) -> tuple[str, ...]:

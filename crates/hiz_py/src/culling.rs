@@ -171,7 +171,9 @@ pub(crate) struct Counts {
     demand: u64,
     written: u64,
     tested_groups: u64,
+    tested_boxes: [u64; 3],
     tested_instances: u64,
+    accepted_instances: u64,
     levels: [u64; 16],
     texels_read: u64,
 }
@@ -189,7 +191,9 @@ impl Counts {
             demand: counts.demand,
             written: counts.written,
             tested_groups: counts.tested_groups,
+            tested_boxes: counts.tested_boxes,
             tested_instances: counts.tested_instances,
+            accepted_instances: counts.accepted_instances,
             levels: counts.levels,
             texels_read: counts.texels_read,
         }

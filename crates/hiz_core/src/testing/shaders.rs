@@ -4,7 +4,7 @@ use crate::cull::among::among_order_module;
 use crate::cull::count::count_module;
 use crate::cull::explain::explain_module;
 use crate::cull::pipelines::{
-    BinKey, Candidates, DepthStore, EmitKey, FramePass, cull_groups_module, cull_members_module,
+    BinKey, Candidates, DepthStore, EmitKey, FramePass, cull_boxes_module, cull_members_module,
     flat_module,
 };
 use crate::cull::refine::{refine_groups_module, refine_module};
@@ -14,6 +14,7 @@ use crate::gpu::depth_source::SourceKind;
 use crate::gpu::shader::{FILES, Source};
 use crate::input::bounds::BoundsKind;
 use crate::instances::from_buffer::{FROM_BUFFER_KINDS, from_buffer_module};
+use crate::instances::tiers::form_tier_module;
 use crate::instances::update::update_module;
 use crate::occluders::device_raster::occluders_module;
 use crate::output::compact::{compact_module, copy_module};
@@ -77,6 +78,7 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("join_views".to_owned(), join_module()),
         ("clock_check".to_owned(), clock_check_module()),
         ("update".to_owned(), update_module()),
+        ("form_tier".to_owned(), form_tier_module()),
         ("occluders".to_owned(), occluders_module()),
         ("resolve Depth".to_owned(), resolve_module(SourceKind::Depth)),
         ("resolve Float".to_owned(), resolve_module(SourceKind::Float)),
@@ -102,7 +104,10 @@ pub(super) fn all() -> Vec<(String, Source)> {
     let passes = [FramePass::Alone, FramePass::Late];
     let passes = stores.clone().flat_map(|store| passes.map(|pass| (store, pass)));
     for (store, pass) in passes.chain([early]) {
-        all.push((format!("cull_groups {store:?} {pass:?}"), cull_groups_module(store, pass)));
+        for (name, is_top) in [("cull_groups", true), ("cull_children", false)] {
+            let module = cull_boxes_module(store, pass, is_top);
+            all.push((format!("{name} {store:?} {pass:?}"), module));
+        }
         let emits: &[_] = if pass == FramePass::Alone { &EMITS } else { &EMITS_OF_TWO };
         for (kind, (way, emit)) in
             KINDS.into_iter().flat_map(|k| emits.iter().map(move |e| (k, *e)))

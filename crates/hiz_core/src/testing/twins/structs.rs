@@ -11,6 +11,7 @@ use crate::input::bounds::{Bounds, Floats};
 use crate::instances::SEQUENCE_BYTES;
 use crate::instances::from_buffer::FromBufferUniform;
 use crate::instances::piece::PieceUniform;
+use crate::instances::tiers::{FormUniform, TierUniform};
 use crate::instances::update::UpdateUniform;
 use crate::output::bins::{BinRecord, EmitUniform, TotalRecord};
 use crate::output::counters::{CounterRecord, StatisticsRecord};
@@ -142,7 +143,17 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         }),
         twin!("Survivors", SurvivorsRecord {
             "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
-            "workgroups_z" = workgroups + 8, "count" = count,
+            "workgroups_z" = workgroups + 8, "count" = count, "tested" = tested,
+            "accepted" = accepted, "padding" = padding,
+        }),
+        twin!("Parents", SurvivorsRecord {
+            "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
+            "workgroups_z" = workgroups + 8, "count" = count, "tested" = tested,
+            "accepted" = accepted, "padding" = padding,
+        }),
+        twin!("Tier", TierUniform { "count" = count, "below" = below, "padding" = padding }),
+        twin!("FormTier", FormUniform {
+            "count" = count, "below" = below, "runtime_zero" = runtime_zero, "padding" = padding,
         }),
         twin!("Template", TemplateRecord {
             "count" = count, "first" = first, "base_vertex" = base_vertex, "padding" = padding,
