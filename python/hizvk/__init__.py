@@ -7,7 +7,8 @@ How data flows, and which object holds it::
     depth array (kind= says what it holds)     └─> DepthImage
                       │                                │
                       └──────── Device.pyramid ────────┴─> Pyramid ─┐
-    Spheres, Boxes, OrientedBoxes ─ Device.instances ─> Instances ──┤ Device.cull
+    Spheres, Boxes, OrientedBoxes,                                  │
+    Points ───────────────── Device.instances ─> Instances ─────────┤ Device.cull
     Camera ─────────────────────────────────────────────────────────┤
     CullOptions, Outputs ───────────────────────────────────────────┘
                                                                     │
@@ -62,7 +63,7 @@ from typing import TYPE_CHECKING, Any
 from . import reference
 from ._core import __version__
 from .adapter import Adapter, adapters
-from .bounds import Boxes, OrientedBoxes, Spheres
+from .bounds import Boxes, OrientedBoxes, Points, Spheres
 from .camera import Camera
 from .check import BoundsCheck, Comparison, ProxyCheck, check_bounds, check_proxy, compare
 from .device import Device
@@ -134,6 +135,7 @@ __all__ = [
     "OutOfMemoryError",
     "Outputs",
     "PassResult",
+    "Points",
     "ProxyCheck",
     "Pyramid",
     "Recommendation",

@@ -254,6 +254,7 @@ class CullOptions:
     guard_px : float, optional
         Pixels by which bounds grow in the image: a multiple of 1/256, at most 16.
         None: 0 for ``coverage="area"``, 1/64 for ``coverage="sample"``.
+        Of `Points`, None is 1/2 and 1: the pixels of the four centres around a point are read.
     depth_slack : float
         Relative error of the depth image, 0 to 0.5.
         The default, 2^-23, is one ulp: it covers depth that was rounded to float32.

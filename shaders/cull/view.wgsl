@@ -55,7 +55,9 @@ struct View {
     // higher the row.
     source_origin: u32,
     padding_0: u32,
-    padding_1: vec2<u32>,
+    // The same for a nearest depth: towards the eye.
+    near_factor: f32,
+    near_offset: f32,
 }
 
 // Bits of a column in `source_origin`.

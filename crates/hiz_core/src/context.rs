@@ -305,9 +305,9 @@ impl HizContext {
     /// They stay in the order in which their first bounds were sorted.
     ///
     /// # Errors
-    /// - [`Error::Invalid`] for [`BoundsKind::OrientedBox`], for an offset or a stride that is no
-    ///   multiple of 4, for a stride shorter than a record, and for a buffer that is too short or
-    ///   lacks the usage `STORAGE`.
+    /// - [`Error::Invalid`] for [`BoundsKind::OrientedBox`] and [`BoundsKind::WidePoint`], for an
+    ///   offset or a stride that is no multiple of 4, for a stride shorter than a record, and for a
+    ///   buffer that is too short or lacks the usage `STORAGE`.
     /// - [`Error::Mismatch`] for a buffer of another device and for a destroyed one.
     /// - [`Error::Limit`] for a stride with which the records exceed one binding.
     /// - [`Error::OutOfMemory`].

@@ -76,6 +76,7 @@ pub(crate) fn bounds<'a>(kind: &str, arrays: &'a [FloatArray<'_>]) -> PyResult<B
             Ok(Bounds::Spheres { centers: centers.floats()?, radii: radii.floats()? })
         }
         ("boxes", [min, max]) => Ok(Bounds::Boxes { min: min.floats()?, max: max.floats()? }),
+        ("points", [positions]) => Ok(Bounds::Points { positions: positions.floats()? }),
         ("oriented_boxes", [centers, half_sizes, rotations]) => Ok(Bounds::OrientedBoxes {
             centers: centers.floats()?,
             half_sizes: half_sizes.floats()?,

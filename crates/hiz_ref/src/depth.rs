@@ -80,14 +80,42 @@ pub fn depth_bounds(
     image: &[f64],
     meaning: DepthMeaning,
 ) -> Result<DepthBounds, Error> {
+    let far = if view.reversed { 0.0 } else { 1.0 };
+    let ends =
+        around_pixels(view, image, meaning)?.into_iter().map(|ends| ends.unwrap_or([far; 2]));
+    let (nearer, farther) = ends.map(|[nearer, farther]| (nearer, farther)).unzip();
+    Ok(DepthBounds { nearer, farther })
+}
+
+/// The nearest NDC depth that each pixel of `image` may have, for [`is_unoccluded`].
+///
+/// It is that of [`depth_bounds`], except that "no data" is *near*: anything may be there.
+///
+/// # Errors
+///
+/// Those of [`depth_bounds`].
+///
+/// [`is_unoccluded`]: crate::is_unoccluded
+pub fn nearest_depths(
+    view: &View,
+    image: &[f64],
+    meaning: DepthMeaning,
+) -> Result<Vec<f32>, Error> {
+    let near = if view.reversed { 1.0 } else { 0.0 };
+    let ends = around_pixels(view, image, meaning)?;
+    Ok(ends.into_iter().map(|ends| ends.map_or(near, |[nearer, _]| nearer)).collect())
+}
+
+/// The two float32 around each pixel's depth, the nearer one first; `None` for "no data".
+fn around_pixels(
+    view: &View,
+    image: &[f64],
+    meaning: DepthMeaning,
+) -> Result<Vec<Option<[f32; 2]>>, Error> {
     view.check()?;
     view.check_length(image.len())?;
     let DepthMeaning { kind, scale, invalid, origin_is_eye } = meaning;
-    let far = if view.reversed { 0.0 } else { 1.0 };
-    let mut bounds = DepthBounds {
-        nearer: Vec::with_capacity(image.len()),
-        farther: Vec::with_capacity(image.len()),
-    };
+    let mut ends = Vec::with_capacity(image.len());
     let metric = matches!(kind, DepthKind::Z | DepthKind::Distance);
     if !metric && (kind == DepthKind::ReversedNdc) != view.reversed {
         return Err(Error::DepthMeaning("kind: expected NDC depth in the view's own convention"));
@@ -118,13 +146,12 @@ pub fn depth_bounds(
                 }
                 Some(_) => None,
             };
-            let [low, high] = around.unwrap_or([far; 2]);
-            let (nearer, farther) = if view.reversed { (high, low) } else { (low, high) };
-            bounds.nearer.push(nearer);
-            bounds.farther.push(farther);
+            ends.push(
+                around.map(|[low, high]| if view.reversed { [high, low] } else { [low, high] }),
+            );
         }
     }
-    Ok(bounds)
+    Ok(ends)
 }
 
 /// How depth along the rays of a view becomes NDC depth, in float64 and exactly.

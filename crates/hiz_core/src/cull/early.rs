@@ -86,7 +86,8 @@ pub(crate) fn record_early(
     check_visible(gpu, "temporal", instances, &temporal.early)?;
     let set = Chosen::new(temporal.set_or_largest(set, instances), instances)?;
     check_order(options)?;
-    let view = ViewUniform::new(camera, NO_REDUCTION, options, DepthTolerance::NONE)?;
+    let view =
+        ViewUniform::new(camera, instances.kind, NO_REDUCTION, options, DepthTolerance::NONE)?;
     let number = temporal.next_number();
     gpu.recorded(|| {
         let target = target(gpu, instances, options, temporal, &set)?;

@@ -226,7 +226,8 @@ pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 7] {
         ("SAMPLE_COVERAGE", flag(key.sample_coverage)),
         ("FOOTPRINT_LOG2", f64::from(key.footprint_log2)),
         ("DESCENT", flag(key.descent)),
-        ("FIT_VOLUME", flag(key.fit_volume)),
+        // A point's rectangle is all there is of it.
+        ("FIT_VOLUME", flag(key.fit_volume && !key.kind.is_point())),
         ("AMONG", flag(key.among)),
     ]
 }
@@ -368,6 +369,12 @@ pub(crate) fn decision_module(
         BoundsKind::Box => &[wgsl!("instances/bounds_box_support"), wgsl!("instances/bounds_box")],
         BoundsKind::OrientedBox => {
             &[wgsl!("instances/bounds_box_support"), wgsl!("instances/bounds_oriented_box")]
+        }
+        BoundsKind::Point => {
+            &[wgsl!("instances/bounds_point_support"), wgsl!("instances/bounds_point")]
+        }
+        BoundsKind::WidePoint => {
+            &[wgsl!("instances/bounds_point_support"), wgsl!("instances/bounds_wide_point")]
         }
     };
     Source::of(&[

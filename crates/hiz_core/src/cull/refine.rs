@@ -106,7 +106,7 @@ impl Refinement {
             return Ok(None);
         }
         // The number of the reduction does not matter, because no depth is read.
-        let view = ViewUniform::new(camera, 1, options, DepthTolerance::NONE)?;
+        let view = ViewUniform::new(camera, instances.kind, 1, options, DepthTolerance::NONE)?;
         Ok(Some(Self {
             view,
             options: options.clone(),

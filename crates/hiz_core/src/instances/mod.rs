@@ -5,7 +5,7 @@
 //! 1. `piece` cuts the instances of one call into pieces that fit a binding and a dispatch.
 //! 2. `order` and `morton` choose where each instance is stored: along a curve through space.
 //! 3. `groups` and `aabb` form groups of 64 neighbours with a box around each.
-//! 4. `volume_record`, `batch` and `records` write the records that the cull reads.
+//! 4. `volume_record`, `point`, `batch` and `records` write the records that the cull reads.
 //! 5. `update` replaces bounds later, and `watch` connects submitted culls with later updates.
 //! 6. `from_buffer` takes bounds that a shader of the caller's has written.
 //!
@@ -22,6 +22,7 @@ pub(crate) mod groups;
 pub(crate) mod morton;
 pub(crate) mod order;
 pub(crate) mod piece;
+pub(crate) mod point;
 pub(crate) mod records;
 pub(crate) mod slots;
 pub(crate) mod update;
@@ -189,7 +190,7 @@ impl Instances {
             let start = index * capacity;
             let range = start..total.min(start.saturating_add(capacity));
             let (piece, its_groups, uploads) =
-                packed(gpu, bounds, index, range, (options.order, &kinds), has_groups)?;
+                packed(gpu, (bounds, kind), index, range, (options.order, &kinds), has_groups)?;
             copy(
                 &|encoder| uploads.iter().for_each(|upload| upload.record(encoder)),
                 index + 1 < num_pieces,

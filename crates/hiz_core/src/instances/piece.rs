@@ -114,14 +114,14 @@ pub(crate) const RECORD_BINDINGS: &[(u32, Binding)] =
 /// Makes a piece, its groups, and the uploads that bring both to the device.
 pub(super) fn packed(
     gpu: &Gpu,
-    bounds: &Bounds<'_>,
+    (bounds, kind): (&Bounds<'_>, BoundsKind),
     index: u32,
     range: Range<u32>,
     (order, kinds): (StoredOrder, &Kinds<'_>),
     has_groups: bool,
 ) -> Result<(Piece, Groups, Vec<Upload>)> {
     let (first, count) = (range.start as usize, range.end - range.start);
-    let record_bytes = bounds.kind().record_bytes();
+    let record_bytes = kind.record_bytes();
     let indices = first..range.end as usize;
     let order = PieceOrder::new(bounds, indices.clone(), order)?;
     let absent = kinds.absent(&indices, &order)?;
@@ -133,9 +133,9 @@ pub(super) fn packed(
     let (records, upload, groups) =
         Records::new(gpu, RECORDS_LABEL, count, record_bytes, |records| {
             if has_groups {
-                Groups::packed(bounds, count as usize, absent, source, records)
+                Groups::packed((bounds, kind), count as usize, absent, source, records)
             } else {
-                Groups::without_groups(bounds, count as usize, source, records)
+                Groups::without_groups((bounds, kind), count as usize, source, records)
             }
         })?;
     let num_groups = groups.len() as u32;
@@ -273,7 +273,7 @@ mod tests {
     #[test]
     fn pieces_fit_the_binding_and_the_dispatch() {
         let limits = wgpu::Limits::default();
-        for bytes in [32, 48, 64] {
+        for bytes in [16, 32, 48, 64] {
             let piece = u64::from(piece_capacity(bytes, &limits));
             assert!(piece * bytes <= 256 << 20, "records wait in one buffer");
             assert!(piece / 1024 <= 8192, "and lie in the rows of one texture");

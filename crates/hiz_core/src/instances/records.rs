@@ -147,6 +147,8 @@ impl Upload {
 }
 
 const _: () =
+    assert!((ROW_MULTIPLE * 16).is_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT), "points");
+const _: () =
     assert!((ROW_MULTIPLE * 32).is_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT), "spheres");
 const _: () =
     assert!((ROW_MULTIPLE * 48).is_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT), "boxes");

@@ -20,7 +20,7 @@ use crate::gpu::layouts::Binding;
 use crate::gpu::pipelines::Compute;
 use crate::gpu::shader::{Source, wgsl};
 use crate::gpu::stage_times::stage_pass;
-use crate::input::bounds::Bounds;
+use crate::input::bounds::{Bounds, BoundsKind};
 use crate::instances::batch::GROUP;
 use crate::instances::batch::Origin;
 use crate::instances::piece::{CULL_WORKGROUP, write_boxes};
@@ -99,10 +99,19 @@ pub(crate) fn record_update(
              `record_update_from` takes from a buffer: write the buffer instead",
         ));
     }
-    if bounds.kind() != instances.kind {
+    let kind = bounds.kind();
+    if kind == BoundsKind::WidePoint && instances.kind == BoundsKind::Point {
         return Err(Error::mismatch(
             "bounds",
-            format!("expected the instances' kind, {:?}, got {:?}", instances.kind, bounds.kind()),
+            "expected positions that float32 holds, as all were when these points were uploaded, \
+             got positions that need two float32: round them to float32, or upload all of them \
+             again",
+        ));
+    }
+    if !instances.kind.holds(kind) {
+        return Err(Error::mismatch(
+            "bounds",
+            format!("expected the instances' kind, {:?}, got {kind:?}", instances.kind),
         ));
     }
     let room = instances.len().checked_sub(first).ok_or_else(|| {
@@ -173,7 +182,7 @@ pub(crate) fn record_update(
                     "hiz.update.records",
                     places.len() as u64 * record_bytes,
                     staging,
-                    |records| groups.replace(bounds, places, source, records),
+                    |records| groups.replace((bounds, instances.kind), places, source, records),
                 )?;
                 dispatch(
                     &Replacement { places, fresh, target: &piece.records },

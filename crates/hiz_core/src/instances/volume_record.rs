@@ -10,20 +10,27 @@
 
 use crate::host::rounding::{round_up, split, sum_up, sum_up_difference};
 use crate::input::bounds::{Bounds, BoundsKind};
+use crate::instances::point::{PointRecord, WidePointRecord};
 
 impl BoundsKind {
-    /// Bytes of one record on the device: 32 for a sphere, 48 for a box, 64 for an oriented box.
+    /// Bytes of one record on the device.
+    ///
+    /// They are 32 for a sphere, 48 for a box, 64 for an oriented box.
+    /// A point takes 16, and 32 if its position needs two float32.
     pub fn record_bytes(self) -> u64 {
         (match self {
             Self::Sphere => size_of::<SphereRecord>(),
             Self::Box => size_of::<BoxRecord>(),
             Self::OrientedBox => size_of::<OrientedBoxRecord>(),
+            Self::Point => size_of::<PointRecord>(),
+            Self::WidePoint => size_of::<WidePointRecord>(),
         }) as u64
     }
 }
 
 impl Bounds<'_> {
-    /// Writes the record of instance `i`, `record_bytes()` bytes, with the caller's `index`.
+    /// Writes the record of instance `i` with the caller's `index`.
+    /// The length of `out` is that of a record, and says how wide a point's is.
     /// Returns false for invalid bounds.
     pub(crate) fn write_record(&self, i: usize, index: u32, out: &mut [u8]) -> bool {
         match *self {
@@ -38,6 +45,12 @@ impl Bounds<'_> {
                 index,
                 OrientedBoxRecord::new(centers.array(i), half_sizes.array(i), rotations.array(i)),
             ),
+            Self::Points { positions } if out.len() == size_of::<PointRecord>() => {
+                write(out, index, PointRecord::new(positions.array(i)))
+            }
+            Self::Points { positions } => {
+                write(out, index, WidePointRecord::new(positions.array(i)))
+            }
         }
     }
 }
@@ -51,6 +64,8 @@ pub(super) fn write_absent(kind: BoundsKind, index: u32, out: &mut [u8]) {
         BoundsKind::Sphere => write::<SphereRecord>(out, index),
         BoundsKind::Box => write::<BoxRecord>(out, index),
         BoundsKind::OrientedBox => write::<OrientedBoxRecord>(out, index),
+        BoundsKind::Point => write::<PointRecord>(out, index),
+        BoundsKind::WidePoint => write::<WidePointRecord>(out, index),
     }
 }
 
@@ -77,7 +92,7 @@ pub(crate) const BEYOND_LIMITS: f32 = 4.0 * LARGEST;
 /// The shader asks for a centre below half of it (`shaders/cull/classify.wgsl`, `ABSENT_BELOW`).
 pub(crate) const ABSENT_CENTER: f32 = -BEYOND_LIMITS;
 
-trait Record: bytemuck::Pod {
+pub(super) trait Record: bytemuck::Pod {
     /// The record that is stored for an absent instance.
     const ABSENT: Self;
 
@@ -91,7 +106,7 @@ trait Record: bytemuck::Pod {
     fn numbered(self, index: u32) -> Self;
 }
 
-fn all_small<const N: usize>(values: [f32; N]) -> bool {
+pub(super) fn all_small<const N: usize>(values: [f32; N]) -> bool {
     values.iter().all(|v| v.abs() < LARGEST)
 }
 
@@ -141,14 +156,14 @@ const _: () = assert!(
 
 /// A position as two float32 halves.
 /// `rest` is what they cannot hold, axis by axis; it is 0 for float32 input.
-struct Position {
-    hi: [f32; 3],
-    lo: [f32; 3],
+pub(super) struct Position {
+    pub(super) hi: [f32; 3],
+    pub(super) lo: [f32; 3],
     rest: [f64; 3],
 }
 
 impl Position {
-    fn new(p: [f64; 3]) -> Self {
+    pub(super) fn new(p: [f64; 3]) -> Self {
         let halves = p.map(split);
         // Exact: `p - hi` is, because both are float64 within a factor of two or hi is 0.
         // Subtracting `lo` is exact, too.

@@ -27,8 +27,13 @@ use crate::testing::lod::choose_lods_module;
 use crate::yardstick::{uncertified_module, yardstick_modules};
 
 /// All kinds of bounds.
-pub(super) const KINDS: [BoundsKind; 3] =
-    [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
+pub(super) const KINDS: [BoundsKind; 5] = [
+    BoundsKind::Sphere,
+    BoundsKind::Box,
+    BoundsKind::OrientedBox,
+    BoundsKind::Point,
+    BoundsKind::WidePoint,
+];
 
 /// Every way to emit the kept instances, each with a shader of its own.
 pub(super) const EMITS: [(&str, EmitKey); 5] = [
@@ -181,7 +186,9 @@ pub(in crate::testing) mod tests {
                 };
                 assert!(function.expressions.iter().any(|(_, e)| is_xor(e)), "{bar}");
             }
-            assert_eq!(calls(&module, "load_volume", "bar3"), 2, "{kind:?}: d_hi and d_lo");
+            // Of a narrow point nothing is added to `d_hi` but a number of the view.
+            let bars = if kind == BoundsKind::Point { 1 } else { 2 };
+            assert_eq!(calls(&module, "load_volume", "bar3"), bars, "{kind:?}: d_hi and d_lo");
             assert_eq!(calls(&module, "surely_behind", "bar"), 1, "d - A");
             assert_eq!(
                 calls(&module, "occluding_depth", "bar"),
@@ -189,7 +196,7 @@ pub(in crate::testing) mod tests {
                 "the depth that slack has moved"
             );
             assert_eq!(calls(&module, "classify", "bar"), 2, "-A and 1 - A");
-            if kind != BoundsKind::Sphere {
+            if matches!(kind, BoundsKind::Box | BoundsKind::OrientedBox) {
                 assert_eq!(calls(&module, "extent_of", "bar"), 2, "low and high");
                 assert_eq!(calls(&module, "surely_after", "bar"), 1, "the edge");
                 assert_eq!(calls(&module, "surely_before", "bar"), 1, "the edge");

@@ -15,13 +15,14 @@ use crate::instances::piece::Piece;
 use crate::instances::records::TEXEL_BYTES;
 
 /// The view's uniform (`shaders/cull/view.wgsl`, `View`) as 32-bit words.
-/// The number of the reduction is 0.
+/// The number of the reduction is 0, and the default guard is not that of points.
 ///
 /// # Errors
 /// As `HizContext::record_cull`, for options and cameras that it refuses.
 pub fn view(camera: &Camera, options: &CullOptions) -> Result<Vec<u32>> {
-    Ok(bytemuck::cast_slice(&[ViewUniform::new(camera, 0, options, DepthTolerance::NONE)?])
-        .to_vec())
+    let kind = BoundsKind::Box;
+    let view = ViewUniform::new(camera, kind, 0, options, DepthTolerance::NONE)?;
+    Ok(bytemuck::cast_slice(&[view]).to_vec())
 }
 
 /// The records of all instances (`shaders/instances/bounds_*.wgsl`) as 32-bit words.

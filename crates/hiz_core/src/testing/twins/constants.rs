@@ -103,6 +103,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/bounds_oriented_box", "RECORD_TEXELS", texels(BoundsKind::OrientedBox)),
         ("instances/bounds_oriented_box", "LAST_TEXEL", texels(BoundsKind::OrientedBox) - 1.0),
         ("instances/bounds_sphere", "RECORD_TEXELS", texels(BoundsKind::Sphere)),
+        ("instances/bounds_point", "RECORD_TEXELS", texels(BoundsKind::Point)),
+        ("instances/bounds_wide_point", "RECORD_TEXELS", texels(BoundsKind::WidePoint)),
         ("instances/from_buffer", "BOX_TEXELS", texels(BoundsKind::Box)),
         ("instances/from_buffer", "SIGN_BIT", bits(-0.0)),
         ("instances/from_buffer", "MAGNITUDE_BITS", int(u32::MAX >> 1)),
@@ -114,6 +116,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/from_buffer", "INVALID_HIGH", int(u32::MAX)),
         ("instances/from_buffer", "WORKGROUP", int(from_buffer::WORKGROUP)),
         ("instances/from_buffer_box", "RECORD_TEXELS", texels(BoundsKind::Box)),
+        ("instances/from_buffer_point", "RECORD_TEXELS", texels(BoundsKind::Point)),
         ("instances/from_buffer_sphere", "RECORD_TEXELS", texels(BoundsKind::Sphere)),
         ("instances/groups", "GROUP", GROUP as f64),
         ("instances/groups", "RUN", int(GROUPS_OF_RUN)),
@@ -168,6 +171,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     // All bits of a run.
     ("cull/early", &["WHOLE_RUN"]),
     ("cull/refine", &["REFINED"]),
+    ("cull/unoccluded", &["HALF_PIXEL"]),
     ("gpu/clock_check", &["LEFT", "RIGHT", "LEFT_AGAIN"]),
     ("cull/refine_groups", &["LAST_TEXEL", "WITHIN"]),
     (
@@ -210,6 +214,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
             "TURN",
         ],
     ),
+    ("instances/bounds_point_support", &["CANDIDATES"]),
     ("instances/from_buffer", &["HALF"]),
     // One workgroup scans, however large it is.
     ("output/compact", &["LANES"]),

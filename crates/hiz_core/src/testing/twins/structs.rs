@@ -155,7 +155,8 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "descent_budget" = descent_budget, "depth_offset" = depth_offset,
             "coordinate_limit" = coordinate_limit, "lod_end" = lod_end,
             "lod_needs" = lod_needs,
-            "source_origin" = source_origin, "padding_0" = padding_0, "padding_1" = padding_1,
+            "source_origin" = source_origin, "padding_0" = padding_0, "near_factor" = near_factor,
+            "near_offset" = near_offset,
         }),
         twin!("YardstickLevel", yardstick::PlainLevel {
             "offset" = offset, "stride" = stride, "width" = width, "height" = height,
@@ -226,6 +227,12 @@ fn records_lie_as_the_shaders_read_them() {
         half_sizes: Floats::F64(&[5.0, 6.0, 7.0]),
         rotations: Floats::F64(&[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
     });
+    let positions = centers;
+    assert_eq!(record(&Bounds::Points { positions }), [one, two, three, 77]);
+    let third = 1.0 / 3.0;
+    let (hi, lo) = (third as f32, (third - f64::from(third as f32)) as f32);
+    let wide = record(&Bounds::Points { positions: Floats::F64(&[third, 2.0, 3.0]) });
+    assert_eq!(wide, [hi.to_bits(), two, three, 77, lo.to_bits(), 0, 0, 0]);
     let texels = [[one, two, three, half_z], [0; 4], [0, half_x, 0, 0], [0, 0, half_y, 77]];
     assert_eq!(oriented, texels.concat());
 }
