@@ -15,7 +15,8 @@ __all__ = ["CullStats"]
 class CullStats:
     """The numbers of one cull.
 
-    ``tested = outside + occluded + kept``, and `invalid` of the kept ones have invalid bounds.
+    ``tested = outside + occluded + kept``.
+    Of the kept ones, `invalid` have invalid bounds, and `unoccluded` surely show as a whole.
     These are the counts of `CullResult.verdicts`.
     The times are wall-clock times, except `gpu_ms`.
     """
@@ -61,6 +62,9 @@ class CullStats:
     Also None where the device has no timestamps that can be trusted."""
     stages: tuple[StageTime, ...]
     """The stages of the cull; empty outside of a block of `Device.timed`."""
+    unoccluded: int = 0
+    """Kept and surely visible as a whole: `Verdict.UNOCCLUDED`.
+    0 unless the pyramid has both ends."""
     absent: int = 0
     """Instances that are absent (`hizvk.ABSENT`); no other number counts them."""
     tested_boxes: tuple[int, ...] = (0, 0, 0)
@@ -76,8 +80,9 @@ class CullStats:
 
     def __str__(self) -> str:
         culled = self.outside + self.occluded
+        sure = f"{self.unoccluded:,} unoccluded, " if self.unoccluded else ""
         return (
-            f"{self.tested:,} tested: {self.kept:,} kept ({self.invalid:,} invalid), "
+            f"{self.tested:,} tested: {self.kept:,} kept ({sure}{self.invalid:,} invalid), "
             f"{culled:,} culled ({self.outside:,} outside, {self.occluded:,} occluded); "
             f"{self.wall_ms:.2f} ms until the device was done"
         )

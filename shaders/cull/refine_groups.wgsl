@@ -10,7 +10,7 @@ const WORKGROUP: u32 = 64u;
 const LAST_TEXEL: u32 = 2u;
 
 // A flag beside the verdict of such a group; REFINED of `refine.wgsl` is another.
-const WITHIN: u32 = 8u;
+const WITHIN: u32 = 16u;
 
 // The tier of the groups' boxes.
 @group(1) @binding(0) var<uniform> groups: Tier;

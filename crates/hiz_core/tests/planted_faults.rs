@@ -425,7 +425,7 @@ fn atlas_texels_beside_the_right_ones() {
     for (what, by) in [
         ("textureLoad(atlas, at.zy)[right]", "textureLoad(atlas, at.zy)[left]"),
         ("textureLoad(atlas, at.xw)[left]", "textureLoad(atlas, at.xy)[left]"),
-        ("let at = pyramid.origins[level].xyxy", "let at = pyramid.origins[0].xyxy"),
+        ("let at = origin.xyxy", "let at = pyramid.origins[0].xyxy"),
     ] {
         assert_red("atlas", &[(what, by)]);
     }

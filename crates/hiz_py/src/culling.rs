@@ -166,6 +166,7 @@ pub(crate) struct Counts {
     outside: u64,
     occluded: u64,
     visible: u64,
+    unoccluded: u64,
     invalid: u64,
     demand: u64,
     written: u64,
@@ -185,6 +186,7 @@ impl Counts {
             outside: counts.outside,
             occluded: counts.occluded,
             visible: counts.visible,
+            unoccluded: counts.unoccluded,
             invalid: counts.invalid,
             demand: counts.demand,
             written: counts.written,
@@ -255,6 +257,16 @@ impl Explanation {
     #[getter]
     fn farthest_z(&self) -> Option<f64> {
         self.0.farthest_z
+    }
+
+    #[getter]
+    fn in_front_of(&self) -> Option<f32> {
+        self.0.in_front_of
+    }
+
+    #[getter]
+    fn in_front_of_z(&self) -> Option<f64> {
+        self.0.in_front_of_z
     }
 
     #[getter]

@@ -29,6 +29,8 @@ pub(crate) struct ExplanationRecord {
     pub(crate) of_footprint: u32,
     pub(crate) farthest_before: u32,
     pub(crate) any_before: u32,
+    pub(crate) nearest_bits: u32,
+    pub(crate) padding: [u32; 3],
 }
 
 /// The step at which a test stopped; twin: `shaders/cull/outcome.wgsl`.
@@ -51,11 +53,13 @@ pub(crate) enum Stage {
     Descent = 6,
     /// No stored level fits the footprint.
     Level = 7,
+    /// At the certificate that the texels cover the projection of what is before all of them.
+    Front = 8,
 }
 
 impl Stage {
     /// All stages, in the order of their codes.
-    pub(crate) const ALL: [Self; 8] = [
+    pub(crate) const ALL: [Self; 9] = [
         Self::Validity,
         Self::Frustum,
         Self::EyePlane,
@@ -64,6 +68,7 @@ impl Stage {
         Self::Block,
         Self::Descent,
         Self::Level,
+        Self::Front,
     ];
 }
 

@@ -26,6 +26,10 @@ pub(crate) struct CullKey {
     pub(crate) fit_volume: bool,
     /// Whether only some instances are asked for.
     pub(crate) among: bool,
+    /// Whether the pyramid has nearest depths, too, so that an instance may surely show.
+    pub(crate) nearest: bool,
+    /// Whether the pyramid leaves out background.
+    pub(crate) receivers: bool,
 }
 
 impl CullKey {
@@ -42,6 +46,8 @@ impl CullKey {
             descent: false,
             fit_volume: false,
             among: false,
+            nearest: false,
+            receivers: false,
         }
     }
 }
@@ -221,7 +227,7 @@ pub(crate) const BINNED_BINDINGS: &[(u32, Binding)] = &[
     (4, Binding::SampledQuads),
 ];
 
-pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 7] {
+pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 9] {
     [
         ("REVERSED", flag(key.reversed)),
         ("CHUNKS", key.chunks as f64),
@@ -231,6 +237,8 @@ pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 7] {
         // A point's rectangle is all there is of it.
         ("FIT_VOLUME", flag(key.fit_volume && !key.kind.is_point())),
         ("AMONG", flag(key.among)),
+        ("NEAREST", flag(key.nearest)),
+        ("RECEIVERS", flag(key.receivers)),
     ]
 }
 
@@ -267,7 +275,9 @@ impl DepthStore {
     /// The shader files that read it.
     pub(crate) fn files(self) -> Vec<File> {
         match self {
-            Self::Apart(source) => [source.files(), &[wgsl!("pyramid/texels_apart")]].concat(),
+            Self::Apart(source) => {
+                [source.files(), &[wgsl!("gpu/ends_one"), wgsl!("pyramid/texels_apart")]].concat()
+            }
             Self::Atlas => vec![wgsl!("pyramid/texels_atlas")],
             Self::Nowhere => vec![wgsl!("pyramid/texels_nowhere")],
         }
@@ -405,7 +415,8 @@ pub(crate) fn decision_module(
 }
 
 /// The files of the decision by certificates; a yardstick replaces them.
-pub(super) const CERTIFIED: &[File] = &[wgsl!("cull/supporting_planes"), wgsl!("cull/classify")];
+pub(super) const CERTIFIED: &[File] =
+    &[wgsl!("cull/supporting_planes"), wgsl!("cull/unoccluded"), wgsl!("cull/classify")];
 
 /// The module of an entry point that does not write down which texels were read
 /// (`shaders/cull/unexplained.wgsl`).

@@ -13,11 +13,14 @@ pub struct Counts {
     pub outside: u64,
     /// Hidden by the depth image, and not outside.
     pub occluded: u64,
-    /// Possibly visible, kept.
+    /// Possibly visible, kept; without those that are unoccluded.
     pub visible: u64,
+    /// Surely visible as a whole, kept; 0 unless the pyramid has both ends
+    /// ([`Depths::Both`](crate::Depths::Both)).
+    pub unoccluded: u64,
     /// With invalid bounds, kept.
     pub invalid: u64,
-    /// Visible and invalid: as many indices as the lists would hold without a capacity.
+    /// Visible, unoccluded and invalid: as many indices as the lists would hold without a capacity.
     pub demand: u64,
     /// As many indices as the lists hold.
     pub written: u64,

@@ -212,7 +212,8 @@ impl Culling {
     ///   In sample coverage also: between all pixel centres.
     ///   In a cull of some instances also: not asked for.
     /// - **Occluded**: every other instance that is hidden.
-    /// - **Visible** and **invalid**: every instance that is kept.
+    /// - **Visible**, **unoccluded** and **invalid**: every instance that is kept.
+    ///   Unoccluded are those that surely show as a whole, if the pyramid has both ends.
     ///
     /// An absent instance ([`ABSENT`](crate::ABSENT)) has the verdict outside.
     ///
@@ -330,7 +331,8 @@ impl Culling {
         let statistics: StatisticsRecord = rest
             .next()
             .map_or_else(StatisticsRecord::default, |bytes| bytemuck::pod_read_unaligned(bytes));
-        let demand = u64::from(record.visible) + u64::from(record.invalid);
+        let kept = [record.visible, record.unoccluded, record.invalid];
+        let demand = kept.map(u64::from).iter().sum();
         // To the device, what is absent is outside.
         let absent = self.instances.num_absent();
         Ok(Counts {
@@ -339,6 +341,7 @@ impl Culling {
             outside: u64::from(record.outside) - absent,
             occluded: record.occluded.into(),
             visible: record.visible.into(),
+            unoccluded: record.unoccluded.into(),
             invalid: record.invalid.into(),
             demand,
             written: demand.min(u64::from(self.visible.capacity())),

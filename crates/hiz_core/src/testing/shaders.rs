@@ -21,7 +21,7 @@ use crate::output::compact::{compact_module, copy_module};
 use crate::output::cut::{cut_module, emit_cut_module};
 use crate::output::emit_passes;
 use crate::output::views::join_module;
-use crate::pyramid::reduce::{blocks_module, coarse_module};
+use crate::pyramid::reduce::{EndFiles, blocks_module, coarse_module};
 use crate::pyramid::resolve::resolve_module;
 use crate::testing::lod::choose_lods_module;
 #[cfg(feature = "yardstick")]
@@ -84,8 +84,10 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("resolve Float".to_owned(), resolve_module(SourceKind::Float)),
     ];
     for source in SOURCES {
-        all.push((format!("reduce {source:?}"), blocks_module(source)));
-        all.push((format!("reduce_coarse {source:?}"), coarse_module(source)));
+        for ends in [EndFiles::One, EndFiles::Both] {
+            all.push((format!("reduce {source:?} {ends:?}"), blocks_module(source, ends)));
+            all.push((format!("reduce_coarse {source:?} {ends:?}"), coarse_module(source, ends)));
+        }
         // Yardsticks read whole images alone.
         #[cfg(feature = "yardstick")]
         all.extend(
@@ -201,6 +203,13 @@ pub(in crate::testing) mod tests {
                 "the depth that slack has moved"
             );
             assert_eq!(calls(&module, "classify", "bar"), 2, "-A and 1 - A");
+            assert_eq!(calls(&module, "surely_in_front", "bar"), 1, "d - A");
+            assert_eq!(
+                calls(&module, "revealing_depth", "bar"),
+                1,
+                "the depth that slack has moved towards the eye"
+            );
+            assert_eq!(calls(&module, "surely_inside", "bar"), 2, "-A and 1 - A");
             if matches!(kind, BoundsKind::Box | BoundsKind::OrientedBox) {
                 assert_eq!(calls(&module, "extent_of", "bar"), 2, "low and high");
                 assert_eq!(calls(&module, "surely_after", "bar"), 1, "the edge");
@@ -222,16 +231,13 @@ pub(in crate::testing) mod tests {
             let module = parse(
                 &cull_module(DepthStore::Apart(source), BoundsKind::Box, EmitKey::NO_LIST).text(),
             );
-            assert_eq!(calls(&module, "source_bits", "sanitized"), 1, "{source:?}");
+            assert_eq!(calls(&module, "texel", "sanitized"), 1, "{source:?}");
+            assert_eq!(calls(&module, "nearest_texel", "sanitized_near"), 1, "{source:?}");
         }
-        assert_eq!(
-            calls(
-                &parse(&cull_module(DepthStore::Atlas, BoundsKind::Box, EmitKey::NO_LIST).text()),
-                "texel",
-                "sanitized"
-            ),
-            1
-        );
+        let atlas = cull_module(DepthStore::Atlas, BoundsKind::Box, EmitKey::NO_LIST);
+        let atlas = parse(&atlas.text());
+        assert_eq!(calls(&atlas, "texel", "sanitized"), 1);
+        assert_eq!(calls(&atlas, "nearest_texel", "sanitized_near"), 1);
     }
 
     /// A guess is mostly right, so that no verdict shows whether it was proved.

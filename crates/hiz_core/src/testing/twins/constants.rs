@@ -85,6 +85,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/outcome", "AT_BLOCK", stage(Stage::Block)),
         ("cull/outcome", "AT_DESCENT", stage(Stage::Descent)),
         ("cull/outcome", "AT_LEVEL", stage(Stage::Level)),
+        ("cull/outcome", "AT_FRONT", stage(Stage::Front)),
         ("cull/refine", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/refine_groups", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/supporting_planes", "LARGEST_BITS", bits(LARGEST)),
@@ -148,7 +149,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("output/verdict", "OCCLUDED", verdict(Verdict::Occluded)),
         ("output/verdict", "VISIBLE", verdict(Verdict::Visible)),
         ("output/verdict", "INVALID", verdict(Verdict::Invalid)),
-        ("output/verdict", "VERDICT_COUNT", verdict(Verdict::Invalid) + 1.0),
+        ("output/verdict", "UNOCCLUDED", verdict(Verdict::Unoccluded)),
+        ("output/verdict", "VERDICT_COUNT", verdict(Verdict::Unoccluded) + 1.0),
         ("output/verdict", "VERDICT_MASK", int(VERDICT_MASK)),
         ("pyramid/levels", "MANTISSA_BITS", int(f32::MANTISSA_DIGITS - 1)),
         ("pyramid/levels", "EXPONENT_BIAS", f64::from(f32::MAX_EXP - 1)),
@@ -428,6 +430,8 @@ fn a_cull_sets_every_override() {
             descent: false,
             fit_volume: false,
             among: false,
+            nearest: false,
+            receivers: false,
         };
         let alone = EMITS.map(|emit| (emit, FramePass::Alone));
         let of_two = [FramePass::Early(Candidates::History), FramePass::Late]
