@@ -269,13 +269,20 @@ fn check_last(engine: &Arc<Engine>) -> usize {
     world.wrong(&world.cull(&World::options(2)))
 }
 
+/// Groups of which a half is beside the view, and all is before the wall.
+fn check_aside(engine: &Arc<Engine>) -> usize {
+    let fates = [Front, Aside].repeat(2100);
+    let world = World::new(Arc::clone(engine), fates, None, (StoredOrder::Given, true));
+    world.wrong(&world.cull(&World::options(2)))
+}
+
 const SIZES: [usize; 10] = [1, 63, 64, 65, 4032, 4033, 4095, 4096, 4097, 8300];
 
 #[test]
 fn every_number_of_tiers_gives_the_same_answers() {
     assert_eq!(check_sizes(&engine(), &SIZES, None), 0);
     assert_eq!(check_sizes(&engine(), &[20_000], Some(8192)), 0);
-    assert_eq!(check_single(&engine()) + check_last(&engine()), 0);
+    assert_eq!(check_single(&engine()) + check_last(&engine()) + check_aside(&engine()), 0);
 }
 
 #[test]
@@ -334,8 +341,8 @@ fn faults_of_tiers_are_seen() {
     ] {
         let engine = faulty(&[(what, by)]);
         let sizes = [20_000, 8300];
-        let wrong =
-            check_single(&engine) + check_last(&engine) + check_sizes(&engine, &sizes, None);
+        let ends = check_single(&engine) + check_last(&engine) + check_aside(&engine);
+        let wrong = ends + check_sizes(&engine, &sizes, None);
         eprintln!("{what} -> {by}: {wrong}");
         assert!(wrong > 0, "{what} -> {by}");
     }
@@ -570,16 +577,19 @@ fn the_oracle_agrees() {
         .map(|i| ndc([4.0, 4.0, 6.0, 2.5][(i % 64 / 16 + i / 1024) % 4], CONVENTION))
         .collect();
     let numbers: Vec<[f32; 4]> = (0..count)
-        .map(|_| {
-            let z = random.range(1.2, 9.0);
-            let mut aside = || (random.range(-1.1, 1.1) * z) as f32;
-            let [x, y] = [aside(), aside()];
-            [x, y, z as f32, random.range(0.0, 0.05) as f32]
+        .map(|i| {
+            // Clusters of a group each.
+            let mut cluster = Random(i / 64);
+            let z = cluster.range(1.2, 9.0);
+            let [x, y] = [0, 1].map(|_| cluster.range(-1.1, 1.1) * z);
+            let mut near = |v: f64| (v + random.range(-0.1, 0.1)) as f32;
+            [near(x), near(y), near(z), random.range(0.0, 0.05) as f32]
         })
         .collect();
     let (centers, radii) = spheres(&numbers);
     let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
-    let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
+    let given = InstanceOptions { order: StoredOrder::Given, ..InstanceOptions::default() };
+    let instances = engine.instances(&bounds, &given).unwrap();
     let camera = camera_along_z(64, 64, CONVENTION);
     let pyramid = levels(&engine, &image, &camera, true);
     let row = |k: usize| std::array::from_fn(|i| f64::from(u8::from(i == k)));
