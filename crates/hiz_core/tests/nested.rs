@@ -163,7 +163,7 @@ impl Spent {
         for fates in fates.chunks(piece) {
             // A tier begins where one of its boxes is full.
             let groups = fates.len().div_ceil(GROUP);
-            let there = 1 + usize::from(groups >= 64) + usize::from(groups >= 64 * 63 + 1);
+            let there = 1 + usize::from(groups >= 64) + usize::from(groups > 64 * 63);
             match tiers.min(there) {
                 0 => spent.instances += fates.len() as u64,
                 tiers => spent.down(fates, tiers - 1),
