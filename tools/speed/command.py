@@ -29,6 +29,7 @@ from . import (
     report,
     scale,
     temporal,
+    tiers,
     transfers,
     views,
 )
@@ -51,6 +52,7 @@ PARTS: Final[dict[str, Callable[[Run], None]]] = {
     "reduction": reduction.measure,
     "depth-in": depth_in.measure,
     "cull": culling.measure,
+    "tiers": tiers.measure,
     "emit": emit.measure,
     "calls": calls.measure,
     "temporal": temporal.measure,

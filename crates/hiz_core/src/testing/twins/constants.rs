@@ -178,7 +178,6 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     // All bits of a run.
     ("cull/early", &["WHOLE_RUN"]),
     ("cull/refine", &["REFINED"]),
-    ("instances/groups", &["NEAREST", "UNOCCLUDED"]),
     ("cull/unoccluded", &["HALF_PIXEL"]),
     ("gpu/clock_check", &["LEFT", "RIGHT", "LEFT_AGAIN"]),
     ("cull/refine_groups", &["LAST_TEXEL", "WITHIN"]),
