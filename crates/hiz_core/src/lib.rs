@@ -210,6 +210,8 @@ pub use pyramid::atlas::AtlasUse;
 pub use pyramid::ends::{DepthEnd, Depths};
 pub use pyramid::level_texels::LevelTexels;
 pub use pyramid::levels::{MAX_LEVELS, StoredLevels};
+pub use pyramid::mips::{MIP_CULL, MIP_LOOKUP};
+pub use pyramid::mips::{MipDepths, MipLayout, MipLookup, MipOptions, MipTexture};
 pub use pyramid::resolve::{DepthResolve, ResolveOptions, ResolvedDepths};
 pub use pyramid::source::DepthSource;
 pub use pyramid::{Pyramid, PyramidOptions};

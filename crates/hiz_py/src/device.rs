@@ -19,7 +19,7 @@ use crate::camera::Camera;
 use crate::culling::{Counts, Culling, StageTime, ViewsCulling, stage_time};
 use crate::held::{Held, OnDevice, detached};
 use crate::meshes::{LodNumbers, MeshTable, mesh_table};
-use crate::options::{Request, cull_options};
+use crate::options::{Request, cull_options, mip_options};
 
 /// The depth of a single cull.
 #[derive(FromPyObject)]
@@ -614,6 +614,25 @@ impl Pyramid {
     /// The first and the last stored level above 0; none for an image of one pixel.
     fn stored_levels(&self, py: Python<'_>) -> PyResult<Option<(u32, u32)>> {
         Ok(self.0.look(py)?.1.stored_levels().map(|levels| (levels.first, levels.last)))
+    }
+
+    /// `((height, width), texels)` of each level of a mip texture.
+    fn mips<'py>(
+        &self,
+        py: Python<'py>,
+        depths: &str,
+        lookup: &str,
+    ) -> PyResult<Vec<LevelArray<'py>>> {
+        let options = mip_options(depths, lookup)?;
+        let levels = self.0.run(py, |(engine, pyramid)| {
+            let mips = engine.mips(pyramid, &options)?;
+            let level = |k| {
+                let size = mips.level_size(k).map_or((0, 0), |size| (size.height, size.width));
+                Ok((size, engine.read_mip(&mips, k)?))
+            };
+            (0..mips.num_levels()).map(level).collect::<Result<Vec<_>, _>>()
+        })?;
+        Ok(levels.into_iter().map(|(size, t)| (size, PyArray1::from_vec(py, t))).collect())
     }
 
     /// `((height, width), texels)` of a level.
