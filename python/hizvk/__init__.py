@@ -90,11 +90,14 @@ from .occluders import (
 )
 from .oneline import visible
 from .options import CullOptions, DrawTemplate, MeshLods, Outputs
+from .points import PointColours, colour_points, depth_from_points
+from .projection import Projected, gather
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import ABSENT, DRAW_DTYPE, NO_LOD, CullResult
 from .stats import CullStats
 from .temporal import PassResult, Temporal
 from .timing import StageTime, StageTimes
+from .tolerance import Tolerance
 from .views import ViewsResult
 
 if TYPE_CHECKING:
@@ -135,7 +138,9 @@ __all__ = [
     "OutOfMemoryError",
     "Outputs",
     "PassResult",
+    "PointColours",
     "Points",
+    "Projected",
     "ProxyCheck",
     "Pyramid",
     "Recommendation",
@@ -144,13 +149,17 @@ __all__ = [
     "StageTime",
     "StageTimes",
     "Temporal",
+    "Tolerance",
     "Verdict",
     "ViewsResult",
     "__version__",
     "adapters",
     "check_bounds",
     "check_proxy",
+    "colour_points",
     "compare",
+    "depth_from_points",
+    "gather",
     "inner_boxes",
     "inner_prisms",
     "recommend",

@@ -38,6 +38,10 @@ Output: TypeAlias = Literal["mask"] | Literal["verdicts"] | Literal["indices"] |
 Emit: TypeAlias = Literal["bins"] | Literal["instances"]
 #: Where bins lie in the list; see `Outputs`.
 Placement: TypeAlias = Literal["packed"] | Literal["reserved"]
+#: What an image shows at a place: its pixel, or a mean of the four around; see `gather`.
+Sampling: TypeAlias = Literal["nearest"] | Literal["bilinear"]
+#: How the views of a point are weighted; see `colour_points`.
+ColourWeight: TypeAlias = Literal["equal"] | Literal["near"]
 #: Which depth of the bounds a pixel of the oracle is compared with.
 OwnDepth: TypeAlias = Literal["nearest"] | Literal["pixel"]
 
