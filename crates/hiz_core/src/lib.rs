@@ -208,6 +208,7 @@ pub use output::verdict::Verdict;
 pub use output::views::{MAX_VIEWS, ViewsOutputs, VisibleViews};
 pub use output::visible::Visible;
 pub use pyramid::atlas::AtlasUse;
+pub use pyramid::ends::{DepthEnd, Depths};
 pub use pyramid::level_texels::LevelTexels;
 pub use pyramid::levels::{MAX_LEVELS, StoredLevels};
 pub use pyramid::resolve::{DepthResolve, ResolveOptions, ResolvedDepths};

@@ -906,7 +906,7 @@ fn least() -> wgpu::Limits {
         max_sampled_textures_per_shader_stage: 4,
         max_samplers_per_shader_stage: 1,
         max_storage_buffers_per_shader_stage: 8,
-        max_storage_textures_per_shader_stage: 3,
+        max_storage_textures_per_shader_stage: 4,
         max_uniform_buffers_per_shader_stage: 4,
         max_uniform_buffer_binding_size: 528,
         max_storage_buffer_binding_size: 8192,

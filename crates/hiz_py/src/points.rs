@@ -61,10 +61,8 @@ pub(crate) fn add_colours(
         weights: weights.as_slice_mut()?,
         counts: counts.as_slice_mut()?,
     };
-    py.detach(|| {
-        hiz_core::add_colours(positions, visible, camera, (image, bilinear, weight), sums)
-    })
-    .map_err(|error| raised(py, error))
+    py.detach(|| hiz_core::add_colours(positions, visible, camera, (image, bilinear, weight), sums))
+        .map_err(|error| raised(py, error))
 }
 
 /// The NDC depth of discs around points, one number per pixel.

@@ -37,7 +37,7 @@ pub(crate) fn refine_module(kind: BoundsKind) -> Source {
 
 /// The shader that finds the groups that lie within the view.
 pub(crate) fn refine_groups_module() -> Source {
-    let entry = [wgsl!("instances/piece"), wgsl!("cull/refine_groups")];
+    let entry = [wgsl!("instances/tier"), wgsl!("cull/refine_groups")];
     unexplained(DepthStore::Nowhere, BoundsKind::Box, &entry)
 }
 

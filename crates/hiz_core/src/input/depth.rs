@@ -396,6 +396,26 @@ pub(crate) fn sanitized(bits: u32, convention: DepthConvention) -> f32 {
     }
 }
 
+/// The same for the nearest end, where what is no depth becomes near.
+pub(crate) fn sanitized_near(bits: u32, convention: DepthConvention) -> f32 {
+    if (0.0..=1.0).contains(&f32::from_bits(bits)) {
+        sanitized(bits, convention)
+    } else {
+        convention.near()
+    }
+}
+
+/// The bits of a pixel, or those of near for background: what has exactly the bits of far, or -0
+/// where far is 0.
+pub(crate) fn foreground(bits: u32, convention: DepthConvention) -> u32 {
+    let negative_zero = convention.is_reversed() && bits == (-0.0_f32).to_bits();
+    if bits == convention.far().to_bits() || negative_zero {
+        convention.near().to_bits()
+    } else {
+        bits
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
