@@ -79,6 +79,20 @@ def check_bounds(
     transforms: npt.NDArray[np.float64],
     instances: Sequence[tuple[int, int | None]],
 ) -> npt.NDArray[np.float64]: ...
+def add_colours(
+    positions: _Floats,
+    visible: npt.NDArray[np.bool_],
+    camera: Camera,
+    image: npt.NDArray[np.uint8] | npt.NDArray[np.float32],
+    bilinear: bool,
+    weight: str,
+    colours: npt.NDArray[np.float32],
+    weights: npt.NDArray[np.float32],
+    counts: npt.NDArray[np.uint32],
+) -> None: ...
+def depth_of_points(
+    positions: _Floats, camera: Camera, radius: float, radius_px: float
+) -> npt.NDArray[np.float32]: ...
 def frustum_matrix(
     borders: _Borders, near: float, far: float | None, reversed_z: bool, size: _Size
 ) -> _Matrix: ...
@@ -155,6 +169,7 @@ class Camera:
     def with_size(self, size: _Size) -> Camera: ...
     def size(self) -> _Size: ...
     def reversed_z(self) -> bool: ...
+    def is_posed(self) -> bool: ...
     def rows(self) -> _Matrix: ...
     def origin(self) -> list[float]: ...
     def clip_from_world(self) -> _Matrix: ...
@@ -210,6 +225,7 @@ class Engine:
         scale: float,
         invalid: Sequence[float],
         rounding: str,
+        tolerance: tuple[float, float],
         camera: Camera,
     ) -> DepthImage: ...
     def upload_samples(
@@ -219,6 +235,7 @@ class Engine:
         scale: float,
         invalid: Sequence[float],
         rounding: str,
+        tolerance: tuple[float, float],
         camera: Camera,
     ) -> DepthImage: ...
     def renew(
@@ -234,6 +251,7 @@ class Engine:
         scale: float,
         invalid: Sequence[float],
         rounding: str,
+        tolerance: tuple[float, float],
     ) -> None: ...
     def pyramid(self, depth: DepthImage, levels: tuple[int, int]) -> Pyramid: ...
     def cull(

@@ -26,8 +26,8 @@ use crate::options::{Request, cull_options, mip_options};
 enum SingleDepth<'py> {
     #[pyo3(transparent, annotation = "Pyramid")]
     Pyramid(Bound<'py, Pyramid>),
-    #[pyo3(annotation = "image, kind, scale, invalid, rounding")]
-    Image(DepthArray<'py>, String, f64, Vec<f64>, String),
+    #[pyo3(annotation = "image, kind, scale, invalid, rounding, tolerance")]
+    Image(DepthArray<'py>, String, f64, Vec<f64>, String, (f64, f64)),
 }
 
 /// Which instances a cull is restricted to.
@@ -233,6 +233,7 @@ impl Engine {
 
     /// `image` is float32, float64, or 16 bits: float16 if `rounding` is "half", else whole numbers.
     /// `rounding` says to which floats the numbers were rounded before: "none", "single" or "half".
+    /// `tolerance` is relative and absolute, in world units.
     #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn upload_depth(
         &self,
@@ -242,9 +243,10 @@ impl Engine {
         scale: f64,
         invalid: Vec<f64>,
         rounding: &str,
+        tolerance: (f64, f64),
         camera: &Camera,
     ) -> PyResult<DepthImage> {
-        let depth = depth_input(&image, kind, scale, &invalid, rounding)?;
+        let depth = depth_input(&image, kind, scale, &invalid, (rounding, tolerance))?;
         let camera = &camera.0;
         self.0
             .run(py, |engine| engine.upload_depth_of_kind(&depth, camera))
@@ -261,9 +263,10 @@ impl Engine {
         scale: f64,
         invalid: Vec<f64>,
         rounding: &str,
+        tolerance: (f64, f64),
         camera: &Camera,
     ) -> PyResult<DepthImage> {
-        let samples = depth_inputs(&images, kind, scale, &invalid, rounding)?;
+        let samples = depth_inputs(&images, kind, scale, &invalid, (rounding, tolerance))?;
         let camera = &camera.0;
         self.0
             .run(py, |engine| engine.upload_depth_of_samples(&samples, camera))
@@ -295,8 +298,9 @@ impl Engine {
         scale: f64,
         invalid: Vec<f64>,
         rounding: &str,
+        tolerance: (f64, f64),
     ) -> PyResult<()> {
-        let rows = depth_inputs(&images, kind, scale, &invalid, rounding)?;
+        let rows = depth_inputs(&images, kind, scale, &invalid, (rounding, tolerance))?;
         let (pyramid, depth) = (pyramid.0.get(py)?, depth.0.get(py)?);
         self.0.run(py, |engine| engine.replace_depth(&pyramid.1, &depth, rectangle.into(), &rows))
     }
@@ -318,8 +322,8 @@ impl Engine {
                 let pyramid = pyramid.get().0.get(py)?;
                 self.0.run(py, |engine| engine.cull_once(&bounds, camera, &pyramid.1, &options))
             }
-            SingleDepth::Image(image, kind, scale, invalid, rounding) => {
-                let depth = depth_input(image, kind, *scale, invalid, rounding)?;
+            SingleDepth::Image(image, kind, scale, invalid, rounding, tolerance) => {
+                let depth = depth_input(image, kind, *scale, invalid, (rounding, *tolerance))?;
                 self.0
                     .run(py, |engine| engine.cull_once_by_depth(&bounds, camera, &depth, &options))
             }

@@ -15,6 +15,7 @@ mod errors;
 mod held;
 mod meshes;
 mod options;
+mod points;
 mod reference;
 mod two_passes;
 #[cfg(feature = "yardstick")]
@@ -36,6 +37,8 @@ mod _core {
     use crate::held::{after_fork, before_fork, let_go};
     #[pymodule_export]
     use crate::meshes::MeshTable;
+    #[pymodule_export]
+    use crate::points::{add_colours, depth_of_points};
     #[pymodule_export]
     use crate::reference::{reference_classify, reference_pyramid, reference_unoccluded};
     #[pymodule_export]
