@@ -3,6 +3,7 @@
 
 #[cfg(feature = "testing")]
 use crate::cull::lod::LodRule;
+use crate::cull::no_depth::STORE;
 use crate::error::Result;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::device::Gpu;
@@ -30,9 +31,9 @@ pub(crate) struct CullKey {
 
 impl CullKey {
     /// The key of a pass that reads no depth.
-    pub(super) fn without_depth(kind: BoundsKind, sample_coverage: bool) -> Self {
+    pub(crate) fn without_depth(kind: BoundsKind, sample_coverage: bool) -> Self {
         Self {
-            store: DepthStore::Nowhere,
+            store: STORE,
             kind,
             sample_coverage,
             // These have no effect, because no depth is read.
@@ -256,8 +257,6 @@ pub(crate) enum DepthStore {
     Apart(SourceKind),
     /// All levels from one texture.
     Atlas,
-    /// No depth is read: such a pass only finds what is outside.
-    Nowhere,
 }
 
 impl DepthStore {
@@ -266,7 +265,6 @@ impl DepthStore {
         match self {
             Self::Apart(source) => [source.files(), &[wgsl!("pyramid/texels_apart")]].concat(),
             Self::Atlas => vec![wgsl!("pyramid/texels_atlas")],
-            Self::Nowhere => vec![wgsl!("pyramid/texels_nowhere")],
         }
     }
 
@@ -275,7 +273,6 @@ impl DepthStore {
         match self {
             Self::Apart(source) => source as u32,
             Self::Atlas => 5,
-            Self::Nowhere => 6,
         }
     }
 
@@ -298,7 +295,6 @@ impl DepthStore {
             Self::Atlas => {
                 gpu.layout("hiz.cull.atlas_layout", &[(2, Uniform), (3, ReadQuads), (6, Uniform)])
             }
-            Self::Nowhere => gpu.layout("hiz.cull.no_depth_layout", &[(2, Uniform), (6, Uniform)]),
         }
     }
 }
