@@ -24,6 +24,7 @@ The other instances are appended to the list that an indirect draw takes.
 The promise: for the numbers as given, whatever could show in a pixel of the depth image is kept.
 `reference` holds the oracle, which is slow and exact.
 `compare` counts false culls, of which there are none, and false keeps, which are a cost.
+`compare_unoccluded` does the same for what a cull says surely shows.
 A small depth image holds for larger ones if it was rendered with ``conservative=True``.
 `check_proxy` and `check_bounds` say whether occluders and bounds are what they should be.
 `split_mesh`, `inner_boxes`, `inner_prisms` and `select_occluders` make occluders of meshes.
@@ -65,7 +66,16 @@ from ._core import __version__
 from .adapter import Adapter, adapters
 from .bounds import Boxes, OrientedBoxes, Points, Spheres
 from .camera import Camera
-from .check import BoundsCheck, Comparison, ProxyCheck, check_bounds, check_proxy, compare
+from .check import (
+    BoundsCheck,
+    Comparison,
+    ProxyCheck,
+    UnoccludedComparison,
+    check_bounds,
+    check_proxy,
+    compare,
+    compare_unoccluded,
+)
 from .device import Device
 from .errors import (
     DeviceLostError,
@@ -144,6 +154,7 @@ __all__ = [
     "StageTime",
     "StageTimes",
     "Temporal",
+    "UnoccludedComparison",
     "Verdict",
     "ViewsResult",
     "__version__",
@@ -151,6 +162,7 @@ __all__ = [
     "check_bounds",
     "check_proxy",
     "compare",
+    "compare_unoccluded",
     "inner_boxes",
     "inner_prisms",
     "recommend",

@@ -79,7 +79,7 @@ class Tally(NamedTuple):
     @classmethod
     def of(cls, counts: Counts) -> Tally:
         """From the counts of a cull."""
-        kept = counts.visible + counts.invalid
+        kept = counts.visible + counts.unoccluded + counts.invalid
         return cls(counts.tested, counts.outside, counts.occluded, kept, counts.invalid)
 
 

@@ -28,6 +28,48 @@ fn surely_in_front(bits: u32, z: Value, w: Value) -> bool {
     return surely_below(z, t, w);
 }
 
+// True implies: all of the volume is nearer than every pixel of the rectangle first..=last.
+// False: it may not be, or the budget has ended.
+//
+// The walk mirrors `descend`, on the nearest end and with a budget of its own.
+// `front` becomes the nearest depth of the texels that decided, or the one that did not.
+fn descend_in_front(
+    top: u32, t: vec4<u32>, first: vec2<u32>, last: vec2<u32>, z: Value, w: Value,
+    front: ptr<function, u32>, texels_read: ptr<function, u32>,
+) -> bool {
+    var left = view.descent_budget;
+    var level = top;
+    var at = t.xy;
+    var decided = far_bits();
+    loop {
+        if left == 0u {
+            return false;
+        }
+        left -= 1u;
+        *texels_read += 1u;
+        let bits = nearest_texel(level, at.x, at.y);
+        if surely_in_front(bits, z, w) {
+            decided = nearest(decided, bits);
+            if !next_texel(top, t, first, last, &level, &at) {
+                *front = decided;
+                return true;
+            }
+            continue;
+        }
+        // One of its pixels has that depth; if the rectangle contains all of them, it decides.
+        let begin = at << vec2<u32>(level);
+        let end = min((at + vec2<u32>(1u)) << vec2<u32>(level), vec2<u32>(view.size));
+        if level == 0u || (all(begin >= first) && all(end <= last + vec2<u32>(1u))) {
+            *front = bits;
+            return false;
+        }
+        let down = levels_down(level);
+        level -= down;
+        at = max(at << vec2<u32>(down), first >> vec2<u32>(level));
+    }
+    return false;
+}
+
 // True implies: all of the volume lies within the six planes of the frustum, and w > 0 on it.
 // It also stays away from the image's borders by the guard.
 fn surely_inside(x: Value, y: Value, z: Value, w: Value) -> bool {

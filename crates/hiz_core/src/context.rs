@@ -972,8 +972,8 @@ fn needed(have: &wgpu::Limits) -> Vec<(&'static str, u64, u64)> {
         max_samplers_per_shader_stage >= 1,
         // The cull of members: three chunks, mask, list, draws, statistics, survivors.
         max_storage_buffers_per_shader_stage >= 8,
-        // An atlas or an image of depth bits; records; the list of survivors.
-        max_storage_textures_per_shader_stage >= 3,
+        // An atlas or an image of depth bits; records; the survivors of two tiers of boxes.
+        max_storage_textures_per_shader_stage >= 4,
         // Pyramid, view, piece, capacity.
         max_uniform_buffers_per_shader_stage >= 4,
         max_uniform_buffer_binding_size >= size_of::<PyramidUniform>() as u64,

@@ -91,10 +91,12 @@ mod view;
 mod volume;
 
 pub use containment::{MeshError, Protrusion, TriangleMesh, check_bounds, check_proxy, contains};
-pub use depth::{DepthBounds, DepthKind, DepthMeaning, depth_bounds, nearest_depths};
+pub use depth::{DepthBounds, DepthKind, DepthMeaning, depth_bounds, nearest_depth_bounds};
 pub use lod::{LodRule, coarsest_lod, greatest_stretch, least_w, pixel_shift, radius, stretch_at};
 pub use pyramid::{Level, pyramid, sanitized_depth};
-pub use unoccluded::{is_before, is_inside, is_unoccluded, sanitized_nearest_depth};
+pub use unoccluded::{
+    is_before, is_inside, is_unoccluded, sanitized_nearest_depth, unoccluded_between,
+};
 pub use view::{Coverage, View};
 pub use volume::Volume;
 

@@ -16,7 +16,7 @@ use crate::pyramid::ONE;
 use crate::scalar::Scalar;
 use crate::search::Projected;
 use crate::view::{Block, Clip, View};
-use crate::{Coverage, Error, Options, Volume};
+use crate::{Coverage, DepthBounds, Error, Options, Volume};
 
 /// The bits of -0.0f32.
 const MINUS_ZERO: u32 = 0x8000_0000;
@@ -116,6 +116,27 @@ pub fn is_unoccluded(
     let options = Options { coverage, ..Options::default() };
     let projected = Projected::new(view, volume, options);
     Ok(projected.is_inside() == Some(true) && !Search::new(&projected).finds_cover(depth))
+}
+
+/// [`is_unoccluded`] for a depth image that is only known to lie between two images.
+///
+/// `None` if the volume is unoccluded in the farther image and not in the nearer one.
+/// [`nearest_depth_bounds`](crate::nearest_depth_bounds) makes such images.
+///
+/// # Errors
+///
+/// Those of [`is_unoccluded`].
+pub fn unoccluded_between(
+    view: &View,
+    volume: &Volume,
+    depth: &DepthBounds,
+    coverage: Coverage,
+) -> Result<Option<bool>, Error> {
+    if is_unoccluded(view, volume, &depth.nearer, coverage)? {
+        return Ok(Some(true));
+    }
+    let may_be = is_unoccluded(view, volume, &depth.farther, coverage)?;
+    Ok((!may_be).then_some(false))
 }
 
 impl Projected<'_> {

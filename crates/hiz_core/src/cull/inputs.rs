@@ -17,6 +17,7 @@ use crate::input::camera::Camera;
 use crate::instances::Instances;
 use crate::pyramid::Pyramid;
 use crate::pyramid::built::Built;
+use crate::pyramid::ends::check_culled;
 
 /// What a cull reads.
 #[derive(Debug, Clone, Copy)]
@@ -122,6 +123,7 @@ impl PreparedView {
                 built.part.tolerance,
             )?
         };
+        check_culled(pyramid.depths())?;
         check_coverage(&built, options)?;
         Pyramid::check_source(gpu, &built)?;
         let atlas = match encoder.filter(|_| pyramid.wants_atlas(gpu, &built, instances.len())) {
@@ -142,6 +144,8 @@ impl PreparedView {
             descent: options.descent > 0,
             fit_volume: options.fit == Fit::Volume,
             among: inputs.among.is_some(),
+            nearest: pyramid.has_nearest(),
+            receivers: false,
         };
         Ok(Self { built, atlas, view, key })
     }

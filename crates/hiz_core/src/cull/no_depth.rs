@@ -4,7 +4,7 @@
 //! 1 ms from its cache on disk.
 //! With an atlas it compiles once.
 
-use crate::cull::pipelines::DepthStore;
+use crate::cull::pipelines::NO_DEPTH;
 use crate::error::Result;
 use crate::gpu::buffers::entry;
 use crate::gpu::device::Gpu;
@@ -12,9 +12,6 @@ use crate::gpu::device::Gpu;
 /// The number of a reduction, which an empty atlas does not have.
 /// So every test ends before it reads depth.
 pub(crate) const NO_REDUCTION: u32 = 1;
-
-/// Where depth would be read.
-pub(crate) const STORE: DepthStore = DepthStore::Atlas;
 
 /// Binds a pyramid's layout and a view, and the empty atlas.
 pub(crate) fn bind_view(
@@ -25,7 +22,7 @@ pub(crate) fn bind_view(
 ) -> Result<wgpu::BindGroup> {
     gpu.bind_group(
         label,
-        &STORE.layout(gpu)?,
+        &NO_DEPTH.layout(gpu)?,
         &[
             entry(2, pyramid.as_entire_binding()),
             entry(3, wgpu::BindingResource::TextureView(gpu.no_atlas()?)),

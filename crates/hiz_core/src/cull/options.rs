@@ -70,16 +70,24 @@ pub enum Fit {
     Volume,
 }
 
-/// Whether whole groups of 64 instances are tested before their members.
+/// Whether whole groups of 64 instances are tested before their members, and in how many tiers.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Hierarchy {
     /// If there are enough instances for it to pay.
     #[default]
     Auto,
-    /// For any number of instances.
+    /// For any number of instances: one tier of boxes, those of the groups.
     Always,
     /// Each instance is tested by itself.
     Never,
+    /// So many tiers of boxes, 0 to 3, for any number of instances.
+    ///
+    /// 1 is that of the groups.
+    /// Above it lie boxes around 64 groups each, and then around 64 of these.
+    /// A piece has another tier as soon as one of its boxes is full: from 4,033 and from 258,049
+    /// instances on.
+    /// Where there are fewer tiers, these are tested.
+    Tiers(u32),
 }
 
 /// The options of a cull.

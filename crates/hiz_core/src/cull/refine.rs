@@ -6,9 +6,11 @@ use std::sync::Arc;
 
 use crate::cull::among::Among;
 use crate::cull::groups::is_grouped;
-use crate::cull::no_depth::{NO_REDUCTION, STORE, bind_view};
+use crate::cull::no_depth::{NO_REDUCTION, bind_view};
 use crate::cull::options::{Coverage, CullOptions};
-use crate::cull::pipelines::{CullKey, TWO_STORAGES, classify_constants, layouts, unexplained};
+use crate::cull::pipelines::{
+    CullKey, NO_DEPTH, TWO_STORAGES, classify_constants, layouts, unexplained,
+};
 use crate::cull::view_uniform::ViewUniform;
 use crate::error::Result;
 use crate::gpu::buffers::entry;
@@ -31,13 +33,13 @@ pub(crate) const WORKGROUP: u32 = 64;
 /// The shader that writes the verdicts of the members of hidden groups.
 pub(crate) fn refine_module(kind: BoundsKind) -> Source {
     let entry = [wgsl!("instances/piece"), wgsl!("instances/groups"), wgsl!("cull/refine")];
-    unexplained(STORE, kind, &entry)
+    unexplained(NO_DEPTH, kind, &entry)
 }
 
 /// The shader that finds the groups that lie within the view.
 pub(crate) fn refine_groups_module() -> Source {
-    let entry = [wgsl!("instances/piece"), wgsl!("cull/refine_groups")];
-    unexplained(STORE, BoundsKind::Box, &entry)
+    let entry = [wgsl!("instances/tier"), wgsl!("cull/refine_groups")];
+    unexplained(NO_DEPTH, BoundsKind::Box, &entry)
 }
 
 /// The pipeline that refines members.

@@ -23,6 +23,7 @@ use crate::gpu::shader::{Source, wgsl};
 use crate::gpu::stage_times::stage_pass;
 use crate::input::bounds::BoundsKind;
 use crate::instances::Instances;
+use crate::instances::forming::Forming;
 use crate::instances::piece::Piece;
 
 /// Invocations of one workgroup, each of which takes a group; `shaders/instances/from_buffer.wgsl`.
@@ -112,6 +113,7 @@ pub(crate) fn from_buffer_module(kind: BoundsKind) -> Source {
         wgsl!("instances/record_layout"),
         wgsl!("instances/groups"),
         wgsl!("instances/sequence"),
+        wgsl!("instances/corners"),
         wgsl!("instances/from_buffer"),
         match kind {
             BoundsKind::Sphere => wgsl!("instances/from_buffer_sphere"),
@@ -236,7 +238,9 @@ pub(crate) fn record_update_from(
         .map(|piece| {
             let is_sorted = !piece.order.is_given();
             let bindings = bind(gpu, instances, piece, source, stride)?;
-            Ok((pipeline(gpu, kind, is_sorted)?, bindings, piece.groups().div_ceil(WORKGROUP)))
+            let workgroups = piece.groups().div_ceil(WORKGROUP);
+            let forming = Forming::all(gpu, piece)?;
+            Ok((pipeline(gpu, kind, is_sorted)?, bindings, workgroups, forming))
         })
         .collect::<Result<Vec<_>>>()?;
     if prepared.is_empty() {
@@ -246,10 +250,13 @@ pub(crate) fn record_update_from(
     instances.bounds_are_on_device();
     gpu.recorded(|| {
         let mut pass = stage_pass(encoder, "hiz.instances.from_buffer", "update");
-        for (pipeline, bindings, workgroups) in &prepared {
+        for (pipeline, bindings, workgroups, forming) in &prepared {
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, bindings, &[]);
             pass.dispatch_workgroups(*workgroups, 1, 1);
+            if let Some(forming) = forming {
+                forming.record(&mut pass);
+            }
         }
         Ok(())
     })

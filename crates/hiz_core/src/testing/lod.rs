@@ -1,8 +1,8 @@
 //! The LODs that the shader chooses, without a cull around it.
 
 use crate::cull::lod::LodRule;
-use crate::cull::no_depth::{STORE, bind_view};
-use crate::cull::pipelines::{CullKey, classify_constants, lod_constants, unexplained};
+use crate::cull::no_depth::bind_view;
+use crate::cull::pipelines::{CullKey, NO_DEPTH, classify_constants, lod_constants, unexplained};
 use crate::error::Result;
 use crate::gpu::buffers::{STORAGE, entry};
 use crate::gpu::layouts::Binding;
@@ -38,7 +38,7 @@ pub struct LodCase {
 /// The shader that writes down LODs.
 pub(crate) fn choose_lods_module(kind: BoundsKind) -> Source {
     let entry = [wgsl!("instances/piece"), wgsl!("cull/lod"), wgsl!("testing/choose_lods")];
-    unexplained(STORE, kind, &entry)
+    unexplained(NO_DEPTH, kind, &entry)
 }
 
 /// The LOD of each instance by the rule whose numbers `view` holds.
@@ -67,7 +67,7 @@ pub fn choose_lods(
     let no_pyramid: PyramidUniform = bytemuck::Zeroable::zeroed();
     let pyramid = gpu.uniform("hiz.choose_lods.pyramid", &no_pyramid)?;
     let layouts = [
-        STORE.layout(gpu)?,
+        NO_DEPTH.layout(gpu)?,
         gpu.layout("hiz.cull.instances_layout", RECORD_BINDINGS)?,
         gpu.layout(
             "hiz.choose_lods.layout",

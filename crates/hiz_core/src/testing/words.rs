@@ -47,6 +47,8 @@ pub struct PieceWords {
     pub records: Vec<u32>,
     /// The records of the groups' boxes.
     pub groups: Vec<u32>,
+    /// The records of the boxes of each tier above.
+    pub tiers: Vec<Vec<u32>>,
 }
 
 /// The records of all pieces, after everything that was submitted.
@@ -69,6 +71,14 @@ pub fn pieces(engine: &Engine, instances: &Instances) -> Result<Vec<PieceWords>>
                 p.group_records.texture(),
                 p.groups() as usize * record_words(BoundsKind::Box),
             )?,
+            tiers: p
+                .upper
+                .iter()
+                .map(|tier| {
+                    let count = tier.count as usize * record_words(BoundsKind::Box);
+                    words(tier.records.texture(), count)
+                })
+                .collect::<Result<_>>()?,
         })
     };
     instances.pieces.iter().map(of_piece).collect()

@@ -11,6 +11,7 @@ use crate::input::bounds::{Bounds, Floats};
 use crate::instances::SEQUENCE_BYTES;
 use crate::instances::from_buffer::FromBufferUniform;
 use crate::instances::piece::PieceUniform;
+use crate::instances::tiers::{FormUniform, TierUniform};
 use crate::instances::update::UpdateUniform;
 use crate::output::bins::{BinRecord, EmitUniform, TotalRecord};
 use crate::output::counters::{CounterRecord, StatisticsRecord};
@@ -37,6 +38,9 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     // Vertex inputs, which are found by location; see `occluders/device_meshes.rs`.
     "Copy",
     "Vertex",
+    "Ends",
+    "Ends2",
+    "Ends4",
     "Extent",
     "Flat",
     "MaskPlace",
@@ -86,6 +90,7 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         }),
         twin!("Counters", CounterRecord {
             "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid,
+            "unoccluded" = unoccluded,
         }),
         twin!("DrawIndexedIndirect", DrawIndexedIndirect {
             "index_count" = index_count, "instance_count" = instance_count,
@@ -104,6 +109,7 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "farthest_bits" = farthest_bits, "pixels" = pixels, "depths" = depths, "last" = last,
             "texels_read" = texels_read, "of_footprint" = of_footprint,
             "farthest_before" = farthest_before, "any_before" = any_before,
+            "nearest_bits" = nearest_bits, "padding" = padding,
         }),
         twin!("Frame", FrameUniform {
             "early" = early, "least_pixels" = least_pixels, "padding" = padding,
@@ -122,7 +128,7 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         }),
         twin!("Pyramid", PyramidUniform {
             "levels" = levels, "origins" = origins, "chunk_shift" = chunk_shift,
-            "first_stored" = first_stored, "last_stored" = last_stored, "padding" = padding,
+            "first_stored" = first_stored, "last_stored" = last_stored, "nearest" = nearest,
         }),
         twin!("ResolvedImage", ResolvedUniform { "origin" = origin, "size" = size }),
         twin!("Band", BandUniform {
@@ -137,7 +143,17 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         }),
         twin!("Survivors", SurvivorsRecord {
             "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
-            "workgroups_z" = workgroups + 8, "count" = count,
+            "workgroups_z" = workgroups + 8, "count" = count, "tested" = tested,
+            "accepted" = accepted, "padding" = padding,
+        }),
+        twin!("Parents", SurvivorsRecord {
+            "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
+            "workgroups_z" = workgroups + 8, "count" = count, "tested" = tested,
+            "accepted" = accepted, "padding" = padding,
+        }),
+        twin!("Tier", TierUniform { "count" = count, "below" = below, "padding" = padding }),
+        twin!("FormTier", FormUniform {
+            "count" = count, "below" = below, "runtime_zero" = runtime_zero, "padding" = padding,
         }),
         twin!("Template", TemplateRecord {
             "count" = count, "first" = first, "base_vertex" = base_vertex, "padding" = padding,
@@ -155,8 +171,8 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "descent_budget" = descent_budget, "depth_offset" = depth_offset,
             "coordinate_limit" = coordinate_limit, "lod_end" = lod_end,
             "lod_needs" = lod_needs,
-            "source_origin" = source_origin, "padding_0" = padding_0, "near_factor" = near_factor,
-            "near_offset" = near_offset,
+            "source_origin" = source_origin, "near_factor" = near_factor,
+            "near_offset" = near_offset, "padding" = padding,
         }),
         twin!("YardstickLevel", yardstick::PlainLevel {
             "offset" = offset, "stride" = stride, "width" = width, "height" = height,
