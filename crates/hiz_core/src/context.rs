@@ -898,7 +898,7 @@ impl HizContext {
         visible: &VisibleViews,
         options: &CullOptions,
     ) -> Result<()> {
-        let inputs = ViewsInputs { instances, views, among, options, idle: false };
+        let inputs = ViewsInputs { instances, views, among, options, idle: false, built: None };
         record_cull_views(&self.gpu, encoder, &inputs, &visible.each(), visible.joined())
     }
 

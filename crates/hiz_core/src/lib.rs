@@ -173,7 +173,7 @@ pub use cull::history::{EarlySet, Temporal};
 pub use cull::lod::LodRule;
 pub use cull::options::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
 pub use cull::views::View;
-pub use cull::warm_up::WarmUp;
+pub use cull::warm_up::{WarmUp, WarmUpMore};
 pub use error::{Error, Result};
 pub use gpu::stage_times::{StageTime, StageTimer, StageTimesInFlight};
 pub use host::linear::{Mat3, Mat4, Vec3};

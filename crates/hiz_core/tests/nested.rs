@@ -460,7 +460,7 @@ fn among_some() {
         let asked: Vec<bool> = (0..9000).map(|_| random.below(share) == 0).collect();
         let among = world.engine.among(&world.instances, &AmongSource::Mask(&asked)).unwrap();
         for tiers in 0..=2 {
-            let extras = CullExtras { among: Some(&among), ahead: false };
+            let extras = CullExtras { among: Some(&among), ..CullExtras::default() };
             let (options, outputs) = (World::options(tiers), Outputs::default());
             let World { engine, instances, camera, pyramid, .. } = &world;
             let culling =
