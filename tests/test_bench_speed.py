@@ -78,6 +78,8 @@ TOLD = (
     "reduction.1080p.uploaded.level 5 alone",
     "depth_in.1080p.rendered.region",
     "depth_in.1080p.uploaded.region",
+    "mips.1080p.rendered.farthest.normalized",
+    "mips.1080p.uploaded.both.normalized",
     "cull.hidden95.share",
     "cull.hidden50.groups_over_flat",
     "cull.hidden95.ns.boxes, flat",

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from .depth import DepthArray
     from .mesh import MeshLike
     from .options import CullKeywords, CullOptions, MeshLods, Outputs
+    from .tolerance import Tolerance
     from .views import _AmongLike
 
 __all__ = ["Device"]
@@ -426,6 +427,7 @@ class Device:
         kind: None = None,
         scale: float = 1.0,
         invalid: None = None,
+        tolerance: None = None,
         levels: Levels = None,
     ) -> Pyramid: ...
 
@@ -438,6 +440,7 @@ class Device:
         kind: DepthKind,
         scale: float = 1.0,
         invalid: Collection[float] | None = None,
+        tolerance: Tolerance | None = None,
         levels: Levels = None,
     ) -> Pyramid: ...
 
@@ -449,6 +452,7 @@ class Device:
         kind: DepthKind | None = None,
         scale: float = 1.0,
         invalid: Collection[float] | None = None,
+        tolerance: Tolerance | None = None,
         levels: Levels = None,
     ) -> Pyramid:
         """Builds the depth pyramid of a depth image.
@@ -492,6 +496,11 @@ class Device:
             None: those that are usual for its dtype, which are 0 and 65535 for uint16, 65504 (the
             greatest) for float16, and none for float32 and float64.
             ``()``: none beside those that never are depth.
+        tolerance : Tolerance, optional
+            How far the depths of the array may be off, in the world.
+            The upload moves them away from the eye by so much, and the promise holds for the moved
+            image.
+            None: they stay where they are.
         levels : int or pair of int, optional
             Which levels are built, of 1 to 15; level 0, the image itself, is always there.
 
@@ -524,6 +533,12 @@ class Device:
                     got = _arguments.describe(value)
                     expected = "nothing beside a DepthImage, which has its own"
                     raise TypeError(f"{name}: expected {expected}, got {got}")
+            if tolerance is not None:
+                got = _arguments.describe(tolerance)
+                raise TypeError(
+                    "tolerance: expected None beside a DepthImage, whose depth stays; to move it "
+                    f"pass depth.numpy(), depth.camera and kind=depth.kind, got {got}"
+                )
             if _arguments.number("scale", scale, above=0.0) != 1.0:
                 raise ValueError(
                     f"scale: expected 1 beside a DepthImage, whose depth is NDC, got {scale:g}"
@@ -534,7 +549,7 @@ class Device:
             return Pyramid(self, built, depth.camera, source, is_rendered=True)
         camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")
         self._check_side(camera)
-        samples = checked_samples("depth", depth, camera, kind, scale, invalid)
+        samples = checked_samples("depth", depth, camera, kind, scale, invalid, tolerance)
         return self._pyramid_of(samples, camera, stored, invalid)
 
     def _pyramid_of(
@@ -674,7 +689,9 @@ class Device:
                 restriction,
                 not wait,
             )
-            return CullResult(self, culling, Question(camera, pyramid, options, instances._are_sizeless))
+            return CullResult(
+                self, culling, Question(camera, pyramid, options, instances._are_sizeless)
+            )
         cameras, pyramids = pairs(camera, pyramid, self)
         for number, (one, of) in enumerate(zip(cameras, pyramids, strict=True)):
             if one != of.camera:

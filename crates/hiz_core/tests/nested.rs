@@ -197,7 +197,7 @@ impl Spent {
         for fates in fates.chunks(piece) {
             // A tier begins where one of its boxes is full.
             let groups = fates.len().div_ceil(GROUP);
-            let there = 1 + usize::from(groups >= 64) + usize::from(groups >= 64 * 63 + 1);
+            let there = 1 + usize::from(groups >= 64) + usize::from(groups > 64 * 63);
             match tiers.min(there) {
                 0 => spent.instances += fates.len() as u64,
                 tiers => spent.down(fates, tiers - 1, both),
@@ -464,7 +464,7 @@ fn among_some() {
         let asked: Vec<bool> = (0..9000).map(|_| random.below(share) == 0).collect();
         let among = world.engine.among(&world.instances, &AmongSource::Mask(&asked)).unwrap();
         for tiers in 0..=2 {
-            let extras = CullExtras { among: Some(&among), ahead: false };
+            let extras = CullExtras { among: Some(&among), ..CullExtras::default() };
             let (options, outputs) = (World::options(tiers), Outputs::default());
             let World { engine, instances, camera, pyramid, .. } = &world;
             let culling =
