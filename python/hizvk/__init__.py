@@ -62,6 +62,7 @@ from typing import TYPE_CHECKING, Any
 from . import reference
 from ._core import __version__
 from .adapter import Adapter, adapters
+from .approximate import ApproximateResult
 from .bounds import Boxes, OrientedBoxes, Spheres
 from .camera import Camera
 from .check import BoundsCheck, Comparison, ProxyCheck, check_bounds, check_proxy, compare
@@ -89,6 +90,7 @@ from .occluders import (
 )
 from .oneline import visible
 from .options import CullOptions, DrawTemplate, MeshLods, Outputs
+from .pixels import PIXELS_DTYPE, visible_fraction
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import ABSENT, DRAW_DTYPE, NO_LOD, CullResult
 from .stats import CullStats
@@ -103,7 +105,9 @@ __all__ = [
     "ABSENT",
     "DRAW_DTYPE",
     "NO_LOD",
+    "PIXELS_DTYPE",
     "Adapter",
+    "ApproximateResult",
     "BoundsCheck",
     "Boxes",
     "Camera",
@@ -156,6 +160,7 @@ __all__ = [
     "select_occluders",
     "split_mesh",
     "visible",
+    "visible_fraction",
 ]
 
 

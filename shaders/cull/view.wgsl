@@ -54,8 +54,10 @@ struct View {
     // Where level 0 begins in its texture, if it is a part of it: the column, and COORDINATE_BITS
     // higher the row.
     source_origin: u32,
-    padding_0: u32,
-    padding_1: vec2<u32>,
+    // What depth_factor and depth_offset are for the nearest end: they move a stored depth nearer.
+    near_factor: f32,
+    near_offset: f32,
+    padding: u32,
 }
 
 // Bits of a column in `source_origin`.

@@ -5,6 +5,7 @@ use crate::cull::options::{Coverage, CullOptions};
 use crate::error::{Error, Result};
 use crate::host::rounding::{EPS, round_up};
 use crate::input::camera::Camera;
+use crate::input::image::DepthConvention;
 use crate::input::tolerance::DepthTolerance;
 use crate::input::view::ViewRows;
 use crate::output::mesh_table::MAX_LODS;
@@ -35,8 +36,9 @@ pub(crate) struct ViewUniform {
     pub(crate) lod_end: u32,
     pub(crate) lod_needs: [f32; MAX_LODS],
     pub(crate) source_origin: u32,
-    pub(crate) padding_0: u32,
-    pub(crate) padding_1: [u32; 2],
+    pub(crate) near_factor: f32,
+    pub(crate) near_offset: f32,
+    pub(crate) padding: u32,
 }
 
 const _: () = assert!(size_of::<ViewUniform>() == 224);
@@ -77,7 +79,9 @@ impl ViewUniform {
             absolute: range("depth_slack_abs", options.depth_slack_abs, 0.5)?,
         };
         // The renderer's error came first, then the rounding of the format.
-        let DepthTolerance { relative: slack, absolute: slack_abs } = tolerance.after(of_caller);
+        let all = tolerance.after(of_caller);
+        let DepthTolerance { relative: slack, absolute: slack_abs } = all;
+        let (near_factor, near_offset) = near_slack(camera.convention(), all);
         range("descent", f64::from(options.descent), 65_536.0)?;
         let kappa = range("transform_slack", options.transform_slack, 1e6)?;
         let guard = match (options.guard_px, options.coverage) {
@@ -121,14 +125,14 @@ impl ViewUniform {
             })?;
         let LodNumbers { end: lod_end, needs: lod_needs } = LodNumbers::new(camera, &options.lod)?;
         let size = camera.size();
-        let all = [rows.x, rows.y, rows.z, rows.w];
+        let rows_of_all = [rows.x, rows.y, rows.z, rows.w];
         Ok(Self {
             x: rows.x.m,
             y: rows.y.m,
             z: rows.z.m,
             w: rows.w.m,
-            magnitudes: all.map(|row| row.a[..3].iter().copied().fold(0.0, f32::max)),
-            constant_magnitudes: all.map(|row| row.a[3]),
+            magnitudes: rows_of_all.map(|row| row.a[..3].iter().copied().fold(0.0, f32::max)),
+            constant_magnitudes: rows_of_all.map(|row| row.a[3]),
             eye_hi: rows.eye_hi,
             z_slope: rows.z_slope,
             eye_lo: rows.eye_lo,
@@ -145,9 +149,29 @@ impl ViewUniform {
             lod_end,
             lod_needs,
             source_origin: 0,
-            padding_0: 0,
-            padding_1: [0; 2],
+            near_factor,
+            near_offset,
+            padding: 0,
         })
+    }
+}
+
+/// What moves a stored depth nearer than every depth that it stands for: a factor and an offset.
+///
+/// Both count the roundings of the shader, 2^-24 of the product and 2^-24 of the sum.
+/// Without slack both are exact, and nothing is moved.
+/// `docs/accuracy.md`, section "The nearest end", has the proof.
+pub(crate) fn near_slack(
+    convention: DepthConvention,
+    DepthTolerance { relative, absolute }: DepthTolerance,
+) -> (f32, f32) {
+    let rounding = EPS / 2.0;
+    let relative = if relative > 0.0 { relative + rounding * (1.0 + relative) } else { 0.0 };
+    let offset = if absolute > 0.0 { round_up(absolute + rounding) } else { 0.0 };
+    if convention.is_reversed() {
+        (round_up(1.0 + relative), offset)
+    } else {
+        (-round_up(relative - 1.0), -offset)
     }
 }
 
@@ -164,7 +188,7 @@ fn halves_size(rows: &ViewRows) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::image::{DepthConvention, ImageSize};
+    use crate::input::image::ImageSize;
 
     /// The slack is never less than what was asked for.
     /// A factor that is rounded to nearest would be too small half of the time.

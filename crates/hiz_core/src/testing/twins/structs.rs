@@ -6,6 +6,7 @@ use std::mem::offset_of;
 use super::declared;
 use crate::cull::explain::ExplanationRecord;
 use crate::cull::history::FrameUniform;
+use crate::cull::pixels::CountingUniform;
 use crate::cull::view_uniform::ViewUniform;
 use crate::input::bounds::{Bounds, Floats};
 use crate::instances::SEQUENCE_BYTES;
@@ -16,6 +17,7 @@ use crate::output::bins::{BinRecord, EmitUniform, TotalRecord};
 use crate::output::counters::{CounterRecord, StatisticsRecord};
 use crate::output::draw::DrawIndexedIndirect;
 use crate::output::mesh_table::TemplateRecord;
+use crate::output::pixels::PixelCounts;
 use crate::output::survivors::SurvivorsRecord;
 use crate::output::views::JoinUniform;
 use crate::pyramid::PyramidUniform;
@@ -41,9 +43,12 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     "Flat",
     "MaskPlace",
     "Outcome",
+    "PixelPlanes",
     "Projected",
+    "Slope",
     "SupportingPlane",
     "SupportingPlanes",
+    "Sure",
     "Value",
     "Volume",
     "Word",
@@ -87,6 +92,9 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         twin!("Counters", CounterRecord {
             "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid,
         }),
+        twin!("Counting", CountingUniform {
+            "budget" = budget, "negligible" = negligible, "padding" = padding,
+        }),
         twin!("DrawIndexedIndirect", DrawIndexedIndirect {
             "index_count" = index_count, "instance_count" = instance_count,
             "first_index" = first_index, "base_vertex" = base_vertex,
@@ -119,6 +127,10 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         }),
         twin!("Piece", PieceUniform {
             "base" = base, "count" = count, "index" = index, "words" = words,
+        }),
+        twin!("PixelCounts", PixelCounts {
+            "touched" = touched, "hidden" = hidden, "inside" = inside, "open" = open,
+            "undecided" = undecided,
         }),
         twin!("Pyramid", PyramidUniform {
             "levels" = levels, "origins" = origins, "chunk_shift" = chunk_shift,
@@ -155,7 +167,8 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "descent_budget" = descent_budget, "depth_offset" = depth_offset,
             "coordinate_limit" = coordinate_limit, "lod_end" = lod_end,
             "lod_needs" = lod_needs,
-            "source_origin" = source_origin, "padding_0" = padding_0, "padding_1" = padding_1,
+            "source_origin" = source_origin, "near_factor" = near_factor,
+            "near_offset" = near_offset, "padding" = padding,
         }),
         twin!("YardstickLevel", yardstick::PlainLevel {
             "offset" = offset, "stride" = stride, "width" = width, "height" = height,
