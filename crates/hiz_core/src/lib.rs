@@ -169,6 +169,7 @@ pub use wgpu;
 
 pub use context::HizContext;
 pub use cull::among::{Among, AmongMask};
+pub use cull::approximate::Approximate;
 pub use cull::history::{EarlySet, Temporal};
 pub use cull::lod::LodRule;
 pub use cull::options::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
@@ -203,6 +204,7 @@ pub use output::draw::{DrawIndexedIndirect, DrawIndirect, DrawTemplate, VertexDr
 pub use output::emit::{Emit, Placement};
 pub use output::mesh_table::{Lod, LodDraw, MAX_LODS, MeshLods, MeshTable};
 pub use output::outputs::Outputs;
+pub use output::pixels::PixelCounts;
 pub use output::readback::{Answer, AnswerInFlight, ReadbackRing};
 pub use output::verdict::Verdict;
 pub use output::views::{MAX_VIEWS, ViewsOutputs, VisibleViews};

@@ -7,6 +7,7 @@ use crate::cull::pipelines::{
     BinKey, Candidates, DepthStore, EmitKey, FramePass, cull_boxes_module, cull_members_module,
     flat_module,
 };
+use crate::cull::pixels::pixels_module;
 use crate::cull::refine::{refine_groups_module, refine_module};
 use crate::gpu::clock_check::clock_check_module;
 use crate::gpu::depth_source::SOURCES;
@@ -124,6 +125,7 @@ pub(super) fn all() -> Vec<(String, Source)> {
     for store in stores {
         for kind in KINDS {
             all.push((format!("explain {store:?} {kind:?}"), explain_module(store, kind)));
+            all.push((format!("pixels {store:?} {kind:?}"), pixels_module(store, kind)));
         }
         #[cfg(feature = "yardstick")]
         all.push((format!("uncertified cull {store:?}"), uncertified_module(store)));
