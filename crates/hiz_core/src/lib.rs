@@ -184,6 +184,7 @@ pub use input::depth_kind::DepthKind;
 pub use input::depth_numbers::DepthNumbers;
 pub use input::image::{DepthConvention, ImageSize, MAX_IMAGE_SIDE};
 pub use input::mesh::{FaceCull, MeshData};
+pub use input::near_slack::NearSlack;
 pub use input::projection::{Pose, Projection};
 pub use input::tolerance::DepthTolerance;
 pub use input::view::ERROR_ULPS;

@@ -287,8 +287,8 @@ impl DepthStore {
     pub(crate) fn code(self) -> u32 {
         match self {
             Self::Apart(source) => source as u32,
-            Self::Atlas => 5,
-            Self::Nowhere => 6,
+            Self::Atlas => 6,
+            Self::Nowhere => 7,
         }
     }
 
@@ -296,9 +296,8 @@ impl DepthStore {
     pub(crate) fn layout(self, gpu: &Gpu) -> Result<wgpu::BindGroupLayout> {
         use Binding::{Depth, Read, ReadQuads, Sampler, Uniform};
         match self {
-            Self::Apart(source) => gpu.layout(
-                "hiz.cull.view_layout",
-                &[
+            Self::Apart(source) => {
+                let bindings = [
                     (0, Depth(source)),
                     (1, Sampler),
                     (2, Uniform),
@@ -306,8 +305,11 @@ impl DepthStore {
                     (4, Read),
                     (5, Read),
                     (6, Uniform),
-                ],
-            ),
+                    (7, Depth(source)),
+                ];
+                let images = if source == SourceKind::Pair { 2 } else { 1 };
+                gpu.layout("hiz.cull.view_layout", &bindings[..6 + images])
+            }
             Self::Atlas => {
                 gpu.layout("hiz.cull.atlas_layout", &[(2, Uniform), (3, ReadQuads), (6, Uniform)])
             }

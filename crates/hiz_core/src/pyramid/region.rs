@@ -31,7 +31,7 @@ pub(crate) fn record_reduce_region(
              builds it",
         )
     })?;
-    let part = Part::new(depth, Sampling::Single, pyramid.size(), "pyramid")?;
+    let part = Part::new(depth, Sampling::Single, (pyramid.size(), "pyramid"), pyramid.depths())?;
     if part != built.part {
         return Err(Error::mismatch(
             "depth",
