@@ -41,6 +41,18 @@ impl SourceKind {
         }
     }
 
+    /// The shader files that read blocks of it for a reduction.
+    pub(crate) fn quad_files(self) -> &'static [File] {
+        match self {
+            Self::Depth | Self::Float => &[wgsl!("gpu/quads_sampled"), wgsl!("gpu/quads_whole")],
+            Self::DepthPart | Self::FloatPart => {
+                &[wgsl!("gpu/quads_sampled"), wgsl!("gpu/quads_part")]
+            }
+            Self::Bits => &[wgsl!("gpu/quads_bits")],
+            Self::Pair => &[wgsl!("gpu/quads_pair")],
+        }
+    }
+
     /// The type of its binding; `multisampled`: of a texture with several samples per pixel.
     pub(crate) fn binding(self, multisampled: bool) -> wgpu::BindingType {
         let view_dimension = wgpu::TextureViewDimension::D2;

@@ -33,7 +33,6 @@ impl FarPixels {
     }
 }
 
-
 impl Conversion<'_> {
     /// Tells the far pixels of converted rows apart, the first of which is row `first`.
     pub(super) fn tell_apart(&self, first: u32, out: &mut [f32]) {

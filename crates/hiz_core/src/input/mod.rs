@@ -16,6 +16,7 @@ pub(crate) mod mesh;
 pub(crate) mod near_slack;
 pub(crate) mod projection;
 mod quick;
+pub(crate) mod seen_points;
 pub(crate) mod stretch;
 pub(crate) mod tolerance;
 pub(crate) mod view;

@@ -68,6 +68,7 @@ fn reduce_module(source: SourceKind, ends: EndFiles, entry: File) -> Source {
     Source::of(&[
         &[wgsl!("gpu/depth_bits")],
         source.files(),
+        source.quad_files(),
         ends.files(),
         &[wgsl!("pyramid/pyramid"), wgsl!("pyramid/pyramid_write"), entry],
     ])
@@ -194,7 +195,7 @@ impl Prepared {
 
     /// Records the pass.
     /// `workgroups` says how many of those of a step there are.
-    fn record(
+    pub(super) fn record(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         steps: &Steps,
