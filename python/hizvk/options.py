@@ -95,8 +95,23 @@ def _flag_or_none(name: str, value: object) -> bool | None:
     return None if value is None else bool(value)
 
 
+def _hierarchy(name: str, value: object) -> bool | int | None:
+    if value is None or isinstance(value, (bool, np.bool_)):
+        return None if value is None else bool(value)
+    if not isinstance(value, (int, np.integer)):
+        got = _arguments.describe(value)
+        raise TypeError(f"{name}: expected True, False, None or a number of tiers, got {got}")
+    return _arguments.integer(name, value, low=0, high=3)
+
+
 def _capacity(name: str, value: object) -> int | None:
     return None if value is None else _arguments.integer(name, value, low=0, high=_LARGEST_U32)
+
+
+def _pixel_budget(name: str, value: object) -> int | None:
+    if value is None:
+        return None
+    return _arguments.integer(name, value, low=1, high=_LARGEST_U32)
 
 
 def _draw(name: str, value: object) -> DrawTemplate | None:
@@ -254,6 +269,7 @@ class CullOptions:
     guard_px : float, optional
         Pixels by which bounds grow in the image: a multiple of 1/256, at most 16.
         None: 0 for ``coverage="area"``, 1/64 for ``coverage="sample"``.
+        Of `Points`, None is 1/2 and 1: the pixels of the four centres around a point are read.
     depth_slack : float
         Relative error of the depth image, 0 to 0.5.
         The default, 2^-23, is one ulp: it covers depth that was rounded to float32.
@@ -280,11 +296,16 @@ class CullOptions:
         texel their own depth there.
 
         The latter keeps less and computes more; with a descent it goes down to single pixels.
-    hierarchy : bool, optional
+    hierarchy : bool or int, optional
         Whether groups of 64 neighbouring instances are tested first.
         Only instances of the groups that remain are then tested one by one.
         None: where there are enough instances for it to pay.
 
+        A number says how many tiers of boxes are tested, 0..3; True is 1, the boxes of groups.
+        With 2, boxes around 64 groups are tested before them, and with 3 boxes around 64 of these.
+        Where there are too few instances for so many tiers, there are fewer.
+
+        With a pyramid of both ends, a box that surely shows keeps all that it holds, untested.
         What is kept differs by next to nothing, because the test of a group may read other texels.
         `CullResult.stats` says how many tests were spent.
     statistics : bool
@@ -323,7 +344,7 @@ class CullOptions:
     footprint: int = field(default=2, metadata=_by(_footprint))
     descent: int = field(default=0, metadata=_by(_arguments.integer, low=0, high=65536))
     fit: Fit = field(default="rectangle", metadata=_by(_arguments.choice, choices=words(Fit)))
-    hierarchy: bool | None = field(default=None, metadata=_by(_flag_or_none))
+    hierarchy: bool | int | None = field(default=None, metadata=_by(_hierarchy))
     statistics: bool = field(default=False, metadata=_by(_arguments.flag))
     lod: LodRule | None = field(default=None, metadata=_by(lod_rule))
 
@@ -351,6 +372,14 @@ class Outputs:
     draws : bool, optional
         The indirect draw arguments.
         None: as for `indices`.
+    pixels : bool
+        In how many pixels each instance is hidden, and in how many it may show
+        (`CullResult.pixels`).
+        A pass of its own looks at all instances, down to single pixels.
+    pixel_budget : int, optional
+        How many rows of four texels that pass may read for each instance, 1 to 2^32 - 1.
+        The pixels that are left count as ``inside`` and ``undecided``.
+        None: as many as it takes.
     capacity : int, optional
         The most instances in the list, 0 to 2^32 - 1; None leaves room for all.
         Too small a capacity shows as ``count < demand``; mask and verdicts stay complete.
@@ -386,6 +415,8 @@ class Outputs:
     verdicts: bool = field(default=True, metadata=_by(_arguments.flag))
     indices: bool | None = field(default=None, metadata=_by(_flag_or_none))
     draws: bool | None = field(default=None, metadata=_by(_flag_or_none))
+    pixels: bool = field(default=False, metadata=_by(_arguments.flag))
+    pixel_budget: int | None = field(default=None, metadata=_by(_pixel_budget))
     capacity: int | None = field(default=None, metadata=_by(_capacity))
     draw: DrawTemplate | None = field(default=None, metadata=_by(_draw))
     meshes: Sequence[MeshLods] | None = field(default=None, metadata=_by(_meshes))
@@ -422,7 +453,7 @@ class OptionKeywords(TypedDict, total=False):
     footprint: int
     descent: int
     fit: Fit
-    hierarchy: bool | None
+    hierarchy: bool | int | None
     statistics: bool
     lod: LodRule | None
 
@@ -430,6 +461,7 @@ class OptionKeywords(TypedDict, total=False):
 class CullKeywords(OptionKeywords, total=False):
     """The keywords of `Device.cull`: those of `CullOptions`, and these of `Outputs`."""
 
+    pixel_budget: int | None
     capacity: int | None
     draw: DrawTemplate | None
     meshes: Sequence[MeshLods] | None
@@ -439,7 +471,7 @@ class CullKeywords(OptionKeywords, total=False):
 
 _OPTIONS: Final = CullOptions()
 _OUTPUTS: Final = Outputs()
-#: The outputs of each set of names; there are sixteen of them.
+#: The outputs of each set of names; there are 32 of them.
 _NAMED: Final[dict[frozenset[str], Outputs]] = {}
 
 
@@ -457,7 +489,7 @@ def cull_request(
 ) -> tuple[CullOptions, Outputs]:
     """Both objects of a cull, from what `Device.cull` was given."""
     _arguments.refuse_unknown(keywords, CullKeywords.__annotations__)
-    names = ("capacity", "draw", "meshes", "emit", "placement")
+    names = ("pixel_budget", "capacity", "draw", "meshes", "emit", "placement")
     of_outputs = {name: keywords[name] for name in names if name in keywords}
     of_options = {name: keywords[name] for name in keywords if name not in of_outputs}
     if outputs is None:

@@ -80,6 +80,12 @@ impl Culling {
         self.0.run(py, bin).map(|indices| PyArray1::from_vec(py, indices))
     }
 
+    /// The counts of pixels one after the other, five u32 each.
+    fn pixels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
+        let counts = self.0.run(py, |culling| culling.pixels())?;
+        Ok(PyArray1::from_slice(py, bytemuck::cast_slice(&counts)))
+    }
+
     fn counts(&self, py: Python<'_>) -> PyResult<Counts> {
         Ok(Counts::of(&self.0.run(py, |culling| culling.counts())?))
     }
@@ -171,7 +177,9 @@ pub(crate) struct Counts {
     demand: u64,
     written: u64,
     tested_groups: u64,
+    tested_boxes: [u64; 3],
     tested_instances: u64,
+    accepted_instances: u64,
     levels: [u64; 16],
     texels_read: u64,
 }
@@ -189,7 +197,9 @@ impl Counts {
             demand: counts.demand,
             written: counts.written,
             tested_groups: counts.tested_groups,
+            tested_boxes: counts.tested_boxes,
             tested_instances: counts.tested_instances,
+            accepted_instances: counts.accepted_instances,
             levels: counts.levels,
             texels_read: counts.texels_read,
         }

@@ -3,8 +3,8 @@
 //! The struct expressions name every field, so that an option without its line does not compile.
 
 use hiz_core::{
-    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, LodRule, MeshTable, Order,
-    Outputs,
+    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, LodRule, MeshTable, MipDepths,
+    MipLookup, MipOptions, Order, Outputs,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -59,14 +59,38 @@ pub(crate) fn cull_options(given: &Bound<'_, PyAny>) -> PyResult<CullOptions> {
             "volume" => Fit::Volume,
             other => return Err(unknown("fit", other)),
         },
-        hierarchy: match given.getattr("hierarchy")?.extract()? {
-            None => Hierarchy::Auto,
-            Some(true) => Hierarchy::Always,
-            Some(false) => Hierarchy::Never,
-        },
+        hierarchy: hierarchy(&given.getattr("hierarchy")?)?,
         statistics: given.getattr("statistics")?.extract()?,
         lod: lod_rule(&given.getattr("lod")?)?,
     })
+}
+
+/// None, a bool, or a number of tiers.
+fn hierarchy(given: &Bound<'_, PyAny>) -> PyResult<Hierarchy> {
+    if given.is_none() {
+        return Ok(Hierarchy::Auto);
+    }
+    Ok(match given.extract::<bool>() {
+        Ok(true) => Hierarchy::Always,
+        Ok(false) => Hierarchy::Never,
+        Err(_) => Hierarchy::Tiers(given.extract()?),
+    })
+}
+
+/// Mip textures have level 0 here, since Python sees arrays alone.
+pub(crate) fn mip_options(depths: &str, lookup: &str) -> PyResult<MipOptions> {
+    let depths = match depths {
+        "farthest" => MipDepths::Farthest,
+        "nearest" => MipDepths::Nearest,
+        "both" => MipDepths::Both,
+        other => return Err(unknown("depths", other)),
+    };
+    let lookup = match lookup {
+        "normalized" => MipLookup::Normalized,
+        "edge_texel" => MipLookup::EdgeTexel,
+        other => return Err(unknown("lookup", other)),
+    };
+    Ok(MipOptions { depths, lookup, level_0: true, ..MipOptions::default() })
 }
 
 fn lod_rule(given: &Bound<'_, PyAny>) -> PyResult<LodRule> {
@@ -99,6 +123,8 @@ fn outputs(
         verdicts: given.getattr("verdicts")?.extract()?,
         indices: listed("indices")?,
         draws: listed("draws")?,
+        pixels: given.getattr("pixels")?.extract()?,
+        pixel_budget: given.getattr("pixel_budget")?.extract()?,
         capacity: given.getattr("capacity")?.extract()?,
         draw: draw_template(&given.getattr("draw")?)?,
         emit: emit(given, meshes)?,

@@ -195,6 +195,9 @@ pub(crate) fn volume(bounds: &Bounds<'_>, i: usize) -> Volume {
         Bounds::Boxes { min, max } => {
             Volume::Box { min: numbers(min, 3 * i), max: numbers(max, 3 * i) }
         }
+        Bounds::Points { positions } => {
+            Volume::Sphere { center: numbers(positions, 3 * i), radius: 0.0 }
+        }
         Bounds::OrientedBoxes { centers, half_sizes, rotations } => {
             let rows: [f64; 9] = numbers(rotations, 9 * i);
             Volume::OrientedBox {

@@ -66,7 +66,7 @@ def classify(
 
     Parameters
     ----------
-    bounds : Spheres, Boxes or OrientedBoxes
+    bounds : Spheres, Boxes, OrientedBoxes or Points
         The N volumes.
     camera : Camera
         The camera that saw `depth`.

@@ -108,7 +108,8 @@ fn explain_pipeline(gpu: &Gpu, key: &CullKey) -> Result<wgpu::ComputePipeline> {
     })
 }
 
-/// Records the explanation of instance `index`, or of the box around its group.
+/// Records the explanation of instance `index`, or of the box around it in a tier: 0 is that of its
+/// group.
 ///
 /// It goes into two storage buffers: `target`, an `ExplanationRecord`, and `readings`, as many
 /// [`Reading`]s as fit.
@@ -116,7 +117,7 @@ pub(crate) fn record_explain(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
     inputs: &CullInputs<'_>,
-    (index, whole_group): (u32, bool),
+    (index, tier): (u32, Option<usize>),
     [target, readings]: [&wgpu::Buffer; 2],
 ) -> Result<()> {
     let instances = inputs.instances;
@@ -129,12 +130,14 @@ pub(crate) fn record_explain(
     // The test of an instance is explained whether or not it was asked for.
     let mut seen = PreparedView::new(gpu, &CullInputs { among: None, ..*inputs }, None)?;
     let place = piece.order.place((index - piece.range.start) as usize);
-    let mut view = seen.bind(gpu, inputs.pyramid, whole_group)?;
-    let (which, records) = if whole_group {
-        seen.key = group_key(seen.key);
-        (place / GROUP, &piece.group_records)
-    } else {
-        (place, &piece.records)
+    let mut view = seen.bind(gpu, inputs.pyramid, tier.is_some())?;
+    let (which, records) = match tier {
+        None => (place, &piece.records),
+        Some(tier) => {
+            seen.key = group_key(seen.key);
+            let upper = tier.checked_sub(1).map(|above| &piece.upper[above].records);
+            (place / GROUP.pow(tier as u32 + 1), upper.unwrap_or(&piece.group_records))
+        }
     };
     let which = gpu.uniform("hiz.explain.which", &[which as u32, 0, 0, 0])?;
     let output = gpu.bind_group(

@@ -115,7 +115,13 @@ impl PreparedView {
         // Bad options are refused before anything is recorded.
         let view = ViewUniform {
             source_origin: packed(built.part.origin),
-            ..ViewUniform::new(camera, built.reduction, options, built.part.tolerance)?
+            ..ViewUniform::new(
+                camera,
+                instances.kind,
+                built.reduction,
+                options,
+                built.part.tolerance,
+            )?
         };
         check_culled(pyramid.depths())?;
         check_coverage(&built, options)?;

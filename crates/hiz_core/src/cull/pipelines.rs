@@ -34,9 +34,9 @@ pub(crate) struct CullKey {
 
 impl CullKey {
     /// The key of a pass that reads no depth.
-    pub(super) fn without_depth(kind: BoundsKind, sample_coverage: bool) -> Self {
+    pub(crate) fn without_depth(kind: BoundsKind, sample_coverage: bool) -> Self {
         Self {
-            store: DepthStore::Nowhere,
+            store: NO_DEPTH,
             kind,
             sample_coverage,
             // These have no effect, because no depth is read.
@@ -57,6 +57,8 @@ impl CullKey {
 pub(crate) struct ReportKey {
     pub(crate) mask: bool,
     pub(crate) verdicts: bool,
+    /// Whether some instances are absent.
+    pub(crate) absent: bool,
     pub(crate) emit: EmitKey,
     pub(crate) statistics: bool,
     pub(crate) pass: FramePass,
@@ -232,7 +234,8 @@ pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 9] {
         ("SAMPLE_COVERAGE", flag(key.sample_coverage)),
         ("FOOTPRINT_LOG2", f64::from(key.footprint_log2)),
         ("DESCENT", flag(key.descent)),
-        ("FIT_VOLUME", flag(key.fit_volume)),
+        // A point's rectangle is all there is of it.
+        ("FIT_VOLUME", flag(key.fit_volume && !key.kind.is_point())),
         ("AMONG", flag(key.among)),
         ("NEAREST", flag(key.nearest)),
         ("RECEIVERS", flag(key.receivers)),
@@ -249,6 +252,7 @@ pub(crate) fn report_constants(key: &ReportKey) -> Vec<(&'static str, f64)> {
     let mut constants = vec![
         ("MASK", flag(key.mask)),
         ("VERDICTS", flag(key.verdicts)),
+        ("ABSENT", flag(key.absent)),
         ("STATISTICS", flag(key.statistics)),
     ];
     constants.extend(key.emit.constants());
@@ -263,9 +267,10 @@ pub(crate) enum DepthStore {
     Apart(SourceKind),
     /// All levels from one texture.
     Atlas,
-    /// No depth is read: such a pass only finds what is outside.
-    Nowhere,
 }
+
+/// Where a pass reads depth that reads none (`no_depth.rs`).
+pub(crate) const NO_DEPTH: DepthStore = DepthStore::Atlas;
 
 impl DepthStore {
     /// The shader files that read it.
@@ -275,7 +280,6 @@ impl DepthStore {
                 [source.files(), &[wgsl!("gpu/ends_one"), wgsl!("pyramid/texels_apart")]].concat()
             }
             Self::Atlas => vec![wgsl!("pyramid/texels_atlas")],
-            Self::Nowhere => vec![wgsl!("pyramid/texels_nowhere")],
         }
     }
 
@@ -284,7 +288,6 @@ impl DepthStore {
         match self {
             Self::Apart(source) => source as u32,
             Self::Atlas => 5,
-            Self::Nowhere => 6,
         }
     }
 
@@ -307,7 +310,6 @@ impl DepthStore {
             Self::Atlas => {
                 gpu.layout("hiz.cull.atlas_layout", &[(2, Uniform), (3, ReadQuads), (6, Uniform)])
             }
-            Self::Nowhere => gpu.layout("hiz.cull.no_depth_layout", &[(2, Uniform), (6, Uniform)]),
         }
     }
 }
@@ -357,7 +359,7 @@ const LATE_SURVIVOR_BINDINGS: &[(u32, Binding)] = &[
     (4, Binding::Write),
 ];
 
-/// The bindings of the survivors, which a cull of members reads.
+/// The bindings of the survivors, which tests of what they hold read.
 pub(crate) const MEMBER_BINDINGS: &[(u32, Binding)] =
     &[(0, Binding::Read), (1, Binding::ReadTexels)];
 
@@ -378,6 +380,12 @@ pub(crate) fn decision_module(
         BoundsKind::Box => &[wgsl!("instances/bounds_box_support"), wgsl!("instances/bounds_box")],
         BoundsKind::OrientedBox => {
             &[wgsl!("instances/bounds_box_support"), wgsl!("instances/bounds_oriented_box")]
+        }
+        BoundsKind::Point => {
+            &[wgsl!("instances/bounds_point_support"), wgsl!("instances/bounds_point")]
+        }
+        BoundsKind::WidePoint => {
+            &[wgsl!("instances/bounds_point_support"), wgsl!("instances/bounds_wide_point")]
         }
     };
     Source::of(&[
@@ -436,10 +444,12 @@ pub(crate) fn flat_module(
     decision_module(store, kind, CERTIFIED, &flat_files(emit, pass))
 }
 
-/// The shader of the cull of groups.
-pub(crate) fn cull_groups_module(store: DepthStore, pass: FramePass) -> Source {
-    let shared = [wgsl!("instances/piece"), wgsl!("instances/groups"), wgsl!("output/statistics")];
-    let entry = [&shared, pass.group_files(), &[wgsl!("cull/cull_groups")]].concat();
+/// The shader of the cull of a tier's boxes: of all of them in the topmost tier, or of those that
+/// the survivors of the tier above hold.
+pub(crate) fn cull_boxes_module(store: DepthStore, pass: FramePass, is_top: bool) -> Source {
+    let shared = [wgsl!("instances/tier"), wgsl!("instances/groups"), wgsl!("output/statistics")];
+    let which = if is_top { wgsl!("cull/cull_groups") } else { wgsl!("cull/cull_children") };
+    let entry = [&shared, pass.group_files(), &[wgsl!("cull/cull_box"), which]].concat();
     unexplained(store, BoundsKind::Box, &entry)
 }
 
@@ -504,21 +514,28 @@ pub(crate) fn cull_pipeline(
     flat_pipeline(gpu, "hiz.cull.pipeline", module, key, report)
 }
 
-/// The cull of groups.
-pub(crate) fn cull_groups_pipeline(
+/// The cull of the boxes of a tier; of all of them if it is the topmost one.
+pub(crate) fn cull_boxes_pipeline(
     gpu: &Gpu,
     key: &CullKey,
     report: &ReportKey,
+    (tier, is_top): (u32, bool),
 ) -> Result<wgpu::ComputePipeline> {
     let mut constants = classify_constants(key).to_vec();
+    constants.push(("TIER", f64::from(tier)));
+    constants.push(("VERDICTS", flag(report.verdicts)));
     constants.push(("STATISTICS", flag(report.statistics)));
     constants.extend(report.pass.constant());
     let written = ("hiz.cull_groups.layout", report.pass.group_bindings());
+    let mut layouts = layouts(gpu, key.store, RECORD_BINDINGS, written)?.to_vec();
+    if !is_top {
+        layouts.push(gpu.layout("hiz.cull_members.layout", MEMBER_BINDINGS)?);
+    }
     gpu.compute_pipeline(&Compute {
         label: "hiz.cull_groups.pipeline",
-        source: cull_groups_module(key.store, report.pass),
-        entry_point: "cull_groups",
-        layouts: &layouts(gpu, key.store, RECORD_BINDINGS, written)?,
+        source: cull_boxes_module(key.store, report.pass, is_top),
+        entry_point: if is_top { "cull_groups" } else { "cull_children" },
+        layouts: &layouts,
         constants: &constants,
     })
 }

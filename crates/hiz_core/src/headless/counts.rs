@@ -24,10 +24,15 @@ pub struct Counts {
     pub demand: u64,
     /// As many indices as the lists hold.
     pub written: u64,
-    /// Groups that were tested as a whole.
+    /// Groups that were tested as a whole: the first of [`Counts::tested_boxes`].
     pub tested_groups: u64,
-    /// Instances that were tested by themselves: all, or the members of surviving groups.
+    /// Boxes that were tested, per tier: around 64 instances, around 4,096 and around 262,144.
+    pub tested_boxes: [u64; 3],
+    /// Instances that were tested by themselves: all, or the members of groups that were neither
+    /// hidden nor accepted.
     pub tested_instances: u64,
+    /// Instances of groups that were accepted as a whole, because all of their box surely shows.
+    pub accepted_instances: u64,
     /// Depth tests of groups and instances at each level; 0 without
     /// [`CullOptions::statistics`](crate::CullOptions::statistics).
     pub levels: [u64; 16],

@@ -14,8 +14,10 @@ mod lens;
 pub(crate) mod mesh;
 pub(crate) mod projection;
 mod quick;
+pub(crate) mod seen_points;
 pub(crate) mod stretch;
 pub(crate) mod tolerance;
 pub(crate) mod view;
 #[cfg(feature = "headless")]
 pub(crate) mod view_depth;
+pub(crate) mod world_tolerance;

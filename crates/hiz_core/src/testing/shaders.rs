@@ -4,22 +4,25 @@ use crate::cull::among::among_order_module;
 use crate::cull::count::count_module;
 use crate::cull::explain::explain_module;
 use crate::cull::pipelines::{
-    BinKey, Candidates, DepthStore, EmitKey, FramePass, cull_groups_module, cull_members_module,
+    BinKey, Candidates, DepthStore, EmitKey, FramePass, cull_boxes_module, cull_members_module,
     flat_module,
 };
+use crate::cull::pixels::pixels_module;
 use crate::cull::refine::{refine_groups_module, refine_module};
 use crate::gpu::clock_check::clock_check_module;
 use crate::gpu::depth_source::SOURCES;
 use crate::gpu::depth_source::SourceKind;
-use crate::gpu::shader::{FILES, Source};
+use crate::gpu::shader::{FILES, Source, wgsl};
 use crate::input::bounds::BoundsKind;
 use crate::instances::from_buffer::{FROM_BUFFER_KINDS, from_buffer_module};
+use crate::instances::tiers::form_tier_module;
 use crate::instances::update::update_module;
 use crate::occluders::device_raster::occluders_module;
 use crate::output::compact::{compact_module, copy_module};
 use crate::output::cut::{cut_module, emit_cut_module};
 use crate::output::emit_passes;
 use crate::output::views::join_module;
+use crate::pyramid::mips_passes::mips_module;
 use crate::pyramid::reduce::{EndFiles, blocks_module, coarse_module};
 use crate::pyramid::resolve::resolve_module;
 use crate::testing::lod::choose_lods_module;
@@ -27,8 +30,13 @@ use crate::testing::lod::choose_lods_module;
 use crate::yardstick::{uncertified_module, yardstick_modules};
 
 /// All kinds of bounds.
-pub(super) const KINDS: [BoundsKind; 3] =
-    [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
+pub(super) const KINDS: [BoundsKind; 5] = [
+    BoundsKind::Sphere,
+    BoundsKind::Box,
+    BoundsKind::OrientedBox,
+    BoundsKind::Point,
+    BoundsKind::WidePoint,
+];
 
 /// Every way to emit the kept instances, each with a shader of its own.
 pub(super) const EMITS: [(&str, EmitKey); 5] = [
@@ -72,11 +80,15 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("join_views".to_owned(), join_module()),
         ("clock_check".to_owned(), clock_check_module()),
         ("update".to_owned(), update_module()),
+        ("form_tier".to_owned(), form_tier_module()),
         ("occluders".to_owned(), occluders_module()),
         ("resolve Depth".to_owned(), resolve_module(SourceKind::Depth)),
         ("resolve Float".to_owned(), resolve_module(SourceKind::Float)),
+        ("snippets".to_owned(), snippets()),
     ];
     for source in SOURCES {
+        all.push((format!("mips {source:?}"), mips_module(source, false)));
+        all.push((format!("mips {source:?} both"), mips_module(source, true)));
         for ends in [EndFiles::One, EndFiles::Both] {
             all.push((format!("reduce {source:?} {ends:?}"), blocks_module(source, ends)));
             all.push((format!("reduce_coarse {source:?} {ends:?}"), coarse_module(source, ends)));
@@ -97,7 +109,10 @@ pub(super) fn all() -> Vec<(String, Source)> {
     let passes = [FramePass::Alone, FramePass::Late];
     let passes = stores.clone().flat_map(|store| passes.map(|pass| (store, pass)));
     for (store, pass) in passes.chain([early]) {
-        all.push((format!("cull_groups {store:?} {pass:?}"), cull_groups_module(store, pass)));
+        for (name, is_top) in [("cull_groups", true), ("cull_children", false)] {
+            let module = cull_boxes_module(store, pass, is_top);
+            all.push((format!("{name} {store:?} {pass:?}"), module));
+        }
         let emits: &[_] = if pass == FramePass::Alone { &EMITS } else { &EMITS_OF_TWO };
         for (kind, (way, emit)) in
             KINDS.into_iter().flat_map(|k| emits.iter().map(move |e| (k, *e)))
@@ -110,6 +125,7 @@ pub(super) fn all() -> Vec<(String, Source)> {
     for store in stores {
         for kind in KINDS {
             all.push((format!("explain {store:?} {kind:?}"), explain_module(store, kind)));
+            all.push((format!("pixels {store:?} {kind:?}"), pixels_module(store, kind)));
         }
         #[cfg(feature = "yardstick")]
         all.push((format!("uncertified cull {store:?}"), uncertified_module(store)));
@@ -119,6 +135,11 @@ pub(super) fn all() -> Vec<(String, Source)> {
     let from_buffer = |kind| (format!("from_buffer {kind:?}"), from_buffer_module(kind));
     all.extend(FROM_BUFFER_KINDS.map(from_buffer));
     all
+}
+
+/// What callers append to shaders of their own.
+fn snippets() -> Source {
+    Source::of(&[&[wgsl!("snippets/mip_lookup"), wgsl!("snippets/mip_cull")]])
 }
 
 #[cfg(test)]
@@ -183,7 +204,9 @@ pub(in crate::testing) mod tests {
                 };
                 assert!(function.expressions.iter().any(|(_, e)| is_xor(e)), "{bar}");
             }
-            assert_eq!(calls(&module, "load_volume", "bar3"), 2, "{kind:?}: d_hi and d_lo");
+            // Of a narrow point nothing is added to `d_hi` but a number of the view.
+            let bars = if kind == BoundsKind::Point { 1 } else { 2 };
+            assert_eq!(calls(&module, "load_volume", "bar3"), bars, "{kind:?}: d_hi and d_lo");
             assert_eq!(calls(&module, "surely_behind", "bar"), 1, "d - A");
             assert_eq!(
                 calls(&module, "occluding_depth", "bar"),
@@ -198,7 +221,7 @@ pub(in crate::testing) mod tests {
                 "the depth that slack has moved towards the eye"
             );
             assert_eq!(calls(&module, "surely_inside", "bar"), 2, "-A and 1 - A");
-            if kind != BoundsKind::Sphere {
+            if matches!(kind, BoundsKind::Box | BoundsKind::OrientedBox) {
                 assert_eq!(calls(&module, "extent_of", "bar"), 2, "low and high");
                 assert_eq!(calls(&module, "surely_after", "bar"), 1, "the edge");
                 assert_eq!(calls(&module, "surely_before", "bar"), 1, "the edge");

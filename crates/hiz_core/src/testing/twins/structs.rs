@@ -6,21 +6,25 @@ use std::mem::offset_of;
 use super::declared;
 use crate::cull::explain::ExplanationRecord;
 use crate::cull::history::FrameUniform;
+use crate::cull::pixels::CountingUniform;
 use crate::cull::view_uniform::ViewUniform;
 use crate::input::bounds::{Bounds, Floats};
 use crate::instances::SEQUENCE_BYTES;
 use crate::instances::from_buffer::FromBufferUniform;
 use crate::instances::piece::PieceUniform;
+use crate::instances::tiers::{FormUniform, TierUniform};
 use crate::instances::update::UpdateUniform;
 use crate::output::bins::{BinRecord, EmitUniform, TotalRecord};
 use crate::output::counters::{CounterRecord, StatisticsRecord};
 use crate::output::draw::DrawIndexedIndirect;
 use crate::output::mesh_table::TemplateRecord;
+use crate::output::pixels::PixelCounts;
 use crate::output::survivors::SurvivorsRecord;
 use crate::output::views::JoinUniform;
 use crate::pyramid::PyramidUniform;
 use crate::pyramid::layout::PYRAMID_CHUNKS;
 use crate::pyramid::levels::Level;
+use crate::pyramid::mips_bindings::{MipStepUniform, MipsUniform};
 use crate::pyramid::resolve::{BandUniform, ResolvedUniform};
 use crate::pyramid::steps::StepUniform;
 use crate::testing::lod::LodCase;
@@ -44,9 +48,12 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     "Flat",
     "MaskPlace",
     "Outcome",
+    "PixelPlanes",
     "Projected",
+    "Slope",
     "SupportingPlane",
     "SupportingPlanes",
+    "Sure",
     "Value",
     "Volume",
     "Word",
@@ -91,6 +98,9 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid,
             "unoccluded" = unoccluded,
         }),
+        twin!("Counting", CountingUniform {
+            "budget" = budget, "negligible" = negligible, "padding" = padding,
+        }),
         twin!("DrawIndexedIndirect", DrawIndexedIndirect {
             "index_count" = index_count, "instance_count" = instance_count,
             "first_index" = first_index, "base_vertex" = base_vertex,
@@ -122,8 +132,18 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         twin!("LodCase", LodCase {
             "mesh" = mesh, "count" = count, "scale" = scale, "padding" = padding,
         }),
+        twin!("Mips", MipsUniform {
+            "levels" = levels, "origin" = origin, "padding" = padding,
+        }),
+        twin!("MipStep", MipStepUniform {
+            "source" = source, "last" = last, "first" = first, "rows" = rows,
+        }),
         twin!("Piece", PieceUniform {
             "base" = base, "count" = count, "index" = index, "words" = words,
+        }),
+        twin!("PixelCounts", PixelCounts {
+            "touched" = touched, "hidden" = hidden, "inside" = inside, "open" = open,
+            "undecided" = undecided,
         }),
         twin!("Pyramid", PyramidUniform {
             "levels" = levels, "origins" = origins, "chunk_shift" = chunk_shift,
@@ -142,7 +162,17 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         }),
         twin!("Survivors", SurvivorsRecord {
             "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
-            "workgroups_z" = workgroups + 8, "count" = count,
+            "workgroups_z" = workgroups + 8, "count" = count, "tested" = tested,
+            "accepted" = accepted, "padding" = padding,
+        }),
+        twin!("Parents", SurvivorsRecord {
+            "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
+            "workgroups_z" = workgroups + 8, "count" = count, "tested" = tested,
+            "accepted" = accepted, "padding" = padding,
+        }),
+        twin!("Tier", TierUniform { "count" = count, "below" = below, "padding" = padding }),
+        twin!("FormTier", FormUniform {
+            "count" = count, "below" = below, "runtime_zero" = runtime_zero, "padding" = padding,
         }),
         twin!("Template", TemplateRecord {
             "count" = count, "first" = first, "base_vertex" = base_vertex, "padding" = padding,
@@ -232,6 +262,12 @@ fn records_lie_as_the_shaders_read_them() {
         half_sizes: Floats::F64(&[5.0, 6.0, 7.0]),
         rotations: Floats::F64(&[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
     });
+    let positions = centers;
+    assert_eq!(record(&Bounds::Points { positions }), [one, two, three, 77]);
+    let third = 1.0 / 3.0;
+    let (hi, lo) = (third as f32, (third - f64::from(third as f32)) as f32);
+    let wide = record(&Bounds::Points { positions: Floats::F64(&[third, 2.0, 3.0]) });
+    assert_eq!(wide, [hi.to_bits(), two, three, 77, lo.to_bits(), 0, 0, 0]);
     let texels = [[one, two, three, half_z], [0; 4], [0, half_x, 0, 0], [0, 0, half_y, 77]];
     assert_eq!(oriented, texels.concat());
 }
