@@ -1277,6 +1277,52 @@ TABLES: dict[str, Table] = {
     "Device.timed": Table(lambda device: (device.timed, {}), {}),
     "Device.wait": Table(lambda device: (device.wait, {}), {}),
     "DepthImage.numpy": Table(lambda device: (device.wait, {}), {}),
+    "mip_texel": Table(
+        lambda _: (hizvk.mip_texel, {"pixel": (0, 0), "level": 1, "size": (6, 8)}),
+        {
+            "pixel": [
+                ((6, 0), ValueError, "rows below 6 and columns below 8, got 0 to 6"),
+                ((0, -1), ValueError, "got -1 to 0"),
+                ((0.5, 1.0), TypeError, "expected (..., 2) integers"),
+                ((1, 2, 3), ValueError, "got (3,) int64"),
+                (3, ValueError, "got int 3"),
+                ([[1, 2], [3]], ValueError, "a ragged sequence"),
+                (None, TypeError, "got None"),
+            ],
+            "level": [
+                (4, ValueError, "expected an integer in 0..3, got int 4"),
+                (-1, ValueError, "got int -1"),
+                (1.0, TypeError, "got float 1.0"),
+            ],
+            "size": SIZE,
+            "lookup": [
+                ("edge", ValueError, 'expected one of "normalized", "edge_texel", got str'),
+                (None, TypeError, "got None"),
+            ],
+        },
+    ),
+    "wgsl": Table(
+        lambda _: (hizvk.wgsl, {}),
+        {
+            "name": [
+                ("mip", ValueError, 'expected one of "mip_lookup", "mip_cull"'),
+                (1, TypeError, "got int 1"),
+            ]
+        },
+    ),
+    "Pyramid.mips": Table(
+        lambda device: (device.pyramid(np.ones((6, 8)), camera(), kind="z").mips, {}),
+        {
+            "depths": [
+                ("all", ValueError, 'expected one of "farthest", "nearest", "both", got str'),
+                (None, TypeError, "got None"),
+            ],
+            "lookup": [
+                ("edge", ValueError, 'expected one of "normalized", "edge_texel", got str'),
+                (True, TypeError, "got bool True"),
+            ],
+        },
+    ),
     "Pyramid.level": Table(
         lambda device: (device.pyramid(np.ones((6, 8)), camera(), kind="z").level, {"k": 0}),
         {

@@ -88,6 +88,7 @@ from .errors import (
 from .explanation import Explanation, Verdict
 from .lod import LodByDistance, LodByError, LodBySize
 from .mesh import Mesh
+from .mips import mip_texel, wgsl
 from .occluders import (
     InnerBoxes,
     InnerPrisms,
@@ -174,11 +175,13 @@ __all__ = [
     "gather",
     "inner_boxes",
     "inner_prisms",
+    "mip_texel",
     "recommend",
     "reference",
     "select_occluders",
     "split_mesh",
     "visible",
+    "wgsl",
 ]
 
 

@@ -41,6 +41,8 @@ __all__ = [
     "check_proxy",
     "frustum_matrix",
     "let_go",
+    "mip_cull",
+    "mip_lookup",
     "options_text",
     "reference_classify",
     "reference_pyramid",
@@ -50,6 +52,8 @@ __all__ = [
 
 __version__: str
 __build__: str
+mip_cull: str
+mip_lookup: str
 takes_planted_faults: bool
 
 _Floats: TypeAlias = npt.NDArray[np.float32] | npt.NDArray[np.float64]
@@ -321,6 +325,7 @@ class Pyramid:
     def num_levels(self) -> int: ...
     def stored_levels(self) -> tuple[int, int] | None: ...
     def read_level(self, k: int) -> tuple[_Size, npt.NDArray[np.float32]]: ...
+    def mips(self, depths: str, lookup: str) -> list[tuple[_Size, npt.NDArray[np.float32]]]: ...
     def device_bytes(self) -> int: ...
 
 @final
@@ -452,6 +457,7 @@ class Yardstick:
         self, depth: DepthImage, rectangle: tuple[int, int, int, int]
     ) -> YardstickReduction: ...
     def resolve(self, camera: Camera, samples: int) -> YardstickReduction: ...
+    def mips(self, depth: DepthImage, depths: str, lookup: str) -> YardstickReduction: ...
     def frames(
         self,
         instances: Instances,

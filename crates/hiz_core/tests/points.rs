@@ -147,7 +147,7 @@ fn a_point_takes_sixteen_bytes_where_float32_holds_it() {
     let singles: Vec<f32> = numbers.iter().map(|v| *v as f32).collect();
     let mut wide = numbers.clone();
     wide[777] = 0.1;
-    // 48 bytes for each 64 are the boxes of the groups.
+    // 48 bytes for each 64 are the boxes of the groups, and as many for each 64 of these.
     for (positions, kind, bytes) in [
         (Floats::F32(&singles), BoundsKind::Point, 16),
         (Floats::F64(&numbers), BoundsKind::Point, 16),
@@ -155,7 +155,7 @@ fn a_point_takes_sixteen_bytes_where_float32_holds_it() {
     ] {
         let instances = upload(&engine, positions);
         assert_eq!(instances.kind(), kind);
-        assert_eq!(instances.device_bytes(), 65_536 * bytes + 1024 * 48, "{kind:?}");
+        assert_eq!(instances.device_bytes(), 65_536 * bytes + (1024 + 16) * 48, "{kind:?}");
     }
 }
 
@@ -289,7 +289,8 @@ fn points_pass_everywhere_where_spheres_do() {
                 };
                 let told = |instances: &Arc<Instances>, among: bool| {
                     let asked = engine.among(instances, &AmongSource::Mask(&asked)).unwrap();
-                    let extras = CullExtras { among: among.then_some(&asked), ahead: false };
+                    let extras =
+                        CullExtras { among: among.then_some(&asked), ..CullExtras::default() };
                     let culling = engine
                         .cull_given(instances, &camera, &pyramid, &options, &Outputs::ALL, &extras)
                         .unwrap();

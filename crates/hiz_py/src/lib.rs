@@ -70,6 +70,14 @@ mod _core {
     #[expect(non_upper_case_globals, reason = "the name is Python's")]
     const takes_planted_faults: bool = cfg!(feature = "testing");
 
+    /// WGSL for shaders of the user's own.
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "the name is Python's")]
+    const mip_lookup: &str = hiz_core::MIP_LOOKUP;
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "the name is Python's")]
+    const mip_cull: &str = hiz_core::MIP_CULL;
+
     #[pymodule_init]
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
         use numpy::PyArrayMethods;

@@ -66,6 +66,7 @@ mod in_flight;
 mod joined;
 mod kept_depth;
 mod levels;
+mod mips;
 mod process;
 mod ranges;
 pub(crate) mod readback;

@@ -37,6 +37,7 @@ use crate::output::views;
 use crate::output::visible::VERDICT_MULTIPLE;
 use crate::pyramid::layout::{BLOCK_ALIGNMENT, BLOCK_LOG2, HEADERS, PIXELS};
 use crate::pyramid::levels::MAX_LEVELS;
+use crate::pyramid::mips_passes;
 use crate::pyramid::reduce::{REDUCE_WORKGROUP, SHARED_LEVEL, TALL_SIDE};
 use crate::pyramid::resolve;
 use crate::testing::lod;
@@ -154,6 +155,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("output/verdict", "VERDICT_MASK", int(VERDICT_MASK)),
         ("pyramid/levels", "MANTISSA_BITS", int(f32::MANTISSA_DIGITS - 1)),
         ("pyramid/levels", "EXPONENT_BIAS", f64::from(f32::MAX_EXP - 1)),
+        ("pyramid/mips", "WORKGROUP", int(mips_passes::WORKGROUP)),
         ("pyramid/pyramid", "MAX_LEVELS", MAX_LEVELS as f64),
         ("pyramid/pyramid_write", "WORKGROUP", int(REDUCE_WORKGROUP)),
         ("pyramid/pyramid_write", "SIDE_LOG2", int(TALL_SIDE.ilog2())),
@@ -178,7 +180,6 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     // All bits of a run.
     ("cull/early", &["WHOLE_RUN"]),
     ("cull/refine", &["REFINED"]),
-    ("instances/groups", &["NEAREST", "UNOCCLUDED"]),
     ("cull/unoccluded", &["HALF_PIXEL"]),
     ("gpu/clock_check", &["LEFT", "RIGHT", "LEFT_AGAIN"]),
     ("cull/refine_groups", &["LAST_TEXEL", "WITHIN"]),
@@ -380,6 +381,9 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("explain", line(1)),
         ("form_tier", line(tiers::WORKGROUP)),
         ("join_views", line(views::WORKGROUP)),
+        ("mip_blocks", line(mips_passes::WORKGROUP)),
+        ("mip_level_0", line(mips_passes::WORKGROUP)),
+        ("mip_tail", line(mips_passes::WORKGROUP)),
         ("occluder_vertex", [0; 3]),
         ("reduce", line(REDUCE_WORKGROUP)),
         ("reduce_buffer", line(yardstick::BUFFER_WORKGROUP)),
