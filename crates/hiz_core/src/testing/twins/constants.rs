@@ -11,6 +11,7 @@ use crate::cull::history::HISTORY_BEGIN;
 use crate::cull::lod::LodRule;
 use crate::cull::pipelines::{Candidates, CullKey, DepthStore, FramePass, ReportKey};
 use crate::cull::pipelines::{classify_constants, flat_module, report_constants};
+use crate::cull::pixels;
 use crate::cull::refine;
 use crate::cull::view_uniform::COORDINATE_BITS;
 use crate::gpu::clock_check;
@@ -87,6 +88,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/outcome", "AT_DESCENT", stage(Stage::Descent)),
         ("cull/outcome", "AT_LEVEL", stage(Stage::Level)),
         ("cull/outcome", "AT_FRONT", stage(Stage::Front)),
+        ("cull/pixels", "WORKGROUP", int(pixels::WORKGROUP)),
         ("cull/refine", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/refine_groups", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/supporting_planes", "LARGEST_BITS", bits(LARGEST)),
@@ -179,6 +181,8 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/lod", &["NEEDS", "NEED_FACTOR", "LARGEST_DEVIATION"]),
     // All bits of a run.
     ("cull/early", &["WHOLE_RUN"]),
+    ("cull/pixels", &["STEP", "TOP_TEXELS", "ROW_BITS", "ROW_MASK", "NO_BORDER"]),
+    ("cull/pixels_planes", &["FACE_PLANES", "NO_PLANE"]),
     ("cull/refine", &["REFINED"]),
     ("cull/unoccluded", &["HALF_PIXEL"]),
     ("gpu/clock_check", &["LEFT", "RIGHT", "LEFT_AGAIN"]),
@@ -202,6 +206,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
             "EDGES",
             "FACES",
             "CANDIDATES",
+            "OUTLINES",
             "EDGES_OF_AXIS_LOG2",
             "BORDER_TOLERANCE",
             "RADIUS_FACTOR",
@@ -220,6 +225,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
             "RING",
             "RING_ANGLES",
             "CANDIDATES",
+            "OUTLINES",
             "TURN",
         ],
     ),
@@ -375,6 +381,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("emit_top", line(emit_passes::WORKGROUP)),
         ("copy_records", line(SCATTER_WORKGROUP)),
         ("count", line(count::LANES)),
+        ("count_of_pixels", line(pixels::WORKGROUP)),
         ("cull", line(GROUP as u32)),
         ("cull_children", line(CULL_WORKGROUP)),
         ("cull_groups", line(CULL_WORKGROUP)),
