@@ -406,18 +406,17 @@ fn the_other_answers_stay_as_they_are() {
         seed: 66,
         rounds: 1,
         volumes: 16,
-        modes: ALL_MODES,
+        kinds: BOXES,
         any_slack: true,
         ..Campaign::default()
     };
     let pipelines = Pipelines::Few;
     let (mut found, mut grouped) = (0, 0);
-    for (coverage, fit) in [
-        (Coverage::Area, Fit::Rectangle),
-        (Coverage::Sample, Fit::Rectangle),
-        (Coverage::Sample, Fit::Volume),
+    for (coverage, fit, modes) in [
+        (Coverage::Area, Fit::Rectangle, PLAIN),
+        (Coverage::Sample, Fit::Volume, DESCENT),
     ] {
-        let campaign = Campaign { coverage, fit, ..campaign };
+        let campaign = Campaign { coverage, fit, modes, ..campaign };
         for mut round in campaign.rounds().flat_map(|r| [r.copied().barely_covered(), r]) {
             let engine = &engine();
             let image = round.depth.clone();
@@ -438,7 +437,7 @@ fn the_other_answers_stay_as_they_are() {
             grouped += shown.claimed;
         }
     }
-    assert!(found > 100 && grouped > 100, "{found} {grouped}");
+    assert!(found > 30 && grouped > 30, "{found} {grouped}");
 }
 
 /// In every arithmetic that WGSL permits, no answer is false.
