@@ -348,8 +348,10 @@ fn the_walk_down_the_nearest_end_is_complete() {
     let forgets = ("if (at.x & last_child) < last_child && at.x < end.x {", "if false {");
     assert_red("a column forgotten", &rounds_of(POSTS, BOXES, DESCENT), &[forgets]);
     let ends = (
-        "    var decided = far_bits();\n    loop {\n        if left == 0u {\n            return false;",
-        "    var decided = far_bits();\n    loop {\n        if left == 0u {\n            return true;",
+        "    var decided = far_bits();\n    loop {\n        if left == 0u {\n            \
+         return false;",
+        "    var decided = far_bits();\n    loop {\n        if left == 0u {\n            \
+         return true;",
     );
     assert_red("the budget's end", &rounds_of(POSTS, BOXES, SHORT), &[ends]);
     let outside = ("if !hidden && !in_front && is_inside && level", "if !hidden && level");
