@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 #: The parameters that take arrays, vectors or matrices.
 ARRAYS = [
+    ("Points", "positions"),
     ("Spheres", "centers"),
     ("Spheres", "radii"),
     ("Boxes", "min"),
@@ -52,6 +53,7 @@ ARRAYS = [
     ("LodBySize", "pixels"),
     ("visible", "depth"),
     ("reference.classify", "depth"),
+    ("reference.unoccluded", "depth"),
     ("reference.pyramid", "depth"),
     ("compare", "mask"),
     ("split_mesh", "vertices"),
@@ -60,6 +62,8 @@ ARRAYS = [
     ("inner_boxes", "vertices"),
     ("inner_prisms", "up"),
     ("compare", "truth"),
+    ("compare_unoccluded", "verdicts"),
+    ("compare_unoccluded", "truth"),
     ("Camera.look_at", "eye"),
     ("Camera.look_at", "target"),
     ("Camera.look_at", "up"),
@@ -191,7 +195,7 @@ def test_any_array_is_an_answer_or_a_named_error(device: hizvk.Device, data: st.
     answer = attempt(device, function, parameter, value)
     if answer is None:
         return
-    if isinstance(answer, hizvk.Spheres | hizvk.Boxes | hizvk.OrientedBoxes):
+    if isinstance(answer, hizvk.Spheres | hizvk.Boxes | hizvk.OrientedBoxes | hizvk.Points):
         # Accepted bounds can be culled, and invalid bounds are kept.
         instances = device.instances(answer)
         camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(6, 8), near=0.1)

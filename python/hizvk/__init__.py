@@ -64,6 +64,7 @@ from typing import TYPE_CHECKING, Any
 from . import reference
 from ._core import __version__
 from .adapter import Adapter, adapters
+from .approximate import ApproximateResult
 from .bounds import Boxes, OrientedBoxes, Points, Spheres
 from .camera import Camera
 from .check import (
@@ -88,6 +89,7 @@ from .errors import (
 from .explanation import Explanation, Verdict
 from .lod import LodByDistance, LodByError, LodBySize
 from .mesh import Mesh
+from .mips import mip_texel, wgsl
 from .occluders import (
     InnerBoxes,
     InnerPrisms,
@@ -100,11 +102,15 @@ from .occluders import (
 )
 from .oneline import visible
 from .options import CullOptions, DrawTemplate, MeshLods, Outputs
+from .pixels import PIXELS_DTYPE, visible_fraction
+from .points import PointColours, colour_points, depth_from_points
+from .projection import Projected, gather
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import ABSENT, DRAW_DTYPE, NO_LOD, CullResult
 from .stats import CullStats
 from .temporal import PassResult, Temporal
 from .timing import StageTime, StageTimes
+from .tolerance import Tolerance
 from .views import ViewsResult
 
 if TYPE_CHECKING:
@@ -114,7 +120,9 @@ __all__ = [
     "ABSENT",
     "DRAW_DTYPE",
     "NO_LOD",
+    "PIXELS_DTYPE",
     "Adapter",
+    "ApproximateResult",
     "BoundsCheck",
     "Boxes",
     "Camera",
@@ -145,7 +153,9 @@ __all__ = [
     "OutOfMemoryError",
     "Outputs",
     "PassResult",
+    "PointColours",
     "Points",
+    "Projected",
     "ProxyCheck",
     "Pyramid",
     "Recommendation",
@@ -154,6 +164,7 @@ __all__ = [
     "StageTime",
     "StageTimes",
     "Temporal",
+    "Tolerance",
     "UnoccludedComparison",
     "Verdict",
     "ViewsResult",
@@ -161,15 +172,21 @@ __all__ = [
     "adapters",
     "check_bounds",
     "check_proxy",
+    "colour_points",
     "compare",
     "compare_unoccluded",
+    "depth_from_points",
+    "gather",
     "inner_boxes",
     "inner_prisms",
+    "mip_texel",
     "recommend",
     "reference",
     "select_occluders",
     "split_mesh",
     "visible",
+    "visible_fraction",
+    "wgsl",
 ]
 
 

@@ -21,13 +21,14 @@ from ._on_device import check_owner
 from ._processes import driver_is_asked
 from ._types import FaceCull, Rasteriser, StoredOrder, words
 from .adapter import Adapter
+from .approximate import ApproximateResult
 from .bounds import Bounds, are_points, as_arrays
 from .camera import Camera
 from .drawing import Drawing, chosen, limit
 from .errors import LimitError
 from .hints import Question
 from .mesh import as_meshes
-from .options import cull_request
+from .options import Outputs, cull_options, cull_request
 from .renewal import Source
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import CullResult
@@ -47,7 +48,8 @@ if TYPE_CHECKING:
     from ._types import DepthKind, Levels, Output
     from .depth import DepthArray
     from .mesh import MeshLike
-    from .options import CullKeywords, CullOptions, MeshLods, Outputs
+    from .options import CullKeywords, CullOptions, MeshLods, OptionKeywords
+    from .tolerance import Tolerance
     from .views import _AmongLike
 
 __all__ = ["Device"]
@@ -426,6 +428,7 @@ class Device:
         kind: None = None,
         scale: float = 1.0,
         invalid: None = None,
+        tolerance: None = None,
         levels: Levels = None,
     ) -> Pyramid: ...
 
@@ -438,6 +441,7 @@ class Device:
         kind: DepthKind,
         scale: float = 1.0,
         invalid: Collection[float] | None = None,
+        tolerance: Tolerance | None = None,
         levels: Levels = None,
     ) -> Pyramid: ...
 
@@ -449,6 +453,7 @@ class Device:
         kind: DepthKind | None = None,
         scale: float = 1.0,
         invalid: Collection[float] | None = None,
+        tolerance: Tolerance | None = None,
         levels: Levels = None,
     ) -> Pyramid:
         """Builds the depth pyramid of a depth image.
@@ -492,6 +497,11 @@ class Device:
             None: those that are usual for its dtype, which are 0 and 65535 for uint16, 65504 (the
             greatest) for float16, and none for float32 and float64.
             ``()``: none beside those that never are depth.
+        tolerance : Tolerance, optional
+            How far the depths of the array may be off, in the world.
+            The upload moves them away from the eye by so much, and the promise holds for the moved
+            image.
+            None: they stay where they are.
         levels : int or pair of int, optional
             Which levels are built, of 1 to 15; level 0, the image itself, is always there.
 
@@ -524,6 +534,12 @@ class Device:
                     got = _arguments.describe(value)
                     expected = "nothing beside a DepthImage, which has its own"
                     raise TypeError(f"{name}: expected {expected}, got {got}")
+            if tolerance is not None:
+                got = _arguments.describe(tolerance)
+                raise TypeError(
+                    "tolerance: expected None beside a DepthImage, whose depth stays; to move it "
+                    f"pass depth.numpy(), depth.camera and kind=depth.kind, got {got}"
+                )
             if _arguments.number("scale", scale, above=0.0) != 1.0:
                 raise ValueError(
                     f"scale: expected 1 beside a DepthImage, whose depth is NDC, got {scale:g}"
@@ -534,7 +550,7 @@ class Device:
             return Pyramid(self, built, depth.camera, source, is_rendered=True)
         camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")
         self._check_side(camera)
-        samples = checked_samples("depth", depth, camera, kind, scale, invalid)
+        samples = checked_samples("depth", depth, camera, kind, scale, invalid, tolerance)
         return self._pyramid_of(samples, camera, stored, invalid)
 
     def _pyramid_of(
@@ -609,7 +625,8 @@ class Device:
             Sizes and conventions may differ.
         options : CullOptions, optional
             How the cull decides; None takes the defaults.
-        outputs : Outputs, or a collection of "mask", "verdicts", "indices", "draws"; optional
+        outputs : Outputs or a collection; optional
+            Of "mask", "verdicts", "indices", "draws" and "pixels".
             What the cull makes: less costs less.
             A collection names all that is made.
             None makes mask and verdicts, and the list and the draw arguments by the time that they
@@ -634,8 +651,8 @@ class Device:
             A third one waits in this call, without the interpreter lock, until the oldest is done.
             A result that was dropped counts no more.
         **keywords
-            Any field of `CullOptions`, and of `Outputs` `capacity`, `draw`, `meshes`, `emit` and
-            `placement`.
+            Any field of `CullOptions`, and of `Outputs` `pixel_budget`, `capacity`, `draw`,
+            `meshes`, `emit` and `placement`.
             They take the place of those fields of `options` and `outputs`:
             ``cull(crowd, camera, hiz, order="any", capacity=1000)``.
 
@@ -674,7 +691,9 @@ class Device:
                 restriction,
                 not wait,
             )
-            return CullResult(self, culling, Question(camera, pyramid, options, instances._are_sizeless))
+            return CullResult(
+                self, culling, Question(camera, pyramid, options, instances._are_sizeless)
+            )
         cameras, pyramids = pairs(camera, pyramid, self)
         for number, (one, of) in enumerate(zip(cameras, pyramids, strict=True)):
             if one != of.camera:
@@ -699,6 +718,68 @@ class Device:
             for one, of in zip(cameras, pyramids, strict=True)
         ]
         return ViewsResult(self, culled, questions)
+
+    def cull_approximate(
+        self,
+        instances: Instances,
+        camera: Camera,
+        pyramid: Pyramid,
+        options: CullOptions | None = None,
+        *,
+        negligible_px: int,
+        **keywords: Unpack[OptionKeywords],
+    ) -> ApproximateResult:
+        """Culls what is hidden, and what can show in at most a few pixels.
+
+        It counts the pixels of every instance first, so it takes longer than `cull`.
+        It pays where what is kept is expensive to draw.
+
+        Parameters
+        ----------
+        instances : Instances
+            Of this device.
+        camera : Camera
+            The camera of the pyramid.
+        pyramid : Pyramid
+            Of this device.
+        options : CullOptions, optional
+            How the cull decides; None takes the defaults.
+        negligible_px : int
+            An instance is culled if it can show in at most so many pixels, 0 to 2^32 - 1.
+        **keywords
+            Any field of `CullOptions`; they take the place of those fields of `options`.
+
+        Returns
+        -------
+        ApproximateResult
+            `ApproximateResult.pixels_lost` bounds the pixels by which a picture can differ.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+        LimitError, OutOfMemoryError
+            If the device cannot hold the counts.
+        """
+        _arguments.instance("instances", instances, Instances, "Instances of Device.instances")
+        check_owner("instances", instances, self)
+        _arguments.instance("camera", camera, Camera, "a Camera")
+        _arguments.instance("pyramid", pyramid, Pyramid, "a Pyramid of Device.pyramid")
+        check_owner("pyramid", pyramid, self)
+        if camera != pyramid.camera:
+            raise ValueError(_other_camera("camera", camera, pyramid))
+        options = cull_options(options, keywords)
+        negligible = _arguments.integer("negligible_px", negligible_px, low=0, high=2**32 - 1)
+        _check_coverage("coverage", options, pyramid)
+        culling = self._engine.cull_approximate(
+            instances._inner,
+            camera._inner,
+            pyramid._inner,
+            options,
+            Outputs(verdicts=False),
+            negligible,
+        )
+        return ApproximateResult(self, culling, negligible)
 
     def temporal(self, instances: Instances, *, early_capacity: int | None = None) -> Temporal:
         """Makes the two passes of a view, which draw each frame what was visible, then the rest.

@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use crate::cull::among::{Among, AmongMask, record_among};
+use crate::cull::approximate::{Approximate, record_cull_approximate};
 use crate::cull::early::record_early;
 use crate::cull::history::{EarlySet, Temporal};
 use crate::cull::inputs::CullInputs;
@@ -19,7 +20,7 @@ use crate::gpu::device::Gpu;
 use crate::gpu::stage_times::{StageTimer, StageTimesInFlight, record_stage_times};
 use crate::input::bounds::{Bounds, BoundsKind};
 use crate::input::camera::Camera;
-use crate::input::image::ImageSize;
+use crate::input::image::{DepthConvention, ImageSize};
 use crate::input::mesh::MeshData;
 use crate::instances::from_buffer::{BoundsBuffer, record_instances_from, record_update_from};
 use crate::instances::piece::CULL_WORKGROUP;
@@ -35,6 +36,8 @@ use crate::output::outputs::Outputs;
 use crate::output::readback::{AnswerInFlight, ReadbackRing, record_readback};
 use crate::output::views::{ViewsOutputs, VisibleViews};
 use crate::output::visible::Visible;
+use crate::pyramid::mips::{MipOptions, MipTexture};
+use crate::pyramid::mips_passes::record_mips;
 use crate::pyramid::reduce::record_reduce;
 use crate::pyramid::region::record_reduce_region;
 use crate::pyramid::resolve::{DepthResolve, ResolveOptions, record_resolve};
@@ -559,6 +562,42 @@ impl HizContext {
         record_reduce_region(&self.gpu, encoder, &depth.into(), rectangle, pyramid)
     }
 
+    /// Makes a texture with mip levels of depth, for depth images of `size` pixels.
+    ///
+    /// It is for shaders of the caller's own, such as screen-space reflections.
+    /// No cull of this crate reads it.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] for a size of 0.
+    /// - [`Error::Limit`] for a size beyond the device's textures, and for levels beyond one
+    ///   storage binding.
+    /// - [`Error::OutOfMemory`].
+    pub fn create_mip_texture(&self, size: ImageSize, options: &MipOptions) -> Result<MipTexture> {
+        MipTexture::new(&self.gpu, size, options)
+    }
+
+    /// Records the passes that fill `mips` from a depth image of its size.
+    ///
+    /// `depth` is what [`record_reduce`](Self::record_reduce) takes: the same formats, usages and
+    /// parts of textures.
+    /// Level 0 is the depth as given; no tolerance of its format is added.
+    /// Shaders that run in later passes of the same encoder read the new levels.
+    ///
+    /// # Errors
+    /// - [`Error::Mismatch`] for sizes or devices that disagree and for a destroyed texture.
+    /// - [`Error::Invalid`] for other formats and usages, and for several layers, mip levels or
+    ///   samples of which none is named.
+    /// - [`Error::OutOfMemory`].
+    pub fn record_mips<'a>(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        depth: impl Into<DepthSource<'a>>,
+        convention: DepthConvention,
+        mips: &MipTexture,
+    ) -> Result<()> {
+        record_mips(&self.gpu, encoder, &depth.into(), convention, mips)
+    }
+
     /// Records the cull of `instances` against `pyramid`; the buffers of `visible` take what it
     /// finds.
     ///
@@ -587,6 +626,40 @@ impl HizContext {
             &CullInputs::new(instances, camera, pyramid, options),
             visible,
         )
+    }
+
+    /// Makes the buffers of an approximate cull; `outputs` are those of what it keeps.
+    ///
+    /// # Errors
+    /// Those of [`create_visible`](Self::create_visible).
+    pub fn create_approximate(
+        &self,
+        instances: &Instances,
+        outputs: &Outputs,
+    ) -> Result<Approximate> {
+        Approximate::new(&self.gpu, instances, outputs)
+    }
+
+    /// Records a cull of what is hidden and of what can show in at most `negligible_px` pixels.
+    ///
+    /// Its result is not that of a certified cull: what it leaves out may show.
+    /// [`Approximate::pixels`] says how much of it.
+    ///
+    /// # Errors
+    /// Those of [`record_cull`](Self::record_cull).
+    #[expect(clippy::too_many_arguments, reason = "as record_cull, and negligible_px")]
+    pub fn record_cull_approximate(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &Instances,
+        camera: &Camera,
+        pyramid: &Pyramid,
+        approximate: &Approximate,
+        options: &CullOptions,
+        negligible_px: u32,
+    ) -> Result<()> {
+        let inputs = CullInputs::new(instances, camera, pyramid, options);
+        record_cull_approximate(&self.gpu, encoder, &inputs, approximate, negligible_px)
     }
 
     /// Makes the two passes of a view: the buffers that they fill, and its history.

@@ -3,8 +3,8 @@
 //! The struct expressions name every field, so that an option without its line does not compile.
 
 use hiz_core::{
-    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, LodRule, MeshTable, Order,
-    Outputs,
+    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, LodRule, MeshTable, MipDepths,
+    MipLookup, MipOptions, Order, Outputs,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -77,6 +77,22 @@ fn hierarchy(given: &Bound<'_, PyAny>) -> PyResult<Hierarchy> {
     })
 }
 
+/// Mip textures have level 0 here, since Python sees arrays alone.
+pub(crate) fn mip_options(depths: &str, lookup: &str) -> PyResult<MipOptions> {
+    let depths = match depths {
+        "farthest" => MipDepths::Farthest,
+        "nearest" => MipDepths::Nearest,
+        "both" => MipDepths::Both,
+        other => return Err(unknown("depths", other)),
+    };
+    let lookup = match lookup {
+        "normalized" => MipLookup::Normalized,
+        "edge_texel" => MipLookup::EdgeTexel,
+        other => return Err(unknown("lookup", other)),
+    };
+    Ok(MipOptions { depths, lookup, level_0: true, ..MipOptions::default() })
+}
+
 fn lod_rule(given: &Bound<'_, PyAny>) -> PyResult<LodRule> {
     if given.is_none() {
         return Ok(LodRule::Finest);
@@ -107,6 +123,8 @@ fn outputs(
         verdicts: given.getattr("verdicts")?.extract()?,
         indices: listed("indices")?,
         draws: listed("draws")?,
+        pixels: given.getattr("pixels")?.extract()?,
+        pixel_budget: given.getattr("pixel_budget")?.extract()?,
         capacity: given.getattr("capacity")?.extract()?,
         draw: draw_template(&given.getattr("draw")?)?,
         emit: emit(given, meshes)?,

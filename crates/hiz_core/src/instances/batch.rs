@@ -12,9 +12,8 @@ use wgpu::WriteOnly;
 use crate::input::bounds::{Bounds, BoundsKind, Floats};
 use crate::instances::aabb::Aabb;
 use crate::instances::point::{PointRecord, WidePointRecord};
-use crate::instances::volume_record::{
-    BoxRecord, LARGEST, OrientedBoxRecord, SphereRecord, write_absent,
-};
+use crate::instances::volume_record::{BoxRecord, LARGEST, OrientedBoxRecord, SphereRecord};
+use crate::instances::write_record::write_absent;
 
 /// Members of a full group: as many as a `u64` has bits.
 /// Twin: `shaders/instances/groups.wgsl`, `GROUP`.

@@ -9,72 +9,6 @@
 //! Their record fails a test in the shader; the instance is kept visible and counted as invalid.
 
 use crate::host::rounding::{round_up, split, sum_up, sum_up_difference};
-use crate::input::bounds::{Bounds, BoundsKind};
-use crate::instances::point::{PointRecord, WidePointRecord};
-
-impl BoundsKind {
-    /// Bytes of one record on the device.
-    ///
-    /// They are 32 for a sphere, 48 for a box, 64 for an oriented box.
-    /// A point takes 16, and 32 if its position needs two float32.
-    pub fn record_bytes(self) -> u64 {
-        (match self {
-            Self::Sphere => size_of::<SphereRecord>(),
-            Self::Box => size_of::<BoxRecord>(),
-            Self::OrientedBox => size_of::<OrientedBoxRecord>(),
-            Self::Point => size_of::<PointRecord>(),
-            Self::WidePoint => size_of::<WidePointRecord>(),
-        }) as u64
-    }
-}
-
-impl Bounds<'_> {
-    /// Writes the record of instance `i` with the caller's `index`.
-    /// The length of `out` is that of a record, and says how wide a point's is.
-    /// Returns false for invalid bounds.
-    pub(crate) fn write_record(&self, i: usize, index: u32, out: &mut [u8]) -> bool {
-        match *self {
-            Self::Spheres { centers, radii } => {
-                write(out, index, SphereRecord::new(centers.array(i), radii.get(i)))
-            }
-            Self::Boxes { min, max } => {
-                write(out, index, BoxRecord::new(min.array(i), max.array(i)))
-            }
-            Self::OrientedBoxes { centers, half_sizes, rotations } => write(
-                out,
-                index,
-                OrientedBoxRecord::new(centers.array(i), half_sizes.array(i), rotations.array(i)),
-            ),
-            Self::Points { positions } if out.len() == size_of::<PointRecord>() => {
-                write(out, index, PointRecord::new(positions.array(i)))
-            }
-            Self::Points { positions } => {
-                write(out, index, WidePointRecord::new(positions.array(i)))
-            }
-        }
-    }
-}
-
-/// Writes the record of an absent instance of a kind into `out`, with the caller's `index`.
-pub(super) fn write_absent(kind: BoundsKind, index: u32, out: &mut [u8]) {
-    fn write<R: Record>(out: &mut [u8], index: u32) {
-        out.copy_from_slice(bytemuck::bytes_of(&R::ABSENT.numbered(index)));
-    }
-    match kind {
-        BoundsKind::Sphere => write::<SphereRecord>(out, index),
-        BoundsKind::Box => write::<BoxRecord>(out, index),
-        BoundsKind::OrientedBox => write::<OrientedBoxRecord>(out, index),
-        BoundsKind::Point => write::<PointRecord>(out, index),
-        BoundsKind::WidePoint => write::<WidePointRecord>(out, index),
-    }
-}
-
-fn write<R: Record>(out: &mut [u8], index: u32, record: R) -> bool {
-    let is_valid = record.is_valid();
-    let record = if is_valid { record } else { R::INVALID };
-    out.copy_from_slice(bytemuck::bytes_of(&record.numbered(index)));
-    is_valid
-}
 
 /// Sizes and coordinates must stay below this, or the bounds are invalid.
 /// Then no product in the shader overflows.
@@ -183,7 +117,7 @@ impl SphereRecord {
         Self { center_hi, radius, center_lo, index }
     }
 
-    fn new(center: [f64; 3], radius: f64) -> Self {
+    pub(super) fn new(center: [f64; 3], radius: f64) -> Self {
         let p = Position::new(center);
         // The stored centre is off by at most the 1-norm of the rests.
         let moved = p.rest.iter().fold(0.0, |sum, r| sum_up(sum, *r));
@@ -238,7 +172,7 @@ impl BoxRecord {
         Self { padding_2: 1.0, ..self }
     }
 
-    fn new(min: [f64; 3], max: [f64; 3]) -> Self {
+    pub(super) fn new(min: [f64; 3], max: [f64; 3]) -> Self {
         // Halved first, because min + max may overflow.
         let center: [f64; 3] = std::array::from_fn(|k| 0.5 * min[k] + 0.5 * max[k]);
         let p = Position::new(center);
@@ -293,7 +227,7 @@ impl OrientedBoxRecord {
     /// Neither this rounding nor the rest of the centre is added to the sizes.
     /// A flat box has no size that could take it, so the error bound covers both
     /// (`docs/accuracy.md`).
-    fn new(center: [f64; 3], half_size: [f64; 3], rotation: [f64; 9]) -> Self {
+    pub(super) fn new(center: [f64; 3], half_size: [f64; 3], rotation: [f64; 9]) -> Self {
         let p = Position::new(center);
         #[expect(
             clippy::cast_possible_truncation,
@@ -353,7 +287,7 @@ impl Record for OrientedBoxRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::bounds::Floats;
+    use crate::input::bounds::{Bounds, Floats};
 
     const TINY: f64 = 1.0 / 9_007_199_254_740_992.0; // 2^-53
 

@@ -12,6 +12,8 @@
 //!    and `built` remembers the image.
 //!    `region` does the same for a part that has changed.
 //! 4. `atlas` copies all levels into one texture for large culls.
+//! 5. `mips` is a texture with mip levels, for shaders of the caller's own: `mips_plan` plans it,
+//!    `mips_bindings` holds what its passes bind, and `mips_passes` records them.
 //!
 //! Passes are recorded into the caller's encoder; nothing here submits, waits or reads back.
 
@@ -22,6 +24,10 @@ pub(crate) mod ends;
 pub(crate) mod layout;
 pub(crate) mod level_texels;
 pub(crate) mod levels;
+pub(crate) mod mips;
+pub(crate) mod mips_bindings;
+pub(crate) mod mips_passes;
+pub(crate) mod mips_plan;
 pub(crate) mod reduce;
 pub(crate) mod region;
 pub(crate) mod resolve;
@@ -65,6 +71,12 @@ const _: () = assert!(size_of::<PyramidUniform>() == 528);
 /// For how many depth images bind groups are kept, by reductions and by culls.
 /// A renderer may alternate between a few.
 const KEPT_IMAGES: usize = 3;
+
+/// What tells the bind groups of reductions apart: the image, that of nearest samples, the kind.
+pub(crate) type SourceKey = (Subresource, Option<wgpu::Texture>, SourceKind);
+
+/// What a reduction binds for an image, with the views of both images.
+pub(crate) type BoundSource = (wgpu::BindGroup, wgpu::TextureView, Option<wgpu::TextureView>);
 
 /// Labels of the stand-ins that are bound for the chunks that a small pyramid does not have.
 const NO_CHUNK: [&str; PYRAMID_CHUNKS] = ["hiz.no_chunk_0", "hiz.no_chunk_1", "hiz.no_chunk_2"];
@@ -155,7 +167,7 @@ pub struct Pyramid {
     /// The view of a cull, for instances and for groups.
     pub(crate) view: RecordedUniform,
     /// What reductions bind for a depth image, and the view of it that they bind.
-    pub(crate) sources: Kept<(Subresource, SourceKind), (wgpu::BindGroup, wgpu::TextureView)>,
+    pub(crate) sources: Kept<SourceKey, BoundSource>,
     /// What the steps of a reduction bind.
     pub(crate) steps: Steps,
     /// The same for reductions of a part; made by the first of them.
@@ -360,7 +372,9 @@ impl Pyramid {
     /// # Errors
     /// [`Error::Mismatch`] for a destroyed depth image.
     pub(crate) fn check_source(gpu: &Gpu, built: &Built) -> Result<()> {
-        gpu.view(built.source.texture()).map(drop).map_err(|error| match error {
+        let views = [&built.source].into_iter().chain(&built.nearest);
+        let mut textures = views.map(wgpu::TextureView::texture);
+        textures.try_for_each(|texture| gpu.view(texture).map(drop)).map_err(|error| match error {
             Error::Device(why) => Error::mismatch(
                 "pyramid",
                 format!(

@@ -11,6 +11,7 @@ use crate::cull::history::HISTORY_BEGIN;
 use crate::cull::lod::LodRule;
 use crate::cull::pipelines::{Candidates, CullKey, DepthStore, FramePass, ReportKey};
 use crate::cull::pipelines::{classify_constants, flat_module, report_constants};
+use crate::cull::pixels;
 use crate::cull::refine;
 use crate::cull::view_uniform::COORDINATE_BITS;
 use crate::gpu::clock_check;
@@ -37,6 +38,7 @@ use crate::output::views;
 use crate::output::visible::VERDICT_MULTIPLE;
 use crate::pyramid::layout::{BLOCK_ALIGNMENT, BLOCK_LOG2, HEADERS, PIXELS};
 use crate::pyramid::levels::MAX_LEVELS;
+use crate::pyramid::mips_passes;
 use crate::pyramid::reduce::{REDUCE_WORKGROUP, SHARED_LEVEL, TALL_SIDE};
 use crate::pyramid::resolve;
 use crate::testing::lod;
@@ -86,6 +88,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/outcome", "AT_DESCENT", stage(Stage::Descent)),
         ("cull/outcome", "AT_LEVEL", stage(Stage::Level)),
         ("cull/outcome", "AT_FRONT", stage(Stage::Front)),
+        ("cull/pixels", "WORKGROUP", int(pixels::WORKGROUP)),
         ("cull/refine", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/refine_groups", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/supporting_planes", "LARGEST_BITS", bits(LARGEST)),
@@ -154,6 +157,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("output/verdict", "VERDICT_MASK", int(VERDICT_MASK)),
         ("pyramid/levels", "MANTISSA_BITS", int(f32::MANTISSA_DIGITS - 1)),
         ("pyramid/levels", "EXPONENT_BIAS", f64::from(f32::MAX_EXP - 1)),
+        ("pyramid/mips", "WORKGROUP", int(mips_passes::WORKGROUP)),
         ("pyramid/pyramid", "MAX_LEVELS", MAX_LEVELS as f64),
         ("pyramid/pyramid_write", "WORKGROUP", int(REDUCE_WORKGROUP)),
         ("pyramid/pyramid_write", "SIDE_LOG2", int(TALL_SIDE.ilog2())),
@@ -177,8 +181,9 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/lod", &["NEEDS", "NEED_FACTOR", "LARGEST_DEVIATION"]),
     // All bits of a run.
     ("cull/early", &["WHOLE_RUN"]),
+    ("cull/pixels", &["STEP", "TOP_TEXELS", "ROW_BITS", "ROW_MASK", "NO_BORDER"]),
+    ("cull/pixels_planes", &["FACE_PLANES", "NO_PLANE"]),
     ("cull/refine", &["REFINED"]),
-    ("instances/groups", &["NEAREST", "UNOCCLUDED"]),
     ("cull/unoccluded", &["HALF_PIXEL"]),
     ("gpu/clock_check", &["LEFT", "RIGHT", "LEFT_AGAIN"]),
     ("cull/refine_groups", &["LAST_TEXEL", "WITHIN"]),
@@ -201,6 +206,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
             "EDGES",
             "FACES",
             "CANDIDATES",
+            "OUTLINES",
             "EDGES_OF_AXIS_LOG2",
             "BORDER_TOLERANCE",
             "RADIUS_FACTOR",
@@ -219,6 +225,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
             "RING",
             "RING_ANGLES",
             "CANDIDATES",
+            "OUTLINES",
             "TURN",
         ],
     ),
@@ -373,6 +380,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("emit_top", line(emit_passes::WORKGROUP)),
         ("copy_records", line(SCATTER_WORKGROUP)),
         ("count", line(count::LANES)),
+        ("count_of_pixels", line(pixels::WORKGROUP)),
         ("cull", line(GROUP as u32)),
         ("cull_children", line(CULL_WORKGROUP)),
         ("cull_groups", line(CULL_WORKGROUP)),
@@ -380,6 +388,9 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("explain", line(1)),
         ("form_tier", line(tiers::WORKGROUP)),
         ("join_views", line(views::WORKGROUP)),
+        ("mip_blocks", line(mips_passes::WORKGROUP)),
+        ("mip_level_0", line(mips_passes::WORKGROUP)),
+        ("mip_tail", line(mips_passes::WORKGROUP)),
         ("occluder_vertex", [0; 3]),
         ("reduce", line(REDUCE_WORKGROUP)),
         ("reduce_buffer", line(yardstick::BUFFER_WORKGROUP)),

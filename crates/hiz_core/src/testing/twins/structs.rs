@@ -6,6 +6,7 @@ use std::mem::offset_of;
 use super::declared;
 use crate::cull::explain::ExplanationRecord;
 use crate::cull::history::FrameUniform;
+use crate::cull::pixels::CountingUniform;
 use crate::cull::view_uniform::ViewUniform;
 use crate::input::bounds::{Bounds, Floats};
 use crate::instances::SEQUENCE_BYTES;
@@ -17,11 +18,13 @@ use crate::output::bins::{BinRecord, EmitUniform, TotalRecord};
 use crate::output::counters::{CounterRecord, StatisticsRecord};
 use crate::output::draw::DrawIndexedIndirect;
 use crate::output::mesh_table::TemplateRecord;
+use crate::output::pixels::PixelCounts;
 use crate::output::survivors::SurvivorsRecord;
 use crate::output::views::JoinUniform;
 use crate::pyramid::PyramidUniform;
 use crate::pyramid::layout::PYRAMID_CHUNKS;
 use crate::pyramid::levels::Level;
+use crate::pyramid::mips_bindings::{MipStepUniform, MipsUniform};
 use crate::pyramid::resolve::{BandUniform, ResolvedUniform};
 use crate::pyramid::steps::StepUniform;
 use crate::testing::lod::LodCase;
@@ -45,9 +48,12 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     "Flat",
     "MaskPlace",
     "Outcome",
+    "PixelPlanes",
     "Projected",
+    "Slope",
     "SupportingPlane",
     "SupportingPlanes",
+    "Sure",
     "Value",
     "Volume",
     "Word",
@@ -92,6 +98,9 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid,
             "unoccluded" = unoccluded,
         }),
+        twin!("Counting", CountingUniform {
+            "budget" = budget, "negligible" = negligible, "padding" = padding,
+        }),
         twin!("DrawIndexedIndirect", DrawIndexedIndirect {
             "index_count" = index_count, "instance_count" = instance_count,
             "first_index" = first_index, "base_vertex" = base_vertex,
@@ -123,8 +132,18 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         twin!("LodCase", LodCase {
             "mesh" = mesh, "count" = count, "scale" = scale, "padding" = padding,
         }),
+        twin!("Mips", MipsUniform {
+            "levels" = levels, "origin" = origin, "padding" = padding,
+        }),
+        twin!("MipStep", MipStepUniform {
+            "source" = source, "last" = last, "first" = first, "rows" = rows,
+        }),
         twin!("Piece", PieceUniform {
             "base" = base, "count" = count, "index" = index, "words" = words,
+        }),
+        twin!("PixelCounts", PixelCounts {
+            "touched" = touched, "hidden" = hidden, "inside" = inside, "open" = open,
+            "undecided" = undecided,
         }),
         twin!("Pyramid", PyramidUniform {
             "levels" = levels, "origins" = origins, "chunk_shift" = chunk_shift,
