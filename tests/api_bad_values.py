@@ -464,7 +464,10 @@ OPTIONS: dict[str, list[Bad]] = {
     "footprint": FOOTPRINT,
     "descent": DESCENT,
     "fit": FIT,
-    "hierarchy": FLAG_OR_NONE,
+    "hierarchy": [
+        ("auto", TypeError, "expected True, False, None or a number of tiers, got str"),
+        (4, ValueError, "expected an integer in 0..3, got int 4"),
+    ],
     "statistics": FLAG,
     "lod": [
         (1.0, TypeError, "expected a LodByError, LodByDistance, LodBySize or None, got float 1.0"),
@@ -1348,6 +1351,31 @@ TABLES: dict[str, Table] = {
             ],
         },
     ),
+    "compare_unoccluded": Table(
+        lambda _: (
+            hizvk.compare_unoccluded,
+            {"verdicts": np.array([4, 2], dtype=np.uint8), "truth": [True, True]},
+        ),
+        {
+            "verdicts": [
+                (np.array([4, 2]), TypeError, "expected uint8 (N,), got (2,) int64"),
+                (np.ones((2, 1), dtype=np.uint8), ValueError, "got (2, 1) uint8"),
+                (np.array([4, 9], dtype=np.uint8), ValueError, "codes of hizvk.Verdict, got 9"),
+                (None, TypeError, "got None"),
+            ],
+            "truth": [
+                ([True], ValueError, "expected bool (2,), got (1,) bool"),
+                (np.array([1.0, 0.0]), TypeError, "got (2,) float64"),
+                (np.array([6], dtype=np.uint8), ValueError, "expected uint8 (2,), got (1,) uint8"),
+                (
+                    np.array([6, 1], dtype=np.uint8),
+                    ValueError,
+                    "codes of hizvk.reference.unoccluded (5, 6, 3, 4), got 1",
+                ),
+                (None, TypeError, "got None"),
+            ],
+        },
+    ),
     "adapters": Table(lambda _: (hizvk.adapters, {}), {}),
     "reference.classify": Table(
         lambda _: (
@@ -1368,6 +1396,21 @@ TABLES: dict[str, Table] = {
             ],
         },
     ),
+    "reference.unoccluded": Table(
+        lambda _: (
+            hizvk.reference.unoccluded,
+            {"bounds": spheres(), "camera": camera(), "depth": np.ones((6, 8)), "kind": "z"},
+        ),
+        {
+            "bounds": BOUNDS,
+            "camera": CAMERA,
+            "depth": [*IMAGE, (None, TypeError, "got None")],
+            "kind": KIND,
+            "scale": SCALE,
+            "invalid": INVALID,
+            "coverage": COVERAGE,
+        },
+    ),
     "reference.pyramid": Table(
         lambda _: (hizvk.reference.pyramid, {"depth": np.ones((6, 8)), "reversed_z": False}),
         {
@@ -1385,6 +1428,7 @@ TABLES: dict[str, Table] = {
 MADE_BY_THE_PACKAGE = {
     "Adapter",
     "Comparison",
+    "UnoccludedComparison",
     "CullResult",
     "CullStats",
     "DepthImage",

@@ -65,7 +65,7 @@ OTHERS: dict[str, tuple[Any, str]] = {
     "footprint": (np.int64(8), "footprint: Eight"),
     "descent": (7, "descent: 7"),
     "fit": ("volume", "fit: Volume"),
-    "hierarchy": (np.bool_(False), "hierarchy: Never"),
+    "hierarchy": (np.int64(2), "hierarchy: Tiers(2)"),
     "statistics": (True, "statistics: true"),
     "lod": (hizvk.LodByError(0.5), "lod: Error { pixels: 0.5 }"),
     "mask": (False, "mask: false"),

@@ -7,7 +7,8 @@ How data flows, and which object holds it::
     depth array (kind= says what it holds)     └─> DepthImage
                       │                                │
                       └──────── Device.pyramid ────────┴─> Pyramid ─┐
-    Spheres, Boxes, OrientedBoxes ─ Device.instances ─> Instances ──┤ Device.cull
+    Spheres, Boxes, OrientedBoxes,                                  │
+    Points ───────────────── Device.instances ─> Instances ─────────┤ Device.cull
     Camera ─────────────────────────────────────────────────────────┤
     CullOptions, Outputs ───────────────────────────────────────────┘
                                                                     │
@@ -23,6 +24,7 @@ The other instances are appended to the list that an indirect draw takes.
 The promise: for the numbers as given, whatever could show in a pixel of the depth image is kept.
 `reference` holds the oracle, which is slow and exact.
 `compare` counts false culls, of which there are none, and false keeps, which are a cost.
+`compare_unoccluded` does the same for what a cull says surely shows.
 A small depth image holds for larger ones if it was rendered with ``conservative=True``.
 `check_proxy` and `check_bounds` say whether occluders and bounds are what they should be.
 `split_mesh`, `inner_boxes`, `inner_prisms` and `select_occluders` make occluders of meshes.
@@ -63,9 +65,18 @@ from . import reference
 from ._core import __version__
 from .adapter import Adapter, adapters
 from .approximate import ApproximateResult
-from .bounds import Boxes, OrientedBoxes, Spheres
+from .bounds import Boxes, OrientedBoxes, Points, Spheres
 from .camera import Camera
-from .check import BoundsCheck, Comparison, ProxyCheck, check_bounds, check_proxy, compare
+from .check import (
+    BoundsCheck,
+    Comparison,
+    ProxyCheck,
+    UnoccludedComparison,
+    check_bounds,
+    check_proxy,
+    compare,
+    compare_unoccluded,
+)
 from .device import Device
 from .errors import (
     DeviceLostError,
@@ -138,6 +149,7 @@ __all__ = [
     "OutOfMemoryError",
     "Outputs",
     "PassResult",
+    "Points",
     "ProxyCheck",
     "Pyramid",
     "Recommendation",
@@ -146,6 +158,7 @@ __all__ = [
     "StageTime",
     "StageTimes",
     "Temporal",
+    "UnoccludedComparison",
     "Verdict",
     "ViewsResult",
     "__version__",
@@ -153,6 +166,7 @@ __all__ = [
     "check_bounds",
     "check_proxy",
     "compare",
+    "compare_unoccluded",
     "inner_boxes",
     "inner_prisms",
     "recommend",

@@ -44,6 +44,7 @@ __all__ = [
     "options_text",
     "reference_classify",
     "reference_pyramid",
+    "reference_unoccluded",
     "takes_planted_faults",
 ]
 
@@ -87,6 +88,16 @@ def reference_classify(
     invalid: Sequence[float],
     coverage: str,
     own_depth: str,
+) -> npt.NDArray[np.uint8]: ...
+def reference_unoccluded(
+    bounds_kind: str,
+    arrays: Sequence[_Floats],
+    camera: Camera,
+    image: _Floats,
+    depth_kind: str,
+    scale: float,
+    invalid: Sequence[float],
+    coverage: str,
 ) -> npt.NDArray[np.uint8]: ...
 def reference_pyramid(
     depth: npt.NDArray[np.float32], width: int, height: int, reversed_z: bool
@@ -316,6 +327,8 @@ class Counts:
     @property
     def visible(self) -> int: ...
     @property
+    def unoccluded(self) -> int: ...
+    @property
     def invalid(self) -> int: ...
     @property
     def demand(self) -> int: ...
@@ -324,7 +337,11 @@ class Counts:
     @property
     def tested_groups(self) -> int: ...
     @property
+    def tested_boxes(self) -> list[int]: ...
+    @property
     def tested_instances(self) -> int: ...
+    @property
+    def accepted_instances(self) -> int: ...
     @property
     def levels(self) -> list[int]: ...
     @property
@@ -354,6 +371,10 @@ class Explanation:
     def farthest_z(self) -> float | None: ...
     @property
     def nearest_z(self) -> float | None: ...
+    @property
+    def in_front_of(self) -> float | None: ...
+    @property
+    def in_front_of_z(self) -> float | None: ...
     @property
     def stale(self) -> bool: ...
     @property

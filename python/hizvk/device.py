@@ -140,10 +140,11 @@ class Device:
         On the device an instance takes its record and its share of the box of its group
         (`Instances.device_bytes`).
         The record has 32 bytes for a sphere, 48 for a box and 64 for an oriented box.
+        That of a point has 16, or 32 if float32 does not hold every position.
 
         Parameters
         ----------
-        bounds : Spheres, Boxes or OrientedBoxes
+        bounds : Spheres, Boxes, OrientedBoxes or Points
             The bounds of the instances.
             Positions may be float64; they are split so that nothing is lost far from the origin.
         strict : bool
@@ -674,7 +675,7 @@ class Device:
                 restriction,
                 not wait,
             )
-            return CullResult(self, culling, Question(camera, pyramid, options, instances._points))
+            return CullResult(self, culling, Question(camera, pyramid, options, instances._are_sizeless))
         cameras, pyramids = pairs(camera, pyramid, self)
         for number, (one, of) in enumerate(zip(cameras, pyramids, strict=True)):
             if one != of.camera:
@@ -695,7 +696,7 @@ class Device:
             not wait,
         )
         questions = [
-            Question(one, of, options, instances._points)
+            Question(one, of, options, instances._are_sizeless)
             for one, of in zip(cameras, pyramids, strict=True)
         ]
         return ViewsResult(self, culled, questions)

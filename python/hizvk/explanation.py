@@ -27,10 +27,17 @@ class Verdict(enum.IntEnum):
     OCCLUDED = 1
     """Culled: surely behind what the depth image shows, and not surely outside."""
     VISIBLE = 2
-    """Kept: visible, or not provably hidden."""
+    """Kept: visible, or not provably hidden, and not `UNOCCLUDED`."""
     INVALID = 3
     """Kept: its bounds are invalid (NaN, infinite, a negative size, min > max, or too large to
     compute with)."""
+    UNOCCLUDED = 4
+    """Kept: surely visible as a whole.
+
+    All of the bounds lie inside the view volume.
+    Every pixel that they touch holds a depth farther than all of them.
+    So nothing in the depth image hides any part of them, and a test of each pixel may be skipped.
+    Only with a pyramid of both ends, ``Device.pyramid(depths="both")``; `VISIBLE` otherwise."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +82,12 @@ class Explanation:
     nearest_z: float | None
     """`nearest` as view depth in world units. None for an orthographic camera made from a bare
     matrix."""
+    in_front_of: float | None
+    """The nearest depth (NDC) of the texels, which all of an `UNOCCLUDED` instance is nearer than.
+    Of another, a depth that it is not surely nearer than, or it is not surely inside the view.
+    None for a pyramid of one end, and where the texels reach the near plane."""
+    in_front_of_z: float | None
+    """`in_front_of` as view depth in world units; see `farthest_z`."""
     stale: bool
     """Whether the instance was updated since the cull. Then all of this is about its new bounds,
     and the verdict of the cull may be another."""
@@ -102,6 +115,7 @@ class Explanation:
         for name, depth, z, what in (
             ("farthest", self.farthest, self.farthest_z, "depth image"),
             ("nearest ", self.nearest, self.nearest_z, "bounds"),
+            ("in front", self.in_front_of, self.in_front_of_z, "nearest in the depth image"),
         ):
             if depth is not None:
                 view = "" if z is None else f", view depth {z:.6g}"
@@ -156,6 +170,8 @@ def explanation_of(index: int, told: CoreExplanation) -> Explanation:
         nearest=told.nearest,
         farthest_z=told.farthest_z,
         nearest_z=told.nearest_z,
+        in_front_of=told.in_front_of,
+        in_front_of_z=told.in_front_of_z,
         stale=told.stale,
         group=None if told.group is None else explanation_of(index, told.group),
     )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
 
 import numpy as np
 
-from .bounds import Boxes
+from .bounds import Boxes, Points
 from .camera import Camera
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ class Tally(NamedTuple):
     @classmethod
     def of(cls, counts: Counts) -> Tally:
         """From the counts of a cull."""
-        kept = counts.visible + counts.invalid
+        kept = counts.visible + counts.unoccluded + counts.invalid
         return cls(counts.tested, counts.outside, counts.occluded, kept, counts.invalid)
 
 
@@ -100,7 +100,7 @@ class Question:
         ----------
         stats : CullStats or Tally
             The answer.
-        bounds : Spheres, Boxes or OrientedBoxes, optional
+        bounds : Spheres, Boxes, OrientedBoxes or Points, optional
             What was tested, to find the pose that was meant.
         """
         if not stats.tested:
@@ -215,6 +215,8 @@ def _middles(bounds: Bounds | None) -> npt.NDArray[np.float64]:
                 np.asarray(corner[_some(bounds)], np.float64) for corner in (bounds.min, bounds.max)
             )
             return 0.5 * (low + high)
+        case Points():
+            return np.asarray(bounds.positions[_some(bounds)], np.float64)
     return np.asarray(bounds.centers[_some(bounds)], np.float64)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from . import _arguments
 from ._processes import per_process
-from .bounds import Bounds, are_points, as_arrays
+from .bounds import Bounds, Points, are_points, as_arrays
 from .camera import Camera
 from .depth import checked_image
 from .device import Device, maker_of
@@ -82,7 +82,7 @@ def visible(
 
     Parameters
     ----------
-    bounds : Spheres, Boxes or OrientedBoxes
+    bounds : Spheres, Boxes, OrientedBoxes or Points
         The N instances.
     camera : Camera
         The camera that saw `depth`.
@@ -166,7 +166,10 @@ def visible(
         def pyramid_again() -> Pyramid:
             return maker._pyramid_of(image, camera, stored)
 
-    points = options.coverage == "sample" and are_points(bounds)
+    # Points have a guard of their own.
+    points = (
+        options.coverage == "sample" and not isinstance(bounds, Points) and are_points(bounds)
+    )
     # What hides some of the first bounds gives no cause for a hint.
     if points or not counts.occluded:
         tally: Counted = Tally.of(counts)

@@ -95,6 +95,15 @@ def _flag_or_none(name: str, value: object) -> bool | None:
     return None if value is None else bool(value)
 
 
+def _hierarchy(name: str, value: object) -> bool | int | None:
+    if value is None or isinstance(value, (bool, np.bool_)):
+        return None if value is None else bool(value)
+    if not isinstance(value, (int, np.integer)):
+        got = _arguments.describe(value)
+        raise TypeError(f"{name}: expected True, False, None or a number of tiers, got {got}")
+    return _arguments.integer(name, value, low=0, high=3)
+
+
 def _capacity(name: str, value: object) -> int | None:
     return None if value is None else _arguments.integer(name, value, low=0, high=_LARGEST_U32)
 
@@ -260,6 +269,7 @@ class CullOptions:
     guard_px : float, optional
         Pixels by which bounds grow in the image: a multiple of 1/256, at most 16.
         None: 0 for ``coverage="area"``, 1/64 for ``coverage="sample"``.
+        Of `Points`, None is 1/2 and 1: the pixels of the four centres around a point are read.
     depth_slack : float
         Relative error of the depth image, 0 to 0.5.
         The default, 2^-23, is one ulp: it covers depth that was rounded to float32.
@@ -286,11 +296,16 @@ class CullOptions:
         texel their own depth there.
 
         The latter keeps less and computes more; with a descent it goes down to single pixels.
-    hierarchy : bool, optional
+    hierarchy : bool or int, optional
         Whether groups of 64 neighbouring instances are tested first.
         Only instances of the groups that remain are then tested one by one.
         None: where there are enough instances for it to pay.
 
+        A number says how many tiers of boxes are tested, 0..3; True is 1, the boxes of groups.
+        With 2, boxes around 64 groups are tested before them, and with 3 boxes around 64 of these.
+        Where there are too few instances for so many tiers, there are fewer.
+
+        With a pyramid of both ends, a box that surely shows keeps all that it holds, untested.
         What is kept differs by next to nothing, because the test of a group may read other texels.
         `CullResult.stats` says how many tests were spent.
     statistics : bool
@@ -329,7 +344,7 @@ class CullOptions:
     footprint: int = field(default=2, metadata=_by(_footprint))
     descent: int = field(default=0, metadata=_by(_arguments.integer, low=0, high=65536))
     fit: Fit = field(default="rectangle", metadata=_by(_arguments.choice, choices=words(Fit)))
-    hierarchy: bool | None = field(default=None, metadata=_by(_flag_or_none))
+    hierarchy: bool | int | None = field(default=None, metadata=_by(_hierarchy))
     statistics: bool = field(default=False, metadata=_by(_arguments.flag))
     lod: LodRule | None = field(default=None, metadata=_by(lod_rule))
 
@@ -438,7 +453,7 @@ class OptionKeywords(TypedDict, total=False):
     footprint: int
     descent: int
     fit: Fit
-    hierarchy: bool | None
+    hierarchy: bool | int | None
     statistics: bool
     lod: LodRule | None
 

@@ -2,6 +2,26 @@
 
 from __future__ import annotations
 
-from .check.reference import HIDDEN, INVALID, UNDECIDED, VISIBLE, classify, pyramid
+from .check.reference import (
+    COVERED,
+    HIDDEN,
+    INVALID,
+    UNDECIDED,
+    UNOCCLUDED,
+    VISIBLE,
+    classify,
+    pyramid,
+    unoccluded,
+)
 
-__all__ = ["HIDDEN", "INVALID", "UNDECIDED", "VISIBLE", "classify", "pyramid"]
+__all__ = [
+    "COVERED",
+    "HIDDEN",
+    "INVALID",
+    "UNDECIDED",
+    "UNOCCLUDED",
+    "VISIBLE",
+    "classify",
+    "pyramid",
+    "unoccluded",
+]

@@ -36,8 +36,13 @@ class Instances(Allocated[CoreInstances]):
 
     @property
     def kind(self) -> str:
-        """``"spheres"``, ``"boxes"`` or ``"oriented_boxes"``."""
+        """``"spheres"``, ``"boxes"``, ``"oriented_boxes"`` or ``"points"``."""
         return self._inner.kind()
+
+    @property
+    def _are_sizeless(self) -> bool:
+        """Whether sample coverage culls what can be seen of them, as it has no guard by default."""
+        return self._points and self.kind != "points"
 
     @property
     def num_pieces(self) -> int:
@@ -85,7 +90,7 @@ class Instances(Allocated[CoreInstances]):
         ----------
         first : int
             The first instance that is replaced, ``0 <= first <= len(self)``.
-        bounds : Spheres, Boxes or OrientedBoxes
+        bounds : Spheres, Boxes, OrientedBoxes or Points
             The n new bounds, of the kind `kind`; ``first + n <= len(self)``, and n may be 0.
         strict : bool
             True refuses invalid bounds, and then nothing has changed.
@@ -95,6 +100,7 @@ class Instances(Allocated[CoreInstances]):
         ------
         TypeError, ValueError
             They name the parameter, what it expects and what came.
+            Of points that take 16 bytes each, the new positions have to be numbers of float32, too.
         OutOfMemoryError
             If the device or the host has no room for a copy of the new bounds.
 

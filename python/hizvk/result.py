@@ -281,7 +281,8 @@ class CullResult(Awaited[CoreCulling]):
             absent=counts.absent,
             outside=counts.outside,
             occluded=counts.occluded,
-            kept=counts.visible + counts.invalid,
+            kept=counts.visible + counts.unoccluded + counts.invalid,
+            unoccluded=counts.unoccluded,
             invalid=counts.invalid,
             tested_groups=counts.tested_groups,
             tested_instances=counts.tested_instances,
@@ -293,6 +294,8 @@ class CullResult(Awaited[CoreCulling]):
             readback_ms=readback_ms,
             gpu_ms=sum_of(stages),
             stages=stages,
+            tested_boxes=tuple(counts.tested_boxes),
+            accepted_instances=counts.accepted_instances,
         )
 
     def hints(self) -> tuple[str, ...]:

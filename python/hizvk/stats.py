@@ -15,7 +15,8 @@ __all__ = ["CullStats"]
 class CullStats:
     """The numbers of one cull.
 
-    ``tested = outside + occluded + kept``, and `invalid` of the kept ones have invalid bounds.
+    ``tested = outside + occluded + kept``.
+    Of the kept ones, `invalid` have invalid bounds, and `unoccluded` surely show as a whole.
     These are the counts of `CullResult.verdicts`.
     The times are wall-clock times, except `gpu_ms`.
     """
@@ -31,14 +32,18 @@ class CullStats:
     invalid: int
     """Kept because their bounds are invalid."""
     tested_groups: int
-    """Groups of 64 that were tested as a whole."""
+    """Groups of 64 that were tested as a whole: the first of `tested_boxes`."""
     tested_instances: int
     """Instances that were tested by themselves: all, or those of the groups that remained."""
     levels: tuple[int, ...] | None
     """How many groups and instances were compared with the pyramid on each level; None without
     ``statistics=True``."""
     texels_read: int | None
-    """Texels of the pyramid that were read for it; None without ``statistics=True``."""
+    """Texels of the pyramid that were read for it: one for each comparison with a depth.
+    None without ``statistics=True``.
+
+    A footprint of 2 x 2 counts as 4, and each step of a descent as 1.
+    A comparison with the nearest depths counts as well."""
     record_ms: float
     """Milliseconds to make buffers and record the commands."""
     compile_ms: float
@@ -57,18 +62,27 @@ class CullStats:
     Also None where the device has no timestamps that can be trusted."""
     stages: tuple[StageTime, ...]
     """The stages of the cull; empty outside of a block of `Device.timed`."""
+    unoccluded: int = 0
+    """Kept and surely visible as a whole: `Verdict.UNOCCLUDED`.
+    0 unless the pyramid has both ends."""
     absent: int = 0
     """Instances that are absent (`hizvk.ABSENT`); no other number counts them."""
+    tested_boxes: tuple[int, ...] = (0, 0, 0)
+    """Boxes that were tested, per tier: around 64, around 4,096 and around 262,144 instances."""
+    accepted_instances: int = 0
+    """Instances of groups that were kept as a whole, untested, because their box surely shows."""
 
     @property
     def comparisons(self) -> int:
-        """Tests of groups and of instances together; a cull without groups spends `tested`."""
-        return self.tested_groups + self.tested_instances
+        """Tests of boxes and of instances together; a cull without groups spends `tested`."""
+        boxes = (self.tested_groups, *self.tested_boxes[1:])
+        return sum(boxes) + self.tested_instances
 
     def __str__(self) -> str:
         culled = self.outside + self.occluded
+        sure = f"{self.unoccluded:,} unoccluded, " if self.unoccluded else ""
         return (
-            f"{self.tested:,} tested: {self.kept:,} kept ({self.invalid:,} invalid), "
+            f"{self.tested:,} tested: {self.kept:,} kept ({sure}{self.invalid:,} invalid), "
             f"{culled:,} culled ({self.outside:,} outside, {self.occluded:,} occluded); "
             f"{self.wall_ms:.2f} ms until the device was done"
         )

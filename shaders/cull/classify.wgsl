@@ -14,6 +14,7 @@
 // - `outcome.wgsl`, `../output/verdict.wgsl`: `Outcome`, stages, verdicts
 // - `../instances/bounds_*.wgsl`: `load_volume`, `support`, `extent_of`, `surely_after`, `_before`
 // - `../pyramid/texels*.wgsl`, `../pyramid/levels.wgsl`: `texel`, `footprint`, `finest_level`
+// - `unoccluded.wgsl`: `surely_in_front`, `surely_inside`, `descend_in_front`
 // - `unexplained.wgsl` or `explain.wgsl`: `note_texel`, `note_clear`
 
 // True: only pixel centres count; otherwise whole pixel squares.
@@ -86,6 +87,41 @@ fn surely_behind(bits: u32, z: Value, w: Value) -> bool {
     return can_occlude(d) && surely_above(z, t, w);
 }
 
+// Moves a walk on to the next sibling, or to that of the first parent that has one.
+// The walk is over the rectangle first..=last, and began at the texels t of the level `top`.
+// False: there is none, so it is over.
+fn next_texel(
+    top: u32, t: vec4<u32>, first: vec2<u32>, last: vec2<u32>,
+    level: ptr<function, u32>, place: ptr<function, vec2<u32>>,
+) -> bool {
+    loop {
+        let at = *place;
+        let end = last >> vec2<u32>(*level);
+        if *level == top {
+            if at.x < t.z {
+                (*place).x = at.x + 1u;
+                return true;
+            }
+            *place = vec2<u32>(t.x, at.y + 1u);
+            return at.y < t.w;
+        }
+        let up = levels_up(*level);
+        // The number of the last column, and row, among a parent's children.
+        let last_child = (1u << up) - 1u;
+        if (at.x & last_child) < last_child && at.x < end.x {
+            (*place).x = at.x + 1u;
+            return true;
+        }
+        if (at.y & last_child) < last_child && at.y < end.y {
+            *place = vec2<u32>(max(at.x & ~last_child, first.x >> *level), at.y + 1u);
+            return true;
+        }
+        *place = at >> vec2<u32>(up);
+        *level += up;
+    }
+    return false;
+}
+
 // True implies: no pixel of the rectangle first..=last shows anything of the volume.
 // False: a pixel may show some of it, or the budget has ended.
 //
@@ -135,40 +171,15 @@ fn descend(
             at = max(at << vec2<u32>(down), first >> vec2<u32>(level));
             continue;
         }
-        // On to the next sibling, or to that of the first parent that has one.
-        loop {
-            let end = last >> vec2<u32>(level);
-            if level == top {
-                if at.x < t.z {
-                    at.x += 1u;
-                    break;
-                }
-                if at.y < t.w {
-                    at = vec2<u32>(t.x, at.y + 1u);
-                    break;
-                }
-                return true;
-            }
-            let up = levels_up(level);
-            // The number of the last column, and row, among a parent's children.
-            let last_child = (1u << up) - 1u;
-            if (at.x & last_child) < last_child && at.x < end.x {
-                at.x += 1u;
-                break;
-            }
-            if (at.y & last_child) < last_child && at.y < end.y {
-                at = vec2<u32>(max(at.x & ~last_child, first.x >> level), at.y + 1u);
-                break;
-            }
-            at >>= vec2<u32>(up);
-            level += up;
+        if !next_texel(top, t, first, last, &level, &at) {
+            return true;
         }
     }
     return false;
 }
 
 fn classify(i: u32) -> Outcome {
-    var out = Outcome(INVALID, AT_VALIDITY, vec4<i32>(0), 0u, vec4<u32>(0u), 0u, 0u);
+    var out = Outcome(INVALID, AT_VALIDITY, vec4<i32>(0), 0u, vec4<u32>(0u), 0u, 0u, 0u);
     let volume = load_volume(i);
     if !(volume.size < view.coordinate_limit) {
         if volume.center.x < ABSENT_BELOW {
@@ -247,25 +258,49 @@ fn classify(i: u32) -> Outcome {
         out.farthest_bits = far_bits();
     }
     out.texels_read = texels_read;
+    // With both ends: is all of it inside the frustum, and nearer than the nearest depth there?
+    var is_inside = false;
+    var in_front = false;
+    var front = near_bits();
+    if NEAREST {
+        is_inside = !hidden && surely_inside(x, y, z, w);
+        if fits {
+            front = nearest_footprint(level, t);
+            in_front = is_inside && surely_in_front(front, z, w);
+        }
+    }
     var block = t;
     if hidden {
         out.stage = AT_BLOCK;
+    } else if in_front && !(SAMPLE_COVERAGE && FIT_VOLUME) {
+        // What shows in some pixel is not hidden, so no descent is needed.
+        // Between samples a volume shows in none, and a fit to the volume may find that out.
+        out.stage = AT_FRONT;
     } else if (DESCENT && level > 0u) || FIT_VOLUME {
         // Texel by texel and into finer levels, over the pixels of the rectangle alone.
         // These are texels of level 0.
         out.stage = AT_DESCENT;
         hidden = descend(level, t, first, last, Projected(x, y, z, w, w_min), &texels_read);
+        if NEAREST && DESCENT {
+            // No texel is farther than the farthest.
+            if !hidden && !in_front && is_inside && level > 0u
+                && surely_in_front(out.farthest_bits, z, w) {
+                in_front = descend_in_front(level, t, first, last, z, w, &front, &texels_read);
+            }
+        }
         out.texels_read = texels_read;
         block = vec4<u32>(first, last);
         level = 0u;
     }
 
+    out.nearest_bits = front;
+
     // 6. Were the texels those of all pixels that matter?
-    if hidden
+    if (hidden | in_front)
         & inside_block(x, w, ends_x, w_min, block.x, block.z, level, view.half_size.x, view.size.x)
         & inside_block(y, w, ends_y, w_min, block.y, block.w, level, view.half_size.y, view.size.y)
     {
-        out.verdict = OCCLUDED;
+        out.verdict = select(OCCLUDED, UNOCCLUDED, in_front & !hidden);
     }
     return out;
 }

@@ -1,4 +1,5 @@
-// The count of verdicts: how many instances are outside, occluded, visible and invalid.
+// The count of verdicts: how many instances are outside, occluded, visible, invalid and
+// unoccluded.
 
 // Invocations of a workgroup, and vectors of four verdicts that each of them reads.
 // Twin: `COUNT_WORKGROUP` in `crates/hiz_core/src/cull/count.rs`, the verdicts of a workgroup.
@@ -11,6 +12,7 @@ struct Counters {
     occluded: atomic<u32>,
     visible: atomic<u32>,
     invalid: atomic<u32>,
+    unoccluded: atomic<u32>,
 }
 
 @group(0) @binding(0) var<uniform> piece: Piece;
@@ -18,12 +20,14 @@ struct Counters {
 @group(0) @binding(1) var<storage, read> mask: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read_write> counters: Counters;
 
-var<workgroup> sums: array<vec4<u32>, LANES>;
+// A number per verdict, in the order of their codes.
+alias Sums = array<u32, VERDICT_COUNT>;
+
+var<workgroup> sums: array<Sums, LANES>;
 
 @compute @workgroup_size(LANES)
 fn count(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    // One sum per verdict, in the order of their codes.
-    var sum = vec4<u32>(0u);
+    var sum = Sums();
     for (var v = 0u; v < VECTORS; v += 1u) {
         let vector = id.x * VECTORS + v;
         let place = VERDICT_MULTIPLE * vector;
@@ -40,13 +44,21 @@ fn count(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation
     sums[lane] = sum;
     workgroupBarrier();
     if lane == 0u {
-        var total = vec4<u32>(0u);
+        var total = Sums();
         for (var l = 0u; l < LANES; l += 1u) {
-            total += sums[l];
+            for (var verdict = 0u; verdict < VERDICT_COUNT; verdict += 1u) {
+                total[verdict] += sums[l][verdict];
+            }
         }
-        if total.x > 0u { atomicAdd(&counters.outside, total.x); }
-        if total.y > 0u { atomicAdd(&counters.occluded, total.y); }
-        if total.z > 0u { atomicAdd(&counters.visible, total.z); }
-        if total.w > 0u { atomicAdd(&counters.invalid, total.w); }
+        let outside = total[OUTSIDE];
+        let occluded = total[OCCLUDED];
+        let visible = total[VISIBLE];
+        let invalid = total[INVALID];
+        let unoccluded = total[UNOCCLUDED];
+        if outside > 0u { atomicAdd(&counters.outside, outside); }
+        if occluded > 0u { atomicAdd(&counters.occluded, occluded); }
+        if visible > 0u { atomicAdd(&counters.visible, visible); }
+        if invalid > 0u { atomicAdd(&counters.invalid, invalid); }
+        if unoccluded > 0u { atomicAdd(&counters.unoccluded, unoccluded); }
     }
 }

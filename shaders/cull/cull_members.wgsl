@@ -1,11 +1,15 @@
 // The cull of the members of surviving groups: an invocation tests RUN members of one group.
+// Those of an accepted group are kept without a test.
 
-// The same record as in `cull_groups.wgsl`, read without atomics.
+// The same record as in `cull_box.wgsl`, read without atomics.
 struct Survivors {
     workgroups: u32,
     workgroups_y: u32,
     workgroups_z: u32,
     count: u32,
+    tested: u32,
+    accepted: u32,
+    padding: vec2<u32>,
 }
 
 @group(3) @binding(0) var<storage, read> survivors: Survivors;
@@ -18,6 +22,7 @@ fn cull_members(
     begin();
     let slot = workgroup.x * RUN + lane / SHARE;
     if slot < survivors.count {
-        cull_run(textureLoad(survivor_list, survivor_position(slot)).x, lane % SHARE);
+        let entry = textureLoad(survivor_list, survivor_position(slot)).x;
+        cull_run(entry & ~ACCEPTED, lane % SHARE, (entry & ACCEPTED) != 0u);
     }
 }

@@ -18,6 +18,9 @@ struct Explanation {
     // The farthest of the depths that all of the volume is behind, and whether there is one.
     farthest_before: u32,
     any_before: u32,
+    // As in `Outcome`.
+    nearest_bits: u32,
+    padding: array<u32, 3>,
 }
 
 // .x: the instance's place within its piece.
@@ -81,6 +84,7 @@ fn explain() {
     explanation.level = outcome.level;
     explanation.farthest_bits = outcome.farthest_bits;
     explanation.pixels = outcome.pixels;
+    explanation.nearest_bits = outcome.nearest_bits;
     explanation.last = last;
     explanation.texels_read = texels_read;
     explanation.farthest_before = farthest_before;

@@ -6,7 +6,7 @@ fn has_candidates(group: u32) -> bool {
     return true;
 }
 
-// Whether the members of a group with this outcome are tested.
+// Whether what a box with this outcome holds is tested or accepted.
 fn is_candidate(outcome: Outcome) -> bool {
     return outcome.verdict >= VISIBLE;
 }

@@ -20,13 +20,13 @@ fn is_drawn(index: u32) -> bool {
     return is_of_frame && (atomicLoad(&mask[early_begin() + at.word]) & at.bit) != 0u;
 }
 
-// Tests the members of a group that belong to one of its invocations.
-fn cull_run(group: u32, share: u32) {
+// Tests the members of a group that belong to one of its invocations, or accepts them.
+fn cull_run(group: u32, share: u32, is_accepted: bool) {
     let first = group * GROUP + share;
     if first >= piece.count {
         return;
     }
-    var kept = test_run(first);
+    var kept = kept_of_run(first, is_accepted);
     history[history_word(group, share)] = kept;
     for (; kept != 0u; kept &= kept - 1u) {
         let place = first + countTrailingZeros(kept) * SHARE;

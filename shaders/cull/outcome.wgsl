@@ -10,6 +10,7 @@ const AT_DEPTH: u32 = 4u;
 const AT_BLOCK: u32 = 5u;
 const AT_DESCENT: u32 = 6u;
 const AT_LEVEL: u32 = 7u;
+const AT_FRONT: u32 = 8u;
 
 struct Outcome {
     verdict: u32,
@@ -23,4 +24,7 @@ struct Outcome {
     // The farthest depth of these texels.
     farthest_bits: u32,
     texels_read: u32,
+    // The nearest depth of these texels, or of those that decided a walk down the nearest end.
+    // Near without both ends.
+    nearest_bits: u32,
 }

@@ -15,7 +15,7 @@
 const WORKGROUP: u32 = 64u;
 
 // A flag beside the verdict of a group: its members have verdicts of their own.
-const REFINED: u32 = 4u;
+const REFINED: u32 = 8u;
 
 @group(1) @binding(0) var<uniform> piece: Piece;
 // The mask, and behind it the verdicts.

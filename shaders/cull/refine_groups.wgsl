@@ -10,10 +10,10 @@ const WORKGROUP: u32 = 64u;
 const LAST_TEXEL: u32 = 2u;
 
 // A flag beside the verdict of such a group; REFINED of `refine.wgsl` is another.
-const WITHIN: u32 = 8u;
+const WITHIN: u32 = 16u;
 
-// The groups' boxes, as if they were the instances of a piece.
-@group(1) @binding(0) var<uniform> groups: Piece;
+// The tier of the groups' boxes.
+@group(1) @binding(0) var<uniform> groups: Tier;
 @group(2) @binding(1) var<storage, read_write> group_verdicts: array<u32>;
 
 // True implies: all of the box lies within the planes that `classify` asks about.

@@ -1,9 +1,14 @@
 // Depths as bits.
-// Non-negative floats order like unsigned integers, so the farthest depth is an integer min or max.
+// Non-negative floats order like unsigned integers, so the farthest depth is an integer min or max,
+// and so is the nearest.
 // That is exact on every driver, whatever it does with NaN, -0 and subnormals.
+//
+// The nearest depth in one convention is the farthest in the other, invalid pixels included.
 
 // True: near is 1 and far is 0.
 override REVERSED: bool;
+// True: pixels of level 0 that show the background leave the farthest depth alone.
+override RECEIVERS: bool = false;
 
 // The bits of 1, of the least normal number, and of -0.
 const ONE_BITS: u32 = 0x3f800000u;
@@ -42,6 +47,12 @@ fn sanitized(bits: u32) -> u32 {
     return select(flushed, far_bits(), outside);
 }
 
+// The same for the nearest depth: what is no depth is near.
+fn sanitized_near(bits: u32) -> u32 {
+    let outside = bits > ONE_BITS && bits != NEGATIVE_ZERO_BITS;
+    return select(sanitized(bits), near_bits(), outside);
+}
+
 fn farthest(a: u32, b: u32) -> u32 {
     return select(max(a, b), min(a, b), REVERSED);
 }
@@ -50,22 +61,32 @@ fn farthest4(v: vec4<u32>) -> u32 {
     return farthest(farthest(v.x, v.y), farthest(v.z, v.w));
 }
 
-// The farthest of four sanitized depths, with less work than sanitizing each.
+fn nearest(a: u32, b: u32) -> u32 {
+    return select(min(a, b), max(a, b), REVERSED);
+}
+
+fn nearest4(v: vec4<u32>) -> u32 {
+    return nearest(nearest(v.x, v.y), nearest(v.z, v.w));
+}
+
+// The least of four depths, where what is no depth is 0, with less work than sanitizing each.
 //
-// Reversed: all bits outside of LEAST_NORMAL_BITS..ONE_BITS are sanitized to 0, which is farthest.
-// The greatest of ONE_BITS - bits, wrapping, belongs to the farthest depth.
+// All bits outside of LEAST_NORMAL_BITS..ONE_BITS are sanitized to 0.
+// The greatest of ONE_BITS - bits, wrapping, belongs to the least depth.
 // If it is greater than that of any number in the range, some depth is sanitized to 0.
+fn least_sanitized4(v: vec4<u32>) -> u32 {
+    let below_one = vec4<u32>(ONE_BITS) - v;
+    let most = max(max(below_one.x, below_one.y), max(below_one.z, below_one.w));
+    return select(ONE_BITS - most, 0u, most > ONE_BITS - LEAST_NORMAL_BITS);
+}
+
+// The greatest of four depths, where what is no depth is 1, with less work than sanitizing each.
 //
-// Standard: sanitizing keeps the order of bits, except for -0, which becomes 0.
+// Sanitizing keeps the order of bits, except for -0, which becomes 0.
 // Its bits are above those of 1.
 // If -0 has the greatest bits, no other number has a sign.
 // As signed integers -0 is then the least, and the greatest is that of the other numbers.
-fn farthest_sanitized4(v: vec4<u32>) -> u32 {
-    if REVERSED {
-        let below_one = vec4<u32>(ONE_BITS) - v;
-        let most = max(max(below_one.x, below_one.y), max(below_one.z, below_one.w));
-        return select(ONE_BITS - most, 0u, most > ONE_BITS - LEAST_NORMAL_BITS);
-    }
+fn greatest_sanitized4(v: vec4<u32>) -> u32 {
     let greatest = max(max(v.x, v.y), max(v.z, v.w));
     let s = bitcast<vec4<i32>>(v);
     let greatest_signed = max(max(s.x, s.y), max(s.z, s.w));
@@ -73,4 +94,35 @@ fn farthest_sanitized4(v: vec4<u32>) -> u32 {
         select(greatest, u32(max(greatest_signed, 0)), greatest == NEGATIVE_ZERO_BITS);
     let bits = min(without_negative_zero, ONE_BITS);
     return select(bits, 0u, bits < LEAST_NORMAL_BITS);
+}
+
+// The farthest of four depths as they were given, where what is no depth is far.
+fn farthest_sanitized4(v: vec4<u32>) -> u32 {
+    if REVERSED {
+        return least_sanitized4(v);
+    }
+    return greatest_sanitized4(v);
+}
+
+// The nearest of four depths as they were given, where what is no depth is near.
+fn nearest_sanitized4(v: vec4<u32>) -> u32 {
+    if REVERSED {
+        return greatest_sanitized4(v);
+    }
+    return least_sanitized4(v);
+}
+
+// A pixel of level 0 as the farthest depth counts it.
+// Background is what has exactly the bits of far, where -0 is 0.
+// Where only receivers count it becomes near, and so leaves the farthest depth alone.
+fn foreground(bits: u32) -> u32 {
+    let is_background = bits == far_bits() || (REVERSED && bits == NEGATIVE_ZERO_BITS);
+    return select(bits, near_bits(), RECEIVERS && is_background);
+}
+
+fn foreground4(v: vec4<u32>) -> vec4<u32> {
+    if RECEIVERS {
+        return vec4<u32>(foreground(v.x), foreground(v.y), foreground(v.z), foreground(v.w));
+    }
+    return v;
 }

@@ -2,8 +2,9 @@
 
 @group(0) @binding(0) var source: texture_depth_2d;
 
-fn source_bits(x: u32, y: u32) -> u32 {
-    return sanitized(bitcast<u32>(textureLoad(source, vec2<u32>(x, y) + source_origin(), 0)));
+// A pixel as it was given.
+fn source_given(x: u32, y: u32) -> u32 {
+    return bitcast<u32>(textureLoad(source, vec2<u32>(x, y) + source_origin(), 0));
 }
 
 // The four pixels around a point, in the order of a gather:

@@ -2,9 +2,10 @@
 
 @group(0) @binding(0) var source: texture_2d<f32>;
 
-fn source_bits(x: u32, y: u32) -> u32 {
+// A pixel as it was given.
+fn source_given(x: u32, y: u32) -> u32 {
     let at = vec2<u32>(x, y) + source_origin();
-    return sanitized(bitcast<u32>(textureLoad(source, at, 0).x));
+    return bitcast<u32>(textureLoad(source, at, 0).x);
 }
 
 // The four pixels around a point, in the order of a gather:

@@ -10,7 +10,7 @@ fn quad_corner(x: u32, y: u32) -> vec2<f32> {
     return vec2<f32>(f32(2u * x + 1u), f32(2u * y + 1u)) / vec2<f32>(textureDimensions(source));
 }
 
-// The farthest depth of these four pixels; pixels past the edge are replaced by pixels at the edge.
-fn quad(x: u32, y: u32) -> u32 {
-    return farthest_sanitized4(gathered(quad_corner(x, y)));
+// The ends of these four pixels; pixels past the edge are replaced by pixels at the edge.
+fn quad(x: u32, y: u32) -> Ends {
+    return ends_of_pixels(gathered(quad_corner(x, y)));
 }

@@ -4,6 +4,7 @@
 // Instances of a group, which are stored one after the other.
 // Twin: `GROUP` in `crates/hiz_core/src/instances/groups.rs`.
 const GROUP: u32 = 64u;
+const GROUP_LOG2: u32 = 6u;
 // How many members of a group one invocation tests, one after the other.
 // So this is also the number of groups that one workgroup takes.
 // Tuning for software drivers, which fetch uniforms anew for every eight invocations and never skip
@@ -13,6 +14,14 @@ const GROUP: u32 = 64u;
 const RUN: u32 = 8u;
 // Invocations that share a group.
 const SHARE: u32 = GROUP / RUN;
+
+// A flag beside the number of a group or box in the list of survivors: all that it holds is kept
+// without a test.
+const ACCEPTED: u32 = 0x80000000u;
+
+// STUB
+const NEAREST: bool = false;
+const UNOCCLUDED: u32 = 4u;
 
 // Survivors in a row of their list, as a power of two.
 // The list is a texture for the reason that `record_layout.wgsl` gives.

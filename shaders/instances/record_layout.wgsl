@@ -17,3 +17,7 @@ fn record_position(i: u32, k: u32, texels: u32) -> vec2<u32> {
 // A record of such numbers is invalid, whatever its kind.
 // Twin: `BEYOND_LIMITS` in `crates/hiz_core/src/instances/volume_record.rs`.
 const BEYOND_LIMITS_BITS: u32 = 0x5e800000u;
+// The bits of -2^62: the centre of what is absent, on the first axis.
+// It is the first word of a record, whatever its kind.
+// Twin: `ABSENT_CENTER` in `crates/hiz_core/src/instances/volume_record.rs`.
+const ABSENT_CENTER_BITS: u32 = 0xde800000u;

@@ -1,6 +1,7 @@
 // The depth pyramid: a list of texels in up to three storage bindings, the chunks.
 // The list begins with a header, whose first word is the number of the reduction that filled it.
 // The stored levels follow, one after the other, with padded rows.
+// Where both ends are stored, all levels of nearest depths follow those of farthest depths.
 
 // Twin: `MAX_LEVELS` in `crates/hiz_core/src/pyramid/levels.rs`.
 const MAX_LEVELS: u32 = 16u;
@@ -17,14 +18,15 @@ struct Level {
 // Twin: `PyramidUniform` in `crates/hiz_core/src/pyramid/mod.rs`.
 struct Pyramid {
     levels: array<Level, MAX_LEVELS>,
-    // .xy: where each level begins in an atlas.
+    // .xy: where each level of farthest depths begins in an atlas; .zw: that of nearest depths.
     origins: array<vec4<u32>, MAX_LEVELS>,
     // A chunk holds 1 << chunk_shift texels.
     chunk_shift: u32,
     // Which levels above 0 are stored; level 0 is the depth image.
     first_stored: u32,
     last_stored: u32,
-    padding: u32,
+    // How far behind a level of farthest depths that of nearest depths lies, in texels of the list.
+    nearest: u32,
 }
 
 // The number of chunks; with 1 the compiler drops the code for the others.

@@ -4,7 +4,8 @@
 // no shared memory, no barrier, one pass per three levels.
 //
 // Sizes are halved and rounded up, and reads past an edge repeat the edge.
-// So a texel of level k is the farthest depth of exactly the pixels [x << k, (x + 1) << k).
+// So a texel of level k has the farthest depth of exactly the pixels [x << k, (x + 1) << k), or the
+// nearest, or both (`../gpu/ends_one.wgsl`, `../gpu/ends_both.wgsl`).
 // At odd sizes nothing is dropped, and no repeated read matters.
 // The shader printed in Rakos 2010 has that defect.
 //
@@ -18,39 +19,32 @@ override FROM_SOURCE: bool;
 // Level 1 of an image is the most expensive one to write.
 override FIRST: u32;
 
-// Two rows of four texels, halved to two texels: the farthest of each 2x2.
-fn halved(a: vec4<u32>, b: vec4<u32>) -> vec2<u32> {
-    return vec2<u32>(farthest4(vec4<u32>(a.xy, b.xy)), farthest4(vec4<u32>(a.zw, b.zw)));
-}
-
 // Rows 2y and 2y + 1 of a stored level, eight texels from column 8x on, halved to four texels.
-fn stored_quads(level: Level, x: u32, y: u32) -> vec4<u32> {
+fn stored_quads(level: Level, x: u32, y: u32) -> Ends4 {
     // The column of the row's last vector.
     let last = ((level.width + VECTOR_MASK) & ~VECTOR_MASK) - VECTOR;
     let left = min(BLOCK * x, last);
     let right = min(BLOCK * x + VECTOR, last);
     let top = level.offset + min(2u * y, level.height - 1u) * level.stride;
     let bottom = level.offset + min(2u * y + 1u, level.height - 1u) * level.stride;
-    return vec4<u32>(
-        halved(load4(top + left), load4(bottom + left)),
-        halved(load4(top + right), load4(bottom + right)));
+    return pairs_in_row(
+        halved(load_ends4(top + left), load_ends4(bottom + left)),
+        halved(load_ends4(top + right), load_ends4(bottom + right)));
 }
 
 // The 4x4 quads of a block.
-fn quads(level: Level, block: vec2<u32>) -> array<vec4<u32>, BLOCK_QUADS> {
+fn quads(level: Level, block: vec2<u32>) -> array<Ends4, BLOCK_QUADS> {
     if FROM_SOURCE {
         return source_quads(block);
     }
     let y = BLOCK_QUADS * block.y;
-    return array<vec4<u32>, BLOCK_QUADS>(
+    return array<Ends4, BLOCK_QUADS>(
         stored_quads(level, block.x, y), stored_quads(level, block.x, y + 1u),
         stored_quads(level, block.x, y + 2u), stored_quads(level, block.x, y + 3u));
 }
 
-fn store_pair(level: Level, x: u32, y: u32, pair: vec2<u32>) {
-    let index = level.offset + y * level.stride + x;
-    store(index, pair.x);
-    store(index + 1u, pair.y);
+fn store_pair(level: Level, x: u32, y: u32, pair: Ends2) {
+    store_ends2(level.offset + y * level.stride + x, pair);
 }
 
 // Reads a block of the level `source_number` and writes its texels of the levels after it, up to
@@ -60,10 +54,10 @@ fn reduce_block(source_number: u32, last: u32, block: vec2<u32>) {
     if FIRST == 1u {
         let half = pyramid.levels[source_number + 1u];
         let row = half.offset + BLOCK_QUADS * (block.y * half.stride + block.x);
-        store4(row, rows[0]);
-        store4(row + half.stride, rows[1]);
-        store4(row + 2u * half.stride, rows[2]);
-        store4(row + 3u * half.stride, rows[3]);
+        store_ends4(row, rows[0]);
+        store_ends4(row + half.stride, rows[1]);
+        store_ends4(row + 2u * half.stride, rows[2]);
+        store_ends4(row + 3u * half.stride, rows[3]);
         if source_number + 1u >= last {
             return;
         }
@@ -79,7 +73,8 @@ fn reduce_block(source_number: u32, last: u32, block: vec2<u32>) {
         }
     }
     let eighth = pyramid.levels[source_number + BLOCK_LOG2];
-    store(eighth.offset + block.y * eighth.stride + block.x, farthest4(vec4<u32>(q0, q1)));
+    let index = eighth.offset + block.y * eighth.stride + block.x;
+    store_ends(index, joined4(pairs_in_row(q0, q1)));
 }
 
 @compute @workgroup_size(WORKGROUP, 1)

@@ -11,24 +11,24 @@
 // True: a workgroup shares a texel.
 override SHARED: bool;
 
-var<workgroup> parts: array<u32, WORKGROUP>;
+var<workgroup> parts: array<Ends, WORKGROUP>;
 
-// The farthest depth of `side` x `side` blocks.
-fn farthest_of(begin: vec2<u32>, side: u32) -> u32 {
+// The ends of `side` x `side` blocks.
+fn ends_of(begin: vec2<u32>, side: u32) -> Ends {
     let image = pyramid.levels[0];
     // Blocks past the edge repeat it: a part that begins there reads its own first block.
     let blocks = (vec2<u32>(image.width, image.height) + vec2<u32>(BLOCK - 1u)) / BLOCK;
     let end = max(min(begin + vec2<u32>(side), blocks), begin + vec2<u32>(1u));
-    var bits = near_bits();
+    var ends = no_ends();
     for (var y = begin.y; y < end.y; y += 1u) {
         for (var x = begin.x; x < end.x; x += 1u) {
             let rows = source_quads(vec2<u32>(x, y));
-            let by_row = vec4<u32>(
-                farthest4(rows[0]), farthest4(rows[1]), farthest4(rows[2]), farthest4(rows[3]));
-            bits = farthest(bits, farthest4(by_row));
+            let by_row =
+                in_row(joined4(rows[0]), joined4(rows[1]), joined4(rows[2]), joined4(rows[3]));
+            ends = joined(ends, joined4(by_row));
         }
     }
-    return bits;
+    return ends;
 }
 
 @compute @workgroup_size(WORKGROUP, 1)
@@ -44,20 +44,20 @@ fn reduce_coarse(
     if !SHARED {
         let at = first_block() + place_of(group.xy, lane);
         if at.x < step.end.x && at.y < step.end.y {
-            store(level.offset + at.y * level.stride + at.x, farthest_of(at * side, side));
+            store_ends(level.offset + at.y * level.stride + at.x, ends_of(at * side, side));
         }
         return;
     }
     // Each invocation takes one of SIDE x SIDE parts of the texel.
     let part = side >> SIDE_LOG2;
     let texel = first_block() + group.xy;
-    parts[lane] = farthest_of(texel * side + place_in_square(lane) * part, part);
+    parts[lane] = ends_of(texel * side + place_in_square(lane) * part, part);
     workgroupBarrier();
     if lane == 0u {
-        var bits = parts[0];
+        var ends = parts[0];
         for (var i = 1u; i < WORKGROUP; i += 1u) {
-            bits = farthest(bits, parts[i]);
+            ends = joined(ends, parts[i]);
         }
-        store(level.offset + texel.y * level.stride + texel.x, bits);
+        store_ends(level.offset + texel.y * level.stride + texel.x, ends);
     }
 }

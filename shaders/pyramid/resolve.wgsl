@@ -61,16 +61,6 @@ fn farthest_sample(x: u32, y: u32) -> u32 {
     return bits;
 }
 
-// As `sanitized`, but what is no depth counts as near: it may hide nothing, and be hidden by all.
-fn sanitized_near(bits: u32) -> u32 {
-    let outside = bits > ONE_BITS && bits != NEGATIVE_ZERO_BITS;
-    return select(sanitized(bits), near_bits(), outside);
-}
-
-fn nearest(a: u32, b: u32) -> u32 {
-    return select(min(a, b), max(a, b), REVERSED);
-}
-
 fn nearest_sample(x: u32, y: u32) -> u32 {
     let at = place(x, y);
     var bits = far_bits();

@@ -3,6 +3,8 @@
 
 // The footprint has at most 2^n x 2^n texels.
 override FOOTPRINT_LOG2: u32;
+// True: the pyramid has nearest depths, too.
+override NEAREST: bool;
 
 @group(0) @binding(2) var<uniform> pyramid: Pyramid;
 @group(0) @binding(6) var<uniform> view_uniform: View;
@@ -34,6 +36,20 @@ fn footprint(level: u32, t: vec4<u32>) -> u32 {
             let here = texel(level, x, y);
             note_texel(level, x, y, here, false);
             bits = farthest(bits, here);
+        }
+    }
+    return bits;
+}
+
+// The nearest depth of the same texels; only where NEAREST is set.
+fn nearest_footprint(level: u32, t: vec4<u32>) -> u32 {
+    if FOOTPRINT_LOG2 == 1u {
+        return nearest_sanitized4(nearest_corners(level, t));
+    }
+    var bits = far_bits();
+    for (var y = t.y; y <= t.w; y += 1u) {
+        for (var x = t.x; x <= t.z; x += 1u) {
+            bits = nearest(bits, nearest_texel(level, x, y));
         }
     }
     return bits;

@@ -29,10 +29,11 @@ fn reduction_number() -> u32 {
 }
 
 // The texels of a stored level at columns t.x and t.z and rows t.y and t.w.
-fn stored_corners(level: u32, t: vec4<u32>) -> vec4<u32> {
+// `end` is 0 for farthest depths, and `pyramid.nearest` for nearest ones.
+fn stored_corners(end: u32, level: u32, t: vec4<u32>) -> vec4<u32> {
     let l = pyramid.levels[level];
-    let top = l.offset + t.y * l.stride;
-    let bottom = l.offset + t.w * l.stride;
+    let top = end + l.offset + t.y * l.stride;
+    let bottom = end + l.offset + t.w * l.stride;
     return vec4<u32>(
         stored_bits(top + t.x), stored_bits(top + t.z),
         stored_bits(bottom + t.x), stored_bits(bottom + t.z));
@@ -42,14 +43,32 @@ fn stored_corners(level: u32, t: vec4<u32>) -> vec4<u32> {
 // Tuning for software drivers: both are read, whatever the level, since they take both sides of a
 // branch anyway.
 fn corners(level: u32, t: vec4<u32>) -> vec4<u32> {
-    return select(stored_corners(level, t), source_corners(t), level == 0u);
+    return select(stored_corners(0u, level, t), foreground4(source_corners(t)), level == 0u);
 }
 
-// The depth of one texel of a level.
+// The same of nearest depths.
+fn nearest_corners(level: u32, t: vec4<u32>) -> vec4<u32> {
+    return select(stored_corners(pyramid.nearest, level, t), source_corners(t), level == 0u);
+}
+
+// A texel of a stored level; `end` as above.
+fn stored_texel(end: u32, level: u32, x: u32, y: u32) -> u32 {
+    let l = pyramid.levels[level];
+    return stored_bits(end + l.offset + y * l.stride + x);
+}
+
+// The farthest depth of one texel of a level.
 fn texel(level: u32, x: u32, y: u32) -> u32 {
     if level == 0u {
-        return source_bits(x, y);
+        return sanitized(foreground(source_given(x, y)));
     }
-    let l = pyramid.levels[level];
-    return stored_bits(l.offset + y * l.stride + x);
+    return stored_texel(0u, level, x, y);
+}
+
+// The nearest depth of one texel of a level.
+fn nearest_texel(level: u32, x: u32, y: u32) -> u32 {
+    if level == 0u {
+        return sanitized_near(source_given(x, y));
+    }
+    return stored_texel(pyramid.nearest, level, x, y);
 }

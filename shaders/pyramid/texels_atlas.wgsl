@@ -18,9 +18,9 @@ fn reduction_number() -> u32 {
     return select(0u, of_levels, of_levels == of_image);
 }
 
-// The texels at columns t.x and t.z and rows t.y and t.w of a level; pixels of level 0 as given.
-fn corners(level: u32, t: vec4<u32>) -> vec4<u32> {
-    let at = pyramid.origins[level].xyxy + (t >> vec4<u32>(VECTOR_LOG2, 0u, VECTOR_LOG2, 0u));
+// The texels at columns t.x and t.z and rows t.y and t.w, counted from `origin`, as copied.
+fn copied_corners(origin: vec2<u32>, t: vec4<u32>) -> vec4<u32> {
+    let at = origin.xyxy + (t >> vec4<u32>(VECTOR_LOG2, 0u, VECTOR_LOG2, 0u));
     let left = t.x & VECTOR_MASK;
     let right = t.z & VECTOR_MASK;
     return vec4<u32>(
@@ -28,8 +28,32 @@ fn corners(level: u32, t: vec4<u32>) -> vec4<u32> {
         textureLoad(atlas, at.xw)[left], textureLoad(atlas, at.zw)[right]);
 }
 
-// The depth of one texel of a level.
+// The texels at columns t.x and t.z and rows t.y and t.w of a level; pixels of level 0 as given.
+fn corners(level: u32, t: vec4<u32>) -> vec4<u32> {
+    let bits = copied_corners(pyramid.origins[level].xy, t);
+    if RECEIVERS {
+        return select(bits, foreground4(bits), level == 0u);
+    }
+    return bits;
+}
+
+// The same of nearest depths.
+fn nearest_corners(level: u32, t: vec4<u32>) -> vec4<u32> {
+    return copied_corners(pyramid.origins[level].zw, t);
+}
+
+// The texel at column x and row y, counted from `origin`, as copied.
+fn copied(origin: vec2<u32>, x: u32, y: u32) -> u32 {
+    return textureLoad(atlas, origin + vec2<u32>(x >> VECTOR_LOG2, y))[x & VECTOR_MASK];
+}
+
+// The farthest depth of one texel of a level.
 fn texel(level: u32, x: u32, y: u32) -> u32 {
-    let at = pyramid.origins[level].xy + vec2<u32>(x >> VECTOR_LOG2, y);
-    return sanitized(textureLoad(atlas, at)[x & VECTOR_MASK]);
+    let bits = copied(pyramid.origins[level].xy, x, y);
+    return sanitized(select(bits, foreground(bits), level == 0u));
+}
+
+// The nearest depth of one texel of a level.
+fn nearest_texel(level: u32, x: u32, y: u32) -> u32 {
+    return sanitized_near(copied(pyramid.origins[level].zw, x, y));
 }

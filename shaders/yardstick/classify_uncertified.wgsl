@@ -41,7 +41,7 @@ fn flat_pixels(interval: vec2<f32>, half_size: f32, size: i32) -> vec2<i32> {
 }
 
 fn classify(i: u32) -> Outcome {
-    var out = Outcome(OUTSIDE, AT_FRUSTUM, vec4<i32>(0), 0u, vec4<u32>(0u), 0u, 0u);
+    var out = Outcome(OUTSIDE, AT_FRUSTUM, vec4<i32>(0), 0u, vec4<u32>(0u), 0u, 0u, 0u);
     let volume = load_volume(i);
     let center = volume.center;
     let x = flat_value(view.x, center, volume);

@@ -17,7 +17,7 @@ override FROM_SOURCE: bool;
 
 fn finer_bits(x: u32, y: u32) -> u32 {
     if FROM_SOURCE {
-        return source_bits(x, y);
+        return sanitized(source_given(x, y));
     }
     return bitcast<u32>(textureLoad(finer, vec2<u32>(x, y), 0).x);
 }

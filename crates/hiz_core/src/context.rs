@@ -306,9 +306,9 @@ impl HizContext {
     /// They stay in the order in which their first bounds were sorted.
     ///
     /// # Errors
-    /// - [`Error::Invalid`] for [`BoundsKind::OrientedBox`], for an offset or a stride that is no
-    ///   multiple of 4, for a stride shorter than a record, and for a buffer that is too short or
-    ///   lacks the usage `STORAGE`.
+    /// - [`Error::Invalid`] for [`BoundsKind::OrientedBox`] and [`BoundsKind::WidePoint`], for an
+    ///   offset or a stride that is no multiple of 4, for a stride shorter than a record, and for a
+    ///   buffer that is too short or lacks the usage `STORAGE`.
     /// - [`Error::Mismatch`] for a buffer of another device and for a destroyed one.
     /// - [`Error::Limit`] for a stride with which the records exceed one binding.
     /// - [`Error::OutOfMemory`].
@@ -1007,8 +1007,8 @@ fn needed(have: &wgpu::Limits) -> Vec<(&'static str, u64, u64)> {
         max_samplers_per_shader_stage >= 1,
         // The cull of members: three chunks, mask, list, draws, statistics, survivors.
         max_storage_buffers_per_shader_stage >= 8,
-        // An atlas or an image of depth bits; records; the list of survivors.
-        max_storage_textures_per_shader_stage >= 3,
+        // An atlas or an image of depth bits; records; the survivors of two tiers of boxes.
+        max_storage_textures_per_shader_stage >= 4,
         // Pyramid, view, piece, capacity.
         max_uniform_buffers_per_shader_stage >= 4,
         max_uniform_buffer_binding_size >= size_of::<PyramidUniform>() as u64,

@@ -141,17 +141,17 @@ fn faults_of_coarse_levels_are_seen() {
     let rows = mean("a.x", "b.y");
     let eighth = mean("farthest4(q0.xyxy)", "farthest4(q1.xyxy)");
     let two = mean("a", "b");
-    let blocks = format!("bits = {};", mean("bits", "farthest4(by_row)"));
-    let shares = format!("bits = {};", mean("bits", "parts[i]"));
+    let blocks = format!("ends = {};", mean("ends", "joined4(by_row)"));
+    let shares = format!("ends = {};", mean("ends", "parts[i]"));
     let planted: [((&str, &str), &[StoredLevels]); 11] = [
         (("farthest4(vec4<u32>(a.xy, b.xy))", &rows), &all),
-        (("farthest4(vec4<u32>(q0, q1))", &eighth), &all),
+        (("joined4(pairs_in_row(q0, q1))", &eighth), &all),
         (("select(max(a, b), min(a, b), REVERSED)", &two), &all),
-        (("bits = farthest(bits, farthest4(by_row));", &blocks), &alone),
-        (("bits = farthest(bits, parts[i]);", &shares), &alone),
+        (("ends = joined(ends, joined4(by_row));", &blocks), &alone),
+        (("ends = joined(ends, parts[i]);", &shares), &alone),
         // Half of the shares; shares off by one; shares that are too short.
         (("i < WORKGROUP; i += 1u", "i < 32u; i += 1u"), &alone),
-        (("var bits = parts[0];", "var bits = parts[1];"), &alone),
+        (("var ends = parts[0];", "var ends = parts[1];"), &alone),
         (
             ("let part = side >> SIDE_LOG2;", "let part = max(side >> (SIDE_LOG2 + 1u), 1u);"),
             &alone,

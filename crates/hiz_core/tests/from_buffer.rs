@@ -18,7 +18,7 @@ use hiz_core::{
     HizContext, InstanceOptions, Instances, Order, Outputs, StoredOrder, wgpu,
 };
 
-const KINDS: [BoundsKind; 2] = [BoundsKind::Sphere, BoundsKind::Box];
+const KINDS: [BoundsKind; 3] = [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::Point];
 const ORDERS: [StoredOrder; 2] = [StoredOrder::Morton, StoredOrder::Given];
 const CONVENTION: DepthConvention = DepthConvention::Reversed;
 const GROUP: usize = 64;
@@ -29,6 +29,7 @@ const LIMIT: f64 = 1_152_921_504_606_846_976.0;
 fn words_of(kind: BoundsKind) -> usize {
     match kind {
         BoundsKind::Sphere => 4,
+        BoundsKind::Point => 3,
         _ => 6,
     }
 }
@@ -62,6 +63,7 @@ impl Given {
             let half = [number(0.0, 0.3), number(0.0, 0.3), number(0.0, 0.3)];
             match kind {
                 BoundsKind::Sphere => numbers.extend([center[0], center[1], center[2], half[0]]),
+                BoundsKind::Point => numbers.extend(center),
                 _ => {
                     numbers.extend((0..3).map(|k| center[k] - half[k]));
                     numbers.extend((0..3).map(|k| center[k] + half[k]));
@@ -88,6 +90,7 @@ impl Given {
                 BoundsKind::Sphere => {
                     numbers.extend([center[0], center[1], center[2], number(0.0)]);
                 }
+                BoundsKind::Point => numbers.extend(center),
                 _ => {
                     let flat = number(0.0) == 0.0;
                     let other: [f32; 3] =
@@ -142,6 +145,10 @@ impl Given {
                 };
                 is_valid.then(|| [along(0), along(1), along(2)])
             }
+            BoundsKind::Point => {
+                let is_valid = v.iter().all(|v| v.abs() < LIMIT);
+                is_valid.then(|| [0, 1, 2].map(|k| [Exact::new(v[k]), Exact::new(v[k])]))
+            }
             _ => {
                 let is_valid = (0..3).all(|k| {
                     // NaN fails every comparison.
@@ -165,6 +172,7 @@ impl Given {
                 let radii = part(3, 1);
                 work(&Bounds::Spheres { centers: Floats::F32(&first), radii: Floats::F32(&radii) })
             }
+            BoundsKind::Point => work(&Bounds::Points { positions: Floats::F32(&first) }),
             _ => {
                 let max = part(3, 3);
                 work(&Bounds::Boxes { min: Floats::F32(&first), max: Floats::F32(&max) })
@@ -251,7 +259,8 @@ fn wrong_in(piece: &PieceWords, given: &Given, base: u32) -> Result<(), String> 
     for (place, index) in piece.indices.iter().enumerate() {
         let record = &piece.records[record_words * place..record_words * (place + 1)];
         let at = |what: &str| format!("instance {index} at {place}: {what}: {record:x?}");
-        if record[7] != index - base {
+        let index_at = if given.kind == BoundsKind::Point { 3 } else { 7 };
+        if record[index_at] != index - base {
             return Err(at("not its index"));
         }
         let corners = given.corners(*index as usize);
@@ -264,7 +273,14 @@ fn wrong_in(piece: &PieceWords, given: &Given, base: u32) -> Result<(), String> 
                     return Err(at(&format!("expected {bits:x?}")));
                 }
             }
+            (BoundsKind::Point, Some(_)) => {
+                let bits = given.of(*index as usize).iter().map(|v| v.to_bits());
+                if !bits.eq(record[..3].iter().copied()) {
+                    return Err(at("expected the given bits"));
+                }
+            }
             (BoundsKind::Sphere, None) if is_beyond(record[3]) => {}
+            (BoundsKind::Point, None) if is_beyond(record[0]) => {}
             (_, Some(corners)) => holds(record, corners, 1e-6).map_err(|what| at(&what))?,
             (BoundsKind::Box, None) if record[8..11].iter().all(|word| is_beyond(*word)) => {}
             _ => return Err(at("expected an invalid record")),
@@ -590,7 +606,13 @@ fn bad_buffers_are_refused() {
             with(&good, 0, None),
             BoundsKind::OrientedBox,
             1,
-            "kind: expected Sphere or Box, got OrientedBox",
+            "kind: expected Sphere, Box or Point, got OrientedBox",
+        ),
+        (
+            with(&good, 0, None),
+            BoundsKind::WidePoint,
+            1,
+            "kind: expected Sphere, Box or Point, got WidePoint: a buffer holds float32",
         ),
     ] {
         let made = context.record_instances_from(&mut encoder, source, kind, count);
@@ -620,7 +642,13 @@ fn planted_faults_are_found() {
         ),
         ("first >= source.count", "first + GROUP > source.count", "the last, partial group"),
         ("min(first + GROUP, source.count)", "min(first + GROUP - 1u, source.count)", "63 members"),
-        ("let is_valid = all(", "let is_valid = true || all(", "NaN is a sphere"),
+        ("let is_valid = all((center", "let is_valid = true || all((center", "NaN is a sphere"),
+        ("let is_valid = all((position", "let is_valid = true || all((position", "NaN is a point"),
+        (
+            "corners = Corners(keys, keys);",
+            "corners = Corners(keys, keys + vec3<u32>(9u));",
+            "a point",
+        ),
         (
             "radius < LARGEST_BITS || radius == SIGN_BIT",
             "(radius & MAGNITUDE_BITS) < LARGEST_BITS",

@@ -52,6 +52,9 @@ fn instances(things: &[Thing], kind: BoundsKind) -> Arc<Instances> {
             half_sizes: Floats::F64(&half_sizes),
             rotations: Floats::F64(&rotations),
         },
+        BoundsKind::Point | BoundsKind::WidePoint => {
+            Bounds::Points { positions: Floats::F64(&centers) }
+        }
     };
     let options = InstanceOptions { order: StoredOrder::Given, ..InstanceOptions::default() };
     engine().instances(&bounds, &options).unwrap()

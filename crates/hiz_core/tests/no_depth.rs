@@ -225,16 +225,21 @@ fn what_is_no_depth_hides_no_group() {
 #[test]
 fn pixels_that_nobody_cleans_hide_something() {
     for (source, atlas, (what, by)) in [
-        (Source::Bits, AtlasUse::Never, ("sanitized(textureLoad(source,", "(textureLoad(source,")),
+        (
+            Source::Bits,
+            AtlasUse::Never,
+            ("sanitized(foreground(source_given(x, y)))", "source_given(x, y)"),
+        ),
         (
             Source::Float,
             AtlasUse::Never,
-            (
-                "sanitized(bitcast<u32>(textureLoad(source, at, 0).x))",
-                "bitcast<u32>(textureLoad(source, at, 0).x)",
-            ),
+            ("sanitized(foreground(source_given(x, y)))", "source_given(x, y)"),
         ),
-        (Source::Bits, AtlasUse::Always, ("sanitized(textureLoad(atlas,", "(textureLoad(atlas,")),
+        (
+            Source::Bits,
+            AtlasUse::Always,
+            ("return sanitized(select(bits, foreground(bits), level == 0u));", "return bits;"),
+        ),
         (
             Source::Bits,
             AtlasUse::Never,

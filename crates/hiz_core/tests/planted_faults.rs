@@ -425,7 +425,7 @@ fn atlas_texels_beside_the_right_ones() {
     for (what, by) in [
         ("textureLoad(atlas, at.zy)[right]", "textureLoad(atlas, at.zy)[left]"),
         ("textureLoad(atlas, at.xw)[left]", "textureLoad(atlas, at.xy)[left]"),
-        ("let at = pyramid.origins[level].xyxy", "let at = pyramid.origins[0].xyxy"),
+        ("let at = origin.xyxy", "let at = pyramid.origins[0].xyxy"),
     ] {
         assert_red("atlas", &[(what, by)]);
     }
@@ -457,7 +457,7 @@ fn groups_that_forget_members_or_shrink() {
         ),
         (
             "the next group's members",
-            ("survivor_position(slot)).x, lane", "survivor_position(slot)).x + 1u, lane"),
+            ("cull_run(entry & ~ACCEPTED", "cull_run((entry & ~ACCEPTED) + 1u"),
             ALL,
         ),
         (
@@ -468,7 +468,7 @@ fn groups_that_forget_members_or_shrink() {
             ),
             ALL,
         ),
-        ("a workgroup too few", ("slot % RUN == 0u", "slot % RUN == 1u"), ALL),
+        ("a workgroup too few", ("RUN, TIER == 0u) == 0u", "RUN, TIER == 0u) == 1u"), ALL),
         ("groups of 32, which", ("group * GROUP + share", "group * 32u + share"), ALL),
         ("half of the shares", ("lane % SHARE", "lane % 4u"), ALL),
     ] {

@@ -68,6 +68,9 @@ impl Crowd {
                 half_sizes: Floats::F64(&self.sizes),
                 rotations: Floats::F64(&self.rotations),
             },
+            BoundsKind::Point | BoundsKind::WidePoint => {
+                Bounds::Points { positions: Floats::F64(&self.centers) }
+            }
         }
     }
 
@@ -100,6 +103,7 @@ impl Crowd {
                     (at(&self.centers).minus(&radius), at(&self.centers).plus(&radius))
                 }
                 BoundsKind::Box => (at(&self.min), at(&self.max)),
+                BoundsKind::Point | BoundsKind::WidePoint => (at(&self.centers), at(&self.centers)),
                 BoundsKind::OrientedBox => {
                     let part = |axis: usize| {
                         let entry = self.rotations[9 * i + 3 * k + axis].abs();

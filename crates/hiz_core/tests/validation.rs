@@ -906,7 +906,7 @@ fn least() -> wgpu::Limits {
         max_sampled_textures_per_shader_stage: 4,
         max_samplers_per_shader_stage: 1,
         max_storage_buffers_per_shader_stage: 8,
-        max_storage_textures_per_shader_stage: 3,
+        max_storage_textures_per_shader_stage: 4,
         max_uniform_buffers_per_shader_stage: 4,
         max_uniform_buffer_binding_size: 528,
         max_storage_buffer_binding_size: 8192,
@@ -990,6 +990,7 @@ fn the_least_limits_are_enough_for_everything() {
         (Format::Depth32Float, SAMPLED, SIDE, BoundsKind::Sphere),
         (Format::R32Float, SAMPLED, SIDE, BoundsKind::Box),
         (Format::Rgba32Uint, Usages::STORAGE_BINDING, SIDE / 4, BoundsKind::OrientedBox),
+        (Format::R32Float, SAMPLED, SIDE, BoundsKind::Point),
     ];
     for (format, usage, width, kind) in sources {
         let image = world.texture_but(format, usage | Usages::COPY_SRC, |d| d.size.width = width);
@@ -1008,6 +1009,9 @@ fn the_least_limits_are_enough_for_everything() {
                 half_sizes: Floats::F32(&sizes),
                 rotations: Floats::F32(&vec![0.5; 9 * n]),
             },
+            BoundsKind::Point | BoundsKind::WidePoint => {
+                Bounds::Points { positions: Floats::F32(&centers) }
+            }
         };
         let mut encoder = world.encoder();
         let instances =

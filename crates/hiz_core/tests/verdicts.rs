@@ -61,6 +61,9 @@ impl Crowd {
                 half_sizes: Floats::F64(&self.halves),
                 rotations: Floats::F64(&self.rotations),
             },
+            BoundsKind::Point | BoundsKind::WidePoint => {
+                Bounds::Points { positions: Floats::F64(&self.centers) }
+            }
         }
     }
 

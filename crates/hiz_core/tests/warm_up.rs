@@ -45,6 +45,7 @@ impl Crowd {
                 half_sizes: Floats::F32(&self.sizes),
                 rotations: Floats::F32(&self.rotations),
             },
+            BoundsKind::Point | BoundsKind::WidePoint => Bounds::Points { positions: centers },
         }
     }
 }

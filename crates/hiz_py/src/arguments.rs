@@ -1,7 +1,8 @@
 //! Arrays and words from Python as the engine's borrowed types.
 
 use hiz_core::{
-    Bounds, DepthConvention, DepthInput, DepthKind, DepthNumbers, DepthTolerance, Floats, ImageSize,
+    Bounds, DepthConvention, DepthInput, DepthKind, DepthNumbers, DepthTolerance, Floats,
+    ImageSize, WorldTolerance,
 };
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -76,6 +77,7 @@ pub(crate) fn bounds<'a>(kind: &str, arrays: &'a [FloatArray<'_>]) -> PyResult<B
             Ok(Bounds::Spheres { centers: centers.floats()?, radii: radii.floats()? })
         }
         ("boxes", [min, max]) => Ok(Bounds::Boxes { min: min.floats()?, max: max.floats()? }),
+        ("points", [positions]) => Ok(Bounds::Points { positions: positions.floats()? }),
         ("oriented_boxes", [centers, half_sizes, rotations]) => Ok(Bounds::OrientedBoxes {
             centers: centers.floats()?,
             half_sizes: half_sizes.floats()?,
@@ -104,7 +106,8 @@ pub(crate) fn depth_input<'a>(
         other => return Err(PyValueError::new_err(format!("rounding: no rounding {other:?}"))),
     };
     let numbers = image.numbers(rounding == "half")?;
-    Ok(DepthInput { numbers, kind: depth_kind(kind)?, scale, invalid, tolerance })
+    let world_tolerance = WorldTolerance::NONE;
+    Ok(DepthInput { numbers, kind: depth_kind(kind)?, scale, invalid, tolerance, world_tolerance })
 }
 
 /// [`depth_input`] of the image of each sample.

@@ -172,11 +172,14 @@ pub(crate) struct Counts {
     outside: u64,
     occluded: u64,
     visible: u64,
+    unoccluded: u64,
     invalid: u64,
     demand: u64,
     written: u64,
     tested_groups: u64,
+    tested_boxes: [u64; 3],
     tested_instances: u64,
+    accepted_instances: u64,
     levels: [u64; 16],
     texels_read: u64,
 }
@@ -189,11 +192,14 @@ impl Counts {
             outside: counts.outside,
             occluded: counts.occluded,
             visible: counts.visible,
+            unoccluded: counts.unoccluded,
             invalid: counts.invalid,
             demand: counts.demand,
             written: counts.written,
             tested_groups: counts.tested_groups,
+            tested_boxes: counts.tested_boxes,
             tested_instances: counts.tested_instances,
+            accepted_instances: counts.accepted_instances,
             levels: counts.levels,
             texels_read: counts.texels_read,
         }
@@ -257,6 +263,16 @@ impl Explanation {
     #[getter]
     fn farthest_z(&self) -> Option<f64> {
         self.0.farthest_z
+    }
+
+    #[getter]
+    fn in_front_of(&self) -> Option<f32> {
+        self.0.in_front_of
+    }
+
+    #[getter]
+    fn in_front_of_z(&self) -> Option<f64> {
+        self.0.in_front_of_z
     }
 
     #[getter]

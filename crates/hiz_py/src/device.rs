@@ -516,6 +516,7 @@ impl Instances {
             hiz_core::BoundsKind::Sphere => "spheres",
             hiz_core::BoundsKind::Box => "boxes",
             hiz_core::BoundsKind::OrientedBox => "oriented_boxes",
+            hiz_core::BoundsKind::Point | hiz_core::BoundsKind::WidePoint => "points",
         })
     }
 

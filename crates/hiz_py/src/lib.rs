@@ -40,7 +40,7 @@ mod _core {
     #[pymodule_export]
     use crate::meshes::MeshTable;
     #[pymodule_export]
-    use crate::reference::{reference_classify, reference_pyramid};
+    use crate::reference::{reference_classify, reference_pyramid, reference_unoccluded};
     #[pymodule_export]
     use crate::two_passes::{PassAnswer, TwoPasses};
 

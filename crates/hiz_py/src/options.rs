@@ -59,13 +59,21 @@ pub(crate) fn cull_options(given: &Bound<'_, PyAny>) -> PyResult<CullOptions> {
             "volume" => Fit::Volume,
             other => return Err(unknown("fit", other)),
         },
-        hierarchy: match given.getattr("hierarchy")?.extract()? {
-            None => Hierarchy::Auto,
-            Some(true) => Hierarchy::Always,
-            Some(false) => Hierarchy::Never,
-        },
+        hierarchy: hierarchy(&given.getattr("hierarchy")?)?,
         statistics: given.getattr("statistics")?.extract()?,
         lod: lod_rule(&given.getattr("lod")?)?,
+    })
+}
+
+/// None, a bool, or a number of tiers.
+fn hierarchy(given: &Bound<'_, PyAny>) -> PyResult<Hierarchy> {
+    if given.is_none() {
+        return Ok(Hierarchy::Auto);
+    }
+    Ok(match given.extract::<bool>() {
+        Ok(true) => Hierarchy::Always,
+        Ok(false) => Hierarchy::Never,
+        Err(_) => Hierarchy::Tiers(given.extract()?),
     })
 }
 

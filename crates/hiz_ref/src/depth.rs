@@ -80,14 +80,56 @@ pub fn depth_bounds(
     image: &[f64],
     meaning: DepthMeaning,
 ) -> Result<DepthBounds, Error> {
+    let far = if view.reversed { 0.0 } else { 1.0 };
+    let ends = around_pixels(view, image, meaning)?.into_iter().map(|at| match at {
+        Pixel::Between(ends) => ends,
+        Pixel::Beyond | Pixel::NoData => [far; 2],
+    });
+    let (nearer, farther) = ends.map(|[nearer, farther]| (nearer, farther)).unzip();
+    Ok(DepthBounds { nearer, farther })
+}
+
+/// The NDC depth of each pixel of `image`, for [`unoccluded_between`].
+///
+/// It is that of [`depth_bounds`], except that "no data" is *near*: anything may be there.
+/// View depth or distance beyond the far plane stays far, infinity included.
+///
+/// # Errors
+///
+/// Those of [`depth_bounds`].
+///
+/// [`unoccluded_between`]: crate::unoccluded_between
+pub fn nearest_depth_bounds(
+    view: &View,
+    image: &[f64],
+    meaning: DepthMeaning,
+) -> Result<DepthBounds, Error> {
+    let (near, far) = if view.reversed { (1.0, 0.0) } else { (0.0, 1.0) };
+    let ends = around_pixels(view, image, meaning)?.into_iter().map(|at| match at {
+        Pixel::Between(ends) => ends,
+        Pixel::Beyond => [far; 2],
+        Pixel::NoData => [near; 2],
+    });
+    let (nearer, farther) = ends.map(|[nearer, farther]| (nearer, farther)).unzip();
+    Ok(DepthBounds { nearer, farther })
+}
+
+/// What a pixel holds.
+enum Pixel {
+    /// A depth between two float32, of which the nearer one comes first.
+    Between([f32; 2]),
+    /// View depth or distance beyond the far plane.
+    Beyond,
+    /// No depth.
+    NoData,
+}
+
+/// What each pixel of an image holds.
+fn around_pixels(view: &View, image: &[f64], meaning: DepthMeaning) -> Result<Vec<Pixel>, Error> {
     view.check()?;
     view.check_length(image.len())?;
     let DepthMeaning { kind, scale, invalid, origin_is_eye } = meaning;
-    let far = if view.reversed { 0.0 } else { 1.0 };
-    let mut bounds = DepthBounds {
-        nearer: Vec::with_capacity(image.len()),
-        farther: Vec::with_capacity(image.len()),
-    };
+    let mut ends = Vec::with_capacity(image.len());
     let metric = matches!(kind, DepthKind::Z | DepthKind::Distance);
     if !metric && (kind == DepthKind::ReversedNdc) != view.reversed {
         return Err(Error::DepthMeaning("kind: expected NDC depth in the view's own convention"));
@@ -108,23 +150,29 @@ pub fn depth_bounds(
     for row in 0..view.height {
         for column in 0..view.width {
             let number = *pixels.next().expect("as many as pixels");
+            let beyond = if view.reversed { Ordering::Less } else { Ordering::Greater };
             let around = match &rays {
-                _ if !number.is_finite() || invalid.contains(&number) => None,
+                _ if invalid.contains(&number) => Err(Ordering::Equal),
+                Some(_) if number == f64::INFINITY => Err(beyond),
+                _ if !number.is_finite() => Err(Ordering::Equal),
                 None => bracket(number, number, |f| {
                     number.partial_cmp(&f64::from(f)).expect("a finite number")
-                }),
+                })
+                .map_err(|_| Ordering::Equal),
                 Some(rays) if number > 0.0 || rays.signed => {
                     rays.around([column, row], number, scale)
                 }
-                Some(_) => None,
+                Some(_) => Err(Ordering::Equal),
             };
-            let [low, high] = around.unwrap_or([far; 2]);
-            let (nearer, farther) = if view.reversed { (high, low) } else { (low, high) };
-            bounds.nearer.push(nearer);
-            bounds.farther.push(farther);
+            ends.push(match around {
+                Ok([low, high]) if view.reversed => Pixel::Between([high, low]),
+                Ok(ends) => Pixel::Between(ends),
+                Err(side) if side == beyond => Pixel::Beyond,
+                Err(_) => Pixel::NoData,
+            });
         }
     }
-    Ok(bounds)
+    Ok(ends)
 }
 
 /// How depth along the rays of a view becomes NDC depth, in float64 and exactly.
@@ -156,8 +204,8 @@ impl<'a> Rays<'a> {
     }
 
     /// The two float32 next to the depth of `number * scale` in a pixel.
-    /// `None` if the depth is outside `0..=1`.
-    fn around(&self, pixel: [u32; 2], number: f64, scale: f64) -> Option<[f32; 2]> {
+    /// If the depth is outside `0..=1`, on which side.
+    fn around(&self, pixel: [u32; 2], number: f64, scale: f64) -> Result<[f32; 2], Ordering> {
         let quick = self.float.depth(self.view, self.kind, pixel, number, scale).rounded();
         let exact = OnceCell::new();
         bracket(quick.mid - quick.err(), quick.mid + quick.err(), |f| {
@@ -171,22 +219,25 @@ impl<'a> Rays<'a> {
 /// The two float32 next to a number in `0..=1`; both are the number if it is a float32.
 ///
 /// The number lies in `low..=high`, and `compare` gives its order relative to a float32.
-/// `None` if it is outside `0..=1`.
+/// If it is outside `0..=1`, on which side.
 /// Below the least normal float32, the two are 0 and that float32.
-fn bracket(low: f64, high: f64, compare: impl Fn(f32) -> Ordering) -> Option<[f32; 2]> {
+fn bracket(low: f64, high: f64, compare: impl Fn(f32) -> Ordering) -> Result<[f32; 2], Ordering> {
     // Outwards once more, to cover the rounding of the ends; a NaN gives no bound.
     let low = if low.is_nan() { f64::NEG_INFINITY } else { low.next_down() };
     let high = if high.is_nan() { f64::INFINITY } else { high.next_up() };
-    if low > 1.0 || high < 0.0 {
-        return None;
+    if low > 1.0 {
+        return Err(Ordering::Greater);
+    }
+    if high < 0.0 {
+        return Err(Ordering::Less);
     }
     for (end, open, outside) in
         [(0.0, low <= 0.0, Ordering::Less), (1.0, high >= 1.0, Ordering::Greater)]
     {
         if open {
             match compare(end) {
-                Ordering::Equal => return Some([end; 2]),
-                order if order == outside => return None,
+                Ordering::Equal => return Ok([end; 2]),
+                order if order == outside => return Err(order),
                 _ => {}
             }
         }
@@ -203,7 +254,7 @@ fn bracket(low: f64, high: f64, compare: impl Fn(f32) -> Ordering) -> Option<[f3
     }
     let below = if below < LEAST_NORMAL { 0 } else { below };
     let above = if above > 0 { above.max(LEAST_NORMAL) } else { 0 };
-    Some([f32::from_bits(below), f32::from_bits(above)])
+    Ok([f32::from_bits(below), f32::from_bits(above)])
 }
 
 /// The bits of the greatest float32 that is not above a number of `0..=1`.

@@ -26,6 +26,7 @@
 //!
 //! # Other questions
 //!
+//! - [`is_unoccluded`] says whether nothing in the image hides any part of a volume.
 //! - [`depth_bounds`] converts an image that does not hold NDC depth.
 //!   Its result is NDC depth between two float32 per pixel, and [`classify_between`] judges by such
 //!   an image.
@@ -53,6 +54,7 @@
 //! `view` and `volume` turn the inputs into linear functions, and `feasibility` asks whether a
 //! volume meets half-spaces.
 //! `search` looks through the image for a pixel that proves a volume visible.
+//! `unoccluded` asks the opposite question: whether all of a volume surely shows.
 //! `scalar` and `dyadic` have the two arithmetics.
 //! `depth` converts depth kinds, `pyramid` builds levels, `containment` checks proxies and
 //! bounds, and `lod` judges levels of detail.
@@ -87,14 +89,18 @@ mod pixels;
 mod pyramid;
 mod scalar;
 mod search;
+mod unoccluded;
 mod view;
 mod volume;
 
 pub use containment::{MeshError, Protrusion, TriangleMesh, check_bounds, check_proxy, contains};
-pub use depth::{DepthBounds, DepthKind, DepthMeaning, depth_bounds};
+pub use depth::{DepthBounds, DepthKind, DepthMeaning, depth_bounds, nearest_depth_bounds};
 pub use lod::{LodRule, coarsest_lod, greatest_stretch, least_w, pixel_shift, radius, stretch_at};
 pub use pixels::{PixelTruth, pixel_truth};
 pub use pyramid::{Level, pyramid, sanitized_depth};
+pub use unoccluded::{
+    is_before, is_inside, is_unoccluded, sanitized_nearest_depth, unoccluded_between,
+};
 pub use view::{Coverage, View};
 pub use volume::Volume;
 

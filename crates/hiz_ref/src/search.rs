@@ -12,11 +12,11 @@ use std::cell::OnceCell;
 /// A volume as a view sees it, with the two questions about it.
 /// Does it meet a block of pixels, and does a depth hide it?
 pub(crate) struct Projected<'a> {
-    view: &'a View,
+    pub(crate) view: &'a View,
     volume: &'a Volume,
-    options: Options,
-    shape: Shape,
-    float: Clip<Ball>,
+    pub(crate) options: Options,
+    pub(crate) shape: Shape,
+    pub(crate) float: Clip<Ball>,
     /// Made when float64 first leaves a sign open, which is rare.
     exact: OnceCell<Clip<Dyadic>>,
 }
@@ -33,12 +33,12 @@ impl<'a> Projected<'a> {
         }
     }
 
-    fn exact(&self) -> &Clip<Dyadic> {
+    pub(crate) fn exact(&self) -> &Clip<Dyadic> {
         self.exact.get_or_init(|| Clip::new(self.view, &Frame::new(self.volume, self.view.origin)))
     }
 
     /// Runs a decision in the arithmetic that the options name.
-    fn decide(
+    pub(crate) fn decide(
         &self,
         float: impl FnOnce() -> Option<bool>,
         exact: impl FnOnce() -> Option<bool>,
@@ -138,7 +138,7 @@ impl<'a> Projected<'a> {
     ///
     /// The projection of eight corners gives a first guess.
     /// Each part of the image outside of the guess is left out only if it is proved empty.
-    fn bounding_block(&self) -> Block {
+    pub(crate) fn bounding_block(&self) -> Block {
         let image = self.view.image();
         let mut low = [f64::INFINITY; 2];
         let mut high = [f64::NEG_INFINITY; 2];

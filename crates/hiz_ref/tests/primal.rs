@@ -11,7 +11,7 @@ mod common;
 use common::Random;
 use hiz_ref::{
     Arithmetic, Coverage, Options, OwnDepth, Verdict, View, Volume, classify_with, is_outside,
-    touched_pixels,
+    is_unoccluded, touched_pixels,
 };
 
 /// `v . s + m >= 0`, in the volume's local coordinates.
@@ -148,6 +148,26 @@ impl Case {
         } else {
             self.plane([0, 0, 8, -depth])
         };
+        self.is_positive(plane)
+    }
+
+    /// Whether every point is nearer than a depth (in eighths).
+    fn is_before(&self, depth: i128) -> bool {
+        self.is_positive(if self.reversed {
+            self.plane([0, 0, 8, -depth])
+        } else {
+            self.plane([0, 0, -8, depth])
+        })
+    }
+
+    /// Whether every point is strictly inside the frustum.
+    fn is_inside(&self) -> bool {
+        let image = self.size.map(|side| [0, 2 * side]);
+        self.frustum(image[0], image[1]).into_iter().all(|plane| self.is_positive(plane))
+    }
+
+    /// Whether a plane is positive at every point.
+    fn is_positive(&self, plane: Plane) -> bool {
         if self.ball {
             return plane.m > 0 && plane.m * plane.m > dot(plane.v, plane.v);
         }
@@ -252,6 +272,7 @@ fn certificates_and_points_agree() {
             let inset = i128::from(coverage == Coverage::Sample);
             let far = if case.reversed { 0 } else { 8 };
             let (mut touched, mut visible, mut open) = (Vec::new(), false, Vec::new());
+            let mut unoccluded = case.is_inside();
             for y in 0..case.size[1] {
                 for x in 0..case.size[0] {
                     let edges = |i: i128| [2 * i + inset, 2 * i + 2 - inset];
@@ -259,6 +280,7 @@ fn certificates_and_points_agree() {
                         touched.push([x as u32, y as u32]);
                         let pixel = case.depth[(y * case.size[0] + x) as usize];
                         visible |= pixel == far || !case.is_hidden_by(pixel);
+                        unoccluded &= pixel == far || case.is_before(pixel);
                         let mut planes = case.frustum(edges(x), edges(y));
                         planes.push(case.before(pixel));
                         if pixel == far || case.meets(planes) {
@@ -272,6 +294,12 @@ fn certificates_and_points_agree() {
             let found = touched_pixels(&view, &volume, coverage).expect("valid");
             assert_eq!(found, touched, "{}", name());
             let outside = touched.is_empty();
+            let answer = is_unoccluded(&view, &volume, &depth, coverage);
+            assert_eq!(answer, Ok(unoccluded), "{}", name());
+            assert!(!unoccluded || !outside || coverage == Coverage::Sample, "{}", name());
+            *tally
+                .entry((format!("{coverage:?} unoccluded {unoccluded}"), outside))
+                .or_insert(0) += 1;
             if coverage == Coverage::Area {
                 assert_eq!(is_outside(&view, &volume), Ok(outside), "{}", name());
             }
@@ -318,5 +346,64 @@ fn certificates_and_points_agree() {
     for (verdict, outside) in [("Visible", false), ("Hidden", false), ("Hidden", true)] {
         let count = tally[&(format!("Area Escalate {verdict}"), outside)];
         assert!(count > 1000, "{verdict} {outside}: {count}");
+    }
+}
+
+/// Small volumes before a pinhole, in images with a few touched pixels.
+/// Many are unoccluded, and many fail by one plane or one pixel.
+#[test]
+fn certificates_and_points_agree_on_what_is_unoccluded() {
+    let mut random = Random(2);
+    let mut tally = std::collections::BTreeMap::new();
+    for number in 0..20_000 {
+        let mut case = Case::random(&mut random);
+        let mut w = |n: i64| i128::from(random.whole(-n, n));
+        case.reversed = w(1) > 0;
+        let z = if case.reversed { [0, 0, 0, 1] } else { [0, 0, 1, -1] };
+        case.rows = [[1, 0, 0, 0], [0, 1, 0, 0], z, [0, 0, 1, 0]];
+        let r = w(1).abs();
+        case.axes = if case.ball || w(1) > 0 {
+            [[r, 0, 0], [0, r, 0], [0, 0, r]]
+        } else {
+            [[w(1), 1, 0], [w(1), w(1), 0], [0, 0, w(1)]]
+        };
+        case.center = [w(3), w(3), w(2) + 4];
+        case.size = [w(2).abs() + 1, w(2).abs() + 1];
+        let (near, far) = if case.reversed { (8, 0) } else { (0, 8) };
+        let between = case.size[0] * case.size[1];
+        case.depth = (0..between)
+            .map(|_| match w(4) {
+                -4 => near,
+                -3 | -2 => far,
+                _ => (7 * far + near) / 8 + if case.reversed { w(1).abs() } else { -w(1).abs() },
+            })
+            .collect();
+        let (view, volume) = (case.view(), case.volume());
+        let depth: Vec<f32> = case.depth.iter().map(|&d| float(d) as f32 / 8.0).collect();
+        for coverage in [Coverage::Area, Coverage::Sample] {
+            let inset = i128::from(coverage == Coverage::Sample);
+            let is_inside = case.is_inside();
+            let mut covering = 0;
+            for y in 0..case.size[1] {
+                for x in 0..case.size[0] {
+                    let edges = |i: i128| [2 * i + inset, 2 * i + 2 - inset];
+                    let pixel = case.depth[(y * case.size[0] + x) as usize];
+                    if pixel != far && !case.is_before(pixel) {
+                        covering += usize::from(case.meets(case.frustum(edges(x), edges(y))));
+                    }
+                }
+            }
+            let answer = is_unoccluded(&view, &volume, &depth, coverage).expect("valid");
+            let name = || format!("case {number}, {coverage:?}: {view:?} {volume:?} {depth:?}");
+            assert_eq!(answer, is_inside && covering == 0, "{}", name());
+            *tally.entry((format!("{coverage:?}"), is_inside, covering.min(2))).or_insert(0) += 1;
+        }
+    }
+    println!("coverage, inside, pixels in the way (2: or more): {tally:#?}");
+    for coverage in ["Area", "Sample"] {
+        for covering in 0..2 {
+            let count = tally[&(coverage.to_owned(), true, covering)];
+            assert!(count > 100, "{coverage} {covering}: {count}");
+        }
     }
 }

@@ -22,6 +22,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let gpu = Gpu::open(&instance(IndirectChecks::On), None)?;
     println!("adapter: {}", gpu.words());
     println!("depth slack: {}", crate::culler::depth_slack(&gpu.adapter));
+    crate::sample_places::tell(&gpu, arguments.samples)?;
     let mut renderer = Renderer::new(gpu, scene, arguments.size, arguments.samples)?;
     renderer.mode = arguments.mode;
     let mut controls = Controls::new(renderer.scene.pose(0, arguments.frames), arguments.mode);

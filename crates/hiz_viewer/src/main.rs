@@ -26,6 +26,7 @@ mod picture;
 mod pipelines;
 mod queries;
 mod renderer;
+mod sample_places;
 mod scene;
 mod scene_on_device;
 mod targets;

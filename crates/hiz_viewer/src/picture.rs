@@ -6,6 +6,7 @@ use hiz_core::ImageSize;
 use hiz_core::wgpu::{self, BufferUsages};
 
 use crate::Failure;
+use crate::gpu::Gpu;
 use crate::pipelines::COUNT_FORMAT;
 use crate::renderer::Renderer;
 use crate::targets::view;
@@ -101,6 +102,27 @@ pub(crate) fn read(renderer: &Renderer) -> Result<Picture, Failure> {
     renderer.draw_again(&mut pass);
     drop(pass);
 
+    let found = record_samples(gpu, &mut encoder, [&targets.depth, &count], size, samples);
+    gpu.submit(encoder);
+
+    let words: Vec<[u32; 2]> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&found)?);
+    Ok(Picture {
+        size,
+        samples,
+        rgba: gpu.read_texture(&targets.picture_texture)?,
+        depth: words.iter().map(|w| w[0]).collect(),
+        at_depth: words.iter().map(|w| w[1]).collect(),
+    })
+}
+
+/// Records the copy of all samples into a buffer: the bits of the depth, and the count.
+pub(crate) fn record_samples(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    [depth, count]: [&wgpu::TextureView; 2],
+    size: ImageSize,
+    samples: u32,
+) -> wgpu::Buffer {
     let mut source = include_str!("shaders/samples.wgsl").to_owned();
     if samples == 1 {
         source = source
@@ -131,8 +153,8 @@ pub(crate) fn read(renderer: &Renderer) -> Result<Picture, Failure> {
         "viewer.samples",
         &pipeline.get_bind_group_layout(0),
         &[
-            wgpu::BindingResource::TextureView(&targets.depth),
-            wgpu::BindingResource::TextureView(&count),
+            wgpu::BindingResource::TextureView(depth),
+            wgpu::BindingResource::TextureView(count),
             found.as_entire_binding(),
         ],
     );
@@ -141,16 +163,7 @@ pub(crate) fn read(renderer: &Renderer) -> Result<Picture, Failure> {
     pass.set_bind_group(0, &bindings, &[]);
     pass.dispatch_workgroups(size.width.div_ceil(8), size.height.div_ceil(8), 1);
     drop(pass);
-    gpu.submit(encoder);
-
-    let words: Vec<[u32; 2]> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&found)?);
-    Ok(Picture {
-        size,
-        samples,
-        rgba: gpu.read_texture(&targets.picture_texture)?,
-        depth: words.iter().map(|w| w[0]).collect(),
-        at_depth: words.iter().map(|w| w[1]).collect(),
-    })
+    found
 }
 
 /// How many fragments the last frame's draws have per pixel, whichever of them shows.

@@ -245,6 +245,13 @@ impl Renderer {
         }
     }
 
+    /// The masks of what the frame drew by lists.
+    #[cfg(test)]
+    pub(crate) fn masks(&self) -> Vec<&wgpu::Buffer> {
+        let drawn = self.drawn();
+        drawn[..self.lists().len()].to_vec()
+    }
+
     /// Draws all of the frame once more, with the pipeline that is set.
     pub(crate) fn draw_again(&self, pass: &mut wgpu::RenderPass<'_>) {
         if self.mode == Mode::All {

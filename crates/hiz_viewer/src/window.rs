@@ -88,6 +88,7 @@ impl Open {
         let gpu = Gpu::open(&instance, Some(&surface))?;
         println!("adapter: {}", gpu.words());
         println!("depth slack: {}", crate::culler::depth_slack(&gpu.adapter));
+        crate::sample_places::tell(&gpu, arguments.samples)?;
         let formats = surface.get_capabilities(&gpu.adapter_handle).formats;
         // Colours are stored as they are computed, so the window must not convert them.
         let format = formats.iter().copied().find(|f| !f.is_srgb()).unwrap_or(formats[0]);

@@ -140,7 +140,7 @@ def check_bounds(
 
     Parameters
     ----------
-    bounds : Spheres, Boxes or OrientedBoxes
+    bounds : Spheres, Boxes, OrientedBoxes or Points
         The N volumes.
     meshes : list of Mesh, of tuples, or of meshes of trimesh or Open3D; or one Mesh
         One for each instance, in order.

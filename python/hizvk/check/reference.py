@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from .. import _arguments
-from .._core import reference_classify, reference_pyramid
+from .._core import reference_classify, reference_pyramid, reference_unoccluded
 from .._types import Coverage, OwnDepth, words
 from ..bounds import Bounds, as_arrays
 from ..camera import Camera
@@ -25,7 +25,17 @@ if TYPE_CHECKING:
 
     from .._types import DepthKind
 
-__all__ = ["HIDDEN", "INVALID", "UNDECIDED", "VISIBLE", "classify", "pyramid"]
+__all__ = [
+    "COVERED",
+    "HIDDEN",
+    "INVALID",
+    "UNDECIDED",
+    "UNOCCLUDED",
+    "VISIBLE",
+    "classify",
+    "pyramid",
+    "unoccluded",
+]
 
 HIDDEN: Final = 1
 """Surely hidden: outside the view, or every pixel that it can meet shows something nearer."""
@@ -35,6 +45,10 @@ INVALID: Final = 3
 """The bounds are invalid; a cull has to keep them."""
 UNDECIDED: Final = 4
 """Too close to call: it depends on which of the two float32 around a converted depth is taken."""
+COVERED: Final = 5
+"""Not unoccluded: a part is outside the view, or some pixel that it meets is no farther."""
+UNOCCLUDED: Final = 6
+"""Surely shows as a whole: inside the view, and every pixel that it meets is farther."""
 
 
 def classify(
@@ -52,7 +66,7 @@ def classify(
 
     Parameters
     ----------
-    bounds : Spheres, Boxes or OrientedBoxes
+    bounds : Spheres, Boxes, OrientedBoxes or Points
         The N volumes.
     camera : Camera
         The camera that saw `depth`.
@@ -90,6 +104,71 @@ def classify(
     # The image as given: the tolerance for half floats is not part of the truth.
     image = (checked.floats(), checked.kind, checked.scale, checked.invalid)
     return reference_classify(bounds_kind, arrays, camera._inner, *image, *asked)
+
+
+def unoccluded(
+    bounds: Bounds,
+    camera: Camera,
+    depth: npt.ArrayLike,
+    *,
+    kind: DepthKind,
+    scale: float = 1.0,
+    invalid: Collection[float] | None = None,
+    coverage: Coverage = "area",
+) -> npt.NDArray[np.uint8]:
+    """Whether all of each instance shows, with nothing of the image before any part.
+
+    An instance is unoccluded if
+
+    - all of its bounds lie strictly inside the six planes of the view volume, and
+    - every pixel that they touch holds a depth strictly farther than all of them.
+
+    A pixel of exactly the far plane's depth is background.
+    A pixel without a valid depth may hold anything, so nothing over it is unoccluded.
+    View depth and distance beyond the far plane are far, infinity included.
+
+    Parameters
+    ----------
+    bounds : Spheres, Boxes or OrientedBoxes
+        The N volumes.
+    camera : Camera
+        The camera that saw `depth`.
+    depth : (height, width) array
+        The depth image, row 0 on top.
+    kind, scale, invalid
+        What its numbers are, as in `Device.pyramid`.
+    coverage : "area" or "sample"
+        Which part of a pixel is touched: its closed square, or its centre.
+
+    Returns
+    -------
+    (N,) uint8 array
+        `UNOCCLUDED`, `COVERED`, `INVALID` or `UNDECIDED`.
+        `compare_unoccluded` compares a cull's verdicts with it.
+
+    Raises
+    ------
+    TypeError, ValueError
+        They name the parameter, what it expects and what came.
+
+    Examples
+    --------
+    >>> import numpy as np, hizvk
+    >>> camera = hizvk.Camera.look_at(
+    ...     (0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(90, 160), near=0.1
+    ... )
+    >>> spheres = hizvk.Spheres([[0, 0, -4], [0, 0, -10], [0, 0, 4]], 0.5)
+    >>> wall = np.full(camera.size, 10.0)
+    >>> codes = hizvk.reference.unoccluded(spheres, camera, wall, kind="z")
+    >>> (codes == hizvk.reference.UNOCCLUDED).tolist()
+    [True, False, False]
+    """
+    bounds_kind, arrays = as_arrays("bounds", bounds)
+    _arguments.instance("camera", camera, Camera, "a Camera")
+    checked = checked_image("depth", depth, camera, kind, scale, invalid)
+    coverage = _arguments.choice("coverage", coverage, words(Coverage))
+    image = (checked.floats(), checked.kind, checked.scale, checked.invalid)
+    return reference_unoccluded(bounds_kind, arrays, camera._inner, *image, coverage)
 
 
 def pyramid(depth: npt.ArrayLike, *, reversed_z: bool) -> list[npt.NDArray[np.float32]]:

@@ -71,7 +71,7 @@ class Configuration:
     """One way to cull."""
 
     volume: str = "boxes"
-    """``"spheres"``, ``"boxes"`` or ``"oriented_boxes"``."""
+    """``"spheres"``, ``"boxes"``, ``"oriented_boxes"`` or ``"points"``."""
     footprint: int = 2
     descent: int = 0
     coverage: str = "area"

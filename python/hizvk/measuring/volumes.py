@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from ..bounds import Bounds, Boxes, OrientedBoxes, Spheres
+from ..bounds import Bounds, Boxes, OrientedBoxes, Points, Spheres
 
 if TYPE_CHECKING:
     import numpy as np
@@ -13,7 +13,12 @@ if TYPE_CHECKING:
 __all__ = ["KINDS", "part_of"]
 
 #: The kinds of bounds, by the names of `Instances.kind`.
-KINDS: Final = {"spheres": Spheres, "boxes": Boxes, "oriented_boxes": OrientedBoxes}
+KINDS: Final = {
+    "spheres": Spheres,
+    "boxes": Boxes,
+    "oriented_boxes": OrientedBoxes,
+    "points": Points,
+}
 
 
 def part_of(bounds: Bounds, which: npt.NDArray[np.intp]) -> Bounds:
@@ -23,4 +28,6 @@ def part_of(bounds: Bounds, which: npt.NDArray[np.intp]) -> Bounds:
             return Spheres(bounds.centers[which], bounds.radii[which])
         case Boxes():
             return Boxes(bounds.min[which], bounds.max[which])
+        case Points():
+            return Points(bounds.positions[which])
     return OrientedBoxes(bounds.centers[which], bounds.half_sizes[which], bounds.rotations[which])

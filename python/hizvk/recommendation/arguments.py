@@ -24,7 +24,7 @@ __all__ = ["alternatives_of", "cameras_of", "device_of", "images_of", "occluders
 
 def alternatives_of(bounds: Any) -> dict[str, Bounds | Instances]:
     """The given bounds by their kind."""
-    expected = "Spheres, Boxes, OrientedBoxes, Instances or a sequence of them"
+    expected = "Spheres, Boxes, OrientedBoxes, Points, Instances or a sequence of them"
     given = bounds if isinstance(bounds, Sequence) and not isinstance(bounds, str) else [bounds]
     found: dict[str, Bounds | Instances] = {}
     for one in given:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from ..bounds import Boxes, OrientedBoxes, Spheres
+from ..bounds import Boxes, OrientedBoxes, Points, Spheres
 
 if TYPE_CHECKING:
     from ..bounds import Bounds
@@ -201,6 +201,8 @@ def points_of(bounds: Bounds, which: Indices, camera: Camera) -> Floats:
     - Box: corners, middles of edges and faces, and the centre.
     - Sphere: its centre, its nearest and farthest point, and two rings of its disc across the view.
     """
+    if isinstance(bounds, Points):
+        return np.asarray(bounds.positions, np.float64)[which][:, None]
     if isinstance(bounds, Spheres):
         centers = np.asarray(bounds.centers, np.float64)[which]
         radii = np.asarray(bounds.radii, np.float64)[which]

@@ -73,7 +73,7 @@ class Candidate:
 
     @property
     def volume(self) -> str:
-        """Which bounds: ``"spheres"``, ``"boxes"`` or ``"oriented_boxes"``."""
+        """Which bounds: ``"spheres"``, ``"boxes"``, ``"oriented_boxes"`` or ``"points"``."""
         return self.configuration.volume
 
     @property

@@ -86,7 +86,7 @@ def recommend(
 
     Parameters
     ----------
-    bounds : Spheres, Boxes, OrientedBoxes or Instances; or a sequence of them
+    bounds : Spheres, Boxes, OrientedBoxes, Points or Instances; or a sequence of them
         The N instances.
         Several kinds of bounds of the same instances are compared with one another.
         The host knows no numbers of `Instances`, so no rays are cast at them: what conservative

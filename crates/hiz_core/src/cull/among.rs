@@ -47,6 +47,7 @@ fn pipeline(gpu: &Gpu, kind: BoundsKind) -> Result<wgpu::ComputePipeline> {
     let texels = (kind.record_bytes() / TEXEL_BYTES) as u32;
     // The bounds' shader files say which texel holds the caller's index.
     let of_index = match kind {
+        BoundsKind::Point | BoundsKind::WidePoint => 0,
         BoundsKind::Sphere | BoundsKind::Box => 1,
         BoundsKind::OrientedBox => texels - 1,
     };

@@ -1,6 +1,6 @@
 //! The early pass of a frame: it lists what is drawn before there is a depth image.
 
-use crate::cull::groups::{NO_STATISTICS, bind_survivors, is_grouped};
+use crate::cull::groups::{NO_STATISTICS, bind_survivors, tiers_of};
 use crate::cull::history::{EarlySet, FrameUniform, Temporal};
 use crate::cull::options::{CullOptions, Order};
 use crate::cull::pipelines::{Candidates, CullKey, DepthStore, FramePass, cull_pipeline};
@@ -86,7 +86,8 @@ pub(crate) fn record_early(
     check_visible(gpu, "temporal", instances, &temporal.early)?;
     let set = Chosen::new(temporal.set_or_largest(set, instances), instances)?;
     check_order(options)?;
-    let view = ViewUniform::new(camera, NO_REDUCTION, options, DepthTolerance::NONE)?;
+    let view =
+        ViewUniform::new(camera, instances.kind, NO_REDUCTION, options, DepthTolerance::NONE)?;
     let number = temporal.next_number();
     gpu.recorded(|| {
         let target = target(gpu, instances, options, temporal, &set)?;
@@ -146,17 +147,16 @@ fn target<'a>(
                 ],
             )
         })?;
-        let groups = if is_grouped(piece, options) {
+        let bind_tier = |tier: usize| {
             let output = output.groups_or_new(gpu, piece)?;
             let more = [
                 entry(4, history.words.as_entire_binding()),
                 entry(5, temporal.frame.as_entire_binding()),
             ];
-            let bind = || bind_survivors(gpu, output, None, report.pass, &more);
-            Some(made(&history.early_groups, bind)?.clone())
-        } else {
-            None
+            let bind = || bind_survivors(gpu, (output, tier), None, report.pass, &more);
+            made(&history.early_groups[tier], bind).cloned()
         };
+        let groups = (0..tiers_of(piece, options)).map(bind_tier).collect::<Result<_>>()?;
         Ok((outputs, groups))
     };
     Target::new(gpu, (instances, options, None), visible, report, bind)

@@ -29,6 +29,8 @@ pub(crate) struct ExplanationRecord {
     pub(crate) of_footprint: u32,
     pub(crate) farthest_before: u32,
     pub(crate) any_before: u32,
+    pub(crate) nearest_bits: u32,
+    pub(crate) padding: [u32; 3],
 }
 
 /// The step at which a test stopped; twin: `shaders/cull/outcome.wgsl`.
@@ -51,11 +53,13 @@ pub(crate) enum Stage {
     Descent = 6,
     /// No stored level fits the footprint.
     Level = 7,
+    /// At the certificate that the texels cover the projection of what is before all of them.
+    Front = 8,
 }
 
 impl Stage {
     /// All stages, in the order of their codes.
-    pub(crate) const ALL: [Self; 8] = [
+    pub(crate) const ALL: [Self; 9] = [
         Self::Validity,
         Self::Frustum,
         Self::EyePlane,
@@ -64,6 +68,7 @@ impl Stage {
         Self::Block,
         Self::Descent,
         Self::Level,
+        Self::Front,
     ];
 }
 
@@ -103,7 +108,8 @@ fn explain_pipeline(gpu: &Gpu, key: &CullKey) -> Result<wgpu::ComputePipeline> {
     })
 }
 
-/// Records the explanation of instance `index`, or of the box around its group.
+/// Records the explanation of instance `index`, or of the box around it in a tier: 0 is that of its
+/// group.
 ///
 /// It goes into two storage buffers: `target`, an `ExplanationRecord`, and `readings`, as many
 /// [`Reading`]s as fit.
@@ -111,7 +117,7 @@ pub(crate) fn record_explain(
     gpu: &Gpu,
     encoder: &mut wgpu::CommandEncoder,
     inputs: &CullInputs<'_>,
-    (index, whole_group): (u32, bool),
+    (index, tier): (u32, Option<usize>),
     [target, readings]: [&wgpu::Buffer; 2],
 ) -> Result<()> {
     let instances = inputs.instances;
@@ -124,12 +130,14 @@ pub(crate) fn record_explain(
     // The test of an instance is explained whether or not it was asked for.
     let mut seen = PreparedView::new(gpu, &CullInputs { among: None, ..*inputs }, None)?;
     let place = piece.order.place((index - piece.range.start) as usize);
-    let mut view = seen.bind(gpu, inputs.pyramid, whole_group)?;
-    let (which, records) = if whole_group {
-        seen.key = group_key(seen.key);
-        (place / GROUP, &piece.group_records)
-    } else {
-        (place, &piece.records)
+    let mut view = seen.bind(gpu, inputs.pyramid, tier.is_some())?;
+    let (which, records) = match tier {
+        None => (place, &piece.records),
+        Some(tier) => {
+            seen.key = group_key(seen.key);
+            let upper = tier.checked_sub(1).map(|above| &piece.upper[above].records);
+            (place / GROUP.pow(tier as u32 + 1), upper.unwrap_or(&piece.group_records))
+        }
     };
     let which = gpu.uniform("hiz.explain.which", &[which as u32, 0, 0, 0])?;
     let output = gpu.bind_group(

@@ -1,15 +1,18 @@
 //! The cull in groups: first the boxes of whole groups, then the members of the surviving groups.
+//!
+//! In large pieces upper tiers of boxes go first, from the topmost one down.
+//! Each tier's survivors are the arguments of an indirect dispatch, which tests what they hold.
 
 use crate::cull::options::{CullOptions, Hierarchy};
 use crate::cull::pipelines::{
-    CullKey, FramePass, MEMBER_BINDINGS, ReportKey, cull_groups_pipeline, cull_members_pipeline,
+    CullKey, FramePass, MEMBER_BINDINGS, ReportKey, cull_boxes_pipeline, cull_members_pipeline,
 };
 use crate::error::Result;
 use crate::gpu::buffers::{entry, made};
 use crate::gpu::device::Gpu;
 use crate::input::bounds::BoundsKind;
-use crate::instances::piece::Piece;
-use crate::output::survivors::GroupOutput;
+use crate::instances::piece::{CULL_WORKGROUP, Piece};
+use crate::output::survivors::{GroupOutput, TierOutput};
 
 /// The label of the buffer that is bound if levels are not counted.
 pub(super) const NO_STATISTICS: &str = "hiz.no_statistics";
@@ -31,6 +34,10 @@ pub(super) fn group_descent(budget: u32) -> u32 {
 /// (`docs/performance.md`).
 const GROUPS_PAY_FROM: u32 = 16_384;
 
+/// From this many instances on, boxes around 64 groups are culled before the groups.
+/// The second number is that of the third tier (`docs/performance.md`).
+const UPPER_TIERS_PAY_FROM: [u32; 2] = [1 << 20, 1 << 23];
+
 /// The options of a group's test.
 pub(crate) fn group_options(options: &CullOptions) -> CullOptions {
     CullOptions { descent: group_descent(options.descent), ..options.clone() }
@@ -41,28 +48,46 @@ pub(super) fn group_key(key: CullKey) -> CullKey {
     CullKey { kind: BoundsKind::Box, descent: true, ..key }
 }
 
+/// How many tiers of boxes are culled before the instances of a piece: 0 for none, 1 for groups.
+pub(crate) fn tiers_of(piece: &Piece, options: &CullOptions) -> usize {
+    let wanted = match options.hierarchy {
+        Hierarchy::Never => 0,
+        Hierarchy::Always => 1,
+        Hierarchy::Tiers(tiers) => tiers as usize,
+        Hierarchy::Auto if piece.count() < GROUPS_PAY_FROM => 0,
+        Hierarchy::Auto => {
+            1 + UPPER_TIERS_PAY_FROM.iter().filter(|from| piece.count() >= **from).count()
+        }
+    };
+    if piece.count() == 0 { 0 } else { wanted.min(piece.tiers()) }
+}
+
 /// Whether the groups of a piece are culled before its instances.
 pub(crate) fn is_grouped(piece: &Piece, options: &CullOptions) -> bool {
-    match options.hierarchy {
-        Hierarchy::Never => false,
-        Hierarchy::Always => piece.count() > 0,
-        Hierarchy::Auto => piece.count() >= GROUPS_PAY_FROM,
-    }
+    tiers_of(piece, options) > 0
 }
 
 /// The pipelines and bindings of the cull of a piece in groups.
 pub(super) struct GroupCull<'a> {
-    output: &'a GroupOutput,
-    /// The test of the boxes of the groups.
-    boxes: (wgpu::ComputePipeline, wgpu::BindGroup),
+    /// The tests of the boxes of each tier, the topmost one last.
+    tiers: Vec<TierCull<'a>>,
     /// The test of the members of the surviving groups.
-    members: (wgpu::ComputePipeline, wgpu::BindGroup),
+    members: wgpu::ComputePipeline,
 }
 
-/// What the cull of a piece's groups binds as its outputs: those of every cull, and `more`.
+/// The tests of the boxes of a tier.
+struct TierCull<'a> {
+    output: &'a TierOutput,
+    pipeline: wgpu::ComputePipeline,
+    outputs: wgpu::BindGroup,
+    /// What reads the survivors.
+    list: wgpu::BindGroup,
+}
+
+/// What the cull of a tier's boxes binds as its outputs: those of every cull, and `more`.
 pub(super) fn bind_survivors(
     gpu: &Gpu,
-    output: &GroupOutput,
+    (output, tier): (&GroupOutput, usize),
     statistics: Option<&wgpu::Buffer>,
     pass: FramePass,
     more: &[wgpu::BindGroupEntry<'_>],
@@ -71,10 +96,11 @@ pub(super) fn bind_survivors(
         Some(statistics) => statistics.clone(),
         None => gpu.stand_in(NO_STATISTICS)?,
     };
+    let of_tier = &output.tiers[tier];
     let mut entries = vec![
-        entry(0, output.survivors.as_entire_binding()),
+        entry(0, of_tier.survivors.as_entire_binding()),
         entry(1, output.verdicts.as_entire_binding()),
-        entry(2, wgpu::BindingResource::TextureView(&output.survivor_list)),
+        entry(2, wgpu::BindingResource::TextureView(&of_tier.survivor_list)),
         entry(3, counted.as_entire_binding()),
     ];
     entries.extend_from_slice(more);
@@ -86,44 +112,69 @@ pub(super) fn bind_survivors(
 }
 
 impl<'a> GroupCull<'a> {
-    /// `survivors`: what [`bind_survivors`] has made for it.
+    /// `survivors`: what [`bind_survivors`] has made for it, for each tier.
     pub(super) fn new(
         gpu: &Gpu,
         (key, report): (CullKey, ReportKey),
         output: &'a GroupOutput,
-        survivors: wgpu::BindGroup,
+        survivors: &[wgpu::BindGroup],
     ) -> Result<Self> {
-        let members = made(&output.member_bindings, || {
-            gpu.bind_group(
-                "hiz.cull.survivors",
-                &gpu.layout("hiz.cull_members.layout", MEMBER_BINDINGS)?,
-                &[
-                    entry(0, output.survivors.as_entire_binding()),
-                    entry(1, wgpu::BindingResource::TextureView(&output.survivor_list)),
-                ],
-            )
-        })?;
-        let of_boxes = cull_groups_pipeline(gpu, &group_key(key), &report)?;
-        let of_members = cull_members_pipeline(gpu, &key, &report)?;
-        Ok(Self { output, boxes: (of_boxes, survivors), members: (of_members, members.clone()) })
+        let boxes =
+            output.tiers.iter().zip(survivors).enumerate().map(|(tier, (output, bound))| {
+                let list = made(&output.list_bindings, || {
+                    gpu.bind_group(
+                        "hiz.cull.survivors",
+                        &gpu.layout("hiz.cull_members.layout", MEMBER_BINDINGS)?,
+                        &[
+                            entry(0, output.survivors.as_entire_binding()),
+                            entry(1, wgpu::BindingResource::TextureView(&output.survivor_list)),
+                        ],
+                    )
+                })?;
+                // Upper tiers do not ask which instances are wanted.
+                let key = CullKey { among: key.among && tier == 0, ..group_key(key) };
+                let is_top = tier + 1 == survivors.len();
+                Ok(TierCull {
+                    output,
+                    pipeline: cull_boxes_pipeline(gpu, &key, &report, (tier as u32, is_top))?,
+                    outputs: bound.clone(),
+                    list: list.clone(),
+                })
+            });
+        let tiers = boxes.collect::<Result<_>>()?;
+        Ok(Self { tiers, members: cull_members_pipeline(gpu, &key, &report)? })
     }
 
-    /// Records the test of the boxes, in so many `workgroups`.
+    /// Records the tests of the boxes of all tiers, from the topmost one down.
+    ///
+    /// `records`: what these bind, the topmost tier last.
+    /// `boxes`: how many there are in the topmost tier.
     pub(super) fn record_boxes(
         &self,
         pass: &mut wgpu::ComputePass<'_>,
-        records: &wgpu::BindGroup,
-        workgroups: u32,
+        records: &[wgpu::BindGroup],
+        boxes: u32,
     ) {
-        pass.set_pipeline(&self.boxes.0);
-        pass.set_bind_group(1, records, &[]);
-        pass.set_bind_group(2, &self.boxes.1, &[]);
-        pass.dispatch_workgroups(workgroups, 1, 1);
+        let mut above: Option<&TierCull<'_>> = None;
+        for (tier, records) in self.tiers.iter().zip(records).rev() {
+            pass.set_pipeline(&tier.pipeline);
+            pass.set_bind_group(1, records, &[]);
+            pass.set_bind_group(2, &tier.outputs, &[]);
+            match above {
+                None => pass.dispatch_workgroups(boxes.div_ceil(CULL_WORKGROUP), 1, 1),
+                Some(above) => {
+                    pass.set_bind_group(3, &above.list, &[]);
+                    pass.dispatch_workgroups_indirect(&above.output.survivors, 0);
+                }
+            }
+            above = Some(tier);
+        }
     }
 
     pub(super) fn record_members(&self, pass: &mut wgpu::ComputePass<'_>) {
-        pass.set_bind_group(3, &self.members.1, &[]);
-        pass.set_pipeline(&self.members.0);
-        pass.dispatch_workgroups_indirect(&self.output.survivors, 0);
+        let groups = &self.tiers[0];
+        pass.set_bind_group(3, &groups.list, &[]);
+        pass.set_pipeline(&self.members);
+        pass.dispatch_workgroups_indirect(&groups.output.survivors, 0);
     }
 }

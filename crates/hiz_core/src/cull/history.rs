@@ -25,6 +25,7 @@ use crate::host::threads::Locked;
 use crate::input::camera::Camera;
 use crate::instances::batch::GROUP;
 use crate::instances::piece::Piece;
+use crate::instances::tiers::TIERS;
 use crate::instances::{Instances, InstancesId};
 use crate::output::outputs::Outputs;
 use crate::output::visible::Visible;
@@ -100,10 +101,11 @@ pub(super) struct History {
     pub(super) words: wgpu::Buffer,
     /// What early passes bind, by the caller's mask; the stand-in of the others is one of them.
     pub(super) early: KeptBindings<wgpu::Buffer>,
-    pub(super) early_groups: OnceLock<wgpu::BindGroup>,
+    /// One per tier of boxes.
+    pub(super) early_groups: [OnceLock<wgpu::BindGroup>; TIERS],
+    pub(super) late_groups: [[OnceLock<wgpu::BindGroup>; 2]; TIERS],
     /// What late passes bind, without and with the count of levels.
     pub(super) late: [OnceLock<wgpu::BindGroup>; 2],
-    pub(super) late_groups: [OnceLock<wgpu::BindGroup>; 2],
     pub(super) cut: OnceLock<wgpu::BindGroup>,
 }
 
@@ -297,9 +299,9 @@ impl History {
         Ok(Self {
             words: gpu.empty("hiz.temporal.history", 4 * u64::from(words), STORAGE)?,
             early: KeptBindings::new(GIVEN_KEPT),
-            early_groups: OnceLock::new(),
-            late: Default::default(),
+            early_groups: Default::default(),
             late_groups: Default::default(),
+            late: Default::default(),
             cut: OnceLock::new(),
         })
     }

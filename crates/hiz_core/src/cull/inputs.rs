@@ -17,6 +17,7 @@ use crate::input::camera::Camera;
 use crate::instances::Instances;
 use crate::pyramid::Pyramid;
 use crate::pyramid::built::Built;
+use crate::pyramid::ends::check_culled;
 
 /// What a cull reads.
 #[derive(Debug, Clone, Copy)]
@@ -114,8 +115,15 @@ impl PreparedView {
         // Bad options are refused before anything is recorded.
         let view = ViewUniform {
             source_origin: packed(built.part.origin),
-            ..ViewUniform::new(camera, built.reduction, options, built.part.tolerance)?
+            ..ViewUniform::new(
+                camera,
+                instances.kind,
+                built.reduction,
+                options,
+                built.part.tolerance,
+            )?
         };
+        check_culled(pyramid.depths())?;
         check_coverage(&built, options)?;
         Pyramid::check_source(gpu, &built)?;
         let atlas = match encoder.filter(|_| pyramid.wants_atlas(gpu, &built, instances.len())) {
@@ -136,8 +144,15 @@ impl PreparedView {
             descent: options.descent > 0,
             fit_volume: options.fit == Fit::Volume,
             among: inputs.among.is_some(),
+            nearest: pyramid.has_nearest(),
+            receivers: false,
         };
         Ok(Self { built, atlas, view, key })
+    }
+
+    /// Whether a pixel of level 0 is one sample, and not the farthest of several.
+    pub(super) fn has_one_sample(&self) -> bool {
+        self.built.part.samples <= 1
     }
 
     /// The bindings for a test of instances and, if `grouped`, for one of groups.

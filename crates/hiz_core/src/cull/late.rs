@@ -1,7 +1,7 @@
 //! The late pass of a frame: it tests all instances against the depth of what the early pass drew.
 
 use crate::cull::early::check_order;
-use crate::cull::groups::{NO_STATISTICS, bind_survivors, is_grouped};
+use crate::cull::groups::{NO_STATISTICS, bind_survivors, tiers_of};
 use crate::cull::history::{FrameUniform, Temporal};
 use crate::cull::inputs::{CullInputs, check_contexts};
 use crate::cull::options::{Coverage, CullOptions};
@@ -98,14 +98,13 @@ fn target<'a>(gpu: &Gpu, inputs: &CullInputs<'_>, temporal: &'a Temporal) -> Res
                 ],
             )
         })?;
-        let groups = if is_grouped(piece, options) {
+        let bind_tier = |tier: usize| {
             let output = output.groups_or_new(gpu, piece)?;
             let more = [entry(4, history.words.as_entire_binding())];
-            let bind = || bind_survivors(gpu, output, statistics, report.pass, &more);
-            Some(made(&history.late_groups[way], bind)?.clone())
-        } else {
-            None
+            let bind = || bind_survivors(gpu, (output, tier), statistics, report.pass, &more);
+            made(&history.late_groups[tier][way], bind).cloned()
         };
+        let groups = (0..tiers_of(piece, options)).map(bind_tier).collect::<Result<_>>()?;
         Ok((outputs.clone(), groups))
     };
     Target::new(gpu, (instances, options, None), visible, report, bind)

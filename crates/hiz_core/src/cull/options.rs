@@ -24,6 +24,16 @@ pub enum Coverage {
     Sample,
 }
 
+impl Coverage {
+    /// How far a pixel's square reaches beyond what has to be missed, in pixels.
+    pub(super) fn own_reach(self) -> f64 {
+        match self {
+            Self::Area => 0.0,
+            Self::Sample => 0.5,
+        }
+    }
+}
+
 /// How many texels of one level a test may read, as N x N.
 /// A larger footprint uses a finer level, so a cull keeps less and reads more.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -60,16 +70,24 @@ pub enum Fit {
     Volume,
 }
 
-/// Whether whole groups of 64 instances are tested before their members.
+/// Whether whole groups of 64 instances are tested before their members, and in how many tiers.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Hierarchy {
     /// If there are enough instances for it to pay.
     #[default]
     Auto,
-    /// For any number of instances.
+    /// For any number of instances: one tier of boxes, those of the groups.
     Always,
     /// Each instance is tested by itself.
     Never,
+    /// So many tiers of boxes, 0 to 3, for any number of instances.
+    ///
+    /// 1 is that of the groups.
+    /// Above it lie boxes around 64 groups each, and then around 64 of these.
+    /// A piece has another tier as soon as one of its boxes is full: from 4,033 and from 258,049
+    /// instances on.
+    /// Where there are fewer tiers, these are tested.
+    Tiers(u32),
 }
 
 /// The options of a cull.
@@ -115,6 +133,9 @@ pub struct CullOptions {
     /// A multiple of 1/256 in 0..=16.
     /// `None`: 0 in area coverage, and 1/64 in sample coverage, where snapping in a rasteriser may
     /// move a sample that far.
+    /// Of points, `None` is 1/2 in area coverage and 1 in sample coverage.
+    /// Either way the pixels of the four centres around a point are read, because a depth image
+    /// knows depth at the centres alone.
     pub guard_px: Option<f64>,
     /// Relative slack of the stored depth, 0..=0.5.
     /// 2^-23 covers float32 depth that was rounded to nearest.

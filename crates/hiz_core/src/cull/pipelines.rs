@@ -26,6 +26,10 @@ pub(crate) struct CullKey {
     pub(crate) fit_volume: bool,
     /// Whether only some instances are asked for.
     pub(crate) among: bool,
+    /// Whether the pyramid has nearest depths, too, so that an instance may surely show.
+    pub(crate) nearest: bool,
+    /// Whether the pyramid leaves out background.
+    pub(crate) receivers: bool,
 }
 
 impl CullKey {
@@ -42,6 +46,8 @@ impl CullKey {
             descent: false,
             fit_volume: false,
             among: false,
+            nearest: false,
+            receivers: false,
         }
     }
 }
@@ -51,6 +57,8 @@ impl CullKey {
 pub(crate) struct ReportKey {
     pub(crate) mask: bool,
     pub(crate) verdicts: bool,
+    /// Whether some instances are absent.
+    pub(crate) absent: bool,
     pub(crate) emit: EmitKey,
     pub(crate) statistics: bool,
     pub(crate) pass: FramePass,
@@ -219,15 +227,18 @@ pub(crate) const BINNED_BINDINGS: &[(u32, Binding)] = &[
     (4, Binding::SampledQuads),
 ];
 
-pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 7] {
+pub(crate) fn classify_constants(key: &CullKey) -> [(&'static str, f64); 9] {
     [
         ("REVERSED", flag(key.reversed)),
         ("CHUNKS", key.chunks as f64),
         ("SAMPLE_COVERAGE", flag(key.sample_coverage)),
         ("FOOTPRINT_LOG2", f64::from(key.footprint_log2)),
         ("DESCENT", flag(key.descent)),
-        ("FIT_VOLUME", flag(key.fit_volume)),
+        // A point's rectangle is all there is of it.
+        ("FIT_VOLUME", flag(key.fit_volume && !key.kind.is_point())),
         ("AMONG", flag(key.among)),
+        ("NEAREST", flag(key.nearest)),
+        ("RECEIVERS", flag(key.receivers)),
     ]
 }
 
@@ -241,6 +252,7 @@ pub(crate) fn report_constants(key: &ReportKey) -> Vec<(&'static str, f64)> {
     let mut constants = vec![
         ("MASK", flag(key.mask)),
         ("VERDICTS", flag(key.verdicts)),
+        ("ABSENT", flag(key.absent)),
         ("STATISTICS", flag(key.statistics)),
     ];
     constants.extend(key.emit.constants());
@@ -263,7 +275,9 @@ impl DepthStore {
     /// The shader files that read it.
     pub(crate) fn files(self) -> Vec<File> {
         match self {
-            Self::Apart(source) => [source.files(), &[wgsl!("pyramid/texels_apart")]].concat(),
+            Self::Apart(source) => {
+                [source.files(), &[wgsl!("gpu/ends_one"), wgsl!("pyramid/texels_apart")]].concat()
+            }
             Self::Atlas => vec![wgsl!("pyramid/texels_atlas")],
             Self::Nowhere => vec![wgsl!("pyramid/texels_nowhere")],
         }
@@ -347,7 +361,7 @@ const LATE_SURVIVOR_BINDINGS: &[(u32, Binding)] = &[
     (4, Binding::Write),
 ];
 
-/// The bindings of the survivors, which a cull of members reads.
+/// The bindings of the survivors, which tests of what they hold read.
 pub(crate) const MEMBER_BINDINGS: &[(u32, Binding)] =
     &[(0, Binding::Read), (1, Binding::ReadTexels)];
 
@@ -368,6 +382,12 @@ pub(crate) fn decision_module(
         BoundsKind::Box => &[wgsl!("instances/bounds_box_support"), wgsl!("instances/bounds_box")],
         BoundsKind::OrientedBox => {
             &[wgsl!("instances/bounds_box_support"), wgsl!("instances/bounds_oriented_box")]
+        }
+        BoundsKind::Point => {
+            &[wgsl!("instances/bounds_point_support"), wgsl!("instances/bounds_point")]
+        }
+        BoundsKind::WidePoint => {
+            &[wgsl!("instances/bounds_point_support"), wgsl!("instances/bounds_wide_point")]
         }
     };
     Source::of(&[
@@ -395,7 +415,8 @@ pub(crate) fn decision_module(
 }
 
 /// The files of the decision by certificates; a yardstick replaces them.
-pub(super) const CERTIFIED: &[File] = &[wgsl!("cull/supporting_planes"), wgsl!("cull/classify")];
+pub(super) const CERTIFIED: &[File] =
+    &[wgsl!("cull/supporting_planes"), wgsl!("cull/unoccluded"), wgsl!("cull/classify")];
 
 /// The module of an entry point that does not write down which texels were read
 /// (`shaders/cull/unexplained.wgsl`).
@@ -425,10 +446,12 @@ pub(crate) fn flat_module(
     decision_module(store, kind, CERTIFIED, &flat_files(emit, pass))
 }
 
-/// The shader of the cull of groups.
-pub(crate) fn cull_groups_module(store: DepthStore, pass: FramePass) -> Source {
-    let shared = [wgsl!("instances/piece"), wgsl!("instances/groups"), wgsl!("output/statistics")];
-    let entry = [&shared, pass.group_files(), &[wgsl!("cull/cull_groups")]].concat();
+/// The shader of the cull of a tier's boxes: of all of them in the topmost tier, or of those that
+/// the survivors of the tier above hold.
+pub(crate) fn cull_boxes_module(store: DepthStore, pass: FramePass, is_top: bool) -> Source {
+    let shared = [wgsl!("instances/tier"), wgsl!("instances/groups"), wgsl!("output/statistics")];
+    let which = if is_top { wgsl!("cull/cull_groups") } else { wgsl!("cull/cull_children") };
+    let entry = [&shared, pass.group_files(), &[wgsl!("cull/cull_box"), which]].concat();
     unexplained(store, BoundsKind::Box, &entry)
 }
 
@@ -493,21 +516,28 @@ pub(crate) fn cull_pipeline(
     flat_pipeline(gpu, "hiz.cull.pipeline", module, key, report)
 }
 
-/// The cull of groups.
-pub(crate) fn cull_groups_pipeline(
+/// The cull of the boxes of a tier; of all of them if it is the topmost one.
+pub(crate) fn cull_boxes_pipeline(
     gpu: &Gpu,
     key: &CullKey,
     report: &ReportKey,
+    (tier, is_top): (u32, bool),
 ) -> Result<wgpu::ComputePipeline> {
     let mut constants = classify_constants(key).to_vec();
+    constants.push(("TIER", f64::from(tier)));
+    constants.push(("VERDICTS", flag(report.verdicts)));
     constants.push(("STATISTICS", flag(report.statistics)));
     constants.extend(report.pass.constant());
     let written = ("hiz.cull_groups.layout", report.pass.group_bindings());
+    let mut layouts = layouts(gpu, key.store, RECORD_BINDINGS, written)?.to_vec();
+    if !is_top {
+        layouts.push(gpu.layout("hiz.cull_members.layout", MEMBER_BINDINGS)?);
+    }
     gpu.compute_pipeline(&Compute {
         label: "hiz.cull_groups.pipeline",
-        source: cull_groups_module(key.store, report.pass),
-        entry_point: "cull_groups",
-        layouts: &layouts(gpu, key.store, RECORD_BINDINGS, written)?,
+        source: cull_boxes_module(key.store, report.pass, is_top),
+        entry_point: if is_top { "cull_groups" } else { "cull_children" },
+        layouts: &layouts,
         constants: &constants,
     })
 }

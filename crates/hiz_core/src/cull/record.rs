@@ -4,7 +4,7 @@
 //! The two passes of a frame (`early.rs`, `late.rs`) have targets of their own.
 
 use crate::cull::among::Among;
-use crate::cull::groups::{GROUPS_OF_RUN, GroupCull, NO_STATISTICS, bind_survivors, is_grouped};
+use crate::cull::groups::{GROUPS_OF_RUN, GroupCull, NO_STATISTICS, bind_survivors, tiers_of};
 use crate::cull::inputs::{CullInputs, PreparedView, check_contexts};
 use crate::cull::lod::LodRule;
 use crate::cull::options::{CullOptions, Order};
@@ -18,7 +18,7 @@ use crate::gpu::buffers::{check_alive, entry, made};
 use crate::gpu::device::Gpu;
 use crate::gpu::stage_times::StagePasses;
 use crate::instances::Instances;
-use crate::instances::piece::{CULL_WORKGROUP, Piece};
+use crate::instances::piece::Piece;
 use crate::output::bins::{Arrangement, Bins};
 use crate::output::compact::Compaction;
 use crate::output::cut::Cut;
@@ -39,14 +39,16 @@ pub(super) struct Target<'a> {
 /// What the tests of a piece bind.
 pub(super) struct PieceTarget {
     records: wgpu::BindGroup,
-    group_records: wgpu::BindGroup,
-    /// The outputs of tests of instances, and of groups; `None` if no groups are tested.
+    /// The outputs of tests of instances.
     outputs: wgpu::BindGroup,
-    groups: Option<wgpu::BindGroup>,
+    /// The records of the boxes of each tier that is tested, and the outputs of their tests.
+    /// None if no groups are tested.
+    boxes: Vec<wgpu::BindGroup>,
+    groups: Vec<wgpu::BindGroup>,
 }
 
-/// What tests of a piece's instances bind as their outputs, and tests of groups.
-pub(super) type Bound = (wgpu::BindGroup, Option<wgpu::BindGroup>);
+/// What tests of a piece's instances bind as their outputs, and tests of the boxes of each tier.
+pub(super) type Bound = (wgpu::BindGroup, Vec<wgpu::BindGroup>);
 
 /// Checks that `visible` was made for these instances, or others of as many.
 pub(super) fn check_visible(
@@ -224,13 +226,13 @@ fn record_all(
     let statistics = if report.statistics { Some(visible.statistics_or_new(gpu)?) } else { None };
     let bind = |p: usize, piece: &Piece, output: &PieceOutput| {
         let outputs = bind_output(gpu, piece, visible, p, &report)?.clone();
-        let groups = if is_grouped(piece, options) {
+        let bind_tier = |tier: usize| {
             let groups = output.groups_or_new(gpu, piece)?;
-            let bind = || bind_survivors(gpu, groups, statistics, report.pass, &[]);
-            Some(made(&groups.bindings[usize::from(report.statistics)], bind)?.clone())
-        } else {
-            None
+            let bind = || bind_survivors(gpu, (groups, tier), statistics, report.pass, &[]);
+            let kept = &groups.tiers[tier].bindings[usize::from(report.statistics)];
+            made(kept, bind).cloned()
         };
+        let groups = (0..tiers_of(piece, options)).map(bind_tier).collect::<Result<_>>()?;
         Ok((outputs, groups))
     };
     let target = Target::new(gpu, (instances, options, inputs.among), visible, report, bind)?;
@@ -255,7 +257,7 @@ pub(super) fn record_against_pyramid(
 ) -> Result<()> {
     let CullInputs { instances, pyramid, .. } = *inputs;
     let seen = PreparedView::new(gpu, inputs, Some(encoder))?;
-    let is_grouped = target.pieces.iter().any(|piece| piece.groups.is_some());
+    let is_grouped = target.pieces.iter().any(|piece| !piece.groups.is_empty());
     let mut view = seen.bind(gpu, pyramid, is_grouped)?;
     let tests = Tests::new(gpu, seen.key, target, flat)?;
     view.record(encoder, pyramid);
@@ -278,9 +280,10 @@ impl<'a> Target<'a> {
         for (p, (piece, output)) in instances.pieces.iter().zip(&visible.pieces).enumerate() {
             let (outputs, groups) = bind(p, piece, output)?;
             let records = bind_records(gpu, piece, visible, p, among)?;
-            let group_records =
-                among.map_or(&piece.group_bindings, |among| among.group_records(p)).clone();
-            pieces.push(PieceTarget { records, group_records, outputs, groups });
+            let of_groups = among.map_or(&piece.group_bindings, |among| among.group_records(p));
+            let upper = piece.upper.iter().map(|tier| &tier.bindings);
+            let boxes = std::iter::once(of_groups).chain(upper).take(groups.len()).cloned();
+            pieces.push(PieceTarget { records, outputs, boxes: boxes.collect(), groups });
         }
         let planes = matches!(report.emit, EmitKey::Planes { .. });
         let emission = match visible.bins.as_ref().filter(|_| planes) {
@@ -322,11 +325,11 @@ impl<'a> Target<'a> {
             if report.mask {
                 encoder.clear_buffer(&output.mask, 0, Some(4 * u64::from(piece.words().max(1))));
             }
-            if target.groups.is_some() {
+            for tier in 0..target.groups.len() {
                 let contents = bytemuck::bytes_of(&NO_SURVIVORS);
                 let from =
                     gpu.constant("hiz.cull.no_survivors", contents, wgpu::BufferUsages::COPY_SRC)?;
-                let to = &output.groups_or_new(gpu, piece)?.survivors;
+                let to = &output.groups_or_new(gpu, piece)?.tiers[tier].survivors;
                 encoder.copy_buffer_to_buffer(&from, 0, to, 0, from.size());
             }
         }
@@ -355,9 +358,9 @@ impl<'a> Tests<'a> {
             .pieces
             .iter()
             .zip(outputs)
-            .map(|(piece, output)| match (&piece.groups, output) {
-                (Some(survivors), Some(output)) => {
-                    GroupCull::new(gpu, (key, target.report), output, survivors.clone()).map(Some)
+            .map(|(piece, output)| match (&piece.groups[..], output) {
+                (survivors @ [_, ..], Some(output)) => {
+                    GroupCull::new(gpu, (key, target.report), output, survivors).map(Some)
                 }
                 _ => Ok(None),
             })
@@ -388,10 +391,10 @@ impl<'a> Tests<'a> {
         let pieces = instances.pieces.iter().zip(&self.target.pieces).zip(&self.groups);
         for ((piece, target), groups) in pieces {
             if let Some(groups) = groups {
-                let count = workgroups(piece.groups().div_ceil(CULL_WORKGROUP));
+                let count = workgroups(piece.boxes(target.boxes.len() - 1));
                 passes.record("cull groups", |pass| {
                     pass.set_bind_group(0, group_view, &[]);
-                    groups.record_boxes(pass, &target.group_records, count);
+                    groups.record_boxes(pass, &target.boxes, count);
                 });
             }
             let stage = if groups.is_some() { "cull members" } else { "cull" };
@@ -465,7 +468,8 @@ fn report_key(
         EmitKey::List { append: listed && any_order, list: list && any_order, capped }
     };
     let (verdicts, statistics) = (outputs.verdicts, options.statistics);
-    Ok(ReportKey { mask, verdicts, emit, statistics, pass: FramePass::Alone })
+    let absent = instances.num_absent() > 0;
+    Ok(ReportKey { mask, verdicts, absent, emit, statistics, pass: FramePass::Alone })
 }
 
 fn bin_key(instances: &Instances, bins: &Bins, options: &CullOptions) -> BinKey {
@@ -492,7 +496,9 @@ pub(super) fn pass_report(
         },
         None => EmitKey::Mask,
     };
-    ReportKey { mask: true, verdicts: visible.outputs().verdicts, emit, statistics, pass }
+    let verdicts = visible.outputs().verdicts;
+    let absent = instances.num_absent() > 0;
+    ReportKey { mask: true, verdicts, absent, emit, statistics, pass }
 }
 
 /// What a pass binds where bins have their planes.

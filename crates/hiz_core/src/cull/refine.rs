@@ -37,7 +37,7 @@ pub(crate) fn refine_module(kind: BoundsKind) -> Source {
 
 /// The shader that finds the groups that lie within the view.
 pub(crate) fn refine_groups_module() -> Source {
-    let entry = [wgsl!("instances/piece"), wgsl!("cull/refine_groups")];
+    let entry = [wgsl!("instances/tier"), wgsl!("cull/refine_groups")];
     unexplained(DepthStore::Nowhere, BoundsKind::Box, &entry)
 }
 
@@ -106,7 +106,7 @@ impl Refinement {
             return Ok(None);
         }
         // The number of the reduction does not matter, because no depth is read.
-        let view = ViewUniform::new(camera, 1, options, DepthTolerance::NONE)?;
+        let view = ViewUniform::new(camera, instances.kind, 1, options, DepthTolerance::NONE)?;
         Ok(Some(Self {
             view,
             options: options.clone(),

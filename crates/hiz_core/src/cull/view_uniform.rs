@@ -4,6 +4,7 @@ use crate::cull::lod::LodNumbers;
 use crate::cull::options::{Coverage, CullOptions};
 use crate::error::{Error, Result};
 use crate::host::rounding::{EPS, round_up};
+use crate::input::bounds::BoundsKind;
 use crate::input::camera::Camera;
 use crate::input::image::DepthConvention;
 use crate::input::tolerance::DepthTolerance;
@@ -43,6 +44,12 @@ pub(crate) struct ViewUniform {
 
 const _: () = assert!(size_of::<ViewUniform>() == 224);
 
+/// The default guard of points in area coverage, in pixels.
+///
+/// A depth image knows depth at the centres of its pixels alone.
+/// So the pixels of the four centres around a point decide about it (`docs/accuracy.md`).
+const GUARD_OF_POINTS: f64 = 0.5;
+
 /// Bits of a column in `source_origin`; twin: `shaders/cull/view.wgsl`, `COORDINATE_BITS`.
 pub(crate) const COORDINATE_BITS: u32 = 16;
 
@@ -57,12 +64,13 @@ impl ViewUniform {
         reason = "multiples of 2^-8 and sizes below 2^15 are exact, the factor is rounded towards \
                   far"
     )]
-    /// Rounds a camera and the options to the numbers of a cull.
+    /// Rounds a camera and the options to the numbers of a cull of instances of `kind`.
     ///
     /// `tolerance` is what the format of the depth image has rounded; the slack of the options is
     /// added to it.
     pub(crate) fn new(
         camera: &Camera,
+        kind: BoundsKind,
         reduction: u32,
         options: &CullOptions,
         tolerance: DepthTolerance,
@@ -86,6 +94,7 @@ impl ViewUniform {
         let kappa = range("transform_slack", options.transform_slack, 1e6)?;
         let guard = match (options.guard_px, options.coverage) {
             (Some(g), _) => range("guard_px", g, 16.0)?,
+            (None, coverage) if kind.is_point() => GUARD_OF_POINTS + coverage.own_reach(),
             (None, Coverage::Area) => 0.0,
             (None, Coverage::Sample) => 1.0 / 64.0,
         };
@@ -95,10 +104,7 @@ impl ViewUniform {
                 format!("expected a multiple of 1/256, got {guard}"),
             ));
         }
-        let reach = match options.coverage {
-            Coverage::Area => guard,
-            Coverage::Sample => guard - 0.5,
-        };
+        let reach = guard - options.coverage.own_reach();
         // Rounded towards far; this does not cover the rounding of the product in the shader
         // (`docs/accuracy.md`).
         let depth_factor = if camera.convention().is_reversed() {
@@ -205,7 +211,7 @@ mod tests {
                 let depth_slack = 0.5 * 10.0_f64.powf(-f64::from(k) / 8.0);
                 let options = CullOptions { depth_slack, ..CullOptions::default() };
                 let factor = f64::from(
-                    ViewUniform::new(&camera, 0, &options, DepthTolerance::NONE)
+                    ViewUniform::new(&camera, BoundsKind::Box, 0, &options, DepthTolerance::NONE)
                         .unwrap()
                         .depth_factor,
                 );
@@ -244,7 +250,8 @@ mod tests {
                     let options =
                         CullOptions { depth_slack, depth_slack_abs, ..CullOptions::default() };
                     let tolerance = DepthTolerance::of(format).unwrap();
-                    let view = ViewUniform::new(&camera, 0, &options, tolerance).unwrap();
+                    let view =
+                        ViewUniform::new(&camera, BoundsKind::Box, 0, &options, tolerance).unwrap();
                     let (factor, offset) =
                         (f64::from(view.depth_factor), f64::from(view.depth_offset));
                     let (moved, offset) = if convention.is_reversed() {

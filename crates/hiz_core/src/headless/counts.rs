@@ -13,18 +13,26 @@ pub struct Counts {
     pub outside: u64,
     /// Hidden by the depth image, and not outside.
     pub occluded: u64,
-    /// Possibly visible, kept.
+    /// Possibly visible, kept; without those that are unoccluded.
     pub visible: u64,
+    /// Surely visible as a whole, kept; 0 unless the pyramid has both ends
+    /// ([`Depths::Both`](crate::Depths::Both)).
+    pub unoccluded: u64,
     /// With invalid bounds, kept.
     pub invalid: u64,
-    /// Visible and invalid: as many indices as the lists would hold without a capacity.
+    /// Visible, unoccluded and invalid: as many indices as the lists would hold without a capacity.
     pub demand: u64,
     /// As many indices as the lists hold.
     pub written: u64,
-    /// Groups that were tested as a whole.
+    /// Groups that were tested as a whole: the first of [`Counts::tested_boxes`].
     pub tested_groups: u64,
-    /// Instances that were tested by themselves: all, or the members of surviving groups.
+    /// Boxes that were tested, per tier: around 64 instances, around 4,096 and around 262,144.
+    pub tested_boxes: [u64; 3],
+    /// Instances that were tested by themselves: all, or the members of groups that were neither
+    /// hidden nor accepted.
     pub tested_instances: u64,
+    /// Instances of groups that were accepted as a whole, because all of their box surely shows.
+    pub accepted_instances: u64,
     /// Depth tests of groups and instances at each level; 0 without
     /// [`CullOptions::statistics`](crate::CullOptions::statistics).
     pub levels: [u64; 16],

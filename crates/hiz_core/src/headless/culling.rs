@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::cull::among::Among;
 use crate::cull::count::record_count;
+use crate::cull::groups::tiers_of;
 use crate::cull::options::CullOptions;
 use crate::error::{Error, Result};
 use crate::gpu::buffers::STORAGE;
@@ -19,8 +20,8 @@ use crate::host::memory;
 use crate::host::threads::Locked;
 use crate::input::camera::Camera;
 use crate::instances::Instances;
-use crate::instances::batch::GROUP;
 use crate::instances::piece::Piece;
+use crate::instances::tiers::TIERS;
 use crate::instances::watch::Watch;
 use crate::output::compact::Compaction;
 use crate::output::counters::{CounterRecord, StatisticsRecord};
@@ -211,7 +212,8 @@ impl Culling {
     ///   In sample coverage also: between all pixel centres.
     ///   In a cull of some instances also: not asked for.
     /// - **Occluded**: every other instance that is hidden.
-    /// - **Visible** and **invalid**: every instance that is kept.
+    /// - **Visible**, **unoccluded** and **invalid**: every instance that is kept.
+    ///   Unoccluded are those that surely show as a whole, if the pyramid has both ends.
     ///
     /// An absent instance ([`ABSENT`](crate::ABSENT)) has the verdict outside.
     ///
@@ -306,28 +308,31 @@ impl Culling {
         let ranges = count_ranges(&self.instances, &self.visible, &self.options, counters);
         let bytes = self.read(&ranges)?;
         let record: CounterRecord = bytemuck::pod_read_unaligned(&bytes[0]);
-        let (survivors, rest) = bytes[1..].split_at(self.instances.num_pieces());
-        let (last_verdicts, statistics) = rest.split_at(self.instances.num_pieces());
-        let statistics: StatisticsRecord = statistics
-            .first()
-            .map_or_else(StatisticsRecord::default, |bytes| bytemuck::pod_read_unaligned(bytes));
-        let (mut tested_groups, mut tested_instances) = (0, 0);
-        for ((piece, survivors), last) in
-            self.instances.pieces.iter().zip(survivors).zip(last_verdicts)
-        {
-            let count = u64::from(piece.count());
-            if survivors.is_empty() {
-                tested_instances += count;
+        let mut rest = bytes[1..].iter();
+        let (mut tested_boxes, mut tested_instances, mut accepted_instances) = ([0; TIERS], 0, 0);
+        for piece in &self.instances.pieces {
+            let tiers = tiers_of(piece, &self.options);
+            let survivors: Vec<SurvivorsRecord> = rest
+                .by_ref()
+                .take(tiers)
+                .map(|bytes| bytemuck::pod_read_unaligned(bytes))
+                .collect();
+            let Some(groups) = survivors.first() else {
+                tested_instances += u64::from(piece.count());
                 continue;
+            };
+            tested_boxes[tiers - 1] += u64::from(piece.boxes(tiers - 1));
+            for (tested, above) in tested_boxes.iter_mut().zip(&survivors[1..]) {
+                *tested += u64::from(above.tested);
             }
-            let survivors: SurvivorsRecord = bytemuck::pod_read_unaligned(survivors);
-            tested_groups += u64::from(piece.groups());
-            tested_instances += u64::from(survivors.count) * GROUP as u64;
-            if last.first().is_some_and(|word| !is_hidden(*word)) {
-                tested_instances -= u64::from(piece.groups()) * GROUP as u64 - count;
-            }
+            tested_instances += u64::from(groups.tested);
+            accepted_instances += u64::from(groups.accepted);
         }
-        let demand = u64::from(record.visible) + u64::from(record.invalid);
+        let statistics: StatisticsRecord = rest
+            .next()
+            .map_or_else(StatisticsRecord::default, |bytes| bytemuck::pod_read_unaligned(bytes));
+        let kept = [record.visible, record.unoccluded, record.invalid];
+        let demand = kept.map(u64::from).iter().sum();
         // To the device, what is absent is outside.
         let absent = self.instances.num_absent();
         Ok(Counts {
@@ -336,11 +341,14 @@ impl Culling {
             outside: u64::from(record.outside) - absent,
             occluded: record.occluded.into(),
             visible: record.visible.into(),
+            unoccluded: record.unoccluded.into(),
             invalid: record.invalid.into(),
             demand,
             written: demand.min(u64::from(self.visible.capacity())),
-            tested_groups,
+            tested_groups: tested_boxes[0],
+            tested_boxes,
             tested_instances,
+            accepted_instances,
             levels: statistics.levels.map(u64::from),
             texels_read: u64::from(statistics.texels_high) << 32 | u64::from(statistics.texels_low),
         })
@@ -460,11 +468,6 @@ impl Culling {
     ) -> Option<&'a GroupOutput> {
         groups_of(piece, output, &self.options)
     }
-}
-
-/// Whether the word of a group says that it was hidden as a whole.
-pub(super) fn is_hidden(word: u8) -> bool {
-    !Verdict::of_word(word.into()).is_kept()
 }
 
 /// The bits of each byte, lowest first.

@@ -1,11 +1,11 @@
 //! Explanations of single verdicts: the cull's own steps, run again for one instance.
 
 use crate::cull::explain::{ExplanationRecord, Reading, TEXELS_NOTED, record_explain};
-use crate::cull::groups::group_options;
+use crate::cull::groups::{group_options, tiers_of};
 use crate::cull::inputs::CullInputs;
 use crate::error::Result;
 use crate::gpu::buffers::STORAGE;
-use crate::headless::culling::{Culling, is_hidden};
+use crate::headless::culling::Culling;
 use crate::headless::explanation::{Explanation, Told};
 use crate::headless::readback::{self, BufferRange};
 use crate::instances::batch::GROUP;
@@ -24,7 +24,7 @@ impl Culling {
     /// - [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn explain(&self, index: u64) -> Result<Explanation> {
         let index = u32::try_from(index).unwrap_or(u32::MAX);
-        let mut told = self.test(index, false)?;
+        let mut told = self.test(index, None)?;
         if !self.is_among(index)? {
             told.verdict = Verdict::Outside;
             told.reason =
@@ -37,14 +37,14 @@ impl Culling {
                 format!("updated since the cull, so this is of its new bounds: {}", told.reason);
             return Ok(told);
         }
-        let Some((of_group, is_updated)) = self.hidden_group(index)? else { return Ok(told) };
-        let mut group = self.test(index, true)?;
-        group.stale = is_updated;
+        let Some(of_group) = self.whole_group(index)? else { return Ok(told) };
+        let (group, size) = self.deciding_box(index, of_group)?;
         if told.verdict != Verdict::Outside {
             told.verdict = of_group;
         }
+        let how = if of_group.is_kept() { "shows" } else { "is hidden" };
         told.reason = format!(
-            "its group of 64 is hidden as a whole ({}); by itself: {}",
+            "its group of {size} {how} as a whole ({}); by itself: {}",
             group.reason, told.reason
         );
         told.group = Some(Box::new(group));
@@ -66,8 +66,8 @@ impl Culling {
         Ok(bytes[place / 8] >> (place % 8) & 1 == 1)
     }
 
-    /// Repeats the test of an instance, or of the box around its group.
-    fn test(&self, index: u32, whole_group: bool) -> Result<Explanation> {
+    /// Repeats the test of an instance, or of the box around it in a tier.
+    fn test(&self, index: u32, tier: Option<usize>) -> Result<Explanation> {
         let engine = &self.engine;
         let bytes = engine.scoped(|| {
             let gpu = &engine.context().gpu;
@@ -81,7 +81,7 @@ impl Culling {
             let mut encoder = engine.encoder("hiz.explain.encoder");
             let inputs =
                 CullInputs::new(&self.instances, &self.camera, &self.pyramid, &self.options);
-            record_explain(gpu, &mut encoder, &inputs, (index, whole_group), [&target, &readings])?;
+            record_explain(gpu, &mut encoder, &inputs, (index, tier), [&target, &readings])?;
             engine.queue().submit([encoder.finish()]);
             let ranges =
                 [&target, &readings].map(|buffer| BufferRange::first(buffer, buffer.size()));
@@ -91,13 +91,12 @@ impl Culling {
         let readings: Vec<Reading> = bytemuck::pod_collect_to_vec(&bytes[1]);
         let readings = &readings[..readings.len().min(record.texels_read as usize)];
         let of_group = group_options(&self.options);
-        let options = if whole_group { &of_group } else { &self.options };
+        let options = if tier.is_some() { &of_group } else { &self.options };
         Ok(Told { record, readings, camera: &self.camera, options }.explanation())
     }
 
-    /// If this cull hid the group of an instance: the group's verdict, and whether any member was
-    /// updated since.
-    fn hidden_group(&self, index: u32) -> Result<Option<(Verdict, bool)>> {
+    /// The verdict on the group of an instance, if this cull gave all its members one verdict.
+    fn whole_group(&self, index: u32) -> Result<Option<Verdict>> {
         let pieces = self.instances.pieces.iter().zip(&self.visible.pieces);
         let Some((piece, output)) =
             pieces.into_iter().find(|(piece, _)| piece.range.contains(&index))
@@ -111,14 +110,35 @@ impl Culling {
             offset: 4 * group as u64,
             size: 4,
         }])?;
-        let Some(word) = word[0].first().copied().filter(|word| is_hidden(*word)) else {
-            return Ok(None);
-        };
-        let members = group * GROUP..((group + 1) * GROUP).min(piece.count() as usize);
-        let is_updated = |place| {
-            let index = piece.range.start + piece.order.index(place) as u32;
-            self.watch.is_updated(&(index..index + 1))
-        };
-        Ok(Some((Verdict::of_word(word.into()), members.into_iter().any(is_updated))))
+        Ok(word[0].first().map(|word| Verdict::of_word((*word).into())).filter(is_of_all))
     }
+
+    /// The test of the box that decided for a whole group, and how many instances it holds.
+    fn deciding_box(&self, index: u32, verdict: Verdict) -> Result<(Explanation, usize)> {
+        let mut pieces = self.instances.pieces.iter();
+        let piece = pieces.find(|piece| piece.range.contains(&index)).expect("checked before");
+        let place = piece.order.place((index - piece.range.start) as usize);
+        let mut first = None;
+        // The box of the group itself comes first: what hides a larger one mostly hides it, too.
+        for tier in 0..tiers_of(piece, &self.options) {
+            let size = GROUP.pow(tier as u32 + 1);
+            let mut told = self.test(index, Some(tier))?;
+            let members =
+                place / size * size..(place / size * size + size).min(piece.count() as usize);
+            told.stale = members.into_iter().any(|place| {
+                let index = piece.range.start + piece.order.index(place) as u32;
+                self.watch.is_updated(&(index..index + 1))
+            });
+            if told.verdict == verdict {
+                return Ok((told, size));
+            }
+            first.get_or_insert((told, size));
+        }
+        Ok(first.expect("groups were tested"))
+    }
+}
+
+/// Whether a group with this verdict has it for all its members.
+fn is_of_all(verdict: &Verdict) -> bool {
+    !verdict.is_kept()
 }

@@ -45,6 +45,13 @@ pub struct Explanation {
     /// The view depth of the bounds' nearest point in world units, an estimate.
     /// `None` for an orthographic camera from a bare matrix.
     pub nearest_z: Option<f64>,
+    /// The nearest NDC depth of the texels, which all of an unoccluded instance is nearer than.
+    /// Of another instance, the depth that it is not surely nearer than, or not surely inside of
+    /// the frustum besides.
+    /// `None` if the pyramid has one end alone, and if the texels reach the near plane.
+    pub in_front_of: Option<f32>,
+    /// `in_front_of` as view depth in world units; see `farthest_z`.
+    pub in_front_of_z: Option<f64>,
     /// Whether the instance was updated since the cull.
     /// If so, everything here is about its new bounds, and the cull's verdict may be another.
     pub stale: bool,
@@ -90,6 +97,9 @@ impl Told<'_> {
             Some(z) => Some(z),
             None => z_of(nearest),
         };
+        let near = f32::to_bits(if self.camera.convention().is_reversed() { 1.0 } else { 0.0 });
+        let in_front_of = (reached_depth && record.nearest_bits != near)
+            .then(|| f32::from_bits(record.nearest_bits));
         Explanation {
             verdict: Verdict::of_word(record.verdict),
             rectangle: reached_depth.then_some(record.pixels),
@@ -103,6 +113,8 @@ impl Told<'_> {
             nearest: is_before_eye.then_some(nearest),
             farthest_z: farthest.and_then(|ndc| z_of(f64::from(ndc))),
             nearest_z: nearest_z.filter(|_| is_before_eye),
+            in_front_of,
+            in_front_of_z: in_front_of.and_then(|ndc| z_of(f64::from(ndc))),
             stale: false,
             group: None,
             reason: reason.to_owned(),
@@ -142,6 +154,13 @@ impl Told<'_> {
                 self.footprint("behind the farthest depth of all texels that it can touch")
             }
             Stage::Block => End::new("behind the texels, but not surely inside their block: kept"),
+            Stage::Front if verdict == Verdict::Unoccluded => End::new(
+                "inside the frustum, and before the nearest depth of all texels that it can touch",
+            ),
+            Stage::Front => End::new("before the texels, but not surely inside their block: kept"),
+            Stage::Descent if verdict == Verdict::Unoccluded => {
+                End::new("inside the frustum, and before every pixel that it can touch")
+            }
             Stage::Descent | Stage::Level if is_hidden => {
                 let farthest = (record.any_before != 0).then_some(record.farthest_before);
                 let is_it = |r: &Reading| r[0] & BEHIND != 0 && Some(r[3]) == farthest;

@@ -7,9 +7,10 @@ use crate::headless::depth_image::DepthImage;
 use crate::headless::engine::Engine;
 use crate::headless::readback::{self, BufferRange, to_u32};
 use crate::host::memory;
-use crate::input::depth::sanitized;
+use crate::input::depth::{foreground, sanitized, sanitized_near};
 use crate::pyramid::atlas;
 use crate::pyramid::built::Owner;
+use crate::pyramid::ends::DepthEnd;
 use crate::pyramid::levels::StoredLevels;
 use crate::pyramid::reduce::record_reduce;
 use crate::pyramid::{Pyramid, PyramidOptions};
@@ -62,6 +63,8 @@ impl Engine {
     }
 
     /// Reads a level of a pyramid: one float32 per texel, sanitised NDC depth, row 0 on top.
+    ///
+    /// It has the farthest depths, or the nearest where the pyramid has these alone.
     /// The array has as many rows and columns as the level.
     ///
     /// # Errors
@@ -70,6 +73,18 @@ impl Engine {
     /// - [`Error::Mismatch`] for a pyramid that was never built.
     /// - [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn read_level(&self, pyramid: &Pyramid, level: u32) -> Result<Vec<f32>> {
+        let end =
+            if pyramid.depths().has_farthest() { DepthEnd::Farthest } else { DepthEnd::Nearest };
+        self.read_level_of(pyramid, level, end)
+    }
+
+    /// [`Engine::read_level`] of one of the ends that the pyramid has ([`Depths`](crate::Depths)).
+    ///
+    /// Level 0 has the pixels as that end counts them.
+    ///
+    /// # Errors
+    /// Those of [`Engine::read_level`], and [`Error::Invalid`] for an end that is not stored.
+    pub fn read_level_of(&self, pyramid: &Pyramid, level: u32, end: DepthEnd) -> Result<Vec<f32>> {
         self.check_process()?;
         self.context().gpu.check_context("pyramid", pyramid.context)?;
         let layout = pyramid.layout.levels.get(level as usize).ok_or_else(|| {
@@ -78,6 +93,7 @@ impl Engine {
                 format!("expected a level below {}, got {level}", pyramid.num_levels()),
             )
         })?;
+        pyramid.depths().check_end(end)?;
         if !pyramid.layout.is_there(level) {
             let StoredLevels { first, last } = pyramid.layout.stored;
             return Err(Error::invalid(
@@ -116,14 +132,19 @@ impl Engine {
                 readback::read_texels(self.device(), self.queue(), copied, &crop)
             })?;
             let convention = built.camera.convention();
-            return memory::collected(
-                to_u32(&bytes).map(|bits| sanitized(bits, convention)),
-                "level",
-            );
+            let depth = |bits| match end {
+                DepthEnd::Farthest if pyramid.depths().of_receivers() => {
+                    sanitized(foreground(bits, convention), convention)
+                }
+                DepthEnd::Farthest => sanitized(bits, convention),
+                DepthEnd::Nearest => sanitized_near(bits, convention),
+            };
+            return memory::collected(to_u32(&bytes).map(depth), "level");
         }
         let (width, stride) = (layout.width as usize, layout.stride as usize);
-        let (first, count) =
-            (u64::from(layout.offset), u64::from(layout.stride) * u64::from(layout.height));
+        let of_end = if end == DepthEnd::Nearest { pyramid.layout.nearest } else { 0 };
+        let first = u64::from(layout.offset) + u64::from(of_end);
+        let count = u64::from(layout.stride) * u64::from(layout.height);
         let chunk = 1_u64 << pyramid.layout.chunk_shift;
         let ranges: Vec<_> = (first / chunk..=(first + count - 1) / chunk)
             .map(|c| {

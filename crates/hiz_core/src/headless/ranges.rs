@@ -1,6 +1,6 @@
 //! Where the answers of a cull lie on the device: which ranges a read copies.
 
-use crate::cull::groups::is_grouped;
+use crate::cull::groups::{is_grouped, tiers_of};
 use crate::cull::options::CullOptions;
 use crate::gpu::copies::BufferRange;
 use crate::headless::answers::mask_bytes;
@@ -40,8 +40,8 @@ pub(super) fn verdict_ranges<'a>(
     })
 }
 
-/// What the counts are made from: the counters, the survivors and the last group's verdict of each
-/// piece, and the statistics if there are any.
+/// What the counts are made from: the counters, the survivors of each tier of each piece, and the
+/// statistics if there are any.
 pub(super) fn count_ranges<'a>(
     instances: &Instances,
     visible: &'a Visible,
@@ -49,23 +49,11 @@ pub(super) fn count_ranges<'a>(
     counters: &'a wgpu::Buffer,
 ) -> Vec<BufferRange<'a>> {
     let mut ranges = vec![BufferRange::first(counters, counters.size())];
-    ranges.extend(of_pieces(instances, visible, |piece, output| {
-        match groups_of(piece, output, options) {
-            Some(groups) => BufferRange::first(&groups.survivors, groups.survivors.size()),
-            None => BufferRange::first(&output.mask, 0),
-        }
-    }));
-    // The last group may have fewer members than 64.
-    ranges.extend(of_pieces(instances, visible, |piece, output| {
-        match groups_of(piece, output, options) {
-            Some(groups) => BufferRange {
-                buffer: &groups.verdicts,
-                offset: groups.verdicts.size() - 4,
-                size: 4,
-            },
-            None => BufferRange::first(&output.mask, 0),
-        }
-    }));
+    for (piece, output) in instances.pieces.iter().zip(&visible.pieces) {
+        let Some(groups) = groups_of(piece, output, options) else { continue };
+        let tiers = groups.tiers.iter().take(tiers_of(piece, options));
+        ranges.extend(tiers.map(|t| BufferRange::first(&t.survivors, t.survivors.size())));
+    }
     let statistics = visible.statistics().filter(|_| options.statistics);
     ranges.extend(statistics.map(|buffer| BufferRange::first(buffer, buffer.size())));
     ranges

@@ -3,6 +3,7 @@
 //! How they are validated and rounded is up to the room `instances`.
 
 use crate::error::{Error, Result};
+use crate::host::rounding::split;
 
 /// A flat array of float32 or float64 in C order.
 #[derive(Debug, Clone, Copy)]
@@ -64,6 +65,14 @@ impl Floats<'_> {
     }
 }
 
+/// Whether one float32 does not hold a coordinate, and two are needed.
+///
+/// Not so for what is no valid coordinate, and for less than the least normal float32: the margin
+/// of a cull covers that much (`docs/accuracy.md`).
+pub(crate) fn needs_two_halves(v: f64) -> bool {
+    split(v).1 != 0.0
+}
+
 /// The bounds of N instances in world coordinates, borrowed from the caller.
 ///
 /// # Examples
@@ -119,6 +128,14 @@ pub enum Bounds<'a> {
         /// Column k is the world direction of axis k.
         rotations: Floats<'a>,
     },
+    /// Points.
+    ///
+    /// A cull of points has a guard of half a pixel by default
+    /// ([`CullOptions::guard_px`](crate::CullOptions::guard_px)).
+    Points {
+        /// N positions, 3 scalars each.
+        positions: Floats<'a>,
+    },
 }
 
 /// Which kind of volume bounds the instances.
@@ -130,15 +147,38 @@ pub enum BoundsKind {
     Box,
     /// Oriented boxes.
     OrientedBox,
+    /// Points whose positions float32 holds exactly.
+    Point,
+    /// Points of which a position needs two float32.
+    WidePoint,
+}
+
+impl BoundsKind {
+    /// Whether these are points, of either width.
+    pub fn is_point(self) -> bool {
+        matches!(self, Self::Point | Self::WidePoint)
+    }
+
+    /// Whether instances of this kind can hold bounds of the kind `other`.
+    pub(crate) fn holds(self, other: Self) -> bool {
+        self == other || (self == Self::WidePoint && other == Self::Point)
+    }
 }
 
 impl<'a> Bounds<'a> {
     /// The kind of these volumes.
+    ///
+    /// Of float64 points it reads all positions: are they numbers of float32?
     pub fn kind(&self) -> BoundsKind {
         match self {
             Self::Spheres { .. } => BoundsKind::Sphere,
             Self::Boxes { .. } => BoundsKind::Box,
             Self::OrientedBoxes { .. } => BoundsKind::OrientedBox,
+            Self::Points { positions: Floats::F32(_) } => BoundsKind::Point,
+            Self::Points { positions: Floats::F64(numbers) } => {
+                let is_wide = numbers.iter().any(|v| needs_two_halves(*v));
+                if is_wide { BoundsKind::WidePoint } else { BoundsKind::Point }
+            }
         }
     }
 
@@ -160,6 +200,7 @@ impl<'a> Bounds<'a> {
                 ],
                 centers,
             ),
+            Self::Points { positions } => (vec![("positions", positions, 3)], positions),
         };
         let n = first.len() / 3;
         for (name, array, width) in columns {
@@ -187,6 +228,7 @@ impl<'a> Bounds<'a> {
                 half_sizes: of(half_sizes, 3),
                 rotations: of(rotations, 9),
             },
+            Self::Points { positions } => Self::Points { positions: of(positions, 3) },
         }
     }
 

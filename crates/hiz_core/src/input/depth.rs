@@ -12,6 +12,7 @@
 
 use crate::error::{Error, Result};
 use crate::host::memory;
+use crate::host::rounding::ROUNDING;
 use crate::host::threads::{cores, on_threads};
 use crate::input::camera::Camera;
 use crate::input::depth_kind::DepthKind;
@@ -20,10 +21,14 @@ use crate::input::image::{DepthConvention, ImageSize};
 use crate::input::lens::{Lens, toward_far};
 use crate::input::quick::{Number, Quick};
 use crate::input::tolerance::DepthTolerance;
+use crate::input::world_tolerance::{NdcMove, WorldTolerance};
 
 /// Pixels of a band of rows, which one thread converts at a time.
 /// A band and its numbers fit the caches of a core.
 const BAND_PIXELS: u32 = 1 << 16;
+
+/// More than what moving a number in float64 loses, relative to the result.
+const MOVED_ROUNDINGS: f64 = 4.0 * ROUNDING;
 
 /// From this many pixels on, more threads help to convert.
 /// One takes tens of microseconds to start.
@@ -103,8 +108,20 @@ pub fn ndc_from_kind_within<'a>(
     camera: &Camera,
     tolerance: DepthTolerance,
 ) -> Result<(Vec<f32>, DepthTolerance)> {
-    let input = DepthInput { numbers: image.into(), kind, scale, invalid, tolerance };
-    let conversion = Conversion::new(&input, camera)?;
+    let world_tolerance = WorldTolerance::NONE;
+    let numbers = image.into();
+    ndc_of(&DepthInput { numbers, kind, scale, invalid, tolerance, world_tolerance }, camera)
+}
+
+/// Converts a depth image as [`ndc_from_kind_within`] does, with all that a [`DepthInput`] says.
+///
+/// Its `world_tolerance` moves NDC depth, too, and then no tolerance is left.
+///
+/// # Errors
+/// As [`ndc_from_kind_within`], and [`Error::Invalid`] for a world tolerance that is negative or not
+/// finite, and for one of NDC depth of a camera that does not say where view depth starts.
+pub fn ndc_of(input: &DepthInput<'_>, camera: &Camera) -> Result<(Vec<f32>, DepthTolerance)> {
+    let conversion = Conversion::new(input, camera)?;
     let mut ndc = memory::list(conversion.numbers.len(), "depth")?;
     ndc.resize(conversion.numbers.len(), 0.0);
     let bands = ndc.chunks_mut((conversion.band_rows() * conversion.size.width) as usize);
@@ -129,6 +146,8 @@ pub struct DepthInput<'a> {
     pub invalid: &'a [f64],
     /// How far the numbers may have been rounded, before `scale`.
     pub tolerance: DepthTolerance,
+    /// How far the depths may lie before the surfaces that they measure, in the world.
+    pub world_tolerance: WorldTolerance,
 }
 
 /// How the numbers of an image become NDC depth, rows at a time.
@@ -141,8 +160,11 @@ pub(crate) struct Conversion<'a> {
     /// The invalid values as the image's type holds them.
     invalid: Vec<f64>,
     tolerance: DepthTolerance,
+    world_tolerance: WorldTolerance,
     /// `None` for NDC depth.
     metric: Option<Metric>,
+    /// How NDC depth is moved by the world tolerance; `None` if it is not.
+    moved: Option<NdcMove>,
 }
 
 /// The kinds `Z` and `Distance`.
@@ -172,9 +194,11 @@ impl<'a> Conversion<'a> {
 
     /// [`Conversion::new`] of whole rows of an image, from row `first_row` on.
     pub(crate) fn of_rows(input: &DepthInput<'a>, camera: &Camera, first_row: u32) -> Result<Self> {
-        let DepthInput { numbers, kind, scale, invalid, tolerance } = *input;
+        let DepthInput { numbers, kind, scale, invalid, tolerance, world_tolerance } = *input;
         let (size, convention, tolerance) =
             (camera.size(), camera.convention(), tolerance.checked()?);
+        let world_tolerance = world_tolerance.checked()?;
+        let mut moved = None;
         let (given, row) = (numbers.len() as u64, u64::from(size.width));
         let left = u64::from(size.height.saturating_sub(first_row));
         if given % row != 0 || given / row > left {
@@ -186,6 +210,9 @@ impl<'a> Conversion<'a> {
         let metric = match kind {
             DepthKind::Ndc | DepthKind::ReversedNdc => {
                 check_ndc(kind, scale, convention)?;
+                if world_tolerance != WorldTolerance::NONE {
+                    moved = Some(NdcMove::new(camera, world_tolerance, tolerance)?);
+                }
                 None
             }
             DepthKind::Z | DepthKind::Distance => {
@@ -197,7 +224,8 @@ impl<'a> Conversion<'a> {
                 }
                 let lens = Lens::new(camera)?;
                 let is_wide = matches!(numbers, DepthNumbers::F64(_));
-                let quick = Quick::new(&lens, kind, scale, tolerance, is_wide);
+                let both = world_tolerance.with_rounding(tolerance, scale);
+                let quick = Quick::new(&lens, kind, scale, both, is_wide);
                 Some(Metric { kind, scale, lens, quick })
             }
         };
@@ -206,18 +234,33 @@ impl<'a> Conversion<'a> {
             // Zero and negative numbers are far in any case.
             invalid.retain(|v| *v > 0.0);
         }
-        Ok(Self { numbers, first_row, size, convention, invalid, tolerance, metric })
+        Ok(Self {
+            numbers,
+            first_row,
+            size,
+            convention,
+            invalid,
+            tolerance,
+            world_tolerance,
+            metric,
+            moved,
+        })
     }
 
     /// The tolerance that the NDC depth still has.
     pub(crate) fn left(&self) -> DepthTolerance {
-        if self.metric.is_some() { DepthTolerance::NONE } else { self.tolerance }
+        let is_counted = self.metric.is_some() || self.moved.is_some();
+        if is_counted { DepthTolerance::NONE } else { self.tolerance }
     }
 
     /// The numbers, where they already are the NDC depth.
     pub(crate) fn unchanged(&self) -> Option<&'a [f32]> {
         match self.numbers {
-            DepthNumbers::F32(ndc) if self.metric.is_none() && self.invalid.is_empty() => Some(ndc),
+            DepthNumbers::F32(ndc)
+                if self.metric.is_none() && self.moved.is_none() && self.invalid.is_empty() =>
+            {
+                Some(ndc)
+            }
             _ => None,
         }
     }
@@ -268,7 +311,15 @@ impl<'a> Conversion<'a> {
     }
 
     fn convert<T: Number>(&self, first: u32, numbers: &[T], invalid: &[T], out: &mut [f32]) {
+        let width = self.size.width as usize;
         let Some(metric) = &self.metric else {
+            if let Some(moved) = &self.moved {
+                let rows = numbers.chunks_exact(width).zip(out.chunks_exact_mut(width));
+                (first..).zip(rows).for_each(|(row, (numbers, out))| {
+                    moved.row(row, numbers, invalid, out);
+                });
+                return;
+            }
             let (far, reversed) = (self.convention.far(), self.convention.is_reversed());
             for (out, number) in out.iter_mut().zip(numbers) {
                 let rounded = toward_far((*number).into(), reversed);
@@ -276,7 +327,6 @@ impl<'a> Conversion<'a> {
             }
             return;
         };
-        let width = self.size.width as usize;
         let rows = numbers.chunks_exact(width).zip(out.chunks_exact_mut(width));
         for (row, (numbers, out)) in (first..).zip(rows) {
             let exact =
@@ -303,7 +353,15 @@ impl<'a> Conversion<'a> {
         // Slightly more than the tolerance, to cover the roundings of this expression.
         let DepthTolerance { relative, absolute } = self.tolerance;
         let off = (number.abs() * relative + absolute) * scale * (1.0 + 1e-15);
-        lens.ndc(column, row, (value, off), *kind)
+        let own = lens.ndc(column, row, (value, off), *kind);
+        let by = self.world_tolerance;
+        if by == WorldTolerance::NONE || own == self.convention.far() {
+            return own;
+        }
+        // In front of the near plane nothing is moved, so that it stays no depth.
+        let moved = by.moved(value);
+        let off = (off * (1.0 + by.relative) + moved.abs() * MOVED_ROUNDINGS) * (1.0 + 1e-15);
+        lens.ndc(column, row, (moved, off), *kind)
     }
 }
 
@@ -335,6 +393,26 @@ pub(crate) fn sanitized(bits: u32, convention: DepthConvention) -> f32 {
         0.0
     } else {
         d
+    }
+}
+
+/// The same for the nearest end, where what is no depth becomes near.
+pub(crate) fn sanitized_near(bits: u32, convention: DepthConvention) -> f32 {
+    if (0.0..=1.0).contains(&f32::from_bits(bits)) {
+        sanitized(bits, convention)
+    } else {
+        convention.near()
+    }
+}
+
+/// The bits of a pixel, or those of near for background: what has exactly the bits of far, or -0
+/// where far is 0.
+pub(crate) fn foreground(bits: u32, convention: DepthConvention) -> u32 {
+    let negative_zero = convention.is_reversed() && bits == (-0.0_f32).to_bits();
+    if bits == convention.far().to_bits() || negative_zero {
+        convention.near().to_bits()
+    } else {
+        bits
     }
 }
 

@@ -31,6 +31,11 @@ impl DepthConvention {
             Self::Reversed => 0.0,
         }
     }
+
+    /// The nearest depth, which nothing is in front of.
+    pub(crate) fn near(self) -> f32 {
+        1.0 - self.far()
+    }
 }
 
 /// The size of an image in pixels.

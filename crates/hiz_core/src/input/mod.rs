@@ -19,3 +19,4 @@ pub(crate) mod tolerance;
 pub(crate) mod view;
 #[cfg(feature = "headless")]
 pub(crate) mod view_depth;
+pub(crate) mod world_tolerance;

@@ -16,6 +16,9 @@ use crate::input::depth_kind::DepthKind;
 use crate::input::lens::{Lens, Rays};
 use crate::input::tolerance::DepthTolerance;
 
+/// The largest relative tolerance that the quick way takes.
+const MOST_RELATIVE: f64 = 0.5;
+
 /// Pixels of a row that are converted together.
 const SEGMENT: usize = 256;
 
@@ -31,7 +34,8 @@ const LEAST: f32 = f32::MIN_POSITIVE;
 const PAST_SINGLE: u64 = (1 << 29) - 1;
 
 /// A bound must be smaller than this share of the depth range, or the long way is taken.
-const LARGEST_MARGIN: f64 = 1.0 / 32.0;
+/// With a larger one most numbers would take it anyway.
+const LARGEST_MARGIN: f64 = 0.75;
 
 /// The largest shares of a quotient that bounds may take, for images of float64 and others.
 /// Where they take more, the long way loses less; other images lose more in float32.
@@ -355,9 +359,19 @@ fn from_eye(
     let moved = tolerance.absolute / (1.0 + tolerance.relative) * (1.0 + 1e-15);
     let [width, _] = lens.size;
     let columns = columns(width);
-    let near_share =
-        share + tolerance.relative + tolerance.absolute * 2.0 * (1.0 + base) / quotient.abs();
-    let margin = 2.0 * lost + 5.0 * (1.0 + base) * near_share;
+    // A number v counts as close if v (1 - relative) - absolute may lie before the near plane.
+    // The greatest such number is moved to at most `1 + beyond` times the near plane's depth.
+    let (relative, absolute) = (
+        tolerance.relative,
+        // In units of the least depth of the near plane.
+        tolerance.absolute * (1.0 + base) / quotient.abs(),
+    );
+    if relative > MOST_RELATIVE {
+        return None;
+    }
+    let beyond =
+        (1.0 + 2.0 * share + absolute) * (1.0 + relative) / (1.0 - relative) + absolute - 1.0;
+    let margin = 2.0 * lost + (1.0 + base) * (5.0 * share + beyond / (1.0 + beyond) * (1.0 + 1e-9));
     let length = length.map(|length| match narrow {
         Some(_) => length.narrowed(),
         None => length,

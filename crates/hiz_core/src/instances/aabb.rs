@@ -56,6 +56,10 @@ impl Bounds<'_> {
             Self::OrientedBoxes { centers, half_sizes, rotations } => {
                 oriented_box(centers, half_sizes, rotations, i)?
             }
+            Self::Points { positions } => {
+                let position = positions.array(i);
+                Aabb { min: position, max: position }
+            }
         };
         aabb.is_box().then_some(aabb)
     }

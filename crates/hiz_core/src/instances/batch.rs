@@ -9,11 +9,11 @@
 
 use wgpu::WriteOnly;
 
-use crate::input::bounds::{Bounds, Floats};
+use crate::input::bounds::{Bounds, BoundsKind, Floats};
 use crate::instances::aabb::Aabb;
-use crate::instances::volume_record::{
-    BoxRecord, LARGEST, OrientedBoxRecord, SphereRecord, write_absent,
-};
+use crate::instances::point::{PointRecord, WidePointRecord};
+use crate::instances::volume_record::{BoxRecord, LARGEST, OrientedBoxRecord, SphereRecord};
+use crate::instances::write_record::write_absent;
 
 /// Members of a full group: as many as a `u64` has bits.
 /// Twin: `shaders/instances/groups.wgsl`, `GROUP`.
@@ -75,13 +75,13 @@ impl Batch {
         }
     }
 
-    /// Packs the volumes `sources` of `bounds` into the beginning of `target`.
+    /// Packs the volumes `sources` of `bounds` into the beginning of `target`, as records of `kind`.
     /// Bit k of `absent`: number k is absent, whatever its bounds are.
     /// Calls `tell` with the boxes around them; that of an absent one is empty.
     /// Returns the rest of `target`.
     pub(super) fn pack<'a>(
         &mut self,
-        bounds: &Bounds<'_>,
+        (bounds, kind): (&Bounds<'_>, BoundsKind),
         sources: impl ExactSizeIterator<Item = Origin>,
         target: WriteOnly<'a, [u8]>,
         (boxes, absent): (Boxes, u64),
@@ -107,17 +107,22 @@ impl Batch {
                 fetch::<3>(half_sizes, from, second);
                 fetch::<9>(rotations, from, nines);
             }
+            Bounds::Points { positions } => fetch::<3>(positions, from, first),
         }
         let are_plain = match bounds {
             _ if absent != 0 => false,
             Bounds::Boxes { .. } => plain_boxes(first, second, indices, count, records),
             Bounds::Spheres { .. } => plain_spheres(first, ones, indices, count, records),
             Bounds::OrientedBoxes { .. } => false,
+            Bounds::Points { .. } => plain_points(first, kind, indices, count, records),
         };
-        let record_bytes = bounds.kind().record_bytes() as usize;
+        let record_bytes = kind.record_bytes() as usize;
         let around_all = match bounds {
             Bounds::Boxes { .. } if are_plain && boxes == Boxes::Whole => {
                 Some(around_boxes(&first[..3 * count], &second[..3 * count]))
+            }
+            Bounds::Points { .. } if are_plain && boxes == Boxes::Whole => {
+                Some(around_boxes(&first[..3 * count], &first[..3 * count]))
             }
             _ => None,
         };
@@ -130,6 +135,7 @@ impl Batch {
                 half_sizes: second,
                 rotations: Floats::F64(nines),
             },
+            Bounds::Points { .. } => Bounds::Points { positions: first },
         };
         if let Some(around) = around_all {
             tell(Around::All(around));
@@ -138,7 +144,7 @@ impl Batch {
         } else {
             for (k, record) in records.chunks_exact_mut(record_bytes).take(count).enumerate() {
                 if absent >> k & 1 == 1 {
-                    write_absent(bounds.kind(), indices[k], record);
+                    write_absent(kind, indices[k], record);
                     tell(Around::One(k, Some(Aabb::EMPTY)));
                     continue;
                 }
@@ -312,6 +318,34 @@ fn plain_spheres(
     true
 }
 
+/// Writes the records of points if all are valid.
+/// Returns false if one is not.
+fn plain_points(
+    positions: &Threes,
+    kind: BoundsKind,
+    indices: &[u32; GROUP],
+    count: usize,
+    records: &mut [u8],
+) -> bool {
+    let halves = Halves::of(positions);
+    // A NaN shows in the rest alone.
+    let are_numbers = are_all(halves.rest.iter().map(|rest| *rest < f64::INFINITY));
+    if !(are_numbers && halves.are_small()) {
+        return false;
+    }
+    let records = records.chunks_exact_mut(kind.record_bytes() as usize).take(count);
+    for (k, record) in records.enumerate() {
+        if kind == BoundsKind::Point {
+            let made = PointRecord::of_parts(halves.hi(k), indices[k]);
+            record.copy_from_slice(bytemuck::bytes_of(&made));
+        } else {
+            let made = WidePointRecord::of_parts(halves.hi(k), halves.lo(k), indices[k]);
+            record.copy_from_slice(bytemuck::bytes_of(&made));
+        }
+    }
+    true
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -378,11 +412,14 @@ mod tests {
             let boxes = Bounds::Boxes { min: Floats::F64(&min), max: Floats::F64(&max) };
             let spheres =
                 Bounds::Spheres { centers: Floats::F64(&min), radii: Floats::F64(&radii) };
-            for bounds in [boxes, spheres] {
-                let bytes = bounds.kind().record_bytes() as usize;
+            let points = Bounds::Points { positions: Floats::F64(&min) };
+            for bounds in [boxes, spheres, points] {
+                let kind = bounds.kind();
+                let bytes = kind.record_bytes() as usize;
                 let mut got = vec![0xff; GROUP * bytes];
                 let are_plain = match bounds {
                     Bounds::Boxes { .. } => plain_boxes(&min, &max, &indices, count, &mut got),
+                    Bounds::Points { .. } => plain_points(&min, kind, &indices, count, &mut got),
                     _ => plain_spheres(&min, &radii, &indices, count, &mut got),
                 };
                 if !are_plain {
@@ -392,7 +429,8 @@ mod tests {
                 plain += 1;
                 for (k, got) in got.chunks_exact(bytes).take(count).enumerate() {
                     let mut expected = vec![0; bytes];
-                    assert!(bounds.write_record(k, indices[k], &mut expected), "{trial} {k}");
+                    let is_valid = bounds.write_record(k, indices[k], &mut expected);
+                    assert!(is_valid, "{trial} {k} {kind:?} {:?}", &min[3 * k..3 * k + 3]);
                     assert_eq!(got, expected, "{trial} {k}: {:?} {:?}", min[3 * k], max[3 * k]);
                 }
                 assert!(got[count * bytes..].iter().all(|byte| *byte == 0xff), "past the end");

@@ -23,6 +23,7 @@ use crate::gpu::shader::{Source, wgsl};
 use crate::gpu::stage_times::stage_pass;
 use crate::input::bounds::BoundsKind;
 use crate::instances::Instances;
+use crate::instances::forming::Forming;
 use crate::instances::piece::Piece;
 
 /// Invocations of one workgroup, each of which takes a group; `shaders/instances/from_buffer.wgsl`.
@@ -30,7 +31,8 @@ pub(crate) const WORKGROUP: u32 = 64;
 
 /// The kinds of bounds that a buffer may hold.
 #[cfg(feature = "testing")]
-pub(crate) const FROM_BUFFER_KINDS: [BoundsKind; 2] = [BoundsKind::Sphere, BoundsKind::Box];
+pub(crate) const FROM_BUFFER_KINDS: [BoundsKind; 3] =
+    [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::Point];
 
 /// Bounds that lie in a storage buffer, where a shader of the caller's writes them.
 ///
@@ -40,8 +42,10 @@ pub(crate) const FROM_BUFFER_KINDS: [BoundsKind; 2] = [BoundsKind::Sphere, Bound
 /// |---|---|---|
 /// | [`BoundsKind::Sphere`] | 4 | x, y and z of the centre, radius |
 /// | [`BoundsKind::Box`] | 6 | x, y and z of the least corner, then of the greatest |
+/// | [`BoundsKind::Point`] | 3 | x, y and z |
 ///
 /// In WGSL, `array<vec4<f32>>` holds spheres, and `array<array<f32, 6>>` holds boxes.
+/// `array<array<f32, 3>>` holds points.
 ///
 /// Positions are world coordinates, in the world of the camera.
 /// In a large world, let both be relative to a point near the eye: float32 is finest there.
@@ -103,15 +107,17 @@ const BINDINGS: &[(u32, Binding)] = &[
     (5, Binding::Write),
 ];
 
-/// The shader that takes bounds of this kind, a sphere or a box.
+/// The shader that takes bounds of this kind, a sphere, a box or a point.
 pub(crate) fn from_buffer_module(kind: BoundsKind) -> Source {
     Source::of(&[&[
         wgsl!("instances/record_layout"),
         wgsl!("instances/groups"),
         wgsl!("instances/sequence"),
+        wgsl!("instances/corners"),
         wgsl!("instances/from_buffer"),
         match kind {
             BoundsKind::Sphere => wgsl!("instances/from_buffer_sphere"),
+            BoundsKind::Point => wgsl!("instances/from_buffer_point"),
             _ => wgsl!("instances/from_buffer_box"),
         },
     ]])
@@ -122,10 +128,16 @@ fn given_bytes(kind: BoundsKind) -> Result<u64> {
     match kind {
         BoundsKind::Sphere => Ok(4 * 4),
         BoundsKind::Box => Ok(6 * 4),
+        BoundsKind::Point => Ok(3 * 4),
         BoundsKind::OrientedBox => Err(Error::invalid(
             "kind",
-            "expected Sphere or Box, got OrientedBox: a buffer may hold a sphere or a box around \
-             each oriented box",
+            "expected Sphere, Box or Point, got OrientedBox: a buffer may hold a sphere or a box \
+             around each oriented box",
+        )),
+        BoundsKind::WidePoint => Err(Error::invalid(
+            "kind",
+            "expected Sphere, Box or Point, got WidePoint: a buffer holds float32, so upload the \
+             points as Point",
         )),
     }
 }
@@ -226,7 +238,9 @@ pub(crate) fn record_update_from(
         .map(|piece| {
             let is_sorted = !piece.order.is_given();
             let bindings = bind(gpu, instances, piece, source, stride)?;
-            Ok((pipeline(gpu, kind, is_sorted)?, bindings, piece.groups().div_ceil(WORKGROUP)))
+            let workgroups = piece.groups().div_ceil(WORKGROUP);
+            let forming = Forming::all(gpu, piece)?;
+            Ok((pipeline(gpu, kind, is_sorted)?, bindings, workgroups, forming))
         })
         .collect::<Result<Vec<_>>>()?;
     if prepared.is_empty() {
@@ -236,10 +250,13 @@ pub(crate) fn record_update_from(
     instances.bounds_are_on_device();
     gpu.recorded(|| {
         let mut pass = stage_pass(encoder, "hiz.instances.from_buffer", "update");
-        for (pipeline, bindings, workgroups) in &prepared {
+        for (pipeline, bindings, workgroups, forming) in &prepared {
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, bindings, &[]);
             pass.dispatch_workgroups(*workgroups, 1, 1);
+            if let Some(forming) = forming {
+                forming.record(&mut pass);
+            }
         }
         Ok(())
     })

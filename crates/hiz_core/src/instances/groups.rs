@@ -19,7 +19,7 @@ use crate::error::{Error, Result};
 use crate::gpu::buffers::Mapped;
 use crate::host::memory;
 use crate::host::threads::{Locked, cores, on_threads};
-use crate::input::bounds::Bounds;
+use crate::input::bounds::{Bounds, BoundsKind};
 use crate::instances::aabb::Aabb;
 use crate::instances::batch::{Around, Batch, Boxes, GROUP, Origin};
 use crate::instances::volume_record::BoxRecord;
@@ -124,7 +124,7 @@ impl Groups {
     /// `source` says which instance is stored at a place of the piece.
     /// `absent` has a word per group, with a bit for each absent member, or no word at all.
     pub(crate) fn packed(
-        bounds: &Bounds<'_>,
+        (bounds, kind): (&Bounds<'_>, BoundsKind),
         count: usize,
         absent: Vec<u64>,
         source: impl Fn(usize) -> Origin + Sync,
@@ -132,7 +132,7 @@ impl Groups {
     ) -> Result<Self> {
         let mut groups = memory::list(count.div_ceil(GROUP), "groups")?;
         groups.resize_with(count.div_ceil(GROUP), Group::new);
-        let record_bytes = bounds.kind().record_bytes();
+        let record_bytes = kind.record_bytes();
         let parts = (0..).step_by(PART).zip(groups.chunks_mut(PART));
         on_parts(count, parts, |(begin, groups): (usize, &mut [Group]), batch| {
             let (first, end) = (begin * GROUP, count.min((begin + groups.len()) * GROUP));
@@ -142,7 +142,7 @@ impl Groups {
                 let sources = (g * GROUP..count.min((g + 1) * GROUP)).map(&source);
                 let absent = absent.get(g).copied().unwrap_or(0);
                 let boxes = (Boxes::Whole, absent);
-                rest = batch.pack(bounds, sources, rest, boxes, |told| match told {
+                rest = batch.pack((bounds, kind), sources, rest, boxes, |told| match told {
                     Around::All(aabb) | Around::One(_, Some(aabb)) => {
                         group.around = group.around.union(&aabb);
                     }
@@ -156,12 +156,12 @@ impl Groups {
 
     /// Writes the records of instances that are culled one by one, once: no groups are formed.
     pub(crate) fn without_groups(
-        bounds: &Bounds<'_>,
+        (bounds, kind): (&Bounds<'_>, BoundsKind),
         count: usize,
         source: impl Fn(usize) -> Origin + Sync,
         records: &Mapped<'_>,
     ) -> Result<Self> {
-        let record_bytes = bounds.kind().record_bytes();
+        let record_bytes = kind.record_bytes();
         let parts = (0..count).step_by(PART * GROUP);
         on_parts(count, parts, |first: usize, batch| {
             let end = count.min(first + PART * GROUP);
@@ -169,7 +169,7 @@ impl Groups {
             let mut rest = view.slice(..);
             for first in (first..end).step_by(GROUP) {
                 let sources = (first..end.min(first + GROUP)).map(&source);
-                rest = batch.pack(bounds, sources, rest, (Boxes::Whole, 0), |_| ());
+                rest = batch.pack((bounds, kind), sources, rest, (Boxes::Whole, 0), |_| ());
             }
             Ok(())
         })?;
@@ -233,13 +233,13 @@ impl Groups {
     /// Returns the groups that contain these places, ascending.
     pub(crate) fn replace(
         &mut self,
-        bounds: &Bounds<'_>,
+        (bounds, kind): (&Bounds<'_>, BoundsKind),
         places: &[u32],
         source: impl Fn(usize) -> Origin + Sync,
         records: &Mapped<'_>,
     ) -> Result<Vec<u32>> {
         let group_of = |place: u32| place as usize / GROUP;
-        let record_bytes = bounds.kind().record_bytes();
+        let record_bytes = kind.record_bytes();
         let (count, all_absent) = (self.count, &self.absent);
         // Parts of whole groups: positions in `places`, the first group, and the groups.
         let mut parts = memory::list(places.len().div_ceil(PART * GROUP) + 1, "update")?;
@@ -264,7 +264,7 @@ impl Groups {
                 let word = all_absent.get(group).copied().unwrap_or(0);
                 let absent = |place: &u32| word >> (*place as usize % GROUP) & 1;
                 let absent = (0..).zip(places).fold(0, |all, (k, p)| all | absent(p) << k);
-                rest = batch.pack(bounds, sources, rest, (Boxes::Each, absent), |told| {
+                rest = batch.pack((bounds, kind), sources, rest, (Boxes::Each, absent), |told| {
                     let Around::One(k, aabb) = told else { return };
                     let k = places[k] as usize % GROUP;
                     members |= 1 << k;

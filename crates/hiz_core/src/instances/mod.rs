@@ -5,7 +5,8 @@
 //! 1. `piece` cuts the instances of one call into pieces that fit a binding and a dispatch.
 //! 2. `order` and `morton` choose where each instance is stored: along a curve through space.
 //! 3. `groups` and `aabb` form groups of 64 neighbours with a box around each.
-//! 4. `volume_record`, `batch` and `records` write the records that the cull reads.
+//!    `tiers` forms boxes around 64 of these boxes each, and so on.
+//! 4. `volume_record`, `point`, `write_record`, `batch` and `records` write the records that the cull reads.
 //! 5. `update` replaces bounds later, and `watch` connects submitted culls with later updates.
 //! 6. `from_buffer` takes bounds that a shader of the caller's has written.
 //!
@@ -17,16 +18,20 @@
 
 pub(crate) mod aabb;
 pub(crate) mod batch;
+pub(crate) mod forming;
 pub(crate) mod from_buffer;
 pub(crate) mod groups;
 pub(crate) mod morton;
 pub(crate) mod order;
 pub(crate) mod piece;
+pub(crate) mod point;
 pub(crate) mod records;
 pub(crate) mod slots;
+pub(crate) mod tiers;
 pub(crate) mod update;
 pub(crate) mod volume_record;
 pub(crate) mod watch;
+pub(crate) mod write_record;
 
 use std::sync::MutexGuard;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -36,6 +41,7 @@ use crate::gpu::device::{ContextId, Gpu};
 use crate::host::memory;
 use crate::host::threads::Locked;
 use crate::input::bounds::{Bounds, BoundsKind, Floats};
+use crate::instances::forming::Forming;
 use crate::instances::groups::Groups;
 use crate::instances::order::StoredOrder;
 #[cfg(feature = "testing")]
@@ -189,11 +195,13 @@ impl Instances {
             let start = index * capacity;
             let range = start..total.min(start.saturating_add(capacity));
             let (piece, its_groups, uploads) =
-                packed(gpu, bounds, index, range, (options.order, &kinds), has_groups)?;
-            copy(
-                &|encoder| uploads.iter().for_each(|upload| upload.record(encoder)),
-                index + 1 < num_pieces,
-            )?;
+                packed(gpu, (bounds, kind), index, range, (options.order, &kinds), has_groups)?;
+            let forming = Forming::all(gpu, &piece)?;
+            let record = |encoder: &mut wgpu::CommandEncoder| {
+                uploads.iter().for_each(|upload| upload.record(encoder));
+                forming.iter().for_each(|forming| forming.record_pass(encoder));
+            };
+            copy(&record, index + 1 < num_pieces)?;
             pieces.push(piece);
             groups.push(its_groups);
         }
@@ -307,11 +315,14 @@ impl Instances {
         changing.groups[p].is_absent(place)
     }
 
-    /// Bytes on the device: one record per instance, and one box per 64 instances.
+    /// Bytes on the device: one record per instance, and one box per 64 instances, per 4,096 and per
+    /// 262,144.
     /// Mesh ids or scales add 24 per instance.
     pub fn device_bytes(&self) -> u64 {
         let bytes = |p: &Piece| {
-            p.records.size() + p.group_records.size() + p.slots.as_ref().map_or(0, Slots::size)
+            let boxes = p.upper.iter().map(|tier| tier.records.size()).sum::<u64>();
+            let slots = p.slots.as_ref().map_or(0, Slots::size);
+            p.records.size() + p.group_records.size() + boxes + slots
         };
         self.pieces.iter().map(bytes).sum()
     }

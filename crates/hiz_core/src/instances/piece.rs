@@ -4,21 +4,22 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 use crate::error::Result;
-use crate::gpu::buffers::{Mapped, entry};
+use crate::gpu::buffers::Mapped;
 use crate::gpu::device::Gpu;
 use crate::gpu::kept::KeptBindings;
-use crate::gpu::layouts::Binding;
 use crate::input::bounds::{Bounds, BoundsKind};
 use crate::instances::batch::GROUP;
 use crate::instances::batch::Origin;
 use crate::instances::groups::Groups;
 use crate::instances::order::{PieceOrder, StoredOrder};
+pub(crate) use crate::instances::records::{RECORD_BINDINGS, bind_records, bind_records_among};
 use crate::instances::records::{RECORDS_PER_ROW, Records, Upload};
 use crate::instances::slots::{Kinds, Slots};
+use crate::instances::tiers::{UpperTier, tier_uniform, upper_tiers};
 use crate::instances::volume_record::BoxRecord;
 
 /// Invocations of one workgroup of the cull of groups, and of updates.
-/// Twins: `shaders/cull/cull_groups.wgsl`, `WORKGROUP`; `shaders/instances/update.wgsl`.
+/// Twins: `shaders/cull/cull_box.wgsl`, `WORKGROUP`; `shaders/instances/update.wgsl`.
 pub(crate) const CULL_WORKGROUP: u32 = 128;
 
 /// How many instances one piece may hold.
@@ -57,12 +58,14 @@ pub(crate) struct Piece {
     /// One `BoxRecord` per group.
     pub(crate) group_records: Records,
     pub(crate) uniform: wgpu::Buffer,
-    /// The same for the boxes of the groups.
+    /// The tier of the boxes of the groups.
     pub(crate) group_uniform: wgpu::Buffer,
     /// What the cull of instances binds.
     pub(crate) bindings: wgpu::BindGroup,
     /// What the cull of groups binds: its boxes, as if they were a piece of instances.
     pub(crate) group_bindings: wgpu::BindGroup,
+    /// The tiers of boxes above those of the groups.
+    pub(crate) upper: Vec<UpperTier>,
     pub(crate) order: PieceOrder,
     /// `None` if all instances have mesh 0 and scale 1: then their slots are their indices.
     pub(crate) slots: Option<Slots>,
@@ -100,28 +103,33 @@ impl Piece {
         self.count().div_ceil(GROUP as u32)
     }
 
+    /// The number of tiers of boxes, with that of the groups.
+    pub(crate) fn tiers(&self) -> usize {
+        1 + self.upper.len()
+    }
+
+    /// The number of boxes of a tier; 0 is that of the groups.
+    pub(crate) fn boxes(&self, tier: usize) -> u32 {
+        if tier == 0 { self.groups() } else { self.upper[tier - 1].count }
+    }
+
     /// Words of the mask of this piece.
     pub(crate) fn words(&self) -> u32 {
         self.count().div_ceil(32)
     }
 }
 
-/// The bindings of a piece's uniform and records in every cull.
-/// The last one says which instances are asked for (`shaders/cull/among.wgsl`).
-pub(crate) const RECORD_BINDINGS: &[(u32, Binding)] =
-    &[(0, Binding::Uniform), (1, Binding::ReadQuads), (4, Binding::SampledQuads)];
-
 /// Makes a piece, its groups, and the uploads that bring both to the device.
 pub(super) fn packed(
     gpu: &Gpu,
-    bounds: &Bounds<'_>,
+    (bounds, kind): (&Bounds<'_>, BoundsKind),
     index: u32,
     range: Range<u32>,
     (order, kinds): (StoredOrder, &Kinds<'_>),
     has_groups: bool,
 ) -> Result<(Piece, Groups, Vec<Upload>)> {
     let (first, count) = (range.start as usize, range.end - range.start);
-    let record_bytes = bounds.kind().record_bytes();
+    let record_bytes = kind.record_bytes();
     let indices = first..range.end as usize;
     let order = PieceOrder::new(bounds, indices.clone(), order)?;
     let absent = kinds.absent(&indices, &order)?;
@@ -133,9 +141,9 @@ pub(super) fn packed(
     let (records, upload, groups) =
         Records::new(gpu, RECORDS_LABEL, count, record_bytes, |records| {
             if has_groups {
-                Groups::packed(bounds, count as usize, absent, source, records)
+                Groups::packed((bounds, kind), count as usize, absent, source, records)
             } else {
-                Groups::without_groups(bounds, count as usize, source, records)
+                Groups::without_groups((bounds, kind), count as usize, source, records)
             }
         })?;
     let num_groups = groups.len() as u32;
@@ -178,14 +186,14 @@ fn assembled(
     group_records: Records,
     (order, slots): (PieceOrder, Option<Slots>),
 ) -> Result<Piece> {
-    let uniform = |count: u32| {
-        let words = count.div_ceil(32);
-        gpu.uniform("hiz.instances.piece", &PieceUniform { base: range.start, count, index, words })
-    };
-    let uniform_of_groups = uniform(num_groups)?;
-    let uniform = uniform(range.end - range.start)?;
+    let count = range.end - range.start;
+    let words = count.div_ceil(32);
+    let uniform = PieceUniform { base: range.start, count, index, words };
+    let uniform = gpu.uniform("hiz.instances.piece", &uniform)?;
+    let uniform_of_groups = tier_uniform(gpu, num_groups, count)?;
     let bindings = bind_records(gpu, &uniform, &records)?;
     let group_bindings = bind_records(gpu, &uniform_of_groups, &group_records)?;
+    let upper = upper_tiers(gpu, num_groups, &group_records)?;
     let from_buffer = KeptSources::default();
     Ok(Piece {
         range,
@@ -195,37 +203,11 @@ fn assembled(
         group_uniform: uniform_of_groups,
         bindings,
         group_bindings,
+        upper,
         order,
         slots,
         from_buffer,
     })
-}
-
-/// Binds a piece's uniform and records for a cull of all instances.
-pub(crate) fn bind_records(
-    gpu: &Gpu,
-    uniform: &wgpu::Buffer,
-    records: &Records,
-) -> Result<wgpu::BindGroup> {
-    bind_records_among(gpu, uniform, records, gpu.no_texels()?)
-}
-
-/// Binds a piece's uniform and records for a cull that reads which instances it asks for.
-pub(crate) fn bind_records_among(
-    gpu: &Gpu,
-    uniform: &wgpu::Buffer,
-    records: &Records,
-    among: &wgpu::TextureView,
-) -> Result<wgpu::BindGroup> {
-    gpu.bind_group(
-        "hiz.cull.instances",
-        &gpu.layout("hiz.cull.instances_layout", RECORD_BINDINGS)?,
-        &[
-            entry(0, uniform.as_entire_binding()),
-            entry(1, wgpu::BindingResource::TextureView(&records.view)),
-            entry(4, wgpu::BindingResource::TextureView(among)),
-        ],
-    )
 }
 
 /// Writes box records, one after the other.
@@ -273,7 +255,7 @@ mod tests {
     #[test]
     fn pieces_fit_the_binding_and_the_dispatch() {
         let limits = wgpu::Limits::default();
-        for bytes in [32, 48, 64] {
+        for bytes in [16, 32, 48, 64] {
             let piece = u64::from(piece_capacity(bytes, &limits));
             assert!(piece * bytes <= 256 << 20, "records wait in one buffer");
             assert!(piece / 1024 <= 8192, "and lie in the rows of one texture");

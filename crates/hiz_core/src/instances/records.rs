@@ -5,8 +5,9 @@
 //! Twin: `shaders/instances/record_layout.wgsl`.
 
 use crate::error::Result;
-use crate::gpu::buffers::Mapped;
+use crate::gpu::buffers::{Mapped, entry};
 use crate::gpu::device::Gpu;
+use crate::gpu::layouts::Binding;
 
 /// Records in a row of the texture.
 pub(crate) const RECORDS_PER_ROW: u32 = 1024;
@@ -146,6 +147,40 @@ impl Upload {
     }
 }
 
+/// The bindings of a piece's uniform and records in every cull.
+/// The last one says which instances are asked for (`shaders/cull/among.wgsl`).
+pub(crate) const RECORD_BINDINGS: &[(u32, Binding)] =
+    &[(0, Binding::Uniform), (1, Binding::ReadQuads), (4, Binding::SampledQuads)];
+
+/// Binds a piece's uniform and records for a cull of all instances.
+pub(crate) fn bind_records(
+    gpu: &Gpu,
+    uniform: &wgpu::Buffer,
+    records: &Records,
+) -> Result<wgpu::BindGroup> {
+    bind_records_among(gpu, uniform, records, gpu.no_texels()?)
+}
+
+/// Binds a piece's uniform and records for a cull that reads which instances it asks for.
+pub(crate) fn bind_records_among(
+    gpu: &Gpu,
+    uniform: &wgpu::Buffer,
+    records: &Records,
+    among: &wgpu::TextureView,
+) -> Result<wgpu::BindGroup> {
+    gpu.bind_group(
+        "hiz.cull.instances",
+        &gpu.layout("hiz.cull.instances_layout", RECORD_BINDINGS)?,
+        &[
+            entry(0, uniform.as_entire_binding()),
+            entry(1, wgpu::BindingResource::TextureView(&records.view)),
+            entry(4, wgpu::BindingResource::TextureView(among)),
+        ],
+    )
+}
+
+const _: () =
+    assert!((ROW_MULTIPLE * 16).is_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT), "points");
 const _: () =
     assert!((ROW_MULTIPLE * 32).is_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT), "spheres");
 const _: () =

@@ -10,6 +10,8 @@
 //! So updates are numbered, and the device counts those that ran.
 //! On a mismatch the device invalidates every group box that is written afterwards.
 //! The members of such a group are always tested one by one.
+//!
+//! The boxes of upper tiers are formed on the device from those of the groups (`tiers`).
 
 use std::ops::Range;
 
@@ -20,9 +22,11 @@ use crate::gpu::layouts::Binding;
 use crate::gpu::pipelines::Compute;
 use crate::gpu::shader::{Source, wgsl};
 use crate::gpu::stage_times::stage_pass;
-use crate::input::bounds::Bounds;
+use crate::host::memory;
+use crate::input::bounds::{Bounds, BoundsKind};
 use crate::instances::batch::GROUP;
 use crate::instances::batch::Origin;
+use crate::instances::forming::Forming;
 use crate::instances::piece::{CULL_WORKGROUP, write_boxes};
 use crate::instances::records::Records;
 use crate::instances::volume_record::BoxRecord;
@@ -99,10 +103,19 @@ pub(crate) fn record_update(
              `record_update_from` takes from a buffer: write the buffer instead",
         ));
     }
-    if bounds.kind() != instances.kind {
+    let kind = bounds.kind();
+    if kind == BoundsKind::WidePoint && instances.kind == BoundsKind::Point {
         return Err(Error::mismatch(
             "bounds",
-            format!("expected the instances' kind, {:?}, got {:?}", instances.kind, bounds.kind()),
+            "expected positions that float32 holds, as all were when these points were uploaded, \
+             got positions that need two float32: round them to float32, or upload all of them \
+             again",
+        ));
+    }
+    if !instances.kind.holds(kind) {
+        return Err(Error::mismatch(
+            "bounds",
+            format!("expected the instances' kind, {:?}, got {kind:?}", instances.kind),
         ));
     }
     let room = instances.len().checked_sub(first).ok_or_else(|| {
@@ -140,7 +153,10 @@ pub(crate) fn record_update(
     let result = gpu.recorded(|| {
         let mut pass = stage_pass(encoder, "hiz.update.pass", "update");
         let mut begun = false;
-        let mut dispatch = |replacement: &Replacement<'_>, entry_point| -> Result<()> {
+        let mut dispatch = |pass: &mut wgpu::ComputePass<'_>,
+                            replacement: &Replacement<'_>,
+                            entry_point|
+         -> Result<()> {
             let (bind_group, pipeline) =
                 (bind(gpu, instances, replacement, number)?, update_pipeline(gpu, entry_point)?);
             pass.set_bind_group(0, &bind_group, &[]);
@@ -167,15 +183,17 @@ pub(crate) fn record_update(
             };
             let record_bytes = instances.kind.record_bytes();
             let groups = &mut changing.groups[p];
+            let mut all_touched = Vec::new();
             let staging = wgpu::BufferUsages::STORAGE;
             for places in bands(&places, record_bytes, gpu.limits()) {
                 let (fresh, touched) = gpu.written(
                     "hiz.update.records",
                     places.len() as u64 * record_bytes,
                     staging,
-                    |records| groups.replace(bounds, places, source, records),
+                    |records| groups.replace((bounds, instances.kind), places, source, records),
                 )?;
                 dispatch(
+                    &mut pass,
                     &Replacement { places, fresh, target: &piece.records },
                     "replace_records",
                 )?;
@@ -184,9 +202,15 @@ pub(crate) fn record_update(
                     write_boxes(boxes, touched.iter().map(|group| groups.record(*group as usize)))
                 })?;
                 dispatch(
+                    &mut pass,
                     &Replacement { places: &touched, fresh, target: &piece.group_records },
                     "replace_groups",
                 )?;
+                memory::reserve(&mut all_touched, touched.len(), "update")?;
+                all_touched.extend(touched);
+            }
+            if let Some(forming) = Forming::around(gpu, piece, &all_touched)? {
+                forming.record(&mut pass);
             }
             Ok(())
         })
@@ -213,6 +237,7 @@ pub(crate) fn record_idle_update(
     let fresh = gpu.stand_in("hiz.no_update")?;
     let target = &instances.pieces[0].records;
     let bind_group = bind(gpu, instances, &Replacement { places: &[0], fresh, target }, 0)?;
+    let forming = Forming::idle(gpu, &instances.pieces[0])?;
     gpu.recorded(|| {
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("hiz.update.warm_up"),
@@ -222,6 +247,9 @@ pub(crate) fn record_idle_update(
         for pipeline in &pipelines {
             pass.set_pipeline(pipeline);
             pass.dispatch_workgroups(0, 1, 1);
+        }
+        if let Some(forming) = &forming {
+            forming.record(&mut pass);
         }
         Ok(())
     })

@@ -9,57 +9,6 @@
 //! Their record fails a test in the shader; the instance is kept visible and counted as invalid.
 
 use crate::host::rounding::{round_up, split, sum_up, sum_up_difference};
-use crate::input::bounds::{Bounds, BoundsKind};
-
-impl BoundsKind {
-    /// Bytes of one record on the device: 32 for a sphere, 48 for a box, 64 for an oriented box.
-    pub fn record_bytes(self) -> u64 {
-        (match self {
-            Self::Sphere => size_of::<SphereRecord>(),
-            Self::Box => size_of::<BoxRecord>(),
-            Self::OrientedBox => size_of::<OrientedBoxRecord>(),
-        }) as u64
-    }
-}
-
-impl Bounds<'_> {
-    /// Writes the record of instance `i`, `record_bytes()` bytes, with the caller's `index`.
-    /// Returns false for invalid bounds.
-    pub(crate) fn write_record(&self, i: usize, index: u32, out: &mut [u8]) -> bool {
-        match *self {
-            Self::Spheres { centers, radii } => {
-                write(out, index, SphereRecord::new(centers.array(i), radii.get(i)))
-            }
-            Self::Boxes { min, max } => {
-                write(out, index, BoxRecord::new(min.array(i), max.array(i)))
-            }
-            Self::OrientedBoxes { centers, half_sizes, rotations } => write(
-                out,
-                index,
-                OrientedBoxRecord::new(centers.array(i), half_sizes.array(i), rotations.array(i)),
-            ),
-        }
-    }
-}
-
-/// Writes the record of an absent instance of a kind into `out`, with the caller's `index`.
-pub(super) fn write_absent(kind: BoundsKind, index: u32, out: &mut [u8]) {
-    fn write<R: Record>(out: &mut [u8], index: u32) {
-        out.copy_from_slice(bytemuck::bytes_of(&R::ABSENT.numbered(index)));
-    }
-    match kind {
-        BoundsKind::Sphere => write::<SphereRecord>(out, index),
-        BoundsKind::Box => write::<BoxRecord>(out, index),
-        BoundsKind::OrientedBox => write::<OrientedBoxRecord>(out, index),
-    }
-}
-
-fn write<R: Record>(out: &mut [u8], index: u32, record: R) -> bool {
-    let is_valid = record.is_valid();
-    let record = if is_valid { record } else { R::INVALID };
-    out.copy_from_slice(bytemuck::bytes_of(&record.numbered(index)));
-    is_valid
-}
 
 /// Sizes and coordinates must stay below this, or the bounds are invalid.
 /// Then no product in the shader overflows.
@@ -77,7 +26,7 @@ pub(crate) const BEYOND_LIMITS: f32 = 4.0 * LARGEST;
 /// The shader asks for a centre below half of it (`shaders/cull/classify.wgsl`, `ABSENT_BELOW`).
 pub(crate) const ABSENT_CENTER: f32 = -BEYOND_LIMITS;
 
-trait Record: bytemuck::Pod {
+pub(super) trait Record: bytemuck::Pod {
     /// The record that is stored for an absent instance.
     const ABSENT: Self;
 
@@ -91,7 +40,7 @@ trait Record: bytemuck::Pod {
     fn numbered(self, index: u32) -> Self;
 }
 
-fn all_small<const N: usize>(values: [f32; N]) -> bool {
+pub(super) fn all_small<const N: usize>(values: [f32; N]) -> bool {
     values.iter().all(|v| v.abs() < LARGEST)
 }
 
@@ -141,14 +90,14 @@ const _: () = assert!(
 
 /// A position as two float32 halves.
 /// `rest` is what they cannot hold, axis by axis; it is 0 for float32 input.
-struct Position {
-    hi: [f32; 3],
-    lo: [f32; 3],
+pub(super) struct Position {
+    pub(super) hi: [f32; 3],
+    pub(super) lo: [f32; 3],
     rest: [f64; 3],
 }
 
 impl Position {
-    fn new(p: [f64; 3]) -> Self {
+    pub(super) fn new(p: [f64; 3]) -> Self {
         let halves = p.map(split);
         // Exact: `p - hi` is, because both are float64 within a factor of two or hi is 0.
         // Subtracting `lo` is exact, too.
@@ -168,7 +117,7 @@ impl SphereRecord {
         Self { center_hi, radius, center_lo, index }
     }
 
-    fn new(center: [f64; 3], radius: f64) -> Self {
+    pub(super) fn new(center: [f64; 3], radius: f64) -> Self {
         let p = Position::new(center);
         // The stored centre is off by at most the 1-norm of the rests.
         let moved = p.rest.iter().fold(0.0, |sum, r| sum_up(sum, *r));
@@ -223,7 +172,7 @@ impl BoxRecord {
         Self { padding_2: 1.0, ..self }
     }
 
-    fn new(min: [f64; 3], max: [f64; 3]) -> Self {
+    pub(super) fn new(min: [f64; 3], max: [f64; 3]) -> Self {
         // Halved first, because min + max may overflow.
         let center: [f64; 3] = std::array::from_fn(|k| 0.5 * min[k] + 0.5 * max[k]);
         let p = Position::new(center);
@@ -278,7 +227,7 @@ impl OrientedBoxRecord {
     /// Neither this rounding nor the rest of the centre is added to the sizes.
     /// A flat box has no size that could take it, so the error bound covers both
     /// (`docs/accuracy.md`).
-    fn new(center: [f64; 3], half_size: [f64; 3], rotation: [f64; 9]) -> Self {
+    pub(super) fn new(center: [f64; 3], half_size: [f64; 3], rotation: [f64; 9]) -> Self {
         let p = Position::new(center);
         #[expect(
             clippy::cast_possible_truncation,
@@ -338,7 +287,7 @@ impl Record for OrientedBoxRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::bounds::Floats;
+    use crate::input::bounds::{Bounds, Floats};
 
     const TINY: f64 = 1.0 / 9_007_199_254_740_992.0; // 2^-53
 

@@ -9,6 +9,7 @@ pub(crate) struct CounterRecord {
     pub(crate) occluded: u32,
     pub(crate) visible: u32,
     pub(crate) invalid: u32,
+    pub(crate) unoccluded: u32,
 }
 
 /// Tests per level, and texels read as a 64-bit number in two halves.

@@ -1,4 +1,4 @@
-//! What a cull of groups leaves: a verdict per group, and the list of surviving groups.
+//! What a cull of groups leaves: a verdict per group, and the list of survivors of each tier.
 
 use std::sync::OnceLock;
 
@@ -7,19 +7,22 @@ use crate::gpu::buffers::STORAGE;
 use crate::gpu::device::Gpu;
 use crate::instances::piece::Piece;
 
-/// Twin: `shaders/cull/cull_groups.wgsl`, `Survivors`.
+/// Twin: `shaders/cull/cull_box.wgsl`, `Survivors`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct SurvivorsRecord {
     pub(crate) workgroups: [u32; 3],
     pub(crate) count: u32,
+    pub(crate) tested: u32,
+    pub(crate) accepted: u32,
+    pub(crate) padding: [u32; 2],
 }
 
-/// The record before the groups are tested.
+/// The record before the boxes are tested.
 pub(crate) const NO_SURVIVORS: SurvivorsRecord =
-    SurvivorsRecord { workgroups: [0, 1, 1], count: 0 };
+    SurvivorsRecord { workgroups: [0, 1, 1], count: 0, tested: 0, accepted: 0, padding: [0; 2] };
 
-/// Groups in a row of the list of survivors; `shaders/instances/groups.wgsl`.
+/// Survivors in a row of their list; `shaders/instances/groups.wgsl`.
 pub(crate) const SURVIVORS_PER_ROW: u32 = 4096;
 
 /// The buffers that the cull of a piece's groups fills.
@@ -28,41 +31,61 @@ pub(crate) struct GroupOutput {
     /// One word per group: its verdict, and whether its members have verdicts of their own
     /// (`shaders/cull/refine.wgsl`).
     pub(crate) verdicts: wgpu::Buffer,
-    /// The number of surviving groups, as the arguments of a dispatch.
-    /// `survivor_list` says which groups they are.
+    /// One per tier of the piece; the first is that of the groups.
+    pub(crate) tiers: Vec<TierOutput>,
+}
+
+/// What the tests of the boxes of a tier leave.
+#[derive(Debug)]
+pub(crate) struct TierOutput {
+    /// The number of survivors, as the arguments of a dispatch.
+    /// `survivor_list` says which boxes they are.
     pub(crate) survivors: wgpu::Buffer,
     pub(crate) survivor_list: wgpu::TextureView,
-    /// What culls of groups bind, without and with the count of levels; made by the first of either.
+    /// What tests of these boxes bind, without and with the count of levels; made by the first of
+    /// either.
     pub(crate) bindings: [OnceLock<wgpu::BindGroup>; 2],
-    /// What culls of the surviving groups' members bind; made by the first one.
-    pub(crate) member_bindings: OnceLock<wgpu::BindGroup>,
+    /// What tests of what the survivors hold bind; made by the first one.
+    pub(crate) list_bindings: OnceLock<wgpu::BindGroup>,
 }
 
 impl GroupOutput {
     pub(super) fn new(gpu: &Gpu, piece: &Piece) -> Result<Self> {
-        let bytes = size_of::<SurvivorsRecord>() as u64;
-        let usage = STORAGE | wgpu::BufferUsages::INDIRECT;
         let verdicts = 4 * u64::from(piece.groups().max(1));
         Ok(Self {
             verdicts: gpu.empty("hiz.visible.group_verdicts", verdicts, STORAGE)?,
-            survivors: gpu.empty("hiz.visible.survivors", bytes, usage)?,
-            survivor_list: list_of(gpu, piece)?,
-            bindings: Default::default(),
-            member_bindings: OnceLock::new(),
+            tiers: (0..piece.tiers())
+                .map(|tier| TierOutput::new(gpu, piece.boxes(tier)))
+                .collect::<Result<_>>()?,
         })
     }
 
     /// Bytes on the device.
     pub(super) fn size(&self) -> u64 {
-        let list = self.survivor_list.texture();
-        let list = 4 * u64::from(list.width()) * u64::from(list.height());
-        self.verdicts.size() + self.survivors.size() + list
+        self.verdicts.size() + self.tiers.iter().map(TierOutput::size).sum::<u64>()
     }
 }
 
-fn list_of(gpu: &Gpu, piece: &Piece) -> Result<wgpu::TextureView> {
-    let groups = piece.groups().max(1);
-    let size = (groups.min(SURVIVORS_PER_ROW), groups.div_ceil(SURVIVORS_PER_ROW));
+impl TierOutput {
+    fn new(gpu: &Gpu, boxes: u32) -> Result<Self> {
+        let bytes = size_of::<SurvivorsRecord>() as u64;
+        let usage = STORAGE | wgpu::BufferUsages::INDIRECT;
+        Ok(Self {
+            survivors: gpu.empty("hiz.visible.survivors", bytes, usage)?,
+            survivor_list: list_of(gpu, boxes.max(1))?,
+            bindings: Default::default(),
+            list_bindings: OnceLock::new(),
+        })
+    }
+
+    fn size(&self) -> u64 {
+        let list = self.survivor_list.texture();
+        self.survivors.size() + 4 * u64::from(list.width()) * u64::from(list.height())
+    }
+}
+
+fn list_of(gpu: &Gpu, boxes: u32) -> Result<wgpu::TextureView> {
+    let size = (boxes.min(SURVIVORS_PER_ROW), boxes.div_ceil(SURVIVORS_PER_ROW));
     let usage = wgpu::TextureUsages::STORAGE_BINDING;
     gpu.view(&gpu.texture(
         "hiz.visible.survivor_list",

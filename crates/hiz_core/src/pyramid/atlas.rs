@@ -147,7 +147,7 @@ impl Atlas {
                 self.record_rows(
                     encoder,
                     buffer,
-                    [column, 0, 0, 0],
+                    [column, 0],
                     Rows { offset: 0, pitch: 0, width: PIXELS, height: 1 },
                 );
             }
@@ -155,7 +155,12 @@ impl Atlas {
         for (k, level) in layout.stored_levels() {
             let Level { offset, stride, width, height } = *level;
             let rows = Rows { offset: 4 * u64::from(offset), pitch: 4 * stride, width, height };
-            self.record_rows(encoder, stored, layout.atlas.origins[k], rows);
+            let [x, y, x_nearest, y_nearest] = layout.atlas.origins[k];
+            self.record_rows(encoder, stored, [x, y], rows);
+            if layout.nearest > 0 {
+                let offset = rows.offset + 4 * u64::from(layout.nearest);
+                self.record_rows(encoder, stored, [x_nearest, y_nearest], Rows { offset, ..rows });
+            }
         }
         let Some(staging) = staging else {
             encoder.copy_texture_to_texture(
@@ -173,7 +178,7 @@ impl Atlas {
             wgpu::TexelCopyBufferInfo { buffer: &staging, layout: copy_layout(0, pitch) },
             extent,
         );
-        self.record_rows(encoder, &staging, [0; 4], Rows { offset: 0, pitch, width, height });
+        self.record_rows(encoder, &staging, [0; 2], Rows { offset: 0, pitch, width, height });
         Ok(())
     }
 
@@ -191,7 +196,7 @@ impl Atlas {
         &self,
         encoder: &mut wgpu::CommandEncoder,
         buffer: &wgpu::Buffer,
-        [x, y, ..]: [u32; 4],
+        [x, y]: [u32; 2],
         Rows { offset, pitch, width, height }: Rows,
     ) {
         encoder.copy_buffer_to_texture(
@@ -217,6 +222,7 @@ fn staging_bytes(size: ImageSize) -> u64 {
 }
 
 /// Rows in a buffer: `offset` and `pitch` in bytes, `width` in pixels.
+#[derive(Clone, Copy)]
 struct Rows {
     offset: u64,
     pitch: u32,
@@ -235,6 +241,7 @@ fn copy_layout(offset: u64, pitch: u32) -> wgpu::TexelCopyBufferLayout {
 #[cfg(test)]
 mod tests {
     use crate::input::image::ImageSize;
+    use crate::pyramid::ends::Depths;
     use crate::pyramid::layout::PyramidLayout;
     use crate::pyramid::levels::StoredLevels;
 
@@ -245,7 +252,8 @@ mod tests {
             for levels in
                 [StoredLevels::ALL, StoredLevels::only(3), StoredLevels { first: 2, last: 4 }]
             {
-                let layout = PyramidLayout::new(ImageSize::new(w, h), levels, 25).unwrap();
+                let layout =
+                    PyramidLayout::new(ImageSize::new(w, h), levels, Depths::Farthest, 25).unwrap();
                 let atlas = &layout.atlas;
                 // Column, row, width and height of each area; the headers have the last columns.
                 let mut areas = vec![
@@ -278,7 +286,9 @@ mod tests {
 
     #[test]
     fn the_largest_image_of_any_device_fits() {
-        let layout = PyramidLayout::new(ImageSize::new(8192, 8192), StoredLevels::ALL, 25).unwrap();
+        let layout =
+            PyramidLayout::new(ImageSize::new(8192, 8192), StoredLevels::ALL, Depths::Farthest, 25)
+                .unwrap();
         assert!(layout.atlas.fits(&wgpu::Limits::default()));
     }
 }

@@ -56,12 +56,15 @@ pub(crate) fn touched_blocks(layout: &PyramidLayout, [x0, y0, x1, y1]: [u32; 4])
 mod tests {
     use super::*;
     use crate::input::image::ImageSize;
+    use crate::pyramid::ends::Depths;
     use crate::pyramid::levels::StoredLevels;
 
     /// Worked out by hand for 1920 x 1080: 240 columns of blocks, of which 30 make a block again.
     #[test]
     fn a_rectangle_is_shifted_by_three_levels_a_step() {
-        let layout = PyramidLayout::new(ImageSize::new(1920, 1080), StoredLevels::ALL, 25).unwrap();
+        let layout =
+            PyramidLayout::new(ImageSize::new(1920, 1080), StoredLevels::ALL, Depths::Farthest, 25)
+                .unwrap();
         let blocks = |begin, end| Blocks { begin, end };
         assert_eq!(
             touched_blocks(&layout, [700, 400, 999, 699]),
@@ -77,11 +80,15 @@ mod tests {
     /// An image of 9 columns has two blocks, and two of padding.
     #[test]
     fn the_padding_follows_the_block_of_the_last_column() {
-        let layout = PyramidLayout::new(ImageSize::new(9, 9), StoredLevels::ALL, 25).unwrap();
+        let layout =
+            PyramidLayout::new(ImageSize::new(9, 9), StoredLevels::ALL, Depths::Farthest, 25)
+                .unwrap();
         let ends = |rectangle| touched_blocks(&layout, rectangle)[0].end;
         assert_eq!(ends([0, 0, 7, 7]), [1, 1]);
         assert_eq!(ends([8, 0, 8, 8]), [4, 2]);
-        let coarse = PyramidLayout::new(ImageSize::new(99, 40), StoredLevels::only(4), 25).unwrap();
+        let coarse =
+            PyramidLayout::new(ImageSize::new(99, 40), StoredLevels::only(4), Depths::Farthest, 25)
+                .unwrap();
         assert_eq!(
             touched_blocks(&coarse, [16, 0, 98, 16]),
             [Blocks { begin: [1, 0], end: [8, 2] }]

@@ -10,6 +10,7 @@
 
 use crate::error::{Error, Result};
 use crate::input::image::ImageSize;
+use crate::pyramid::ends::Depths;
 use crate::pyramid::levels::{Level, MAX_LEVELS, StoredLevels, stored_levels};
 
 /// Pixels of a row that one texel of the atlas holds.
@@ -22,18 +23,19 @@ pub(crate) const HEADERS: u32 = 2;
 ///
 /// - Level 0 is on the left.
 /// - The stored levels are to its right, below each other.
+/// - Where both ends are stored, the levels of nearest depths are to the right of these.
 /// - Two headers have the last two columns: the number of the reduction whose depth image level 0
 ///   is, and the number of the reduction that made the stored levels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct AtlasLayout {
     pub(crate) width: u32,
     pub(crate) height: u32,
-    /// Column and row where each level begins, padded as in `shaders/pyramid/pyramid.wgsl`.
+    /// Column and row where each level begins: that of farthest depths, then that of nearest ones.
     pub(crate) origins: [[u32; 4]; MAX_LEVELS],
 }
 
 impl AtlasLayout {
-    pub(crate) fn new(levels: &[Level], stored: StoredLevels) -> Self {
+    pub(crate) fn new(levels: &[Level], stored: StoredLevels, depths: Depths) -> Self {
         let texels = |level: &Level| level.width.div_ceil(PIXELS);
         let mut origins = [[0; 4]; MAX_LEVELS];
         let column = texels(&levels[0]);
@@ -43,6 +45,11 @@ impl AtlasLayout {
             width = width.max(texels(level));
             rows += level.height;
         }
+        for (k, _) in stored_levels(levels, stored).filter(|_| depths.has_nearest()) {
+            let [x, y, ..] = origins[k];
+            origins[k] = [x, y, x + if depths.has_farthest() { width } else { 0 }, y];
+        }
+        let width = width * depths.count() as u32;
         Self { width: column + width + HEADERS, height: levels[0].height.max(rows), origins }
     }
 
@@ -118,6 +125,11 @@ pub(crate) struct PyramidLayout {
     /// Which levels are stored, limited to those that exist; none if `first` is past `last`.
     pub(crate) stored: StoredLevels,
     pub(crate) steps: Vec<Step>,
+    /// Which depths are stored.
+    pub(crate) depths: Depths,
+    /// How far behind a level of farthest depths that of nearest depths lies, in texels; 0 where one
+    /// of them is stored alone.
+    pub(crate) nearest: u32,
     /// Texels of the header and of the stored levels, padding included.
     pub(crate) texels: u64,
     /// A chunk holds `1 << chunk_shift` texels.
@@ -132,7 +144,12 @@ impl PyramidLayout {
     /// # Errors
     /// [`Error::Invalid`] for levels out of range;
     /// [`Error::Limit`] for more texels than [`PYRAMID_CHUNKS`] chunks or 32-bit offsets can hold.
-    pub(crate) fn new(size: ImageSize, stored: StoredLevels, chunk_shift: u32) -> Result<Self> {
+    pub(crate) fn new(
+        size: ImageSize,
+        stored: StoredLevels,
+        depths: Depths,
+        chunk_shift: u32,
+    ) -> Result<Self> {
         debug_assert!(
             1 << chunk_shift >= BLOCK_ALIGNMENT,
             "a vector store must not straddle chunks"
@@ -153,19 +170,28 @@ impl PyramidLayout {
         };
         let steps = passes(&levels, stored);
         let mut texels = HEADER_TEXELS;
+        let offset = |texels: u64| {
+            u32::try_from(texels)
+                .map_err(|_| Error::limit("pyramid texels", texels, u64::from(u32::MAX)))
+        };
         for step in &steps {
             for k in step.first..=step.last {
                 let level = &mut levels[k as usize];
                 let [stride, rows] = step.blocks.map(|n| n * step.texels_a_block(k));
                 level.stride = stride.next_multiple_of(ROW_ALIGNMENT);
-                level.offset = u32::try_from(texels)
-                    .map_err(|_| Error::limit("pyramid texels", texels, u64::from(u32::MAX)))?;
+                level.offset = offset(texels)?;
                 texels += u64::from(level.stride) * u64::from(rows);
             }
         }
         let steps = with_tail(&levels, steps);
-        let atlas = AtlasLayout::new(&levels, stored);
-        let layout = Self { size, levels, stored, steps, texels, chunk_shift, atlas };
+        // The second end has the same places behind the first.
+        let of_one = texels - HEADER_TEXELS;
+        let nearest = if depths.count() > 1 { offset(of_one)? } else { 0 };
+        texels += u64::from(nearest);
+        offset(texels)?;
+        let atlas = AtlasLayout::new(&levels, stored, depths);
+        let layout =
+            Self { size, levels, stored, steps, depths, nearest, texels, chunk_shift, atlas };
         if layout.chunk_sizes().len() > PYRAMID_CHUNKS {
             return Err(Error::limit(
                 "pyramid texels",
@@ -253,8 +279,13 @@ mod tests {
     use super::*;
 
     fn sizes(width: u32, height: u32) -> Vec<(u32, u32)> {
-        let layout =
-            PyramidLayout::new(ImageSize::new(width, height), StoredLevels::ALL, 25).unwrap();
+        let layout = PyramidLayout::new(
+            ImageSize::new(width, height),
+            StoredLevels::ALL,
+            Depths::Farthest,
+            25,
+        )
+        .unwrap();
         layout.levels.iter().map(|l| (l.width, l.height)).collect()
     }
 
@@ -270,7 +301,9 @@ mod tests {
     #[test]
     fn levels_do_not_overlap_and_rows_are_aligned() {
         for (w, h) in [(7, 5), (1023, 769), (1, 17), (640, 360)] {
-            let layout = PyramidLayout::new(ImageSize::new(w, h), StoredLevels::ALL, 25).unwrap();
+            let layout =
+                PyramidLayout::new(ImageSize::new(w, h), StoredLevels::ALL, Depths::Farthest, 25)
+                    .unwrap();
             let mut end = 4;
             for level in &layout.levels[1..] {
                 assert!(
@@ -287,7 +320,8 @@ mod tests {
 
     #[test]
     fn a_level_alone_takes_one_dispatch_and_all_of_a_screen_take_two() {
-        let steps = |size, levels| PyramidLayout::new(size, levels, 25).unwrap().steps;
+        let steps =
+            |size, levels| PyramidLayout::new(size, levels, Depths::Farthest, 25).unwrap().steps;
         let (screen, pixel) = (ImageSize::new(1920, 1080), ImageSize::new(1, 1));
         for level in 1..=15 {
             let alone = steps(screen, StoredLevels::only(level));
@@ -306,11 +340,18 @@ mod tests {
 
     #[test]
     fn the_largest_image_of_lavapipe_fits_three_bindings() {
-        let layout =
-            PyramidLayout::new(ImageSize::new(16_384, 16_384), StoredLevels::ALL, 25).unwrap();
+        let layout = PyramidLayout::new(
+            ImageSize::new(16_384, 16_384),
+            StoredLevels::ALL,
+            Depths::Farthest,
+            25,
+        )
+        .unwrap();
         assert_eq!(layout.chunk_sizes().len(), 3);
         assert!(layout.chunk_sizes().iter().sum::<u64>() >= layout.texels);
-        let error = PyramidLayout::new(ImageSize::new(64, 64), StoredLevels::ALL, 4).unwrap_err();
+        let error =
+            PyramidLayout::new(ImageSize::new(64, 64), StoredLevels::ALL, Depths::Farthest, 4)
+                .unwrap_err();
         assert!(matches!(error, Error::Limit { .. }));
     }
 

@@ -5,7 +5,8 @@
 //! 1. `layout` plans levels, offsets and dispatches without a device; `levels` says what is stored,
 //!    and `blocks` what a step reads.
 //! 2. [`Pyramid`] holds the buffers of the stored levels.
-//! 3. `resolve` makes one depth per pixel of multisampled depth.
+//! 3. `ends` says which depths of a block are stored.
+//!    `resolve` makes one depth per pixel of multisampled depth.
 //!    `source` says where a depth image lies in a texture.
 //!    `reduce` records the passes that fill the levels from it; `steps` holds what the passes bind,
 //!    and `built` remembers the image.
@@ -17,6 +18,7 @@
 pub(crate) mod atlas;
 pub(crate) mod blocks;
 pub(crate) mod built;
+pub(crate) mod ends;
 pub(crate) mod layout;
 pub(crate) mod level_texels;
 pub(crate) mod levels;
@@ -40,6 +42,7 @@ use crate::input::image::ImageSize;
 use crate::input::tolerance::DepthTolerance;
 use crate::pyramid::atlas::{Atlas, AtlasUse};
 use crate::pyramid::built::{Built, Owner};
+use crate::pyramid::ends::Depths;
 use crate::pyramid::layout::{PYRAMID_CHUNKS, PyramidLayout, chunk_shift};
 use crate::pyramid::levels::{Level, MAX_LEVELS, StoredLevels};
 use crate::pyramid::source::Subresource;
@@ -54,7 +57,7 @@ pub(crate) struct PyramidUniform {
     pub(crate) chunk_shift: u32,
     pub(crate) first_stored: u32,
     pub(crate) last_stored: u32,
-    pub(crate) padding: u32,
+    pub(crate) nearest: u32,
 }
 
 const _: () = assert!(size_of::<PyramidUniform>() == 528);
@@ -71,6 +74,8 @@ const NO_CHUNK: [&str; PYRAMID_CHUNKS] = ["hiz.no_chunk_0", "hiz.no_chunk_1", "h
 pub struct PyramidOptions {
     /// Which levels are stored; all by default.
     pub levels: StoredLevels,
+    /// Which depths of each block are stored: the farthest by default.
+    pub depths: Depths,
     /// Texels per chunk as a power of two, at least 2.
     ///
     /// `None`: as many as one storage binding of the device holds, which is the most allowed.
@@ -99,6 +104,8 @@ impl PyramidOptions {
 }
 
 /// A depth pyramid on the device: for every level, the farthest depth of each block of pixels.
+///
+/// [`PyramidOptions::depths`] asks for the nearest depth instead, or for both.
 ///
 /// Level 0 is the depth texture itself, which the pyramid does not copy.
 /// It keeps the last three depth textures alive, in the bind groups that read them.
@@ -173,7 +180,7 @@ impl Pyramid {
             ));
         }
         let chunk_shift = options.checked_chunk_shift(chunk_shift(gpu.limits()))?;
-        let layout = PyramidLayout::new(size, options.levels, chunk_shift)?;
+        let layout = PyramidLayout::new(size, options.levels, options.depths, chunk_shift)?;
         let chunks = layout
             .chunk_sizes()
             .iter()
@@ -193,7 +200,7 @@ impl Pyramid {
                 chunk_shift,
                 first_stored: first,
                 last_stored: last,
-                padding: 0,
+                nearest: layout.nearest,
             },
         )?;
         let steps = Steps::new(gpu, &layout.steps)?;
@@ -233,6 +240,16 @@ impl Pyramid {
     pub fn stored_levels(&self) -> Option<StoredLevels> {
         let stored = self.layout.stored;
         (stored.first <= stored.last).then_some(stored)
+    }
+
+    /// Which depths of each block of pixels are stored.
+    pub fn depths(&self) -> Depths {
+        self.layout.depths
+    }
+
+    /// Whether the nearest depths are stored, beside the farthest or alone.
+    pub fn has_nearest(&self) -> bool {
+        self.layout.depths.has_nearest()
     }
 
     /// The size of a level in texels; `None` past the last level.

@@ -19,6 +19,7 @@ use crate::input::image::ImageSize;
 use crate::pyramid::Pyramid;
 use crate::pyramid::blocks::Blocks;
 use crate::pyramid::built::Built;
+use crate::pyramid::ends::Depths;
 use crate::pyramid::layout::Step;
 use crate::pyramid::source::{DepthSource, Part, Sampling};
 use crate::pyramid::steps::{Recording, STEP_BINDINGS, Staged, Steps};
@@ -41,50 +42,75 @@ enum Shape {
     Coarse { shared: bool },
 }
 
-fn reduce_module(source: SourceKind, entry: File) -> Source {
+/// The ends that the reduction makes: one, of farthest depths, or both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum EndFiles {
+    One,
+    Both,
+}
+
+impl EndFiles {
+    fn of(depths: Depths) -> Self {
+        if depths.count() > 1 { Self::Both } else { Self::One }
+    }
+
+    fn files(self) -> &'static [File] {
+        match self {
+            Self::One => &[wgsl!("gpu/ends_one"), wgsl!("pyramid/store_one")],
+            Self::Both => &[wgsl!("gpu/ends_both"), wgsl!("pyramid/store_both")],
+        }
+    }
+}
+
+fn reduce_module(source: SourceKind, ends: EndFiles, entry: File) -> Source {
     Source::of(&[
         &[wgsl!("gpu/depth_bits")],
         source.files(),
+        ends.files(),
         &[wgsl!("pyramid/pyramid"), wgsl!("pyramid/pyramid_write"), entry],
     ])
 }
 
 /// The shader module of the reduction, three levels per pass.
-pub(crate) fn blocks_module(source: SourceKind) -> Source {
-    reduce_module(source, wgsl!("pyramid/reduce"))
+pub(crate) fn blocks_module(source: SourceKind, ends: EndFiles) -> Source {
+    reduce_module(source, ends, wgsl!("pyramid/reduce"))
 }
 
 /// The shader module of the reduction to one coarse level.
-pub(crate) fn coarse_module(source: SourceKind) -> Source {
-    reduce_module(source, wgsl!("pyramid/reduce_coarse"))
+pub(crate) fn coarse_module(source: SourceKind, ends: EndFiles) -> Source {
+    reduce_module(source, ends, wgsl!("pyramid/reduce_coarse"))
 }
 
 /// `tall`: neighbouring invocations read below each other; `region`: not all blocks are read.
+///
+/// Nearest depths alone are the farthest in the other convention, invalid pixels included.
 fn reduce_pipeline(
     gpu: &Gpu,
     source: SourceKind,
     shape: Shape,
-    (reversed, chunks): (bool, usize),
+    (reversed, depths, chunks): (bool, Depths, usize),
     (tall, region): (bool, bool),
 ) -> Result<wgpu::ComputePipeline> {
     let mut constants = vec![
-        ("REVERSED", flag(reversed)),
+        ("REVERSED", flag(reversed == depths.has_farthest())),
+        ("RECEIVERS", flag(depths.of_receivers())),
         ("CHUNKS", chunks as f64),
         ("TALL", flag(tall)),
         ("REGION", flag(region)),
     ];
+    let ends = EndFiles::of(depths);
     let (module, entry_point) = match shape {
         Shape::Blocks { from_source, first } => {
             constants.extend([("FROM_SOURCE", flag(from_source)), ("FIRST", f64::from(first))]);
-            (blocks_module(source), "reduce")
+            (blocks_module(source, ends), "reduce")
         }
         Shape::Tail => {
             constants.extend([("FROM_SOURCE", flag(false)), ("FIRST", 1.0)]);
-            (blocks_module(source), "reduce_tail")
+            (blocks_module(source, ends), "reduce_tail")
         }
         Shape::Coarse { shared } => {
             constants.push(("SHARED", flag(shared)));
-            (coarse_module(source), "reduce_coarse")
+            (coarse_module(source, ends), "reduce_coarse")
         }
     };
     gpu.compute_pipeline(&Compute {
@@ -133,7 +159,8 @@ impl Prepared {
         let dispatch = |(step, blocks): (&Step, &Blocks)| {
             let tall = step.source == 0 && reads_tall(step, kind, pyramid.size());
             let (shape, workgroups) = shape_of(step, blocks.size(), tall);
-            let constants = (built.camera.convention().is_reversed(), pyramid.chunks.len());
+            let reversed = built.camera.convention().is_reversed();
+            let constants = (reversed, pyramid.depths(), pyramid.chunks.len());
             let pipeline = reduce_pipeline(gpu, kind, shape, constants, (tall, region))?;
             Ok((pipeline, workgroups))
         };

@@ -94,6 +94,8 @@ pub fn choose_lods(
         descent: false,
         fit_volume: false,
         among: false,
+        nearest: false,
+        receivers: false,
     };
     let pipeline = gpu.compute_pipeline(&Compute {
         label: "hiz.choose_lods.pipeline",

@@ -4,7 +4,7 @@ use crate::cull::among::among_order_module;
 use crate::cull::count::count_module;
 use crate::cull::explain::explain_module;
 use crate::cull::pipelines::{
-    BinKey, Candidates, DepthStore, EmitKey, FramePass, cull_groups_module, cull_members_module,
+    BinKey, Candidates, DepthStore, EmitKey, FramePass, cull_boxes_module, cull_members_module,
     flat_module,
 };
 use crate::cull::pixels::pixels_module;
@@ -15,21 +15,27 @@ use crate::gpu::depth_source::SourceKind;
 use crate::gpu::shader::{FILES, Source};
 use crate::input::bounds::BoundsKind;
 use crate::instances::from_buffer::{FROM_BUFFER_KINDS, from_buffer_module};
+use crate::instances::tiers::form_tier_module;
 use crate::instances::update::update_module;
 use crate::occluders::device_raster::occluders_module;
 use crate::output::compact::{compact_module, copy_module};
 use crate::output::cut::{cut_module, emit_cut_module};
 use crate::output::emit_passes;
 use crate::output::views::join_module;
-use crate::pyramid::reduce::{blocks_module, coarse_module};
+use crate::pyramid::reduce::{EndFiles, blocks_module, coarse_module};
 use crate::pyramid::resolve::resolve_module;
 use crate::testing::lod::choose_lods_module;
 #[cfg(feature = "yardstick")]
 use crate::yardstick::{uncertified_module, yardstick_modules};
 
 /// All kinds of bounds.
-pub(super) const KINDS: [BoundsKind; 3] =
-    [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
+pub(super) const KINDS: [BoundsKind; 5] = [
+    BoundsKind::Sphere,
+    BoundsKind::Box,
+    BoundsKind::OrientedBox,
+    BoundsKind::Point,
+    BoundsKind::WidePoint,
+];
 
 /// Every way to emit the kept instances, each with a shader of its own.
 pub(super) const EMITS: [(&str, EmitKey); 5] = [
@@ -73,13 +79,16 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("join_views".to_owned(), join_module()),
         ("clock_check".to_owned(), clock_check_module()),
         ("update".to_owned(), update_module()),
+        ("form_tier".to_owned(), form_tier_module()),
         ("occluders".to_owned(), occluders_module()),
         ("resolve Depth".to_owned(), resolve_module(SourceKind::Depth)),
         ("resolve Float".to_owned(), resolve_module(SourceKind::Float)),
     ];
     for source in SOURCES {
-        all.push((format!("reduce {source:?}"), blocks_module(source)));
-        all.push((format!("reduce_coarse {source:?}"), coarse_module(source)));
+        for ends in [EndFiles::One, EndFiles::Both] {
+            all.push((format!("reduce {source:?} {ends:?}"), blocks_module(source, ends)));
+            all.push((format!("reduce_coarse {source:?} {ends:?}"), coarse_module(source, ends)));
+        }
         // Yardsticks read whole images alone.
         #[cfg(feature = "yardstick")]
         all.extend(
@@ -96,7 +105,10 @@ pub(super) fn all() -> Vec<(String, Source)> {
     let passes = [FramePass::Alone, FramePass::Late];
     let passes = stores.clone().flat_map(|store| passes.map(|pass| (store, pass)));
     for (store, pass) in passes.chain([early]) {
-        all.push((format!("cull_groups {store:?} {pass:?}"), cull_groups_module(store, pass)));
+        for (name, is_top) in [("cull_groups", true), ("cull_children", false)] {
+            let module = cull_boxes_module(store, pass, is_top);
+            all.push((format!("{name} {store:?} {pass:?}"), module));
+        }
         let emits: &[_] = if pass == FramePass::Alone { &EMITS } else { &EMITS_OF_TWO };
         for (kind, (way, emit)) in
             KINDS.into_iter().flat_map(|k| emits.iter().map(move |e| (k, *e)))
@@ -183,7 +195,9 @@ pub(in crate::testing) mod tests {
                 };
                 assert!(function.expressions.iter().any(|(_, e)| is_xor(e)), "{bar}");
             }
-            assert_eq!(calls(&module, "load_volume", "bar3"), 2, "{kind:?}: d_hi and d_lo");
+            // Of a narrow point nothing is added to `d_hi` but a number of the view.
+            let bars = if kind == BoundsKind::Point { 1 } else { 2 };
+            assert_eq!(calls(&module, "load_volume", "bar3"), bars, "{kind:?}: d_hi and d_lo");
             assert_eq!(calls(&module, "surely_behind", "bar"), 1, "d - A");
             assert_eq!(
                 calls(&module, "occluding_depth", "bar"),
@@ -191,7 +205,14 @@ pub(in crate::testing) mod tests {
                 "the depth that slack has moved"
             );
             assert_eq!(calls(&module, "classify", "bar"), 2, "-A and 1 - A");
-            if kind != BoundsKind::Sphere {
+            assert_eq!(calls(&module, "surely_in_front", "bar"), 1, "d - A");
+            assert_eq!(
+                calls(&module, "revealing_depth", "bar"),
+                1,
+                "the depth that slack has moved towards the eye"
+            );
+            assert_eq!(calls(&module, "surely_inside", "bar"), 2, "-A and 1 - A");
+            if matches!(kind, BoundsKind::Box | BoundsKind::OrientedBox) {
                 assert_eq!(calls(&module, "extent_of", "bar"), 2, "low and high");
                 assert_eq!(calls(&module, "surely_after", "bar"), 1, "the edge");
                 assert_eq!(calls(&module, "surely_before", "bar"), 1, "the edge");
@@ -212,16 +233,13 @@ pub(in crate::testing) mod tests {
             let module = parse(
                 &cull_module(DepthStore::Apart(source), BoundsKind::Box, EmitKey::NO_LIST).text(),
             );
-            assert_eq!(calls(&module, "source_bits", "sanitized"), 1, "{source:?}");
+            assert_eq!(calls(&module, "texel", "sanitized"), 1, "{source:?}");
+            assert_eq!(calls(&module, "nearest_texel", "sanitized_near"), 1, "{source:?}");
         }
-        assert_eq!(
-            calls(
-                &parse(&cull_module(DepthStore::Atlas, BoundsKind::Box, EmitKey::NO_LIST).text()),
-                "texel",
-                "sanitized"
-            ),
-            1
-        );
+        let atlas = cull_module(DepthStore::Atlas, BoundsKind::Box, EmitKey::NO_LIST);
+        let atlas = parse(&atlas.text());
+        assert_eq!(calls(&atlas, "texel", "sanitized"), 1);
+        assert_eq!(calls(&atlas, "nearest_texel", "sanitized_near"), 1);
     }
 
     /// A guess is mostly right, so that no verdict shows whether it was proved.

@@ -15,13 +15,14 @@ use crate::instances::piece::Piece;
 use crate::instances::records::TEXEL_BYTES;
 
 /// The view's uniform (`shaders/cull/view.wgsl`, `View`) as 32-bit words.
-/// The number of the reduction is 0.
+/// The number of the reduction is 0, and the default guard is not that of points.
 ///
 /// # Errors
 /// As `HizContext::record_cull`, for options and cameras that it refuses.
 pub fn view(camera: &Camera, options: &CullOptions) -> Result<Vec<u32>> {
-    Ok(bytemuck::cast_slice(&[ViewUniform::new(camera, 0, options, DepthTolerance::NONE)?])
-        .to_vec())
+    let kind = BoundsKind::Box;
+    let view = ViewUniform::new(camera, kind, 0, options, DepthTolerance::NONE)?;
+    Ok(bytemuck::cast_slice(&[view]).to_vec())
 }
 
 /// The records of all instances (`shaders/instances/bounds_*.wgsl`) as 32-bit words.
@@ -46,6 +47,8 @@ pub struct PieceWords {
     pub records: Vec<u32>,
     /// The records of the groups' boxes.
     pub groups: Vec<u32>,
+    /// The records of the boxes of each tier above.
+    pub tiers: Vec<Vec<u32>>,
 }
 
 /// The records of all pieces, after everything that was submitted.
@@ -68,6 +71,14 @@ pub fn pieces(engine: &Engine, instances: &Instances) -> Result<Vec<PieceWords>>
                 p.group_records.texture(),
                 p.groups() as usize * record_words(BoundsKind::Box),
             )?,
+            tiers: p
+                .upper
+                .iter()
+                .map(|tier| {
+                    let count = tier.count as usize * record_words(BoundsKind::Box);
+                    words(tier.records.texture(), count)
+                })
+                .collect::<Result<_>>()?,
         })
     };
     instances.pieces.iter().map(of_piece).collect()

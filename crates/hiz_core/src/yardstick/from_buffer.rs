@@ -16,7 +16,7 @@ pub struct BoundsInBuffer {
 }
 
 impl BoundsInBuffer {
-    /// Writes the float32 numbers of `bounds`, spheres or boxes, into a buffer.
+    /// Writes the float32 numbers of `bounds`, spheres, boxes or points, into a buffer.
     ///
     /// # Errors
     /// Those of [`Engine::instances_from`].
@@ -26,6 +26,7 @@ impl BoundsInBuffer {
             Bounds::Spheres { centers, radii } => (centers, radii, 1),
             Bounds::Boxes { min, max } => (min, max, 3),
             Bounds::OrientedBoxes { centers, half_sizes, .. } => (centers, half_sizes, 3),
+            Bounds::Points { positions } => (positions, positions, 0),
         };
         let mut numbers = Vec::with_capacity(count * (3 + width));
         for i in 0..count {

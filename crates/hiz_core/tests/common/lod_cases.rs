@@ -388,6 +388,7 @@ impl Cases {
             BoundsKind::OrientedBox => {
                 Bounds::OrientedBoxes { centers: a, half_sizes: b, rotations: c }
             }
+            BoundsKind::Point | BoundsKind::WidePoint => Bounds::Points { positions: a },
         };
         take(&bounds)
     }
@@ -398,6 +399,7 @@ fn any_volume(kind: BoundsKind, center: Vec3, size: f64, random: &mut Random) ->
     let half_sizes = [0; 3].map(|_| size * random.range(0.0, 1.0));
     match kind {
         BoundsKind::Sphere => Volume::Sphere { center, radius: size },
+        BoundsKind::Point | BoundsKind::WidePoint => Volume::Sphere { center, radius: 0.0 },
         BoundsKind::Box => Volume::Box {
             min: along(center, half_sizes, -1.0),
             max: along(center, half_sizes, 1.0),
@@ -486,6 +488,7 @@ impl Setting {
         let error = length(between);
         let more = error * 10.0_f64.powf(random.range(-2.0, 1.0));
         match kind {
+            BoundsKind::Point | BoundsKind::WidePoint => panic!("no point contains two others"),
             BoundsKind::Sphere => {
                 let (center, radius) = if self.is_orthographic() {
                     (along(near, between, 0.5), 0.5 * error)

@@ -9,11 +9,13 @@ use hiz_core::{HizContext, ImageSize, wgpu};
 use crate::gpu::{Gpu, IndirectChecks, instance};
 use crate::picture::{Difference, Picture, read};
 use crate::renderer::{Mode, Renderer};
+use crate::sample_places;
 use crate::scene::{NAMES, Scene};
+use crate::tests::samples::excuse;
 
 const SIZE: ImageSize = ImageSize { width: 192, height: 108 };
 
-fn gpu() -> Arc<Gpu> {
+pub(super) fn gpu() -> Arc<Gpu> {
     checked(Gpu::open(&instance(IndirectChecks::On), None).expect("a Vulkan device"))
 }
 
@@ -41,6 +43,8 @@ struct Found {
     ties: usize,
     drawn: u64,
     in_view: u64,
+    /// Samples whose depths differ because the driver computes them beside the samples.
+    excused: usize,
 }
 
 impl Pair {
@@ -58,6 +62,8 @@ impl Pair {
         let mut found = Found::default();
         self.culling.mode = mode;
         self.reference.mode = reference;
+        let samples = self.culling.targets.samples;
+        let are_right = sample_places::agree(&self.culling.gpu, samples).expect("a picture");
         for frame in 0..frames {
             let pose = self.culling.scene.pose(frame, frames);
             // Of every other jump the library is told; a stale history costs time alone.
@@ -65,12 +71,17 @@ impl Pair {
                 self.culling.culler.cut();
             }
             let camera = self.culling.scene.camera(&pose, SIZE).expect("a camera");
-            let [seen, expected] = [&mut self.culling, &mut self.reference].map(|renderer| {
+            let [seen, mut expected] = [&mut self.culling, &mut self.reference].map(|renderer| {
                 renderer.draw(&camera).expect("a frame");
                 read(renderer).expect("a picture")
             });
             check_is_a_picture(&expected);
-            let difference = seen.difference(&expected);
+            let mut difference = seen.difference(&expected);
+            if difference.depths > 0 && !are_right {
+                let renderers = [&self.culling, &self.reference];
+                found.excused += excuse(&seen, &mut expected, &camera, renderers);
+                difference = seen.difference(&expected);
+            }
             found.ties += difference.ties;
             found.drawn += u64::from(self.culling.counts.drawn.iter().sum::<u32>());
             found.in_view += u64::from(self.reference.counts.drawn.iter().sum::<u32>());
@@ -79,12 +90,13 @@ impl Pair {
             }
         }
         eprintln!(
-            "{} {}: {frames} frames, {} of {} drawn, {} ties, differing: {:?}",
+            "{} {}: {frames} frames, {} of {} drawn, {} ties, {} excused, differing: {:?}",
             self.culling.scene.name,
             mode.name(),
             found.drawn,
             found.in_view,
             found.ties,
+            found.excused,
             found.differing
         );
         found
@@ -109,6 +121,8 @@ fn equal_pictures(mode: Mode, samples: u32, frames: usize) {
         assert!(4 * found.drawn < 3 * found.in_view, "{name}: {found:?}");
         let pixels = SIZE.width as usize * SIZE.height as usize * frames;
         assert!(found.ties < pixels / 20, "{name}: {} ties", found.ties);
+        let most = pixels * samples as usize / 20_000;
+        assert!(found.excused <= most, "{name}: {} samples beyond bounds", found.excused);
     }
 }
 

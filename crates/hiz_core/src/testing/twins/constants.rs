@@ -22,11 +22,11 @@ use crate::input::bounds::BoundsKind;
 use crate::input::image::MAX_IMAGE_SIDE;
 use crate::input::view::ERROR_ULPS;
 use crate::instances::batch::GROUP;
-use crate::instances::from_buffer;
 use crate::instances::piece::CULL_WORKGROUP;
 use crate::instances::records::{RECORDS_PER_ROW, TEXEL_BYTES};
 use crate::instances::update;
 use crate::instances::volume_record::{ABSENT_CENTER, BEYOND_LIMITS, LARGEST};
+use crate::instances::{from_buffer, tiers};
 use crate::output::bins::BLOCK_WORDS;
 use crate::output::compact::SCATTER_WORKGROUP;
 use crate::output::cut::CUT_WORKGROUP;
@@ -69,7 +69,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/certificate", "ERROR_ULPS", ERROR_ULPS),
         ("cull/count", "LANES", int(count::LANES)),
         ("cull/count", "VECTORS", int(count::VECTORS)),
-        ("cull/cull_groups", "WORKGROUP", int(CULL_WORKGROUP)),
+        ("cull/cull_box", "PARENTS", int(CULL_WORKGROUP) / GROUP as f64),
+        ("cull/cull_box", "WORKGROUP", int(CULL_WORKGROUP)),
         ("cull/explain", "BEHIND", int(explain::BEHIND)),
         ("cull/explain", "CLEAR", int(explain::CLEAR)),
         ("cull/lod", "LOD_FINEST", rule(&LodRule::Finest)),
@@ -85,6 +86,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/outcome", "AT_BLOCK", stage(Stage::Block)),
         ("cull/outcome", "AT_DESCENT", stage(Stage::Descent)),
         ("cull/outcome", "AT_LEVEL", stage(Stage::Level)),
+        ("cull/outcome", "AT_FRONT", stage(Stage::Front)),
         ("cull/pixels", "WORKGROUP", int(pixels::WORKGROUP)),
         ("cull/refine", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/refine_groups", "WORKGROUP", int(refine::WORKGROUP)),
@@ -105,25 +107,32 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/bounds_oriented_box", "RECORD_TEXELS", texels(BoundsKind::OrientedBox)),
         ("instances/bounds_oriented_box", "LAST_TEXEL", texels(BoundsKind::OrientedBox) - 1.0),
         ("instances/bounds_sphere", "RECORD_TEXELS", texels(BoundsKind::Sphere)),
-        ("instances/from_buffer", "BOX_TEXELS", texels(BoundsKind::Box)),
-        ("instances/from_buffer", "SIGN_BIT", bits(-0.0)),
-        ("instances/from_buffer", "MAGNITUDE_BITS", int(u32::MAX >> 1)),
-        ("instances/from_buffer", "LARGEST_BITS", bits(LARGEST)),
-        ("instances/from_buffer", "LARGEST_CORNER_BITS", bits(2.0 * LARGEST)),
-        ("instances/from_buffer", "SMALL_BITS", bits(SMALL)),
-        ("instances/from_buffer", "BEYOND_SMALL_BITS", bits(2.0 * SMALL)),
-        ("instances/from_buffer", "INVALID_LOW", int(u32::MIN)),
-        ("instances/from_buffer", "INVALID_HIGH", int(u32::MAX)),
+        ("instances/bounds_point", "RECORD_TEXELS", texels(BoundsKind::Point)),
+        ("instances/bounds_wide_point", "RECORD_TEXELS", texels(BoundsKind::WidePoint)),
+        ("instances/corners", "BOX_TEXELS", texels(BoundsKind::Box)),
+        ("instances/corners", "SIGN_BIT", bits(-0.0)),
+        ("instances/corners", "MAGNITUDE_BITS", int(u32::MAX >> 1)),
+        ("instances/corners", "LARGEST_BITS", bits(LARGEST)),
+        ("instances/corners", "LARGEST_CORNER_BITS", bits(2.0 * LARGEST)),
+        ("instances/corners", "SMALL_BITS", bits(SMALL)),
+        ("instances/corners", "BEYOND_SMALL_BITS", bits(2.0 * SMALL)),
+        ("instances/corners", "INVALID_LOW", int(u32::MIN)),
+        ("instances/corners", "INVALID_HIGH", int(u32::MAX)),
         ("instances/from_buffer", "WORKGROUP", int(from_buffer::WORKGROUP)),
         ("instances/from_buffer_box", "RECORD_TEXELS", texels(BoundsKind::Box)),
+        ("instances/from_buffer_point", "RECORD_TEXELS", texels(BoundsKind::Point)),
         ("instances/from_buffer_sphere", "RECORD_TEXELS", texels(BoundsKind::Sphere)),
+        ("instances/form_tier", "WORKGROUP", int(tiers::WORKGROUP)),
+        ("instances/groups", "ACCEPTED", int(1 << 31)),
         ("instances/groups", "GROUP", GROUP as f64),
+        ("instances/groups", "GROUP_LOG2", f64::from(GROUP.ilog2())),
         ("instances/groups", "RUN", int(GROUPS_OF_RUN)),
         ("instances/groups", "SHARE", GROUP as f64 / int(GROUPS_OF_RUN)),
         ("instances/groups", "SURVIVORS_PER_ROW_LOG2", int(SURVIVORS_PER_ROW.ilog2())),
         ("instances/piece", "VERDICT_MULTIPLE", int(VERDICT_MULTIPLE)),
         ("instances/piece", "WORD_BITS", int(u32::BITS)),
         ("instances/record_layout", "RECORDS_PER_ROW_LOG2", int(RECORDS_PER_ROW.ilog2())),
+        ("instances/record_layout", "ABSENT_CENTER_BITS", bits(ABSENT_CENTER)),
         ("instances/record_layout", "BEYOND_LIMITS_BITS", bits(BEYOND_LIMITS)),
         ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
         ("cull/classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
@@ -142,7 +151,8 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("output/verdict", "OCCLUDED", verdict(Verdict::Occluded)),
         ("output/verdict", "VISIBLE", verdict(Verdict::Visible)),
         ("output/verdict", "INVALID", verdict(Verdict::Invalid)),
-        ("output/verdict", "VERDICT_COUNT", verdict(Verdict::Invalid) + 1.0),
+        ("output/verdict", "UNOCCLUDED", verdict(Verdict::Unoccluded)),
+        ("output/verdict", "VERDICT_COUNT", verdict(Verdict::Unoccluded) + 1.0),
         ("output/verdict", "VERDICT_MASK", int(VERDICT_MASK)),
         ("pyramid/levels", "MANTISSA_BITS", int(f32::MANTISSA_DIGITS - 1)),
         ("pyramid/levels", "EXPONENT_BIAS", f64::from(f32::MAX_EXP - 1)),
@@ -169,9 +179,11 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/lod", &["NEEDS", "NEED_FACTOR", "LARGEST_DEVIATION"]),
     // All bits of a run.
     ("cull/early", &["WHOLE_RUN"]),
-    ("cull/pixels", &["STEP", "TOP_TEXELS", "ROW_BITS", "ROW_MASK", "NO_BORDER"]),
-    ("cull/pixels_planes", &["FACE_PLANES", "NO_PLANE"]),
+    ("cull/pixels", &["STEP", "TOP_TEXELS", "ROW_BITS", "ROW_MASK", "NO_BORDER", "ONE_TILE", "TILE_LOG2", "MAX_TILES", "WHOLE_IMAGE_LOG2", "UNKNOWN_BITS"]),
+    ("cull/pixels_planes", &["FACE_PLANES", "OUTLINE_PLACES", "NO_PLANE"]),
     ("cull/refine", &["REFINED"]),
+    ("instances/groups", &["NEAREST", "UNOCCLUDED"]),
+    ("cull/unoccluded", &["HALF_PIXEL"]),
     ("gpu/clock_check", &["LEFT", "RIGHT", "LEFT_AGAIN"]),
     ("cull/refine_groups", &["LAST_TEXEL", "WITHIN"]),
     (
@@ -216,7 +228,8 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
             "TURN",
         ],
     ),
-    ("instances/from_buffer", &["HALF"]),
+    ("instances/corners", &["HALF"]),
+    ("instances/bounds_point_support", &["CANDIDATES", "OUTLINES"]),
     // One workgroup scans, however large it is.
     ("output/compact", &["LANES"]),
     ("output/emit_draws", &["LANES"]),
@@ -368,9 +381,11 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("count", line(count::LANES)),
         ("count_of_pixels", line(pixels::WORKGROUP)),
         ("cull", line(GROUP as u32)),
+        ("cull_children", line(CULL_WORKGROUP)),
         ("cull_groups", line(CULL_WORKGROUP)),
         ("cull_members", line(GROUP as u32)),
         ("explain", line(1)),
+        ("form_tier", line(tiers::WORKGROUP)),
         ("join_views", line(views::WORKGROUP)),
         ("occluder_vertex", [0; 3]),
         ("reduce", line(REDUCE_WORKGROUP)),
@@ -422,13 +437,22 @@ fn a_cull_sets_every_override() {
             descent: false,
             fit_volume: false,
             among: false,
+            nearest: false,
+            receivers: false,
         };
         let alone = EMITS.map(|emit| (emit, FramePass::Alone));
         let of_two = [FramePass::Early(Candidates::History), FramePass::Late]
             .into_iter()
             .flat_map(|pass| EMITS_OF_TWO.map(|emit| (emit, pass)));
         for ((way, emit), pass) in alone.into_iter().chain(of_two) {
-            let report = ReportKey { mask: false, verdicts: false, emit, statistics: false, pass };
+            let report = ReportKey {
+                mask: false,
+                verdicts: false,
+                absent: false,
+                emit,
+                statistics: false,
+                pass,
+            };
             let set = classify_constants(&key).into_iter().chain(report_constants(&report));
             let set: BTreeSet<String> = set.map(|(name, _)| name.to_owned()).collect();
             let module = parse(&flat_module(store, kind, emit, pass).text());

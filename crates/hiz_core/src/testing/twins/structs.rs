@@ -12,6 +12,7 @@ use crate::input::bounds::{Bounds, Floats};
 use crate::instances::SEQUENCE_BYTES;
 use crate::instances::from_buffer::FromBufferUniform;
 use crate::instances::piece::PieceUniform;
+use crate::instances::tiers::{FormUniform, TierUniform};
 use crate::instances::update::UpdateUniform;
 use crate::output::bins::{BinRecord, EmitUniform, TotalRecord};
 use crate::output::counters::{CounterRecord, StatisticsRecord};
@@ -39,16 +40,21 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     // Vertex inputs, which are found by location; see `occluders/device_meshes.rs`.
     "Copy",
     "Vertex",
+    "Ends",
+    "Ends2",
+    "Ends4",
     "Extent",
     "Flat",
     "MaskPlace",
     "Outcome",
     "PixelPlanes",
+    "Prepared",
     "Projected",
     "Slope",
     "SupportingPlane",
     "SupportingPlanes",
     "Sure",
+    "Tiling",
     "Value",
     "Volume",
     "Word",
@@ -91,6 +97,7 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         }),
         twin!("Counters", CounterRecord {
             "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid,
+            "unoccluded" = unoccluded,
         }),
         twin!("Counting", CountingUniform {
             "budget" = budget, "negligible" = negligible, "padding" = padding,
@@ -112,6 +119,7 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "farthest_bits" = farthest_bits, "pixels" = pixels, "depths" = depths, "last" = last,
             "texels_read" = texels_read, "of_footprint" = of_footprint,
             "farthest_before" = farthest_before, "any_before" = any_before,
+            "nearest_bits" = nearest_bits, "padding" = padding,
         }),
         twin!("Frame", FrameUniform {
             "early" = early, "least_pixels" = least_pixels, "padding" = padding,
@@ -134,7 +142,7 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         }),
         twin!("Pyramid", PyramidUniform {
             "levels" = levels, "origins" = origins, "chunk_shift" = chunk_shift,
-            "first_stored" = first_stored, "last_stored" = last_stored, "padding" = padding,
+            "first_stored" = first_stored, "last_stored" = last_stored, "nearest" = nearest,
         }),
         twin!("ResolvedImage", ResolvedUniform { "origin" = origin, "size" = size }),
         twin!("Band", BandUniform {
@@ -149,7 +157,17 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         }),
         twin!("Survivors", SurvivorsRecord {
             "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
-            "workgroups_z" = workgroups + 8, "count" = count,
+            "workgroups_z" = workgroups + 8, "count" = count, "tested" = tested,
+            "accepted" = accepted, "padding" = padding,
+        }),
+        twin!("Parents", SurvivorsRecord {
+            "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
+            "workgroups_z" = workgroups + 8, "count" = count, "tested" = tested,
+            "accepted" = accepted, "padding" = padding,
+        }),
+        twin!("Tier", TierUniform { "count" = count, "below" = below, "padding" = padding }),
+        twin!("FormTier", FormUniform {
+            "count" = count, "below" = below, "runtime_zero" = runtime_zero, "padding" = padding,
         }),
         twin!("Template", TemplateRecord {
             "count" = count, "first" = first, "base_vertex" = base_vertex, "padding" = padding,
@@ -239,6 +257,12 @@ fn records_lie_as_the_shaders_read_them() {
         half_sizes: Floats::F64(&[5.0, 6.0, 7.0]),
         rotations: Floats::F64(&[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
     });
+    let positions = centers;
+    assert_eq!(record(&Bounds::Points { positions }), [one, two, three, 77]);
+    let third = 1.0 / 3.0;
+    let (hi, lo) = (third as f32, (third - f64::from(third as f32)) as f32);
+    let wide = record(&Bounds::Points { positions: Floats::F64(&[third, 2.0, 3.0]) });
+    assert_eq!(wide, [hi.to_bits(), two, three, 77, lo.to_bits(), 0, 0, 0]);
     let texels = [[one, two, three, half_z], [0; 4], [0, half_x, 0, 0], [0, 0, half_y, 77]];
     assert_eq!(oriented, texels.concat());
 }

@@ -37,6 +37,7 @@ impl Arrays {
         let (a, b, c) = (Floats::F64(&self.a), Floats::F64(&self.b), Floats::F64(&self.c));
         match kind {
             BoundsKind::Sphere => Bounds::Spheres { centers: a, radii: b },
+            BoundsKind::Point | BoundsKind::WidePoint => Bounds::Points { positions: a },
             BoundsKind::Box => Bounds::Boxes { min: a, max: b },
             BoundsKind::OrientedBox => {
                 Bounds::OrientedBoxes { centers: a, half_sizes: b, rotations: c }

@@ -86,8 +86,14 @@ impl Round {
                 });
                 others.count() as u64 + if is_right { 0 } else { by_box }
             });
-            let counted = [counts.outside, counts.occluded, counts.visible, counts.invalid];
-            let wrong_counts = (0..4).map(|verdict| {
+            let counted = [
+                counts.outside,
+                counts.occluded,
+                counts.visible,
+                counts.invalid,
+                counts.unoccluded,
+            ];
+            let wrong_counts = (0..5).map(|verdict| {
                 counted[verdict]
                     .abs_diff(verdicts.iter().filter(|v| **v as usize == verdict).count() as u64)
             });

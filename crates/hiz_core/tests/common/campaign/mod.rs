@@ -41,6 +41,9 @@ pub(crate) use volume::moved;
 pub(crate) const KINDS: [BoundsKind; 3] =
     [BoundsKind::Sphere, BoundsKind::Box, BoundsKind::OrientedBox];
 
+/// Points, whose oracle is that of spheres with radius 0.
+pub(crate) const POINTS: [BoundsKind; 2] = [BoundsKind::Point, BoundsKind::WidePoint];
+
 /// The footprint and descent of a default cull.
 pub(crate) const PLAIN: &[(Footprint, u32)] = &[(Footprint::Two, 0)];
 

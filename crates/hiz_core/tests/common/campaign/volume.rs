@@ -28,7 +28,8 @@ impl Scene {
         kind: BoundsKind,
         random: &mut Random,
     ) -> (Volume, [f64; 3]) {
-        let placed = if class == Class::Grazing && kind != BoundsKind::Sphere {
+        let has_plates = matches!(kind, BoundsKind::Box | BoundsKind::OrientedBox);
+        let placed = if class == Class::Grazing && has_plates {
             self.plate(kind, random)
         } else {
             self.placed(class, kind, random)
@@ -36,10 +37,12 @@ impl Scene {
         let way = self.way(class, random);
         let away = way.direction.map(|x| x * self.front.abs());
         // One in four stays where it was placed: a hair beside a border, or anywhere.
-        if random.below(4) == 0 {
-            return (placed, away);
-        }
-        (self.last_before(placed, away, &*way.cleared, random).unwrap_or(placed), away)
+        let volume = if random.below(4) == 0 {
+            placed
+        } else {
+            self.last_before(placed, away, &*way.cleared, random).unwrap_or(placed)
+        };
+        (if kind == BoundsKind::Point { narrowed(&volume) } else { volume }, away)
     }
 
     /// An interval in pixels along an axis.
@@ -79,6 +82,12 @@ impl Scene {
             _ => random.pick(&[0.0, 0.0, 1e-3, 1.0, 30.0]) * pixel,
         };
         match kind {
+            BoundsKind::Point | BoundsKind::WidePoint => {
+                // An end of the interval, which is often a hair beside a border.
+                let (x, y) = (random.pick(&[x0, x1]), random.pick(&[y0, y1]));
+                let [x, y] = self.at([x, y], z);
+                Volume::Sphere { center: self.world([x, y, z]), radius: 0.0 }
+            }
             BoundsKind::Sphere => {
                 let radius = match class {
                     Class::Tiny => half[0],
@@ -226,6 +235,12 @@ impl Scene {
 
 fn spanned(a: [f64; 3], b: [f64; 3]) -> Volume {
     Volume::Box { min: [0, 1, 2].map(|k| a[k].min(b[k])), max: [0, 1, 2].map(|k| a[k].max(b[k])) }
+}
+
+/// A point at the nearest position that float32 holds.
+fn narrowed(point: &Volume) -> Volume {
+    let Volume::Sphere { center, radius } = *point else { panic!("expected a point") };
+    Volume::Sphere { center: center.map(|x| f64::from(x as f32)), radius }
 }
 
 /// `volume`, translated.

@@ -460,7 +460,7 @@ impl Certificates<'_> {
     fn support(&mut self, half: [f32; 3]) -> f32 {
         match self.kind {
             BoundsKind::Sphere => self.arithmetic.sum_of_products(half, half, None).sqrt(),
-            BoundsKind::Box | BoundsKind::OrientedBox => self.arithmetic.sum(half.map(f32::abs)),
+            _ => self.arithmetic.sum(half.map(f32::abs)),
         }
     }
 
@@ -473,7 +473,7 @@ impl Certificates<'_> {
                 self.arithmetic.part();
                 center > 0.0 && self.arithmetic.mul(center, center) > most
             }
-            BoundsKind::Box | BoundsKind::OrientedBox => center > self.support(half),
+            _ => center > self.support(half),
         }
     }
 

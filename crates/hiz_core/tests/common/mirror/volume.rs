@@ -26,11 +26,14 @@ impl Volume {
         let three = |i: usize| [0, 1, 2].map(|k| f32::from_bits(record[i + k]));
         let one = |i: usize| f32::from_bits(record[i]);
         let diagonal = |h: [f32; 3]| [[h[0], 0.0, 0.0], [0.0, h[1], 0.0], [0.0, 0.0, h[2]]];
-        let (hi, lo) = (three(0), three(4));
+        // A point whose position is one float32 has no second half.
+        let lo = if kind == BoundsKind::Point { [0.0; 3] } else { three(4) };
+        let hi = three(0);
         let half_axes = match kind {
             BoundsKind::Sphere => diagonal([one(3); 3]),
             BoundsKind::Box => diagonal(three(8)),
             BoundsKind::OrientedBox => [three(8), three(12), [one(3), one(7), one(11)]],
+            BoundsKind::Point | BoundsKind::WidePoint => [[0.0; 3]; 3],
         };
         let mut d_hi = [0.0; 3];
         let mut center = [0.0; 3];
@@ -53,6 +56,7 @@ impl Volume {
                 let sums = half_axes.map(|e| f.sum(e.map(f32::abs)));
                 f.sum(sums)
             }
+            BoundsKind::Point | BoundsKind::WidePoint => 0.0,
         };
         f.part();
         let distance = f.sum(d_hi.map(f32::abs));
@@ -65,7 +69,7 @@ impl Volume {
     pub(super) fn on_half_axes(&self, m: [f32; 3], f: &mut Arithmetic) -> [f32; 3] {
         [0, 1, 2].map(|k| match self.kind {
             BoundsKind::OrientedBox => f.sum_of_products(m, self.half_axes[k], None),
-            BoundsKind::Sphere | BoundsKind::Box => f.mul(m[k], self.half_axes[k][k]),
+            _ => f.mul(m[k], self.half_axes[k][k]),
         })
     }
 }
