@@ -192,7 +192,11 @@ HALF_SIZES: list[Bad] = [
     (None, TypeError, "got None"),
 ]
 BOUNDS: list[Bad] = [
-    (np.zeros((2, 3)), TypeError, "expected Spheres, Boxes or OrientedBoxes, got (2, 3) float64"),
+    (
+        np.zeros((2, 3)),
+        TypeError,
+        "expected Spheres, Boxes, OrientedBoxes or Points, got (2, 3) float64",
+    ),
     (None, TypeError, "got None"),
 ]
 CAMERA: list[Bad] = [
@@ -249,6 +253,23 @@ INVALID: list[Bad] = [
     (("0",), TypeError, "got str '0' in it"),
     ((True,), TypeError, "got bool True in it"),
     (np.zeros((2, 2)), TypeError, "(2, 2) float64"),
+]
+TOLERANCE: list[Bad] = [
+    (0.01, TypeError, "expected a hizvk.Tolerance or None, got float 0.01"),
+    ((0.01, 0.02), TypeError, "got tuple (0.01, 0.02)"),
+]
+SAMPLING: list[Bad] = [
+    ("linear", ValueError, 'expected one of "nearest", "bilinear"'),
+    (1, TypeError, "got int 1"),
+]
+POINTS: list[Bad] = [
+    (np.zeros((2, 3)), TypeError, "expected Points, got (2, 3) float64"),
+    (None, TypeError, "got None"),
+]
+RADIUS: list[Bad] = [
+    (-1, ValueError, "at least 0"),
+    (NAN, ValueError, "got float nan"),
+    ("1", TypeError, "got str '1'"),
 ]
 GUARD: list[Bad] = [
     (0.3, ValueError, "expected a multiple of 1/256, got 0.3"),
@@ -793,6 +814,94 @@ TABLES: dict[str, Table] = {
             "reversed_z": FLAG,
         },
     ),
+    "Camera.project": Table(
+        lambda _: (camera().project, {"xyz": np.zeros((2, 3))}),
+        {"xyz": array_of("(N, 3)", wrong=(3, 100))},
+    ),
+    "Projected.rounded": Table(lambda _: (camera().project(np.zeros((2, 3))).rounded, {}), {}),
+    "PointColours.bytes": Table(
+        lambda device: (
+            hizvk.colour_points(hizvk.Points(np.zeros((2, 3))), [], device=device).bytes,
+            {},
+        ),
+        {},
+    ),
+    "Points": Table(
+        lambda _: (hizvk.Points, {"positions": np.zeros((2, 3))}),
+        {"positions": array_of("(N, 3)", wrong=(3, 100))},
+    ),
+    "Tolerance": Table(
+        lambda _: (hizvk.Tolerance, {"rel": 0.01, "abs": 0.02}),
+        {
+            "rel": [
+                (0.6, ValueError, "at least 0 and at most 0.5, got float 0.6"),
+                (NAN, ValueError, "got float nan"),
+                ("1", TypeError, "got str '1'"),
+            ],
+            "abs": RADIUS,
+        },
+    ),
+    "gather": Table(
+        lambda _: (hizvk.gather, {"image": np.zeros((4, 4)), "pixels": np.zeros((2, 2))}),
+        {
+            "image": [
+                (np.zeros(4), ValueError, "expected (height, width) or (height, width, channels)"),
+                (np.zeros((0, 4)), ValueError, "got (0, 4) float64"),
+                ("image", ValueError, "got str 'image'"),
+            ],
+            "pixels": array_of("(N, 2)", wrong=(2, 100)),
+            "sampling": SAMPLING,
+        },
+    ),
+    "depth_from_points": Table(
+        lambda _: (
+            hizvk.depth_from_points,
+            {"points": hizvk.Points(np.zeros((2, 3))), "camera": camera()},
+        ),
+        {"points": POINTS, "camera": CAMERA, "radius": RADIUS, "radius_px": RADIUS},
+    ),
+    "colour_points": Table(
+        lambda device: (
+            hizvk.colour_points,
+            {
+                "points": hizvk.Points(np.zeros((2, 3))),
+                "views": [(camera(), np.ones((6, 8)), np.zeros((6, 8, 3), np.uint8))],
+                "kind": "z",
+                "device": device,
+            },
+        ),
+        {
+            "points": POINTS,
+            "views": [
+                (None, TypeError, "expected an iterable of (Camera, depth, image), got None"),
+                ([camera()], TypeError, "expected tuples (Camera, depth, image), got Camera"),
+                ([(1, 2, 3)], TypeError, "expected a Camera first in each view, got int 1"),
+                (
+                    [(camera(), np.ones((6, 8)), np.zeros((6, 8, 3), np.int32))],
+                    TypeError,
+                    "expected uint8 or float images (6, 8, 3), got (6, 8, 3) int32",
+                ),
+                (
+                    [(camera(), np.ones((6, 8)), np.zeros((8, 6, 3), np.uint8))],
+                    ValueError,
+                    "expected images (6, 8, 3) (the camera's size), got (8, 6, 3) uint8",
+                ),
+            ],
+            "kind": KIND,
+            "scale": SCALE,
+            "invalid": INVALID,
+            "tolerance": TOLERANCE,
+            "sampling": SAMPLING,
+            "weight": [
+                ("far", ValueError, 'expected one of "equal", "near"'),
+                (1, TypeError, "got int 1"),
+            ],
+            "device": [(3, TypeError, "expected a Device or None, got int 3")],
+            "options": OPTIONS_OBJECT,
+            **OPTIONS,
+            "progress": [("bar", TypeError, "expected True, False or a function, got str 'bar'")],
+        },
+    ),
     "Camera.resized": Table(lambda _: (camera().resized, {"size": (3, 4)}), {"size": SIZE}),
     "Mesh": Table(
         lambda _: (
@@ -955,6 +1064,7 @@ TABLES: dict[str, Table] = {
             "kind": KIND,
             "scale": SCALE,
             "invalid": INVALID,
+            "tolerance": TOLERANCE,
             "levels": LEVELS,
         },
     ),
@@ -1167,6 +1277,52 @@ TABLES: dict[str, Table] = {
     "Device.timed": Table(lambda device: (device.timed, {}), {}),
     "Device.wait": Table(lambda device: (device.wait, {}), {}),
     "DepthImage.numpy": Table(lambda device: (device.wait, {}), {}),
+    "mip_texel": Table(
+        lambda _: (hizvk.mip_texel, {"pixel": (0, 0), "level": 1, "size": (6, 8)}),
+        {
+            "pixel": [
+                ((6, 0), ValueError, "rows below 6 and columns below 8, got 0 to 6"),
+                ((0, -1), ValueError, "got -1 to 0"),
+                ((0.5, 1.0), TypeError, "expected (..., 2) integers"),
+                ((1, 2, 3), ValueError, "got (3,) int64"),
+                (3, ValueError, "got int 3"),
+                ([[1, 2], [3]], ValueError, "a ragged sequence"),
+                (None, TypeError, "got None"),
+            ],
+            "level": [
+                (4, ValueError, "expected an integer in 0..3, got int 4"),
+                (-1, ValueError, "got int -1"),
+                (1.0, TypeError, "got float 1.0"),
+            ],
+            "size": SIZE,
+            "lookup": [
+                ("edge", ValueError, 'expected one of "normalized", "edge_texel", got str'),
+                (None, TypeError, "got None"),
+            ],
+        },
+    ),
+    "wgsl": Table(
+        lambda _: (hizvk.wgsl, {}),
+        {
+            "name": [
+                ("mip", ValueError, 'expected one of "mip_lookup", "mip_cull"'),
+                (1, TypeError, "got int 1"),
+            ]
+        },
+    ),
+    "Pyramid.mips": Table(
+        lambda device: (device.pyramid(np.ones((6, 8)), camera(), kind="z").mips, {}),
+        {
+            "depths": [
+                ("all", ValueError, 'expected one of "farthest", "nearest", "both", got str'),
+                (None, TypeError, "got None"),
+            ],
+            "lookup": [
+                ("edge", ValueError, 'expected one of "normalized", "edge_texel", got str'),
+                (True, TypeError, "got bool True"),
+            ],
+        },
+    ),
     "Pyramid.level": Table(
         lambda device: (device.pyramid(np.ones((6, 8)), camera(), kind="z").level, {"k": 0}),
         {
@@ -1253,6 +1409,7 @@ TABLES: dict[str, Table] = {
             },
         ),
         {
+            "tolerance": TOLERANCE,
             "bounds": BOUNDS,
             "camera": CAMERA,
             "depth": [*IMAGE, (None, TypeError, "got None")],
@@ -1281,7 +1438,7 @@ TABLES: dict[str, Table] = {
                 (
                     np.zeros((2, 3)),
                     TypeError,
-                    "expected Spheres, Boxes, OrientedBoxes, Instances or a sequence",
+                    "expected Spheres, Boxes, OrientedBoxes, Points, Instances or a sequence",
                 ),
                 (None, TypeError, "got None"),
                 ([], ValueError, "got an empty sequence"),
@@ -1438,6 +1595,7 @@ MADE_BY_THE_PACKAGE = {
 MADE_BY_THE_PACKAGE |= {"BoundsCheck", "Occluders", "ProxyCheck", "Pyramid", "Recommendation"}
 MADE_BY_THE_PACKAGE |= {"StageTime", "StageTimes", "ViewsResult"}
 MADE_BY_THE_PACKAGE |= {"PassResult", "Temporal"}
+MADE_BY_THE_PACKAGE |= {"PointColours", "Projected"}
 MADE_BY_THE_PACKAGE |= {"InnerBoxes", "InnerPrisms", "OccluderSelection", "SplitMesh"}
 
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 #: The parameters that take arrays, vectors or matrices.
 ARRAYS = [
+    ("Points", "positions"),
     ("Spheres", "centers"),
     ("Spheres", "radii"),
     ("Boxes", "min"),
@@ -191,7 +192,7 @@ def test_any_array_is_an_answer_or_a_named_error(device: hizvk.Device, data: st.
     answer = attempt(device, function, parameter, value)
     if answer is None:
         return
-    if isinstance(answer, hizvk.Spheres | hizvk.Boxes | hizvk.OrientedBoxes):
+    if isinstance(answer, hizvk.Spheres | hizvk.Boxes | hizvk.OrientedBoxes | hizvk.Points):
         # Accepted bounds can be culled, and invalid bounds are kept.
         instances = device.instances(answer)
         camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(6, 8), near=0.1)

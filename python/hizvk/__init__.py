@@ -89,6 +89,7 @@ from .errors import (
 from .explanation import Explanation, Verdict
 from .lod import LodByDistance, LodByError, LodBySize
 from .mesh import Mesh
+from .mips import mip_texel, wgsl
 from .occluders import (
     InnerBoxes,
     InnerPrisms,
@@ -102,11 +103,14 @@ from .occluders import (
 from .oneline import visible
 from .options import CullOptions, DrawTemplate, MeshLods, Outputs
 from .pixels import PIXELS_DTYPE, visible_fraction
+from .points import PointColours, colour_points, depth_from_points
+from .projection import Projected, gather
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import ABSENT, DRAW_DTYPE, NO_LOD, CullResult
 from .stats import CullStats
 from .temporal import PassResult, Temporal
 from .timing import StageTime, StageTimes
+from .tolerance import Tolerance
 from .views import ViewsResult
 
 if TYPE_CHECKING:
@@ -149,7 +153,9 @@ __all__ = [
     "OutOfMemoryError",
     "Outputs",
     "PassResult",
+    "PointColours",
     "Points",
+    "Projected",
     "ProxyCheck",
     "Pyramid",
     "Recommendation",
@@ -158,6 +164,7 @@ __all__ = [
     "StageTime",
     "StageTimes",
     "Temporal",
+    "Tolerance",
     "UnoccludedComparison",
     "Verdict",
     "ViewsResult",
@@ -165,16 +172,21 @@ __all__ = [
     "adapters",
     "check_bounds",
     "check_proxy",
+    "colour_points",
     "compare",
     "compare_unoccluded",
+    "depth_from_points",
+    "gather",
     "inner_boxes",
     "inner_prisms",
+    "mip_texel",
     "recommend",
     "reference",
     "select_occluders",
     "split_mesh",
     "visible",
     "visible_fraction",
+    "wgsl",
 ]
 
 

@@ -41,6 +41,8 @@ __all__ = [
     "check_proxy",
     "frustum_matrix",
     "let_go",
+    "mip_cull",
+    "mip_lookup",
     "options_text",
     "reference_classify",
     "reference_pyramid",
@@ -50,6 +52,8 @@ __all__ = [
 
 __version__: str
 __build__: str
+mip_cull: str
+mip_lookup: str
 takes_planted_faults: bool
 
 _Floats: TypeAlias = npt.NDArray[np.float32] | npt.NDArray[np.float64]
@@ -75,6 +79,20 @@ def check_bounds(
     transforms: npt.NDArray[np.float64],
     instances: Sequence[tuple[int, int | None]],
 ) -> npt.NDArray[np.float64]: ...
+def add_colours(
+    positions: _Floats,
+    visible: npt.NDArray[np.bool_],
+    camera: Camera,
+    image: npt.NDArray[np.uint8] | npt.NDArray[np.float32],
+    bilinear: bool,
+    weight: str,
+    colours: npt.NDArray[np.float32],
+    weights: npt.NDArray[np.float32],
+    counts: npt.NDArray[np.uint32],
+) -> None: ...
+def depth_of_points(
+    positions: _Floats, camera: Camera, radius: float, radius_px: float
+) -> npt.NDArray[np.float32]: ...
 def frustum_matrix(
     borders: _Borders, near: float, far: float | None, reversed_z: bool, size: _Size
 ) -> _Matrix: ...
@@ -151,6 +169,7 @@ class Camera:
     def with_size(self, size: _Size) -> Camera: ...
     def size(self) -> _Size: ...
     def reversed_z(self) -> bool: ...
+    def is_posed(self) -> bool: ...
     def rows(self) -> _Matrix: ...
     def origin(self) -> list[float]: ...
     def clip_from_world(self) -> _Matrix: ...
@@ -206,6 +225,7 @@ class Engine:
         scale: float,
         invalid: Sequence[float],
         rounding: str,
+        tolerance: tuple[float, float],
         camera: Camera,
     ) -> DepthImage: ...
     def upload_samples(
@@ -215,6 +235,7 @@ class Engine:
         scale: float,
         invalid: Sequence[float],
         rounding: str,
+        tolerance: tuple[float, float],
         camera: Camera,
     ) -> DepthImage: ...
     def renew(
@@ -230,6 +251,7 @@ class Engine:
         scale: float,
         invalid: Sequence[float],
         rounding: str,
+        tolerance: tuple[float, float],
     ) -> None: ...
     def pyramid(self, depth: DepthImage, levels: tuple[int, int]) -> Pyramid: ...
     def cull(
@@ -312,6 +334,7 @@ class Pyramid:
     def num_levels(self) -> int: ...
     def stored_levels(self) -> tuple[int, int] | None: ...
     def read_level(self, k: int) -> tuple[_Size, npt.NDArray[np.float32]]: ...
+    def mips(self, depths: str, lookup: str) -> list[tuple[_Size, npt.NDArray[np.float32]]]: ...
     def device_bytes(self) -> int: ...
 
 @final
@@ -452,6 +475,7 @@ class Yardstick:
         self, depth: DepthImage, rectangle: tuple[int, int, int, int]
     ) -> YardstickReduction: ...
     def resolve(self, camera: Camera, samples: int) -> YardstickReduction: ...
+    def mips(self, depth: DepthImage, depths: str, lookup: str) -> YardstickReduction: ...
     def frames(
         self,
         instances: Instances,

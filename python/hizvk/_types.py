@@ -44,6 +44,14 @@ Output: TypeAlias = (
 Emit: TypeAlias = Literal["bins"] | Literal["instances"]
 #: Where bins lie in the list; see `Outputs`.
 Placement: TypeAlias = Literal["packed"] | Literal["reserved"]
+#: Which depths a texel of a mip texture holds; see `Pyramid.mips`.
+MipDepths: TypeAlias = Literal["farthest"] | Literal["nearest"] | Literal["both"]
+#: How texels of a mip texture are looked up; see `Pyramid.mips`.
+MipLookup: TypeAlias = Literal["normalized"] | Literal["edge_texel"]
+#: What an image shows at a place: its pixel, or a mean of the four around; see `gather`.
+Sampling: TypeAlias = Literal["nearest"] | Literal["bilinear"]
+#: How the views of a point are weighted; see `colour_points`.
+ColourWeight: TypeAlias = Literal["equal"] | Literal["near"]
 #: Which depth of the bounds a pixel of the oracle is compared with.
 OwnDepth: TypeAlias = Literal["nearest"] | Literal["pixel"]
 

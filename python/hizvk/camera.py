@@ -20,6 +20,7 @@ import numpy as np
 from . import _arguments, _camera_arguments
 from ._core import Camera as CoreCamera
 from ._core import frustum_matrix
+from .projection import Projected, projected
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -563,6 +564,39 @@ class Camera:
     def clip_from_world(self) -> npt.NDArray[np.float64]:
         """``(4, 4)`` float64 for column vectors, up to a positive factor; a copy."""
         return np.array(self._inner.clip_from_world(), dtype=np.float64)
+
+    def project(self, xyz: npt.ArrayLike) -> Projected:
+        """Where world positions lie in the image, in float64.
+
+        Parameters
+        ----------
+        xyz : (N, 3) float array
+            World positions.
+
+        Returns
+        -------
+        Projected
+            ``pixels`` as column and row with the first centre at (0.5, 0.5), NDC ``depth``, view
+            depth ``z``, and which points are ``inside``.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+
+        Examples
+        --------
+        >>> import hizvk
+        >>> camera = hizvk.Camera.look_at(
+        ...     (0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(100, 100), near=0.5
+        ... )
+        >>> seen = camera.project([(0.0, 0.0, -2.0), (1.0, 1.0, -2.0), (0.0, 0.0, 2.0)])
+        >>> seen.pixels[:2].tolist(), seen.z.tolist()
+        ([[50.0, 50.0], [75.0, 25.0]], [2.0, 2.0, -2.0])
+        >>> seen.inside.tolist(), float(seen.depth[0])
+        ([True, True, False], 0.25)
+        """
+        return projected(self._inner, xyz)
 
     def resized(self, size: Size) -> Camera:
         """The same view in an image of another size ``(height, width)``.

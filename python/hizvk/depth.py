@@ -10,6 +10,7 @@ import numpy as np
 
 from . import _arguments
 from ._types import DepthKind, Rounding, words
+from .tolerance import numbers_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,6 +47,8 @@ class DepthArray(NamedTuple):
 
     Half floats of every kind count, and float32 of metric kinds.
     For NDC depth `CullOptions.depth_slack` covers float32."""
+    tolerance: tuple[float, float] = (0.0, 0.0)
+    """How far the upload moves depth away from the eye: a share of it, and world units."""
 
     def numbers(self) -> npt.NDArray[Any]:
         """The image in a dtype that says what its numbers are: float16 is not in bits here."""
@@ -59,7 +62,13 @@ class DepthArray(NamedTuple):
 
 
 def checked_image(
-    name: str, value: object, camera: Camera, kind: object, scale: object, invalid: object = None
+    name: str,
+    value: object,
+    camera: Camera,
+    kind: object,
+    scale: object,
+    invalid: object = None,
+    tolerance: object = None,
 ) -> DepthArray:
     """The image as the engine takes it, and what its numbers mean; or an error that says why."""
     if kind is None:
@@ -109,7 +118,9 @@ def checked_image(
     if mask is not None and mask.any():
         # What is masked is "no data", whatever number lies there.
         image = np.where(mask, image.dtype.type(np.nan), image)
-    return DepthArray(image, kind_, scale_, _no_data(invalid, dtype), _rounding(dtype, kind_))
+    moved = numbers_of("tolerance", tolerance)
+    no_data = _no_data(invalid, dtype)
+    return DepthArray(image, kind_, scale_, no_data, _rounding(dtype, kind_), moved)
 
 
 def _bits_or_floats(array: npt.NDArray[Any]) -> npt.NDArray[Any]:

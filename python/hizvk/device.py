@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from .depth import DepthArray
     from .mesh import MeshLike
     from .options import CullKeywords, CullOptions, MeshLods, OptionKeywords
+    from .tolerance import Tolerance
     from .views import _AmongLike
 
 __all__ = ["Device"]
@@ -427,6 +428,7 @@ class Device:
         kind: None = None,
         scale: float = 1.0,
         invalid: None = None,
+        tolerance: None = None,
         levels: Levels = None,
     ) -> Pyramid: ...
 
@@ -439,6 +441,7 @@ class Device:
         kind: DepthKind,
         scale: float = 1.0,
         invalid: Collection[float] | None = None,
+        tolerance: Tolerance | None = None,
         levels: Levels = None,
     ) -> Pyramid: ...
 
@@ -450,6 +453,7 @@ class Device:
         kind: DepthKind | None = None,
         scale: float = 1.0,
         invalid: Collection[float] | None = None,
+        tolerance: Tolerance | None = None,
         levels: Levels = None,
     ) -> Pyramid:
         """Builds the depth pyramid of a depth image.
@@ -493,6 +497,11 @@ class Device:
             None: those that are usual for its dtype, which are 0 and 65535 for uint16, 65504 (the
             greatest) for float16, and none for float32 and float64.
             ``()``: none beside those that never are depth.
+        tolerance : Tolerance, optional
+            How far the depths of the array may be off, in the world.
+            The upload moves them away from the eye by so much, and the promise holds for the moved
+            image.
+            None: they stay where they are.
         levels : int or pair of int, optional
             Which levels are built, of 1 to 15; level 0, the image itself, is always there.
 
@@ -525,6 +534,12 @@ class Device:
                     got = _arguments.describe(value)
                     expected = "nothing beside a DepthImage, which has its own"
                     raise TypeError(f"{name}: expected {expected}, got {got}")
+            if tolerance is not None:
+                got = _arguments.describe(tolerance)
+                raise TypeError(
+                    "tolerance: expected None beside a DepthImage, whose depth stays; to move it "
+                    f"pass depth.numpy(), depth.camera and kind=depth.kind, got {got}"
+                )
             if _arguments.number("scale", scale, above=0.0) != 1.0:
                 raise ValueError(
                     f"scale: expected 1 beside a DepthImage, whose depth is NDC, got {scale:g}"
@@ -535,7 +550,7 @@ class Device:
             return Pyramid(self, built, depth.camera, source, is_rendered=True)
         camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")
         self._check_side(camera)
-        samples = checked_samples("depth", depth, camera, kind, scale, invalid)
+        samples = checked_samples("depth", depth, camera, kind, scale, invalid, tolerance)
         return self._pyramid_of(samples, camera, stored, invalid)
 
     def _pyramid_of(
@@ -610,9 +625,9 @@ class Device:
             Sizes and conventions may differ.
         options : CullOptions, optional
             How the cull decides; None takes the defaults.
-        outputs : Outputs, or a collection of "mask", "verdicts", "indices", "draws", "pixels"; optional
+        outputs : Outputs, or a collection of names, optional
             What the cull makes: less costs less.
-            A collection names all that is made.
+            A collection names all that is made: "mask", "verdicts", "indices", "draws", "pixels".
             None makes mask and verdicts, and the list and the draw arguments by the time that they
             are read.
             For several cameras indices and draws are those of what any of them keeps, and made only
@@ -675,7 +690,9 @@ class Device:
                 restriction,
                 not wait,
             )
-            return CullResult(self, culling, Question(camera, pyramid, options, instances._are_sizeless))
+            return CullResult(
+                self, culling, Question(camera, pyramid, options, instances._are_sizeless)
+            )
         cameras, pyramids = pairs(camera, pyramid, self)
         for number, (one, of) in enumerate(zip(cameras, pyramids, strict=True)):
             if one != of.camera:

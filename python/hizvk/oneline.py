@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from ._types import DepthKind
     from .options import CullOptions, OptionKeywords
+    from .tolerance import Tolerance
 
 __all__ = ["visible"]
 
@@ -63,6 +64,7 @@ def visible(
     kind: DepthKind | None = None,
     scale: float = 1.0,
     invalid: Collection[float] | None = None,
+    tolerance: Tolerance | None = None,
     device: Device | None = None,
     options: CullOptions | None = None,
     **keywords: Unpack[OptionKeywords],
@@ -96,6 +98,8 @@ def visible(
     invalid : collection of float, optional
         Which numbers of an array mean "no data", before `scale`.
         None: those that are usual for its dtype, as in `Device.pyramid`.
+    tolerance : Tolerance, optional
+        How far the depths of an array may be off; None: not at all.
     device : Device, optional
         None: the device of `depth`, else one that is made at the first call and kept.
     options : CullOptions, optional
@@ -143,7 +147,7 @@ def visible(
             raise ValueError(
                 f"camera: expected the camera of depth, {depth.camera!r}, got {camera!r}"
             )
-        for name, value in (("kind", kind), ("invalid", invalid)):
+        for name, value in (("kind", kind), ("invalid", invalid), ("tolerance", tolerance)):
             if value is not None:
                 got = _arguments.describe(value)
                 raise TypeError(f"{name}: expected nothing beside a DepthImage, got {got}")
@@ -158,7 +162,7 @@ def visible(
     else:
         if device is not None:
             device._check_side(camera)
-        image = checked_image("depth", depth, camera, kind, scale, invalid)
+        image = checked_image("depth", depth, camera, kind, scale, invalid, tolerance)
         maker = device = default_device() if device is None else device
         mask, counts = device._engine.cull_once(kind_and_arrays, camera._inner, image, options)
         stored = _arguments.stored_levels("levels", None)
@@ -167,9 +171,7 @@ def visible(
             return maker._pyramid_of(image, camera, stored)
 
     # Points have a guard of their own.
-    points = (
-        options.coverage == "sample" and not isinstance(bounds, Points) and are_points(bounds)
-    )
+    points = options.coverage == "sample" and not isinstance(bounds, Points) and are_points(bounds)
     # What hides some of the first bounds gives no cause for a hint.
     if points or not counts.occluded:
         tally: Counted = Tally.of(counts)

@@ -83,6 +83,7 @@ def replacement(
     array = _checked_shape(source, array, (height - row, width - column), (row, column))
     part = camera.resized(array.shape[:2])
     planes = checked_samples("array", array, part, given.kind, given.scale, source.invalid)
+    planes = [plane._replace(tolerance=given.tolerance) for plane in planes]
     rows, columns = array.shape[:2]
     return (
         (column, row, column + columns - 1, row + rows - 1),

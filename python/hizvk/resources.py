@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, overload
 
-from . import _arguments
+from . import _arguments, mips
 from ._core import DepthImage as CoreDepthImage
 from ._core import Instances as CoreInstances
 from ._core import Occluders as CoreOccluders
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from ._arguments import Size
     from ._on_device import Maker
-    from ._types import DepthKind
+    from ._types import DepthKind, MipDepths, MipLookup
     from .camera import Camera
     from .renewal import Source
 
@@ -285,6 +285,61 @@ class Pyramid(_Seen, Allocated[CorePyramid]):
             raise IndexError(f"k: expected 0 or a level that is stored, {self._stored()}, got {k}")
         size, texels = self._inner.read_level(k)
         return texels.reshape(size)
+
+    def mips(
+        self, *, depths: MipDepths = "farthest", lookup: MipLookup = "normalized"
+    ) -> list[npt.NDArray[np.float32]]:
+        """The levels of a mip texture of the depth image, as shaders of one's own read them.
+
+        Unlike the pyramid's own levels they are halved and rounded down, as mip levels are.
+        Level k has ``max(1, height >> k)`` rows and ``max(1, width >> k)`` columns, and level 0 is
+        the image.
+        In Rust the same levels are a texture: ``HizContext::create_mip_texture``.
+
+        Parameters
+        ----------
+        depths : "farthest", "nearest" or "both"
+            Which depths of its pixels a texel holds.
+            Pixels without a depth (NaN, outside of 0..1) count as far for the farthest depth, and
+            as near for the nearest one.
+        lookup : "normalized" or "edge_texel"
+            How a shader finds the texel that covers a pixel; `hizvk.mip_texel` computes it.
+
+            - ``"normalized"``: by normalised coordinates u, at texel ``floor(u n)``.
+              A texel covers every pixel that its part of the image touches.
+            - ``"edge_texel"``: by the pixel's number p, at texel ``min(p >> k, n - 1)``.
+              Texels share no pixels.
+
+        Returns
+        -------
+        list of arrays
+            For each level ``(height, width)`` float32 of NDC depth, row 0 on top.
+            With ``"both"`` it is ``(height, width, 2)``: the farthest depth, then the nearest.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+        LimitError
+            If the levels exceed one storage binding of the device.
+        OutOfMemoryError
+            If the device or the host has no room for them.
+
+        Examples
+        --------
+        >>> import numpy as np, hizvk
+        >>> device = hizvk.Device()
+        >>> camera = hizvk.Camera.look_at(
+        ...     (0, 0, 9), (0, 0, 0), fov_y_deg=60, size=(90, 161), near=0.1
+        ... )
+        >>> hiz = device.pyramid(np.full(camera.size, 20.0), camera, kind="z")
+        >>> [level.shape for level in hiz.mips(depths="nearest")][:3]
+        [(90, 161), (45, 80), (22, 40)]
+        """
+        depths_, lookup_ = mips.checked(depths, lookup)
+        levels = self._inner.mips(depths_, lookup_)
+        ends = (2,) if depths_ == "both" else ()
+        return [texels.reshape(size + ends) for size, texels in levels]
 
     @overload
     def update(self, row: int, column: int, array: npt.NDArray[Any]) -> None: ...

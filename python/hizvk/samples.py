@@ -20,14 +20,20 @@ COUNTS = (2, 4, 8, 16)
 
 
 def checked_samples(
-    name: str, value: Any, camera: Camera, kind: object, scale: object, invalid: object = None
+    name: str,
+    value: Any,
+    camera: Camera,
+    kind: object,
+    scale: object,
+    invalid: object = None,
+    tolerance: object = None,
 ) -> list[DepthArray]:
     """The image of each sample, as the engine takes them; one for an array without samples."""
     if not isinstance(value, np.ndarray) or value.ndim != 3 or value.shape[2] == 1:
-        return [checked_image(name, value, camera, kind, scale, invalid)]
+        return [checked_image(name, value, camera, kind, scale, invalid, tolerance)]
     if value.shape[:2] != camera.size:
         # Refused there, with hints about other axes.
-        return [checked_image(name, value, camera, kind, scale, invalid)]
+        return [checked_image(name, value, camera, kind, scale, invalid, tolerance)]
     if value.shape[2] not in COUNTS:
         listed = ", ".join(map(str, COUNTS[:-1]))
         raise ValueError(
@@ -35,4 +41,4 @@ def checked_samples(
             f"{COUNTS[-1]} samples, got {_arguments.describe(value)}"
         )
     planes = (value[..., k] for k in range(value.shape[2]))
-    return [checked_image(name, plane, camera, kind, scale, invalid) for plane in planes]
+    return [checked_image(name, plane, camera, kind, scale, invalid, tolerance) for plane in planes]

@@ -262,11 +262,14 @@ fn classify(i: u32) -> Outcome {
     var is_inside = false;
     var in_front = false;
     var front = near_bits();
+    // Texels of the nearest end are counted, and are no part of a descent's budget.
+    var nearest_read = 0u;
     if NEAREST {
         is_inside = !hidden && surely_inside(x, y, z, w);
-        if fits {
+        if fits && is_inside {
             front = nearest_footprint(level, t);
-            in_front = is_inside && surely_in_front(front, z, w);
+            in_front = surely_in_front(front, z, w);
+            nearest_read = texels_read;
         }
     }
     var block = t;
@@ -288,12 +291,12 @@ fn classify(i: u32) -> Outcome {
                 in_front = descend_in_front(level, t, first, last, z, w, &front, &texels_read);
             }
         }
-        out.texels_read = texels_read;
         block = vec4<u32>(first, last);
         level = 0u;
     }
 
     out.nearest_bits = front;
+    out.texels_read = texels_read + nearest_read;
 
     // 6. Were the texels those of all pixels that matter?
     if (hidden | in_front)

@@ -39,6 +39,7 @@ struct Survivors {
 @group(1) @binding(0) var<uniform> tier: Tier;
 @group(2) @binding(0) var<storage, read_write> survivors: Survivors;
 // A word per group: its verdict, or VISIBLE where the members have verdicts of their own.
+// UNOCCLUDED: all of it is accepted.
 @group(2) @binding(1) var<storage, read_write> group_verdicts: array<u32>;
 @group(2) @binding(2) var survivor_list: texture_storage_2d<r32uint, write>;
 
@@ -82,6 +83,12 @@ fn survive(box: u32, is_accepted: bool) {
     }
 }
 
+// Whether all that a box with this outcome holds surely shows.
+// In sample coverage some of it may lie between all samples, so that its own test culls it.
+fn is_shown(outcome: Outcome) -> bool {
+    return NEAREST && !SAMPLE_COVERAGE && outcome.verdict == UNOCCLUDED;
+}
+
 // `is_accepted`: the box of the tier above is accepted, with all that it holds.
 fn cull_box(box: u32, is_accepted: bool) {
     if TIER == 0u {
@@ -102,9 +109,9 @@ fn cull_box(box: u32, is_accepted: bool) {
     if STATISTICS {
         count_texels(outcome.level, outcome.texels_read);
     }
-    tell(box, outcome.verdict);
+    tell(box, select(VISIBLE, outcome.verdict, outcome.verdict < VISIBLE || is_shown(outcome)));
     if is_candidate(outcome) {
-        survive(box, outcome.verdict == UNOCCLUDED);
+        survive(box, is_shown(outcome));
     } else {
         for (var group = first_group(box); group < end_group(box); group += 1u) {
             forget(group);

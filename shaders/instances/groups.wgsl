@@ -19,10 +19,6 @@ const SHARE: u32 = GROUP / RUN;
 // without a test.
 const ACCEPTED: u32 = 0x80000000u;
 
-// STUB
-const NEAREST: bool = false;
-const UNOCCLUDED: u32 = 4u;
-
 // Survivors in a row of their list, as a power of two.
 // The list is a texture for the reason that `record_layout.wgsl` gives.
 // Twin: `SURVIVORS_PER_ROW` in `crates/hiz_core/src/output/survivors.rs`.

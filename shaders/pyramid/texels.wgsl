@@ -1,5 +1,5 @@
 // The pyramid as a cull reads it, wherever its levels lie.
-// `texels_apart.wgsl`, `texels_atlas.wgsl` and `texels_nowhere.wgsl` read single texels.
+// `texels_apart.wgsl` and `texels_atlas.wgsl` read single texels.
 
 // The footprint has at most 2^n x 2^n texels.
 override FOOTPRINT_LOG2: u32;

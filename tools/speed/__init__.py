@@ -8,6 +8,7 @@ From a checkout with the module built for release: ``python -m tools.speed``.
 - `run`: what the parts below share
 - `reduction`: the depth pyramid against a memcpy and one dispatch per level
 - `depth_in`: multisampled depth, and rectangles that have changed
+- `mips`: mip textures of depth against the pyramid
 - `culling`: certified, uncertified and grouped culls; what each output costs
 - `errors`: what the culls keep, against the float64 oracle
 - `calls`: what Python adds; small calls; numpy and Embree

@@ -138,7 +138,7 @@ class Run:
         pyramid: Pyramid,
         *,
         certified: bool = True,
-        groups: bool | None = False,
+        groups: bool | int | None = False,
         order: str = "stable",
         outputs: tuple[bool, bool, bool, bool] = MASK,
         depth: DepthImage | None = None,

@@ -20,7 +20,7 @@ use crate::gpu::device::Gpu;
 use crate::gpu::stage_times::{StageTimer, StageTimesInFlight, record_stage_times};
 use crate::input::bounds::{Bounds, BoundsKind};
 use crate::input::camera::Camera;
-use crate::input::image::ImageSize;
+use crate::input::image::{DepthConvention, ImageSize};
 use crate::input::mesh::MeshData;
 use crate::instances::from_buffer::{BoundsBuffer, record_instances_from, record_update_from};
 use crate::instances::piece::CULL_WORKGROUP;
@@ -36,6 +36,8 @@ use crate::output::outputs::Outputs;
 use crate::output::readback::{AnswerInFlight, ReadbackRing, record_readback};
 use crate::output::views::{ViewsOutputs, VisibleViews};
 use crate::output::visible::Visible;
+use crate::pyramid::mips::{MipOptions, MipTexture};
+use crate::pyramid::mips_passes::record_mips;
 use crate::pyramid::reduce::record_reduce;
 use crate::pyramid::region::record_reduce_region;
 use crate::pyramid::resolve::{DepthResolve, ResolveOptions, record_resolve};
@@ -560,6 +562,42 @@ impl HizContext {
         record_reduce_region(&self.gpu, encoder, &depth.into(), rectangle, pyramid)
     }
 
+    /// Makes a texture with mip levels of depth, for depth images of `size` pixels.
+    ///
+    /// It is for shaders of the caller's own, such as screen-space reflections.
+    /// No cull of this crate reads it.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] for a size of 0.
+    /// - [`Error::Limit`] for a size beyond the device's textures, and for levels beyond one
+    ///   storage binding.
+    /// - [`Error::OutOfMemory`].
+    pub fn create_mip_texture(&self, size: ImageSize, options: &MipOptions) -> Result<MipTexture> {
+        MipTexture::new(&self.gpu, size, options)
+    }
+
+    /// Records the passes that fill `mips` from a depth image of its size.
+    ///
+    /// `depth` is what [`record_reduce`](Self::record_reduce) takes: the same formats, usages and
+    /// parts of textures.
+    /// Level 0 is the depth as given; no tolerance of its format is added.
+    /// Shaders that run in later passes of the same encoder read the new levels.
+    ///
+    /// # Errors
+    /// - [`Error::Mismatch`] for sizes or devices that disagree and for a destroyed texture.
+    /// - [`Error::Invalid`] for other formats and usages, and for several layers, mip levels or
+    ///   samples of which none is named.
+    /// - [`Error::OutOfMemory`].
+    pub fn record_mips<'a>(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        depth: impl Into<DepthSource<'a>>,
+        convention: DepthConvention,
+        mips: &MipTexture,
+    ) -> Result<()> {
+        record_mips(&self.gpu, encoder, &depth.into(), convention, mips)
+    }
+
     /// Records the cull of `instances` against `pyramid`; the buffers of `visible` take what it
     /// finds.
     ///
@@ -895,7 +933,7 @@ impl HizContext {
         visible: &VisibleViews,
         options: &CullOptions,
     ) -> Result<()> {
-        let inputs = ViewsInputs { instances, views, among, options, idle: false };
+        let inputs = ViewsInputs { instances, views, among, options, idle: false, built: None };
         record_cull_views(&self.gpu, encoder, &inputs, &visible.each(), visible.joined())
     }
 

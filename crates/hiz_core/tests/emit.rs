@@ -10,7 +10,7 @@ use hiz_core::headless::{Engine, NO_LOD};
 use hiz_core::{
     ABSENT, Bounds, Camera, CullOptions, DepthConvention, DrawTemplate, Emit, Error, Floats,
     Hierarchy, HizContext, InstanceOptions, Instances, Lod, LodRule, MeshLods, MeshTable, Order,
-    Outputs, Placement, Pyramid, PyramidOptions, Verdict, VertexDraw, Visible, WarmUp,
+    Outputs, Placement, Pyramid, PyramidOptions, Verdict, VertexDraw, Visible, WarmUp, WarmUpMore,
     testing::CANARY_WORDS, wgpu,
 };
 
@@ -1133,6 +1133,7 @@ fn frames_of_bins_make_nothing() {
             visible: &visible,
             options: &options,
             updates: false,
+            more: WarmUpMore::default(),
         };
         let descriptor = wgpu::CommandEncoderDescriptor::default();
         let mut encoder = world.engine.device().create_command_encoder(&descriptor);

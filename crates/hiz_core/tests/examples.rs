@@ -1,9 +1,16 @@
-//! Runs the examples `simple` and `frames`; `tests/renderer.rs` runs the other renderer.
+//! Runs the examples `simple`, `frames`, `reflections` and `own_culling`; `tests/renderer.rs` runs
+//! the other renderer.
 
 mod common;
 #[path = "../examples/frames.rs"]
 #[allow(dead_code, reason = "the program's own device, and its report")]
 mod frames;
+#[path = "../examples/own_culling.rs"]
+#[allow(dead_code, reason = "the program's own report")]
+mod own_culling;
+#[path = "../examples/reflections.rs"]
+#[allow(dead_code, reason = "the program's own device, and its report")]
+mod reflections;
 #[path = "../examples/simple.rs"]
 #[allow(dead_code, reason = "the program's own device, and its report")]
 mod simple;
@@ -115,4 +122,82 @@ fn frames_draw_the_picture_of_all_discs() {
 #[test]
 fn frames_runs() {
     frames::main().unwrap();
+}
+
+/// The pixel that a ray hits, by a march from pixel to pixel in float64.
+fn first_pixel_in_front(frame: &reflections::Frame, ray: &reflections::Ray) -> u32 {
+    let [begin, change] =
+        [ray.begin, ray.change].map(|v| [f64::from(v[0]), f64::from(v[1]), f64::from(v[2])]);
+    let (width, height) = (i64::from(frame.size.width), i64::from(frame.size.height));
+    if change[1] == 0.0 {
+        return reflections::NONE;
+    }
+    let mut pixel = [begin[0].floor() as i64, begin[1].floor() as i64];
+    let mut time = 0.0;
+    for steps in 0.. {
+        let border = |k: usize| {
+            let at = pixel[k] + i64::from(change[k] > 0.0);
+            if change[k] == 0.0 { f64::INFINITY } else { (at as f64 - begin[k]) / change[k] }
+        };
+        let [of_column, of_row] = [border(0), border(1)];
+        let left = of_column.min(of_row);
+        let depth = |t: f64| begin[2] + t * change[2];
+        let index = pixel[1] * width + pixel[0];
+        let farthest = depth(time).min(depth(left.min(1.0)));
+        if steps > 0 && farthest < f64::from(frame.depth[index as usize]) {
+            return index as u32;
+        }
+        let k = usize::from(of_row < of_column);
+        pixel[k] += if change[k] > 0.0 { 1 } else { -1 };
+        time = left;
+        if left >= 1.0 || !(0..width).contains(&pixel[0]) || !(0..height).contains(&pixel[1]) {
+            break;
+        }
+    }
+    reflections::NONE
+}
+
+/// The march through the levels hits what a march from pixel to pixel hits, for every pixel.
+#[test]
+fn reflections_hit_the_first_pixel_in_front() {
+    let engine = engine();
+    for (width, height) in [(160, 90), (203, 121)] {
+        let frame = reflections::draw(hiz_core::ImageSize::new(width, height));
+        let hits = reflections::trace(engine.device(), engine.queue(), &frame).unwrap();
+        let expected: Vec<u32> =
+            frame.rays.iter().map(|ray| first_pixel_in_front(&frame, ray)).collect();
+        let differ = hits.iter().zip(&expected).filter(|(found, hit)| found[0] != **hit).count();
+        let rays = frame.rays.iter().filter(|ray| ray.change[1] != 0.0).count();
+        let found = expected.iter().filter(|hit| **hit != reflections::NONE).count();
+        let looked: u32 = hits.iter().map(|[_, looked]| looked).sum();
+        println!(
+            "{width} x {height}: {rays} rays, {found} hits, {differ} differ, {:.1} texels per ray",
+            f64::from(looked) / rays as f64
+        );
+        assert_eq!(differ, 0);
+        assert!(rays > 5000 && found > 1000 && found + 1000 < rays, "{rays} rays, {found} hits");
+        let picture = reflections::picture(&frame, &hits);
+        assert_eq!(picture.len(), 3 * frame.depth.len());
+    }
+}
+
+/// The certified cull hides nothing that shows; a shader without certificates does so far away from
+/// the origin, where float32 positions are coarse.
+#[test]
+fn own_culling_is_compared_with_the_certified_cull() {
+    let engine = engine();
+    let mut of_own = Vec::new();
+    for (name, place) in own_culling::PLACES {
+        let rows = own_culling::compare(&engine, place, 3000).unwrap();
+        println!("{name}: {rows:?}");
+        let [each, groups, own] = rows.try_into().expect("three ways");
+        assert_eq!((each.false_culls, groups.false_culls), (0, 0), "{name}");
+        assert_eq!(each.kept, groups.kept, "{name}");
+        assert!(each.kept > 100 && each.kept < 2500, "{name}: {each:?}");
+        of_own.push(own);
+    }
+    // Near the origin it is a cull, not noise.
+    let near = of_own[0].kept;
+    assert!(near > 100 && near < 2500, "{near}");
+    assert!(of_own[2].false_culls > 0, "{:?}", of_own[2]);
 }

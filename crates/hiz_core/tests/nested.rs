@@ -8,9 +8,9 @@ use common::{Random, camera_along_z, engine, ndc};
 use hiz_core::headless::{AmongSource, CullExtras, Culling, Engine};
 use hiz_core::testing::words;
 use hiz_core::{
-    ABSENT, Bounds, Camera, CullOptions, DepthConvention, DrawTemplate, EarlySet, Emit, Floats,
-    Hierarchy, InstanceOptions, Instances, Lod, LodRule, MeshLods, Order, Outputs, Placement,
-    Pyramid, StoredOrder, Verdict, wgpu,
+    ABSENT, Bounds, Camera, CullOptions, DepthConvention, Depths, DrawTemplate, EarlySet, Emit,
+    Floats, Hierarchy, InstanceOptions, Instances, Lod, LodRule, MeshLods, Order, Outputs,
+    Placement, Pyramid, PyramidOptions, StoredOrder, Verdict, wgpu,
 };
 use wgpu::util::DeviceExt as _;
 
@@ -24,12 +24,15 @@ const WALL: f32 = 4.0;
 enum Fate {
     Front,
     Behind,
+    /// Outside of the view, and behind the wall's plane.
     Outside,
+    /// Outside of the view, and before the wall's plane.
+    Aside,
     Invalid,
     Absent,
 }
 
-use Fate::{Absent, Behind, Front, Invalid, Outside};
+use Fate::{Absent, Aside, Behind, Front, Invalid, Outside};
 
 impl Fate {
     fn bounds(self, random: &mut Random) -> [f32; 4] {
@@ -39,15 +42,18 @@ impl Fate {
             Front => [x, y, random.range(2.0, 3.0) as f32, 0.05],
             Behind | Absent => [x, y, random.range(6.0, 8.0) as f32, 0.05],
             Outside => [100.0 + x, y, 6.0, 0.05],
+            Aside => [100.0 + x, y, 2.5, 0.05],
             Invalid => [x, f32::NAN, 6.0, 0.05],
         }
     }
 
-    fn verdict(self) -> Verdict {
+    /// The verdict, with both ends of the pyramid or one.
+    fn verdict(self, both: bool) -> Verdict {
         match self {
+            Front if both => Verdict::Unoccluded,
             Front => Verdict::Visible,
             Behind => Verdict::Occluded,
-            Outside | Absent => Verdict::Outside,
+            Outside | Aside | Absent => Verdict::Outside,
             Invalid => Verdict::Invalid,
         }
     }
@@ -56,7 +62,7 @@ impl Fate {
 /// Fates by blocks: of each tier some boxes have one fate, and the others are mixed.
 fn fates(count: usize, random: &mut Random) -> Vec<Fate> {
     let mut fates = vec![Behind; count];
-    let mixed = |random: &mut Random| random.pick(&[Front, Behind, Behind, Outside, Absent]);
+    let mixed = |random: &mut Random| random.pick(&[Front, Behind, Behind, Outside, Aside, Absent]);
     for large in fates.chunks_mut(GROUP * GROUP) {
         let one = random.pick(&[None, None, Some(Front), Some(Behind), Some(Outside)]);
         for group in large.chunks_mut(GROUP) {
@@ -66,9 +72,17 @@ fn fates(count: usize, random: &mut Random) -> Vec<Fate> {
                 Some(Behind),
                 Some(Behind),
                 Some(Outside),
+                Some(Aside),
                 Some(Absent),
             ]));
-            group.iter_mut().for_each(|fate| *fate = of_group.unwrap_or_else(|| mixed(random)));
+            // Some of it is not there, and the rest is of one fate.
+            let gaps = random.below(3) == 0;
+            for fate in group.iter_mut() {
+                *fate = of_group.unwrap_or_else(|| mixed(random));
+                if gaps && random.below(8) == 0 {
+                    *fate = Absent;
+                }
+            }
             if random.below(16) == 0 {
                 group[0] = Invalid;
             }
@@ -82,6 +96,7 @@ struct World {
     engine: Arc<Engine>,
     camera: Camera,
     pyramid: Arc<Pyramid>,
+    both: bool,
     fates: Vec<Fate>,
     instances: Arc<Instances>,
 }
@@ -93,13 +108,20 @@ fn spheres(numbers: &[[f32; 4]]) -> (Vec<f32>, Vec<f32>) {
     )
 }
 
-fn wall(engine: &Engine, camera: &Camera) -> Arc<Pyramid> {
-    let image = [ndc(WALL, CONVENTION); 64 * 64];
-    engine.pyramid(&engine.upload_depth(&image, camera).unwrap()).unwrap()
+/// The pyramid of an image, of its farthest depths or of both ends.
+fn levels(engine: &Engine, image: &[f32], camera: &Camera, both: bool) -> Arc<Pyramid> {
+    let depths = if both { Depths::Both } else { Depths::Farthest };
+    let options = PyramidOptions { depths, ..PyramidOptions::default() };
+    engine.pyramid_with(&engine.upload_depth(image, camera).unwrap(), &options).unwrap()
 }
 
 impl World {
-    fn new(engine: Arc<Engine>, fates: Vec<Fate>, piece: Option<u32>, order: StoredOrder) -> Self {
+    fn new(
+        engine: Arc<Engine>,
+        fates: Vec<Fate>,
+        piece: Option<u32>,
+        (order, both): (StoredOrder, bool),
+    ) -> Self {
         let mut random = Random(7);
         let numbers: Vec<_> = fates.iter().map(|fate| fate.bounds(&mut random)).collect();
         let (centers, radii) = spheres(&numbers);
@@ -114,8 +136,8 @@ impl World {
         };
         let instances = engine.instances(&bounds, &options).unwrap();
         let camera = camera_along_z(64, 64, CONVENTION);
-        let pyramid = wall(&engine, &camera);
-        Self { engine, camera, pyramid, fates, instances }
+        let pyramid = levels(&engine, &[ndc(WALL, CONVENTION); 64 * 64], &camera, both);
+        Self { engine, camera, pyramid, both, fates, instances }
     }
 
     fn options(tiers: u32) -> CullOptions {
@@ -139,9 +161,10 @@ impl World {
     /// How many answers of a cull differ from the fates.
     fn wrong(&self, culling: &Culling) -> usize {
         let verdicts = culling.verdicts().unwrap();
-        let of_verdicts = self.fates.iter().zip(&verdicts).filter(|(f, v)| f.verdict() != **v);
+        let of_verdicts =
+            self.fates.iter().zip(&verdicts).filter(|(f, v)| f.verdict(self.both) != **v);
         let mask = culling.mask().unwrap();
-        let kept = |fate: &Fate| fate.verdict().is_kept();
+        let kept = |fate: &Fate| fate.verdict(self.both).is_kept();
         let of_mask = self.fates.iter().zip(&mask).filter(|(f, kept_here)| kept(f) != **kept_here);
         let mut listed = culling.indices().unwrap();
         listed.sort_unstable();
@@ -155,10 +178,21 @@ impl World {
 struct Spent {
     boxes: [u64; 3],
     instances: u64,
+    accepted: u64,
 }
 
 impl Spent {
-    fn of(fates: &[Fate], tiers: usize, piece: usize) -> Self {
+    fn counted(culling: &Culling) -> Self {
+        let counts = culling.counts().unwrap();
+        assert_eq!(counts.tested_groups, counts.tested_boxes[0]);
+        Self {
+            boxes: counts.tested_boxes,
+            instances: counts.tested_instances,
+            accepted: counts.accepted_instances,
+        }
+    }
+
+    fn of(fates: &[Fate], (tiers, both): (usize, bool), piece: usize) -> Self {
         let mut spent = Self::default();
         for fates in fates.chunks(piece) {
             // A tier begins where one of its boxes is full.
@@ -166,21 +200,27 @@ impl Spent {
             let there = 1 + usize::from(groups >= 64) + usize::from(groups > 64 * 63);
             match tiers.min(there) {
                 0 => spent.instances += fates.len() as u64,
-                tiers => spent.down(fates, tiers - 1),
+                tiers => spent.down(fates, tiers - 1, both),
             }
         }
         spent
     }
 
-    fn down(&mut self, fates: &[Fate], tier: usize) {
+    fn down(&mut self, fates: &[Fate], tier: usize, both: bool) {
         for part in fates.chunks(GROUP.pow(tier as u32 + 1)) {
             self.boxes[tier] += 1;
-            // A box is hidden if all that it holds is behind the wall or beside the view.
-            let survives = part.iter().any(|fate| matches!(fate, Front | Invalid));
+            let all = |of: &[Fate]| part.iter().all(|fate| *fate == Absent || of.contains(fate));
+            // Behind the wall or beside the view, or before the wall and within the view.
+            if all(&[Behind, Outside]) || all(&[Outside, Aside]) {
+                continue;
+            }
+            if both && all(&[Front]) {
+                self.accepted += part.len() as u64;
+                continue;
+            }
             match tier {
-                _ if !survives => {}
                 0 => self.instances += part.len() as u64,
-                _ => self.down(part, tier - 1),
+                _ => self.down(part, tier - 1, both),
             }
         }
     }
@@ -188,26 +228,52 @@ impl Spent {
 
 fn check_sizes(engine: &Arc<Engine>, sizes: &[usize], piece: Option<u32>) -> usize {
     let mut wrong = 0;
-    for &count in sizes {
+    for (count, both) in sizes.iter().flat_map(|count| [(*count, false), (*count, true)]) {
         let fates = fates(count, &mut Random(count as u64));
-        let world = World::new(Arc::clone(engine), fates, piece, StoredOrder::Given);
+        let stored = (StoredOrder::Given, both);
+        let world = World::new(Arc::clone(engine), fates, piece, stored);
         for tiers in 0..=3 {
             for order in [Order::Stable, Order::Any] {
                 let culling = world.cull(&CullOptions { order, ..World::options(tiers) });
-                let counts = culling.counts().unwrap();
-                let got = Spent { boxes: counts.tested_boxes, instances: counts.tested_instances };
+                let got = Spent::counted(&culling);
                 let piece = piece.map_or(usize::MAX, |piece| piece as usize);
-                let expected = Spent::of(&world.fates, tiers as usize, piece);
+                let expected = Spent::of(&world.fates, (tiers as usize, both), piece);
                 let here = world.wrong(&culling) + usize::from(got != expected);
                 if here > 0 {
-                    eprintln!("{count}, {tiers} tiers, {order:?}: {here}, {got:?}, {expected:?}");
+                    eprintln!("{count} {both} {tiers} {order:?}: {here} {got:?} {expected:?}");
                 }
                 wrong += here;
-                assert_eq!(counts.tested_groups, counts.tested_boxes[0]);
             }
         }
     }
     wrong
+}
+
+/// One instance is before the wall, at the beginning or end of a box.
+fn check_single(engine: &Arc<Engine>) -> usize {
+    let wrong = |place: usize| {
+        let mut fates = vec![Behind; 8300];
+        fates[place] = Front;
+        let stored = (StoredOrder::Given, false);
+        let world = World::new(Arc::clone(engine), fates, None, stored);
+        world.wrong(&world.cull(&World::options(2)))
+    };
+    [0, 63, 64, 4031, 4032, 4095, 4096, 8299].into_iter().map(wrong).sum()
+}
+
+/// The last group is short and shows as a whole; the first instances do not.
+fn check_last(engine: &Arc<Engine>) -> usize {
+    let mut fates = vec![Front; 4100];
+    fates[..64].fill(Behind);
+    let world = World::new(Arc::clone(engine), fates, None, (StoredOrder::Given, true));
+    world.wrong(&world.cull(&World::options(2)))
+}
+
+/// Groups of which a half is beside the view, and all is before the wall.
+fn check_aside(engine: &Arc<Engine>) -> usize {
+    let fates = [Front, Aside].repeat(2100);
+    let world = World::new(Arc::clone(engine), fates, None, (StoredOrder::Given, true));
+    world.wrong(&world.cull(&World::options(2)))
 }
 
 const SIZES: [usize; 10] = [1, 63, 64, 65, 4032, 4033, 4095, 4096, 4097, 8300];
@@ -216,18 +282,20 @@ const SIZES: [usize; 10] = [1, 63, 64, 65, 4032, 4033, 4095, 4096, 4097, 8300];
 fn every_number_of_tiers_gives_the_same_answers() {
     assert_eq!(check_sizes(&engine(), &SIZES, None), 0);
     assert_eq!(check_sizes(&engine(), &[20_000], Some(8192)), 0);
+    assert_eq!(check_single(&engine()) + check_last(&engine()) + check_aside(&engine()), 0);
 }
 
 #[test]
 fn three_tiers_of_a_quarter_of_a_million() {
-    for count in [258_048, 258_049, 262_143, 262_144, 262_145] {
+    for (count, both) in
+        [(258_048, true), (258_049, false), (262_143, true), (262_144, false), (262_145, true)]
+    {
         let fates = fates(count, &mut Random(count as u64));
-        let world = World::new(engine(), fates, None, StoredOrder::Given);
+        let world = World::new(engine(), fates, None, (StoredOrder::Given, both));
         for tiers in [0, 3] {
             let culling = world.cull(&World::options(tiers));
-            let counts = culling.counts().unwrap();
-            let got = Spent { boxes: counts.tested_boxes, instances: counts.tested_instances };
-            assert_eq!(got, Spent::of(&world.fates, tiers as usize, usize::MAX), "{count}");
+            let expected = Spent::of(&world.fates, (tiers as usize, both), usize::MAX);
+            assert_eq!(Spent::counted(&culling), expected, "{count}");
             assert_eq!(world.wrong(&culling), 0, "{count}, {tiers} tiers");
         }
     }
@@ -254,8 +322,27 @@ fn faults_of_tiers_are_seen() {
             "return min((box + 1u) << (GROUP_LOG2 * TIER)",
             "return min((box + 2u) << (GROUP_LOG2 * TIER)",
         ),
+        // Accepted without being inside the view, or with invalid members.
+        ("is_inside = !hidden && surely_inside(x, y, z, w);", "is_inside = !hidden;"),
+        (
+            "return NEAREST && !SAMPLE_COVERAGE && outcome.verdict == UNOCCLUDED;",
+            "return NEAREST && outcome.verdict >= INVALID;",
+        ),
+        // Members that are absent or beyond the piece.
+        ("return ABSENT && record_texel", "return false && record_texel"),
+        (
+            "for (var k = 0u; k < RUN && first + k * SHARE < piece.count; k += 1u) {\n        let \
+             place = first + k * SHARE;\n        let is_kept",
+            "for (var k = 0u; k < RUN; k += 1u) {\n        let place = first + k * \
+             SHARE;\n        let is_kept",
+        ),
+        // Accepted groups whose verdicts are left alone.
+        ("let verdict = select(OUTSIDE, UNOCCLUDED, is_kept);", "let verdict = VISIBLE;"),
     ] {
-        let wrong = check_sizes(&faulty(&[(what, by)]), &[4097, 20_000], None);
+        let engine = faulty(&[(what, by)]);
+        let sizes = [20_000, 8300];
+        let ends = check_single(&engine) + check_last(&engine) + check_aside(&engine);
+        let wrong = ends + check_sizes(&engine, &sizes, None);
         eprintln!("{what} -> {by}: {wrong}");
         assert!(wrong > 0, "{what} -> {by}");
     }
@@ -305,11 +392,11 @@ fn upper_boxes_contain_what_they_hold() {
         let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
         for order in [StoredOrder::Morton, StoredOrder::Given] {
             let options = InstanceOptions { order, ..InstanceOptions::default() };
-            let mut world = World::new(engine(), vec![Front], None, order);
+            let mut world = World::new(engine(), vec![Front], None, (order, false));
             world.instances = world.engine.instances(&bounds, &options).unwrap();
             assert_eq!(uncovered(&world, &numbers), 0, "{scale} {order:?}");
             // The same of a buffer.
-            let other = vec![1.0; 4 * count];
+            let other = [3.0, 3.0, 3.0, 1.0].repeat(count);
             let engine = &world.engine;
             engine.update_from(&world.instances, &buffer(engine, &other)).unwrap();
             assert!(uncovered(&world, &numbers) > 0);
@@ -323,7 +410,7 @@ fn upper_boxes_contain_what_they_hold() {
 /// Members move out of hidden boxes and back: culls with tiers follow.
 fn check_updates(engine: Arc<Engine>) -> usize {
     let mut random = Random(5);
-    let mut world = World::new(engine, vec![Behind; 8300], None, StoredOrder::Morton);
+    let mut world = World::new(engine, vec![Behind; 8300], None, (StoredOrder::Morton, true));
     let mut wrong = 0;
     for step in 0..12 {
         let (first, count) = match step % 3 {
@@ -367,19 +454,20 @@ fn boxes_of_the_frame_before_are_seen() {
 #[test]
 fn among_some() {
     let fates = fates(9000, &mut Random(2));
-    let world = World::new(engine(), fates, None, StoredOrder::Morton);
+    let world = World::new(engine(), fates, None, (StoredOrder::Morton, true));
     let mut random = Random(9);
     for share in [2, 50, 3000] {
         let asked: Vec<bool> = (0..9000).map(|_| random.below(share) == 0).collect();
         let among = world.engine.among(&world.instances, &AmongSource::Mask(&asked)).unwrap();
         for tiers in 0..=2 {
-            let extras = CullExtras { among: Some(&among), ahead: false };
+            let extras = CullExtras { among: Some(&among), ..CullExtras::default() };
             let (options, outputs) = (World::options(tiers), Outputs::default());
             let World { engine, instances, camera, pyramid, .. } = &world;
             let culling =
                 engine.cull_given(instances, camera, pyramid, &options, &outputs, &extras).unwrap();
             for (i, got) in culling.verdicts().unwrap().into_iter().enumerate() {
-                let expected = if asked[i] { world.fates[i].verdict() } else { Verdict::Outside };
+                let expected =
+                    if asked[i] { world.fates[i].verdict(world.both) } else { Verdict::Outside };
                 assert_eq!(got, expected, "{share} {tiers} {i}");
             }
         }
@@ -401,9 +489,9 @@ fn read(engine: &Engine, buffer: &wgpu::Buffer) -> Vec<u32> {
 #[test]
 fn two_passes_draw_the_same() {
     let fates = fates(8300, &mut Random(4));
-    let world = World::new(engine(), fates, None, StoredOrder::Morton);
+    let world = World::new(engine(), fates, None, (StoredOrder::Morton, true));
     let World { engine, camera, pyramid, instances, .. } = &world;
-    let open = engine.pyramid(&engine.upload_depth(&[0.0; 64 * 64], camera).unwrap()).unwrap();
+    let open = levels(engine, &[0.0; 64 * 64], camera, true);
     let words = instances.len().div_ceil(32) as usize;
     let outputs = Outputs { mask: true, ..Outputs::NONE };
     let run = |tiers: u32| {
@@ -414,7 +502,7 @@ fn two_passes_draw_the_same() {
         engine.queue().write_buffer(temporal.history(0), 16, &noise);
         let frame = |k: usize| {
             let mut encoder = engine.device().create_command_encoder(&Default::default());
-            let set = if k == 4 { EarlySet::Largest { pixels: 2 } } else { EarlySet::LastVisible };
+            let set = EarlySet::LastVisible;
             context
                 .record_early(&mut encoder, instances, camera, &temporal, set, &options)
                 .unwrap();
@@ -442,7 +530,7 @@ fn two_passes_draw_the_same() {
 #[test]
 fn bins_hold_the_same() {
     let fates = fates(9000, &mut Random(6));
-    let world = World::new(engine(), fates, None, StoredOrder::Morton);
+    let world = World::new(engine(), fates, None, (StoredOrder::Morton, true));
     let draw = DrawTemplate { index_count: 3, ..DrawTemplate::default() };
     let lods: Vec<Lod> = (0..4).map(|l| Lod::new(draw, f64::from(l))).collect();
     let meshes =
@@ -450,12 +538,12 @@ fn bins_hold_the_same() {
     let lod = LodRule::Distance { thresholds: vec![2.2, 2.5, 2.8] };
     for placement in [Placement::Packed, Placement::Reserved] {
         let emit = Emit::Binned { meshes: meshes.clone(), placement };
-        let outputs = Outputs { indices: true, emit, ..Outputs::NONE };
+        let outputs = Outputs { mask: true, indices: true, emit, ..Outputs::NONE };
         let run = |tiers: u32| {
             let options = CullOptions { lod: lod.clone(), ..World::options(tiers) };
             let World { engine, instances, camera, pyramid, .. } = &world;
             let culling = engine.cull(instances, camera, pyramid, &options, &outputs).unwrap();
-            (culling.indices().unwrap(), culling.lods().unwrap(), culling.draws().unwrap())
+            (culling.mask().unwrap(), culling.lods().unwrap(), culling.draws().unwrap())
         };
         let flat = run(0);
         assert!((1..4).all(|lod| flat.1.contains(&lod)), "all levels of detail occur");
@@ -468,10 +556,75 @@ fn bins_hold_the_same() {
 /// The explanation of a member of a hidden box names the box that decided.
 #[test]
 fn explanations_name_the_box() {
-    let world = World::new(engine(), vec![Behind; 4200], None, StoredOrder::Given);
+    let world = World::new(engine(), vec![Behind; 4200], None, (StoredOrder::Given, true));
     let culling = world.cull(&World::options(2));
     let told = culling.explain(4199).unwrap();
     assert_eq!(told.verdict, Verdict::Occluded);
     assert!(told.reason.contains("its group of 64 is hidden as a whole"), "{}", told.reason);
     assert_eq!(told.group.unwrap().verdict, Verdict::Occluded);
+
+    let world = World::new(engine(), vec![Front; 4200], None, (StoredOrder::Given, true));
+    let told = world.cull(&World::options(2)).explain(4199).unwrap();
+    assert_eq!(told.verdict, Verdict::Unoccluded);
+    assert!(told.reason.contains("its group of 64 shows as a whole"), "{}", told.reason);
+}
+
+/// A crowd before a rough image: the oracle agrees with what is culled and with what is accepted.
+#[test]
+fn the_oracle_agrees() {
+    let (engine, mut random, count) = (engine(), Random(11), 6000);
+    let image: Vec<f32> = (0..64 * 64)
+        .map(|i| ndc([4.0, 4.0, 6.0, 2.5][(i % 64 / 16 + i / 1024) % 4], CONVENTION))
+        .collect();
+    let numbers: Vec<[f32; 4]> = (0..count)
+        .map(|i| {
+            // Clusters of a group each.
+            let mut cluster = Random(i / 64);
+            let z = cluster.range(1.2, 9.0);
+            let [x, y] = [0, 1].map(|_| cluster.range(-1.1, 1.1) * z);
+            let mut near = |v: f64| (v + random.range(-0.1, 0.1)) as f32;
+            [near(x), near(y), near(z), random.range(0.0, 0.05) as f32]
+        })
+        .collect();
+    let (centers, radii) = spheres(&numbers);
+    let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
+    let given = InstanceOptions { order: StoredOrder::Given, ..InstanceOptions::default() };
+    let instances = engine.instances(&bounds, &given).unwrap();
+    let camera = camera_along_z(64, 64, CONVENTION);
+    let pyramid = levels(&engine, &image, &camera, true);
+    let row = |k: usize| std::array::from_fn(|i| f64::from(u8::from(i == k)));
+    let view = hiz_ref::View {
+        rows: [row(0), row(1), row(3), row(2)],
+        origin: [0.0; 3],
+        width: 64,
+        height: 64,
+        reversed: true,
+    };
+    let cull = |options: &CullOptions| {
+        engine.cull(&instances, &camera, &pyramid, options, &Outputs::default()).unwrap()
+    };
+    let flat = cull(&World::options(0)).mask().unwrap();
+    for tiers in 1..=2 {
+        let culling = cull(&World::options(tiers));
+        let (counts, mask) = (culling.counts().unwrap(), culling.mask().unwrap());
+        assert!(counts.accepted_instances > 200 && counts.occluded > 200, "{counts:?}");
+        let verdicts = culling.verdicts().unwrap();
+        for (i, number) in numbers.iter().enumerate() {
+            let [x, y, z, radius] = number.map(f64::from);
+            let volume = hiz_ref::Volume::Sphere { center: [x, y, z], radius };
+            assert!(!mask[i] || flat[i], "{tiers} tiers keep {i}, which its own test culls");
+            let is_right = match verdicts[i] {
+                Verdict::Unoccluded => {
+                    let coverage = hiz_ref::Coverage::Area;
+                    hiz_ref::is_unoccluded(&view, &volume, &image, coverage).unwrap()
+                }
+                Verdict::Outside | Verdict::Occluded => {
+                    hiz_ref::classify(&view, &volume, &image).unwrap() == hiz_ref::Verdict::Hidden
+                }
+                _ => true,
+            };
+            assert!(is_right, "{tiers} tiers: {i} is {:?}", verdicts[i]);
+            assert_eq!(mask[i], verdicts[i].is_kept());
+        }
+    }
 }

@@ -229,7 +229,8 @@ fn points_pass_everywhere_where_spheres_do() {
                 };
                 let told = |instances: &Arc<Instances>, among: bool| {
                     let asked = engine.among(instances, &AmongSource::Mask(&asked)).unwrap();
-                    let extras = CullExtras { among: among.then_some(&asked), ahead: false };
+                    let extras =
+                        CullExtras { among: among.then_some(&asked), ..CullExtras::default() };
                     let culling = engine
                         .cull_given(instances, &camera, &pyramid, &options, &Outputs::ALL, &extras)
                         .unwrap();

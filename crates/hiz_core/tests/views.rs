@@ -439,7 +439,7 @@ fn what_is_not_asked_for_is_outside_and_costs_no_test() {
         {
             let what = format!("{count} {pieces:?} {hierarchy:?} {ahead}");
             let options = CullOptions { hierarchy, statistics: true, ..CullOptions::default() };
-            let extras = CullExtras { among: Some(&among), ahead };
+            let extras = CullExtras { among: Some(&among), ahead, ..CullExtras::default() };
             let cull = |outputs| {
                 engine
                     .cull_given(&instances, &camera, &pyramid, &options, outputs, &extras)
@@ -466,19 +466,38 @@ fn what_is_not_asked_for_is_outside_and_costs_no_test() {
                 assert_eq!(told.verdict, Verdict::Outside);
                 assert!(told.reason.starts_with("not among the instances"), "{}", told.reason);
             }
+            // The same with the mask in the cull's own submission.
+            let mask = Some(AmongSource::Mask(&flags));
+            let extras = CullExtras { mask, ahead, ..CullExtras::default() };
+            let own = engine
+                .cull_given(&instances, &camera, &pyramid, &options, &Outputs::ALL, &extras)
+                .unwrap();
+            assert!(own.verdicts().unwrap() == (0..count).map(expected).collect::<Vec<_>>());
+            assert_eq!(own.indices().unwrap(), kept, "{what}");
+            let both = CullExtras { among: Some(&among), ..extras };
+            let refused = engine
+                .cull_given(&instances, &camera, &pyramid, &options, &Outputs::ALL, &both)
+                .unwrap_err();
+            assert!(refused.to_string().starts_with("mask: expected no among beside it"));
             // What this cull has kept restricts the next one: the mask never visits the host.
             let next = engine.among(&instances, &AmongSource::Kept(&culling)).unwrap();
-            let extras = CullExtras { among: Some(&next), ahead };
+            let extras = CullExtras { among: Some(&next), ahead, ..CullExtras::default() };
             let (camera, pyramid) = (camera_of(VIEWS[1]), pyramid_of(&engine, VIEWS[1]));
             let both = engine
                 .cull_given(&instances, &camera, &pyramid, &options, &Outputs::ALL, &extras)
                 .unwrap();
             let in_both = |i: usize| asked(i) && is_kept(i, Wall::Left) && is_kept(i, Wall::Right);
             assert!(both.mask().unwrap() == (0..count).map(in_both).collect::<Vec<_>>(), "{what}");
+            let mask = Some(AmongSource::Kept(&culling));
+            let extras = CullExtras { mask, ahead, ..CullExtras::default() };
+            let both = engine
+                .cull_given(&instances, &camera, &pyramid, &options, &Outputs::ALL, &extras)
+                .unwrap();
+            assert!(both.mask().unwrap() == (0..count).map(in_both).collect::<Vec<_>>(), "{what}");
         }
         let nobody = engine.among(&instances, &AmongSource::Mask(&vec![false; count])).unwrap();
         let options = CullOptions { statistics: true, ..CullOptions::default() };
-        let extras = CullExtras { among: Some(&nobody), ahead: false };
+        let extras = CullExtras { among: Some(&nobody), ahead: false, ..CullExtras::default() };
         let culling = engine
             .cull_given(&instances, &camera, &pyramid, &options, &Outputs::ALL, &extras)
             .unwrap();
@@ -490,7 +509,7 @@ fn what_is_not_asked_for_is_outside_and_costs_no_test() {
     let bounds = Bounds::Spheres { centers: Floats::F32(&centers), radii: Floats::F32(&radii) };
     let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
     let among = engine.among(&instances, &AmongSource::Mask(&[false, true])).unwrap();
-    let extras = CullExtras { among: Some(&among), ahead: false };
+    let extras = CullExtras { among: Some(&among), ahead: false, ..CullExtras::default() };
     let (options, outputs) = (CullOptions::default(), Outputs::ALL);
     let culling =
         engine.cull_given(&instances, &camera, &pyramid, &options, &outputs, &extras).unwrap();
@@ -518,7 +537,7 @@ fn all_kinds_of_bounds_are_restricted_in_stored_order() {
     for bounds in [boxes, oriented] {
         let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
         let among = engine.among(&instances, &AmongSource::Mask(&flags)).unwrap();
-        let extras = CullExtras { among: Some(&among), ahead: false };
+        let extras = CullExtras { among: Some(&among), ahead: false, ..CullExtras::default() };
         let (options, outputs) = (CullOptions::default(), Outputs::ALL);
         let culling =
             engine.cull_given(&instances, &camera, &pyramid, &options, &outputs, &extras).unwrap();
@@ -566,7 +585,7 @@ fn views_without_a_renderer_answer_in_one_readback() {
             }
             // Those that any view has kept are all that the next call asks for.
             let among = engine.among(&instances, &AmongSource::KeptByAny(&culling)).unwrap();
-            let extras = CullExtras { among: Some(&among), ahead };
+            let extras = CullExtras { among: Some(&among), ahead, ..CullExtras::default() };
             let empty = ((9, 9), DepthConvention::Reversed, Wall::Nowhere);
             let (camera, pyramid) = (camera_of(empty), pyramid_of(&engine, empty));
             let (one, outputs) = ([(&camera, &pyramid)], ViewsOutputs::default());

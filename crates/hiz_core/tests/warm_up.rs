@@ -6,9 +6,10 @@ use common::{Random, camera_along_z, depth_descriptor, engine};
 use hiz_core::headless::Engine;
 use hiz_core::testing::Made;
 use hiz_core::{
-    AtlasUse, Bounds, BoundsKind, Camera, Coverage, CullOptions, DepthConvention, FaceCull, Fit,
-    Floats, Footprint, Hierarchy, HizContext, ImageSize, InstanceOptions, Instances, MeshData,
-    OccluderOptions, Order, Outputs, PyramidOptions, StoredLevels, WarmUp, wgpu,
+    AtlasUse, Bounds, BoundsKind, Camera, Coverage, CullOptions, DepthConvention, EarlySet,
+    FaceCull, Fit, Floats, Footprint, Hierarchy, HizContext, ImageSize, InstanceOptions, Instances,
+    MeshData, OccluderOptions, Order, Outputs, PyramidOptions, ResolveOptions, StoredLevels, View,
+    ViewsOutputs, WarmUp, WarmUpMore, wgpu,
 };
 
 const COUNT: usize = 300;
@@ -168,6 +169,7 @@ fn the_first_frame_of_a_renderer_makes_nothing() {
             visible: &visible,
             options: &kind.options,
             updates: true,
+            more: WarmUpMore::default(),
         };
         let nothing = context.made();
         let mut first = encoder(&engine);
@@ -204,6 +206,88 @@ fn the_first_frame_of_a_renderer_makes_nothing() {
     assert_eq!(with_pipelines, 36, "the warm-up makes the pipelines");
 }
 
+/// Two passes, several views, a multisampled depth image, and a part that is renewed.
+#[test]
+fn the_first_frame_of_other_passes_makes_no_pipeline() {
+    let (engine, crowd) = (engine(), Crowd::new());
+    for kind in kinds(12) {
+        let options = CullOptions { order: Order::Stable, guard_px: Some(0.1), ..kind.options };
+        let outputs = Outputs { mask: true, indices: true, draws: true, ..kind.outputs };
+        // Samples are those of area coverage.
+        let coverage = Coverage::Area;
+        let options = CullOptions { coverage, ..options };
+        let context = HizContext::new(engine.device()).unwrap();
+        let instances = uploaded(&engine, &context, kind.bounds, &crowd);
+        let kind = Kind { format: wgpu::TextureFormat::Rgba32Uint, options, outputs, ..kind };
+        let camera = camera(&kind);
+        let samples = engine.device().create_texture(&wgpu::TextureDescriptor {
+            sample_count: 4,
+            ..depth_descriptor(
+                kind.size,
+                wgpu::TextureFormat::Depth32Float,
+                wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::RENDER_ATTACHMENT,
+            )
+        });
+        let samples = samples.create_view(&wgpu::TextureViewDescriptor::default());
+        let resolve =
+            context.create_depth_resolve(camera.size(), &ResolveOptions::default()).unwrap();
+        let depth = resolve.farthest().unwrap();
+        let levels =
+            PyramidOptions { levels: kind.levels, atlas: kind.atlas, ..PyramidOptions::default() };
+        let pyramid = context.create_pyramid(camera.size(), &levels).unwrap();
+        let visible = context.create_visible(&instances, &kind.outputs).unwrap();
+        let temporal = context.create_temporal(&instances, &kind.outputs).unwrap();
+        let of_views = ViewsOutputs {
+            each: Outputs { mask: true, ..Outputs::NONE },
+            any: kind.outputs.clone(),
+        };
+        let views = context.create_visible_views(&instances, 2, &of_views).unwrap();
+        let frame = WarmUp {
+            occluders: None,
+            depth: &depth.texture.create_view(&wgpu::TextureViewDescriptor::default()),
+            camera: &camera,
+            pyramid: &pyramid,
+            instances: &instances,
+            visible: &visible,
+            options: &kind.options,
+            updates: false,
+            more: WarmUpMore {
+                temporal: Some(&temporal),
+                views: Some(&views),
+                resolve: Some((&samples, &resolve)),
+                regions: true,
+            },
+        };
+        let mut first = encoder(&engine);
+        context.record_warm_up(&mut first, &frame).unwrap();
+        engine.queue().submit([first.finish()]);
+        engine.wait().unwrap();
+        let before = context.made();
+        assert!(pyramid.camera().is_none(), "nothing was built");
+
+        let mut frame = encoder(&engine);
+        // The first frame draws by size, and later ones by history.
+        for _ in 0..2 {
+            let set = EarlySet::LastVisible;
+            context
+                .record_early(&mut frame, &instances, &camera, &temporal, set, &kind.options)
+                .unwrap();
+            context.record_resolve(&mut frame, &samples, &camera, &resolve).unwrap();
+            context.record_reduce(&mut frame, depth, &camera, &pyramid).unwrap();
+            context
+                .record_late(&mut frame, &instances, &camera, &pyramid, &temporal, &kind.options)
+                .unwrap();
+        }
+        context.record_reduce_region(&mut frame, depth, [3, 3, 9, 9], &pyramid).unwrap();
+        let each = [View { camera: &camera, pyramid: &pyramid }; 2];
+        context
+            .record_cull_views(&mut frame, &instances, &each, None, &views, &kind.options)
+            .unwrap();
+        engine.queue().submit([frame.finish()]);
+        assert_eq!(context.made().pipelines, before.pipelines, "{kind:?}");
+    }
+}
+
 /// A pyramid that a warm-up ran on was built of nothing, so a cull refuses it as before.
 #[test]
 fn a_warm_up_builds_and_culls_nothing() {
@@ -223,6 +307,7 @@ fn a_warm_up_builds_and_culls_nothing() {
         visible: &visible,
         options: &kind.options,
         updates: false,
+        more: WarmUpMore::default(),
     };
     let mut warm_up = encoder(&engine);
     context.record_warm_up(&mut warm_up, &frame).unwrap();

@@ -92,12 +92,13 @@ pub(crate) fn bounds<'a>(kind: &str, arrays: &'a [FloatArray<'_>]) -> PyResult<B
 
 /// A depth image, and what its numbers mean.
 /// `rounding` says to which floats they were rounded before: "none", "single" or "half".
+/// Beside it stand relative and absolute tolerance in the world.
 pub(crate) fn depth_input<'a>(
     image: &'a DepthArray<'_>,
     kind: &str,
     scale: f64,
     invalid: &'a [f64],
-    rounding: &str,
+    (rounding, (relative, absolute)): (&str, (f64, f64)),
 ) -> PyResult<DepthInput<'a>> {
     let tolerance = match rounding {
         "none" => DepthTolerance::NONE,
@@ -106,7 +107,7 @@ pub(crate) fn depth_input<'a>(
         other => return Err(PyValueError::new_err(format!("rounding: no rounding {other:?}"))),
     };
     let numbers = image.numbers(rounding == "half")?;
-    let world_tolerance = WorldTolerance::NONE;
+    let world_tolerance = WorldTolerance { relative, absolute };
     Ok(DepthInput { numbers, kind: depth_kind(kind)?, scale, invalid, tolerance, world_tolerance })
 }
 
@@ -116,9 +117,9 @@ pub(crate) fn depth_inputs<'a>(
     kind: &str,
     scale: f64,
     invalid: &'a [f64],
-    rounding: &str,
+    moved: (&str, (f64, f64)),
 ) -> PyResult<Vec<DepthInput<'a>>> {
-    images.iter().map(|image| depth_input(image, kind, scale, invalid, rounding)).collect()
+    images.iter().map(|image| depth_input(image, kind, scale, invalid, moved)).collect()
 }
 
 /// The meaning of a depth image's numbers.

@@ -141,6 +141,10 @@ impl Camera {
         self.0.convention().is_reversed()
     }
 
+    fn is_posed(&self) -> bool {
+        self.0.is_posed()
+    }
+
     fn rows(&self) -> Mat4 {
         self.0.rows()
     }

@@ -20,15 +20,15 @@ use crate::camera::Camera;
 use crate::culling::{Counts, Culling, StageTime, ViewsCulling, stage_time};
 use crate::held::{Held, OnDevice, detached};
 use crate::meshes::{LodNumbers, MeshTable, mesh_table};
-use crate::options::{Request, cull_options};
+use crate::options::{Request, cull_options, mip_options};
 
 /// The depth of a single cull.
 #[derive(FromPyObject)]
 enum SingleDepth<'py> {
     #[pyo3(transparent, annotation = "Pyramid")]
     Pyramid(Bound<'py, Pyramid>),
-    #[pyo3(annotation = "image, kind, scale, invalid, rounding")]
-    Image(DepthArray<'py>, String, f64, Vec<f64>, String),
+    #[pyo3(annotation = "image, kind, scale, invalid, rounding, tolerance")]
+    Image(DepthArray<'py>, String, f64, Vec<f64>, String, (f64, f64)),
 }
 
 /// Which instances a cull is restricted to.
@@ -234,6 +234,7 @@ impl Engine {
 
     /// `image` is float32, float64, or 16 bits: float16 if `rounding` is "half", else whole numbers.
     /// `rounding` says to which floats the numbers were rounded before: "none", "single" or "half".
+    /// `tolerance` is relative and absolute, in world units.
     #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
     fn upload_depth(
         &self,
@@ -243,9 +244,10 @@ impl Engine {
         scale: f64,
         invalid: Vec<f64>,
         rounding: &str,
+        tolerance: (f64, f64),
         camera: &Camera,
     ) -> PyResult<DepthImage> {
-        let depth = depth_input(&image, kind, scale, &invalid, rounding)?;
+        let depth = depth_input(&image, kind, scale, &invalid, (rounding, tolerance))?;
         let camera = &camera.0;
         self.0
             .run(py, |engine| engine.upload_depth_of_kind(&depth, camera))
@@ -262,9 +264,10 @@ impl Engine {
         scale: f64,
         invalid: Vec<f64>,
         rounding: &str,
+        tolerance: (f64, f64),
         camera: &Camera,
     ) -> PyResult<DepthImage> {
-        let samples = depth_inputs(&images, kind, scale, &invalid, rounding)?;
+        let samples = depth_inputs(&images, kind, scale, &invalid, (rounding, tolerance))?;
         let camera = &camera.0;
         self.0
             .run(py, |engine| engine.upload_depth_of_samples(&samples, camera))
@@ -296,8 +299,9 @@ impl Engine {
         scale: f64,
         invalid: Vec<f64>,
         rounding: &str,
+        tolerance: (f64, f64),
     ) -> PyResult<()> {
-        let rows = depth_inputs(&images, kind, scale, &invalid, rounding)?;
+        let rows = depth_inputs(&images, kind, scale, &invalid, (rounding, tolerance))?;
         let (pyramid, depth) = (pyramid.0.get(py)?, depth.0.get(py)?);
         self.0.run(py, |engine| engine.replace_depth(&pyramid.1, &depth, rectangle.into(), &rows))
     }
@@ -319,8 +323,8 @@ impl Engine {
                 let pyramid = pyramid.get().0.get(py)?;
                 self.0.run(py, |engine| engine.cull_once(&bounds, camera, &pyramid.1, &options))
             }
-            SingleDepth::Image(image, kind, scale, invalid, rounding) => {
-                let depth = depth_input(image, kind, *scale, invalid, rounding)?;
+            SingleDepth::Image(image, kind, scale, invalid, rounding, tolerance) => {
+                let depth = depth_input(image, kind, *scale, invalid, (rounding, *tolerance))?;
                 self.0
                     .run(py, |engine| engine.cull_once_by_depth(&bounds, camera, &depth, &options))
             }
@@ -364,9 +368,10 @@ impl Engine {
         let meshes = meshes.map(|table| table.0.get(py)).transpose()?;
         let Request { options, outputs } = Request::new(options, outputs, meshes.as_deref())?;
         let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
-        let among = self.among(py, &instances, among)?;
+        let among = among.as_ref().map(|among| HeldAmong::new(py, among)).transpose()?;
         let cull = |engine: &headless::Engine| {
-            let extras = CullExtras { among: among.as_ref(), ahead };
+            let mask = among.as_ref().map(HeldAmong::source);
+            let extras = CullExtras { mask, ahead, ..CullExtras::default() };
             engine.cull_given(&instances, &camera.0, &pyramid.1, &options, &outputs, &extras)
         };
         self.0.run(py, cull).map(|culling| Culling(Held::new(py, Arc::new(culling))))
@@ -419,9 +424,10 @@ impl Engine {
             .zip(&pyramids)
             .map(|(camera, pyramid)| (&camera.0, &pyramid.1))
             .collect();
-        let among = self.among(py, &instances, among)?;
+        let among = among.as_ref().map(|among| HeldAmong::new(py, among)).transpose()?;
         let cull = |engine: &headless::Engine| {
-            let extras = CullExtras { among: among.as_ref(), ahead };
+            let mask = among.as_ref().map(HeldAmong::source);
+            let extras = CullExtras { mask, ahead, ..CullExtras::default() };
             engine.cull_views(&instances, &views, &options, &outputs, &extras)
         };
         self.0.run(py, cull).map(|culling| ViewsCulling(Held::new(py, culling)))
@@ -473,29 +479,28 @@ impl Engine {
     }
 }
 
-impl Engine {
-    fn among(
-        &self,
-        py: Python<'_>,
-        instances: &Arc<hiz_core::Instances>,
-        among: Option<AmongArgument<'_>>,
-    ) -> PyResult<Option<Arc<hiz_core::Among>>> {
-        let made = match among {
-            None => return Ok(None),
-            Some(AmongArgument::Kept(culling)) => {
-                let culling = culling.get().0.get(py)?;
-                self.0.run(py, |engine| engine.among(instances, &AmongSource::Kept(&culling)))
-            }
-            Some(AmongArgument::KeptByAny(views)) => {
-                let views = views.get().0.get(py)?;
-                self.0.run(py, |engine| engine.among(instances, &AmongSource::KeptByAny(&views)))
-            }
-            Some(AmongArgument::Mask(mask)) => {
-                let mask = mask.as_slice()?;
-                self.0.run(py, |engine| engine.among(instances, &AmongSource::Mask(mask)))
-            }
-        };
-        made.map(Some)
+/// An [`AmongArgument`] for calls without the interpreter.
+enum HeldAmong<'a> {
+    Mask(&'a [bool]),
+    Kept(Arc<Arc<headless::Culling>>),
+    KeptByAny(Arc<headless::ViewsCulling>),
+}
+
+impl<'a> HeldAmong<'a> {
+    fn new(py: Python<'_>, among: &'a AmongArgument<'_>) -> PyResult<Self> {
+        Ok(match among {
+            AmongArgument::Mask(mask) => Self::Mask(mask.as_slice()?),
+            AmongArgument::Kept(culling) => Self::Kept(culling.get().0.get(py)?),
+            AmongArgument::KeptByAny(views) => Self::KeptByAny(views.get().0.get(py)?),
+        })
+    }
+
+    fn source(&self) -> AmongSource<'_> {
+        match self {
+            Self::Mask(mask) => AmongSource::Mask(mask),
+            Self::Kept(culling) => AmongSource::Kept(culling),
+            Self::KeptByAny(views) => AmongSource::KeptByAny(views),
+        }
     }
 }
 
@@ -636,6 +641,25 @@ impl Pyramid {
     /// The first and the last stored level above 0; none for an image of one pixel.
     fn stored_levels(&self, py: Python<'_>) -> PyResult<Option<(u32, u32)>> {
         Ok(self.0.look(py)?.1.stored_levels().map(|levels| (levels.first, levels.last)))
+    }
+
+    /// `((height, width), texels)` of each level of a mip texture.
+    fn mips<'py>(
+        &self,
+        py: Python<'py>,
+        depths: &str,
+        lookup: &str,
+    ) -> PyResult<Vec<LevelArray<'py>>> {
+        let options = mip_options(depths, lookup)?;
+        let levels = self.0.run(py, |(engine, pyramid)| {
+            let mips = engine.mips(pyramid, &options)?;
+            let level = |k| {
+                let size = mips.level_size(k).map_or((0, 0), |size| (size.height, size.width));
+                Ok((size, engine.read_mip(&mips, k)?))
+            };
+            (0..mips.num_levels()).map(level).collect::<Result<Vec<_>, _>>()
+        })?;
+        Ok(levels.into_iter().map(|(size, t)| (size, PyArray1::from_vec(py, t))).collect())
     }
 
     /// `((height, width), texels)` of a level.

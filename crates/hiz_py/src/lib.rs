@@ -16,6 +16,7 @@ mod errors;
 mod held;
 mod meshes;
 mod options;
+mod points;
 mod reference;
 mod two_passes;
 #[cfg(feature = "yardstick")]
@@ -39,6 +40,8 @@ mod _core {
     use crate::held::{after_fork, before_fork, let_go};
     #[pymodule_export]
     use crate::meshes::MeshTable;
+    #[pymodule_export]
+    use crate::points::{add_colours, depth_of_points};
     #[pymodule_export]
     use crate::reference::{reference_classify, reference_pyramid, reference_unoccluded};
     #[pymodule_export]
@@ -69,6 +72,14 @@ mod _core {
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "the name is Python's")]
     const takes_planted_faults: bool = cfg!(feature = "testing");
+
+    /// WGSL for shaders of the user's own.
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "the name is Python's")]
+    const mip_lookup: &str = hiz_core::MIP_LOOKUP;
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "the name is Python's")]
+    const mip_cull: &str = hiz_core::MIP_CULL;
 
     #[pymodule_init]
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {

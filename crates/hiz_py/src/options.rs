@@ -3,8 +3,8 @@
 //! The struct expressions name every field, so that an option without its line does not compile.
 
 use hiz_core::{
-    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, LodRule, MeshTable, Order,
-    Outputs,
+    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, LodRule, MeshTable, MipDepths,
+    MipLookup, MipOptions, Order, Outputs,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -75,6 +75,22 @@ fn hierarchy(given: &Bound<'_, PyAny>) -> PyResult<Hierarchy> {
         Ok(false) => Hierarchy::Never,
         Err(_) => Hierarchy::Tiers(given.extract()?),
     })
+}
+
+/// Mip textures have level 0 here, since Python sees arrays alone.
+pub(crate) fn mip_options(depths: &str, lookup: &str) -> PyResult<MipOptions> {
+    let depths = match depths {
+        "farthest" => MipDepths::Farthest,
+        "nearest" => MipDepths::Nearest,
+        "both" => MipDepths::Both,
+        other => return Err(unknown("depths", other)),
+    };
+    let lookup = match lookup {
+        "normalized" => MipLookup::Normalized,
+        "edge_texel" => MipLookup::EdgeTexel,
+        other => return Err(unknown("lookup", other)),
+    };
+    Ok(MipOptions { depths, lookup, level_0: true, ..MipOptions::default() })
 }
 
 fn lod_rule(given: &Bound<'_, PyAny>) -> PyResult<LodRule> {

@@ -8,7 +8,8 @@ use hiz_core::yardstick::{
     self, BoundsInBuffer, HostRaster, MultisampledDepth, PerLevelReduction, ReductionShape,
 };
 use hiz_core::{
-    CullOptions, Error, Instances, Pyramid, PyramidOptions, StoredLevels, Visible, headless,
+    CullOptions, Error, Instances, MipOptions, MipTexture, Pyramid, PyramidOptions, StoredLevels,
+    Visible, headless,
 };
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -19,7 +20,7 @@ use crate::camera::Camera;
 use crate::device::{DepthImage, Engine};
 use crate::held::{Held, OnDevice, detached};
 use crate::meshes::MeshTable;
-use crate::options::Request;
+use crate::options::{Request, mip_options};
 
 /// Wall-clock milliseconds of single submissions to one device.
 #[pyclass(frozen, module = "hizvk._core")]
@@ -122,6 +123,23 @@ impl Yardstick {
         self.0.run(py, prepare).map(|work| YardstickReduction(Held::new(py, work)))
     }
 
+    /// The levels above 0 of a mip texture of `depth`.
+    fn mips(
+        &self,
+        py: Python<'_>,
+        depth: &DepthImage,
+        depths: &str,
+        lookup: &str,
+    ) -> PyResult<YardstickReduction> {
+        let depth = headless::DepthImage::clone(&*depth.0.get(py)?);
+        let options = MipOptions { level_0: false, ..mip_options(depths, lookup)? };
+        let prepare = |engine: &headless::Engine| {
+            let mips = engine.context().create_mip_texture(depth.size(), &options)?;
+            Ok(Reduction { engine: engine.clone(), reducer: Reducer::Mips(depth, mips) })
+        };
+        self.0.run(py, prepare).map(|work| YardstickReduction(Held::new(py, work)))
+    }
+
     /// Spheres or boxes in a buffer on the device, as float32.
     fn bounds_in_buffer(
         &self,
@@ -213,6 +231,7 @@ enum Reducer {
     Own(headless::DepthImage, Arc<Pyramid>),
     Region(headless::DepthImage, Arc<Pyramid>, [u32; 4]),
     Resolve(MultisampledDepth),
+    Mips(headless::DepthImage, MipTexture),
     PerLevel(PerLevelReduction),
 }
 
@@ -235,6 +254,10 @@ impl YardstickReduction {
                     yardstick::reduce_region(engine, encoder, depth, *rectangle, pyramid)
                 }
                 Reducer::Resolve(depth) => depth.record(engine, encoder),
+                Reducer::Mips(depth, mips) => {
+                    let convention = depth.camera().convention();
+                    engine.context().record_mips(encoder, depth.texture(), convention, mips)
+                }
                 Reducer::PerLevel(reduction) => {
                     reduction.record(encoder);
                     Ok(())

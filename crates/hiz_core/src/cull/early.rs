@@ -2,8 +2,9 @@
 
 use crate::cull::groups::{NO_STATISTICS, bind_survivors, tiers_of};
 use crate::cull::history::{EarlySet, FrameUniform, Temporal};
+use crate::cull::no_depth::{NO_REDUCTION, bind_view};
 use crate::cull::options::{CullOptions, Order};
-use crate::cull::pipelines::{Candidates, CullKey, DepthStore, FramePass, cull_pipeline};
+use crate::cull::pipelines::{Candidates, CullKey, FramePass, cull_pipeline};
 use crate::cull::record::{Target, Tests, bound_planes, check_visible, check_written, pass_report};
 use crate::cull::view_uniform::ViewUniform;
 use crate::error::{Error, Result};
@@ -17,20 +18,6 @@ use crate::instances::piece::Piece;
 use crate::output::cut::Cut;
 use crate::output::visible::PieceOutput;
 use crate::pyramid::PyramidUniform;
-
-/// The number of a reduction, which an empty atlas does not have.
-/// So every test ends before it reads depth.
-const NO_REDUCTION: u32 = 1;
-
-/// Where depth would be read.
-///
-/// Mesa 22.3's lavapipe compiles a cull that binds no depth anew at each dispatch, for 60 ms or
-/// for 1 ms from its cache on disk.
-/// With an atlas it compiles once.
-const STORE: DepthStore = DepthStore::Atlas;
-
-/// Texels of the empty atlas: room for its headers.
-const ATLAS_TEXELS: u32 = 4;
 
 /// An early pass, as the shaders are told.
 struct Chosen<'a> {
@@ -89,24 +76,60 @@ pub(crate) fn record_early(
     let view =
         ViewUniform::new(camera, instances.kind, NO_REDUCTION, options, DepthTolerance::NONE)?;
     let number = temporal.next_number();
+    let frame = FrameUniform {
+        early: number,
+        least_pixels: i32::try_from(set.least_pixels).unwrap_or(i32::MAX),
+        ..FrameUniform::default()
+    };
+    let numbers =
+        |encoder: &mut wgpu::CommandEncoder| record_numbers(gpu, encoder, temporal, &view, &frame);
+    record_tests(gpu, encoder, (instances, temporal), (&set, options), Some(numbers))?;
+    temporal.note_early(number, instances, camera, options);
+    Ok(())
+}
+
+/// Records early passes that do nothing: of the candidates that a first frame has, and of those
+/// that later frames have.
+pub(super) fn record_idle_early(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    instances: &Instances,
+    temporal: &Temporal,
+    options: &CullOptions,
+) -> Result<()> {
+    gpu.check_context("temporal", temporal.context)?;
+    check_visible(gpu, "temporal", instances, &temporal.early)?;
+    check_order(options)?;
+    for candidates in [Candidates::Size, Candidates::History, Candidates::Given] {
+        let set = Chosen { candidates, least_pixels: 0, given: None };
+        let no_numbers = None::<fn(&mut wgpu::CommandEncoder) -> Result<()>>;
+        record_tests(gpu, encoder, (instances, temporal), (&set, options), no_numbers)?;
+    }
+    Ok(())
+}
+
+/// Records the tests of an early pass, behind its numbers.
+/// Without numbers every dispatch of a test has zero workgroups.
+fn record_tests(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    (instances, temporal): (&Instances, &Temporal),
+    (set, options): (&Chosen<'_>, &CullOptions),
+    numbers: Option<impl FnOnce(&mut wgpu::CommandEncoder) -> Result<()>>,
+) -> Result<()> {
     gpu.recorded(|| {
-        let target = target(gpu, instances, options, temporal, &set)?;
-        let key = CullKey { store: STORE, ..CullKey::without_depth(instances.kind, false) };
+        let target = target(gpu, instances, options, temporal, set)?;
+        let key = CullKey::without_depth(instances.kind, false);
         let tests = Tests::new(gpu, key, &target, cull_pipeline)?;
         let bindings = temporal.pieces.iter().map(|history| &history.cut);
         let cut = Cut::new(gpu, instances, &temporal.early, bindings)?;
-        let view_bindings = made(&temporal.view_bindings, || bind_view(gpu, temporal))?;
-        let frame = FrameUniform {
-            early: number,
-            least_pixels: i32::try_from(set.least_pixels).unwrap_or(i32::MAX),
-            ..FrameUniform::default()
-        };
-        record_numbers(gpu, encoder, temporal, &view, &frame)?;
-        let views = [view_bindings, view_bindings];
-        tests.record(gpu, encoder, instances, views, false, cut.as_ref())
-    })?;
-    temporal.note_early(number, instances, camera, options);
-    Ok(())
+        let view = made(&temporal.view_bindings, || bind_early_view(gpu, temporal))?;
+        let idle = numbers.is_none();
+        if let Some(record) = numbers {
+            record(encoder)?;
+        }
+        tests.record(gpu, encoder, instances, [view, view], idle, cut.as_ref())
+    })
 }
 
 /// Refuses an order that masks cannot give.
@@ -163,24 +186,10 @@ fn target<'a>(
 }
 
 /// What an early pass binds as its view: the camera, and a pyramid that is never read.
-fn bind_view(gpu: &Gpu, temporal: &Temporal) -> Result<wgpu::BindGroup> {
+fn bind_early_view(gpu: &Gpu, temporal: &Temporal) -> Result<wgpu::BindGroup> {
     let zeros = [0; size_of::<PyramidUniform>()];
     let pyramid = gpu.constant("hiz.no_pyramid", &zeros, wgpu::BufferUsages::UNIFORM)?;
-    let atlas = gpu.view(&gpu.texture(
-        "hiz.early.no_atlas",
-        (ATLAS_TEXELS, 1),
-        wgpu::TextureFormat::Rgba32Uint,
-        wgpu::TextureUsages::STORAGE_BINDING,
-    )?)?;
-    gpu.bind_group(
-        "hiz.early.view",
-        &STORE.layout(gpu)?,
-        &[
-            entry(2, pyramid.as_entire_binding()),
-            entry(3, wgpu::BindingResource::TextureView(&atlas)),
-            entry(6, temporal.view.as_entire_binding()),
-        ],
-    )
+    bind_view(gpu, "hiz.early.view", &pyramid, &temporal.view)
 }
 
 /// Records the copies of the view and of the frame.

@@ -45,6 +45,21 @@ pub(crate) fn record_late(
     Ok(())
 }
 
+/// Records a late pass that does nothing; `inputs` are idle.
+pub(super) fn record_idle_late(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    inputs: &CullInputs<'_>,
+    temporal: &Temporal,
+) -> Result<()> {
+    check_visible(gpu, "temporal", inputs.instances, &temporal.late)?;
+    check_guard(inputs.options)?;
+    gpu.recorded(|| {
+        let target = target(gpu, inputs, temporal)?;
+        record_against_pyramid(gpu, encoder, inputs, &target, cull_pipeline, |_| ())
+    })
+}
+
 /// Refuses sample coverage whose guard might be too small for the driver's rasteriser.
 fn check_guard(options: &CullOptions) -> Result<()> {
     if options.coverage == Coverage::Area || options.guard_px.is_some() {

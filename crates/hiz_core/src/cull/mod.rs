@@ -31,6 +31,7 @@ pub(crate) mod history;
 pub(crate) mod inputs;
 pub(crate) mod late;
 pub(crate) mod lod;
+pub(crate) mod no_depth;
 pub(crate) mod options;
 pub(crate) mod pipelines;
 pub(crate) mod pixels;

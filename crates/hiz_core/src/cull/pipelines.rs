@@ -34,9 +34,9 @@ pub(crate) struct CullKey {
 
 impl CullKey {
     /// The key of a pass that reads no depth.
-    pub(super) fn without_depth(kind: BoundsKind, sample_coverage: bool) -> Self {
+    pub(crate) fn without_depth(kind: BoundsKind, sample_coverage: bool) -> Self {
         Self {
-            store: DepthStore::Nowhere,
+            store: NO_DEPTH,
             kind,
             sample_coverage,
             // These have no effect, because no depth is read.
@@ -267,9 +267,10 @@ pub(crate) enum DepthStore {
     Apart(SourceKind),
     /// All levels from one texture.
     Atlas,
-    /// No depth is read: such a pass only finds what is outside.
-    Nowhere,
 }
+
+/// Where a pass reads depth that reads none (`no_depth.rs`).
+pub(crate) const NO_DEPTH: DepthStore = DepthStore::Atlas;
 
 impl DepthStore {
     /// The shader files that read it.
@@ -279,7 +280,6 @@ impl DepthStore {
                 [source.files(), &[wgsl!("gpu/ends_one"), wgsl!("pyramid/texels_apart")]].concat()
             }
             Self::Atlas => vec![wgsl!("pyramid/texels_atlas")],
-            Self::Nowhere => vec![wgsl!("pyramid/texels_nowhere")],
         }
     }
 
@@ -288,7 +288,6 @@ impl DepthStore {
         match self {
             Self::Apart(source) => source as u32,
             Self::Atlas => 5,
-            Self::Nowhere => 6,
         }
     }
 
@@ -311,7 +310,6 @@ impl DepthStore {
             Self::Atlas => {
                 gpu.layout("hiz.cull.atlas_layout", &[(2, Uniform), (3, ReadQuads), (6, Uniform)])
             }
-            Self::Nowhere => gpu.layout("hiz.cull.no_depth_layout", &[(2, Uniform), (6, Uniform)]),
         }
     }
 }

@@ -42,7 +42,7 @@ pub(crate) fn pixels_module(store: DepthStore, kind: BoundsKind) -> Source {
         DepthStore::Apart(_) => {
             [wgsl!("cull/pixels_row_sampled"), wgsl!("cull/pixels_row_apart")].to_vec()
         }
-        DepthStore::Atlas | DepthStore::Nowhere => vec![wgsl!("cull/pixels_row_atlas")],
+        DepthStore::Atlas => vec![wgsl!("cull/pixels_row_atlas")],
     };
     let entry =
         [&row[..], &[wgsl!("instances/piece"), wgsl!("cull/pixels_planes"), wgsl!("cull/pixels")]];
@@ -65,14 +65,13 @@ fn pixels_pipeline(
 }
 
 /// The constants of a count of pixels.
-fn pixels_constants(
-    key: &CullKey,
-    one_sample: bool,
-    shown: bool,
-) -> Vec<(&'static str, f64)> {
+fn pixels_constants(key: &CullKey, one_sample: bool, shown: bool) -> Vec<(&'static str, f64)> {
     // The rectangle of a footprint and its fit have no effect, because every pixel is looked for.
     let key = CullKey { footprint_log2: 1, descent: true, fit_volume: true, ..*key };
-    classify_constants(&key).into_iter().chain([("ONE_SAMPLE", flag(one_sample)), ("SHOWN", flag(shown))]).collect()
+    classify_constants(&key)
+        .into_iter()
+        .chain([("ONE_SAMPLE", flag(one_sample)), ("SHOWN", flag(shown))])
+        .collect()
 }
 
 /// A count that is prepared: nothing that it records can fail any more.
@@ -100,7 +99,8 @@ impl PixelPass {
         let CullInputs { instances, pyramid, .. } = *inputs;
         let seen = PreparedView::new(gpu, inputs, None)?;
         let view = seen.bind(gpu, pyramid, false)?;
-        let pipeline = pixels_pipeline(gpu, &seen.key, (seen.has_one_sample(), negligible.is_some()))?;
+        let pipeline =
+            pixels_pipeline(gpu, &seen.key, (seen.has_one_sample(), negligible.is_some()))?;
         let counting = gpu.uniform(
             "hiz.pixels.counting",
             &CountingUniform {

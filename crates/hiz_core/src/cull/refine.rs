@@ -6,9 +6,10 @@ use std::sync::Arc;
 
 use crate::cull::among::Among;
 use crate::cull::groups::is_grouped;
+use crate::cull::no_depth::{NO_REDUCTION, bind_view};
 use crate::cull::options::{Coverage, CullOptions};
 use crate::cull::pipelines::{
-    CullKey, DepthStore, TWO_STORAGES, classify_constants, layouts, unexplained,
+    CullKey, NO_DEPTH, TWO_STORAGES, classify_constants, layouts, unexplained,
 };
 use crate::cull::view_uniform::ViewUniform;
 use crate::error::Result;
@@ -32,13 +33,13 @@ pub(crate) const WORKGROUP: u32 = 64;
 /// The shader that writes the verdicts of the members of hidden groups.
 pub(crate) fn refine_module(kind: BoundsKind) -> Source {
     let entry = [wgsl!("instances/piece"), wgsl!("instances/groups"), wgsl!("cull/refine")];
-    unexplained(DepthStore::Nowhere, kind, &entry)
+    unexplained(NO_DEPTH, kind, &entry)
 }
 
 /// The shader that finds the groups that lie within the view.
 pub(crate) fn refine_groups_module() -> Source {
     let entry = [wgsl!("instances/tier"), wgsl!("cull/refine_groups")];
-    unexplained(DepthStore::Nowhere, BoundsKind::Box, &entry)
+    unexplained(NO_DEPTH, BoundsKind::Box, &entry)
 }
 
 /// The pipeline that refines members.
@@ -105,8 +106,8 @@ impl Refinement {
         if !is_needed {
             return Ok(None);
         }
-        // The number of the reduction does not matter, because no depth is read.
-        let view = ViewUniform::new(camera, instances.kind, 1, options, DepthTolerance::NONE)?;
+        let view =
+            ViewUniform::new(camera, instances.kind, NO_REDUCTION, options, DepthTolerance::NONE)?;
         Ok(Some(Self {
             view,
             options: options.clone(),
@@ -122,14 +123,7 @@ impl Refine for Refinement {
     fn record(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder) -> Result<()> {
         let instances = &*self.instances;
         let view = gpu.uniform("hiz.refine.view_uniform", &self.view)?;
-        let view = gpu.bind_group(
-            "hiz.refine.view",
-            &DepthStore::Nowhere.layout(gpu)?,
-            &[
-                entry(2, self.pyramid.uniform.as_entire_binding()),
-                entry(6, view.as_entire_binding()),
-            ],
-        )?;
+        let view = bind_view(gpu, "hiz.refine.view", &self.pyramid.uniform, &view)?;
         let is_sample = self.options.coverage == Coverage::Sample;
         let (of_groups, of_members) = (
             refine_groups_pipeline(gpu)?,

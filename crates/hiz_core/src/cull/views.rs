@@ -12,6 +12,7 @@ use crate::instances::piece::Piece;
 use crate::output::views::Joined;
 use crate::output::visible::Visible;
 use crate::pyramid::Pyramid;
+use crate::pyramid::built::Built;
 
 /// One view of [`HizContext::record_cull_views`](crate::HizContext::record_cull_views).
 /// Views may differ in size and in depth convention.
@@ -32,6 +33,8 @@ pub(crate) struct ViewsInputs<'a> {
     pub(crate) options: &'a CullOptions,
     /// As `CullInputs::idle`.
     pub(crate) idle: bool,
+    /// As `CullInputs::built`.
+    pub(crate) built: Option<&'a Built>,
 }
 
 /// Records the culls of all views, then what joins their masks.
@@ -42,7 +45,7 @@ pub(crate) fn record_cull_views(
     each: &[&Visible],
     joined: &Joined,
 ) -> Result<()> {
-    let ViewsInputs { instances, views, among, options, idle } = *inputs;
+    let ViewsInputs { instances, views, among, options, idle, built } = *inputs;
     gpu.check_context("visible", joined.any.context)?;
     if views.len() != joined.views {
         return Err(Error::mismatch(
@@ -58,8 +61,12 @@ pub(crate) fn record_cull_views(
     }
     let join = joined.prepare(gpu, instances, each)?;
     for (View { camera, pyramid }, visible) in views.iter().zip(each) {
-        let inputs =
-            CullInputs { among, idle, ..CullInputs::new(instances, camera, pyramid, options) };
+        let inputs = CullInputs {
+            among,
+            idle,
+            built,
+            ..CullInputs::new(instances, camera, pyramid, options)
+        };
         record_cull(gpu, encoder, &inputs, visible)?;
     }
     gpu.recorded(|| {

@@ -94,6 +94,9 @@ fn depth_aspect(texture: &wgpu::Texture) -> wgpu::TextureAspect {
 /// What wgpu's message contains for a buffer that exists.
 const NOT_MAPPED: &str = "is not mapped";
 
+/// Texels of an atlas that is not read, with room for its headers.
+const NO_ATLAS_TEXELS: u32 = 4;
+
 /// Bytes of a stand-in: the size of the largest structure that one is bound for.
 const STAND_IN_BYTES: u64 = 256;
 
@@ -112,6 +115,15 @@ impl Gpu {
             let usage = wgpu::TextureUsages::TEXTURE_BINDING;
             let format = wgpu::TextureFormat::R32Uint;
             self.view(&self.texture("hiz.no_texels", (1, 1), format, usage)?)
+        })
+    }
+
+    /// An atlas of zeros to bind where no depth is read: its header has the number of no reduction.
+    pub(crate) fn no_atlas(&self) -> Result<&wgpu::TextureView> {
+        made(&self.no_atlas, || {
+            let usage = wgpu::TextureUsages::STORAGE_BINDING;
+            let format = wgpu::TextureFormat::Rgba32Uint;
+            self.view(&self.texture("hiz.no_atlas", (NO_ATLAS_TEXELS, 1), format, usage)?)
         })
     }
 

@@ -43,6 +43,8 @@ pub(crate) struct Gpu {
     pub(super) ring: Ring,
     /// Bound in place of a sampled texture that a call does not read.
     pub(super) no_texels: OnceLock<wgpu::TextureView>,
+    /// Bound in place of an atlas.
+    pub(super) no_atlas: OnceLock<wgpu::TextureView>,
     pub(crate) making: Making,
     /// Texts of the shaders that are replaced, as (what, by what).
     #[cfg(feature = "testing")]
@@ -70,6 +72,7 @@ impl Gpu {
             buffers: KeptBuffers::default(),
             ring: Ring::new(STAGING_KEPT),
             no_texels: OnceLock::new(),
+            no_atlas: OnceLock::new(),
             making: Making::default(),
             #[cfg(feature = "testing")]
             faults: Vec::new(),

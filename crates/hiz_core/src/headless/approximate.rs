@@ -7,7 +7,7 @@ use crate::cull::approximate::{counted, record_more_than_negligible};
 use crate::cull::inputs::CullInputs;
 use crate::cull::options::CullOptions;
 use crate::error::Result;
-use crate::headless::cull::{Question, Reading};
+use crate::headless::cull::{CullExtras, Question, Reading};
 use crate::headless::culling::{Culling, spread_bits};
 use crate::headless::engine::Engine;
 use crate::headless::ranges::{mask_ranges, pixel_ranges};
@@ -58,8 +58,9 @@ impl Engine {
             Ok((counted, among))
         })?;
         let outputs = Outputs { pixels: false, ..outputs.clone() };
-        let question = Question { instances, camera, pyramid, options, among: Some(&among) };
-        let culling = self.cull_with(&question, &outputs, Reading::Staged)?;
+        let question = Question { instances, camera, pyramid, options, among: None };
+        let extras = CullExtras { among: Some(&among), ..CullExtras::default() };
+        let culling = self.cull_with(&question, &outputs, Reading::Staged, &extras)?;
         Ok(ApproximateCulling { engine: self.clone(), culling, counted })
     }
 }

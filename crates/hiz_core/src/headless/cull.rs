@@ -17,6 +17,7 @@ use crate::headless::counts::{Timings, milliseconds};
 use crate::headless::culling::Culling;
 use crate::headless::engine::Engine;
 use crate::headless::readback::{self, Staged};
+use crate::headless::views::AmongSource;
 use crate::host::threads::Locked;
 use crate::input::camera::Camera;
 use crate::instances::Instances;
@@ -50,6 +51,8 @@ pub(super) enum Reading {
 pub struct CullExtras<'a> {
     /// The instances that are asked for ([`Engine::among`]); `None`: all.
     pub among: Option<&'a Arc<Among>>,
+    /// The same for this cull alone: its own submission brings the mask to the device.
+    pub mask: Option<AmongSource<'a>>,
     /// Whether the cull's own submission copies the answer, as [`Engine::cull_ahead`] says.
     pub ahead: bool,
 }
@@ -158,7 +161,7 @@ impl Engine {
         outputs: &Outputs,
     ) -> Result<Culling> {
         let question = Question { instances, camera, pyramid, options, among: None };
-        self.cull_with(&question, outputs, Reading::Staged)
+        self.cull_with(&question, outputs, Reading::Staged, &CullExtras::default())
     }
 
     pub(super) fn cull_with(
@@ -166,21 +169,25 @@ impl Engine {
         question: &Question<'_>,
         outputs: &Outputs,
         reading: Reading,
+        extras: &CullExtras<'_>,
     ) -> Result<Culling> {
         self.check_process()?;
-        let Question { instances, camera, pyramid, options, among } = *question;
+        let Question { instances, camera, pyramid, options, .. } = *question;
         let gpu = &self.context().gpu;
         let attempt = || {
             let (start, made_before) = (Instant::now(), PipelinesMade::so_far());
             let buffers = self.answers().lend(self.context(), instances, outputs)?;
             let visible = Arc::clone(&buffers.visible);
-            let inputs = CullInputs {
-                among: among.map(Arc::as_ref),
-                ..CullInputs::new(instances, camera, pyramid, options)
-            };
             let mut encoder = self.encoder("hiz.cull.encoder");
-            let ((), times) =
-                self.timed(&mut encoder, |encoder| record_cull(gpu, encoder, &inputs, &visible))?;
+            let inputs = CullInputs::new(instances, camera, pyramid, options);
+            let (among, times) = self.timed(&mut encoder, |encoder| {
+                let among = self.record_mask(encoder, instances, extras)?;
+                let inputs = CullInputs { among: among.as_deref(), ..inputs };
+                record_cull(gpu, encoder, &inputs, &visible)?;
+                Ok(among)
+            })?;
+            let inputs = CullInputs { among: among.as_deref(), ..inputs };
+            let question = Question { among: among.as_ref(), ..*question };
             let recorded = question.record_reading(self, &mut encoder, buffers, reading)?;
             let done = tell_when_done(&encoder);
             let timings = self.compiled((start, made_before), |encoder| {

@@ -140,5 +140,5 @@ impl Culling {
 
 /// Whether a group with this verdict has it for all its members.
 fn is_of_all(verdict: &Verdict) -> bool {
-    !verdict.is_kept()
+    !verdict.is_kept() || *verdict == Verdict::Unoccluded
 }

@@ -88,12 +88,12 @@ impl Engine {
         outputs: &Outputs,
         extras: &CullExtras<'_>,
     ) -> Result<Culling> {
-        let question = Question { instances, camera, pyramid, options, among: extras.among };
+        let question = Question { instances, camera, pyramid, options, among: None };
         if !extras.ahead {
-            return self.cull_with(&question, outputs, Reading::Staged);
+            return self.cull_with(&question, outputs, Reading::Staged, extras);
         }
         self.in_a_slot(
-            || self.cull_with(&question, outputs, Reading::Ahead),
+            || self.cull_with(&question, outputs, Reading::Ahead, extras),
             |culling| culling.ahead.as_ref().map(|ahead| culling.taken(&ahead.slot)),
         )
     }

@@ -67,6 +67,7 @@ mod in_flight;
 mod joined;
 mod kept_depth;
 mod levels;
+mod mips;
 mod pixels;
 mod process;
 mod ranges;

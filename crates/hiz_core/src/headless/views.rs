@@ -33,6 +33,37 @@ pub enum AmongSource<'a> {
     KeptByAny(&'a ViewsCulling),
 }
 
+impl<'a> AmongSource<'a> {
+    /// The mask as a recording takes it; `words` holds the bits of flags.
+    fn mask<'b>(&self, instances: &Instances, words: &'b mut Vec<u32>) -> Result<AmongMask<'b>>
+    where
+        'a: 'b,
+    {
+        match *self {
+            Self::Kept(culling) if !culling.visible.outputs().mask => {
+                let outputs = culling.visible.outputs();
+                Err(Error::mismatch(
+                    "among",
+                    format!("expected a cull that was asked for mask, got one with {outputs}"),
+                ))
+            }
+            Self::Mask(mask) if mask.len() != instances.len() as usize => Err(Error::invalid(
+                "among",
+                format!("expected {} flags, got {}", instances.len(), mask.len()),
+            )),
+            Self::Mask(mask) => {
+                let word = |flags: &[bool]| {
+                    flags.iter().rev().fold(0_u32, |word, flag| word << 1 | u32::from(*flag))
+                };
+                words.extend(mask.chunks(32).map(word));
+                Ok(AmongMask::Bits(words))
+            }
+            Self::Kept(culling) => Ok(AmongMask::Kept(&culling.visible)),
+            Self::KeptByAny(views) => Ok(AmongMask::Kept(&views.joined.any)),
+        }
+    }
+}
+
 /// A cull for several views that was submitted.
 ///
 /// # Examples
@@ -87,33 +118,8 @@ impl Engine {
         instances: &Arc<Instances>,
         source: &AmongSource<'_>,
     ) -> Result<Arc<Among>> {
-        if let AmongSource::Kept(culling) = source {
-            let outputs = culling.visible.outputs();
-            if !outputs.mask {
-                return Err(Error::mismatch(
-                    "among",
-                    format!("expected a cull that was asked for mask, got one with {outputs}"),
-                ));
-            }
-        }
         let mut words = Vec::new();
-        let mask = match source {
-            AmongSource::Mask(mask) => {
-                if mask.len() != instances.len() as usize {
-                    return Err(Error::invalid(
-                        "among",
-                        format!("expected {} flags, got {}", instances.len(), mask.len()),
-                    ));
-                }
-                let word = |flags: &[bool]| {
-                    flags.iter().rev().fold(0_u32, |word, flag| word << 1 | u32::from(*flag))
-                };
-                words.extend(mask.chunks(32).map(word));
-                AmongMask::Bits(&words)
-            }
-            AmongSource::Kept(culling) => AmongMask::Kept(&culling.visible),
-            AmongSource::KeptByAny(views) => AmongMask::Kept(&views.joined.any),
-        };
+        let mask = source.mask(instances, &mut words)?;
         let gpu = &self.context().gpu;
         self.scoped(|| {
             let among = Among::new(gpu, instances)?;
@@ -124,6 +130,24 @@ impl Engine {
             self.queue().submit([encoder.finish()]);
             Ok(Arc::new(among))
         })
+    }
+
+    /// Records what brings the mask of a cull to the device, if it has one of its own.
+    pub(super) fn record_mask(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &Arc<Instances>,
+        extras: &CullExtras<'_>,
+    ) -> Result<Option<Arc<Among>>> {
+        let Some(source) = &extras.mask else { return Ok(extras.among.cloned()) };
+        if extras.among.is_some() {
+            return Err(Error::invalid("mask", "expected no among beside it, got both"));
+        }
+        let among = Among::new(&self.context().gpu, instances)?;
+        let mut words = Vec::new();
+        let mask = source.mask(instances, &mut words)?;
+        record_among(&self.context().gpu, encoder, instances, &mask, &among)?;
+        Ok(Some(Arc::new(among)))
     }
 
     /// Culls for several views, each a camera and its pyramid: one submission and one readback.
@@ -179,16 +203,20 @@ impl Engine {
         let visible: Vec<&Visible> = visible.iter().map(Arc::as_ref).collect();
         let of_views: Vec<_> =
             views.iter().map(|(camera, pyramid)| View { camera, pyramid }).collect();
+        let mut encoder = self.encoder("hiz.views.encoder");
         let inputs = ViewsInputs {
             instances,
             views: &of_views,
-            among: extras.among.map(Arc::as_ref),
+            among: None,
             options,
             idle: false,
+            built: None,
         };
-        let mut encoder = self.encoder("hiz.views.encoder");
-        let ((), times) = self.timed(&mut encoder, |encoder| {
-            record_cull_views(gpu, encoder, &inputs, &visible, &joined)
+        let (among, times) = self.timed(&mut encoder, |encoder| {
+            let among = self.record_mask(encoder, instances, extras)?;
+            let inputs = ViewsInputs { among: among.as_deref(), ..inputs };
+            record_cull_views(gpu, encoder, &inputs, &visible, &joined)?;
+            Ok(among)
         })?;
         let questions: Vec<_> = views
             .iter()
@@ -197,7 +225,7 @@ impl Engine {
                 camera,
                 pyramid,
                 options,
-                among: extras.among,
+                among: among.as_ref(),
             })
             .collect();
         let reading = if extras.ahead { Reading::Ahead } else { Reading::Later };
@@ -212,7 +240,7 @@ impl Engine {
         let copies = Copies::record(gpu, &mut encoder, self.staging(), &ranges)?;
         let done = tell_when_done(&encoder);
         let timings = self.compiled((start, made_before), |encoder| {
-            let inputs = ViewsInputs { idle: true, ..inputs };
+            let inputs = ViewsInputs { among: among.as_deref(), idle: true, ..inputs };
             record_cull_views(gpu, encoder, &inputs, &visible, &joined)
         })?;
         let watches = &mut instances.watches();

@@ -14,6 +14,7 @@ mod lens;
 pub(crate) mod mesh;
 pub(crate) mod projection;
 mod quick;
+pub(crate) mod seen_points;
 pub(crate) mod stretch;
 pub(crate) mod tolerance;
 pub(crate) mod view;

@@ -12,6 +12,8 @@
 //!    and `built` remembers the image.
 //!    `region` does the same for a part that has changed.
 //! 4. `atlas` copies all levels into one texture for large culls.
+//! 5. `mips` is a texture with mip levels, for shaders of the caller's own: `mips_plan` plans it,
+//!    `mips_bindings` holds what its passes bind, and `mips_passes` records them.
 //!
 //! Passes are recorded into the caller's encoder; nothing here submits, waits or reads back.
 
@@ -22,6 +24,10 @@ pub(crate) mod ends;
 pub(crate) mod layout;
 pub(crate) mod level_texels;
 pub(crate) mod levels;
+pub(crate) mod mips;
+pub(crate) mod mips_bindings;
+pub(crate) mod mips_passes;
+pub(crate) mod mips_plan;
 pub(crate) mod reduce;
 pub(crate) mod region;
 pub(crate) mod resolve;

@@ -192,7 +192,7 @@ impl Prepared {
 
     /// Records the pass.
     /// `workgroups` says how many of those of a step there are.
-    fn record(
+    pub(super) fn record(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         steps: &Steps,

@@ -5,9 +5,10 @@
 use crate::error::{Error, Result};
 use crate::gpu::buffers::made;
 use crate::gpu::device::Gpu;
+use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
 use crate::pyramid::Pyramid;
-use crate::pyramid::blocks::touched_blocks;
+use crate::pyramid::blocks::{Blocks, touched_blocks};
 use crate::pyramid::reduce::{Prepared, finish, next_reduction};
 use crate::pyramid::source::{DepthSource, Part, Sampling};
 use crate::pyramid::steps::{Recording, Steps};
@@ -54,6 +55,25 @@ pub(crate) fn record_reduce_region(
         pyramid.keep_with_it(owner);
     }
     Ok(())
+}
+
+/// Records the reduction of no rectangle, for a driver that compiles at the first dispatch.
+pub(crate) fn record_idle_region(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    depth: &DepthSource<'_>,
+    camera: &Camera,
+    pyramid: &Pyramid,
+) -> Result<()> {
+    let part = Part::new(depth, Sampling::Single, pyramid.size(), "pyramid")?;
+    let layout = &pyramid.layout;
+    let blocks: Vec<_> = layout.steps.iter().map(Blocks::all).collect();
+    let steps = made(&pyramid.part_steps, || Steps::new(gpu, &layout.steps))?;
+    let prepared = Prepared::new(gpu, (part, camera.clone(), 0), (&blocks, true), pyramid)?;
+    gpu.recorded(|| {
+        prepared.record(encoder, steps, |_| [0, 0]);
+        Ok(())
+    })
 }
 
 /// Checks a rectangle of an image.

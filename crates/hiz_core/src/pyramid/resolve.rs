@@ -330,22 +330,10 @@ pub(crate) fn record_resolve(
     camera: &Camera,
     resolve: &DepthResolve,
 ) -> Result<()> {
-    gpu.check_context("resolve", resolve.context)?;
-    let (size, depths) = (resolve.size, resolve.depths);
-    let part = Part::new(depth, Sampling::Multiple, size, "resolve")?;
-    if size != camera.size() {
-        return Err(Error::mismatch(
-            "camera",
-            format!("expected the depth image's size {size}, got {}", camera.size()),
-        ));
-    }
     // Everything that can fail comes before the first command is recorded.
-    let kind = part.kind.whole();
-    let count = part.subresource.texture.sample_count();
-    let reversed = camera.convention().is_reversed();
-    let pipeline = pipeline(gpu, kind, (reversed, count, depths))?;
-    let samples = bind_samples(gpu, &part, kind, resolve)?;
-    let image = ResolvedUniform { origin: part.origin, size: [size.width, size.height] };
+    let (part, pipeline, samples) = prepare(gpu, depth, camera, resolve)?;
+    let ImageSize { width, height } = resolve.size;
+    let image = ResolvedUniform { origin: part.origin, size: [width, height] };
     let numbers = gpu.numbers(bytemuck::bytes_of(&image))?;
     gpu.recorded(|| {
         let len = numbers.len();
@@ -357,6 +345,51 @@ pub(crate) fn record_resolve(
     })?;
     *resolve.resolved.lock() = Some((part.samples, part.tolerance));
     Ok(())
+}
+
+/// Records a resolve of nothing, for a driver that compiles at the first dispatch.
+pub(crate) fn record_idle_resolve(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    depth: &DepthSource<'_>,
+    camera: &Camera,
+    resolve: &DepthResolve,
+) -> Result<()> {
+    let (_, pipeline, samples) = prepare(gpu, depth, camera, resolve)?;
+    gpu.recorded(|| {
+        let mut pass = stage_pass(encoder, "hiz.resolve.pass", "resolve");
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &samples, &[]);
+        if let Some(band) = resolve.bands.first() {
+            pass.set_bind_group(1, &band.bindings, &[]);
+            pass.dispatch_workgroups(0, 0, 1);
+        }
+        Ok(())
+    })
+}
+
+/// Checks the arguments of a resolve, and makes what it needs.
+fn prepare(
+    gpu: &Gpu,
+    depth: &DepthSource<'_>,
+    camera: &Camera,
+    resolve: &DepthResolve,
+) -> Result<(Part, wgpu::ComputePipeline, wgpu::BindGroup)> {
+    gpu.check_context("resolve", resolve.context)?;
+    let (size, depths) = (resolve.size, resolve.depths);
+    let part = Part::new(depth, Sampling::Multiple, size, "resolve")?;
+    if size != camera.size() {
+        return Err(Error::mismatch(
+            "camera",
+            format!("expected the depth image's size {size}, got {}", camera.size()),
+        ));
+    }
+    let kind = part.kind.whole();
+    let count = part.subresource.texture.sample_count();
+    let reversed = camera.convention().is_reversed();
+    let pipeline = pipeline(gpu, kind, (reversed, count, depths))?;
+    let samples = bind_samples(gpu, &part, kind, resolve)?;
+    Ok((part, pipeline, samples))
 }
 
 /// The bind group of the samples, kept from an earlier resolve of the same texture.

@@ -1,7 +1,8 @@
 //! The LODs that the shader chooses, without a cull around it.
 
 use crate::cull::lod::LodRule;
-use crate::cull::pipelines::{CullKey, DepthStore, classify_constants, lod_constants, unexplained};
+use crate::cull::no_depth::bind_view;
+use crate::cull::pipelines::{CullKey, NO_DEPTH, classify_constants, lod_constants, unexplained};
 use crate::error::Result;
 use crate::gpu::buffers::{STORAGE, entry};
 use crate::gpu::layouts::Binding;
@@ -37,7 +38,7 @@ pub struct LodCase {
 /// The shader that writes down LODs.
 pub(crate) fn choose_lods_module(kind: BoundsKind) -> Source {
     let entry = [wgsl!("instances/piece"), wgsl!("cull/lod"), wgsl!("testing/choose_lods")];
-    unexplained(DepthStore::Nowhere, kind, &entry)
+    unexplained(NO_DEPTH, kind, &entry)
 }
 
 /// The LOD of each instance by the rule whose numbers `view` holds.
@@ -65,38 +66,20 @@ pub fn choose_lods(
     let view = gpu.filled("hiz.choose_lods.view", bytemuck::cast_slice(view), usage)?;
     let no_pyramid: PyramidUniform = bytemuck::Zeroable::zeroed();
     let pyramid = gpu.uniform("hiz.choose_lods.pyramid", &no_pyramid)?;
-    let store = DepthStore::Nowhere;
     let layouts = [
-        store.layout(gpu)?,
+        NO_DEPTH.layout(gpu)?,
         gpu.layout("hiz.cull.instances_layout", RECORD_BINDINGS)?,
         gpu.layout(
             "hiz.choose_lods.layout",
             &[(0, Binding::Read), (1, Binding::Read), (2, Binding::Write)],
         )?,
     ];
-    let view = gpu.bind_group(
-        "hiz.choose_lods.view",
-        &layouts[0],
-        &[entry(2, pyramid.as_entire_binding()), entry(6, view.as_entire_binding())],
-    )?;
+    let view = bind_view(gpu, "hiz.choose_lods.view", &pyramid, &view)?;
     let buffers = [&errors, &cases, &chosen];
     let entries = (0..).zip(buffers).map(|(i, buffer)| entry(i, buffer.as_entire_binding()));
     let entries: Vec<_> = entries.collect();
     let buffers = gpu.bind_group("hiz.choose_lods.buffers", &layouts[2], &entries)?;
-    let key = CullKey {
-        store,
-        kind: instances.kind,
-        sample_coverage: false,
-        // No depth is read.
-        reversed: false,
-        chunks: 1,
-        footprint_log2: 1,
-        descent: false,
-        fit_volume: false,
-        among: false,
-        nearest: false,
-        receivers: false,
-    };
+    let key = CullKey::without_depth(instances.kind, false);
     let pipeline = gpu.compute_pipeline(&Compute {
         label: "hiz.choose_lods.pipeline",
         source: choose_lods_module(instances.kind),

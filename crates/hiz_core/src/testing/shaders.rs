@@ -12,7 +12,7 @@ use crate::cull::refine::{refine_groups_module, refine_module};
 use crate::gpu::clock_check::clock_check_module;
 use crate::gpu::depth_source::SOURCES;
 use crate::gpu::depth_source::SourceKind;
-use crate::gpu::shader::{FILES, Source};
+use crate::gpu::shader::{FILES, Source, wgsl};
 use crate::input::bounds::BoundsKind;
 use crate::instances::from_buffer::{FROM_BUFFER_KINDS, from_buffer_module};
 use crate::instances::tiers::form_tier_module;
@@ -22,6 +22,7 @@ use crate::output::compact::{compact_module, copy_module};
 use crate::output::cut::{cut_module, emit_cut_module};
 use crate::output::emit_passes;
 use crate::output::views::join_module;
+use crate::pyramid::mips_passes::mips_module;
 use crate::pyramid::reduce::{EndFiles, blocks_module, coarse_module};
 use crate::pyramid::resolve::resolve_module;
 use crate::testing::lod::choose_lods_module;
@@ -83,8 +84,11 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("occluders".to_owned(), occluders_module()),
         ("resolve Depth".to_owned(), resolve_module(SourceKind::Depth)),
         ("resolve Float".to_owned(), resolve_module(SourceKind::Float)),
+        ("snippets".to_owned(), snippets()),
     ];
     for source in SOURCES {
+        all.push((format!("mips {source:?}"), mips_module(source, false)));
+        all.push((format!("mips {source:?} both"), mips_module(source, true)));
         for ends in [EndFiles::One, EndFiles::Both] {
             all.push((format!("reduce {source:?} {ends:?}"), blocks_module(source, ends)));
             all.push((format!("reduce_coarse {source:?} {ends:?}"), coarse_module(source, ends)));
@@ -131,6 +135,11 @@ pub(super) fn all() -> Vec<(String, Source)> {
     let from_buffer = |kind| (format!("from_buffer {kind:?}"), from_buffer_module(kind));
     all.extend(FROM_BUFFER_KINDS.map(from_buffer));
     all
+}
+
+/// What callers append to shaders of their own.
+fn snippets() -> Source {
+    Source::of(&[&[wgsl!("snippets/mip_lookup"), wgsl!("snippets/mip_cull")]])
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use crate::cull::options::CullOptions;
-use crate::cull::warm_up::WarmUp;
+use crate::cull::warm_up::{WarmUp, WarmUpMore};
 use crate::error::Result;
 use crate::headless::{Engine, readback};
 use crate::input::camera::Camera;
@@ -72,6 +72,7 @@ pub fn frames(
             visible: &visible,
             options,
             updates: true,
+            more: WarmUpMore::default(),
         };
         let (start, mut encoder) = (Instant::now(), encoder());
         context.record_warm_up(&mut encoder, &frame)?;

@@ -38,6 +38,7 @@ use crate::output::views;
 use crate::output::visible::VERDICT_MULTIPLE;
 use crate::pyramid::layout::{BLOCK_ALIGNMENT, BLOCK_LOG2, HEADERS, PIXELS};
 use crate::pyramid::levels::MAX_LEVELS;
+use crate::pyramid::mips_passes;
 use crate::pyramid::reduce::{REDUCE_WORKGROUP, SHARED_LEVEL, TALL_SIDE};
 use crate::pyramid::resolve;
 use crate::testing::lod;
@@ -156,6 +157,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("output/verdict", "VERDICT_MASK", int(VERDICT_MASK)),
         ("pyramid/levels", "MANTISSA_BITS", int(f32::MANTISSA_DIGITS - 1)),
         ("pyramid/levels", "EXPONENT_BIAS", f64::from(f32::MAX_EXP - 1)),
+        ("pyramid/mips", "WORKGROUP", int(mips_passes::WORKGROUP)),
         ("pyramid/pyramid", "MAX_LEVELS", MAX_LEVELS as f64),
         ("pyramid/pyramid_write", "WORKGROUP", int(REDUCE_WORKGROUP)),
         ("pyramid/pyramid_write", "SIDE_LOG2", int(TALL_SIDE.ilog2())),
@@ -179,10 +181,23 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/lod", &["NEEDS", "NEED_FACTOR", "LARGEST_DEVIATION"]),
     // All bits of a run.
     ("cull/early", &["WHOLE_RUN"]),
-    ("cull/pixels", &["STEP", "TOP_TEXELS", "ROW_BITS", "ROW_MASK", "NO_BORDER", "ONE_TILE", "TILE_LOG2", "MAX_TILES", "WHOLE_IMAGE_LOG2", "UNKNOWN_BITS"]),
+    (
+        "cull/pixels",
+        &[
+            "STEP",
+            "TOP_TEXELS",
+            "ROW_BITS",
+            "ROW_MASK",
+            "NO_BORDER",
+            "ONE_TILE",
+            "TILE_LOG2",
+            "MAX_TILES",
+            "WHOLE_IMAGE_LOG2",
+            "UNKNOWN_BITS",
+        ],
+    ),
     ("cull/pixels_planes", &["FACE_PLANES", "OUTLINE_PLACES", "NO_PLANE"]),
     ("cull/refine", &["REFINED"]),
-    ("instances/groups", &["NEAREST", "UNOCCLUDED"]),
     ("cull/unoccluded", &["HALF_PIXEL"]),
     ("gpu/clock_check", &["LEFT", "RIGHT", "LEFT_AGAIN"]),
     ("cull/refine_groups", &["LAST_TEXEL", "WITHIN"]),
@@ -387,6 +402,9 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("explain", line(1)),
         ("form_tier", line(tiers::WORKGROUP)),
         ("join_views", line(views::WORKGROUP)),
+        ("mip_blocks", line(mips_passes::WORKGROUP)),
+        ("mip_level_0", line(mips_passes::WORKGROUP)),
+        ("mip_tail", line(mips_passes::WORKGROUP)),
         ("occluder_vertex", [0; 3]),
         ("reduce", line(REDUCE_WORKGROUP)),
         ("reduce_buffer", line(yardstick::BUFFER_WORKGROUP)),

@@ -24,6 +24,7 @@ use crate::output::views::JoinUniform;
 use crate::pyramid::PyramidUniform;
 use crate::pyramid::layout::PYRAMID_CHUNKS;
 use crate::pyramid::levels::Level;
+use crate::pyramid::mips_bindings::{MipStepUniform, MipsUniform};
 use crate::pyramid::resolve::{BandUniform, ResolvedUniform};
 use crate::pyramid::steps::StepUniform;
 use crate::testing::lod::LodCase;
@@ -132,6 +133,12 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         }),
         twin!("LodCase", LodCase {
             "mesh" = mesh, "count" = count, "scale" = scale, "padding" = padding,
+        }),
+        twin!("Mips", MipsUniform {
+            "levels" = levels, "origin" = origin, "padding" = padding,
+        }),
+        twin!("MipStep", MipStepUniform {
+            "source" = source, "last" = last, "first" = first, "rows" = rows,
         }),
         twin!("Piece", PieceUniform {
             "base" = base, "count" = count, "index" = index, "words" = words,
