@@ -698,6 +698,11 @@ class Device:
             if one != of.camera:
                 raise ValueError(_other_camera(f"camera[{number}]", one, of))
             _check_coverage("coverage", options, of)
+        if outputs.pixels:
+            raise ValueError(
+                "pixels: expected False beside several cameras, got True: counts are those of one "
+                "view, so cull them one by one"
+            )
         if outputs.meshes is not None:
             raise ValueError(
                 f"meshes: expected None beside several cameras, got {len(outputs.meshes)}: levels "

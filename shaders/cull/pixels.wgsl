@@ -114,6 +114,8 @@ fn with_margin(bound: vec4<f32>) -> vec4<f32> {
 // What is sure about four texels of a row, whose pixels begin and end there.
 struct Sure {
     untouched: vec4<bool>,
+    // No pixel of the texel is surely untouched, as far as the outline tells.
+    whole: vec4<bool>,
     // All of the volume is behind the texel's depth, in each of its pixels.
     hidden: vec4<bool>,
     // All of the volume is in front of the depth, in each of its pixels.
@@ -124,11 +126,18 @@ fn sure_of(
     planes: ptr<function, PixelPlanes>,
     left: vec4<f32>, right: vec4<f32>, top: f32, bottom: f32, raw: vec4<u32>, near: vec4<u32>,
 ) -> Sure {
+    // How far the outline's planes are inside of the texel's nearest pixel, and of its farthest.
     var outside = vec4<f32>(NO_PLANE);
+    var partly = vec4<f32>(NO_PLANE);
     for (var i = 0u; i < OUTLINES; i += 1u) {
         let slope = (*planes).outline_slopes[i];
-        let row = (*planes).outlines[i] - slope.y * select(top, bottom, slope.y > 0.0);
-        outside = max(outside, vec4<f32>(row) - slope.x * select(left, right, slope.x > 0.0));
+        let offset = (*planes).outlines[i];
+        let rows = slope.y * select(vec2<f32>(top, bottom), vec2<f32>(bottom, top), slope.y > 0.0);
+        let is_right = slope.x > 0.0;
+        outside = max(outside,
+            vec4<f32>(offset - rows.x) - slope.x * select(left, right, is_right));
+        partly = max(partly,
+            vec4<f32>(offset - rows.y) - slope.x * select(right, left, is_right));
     }
     var front = vec4<f32>(NO_PLANE);
     var back = vec4<f32>(NO_PLANE);
@@ -147,7 +156,9 @@ fn sure_of(
     let is_background = near == vec4<u32>(far_bits());
     let open = are_depths(near) & (is_background | back > opening_bounds(all_sanitized(near)));
     // Nothing of the volume is there if it would have to be behind the surface and in front of it.
-    return Sure(outside > vec4<f32>(TEXEL_FLOOR) | (hidden & open), hidden, open);
+    return Sure(
+        outside > vec4<f32>(TEXEL_FLOOR) | (hidden & open), partly <= vec4<f32>(TEXEL_FLOOR),
+        hidden, open);
 }
 
 // No depth: it says nothing.
@@ -230,12 +241,13 @@ fn walk(
             clamp((*planes).left_top.y, low_y, high_y),
             clamp((*planes).right_bottom.y, low_y, high_y),
             raw, nearest_of(level, at, raw));
-        let is_pixel = vec4<bool>(level == 0u);
-        found.hidden += pixels_of(sure.hidden & !sure.untouched, here);
-        found.open += pixels_of(sure.open & !sure.untouched, here);
-        let neither = !(sure.untouched | sure.hidden | sure.open);
-        found.inside += pixels_of(neither & is_pixel, here);
-        let is_left = neither & is_there & !is_pixel;
+        // A texel with untouched pixels is entered, so that these are not counted.
+        let is_decided = sure.untouched | ((sure.hidden | sure.open) & sure.whole);
+        let is_left = !is_decided & is_there & vec4<bool>(level > 0u);
+        let is_counted = !sure.untouched & !is_left;
+        found.hidden += pixels_of(sure.hidden & is_counted, here);
+        found.open += pixels_of(sure.open & is_counted, here);
+        found.inside += pixels_of(!(sure.hidden | sure.open) & is_counted, here);
         done += pixels_of(!is_left, here);
         let left_bits = select(vec4<u32>(0u), vec4<u32>(1u) << vec4<u32>(0u, 1u, 2u, 3u), is_left);
         to_enter |= (left_bits.x | left_bits.y | left_bits.z | left_bits.w) << bits_of(level);
@@ -458,8 +470,11 @@ fn count_of_pixels(
         }
         let index = caller_index(id.x);
         counts[index] = found;
-        if SHOWN && found.touched - found.hidden > counting.negligible {
-            atomicOr(&shown[index / WORD_BITS], 1u << (index % WORD_BITS));
+        if SHOWN {
+            let may_show = found.touched - found.hidden > counting.negligible;
+            let bit = select(0u, 1u << (index % WORD_BITS), may_show);
+            // Mesa 22.3 crashes in compiling a branch around the atomic.
+            atomicOr(&shown[index / WORD_BITS], bit);
         }
     }
 }
