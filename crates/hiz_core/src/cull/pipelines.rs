@@ -276,9 +276,7 @@ impl DepthStore {
     /// The shader files that read it.
     pub(crate) fn files(self) -> Vec<File> {
         match self {
-            Self::Apart(source) => {
-                [source.files(), &[wgsl!("gpu/ends_one"), wgsl!("pyramid/texels_apart")]].concat()
-            }
+            Self::Apart(source) => [source.files(), &[wgsl!("pyramid/texels_apart")]].concat(),
             Self::Atlas => vec![wgsl!("pyramid/texels_atlas")],
         }
     }
@@ -287,7 +285,7 @@ impl DepthStore {
     pub(crate) fn code(self) -> u32 {
         match self {
             Self::Apart(source) => source as u32,
-            Self::Atlas => 5,
+            Self::Atlas => 6,
         }
     }
 
@@ -295,9 +293,8 @@ impl DepthStore {
     pub(crate) fn layout(self, gpu: &Gpu) -> Result<wgpu::BindGroupLayout> {
         use Binding::{Depth, Read, ReadQuads, Sampler, Uniform};
         match self {
-            Self::Apart(source) => gpu.layout(
-                "hiz.cull.view_layout",
-                &[
+            Self::Apart(source) => {
+                let bindings = [
                     (0, Depth(source)),
                     (1, Sampler),
                     (2, Uniform),
@@ -305,8 +302,11 @@ impl DepthStore {
                     (4, Read),
                     (5, Read),
                     (6, Uniform),
-                ],
-            ),
+                    (7, Depth(source)),
+                ];
+                let images = if source == SourceKind::Pair { 2 } else { 1 };
+                gpu.layout("hiz.cull.view_layout", &bindings[..6 + images])
+            }
             Self::Atlas => {
                 gpu.layout("hiz.cull.atlas_layout", &[(2, Uniform), (3, ReadQuads), (6, Uniform)])
             }

@@ -87,8 +87,11 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("snippets".to_owned(), snippets()),
     ];
     for source in SOURCES {
-        all.push((format!("mips {source:?}"), mips_module(source, false)));
-        all.push((format!("mips {source:?} both"), mips_module(source, true)));
+        // Mip textures read one image.
+        if source != SourceKind::Pair {
+            all.push((format!("mips {source:?}"), mips_module(source, false)));
+            all.push((format!("mips {source:?} both"), mips_module(source, true)));
+        }
         for ends in [EndFiles::One, EndFiles::Both] {
             all.push((format!("reduce {source:?} {ends:?}"), blocks_module(source, ends)));
             all.push((format!("reduce_coarse {source:?} {ends:?}"), coarse_module(source, ends)));
@@ -96,7 +99,7 @@ pub(super) fn all() -> Vec<(String, Source)> {
         // Yardsticks read whole images alone.
         #[cfg(feature = "yardstick")]
         all.extend(
-            (!source.is_part())
+            (!source.is_part() && source != SourceKind::Pair)
                 .then(|| yardstick_modules(source))
                 .into_iter()
                 .flatten()
