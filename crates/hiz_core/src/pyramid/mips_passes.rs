@@ -30,7 +30,11 @@ const fn bindings(source: SourceKind) -> [(u32, Binding); 4] {
 
 /// The shader module; `both`: its texels hold two depths.
 pub(crate) fn mips_module(source: SourceKind, both: bool) -> Source {
-    let ends = if both { wgsl!("pyramid/mips_both") } else { wgsl!("pyramid/mips_one") };
+    let ends = if both {
+        [wgsl!("gpu/ends_both"), wgsl!("pyramid/mips_both")]
+    } else {
+        [wgsl!("gpu/ends_one"), wgsl!("pyramid/mips_one")]
+    };
     let rows = if source == SourceKind::Bits {
         wgsl!("pyramid/mips_bits")
     } else {
@@ -39,7 +43,8 @@ pub(crate) fn mips_module(source: SourceKind, both: bool) -> Source {
     Source::of(&[
         &[wgsl!("gpu/depth_bits")],
         source.files(),
-        &[wgsl!("pyramid/pyramid"), ends, rows, wgsl!("pyramid/mips")],
+        &ends,
+        &[wgsl!("pyramid/pyramid"), rows, wgsl!("pyramid/mips")],
     ])
 }
 
@@ -65,8 +70,11 @@ fn pipeline(
         Work::Step(step) if step.is_tail => ("mip_tail", false, 1, [false; 2]),
         Work::Step(step) => ("mip_blocks", step.source == 0, step.last - step.source, step.odd),
     };
-    let mut constants = vec![
+    // Nearest depths alone are the farthest in the other convention.
+    let reversed = reversed != (options.depths == MipDepths::Nearest);
+    let constants = [
         ("REVERSED", flag(reversed)),
+        ("RECEIVERS", flag(false)),
         ("CHUNKS", 1.0),
         ("FROM_SOURCE", flag(from_source)),
         ("LEVELS", f64::from(levels)),
@@ -74,9 +82,6 @@ fn pipeline(
         ("ODD_Y", flag(odd[1])),
         ("EDGE_TEXEL", flag(options.lookup == MipLookup::EdgeTexel)),
     ];
-    if !both {
-        constants.push(("NEAREST", flag(options.depths == MipDepths::Nearest)));
-    }
     gpu.compute_pipeline(&Compute {
         label: "hiz.mips.pipeline",
         source: mips_module(source, both),
