@@ -482,6 +482,7 @@ impl Engine {
 /// An [`AmongArgument`] for calls without the interpreter.
 enum HeldAmong<'a> {
     Mask(&'a [bool]),
+    #[expect(clippy::redundant_allocation, reason = "what Python holds is an `Arc` itself")]
     Kept(Arc<Arc<headless::Culling>>),
     KeptByAny(Arc<headless::ViewsCulling>),
 }

@@ -200,6 +200,11 @@ impl DepthResolve {
         self.size
     }
 
+    /// The texture of [`DepthResolve::farthest`], before anything was resolved into it.
+    pub(crate) fn unresolved(&self) -> Option<DepthSource<'_>> {
+        self.farthest.as_ref().map(DepthSource::from)
+    }
+
     /// The farthest depth of each pixel's samples, as
     /// [`record_reduce`](crate::HizContext::record_reduce) takes it.
     ///
