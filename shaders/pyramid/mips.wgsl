@@ -12,6 +12,8 @@
 // A list of texels takes the levels, and is copied into the texture afterwards.
 // On software drivers this takes about half of the time of stores into a texture.
 //
+// Nearest depths alone are the farthest in the other convention, invalid pixels included.
+//
 // An invocation reads 8x8 texels, or 9x9 at odd sizes, and makes up to three levels of them.
 // The shape is that of `reduce.wgsl`.
 // The second and the third level are made where the level before them has even sizes.
@@ -61,25 +63,6 @@ fn part_edge() -> vec2<u32> {
     return vec2<u32>(mips.levels[0].width, mips.levels[0].height) - vec2<u32>(1u);
 }
 
-fn nearer(a: u32, b: u32) -> u32 {
-    return select(min(a, b), max(a, b), REVERSED);
-}
-
-// As `sanitized`, but what is no depth counts as near.
-fn sanitized_to_near(bits: u32) -> u32 {
-    let outside = bits > ONE_BITS && bits != NEGATIVE_ZERO_BITS;
-    return select(sanitized(bits), near_bits(), outside);
-}
-
-fn four_ends(bits: vec4<u32>) -> Four {
-    return Four(ends_of(bits.x), ends_of(bits.y), ends_of(bits.z), ends_of(bits.w));
-}
-
-fn joined_four(a: Four, b: Four) -> Four {
-    return Four(
-        joined(a[0], b[0]), joined(a[1], b[1]), joined(a[2], b[2]), joined(a[3], b[3]));
-}
-
 // A level's texel; past the edge that of the edge.
 fn stored(level: Level, x: u32, y: u32) -> Ends {
     let column = min(x, level.width - 1u);
@@ -92,90 +75,71 @@ fn takes_third(i: u32, n: u32) -> bool {
     return !EDGE_TEXEL || i + 1u == n;
 }
 
-// `pair`, joined with a third texel where texel i of n takes one.
-fn with_third(pair: Ends, third: Ends, i: u32, n: u32) -> Ends {
-    return select(pair, joined(pair, third), takes_third(i, n));
-}
-
 // Nine texels of a row become four, which are texels i to i + 3 of n.
-fn halved(
-    left: Four, right: Four, ninth: Ends, i: u32, n: u32,
-) -> Four {
-    let pairs = Four(
-        joined(left[0], left[1]), joined(left[2], left[3]),
-        joined(right[0], right[1]), joined(right[2], right[3]));
+fn halved_row(left: Ends4, right: Ends4, ninth: Ends, i: u32, n: u32) -> Ends4 {
+    let pairs = joined_rows(firsts(left, right), seconds(left, right));
     if !ODD_X {
         return pairs;
     }
-    return Four(
-        with_third(pairs[0], left[2], i, n),
-        with_third(pairs[1], right[0], i + 1u, n),
-        with_third(pairs[2], right[2], i + 2u, n),
-        with_third(pairs[3], ninth, i + 3u, n));
+    let takes = vec4<bool>(
+        takes_third(i, n), takes_third(i + 1u, n), takes_third(i + 2u, n), takes_third(i + 3u, n));
+    return chosen(pairs, joined_rows(pairs, thirds(left, right, ninth)), takes);
 }
 
 // Rows 2y and 2y + 1 of the level that is read, halved along x, for block column x.
-fn halved_rows(level: Level, x: u32, y: u32, n: u32) -> array<Four, 2> {
+fn halved_rows(level: Level, x: u32, y: u32, n: u32) -> array<Ends4, 2> {
     let i = BLOCK_QUADS * x;
     if FROM_SOURCE {
         let left = two_rows(2u * x, 2u * y);
         let right = two_rows(2u * x + 1u, 2u * y);
-        var ninth = vec2<u32>(0u);
+        var more = array<vec4<u32>, 2>();
         if ODD_X {
-            let more = two_rows(2u * x + 2u, 2u * y);
-            ninth = vec2<u32>(more[0].x, more[1].x);
+            more = two_rows(2u * x + 2u, 2u * y);
         }
-        return array<Four, 2>(
-            halved(four_ends(left[0]), four_ends(right[0]), ends_of(ninth.x), i, n),
-            halved(four_ends(left[1]), four_ends(right[1]), ends_of(ninth.y), i, n));
+        let above = ends_of_pixels(more[0].xxxx);
+        let below = ends_of_pixels(more[1].xxxx);
+        return array<Ends4, 2>(
+            halved_row(pixels_in_row(left[0]), pixels_in_row(right[0]), above, i, n),
+            halved_row(pixels_in_row(left[1]), pixels_in_row(right[1]), below, i, n));
     }
-    return array<Four, 2>(
-        halved_stored_row(level, x, 2u * y, i, n), halved_stored_row(level, x, 2u * y + 1u, i, n));
+    return array<Ends4, 2>(
+        halved_stored_row(level, x, 2u * y, n), halved_stored_row(level, x, 2u * y + 1u, n));
 }
 
-fn halved_stored_row(level: Level, x: u32, y: u32, i: u32, n: u32) -> Four {
+fn halved_stored_row(level: Level, x: u32, y: u32, n: u32) -> Ends4 {
     let first = BLOCK * x;
     let left = four_stored(level, first, y);
     let right = four_stored(level, first + VECTOR, y);
-    return halved(left, right, stored(level, first + BLOCK, y), i, n);
+    return halved_row(left, right, stored(level, first + BLOCK, y), BLOCK_QUADS * x, n);
 }
 
-fn four_stored(level: Level, x: u32, y: u32) -> Four {
-    return Four(
+fn four_stored(level: Level, x: u32, y: u32) -> Ends4 {
+    return in_row(
         stored(level, x, y), stored(level, x + 1u, y),
         stored(level, x + 2u, y), stored(level, x + 3u, y));
 }
 
 // Row i of n of the first level that is made: two or three rows, halved along x.
-fn first_row(
-    pair: array<Four, 2>, third: Four, i: u32, n: u32,
-) -> Four {
-    let of_pair = joined_four(pair[0], pair[1]);
+fn first_row(pair: array<Ends4, 2>, third: Ends4, i: u32, n: u32) -> Ends4 {
+    let of_pair = joined_rows(pair[0], pair[1]);
     if !ODD_Y || !takes_third(i, n) {
         return of_pair;
     }
-    return joined_four(of_pair, third);
+    return joined_rows(of_pair, third);
 }
 
 // Stores four texels of a level, or two; rows past its end are left out.
 // Columns past its end lie in the padding of the list.
-fn store_row(level: Level, x: u32, y: u32, row: Four) {
+fn store_row(level: Level, x: u32, y: u32, row: Ends4) {
     if y < level.height {
         store_four(level.offset + y * level.stride + x, row);
     }
 }
 
-fn store_pair(level: Level, x: u32, y: u32, a: Ends, b: Ends) {
+fn store_half_row(level: Level, x: u32, y: u32, row: Ends2) {
     if y < level.height {
-        let index = level.offset + y * level.stride + x;
-        store(index, a);
-        store(index + 1u, b);
+        store_pair(level.offset + y * level.stride + x, row);
     }
-}
-
-fn quad_ends(top: Four, bottom: Four, k: u32) -> Ends {
-    let both = joined_four(top, bottom);
-    return select(joined(both[2], both[3]), joined(both[0], both[1]), k == 0u);
 }
 
 // A block of the level that is read becomes 4x4 texels of the next one, then 2x2, then one.
@@ -209,17 +173,15 @@ fn mip_blocks(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let quarter = mips.levels[step.source + 2u];
-    let top_left = quad_ends(a, b, 0u);
-    let top_right = quad_ends(a, b, 1u);
-    let bottom_left = quad_ends(c, d, 0u);
-    let bottom_right = quad_ends(c, d, 1u);
-    store_pair(quarter, 2u * id.x, 2u * id.y, top_left, top_right);
-    store_pair(quarter, 2u * id.x, 2u * id.y + 1u, bottom_left, bottom_right);
+    let top = halved(a, b);
+    let bottom = halved(c, d);
+    store_half_row(quarter, 2u * id.x, 2u * id.y, top);
+    store_half_row(quarter, 2u * id.x, 2u * id.y + 1u, bottom);
     if LEVELS == 2u {
         return;
     }
     let eighth = mips.levels[step.source + BLOCK_LOG2];
-    let all = joined(joined(top_left, top_right), joined(bottom_left, bottom_right));
+    let all = joined4(pairs_in_row(top, bottom));
     store(eighth.offset + id.y * eighth.stride + id.x, all);
 }
 
@@ -265,8 +227,8 @@ fn mip_level_0(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let rows = two_rows(id.x, y);
     let index = row * level.stride + VECTOR * id.x;
-    store_four(index, four_ends(rows[0]));
+    store_four(index, pixels_in_row(rows[0]));
     if row + 1u < step.rows {
-        store_four(index + level.stride, four_ends(rows[1]));
+        store_four(index + level.stride, pixels_in_row(rows[1]));
     }
 }

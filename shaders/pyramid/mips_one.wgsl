@@ -1,24 +1,8 @@
-// Texels of a mip texture that holds one end: the farthest depth of the pixels, or the nearest.
-
-// True: the nearest depth; false: the farthest.
-override NEAREST: bool;
-
-// The bits of a texel's depth.
-alias Ends = u32;
-
-// Texels of a row that are made and stored together.
-alias Four = array<Ends, BLOCK_QUADS>;
+// The list of a mip texture of one end, and rows of it; `gpu/ends_one.wgsl` says what a texel is.
+// `mips_both.wgsl` has the same functions for both ends.
 
 // Four texels per vector.
 @group(0) @binding(3) var<storage, read_write> list: array<vec4<u32>>;
-
-fn joined(a: Ends, b: Ends) -> Ends {
-    return select(farthest(a, b), nearer(a, b), NEAREST);
-}
-
-fn ends_of(bits: u32) -> Ends {
-    return select(sanitized(bits), sanitized_to_near(bits), NEAREST);
-}
 
 fn load(index: u32) -> Ends {
     return list[index >> VECTOR_LOG2][index & VECTOR_MASK];
@@ -28,7 +12,39 @@ fn store(index: u32, texel: Ends) {
     list[index >> VECTOR_LOG2][index & VECTOR_MASK] = texel;
 }
 
-// Stores four texels of a row; `index` is a multiple of four.
-fn store_four(index: u32, texels: Four) {
-    list[index >> VECTOR_LOG2] = vec4<u32>(texels[0], texels[1], texels[2], texels[3]);
+fn store_pair(index: u32, texels: Ends2) {
+    store(index, texels.x);
+    store(index + 1u, texels.y);
+}
+
+// `index` is a multiple of four.
+fn store_four(index: u32, texels: Ends4) {
+    list[index >> VECTOR_LOG2] = texels;
+}
+
+// Four pixels of a row as they were given.
+fn pixels_in_row(bits: vec4<u32>) -> Ends4 {
+    return vec4<u32>(sanitized(bits.x), sanitized(bits.y), sanitized(bits.z), sanitized(bits.w));
+}
+
+// The first, the second and the third texel that each of four halved ones takes of eight or nine.
+fn firsts(left: Ends4, right: Ends4) -> Ends4 {
+    return vec4<u32>(left.xz, right.xz);
+}
+
+fn seconds(left: Ends4, right: Ends4) -> Ends4 {
+    return vec4<u32>(left.yw, right.yw);
+}
+
+fn thirds(left: Ends4, right: Ends4, ninth: Ends) -> Ends4 {
+    return vec4<u32>(left.z, right.x, right.z, ninth);
+}
+
+fn joined_rows(a: Ends4, b: Ends4) -> Ends4 {
+    return select(max(a, b), min(a, b), REVERSED);
+}
+
+// `joined` where a texel takes its third one, otherwise `pairs`.
+fn chosen(pairs: Ends4, joined: Ends4, takes: vec4<bool>) -> Ends4 {
+    return select(pairs, joined, takes);
 }

@@ -185,6 +185,7 @@ pub use input::depth_kind::DepthKind;
 pub use input::depth_numbers::DepthNumbers;
 pub use input::image::{DepthConvention, ImageSize, MAX_IMAGE_SIDE};
 pub use input::mesh::{FaceCull, MeshData};
+pub use input::near_slack::NearSlack;
 pub use input::projection::{Pose, Projection};
 pub use input::seen_points::{ColourSums, ColourWeight, Colours, add_colours, depth_of_points};
 pub use input::tolerance::DepthTolerance;

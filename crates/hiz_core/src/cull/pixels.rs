@@ -36,7 +36,7 @@ pub(crate) struct CountingUniform {
 /// The shader that counts pixels.
 pub(crate) fn pixels_module(store: DepthStore, kind: BoundsKind) -> Source {
     let row = match store {
-        DepthStore::Apart(SourceKind::Bits) => {
+        DepthStore::Apart(SourceKind::Bits | SourceKind::Pair) => {
             [wgsl!("cull/pixels_row_bits"), wgsl!("cull/pixels_row_apart")].to_vec()
         }
         DepthStore::Apart(_) => {

@@ -1,6 +1,6 @@
 //! The passes that fill a mip texture: `shaders/pyramid/mips.wgsl`, then a copy per level.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::buffers::entry;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::device::Gpu;
@@ -10,6 +10,7 @@ use crate::gpu::pipelines::{Compute, flag};
 use crate::gpu::shader::{Source, wgsl};
 use crate::gpu::stage_times::stage_pass;
 use crate::input::image::DepthConvention;
+use crate::pyramid::ends::Depths;
 use crate::pyramid::layout::{BLOCK_ALIGNMENT, PIXELS};
 use crate::pyramid::levels::Level;
 use crate::pyramid::mips::{MipDepths, MipLookup, MipTexture};
@@ -29,7 +30,11 @@ const fn bindings(source: SourceKind) -> [(u32, Binding); 4] {
 
 /// The shader module; `both`: its texels hold two depths.
 pub(crate) fn mips_module(source: SourceKind, both: bool) -> Source {
-    let ends = if both { wgsl!("pyramid/mips_both") } else { wgsl!("pyramid/mips_one") };
+    let ends = if both {
+        [wgsl!("gpu/ends_both"), wgsl!("pyramid/mips_both")]
+    } else {
+        [wgsl!("gpu/ends_one"), wgsl!("pyramid/mips_one")]
+    };
     let rows = if source == SourceKind::Bits {
         wgsl!("pyramid/mips_bits")
     } else {
@@ -38,7 +43,8 @@ pub(crate) fn mips_module(source: SourceKind, both: bool) -> Source {
     Source::of(&[
         &[wgsl!("gpu/depth_bits")],
         source.files(),
-        &[wgsl!("pyramid/pyramid"), ends, rows, wgsl!("pyramid/mips")],
+        &ends,
+        &[wgsl!("pyramid/pyramid"), rows, wgsl!("pyramid/mips")],
     ])
 }
 
@@ -64,8 +70,11 @@ fn pipeline(
         Work::Step(step) if step.is_tail => ("mip_tail", false, 1, [false; 2]),
         Work::Step(step) => ("mip_blocks", step.source == 0, step.last - step.source, step.odd),
     };
-    let mut constants = vec![
+    // Nearest depths alone are the farthest in the other convention.
+    let reversed = reversed != (options.depths == MipDepths::Nearest);
+    let constants = [
         ("REVERSED", flag(reversed)),
+        ("RECEIVERS", flag(false)),
         ("CHUNKS", 1.0),
         ("FROM_SOURCE", flag(from_source)),
         ("LEVELS", f64::from(levels)),
@@ -73,9 +82,6 @@ fn pipeline(
         ("ODD_Y", flag(odd[1])),
         ("EDGE_TEXEL", flag(options.lookup == MipLookup::EdgeTexel)),
     ];
-    if !both {
-        constants.push(("NEAREST", flag(options.depths == MipDepths::Nearest)));
-    }
     gpu.compute_pipeline(&Compute {
         label: "hiz.mips.pipeline",
         source: mips_module(source, both),
@@ -104,6 +110,26 @@ impl Dispatch<'_> {
     }
 }
 
+/// The ends that are read of `depth`; both are those of one image.
+///
+/// # Errors
+/// [`Error::Invalid`] for both ends of several samples per pixel.
+fn ends_of(depth: &DepthSource<'_>, mips: &MipTexture) -> Result<Depths> {
+    match mips.options.depths {
+        MipDepths::Farthest => Ok(Depths::Farthest),
+        MipDepths::Nearest => Ok(Depths::Nearest),
+        MipDepths::Both if depth.samples > 1 => Err(Error::invalid(
+            "depths",
+            format!(
+                "expected MipDepths::Farthest or Nearest for {} samples per pixel, got Both; make \
+                 a mip texture of each",
+                depth.samples
+            ),
+        )),
+        MipDepths::Both => Ok(Depths::Farthest),
+    }
+}
+
 /// Records the passes that fill `mips` from `depth`.
 ///
 /// # Errors
@@ -116,7 +142,8 @@ pub(crate) fn record_mips(
     mips: &MipTexture,
 ) -> Result<()> {
     gpu.check_context("mips", mips.context)?;
-    let part = Part::new(depth, Sampling::Single, mips.size, "mip texture")?;
+    let part =
+        Part::new(depth, Sampling::Single, (mips.size, "mip texture"), ends_of(depth, mips)?)?;
     // Everything that can fail comes before the first command is recorded.
     let source = bind_source(gpu, &part, mips)?;
     let (plan, reversed) = (&mips.plan, convention.is_reversed());

@@ -166,11 +166,17 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
             "workgroups_z" = workgroups + 8, "count" = count, "tested" = tested,
             "accepted" = accepted, "padding" = padding,
+            "accept_workgroups" = accept_workgroups,
+            "accept_workgroups_y" = accept_workgroups + 4,
+            "accept_workgroups_z" = accept_workgroups + 8, "accept_count" = accept_count,
         }),
         twin!("Parents", SurvivorsRecord {
             "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
             "workgroups_z" = workgroups + 8, "count" = count, "tested" = tested,
             "accepted" = accepted, "padding" = padding,
+            "accept_workgroups" = accept_workgroups,
+            "accept_workgroups_y" = accept_workgroups + 4,
+            "accept_workgroups_z" = accept_workgroups + 8, "accept_count" = accept_count,
         }),
         twin!("Tier", TierUniform { "count" = count, "below" = below, "padding" = padding }),
         twin!("FormTier", FormUniform {
