@@ -16,7 +16,7 @@ def cars() -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Corners of eight cars in a row, 20 m away."""
     left = np.arange(8) * 3.0 - 11.5
     low = np.stack([left, np.zeros(8), np.full(8, -24.0)], axis=1)
-    return low, low + (2.0, 1.5, 4.0)
+    return low, low + np.array([2.0, 1.5, 4.0])
 
 
 def main() -> None:
