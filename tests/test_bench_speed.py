@@ -97,6 +97,8 @@ TOLD = (
     "readback.lost",
     "views.calls",
     "views.among.a scattered share, flat",
+    "points.numpy.crowd",
+    "points.colours.four",
     "occluders.city.640x360.host",
     "occluders.city.conservative",
     "others.numpy, cull",

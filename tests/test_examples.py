@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+import struct
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -20,6 +23,8 @@ LAST_LINES = {
     "cascades.py": "lit AND in the slice: True",
     # An exact oracle has the last word, and how much a way keeps in vain is no promise.
     "check_against_truth.py": r"0 false culls; false keeps: \d+, \d+, \d+",
+    # All of the wall is in every picture of its side, and 40 cm hide the other side.
+    "colour_points.py": r"red or blue as they are: 100\.0%; of both colours: 0",
     # A small pixel is 13 cm wide at 10 m, and its centre 6 cm off the middle of the 2 cm gap.
     # A large pixel is 1 cm wide.
     "conservative.py": "the ball behind the gap: "
@@ -42,6 +47,8 @@ LAST_LINES = {
     "readback.py": "8 of 8 masks are those of a blocking read",
     # Each eye sees past its own side of the pillar.
     "stereo.py": "a list of one eye would lose balls of the other: True",
+    # The first ball is as wide as any, nearest, and on the same axis.
+    "ten_spheres.py": "1 drawn, 9 skipped",
     # The stale answer lacks what the door has hidden.
     "two_passes.py": "pixels lost: 0 by two passes, 0 by hand; the stale answer loses some: True",
     # x is -9, -7, ... 9: a ball of 0.5 m is hidden up to 3.5 m from the middle.
@@ -68,6 +75,31 @@ def test_script_runs(name: str, tmp_path: Path) -> None:
     last = run.stdout.splitlines()[-1]
     assert re.fullmatch(LAST_LINES[name], last), run.stdout
     assert not list(tmp_path.iterdir())
+
+
+def test_ten_spheres_show_their_depth_complexity(tmp_path: Path) -> None:
+    path = tmp_path / "complexity.png"
+    script = str(ROOT / "examples" / "ten_spheres.py")
+    subprocess.run([sys.executable, script, str(path)], check=True, timeout=GUARD_S)
+    data = path.read_bytes()
+    assert data.startswith(b"\x89PNG\r\n\x1a\n")
+    chunks, at = {}, 8
+    while at < len(data):
+        (length,) = struct.unpack_from(">I", data, at)
+        kind, body = data[at + 4 : at + 8], data[at + 8 : at + 8 + length]
+        (check,) = struct.unpack_from(">I", data, at + 8 + length)
+        assert check == zlib.crc32(kind + body)
+        chunks[kind], at = body, at + 12 + length
+    width, height = struct.unpack_from(">2I", chunks[b"IHDR"])
+    rows = np.frombuffer(zlib.decompress(chunks[b"IDAT"]), np.uint8).reshape(height, width + 1)
+    everything, drawn = np.split(rows[:, 1:] // 25, 2, axis=1)
+    # All ten lie in the middle, and only the first was drawn there.
+    middle = (height // 2, width // 4)
+    assert (everything[middle], drawn[middle]) == (10, 1)
+    assert (everything.max(), drawn.max()) == (10, 1)
+    # The first is the widest: as many pixels are covered at all.
+    assert ((everything > 0) == (drawn > 0)).all()
+    assert everything[0, 0] == 0
 
 
 @pytest.mark.parametrize("name", SCRIPTS)

@@ -65,7 +65,8 @@ def mesh() -> tuple[Floats, Any, Any]:
 def test_a_point_takes_16_bytes_where_float32_holds_it(device: hizvk.Device) -> None:
     numbers = np.random.default_rng(1).normal(size=(65536, 3))
     single = numbers.astype(np.float32)
-    boxes = 65536 // 64 * 48
+    # A box of 48 bytes around each 64 points, and around each 64 of these boxes.
+    boxes = (65536 // 64 + 65536 // 4096) * 48
     for array, each in ((single, 16), (single.astype(np.float64), 16), (numbers, 32)):
         cloud = device.instances(hizvk.Points(array))
         assert cloud.kind == "points"
@@ -111,7 +112,7 @@ def test_explicit_guards_win_and_options_say_the_default(device: hizvk.Device) -
     spheres = device.instances(hizvk.Spheres(positions, 0.0))
 
     def told(instances: hizvk.Instances, **keywords: Any) -> list[int]:
-        return device.cull(instances, camera, hiz, **keywords).verdicts.tolist()
+        return [int(code) for code in device.cull(instances, camera, hiz, **keywords).verdicts]
 
     assert told(points) == told(points, guard_px=0.5) == told(spheres, guard_px=0.5)
     assert told(points, guard_px=0.0) == told(spheres) != told(points)

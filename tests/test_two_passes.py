@@ -187,3 +187,22 @@ def test_what_is_refused_is_named(device: hizvk.Device) -> None:
         culler.late(view, depth, kind="z")
     with pytest.raises(TypeError, match="kind: expected nothing beside a Pyramid"):
         culler.late(view, device.pyramid(depth, view, kind="z"), kind="z")
+
+
+def test_levels_of_detail_are_refused_and_the_way_out_is_named() -> None:
+    device = hizvk.Device()
+    town = Town(1)
+    center, half = town.bodies()
+    crowd = device.instances(hizvk.Boxes(center - half, center + half))
+    culler = device.temporal(crowd)
+    view = camera(0)
+    culler.early(view)
+    depth = device.pyramid(np.zeros(SIZE), view, kind=view.depth_kind)
+    rule = hizvk.LodByDistance([20.0])
+    with pytest.raises(ValueError, match=r"^lod: expected None.*got LodByDistance.*among=late\.mask"):
+        culler.late(view, depth, lod=rule)
+    late = culler.late(view, depth)
+    # The way out: the levels of what a pass draws.
+    lods = [hizvk.MeshLods([hizvk.DrawTemplate(36)] * 2)]
+    told = device.cull(crowd, view, depth, meshes=lods, lod=rule, among=late.mask)
+    assert (told.mask == late.mask).all()

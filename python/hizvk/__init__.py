@@ -64,6 +64,7 @@ from typing import TYPE_CHECKING, Any
 from . import reference
 from ._core import __version__
 from .adapter import Adapter, adapters
+from .approximate import ApproximateResult
 from .bounds import Boxes, OrientedBoxes, Points, Spheres
 from .camera import Camera
 from .check import (
@@ -101,6 +102,7 @@ from .occluders import (
 )
 from .oneline import visible
 from .options import CullOptions, DrawTemplate, MeshLods, Outputs
+from .pixels import PIXELS_DTYPE, visible_fraction
 from .points import PointColours, colour_points, depth_from_points
 from .projection import Projected, gather
 from .resources import DepthImage, Instances, Occluders, Pyramid
@@ -118,7 +120,9 @@ __all__ = [
     "ABSENT",
     "DRAW_DTYPE",
     "NO_LOD",
+    "PIXELS_DTYPE",
     "Adapter",
+    "ApproximateResult",
     "BoundsCheck",
     "Boxes",
     "Camera",
@@ -181,6 +185,7 @@ __all__ = [
     "select_occluders",
     "split_mesh",
     "visible",
+    "visible_fraction",
     "wgsl",
 ]
 

@@ -33,7 +33,13 @@ Coverage: TypeAlias = Literal["area"] | Literal["sample"]
 #: What stands for the bounds in a test; see `CullOptions`.
 Fit: TypeAlias = Literal["rectangle"] | Literal["volume"]
 #: What a cull can make; see `Outputs`.
-Output: TypeAlias = Literal["mask"] | Literal["verdicts"] | Literal["indices"] | Literal["draws"]
+Output: TypeAlias = (
+    Literal["mask"]
+    | Literal["verdicts"]
+    | Literal["indices"]
+    | Literal["draws"]
+    | Literal["pixels"]
+)
 #: How a cull lists what it keeps of several meshes; see `Outputs`.
 Emit: TypeAlias = Literal["bins"] | Literal["instances"]
 #: Where bins lie in the list; see `Outputs`.

@@ -337,8 +337,8 @@ class Points:
     >>> cloud = device.instances(hizvk.Points(np.zeros((65536, 3), np.float32)))
     >>> cloud
     <Instances: 65536 points>
-    >>> cloud.device_bytes / len(cloud)  # of which the boxes of groups take 48 / 64
-    16.75
+    >>> round(cloud.device_bytes / len(cloud), 1)  # 16, and a share of the boxes of groups
+    16.8
     """
 
     positions: FloatArray

@@ -21,13 +21,14 @@ from ._on_device import check_owner
 from ._processes import driver_is_asked
 from ._types import FaceCull, Rasteriser, StoredOrder, words
 from .adapter import Adapter
+from .approximate import ApproximateResult
 from .bounds import Bounds, are_points, as_arrays
 from .camera import Camera
 from .drawing import Drawing, chosen, limit
 from .errors import LimitError
 from .hints import Question
 from .mesh import as_meshes
-from .options import cull_request
+from .options import Outputs, cull_options, cull_request
 from .renewal import Source
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import CullResult
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
     from ._types import DepthKind, Levels, Output
     from .depth import DepthArray
     from .mesh import MeshLike
-    from .options import CullKeywords, CullOptions, MeshLods, Outputs
+    from .options import CullKeywords, CullOptions, MeshLods, OptionKeywords
     from .tolerance import Tolerance
     from .views import _AmongLike
 
@@ -624,9 +625,9 @@ class Device:
             Sizes and conventions may differ.
         options : CullOptions, optional
             How the cull decides; None takes the defaults.
-        outputs : Outputs, or a collection of "mask", "verdicts", "indices", "draws"; optional
+        outputs : Outputs, or a collection of names, optional
             What the cull makes: less costs less.
-            A collection names all that is made.
+            A collection names all that is made: "mask", "verdicts", "indices", "draws", "pixels".
             None makes mask and verdicts, and the list and the draw arguments by the time that they
             are read.
             For several cameras indices and draws are those of what any of them keeps, and made only
@@ -649,8 +650,8 @@ class Device:
             A third one waits in this call, without the interpreter lock, until the oldest is done.
             A result that was dropped counts no more.
         **keywords
-            Any field of `CullOptions`, and of `Outputs` `capacity`, `draw`, `meshes`, `emit` and
-            `placement`.
+            Any field of `CullOptions`, and of `Outputs` `pixel_budget`, `capacity`, `draw`,
+            `meshes`, `emit` and `placement`.
             They take the place of those fields of `options` and `outputs`:
             ``cull(crowd, camera, hiz, order="any", capacity=1000)``.
 
@@ -697,6 +698,11 @@ class Device:
             if one != of.camera:
                 raise ValueError(_other_camera(f"camera[{number}]", one, of))
             _check_coverage("coverage", options, of)
+        if outputs.pixels:
+            raise ValueError(
+                "pixels: expected False beside several cameras, got True: counts are those of one "
+                "view, so cull them one by one"
+            )
         if outputs.meshes is not None:
             raise ValueError(
                 f"meshes: expected None beside several cameras, got {len(outputs.meshes)}: levels "
@@ -716,6 +722,68 @@ class Device:
             for one, of in zip(cameras, pyramids, strict=True)
         ]
         return ViewsResult(self, culled, questions)
+
+    def cull_approximate(
+        self,
+        instances: Instances,
+        camera: Camera,
+        pyramid: Pyramid,
+        options: CullOptions | None = None,
+        *,
+        negligible_px: int,
+        **keywords: Unpack[OptionKeywords],
+    ) -> ApproximateResult:
+        """Culls what is hidden, and what can show in at most a few pixels.
+
+        It counts the pixels of every instance first, so it takes longer than `cull`.
+        It pays where what is kept is expensive to draw.
+
+        Parameters
+        ----------
+        instances : Instances
+            Of this device.
+        camera : Camera
+            The camera of the pyramid.
+        pyramid : Pyramid
+            Of this device.
+        options : CullOptions, optional
+            How the cull decides; None takes the defaults.
+        negligible_px : int
+            An instance is culled if it can show in at most so many pixels, 0 to 2^32 - 1.
+        **keywords
+            Any field of `CullOptions`; they take the place of those fields of `options`.
+
+        Returns
+        -------
+        ApproximateResult
+            `ApproximateResult.pixels_lost` bounds the pixels by which a picture can differ.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+        LimitError, OutOfMemoryError
+            If the device cannot hold the counts.
+        """
+        _arguments.instance("instances", instances, Instances, "Instances of Device.instances")
+        check_owner("instances", instances, self)
+        _arguments.instance("camera", camera, Camera, "a Camera")
+        _arguments.instance("pyramid", pyramid, Pyramid, "a Pyramid of Device.pyramid")
+        check_owner("pyramid", pyramid, self)
+        if camera != pyramid.camera:
+            raise ValueError(_other_camera("camera", camera, pyramid))
+        options = cull_options(options, keywords)
+        negligible = _arguments.integer("negligible_px", negligible_px, low=0, high=2**32 - 1)
+        _check_coverage("coverage", options, pyramid)
+        culling = self._engine.cull_approximate(
+            instances._inner,
+            camera._inner,
+            pyramid._inner,
+            options,
+            Outputs(verdicts=False),
+            negligible,
+        )
+        return ApproximateResult(self, culling, negligible)
 
     def temporal(self, instances: Instances, *, early_capacity: int | None = None) -> Temporal:
         """Makes the two passes of a view, which draw each frame what was visible, then the rest.

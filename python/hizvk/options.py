@@ -108,6 +108,12 @@ def _capacity(name: str, value: object) -> int | None:
     return None if value is None else _arguments.integer(name, value, low=0, high=_LARGEST_U32)
 
 
+def _pixel_budget(name: str, value: object) -> int | None:
+    if value is None:
+        return None
+    return _arguments.integer(name, value, low=1, high=_LARGEST_U32)
+
+
 def _draw(name: str, value: object) -> DrawTemplate | None:
     if value is None:
         return None
@@ -366,6 +372,14 @@ class Outputs:
     draws : bool, optional
         The indirect draw arguments.
         None: as for `indices`.
+    pixels : bool
+        In how many pixels each instance is hidden, and in how many it may show
+        (`CullResult.pixels`).
+        A pass of its own looks at all instances, down to single pixels.
+    pixel_budget : int, optional
+        How many rows of four texels that pass may read for each instance, 1 to 2^32 - 1.
+        The pixels that are left count as ``inside`` and ``undecided``.
+        None: as many as it takes.
     capacity : int, optional
         The most instances in the list, 0 to 2^32 - 1; None leaves room for all.
         Too small a capacity shows as ``count < demand``; mask and verdicts stay complete.
@@ -401,6 +415,8 @@ class Outputs:
     verdicts: bool = field(default=True, metadata=_by(_arguments.flag))
     indices: bool | None = field(default=None, metadata=_by(_flag_or_none))
     draws: bool | None = field(default=None, metadata=_by(_flag_or_none))
+    pixels: bool = field(default=False, metadata=_by(_arguments.flag))
+    pixel_budget: int | None = field(default=None, metadata=_by(_pixel_budget))
     capacity: int | None = field(default=None, metadata=_by(_capacity))
     draw: DrawTemplate | None = field(default=None, metadata=_by(_draw))
     meshes: Sequence[MeshLods] | None = field(default=None, metadata=_by(_meshes))
@@ -445,6 +461,7 @@ class OptionKeywords(TypedDict, total=False):
 class CullKeywords(OptionKeywords, total=False):
     """The keywords of `Device.cull`: those of `CullOptions`, and these of `Outputs`."""
 
+    pixel_budget: int | None
     capacity: int | None
     draw: DrawTemplate | None
     meshes: Sequence[MeshLods] | None
@@ -454,7 +471,7 @@ class CullKeywords(OptionKeywords, total=False):
 
 _OPTIONS: Final = CullOptions()
 _OUTPUTS: Final = Outputs()
-#: The outputs of each set of names; there are sixteen of them.
+#: The outputs of each set of names; there are 32 of them.
 _NAMED: Final[dict[frozenset[str], Outputs]] = {}
 
 
@@ -472,7 +489,7 @@ def cull_request(
 ) -> tuple[CullOptions, Outputs]:
     """Both objects of a cull, from what `Device.cull` was given."""
     _arguments.refuse_unknown(keywords, CullKeywords.__annotations__)
-    names = ("capacity", "draw", "meshes", "emit", "placement")
+    names = ("pixel_budget", "capacity", "draw", "meshes", "emit", "placement")
     of_outputs = {name: keywords[name] for name in names if name in keywords}
     of_options = {name: keywords[name] for name in keywords if name not in of_outputs}
     if outputs is None:

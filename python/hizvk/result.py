@@ -18,6 +18,7 @@ from ._core import Culling as CoreCulling
 from ._processes import cached_property
 from .explanation import explanation_of
 from .options import MAX_LODS
+from .pixels import pixels_of, visible_fraction
 from .stats import CullStats
 from .timing import sum_of, table_of
 
@@ -181,6 +182,57 @@ class CullResult(Awaited[CoreCulling]):
         mesh = _arguments.integer("mesh", mesh, low=0, high=2**16 - 1)
         lod = _arguments.integer("lod", lod, low=0, high=MAX_LODS - 1)
         return self._inner.bin(mesh, lod)
+
+    @cached_property
+    def pixels(self) -> npt.NDArray[np.void]:
+        """``(N,)`` of `PIXELS_DTYPE`: in how many pixels each instance is hidden, and may show.
+
+        The counts are complete, whether the cull has kept an instance or not.
+        An instance that is outside touches nothing; so does one that was not asked for.
+        One that crosses the plane of the eye, or has invalid bounds, counts as ``inside`` and
+        ``undecided`` in all pixels of the image.
+
+        Raises
+        ------
+        ValueError
+            If the cull was not asked for pixels.
+
+        Examples
+        --------
+        A box behind a wall that ends in the middle of the image:
+
+        >>> import numpy as np, hizvk
+        >>> device = hizvk.Device()
+        >>> box = device.instances(hizvk.Boxes([(-1, -1, -6)], [(1, 1, -5)]))
+        >>> camera = hizvk.Camera.look_at(
+        ...     (0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(100, 100), near=0.1
+        ... )
+        >>> wall = np.full(camera.size, np.inf)
+        >>> wall[:, :50] = 2.0
+        >>> pyramid = device.pyramid(wall, camera, kind="z")
+        >>> seen = device.cull(box, camera, pyramid, outputs=["pixels"], coverage="sample")
+        >>> seen.pixels[0].item()
+        (400, 200, 0, 200, 0)
+        >>> seen.visible_fraction(objects_in_depth=False)
+        array([0.5])
+        """
+        return shared(pixels_of(self._inner.pixels()))  # type: ignore[no-any-return]
+
+    def visible_fraction(self, *, objects_in_depth: bool = True) -> npt.NDArray[np.float64]:
+        """``(N,)`` float64: the share of each object that can be seen, by its `pixels`.
+
+        Parameters
+        ----------
+        objects_in_depth : bool
+            Whether the objects themselves are in the depth image; `hizvk.visible_fraction` has the
+            two formulas.
+
+        Raises
+        ------
+        TypeError, ValueError
+            For another type, and if the cull was not asked for pixels.
+        """
+        return visible_fraction(np.asarray(self.pixels), objects_in_depth=objects_in_depth)
 
     @cached_property
     def _counts(self) -> CoreCounts:

@@ -195,7 +195,8 @@ class Temporal(Allocated[CoreTwoPasses]):
         options : CullOptions, optional
             How the cull decides; None takes the defaults.
             ``order="any"`` is refused, because two passes list from their masks.
-            `CullOptions.lod` has no effect, because masks do not tell levels of detail.
+            ``lod`` is refused, because masks do not tell levels of detail.
+            `Device.cull` with ``meshes=``, ``lod=`` and ``among=pass.mask`` lists a pass by level.
         **keywords
             Any field of `CullOptions`, which takes the place of that of `options`.
 
@@ -215,6 +216,12 @@ class Temporal(Allocated[CoreTwoPasses]):
         """
         _arguments.instance("camera", camera, Camera, "a Camera")
         chosen = cull_options(options, keywords)
+        if chosen.lod is not None:
+            raise ValueError(
+                "lod: expected None, because the passes answer masks, which tell no levels of "
+                f"detail, got {chosen.lod!r}; list what a pass draws by level with "
+                "Device.cull(..., meshes=, lod=, among=late.mask)"
+            )
         pyramid = self._pyramid(camera, depth, kind, scale, invalid, levels)
         if pyramid.camera != camera:
             raise ValueError(

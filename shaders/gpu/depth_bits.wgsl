@@ -112,12 +112,15 @@ fn nearest_sanitized4(v: vec4<u32>) -> u32 {
     return least_sanitized4(v);
 }
 
-// A pixel of level 0 as the farthest depth counts it.
 // Background is what has exactly the bits of far, where -0 is 0.
-// Where only receivers count it becomes near, and so leaves the farthest depth alone.
+fn is_background(bits: u32) -> bool {
+    return bits == far_bits() || (REVERSED && bits == NEGATIVE_ZERO_BITS);
+}
+
+// A pixel of level 0 as the farthest depth counts it.
+// Where only receivers count, background becomes near, and so leaves the farthest depth alone.
 fn foreground(bits: u32) -> u32 {
-    let is_background = bits == far_bits() || (REVERSED && bits == NEGATIVE_ZERO_BITS);
-    return select(bits, near_bits(), RECEIVERS && is_background);
+    return select(bits, near_bits(), RECEIVERS && is_background(bits));
 }
 
 fn foreground4(v: vec4<u32>) -> vec4<u32> {

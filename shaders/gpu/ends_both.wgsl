@@ -28,6 +28,11 @@ fn ends_of_pixels(pixels: vec4<u32>) -> Ends {
     return Ends(farthest_sanitized4(foreground4(pixels)), nearest_sanitized4(pixels));
 }
 
+// The same of the farthest and the nearest samples of four pixels.
+fn ends_of_pair(far: vec4<u32>, near: vec4<u32>) -> Ends {
+    return Ends(farthest_sanitized4(far), nearest_sanitized4(near));
+}
+
 // Four texels in a row.
 fn in_row(a: Ends, b: Ends, c: Ends, d: Ends) -> Ends4 {
     return Ends4(vec4<u32>(a.far, b.far, c.far, d.far), vec4<u32>(a.near, b.near, c.near, d.near));

@@ -17,6 +17,11 @@ fn ends_of_pixels(pixels: vec4<u32>) -> Ends {
     return farthest_sanitized4(pixels);
 }
 
+// The same of the farthest and the nearest samples of four pixels.
+fn ends_of_pair(far: vec4<u32>, near: vec4<u32>) -> Ends {
+    return farthest_sanitized4(far);
+}
+
 // Four texels in a row.
 fn in_row(a: Ends, b: Ends, c: Ends, d: Ends) -> Ends4 {
     return vec4<u32>(a, b, c, d);

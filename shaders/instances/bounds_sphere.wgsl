@@ -111,6 +111,8 @@ const RING: u32 = 4u;
 // The angles of the rings, seen from the centre, in radians.
 const RING_ANGLES: vec2<f32> = vec2<f32>(0.7, 1.2);
 const CANDIDATES: u32 = OUTLINE + 2u * RING;
+// Candidates that bound the outline, which come first.
+const OUTLINES: u32 = OUTLINE;
 // A full turn, in radians.
 const TURN: f32 = 6.2831853;
 

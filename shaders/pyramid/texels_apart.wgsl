@@ -43,12 +43,12 @@ fn stored_corners(end: u32, level: u32, t: vec4<u32>) -> vec4<u32> {
 // Tuning for software drivers: both are read, whatever the level, since they take both sides of a
 // branch anyway.
 fn corners(level: u32, t: vec4<u32>) -> vec4<u32> {
-    return select(stored_corners(0u, level, t), foreground4(source_corners(t)), level == 0u);
+    return select(stored_corners(0u, level, t), far_corners(t), level == 0u);
 }
 
 // The same of nearest depths.
 fn nearest_corners(level: u32, t: vec4<u32>) -> vec4<u32> {
-    return select(stored_corners(pyramid.nearest, level, t), source_corners(t), level == 0u);
+    return select(stored_corners(pyramid.nearest, level, t), near_corners(t), level == 0u);
 }
 
 // A texel of a stored level; `end` as above.
@@ -60,7 +60,7 @@ fn stored_texel(end: u32, level: u32, x: u32, y: u32) -> u32 {
 // The farthest depth of one texel of a level.
 fn texel(level: u32, x: u32, y: u32) -> u32 {
     if level == 0u {
-        return sanitized(foreground(source_given(x, y)));
+        return sanitized(far_given(x, y));
     }
     return stored_texel(0u, level, x, y);
 }
@@ -68,7 +68,7 @@ fn texel(level: u32, x: u32, y: u32) -> u32 {
 // The nearest depth of one texel of a level.
 fn nearest_texel(level: u32, x: u32, y: u32) -> u32 {
     if level == 0u {
-        return sanitized_near(source_given(x, y));
+        return sanitized_near(near_given(x, y));
     }
     return stored_texel(pyramid.nearest, level, x, y);
 }

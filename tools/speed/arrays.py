@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from .run import Run
 
-__all__ = ["measure"]
+__all__ = ["MISSING", "measure", "numba_test"]
 
 #: Why numba's ways may be missing.
 MISSING: Final = "numba is not installed (the dependency group dev has it)"
@@ -103,7 +103,7 @@ def _single(run: Run) -> None:
             run, lambda: hizvk.visible(points, camera, depth=image, kind=kind, device=device)
         ),
     }
-    test = _numba_test()
+    test = numba_test()
     if test is None:
         run.found.notes.append(f"left out: {MISSING}")
     else:
@@ -128,7 +128,7 @@ def _single(run: Run) -> None:
         )
 
 
-def _numba_test() -> Callable[[Any, Any, Any], Any] | None:
+def numba_test() -> Callable[[Any, Any, Any], Any] | None:
     """A plain z-test of points by reversed depth, compiled; None without numba."""
     try:
         import numba

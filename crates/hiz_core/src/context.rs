@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use crate::cull::among::{Among, AmongMask, record_among};
+use crate::cull::approximate::{Approximate, record_cull_approximate};
 use crate::cull::early::record_early;
 use crate::cull::history::{EarlySet, Temporal};
 use crate::cull::inputs::CullInputs;
@@ -625,6 +626,40 @@ impl HizContext {
             &CullInputs::new(instances, camera, pyramid, options),
             visible,
         )
+    }
+
+    /// Makes the buffers of an approximate cull; `outputs` are those of what it keeps.
+    ///
+    /// # Errors
+    /// Those of [`create_visible`](Self::create_visible).
+    pub fn create_approximate(
+        &self,
+        instances: &Instances,
+        outputs: &Outputs,
+    ) -> Result<Approximate> {
+        Approximate::new(&self.gpu, instances, outputs)
+    }
+
+    /// Records a cull of what is hidden and of what can show in at most `negligible_px` pixels.
+    ///
+    /// Its result is not that of a certified cull: what it leaves out may show.
+    /// [`Approximate::pixels`] says how much of it.
+    ///
+    /// # Errors
+    /// Those of [`record_cull`](Self::record_cull).
+    #[expect(clippy::too_many_arguments, reason = "as record_cull, and negligible_px")]
+    pub fn record_cull_approximate(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &Instances,
+        camera: &Camera,
+        pyramid: &Pyramid,
+        approximate: &Approximate,
+        options: &CullOptions,
+        negligible_px: u32,
+    ) -> Result<()> {
+        let inputs = CullInputs::new(instances, camera, pyramid, options);
+        record_cull_approximate(&self.gpu, encoder, &inputs, approximate, negligible_px)
     }
 
     /// Makes the two passes of a view: the buffers that they fill, and its history.

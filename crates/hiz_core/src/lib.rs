@@ -169,6 +169,7 @@ pub use wgpu;
 
 pub use context::HizContext;
 pub use cull::among::{Among, AmongMask};
+pub use cull::approximate::Approximate;
 pub use cull::history::{EarlySet, Temporal};
 pub use cull::lod::LodRule;
 pub use cull::options::{Coverage, CullOptions, Fit, Footprint, Hierarchy, Order};
@@ -184,6 +185,7 @@ pub use input::depth_kind::DepthKind;
 pub use input::depth_numbers::DepthNumbers;
 pub use input::image::{DepthConvention, ImageSize, MAX_IMAGE_SIDE};
 pub use input::mesh::{FaceCull, MeshData};
+pub use input::near_slack::NearSlack;
 pub use input::projection::{Pose, Projection};
 pub use input::seen_points::{ColourSums, ColourWeight, Colours, add_colours, depth_of_points};
 pub use input::tolerance::DepthTolerance;
@@ -203,6 +205,7 @@ pub use output::draw::{DrawIndexedIndirect, DrawIndirect, DrawTemplate, VertexDr
 pub use output::emit::{Emit, Placement};
 pub use output::mesh_table::{Lod, LodDraw, MAX_LODS, MeshLods, MeshTable};
 pub use output::outputs::Outputs;
+pub use output::pixels::PixelCounts;
 pub use output::readback::{Answer, AnswerInFlight, ReadbackRing};
 pub use output::verdict::Verdict;
 pub use output::views::{MAX_VIEWS, ViewsOutputs, VisibleViews};

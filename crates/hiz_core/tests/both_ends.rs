@@ -37,7 +37,7 @@ fn counted(
     convention: DepthConvention,
 ) -> Option<f32> {
     let far = if convention.is_reversed() { 0.0 } else { 1.0 };
-    let is_depth = given >= 0.0 && given <= 1.0;
+    let is_depth = (0.0..=1.0).contains(&given);
     // -0 equals 0.
     if depths == Depths::Receivers && given == far {
         return None;

@@ -1,13 +1,19 @@
-//! Runs the examples `simple`, `frames`, `reflections` and `own_culling`; `tests/renderer.rs` runs
-//! the other renderer.
+//! Runs the examples `simple`, `frames`, `every_way`, `particles`, `reflections` and `own_culling`;
+//! `tests/renderer.rs` runs the other renderer.
 
 mod common;
+#[path = "../examples/every_way.rs"]
+#[allow(dead_code, reason = "the program's own device, and its report")]
+mod every_way;
 #[path = "../examples/frames.rs"]
 #[allow(dead_code, reason = "the program's own device, and its report")]
 mod frames;
 #[path = "../examples/own_culling.rs"]
 #[allow(dead_code, reason = "the program's own report")]
 mod own_culling;
+#[path = "../examples/particles/particles.rs"]
+#[allow(dead_code, reason = "the report of the program")]
+mod particles;
 #[path = "../examples/reflections.rs"]
 #[allow(dead_code, reason = "the program's own device, and its report")]
 mod reflections;
@@ -17,7 +23,7 @@ mod simple;
 
 use common::engine;
 use hiz_core::wgpu::{self, util::DownloadBuffer};
-use hiz_core::{DrawIndexedIndirect, DrawIndirect, EarlySet, Visible};
+use hiz_core::{DrawIndexedIndirect, DrawIndirect, EarlySet, ImageSize, Visible};
 
 /// 256 pixels of one byte: as many as `copy_texture_to_buffer` wants in a row.
 const SIDE: u32 = 256;
@@ -122,6 +128,51 @@ fn frames_draw_the_picture_of_all_discs() {
 #[test]
 fn frames_runs() {
     frames::main().unwrap();
+}
+
+/// Things of even numbers stand before the wall, or beside the roof; the others are hidden.
+#[test]
+fn every_way_takes_one_submission_and_one_readback() {
+    let engine = engine();
+    let frame = every_way::run(engine.device(), engine.queue()).unwrap();
+    assert_eq!((frame.submissions, frame.readbacks), (1, 1));
+    let expected = |count: usize| (0..count).map(|i| i % 2 == 0).collect::<Vec<_>>();
+    assert_eq!((frame.lights.len(), frame.particles.len()), (3, 3));
+    assert!(frame.lights.iter().all(|seen| *seen == expected(every_way::LIGHTS)));
+    assert!(frame.particles.iter().all(|seen| *seen == expected(every_way::PARTICLES)));
+    assert_eq!(frame.casters, expected(every_way::CASTERS));
+}
+
+/// The picture does not depend on the coarse level, unless its ends are wrong.
+#[test]
+fn particles_are_the_same_with_a_coarse_level() {
+    let engine = engine();
+    let run = |level, size, faults: &[_]| {
+        let setup = particles::Setup { size, particles: 40_000, level, rounds: 0 };
+        particles::run(engine.device(), engine.queue(), setup, faults).unwrap()
+    };
+    let size = ImageSize::new(211, 97);
+    for level in [1, 2, 3, 4] {
+        let found = run(level, size, &[]);
+        assert!(found.pictures[0] == found.pictures[1], "level {level}");
+        assert!(found.pictures[0].iter().any(|sum| *sum > 0));
+        let [all, before, behind] = found.counts;
+        assert!(before > 0 && behind > 0 && before + behind <= all, "{level}: {:?}", found.counts);
+        // Each particle in the image is decided by one of the three.
+        assert!(level > 2 || found.skipped() > 0.5, "level {level}: {}", found.skipped());
+    }
+    let swapped = [
+        ("ndc.z > nearest[view.nearest + word]", "ndc.z > farthest[view.farthest + word]"),
+        ("ndc.z <= farthest[view.farthest + word]", "ndc.z <= nearest[view.nearest + word]"),
+        (
+            "let texel = pixel >> vec2<u32>(view.level)",
+            "let texel = pixel >> vec2<u32>(view.level + 1u)",
+        ),
+    ];
+    for fault in swapped {
+        let found = run(4, size, &[fault]);
+        assert!(found.pictures[0] != found.pictures[1], "{fault:?}");
+    }
 }
 
 /// The pixel that a ray hits, by a march from pixel to pixel in float64.

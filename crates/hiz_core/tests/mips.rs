@@ -235,7 +235,7 @@ fn differing_of_size(
     for convention in CONVENTIONS {
         let camera = camera_along_z(width, height, convention);
         // In the larger ones of few odd pixels, levels are not all far or near.
-        let image = image(&mut random, size, if seed % 2 == 0 { 7 } else { 500 });
+        let image = image(&mut random, size, if seed.is_multiple_of(2) { 7 } else { 500 });
         let upload = engine.upload_depth(&image, &camera).unwrap();
         let sampled = engine.upload_depth_sampled(&image, &camera).unwrap();
         for (depths, lookup) in DEPTHS.into_iter().flat_map(|d| LOOKUPS.map(|l| (d, l))) {

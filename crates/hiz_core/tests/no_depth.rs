@@ -225,16 +225,8 @@ fn what_is_no_depth_hides_no_group() {
 #[test]
 fn pixels_that_nobody_cleans_hide_something() {
     for (source, atlas, (what, by)) in [
-        (
-            Source::Bits,
-            AtlasUse::Never,
-            ("sanitized(foreground(source_given(x, y)))", "source_given(x, y)"),
-        ),
-        (
-            Source::Float,
-            AtlasUse::Never,
-            ("sanitized(foreground(source_given(x, y)))", "source_given(x, y)"),
-        ),
+        (Source::Bits, AtlasUse::Never, ("sanitized(far_given(x, y))", "far_given(x, y)")),
+        (Source::Float, AtlasUse::Never, ("sanitized(far_given(x, y))", "far_given(x, y)")),
         (
             Source::Bits,
             AtlasUse::Always,

@@ -7,13 +7,13 @@ mod campaign;
 
 use std::sync::Arc;
 
-use campaign::{Campaign, HEADER, POINTS, Report};
+use campaign::{Arrays, Campaign, HEADER, PLAIN, POINTS, Report};
 use common::{CONVENTIONS, Random, camera_along_z, engine, ndc};
 use hiz_core::headless::{AmongSource, CullExtras, Engine};
 use hiz_core::{
-    ABSENT, Bounds, BoundsKind, Camera, Coverage, CullOptions, DepthConvention, Fit, Floats,
-    Footprint, Hierarchy, InstanceOptions, Instances, Order, Outputs, Pyramid, StoredOrder,
-    Verdict,
+    ABSENT, Bounds, BoundsKind, Camera, Coverage, CullOptions, DepthConvention, Depths, Fit,
+    Floats, Footprint, Hierarchy, InstanceOptions, Instances, Order, Outputs, Pyramid,
+    PyramidOptions, StoredOrder, Verdict,
 };
 
 const ALL: &[(Footprint, u32)] =
@@ -65,6 +65,66 @@ fn planted_faults_are_found() {
     }
 }
 
+/// With both ends a point may surely show: never one that the oracle sees covered.
+///
+/// Returns how many were said to show, and how many of them wrongly.
+fn unoccluded(engine: &Engine, seed: u64, rounds: usize) -> [usize; 2] {
+    let [mut said, mut wrong] = [0, 0];
+    let campaign = Campaign { modes: PLAIN, ..campaign(seed, rounds) };
+    for round in campaign.rounds() {
+        let image = round.upload(engine);
+        let options = PyramidOptions { depths: Depths::Both, ..round.pyramid_options(engine) };
+        let pyramid = engine.pyramid_with(&image, &options).expect("pyramid");
+        for (kind, volumes) in &round.volumes {
+            let arrays = Arrays::new(volumes);
+            let bounds = arrays.bounds(*kind);
+            let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
+            for guard in [0.0, 0.5] {
+                let options = CullOptions { guard_px: Some(guard), ..round.options.clone() };
+                let outputs = Outputs::default();
+                let told = engine.cull(&instances, &round.camera, &pyramid, &options, &outputs);
+                let Ok(told) = told else { continue };
+                for (volume, verdict) in volumes.iter().zip(told.verdicts().unwrap()) {
+                    if verdict != Verdict::Unoccluded {
+                        continue;
+                    }
+                    let (view, depth) = (&round.view, &round.depth);
+                    let truth =
+                        hiz_ref::is_unoccluded(view, volume, depth, hiz_ref::Coverage::Area);
+                    said += 1;
+                    wrong += usize::from(!truth.expect("a finite view"));
+                }
+            }
+        }
+    }
+    [said, wrong]
+}
+
+#[test]
+fn no_point_is_falsely_said_to_show() {
+    let [said, wrong] = unoccluded(&engine(), 37, 20);
+    eprintln!("{said} points surely show, {wrong} wrongly");
+    assert!(said > 300 && wrong == 0, "{said} {wrong}");
+    for (name, what, by) in [
+        ("no margin", "ERROR_ULPS: f32 = 24.0", "ERROR_ULPS: f32 = 0.0"),
+        (
+            "hidden for in front",
+            "return surely_above(z, t, w);\n    }\n    return surely_below(z, t, w);",
+            "return surely_below(z, t, w);\n    }\n    return surely_above(z, t, w);",
+        ),
+        (
+            "one pixel of four",
+            "front = nearest_footprint(level, t);",
+            "front = nearest_footprint(level, t.xyxy);",
+        ),
+    ] {
+        let engine = Engine::with_planted_faults(None, &[(what, by)]).unwrap();
+        let [said, wrong] = unoccluded(&engine, 37, 8);
+        eprintln!("{name}: {wrong} of {said}");
+        assert!(wrong > 0, "{name} stayed green");
+    }
+}
+
 const SIZE: (u32, u32) = (64, 48);
 
 fn upload(engine: &Engine, positions: Floats<'_>) -> Arc<Instances> {
@@ -87,7 +147,7 @@ fn a_point_takes_sixteen_bytes_where_float32_holds_it() {
     let singles: Vec<f32> = numbers.iter().map(|v| *v as f32).collect();
     let mut wide = numbers.clone();
     wide[777] = 0.1;
-    // 48 bytes for each 64 are the boxes of the groups.
+    // 48 bytes for each 64 are the boxes of the groups, and as many for each 64 of these.
     for (positions, kind, bytes) in [
         (Floats::F32(&singles), BoundsKind::Point, 16),
         (Floats::F64(&numbers), BoundsKind::Point, 16),
@@ -95,7 +155,7 @@ fn a_point_takes_sixteen_bytes_where_float32_holds_it() {
     ] {
         let instances = upload(&engine, positions);
         assert_eq!(instances.kind(), kind);
-        assert_eq!(instances.device_bytes(), 65_536 * bytes + 1024 * 48, "{kind:?}");
+        assert_eq!(instances.device_bytes(), 65_536 * bytes + (1024 + 16) * 48, "{kind:?}");
     }
 }
 

@@ -80,6 +80,12 @@ impl Culling {
         self.0.run(py, bin).map(|indices| PyArray1::from_vec(py, indices))
     }
 
+    /// The counts of pixels one after the other, five u32 each.
+    fn pixels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
+        let counts = self.0.run(py, |culling| culling.pixels())?;
+        Ok(PyArray1::from_slice(py, bytemuck::cast_slice(&counts)))
+    }
+
     fn counts(&self, py: Python<'_>) -> PyResult<Counts> {
         Ok(Counts::of(&self.0.run(py, |culling| culling.counts())?))
     }

@@ -12,6 +12,7 @@ use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethod
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::approximate::ApproximateCulling;
 use crate::arguments::{
     DepthArray, FloatArray, LevelArray, bounds, depth_input, depth_inputs, in_c_order,
 };
@@ -374,6 +375,27 @@ impl Engine {
             engine.cull_given(&instances, &camera.0, &pyramid.1, &options, &outputs, &extras)
         };
         self.0.run(py, cull).map(|culling| Culling(Held::new(py, Arc::new(culling))))
+    }
+
+    /// As `cull`; what can show in at most `negligible_px` pixels is culled, too.
+    #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
+    fn cull_approximate(
+        &self,
+        py: Python<'_>,
+        instances: &Instances,
+        camera: &Camera,
+        pyramid: &Pyramid,
+        options: &Bound<'_, PyAny>,
+        outputs: &Bound<'_, PyAny>,
+        negligible_px: u32,
+    ) -> PyResult<ApproximateCulling> {
+        let Request { options, outputs } = Request::new(options, outputs, None)?;
+        let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
+        let cull = |engine: &headless::Engine| {
+            let (camera, pyramid) = (&camera.0, &pyramid.1);
+            engine.cull_approximate(&instances, camera, pyramid, &options, &outputs, negligible_px)
+        };
+        self.0.run(py, cull).map(|culling| ApproximateCulling(Held::new(py, culling)))
     }
 
     /// As `cull`, for several views; the lists of `outputs` are those of what any view keeps.

@@ -6,6 +6,7 @@
 //! What is still wrong is refused by `hiz_core` in the same words.
 //! Every class is frozen and may be used from any thread.
 
+mod approximate;
 mod arguments;
 mod camera;
 mod containment;
@@ -25,6 +26,8 @@ mod yardstick;
 /// Not public: use the modules around it.
 #[pyo3::pymodule]
 mod _core {
+    #[pymodule_export]
+    use crate::approximate::ApproximateCulling;
     #[pymodule_export]
     use crate::camera::{Camera, frustum_matrix};
     #[pymodule_export]

@@ -123,6 +123,8 @@ fn outputs(
         verdicts: given.getattr("verdicts")?.extract()?,
         indices: listed("indices")?,
         draws: listed("draws")?,
+        pixels: given.getattr("pixels")?.extract()?,
+        pixel_budget: given.getattr("pixel_budget")?.extract()?,
         capacity: given.getattr("capacity")?.extract()?,
         draw: draw_template(&given.getattr("draw")?)?,
         emit: emit(given, meshes)?,

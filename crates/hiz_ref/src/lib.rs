@@ -34,6 +34,8 @@
 //!   pixels.
 //! - [`check_proxy`] says whether an occluder proxy lies inside its mesh.
 //! - [`check_bounds`] says whether bounds contain their mesh.
+//! - [`pixel_truth`] counts the pixels that a volume touches, and of them those whose depth leaves
+//!   open whether it shows.
 //! - [`pixel_shift`] says how far two points are apart in the image, and [`coarsest_lod`] which
 //!   level of detail a rule allows.
 //!   Both are in float64 alone.
@@ -83,6 +85,7 @@ mod depth;
 mod dyadic;
 mod feasibility;
 mod lod;
+mod pixels;
 mod pyramid;
 mod scalar;
 mod search;
@@ -93,6 +96,7 @@ mod volume;
 pub use containment::{MeshError, Protrusion, TriangleMesh, check_bounds, check_proxy, contains};
 pub use depth::{DepthBounds, DepthKind, DepthMeaning, depth_bounds, nearest_depth_bounds};
 pub use lod::{LodRule, coarsest_lod, greatest_stretch, least_w, pixel_shift, radius, stretch_at};
+pub use pixels::{PixelTruth, pixel_truth};
 pub use pyramid::{Level, pyramid, sanitized_depth};
 pub use unoccluded::{
     is_before, is_inside, is_unoccluded, sanitized_nearest_depth, unoccluded_between,

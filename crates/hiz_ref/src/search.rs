@@ -1,7 +1,7 @@
 //! The search through the image for a pixel that proves a volume visible.
 
 use crate::dyadic::Dyadic;
-use crate::feasibility::{Shape, feasible, feasible_in_float, is_consistent};
+use crate::feasibility::{Constraint, Shape, feasible, feasible_in_float, is_consistent};
 use crate::pyramid::{ONE, sanitized_depth};
 use crate::scalar::{Ball, Scalar};
 use crate::view::{Block, Clip, Coverage, View};
@@ -75,6 +75,20 @@ impl<'a> Projected<'a> {
                 feasible(&exact, self.shape, is_consistent(&before))
             },
         )
+    }
+
+    /// The conditions for a point inside the frustum and the block that is not nearer than `depth`.
+    pub(crate) fn float_behind(&self, block: Block, depth: f32) -> Vec<Constraint<Ball>> {
+        self.float.inside_and_behind(self.view, block, self.options.coverage, depth)
+    }
+
+    /// The same, exactly.
+    pub(crate) fn exact_behind(&self, block: Block, depth: f32) -> Vec<Constraint<Dyadic>> {
+        self.exact().inside_and_behind(self.view, block, self.options.coverage, depth)
+    }
+
+    pub(crate) fn shape(&self) -> Shape {
+        self.shape
     }
 
     /// The nearest depth at which a pixel shows something of the volume.

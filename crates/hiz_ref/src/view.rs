@@ -152,6 +152,19 @@ impl<S: Scalar> Clip<S> {
         all
     }
 
+    /// [`Clip::inside`] the block and not nearer than `depth`.
+    pub(crate) fn inside_and_behind(
+        &self,
+        view: &View,
+        block: Block,
+        coverage: Coverage,
+        depth: f32,
+    ) -> Vec<Constraint<S>> {
+        let mut all = self.inside(view, block, coverage);
+        all.push(Constraint::at_least_zero(self.beyond(depth, view.reversed)));
+        all
+    }
+
     /// The conditions under which a point is inside the frustum and inside the block.
     /// For samples, the block is the hull of the samples; otherwise its closed rectangle.
     ///

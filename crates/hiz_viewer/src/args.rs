@@ -18,6 +18,7 @@ pub(crate) struct Arguments {
     pub(crate) samples: u32,
     pub(crate) mode: Mode,
     pub(crate) lods: bool,
+    pub(crate) moving: bool,
     pub(crate) keys: Vec<Key>,
     pub(crate) frames: usize,
     pub(crate) out: PathBuf,
@@ -51,6 +52,7 @@ impl Arguments {
             samples: 1,
             mode: Mode::TwoPasses,
             lods: true,
+            moving: false,
             keys: Vec::new(),
             frames: 6,
             out: "out/viewer".into(),
@@ -66,6 +68,7 @@ impl Arguments {
                 "--bench" => parsed.what = What::Bench,
                 "--no-cull" => parsed.mode = Mode::Frustum,
                 "--no-lods" => parsed.lods = false,
+                "--moving" => parsed.moving = true,
                 "--scene" => parsed.scene = Some(value()?),
                 "--size" => parsed.size = size(&value()?)?,
                 "--samples" => parsed.samples = samples(&value()?)?,
@@ -134,6 +137,7 @@ Scenes: mountains, arm, city, and castle, whose data is not part of this reposit
                        two-passes  also what is hidden by what the frame before has shown
   --no-cull          the same as --mode frustum
   --no-lods          each body is drawn at its finest
+  --moving           with --headless, bodies drift, come and go from frame to frame
   --keys KEYS        keys to press before the first frame, separated by commas: F4,plus,C
   --frames N         frames along the scene's path, which has jumps (default: 6)
   --out FOLDER       where the PNG files of --headless and of the key P go (default: out/viewer)
@@ -186,8 +190,10 @@ mod tests {
     #[test]
     fn help_names_every_argument_and_key() {
         let help = help();
-        let arguments =
-            ["headless", "bench", "scene", "size", "samples", "mode", "no-cull", "no-lods", "keys"];
+        let arguments = [
+            "headless", "bench", "scene", "size", "samples", "mode", "no-cull", "no-lods",
+            "moving", "keys",
+        ];
         for name in arguments.into_iter().chain(["frames", "out", "screenshots"]) {
             assert!(help.contains(&format!("--{name} ")), "{name}");
         }

@@ -6,7 +6,7 @@ use hiz_core::wgpu;
 use hiz_core::{
     Bounds, Camera, CullOptions, DepthResolve, EarlySet, Emit, Floats, HizContext, InstanceOptions,
     Instances, Lod, MeshLods, MeshTable, OCCLUDER_DEPTH_FORMAT, Outputs, Placement, Pyramid,
-    PyramidOptions, ResolveOptions, Temporal, Visible,
+    PyramidOptions, ResolveOptions, StageTimer, StageTimesInFlight, Temporal, Visible,
 };
 
 use crate::Failure;
@@ -126,14 +126,7 @@ impl Culler {
         on_device: &OnDevice,
         targets: &Targets,
     ) -> Result<Self, Failure> {
-        let bounds = match &scene.volumes {
-            Volumes::Boxes { min, max } => {
-                Bounds::Boxes { min: Floats::F64(min), max: Floats::F64(max) }
-            }
-            Volumes::Spheres { centers, radii } => {
-                Bounds::Spheres { centers: Floats::F64(centers), radii: Floats::F64(radii) }
-            }
-        };
+        let bounds = bounds(&scene.volumes);
         let mesh_ids: Vec<u32> = scene.bodies.iter().map(|body| body.kind).collect();
         let scales: Vec<f32> = scene.bodies.iter().map(|body| body.scale).collect();
         let options = InstanceOptions {
@@ -177,6 +170,28 @@ impl Culler {
     pub(crate) fn resize(&mut self, gpu: &Gpu, targets: &Targets) -> Result<(), Failure> {
         self.sized = OfSize::new(gpu, &self.hiz, targets)?;
         Ok(())
+    }
+
+    /// Gives all bodies new bounds.
+    pub(crate) fn update(&self, gpu: &Gpu, volumes: &Volumes) -> Result<(), Failure> {
+        let mut encoder = gpu.encoder("viewer.update");
+        self.hiz.record_update(&mut encoder, &self.crowd, 0, &bounds(volumes), true)?;
+        gpu.submit(encoder);
+        Ok(())
+    }
+
+    /// A timer of the library's stages.
+    pub(crate) fn timer(&self, gpu: &Gpu) -> Result<StageTimer, Failure> {
+        Ok(self.hiz.create_stage_timer(&gpu.queue)?)
+    }
+
+    /// Records the copy of what the timer has measured.
+    pub(crate) fn record_times(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        timer: &StageTimer,
+    ) -> Result<StageTimesInFlight, Failure> {
+        Ok(self.hiz.record_stage_times(encoder, timer)?)
     }
 
     /// Forgets what was visible, where the camera jumps.
@@ -289,6 +304,17 @@ impl Culler {
     /// The pyramid of the last cull.
     pub(crate) fn pyramid(&self) -> &Pyramid {
         &self.sized.pyramid
+    }
+}
+
+fn bounds(volumes: &Volumes) -> Bounds<'_> {
+    match volumes {
+        Volumes::Boxes { min, max } => {
+            Bounds::Boxes { min: Floats::F64(min), max: Floats::F64(max) }
+        }
+        Volumes::Spheres { centers, radii } => {
+            Bounds::Spheres { centers: Floats::F64(centers), radii: Floats::F64(radii) }
+        }
     }
 }
 

@@ -50,8 +50,10 @@ impl Gpu {
         surface: Option<&wgpu::Surface<'_>>,
     ) -> Result<Arc<Self>, Failure> {
         // Packed lists need the first, and the second saves records without a draw.
-        let useful =
-            wgpu::Features::INDIRECT_FIRST_INSTANCE | wgpu::Features::MULTI_DRAW_INDIRECT_COUNT;
+        // The third is for the times of stages.
+        let useful = wgpu::Features::INDIRECT_FIRST_INSTANCE
+            | wgpu::Features::MULTI_DRAW_INDIRECT_COUNT
+            | wgpu::Features::TIMESTAMP_QUERY;
         Self::with_features(instance, surface, useful)
     }
 

@@ -35,6 +35,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             renderer.culler.cut();
         }
         let camera = renderer.scene.camera(&pose, arguments.size)?;
+        if arguments.moving {
+            renderer.step(frame)?;
+        }
         renderer.draw(&camera)?;
         let path = arguments.out.join(format!(
             "{}_{}_{frame:03}.png",

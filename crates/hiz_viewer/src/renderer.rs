@@ -4,7 +4,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use hiz_core::wgpu;
-use hiz_core::{Camera, DrawIndexedIndirect, HizContext, ImageSize};
+use hiz_core::{
+    Camera, DrawIndexedIndirect, HizContext, ImageSize, StageTimer, StageTimesInFlight,
+};
 
 use crate::Failure;
 use crate::culler::{Culler, DrawList};
@@ -12,6 +14,7 @@ use crate::gpu::Gpu;
 use crate::overlay::Overlay;
 use crate::pipelines::Pipelines;
 use crate::scene::Scene;
+use crate::scene::motion::moved;
 use crate::scene_on_device::{OnDevice, SKY};
 use crate::targets::{Begin, Targets};
 
@@ -74,6 +77,9 @@ pub(crate) struct Renderer {
     pub(crate) gpu: Arc<Gpu>,
     pub(crate) scene: Scene,
     pub(crate) on_device: OnDevice,
+    timer: StageTimer,
+    /// What the stages of the last frame took, in words.
+    stages: String,
     pub(crate) culler: Culler,
     pub(crate) targets: Targets,
     pub(crate) pipelines: Pipelines,
@@ -107,9 +113,12 @@ impl Renderer {
         let on_device = OnDevice::new(&gpu, &scene);
         let pipelines = Pipelines::new(&gpu, samples);
         let targets = Targets::new(&gpu, size, samples);
+        let culler = Culler::new(&gpu, hiz, &scene, &on_device, &targets)?;
         Ok(Self {
             bindings: on_device.bind_group(&gpu, &pipelines.layout),
-            culler: Culler::new(&gpu, hiz, &scene, &on_device, &targets)?,
+            timer: culler.timer(&gpu)?,
+            stages: String::new(),
+            culler,
             overlay: Overlay::new(&gpu, samples),
             mode: Mode::TwoPasses,
             shown: Shown { tint: true, in_vain: false, boxes: false, level: None, numbers: false },
@@ -131,46 +140,78 @@ impl Renderer {
     /// Draws a frame into the picture, waits for it, and counts what it drew.
     pub(crate) fn draw(&mut self, camera: &Camera) -> Result<(), Failure> {
         let begin = Instant::now();
-        self.draw_scene(camera)?;
+        let times = self.shown.numbers.then(|| self.draw_timed(camera)).transpose()?;
+        if times.is_none() {
+            self.draw_scene(camera)?;
+        }
         self.gpu.wait()?;
         self.counts.milliseconds = 1e3 * begin.elapsed().as_secs_f64();
+        self.stages = times.map(|times| stages_in_words(&times)).transpose()?.unwrap_or_default();
         self.count()?;
         self.draw_overlay(camera)
     }
 
+    /// Moves bodies to where they are in frame `frame`, and lets others come and go.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub(crate) fn step(&self, frame: usize) -> Result<(), Failure> {
+        let (bodies, volumes) = moved(&self.scene, frame);
+        self.on_device.put(&self.gpu, &bodies);
+        self.culler.update(&self.gpu, &volumes)
+    }
+
     /// Submits the scene alone: no boxes, level or numbers.
     pub(crate) fn draw_scene(&self, camera: &Camera) -> Result<(), Failure> {
-        self.on_device.look(&self.gpu, camera, self.shown.tint);
         let mut encoder = self.gpu.encoder("viewer.frame");
+        self.record_scene(&mut encoder, camera)?;
+        self.gpu.submit(encoder);
+        Ok(())
+    }
+
+    /// [`Renderer::draw_scene`] with timestamps around the library's stages.
+    fn draw_timed(&self, camera: &Camera) -> Result<StageTimesInFlight, Failure> {
+        let mut encoder = self.gpu.encoder("viewer.frame");
+        self.timer.time(|| self.record_scene(&mut encoder, camera))?;
+        let times = self.culler.record_times(&mut encoder, &self.timer)?;
+        self.gpu.submit(encoder);
+        Ok(times)
+    }
+
+    fn record_scene(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        camera: &Camera,
+    ) -> Result<(), Failure> {
+        self.on_device.look(&self.gpu, camera, self.shown.tint);
         let last = !self.shown.in_vain;
         match self.mode {
             Mode::All => {
-                let mut pass = self.begin(&mut encoder, Begin::Empty, last);
+                let mut pass = self.begin(encoder, Begin::Empty, last);
                 pass.set_pipeline(&self.pipelines.picture);
                 self.on_device.draw_all(&mut pass);
             }
             Mode::Frustum => {
-                self.culler.record_frustum(&mut encoder, camera)?;
-                self.record_picture(&mut encoder, Begin::Empty, self.culler.kept(), last);
+                self.culler.record_frustum(encoder, camera)?;
+                self.record_picture(encoder, Begin::Empty, self.culler.kept(), last);
             }
             Mode::OnePass => {
-                self.record_occluders(&mut encoder);
-                self.culler.record_one_pass(&mut encoder, camera, &self.targets)?;
-                self.record_picture(&mut encoder, Begin::Empty, self.culler.kept(), last);
+                self.record_occluders(encoder);
+                self.culler.record_one_pass(encoder, camera, &self.targets)?;
+                self.record_picture(encoder, Begin::Empty, self.culler.kept(), last);
             }
             Mode::TwoPasses => {
-                self.culler.record_early(&mut encoder, camera)?;
-                self.record_picture(&mut encoder, Begin::Empty, self.culler.early(), false);
-                self.culler.record_late(&mut encoder, camera, &self.targets)?;
-                self.record_picture(&mut encoder, Begin::On, self.culler.late(), last);
+                self.culler.record_early(encoder, camera)?;
+                self.record_picture(encoder, Begin::Empty, self.culler.early(), false);
+                self.culler.record_late(encoder, camera, &self.targets)?;
+                self.record_picture(encoder, Begin::On, self.culler.late(), last);
             }
         }
         if self.shown.in_vain {
-            let mut pass = self.begin(&mut encoder, Begin::On, true);
+            let mut pass = self.begin(encoder, Begin::On, true);
             pass.set_pipeline(&self.pipelines.in_vain);
             self.draw_again(&mut pass);
         }
-        self.gpu.submit(encoder);
         Ok(())
     }
 
@@ -299,6 +340,9 @@ impl Renderer {
             ),
             format!("drawn {drawn} of {bodies}  triangles {triangles}"),
         ];
+        if !self.stages.is_empty() {
+            lines.push(self.stages.clone());
+        }
         if let Some(level) = self.shown.level
             && let Some(ImageSize { width, height }) = self.culler.pyramid().level_size(level)
         {
@@ -311,4 +355,17 @@ impl Renderer {
     pub(crate) fn num_levels(&self) -> u32 {
         self.culler.pyramid().num_levels()
     }
+}
+
+/// What the library's stages took on the device.
+fn stages_in_words(times: &StageTimesInFlight) -> Result<String, Failure> {
+    let stages = times.stages()?;
+    let known: Option<Vec<_>> = stages
+        .iter()
+        .map(|stage| stage.gpu_ms.map(|ms| format!("{} {ms:.2}", stage.stage)))
+        .collect();
+    Ok(match known {
+        Some(known) if !known.is_empty() => format!("stages in ms: {}", known.join(", ")),
+        _ => "stages: wall time alone, as no timestamps of this device can be trusted".to_owned(),
+    })
 }

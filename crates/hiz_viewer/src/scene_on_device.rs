@@ -7,7 +7,7 @@ use hiz_core::{Camera, DrawTemplate};
 
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, Vertex};
-use crate::scene::Scene;
+use crate::scene::{Body, Scene};
 
 /// Twin: `shaders/scene.wgsl`, `Body`.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -99,7 +99,11 @@ impl OnDevice {
         Self {
             vertices: gpu.buffer("viewer.vertices", &vertices, BufferUsages::VERTEX),
             indices: gpu.buffer("viewer.indices", &indices, BufferUsages::INDEX),
-            bodies: gpu.buffer("viewer.bodies", &records(scene), usage),
+            bodies: gpu.buffer(
+                "viewer.bodies",
+                &records(&scene.bodies),
+                usage | BufferUsages::COPY_DST,
+            ),
             everybody: gpu.buffer(
                 "viewer.everybody",
                 &(0..num_bodies).collect::<Vec<_>>(),
@@ -136,6 +140,11 @@ impl OnDevice {
             fog_density: 0.55 / self.reach,
         };
         gpu.queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
+    }
+
+    /// Puts the bodies elsewhere, for commands that are submitted later.
+    pub(crate) fn put(&self, gpu: &Gpu, bodies: &[Body]) {
+        gpu.queue.write_buffer(&self.bodies, 0, bytemuck::cast_slice(&records(bodies)));
     }
 
     /// Binds vertices, indices, and the list of all bodies.
@@ -180,10 +189,9 @@ fn draw_one(pass: &mut wgpu::RenderPass<'_>, draw: &DrawTemplate, bodies: Range<
 }
 
 /// The records of the bodies.
-fn records(scene: &Scene) -> Vec<BodyRecord> {
+fn records(bodies: &[Body]) -> Vec<BodyRecord> {
     let byte = |tint: f32| (127.5 * tint.clamp(0.0, 2.0)).round() as u8;
-    scene
-        .bodies
+    bodies
         .iter()
         .map(|body| BodyRecord {
             position: body.position,

@@ -142,6 +142,13 @@ impl Temporal {
                 ),
             ));
         }
+        if outputs.pixels {
+            return Err(Error::invalid(
+                "outputs",
+                "expected outputs without pixels for the two passes of a frame, got some with; \
+                 count by a cull of its own against the pyramid of the late pass",
+            ));
+        }
         let early = Outputs { verdicts: false, ..outputs.clone() };
         let late = Outputs { capacity: None, ..outputs.clone() };
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;

@@ -122,6 +122,12 @@ impl PreparedView {
                 options,
                 built.part.tolerance,
             )?
+            .with_near_slack(
+                camera.convention(),
+                built.part.near_slack,
+                options,
+                built.part.tolerance,
+            )
         };
         check_culled(pyramid.depths())?;
         check_coverage(&built, options)?;
@@ -150,13 +156,18 @@ impl PreparedView {
         Ok(Self { built, atlas, view, key })
     }
 
+    /// Whether a pixel of level 0 is one sample, and not the farthest of several.
+    pub(super) fn has_one_sample(&self) -> bool {
+        self.built.part.samples <= 1
+    }
+
     /// The bindings for a test of instances and, if `grouped`, for one of groups.
     pub(super) fn bind(&self, gpu: &Gpu, pyramid: &Pyramid, grouped: bool) -> Result<BoundView> {
         let descent_budget = group_descent(self.view.descent_budget);
         let views = [self.view, ViewUniform { descent_budget, ..self.view }];
         let parts = views.each_ref().map(bytemuck::bytes_of);
-        let key =
-            (self.key.store.code(), self.atlas.as_ref().unwrap_or(&self.built.source).clone());
+        let texture = self.atlas.as_ref().unwrap_or(&self.built.source).clone();
+        let key = (self.key.store.code(), texture, self.built.nearest.clone());
         let bound = pyramid.view.bind(gpu, &key, &parts[..1 + usize::from(grouped)], |view| {
             self.create(gpu, pyramid, view)
         })?;
@@ -180,6 +191,9 @@ impl PreparedView {
             chunks = [pyramid.chunk(gpu, 0)?, pyramid.chunk(gpu, 1)?, pyramid.chunk(gpu, 2)?];
             entries.push(entry(0, wgpu::BindingResource::TextureView(&self.built.source)));
             entries.push(entry(1, wgpu::BindingResource::Sampler(gpu.sampler())));
+            if let Some(nearest) = &self.built.nearest {
+                entries.push(entry(7, wgpu::BindingResource::TextureView(nearest)));
+            }
             let chunks = (3..).zip(&chunks);
             entries.extend(chunks.map(|(i, chunk)| entry(i, chunk.as_entire_binding())));
         }

@@ -11,13 +11,16 @@
 //!    `among` restricts it to some of the instances, and `views` culls for several cameras.
 //! 5. `history`, `early` and `late` are the two passes of a frame: the early one draws what was
 //!    visible before, and the late one tests all against the depth of that.
-//! 6. `warm_up` does all of it once without workgroups, before the first frame.
-//! 7. Later, and only if they are read: `refine` completes the verdicts, `count` counts them, and
+//! 6. `pixels` counts the pixels of each instance, where that is asked for, and `approximate` culls
+//!    what shows in few of them.
+//! 7. `warm_up` does all of it once without workgroups, before the first frame.
+//! 8. Later, and only if they are read: `refine` completes the verdicts, `count` counts them, and
 //!    `explain` repeats one test.
 //!
 //! This room records commands into an encoder; it never submits or waits.
 
 pub(crate) mod among;
+pub(crate) mod approximate;
 #[cfg(feature = "headless")]
 pub(crate) mod count;
 pub(crate) mod early;
@@ -31,6 +34,7 @@ pub(crate) mod lod;
 pub(crate) mod no_depth;
 pub(crate) mod options;
 pub(crate) mod pipelines;
+pub(crate) mod pixels;
 pub(crate) mod record;
 #[cfg(feature = "headless")]
 pub(crate) mod refine;

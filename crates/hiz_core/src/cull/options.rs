@@ -2,6 +2,7 @@
 
 use crate::cull::lod::LodRule;
 use crate::host::rounding::EPS;
+use crate::input::tolerance::DepthTolerance;
 
 /// In which order the indices of the kept instances are listed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -170,6 +171,13 @@ pub struct CullOptions {
     pub statistics: bool,
     /// Which level of detail of its mesh a kept instance is drawn with.
     pub lod: LodRule,
+}
+
+impl CullOptions {
+    /// The slack for what the renderer of the depth image rounded.
+    pub(crate) fn depth_tolerance(&self) -> DepthTolerance {
+        DepthTolerance { relative: self.depth_slack, absolute: self.depth_slack_abs }
+    }
 }
 
 impl Default for CullOptions {

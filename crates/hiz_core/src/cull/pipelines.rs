@@ -252,7 +252,6 @@ pub(crate) fn report_constants(key: &ReportKey) -> Vec<(&'static str, f64)> {
     let mut constants = vec![
         ("MASK", flag(key.mask)),
         ("VERDICTS", flag(key.verdicts)),
-        ("ABSENT", flag(key.absent)),
         ("STATISTICS", flag(key.statistics)),
     ];
     constants.extend(key.emit.constants());
@@ -276,9 +275,7 @@ impl DepthStore {
     /// The shader files that read it.
     pub(crate) fn files(self) -> Vec<File> {
         match self {
-            Self::Apart(source) => {
-                [source.files(), &[wgsl!("gpu/ends_one"), wgsl!("pyramid/texels_apart")]].concat()
-            }
+            Self::Apart(source) => [source.files(), &[wgsl!("pyramid/texels_apart")]].concat(),
             Self::Atlas => vec![wgsl!("pyramid/texels_atlas")],
         }
     }
@@ -287,7 +284,7 @@ impl DepthStore {
     pub(crate) fn code(self) -> u32 {
         match self {
             Self::Apart(source) => source as u32,
-            Self::Atlas => 5,
+            Self::Atlas => 6,
         }
     }
 
@@ -295,9 +292,8 @@ impl DepthStore {
     pub(crate) fn layout(self, gpu: &Gpu) -> Result<wgpu::BindGroupLayout> {
         use Binding::{Depth, Read, ReadQuads, Sampler, Uniform};
         match self {
-            Self::Apart(source) => gpu.layout(
-                "hiz.cull.view_layout",
-                &[
+            Self::Apart(source) => {
+                let bindings = [
                     (0, Depth(source)),
                     (1, Sampler),
                     (2, Uniform),
@@ -305,8 +301,11 @@ impl DepthStore {
                     (4, Read),
                     (5, Read),
                     (6, Uniform),
-                ],
-            ),
+                    (7, Depth(source)),
+                ];
+                let images = if source == SourceKind::Pair { 2 } else { 1 };
+                gpu.layout("hiz.cull.view_layout", &bindings[..6 + images])
+            }
             Self::Atlas => {
                 gpu.layout("hiz.cull.atlas_layout", &[(2, Uniform), (3, ReadQuads), (6, Uniform)])
             }
@@ -460,15 +459,34 @@ pub(crate) fn cull_members_module(
     emit: EmitKey,
     pass: FramePass,
 ) -> Source {
+    members_module((store, kind), emit, pass, wgsl!("cull/cull_members"))
+}
+
+/// The shader that keeps the members of accepted groups.
+pub(crate) fn accept_members_module(
+    store: DepthStore,
+    kind: BoundsKind,
+    emit: EmitKey,
+    pass: FramePass,
+) -> Source {
+    members_module((store, kind), emit, pass, wgsl!("cull/accept_members"))
+}
+
+fn members_module(
+    (store, kind): (DepthStore, BoundsKind),
+    emit: EmitKey,
+    pass: FramePass,
+    entry: File,
+) -> Source {
     let shared = [
         wgsl!("instances/piece"),
         wgsl!("output/statistics"),
         wgsl!("output/report"),
         wgsl!("instances/groups"),
     ];
-    let entry =
-        [&shared[..], &emit.files(), pass.member_files(), &[wgsl!("cull/cull_members")]].concat();
-    unexplained(store, kind, &entry)
+    let last = [wgsl!("cull/survivors"), entry];
+    let files = [&shared[..], &emit.files(), pass.member_files(), &last].concat();
+    unexplained(store, kind, &files)
 }
 
 /// The layouts of a cull's view, of its records and of what it writes.
@@ -546,14 +564,36 @@ pub(crate) fn cull_members_pipeline(
     key: &CullKey,
     report: &ReportKey,
 ) -> Result<wgpu::ComputePipeline> {
+    let module = cull_members_module(key.store, key.kind, report.emit, report.pass);
+    members_pipeline(gpu, key, report, ("cull_members", module), &[])
+}
+
+/// What keeps the members of accepted groups.
+pub(crate) fn accept_members_pipeline(
+    gpu: &Gpu,
+    key: &CullKey,
+    report: &ReportKey,
+) -> Result<wgpu::ComputePipeline> {
+    let module = accept_members_module(key.store, key.kind, report.emit, report.pass);
+    let absent = [("ABSENT", flag(report.absent))];
+    members_pipeline(gpu, key, report, ("accept_members", module), &absent)
+}
+
+fn members_pipeline(
+    gpu: &Gpu,
+    key: &CullKey,
+    report: &ReportKey,
+    (entry_point, source): (&'static str, Source),
+    more: &[(&'static str, f64)],
+) -> Result<wgpu::ComputePipeline> {
     let written = ("hiz.cull.visible_layout", report.pass.member_bindings());
     let [view, records, visible] = layouts(gpu, key.store, report.emit.record_bindings(), written)?;
     let members = gpu.layout("hiz.cull_members.layout", MEMBER_BINDINGS)?;
     gpu.compute_pipeline(&Compute {
         label: "hiz.cull_members.pipeline",
-        source: cull_members_module(key.store, key.kind, report.emit, report.pass),
-        entry_point: "cull_members",
+        source,
+        entry_point,
         layouts: &[view, records, visible, members],
-        constants: &[&classify_constants(key)[..], &report_constants(report)].concat(),
+        constants: &[&classify_constants(key)[..], &report_constants(report), more].concat(),
     })
 }

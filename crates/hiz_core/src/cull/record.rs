@@ -12,6 +12,7 @@ use crate::cull::pipelines::{
     BINNED_BINDINGS, BinKey, CullKey, EmitKey, FramePass, ReportKey, VISIBLE_BINDINGS,
     cull_pipeline,
 };
+use crate::cull::pixels::PixelPass;
 use crate::error::{Error, Result};
 use crate::gpu::buffers::{check_alive, entry, made};
 use crate::gpu::device::Gpu;
@@ -235,7 +236,12 @@ fn record_all(
         Ok((outputs, groups))
     };
     let target = Target::new(gpu, (instances, options, inputs.among), visible, report, bind)?;
-    record_against_pyramid(gpu, encoder, inputs, &target, flat, |_| ())
+    let pixels = PixelPass::new(gpu, inputs, visible, None)?;
+    record_against_pyramid(gpu, encoder, inputs, &target, flat, |_| ())?;
+    if let Some(pixels) = pixels {
+        pixels.record(encoder, inputs.pyramid);
+    }
+    Ok(())
 }
 
 /// Records the tests of `inputs` against their pyramid.

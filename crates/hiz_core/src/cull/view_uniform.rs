@@ -7,6 +7,7 @@ use crate::host::rounding::{EPS, round_up};
 use crate::input::bounds::BoundsKind;
 use crate::input::camera::Camera;
 use crate::input::image::DepthConvention;
+use crate::input::near_slack::NearSlack;
 use crate::input::tolerance::DepthTolerance;
 use crate::input::view::ViewRows;
 use crate::output::mesh_table::MAX_LODS;
@@ -82,14 +83,11 @@ impl ViewUniform {
                 Err(Error::invalid(name, format!("expected a number in 0..={most}, got {value}")))
             }
         };
-        let of_caller = DepthTolerance {
-            relative: range("depth_slack", options.depth_slack, 0.5)?,
-            absolute: range("depth_slack_abs", options.depth_slack_abs, 0.5)?,
-        };
+        range("depth_slack", options.depth_slack, 0.5)?;
+        range("depth_slack_abs", options.depth_slack_abs, 0.5)?;
+        let of_caller = options.depth_tolerance();
         // The renderer's error came first, then the rounding of the format.
-        let all = tolerance.after(of_caller);
-        let DepthTolerance { relative: slack, absolute: slack_abs } = all;
-        let (near_factor, near_offset) = near_slack(camera.convention(), all);
+        let DepthTolerance { relative: slack, absolute: slack_abs } = tolerance.after(of_caller);
         range("descent", f64::from(options.descent), 65_536.0)?;
         let kappa = range("transform_slack", options.transform_slack, 1e6)?;
         let guard = match (options.guard_px, options.coverage) {
@@ -155,29 +153,24 @@ impl ViewUniform {
             lod_end,
             lod_needs,
             source_origin: 0,
-            near_factor,
-            near_offset,
+            near_factor: 1.0,
+            near_offset: 0.0,
             padding: 0,
-        })
+        }
+        .with_near_slack(camera.convention(), NearSlack::NONE, options, tolerance))
     }
-}
 
-/// What moves a stored depth nearer than every depth that it stands for: a factor and an offset.
-///
-/// Both count the roundings of the shader, 2^-24 of the product and 2^-24 of the sum.
-/// Without slack both are exact, and nothing is moved.
-/// `docs/accuracy.md`, section "The nearest end", has the proof.
-pub(crate) fn near_slack(
-    convention: DepthConvention,
-    DepthTolerance { relative, absolute }: DepthTolerance,
-) -> (f32, f32) {
-    let rounding = EPS / 2.0;
-    let relative = if relative > 0.0 { relative + rounding * (1.0 + relative) } else { 0.0 };
-    let offset = if absolute > 0.0 { round_up(absolute + rounding) } else { 0.0 };
-    if convention.is_reversed() {
-        (round_up(1.0 + relative), offset)
-    } else {
-        (-round_up(relative - 1.0), -offset)
+    /// The same view, where stored depths stand for nearer ones by `slack` and by the tolerances.
+    pub(crate) fn with_near_slack(
+        self,
+        convention: DepthConvention,
+        slack: NearSlack,
+        options: &CullOptions,
+        tolerance: DepthTolerance,
+    ) -> Self {
+        let all = slack.with(tolerance, options.depth_tolerance(), convention);
+        let (near_factor, near_offset) = all.in_single(convention);
+        Self { near_factor, near_offset, ..self }
     }
 }
 

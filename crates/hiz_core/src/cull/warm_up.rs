@@ -59,6 +59,7 @@ pub struct WarmUpMore<'a> {
     /// Culls for several views like [`WarmUp::camera`].
     pub views: Option<&'a VisibleViews>,
     /// The resolve of a multisampled depth texture, with that texture.
+    /// The pyramid is then built from its farthest samples instead of [`WarmUp::depth`].
     pub resolve: Option<(&'a wgpu::TextureView, &'a DepthResolve)>,
     /// Whether [`HizContext::record_reduce_region`](crate::HizContext::record_reduce_region) renews
     /// parts of the pyramid.
@@ -78,7 +79,10 @@ pub(crate) fn record_warm_up(
     if let Some(occluders) = frame.occluders {
         record_occluders(gpu, encoder, occluders, camera, depth, &DrawOptions::default())?;
     }
-    let built = record_idle_reduce(gpu, encoder, &depth.into(), camera, pyramid)?;
+    // Where samples are resolved, the pyramid is built from what that leaves.
+    let resolved = frame.more.resolve.and_then(|(_, resolve)| resolve.unresolved());
+    let source = resolved.unwrap_or_else(|| depth.into());
+    let built = record_idle_reduce(gpu, encoder, &source, camera, pyramid)?;
     let inputs = CullInputs {
         idle: true,
         built: Some(&built),
@@ -106,7 +110,7 @@ pub(crate) fn record_warm_up(
         record_idle_resolve(gpu, encoder, &samples.into(), camera, resolve)?;
     }
     if regions {
-        record_idle_region(gpu, encoder, &depth.into(), camera, pyramid)?;
+        record_idle_region(gpu, encoder, &source, camera, pyramid)?;
     }
     if frame.updates {
         record_idle_update(gpu, encoder, instances)?;

@@ -17,6 +17,8 @@ pub(crate) enum SourceKind {
     DepthPart,
     /// A rectangle of a float colour texture with one channel.
     FloatPart,
+    /// Two textures of float32 bits: the farthest of each pixel's samples, and the nearest.
+    Pair,
 }
 
 const DEPTH: File = wgsl!("gpu/source_depth");
@@ -24,16 +26,30 @@ const FLOAT: File = wgsl!("gpu/source_float");
 const SAMPLED: File = wgsl!("gpu/source_sampled");
 const WHOLE: File = wgsl!("gpu/source_whole");
 const PART: File = wgsl!("gpu/source_part");
+const SINGLE: File = wgsl!("gpu/source_single");
 
 impl SourceKind {
     /// The shader files that read this kind.
     pub(crate) fn files(self) -> &'static [File] {
         match self {
-            Self::Depth => &[DEPTH, SAMPLED, WHOLE],
-            Self::Float => &[FLOAT, SAMPLED, WHOLE],
-            Self::DepthPart => &[DEPTH, SAMPLED, PART],
-            Self::FloatPart => &[FLOAT, SAMPLED, PART],
-            Self::Bits => &[wgsl!("gpu/source_bits")],
+            Self::Depth => &[DEPTH, SAMPLED, WHOLE, SINGLE],
+            Self::Float => &[FLOAT, SAMPLED, WHOLE, SINGLE],
+            Self::DepthPart => &[DEPTH, SAMPLED, PART, SINGLE],
+            Self::FloatPart => &[FLOAT, SAMPLED, PART, SINGLE],
+            Self::Bits => &[wgsl!("gpu/source_bits"), SINGLE],
+            Self::Pair => &[wgsl!("gpu/source_pair")],
+        }
+    }
+
+    /// The shader files that read blocks of it for a reduction.
+    pub(crate) fn quad_files(self) -> &'static [File] {
+        match self {
+            Self::Depth | Self::Float => &[wgsl!("gpu/quads_sampled"), wgsl!("gpu/quads_whole")],
+            Self::DepthPart | Self::FloatPart => {
+                &[wgsl!("gpu/quads_sampled"), wgsl!("gpu/quads_part")]
+            }
+            Self::Bits => &[wgsl!("gpu/quads_bits")],
+            Self::Pair => &[wgsl!("gpu/quads_pair")],
         }
     }
 
@@ -47,7 +63,7 @@ impl SourceKind {
             Self::Float | Self::FloatPart => {
                 sampled(wgpu::TextureSampleType::Float { filterable: false })
             }
-            Self::Bits => wgpu::BindingType::StorageTexture {
+            Self::Bits | Self::Pair => wgpu::BindingType::StorageTexture {
                 access: wgpu::StorageTextureAccess::ReadOnly,
                 format: wgpu::TextureFormat::Rgba32Uint,
                 view_dimension,
@@ -61,13 +77,18 @@ impl SourceKind {
             Self::Depth | Self::Float | Self::DepthPart | Self::FloatPart => {
                 wgpu::TextureUsages::TEXTURE_BINDING
             }
-            Self::Bits => wgpu::TextureUsages::STORAGE_BINDING,
+            Self::Bits | Self::Pair => wgpu::TextureUsages::STORAGE_BINDING,
         }
+    }
+
+    /// Whether a texel holds four pixels of a row.
+    pub(crate) fn is_packed(self) -> bool {
+        matches!(self, Self::Bits | Self::Pair)
     }
 
     /// Pixels of a row that one texel holds.
     pub(crate) fn pixels_of_texel(self) -> u32 {
-        if self == Self::Bits { 4 } else { 1 }
+        if self.is_packed() { 4 } else { 1 }
     }
 
     /// The size in texels of the texture for an image of this size in pixels.
@@ -75,12 +96,12 @@ impl SourceKind {
         ImageSize::new(image.width.div_ceil(self.pixels_of_texel()), image.height)
     }
 
-    /// The kind that reads a rectangle of such a texture; none for [`SourceKind::Bits`].
+    /// The kind that reads a rectangle of such a texture; none where a texel holds four pixels.
     pub(crate) fn part(self) -> Option<Self> {
         match self {
             Self::Depth | Self::DepthPart => Some(Self::DepthPart),
             Self::Float | Self::FloatPart => Some(Self::FloatPart),
-            Self::Bits => None,
+            Self::Bits | Self::Pair => None,
         }
     }
 
@@ -112,10 +133,11 @@ impl SourceKind {
 
 /// All kinds of source, in the order of their declaration.
 #[cfg(feature = "testing")]
-pub(crate) const SOURCES: [SourceKind; 5] = [
+pub(crate) const SOURCES: [SourceKind; 6] = [
     SourceKind::Depth,
     SourceKind::Float,
     SourceKind::Bits,
     SourceKind::DepthPart,
     SourceKind::FloatPart,
+    SourceKind::Pair,
 ];

@@ -17,9 +17,9 @@ const RECURS: u32 = 16;
 /// Parts with a uniform of their own that are kept at most.
 const OWN_KEPT: usize = 4;
 
-/// What tells apart the bind groups over one part: a code of the stage that asks, and the texture
-/// that is bound beside it.
-pub(crate) type BindingKey = (u32, wgpu::TextureView);
+/// What tells apart the bind groups over one part: a code of the stage that asks, and the textures
+/// that are bound beside it.
+pub(crate) type BindingKey = (u32, wgpu::TextureView, Option<wgpu::TextureView>);
 
 /// A uniform of [`PARTS`] parts, each of which may be bound by itself.
 ///

@@ -449,7 +449,7 @@ impl Culling {
         }
     }
 
-    fn require(&self, output: &str, is_there: bool) -> Result<()> {
+    pub(super) fn require(&self, output: &str, is_there: bool) -> Result<()> {
         if is_there {
             return Ok(());
         }

@@ -10,17 +10,29 @@ use crate::host::memory;
 use crate::host::threads::{Locked, on_threads};
 use crate::input::camera::Camera;
 use crate::input::depth::{Conversion, DepthInput};
+use crate::input::far_pixels::FarPixels;
 use crate::input::image::ImageSize;
+use crate::input::near_slack::NearSlack;
 use crate::input::tolerance::DepthTolerance;
 use crate::occluders::depth::OccluderDepth;
 use crate::occluders::drawing::{DepthLoad, DrawOptions, Rasteriser, Touched};
 use crate::occluders::surface::ConservativeDepthOptions;
 use crate::occluders::uploaded::Occluders;
+use crate::pyramid::ends::Depths;
 use crate::pyramid::source::DepthSource;
 
 /// Bytes of an upload's staging buffer at most.
 /// Larger images are uploaded in bands of rows.
 const STAGING_BYTES: u32 = 1 << 26;
+
+/// What an upload has to tell of far pixels for a pyramid of `depths`.
+pub(super) fn far_pixels(depths: Depths) -> FarPixels {
+    match depths {
+        Depths::Farthest => FarPixels::Alike,
+        Depths::Nearest | Depths::Both => FarPixels::NoDepthApart,
+        Depths::Receivers => FarPixels::BackgroundApart,
+    }
+}
 
 /// A depth image on the device, and the camera that made it.
 #[derive(Debug, Clone)]
@@ -30,8 +42,14 @@ pub struct DepthImage {
     pub(super) view: wgpu::TextureView,
     pub(super) camera: Camera,
     pub(super) tolerance: DepthTolerance,
+    /// How much nearer than its depths the surfaces may be, beside the tolerance.
+    pub(super) near_slack: NearSlack,
+    /// What it tells of pixels that are far.
+    pub(super) far_pixels: FarPixels,
     /// How many samples of each pixel the depth is the farthest of.
     pub(super) samples: u32,
+    /// The nearest of several samples.
+    pub(super) nearest: Option<wgpu::Texture>,
     /// What draws occluders into it; none for an uploaded image.
     pub(super) drawn: Option<Arc<OccluderDepth>>,
 }
@@ -69,8 +87,24 @@ impl DepthImage {
 
     /// What a reduction reads.
     pub(super) fn source(&self) -> DepthSource<'_> {
-        let Self { tolerance, samples, .. } = *self;
-        DepthSource { tolerance, samples, ..DepthSource::from(&self.texture) }
+        let Self { tolerance, near_slack, samples, .. } = *self;
+        let nearest = self.nearest.as_ref();
+        let whole = DepthSource::from(&self.texture);
+        DepthSource { tolerance, near_slack, samples, nearest, ..whole }
+    }
+
+    /// Checks that it tells what a pyramid of `depths` has to know.
+    pub(super) fn check_depths(&self, depths: Depths) -> Result<()> {
+        if self.far_pixels >= far_pixels(depths) {
+            return Ok(());
+        }
+        Err(Error::mismatch(
+            "depth",
+            format!(
+                "expected an image that was uploaded for Depths::{depths:?}, got one whose \
+                 conversion has lost which pixels are no depth; upload_depth_for keeps it"
+            ),
+        ))
     }
 
     /// The NDC depths as they were given, one per pixel, row 0 on top.
@@ -112,7 +146,10 @@ impl DepthImage {
             view,
             camera: camera.clone(),
             tolerance: DepthTolerance::NONE,
+            near_slack: NearSlack::NONE,
+            far_pixels: FarPixels::BackgroundApart,
             samples: 1,
+            nearest: None,
             drawn: None,
         })
     }
@@ -178,9 +215,9 @@ impl DepthImage {
         Ok(())
     }
 
-    /// The same image with the contents that `depth` describes.
-    pub(super) fn filled(self, depth: &DepthInput<'_>) -> Result<Self> {
-        let conversion = Conversion::new(depth, &self.camera)?;
+    /// The same image with the contents that `depth` describes, for a pyramid of `depths`.
+    pub(super) fn filled(self, depth: &DepthInput<'_>, depths: Depths) -> Result<Self> {
+        let conversion = Conversion::new(depth, &self.camera)?.telling(far_pixels(depths));
         let engine = self.engine.clone();
         engine.scoped(|| match conversion.unchanged() {
             // The numbers already are what is uploaded, so they are not copied.
@@ -190,7 +227,10 @@ impl DepthImage {
                 self.write_bands(rows, threads, |first, band| conversion.rows(first, band))
             }
         })?;
-        Ok(Self { tolerance: conversion.left(), ..self })
+        let is_unchanged = conversion.unchanged().is_some();
+        let far_pixels = if is_unchanged { FarPixels::BackgroundApart } else { far_pixels(depths) };
+        let (tolerance, near_slack) = (conversion.left(), conversion.near_slack());
+        Ok(Self { tolerance, near_slack, far_pixels, ..self })
     }
 
     /// Writes the rows that `fill` makes, which gets the first row of a band and room for it.
@@ -229,8 +269,18 @@ impl DepthImage {
         camera: &Camera,
     ) -> Self {
         let (engine, camera) = (engine.clone(), camera.clone());
-        let tolerance = DepthTolerance::NONE;
-        Self { engine, texture, view, camera, tolerance, samples: 1, drawn: None }
+        Self {
+            engine,
+            texture,
+            view,
+            camera,
+            tolerance: DepthTolerance::NONE,
+            near_slack: NearSlack::NONE,
+            far_pixels: FarPixels::BackgroundApart,
+            samples: 1,
+            nearest: None,
+            drawn: None,
+        }
     }
 
     /// An image without contents, to be written from the host.
@@ -319,7 +369,10 @@ impl Engine {
                 view: drawn.view().clone(),
                 camera: camera.clone(),
                 tolerance: DepthTolerance::NONE,
+                near_slack: NearSlack::NONE,
+                far_pixels: FarPixels::BackgroundApart,
                 samples: 1,
+                nearest: None,
                 drawn: Some(drawn),
             };
             let options = DrawOptions { load: DepthLoad::Clear, ..*options };
@@ -404,8 +457,56 @@ impl Engine {
         depth: &DepthInput<'_>,
         camera: &Camera,
     ) -> Result<DepthImage> {
+        self.upload_depth_for(depth, camera, Depths::Farthest)
+    }
+
+    /// [`Engine::upload_depth_of_kind`] for a pyramid of `depths`, or of the farthest depths alone.
+    ///
+    /// What is no depth stays NaN, so that the nearest end counts it as near.
+    /// For [`Depths::Receivers`] a measured depth stops one float short of far, so that it is never
+    /// background.
+    ///
+    /// # Errors
+    /// Those of [`Engine::upload_depth_of_kind`].
+    ///
+    /// # Examples
+    /// ```
+    /// use hiz_core::headless::Engine;
+    /// use hiz_core::{DepthEnd, DepthInput, DepthKind, DepthTolerance, Depths, Floats};
+    /// use hiz_core::{PyramidOptions, WorldTolerance};
+    /// # use hiz_core::{Camera, DepthConvention, ImageSize, Pose, Projection};
+    /// # let engine = Engine::new(None)?;
+    /// # let pose = Pose { eye: [0.0; 3], target: [0.0, 0.0, -1.0], up: [0.0, 1.0, 0.0] };
+    /// # let (fov_y, convention) = (std::f64::consts::FRAC_PI_2, DepthConvention::Reversed);
+    /// # let projection = Projection::Perspective { fov_y, near: 1.0, far: None, convention };
+    /// # let camera = Camera::look_at(&pose, &projection, ImageSize::new(4, 1))?;
+    ///
+    /// // Walls at 2 m and 4 m, and a pixel without data.
+    /// let depth = DepthInput {
+    ///     numbers: Floats::F32(&[4.0, 4.0, 2.0, f32::NAN]).into(),
+    ///     kind: DepthKind::Z,
+    ///     scale: 1.0,
+    ///     invalid: &[],
+    ///     tolerance: DepthTolerance::NONE,
+    ///     world_tolerance: WorldTolerance::NONE,
+    /// };
+    /// let depth = engine.upload_depth_for(&depth, &camera, Depths::Both)?;
+    /// let options = PyramidOptions { depths: Depths::Both, ..PyramidOptions::default() };
+    /// let pyramid = engine.pyramid_with(&depth, &options)?;
+    /// let level = |end| engine.read_level_of(&pyramid, 1, end);
+    /// let farthest = level(DepthEnd::Farthest)?;
+    /// assert!((farthest[0] - 0.25).abs() < 1e-6 && farthest[1] == 0.0);
+    /// assert!((level(DepthEnd::Nearest)?[1] - 1.0).abs() < 1e-6); // near, by the pixel without data
+    /// # Ok::<(), hiz_core::Error>(())
+    /// ```
+    pub fn upload_depth_for(
+        &self,
+        depth: &DepthInput<'_>,
+        camera: &Camera,
+        depths: Depths,
+    ) -> Result<DepthImage> {
         self.check_process()?;
-        DepthImage::for_upload(self, camera)?.filled(depth)
+        DepthImage::for_upload(self, camera)?.filled(depth, depths)
     }
 
     /// [`Engine::upload_depth`] into a float texture, for tests.

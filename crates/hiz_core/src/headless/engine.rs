@@ -14,6 +14,7 @@ use crate::headless::kept_depth::KeptDepth;
 use crate::headless::process::Process;
 use crate::headless::readback;
 use crate::headless::slots::Slots;
+use crate::headless::views::Amongs;
 use crate::host::threads::Locked;
 use crate::input::image::MAX_IMAGE_SIDE;
 
@@ -73,6 +74,7 @@ struct Shared {
     images: Images,
     slots: Locked<Slots>,
     joined: JoinedPool,
+    amongs: Amongs,
     timing: Locked<Option<Timing>>,
     /// Whether the device's timestamps can be trusted, once that was checked.
     clock: OnceLock<bool>,
@@ -170,6 +172,7 @@ impl Engine {
                 images: Images::default(),
                 slots: Locked::default(),
                 joined: JoinedPool::default(),
+                amongs: Amongs::default(),
                 timing: Locked::default(),
                 clock: OnceLock::new(),
                 staging: StagingPool::new(STAGING_KEPT),
@@ -233,6 +236,10 @@ impl Engine {
     /// What joins the masks of several views.
     pub(super) fn joined(&self) -> &JoinedPool {
         &self.shared.joined
+    }
+
+    pub(super) fn amongs(&self) -> &Amongs {
+        &self.shared.amongs
     }
 
     pub(super) fn staging(&self) -> &StagingPool {

@@ -7,7 +7,7 @@ use crate::headless::depth_image::DepthImage;
 use crate::headless::engine::Engine;
 use crate::headless::readback::{self, BufferRange, to_u32};
 use crate::host::memory;
-use crate::input::depth::{foreground, sanitized, sanitized_near};
+use crate::input::depth::{is_background, sanitized, sanitized_near};
 use crate::pyramid::atlas;
 use crate::pyramid::built::Owner;
 use crate::pyramid::ends::DepthEnd;
@@ -49,6 +49,7 @@ impl Engine {
     }
 
     fn submit_reduce(&self, depth: &DepthImage, pyramid: &Pyramid) -> Result<()> {
+        depth.check_depths(pyramid.depths())?;
         let _in_order = pyramid.submitting.lock();
         let mut encoder = self.encoder("hiz.reduce.encoder");
         let gpu = &self.context().gpu;
@@ -126,20 +127,32 @@ impl Engine {
                 first: y,
                 rows: u64::from(layout.height),
             };
-            let of = &part.subresource;
-            let bytes = self.scoped(|| {
-                let copied = (of.as_image_copy(), of.texels());
-                readback::read_texels(self.device(), self.queue(), copied, &crop)
-            })?;
-            let convention = built.camera.convention();
-            let depth = |bits| match end {
-                DepthEnd::Farthest if pyramid.depths().of_receivers() => {
-                    sanitized(foreground(bits, convention), convention)
+            let (of, convention) = (&part.subresource, built.camera.convention());
+            let read = |copied| {
+                let texels = (copied, of.texels());
+                self.scoped(|| readback::read_texels(self.device(), self.queue(), texels, &crop))
+            };
+            let nearest = match &part.nearest {
+                Some(nearest) => Some(read(nearest.as_image_copy())?),
+                None => None,
+            };
+            if let (DepthEnd::Nearest, Some(nearest)) = (end, &nearest) {
+                let depth = |bits| sanitized_near(bits, convention);
+                return memory::collected(to_u32(nearest).map(depth), "level");
+            }
+            let bytes = read(of.as_image_copy())?;
+            // Where a pixel has several samples, the nearest tells whether all are background.
+            let told = to_u32(nearest.as_ref().unwrap_or(&bytes));
+            let depth = |(bits, told)| match end {
+                DepthEnd::Farthest
+                    if pyramid.depths().of_receivers() && is_background(told, convention) =>
+                {
+                    convention.near()
                 }
                 DepthEnd::Farthest => sanitized(bits, convention),
                 DepthEnd::Nearest => sanitized_near(bits, convention),
             };
-            return memory::collected(to_u32(&bytes).map(depth), "level");
+            return memory::collected(to_u32(&bytes).zip(told).map(depth), "level");
         }
         let (width, stride) = (layout.width as usize, layout.stride as usize);
         let of_end = if end == DepthEnd::Nearest { pyramid.layout.nearest } else { 0 };

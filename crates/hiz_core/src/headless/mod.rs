@@ -52,6 +52,7 @@
 mod adapter;
 mod ahead;
 mod answers;
+mod approximate;
 mod bins;
 mod clock;
 mod counts;
@@ -67,6 +68,7 @@ mod joined;
 mod kept_depth;
 mod levels;
 mod mips;
+mod pixels;
 mod process;
 mod ranges;
 pub(crate) mod readback;
@@ -81,6 +83,7 @@ mod views;
 mod warm_up;
 
 pub use adapter::{ADAPTER_VARIABLE, AdapterSummary, INSTALL_HINT, adapters};
+pub use approximate::ApproximateCulling;
 pub use bins::NO_LOD;
 pub use counts::{Counts, Timings};
 pub use cull::CullExtras;

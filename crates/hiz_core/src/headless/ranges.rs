@@ -6,6 +6,7 @@ use crate::gpu::copies::BufferRange;
 use crate::headless::answers::mask_bytes;
 use crate::instances::Instances;
 use crate::instances::piece::Piece;
+use crate::output::pixels::PixelCounts;
 use crate::output::survivors::GroupOutput;
 use crate::output::visible::{PieceOutput, Visible, verdicts_offset};
 
@@ -67,4 +68,17 @@ pub(super) fn mask_ranges<'a>(instances: &Instances, visible: &'a Visible) -> Ve
         .zip(sizes)
         .map(|(output, size)| BufferRange::first(&output.mask, size))
         .collect()
+}
+
+/// The counts of pixels of all pieces; none if they were not asked for.
+pub(super) fn pixel_ranges<'a>(
+    instances: &Instances,
+    visible: &'a Visible,
+) -> Vec<BufferRange<'a>> {
+    let pieces = instances.pieces.iter().zip(&visible.pieces);
+    let counts = pieces.filter_map(|(piece, output)| Some((piece, output.pixels.as_ref()?)));
+    let range = |(piece, counts): (&Piece, &'a wgpu::Buffer)| {
+        BufferRange::first(counts, u64::from(piece.count()) * size_of::<PixelCounts>() as u64)
+    };
+    counts.map(range).collect()
 }

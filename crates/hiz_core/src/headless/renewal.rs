@@ -6,6 +6,7 @@ use crate::headless::engine::Engine;
 use crate::headless::samples::Samples;
 use crate::input::depth::DepthInput;
 use crate::pyramid::Pyramid;
+use crate::pyramid::ends::DepthEnd;
 use crate::pyramid::layout::PIXELS;
 use crate::pyramid::region::{check_rectangle, record_reduce_region};
 
@@ -81,9 +82,10 @@ impl Engine {
             ));
         }
         check_rectangle(rectangle, depth.size())?;
-        let samples = Samples::new(rows, &depth.camera, rectangle[1])?;
+        let samples = Samples::new(rows, &depth.camera, (rectangle[1], depth.far_pixels))?;
         let (count, left) = (samples.count(), samples.tolerance());
-        if count != depth.samples || left != depth.tolerance {
+        let is_alike = count == depth.samples && left == depth.tolerance;
+        if !is_alike || samples.near_slack() != depth.near_slack {
             return Err(Error::invalid(
                 "depth",
                 format!(
@@ -94,7 +96,11 @@ impl Engine {
             ));
         }
         self.renew(pyramid, depth, rectangle, |encoder| {
-            depth.record_patch(encoder, rectangle, &samples)
+            depth.record_patch(encoder, rectangle, &samples, DepthEnd::Farthest)?;
+            if depth.nearest.is_some() {
+                depth.record_patch(encoder, rectangle, &samples, DepthEnd::Nearest)?;
+            }
+            Ok(())
         })
     }
 
@@ -130,11 +136,16 @@ impl DepthImage {
         encoder: &mut wgpu::CommandEncoder,
         [x0, y0, x1, y1]: [u32; 4],
         samples: &Samples<'_>,
+        end: DepthEnd,
     ) -> Result<()> {
+        let texture = match &self.nearest {
+            Some(nearest) if end == DepthEnd::Nearest => nearest,
+            _ => &self.texture,
+        };
         let (gpu, width) = (&self.engine.context().gpu, self.size().width);
         let height = y1 - y0 + 1;
         let mut rows = vec![0.0; (width * height) as usize];
-        samples.rows(y0, &mut rows);
+        samples.rows(y0, &mut rows, end);
         // The spare pixels of the last texel repeat the row's last pixel.
         let end = if x1 + 1 == width { width.next_multiple_of(PIXELS) } else { x1 + 1 };
         let columns = (end - x0) as usize;
@@ -160,7 +171,7 @@ impl DepthImage {
         };
         let in_texture = wgpu::TexelCopyTextureInfo {
             origin: wgpu::Origin3d { x: first, y: y0, z: 0 },
-            ..self.texture.as_image_copy()
+            ..texture.as_image_copy()
         };
         let extent = wgpu::Extent3d { width: last - first + 1, height, depth_or_array_layers: 1 };
         encoder.copy_texture_to_buffer(in_texture, in_buffer, extent);

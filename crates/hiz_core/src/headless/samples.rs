@@ -1,12 +1,15 @@
 //! Multisampled depth from the host: the farthest of each pixel's samples is uploaded.
 
 use crate::error::{Error, Result};
-use crate::headless::depth_image::DepthImage;
+use crate::headless::depth_image::{DepthImage, far_pixels};
 use crate::headless::engine::Engine;
 use crate::input::camera::Camera;
-use crate::input::depth::{Conversion, DepthInput, sanitized};
+use crate::input::depth::{Conversion, DepthInput, sanitized, sanitized_near};
+use crate::input::far_pixels::FarPixels;
 use crate::input::image::DepthConvention;
+use crate::input::near_slack::NearSlack;
 use crate::input::tolerance::DepthTolerance;
+use crate::pyramid::ends::{DepthEnd, Depths};
 
 impl Engine {
     /// Uploads the farthest depth of several samples per pixel.
@@ -23,13 +26,44 @@ impl Engine {
         samples: &[DepthInput<'_>],
         camera: &Camera,
     ) -> Result<DepthImage> {
+        self.upload_samples_for(samples, camera, Depths::Farthest)
+    }
+
+    /// [`Engine::upload_depth_of_samples`] for a pyramid of `depths`, or of the farthest depths alone.
+    ///
+    /// The nearest depth of the samples is uploaded, too, where `depths` has it.
+    /// A sample without a depth then makes its pixel near in the nearest end.
+    ///
+    /// # Errors
+    /// Those of [`Engine::upload_depth_of_samples`].
+    pub fn upload_samples_for(
+        &self,
+        samples: &[DepthInput<'_>],
+        camera: &Camera,
+        depths: Depths,
+    ) -> Result<DepthImage> {
         self.check_process()?;
-        let samples = Samples::new(samples, camera, 0)?;
-        let image = DepthImage::for_upload(self, camera)?;
-        let first = &samples.conversions[0];
-        let (rows, threads) = (first.band_rows(), first.threads());
-        self.scoped(|| image.write_bands(rows, threads, |row, band| samples.rows(row, band)))?;
-        Ok(DepthImage { samples: samples.count(), tolerance: samples.tolerance(), ..image })
+        let samples = Samples::new(samples, camera, (0, far_pixels(depths)))?;
+        let upload = |end| {
+            let image = DepthImage::for_upload(self, camera)?;
+            let first = &samples.conversions[0];
+            let (rows, threads) = (first.band_rows(), first.threads());
+            self.scoped(|| {
+                image.write_bands(rows, threads, |row, band| samples.rows(row, band, end))
+            })?;
+            Ok(image)
+        };
+        let image = upload(DepthEnd::Farthest)?;
+        let has_nearest = depths.has_nearest() && samples.count() > 1;
+        let nearest = if has_nearest { Some(upload(DepthEnd::Nearest)?.texture) } else { None };
+        Ok(DepthImage {
+            samples: samples.count(),
+            tolerance: samples.tolerance(),
+            near_slack: samples.near_slack(),
+            far_pixels: far_pixels(depths),
+            nearest,
+            ..image
+        })
     }
 }
 
@@ -41,11 +75,16 @@ pub(super) struct Samples<'a> {
 
 impl<'a> Samples<'a> {
     /// Images of whole rows of the camera's image, from row `first` on: one for each sample.
-    pub(super) fn new(samples: &[DepthInput<'a>], camera: &Camera, first: u32) -> Result<Self> {
+    pub(super) fn new(
+        samples: &[DepthInput<'a>],
+        camera: &Camera,
+        (first, far_pixels): (u32, FarPixels),
+    ) -> Result<Self> {
         if samples.is_empty() {
             return Err(Error::invalid("samples", "expected an image for each sample, got none"));
         }
-        let convert = |sample| Conversion::of_rows(sample, camera, first);
+        let convert =
+            |sample| Conversion::of_rows(sample, camera, first).map(|of| of.telling(far_pixels));
         let conversions = samples.iter().map(convert).collect::<Result<_>>()?;
         Ok(Self { conversions, convention: camera.convention() })
     }
@@ -64,24 +103,34 @@ impl<'a> Samples<'a> {
         })
     }
 
-    /// Converts whole rows, the first of which is row `first` of the image.
-    pub(super) fn rows(&self, first: u32, out: &mut [f32]) {
+    /// How near the surfaces may be: the most that any sample's may.
+    pub(super) fn near_slack(&self) -> NearSlack {
+        let all = self.conversions.iter().map(Conversion::near_slack);
+        all.reduce(|a, b| a.or(b, self.convention)).unwrap_or(NearSlack::NONE)
+    }
+
+    /// Converts whole rows to an end of the samples; the first is row `first` of the image.
+    pub(super) fn rows(&self, first: u32, out: &mut [f32], end: DepthEnd) {
         let [only_or_first, others @ ..] = self.conversions.as_slice() else { return };
         only_or_first.rows(first, out);
         if others.is_empty() {
             return;
         }
-        let depth = |d: f32| sanitized(d.to_bits(), self.convention);
+        let takes_nearest = end == DepthEnd::Nearest;
+        let depth = |d: f32| {
+            let sanitized = if takes_nearest { sanitized_near } else { sanitized };
+            sanitized(d.to_bits(), self.convention)
+        };
         out.iter_mut().for_each(|d| *d = depth(*d));
         let mut row = vec![0.0; out.len()];
         for other in others {
             other.rows(first, &mut row);
-            for (farthest, sample) in out.iter_mut().zip(&row) {
+            for (found, sample) in out.iter_mut().zip(&row) {
                 let sample = depth(*sample);
-                *farthest = if self.convention.is_reversed() {
-                    farthest.min(sample)
+                *found = if self.convention.is_reversed() == takes_nearest {
+                    found.max(sample)
                 } else {
-                    farthest.max(sample)
+                    found.min(sample)
                 };
             }
         }

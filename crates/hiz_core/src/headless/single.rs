@@ -24,6 +24,7 @@ use crate::instances::InstanceOptions;
 use crate::instances::order::StoredOrder;
 use crate::output::outputs::Outputs;
 use crate::pyramid::atlas::AtlasUse;
+use crate::pyramid::ends::Depths;
 use crate::pyramid::{Pyramid, PyramidOptions};
 
 /// Bounds of a part: as many as fit the caches of a core, and have a mask that needs no submit of
@@ -81,7 +82,7 @@ impl Engine {
                 (image, self.context().create_pyramid(camera.size(), &options)?)
             }
         };
-        let image = image.filled(depth)?;
+        let image = image.filled(depth, Depths::Farthest)?;
         self.reduce(&image, &pyramid)?;
         let pyramid = Arc::new(pyramid);
         let answer = self.cull_once(bounds, camera, &pyramid, options)?;

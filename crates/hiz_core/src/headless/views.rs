@@ -15,12 +15,19 @@ use crate::headless::culling::{Culling, spread_bits};
 use crate::headless::engine::Engine;
 use crate::headless::readback::{self, to_u32};
 use crate::host::memory;
+use crate::host::threads::Locked;
 use crate::input::camera::Camera;
-use crate::instances::Instances;
+use crate::instances::{Instances, InstancesId};
 use crate::output::draw::DrawIndexedIndirect;
 use crate::output::views::{Joined, ViewsOutputs};
 use crate::output::visible::Visible;
 use crate::pyramid::Pyramid;
+
+/// Masks of culls that are kept for later ones, with the instances that they are of.
+pub(super) type Amongs = Locked<Vec<(InstancesId, Arc<Among>)>>;
+
+/// How many are kept.
+const AMONGS_KEPT: usize = 4;
 
 /// Which instances a cull is restricted to; see [`Engine::among`].
 #[derive(Debug, Clone, Copy)]
@@ -143,11 +150,27 @@ impl Engine {
         if extras.among.is_some() {
             return Err(Error::invalid("mask", "expected no among beside it, got both"));
         }
-        let among = Among::new(&self.context().gpu, instances)?;
+        let among = self.lend_among(instances)?;
         let mut words = Vec::new();
         let mask = source.mask(instances, &mut words)?;
         record_among(&self.context().gpu, encoder, instances, &mask, &among)?;
-        Ok(Some(Arc::new(among)))
+        Ok(Some(among))
+    }
+
+    /// An [`Among`] that no cull uses any more, or a new one.
+    /// Its recording writes all of it again.
+    fn lend_among(&self, instances: &Arc<Instances>) -> Result<Arc<Among>> {
+        let mut kept = self.amongs().lock();
+        let is_free = |(id, among): &&(InstancesId, Arc<Among>)| {
+            *id == instances.id && Arc::strong_count(among) == 1
+        };
+        if let Some((_, free)) = kept.iter().find(is_free) {
+            return Ok(Arc::clone(free));
+        }
+        let among = Arc::new(Among::new(&self.context().gpu, instances)?);
+        kept.insert(0, (instances.id, Arc::clone(&among)));
+        kept.truncate(AMONGS_KEPT);
+        Ok(among)
     }
 
     /// Culls for several views, each a camera and its pyramid: one submission and one readback.

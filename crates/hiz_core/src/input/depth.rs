@@ -17,8 +17,10 @@ use crate::host::threads::{cores, on_threads};
 use crate::input::camera::Camera;
 use crate::input::depth_kind::DepthKind;
 use crate::input::depth_numbers::{DepthNumbers, of_half};
+use crate::input::far_pixels::FarPixels;
 use crate::input::image::{DepthConvention, ImageSize};
 use crate::input::lens::{Lens, toward_far};
+use crate::input::near_slack::{self, NearSlack};
 use crate::input::quick::{Number, Quick};
 use crate::input::tolerance::DepthTolerance;
 use crate::input::world_tolerance::{NdcMove, WorldTolerance};
@@ -118,8 +120,8 @@ pub fn ndc_from_kind_within<'a>(
 /// Its `world_tolerance` moves NDC depth, too, and then no tolerance is left.
 ///
 /// # Errors
-/// As [`ndc_from_kind_within`], and [`Error::Invalid`] for a world tolerance that is negative or not
-/// finite, and for one of NDC depth of a camera that does not say where view depth starts.
+/// As [`ndc_from_kind_within`], and [`Error::Invalid`] for a world tolerance that is negative or
+/// not finite, and for one of NDC depth of a camera that does not say where view depth starts.
 pub fn ndc_of(input: &DepthInput<'_>, camera: &Camera) -> Result<(Vec<f32>, DepthTolerance)> {
     let conversion = Conversion::new(input, camera)?;
     let mut ndc = memory::list(conversion.numbers.len(), "depth")?;
@@ -152,26 +154,28 @@ pub struct DepthInput<'a> {
 
 /// How the numbers of an image become NDC depth, rows at a time.
 pub(crate) struct Conversion<'a> {
-    numbers: DepthNumbers<'a>,
+    pub(super) numbers: DepthNumbers<'a>,
     /// The row of the image that the numbers begin with.
-    first_row: u32,
-    size: ImageSize,
-    convention: DepthConvention,
+    pub(super) first_row: u32,
+    pub(super) size: ImageSize,
+    pub(super) convention: DepthConvention,
     /// The invalid values as the image's type holds them.
-    invalid: Vec<f64>,
+    pub(super) invalid: Vec<f64>,
     tolerance: DepthTolerance,
     world_tolerance: WorldTolerance,
     /// `None` for NDC depth.
-    metric: Option<Metric>,
+    pub(super) metric: Option<Metric>,
     /// How NDC depth is moved by the world tolerance; `None` if it is not.
     moved: Option<NdcMove>,
+    /// What is told of pixels that are far.
+    pub(super) far_pixels: FarPixels,
 }
 
 /// The kinds `Z` and `Distance`.
-struct Metric {
-    kind: DepthKind,
+pub(super) struct Metric {
+    pub(super) kind: DepthKind,
     scale: f64,
-    lens: Lens,
+    pub(super) lens: Lens,
     quick: Option<Quick>,
 }
 
@@ -244,13 +248,38 @@ impl<'a> Conversion<'a> {
             world_tolerance,
             metric,
             moved,
+            far_pixels: FarPixels::Alike,
         })
+    }
+
+    /// The same conversion, which tells more of pixels that are far.
+    pub(crate) fn telling(self, far_pixels: FarPixels) -> Self {
+        Self { far_pixels, ..self }
     }
 
     /// The tolerance that the NDC depth still has.
     pub(crate) fn left(&self) -> DepthTolerance {
         let is_counted = self.metric.is_some() || self.moved.is_some();
-        if is_counted { DepthTolerance::NONE } else { self.tolerance }
+        let left = if is_counted { DepthTolerance::NONE } else { self.tolerance };
+        if self.unchanged().is_some() {
+            return left;
+        }
+        self.far_pixels.tolerance(self.convention).after(left)
+    }
+
+    /// How near the depth may be that the NDC depth stands for, beside the tolerance that is left.
+    pub(crate) fn near_slack(&self) -> NearSlack {
+        let reversed = self.convention.is_reversed();
+        let of_rounding = NearSlack::of_rounding(reversed);
+        match (&self.metric, &self.moved) {
+            (Some(Metric { kind, scale, lens, .. }), _) => {
+                let both = self.world_tolerance.with_rounding(self.tolerance, *scale);
+                near_slack::of_metric(lens, *kind, *scale, both)
+            }
+            (None, Some(moved)) => moved.near_slack(),
+            (None, None) if matches!(self.numbers, DepthNumbers::F64(_)) => of_rounding,
+            (None, None) => NearSlack::NONE,
+        }
     }
 
     /// The numbers, where they already are the NDC depth.
@@ -288,6 +317,9 @@ impl<'a> Conversion<'a> {
             }
             DepthNumbers::F16(bits) => self.widened(first, &bits[range], of_half, out),
             DepthNumbers::U16(numbers) => self.widened(first, &numbers[range], f32::from, out),
+        }
+        if self.far_pixels != FarPixels::Alike {
+            self.tell_apart(first, out);
         }
     }
 
@@ -343,16 +375,10 @@ impl<'a> Conversion<'a> {
 
     /// The NDC depth of one number, by the bounds of its own pixel.
     fn exact(&self, metric: &Metric, column: u32, row: u32, number: f64) -> f32 {
-        let Metric { kind, scale, lens, .. } = metric;
-        let value = number * scale;
-        let known =
-            value.is_finite() && (value > 0.0 || lens.signed) && !self.invalid.contains(&number);
-        if !known {
+        let Metric { kind, lens, .. } = metric;
+        let Some((value, off)) = self.value_of(metric, number) else {
             return self.convention.far();
-        }
-        // Slightly more than the tolerance, to cover the roundings of this expression.
-        let DepthTolerance { relative, absolute } = self.tolerance;
-        let off = (number.abs() * relative + absolute) * scale * (1.0 + 1e-15);
+        };
         let own = lens.ndc(column, row, (value, off), *kind);
         let by = self.world_tolerance;
         if by == WorldTolerance::NONE || own == self.convention.far() {
@@ -362,6 +388,19 @@ impl<'a> Conversion<'a> {
         let moved = by.moved(value);
         let off = (off * (1.0 + by.relative) + moved.abs() * MOVED_ROUNDINGS) * (1.0 + 1e-15);
         lens.ndc(column, row, (moved, off), *kind)
+    }
+
+    /// A number in world units, and by how much it may be off; `None` for what is no depth.
+    #[inline]
+    pub(super) fn value_of(&self, metric: &Metric, number: f64) -> Option<(f64, f64)> {
+        let Metric { scale, lens, .. } = metric;
+        let value = number * scale;
+        let known =
+            value.is_finite() && (value > 0.0 || lens.signed) && !self.invalid.contains(&number);
+        // Slightly more than the tolerance, to cover the roundings of this expression.
+        let DepthTolerance { relative, absolute } = self.tolerance;
+        let off = (number.abs() * relative + absolute) * scale * (1.0 + 1e-15);
+        known.then_some((value, off))
     }
 }
 
@@ -405,15 +444,9 @@ pub(crate) fn sanitized_near(bits: u32, convention: DepthConvention) -> f32 {
     }
 }
 
-/// The bits of a pixel, or those of near for background: what has exactly the bits of far, or -0
-/// where far is 0.
-pub(crate) fn foreground(bits: u32, convention: DepthConvention) -> u32 {
-    let negative_zero = convention.is_reversed() && bits == (-0.0_f32).to_bits();
-    if bits == convention.far().to_bits() || negative_zero {
-        convention.near().to_bits()
-    } else {
-        bits
-    }
+/// Whether a pixel shows the background: exactly the bits of far, or -0 where far is 0.
+pub(crate) fn is_background(bits: u32, convention: DepthConvention) -> bool {
+    f32::from_bits(bits) == convention.far()
 }
 
 #[cfg(test)]

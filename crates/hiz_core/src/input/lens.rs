@@ -60,13 +60,45 @@ impl Lens {
     ///
     /// `value` may be off by up to `off` in either direction.
     #[inline]
-    pub(super) fn ndc(
+    pub(super) fn ndc(&self, column: u32, row: u32, value: (f64, f64), kind: DepthKind) -> f32 {
+        let (depth, lost) = self.depth(column, row, value, kind);
+        toward_far_by(depth, lost, self.reversed)
+    }
+
+    /// Whether the depth of the same number may lie between the planes, where it surely does not lie
+    /// in front of the near plane.
+    pub(super) fn may_lie_inside(
+        &self,
+        column: u32,
+        row: u32,
+        value: (f64, f64),
+        kind: DepthKind,
+    ) -> bool {
+        let (depth, lost) = self.depth(column, row, value, kind);
+        if self.reversed {
+            (0.0..=1.0).contains(&(depth + lost))
+        } else {
+            (0.0..=1.0).contains(&(depth - lost))
+        }
+    }
+
+    /// Whether equal numbers of a kind have equal depths, wherever in the image they are.
+    pub(super) fn is_alike(&self, kind: DepthKind) -> bool {
+        match &self.rays {
+            Rays::Parallel { .. } => true,
+            Rays::FromEye { k, .. } => kind == DepthKind::Z && k[0] == 0.0 && k[1] == 0.0,
+        }
+    }
+
+    /// The NDC depth of the number, and a bound of its error; NaN where too little is known.
+    #[inline]
+    fn depth(
         &self,
         column: u32,
         row: u32,
         (value, off): (f64, f64),
         kind: DepthKind,
-    ) -> f32 {
+    ) -> (f64, f64) {
         match &self.rays {
             // The rays are parallel, so view depth and distance are the same.
             // Roundings: `value`, the slope (6), the constant, the product and the sum, less than
@@ -75,7 +107,7 @@ impl Lens {
                 let terms = [slope * value, *constant];
                 let of_value = slope.abs() * off * (1.0 + 16.0 * ROUNDING);
                 let lost = 12.0 * ROUNDING * (terms[0].abs() + terms[1].abs()) + tilt + of_value;
-                toward_far_by(terms[0] + terms[1], lost, self.reversed)
+                (terms[0] + terms[1], lost)
             }
             Rays::FromEye { k, constant, k_error, constant_error, inverse, w_length } => {
                 // The numerators are whole numbers and exact, so each ratio is rounded once.
@@ -93,7 +125,7 @@ impl Lens {
                 // Where depth is off by a share s, 1 / w is off by at most the share s / (1 - s).
                 let share = off / value;
                 if share >= 0.5 {
-                    return if self.reversed { 0.0 } else { 1.0 };
+                    return (f64::NAN, 0.0);
                 }
                 let per_w_error = per_w_error
                     + (per_w + per_w_error) * share / (1.0 - share) * (1.0 + 16.0 * ROUNDING);
@@ -107,7 +139,7 @@ impl Lens {
                     + constant_error * per_w
                     + (constant.abs() + constant_error) * per_w_error;
                 let lost = 16.0 * ROUNDING * size + inherited * (1.0 + 1e-9);
-                toward_far_by(terms.iter().sum(), lost, self.reversed)
+                (terms.iter().sum(), lost)
             }
         }
     }

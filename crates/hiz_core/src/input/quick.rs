@@ -393,6 +393,17 @@ fn from_eye(
     Some((form, margin, knows_depth))
 }
 
+/// The share of a quotient that the length of its ray may lose, in float64 and in float32.
+pub(super) fn length_share(lens: &Lens, kind: DepthKind) -> f64 {
+    match &lens.rays {
+        Rays::FromEye { inverse, w_length, .. } if kind == DepthKind::Distance => {
+            let (length, lost) = RayLength::new(inverse, *w_length, lens.size[0]);
+            lost + length.lost_in_single(true)
+        }
+        _ => 0.0,
+    }
+}
+
 /// x of the columns' centres, from -1 to 1.
 fn columns(width: f64) -> Vec<f64> {
     (0..width as u32).map(|column| (2.0 * f64::from(column) + 1.0 - width) / width).collect()

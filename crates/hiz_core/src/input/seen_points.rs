@@ -159,7 +159,7 @@ pub fn add_colours(
     let (count, size) = (visible.len(), camera.size());
     for (name, got, expected) in [
         ("positions", positions.len(), 3 * count),
-        ("image", image.len() as usize, 3 * size.pixels() as usize),
+        ("image", image.len(), 3 * size.pixels() as usize),
         ("colours", sums.colours.len(), 3 * count),
         ("weights", sums.weights.len(), count),
         ("counts", sums.counts.len(), count),

@@ -7,7 +7,9 @@
 use crate::error::{Error, Result};
 use crate::host::rounding::ROUNDING;
 use crate::input::camera::Camera;
+use crate::input::depth_kind::DepthKind;
 use crate::input::lens::{Lens, Rays, toward_far};
+use crate::input::near_slack::{self, NearSlack};
 use crate::input::quick::Number;
 use crate::input::tolerance::DepthTolerance;
 
@@ -113,7 +115,8 @@ impl NdcMove {
             )
         })?;
         let lost = match &lens.rays {
-            // Roundings of the difference, the products and the sums: less than 16 of 1 + |constant|.
+            // Roundings of the difference, the products and the sums are less than 16 of
+            // 1 + |constant|.
             // A depth that is off by `tilt` moves by so much of it.
             Rays::Parallel { constant, tilt, .. } => {
                 16.0 * ROUNDING * (1.0 + constant.abs()) + tilt * tolerance.relative
@@ -129,6 +132,18 @@ impl NdcMove {
             }
         };
         Ok(Self { lens, tolerance, rounding, lost })
+    }
+
+    /// How near the depth may be that a moved one stands for.
+    pub(super) fn near_slack(&self) -> NearSlack {
+        let Self { lens, tolerance, rounding, lost } = self;
+        let WorldTolerance { relative, absolute } = *tolerance;
+        let of_move = DepthTolerance { relative, absolute };
+        let slack = near_slack::of_metric(lens, DepthKind::Z, 1.0, of_move);
+        // The number was rounded before it was moved, and was moved by as much.
+        let off = 2.0 * (rounding.relative + rounding.absolute);
+        // The quotient's growth applies to what rounding may add to it.
+        NearSlack { offset: slack.offset + 2.0 * (off + 2.0 * lost), ..slack }
     }
 
     /// Moves the NDC depths of a row away from the eye, rounded to float32 towards far.
@@ -178,7 +193,6 @@ mod tests {
     use super::*;
     use crate::input::bounds::Floats;
     use crate::input::depth::{DepthInput, ndc_of};
-    use crate::input::depth_kind::DepthKind;
     use crate::input::image::{DepthConvention, ImageSize};
     use crate::input::lens::test_cameras::POSE;
     use crate::input::projection::Projection;

@@ -9,7 +9,7 @@
 //!   the list has no room for.
 //! - `views` joins the masks of several views.
 //! - `readback` copies them to the host, a ring of slots at a time.
-//! - `draw`, `counters` and `verdict` have the layouts and codes that the shaders share.
+//! - `draw`, `counters`, `pixels` and `verdict` have the layouts and codes that the shaders share.
 //!
 //! This room makes buffers and records commands; it never submits or waits.
 
@@ -23,6 +23,7 @@ pub(crate) mod emit_passes;
 pub(crate) mod lists;
 pub(crate) mod mesh_table;
 pub(crate) mod outputs;
+pub(crate) mod pixels;
 pub(crate) mod readback;
 pub(crate) mod survivors;
 pub(crate) mod verdict;

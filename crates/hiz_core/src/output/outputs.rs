@@ -53,6 +53,12 @@ pub struct Outputs {
     /// The draw arguments.
     /// Their instance count is the length of the list, whether or not there is a list.
     pub draws: bool,
+    /// The [`PixelCounts`](crate::PixelCounts) of each instance, by a pass of its own.
+    pub pixels: bool,
+    /// How many rows of four texels that pass may read of an instance.
+    /// The pixels that are left then count as undecided.
+    /// `None`: as many as it takes.
+    pub pixel_budget: Option<u32>,
     /// How many indices are written at most, in all pieces together.
     /// `None`: as many as there are instances.
     pub capacity: Option<u32>,
@@ -69,16 +75,20 @@ impl Outputs {
         verdicts: false,
         indices: false,
         draws: false,
+        pixels: false,
+        pixel_budget: None,
         capacity: None,
         draw: DrawTemplate { index_count: 0, first_index: 0, base_vertex: 0, first_instance: 0 },
         emit: Emit::List,
     };
-    /// Everything, for all instances.
+    /// Everything but counts of pixels, for all instances.
     pub const ALL: Self = Self {
         mask: true,
         verdicts: true,
         indices: true,
         draws: true,
+        pixels: false,
+        pixel_budget: None,
         capacity: None,
         draw: DrawTemplate { index_count: 0, first_index: 0, base_vertex: 0, first_instance: 0 },
         emit: Emit::List,
@@ -92,6 +102,7 @@ impl std::fmt::Display for Outputs {
             (self.verdicts, "verdicts"),
             (self.indices, "indices"),
             (self.draws, "draws"),
+            (self.pixels, "pixels"),
         ];
         let names: Vec<_> =
             all.into_iter().filter_map(|(asked, name)| asked.then_some(name)).collect();

@@ -211,8 +211,12 @@ pub(crate) fn record_readback(
     if visible.outputs().emit != Emit::List && visible.draw_arguments().is_some() {
         return Err(Error::invalid(
             "visible",
-            "expected outputs with Emit::List, or with a mask alone: bins and copied records are \
-             for the device's draws",
+            format!(
+                "expected outputs with Emit::List, or with a mask alone, got {}: bins and copied \
+                 records are for the device's draws; copy Visible::list and draw_arguments into \
+                 a buffer of your own, or let a second cull with a mask be read",
+                visible.outputs()
+            ),
         ));
     }
     let slot = Slot::take(ring)?;

@@ -72,7 +72,7 @@ impl ViewsOutputs {
     pub(crate) fn completed(&self) -> Self {
         Self {
             each: Outputs { mask: true, ..self.each.clone() },
-            any: Outputs { mask: true, verdicts: false, ..self.any.clone() },
+            any: Outputs { mask: true, verdicts: false, pixels: false, ..self.any.clone() },
         }
     }
 }

@@ -14,6 +14,7 @@ use crate::output::counters::StatisticsRecord;
 use crate::output::draw::DrawIndexedIndirect;
 use crate::output::lists::Lists;
 use crate::output::outputs::Outputs;
+use crate::output::pixels::PixelCounts;
 use crate::output::survivors::GroupOutput;
 
 /// Places whose verdicts `shaders/cull/count.wgsl` reads at once.
@@ -25,6 +26,8 @@ pub(crate) struct PieceOutput {
     /// One bit per instance, in the caller's order.
     /// From `verdicts_offset` on follows one word per place: its verdict.
     pub(crate) mask: wgpu::Buffer,
+    /// The counts of pixels, in the caller's order, if they were asked for.
+    pub(crate) pixels: Option<wgpu::Buffer>,
     /// Made by the first cull that tests groups.
     groups: OnceLock<GroupOutput>,
     /// What culls bind, made by the first of each kind.
@@ -121,7 +124,7 @@ impl Visible {
         let pieces = instances
             .pieces
             .iter()
-            .map(|piece| PieceOutput::new(gpu, piece, outputs.verdicts, of_two_passes));
+            .map(|piece| PieceOutput::new(gpu, piece, outputs, of_two_passes));
         let listed = outputs.indices || outputs.draws;
         let most = capacity.unwrap_or(instances.len());
         let bins =
@@ -246,6 +249,16 @@ impl Visible {
         self.outputs.mask.then_some(&self.pieces[piece].mask)
     }
 
+    /// A piece's counts of pixels: [`PixelCounts`] in the caller's numbering, five u32 words per
+    /// instance.
+    /// `None` without [`Outputs::pixels`].
+    ///
+    /// # Panics
+    /// If `piece` is not below [`Visible::num_pieces`].
+    pub fn pixels(&self, piece: usize) -> Option<&wgpu::Buffer> {
+        self.pieces[piece].pixels.as_ref()
+    }
+
     /// How many indices are written at most, in all pieces together.
     pub fn capacity(&self) -> u32 {
         self.capacity
@@ -282,11 +295,14 @@ impl Visible {
 }
 
 impl PieceOutput {
-    fn new(gpu: &Gpu, piece: &Piece, has_verdicts: bool, has_tail: bool) -> Result<Self> {
+    fn new(gpu: &Gpu, piece: &Piece, outputs: &Outputs, has_tail: bool) -> Result<Self> {
         let tail = if has_tail { 4 * u64::from(piece.words()) } else { 0 };
-        let size = (early_offset(piece, has_verdicts) + tail).max(32);
+        let size = (early_offset(piece, outputs.verdicts) + tail).max(32);
+        let counts = u64::from(piece.count().max(1)) * size_of::<PixelCounts>() as u64;
+        let pixels = || gpu.empty("hiz.visible.pixels", counts, STORAGE);
         Ok(Self {
             mask: gpu.empty("hiz.visible.mask", size, STORAGE)?,
+            pixels: outputs.pixels.then(pixels).transpose()?,
             groups: OnceLock::new(),
             bindings: Default::default(),
         })
@@ -304,7 +320,7 @@ impl PieceOutput {
 
     fn size(&self) -> u64 {
         let of_groups = self.groups.get().map_or(0, GroupOutput::size);
-        self.mask.size() + of_groups
+        self.mask.size() + of_groups + self.pixels.as_ref().map_or(0, wgpu::Buffer::size)
     }
 }
 

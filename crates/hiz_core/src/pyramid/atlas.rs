@@ -31,6 +31,7 @@ const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 ///   [`Rgba32Uint`](wgpu::TextureFormat::Rgba32Uint).
 /// - It has the usage [`COPY_SRC`](wgpu::TextureUsages::COPY_SRC).
 /// - It is all of its mip level, and no rectangle of it ([`DepthSource`](crate::DepthSource)).
+/// - It is one image, and no pair of farthest and nearest samples.
 /// - The stored levels fit one storage binding.
 /// - The atlas fits a texture of the device, and the depth image a buffer to copy it through.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -64,6 +65,7 @@ pub(crate) fn is_possible(layout: &PyramidLayout, part: &Part, limits: &wgpu::Li
     let source = &part.subresource.texture;
     travels(source.format())
         && !part.kind.is_part()
+        && part.nearest.is_none()
         && source.usage().contains(wgpu::TextureUsages::COPY_SRC)
         && layout.chunk_sizes().len() == 1
         && layout.atlas.fits(limits)

@@ -17,6 +17,8 @@ pub(crate) struct Built {
     /// The number of the reduction; once that has run, the pyramid's header holds it.
     pub(crate) reduction: u32,
     pub(crate) source: wgpu::TextureView,
+    /// The image of the nearest samples, where `source` has the farthest of several.
+    pub(crate) nearest: Option<wgpu::TextureView>,
     /// Where the image lies in its texture, and what was rounded in it: every cull counts that.
     pub(crate) part: Part,
     pub(crate) camera: Camera,

@@ -5,7 +5,8 @@ use crate::pyramid::Pyramid;
 
 /// The texels of one stored level in a buffer on the device.
 ///
-/// Each is a float32 of NDC depth: the farthest of a block of `2^level` by `2^level` pixels.
+/// Each is a float32 of NDC depth: the farthest of a block of `2^level` by `2^level` pixels, or the
+/// nearest ([`Pyramid::nearest_texels`]).
 /// Texel `(x, y)` is word `first + y * stride + x` of the buffer, with row 0 on top.
 /// The words are those of the last reduction that has run.
 ///
@@ -24,6 +25,7 @@ use crate::pyramid::Pyramid;
 /// assert_eq!((level.size.width, level.size.height), (8, 4));
 /// assert!(level.stride >= 8);
 /// assert!(pyramid.level_texels(0).is_none()); // the depth image itself
+/// assert!(pyramid.nearest_texels(1).is_none()); // `Depths::Both` stores them, too
 /// # Ok::<(), hiz_core::Error>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
@@ -40,6 +42,7 @@ pub struct LevelTexels<'a> {
 
 impl Pyramid {
     /// The texels of a level on the device, for a shader that shows them.
+    /// They have the farthest depths, or the nearest where the pyramid has these alone.
     ///
     /// `None` for these levels:
     ///
@@ -47,18 +50,34 @@ impl Pyramid {
     /// - a level that is not stored, or past the last one;
     /// - a level that needs more than one storage binding of this device.
     pub fn level_texels(&self, level: u32) -> Option<LevelTexels<'_>> {
+        self.texels_of(level, 0)
+    }
+
+    /// As [`Pyramid::level_texels`], of the nearest depths of each block.
+    ///
+    /// `None` also where the pyramid does not store these ([`Pyramid::has_nearest`]).
+    pub fn nearest_texels(&self, level: u32) -> Option<LevelTexels<'_>> {
+        if !self.has_nearest() {
+            return None;
+        }
+        self.texels_of(level, self.layout.nearest)
+    }
+
+    /// The texels of a level that begin `behind` words behind its first ones.
+    fn texels_of(&self, level: u32, behind: u32) -> Option<LevelTexels<'_>> {
         if level == 0 || !self.layout.is_there(level) {
             return None;
         }
         let found = self.layout.levels.get(level as usize)?;
-        let last = found.offset + found.stride * found.height - 1;
-        let [chunk, other] = [found.offset, last].map(|word| word >> self.layout.chunk_shift);
+        let first = found.offset + behind;
+        let last = first + found.stride * found.height - 1;
+        let [chunk, other] = [first, last].map(|word| word >> self.layout.chunk_shift);
         if chunk != other {
             return None;
         }
         Some(LevelTexels {
             buffer: &self.chunks[chunk as usize],
-            first: found.offset - (chunk << self.layout.chunk_shift),
+            first: first - (chunk << self.layout.chunk_shift),
             stride: found.stride,
             size: ImageSize::new(found.width, found.height),
         })

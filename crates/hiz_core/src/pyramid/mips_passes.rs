@@ -1,6 +1,6 @@
 //! The passes that fill a mip texture: `shaders/pyramid/mips.wgsl`, then a copy per level.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::buffers::entry;
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::device::Gpu;
@@ -10,6 +10,7 @@ use crate::gpu::pipelines::{Compute, flag};
 use crate::gpu::shader::{Source, wgsl};
 use crate::gpu::stage_times::stage_pass;
 use crate::input::image::DepthConvention;
+use crate::pyramid::ends::Depths;
 use crate::pyramid::layout::{BLOCK_ALIGNMENT, PIXELS};
 use crate::pyramid::levels::Level;
 use crate::pyramid::mips::{MipDepths, MipLookup, MipTexture};
@@ -109,6 +110,26 @@ impl Dispatch<'_> {
     }
 }
 
+/// The ends that are read of `depth`; both are those of one image.
+///
+/// # Errors
+/// [`Error::Invalid`] for both ends of several samples per pixel.
+fn ends_of(depth: &DepthSource<'_>, mips: &MipTexture) -> Result<Depths> {
+    match mips.options.depths {
+        MipDepths::Farthest => Ok(Depths::Farthest),
+        MipDepths::Nearest => Ok(Depths::Nearest),
+        MipDepths::Both if depth.samples > 1 => Err(Error::invalid(
+            "depths",
+            format!(
+                "expected MipDepths::Farthest or Nearest for {} samples per pixel, got Both; make \
+                 a mip texture of each",
+                depth.samples
+            ),
+        )),
+        MipDepths::Both => Ok(Depths::Farthest),
+    }
+}
+
 /// Records the passes that fill `mips` from `depth`.
 ///
 /// # Errors
@@ -121,7 +142,8 @@ pub(crate) fn record_mips(
     mips: &MipTexture,
 ) -> Result<()> {
     gpu.check_context("mips", mips.context)?;
-    let part = Part::new(depth, Sampling::Single, mips.size, "mip texture")?;
+    let part =
+        Part::new(depth, Sampling::Single, (mips.size, "mip texture"), ends_of(depth, mips)?)?;
     // Everything that can fail comes before the first command is recorded.
     let source = bind_source(gpu, &part, mips)?;
     let (plan, reversed) = (&mips.plan, convention.is_reversed());

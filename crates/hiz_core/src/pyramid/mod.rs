@@ -72,6 +72,12 @@ const _: () = assert!(size_of::<PyramidUniform>() == 528);
 /// A renderer may alternate between a few.
 const KEPT_IMAGES: usize = 3;
 
+/// What tells the bind groups of reductions apart: the image, that of nearest samples, the kind.
+pub(crate) type SourceKey = (Subresource, Option<wgpu::Texture>, SourceKind);
+
+/// What a reduction binds for an image, with the views of both images.
+pub(crate) type BoundSource = (wgpu::BindGroup, wgpu::TextureView, Option<wgpu::TextureView>);
+
 /// Labels of the stand-ins that are bound for the chunks that a small pyramid does not have.
 const NO_CHUNK: [&str; PYRAMID_CHUNKS] = ["hiz.no_chunk_0", "hiz.no_chunk_1", "hiz.no_chunk_2"];
 
@@ -161,7 +167,7 @@ pub struct Pyramid {
     /// The view of a cull, for instances and for groups.
     pub(crate) view: RecordedUniform,
     /// What reductions bind for a depth image, and the view of it that they bind.
-    pub(crate) sources: Kept<(Subresource, SourceKind), (wgpu::BindGroup, wgpu::TextureView)>,
+    pub(crate) sources: Kept<SourceKey, BoundSource>,
     /// What the steps of a reduction bind.
     pub(crate) steps: Steps,
     /// The same for reductions of a part; made by the first of them.
@@ -366,7 +372,9 @@ impl Pyramid {
     /// # Errors
     /// [`Error::Mismatch`] for a destroyed depth image.
     pub(crate) fn check_source(gpu: &Gpu, built: &Built) -> Result<()> {
-        gpu.view(built.source.texture()).map(drop).map_err(|error| match error {
+        let views = [&built.source].into_iter().chain(&built.nearest);
+        let mut textures = views.map(wgpu::TextureView::texture);
+        textures.try_for_each(|texture| gpu.view(texture).map(drop)).map_err(|error| match error {
             Error::Device(why) => Error::mismatch(
                 "pyramid",
                 format!(

@@ -16,18 +16,20 @@ use crate::gpu::shader::{File, Source, wgsl};
 use crate::gpu::stage_times::stage_pass;
 use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
-use crate::pyramid::Pyramid;
 use crate::pyramid::blocks::Blocks;
 use crate::pyramid::built::Built;
 use crate::pyramid::ends::Depths;
 use crate::pyramid::layout::Step;
 use crate::pyramid::source::{DepthSource, Part, Sampling};
 use crate::pyramid::steps::{Recording, STEP_BINDINGS, Staged, Steps};
+use crate::pyramid::{BoundSource, Pyramid};
 
 /// The bindings of the depth image and the pyramid.
-const fn bindings(source: SourceKind) -> [(u32, Binding); 6] {
+fn bindings(source: SourceKind) -> Vec<(u32, Binding)> {
     use Binding::{Depth, Sampler, Uniform, Write};
-    [(0, Depth(source)), (1, Sampler), (2, Uniform), (3, Write), (4, Write), (5, Write)]
+    let one = [(0, Depth(source)), (1, Sampler), (2, Uniform), (3, Write), (4, Write), (5, Write)];
+    let nearest = (source == SourceKind::Pair).then_some((7, Depth(source)));
+    one.into_iter().chain(nearest).collect()
 }
 
 /// Which shader and entry point make a step.
@@ -66,6 +68,7 @@ fn reduce_module(source: SourceKind, ends: EndFiles, entry: File) -> Source {
     Source::of(&[
         &[wgsl!("gpu/depth_bits")],
         source.files(),
+        source.quad_files(),
         ends.files(),
         &[wgsl!("pyramid/pyramid"), wgsl!("pyramid/pyramid_write"), entry],
     ])
@@ -154,8 +157,8 @@ impl Prepared {
         pyramid: &Pyramid,
     ) -> Result<Self> {
         let kind = part.kind;
-        let (source, view) = source_bindings(gpu, &part, pyramid)?;
-        let built = Built { reduction: number, source: view, part, camera, owner: None };
+        let (source, view, nearest) = source_bindings(gpu, &part, pyramid)?;
+        let built = Built { reduction: number, source: view, nearest, part, camera, owner: None };
         let dispatch = |(step, blocks): (&Step, &Blocks)| {
             let tall = step.source == 0 && reads_tall(step, kind, pyramid.size());
             let (shape, workgroups) = shape_of(step, blocks.size(), tall);
@@ -179,7 +182,7 @@ impl Prepared {
     ) -> Result<Self> {
         gpu.check_context("pyramid", pyramid.context)?;
         let size = pyramid.size();
-        let part = Part::new(depth, Sampling::Single, size, "pyramid")?;
+        let part = Part::new(depth, Sampling::Single, (size, "pyramid"), pyramid.depths())?;
         if size != camera.size() {
             return Err(Error::mismatch(
                 "camera",
@@ -270,17 +273,16 @@ pub(crate) fn record_idle_reduce(
 
 /// The bind group of the reduction and the view of the depth image that it binds, kept from an
 /// earlier reduction of the same image if there was one.
-fn source_bindings(
-    gpu: &Gpu,
-    part: &Part,
-    pyramid: &Pyramid,
-) -> Result<(wgpu::BindGroup, wgpu::TextureView)> {
-    let Some(kept) = pyramid.sources.find(&(part.subresource.clone(), part.kind)) else {
+fn source_bindings(gpu: &Gpu, part: &Part, pyramid: &Pyramid) -> Result<BoundSource> {
+    let key = (part.subresource.clone(), part.nearest.clone(), part.kind);
+    let Some(kept) = pyramid.sources.find(&key) else {
         let bound = bind_source(gpu, part, pyramid).map_err(refused)?;
-        return pyramid.sources.get((part.subresource.clone(), part.kind), || Ok(bound));
+        return pyramid.sources.get(key, || Ok(bound));
     };
-    // A bind group does not tell that its texture was destroyed since, but a new view does.
-    gpu.view(&part.subresource.texture).map_err(refused)?;
+    // A bind group does not tell that a texture was destroyed since, but a new view does.
+    for texture in [&part.subresource.texture].into_iter().chain(&part.nearest) {
+        gpu.view(texture).map_err(refused)?;
+    }
     Ok(kept)
 }
 
@@ -299,27 +301,26 @@ pub(super) fn refused(error: Error) -> Error {
 }
 
 /// The bind group of the reduction, and the view of the depth image that it binds.
-fn bind_source(
-    gpu: &Gpu,
-    part: &Part,
-    pyramid: &Pyramid,
-) -> Result<(wgpu::BindGroup, wgpu::TextureView)> {
+fn bind_source(gpu: &Gpu, part: &Part, pyramid: &Pyramid) -> Result<BoundSource> {
     let layout = gpu.layout("hiz.reduce.layout", &bindings(part.kind))?;
     let chunks = [pyramid.chunk(gpu, 0)?, pyramid.chunk(gpu, 1)?, pyramid.chunk(gpu, 2)?];
     let view = part.subresource.view(gpu)?;
-    let bound = gpu.bind_group(
-        "hiz.reduce.pyramid",
-        &layout,
-        &[
-            entry(0, wgpu::BindingResource::TextureView(&view)),
-            entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
-            entry(2, pyramid.uniform.as_entire_binding()),
-            entry(3, chunks[0].as_entire_binding()),
-            entry(4, chunks[1].as_entire_binding()),
-            entry(5, chunks[2].as_entire_binding()),
-        ],
-    )?;
-    Ok((bound, view))
+    let nearest = part.nearest.as_ref().map(|texture| {
+        gpu.check_owned(texture)?;
+        gpu.view(texture)
+    });
+    let nearest = nearest.transpose()?;
+    let mut entries = vec![
+        entry(0, wgpu::BindingResource::TextureView(&view)),
+        entry(1, wgpu::BindingResource::Sampler(gpu.sampler())),
+        entry(2, pyramid.uniform.as_entire_binding()),
+        entry(3, chunks[0].as_entire_binding()),
+        entry(4, chunks[1].as_entire_binding()),
+        entry(5, chunks[2].as_entire_binding()),
+    ];
+    entries.extend(nearest.as_ref().map(|n| entry(7, wgpu::BindingResource::TextureView(n))));
+    let bound = gpu.bind_group("hiz.reduce.pyramid", &layout, &entries)?;
+    Ok((bound, view, nearest))
 }
 
 /// The shader of a step, and its workgroups for so many columns and rows of blocks.
@@ -349,7 +350,7 @@ fn shape_of(step: &Step, blocks: [u32; 2], tall: bool) -> (Shape, [u32; 2]) {
 /// - Images with four pixels per texel, except in coarse steps.
 /// - Rows that begin at multiples of a page, which would all fall into the same lines of a cache.
 fn reads_tall(step: &Step, source: SourceKind, size: ImageSize) -> bool {
-    (source != SourceKind::Bits || step.is_coarse()) && !size.width.is_multiple_of(PAGE_PIXELS)
+    (!source.is_packed() || step.is_coarse()) && !size.width.is_multiple_of(PAGE_PIXELS)
 }
 
 /// A new number for a reduction, never 0.

@@ -32,7 +32,7 @@ pub(crate) fn record_reduce_region(
              builds it",
         )
     })?;
-    let part = Part::new(depth, Sampling::Single, pyramid.size(), "pyramid")?;
+    let part = Part::new(depth, Sampling::Single, (pyramid.size(), "pyramid"), pyramid.depths())?;
     if part != built.part {
         return Err(Error::mismatch(
             "depth",
@@ -65,7 +65,7 @@ pub(crate) fn record_idle_region(
     camera: &Camera,
     pyramid: &Pyramid,
 ) -> Result<()> {
-    let part = Part::new(depth, Sampling::Single, pyramid.size(), "pyramid")?;
+    let part = Part::new(depth, Sampling::Single, (pyramid.size(), "pyramid"), pyramid.depths())?;
     let layout = &pyramid.layout;
     let blocks: Vec<_> = layout.steps.iter().map(Blocks::all).collect();
     let steps = made(&pyramid.part_steps, || Steps::new(gpu, &layout.steps))?;

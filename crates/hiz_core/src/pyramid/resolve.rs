@@ -18,6 +18,7 @@ use crate::host::threads::Locked;
 use crate::input::camera::Camera;
 use crate::input::image::ImageSize;
 use crate::input::tolerance::DepthTolerance;
+use crate::pyramid::ends::Depths;
 use crate::pyramid::layout::PIXELS;
 use crate::pyramid::reduce::refused;
 use crate::pyramid::source::{DepthSource, Part, Sampling, Subresource};
@@ -199,6 +200,11 @@ impl DepthResolve {
         self.size
     }
 
+    /// The texture of [`DepthResolve::farthest`], before anything was resolved into it.
+    pub(crate) fn unresolved(&self) -> Option<DepthSource<'_>> {
+        self.farthest.as_ref().map(DepthSource::from)
+    }
+
     /// The farthest depth of each pixel's samples, as
     /// [`record_reduce`](crate::HizContext::record_reduce) takes it.
     ///
@@ -212,7 +218,28 @@ impl DepthResolve {
     pub fn farthest(&self) -> Result<DepthSource<'_>> {
         let (samples, tolerance) = self.resolved()?;
         let texture = made(self.farthest.as_ref(), "Farthest or Both", self.depths)?;
-        Ok(DepthSource { samples, tolerance, ..DepthSource::from(texture) })
+        let nearest = self.nearest.as_ref();
+        Ok(DepthSource { samples, tolerance, nearest, ..DepthSource::from(texture) })
+    }
+
+    /// All that was made, as [`record_reduce`](crate::HizContext::record_reduce) takes it for a
+    /// pyramid of any [`Depths`].
+    ///
+    /// | resolved | pyramids of |
+    /// |---|---|
+    /// | [`ResolvedDepths::Farthest`] | [`Depths::Farthest`] |
+    /// | [`ResolvedDepths::Nearest`] | [`Depths::Nearest`] |
+    /// | [`ResolvedDepths::Both`] | any |
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] before the first
+    /// [`record_resolve`](crate::HizContext::record_resolve).
+    pub fn source(&self) -> Result<DepthSource<'_>> {
+        let (samples, tolerance) = self.resolved()?;
+        let nearest = self.nearest.as_ref();
+        let texture = self.farthest.as_ref().or(nearest);
+        let texture = made(texture, "Farthest, Nearest or Both", self.depths)?;
+        Ok(DepthSource { samples, tolerance, nearest, ..DepthSource::from(texture) })
     }
 
     /// The nearest depth of each pixel's samples: a texture of the format `Rgba32Uint`, with the
@@ -377,7 +404,7 @@ fn prepare(
 ) -> Result<(Part, wgpu::ComputePipeline, wgpu::BindGroup)> {
     gpu.check_context("resolve", resolve.context)?;
     let (size, depths) = (resolve.size, resolve.depths);
-    let part = Part::new(depth, Sampling::Multiple, size, "resolve")?;
+    let part = Part::new(depth, Sampling::Multiple, (size, "resolve"), Depths::Farthest)?;
     if size != camera.size() {
         return Err(Error::mismatch(
             "camera",

@@ -4,7 +4,9 @@ use crate::error::{Error, Result};
 use crate::gpu::depth_source::SourceKind;
 use crate::gpu::device::Gpu;
 use crate::input::image::ImageSize;
+use crate::input::near_slack::NearSlack;
 use crate::input::tolerance::DepthTolerance;
+use crate::pyramid::ends::Depths;
 
 /// A depth image in a texture: one layer of one mip level, or a rectangle of it.
 ///
@@ -76,6 +78,15 @@ pub struct DepthSource<'a> {
     ///
     /// What the texture's own format rounds is added ([`DepthTolerance::of`]).
     pub tolerance: DepthTolerance,
+    /// How much nearer than the depths the surfaces may be, beside the tolerance.
+    ///
+    /// It is for depths that a conversion has moved towards far; the nearest end counts it.
+    pub near_slack: NearSlack,
+    /// The nearest of each pixel's samples, where `texture` has the farthest of several.
+    ///
+    /// Both are as [`record_resolve`](crate::HizContext::record_resolve) makes them, for pyramids
+    /// that have the nearest depths, too.
+    pub nearest: Option<&'a wgpu::Texture>,
 }
 
 impl<'a> From<&'a wgpu::Texture> for DepthSource<'a> {
@@ -89,6 +100,8 @@ impl<'a> From<&'a wgpu::Texture> for DepthSource<'a> {
             size: None,
             samples: 1,
             tolerance: DepthTolerance::NONE,
+            near_slack: NearSlack::NONE,
+            nearest: None,
         }
     }
 }
@@ -145,6 +158,10 @@ pub(crate) struct Part {
     pub(crate) samples: u32,
     /// What the format and the caller have rounded.
     pub(crate) tolerance: DepthTolerance,
+    /// What was moved towards far before that.
+    pub(crate) near_slack: NearSlack,
+    /// The image of nearest samples, if it is read beside the other.
+    pub(crate) nearest: Option<wgpu::Texture>,
 }
 
 /// How many samples a texture must have.
@@ -155,7 +172,7 @@ pub(crate) enum Sampling {
 }
 
 impl Part {
-    /// Checks that `source` is an image of `size`, that of `of`.
+    /// Checks that `source` is an image of `size`, that of `of`, for a pyramid of `depths`.
     ///
     /// # Errors
     /// [`Error::Invalid`] and [`Error::Mismatch`], as
@@ -163,10 +180,11 @@ impl Part {
     pub(crate) fn new(
         source: &DepthSource<'_>,
         sampling: Sampling,
-        size: ImageSize,
-        of: &str,
+        (size, of): (ImageSize, &str),
+        depths: Depths,
     ) -> Result<Self> {
-        let texture = source.texture;
+        let (texture, nearest) = images(source, depths)?;
+        let source = &DepthSource { texture, ..*source };
         let (whole, of_format) = read_as(texture.format(), sampling)?;
         check_samples(source, sampling)?;
         if source.aspect == wgpu::TextureAspect::StencilOnly {
@@ -181,12 +199,75 @@ impl Part {
         }
         let samples = source.samples * texture.sample_count();
         let tolerance = of_format.after(source.tolerance.checked()?);
-        Ok(Self { subresource, origin, kind, samples, tolerance })
+        let near_slack = source.near_slack.checked()?;
+        let nearest = nearest.cloned();
+        let kind = if nearest.is_some() { SourceKind::Pair } else { kind };
+        Ok(Self { subresource, origin, kind, samples, tolerance, near_slack, nearest })
     }
 }
 
 fn refused<T>(message: String) -> Result<T> {
     Err(Error::invalid("depth", message))
+}
+
+/// The image that a pyramid of `depths` reads, and beside it that of the nearest samples.
+///
+/// # Errors
+/// [`Error::Invalid`] where a pixel has several samples and the images lack an end.
+fn images<'a>(
+    source: &DepthSource<'a>,
+    depths: Depths,
+) -> Result<(&'a wgpu::Texture, Option<&'a wgpu::Texture>)> {
+    let has_nearest_alone = source.nearest == Some(source.texture);
+    let lacks = |has: &str, way: &str| {
+        Err(Error::invalid("depths", format!("expected {has}, got Depths::{depths:?}; {way}")))
+    };
+    match source.nearest {
+        _ if depths.has_farthest() && has_nearest_alone => lacks(
+            "Depths::Nearest for an image of the nearest samples alone",
+            "resolve with ResolvedDepths::Farthest or Both",
+        ),
+        None if depths.has_nearest() && source.samples > 1 => lacks(
+            &format!(
+                "Depths::Farthest for an image of the farthest of {} samples per pixel",
+                source.samples
+            ),
+            "resolve with ResolvedDepths::Both",
+        ),
+        Some(nearest) if depths.has_nearest() => {
+            check_nearest(source.texture, nearest)?;
+            let is_pair = depths.has_farthest();
+            Ok(if is_pair { (source.texture, Some(nearest)) } else { (nearest, None) })
+        }
+        _ => Ok((source.texture, None)),
+    }
+}
+
+/// Checks that the image of nearest samples is like that of the farthest.
+fn check_nearest(farthest: &wgpu::Texture, nearest: &wgpu::Texture) -> Result<()> {
+    let of = |texture: &wgpu::Texture| (texture.format(), texture.size());
+    let expected = (wgpu::TextureFormat::Rgba32Uint, farthest.size());
+    if of(farthest) != expected || of(nearest) != expected {
+        return Err(Error::invalid(
+            "nearest",
+            format!(
+                "expected two textures of one size and of the format Rgba32Uint, got {:?} and {:?}",
+                of(farthest),
+                of(nearest)
+            ),
+        ));
+    }
+    if nearest.mip_level_count() > 1 || !nearest.usage().contains(SourceKind::Pair.usage()) {
+        return Err(Error::invalid(
+            "nearest",
+            format!(
+                "expected one mip level and the usage STORAGE_BINDING, got {} and {:?}",
+                nearest.mip_level_count(),
+                nearest.usage()
+            ),
+        ));
+    }
+    Ok(())
 }
 
 /// How a format is read, and what it rounds.

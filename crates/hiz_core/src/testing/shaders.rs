@@ -4,9 +4,10 @@ use crate::cull::among::among_order_module;
 use crate::cull::count::count_module;
 use crate::cull::explain::explain_module;
 use crate::cull::pipelines::{
-    BinKey, Candidates, DepthStore, EmitKey, FramePass, cull_boxes_module, cull_members_module,
-    flat_module,
+    BinKey, Candidates, DepthStore, EmitKey, FramePass, accept_members_module, cull_boxes_module,
+    cull_members_module, flat_module,
 };
+use crate::cull::pixels::pixels_module;
 use crate::cull::refine::{refine_groups_module, refine_module};
 use crate::gpu::clock_check::clock_check_module;
 use crate::gpu::depth_source::SOURCES;
@@ -86,8 +87,11 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("snippets".to_owned(), snippets()),
     ];
     for source in SOURCES {
-        all.push((format!("mips {source:?}"), mips_module(source, false)));
-        all.push((format!("mips {source:?} both"), mips_module(source, true)));
+        // Mip textures read one image.
+        if source != SourceKind::Pair {
+            all.push((format!("mips {source:?}"), mips_module(source, false)));
+            all.push((format!("mips {source:?} both"), mips_module(source, true)));
+        }
         for ends in [EndFiles::One, EndFiles::Both] {
             all.push((format!("reduce {source:?} {ends:?}"), blocks_module(source, ends)));
             all.push((format!("reduce_coarse {source:?} {ends:?}"), coarse_module(source, ends)));
@@ -95,7 +99,7 @@ pub(super) fn all() -> Vec<(String, Source)> {
         // Yardsticks read whole images alone.
         #[cfg(feature = "yardstick")]
         all.extend(
-            (!source.is_part())
+            (!source.is_part() && source != SourceKind::Pair)
                 .then(|| yardstick_modules(source))
                 .into_iter()
                 .flatten()
@@ -119,11 +123,16 @@ pub(super) fn all() -> Vec<(String, Source)> {
             let named = |name: &str| format!("{name} {way} {store:?} {pass:?} {kind:?}");
             all.push((named("cull"), flat_module(store, kind, emit, pass)));
             all.push((named("cull_members"), cull_members_module(store, kind, emit, pass)));
+            if matches!(pass, FramePass::Early(_)) {
+                continue;
+            }
+            all.push((named("accept_members"), accept_members_module(store, kind, emit, pass)));
         }
     }
     for store in stores {
         for kind in KINDS {
             all.push((format!("explain {store:?} {kind:?}"), explain_module(store, kind)));
+            all.push((format!("pixels {store:?} {kind:?}"), pixels_module(store, kind)));
         }
         #[cfg(feature = "yardstick")]
         all.push((format!("uncertified cull {store:?}"), uncertified_module(store)));

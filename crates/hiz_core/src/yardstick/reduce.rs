@@ -13,7 +13,12 @@ use crate::input::image::ImageSize;
 use crate::pyramid::Pyramid;
 
 fn yardstick_module(source: SourceKind, entry: File) -> Source {
-    Source::of(&[&[wgsl!("gpu/depth_bits")], source.files(), &[wgsl!("gpu/ends_one"), entry]])
+    Source::of(&[
+        &[wgsl!("gpu/depth_bits")],
+        source.files(),
+        source.quad_files(),
+        &[wgsl!("gpu/ends_one"), entry],
+    ])
 }
 
 const IN_BUFFER: File = wgsl!("yardstick/reduce_buffer");

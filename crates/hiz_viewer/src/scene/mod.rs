@@ -6,7 +6,8 @@
 pub(crate) mod arm;
 pub(crate) mod castle;
 pub(crate) mod city;
-pub(crate) mod mountains;
+pub(crate) mod motion;
+mod mountains;
 mod npy;
 mod random;
 

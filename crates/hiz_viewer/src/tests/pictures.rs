@@ -10,6 +10,7 @@ use crate::gpu::{Gpu, IndirectChecks, instance};
 use crate::picture::{Difference, Picture, read};
 use crate::renderer::{Mode, Renderer};
 use crate::sample_places;
+use crate::scene::motion::moved;
 use crate::scene::{NAMES, Scene};
 use crate::tests::samples::excuse;
 
@@ -59,6 +60,17 @@ impl Pair {
 
     /// Draws a path in two ways and compares.
     fn compare(&mut self, mode: Mode, reference: Mode, frames: usize) -> Found {
+        self.compare_moving(mode, reference, frames, false)
+    }
+
+    /// [`Pair::compare`]; with `moving`, bodies drift, come and go.
+    fn compare_moving(
+        &mut self,
+        mode: Mode,
+        reference: Mode,
+        frames: usize,
+        moving: bool,
+    ) -> Found {
         let mut found = Found::default();
         self.culling.mode = mode;
         self.reference.mode = reference;
@@ -72,6 +84,9 @@ impl Pair {
             }
             let camera = self.culling.scene.camera(&pose, SIZE).expect("a camera");
             let [seen, mut expected] = [&mut self.culling, &mut self.reference].map(|renderer| {
+                if moving {
+                    renderer.step(frame).expect("bodies moved");
+                }
                 renderer.draw(&camera).expect("a frame");
                 read(renderer).expect("a picture")
             });
@@ -134,6 +149,28 @@ fn two_passes_show_what_all_show() {
 #[test]
 fn two_passes_show_what_all_show_with_four_samples() {
     equal_pictures(Mode::TwoPasses, 4, 6);
+}
+
+/// Bodies that move, appear and disappear.
+#[test]
+fn two_passes_show_what_all_show_while_bodies_move() {
+    let gpu = gpu();
+    for name in NAMES {
+        let mut pair = Pair::new(&gpu, name, true, 1, &[]);
+        let found = pair.compare_moving(Mode::TwoPasses, Mode::Frustum, 8, true);
+        assert!(found.differing.is_empty(), "{name}: {:?}", found.differing);
+        assert!(4 * found.drawn < 3 * found.in_view, "{name}: {found:?}");
+    }
+}
+
+/// The frames differ from those at rest, so that something moves.
+#[test]
+fn bodies_move_and_come_and_go() {
+    let scene = scene("city");
+    let (bodies, _) = moved(&scene, 4);
+    let moved = scene.bodies.iter().zip(&bodies).filter(|(a, b)| a.position != b.position).count();
+    let away = bodies.iter().filter(|body| body.position[1] < -1000.0).count();
+    assert!(away > scene.bodies.len() / 50 && moved > 2 * away, "{moved} {away}");
 }
 
 #[test]
@@ -206,6 +243,17 @@ fn soak_frames() -> usize {
 #[ignore = "minutes: make soak"]
 fn two_passes_show_what_all_show_in_hundreds_of_frames() {
     equal_pictures(Mode::TwoPasses, 1, soak_frames());
+}
+
+#[test]
+#[ignore = "minutes: make soak"]
+fn two_passes_show_what_all_show_in_hundreds_of_frames_while_bodies_move() {
+    let gpu = gpu();
+    for name in NAMES {
+        let mut pair = Pair::new(&gpu, name, true, 1, &[]);
+        let found = pair.compare_moving(Mode::TwoPasses, Mode::Frustum, soak_frames(), true);
+        assert!(found.differing.is_empty(), "{name}: {:?}", found.differing);
+    }
 }
 
 #[test]

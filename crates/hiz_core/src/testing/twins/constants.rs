@@ -11,6 +11,7 @@ use crate::cull::history::HISTORY_BEGIN;
 use crate::cull::lod::LodRule;
 use crate::cull::pipelines::{Candidates, CullKey, DepthStore, FramePass, ReportKey};
 use crate::cull::pipelines::{classify_constants, flat_module, report_constants};
+use crate::cull::pixels;
 use crate::cull::refine;
 use crate::cull::view_uniform::COORDINATE_BITS;
 use crate::gpu::clock_check;
@@ -87,6 +88,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("cull/outcome", "AT_DESCENT", stage(Stage::Descent)),
         ("cull/outcome", "AT_LEVEL", stage(Stage::Level)),
         ("cull/outcome", "AT_FRONT", stage(Stage::Front)),
+        ("cull/pixels", "WORKGROUP", int(pixels::WORKGROUP)),
         ("cull/refine", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/refine_groups", "WORKGROUP", int(refine::WORKGROUP)),
         ("cull/supporting_planes", "LARGEST_BITS", bits(LARGEST)),
@@ -179,6 +181,22 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/lod", &["NEEDS", "NEED_FACTOR", "LARGEST_DEVIATION"]),
     // All bits of a run.
     ("cull/early", &["WHOLE_RUN"]),
+    (
+        "cull/pixels",
+        &[
+            "STEP",
+            "TOP_TEXELS",
+            "ROW_BITS",
+            "ROW_MASK",
+            "NO_BORDER",
+            "ONE_TILE",
+            "TILE_LOG2",
+            "MAX_TILES",
+            "WHOLE_IMAGE_LOG2",
+            "UNKNOWN_BITS",
+        ],
+    ),
+    ("cull/pixels_planes", &["FACE_PLANES", "OUTLINE_PLACES", "NO_PLANE"]),
     ("cull/refine", &["REFINED"]),
     ("cull/unoccluded", &["HALF_PIXEL"]),
     ("gpu/clock_check", &["LEFT", "RIGHT", "LEFT_AGAIN"]),
@@ -202,6 +220,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
             "EDGES",
             "FACES",
             "CANDIDATES",
+            "OUTLINES",
             "EDGES_OF_AXIS_LOG2",
             "BORDER_TOLERANCE",
             "RADIUS_FACTOR",
@@ -220,11 +239,12 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
             "RING",
             "RING_ANGLES",
             "CANDIDATES",
+            "OUTLINES",
             "TURN",
         ],
     ),
     ("instances/corners", &["HALF"]),
-    ("instances/bounds_point_support", &["CANDIDATES"]),
+    ("instances/bounds_point_support", &["CANDIDATES", "OUTLINES"]),
     // One workgroup scans, however large it is.
     ("output/compact", &["LANES"]),
     ("output/emit_draws", &["LANES"]),
@@ -360,6 +380,7 @@ fn constants_cover_what_is_counted() {
 fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
     let line = |n: u32| [n, 1, 1];
     BTreeMap::from([
+        ("accept_members", line(GROUP as u32)),
         ("among_order", line(among::WORKGROUP)),
         ("begin", line(1)),
         ("choose_lods", line(lod::LANES)),
@@ -374,6 +395,7 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("emit_top", line(emit_passes::WORKGROUP)),
         ("copy_records", line(SCATTER_WORKGROUP)),
         ("count", line(count::LANES)),
+        ("count_of_pixels", line(pixels::WORKGROUP)),
         ("cull", line(GROUP as u32)),
         ("cull_children", line(CULL_WORKGROUP)),
         ("cull_groups", line(CULL_WORKGROUP)),

@@ -6,6 +6,7 @@ use std::mem::offset_of;
 use super::declared;
 use crate::cull::explain::ExplanationRecord;
 use crate::cull::history::FrameUniform;
+use crate::cull::pixels::CountingUniform;
 use crate::cull::view_uniform::ViewUniform;
 use crate::input::bounds::{Bounds, Floats};
 use crate::instances::SEQUENCE_BYTES;
@@ -17,6 +18,7 @@ use crate::output::bins::{BinRecord, EmitUniform, TotalRecord};
 use crate::output::counters::{CounterRecord, StatisticsRecord};
 use crate::output::draw::DrawIndexedIndirect;
 use crate::output::mesh_table::TemplateRecord;
+use crate::output::pixels::PixelCounts;
 use crate::output::survivors::SurvivorsRecord;
 use crate::output::views::JoinUniform;
 use crate::pyramid::PyramidUniform;
@@ -46,9 +48,14 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     "Flat",
     "MaskPlace",
     "Outcome",
+    "PixelPlanes",
+    "Prepared",
     "Projected",
+    "Slope",
     "SupportingPlane",
     "SupportingPlanes",
+    "Sure",
+    "Tiling",
     "Value",
     "Volume",
     "Word",
@@ -93,6 +100,9 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "outside" = outside, "occluded" = occluded, "visible" = visible, "invalid" = invalid,
             "unoccluded" = unoccluded,
         }),
+        twin!("Counting", CountingUniform {
+            "budget" = budget, "negligible" = negligible, "padding" = padding,
+        }),
         twin!("DrawIndexedIndirect", DrawIndexedIndirect {
             "index_count" = index_count, "instance_count" = instance_count,
             "first_index" = first_index, "base_vertex" = base_vertex,
@@ -133,6 +143,10 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         twin!("Piece", PieceUniform {
             "base" = base, "count" = count, "index" = index, "words" = words,
         }),
+        twin!("PixelCounts", PixelCounts {
+            "touched" = touched, "hidden" = hidden, "inside" = inside, "open" = open,
+            "undecided" = undecided,
+        }),
         twin!("Pyramid", PyramidUniform {
             "levels" = levels, "origins" = origins, "chunk_shift" = chunk_shift,
             "first_stored" = first_stored, "last_stored" = last_stored, "nearest" = nearest,
@@ -152,11 +166,17 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
             "workgroups_z" = workgroups + 8, "count" = count, "tested" = tested,
             "accepted" = accepted, "padding" = padding,
+            "accept_workgroups" = accept_workgroups,
+            "accept_workgroups_y" = accept_workgroups + 4,
+            "accept_workgroups_z" = accept_workgroups + 8, "accept_count" = accept_count,
         }),
         twin!("Parents", SurvivorsRecord {
             "workgroups" = workgroups, "workgroups_y" = workgroups + 4,
             "workgroups_z" = workgroups + 8, "count" = count, "tested" = tested,
             "accepted" = accepted, "padding" = padding,
+            "accept_workgroups" = accept_workgroups,
+            "accept_workgroups_y" = accept_workgroups + 4,
+            "accept_workgroups_z" = accept_workgroups + 8, "accept_count" = accept_count,
         }),
         twin!("Tier", TierUniform { "count" = count, "below" = below, "padding" = padding }),
         twin!("FormTier", FormUniform {

@@ -18,6 +18,7 @@ mod fitted;
 mod grouped;
 mod report;
 mod scene;
+mod shown;
 mod volume;
 
 use hiz_core::headless::{DepthImage, Engine};
@@ -35,6 +36,7 @@ pub(crate) use checkpoint::Checkpoint;
 pub(crate) use class::Class;
 pub(crate) use grouped::Tested;
 pub(crate) use report::{HEADER, Report, Tally};
+pub(crate) use shown::{Pipelines, Shown, center_of, shown_by_class, total};
 pub(crate) use volume::moved;
 
 /// Every kind of bounds.

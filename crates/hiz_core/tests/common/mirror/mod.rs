@@ -6,6 +6,7 @@
 
 mod arithmetic;
 mod extent;
+mod front;
 mod guesses;
 mod lod;
 mod loss;
@@ -96,6 +97,8 @@ struct View {
     descent_budget: u32,
     depth_offset: f32,
     coordinate_limit: f32,
+    near_factor: f32,
+    near_offset: f32,
 }
 
 impl View {
@@ -123,6 +126,8 @@ impl View {
             descent_budget: words[40],
             depth_offset: one(41),
             coordinate_limit: one(42),
+            near_factor: one(53),
+            near_offset: one(54),
         }
     }
 }

@@ -1,0 +1,152 @@
+//! The counts of pixels: a pass of its own behind a cull, which looks at every instance.
+//!
+//! A group that is hidden as a whole tells nothing about its members' pixels, so they are counted
+//! all the same.
+
+use crate::cull::inputs::{BoundView, CullInputs, PreparedView};
+use crate::cull::pipelines::{CullKey, DepthStore, classify_constants, layouts, unexplained};
+use crate::error::Result;
+use crate::gpu::buffers::{check_alive, entry};
+use crate::gpu::depth_source::SourceKind;
+use crate::gpu::device::Gpu;
+use crate::gpu::layouts::Binding;
+use crate::gpu::pipelines::{Compute, flag};
+use crate::gpu::shader::{Source, wgsl};
+use crate::gpu::stage_times::stage_pass;
+use crate::input::bounds::BoundsKind;
+use crate::instances::piece::RECORD_BINDINGS;
+use crate::output::visible::Visible;
+
+/// Invocations of a workgroup, and the instances that it prepares; `shaders/cull/pixels.wgsl`.
+pub(crate) const WORKGROUP: u32 = 32;
+
+/// What a count writes: the counts, the mask of what is not negligible, and the numbers it reads.
+const COUNTED_BINDINGS: &[(u32, Binding)] =
+    &[(0, Binding::Write), (1, Binding::Write), (2, Binding::Uniform)];
+
+/// Twin: `shaders/cull/pixels.wgsl`, `Counting`.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct CountingUniform {
+    pub(crate) budget: u32,
+    pub(crate) negligible: u32,
+    pub(crate) padding: [u32; 2],
+}
+
+/// The shader that counts pixels.
+pub(crate) fn pixels_module(store: DepthStore, kind: BoundsKind) -> Source {
+    let row = match store {
+        DepthStore::Apart(SourceKind::Bits | SourceKind::Pair) => {
+            [wgsl!("cull/pixels_row_bits"), wgsl!("cull/pixels_row_apart")].to_vec()
+        }
+        DepthStore::Apart(_) => {
+            [wgsl!("cull/pixels_row_sampled"), wgsl!("cull/pixels_row_apart")].to_vec()
+        }
+        DepthStore::Atlas => vec![wgsl!("cull/pixels_row_atlas")],
+    };
+    let entry =
+        [&row[..], &[wgsl!("instances/piece"), wgsl!("cull/pixels_planes"), wgsl!("cull/pixels")]];
+    unexplained(store, kind, &entry.concat())
+}
+
+fn pixels_pipeline(
+    gpu: &Gpu,
+    key: &CullKey,
+    (one_sample, shown): (bool, bool),
+) -> Result<wgpu::ComputePipeline> {
+    let written = ("hiz.pixels.layout", COUNTED_BINDINGS);
+    gpu.compute_pipeline(&Compute {
+        label: "hiz.pixels.pipeline",
+        source: pixels_module(key.store, key.kind),
+        entry_point: "count_of_pixels",
+        layouts: &layouts(gpu, key.store, RECORD_BINDINGS, written)?,
+        constants: &pixels_constants(key, one_sample, shown),
+    })
+}
+
+/// The constants of a count of pixels.
+fn pixels_constants(key: &CullKey, one_sample: bool, shown: bool) -> Vec<(&'static str, f64)> {
+    // The rectangle of a footprint and its fit have no effect, because every pixel is looked for.
+    let key = CullKey { footprint_log2: 1, descent: true, fit_volume: true, ..*key };
+    classify_constants(&key)
+        .into_iter()
+        .chain([("ONE_SAMPLE", flag(one_sample)), ("SHOWN", flag(shown))])
+        .collect()
+}
+
+/// A count that is prepared: nothing that it records can fail any more.
+#[derive(Debug)]
+pub(crate) struct PixelPass {
+    pipeline: wgpu::ComputePipeline,
+    view: BoundView,
+    /// Per piece: records, outputs, workgroups.
+    pieces: Vec<(wgpu::BindGroup, wgpu::BindGroup, u32)>,
+}
+
+impl PixelPass {
+    /// Prepares the count of what `inputs` ask for, into `visible`, if that has room for counts.
+    ///
+    /// `negligible`: a bit of the mask is set for what may show in more pixels than that.
+    pub(crate) fn new(
+        gpu: &Gpu,
+        inputs: &CullInputs<'_>,
+        visible: &Visible,
+        negligible: Option<u32>,
+    ) -> Result<Option<Self>> {
+        if !visible.outputs().pixels {
+            return Ok(None);
+        }
+        let CullInputs { instances, pyramid, .. } = *inputs;
+        let seen = PreparedView::new(gpu, inputs, None)?;
+        let view = seen.bind(gpu, pyramid, false)?;
+        let pipeline =
+            pixels_pipeline(gpu, &seen.key, (seen.has_one_sample(), negligible.is_some()))?;
+        let counting = gpu.uniform(
+            "hiz.pixels.counting",
+            &CountingUniform {
+                budget: visible.outputs().pixel_budget.unwrap_or(u32::MAX),
+                negligible: negligible.unwrap_or(0),
+                padding: [0; 2],
+            },
+        )?;
+        let bound = |(p, piece): (usize, &crate::instances::piece::Piece)| {
+            let output = &visible.pieces[p];
+            let counts = output.pixels.as_ref().expect("the outputs have counts");
+            check_alive(counts)?;
+            let shown = match negligible {
+                Some(_) => output.mask.clone(),
+                None => gpu.stand_in("hiz.pixels.no_mask")?,
+            };
+            let records = inputs.among.map_or(&piece.bindings, |among| among.records(p)).clone();
+            let written = gpu.bind_group(
+                "hiz.pixels.counts",
+                &gpu.layout("hiz.pixels.layout", COUNTED_BINDINGS)?,
+                &[
+                    entry(0, counts.as_entire_binding()),
+                    entry(1, shown.as_entire_binding()),
+                    entry(2, counting.as_entire_binding()),
+                ],
+            )?;
+            let workgroups = if inputs.idle { 0 } else { piece.count().div_ceil(WORKGROUP) };
+            Ok((records, written, workgroups))
+        };
+        let pieces = instances.pieces.iter().enumerate().map(bound).collect::<Result<_>>()?;
+        Ok(Some(Self { pipeline, view, pieces }))
+    }
+
+    pub(crate) fn record(
+        mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        pyramid: &crate::pyramid::Pyramid,
+    ) {
+        self.view.record(encoder, pyramid);
+        let mut pass = stage_pass(encoder, "hiz.pixels.pass", "pixels");
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.view.instances, &[]);
+        for (records, written, workgroups) in &self.pieces {
+            pass.set_bind_group(1, records, &[]);
+            pass.set_bind_group(2, written, &[]);
+            pass.dispatch_workgroups(*workgroups, 1, 1);
+        }
+    }
+}
