@@ -460,6 +460,10 @@ OF_MESHES: BadValues = {
         (None, TypeError, "got None"),
     ],
 }
+PIXEL_BUDGET: list[Bad] = [
+    (0, ValueError, "expected an integer in 1..4294967295, got int 0"),
+    (1.5, TypeError, "got float 1.5"),
+]
 DRAW: list[Bad] = [((36,), TypeError, "expected a DrawTemplate or None, got tuple (36,)")]
 OPTIONS_OBJECT: list[Bad] = [
     ({"order": "any"}, TypeError, "expected a CullOptions or None, got dict {'order': 'any'}"),
@@ -1111,9 +1115,59 @@ TABLES: dict[str, Table] = {
             ],
             "wait": FLAG,
             **OPTIONS,
+            "pixel_budget": PIXEL_BUDGET,
             "capacity": CAPACITY,
             "draw": DRAW,
             **OF_MESHES,
+        },
+    ),
+    "Device.cull_approximate": Table(
+        lambda device: (
+            device.cull_approximate,
+            {
+                "instances": device.instances(spheres()),
+                "camera": camera(),
+                "pyramid": device.pyramid(np.ones((6, 8)), camera(), kind="ndc"),
+                "negligible_px": 4,
+            },
+        ),
+        {
+            "instances": [
+                (spheres(), TypeError, "expected Instances of Device.instances, got Spheres")
+            ],
+            "camera": [
+                (None, TypeError, "expected a Camera, got None"),
+                (camera((6, 9)), ValueError, "expected the camera of the pyramid"),
+            ],
+            "pyramid": [(None, TypeError, "expected a Pyramid of Device.pyramid, got None")],
+            "options": OPTIONS_OBJECT,
+            "negligible_px": [
+                (-1, ValueError, "expected an integer in 0..4294967295, got int -1"),
+                (0.5, TypeError, "got float 0.5"),
+            ],
+            **OPTIONS,
+        },
+    ),
+    "CullResult.visible_fraction": Table(
+        lambda device: (
+            device.cull(
+                device.instances(spheres()),
+                camera(),
+                device.pyramid(np.ones((6, 8)), camera(), kind="ndc"),
+                outputs=["pixels"],
+            ).visible_fraction,
+            {},
+        ),
+        {"objects_in_depth": FLAG},
+    ),
+    "visible_fraction": Table(
+        lambda _: (hizvk.visible_fraction, {"pixels": np.zeros(2, hizvk.PIXELS_DTYPE)}),
+        {
+            "pixels": [
+                (np.zeros(2), TypeError, "expected an array of PIXELS_DTYPE, got (2,) float64"),
+                ([(1, 0, 1, 0, 0)], TypeError, "expected an array of PIXELS_DTYPE, got"),
+            ],
+            "objects_in_depth": FLAG,
         },
     ),
     "Device.temporal": Table(
@@ -1190,6 +1244,7 @@ TABLES: dict[str, Table] = {
             ],
             "levels": LEVELS,
             **OPTIONS,
+            "pixel_budget": PIXEL_BUDGET,
             "capacity": CAPACITY,
             "draw": DRAW,
             **OF_MESHES,
@@ -1203,6 +1258,8 @@ TABLES: dict[str, Table] = {
             "verdicts": FLAG,
             "indices": FLAG_OR_NONE,
             "draws": FLAG_OR_NONE,
+            "pixels": FLAG,
+            "pixel_budget": PIXEL_BUDGET,
             "capacity": CAPACITY,
             "draw": DRAW,
             **OF_MESHES,

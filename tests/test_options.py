@@ -72,6 +72,8 @@ OTHERS: dict[str, tuple[Any, str]] = {
     "verdicts": (False, "verdicts: false"),
     "indices": (True, "indices: true"),
     "draws": (True, "draws: true"),
+    "pixels": (True, "pixels: true"),
+    "pixel_budget": (9, "pixel_budget: Some(9)"),
     "capacity": (5, "capacity: Some(5)"),
     "draw": (
         hizvk.DrawTemplate(1, 2, -3, 4),
@@ -104,7 +106,7 @@ def test_the_keywords_are_the_fields() -> None:
     assert keywords == get_type_hints(hizvk.CullOptions)
     outputs = get_type_hints(hizvk.Outputs)
     assert get_type_hints(options.CullKeywords) == keywords | {
-        name: outputs[name] for name in ("capacity", "draw", *OF_EMIT)
+        name: outputs[name] for name in ("pixel_budget", "capacity", "draw", *OF_EMIT)
     }
 
 

@@ -112,7 +112,7 @@ def test_explicit_guards_win_and_options_say_the_default(device: hizvk.Device) -
     spheres = device.instances(hizvk.Spheres(positions, 0.0))
 
     def told(instances: hizvk.Instances, **keywords: Any) -> list[int]:
-        return device.cull(instances, camera, hiz, **keywords).verdicts.tolist()
+        return [int(code) for code in device.cull(instances, camera, hiz, **keywords).verdicts]
 
     assert told(points) == told(points, guard_px=0.5) == told(spheres, guard_px=0.5)
     assert told(points, guard_px=0.0) == told(spheres) != told(points)

@@ -625,10 +625,9 @@ class Device:
             Sizes and conventions may differ.
         options : CullOptions, optional
             How the cull decides; None takes the defaults.
-        outputs : Outputs or a collection; optional
-            Of "mask", "verdicts", "indices", "draws" and "pixels".
+        outputs : Outputs, or a collection of names, optional
             What the cull makes: less costs less.
-            A collection names all that is made.
+            A collection names all that is made: "mask", "verdicts", "indices", "draws", "pixels".
             None makes mask and verdicts, and the list and the draw arguments by the time that they
             are read.
             For several cameras indices and draws are those of what any of them keeps, and made only
@@ -699,6 +698,11 @@ class Device:
             if one != of.camera:
                 raise ValueError(_other_camera(f"camera[{number}]", one, of))
             _check_coverage("coverage", options, of)
+        if outputs.pixels:
+            raise ValueError(
+                "pixels: expected False beside several cameras, got True: counts are those of one "
+                "view, so cull them one by one"
+            )
         if outputs.meshes is not None:
             raise ValueError(
                 f"meshes: expected None beside several cameras, got {len(outputs.meshes)}: levels "

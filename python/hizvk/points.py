@@ -7,7 +7,7 @@ What is added up afterwards is plain arithmetic.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sized
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from .bounds import Points
 from .camera import Camera
 from .device import Device
 from .oneline import default_device
-from .options import cull_options
+from .options import Outputs, cull_options
 from .resources import DepthImage
 
 if TYPE_CHECKING:
@@ -32,6 +32,10 @@ if TYPE_CHECKING:
     from .tolerance import Tolerance
 
 __all__ = ["PointColours", "colour_points", "depth_from_points"]
+
+
+#: What a cull makes here.
+_MASK: Final = Outputs(mask=True, verdicts=False, indices=False, draws=False)
 
 
 class PointColours(NamedTuple):
@@ -146,7 +150,7 @@ def colour_points(
                 hiz = maker.pyramid(depth)
             else:
                 hiz = maker.pyramid(depth, camera, **meaning)
-            seen = maker.cull(cloud, camera, hiz, options, ("mask",))
+            seen = maker.cull(cloud, camera, hiz, options, _MASK)
             core_add_colours(
                 points.positions, seen.mask, camera._inner, image, sampling == "bilinear", weight,
                 colours, weights, counts,

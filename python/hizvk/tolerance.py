@@ -25,6 +25,7 @@ class Tolerance:
 
     The promise then holds for the moved image: nothing is hidden that shows in it.
     So a point that lies up to the tolerance behind what was measured is kept.
+    What surely shows (`Verdict.UNOCCLUDED`) lies before the measured depth, less the tolerance.
     With ``coverage="area"`` its pixels may show steps of depth, which no tolerance covers; `Points`
     have a guard for that.
 

@@ -5,5 +5,5 @@
 @compute @workgroup_size(GROUP)
 fn cull(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     begin();
-    cull_run(workgroup.x * RUN + lane / SHARE, lane % SHARE, false);
+    cull_run(workgroup.x * RUN + lane / SHARE, lane % SHARE);
 }

@@ -34,6 +34,11 @@ struct Survivors {
     tested: atomic<u32>,
     accepted: atomic<u32>,
     padding: vec2<u32>,
+    // The arguments of the dispatch that accepts the members of groups, and how many groups.
+    accept_workgroups: atomic<u32>,
+    accept_workgroups_y: u32,
+    accept_workgroups_z: u32,
+    accept_count: atomic<u32>,
 }
 
 @group(1) @binding(0) var<uniform> tier: Tier;
@@ -66,12 +71,23 @@ fn end_group(box: u32) -> u32 {
     return min((box + 1u) << (GROUP_LOG2 * TIER), arrayLength(&group_verdicts));
 }
 
+// Accepted groups fill the list of groups from its end, the others from its beginning.
+// Accepted boxes of upper tiers bear a flag.
 fn survive(box: u32, is_accepted: bool) {
-    let slot = atomicAdd(&survivors.count, 1u);
-    let entry = box | select(0u, ACCEPTED, is_accepted);
-    textureStore(survivor_list, survivor_position(slot), vec4<u32>(entry));
-    if slot % select(PARENTS, RUN, TIER == 0u) == 0u {
-        atomicAdd(&survivors.workgroups, 1u);
+    if TIER == 0u && is_accepted {
+        let slot = atomicAdd(&survivors.accept_count, 1u);
+        let position = survivor_position(tier.count - 1u - slot);
+        textureStore(survivor_list, position, vec4<u32>(box));
+        if slot % RUN == 0u {
+            atomicAdd(&survivors.accept_workgroups, 1u);
+        }
+    } else {
+        let slot = atomicAdd(&survivors.count, 1u);
+        let entry = box | select(0u, ACCEPTED, is_accepted);
+        textureStore(survivor_list, survivor_position(slot), vec4<u32>(entry));
+        if slot % select(PARENTS, RUN, TIER == 0u) == 0u {
+            atomicAdd(&survivors.workgroups, 1u);
+        }
     }
     if VERDICTS {
         let children = min(GROUP, tier.below - box * GROUP);

@@ -10,6 +10,10 @@ struct Parents {
     tested: u32,
     accepted: u32,
     padding: vec2<u32>,
+    accept_workgroups: u32,
+    accept_workgroups_y: u32,
+    accept_workgroups_z: u32,
+    accept_count: u32,
 }
 
 @group(3) @binding(0) var<storage, read> parents: Parents;

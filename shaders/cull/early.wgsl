@@ -26,8 +26,7 @@ fn candidates(group: u32, share: u32, first: u32) -> u32 {
 }
 
 // Tests the candidates among the members of a group that belong to one of its invocations.
-// No group is accepted here, because no depth is read.
-fn cull_run(group: u32, share: u32, is_accepted: bool) {
+fn cull_run(group: u32, share: u32) {
     let first = group * GROUP + share;
     var kept = 0u;
     for (var left = candidates(group, share, first); left != 0u; left &= left - 1u) {

@@ -20,13 +20,13 @@ fn is_drawn(index: u32) -> bool {
     return is_of_frame && (atomicLoad(&mask[early_begin() + at.word]) & at.bit) != 0u;
 }
 
-// Tests the members of a group that belong to one of its invocations, or accepts them.
-fn cull_run(group: u32, share: u32, is_accepted: bool) {
+// Reports the members of a run that are kept and not drawn yet, and writes their history.
+fn report_run(group: u32, share: u32, found: u32) {
     let first = group * GROUP + share;
     if first >= piece.count {
         return;
     }
-    var kept = kept_of_run(first, is_accepted);
+    var kept = found;
     history[history_word(group, share)] = kept;
     for (; kept != 0u; kept &= kept - 1u) {
         let place = first + countTrailingZeros(kept) * SHARE;
@@ -34,4 +34,9 @@ fn cull_run(group: u32, share: u32, is_accepted: bool) {
             report(place);
         }
     }
+}
+
+// Tests the members of a group that belong to one of its invocations.
+fn cull_run(group: u32, share: u32) {
+    report_run(group, share, test_run(group * GROUP + share));
 }

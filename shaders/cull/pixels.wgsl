@@ -15,6 +15,9 @@
 // - `pixels_row_*.wgsl`: `texel_row`
 // - `classify.wgsl`: `pixel_interval`, `between_samples`, `inside_block`
 
+// True: a pixel of level 0 stands for all that its surface shows.
+// False: it is the farthest of several samples, which says nothing about what is behind the volume.
+override ONE_SAMPLE: bool;
 // True: set the bit of each instance that may show in more than a negligible number of pixels.
 override SHOWN: bool;
 
@@ -111,21 +114,30 @@ fn with_margin(bound: vec4<f32>) -> vec4<f32> {
 // What is sure about four texels of a row, whose pixels begin and end there.
 struct Sure {
     untouched: vec4<bool>,
+    // No pixel of the texel is surely untouched, as far as the outline tells.
+    whole: vec4<bool>,
     // All of the volume is behind the texel's depth, in each of its pixels.
     hidden: vec4<bool>,
-    // Where the texels are pixels: all of the volume is in front of the depth.
+    // All of the volume is in front of the depth, in each of its pixels.
     open: vec4<bool>,
 }
 
 fn sure_of(
     planes: ptr<function, PixelPlanes>,
-    left: vec4<f32>, right: vec4<f32>, top: f32, bottom: f32, raw: vec4<u32>, is_image: bool,
+    left: vec4<f32>, right: vec4<f32>, top: f32, bottom: f32, raw: vec4<u32>, near: vec4<u32>,
 ) -> Sure {
+    // How far the outline's planes are inside of the texel's nearest pixel, and of its farthest.
     var outside = vec4<f32>(NO_PLANE);
+    var partly = vec4<f32>(NO_PLANE);
     for (var i = 0u; i < OUTLINES; i += 1u) {
         let slope = (*planes).outline_slopes[i];
-        let row = (*planes).outlines[i] - slope.y * select(top, bottom, slope.y > 0.0);
-        outside = max(outside, vec4<f32>(row) - slope.x * select(left, right, slope.x > 0.0));
+        let offset = (*planes).outlines[i];
+        let rows = slope.y * select(vec2<f32>(top, bottom), vec2<f32>(bottom, top), slope.y > 0.0);
+        let is_right = slope.x > 0.0;
+        outside = max(outside,
+            vec4<f32>(offset - rows.x) - slope.x * select(left, right, is_right));
+        partly = max(partly,
+            vec4<f32>(offset - rows.y) - slope.x * select(right, left, is_right));
     }
     var front = vec4<f32>(NO_PLANE);
     var back = vec4<f32>(NO_PLANE);
@@ -139,14 +151,31 @@ fn sure_of(
         back = max(back,
             vec4<f32>((*planes).backs[i] + rows.y) + slope.x * select(right, left, is_right));
     }
-    let bits = all_sanitized(raw);
-    let is_depth = are_depths(raw);
+    let hidden = front > hiding_bounds(all_sanitized(raw));
     // Background hides nothing, however far the volume is.
-    let is_background = raw == vec4<u32>(far_bits());
-    let hidden = front > hiding_bounds(bits);
-    let open = vec4<bool>(is_image) & is_depth & (is_background | back > opening_bounds(bits));
+    let is_background = near == vec4<u32>(far_bits());
+    let open = are_depths(near) & (is_background | back > opening_bounds(all_sanitized(near)));
     // Nothing of the volume is there if it would have to be behind the surface and in front of it.
-    return Sure(outside > vec4<f32>(TEXEL_FLOOR) | (hidden & open), hidden, open);
+    return Sure(
+        outside > vec4<f32>(TEXEL_FLOOR) | (hidden & open), partly <= vec4<f32>(TEXEL_FLOOR),
+        hidden, open);
+}
+
+// No depth: it says nothing.
+const UNKNOWN_BITS: u32 = 0xffffffffu;
+
+// The nearest depths of four texels, of which `raw` are the farthest.
+fn nearest_of(level: u32, at: vec2<u32>, raw: vec4<u32>) -> vec4<u32> {
+    var near = vec4<u32>(UNKNOWN_BITS);
+    if NEAREST {
+        near = nearest_row(level, at.x, at.y);
+    }
+    if ONE_SAMPLE {
+        near = select(near, raw, level == 0u);
+    } else if level == 0u {
+        near = vec4<u32>(UNKNOWN_BITS);
+    }
+    return near;
 }
 
 // The pixels of four texels that `chosen` names.
@@ -204,19 +233,21 @@ fn walk(
         let high = vec4<f32>(end) + view.reach - view.half_size.x;
         let low_y = f32(begin_y) - view.reach - view.half_size.y;
         let high_y = f32(end_y) + view.reach - view.half_size.y;
+        let raw = texel_row(level, at.x, at.y);
         let sure = sure_of(
             planes,
             clamp(vec4<f32>((*planes).left_top.x), low, high),
             clamp(vec4<f32>((*planes).right_bottom.x), low, high),
             clamp((*planes).left_top.y, low_y, high_y),
             clamp((*planes).right_bottom.y, low_y, high_y),
-            texel_row(level, at.x, at.y), level == 0u);
-        let is_pixel = vec4<bool>(level == 0u);
-        found.hidden += pixels_of(sure.hidden & !sure.untouched, here);
-        found.open += pixels_of(sure.open & !sure.untouched, here);
-        let neither = !(sure.untouched | sure.hidden | sure.open);
-        found.inside += pixels_of(neither & is_pixel, here);
-        let is_left = neither & is_there & !is_pixel;
+            raw, nearest_of(level, at, raw));
+        // A texel with untouched pixels is entered, so that these are not counted.
+        let is_decided = sure.untouched | ((sure.hidden | sure.open) & sure.whole);
+        let is_left = !is_decided & is_there & vec4<bool>(level > 0u);
+        let is_counted = !sure.untouched & !is_left;
+        found.hidden += pixels_of(sure.hidden & is_counted, here);
+        found.open += pixels_of(sure.open & is_counted, here);
+        found.inside += pixels_of(!(sure.hidden | sure.open) & is_counted, here);
         done += pixels_of(!is_left, here);
         let left_bits = select(vec4<u32>(0u), vec4<u32>(1u) << vec4<u32>(0u, 1u, 2u, 3u), is_left);
         to_enter |= (left_bits.x | left_bits.y | left_bits.z | left_bits.w) << bits_of(level);
@@ -439,8 +470,11 @@ fn count_of_pixels(
         }
         let index = caller_index(id.x);
         counts[index] = found;
-        if SHOWN && found.touched - found.hidden > counting.negligible {
-            atomicOr(&shown[index / WORD_BITS], 1u << (index % WORD_BITS));
+        if SHOWN {
+            let may_show = found.touched - found.hidden > counting.negligible;
+            let bit = select(0u, 1u << (index % WORD_BITS), may_show);
+            // Mesa 22.3 crashes in compiling a branch around the atomic.
+            atomicOr(&shown[index / WORD_BITS], bit);
         }
     }
 }

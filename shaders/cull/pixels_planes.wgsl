@@ -11,6 +11,8 @@
 
 // Candidates that bound the depth; those that bound the outline come first.
 const FACE_PLANES: u32 = CANDIDATES - OUTLINES;
+// No array is empty.
+const OUTLINE_PLACES: u32 = max(OUTLINES, 1u);
 // The offset of a plane that says nothing.
 const NO_PLANE: f32 = -0x1p100;
 
@@ -18,8 +20,8 @@ struct PixelPlanes {
     // The rectangle around the volume, to fractions of a pixel.
     left_top: vec2<f32>,
     right_bottom: vec2<f32>,
-    outline_slopes: array<vec2<f32>, OUTLINES>,
-    outlines: array<f32, OUTLINES>,
+    outline_slopes: array<vec2<f32>, OUTLINE_PLACES>,
+    outlines: array<f32, OUTLINE_PLACES>,
     face_slopes: array<vec2<f32>, FACE_PLANES>,
     fronts: array<f32, FACE_PLANES>,
     backs: array<f32, FACE_PLANES>,

@@ -4,3 +4,8 @@
 fn texel_row(level: u32, q: u32, y: u32) -> vec4<u32> {
     return textureLoad(atlas, pyramid.origins[level].xy + vec2<u32>(q, y));
 }
+
+// The nearest depths of the same texels of a stored level.
+fn nearest_row(level: u32, q: u32, y: u32) -> vec4<u32> {
+    return textureLoad(atlas, pyramid.origins[level].zw + vec2<u32>(q, y));
+}

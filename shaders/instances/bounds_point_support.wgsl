@@ -57,6 +57,8 @@ fn surely_before(r: Value, w: Value, extent: Extent, edge: f32, w_min: f32) -> b
 // A point's rectangle is all there is of it, so `fit="volume"` adds nothing and is left out.
 // These are here because the module names them: one plane, at the point's own depth.
 const CANDIDATES: u32 = 1u;
+// Candidates that bound the outline: the rectangle does.
+const OUTLINES: u32 = 0u;
 
 fn candidate(i: u32, p: Projected) -> Candidate {
     return Candidate(farther_sign(), vec2<f32>(0.0), 0.0);

@@ -15,8 +15,8 @@ const RUN: u32 = 8u;
 // Invocations that share a group.
 const SHARE: u32 = GROUP / RUN;
 
-// A flag beside the number of a group or box in the list of survivors: all that it holds is kept
-// without a test.
+// A flag beside the number of a box in the list of an upper tier's survivors: all that it holds is
+// kept without a test.
 const ACCEPTED: u32 = 0x80000000u;
 
 // Survivors in a row of their list, as a power of two.

@@ -12,8 +12,6 @@
 override MASK: bool;
 // Write its verdict.
 override VERDICTS: bool;
-// Some instances are absent.
-override ABSENT: bool;
 
 @group(1) @binding(0) var<uniform> piece: Piece;
 // Bit i of the first words: the caller's instance i of the piece is kept.
@@ -97,33 +95,4 @@ fn test_run(first: u32) -> u32 {
         }
     }
     return kept;
-}
-
-fn is_absent(place: u32) -> bool {
-    return ABSENT && record_texel(place, 0u).x == ABSENT_CENTER_BITS;
-}
-
-// The members of a run that are there and asked for, which are kept without a test, as all of their
-// group shows.
-// A group with invalid bounds is never accepted.
-fn accept_run(first: u32) -> u32 {
-    var kept = 0u;
-    for (var k = 0u; k < RUN && first + k * SHARE < piece.count; k += 1u) {
-        let place = first + k * SHARE;
-        let is_kept = is_among(place) && !is_absent(place);
-        kept |= select(0u, 1u << k, is_kept);
-        if VERDICTS {
-            let verdict = select(OUTSIDE, UNOCCLUDED, is_kept);
-            atomicStore(&mask[verdicts_begin(piece.words) + place], verdict);
-        }
-    }
-    return kept;
-}
-
-// What is kept of a run, of which all is accepted or each member is tested.
-fn kept_of_run(first: u32, is_accepted: bool) -> u32 {
-    if NEAREST && is_accepted {
-        return accept_run(first);
-    }
-    return test_run(first);
 }

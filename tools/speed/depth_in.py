@@ -61,7 +61,7 @@ def _region(run: Run, name: str, size: tuple[int, int]) -> None:
     rendered = run.depth(run.town(1, 0.0), size)
     camera = rendered.camera
     uploaded = run.device._engine.upload_depth(
-        rendered.numpy(), camera.depth_kind, 1.0, (), "none", camera._inner
+        rendered.numpy(), camera.depth_kind, 1.0, (), "none", (0.0, 0.0), camera._inner
     )
     # The tests' images are smaller than that.
     height, width = (min(side, SIDE) for side in size)

@@ -30,7 +30,7 @@ def measure(run: Run) -> None:
         rendered = run.depth(run.town(1, 0.0), size)
         camera = rendered.camera
         uploaded = run.device._engine.upload_depth(
-            rendered.numpy(), camera.depth_kind, 1.0, (), "none", camera._inner
+            rendered.numpy(), camera.depth_kind, 1.0, (), "none", (0.0, 0.0), camera._inner
         )
         for source, depth in (("rendered", rendered._inner), ("uploaded", uploaded)):
             own = "all levels of a pyramid"

@@ -48,7 +48,7 @@ def measure(run: Run) -> None:
         numbers = rendered.numpy()
         camera = rendered.camera
         uploaded = run.device._engine.upload_depth(
-            numbers, camera.depth_kind, 1.0, (), "none", camera._inner
+            numbers, camera.depth_kind, 1.0, (), "none", (0.0, 0.0), camera._inner
         )
         for source, depth in (("rendered", rendered._inner), ("uploaded", uploaded)):
             run.step(f"reduction of a {source} image, {name}")

@@ -16,8 +16,9 @@ use common::{Way, measure, table};
 use hiz_core::headless::{DepthImage, Engine};
 use hiz_core::yardstick::{empty_submit_ms, record_uncertified_cull, submitted_ms};
 use hiz_core::{
-    Bounds, Camera, CullOptions, DepthConvention, Floats, Hierarchy, ImageSize, InstanceOptions,
-    Instances, MeshData, OccluderOptions, Order, Outputs, Pose, Projection, Pyramid,
+    Bounds, Camera, CullOptions, DepthConvention, Depths, Floats, Hierarchy, ImageSize,
+    InstanceOptions, Instances, MeshData, OccluderOptions, Order, Outputs, Pose, Projection,
+    Pyramid, PyramidOptions,
 };
 
 /// Half the width of the crowd, divided by its distance: well inside the view.
@@ -145,11 +146,14 @@ fn way<'a>(
 const MASK: Outputs = Outputs { mask: true, ..Outputs::NONE };
 
 /// Each kind of bounds, flat and in groups, with the mask as the only output.
+/// Boxes also in several tiers, and with both ends of the pyramid.
 fn kinds<'a>(
     engine: &'a Engine,
     crowd: &Crowd,
-    seen: (&'a Camera, &'a Arc<Pyramid>),
+    (camera, pyramid): (&'a Camera, &'a Arc<Pyramid>),
+    both: &'a Arc<Pyramid>,
 ) -> Vec<Way<'a>> {
+    let seen = (camera, pyramid);
     let mut ways = Vec::new();
     for (kind, bounds) in crowd.bounds() {
         let instances = engine.instances(&bounds, &InstanceOptions::default()).expect("instances");
@@ -162,6 +166,21 @@ fn kinds<'a>(
         }
         add(format!("{kind}, flat"), Hierarchy::Never, true);
         add(format!("{kind}, groups"), Hierarchy::Always, true);
+        if matches!(bounds, Bounds::Boxes { .. }) {
+            for (tiers, end, pyramid) in [
+                (2, "", pyramid),
+                (3, "", pyramid),
+                (0, ", both ends", both),
+                (1, ", both ends", both),
+                (2, ", both ends", both),
+            ] {
+                let hierarchy = Hierarchy::Tiers(tiers);
+                let options = CullOptions { hierarchy, ..CullOptions::default() };
+                let name = format!("{kind}, {tiers} tiers{end}");
+                let seen = (camera, pyramid);
+                ways.push(way(engine, (name, &instances), seen, options, MASK, true));
+            }
+        }
     }
     ways.push(("empty submit".to_owned(), Box::new(|| empty_submit_ms(engine).expect("a submit"))));
     ways
@@ -211,10 +230,12 @@ fn main() {
         Camera::look_at(&pose, &projection, ImageSize::new(1920, 1080)).expect("a plain camera");
     let pyramid = engine.pyramid(&wall(&engine, &camera)).expect("a pyramid");
     let seen = (&camera, &pyramid);
+    let options = PyramidOptions { depths: Depths::Both, ..PyramidOptions::default() };
+    let both = engine.pyramid_with(&wall(&engine, &camera), &options).expect("a pyramid");
     for (hidden, behind) in [("95 % hidden", 0.95), ("0 % hidden", 0.0)] {
         let crowd = Crowd::new(count, behind);
         let name = format!("{count} instances, {hidden}");
-        let mut ways = kinds(&engine, &crowd, seen);
+        let mut ways = kinds(&engine, &crowd, seen, &both);
         table(&name, "uncertified", &mut ways);
         measure(&mut criterion, &name, &mut ways);
         for (hierarchy, how) in [(Hierarchy::Never, "flat"), (Hierarchy::Always, "groups")] {

@@ -9,8 +9,8 @@ use campaign::{Campaign, KINDS, Round};
 use common::{CONVENTIONS, camera_along_z, engine, ndc};
 use hiz_core::headless::Engine;
 use hiz_core::{
-    Bounds, BoundsKind, Coverage, CullOptions, DepthConvention, Fit, Floats, Hierarchy,
-    InstanceOptions, Outputs, PixelCounts, PyramidOptions, StoredLevels,
+    Bounds, BoundsKind, Coverage, CullOptions, DepthConvention, Depths, Fit, Floats, Hierarchy,
+    InstanceOptions, Outputs, PixelCounts, PyramidOptions,
 };
 use hiz_ref::{PixelTruth, Volume, pixel_truth};
 
@@ -81,9 +81,10 @@ impl Tally {
 
 /// The counts of the volumes of a round; `None` for a camera that float32 cannot hold.
 fn counts_of(engine: &Engine, round: &Round, budget: Option<u32>) -> Vec<Option<Vec<PixelCounts>>> {
-    let pyramid = engine
-        .pyramid_with(&round.upload(engine), &round.pyramid_options(engine))
-        .expect("a pyramid");
+    // Every other pyramid has both ends, so that a coarse texel decides open pixels, too.
+    let depths = if round.number % 2 == 0 { Depths::Both } else { Depths::Farthest };
+    let options = PyramidOptions { depths, ..round.pyramid_options(engine) };
+    let pyramid = engine.pyramid_with(&round.upload(engine), &options).expect("a pyramid");
     let of_kind = |(kind, volumes): &(BoundsKind, Vec<Volume>)| {
         let arrays = campaign::Arrays::new(volumes);
         let bounds = arrays.bounds(*kind);
@@ -229,15 +230,14 @@ fn groups_change_no_count() {
     }
 }
 
-/// A recorded count whose pyramid never ran knows nothing about depth.
+/// A cull that counts nothing else, and what is refused.
 #[test]
-fn without_a_reduction_all_pixels_are_undecided() {
+fn counts_are_an_output_of_their_own() {
     let engine = engine();
     let camera = camera_along_z(64, 64, DepthConvention::Reversed);
-    let options = PyramidOptions { levels: StoredLevels::default(), ..PyramidOptions::default() };
     let context = engine.context();
     let depth = engine.upload_depth(&[0.5; 64 * 64], &camera).unwrap();
-    let pyramid = engine.pyramid_with(&depth, &options).unwrap();
+    let pyramid = engine.pyramid(&depth).unwrap();
     let (centers, radii) = ([0.0, 0.0, 8.0], [1.0]);
     let bounds = Bounds::Spheres { centers: Floats::F64(&centers), radii: Floats::F64(&radii) };
     let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
@@ -314,4 +314,46 @@ fn planted_faults_turn_it_red() {
     let engine = Engine::with_planted_faults(None, &[fault]).expect("a Vulkan driver");
     let rounds = campaign(75, 3, Coverage::Area).fitted(&[BoundsKind::OrientedBox], false);
     assert!(run(&engine, rounds, Some(2)).contradictions > 0, "{name}: stayed green");
+}
+
+/// One pixel of 4096 that is near or no depth keeps its texel from being open at once, and is not
+/// open itself.
+#[test]
+fn both_ends_decide_no_pixel_that_is_not_open() {
+    let engine = engine();
+    for convention in CONVENTIONS {
+        let camera = camera_along_z(64, 64, convention);
+        let far = ndc(512.0, convention);
+        let (center, radius) = ([0.0, 0.0, 8.0], [4.0]);
+        let bounds = Bounds::Spheres { centers: Floats::F64(&center), radii: Floats::F64(&radius) };
+        let instances = engine.instances(&bounds, &InstanceOptions::default()).unwrap();
+        let volume = Volume::Sphere { center, radius: radius[0] };
+        for (pixel, odd) in [(0, far), (2080, ndc(2.0, convention)), (2081, ndc(8.0, convention))]
+            .into_iter()
+            .chain([(2079, f32::NAN), (1950, -1.0), (2100, f32::INFINITY)])
+        {
+            let mut depth = vec![far; 64 * 64];
+            depth[pixel] = odd;
+            let image = engine.upload_depth(&depth, &camera).unwrap();
+            let counts = [Depths::Farthest, Depths::Both].map(|depths| {
+                let options = PyramidOptions { depths, ..PyramidOptions::default() };
+                let pyramid = engine.pyramid_with(&image, &options).unwrap();
+                let options = CullOptions::default();
+                let seen = engine.cull(&instances, &camera, &pyramid, &options, &PIXELS).unwrap();
+                seen.pixels().unwrap()[0]
+            });
+            assert_eq!(counts[0], counts[1], "{convention:?} {pixel} {odd}");
+            let rows = camera.rows();
+            let view = hiz_ref::View {
+                rows,
+                origin: camera.origin(),
+                width: 64,
+                height: 64,
+                reversed: convention.is_reversed(),
+            };
+            let truth = pixel_truth(&view, &volume, &depth, hiz_ref::Coverage::Area).unwrap();
+            assert_eq!(contradiction(&counts[0], &truth, 4096), None, "{counts:?} {truth:?}");
+            assert_eq!(counts[0].touched - counts[0].open, truth.not_open, "{pixel} {odd}");
+        }
+    }
 }

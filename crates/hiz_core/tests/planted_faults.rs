@@ -457,7 +457,7 @@ fn groups_that_forget_members_or_shrink() {
         ),
         (
             "the next group's members",
-            ("cull_run(entry & ~ACCEPTED", "cull_run((entry & ~ACCEPTED) + 1u"),
+            ("survivor_position(slot)).x, lane", "survivor_position(slot)).x + 1u, lane"),
             ALL,
         ),
         (

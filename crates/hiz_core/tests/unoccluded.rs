@@ -348,8 +348,10 @@ fn the_walk_down_the_nearest_end_is_complete() {
     let forgets = ("if (at.x & last_child) < last_child && at.x < end.x {", "if false {");
     assert_red("a column forgotten", &rounds_of(POSTS, BOXES, DESCENT), &[forgets]);
     let ends = (
-        "    var decided = far_bits();\n    loop {\n        if left == 0u {\n            return false;",
-        "    var decided = far_bits();\n    loop {\n        if left == 0u {\n            return true;",
+        "    var decided = far_bits();\n    loop {\n        if left == 0u {\n            \
+         return false;",
+        "    var decided = far_bits();\n    loop {\n        if left == 0u {\n            \
+         return true;",
     );
     assert_red("the budget's end", &rounds_of(POSTS, BOXES, SHORT), &[ends]);
     let outside = ("if !hidden && !in_front && is_inside && level", "if !hidden && level");
@@ -406,18 +408,17 @@ fn the_other_answers_stay_as_they_are() {
         seed: 66,
         rounds: 1,
         volumes: 16,
-        modes: ALL_MODES,
+        kinds: BOXES,
         any_slack: true,
         ..Campaign::default()
     };
     let pipelines = Pipelines::Few;
     let (mut found, mut grouped) = (0, 0);
-    for (coverage, fit) in [
-        (Coverage::Area, Fit::Rectangle),
-        (Coverage::Sample, Fit::Rectangle),
-        (Coverage::Sample, Fit::Volume),
+    for (coverage, fit, modes) in [
+        (Coverage::Area, Fit::Rectangle, PLAIN),
+        (Coverage::Sample, Fit::Volume, DESCENT),
     ] {
-        let campaign = Campaign { coverage, fit, ..campaign };
+        let campaign = Campaign { coverage, fit, modes, ..campaign };
         for mut round in campaign.rounds().flat_map(|r| [r.copied().barely_covered(), r]) {
             let engine = &engine();
             let image = round.depth.clone();
@@ -438,7 +439,7 @@ fn the_other_answers_stay_as_they_are() {
             grouped += shown.claimed;
         }
     }
-    assert!(found > 100 && grouped > 100, "{found} {grouped}");
+    assert!(found > 30 && grouped > 30, "{found} {grouped}");
 }
 
 /// In every arithmetic that WGSL permits, no answer is false.

@@ -5,14 +5,15 @@
 
 use crate::cull::options::{CullOptions, Hierarchy};
 use crate::cull::pipelines::{
-    CullKey, FramePass, MEMBER_BINDINGS, ReportKey, cull_boxes_pipeline, cull_members_pipeline,
+    CullKey, FramePass, MEMBER_BINDINGS, ReportKey, accept_members_pipeline, cull_boxes_pipeline,
+    cull_members_pipeline,
 };
 use crate::error::Result;
 use crate::gpu::buffers::{entry, made};
 use crate::gpu::device::Gpu;
 use crate::input::bounds::BoundsKind;
 use crate::instances::piece::{CULL_WORKGROUP, Piece};
-use crate::output::survivors::{GroupOutput, TierOutput};
+use crate::output::survivors::{ACCEPT_OFFSET, GroupOutput, TierOutput};
 
 /// The label of the buffer that is bound if levels are not counted.
 pub(super) const NO_STATISTICS: &str = "hiz.no_statistics";
@@ -73,6 +74,8 @@ pub(super) struct GroupCull<'a> {
     tiers: Vec<TierCull<'a>>,
     /// The test of the members of the surviving groups.
     members: wgpu::ComputePipeline,
+    /// What keeps the members of accepted groups; `None` where no group can be accepted.
+    accept: Option<wgpu::ComputePipeline>,
 }
 
 /// The tests of the boxes of a tier.
@@ -142,7 +145,12 @@ impl<'a> GroupCull<'a> {
                 })
             });
         let tiers = boxes.collect::<Result<_>>()?;
-        Ok(Self { tiers, members: cull_members_pipeline(gpu, &key, &report)? })
+        let accepts = key.nearest && !key.sample_coverage;
+        Ok(Self {
+            tiers,
+            members: cull_members_pipeline(gpu, &key, &report)?,
+            accept: accepts.then(|| accept_members_pipeline(gpu, &key, &report)).transpose()?,
+        })
     }
 
     /// Records the tests of the boxes of all tiers, from the topmost one down.
@@ -176,5 +184,9 @@ impl<'a> GroupCull<'a> {
         pass.set_bind_group(3, &groups.list, &[]);
         pass.set_pipeline(&self.members);
         pass.dispatch_workgroups_indirect(&groups.output.survivors, 0);
+        if let Some(accept) = &self.accept {
+            pass.set_pipeline(accept);
+            pass.dispatch_workgroups_indirect(&groups.output.survivors, ACCEPT_OFFSET);
+        }
     }
 }

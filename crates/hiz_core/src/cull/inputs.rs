@@ -156,6 +156,11 @@ impl PreparedView {
         Ok(Self { built, atlas, view, key })
     }
 
+    /// Whether a pixel of level 0 is one sample, and not the farthest of several.
+    pub(super) fn has_one_sample(&self) -> bool {
+        self.built.part.samples <= 1
+    }
+
     /// The bindings for a test of instances and, if `grouped`, for one of groups.
     pub(super) fn bind(&self, gpu: &Gpu, pyramid: &Pyramid, grouped: bool) -> Result<BoundView> {
         let descent_budget = group_descent(self.view.descent_budget);

@@ -252,7 +252,6 @@ pub(crate) fn report_constants(key: &ReportKey) -> Vec<(&'static str, f64)> {
     let mut constants = vec![
         ("MASK", flag(key.mask)),
         ("VERDICTS", flag(key.verdicts)),
-        ("ABSENT", flag(key.absent)),
         ("STATISTICS", flag(key.statistics)),
     ];
     constants.extend(key.emit.constants());
@@ -460,15 +459,34 @@ pub(crate) fn cull_members_module(
     emit: EmitKey,
     pass: FramePass,
 ) -> Source {
+    members_module((store, kind), emit, pass, wgsl!("cull/cull_members"))
+}
+
+/// The shader that keeps the members of accepted groups.
+pub(crate) fn accept_members_module(
+    store: DepthStore,
+    kind: BoundsKind,
+    emit: EmitKey,
+    pass: FramePass,
+) -> Source {
+    members_module((store, kind), emit, pass, wgsl!("cull/accept_members"))
+}
+
+fn members_module(
+    (store, kind): (DepthStore, BoundsKind),
+    emit: EmitKey,
+    pass: FramePass,
+    entry: File,
+) -> Source {
     let shared = [
         wgsl!("instances/piece"),
         wgsl!("output/statistics"),
         wgsl!("output/report"),
         wgsl!("instances/groups"),
     ];
-    let entry =
-        [&shared[..], &emit.files(), pass.member_files(), &[wgsl!("cull/cull_members")]].concat();
-    unexplained(store, kind, &entry)
+    let last = [wgsl!("cull/survivors"), entry];
+    let files = [&shared[..], &emit.files(), pass.member_files(), &last].concat();
+    unexplained(store, kind, &files)
 }
 
 /// The layouts of a cull's view, of its records and of what it writes.
@@ -546,14 +564,36 @@ pub(crate) fn cull_members_pipeline(
     key: &CullKey,
     report: &ReportKey,
 ) -> Result<wgpu::ComputePipeline> {
+    let module = cull_members_module(key.store, key.kind, report.emit, report.pass);
+    members_pipeline(gpu, key, report, ("cull_members", module), &[])
+}
+
+/// What keeps the members of accepted groups.
+pub(crate) fn accept_members_pipeline(
+    gpu: &Gpu,
+    key: &CullKey,
+    report: &ReportKey,
+) -> Result<wgpu::ComputePipeline> {
+    let module = accept_members_module(key.store, key.kind, report.emit, report.pass);
+    let absent = [("ABSENT", flag(report.absent))];
+    members_pipeline(gpu, key, report, ("accept_members", module), &absent)
+}
+
+fn members_pipeline(
+    gpu: &Gpu,
+    key: &CullKey,
+    report: &ReportKey,
+    (entry_point, source): (&'static str, Source),
+    more: &[(&'static str, f64)],
+) -> Result<wgpu::ComputePipeline> {
     let written = ("hiz.cull.visible_layout", report.pass.member_bindings());
     let [view, records, visible] = layouts(gpu, key.store, report.emit.record_bindings(), written)?;
     let members = gpu.layout("hiz.cull_members.layout", MEMBER_BINDINGS)?;
     gpu.compute_pipeline(&Compute {
         label: "hiz.cull_members.pipeline",
-        source: cull_members_module(key.store, key.kind, report.emit, report.pass),
-        entry_point: "cull_members",
+        source,
+        entry_point,
         layouts: &[view, records, visible, members],
-        constants: &[&classify_constants(key)[..], &report_constants(report)].concat(),
+        constants: &[&classify_constants(key)[..], &report_constants(report), more].concat(),
     })
 }

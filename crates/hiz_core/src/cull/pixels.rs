@@ -49,22 +49,29 @@ pub(crate) fn pixels_module(store: DepthStore, kind: BoundsKind) -> Source {
     unexplained(store, kind, &entry.concat())
 }
 
-fn pixels_pipeline(gpu: &Gpu, key: &CullKey, shown: bool) -> Result<wgpu::ComputePipeline> {
+fn pixels_pipeline(
+    gpu: &Gpu,
+    key: &CullKey,
+    (one_sample, shown): (bool, bool),
+) -> Result<wgpu::ComputePipeline> {
     let written = ("hiz.pixels.layout", COUNTED_BINDINGS);
     gpu.compute_pipeline(&Compute {
         label: "hiz.pixels.pipeline",
         source: pixels_module(key.store, key.kind),
         entry_point: "count_of_pixels",
         layouts: &layouts(gpu, key.store, RECORD_BINDINGS, written)?,
-        constants: &pixels_constants(key, shown),
+        constants: &pixels_constants(key, one_sample, shown),
     })
 }
 
 /// The constants of a count of pixels.
-pub(crate) fn pixels_constants(key: &CullKey, shown: bool) -> Vec<(&'static str, f64)> {
+fn pixels_constants(key: &CullKey, one_sample: bool, shown: bool) -> Vec<(&'static str, f64)> {
     // The rectangle of a footprint and its fit have no effect, because every pixel is looked for.
     let key = CullKey { footprint_log2: 1, descent: true, fit_volume: true, ..*key };
-    classify_constants(&key).into_iter().chain([("SHOWN", flag(shown))]).collect()
+    classify_constants(&key)
+        .into_iter()
+        .chain([("ONE_SAMPLE", flag(one_sample)), ("SHOWN", flag(shown))])
+        .collect()
 }
 
 /// A count that is prepared: nothing that it records can fail any more.
@@ -92,7 +99,8 @@ impl PixelPass {
         let CullInputs { instances, pyramid, .. } = *inputs;
         let seen = PreparedView::new(gpu, inputs, None)?;
         let view = seen.bind(gpu, pyramid, false)?;
-        let pipeline = pixels_pipeline(gpu, &seen.key, negligible.is_some())?;
+        let pipeline =
+            pixels_pipeline(gpu, &seen.key, (seen.has_one_sample(), negligible.is_some()))?;
         let counting = gpu.uniform(
             "hiz.pixels.counting",
             &CountingUniform {

@@ -120,8 +120,8 @@ pub fn ndc_from_kind_within<'a>(
 /// Its `world_tolerance` moves NDC depth, too, and then no tolerance is left.
 ///
 /// # Errors
-/// As [`ndc_from_kind_within`], and [`Error::Invalid`] for a world tolerance that is negative or not
-/// finite, and for one of NDC depth of a camera that does not say where view depth starts.
+/// As [`ndc_from_kind_within`], and [`Error::Invalid`] for a world tolerance that is negative or
+/// not finite, and for one of NDC depth of a camera that does not say where view depth starts.
 pub fn ndc_of(input: &DepthInput<'_>, camera: &Camera) -> Result<(Vec<f32>, DepthTolerance)> {
     let conversion = Conversion::new(input, camera)?;
     let mut ndc = memory::list(conversion.numbers.len(), "depth")?;

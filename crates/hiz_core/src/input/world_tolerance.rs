@@ -115,7 +115,8 @@ impl NdcMove {
             )
         })?;
         let lost = match &lens.rays {
-            // Roundings of the difference, the products and the sums: less than 16 of 1 + |constant|.
+            // Roundings of the difference, the products and the sums are less than 16 of
+            // 1 + |constant|.
             // A depth that is off by `tilt` moves by so much of it.
             Rays::Parallel { constant, tilt, .. } => {
                 16.0 * ROUNDING * (1.0 + constant.abs()) + tilt * tolerance.relative

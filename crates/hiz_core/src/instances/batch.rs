@@ -75,7 +75,8 @@ impl Batch {
         }
     }
 
-    /// Packs the volumes `sources` of `bounds` into the beginning of `target`, as records of `kind`.
+    /// Packs the volumes `sources` of `bounds` into the beginning of `target`.
+    /// The records are those of `kind`.
     /// Bit k of `absent`: number k is absent, whatever its bounds are.
     /// Calls `tell` with the boxes around them; that of an absent one is empty.
     /// Returns the rest of `target`.

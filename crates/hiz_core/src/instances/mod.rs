@@ -6,7 +6,8 @@
 //! 2. `order` and `morton` choose where each instance is stored: along a curve through space.
 //! 3. `groups` and `aabb` form groups of 64 neighbours with a box around each.
 //!    `tiers` forms boxes around 64 of these boxes each, and so on.
-//! 4. `volume_record`, `point`, `write_record`, `batch` and `records` write the records that the cull reads.
+//! 4. `volume_record`, `point`, `write_record`, `batch` and `records` write the records that the
+//!    cull reads.
 //! 5. `update` replaces bounds later, and `watch` connects submitted culls with later updates.
 //! 6. `from_buffer` takes bounds that a shader of the caller's has written.
 //!

@@ -110,7 +110,7 @@ mod tests {
         );
     }
 
-    /// Both halves together are the position, to within 2^-48 of it, and nothing moves a narrow one.
+    /// Both halves together are the position, to within 2^-48 of it; a narrow one is exact.
     #[test]
     fn records_hold_their_positions() {
         let numbers = [0.1, 1.0e7 + 1.0 / 3.0, -1.0 / 7.0];

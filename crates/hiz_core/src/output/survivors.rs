@@ -16,11 +16,24 @@ pub(crate) struct SurvivorsRecord {
     pub(crate) tested: u32,
     pub(crate) accepted: u32,
     pub(crate) padding: [u32; 2],
+    pub(crate) accept_workgroups: [u32; 3],
+    pub(crate) accept_count: u32,
 }
 
 /// The record before the boxes are tested.
-pub(crate) const NO_SURVIVORS: SurvivorsRecord =
-    SurvivorsRecord { workgroups: [0, 1, 1], count: 0, tested: 0, accepted: 0, padding: [0; 2] };
+pub(crate) const NO_SURVIVORS: SurvivorsRecord = SurvivorsRecord {
+    workgroups: [0, 1, 1],
+    count: 0,
+    tested: 0,
+    accepted: 0,
+    padding: [0; 2],
+    accept_workgroups: [0, 1, 1],
+    accept_count: 0,
+};
+
+/// Where the arguments of the dispatch for accepted groups begin in the record, in bytes.
+pub(crate) const ACCEPT_OFFSET: u64 =
+    std::mem::offset_of!(SurvivorsRecord, accept_workgroups) as u64;
 
 /// Survivors in a row of their list; `shaders/instances/groups.wgsl`.
 pub(crate) const SURVIVORS_PER_ROW: u32 = 4096;

@@ -4,8 +4,8 @@ use crate::cull::among::among_order_module;
 use crate::cull::count::count_module;
 use crate::cull::explain::explain_module;
 use crate::cull::pipelines::{
-    BinKey, Candidates, DepthStore, EmitKey, FramePass, cull_boxes_module, cull_members_module,
-    flat_module,
+    BinKey, Candidates, DepthStore, EmitKey, FramePass, accept_members_module, cull_boxes_module,
+    cull_members_module, flat_module,
 };
 use crate::cull::pixels::pixels_module;
 use crate::cull::refine::{refine_groups_module, refine_module};
@@ -123,6 +123,10 @@ pub(super) fn all() -> Vec<(String, Source)> {
             let named = |name: &str| format!("{name} {way} {store:?} {pass:?} {kind:?}");
             all.push((named("cull"), flat_module(store, kind, emit, pass)));
             all.push((named("cull_members"), cull_members_module(store, kind, emit, pass)));
+            if matches!(pass, FramePass::Early(_)) {
+                continue;
+            }
+            all.push((named("accept_members"), accept_members_module(store, kind, emit, pass)));
         }
     }
     for store in stores {

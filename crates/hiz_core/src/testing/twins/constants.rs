@@ -181,8 +181,22 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ("cull/lod", &["NEEDS", "NEED_FACTOR", "LARGEST_DEVIATION"]),
     // All bits of a run.
     ("cull/early", &["WHOLE_RUN"]),
-    ("cull/pixels", &["STEP", "TOP_TEXELS", "ROW_BITS", "ROW_MASK", "NO_BORDER"]),
-    ("cull/pixels_planes", &["FACE_PLANES", "NO_PLANE"]),
+    (
+        "cull/pixels",
+        &[
+            "STEP",
+            "TOP_TEXELS",
+            "ROW_BITS",
+            "ROW_MASK",
+            "NO_BORDER",
+            "ONE_TILE",
+            "TILE_LOG2",
+            "MAX_TILES",
+            "WHOLE_IMAGE_LOG2",
+            "UNKNOWN_BITS",
+        ],
+    ),
+    ("cull/pixels_planes", &["FACE_PLANES", "OUTLINE_PLACES", "NO_PLANE"]),
     ("cull/refine", &["REFINED"]),
     ("cull/unoccluded", &["HALF_PIXEL"]),
     ("gpu/clock_check", &["LEFT", "RIGHT", "LEFT_AGAIN"]),
@@ -230,7 +244,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
         ],
     ),
     ("instances/corners", &["HALF"]),
-    ("instances/bounds_point_support", &["CANDIDATES"]),
+    ("instances/bounds_point_support", &["CANDIDATES", "OUTLINES"]),
     // One workgroup scans, however large it is.
     ("output/compact", &["LANES"]),
     ("output/emit_draws", &["LANES"]),
@@ -366,6 +380,7 @@ fn constants_cover_what_is_counted() {
 fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
     let line = |n: u32| [n, 1, 1];
     BTreeMap::from([
+        ("accept_members", line(GROUP as u32)),
         ("among_order", line(among::WORKGROUP)),
         ("begin", line(1)),
         ("choose_lods", line(lod::LANES)),
