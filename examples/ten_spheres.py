@@ -2,8 +2,8 @@
 
 The camera looks along the line, so the first sphere hides the other nine.
 The depth image and its pyramid stay on the device: no depth is read back.
-With a path, the script writes a PNG: how many spheres of the line lie in each pixel on the left, and
-how many of those that were drawn on the right.
+With a path, the script writes a PNG: how many spheres of the line lie in each pixel on the left,
+and how many of those that were drawn on the right.
 """
 
 import struct

@@ -300,7 +300,15 @@ class Engine:
         self,
         bounds: tuple[str, Sequence[_Floats]],
         camera: Camera,
-        depth: Pyramid | tuple[_Floats | npt.NDArray[np.uint16], str, float, Sequence[float], str],
+        depth: Pyramid
+        | tuple[
+            _Floats | npt.NDArray[np.uint16],
+            str,
+            float,
+            Sequence[float],
+            str,
+            tuple[float, float],
+        ],
         options: CullOptions,
     ) -> tuple[npt.NDArray[np.bool_], Counts]: ...
     def start_timing(self) -> None: ...
