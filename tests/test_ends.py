@@ -60,7 +60,8 @@ def check(hiz: hizvk.Pyramid, pixels: dict[str, F32], reversed_z: bool) -> None:
         for k in [0, *hiz.levels]:
             expected = block_level(level_0, k, greatest)
             found = hiz.level(k, end=end)  # type: ignore[arg-type]
-            assert found.dtype == np.float32 and found.shape == expected.shape
+            assert found.dtype == np.float32
+            assert found.shape == expected.shape
             assert np.array_equal(found, expected), (hiz, end, k)
 
 
@@ -218,4 +219,5 @@ def test_both_ends_hide_the_same(device: hizvk.Device, rng: np.random.Generator)
             hiz = device.pyramid(image, view, kind="z", depths=depths)  # type: ignore[call-overload]
             masks.append(device.cull(balls, view, hiz).mask)
         assert np.array_equal(*masks)
-        assert not masks[0].all() and masks[0].any()
+        assert not masks[0].all()
+        assert masks[0].any()

@@ -74,24 +74,26 @@ fn draw(@builtin(global_invocation_id) id: vec3<u32>) {
     let place = vec2<f32>(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y) * size;
     let pixel = min(vec2<u32>(place), view.size - 1u);
     // Reversed Z: nearer is greater.
+    // Tuning for software drivers: they skip no branch, but end a loop.
     var shows = false;
     var undecided = 1u;
     if COARSE {
         let texel = pixel >> vec2<u32>(view.level);
         let word = texel.y * view.stride + texel.x;
-        let before_all = ndc.z > nearest[view.nearest + word];
         let behind_all = ndc.z <= farthest[view.farthest + word];
-        shows = before_all;
-        undecided = select(1u, 0u, before_all || behind_all);
+        undecided = select(1u, 0u, behind_all);
+        for (var turn = 0u; turn < select(1u, 0u, behind_all); turn += 1u) {
+            shows = ndc.z > nearest[view.nearest + word];
+            undecided = select(1u, 0u, shows);
+        }
         if COUNTED {
-            atomicAdd(&counts[1], u32(before_all));
+            atomicAdd(&counts[1], u32(shows));
             atomicAdd(&counts[2], u32(behind_all));
         }
     }
     if COUNTED {
         atomicAdd(&counts[0], 1u);
     }
-    // Tuning for software drivers: they skip no branch, but end a loop.
     for (var turn = 0u; turn < undecided; turn += 1u) {
         shows = ndc.z > textureLoad(depth, pixel, 0);
     }
