@@ -41,6 +41,10 @@ TETRAHEDRON = hizvk.Mesh(np.eye(4)[:, :3] / 4, [[0, 1, 2], [0, 3, 1], [1, 3, 2],
 
 # --- bad values that several functions share ---
 
+DEPTHS: list[Bad] = [
+    ("far", ValueError, 'expected one of "farthest", "nearest", "both", "receivers", got'),
+    (2, TypeError, "got int 2"),
+]
 LEVELS: list[Bad] = [
     (0, ValueError, "expected an integer in 1..15, got int 0"),
     (16, ValueError, "expected an integer in 1..15, got int 16"),
@@ -1070,6 +1074,7 @@ TABLES: dict[str, Table] = {
             "invalid": INVALID,
             "tolerance": TOLERANCE,
             "levels": LEVELS,
+            "depths": DEPTHS,
         },
     ),
     "Device.cull": Table(
@@ -1387,7 +1392,11 @@ TABLES: dict[str, Table] = {
                 (4, IndexError, "expected a level in 0..3, got 4"),
                 (-1, IndexError, "expected a level in 0..3, got -1"),
                 (0.0, TypeError, "got float 0.0"),
-            ]
+            ],
+            "end": [
+                ("nearest", ValueError, 'expected one of "farthest", got'),
+                (1, TypeError, "got int 1"),
+            ],
         },
     ),
     "Pyramid.update": Table(

@@ -19,7 +19,7 @@ from ._core import MeshTable as CoreMeshTable
 from ._core import TwoPasses as CoreTwoPasses
 from ._on_device import check_owner
 from ._processes import driver_is_asked
-from ._types import FaceCull, Rasteriser, StoredOrder, words
+from ._types import Depths, FaceCull, Rasteriser, StoredOrder, words
 from .adapter import Adapter
 from .approximate import ApproximateResult
 from .bounds import Bounds, are_points, as_arrays
@@ -430,6 +430,7 @@ class Device:
         invalid: None = None,
         tolerance: None = None,
         levels: Levels = None,
+        depths: Depths = "farthest",
     ) -> Pyramid: ...
 
     @overload
@@ -443,6 +444,7 @@ class Device:
         invalid: Collection[float] | None = None,
         tolerance: Tolerance | None = None,
         levels: Levels = None,
+        depths: Depths = "farthest",
     ) -> Pyramid: ...
 
     def pyramid(
@@ -455,6 +457,7 @@ class Device:
         invalid: Collection[float] | None = None,
         tolerance: Tolerance | None = None,
         levels: Levels = None,
+        depths: Depths = "farthest",
     ) -> Pyramid:
         """Builds the depth pyramid of a depth image.
 
@@ -464,7 +467,8 @@ class Device:
             A rendered image of this device, alone; or an array, with `camera` and `kind`.
             Arrays are float, or uint16 for the kinds ``"z"`` and ``"distance"``.
             Row 0 is the top of the image.
-            With 2, 4, 8 or 16 samples per pixel the farthest one counts.
+            With 2, 4, 8 or 16 samples per pixel the farthest one counts, and the nearest in the
+            nearest end.
             A sample with "no data" makes its pixel far, and a cull takes ``coverage="area"`` alone.
             What is masked in a masked array is "no data".
 
@@ -519,6 +523,23 @@ class Device:
             unless a descent may read that many.
             Level 1 costs most to build; bounds of one or two pixels read the image itself.
             ``hizvk bench`` measures both sides.
+        depths : {"farthest", "nearest", "both", "receivers"}
+            Which depths of each block are stored, beside level 0.
+
+            - ``"farthest"``: what a cull needs to hide.
+            - ``"both"``: the nearest, too, in the same pass.
+              A cull then also tells what surely shows (`UNOCCLUDED`).
+            - ``"nearest"``: these alone; no cull takes such a pyramid.
+            - ``"receivers"``: both, of the pixels that show a receiver of shadows.
+              Culls of shadow casters take it, and no others do.
+
+            The ends differ in what "no data" counts as: far in the farthest, near in the nearest.
+
+            For ``"receivers"`` background is left out: pixels with exactly the depth of far, which
+            is what a depth buffer is cleared to.
+            "No data" is no background: its block has far as farthest and near as nearest depth.
+            A block without any receiver has near as farthest and far as nearest depth.
+            Depths of the kinds ``"z"`` and ``"distance"`` never are background.
 
         Raises
         ------
@@ -526,8 +547,23 @@ class Device:
             They name the parameter, what it expects and what came.
         LimitError, OutOfMemoryError
             If the image is larger than the device allows.
+
+        Examples
+        --------
+        >>> import numpy as np, hizvk
+        >>> device = hizvk.Device()
+        >>> camera = hizvk.Camera.look_at(
+        ...     (0, 0, 9), (0, 0, 0), fov_y_deg=60, size=(2, 4), near=1.0, reversed_z=True
+        ... )
+        >>> depth = np.float32([[0.5, 0.25, 0, np.nan], [0.25, 0.25, 0.125, 0.125]])
+        >>> hiz = device.pyramid(depth, camera, kind="reversed_ndc", depths="both")
+        >>> hiz.level(1, end="farthest").tolist()
+        [[0.25, 0.0]]
+        >>> hiz.level(1, end="nearest").tolist()
+        [[0.5, 1.0]]
         """
         stored = _arguments.stored_levels("levels", levels)
+        _arguments.choice("depths", depths, words(Depths))
         if isinstance(depth, DepthImage):
             for name, value in (("camera", camera), ("kind", kind), ("invalid", invalid)):
                 if value is not None:
@@ -546,12 +582,12 @@ class Device:
                 )
             check_owner("depth", depth, self)
             source = Source(depth._inner)
-            built = self._engine.pyramid(depth._inner, stored)
-            return Pyramid(self, built, depth.camera, source, is_rendered=True)
+            built = self._engine.pyramid(depth._inner, stored, depths)
+            return Pyramid(self, built, depth.camera, source, is_rendered=True, depths=depths)
         camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")
         self._check_side(camera)
         samples = checked_samples("depth", depth, camera, kind, scale, invalid, tolerance)
-        return self._pyramid_of(samples, camera, stored, invalid)
+        return self._pyramid_of(samples, camera, stored, invalid, depths)
 
     def _pyramid_of(
         self,
@@ -559,16 +595,18 @@ class Device:
         camera: Camera,
         stored: tuple[int, int],
         invalid: Any = None,
+        depths: Depths = "farthest",
     ) -> Pyramid:
         """The pyramid of an image that was checked, or of one per sample; with levels `stored`."""
         given = images if isinstance(images, list) else [images]
         if len(given) == 1:
-            uploaded = self._engine.upload_depth(*given[0], camera._inner)
+            uploaded = self._engine.upload_depth(*given[0], camera._inner, depths)
         else:
             planes = [plane.image for plane in given]
-            uploaded = self._engine.upload_samples(planes, *given[0][1:], camera._inner)
+            uploaded = self._engine.upload_samples(planes, *given[0][1:], camera._inner, depths)
         source = Source.uploaded(uploaded, given, invalid)
-        return Pyramid(self, self._engine.pyramid(uploaded, stored), camera, source)
+        built = self._engine.pyramid(uploaded, stored, depths)
+        return Pyramid(self, built, camera, source, depths=depths)
 
     @overload
     def cull(

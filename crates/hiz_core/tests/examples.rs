@@ -171,7 +171,7 @@ fn particles_are_the_same_with_a_coarse_level() {
         ),
     ];
     for fault in swapped {
-        let found = run(4, true, &[fault]);
+        let found = run(2, true, &[fault]);
         assert!(found.pictures[0] != found.pictures[1], "{fault:?}");
     }
 }

@@ -166,9 +166,9 @@ def unoccluded(
     bounds_kind, arrays = as_arrays("bounds", bounds)
     _arguments.instance("camera", camera, Camera, "a Camera")
     checked = checked_image("depth", depth, camera, kind, scale, invalid)
-    coverage = _arguments.choice("coverage", coverage, words(Coverage))
+    asked = _arguments.choice("coverage", coverage, words(Coverage))
     image = (checked.floats(), checked.kind, checked.scale, checked.invalid)
-    return reference_unoccluded(bounds_kind, arrays, camera._inner, *image, coverage)
+    return reference_unoccluded(bounds_kind, arrays, camera._inner, *image, asked)
 
 
 def pyramid(depth: npt.ArrayLike, *, reversed_z: bool) -> list[npt.NDArray[np.float32]]:
