@@ -165,10 +165,7 @@ fn particles_are_the_same_with_a_coarse_level() {
         ("ndc.z > nearest[view.nearest + word]", "ndc.z > farthest[view.farthest + word]"),
         ("ndc.z <= farthest[view.farthest + word]", "ndc.z <= nearest[view.nearest + word]"),
         ("all(last == texel) && ", ""),
-        (
-            "let texel = pixel >> vec2<u32>(view.level)",
-            "let texel = pixel >> vec2<u32>(view.level + 1u)",
-        ),
+        ("texel.y * view.stride + texel.x;", "texel.y * view.stride + texel.x + 1u;"),
     ];
     for fault in swapped {
         let found = run(2, true, &[fault]);
