@@ -113,9 +113,7 @@ def test_a_part_is_renewed_as_the_whole_is(
             height, width = int(rng.integers(1, 46 - y)), int(rng.integers(1, 68 - x))
             image[y : y + height, x : x + width] = odd_image((height, width), rng)
             hiz.update(y, x, image[y : y + height, x : x + width].copy())
-        pixels = {
-            end: by_definition(image, end, reversed_z, depths == "receivers") for end in ENDS
-        }
+        pixels = {end: by_definition(image, end, reversed_z, depths == "receivers") for end in ENDS}
         check(hiz, pixels, reversed_z)
 
 

@@ -166,11 +166,11 @@ fn the_swept_certificate_never_claims_what_is_not_so() {
     let (wrong, claims) = false_claims(0.0, 0, 1500);
     println!("without a margin: {wrong} of {claims} claims are wrong");
     assert!(wrong > 200, "without a margin {wrong} are wrong: the cases lie too far away");
-    for style in 0..STYLES.len() {
+    for (style, named) in STYLES.iter().enumerate() {
         let (wrong, claims) = false_claims(24.0, style, if style == 0 { 3000 } else { 800 });
-        println!("{}: {wrong} of {claims}", STYLES[style].name);
-        assert_eq!(wrong, 0, "{}, of {claims}", STYLES[style].name);
-        assert!(claims > 1000, "{}: only {claims} claims", STYLES[style].name);
+        println!("{}: {wrong} of {claims}", named.name);
+        assert_eq!(wrong, 0, "{}, of {claims}", named.name);
+        assert!(claims > 1000, "{}: only {claims} claims", named.name);
     }
 }
 
@@ -284,7 +284,7 @@ fn receivers(camera: &Camera, depth: &[f32]) -> Vec<Vec3> {
     let far = if camera.convention().is_reversed() { 0.0 } else { 1.0 };
     let mut points = Vec::new();
     for (i, d) in depth.iter().enumerate().filter(|(_, d)| **d != far) {
-        let (column, row) = ((i as u32 % SIDE) as f64, (i as u32 / SIDE) as f64);
+        let (column, row) = (f64::from(i as u32 % SIDE), f64::from(i as u32 / SIDE));
         for (x, y) in [(0.5, 0.5), (0.01, 0.01), (0.99, 0.01), (0.01, 0.99), (0.99, 0.99)] {
             points.push(unprojected(camera, column + x, row + y, f64::from(*d)));
         }

@@ -19,6 +19,7 @@ pub(crate) mod projection;
 mod quick;
 pub(crate) mod seen_points;
 pub(crate) mod stretch;
+pub(crate) mod telling_far;
 pub(crate) mod tolerance;
 pub(crate) mod view;
 #[cfg(feature = "headless")]
