@@ -497,16 +497,20 @@ fn differs(engine: &Engine, source: Source, depths: Depths, levels: StoredLevels
         CONVENTIONS.into_iter().any(|convention| {
             let camera = camera_along_z(size.0, size.1, convention);
             let image = plain_for(source, image(size, convention, &mut random));
-            let pyramid = pyramid_from(engine, source, &image, &camera, &options(depths, levels));
-            (1..pyramid.num_levels()).filter(|k| (levels.first..=levels.last).contains(k)).any(
-                |level| {
+            // Neither near nor far, so that what a block begins with would show.
+            let between = plain_for(Source::Float, image.clone());
+            let between = between.iter().map(|d| 0.25 + 0.5 * d).collect();
+            [image, between].iter().any(|image| {
+                let options = options(depths, levels);
+                let pyramid = pyramid_from(engine, source, image, &camera, &options);
+                let stored = levels.first..=levels.last;
+                (1..pyramid.num_levels()).filter(|k| stored.contains(k)).any(|level| {
                     stored_ends(depths).any(|end| {
-                        let of = (end, depths);
                         engine.read_level_of(&pyramid, level, end).unwrap()
-                            != expected_level(&image, size, level, of, convention)
+                            != expected_level(image, size, level, (end, depths), convention)
                     })
-                },
-            )
+                })
+            })
         })
     })
 }
@@ -514,67 +518,45 @@ fn differs(engine: &Engine, source: Source, depths: Depths, levels: StoredLevels
 #[test]
 fn faults_of_both_ends_are_seen() {
     let all = StoredLevels::ALL;
-    let faults: [(&str, &str, Depths, StoredLevels); 12] = [
-        ("nearest_sanitized4(pixels));", "farthest_sanitized4(pixels));", Depths::Both, all),
-        // What is no depth is far at the nearest end, or -0 is.
-        (
-            "nearest_sanitized4(pixels));",
-            "nearest4(vec4<u32>(sanitized(pixels.x), sanitized(pixels.y), sanitized(pixels.z), \
-             sanitized(pixels.w))));",
-            Depths::Both,
-            all,
-        ),
-        (
-            "nearest_sanitized4(pixels));",
-            "nearest_sanitized4(pixels & vec4<u32>(0x7fffffffu)));",
-            Depths::Both,
-            all,
-        ),
+    let receivers = "return Ends(farthest_sanitized4(foreground4(pixels)), nearest_sanitized4";
+    let faults: [(&str, &str, Depths, StoredLevels); 15] = [
+        // What is no depth counts as a depth, or as far at the nearest end.
+        ("greatest > ONE_BITS || least < LEAST_NORMAL_BITS", "least < 1u", Depths::Both, all),
+        ("greatest > NEGATIVE_ZERO_BITS)", "false)", Depths::Both, all),
+        ("greatest > NEGATIVE_ZERO_BITS)", "greatest >= NEGATIVE_ZERO_BITS)", Depths::Both, all),
+        ("min(u32(max(greatest_signed, 0)), ONE_BITS)", "greatest & ONE_BITS", Depths::Both, all),
+        // Near and far are swapped, or one of them is lost.
+        ("return Ends(range.x, range.y);", "return Ends(range.y, range.x);", Depths::Both, all),
+        ("return Ends(range.y, range.x);", "return Ends(range.y, range.y);", Depths::Both, all),
         ("nearest4(v.near)", "farthest4(v.near)", Depths::Both, all),
-        (
-            "nearest(a.near, b.near)",
-            "farthest(a.near, b.near)",
-            Depths::Both,
-            StoredLevels::only(5),
-        ),
-        // Near and far are swapped.
-        (
-            "store4(pyramid.nearest + index, ends.near);",
-            "store4(pyramid.nearest + index, ends.far);",
-            Depths::Both,
-            all,
-        ),
+        ("nearest(a.near, b.near)", "b.near", Depths::Both, StoredLevels::only(5)),
+        ("pyramid.nearest + index, ends.near)", "index, ends.near)", Depths::Both, all),
         ("load4(pyramid.nearest + index)", "load4(index)", Depths::Both, all),
-        (
-            "a.far.xy, b.far.xy), vec4<u32>(a.near.xy, b.near.xy)",
-            "a.far.xy, b.far.xy), vec4<u32>(a.near.xy, a.near.xy)",
-            Depths::Both,
-            all,
-        ),
-        // Background.
-        (
-            "farthest_sanitized4(foreground4(pixels))",
-            "farthest_sanitized4(pixels)",
-            Depths::Receivers,
-            all,
-        ),
-        (
-            "bits == far_bits() || (REVERSED && bits == NEGATIVE_ZERO_BITS)",
-            "bits == far_bits()",
-            Depths::Receivers,
-            all,
-        ),
-        (
-            "bits == far_bits() || (REVERSED && bits == NEGATIVE_ZERO_BITS)",
-            "sanitized(bits) == far_bits()",
-            Depths::Receivers,
-            all,
-        ),
+        ("vec4<u32>(a.near.xy, b.near.xy)", "vec4<u32>(a.near.xy, a.near.xy)", Depths::Both, all),
         (
             "return Ends(near_bits(), far_bits());",
-            "return Ends(far_bits(), near_bits());",
+            "return Ends(far_bits(), far_bits());",
             Depths::Both,
             StoredLevels::only(5),
+        ),
+        // Background: -0 as well, and subnormals are none.
+        (
+            receivers,
+            "return Ends(farthest_sanitized4(pixels), nearest_sanitized4",
+            Depths::Receivers,
+            all,
+        ),
+        (
+            "bits == far_bits() || (REVERSED",
+            "bits == far_bits() && (REVERSED",
+            Depths::Receivers,
+            all,
+        ),
+        (
+            "return bits == far_bits() ||",
+            "return sanitized(bits) == far_bits() ||",
+            Depths::Receivers,
+            all,
         ),
     ];
     for (what, by, depths, levels) in faults {

@@ -126,6 +126,7 @@ def unoccluded(
     A pixel of exactly the far plane's depth is background.
     A pixel without a valid depth may hold anything, so nothing over it is unoccluded.
     View depth and distance beyond the far plane are far, infinity included.
+    A cull takes these for no depth, so it finds fewer there.
 
     Parameters
     ----------
