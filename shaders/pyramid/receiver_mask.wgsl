@@ -1,8 +1,10 @@
-// Receivers as a light sees them: each pixel of the camera's depth image goes into the texels of the
-// light's image that it may lie in, and each texel keeps its farthest receiver.
+// Receivers as a light sees them.
+//
+// Each pixel of the camera's depth image goes into the texels of the light's image that it may lie
+// in, and each texel keeps its farthest receiver.
 // A caster behind all receivers of its texels shadows none of them.
 //
-// A pixel stands for a box in pixel coordinates and depth: its square, or its centre, and the slack.
+// A pixel stands for a box in pixel coordinates and depth: its square or its centre, and the slack.
 // A row of the light is a linear function of these coordinates, up to a factor above 0.
 // So certificates decide as in a cull; docs/accuracy.md derives this, under "A receiver mask".
 //
