@@ -477,7 +477,7 @@ OUTPUTS_OBJECT: list[Bad] = [
     ("mask", TypeError, "expected None or a collection of"),
     (["masks"], ValueError, 'expected one of "mask", "verdicts", "indices", "draws"'),
     ([1], TypeError, "got int 1"),
-    (hizvk.CullOptions(), TypeError, "'draws', or an Outputs, got CullOptions"),
+    (hizvk.CullOptions(), TypeError, "'pixels', or an Outputs, got CullOptions"),
 ]
 #: The fields of `CullOptions`, which are also keywords of functions.
 OPTIONS: dict[str, list[Bad]] = {
@@ -1132,7 +1132,7 @@ TABLES: dict[str, Table] = {
             {
                 "instances": device.instances(spheres()),
                 "camera": camera(),
-                "pyramid": device.pyramid(np.ones((6, 8)), camera(), kind="ndc"),
+                "pyramid": device.pyramid(np.ones((6, 8)), camera(), kind="z"),
                 "negligible_px": 4,
             },
         ),
@@ -1158,7 +1158,7 @@ TABLES: dict[str, Table] = {
             device.cull(
                 device.instances(spheres()),
                 camera(),
-                device.pyramid(np.ones((6, 8)), camera(), kind="ndc"),
+                device.pyramid(np.ones((6, 8)), camera(), kind="z"),
                 outputs=["pixels"],
             ).visible_fraction,
             {},
@@ -1660,7 +1660,7 @@ MADE_BY_THE_PACKAGE = {
 }
 MADE_BY_THE_PACKAGE |= {"BoundsCheck", "Occluders", "ProxyCheck", "Pyramid", "Recommendation"}
 MADE_BY_THE_PACKAGE |= {"StageTime", "StageTimes", "ViewsResult"}
-MADE_BY_THE_PACKAGE |= {"PassResult", "Temporal"}
+MADE_BY_THE_PACKAGE |= {"ApproximateResult", "PassResult", "Temporal"}
 MADE_BY_THE_PACKAGE |= {"PointColours", "Projected"}
 MADE_BY_THE_PACKAGE |= {"InnerBoxes", "InnerPrisms", "OccluderSelection", "SplitMesh"}
 

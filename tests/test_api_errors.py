@@ -83,9 +83,6 @@ def public_callables() -> dict[str, Callable[..., Any]]:
     for name in hizvk.reference.__all__:
         if inspect.isfunction(getattr(hizvk.reference, name)):
             found[f"reference.{name}"] = getattr(hizvk.reference, name)
-    found: dict[str, Callable[..., Any]] = {
-        f"reference.{n}": getattr(hizvk.reference, n) for n in ("classify", "pyramid")
-    }
     for name in hizvk.__all__:
         thing = getattr(hizvk, name)
         if inspect.isfunction(thing):

@@ -91,9 +91,9 @@ def test_a_result_that_says_what_it_is(device: hizvk.Device) -> None:
     assert repr(seen) == "<ApproximateResult of 40 instances, 30 px negligible>"
     # It cannot slip in where a certified result is expected.
     with pytest.raises(TypeError, match="among: expected"):
-        device.cull(crowd, CAMERA, pyramid, among=seen)  # type: ignore[arg-type]
+        device.cull(crowd, CAMERA, pyramid, among=seen)  # type: ignore[call-overload]
     with pytest.raises(TypeError, match="negligible_px"):
-        device.cull(crowd, CAMERA, pyramid, negligible_px=3)  # type: ignore[call-arg]
+        device.cull(crowd, CAMERA, pyramid, negligible_px=3)  # type: ignore[call-overload]
 
 
 @pytest.mark.parametrize("negligible", [4, 40])

@@ -87,7 +87,7 @@ def test_counts_are_within_their_bounds_and_fractions_are_close(
     for i in range(len(boxes[0])):
         enter, leave = crossing(boxes[0][i], boxes[1][i])
         covered = np.isfinite(enter)
-        one = {name: int(counts[i][name]) for name in counts.dtype.names}
+        one = {name: int(counts[i][name]) for name in hizvk.PIXELS_DTYPE.names or ()}
         assert one["touched"] == one["hidden"] + one["inside"] + one["open"], i
         assert one["touched"] >= covered.sum(), i
         if depths_of == "all":

@@ -141,7 +141,7 @@ fn sure_of(
     }
     var front = vec4<f32>(NO_PLANE);
     var back = vec4<f32>(NO_PLANE);
-    for (var i = 0u; i < FACE_PLANES; i += 1u) {
+    for (var i = 0u; i < DEPTH_PLANES; i += 1u) {
         // At one corner the plane is nearest, at the opposite one farthest.
         let slope = (*planes).face_slopes[i];
         let rows = slope.y * select(vec2<f32>(top, bottom), vec2<f32>(bottom, top), slope.y > 0.0);

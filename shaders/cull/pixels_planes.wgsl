@@ -11,6 +11,8 @@
 
 // Candidates that bound the depth; those that bound the outline come first.
 const FACE_PLANES: u32 = CANDIDATES - OUTLINES;
+// And one of slope 0 behind them, at the nearest and farthest depth of all of the volume.
+const DEPTH_PLANES: u32 = FACE_PLANES + 1u;
 // No array is empty.
 const OUTLINE_PLACES: u32 = max(OUTLINES, 1u);
 // The offset of a plane that says nothing.
@@ -22,9 +24,9 @@ struct PixelPlanes {
     right_bottom: vec2<f32>,
     outline_slopes: array<vec2<f32>, OUTLINE_PLACES>,
     outlines: array<f32, OUTLINE_PLACES>,
-    face_slopes: array<vec2<f32>, FACE_PLANES>,
-    fronts: array<f32, FACE_PLANES>,
-    backs: array<f32, FACE_PLANES>,
+    face_slopes: array<vec2<f32>, DEPTH_PLANES>,
+    fronts: array<f32, DEPTH_PLANES>,
+    backs: array<f32, DEPTH_PLANES>,
 }
 
 // An offset less than the least r / w, if a certificate proves it, less the margin of its
@@ -100,4 +102,10 @@ fn pixel_planes(planes: ptr<function, PixelPlanes>, p: Projected, most: vec2<f32
         (*planes).fronts[i] = select(NO_PLANE, front, in_front);
         (*planes).backs[i] = select(NO_PLANE, back, behind);
     }
+    let none = vec2<f32>(0.0);
+    let depth = tilted(farther_sign(), none, p);
+    let depths = ratio_interval(depth, p.w);
+    (*planes).face_slopes[FACE_PLANES] = none;
+    (*planes).fronts[FACE_PLANES] = proved_offset(depth, depths.x, none, most, p);
+    (*planes).backs[FACE_PLANES] = proved_offset(opposite(depth), -depths.y, none, most, p);
 }

@@ -382,7 +382,9 @@ impl Engine {
         let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
         let among = among.as_ref().map(|among| HeldAmong::new(py, among)).transpose()?;
         let cull = |engine: &headless::Engine| {
-            let mask = among.as_ref().map(HeldAmong::source);
+            let mut words = Vec::new();
+            let source = among.as_ref().map(HeldAmong::source);
+            let mask = source.map(|source| source.mask(&instances, &mut words)).transpose()?;
             let extras = CullExtras { mask, ahead, ..CullExtras::default() };
             engine.cull_given(&instances, &camera.0, &pyramid.1, &options, &outputs, &extras)
         };
@@ -438,7 +440,9 @@ impl Engine {
             .collect();
         let among = among.as_ref().map(|among| HeldAmong::new(py, among)).transpose()?;
         let cull = |engine: &headless::Engine| {
-            let mask = among.as_ref().map(HeldAmong::source);
+            let mut words = Vec::new();
+            let source = among.as_ref().map(HeldAmong::source);
+            let mask = source.map(|source| source.mask(&instances, &mut words)).transpose()?;
             let extras = CullExtras { mask, ahead, ..CullExtras::default() };
             engine.cull_views(&instances, &views, &options, &outputs, &extras)
         };

@@ -104,7 +104,7 @@ impl PixelPass {
         let counting = gpu.uniform(
             "hiz.pixels.counting",
             &CountingUniform {
-                budget: visible.outputs().pixel_budget.unwrap_or(u32::MAX),
+                budget: visible.outputs().pixel_budget.unwrap_or(u32::MAX).max(1),
                 negligible: negligible.unwrap_or(0),
                 padding: [0; 2],
             },

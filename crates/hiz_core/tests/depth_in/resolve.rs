@@ -501,7 +501,7 @@ fn wrong_levels(depths: Depths, faults: &[(&str, &str)]) -> usize {
                     let fold = if greatest { f32::max } else { f32::min };
                     let mut blocks = vec![if greatest { 0.0 } else { 1.0 }; found.len()];
                     for (i, depth) in (0..).zip(&pixels) {
-                        let (x, y) = (i % width >> level, i / width >> level);
+                        let (x, y) = ((i % width) >> level, (i / width) >> level);
                         let block = &mut blocks[(y * columns + x) as usize];
                         *block = fold(*block, *depth);
                     }

@@ -196,7 +196,7 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
             "UNKNOWN_BITS",
         ],
     ),
-    ("cull/pixels_planes", &["FACE_PLANES", "OUTLINE_PLACES", "NO_PLANE"]),
+    ("cull/pixels_planes", &["FACE_PLANES", "DEPTH_PLANES", "OUTLINE_PLACES", "NO_PLANE"]),
     ("cull/refine", &["REFINED"]),
     ("cull/unoccluded", &["HALF_PIXEL"]),
     ("gpu/clock_check", &["LEFT", "RIGHT", "LEFT_AGAIN"]),
