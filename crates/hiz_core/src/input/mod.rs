@@ -18,6 +18,7 @@ pub(crate) mod projection;
 mod quick;
 pub(crate) mod seen_points;
 pub(crate) mod stretch;
+mod tell_apart;
 pub(crate) mod tolerance;
 pub(crate) mod view;
 #[cfg(feature = "headless")]
