@@ -161,7 +161,8 @@ def test_no_data_of_measured_depth_is_near_in_the_nearest_end(
     image[3, 3], image[4, 12], image[12, 4] = 2, 0, 9
     no_data = np.float32(0 if reversed_z else 1)
     for depths in ("both", "receivers"):
-        hiz = device.pyramid(image, view, kind=kind, depths=depths, invalid=[0])  # type: ignore[call-overload]
+        keywords: dict[str, Any] = {"kind": kind, "depths": depths, "invalid": [0]}
+        hiz = device.pyramid(image, view, **keywords)
         sign = -1 if reversed_z else 1
         farthest, nearest = (sign * hiz.level(3, end=end) for end in ENDS)
         assert nearest[0, 1] == sign * (1 - no_data), "no data is near"
@@ -193,7 +194,8 @@ def test_what_refuses_a_pyramid_says_why(device: hizvk.Device) -> None:
     view = camera((8, 8), True)
     ball = device.instances(hizvk.Spheres([[0, 0, -3]], 0.5))
     for depths, why in (("nearest", "no farthest depths"), ("receivers", "leaves out background")):
-        hiz = device.pyramid(np.ones((8, 8)), view, kind="z", depths=depths)  # type: ignore[call-overload]
+        keywords: dict[str, Any] = {"kind": "z", "depths": depths}
+        hiz = device.pyramid(np.ones((8, 8)), view, **keywords)
         with pytest.raises(ValueError, match=why):
             device.cull(ball, view, hiz)
     with pytest.raises(ValueError, match='end: expected one of "farthest"'):
@@ -214,7 +216,8 @@ def test_both_ends_hide_the_same(device: hizvk.Device, rng: np.random.Generator)
         balls = device.instances(hizvk.Spheres(centers, 0.05))
         masks = []
         for depths in ("farthest", "both"):
-            hiz = device.pyramid(image, view, kind="z", depths=depths)  # type: ignore[call-overload]
+            keywords: dict[str, Any] = {"kind": "z", "depths": depths}
+            hiz = device.pyramid(image, view, **keywords)
             masks.append(device.cull(balls, view, hiz).mask)
         assert np.array_equal(*masks)
         assert not masks[0].all()

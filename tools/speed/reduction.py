@@ -36,6 +36,8 @@ TARGETS: Final = {
     ("levels >= 2", "1080p"): 2.0,
     ("levels >= 2", "4K"): 1.5,
 }
+#: Times of the farthest end alone that both may take, by the choice of levels.
+BOTH_ENDS: Final = {"all levels": 1.5, "level 5 alone": 1.5}
 #: One dispatch per level takes at least this many times the library's own reduction.
 SHAPES: Final = {"buffer": 1.8, "textures": 4.0}
 
@@ -71,6 +73,10 @@ def _one(
     }
     for choice, levels in CHOICES.items():
         ways[choice] = run.yardstick.reduction(depth, "own", levels).ms
+    for choice in BOTH_ENDS:
+        ways[f"both ends, {choice}"] = run.yardstick.reduction(
+            depth, "own", CHOICES[choice], "both"
+        ).ms
     for shape in SHAPES:
         ways[f"level by level, {shape}"] = run.yardstick.reduction(depth, shape, ALL_LEVELS).ms
     ms = in_turns(ways, run.extent.rounds)
@@ -83,6 +89,14 @@ def _one(
             ms[choice],
             ms["memcpy of the input"],
             TARGETS.get((choice, name)),
+        )
+    for choice, most in BOTH_ENDS.items():
+        found.ratio(
+            f"{key}.{choice}.both",
+            f"{name}, {source}: both ends / farthest, {choice}",
+            ms[f"both ends, {choice}"],
+            ms[choice],
+            most,
         )
     for shape, least in SHAPES.items():
         found.ratio(

@@ -376,7 +376,7 @@ fn what_lacks_an_end_is_refused() {
     }
 }
 
-/// Parts of textures, mip levels and layers, and half floats, around which all is nearer or farther.
+/// Parts of textures, mip levels, layers and half floats, around which all is nearer or farther.
 /// After random rectangles have changed, the levels are those of the whole image.
 #[test]
 fn parts_of_textures_and_changed_rectangles_have_both_ends() {

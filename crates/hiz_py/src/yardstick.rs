@@ -15,7 +15,7 @@ use numpy::{PyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn, PyUntypedArrayMet
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arguments::{FloatArray, bounds, in_c_order};
+use crate::arguments::{FloatArray, bounds, depths_of, in_c_order};
 use crate::camera::Camera;
 use crate::device::{DepthImage, Engine};
 use crate::held::{Held, OnDevice, detached};
@@ -65,14 +65,17 @@ impl Yardstick {
     }
 
     /// A reduction of `depth`: the library's own with these levels, or one dispatch per level.
-    /// The latter makes all levels.
+    /// The latter makes all levels of farthest depths.
+    #[pyo3(signature = (depth, shape, levels, depths = "farthest"))]
     fn reduction(
         &self,
         py: Python<'_>,
         depth: &DepthImage,
         shape: &str,
         levels: (u32, u32),
+        depths: &str,
     ) -> PyResult<YardstickReduction> {
+        let depths = depths_of(depths)?;
         let (engine, depth) = (self.0.get(py)?, depth.0.get(py)?);
         let (engine, depth) =
             (headless::Engine::clone(&engine), headless::DepthImage::clone(&depth));
@@ -82,7 +85,7 @@ impl Yardstick {
         let reducer = match shape {
             "own" => {
                 let levels = StoredLevels { first: levels.0, last: levels.1 };
-                let options = PyramidOptions { levels, ..PyramidOptions::default() };
+                let options = PyramidOptions { levels, depths, ..PyramidOptions::default() };
                 let pyramid = detached(py, || engine.pyramid_with(&depth, &options))?;
                 Reducer::Own(depth, pyramid)
             }

@@ -12,14 +12,13 @@ pub(crate) mod depth_numbers;
 pub(crate) mod far_pixels;
 pub(crate) mod image;
 mod lens;
-pub(crate) mod light;
 pub(crate) mod mesh;
 pub(crate) mod near_slack;
 pub(crate) mod projection;
 mod quick;
 pub(crate) mod seen_points;
 pub(crate) mod stretch;
-pub(crate) mod telling_far;
+mod tell_apart;
 pub(crate) mod tolerance;
 pub(crate) mod view;
 #[cfg(feature = "headless")]

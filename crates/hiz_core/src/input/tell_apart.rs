@@ -1,4 +1,4 @@
-//! Telling far pixels apart, in what an upload has converted.
+//! Conversions tell pixels apart whose depth came out as far (`far_pixels`).
 
 use crate::input::depth::Conversion;
 use crate::input::far_pixels::FarPixels;
