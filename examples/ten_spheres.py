@@ -2,8 +2,8 @@
 
 The camera looks along the line, so the first sphere hides the other nine.
 The depth image and its pyramid stay on the device: no depth is read back.
-With a path, the script writes a PNG: how many spheres of the line lie in each pixel on the left, and
-how many of those that were drawn on the right.
+With a path, the script writes a PNG of the depth complexity: how many spheres each pixel shows or
+hides, of all of them on the left and of those that were drawn on the right.
 """
 
 import struct
@@ -12,6 +12,7 @@ import zlib
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 import hizvk
 
@@ -42,14 +43,17 @@ for i in range(N):
         drawn.append(i)
 
 
-def complexity(indices: list[int]) -> np.ndarray:
+def complexity(indices: list[int]) -> npt.NDArray[np.uint8]:
     """Spheres per pixel, by the rays through the pixels' centres."""
     rows, columns = np.indices(SIZE)
     scale = np.tan(np.radians(30)) / (SIZE[0] / 2)
     x, y = (columns + 0.5 - SIZE[1] / 2) * scale, (rows + 0.5 - SIZE[0] / 2) * scale
     # A ray meets a ball on the axis at an angle whose sine is at most radius / distance.
     sine = np.sqrt((x * x + y * y) / (1 + x * x + y * y))
-    return sum((sine <= 1.0 / -centers[i, 2]).astype(np.uint8) for i in indices)
+    count: npt.NDArray[np.uint8] = np.zeros(SIZE, np.uint8)
+    for i in indices:
+        count += sine <= 1.0 / -centers[i, 2]
+    return count
 
 
 for path in sys.argv[1:]:

@@ -28,7 +28,7 @@ def pyramids(device: hizvk.Device, camera: hizvk.Camera) -> dict[str, hizvk.Pyra
     """Of the farthest end, and of both."""
     image = np.full(SIZE, WALL)
     return {
-        depths: device.pyramid(image, camera, kind="z", depths=depths)  # type: ignore[arg-type]
+        depths: device.pyramid(image, camera, kind="z", depths=depths)
         for depths in ("farthest", "both")
     }
 
@@ -83,7 +83,7 @@ def test_tiers_give_the_same_answers(
     crowd = device.instances(spheres(of), order="given")
     front = hizvk.Verdict.UNOCCLUDED if depths == "both" else hizvk.Verdict.VISIBLE
     expected = np.choose(of, [front, hizvk.Verdict.OCCLUDED, hizvk.Verdict.OUTSIDE])
-    for hierarchy in (None, False, True, 0, 1, 2, 3, np.int32(2)):
+    for hierarchy in (None, False, True, 0, 1, 2, 3):
         seen = device.cull(crowd, camera, pyramids[depths], hierarchy=hierarchy)
         assert np.array_equal(seen.mask, of == FRONT), hierarchy
         assert np.array_equal(seen.verdicts, expected), hierarchy

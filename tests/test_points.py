@@ -464,3 +464,61 @@ def test_a_cloud_hides_its_own_back(device: hizvk.Device) -> None:
     print(f"of {seen.sum()} visible lost: {lost}; of {(~seen).sum()} hidden kept: {kept}")
     assert lost[0.16] <= 0.15 * seen.sum() < lost[0.0]
     assert kept[0.16] <= 0.35 * (~seen).sum()
+
+
+# -- three answers --------------------------------------------------------------------------------
+
+
+def test_points_get_three_answers(device: hizvk.Device) -> None:
+    """Outside, hidden, surely visible; and undecided where pixels disagree or depth is equal."""
+    for reversed_z in (False, True):
+        for camera in cameras(reversed_z):
+            image = np.full(SIZE, 4.0)
+            image[:, 80:] = 8.0
+            hiz = device.pyramid(image, camera, kind="z", depths="both")
+            # At the pixel's own view depth, in columns 40 and 120, and on the step between.
+            at = [(40.2, 60.4, z) for z in (3.9, 4.0, 4.1)]
+            at += [(120.2, 60.4, z) for z in (7.9, 8.1)]
+            at += [(80.0, 60.4, z) for z in (3.9, 6.0, 8.1)]
+            at += [(40.2, -3.0, 3.9)]
+            expected = "ZVOZOZVOX"
+            positions = placed(camera, at)
+            assert np.allclose(camera.project(positions).pixels, np.array(at)[:, :2])
+            for array in (positions, positions.astype(np.float32)):
+                seen = device.cull(device.instances(hizvk.Points(array)), camera, hiz)
+                letters = {"UNOCCLUDED": "Z", "VISIBLE": "V", "OCCLUDED": "O", "OUTSIDE": "X"}
+                told = "".join(letters[hizvk.Verdict(code).name] for code in seen.verdicts)
+                if array.dtype == np.float32:  # equal depth is no longer equal
+                    told, expected = told[:1] + told[2:], expected[:1] + expected[2:]
+                assert told == expected, camera
+                truth = hizvk.reference.unoccluded(hizvk.Points(array), camera, image, kind="z")
+                found = hizvk.compare_unoccluded(seen.verdicts, truth)
+                assert len(found.false_claims) == 0, found
+
+
+def placed(camera: hizvk.Camera, at: Any) -> Floats:
+    """World positions at some columns, rows and view depths of a camera of `cameras`."""
+    at = np.array(at, np.float64)
+    forward = -np.array(EYE) / np.linalg.norm(EYE)
+    right = np.cross(forward, (0.0, 1.0, 0.0))
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    ndc = np.stack([at[:, 0] / SIZE[1] * 2.0 - 1.0, 1.0 - at[:, 1] / SIZE[0] * 2.0], 1)
+    z = at[:, 2:]
+    if camera.clip_from_world[3, :3].any():
+        half = np.tan(np.radians(30.0))
+        aside = ndc * z * np.array([half * SIZE[1] / SIZE[0], half])
+    else:
+        aside = ndc * np.array([1.5, 1.0])
+    result: Floats = np.array(EYE) + aside[:, :1] * right + aside[:, 1:] * up + z * forward
+    return result
+
+
+def test_a_tolerance_works_both_ways_for_what_surely_shows(device: hizvk.Device) -> None:
+    camera = view()
+    some = hizvk.Tolerance(abs=0.001)
+    hiz = device.pyramid(np.full(SIZE, 4.0), camera, kind="z", depths="both", tolerance=some)
+    points = hizvk.Points(placed(camera, [(40.2, 60.4, z) for z in (3.0, 3.9995, 4.0005, 4.01)]))
+    told = device.cull(device.instances(points), camera, hiz).verdicts
+    names = [hizvk.Verdict(code).name for code in told]
+    assert names == ["UNOCCLUDED", "VISIBLE", "VISIBLE", "OCCLUDED"]

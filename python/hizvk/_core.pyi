@@ -227,6 +227,7 @@ class Engine:
         rounding: str,
         tolerance: tuple[float, float],
         camera: Camera,
+        depths: str = ...,
     ) -> DepthImage: ...
     def upload_samples(
         self,
@@ -237,6 +238,15 @@ class Engine:
         rounding: str,
         tolerance: tuple[float, float],
         camera: Camera,
+        depths: str = ...,
+    ) -> DepthImage: ...
+    def receiver_mask(
+        self,
+        depth: DepthImage,
+        light: Camera,
+        filter_radius: float,
+        reach_px: float,
+        slacks: tuple[float, float],
     ) -> DepthImage: ...
     def renew(
         self, pyramid: Pyramid, depth: DepthImage, rectangle: tuple[int, int, int, int]
@@ -253,7 +263,7 @@ class Engine:
         rounding: str,
         tolerance: tuple[float, float],
     ) -> None: ...
-    def pyramid(self, depth: DepthImage, levels: tuple[int, int]) -> Pyramid: ...
+    def pyramid(self, depth: DepthImage, levels: tuple[int, int], depths: str = ...) -> Pyramid: ...
     def cull(
         self,
         instances: Instances,
@@ -298,7 +308,15 @@ class Engine:
         self,
         bounds: tuple[str, Sequence[_Floats]],
         camera: Camera,
-        depth: Pyramid | tuple[_Floats | npt.NDArray[np.uint16], str, float, Sequence[float], str],
+        depth: Pyramid
+        | tuple[
+            _Floats | npt.NDArray[np.uint16],
+            str,
+            float,
+            Sequence[float],
+            str,
+            tuple[float, float],
+        ],
         options: CullOptions,
     ) -> tuple[npt.NDArray[np.bool_], Counts]: ...
     def start_timing(self) -> None: ...
@@ -333,7 +351,7 @@ class DepthImage:
 class Pyramid:
     def num_levels(self) -> int: ...
     def stored_levels(self) -> tuple[int, int] | None: ...
-    def read_level(self, k: int) -> tuple[_Size, npt.NDArray[np.float32]]: ...
+    def read_level(self, k: int, nearest: bool) -> tuple[_Size, npt.NDArray[np.float32]]: ...
     def mips(self, depths: str, lookup: str) -> list[tuple[_Size, npt.NDArray[np.float32]]]: ...
     def device_bytes(self) -> int: ...
 

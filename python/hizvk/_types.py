@@ -26,6 +26,12 @@ FaceCull: TypeAlias = Literal["none"] | Literal["back"] | Literal["front"]
 Rasteriser: TypeAlias = Literal["auto"] | Literal["device"] | Literal["host"]
 #: Which levels of a pyramid are built; see `Device.pyramid`.
 Levels: TypeAlias = int | tuple[int, int] | None
+#: Which depths of each block a pyramid has; see `Device.pyramid`.
+Depths: TypeAlias = (
+    Literal["farthest"] | Literal["nearest"] | Literal["both"] | Literal["receivers"]
+)
+#: One of the two ends of a block's depths; see `Pyramid.level`.
+DepthEnd: TypeAlias = Literal["farthest"] | Literal["nearest"]
 #: The order of the list of kept instances; see `CullOptions`.
 Order: TypeAlias = Literal["stable"] | Literal["any"]
 #: Which part of a pixel counts; see `CullOptions`.

@@ -591,7 +591,7 @@ class Camera:
         ...     (0, 0, 0), (0, 0, -1), fov_y_deg=90, size=(100, 100), near=0.5
         ... )
         >>> seen = camera.project([(0.0, 0.0, -2.0), (1.0, 1.0, -2.0), (0.0, 0.0, 2.0)])
-        >>> seen.pixels[:2].tolist(), seen.z.tolist()
+        >>> seen.pixels[:2].round(6).tolist(), seen.z.tolist()
         ([[50.0, 50.0], [75.0, 25.0]], [2.0, 2.0, -2.0])
         >>> seen.inside.tolist(), float(seen.depth[0])
         ([True, True, False], 0.25)

@@ -19,7 +19,7 @@ from ._core import MeshTable as CoreMeshTable
 from ._core import TwoPasses as CoreTwoPasses
 from ._on_device import check_owner
 from ._processes import driver_is_asked
-from ._types import FaceCull, Rasteriser, StoredOrder, words
+from ._types import Depths, FaceCull, Rasteriser, StoredOrder, words
 from .adapter import Adapter
 from .approximate import ApproximateResult
 from .bounds import Bounds, are_points, as_arrays
@@ -430,6 +430,7 @@ class Device:
         invalid: None = None,
         tolerance: None = None,
         levels: Levels = None,
+        depths: Depths = "farthest",
     ) -> Pyramid: ...
 
     @overload
@@ -443,6 +444,7 @@ class Device:
         invalid: Collection[float] | None = None,
         tolerance: Tolerance | None = None,
         levels: Levels = None,
+        depths: Depths = "farthest",
     ) -> Pyramid: ...
 
     def pyramid(
@@ -455,6 +457,7 @@ class Device:
         invalid: Collection[float] | None = None,
         tolerance: Tolerance | None = None,
         levels: Levels = None,
+        depths: Depths = "farthest",
     ) -> Pyramid:
         """Builds the depth pyramid of a depth image.
 
@@ -464,7 +467,8 @@ class Device:
             A rendered image of this device, alone; or an array, with `camera` and `kind`.
             Arrays are float, or uint16 for the kinds ``"z"`` and ``"distance"``.
             Row 0 is the top of the image.
-            With 2, 4, 8 or 16 samples per pixel the farthest one counts.
+            With 2, 4, 8 or 16 samples per pixel the farthest one counts, and the nearest in the
+            nearest end.
             A sample with "no data" makes its pixel far, and a cull takes ``coverage="area"`` alone.
             What is masked in a masked array is "no data".
 
@@ -519,6 +523,23 @@ class Device:
             unless a descent may read that many.
             Level 1 costs most to build; bounds of one or two pixels read the image itself.
             ``hizvk bench`` measures both sides.
+        depths : {"farthest", "nearest", "both", "receivers"}
+            Which depths of each block are stored, beside level 0.
+
+            - ``"farthest"``: what a cull needs to hide.
+            - ``"both"``: the nearest, too, in the same pass.
+              A cull then also tells what surely shows (`UNOCCLUDED`).
+            - ``"nearest"``: these alone; no cull takes such a pyramid.
+            - ``"receivers"``: both, of the pixels that show a receiver of shadows.
+              Culls of shadow casters take it, and no others do.
+
+            The ends differ in what "no data" counts as: far in the farthest, near in the nearest.
+
+            For ``"receivers"`` background is left out: pixels with exactly the depth of far, which
+            is what a depth buffer is cleared to.
+            "No data" is no background: its block has far as farthest and near as nearest depth.
+            A block without any receiver has near as farthest and far as nearest depth.
+            Depths of the kinds ``"z"`` and ``"distance"`` never are background.
 
         Raises
         ------
@@ -526,8 +547,23 @@ class Device:
             They name the parameter, what it expects and what came.
         LimitError, OutOfMemoryError
             If the image is larger than the device allows.
+
+        Examples
+        --------
+        >>> import numpy as np, hizvk
+        >>> device = hizvk.Device()
+        >>> camera = hizvk.Camera.look_at(
+        ...     (0, 0, 9), (0, 0, 0), fov_y_deg=60, size=(2, 4), near=1.0, reversed_z=True
+        ... )
+        >>> depth = np.float32([[0.5, 0.25, 0, np.nan], [0.25, 0.25, 0.125, 0.125]])
+        >>> hiz = device.pyramid(depth, camera, kind="reversed_ndc", depths="both")
+        >>> hiz.level(1, end="farthest").tolist()
+        [[0.25, 0.0]]
+        >>> hiz.level(1, end="nearest").tolist()
+        [[0.5, 1.0]]
         """
         stored = _arguments.stored_levels("levels", levels)
+        _arguments.choice("depths", depths, words(Depths))
         if isinstance(depth, DepthImage):
             for name, value in (("camera", camera), ("kind", kind), ("invalid", invalid)):
                 if value is not None:
@@ -546,12 +582,12 @@ class Device:
                 )
             check_owner("depth", depth, self)
             source = Source(depth._inner)
-            built = self._engine.pyramid(depth._inner, stored)
-            return Pyramid(self, built, depth.camera, source, is_rendered=True)
+            built = self._engine.pyramid(depth._inner, stored, depths)
+            return Pyramid(self, built, depth.camera, source, is_rendered=True, depths=depths)
         camera = _arguments.instance("camera", camera, Camera, "a Camera beside an array of depth")
         self._check_side(camera)
         samples = checked_samples("depth", depth, camera, kind, scale, invalid, tolerance)
-        return self._pyramid_of(samples, camera, stored, invalid)
+        return self._pyramid_of(samples, camera, stored, invalid, depths)
 
     def _pyramid_of(
         self,
@@ -559,16 +595,121 @@ class Device:
         camera: Camera,
         stored: tuple[int, int],
         invalid: Any = None,
+        depths: Depths = "farthest",
     ) -> Pyramid:
         """The pyramid of an image that was checked, or of one per sample; with levels `stored`."""
         given = images if isinstance(images, list) else [images]
         if len(given) == 1:
-            uploaded = self._engine.upload_depth(*given[0], camera._inner)
+            uploaded = self._engine.upload_depth(*given[0], camera._inner, depths)
         else:
             planes = [plane.image for plane in given]
-            uploaded = self._engine.upload_samples(planes, *given[0][1:], camera._inner)
+            uploaded = self._engine.upload_samples(planes, *given[0][1:], camera._inner, depths)
         source = Source.uploaded(uploaded, given, invalid)
-        return Pyramid(self, self._engine.pyramid(uploaded, stored), camera, source)
+        built = self._engine.pyramid(uploaded, stored, depths)
+        return Pyramid(self, built, camera, source, depths=depths)
+
+    def receiver_mask(
+        self,
+        depth: DepthImage | npt.ArrayLike,
+        camera: Camera,
+        light_camera: Camera,
+        *,
+        kind: DepthKind | None = None,
+        filter_radius: float = 0.0,
+        reach_px: float = 0.5,
+        depth_slack: float = 2.0**-21,
+        depth_slack_abs: float = 0.0,
+    ) -> DepthImage:
+        """The farthest receivers that a camera sees, as a depth image of a light.
+
+        It is for spot lights and for the faces of point lights.
+        A pyramid of the result is what casters are culled by, as anything is:
+        ``device.cull(casters, light_camera, device.pyramid(mask))``.
+        A culled caster shadows nothing that the camera sees (``docs/shadows.md``).
+
+        Parameters
+        ----------
+        depth : DepthImage, or (height, width) array
+            The depth of all that receives shadows, with one sample per pixel.
+            Exactly far means background; a pixel without a valid depth keeps every caster.
+        camera : Camera
+            The camera that saw it.
+        light_camera : Camera
+            Of the shadow map, or with another size: the finer, the more is culled.
+        kind : {"ndc", "reversed_ndc", "z", "distance"}
+            What an array's numbers are; None beside a DepthImage.
+        filter_radius : float
+            How far from a point the lookup of its shadow reaches, in world units: the radius of the
+            filter's kernel, the diagonal of a texel of the shadow map, and the bias, added.
+        reach_px : float
+            How far from its pixel's centre a receiver may lie along each axis, at the pixel's
+            depth: a multiple of 1/256 from 0 to 16.
+            0.5 covers the whole pixel.
+        depth_slack, depth_slack_abs : float
+            How far depths may be off, relative to them and in units of NDC depth, 0 to 0.5.
+
+        Returns
+        -------
+        DepthImage
+            Of the light's camera.
+            A texel without a receiver is at the near plane.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+        LimitError, OutOfMemoryError
+            If the image is larger than the device allows.
+
+        Examples
+        --------
+        A camera and a spot light look at a wall at z = -10.
+        A box before the wall shadows it, and a box behind the wall does not.
+
+        >>> import numpy as np, hizvk
+        >>> device = hizvk.Device()
+        >>> view = {"fov_y_deg": 60, "near": 0.1}
+        >>> camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), size=(32, 32), **view)
+        >>> light = hizvk.Camera.look_at((3, 0, 0), (0, 0, -10), size=(64, 64), **view)
+        >>> wall = np.full((32, 32), 10.0, np.float32)
+        >>> mask = device.receiver_mask(wall, camera, light, kind="z", filter_radius=0.1)
+        >>> casters = device.instances(hizvk.Spheres([[2, 0, -5], [0, 0, -15]], [0.5, 0.5]))
+        >>> device.cull(casters, light, device.pyramid(mask)).mask
+        array([ True, False])
+        """
+        camera = _arguments.instance("camera", camera, Camera, "a Camera")
+        light_camera = _arguments.instance("light_camera", light_camera, Camera, "a Camera")
+        self._check_side(light_camera)
+        radius = _arguments.number("filter_radius", filter_radius, at_least=0.0, at_most=2.0**60)
+        reach = _arguments.number("reach_px", reach_px, at_least=0.0, at_most=16.0)
+        if reach * 256.0 != round(reach * 256.0):
+            raise ValueError(f"reach_px: expected a multiple of 1/256, got {reach}")
+        slacks = (
+            _arguments.number("depth_slack", depth_slack, at_least=0.0, at_most=0.5),
+            _arguments.number("depth_slack_abs", depth_slack_abs, at_least=0.0, at_most=0.5),
+        )
+        if isinstance(depth, DepthImage):
+            check_owner("depth", depth, self)
+            if kind is not None:
+                got = _arguments.describe(kind)
+                raise TypeError(f"kind: expected None beside a DepthImage, got {got}")
+            if camera != depth.camera:
+                raise ValueError(
+                    f"camera: expected that of the depth image, {depth.camera!r}, got {camera!r}"
+                )
+            image = depth._inner
+        else:
+            self._check_side(camera)
+            given = checked_samples("depth", depth, camera, kind, 1.0, None)
+            if isinstance(given, list) and len(given) != 1:
+                raise ValueError(
+                    f"depth: expected one sample per pixel, got {len(given)}: the farthest of them "
+                    "is not all that receives shadows"
+                )
+            one = given[0] if isinstance(given, list) else given
+            image = self._engine.upload_depth(*one, camera._inner, "receivers")
+        made = self._engine.receiver_mask(image, light_camera._inner, radius, reach, slacks)
+        return DepthImage(self, made, light_camera)
 
     @overload
     def cull(

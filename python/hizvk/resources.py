@@ -10,6 +10,7 @@ from ._core import Instances as CoreInstances
 from ._core import Occluders as CoreOccluders
 from ._core import Pyramid as CorePyramid
 from ._on_device import Allocated, OnDevice, check_owner
+from ._types import DepthEnd, words
 from .bounds import Bounds, are_points, as_arrays
 from .mesh import placed
 from .renewal import rectangle, replacement
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
     from ._arguments import Size
     from ._on_device import Maker
-    from ._types import DepthKind, MipDepths, MipLookup
+    from ._types import DepthKind, Depths, MipDepths, MipLookup
     from .camera import Camera
     from .renewal import Source
 
@@ -234,6 +235,7 @@ class Pyramid(_Seen, Allocated[CorePyramid]):
     """A depth pyramid on the device; made by `Device.pyramid`.
 
     On level ``k`` a texel holds the farthest depth of a block of ``2^k x 2^k`` pixels.
+    With ``depths=`` it has the nearest depth, too, or instead.
     """
 
     def __init__(
@@ -244,10 +246,12 @@ class Pyramid(_Seen, Allocated[CorePyramid]):
         source: Source,
         *,
         is_rendered: bool = False,
+        depths: Depths = "farthest",
     ) -> None:
         super().__init__(device, inner)
         self._camera = camera
         self._source = source
+        self._depths = depths
         self._is_rendered = is_rendered
 
     @property
@@ -261,21 +265,37 @@ class Pyramid(_Seen, Allocated[CorePyramid]):
         stored = self._inner.stored_levels()
         return range(0) if stored is None else range(stored[0], stored[1] + 1)
 
-    def level(self, k: int) -> npt.NDArray[np.float32]:
+    @property
+    def depths(self) -> Depths:
+        """Which depths of each block are stored, as ``depths=`` of `Device.pyramid` asked for."""
+        return self._depths
+
+    def level(self, k: int, end: DepthEnd | None = None) -> npt.NDArray[np.float32]:
         """Level `k` as a ``(height, width)`` float32 array of NDC depth, row 0 on top; a copy.
 
         Parameters
         ----------
         k : int
             ``0 <= k < num_levels``; 0 is the finest.
+        end : {"farthest", "nearest"}, optional
+            Which end of each block's depths.
+            Level 0 has the pixels as that end counts them: "no data" is far in the farthest and
+            near in the nearest.
+            None: the farthest, or the nearest of a pyramid that has nothing else.
 
         Raises
         ------
         TypeError
-            If it is no integer.
+            If `k` is no integer, or `end` no word.
+        ValueError
+            If `end` is not stored (see `depths`).
         IndexError
             If there is no such level, or it is not stored (see `levels`).
         """
+        alone = self._depths if self._depths in words(DepthEnd) else None
+        if end is None:
+            end = "nearest" if alone == "nearest" else "farthest"
+        _arguments.choice("end", end, words(DepthEnd) if alone is None else (alone,))
         last = self.num_levels - 1
         try:
             k = _arguments.integer("k", k, low=0, high=last)
@@ -283,7 +303,7 @@ class Pyramid(_Seen, Allocated[CorePyramid]):
             raise IndexError(f"k: expected a level in 0..{last}, got {k}") from None
         if k > 0 and k not in self.levels:
             raise IndexError(f"k: expected 0 or a level that is stored, {self._stored()}, got {k}")
-        size, texels = self._inner.read_level(k)
+        size, texels = self._inner.read_level(k, end == "nearest")
         return texels.reshape(size)
 
     def mips(
@@ -425,4 +445,5 @@ class Pyramid(_Seen, Allocated[CorePyramid]):
     def _summary(self) -> str:
         missing = len(self.levels) < self.num_levels - 1
         stored = f", stored {self._stored()}" if missing else ""
-        return f" {self.size[0]}x{self.size[1]}, {self.num_levels} levels{stored}"
+        ends = "" if self._depths == "farthest" else f", depths {self._depths}"
+        return f" {self.size[0]}x{self.size[1]}, {self.num_levels} levels{stored}{ends}"

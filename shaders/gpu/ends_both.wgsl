@@ -23,9 +23,36 @@ fn no_ends() -> Ends {
     return Ends(near_bits(), far_bits());
 }
 
+// The least and the greatest of four depths as they were given.
+// What is no depth is 0 for the least, and 1 for the greatest.
+// Together they take less work than `least_sanitized4` and `greatest_sanitized4`.
+//
+// Where no bits are above those of 1, all four are depths, whose order is that of their bits.
+// Otherwise one of them is no depth or -0, and the least is 0.
+// Bits above those of -0 belong to negative numbers, which are no depths.
+// Without these, the greatest as signed integers is that of all but -0.
+fn range_of_pixels(v: vec4<u32>) -> vec2<u32> {
+    let least = min(min(v.x, v.y), min(v.z, v.w));
+    let greatest = max(max(v.x, v.y), max(v.z, v.w));
+    let s = bitcast<vec4<i32>>(v);
+    let greatest_signed = max(max(s.x, s.y), max(s.z, s.w));
+    let without_negative = min(u32(max(greatest_signed, 0)), ONE_BITS);
+    let high = select(without_negative, ONE_BITS, greatest > NEGATIVE_ZERO_BITS);
+    return vec2<u32>(
+        select(least, 0u, greatest > ONE_BITS || least < LEAST_NORMAL_BITS),
+        select(high, 0u, high < LEAST_NORMAL_BITS));
+}
+
 // The ends of four pixels as they were given.
 fn ends_of_pixels(pixels: vec4<u32>) -> Ends {
-    return Ends(farthest_sanitized4(foreground4(pixels)), nearest_sanitized4(pixels));
+    if RECEIVERS {
+        return Ends(farthest_sanitized4(foreground4(pixels)), nearest_sanitized4(pixels));
+    }
+    let range = range_of_pixels(pixels);
+    if REVERSED {
+        return Ends(range.x, range.y);
+    }
+    return Ends(range.y, range.x);
 }
 
 // The same of the farthest and the nearest samples of four pixels.

@@ -147,30 +147,28 @@ fn every_way_takes_one_submission_and_one_readback() {
 #[test]
 fn particles_are_the_same_with_a_coarse_level() {
     let engine = engine();
-    let run = |level, size, faults: &[_]| {
-        let setup = particles::Setup { size, particles: 40_000, level, rounds: 0 };
+    let run = |level, soft, faults: &[_]| {
+        let size = ImageSize::new(211, 97);
+        let setup = particles::Setup { size, particles: 40_000, level, soft, rounds: 0 };
         particles::run(engine.device(), engine.queue(), setup, faults).unwrap()
     };
-    let size = ImageSize::new(211, 97);
-    for level in [1, 2, 3, 4] {
-        let found = run(level, size, &[]);
-        assert!(found.pictures[0] == found.pictures[1], "level {level}");
+    for (level, soft) in [(1, false), (2, false), (3, false), (4, false), (2, true), (4, true)] {
+        let found = run(level, soft, &[]);
+        assert!(found.pictures[0] == found.pictures[1], "level {level}, {soft}");
         assert!(found.pictures[0].iter().any(|sum| *sum > 0));
         let [all, before, behind] = found.counts;
         assert!(before > 0 && behind > 0 && before + behind <= all, "{level}: {:?}", found.counts);
         // Each particle in the image is decided by one of the three.
-        assert!(level > 2 || found.skipped() > 0.5, "level {level}: {}", found.skipped());
+        assert!(level > 2 || found.skipped() > 0.4, "level {level}: {}", found.skipped());
     }
     let swapped = [
         ("ndc.z > nearest[view.nearest + word]", "ndc.z > farthest[view.farthest + word]"),
         ("ndc.z <= farthest[view.farthest + word]", "ndc.z <= nearest[view.nearest + word]"),
-        (
-            "let texel = pixel >> vec2<u32>(view.level)",
-            "let texel = pixel >> vec2<u32>(view.level + 1u)",
-        ),
+        ("all(last == texel) && ", ""),
+        ("texel.y * view.stride + texel.x;", "texel.y * view.stride + texel.x + 1u;"),
     ];
     for fault in swapped {
-        let found = run(4, size, &[fault]);
+        let found = run(2, true, &[fault]);
         assert!(found.pictures[0] != found.pictures[1], "{fault:?}");
     }
 }

@@ -222,8 +222,14 @@ fn made<'a>(
     mips
 }
 
-/// How many of all levels of an image differ, in each way to store them.
-fn differing_of_size(engine: &Engine, (width, height): (u32, u32), seed: u64) -> (usize, usize) {
+/// How many of all levels of an image differ, in each way to store them, and in how many ways.
+/// `at_first`: the first way with a difference ends it.
+fn differing_of_size(
+    engine: &Engine,
+    (width, height): (u32, u32),
+    seed: u64,
+    at_first: bool,
+) -> (usize, usize) {
     let (size, mut random) = (ImageSize::new(width, height), Random(seed));
     let (mut wrong, mut made_so_far) = (0, 0);
     for convention in CONVENTIONS {
@@ -240,6 +246,9 @@ fn differing_of_size(engine: &Engine, (width, height): (u32, u32), seed: u64) ->
             let mips = made(engine, texture, (size, convention), &options);
             wrong += differing(engine, &mips, &image, convention);
             made_so_far += 1;
+            if at_first && wrong > 0 {
+                return (wrong, made_so_far);
+            }
         }
     }
     (wrong, made_so_far)
@@ -250,7 +259,7 @@ fn levels_are_those_of_the_definition() {
     let engine = engine();
     let (mut wrong, mut made) = (0, 0);
     for (seed, size) in (0..).zip(SIZES) {
-        let (differ, count) = differing_of_size(&engine, size, seed);
+        let (differ, count) = differing_of_size(&engine, size, seed, false);
         assert_eq!(differ, 0, "{size:?}");
         wrong += differ;
         made += count;
@@ -318,7 +327,7 @@ fn a_mip_texture_follows_its_image() {
 }
 
 /// Sizes with odd levels of both kinds of steps, and one with steps of three levels.
-const FAULT_SIZES: [(u32, u32); 4] = [(521, 373), (480, 270), (129, 100), (255, 255)];
+const FAULT_SIZES: [(u32, u32); 3] = [(255, 255), (480, 270), (521, 373)];
 
 /// Planted faults, each of which changes levels.
 #[test]
@@ -337,7 +346,7 @@ fn planted_faults_change_levels() {
     for fault in faults {
         let engine = Engine::with_planted_faults(None, &[fault]).unwrap();
         // The first size that shows the fault will do.
-        let of_size = |(seed, size)| differing_of_size(&engine, size, seed).0;
+        let of_size = |(seed, size)| differing_of_size(&engine, size, seed, true).0;
         let mut wrong = (11..).zip(FAULT_SIZES).map(of_size);
         let wrong = wrong.find(|wrong| *wrong > 0).unwrap_or(0);
         println!("{wrong} levels differ with {}", fault.1);

@@ -82,7 +82,7 @@ impl Tally {
 /// The counts of the volumes of a round; `None` for a camera that float32 cannot hold.
 fn counts_of(engine: &Engine, round: &Round, budget: Option<u32>) -> Vec<Option<Vec<PixelCounts>>> {
     // Every other pyramid has both ends, so that a coarse texel decides open pixels, too.
-    let depths = if round.number % 2 == 0 { Depths::Both } else { Depths::Farthest };
+    let depths = if round.number.is_multiple_of(2) { Depths::Both } else { Depths::Farthest };
     let options = PyramidOptions { depths, ..round.pyramid_options(engine) };
     let pyramid = engine.pyramid_with(&round.upload(engine), &options).expect("a pyramid");
     let of_kind = |(kind, volumes): &(BoundsKind, Vec<Volume>)| {

@@ -48,6 +48,7 @@ const VALUES: &[(&str, &[f64])] = &[
     ("SORTED", FLAG),
     ("STATISTICS", FLAG),
     ("STEPS", ONE_TO_THREE),
+    ("TIER", &[0.0, 1.0, 2.0]),
     ("TALL", FLAG),
     ("TEXELS", ONE_TO_THREE),
     ("VERDICTS", FLAG),

@@ -414,10 +414,9 @@ fn the_other_answers_stay_as_they_are() {
     };
     let pipelines = Pipelines::Few;
     let (mut found, mut grouped) = (0, 0);
-    for (coverage, fit, modes) in [
-        (Coverage::Area, Fit::Rectangle, PLAIN),
-        (Coverage::Sample, Fit::Volume, DESCENT),
-    ] {
+    for (coverage, fit, modes) in
+        [(Coverage::Area, Fit::Rectangle, PLAIN), (Coverage::Sample, Fit::Volume, DESCENT)]
+    {
         let campaign = Campaign { coverage, fit, modes, ..campaign };
         for mut round in campaign.rounds().flat_map(|r| [r.copied().barely_covered(), r]) {
             let engine = &engine();

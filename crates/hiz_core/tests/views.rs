@@ -467,7 +467,8 @@ fn what_is_not_asked_for_is_outside_and_costs_no_test() {
                 assert!(told.reason.starts_with("not among the instances"), "{}", told.reason);
             }
             // The same with the mask in the cull's own submission.
-            let mask = Some(AmongSource::Mask(&flags));
+            let mut words = Vec::new();
+            let mask = Some(AmongSource::Mask(&flags).mask(&instances, &mut words).unwrap());
             let extras = CullExtras { mask, ahead, ..CullExtras::default() };
             let own = engine
                 .cull_given(&instances, &camera, &pyramid, &options, &Outputs::ALL, &extras)
@@ -488,7 +489,8 @@ fn what_is_not_asked_for_is_outside_and_costs_no_test() {
                 .unwrap();
             let in_both = |i: usize| asked(i) && is_kept(i, Wall::Left) && is_kept(i, Wall::Right);
             assert!(both.mask().unwrap() == (0..count).map(in_both).collect::<Vec<_>>(), "{what}");
-            let mask = Some(AmongSource::Kept(&culling));
+            let mut words = Vec::new();
+            let mask = Some(AmongSource::Kept(&culling).mask(&instances, &mut words).unwrap());
             let extras = CullExtras { mask, ahead, ..CullExtras::default() };
             let both = engine
                 .cull_given(&instances, &camera, &pyramid, &options, &Outputs::ALL, &extras)

@@ -1,7 +1,7 @@
 //! Arrays and words from Python as the engine's borrowed types.
 
 use hiz_core::{
-    Bounds, DepthConvention, DepthInput, DepthKind, DepthNumbers, DepthTolerance, Floats,
+    Bounds, DepthConvention, DepthInput, DepthKind, DepthNumbers, DepthTolerance, Depths, Floats,
     ImageSize, WorldTolerance,
 };
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
@@ -87,6 +87,17 @@ pub(crate) fn bounds<'a>(kind: &str, arrays: &'a [FloatArray<'_>]) -> PyResult<B
             "bounds: no kind {kind:?} of {} arrays",
             arrays.len()
         ))),
+    }
+}
+
+/// Which depths a pyramid stores, by its word in Python.
+pub(crate) fn depths_of(word: &str) -> PyResult<Depths> {
+    match word {
+        "farthest" => Ok(Depths::Farthest),
+        "nearest" => Ok(Depths::Nearest),
+        "both" => Ok(Depths::Both),
+        "receivers" => Ok(Depths::Receivers),
+        other => Err(PyValueError::new_err(format!("depths: no depths {other:?}"))),
     }
 }
 

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use hiz_core::headless::{self, AdapterSummary, AmongSource, CullExtras};
 use hiz_core::{
-    ConservativeDepthOptions, DepthLoad, DrawOptions, FaceCull, InstanceOptions, MeshData,
-    OccluderOptions, Only, Outputs, PyramidOptions, Rasteriser, StoredLevels, StoredOrder,
-    ViewsOutputs,
+    ConservativeDepthOptions, DepthEnd, DepthLoad, DrawOptions, FaceCull, InstanceOptions,
+    MeshData, OccluderOptions, Only, Outputs, PyramidOptions, Rasteriser, ReceiverMaskOptions,
+    StoredLevels, StoredOrder, ViewsOutputs,
 };
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 
 use crate::approximate::ApproximateCulling;
 use crate::arguments::{
-    DepthArray, FloatArray, LevelArray, bounds, depth_input, depth_inputs, in_c_order,
+    DepthArray, FloatArray, LevelArray, bounds, depth_input, depth_inputs, depths_of, in_c_order,
 };
 use crate::camera::Camera;
 use crate::culling::{Counts, Culling, StageTime, ViewsCulling, stage_time};
@@ -236,6 +236,7 @@ impl Engine {
     /// `rounding` says to which floats the numbers were rounded before: "none", "single" or "half".
     /// `tolerance` is relative and absolute, in world units.
     #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
+    #[pyo3(signature = (image, kind, scale, invalid, rounding, tolerance, camera, depths = "farthest"))]
     fn upload_depth(
         &self,
         py: Python<'_>,
@@ -246,16 +247,18 @@ impl Engine {
         rounding: &str,
         tolerance: (f64, f64),
         camera: &Camera,
+        depths: &str,
     ) -> PyResult<DepthImage> {
         let depth = depth_input(&image, kind, scale, &invalid, (rounding, tolerance))?;
-        let camera = &camera.0;
+        let (camera, depths) = (&camera.0, depths_of(depths)?);
         self.0
-            .run(py, |engine| engine.upload_depth_of_kind(&depth, camera))
+            .run(py, |engine| engine.upload_depth_for(&depth, camera, depths))
             .map(|depth| DepthImage(Held::new(py, depth)))
     }
 
     /// As `upload_depth`, with an image for each sample of a pixel: the farthest one counts.
     #[expect(clippy::too_many_arguments, reason = "the signature of Python's method")]
+    #[pyo3(signature = (images, kind, scale, invalid, rounding, tolerance, camera, depths = "farthest"))]
     fn upload_samples(
         &self,
         py: Python<'_>,
@@ -266,12 +269,35 @@ impl Engine {
         rounding: &str,
         tolerance: (f64, f64),
         camera: &Camera,
+        depths: &str,
     ) -> PyResult<DepthImage> {
         let samples = depth_inputs(&images, kind, scale, &invalid, (rounding, tolerance))?;
-        let camera = &camera.0;
+        let (camera, depths) = (&camera.0, depths_of(depths)?);
         self.0
-            .run(py, |engine| engine.upload_depth_of_samples(&samples, camera))
+            .run(py, |engine| engine.upload_samples_for(&samples, camera, depths))
             .map(|depth| DepthImage(Held::new(py, depth)))
+    }
+
+    /// The depth image of `light` that holds the farthest receivers in `depth`.
+    fn receiver_mask(
+        &self,
+        py: Python<'_>,
+        depth: &DepthImage,
+        light: &Camera,
+        filter_radius: f64,
+        reach_px: f64,
+        slacks: (f64, f64),
+    ) -> PyResult<DepthImage> {
+        let options = ReceiverMaskOptions {
+            filter_radius,
+            reach_px,
+            depth_slack: slacks.0,
+            depth_slack_abs: slacks.1,
+        };
+        let depth = depth.0.get(py)?;
+        self.0
+            .run(py, |engine| engine.receiver_mask(&depth, &light.0, &options))
+            .map(|mask| DepthImage(Held::new(py, mask)))
     }
 
     /// Renews a pyramid within the rectangle (x0, y0, x1, y1) of its depth image.
@@ -332,9 +358,17 @@ impl Engine {
         Ok((PyArray1::from_vec(py, answer.mask), Counts::of(&answer.first_counts)))
     }
 
-    fn pyramid(&self, py: Python<'_>, depth: &DepthImage, levels: (u32, u32)) -> PyResult<Pyramid> {
+    #[pyo3(signature = (depth, levels, depths = "farthest"))]
+    fn pyramid(
+        &self,
+        py: Python<'_>,
+        depth: &DepthImage,
+        levels: (u32, u32),
+        depths: &str,
+    ) -> PyResult<Pyramid> {
         let levels = StoredLevels { first: levels.0, last: levels.1 };
-        let options = PyramidOptions { levels, ..PyramidOptions::default() };
+        let depths = depths_of(depths)?;
+        let options = PyramidOptions { levels, depths, ..PyramidOptions::default() };
         let depth = depth.0.get(py)?;
         let reduce = |engine: &headless::Engine| {
             Ok((engine.clone(), engine.pyramid_with(&depth, &options)?))
@@ -370,7 +404,9 @@ impl Engine {
         let (instances, pyramid) = (instances.0.get(py)?, pyramid.0.get(py)?);
         let among = among.as_ref().map(|among| HeldAmong::new(py, among)).transpose()?;
         let cull = |engine: &headless::Engine| {
-            let mask = among.as_ref().map(HeldAmong::source);
+            let mut words = Vec::new();
+            let source = among.as_ref().map(HeldAmong::source);
+            let mask = source.map(|source| source.mask(&instances, &mut words)).transpose()?;
             let extras = CullExtras { mask, ahead, ..CullExtras::default() };
             engine.cull_given(&instances, &camera.0, &pyramid.1, &options, &outputs, &extras)
         };
@@ -426,7 +462,9 @@ impl Engine {
             .collect();
         let among = among.as_ref().map(|among| HeldAmong::new(py, among)).transpose()?;
         let cull = |engine: &headless::Engine| {
-            let mask = among.as_ref().map(HeldAmong::source);
+            let mut words = Vec::new();
+            let source = among.as_ref().map(HeldAmong::source);
+            let mask = source.map(|source| source.mask(&instances, &mut words)).transpose()?;
             let extras = CullExtras { mask, ahead, ..CullExtras::default() };
             engine.cull_views(&instances, &views, &options, &outputs, &extras)
         };
@@ -482,6 +520,7 @@ impl Engine {
 /// An [`AmongArgument`] for calls without the interpreter.
 enum HeldAmong<'a> {
     Mask(&'a [bool]),
+    #[expect(clippy::redundant_allocation, reason = "what Python holds is an `Arc` itself")]
     Kept(Arc<Arc<headless::Culling>>),
     KeptByAny(Arc<headless::ViewsCulling>),
 }
@@ -662,11 +701,12 @@ impl Pyramid {
         Ok(levels.into_iter().map(|(size, t)| (size, PyArray1::from_vec(py, t))).collect())
     }
 
-    /// `((height, width), texels)` of a level.
-    fn read_level<'py>(&self, py: Python<'py>, k: u32) -> PyResult<LevelArray<'py>> {
+    /// `((height, width), texels)` of a level of one end.
+    fn read_level<'py>(&self, py: Python<'py>, k: u32, nearest: bool) -> PyResult<LevelArray<'py>> {
+        let end = if nearest { DepthEnd::Nearest } else { DepthEnd::Farthest };
         let (size, texels) = self.0.run(py, |(engine, pyramid)| {
             let size = pyramid.level_size(k).map_or((0, 0), |size| (size.height, size.width));
-            Ok((size, engine.read_level(pyramid, k)?))
+            Ok((size, engine.read_level_of(pyramid, k, end)?))
         })?;
         Ok((size, PyArray1::from_vec(py, texels)))
     }

@@ -135,7 +135,10 @@ impl Yardstick {
         let options = MipOptions { level_0: false, ..mip_options(depths, lookup)? };
         let prepare = |engine: &headless::Engine| {
             let mips = engine.context().create_mip_texture(depth.size(), &options)?;
-            Ok(Reduction { engine: engine.clone(), reducer: Reducer::Mips(depth, mips) })
+            Ok(Reduction {
+                engine: engine.clone(),
+                reducer: Reducer::Mips(Box::new((depth, mips))),
+            })
         };
         self.0.run(py, prepare).map(|work| YardstickReduction(Held::new(py, work)))
     }
@@ -231,7 +234,7 @@ enum Reducer {
     Own(headless::DepthImage, Arc<Pyramid>),
     Region(headless::DepthImage, Arc<Pyramid>, [u32; 4]),
     Resolve(MultisampledDepth),
-    Mips(headless::DepthImage, MipTexture),
+    Mips(Box<(headless::DepthImage, MipTexture)>),
     PerLevel(PerLevelReduction),
 }
 
@@ -254,7 +257,8 @@ impl YardstickReduction {
                     yardstick::reduce_region(engine, encoder, depth, *rectangle, pyramid)
                 }
                 Reducer::Resolve(depth) => depth.record(engine, encoder),
-                Reducer::Mips(depth, mips) => {
+                Reducer::Mips(mips) => {
+                    let (depth, mips) = &**mips;
                     let convention = depth.camera().convention();
                     engine.context().record_mips(encoder, depth.texture(), convention, mips)
                 }

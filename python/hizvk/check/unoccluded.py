@@ -82,10 +82,6 @@ def compare_unoccluded(verdicts: npt.ArrayLike, truth: npt.ArrayLike) -> Unocclu
     if codes.dtype != np.uint8 or codes.ndim != 1:
         kind = ValueError if codes.dtype == np.uint8 else TypeError
         raise kind(f"verdicts: expected uint8 (N,), got {_arguments.describe(verdicts)}")
-    unknown = codes[~np.isin(codes, list(Verdict))]
-    if unknown.size:
-        raise ValueError(f"verdicts: expected codes of hizvk.Verdict, got {int(unknown[0])}")
-    is_claimed = codes == Verdict.UNOCCLUDED
     told = np.asarray(truth)
     if isinstance(truth, np.ndarray) and told.dtype == np.uint8:
         if told.shape != codes.shape:
@@ -103,6 +99,10 @@ def compare_unoccluded(verdicts: npt.ArrayLike, truth: npt.ArrayLike) -> Unocclu
     else:
         is_it = _arguments.bools("truth", truth, len(codes))
         is_open = np.zeros(len(codes), dtype=bool)
+    unknown = codes[~np.isin(codes, list(Verdict))]
+    if unknown.size:
+        raise ValueError(f"verdicts: expected codes of hizvk.Verdict, got {int(unknown[0])}")
+    is_claimed = codes == Verdict.UNOCCLUDED
     return UnoccludedComparison(
         false_claims=np.flatnonzero(is_claimed & ~is_it & ~is_open),
         missed=np.flatnonzero(is_it & ~is_claimed),

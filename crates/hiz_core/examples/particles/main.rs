@@ -1,4 +1,4 @@
-//! A million unsorted particles of one pixel each, which ask one coarse level before the depth image.
+//! A million unsorted particles of one pixel each, which ask one coarse level first.
 //!
 //! ```text
 //! cargo run --release --example particles
@@ -21,17 +21,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     let adapter = pollster::block_on(instance.request_adapter(&Default::default()))?;
     let (device, queue) = pollster::block_on(adapter.request_device(&Default::default()))?;
     println!("{}", adapter.get_info().name);
-    for level in [2, 3, 4, 5] {
+    for (level, soft) in [3, 4, 5].into_iter().flat_map(|level| [(level, false), (level, true)]) {
         let size = ImageSize::new(1280, 720);
-        let setup = particles::Setup { size, particles: 1_000_000, level, rounds: 12 };
+        let setup = particles::Setup { size, particles: 1_000_000, level, soft, rounds: 12 };
         let found = particles::run(&device, &queue, setup, &[])?;
         let [all, before, behind] = found.counts;
         let [plain, coarse] = found.ms;
+        let pixels = if soft { "2x2 pixels" } else { "1 pixel" };
         let same = found.pictures[0] == found.pictures[1];
         println!(
-            "level {level}: of {all} particles in the image {before} before all and {behind} behind \
-             all of a texel: {:.1} % skip the depth image; {coarse:.2} of {plain:.2} ms, {:.2} times; \
-             pictures equal: {same}",
+            "level {level}, {pixels} per test: of {all} particles in the image {before} lie before \
+             all of a texel and {behind} behind it: {:.1} % skip the depth image; {coarse:.2} of \
+             {plain:.2} ms, {:.2} times; pictures equal: {same}",
             1e2 * found.skipped(),
             coarse / plain
         );

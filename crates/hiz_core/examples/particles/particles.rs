@@ -36,6 +36,8 @@ pub(crate) struct Setup {
     pub(crate) particles: u32,
     /// The coarse level: its texels have `2^level` by `2^level` pixels.
     pub(crate) level: u32,
+    /// Whether 2x2 pixels decide in shares, instead of one.
+    pub(crate) soft: bool,
     /// Timed drawings of each kind.
     pub(crate) rounds: u32,
 }
@@ -107,7 +109,8 @@ pub(crate) fn run(
         source: wgpu::ShaderSource::Wgsl(source.into()),
     });
     let draw = |coarse: bool, counted: bool| {
-        let pipeline = scene.pipeline(&module, coarse, counted);
+        let flags = [("COARSE", coarse), ("COUNTED", counted), ("SOFT", setup.soft)];
+        let pipeline = scene.pipeline(&module, flags);
         let entries = [
             view.as_entire_binding(),
             wgpu::BindingResource::TextureView(&scene.depth),
@@ -258,10 +261,9 @@ impl<'a> Scene<'a> {
     fn pipeline(
         &self,
         module: &wgpu::ShaderModule,
-        coarse: bool,
-        counted: bool,
+        flags: [(&str, bool); 3],
     ) -> wgpu::ComputePipeline {
-        let flag = |flag: bool| f64::from(u8::from(flag));
+        let constants = flags.map(|(name, flag)| (name, f64::from(u8::from(flag))));
         let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("particles.draw"),
             bind_group_layouts: &[Some(&self.layout())],
@@ -273,7 +275,7 @@ impl<'a> Scene<'a> {
             module,
             entry_point: Some("draw"),
             compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &[("COARSE", flag(coarse)), ("COUNTED", flag(counted))],
+                constants: &constants,
                 ..Default::default()
             },
             cache: None,

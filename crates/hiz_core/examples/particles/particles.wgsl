@@ -5,6 +5,9 @@
 
 // Asks one coarse level before the depth image.
 override COARSE: bool;
+// A particle shows in four shares, one for each of the 2x2 pixels that it may touch.
+// Otherwise one pixel decides.
+override SOFT: bool;
 // Counts how the particles were decided.
 override COUNTED: bool;
 
@@ -58,6 +61,20 @@ fn position(particle: u32) -> vec3<f32> {
     return vec3<f32>(40.0, 8.0, 40.0) * (puff - 0.5) + 2.0 * RADIUS * within;
 }
 
+// The shares of a particle that all pixels let through.
+const FULL: u32 = 4u;
+
+fn shares_in_front(pixel: vec2<u32>, z: f32) -> u32 {
+    if !SOFT {
+        return select(0u, FULL, z > textureLoad(depth, pixel, 0));
+    }
+    let last = min(pixel + 1u, view.size - 1u);
+    return u32(z > textureLoad(depth, pixel, 0))
+        + u32(z > textureLoad(depth, vec2<u32>(last.x, pixel.y), 0))
+        + u32(z > textureLoad(depth, vec2<u32>(pixel.x, last.y), 0))
+        + u32(z > textureLoad(depth, last, 0));
+}
+
 @compute @workgroup_size(64)
 fn draw(@builtin(global_invocation_id) id: vec3<u32>) {
     let particle = id.x;
@@ -74,18 +91,21 @@ fn draw(@builtin(global_invocation_id) id: vec3<u32>) {
     let place = vec2<f32>(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y) * size;
     let pixel = min(vec2<u32>(place), view.size - 1u);
     // Reversed Z: nearer is greater.
-    var shows = false;
+    var shares = 0u;
     var undecided = 1u;
     if COARSE {
         let texel = pixel >> vec2<u32>(view.level);
         let word = texel.y * view.stride + texel.x;
         let before_all = ndc.z > nearest[view.nearest + word];
         let behind_all = ndc.z <= farthest[view.farthest + word];
-        shows = before_all;
-        undecided = select(1u, 0u, before_all || behind_all);
+        // The pixels of a soft test have to lie in the texel, too.
+        let last = min(pixel + u32(SOFT), view.size - 1u) >> vec2<u32>(view.level);
+        let decided = all(last == texel) && (before_all || behind_all);
+        shares = select(0u, FULL, before_all);
+        undecided = select(1u, 0u, decided);
         if COUNTED {
-            atomicAdd(&counts[1], u32(before_all));
-            atomicAdd(&counts[2], u32(behind_all));
+            atomicAdd(&counts[1], u32(decided && before_all));
+            atomicAdd(&counts[2], u32(decided && behind_all));
         }
     }
     if COUNTED {
@@ -93,10 +113,10 @@ fn draw(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     // Tuning for software drivers: they skip no branch, but end a loop.
     for (var turn = 0u; turn < undecided; turn += 1u) {
-        shows = ndc.z > textureLoad(depth, pixel, 0);
+        shares = shares_in_front(pixel, ndc.z);
     }
-    if shows {
+    if shares > 0u {
         let brightness = 1u + (particle & 15u);
-        atomicAdd(&picture[pixel.y * view.size.x + pixel.x], brightness);
+        atomicAdd(&picture[pixel.y * view.size.x + pixel.x], shares * brightness);
     }
 }

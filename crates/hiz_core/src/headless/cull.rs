@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
-use crate::cull::among::Among;
+use crate::cull::among::{Among, AmongMask};
 use crate::cull::inputs::CullInputs;
 use crate::cull::options::CullOptions;
 use crate::cull::record::record_cull;
@@ -17,7 +17,6 @@ use crate::headless::counts::{Timings, milliseconds};
 use crate::headless::culling::Culling;
 use crate::headless::engine::Engine;
 use crate::headless::readback::{self, Staged};
-use crate::headless::views::AmongSource;
 use crate::host::threads::Locked;
 use crate::input::camera::Camera;
 use crate::instances::Instances;
@@ -52,7 +51,8 @@ pub struct CullExtras<'a> {
     /// The instances that are asked for ([`Engine::among`]); `None`: all.
     pub among: Option<&'a Arc<Among>>,
     /// The same for this cull alone: its own submission brings the mask to the device.
-    pub mask: Option<AmongSource<'a>>,
+    /// [`AmongSource::mask`](crate::headless::AmongSource::mask) makes it.
+    pub mask: Option<AmongMask<'a>>,
     /// Whether the cull's own submission copies the answer, as [`Engine::cull_ahead`] says.
     pub ahead: bool,
 }

@@ -3,6 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use crate::context::HizContext;
+use crate::cull::among::Among;
 use crate::error::{Error, Result};
 use crate::gpu::copies::StagingPool;
 use crate::headless::adapter::{self, ADAPTER_VARIABLE, AdapterSummary};
@@ -14,9 +15,9 @@ use crate::headless::kept_depth::KeptDepth;
 use crate::headless::process::Process;
 use crate::headless::readback;
 use crate::headless::slots::Slots;
-use crate::headless::views::Amongs;
 use crate::host::threads::Locked;
 use crate::input::image::MAX_IMAGE_SIDE;
+use crate::instances::InstancesId;
 
 /// Staging buffers of answers that are kept at most.
 const STAGING_KEPT: usize = 4;
@@ -74,7 +75,8 @@ struct Shared {
     images: Images,
     slots: Locked<Slots>,
     joined: JoinedPool,
-    amongs: Amongs,
+    /// Masks of culls that are kept for later ones, with the instances that they are of.
+    amongs: Locked<Vec<(InstancesId, Arc<Among>)>>,
     timing: Locked<Option<Timing>>,
     /// Whether the device's timestamps can be trusted, once that was checked.
     clock: OnceLock<bool>,
@@ -172,7 +174,7 @@ impl Engine {
                 images: Images::default(),
                 slots: Locked::default(),
                 joined: JoinedPool::default(),
-                amongs: Amongs::default(),
+                amongs: Locked::default(),
                 timing: Locked::default(),
                 clock: OnceLock::new(),
                 staging: StagingPool::new(STAGING_KEPT),
@@ -238,7 +240,7 @@ impl Engine {
         &self.shared.joined
     }
 
-    pub(super) fn amongs(&self) -> &Amongs {
+    pub(super) fn amongs(&self) -> &Locked<Vec<(InstancesId, Arc<Among>)>> {
         &self.shared.amongs
     }
 

@@ -15,7 +15,6 @@ use crate::headless::culling::{Culling, spread_bits};
 use crate::headless::engine::Engine;
 use crate::headless::readback::{self, to_u32};
 use crate::host::memory;
-use crate::host::threads::Locked;
 use crate::input::camera::Camera;
 use crate::instances::{Instances, InstancesId};
 use crate::output::draw::DrawIndexedIndirect;
@@ -23,10 +22,7 @@ use crate::output::views::{Joined, ViewsOutputs};
 use crate::output::visible::Visible;
 use crate::pyramid::Pyramid;
 
-/// Masks of culls that are kept for later ones, with the instances that they are of.
-pub(super) type Amongs = Locked<Vec<(InstancesId, Arc<Among>)>>;
-
-/// How many are kept.
+/// How many masks of culls are kept for later ones.
 const AMONGS_KEPT: usize = 4;
 
 /// Which instances a cull is restricted to; see [`Engine::among`].
@@ -41,8 +37,13 @@ pub enum AmongSource<'a> {
 }
 
 impl<'a> AmongSource<'a> {
-    /// The mask as a recording takes it; `words` holds the bits of flags.
-    fn mask<'b>(&self, instances: &Instances, words: &'b mut Vec<u32>) -> Result<AmongMask<'b>>
+    /// The mask as a recording takes it, such as [`CullExtras::mask`].
+    /// `words` holds the bits of flags; it comes empty.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] for a mask of another length.
+    /// - [`Error::Mismatch`] for a cull without a mask.
+    pub fn mask<'b>(&self, instances: &Instances, words: &'b mut Vec<u32>) -> Result<AmongMask<'b>>
     where
         'a: 'b,
     {
@@ -146,14 +147,12 @@ impl Engine {
         instances: &Arc<Instances>,
         extras: &CullExtras<'_>,
     ) -> Result<Option<Arc<Among>>> {
-        let Some(source) = &extras.mask else { return Ok(extras.among.cloned()) };
+        let Some(mask) = &extras.mask else { return Ok(extras.among.cloned()) };
         if extras.among.is_some() {
             return Err(Error::invalid("mask", "expected no among beside it, got both"));
         }
         let among = self.lend_among(instances)?;
-        let mut words = Vec::new();
-        let mask = source.mask(instances, &mut words)?;
-        record_among(&self.context().gpu, encoder, instances, &mask, &among)?;
+        record_among(&self.context().gpu, encoder, instances, mask, &among)?;
         Ok(Some(among))
     }
 

@@ -254,7 +254,7 @@ mod tests {
                         assert!(bare < 0.0, "no depth is nearer than it was stored");
                     }
                     let what = format!("{convention:?} {which} {tolerance:?} {slack:?}");
-                    assert!(least >= 0.0 && least < 0.2, "{what}: {least}");
+                    assert!((0.0..0.2).contains(&least), "{what}: {least}");
                 }
             }
         }

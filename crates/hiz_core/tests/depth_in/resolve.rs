@@ -5,9 +5,11 @@
 
 use std::sync::mpsc;
 
+use hiz_core::headless::Engine;
 use hiz_core::{
-    Bounds, Coverage, CullOptions, DepthConvention, DepthSource, Floats, HizContext, ImageSize,
-    InstanceOptions, Outputs, PyramidOptions, ResolveOptions, ResolvedDepths, wgpu,
+    Bounds, Coverage, CullOptions, DepthConvention, DepthEnd, DepthSource, Depths, Floats,
+    HizContext, ImageSize, InstanceOptions, Outputs, PyramidOptions, ResolveOptions,
+    ResolvedDepths, wgpu,
 };
 use wgpu::TextureFormat as Format;
 
@@ -448,4 +450,80 @@ fn the_tolerance_of_the_format_goes_with_the_depth() {
     engine.queue().submit([commands.finish()]);
     let step = pyramid.tolerance().unwrap().absolute * 65_535.0;
     assert!((1.0..1.001).contains(&step), "{step}");
+}
+
+/// Every level of a pyramid of resolved samples, of each end, against folds over the samples.
+///
+/// Receivers: a pixel is background where all its samples are.
+fn wrong_levels(depths: Depths, faults: &[(&str, &str)]) -> usize {
+    let engine = Engine::with_planted_faults(None, faults).expect("a Vulkan driver");
+    let (mut random, mut wrong) = (Random(12), 0);
+    for (width, height) in [(33, 17), (64, 40), (5, 90)] {
+        let size = ImageSize::new(width, height);
+        let mut samples = planes(Format::R32Float, 4, size, &mut random);
+        for convention in CONVENTIONS {
+            let far = if convention.is_reversed() { 0.0 } else { 1.0_f32 };
+            for plane in &mut samples {
+                // Background behind all samples of the first rows, and behind some of others.
+                let mixed = random.below(2) == 0;
+                plane[..(5 * width) as usize].fill(far);
+                if mixed {
+                    plane[(5 * width) as usize..(8 * width) as usize].fill(far);
+                }
+            }
+            let texture =
+                drawn((engine.device(), engine.queue()), Format::R32Float, size, &samples);
+            let camera = camera_along_z(width, height, convention);
+            let hiz = engine.context();
+            let options = ResolveOptions { depths: ResolvedDepths::Both };
+            let resolve = hiz.create_depth_resolve(size, &options).unwrap();
+            let options = PyramidOptions { depths, ..PyramidOptions::default() };
+            let pyramid = hiz.create_pyramid(size, &options).unwrap();
+            let mut commands = encoder(engine.device());
+            hiz.record_resolve(&mut commands, &texture, &camera, &resolve).unwrap();
+            hiz.record_reduce(&mut commands, resolve.source().unwrap(), &camera, &pyramid).unwrap();
+            engine.queue().submit([commands.finish()]);
+            let [mut farthest, nearest] = expected(&samples, convention.is_reversed());
+            if depths == Depths::Receivers {
+                for (farthest, nearest) in farthest.iter_mut().zip(&nearest) {
+                    *farthest = if *nearest == far { 1.0 - far } else { *farthest };
+                }
+            }
+            let ends = [
+                (DepthEnd::Farthest, farthest, depths.has_farthest()),
+                (DepthEnd::Nearest, nearest, depths.has_nearest()),
+            ];
+            for (end, pixels, _) in ends.into_iter().filter(|(.., is_there)| *is_there) {
+                let greatest = (end == DepthEnd::Farthest) != convention.is_reversed();
+                for level in 0..pyramid.num_levels() {
+                    let found = engine.read_level_of(&pyramid, level, end).unwrap();
+                    let columns = width.div_ceil(1 << level);
+                    let fold = if greatest { f32::max } else { f32::min };
+                    let mut blocks = vec![if greatest { 0.0 } else { 1.0 }; found.len()];
+                    for (i, depth) in (0..).zip(&pixels) {
+                        let (x, y) = ((i % width) >> level, (i / width) >> level);
+                        let block = &mut blocks[(y * columns + x) as usize];
+                        *block = fold(*block, *depth);
+                    }
+                    wrong += usize::from(bits(&found) != bits(&blocks));
+                }
+            }
+        }
+    }
+    wrong
+}
+
+#[test]
+fn pyramids_of_resolved_samples_have_both_ends() {
+    for depths in [Depths::Farthest, Depths::Nearest, Depths::Both, Depths::Receivers] {
+        assert_eq!(wrong_levels(depths, &[]), 0, "{depths:?}");
+    }
+    // The nearest depth from the farthest samples, and background by the farthest sample.
+    for (what, by, depths) in [
+        ("nearest_sanitized4(near));", "nearest_sanitized4(far));", Depths::Both),
+        ("RECEIVERS && is_background(near)", "RECEIVERS && is_background(far)", Depths::Receivers),
+        ("sanitized_near(sample_bits(at, k))", "sanitized_near(sample_bits(at, 0))", Depths::Both),
+    ] {
+        assert!(wrong_levels(depths, &[(what, by)]) > 0, "{what} -> {by}: stayed green");
+    }
 }
