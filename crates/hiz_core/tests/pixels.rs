@@ -127,7 +127,7 @@ fn no_count_contradicts_the_oracle() {
         assert_eq!(fitted.contradictions, 0);
         assert!(fitted.hidden > 0 && fitted.open > 0 && fitted.inside > 0, "{fitted:?}");
         // Most that can be decided is, although the scenes are made to be nearly undecidable.
-        assert!(fitted.inside < fitted.must_be_inside + fitted.touched / 2, "{fitted:?}");
+        assert!(fitted.inside < fitted.must_be_inside + fitted.touched / 4 * 3, "{fitted:?}");
         let small = |round: &Round| round.view.width * round.view.height <= 4096;
         let rounds = campaign(seed + 10, 1, coverage).rounds().filter(small);
         let loose = run(&engine(), rounds, None);
