@@ -45,17 +45,17 @@ fn no_false_cull_of_points() {
 #[test]
 fn planted_faults_are_found() {
     const WIDE: &[BoundsKind] = &[BoundsKind::WidePoint];
-    for (name, what, by, kinds) in [
-        ("no margin", "ERROR_ULPS: f32 = 24.0", "ERROR_ULPS: f32 = 0.0", &POINTS[..]),
+    for (what, by, name, kinds) in [
+        ("ERROR_ULPS: f32 = 24.0", "ERROR_ULPS: f32 = 0.0", "no margin", &POINTS[..]),
         (
-            "one pixel of four",
             "let bits = corners(level, t);",
             "let bits = corners(level, t.xyxy);",
+            "one pixel of four",
             &POINTS,
         ),
-        ("half of the size", "size_of(d_hi, 0.0)", "(0.0 * size_of(d_hi, 0.0))", &POINTS),
-        ("no low half", "bar3(lo - view.eye_lo)", "bar3(-view.eye_lo)", WIDE),
-        ("the eye's low half", "Volume(d_hi - view.eye_lo", "Volume(d_hi", &POINTS[..1]),
+        ("size_of(d_hi, 0.0)", "(0.0 * size_of(d_hi, 0.0))", "half of the size", &POINTS),
+        ("bar3(lo - view.eye_lo)", "bar3(-view.eye_lo)", "no low half", WIDE),
+        ("Volume(d_hi - view.eye_lo", "Volume(d_hi", "the eye's low half", &POINTS[..1]),
     ] {
         let engine = Engine::with_planted_faults(None, &[(what, by)]).unwrap();
         let report = Campaign { kinds, ..campaign(36, 6) }.run(&engine);
@@ -105,17 +105,17 @@ fn no_point_is_falsely_said_to_show() {
     let [said, wrong] = unoccluded(&engine(), 37, 20);
     eprintln!("{said} points surely show, {wrong} wrongly");
     assert!(said > 300 && wrong == 0, "{said} {wrong}");
-    for (name, what, by) in [
-        ("no margin", "ERROR_ULPS: f32 = 24.0", "ERROR_ULPS: f32 = 0.0"),
+    for (what, by, name) in [
+        ("ERROR_ULPS: f32 = 24.0", "ERROR_ULPS: f32 = 0.0", "no margin"),
         (
-            "hidden for in front",
             "return surely_above(z, t, w);\n    }\n    return surely_below(z, t, w);",
             "return surely_below(z, t, w);\n    }\n    return surely_above(z, t, w);",
+            "hidden for in front",
         ),
         (
-            "one pixel of four",
             "front = nearest_footprint(level, t);",
             "front = nearest_footprint(level, t.xyxy);",
+            "one pixel of four",
         ),
     ] {
         let engine = Engine::with_planted_faults(None, &[(what, by)]).unwrap();
