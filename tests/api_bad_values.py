@@ -502,6 +502,9 @@ OPTIONS: dict[str, list[Bad]] = {
         (1.0, TypeError, "expected a LodByError, LodByDistance, LodBySize or None, got float 1.0"),
         ([10.0], TypeError, "got list [10.0]"),
     ],
+    "shadow": [
+        ((0, -1, 0), TypeError, "expected a DirectionalLight or None, got tuple (0, -1, 0)"),
+    ],
 }
 
 LOD_PIXELS: list[Bad] = [
@@ -528,6 +531,34 @@ def lod_list(way: str, wrong_order: list[float]) -> list[Bad]:
 
 
 TABLES: dict[str, Table] = {
+    "DirectionalLight": Table(
+        lambda _: (
+            hizvk.DirectionalLight,
+            {
+                "direction": (0, -1, 0),
+                "receivers": ((-1, -1, -1), (1, 1, 1)),
+                "angular_radius_deg": 0.27,
+                "filter_radius": 0.05,
+            },
+        ),
+        {
+            "direction": [*VECTOR, ((0, 0, 0), ValueError, "expected a vector that is not 0")],
+            "receivers": [
+                (3.0, TypeError, "expected a pair (least, greatest) of corners, got float 3.0"),
+                (((0, 0, 0),), ValueError, "expected a pair (least, greatest) of corners"),
+                (((0, 0), (1, 1)), ValueError, "expected (3,) finite numbers"),
+                (((0, 0, 2), (1, 1, 1)), ValueError, "expected least <= greatest on each axis"),
+                (((0, 0, 0), (1, 1, NAN)), ValueError, "nan"),
+                (((0, 0, 0), (1, 1, 1e30)), ValueError, "expected numbers below 2^60"),
+            ],
+            "angular_radius_deg": [
+                *NUMBER,
+                (-1.0, ValueError, "got float -1.0"),
+                (31.0, ValueError, "at most 30, got float 31.0"),
+            ],
+            "filter_radius": [*NUMBER, (-1.0, ValueError, "got float -1.0")],
+        },
+    ),
     "LodByError": Table(
         lambda _: (hizvk.LodByError, {"pixels": 1.0}),
         {"pixels": LOD_PIXELS},
@@ -1075,6 +1106,38 @@ TABLES: dict[str, Table] = {
             "tolerance": TOLERANCE,
             "levels": LEVELS,
             "depths": DEPTHS,
+        },
+    ),
+    "Device.receiver_mask": Table(
+        lambda device: (
+            device.receiver_mask,
+            {
+                "depth": np.ones((6, 8)),
+                "camera": camera(),
+                "light_camera": camera(),
+                "kind": "z",
+                "filter_radius": 0.1,
+                "reach_px": 0.5,
+                "depth_slack": 0.0,
+                "depth_slack_abs": 0.0,
+            },
+        ),
+        {
+            "depth": [
+                *IMAGE,
+                (np.ones((6, 8, 4)), ValueError, "expected one sample per pixel, got 4"),
+            ],
+            "camera": CAMERA,
+            "light_camera": CAMERA,
+            "kind": KIND,
+            "filter_radius": [*NUMBER, (-1.0, ValueError, "got float -1.0")],
+            "reach_px": [
+                *NUMBER,
+                (17.0, ValueError, "at most 16, got float 17.0"),
+                (0.3, ValueError, "expected a multiple of 1/256, got 0.3"),
+            ],
+            "depth_slack": DEPTH_SLACK,
+            "depth_slack_abs": DEPTH_SLACK,
         },
     ),
     "Device.cull": Table(

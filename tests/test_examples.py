@@ -45,6 +45,8 @@ LAST_LINES = {
     "polygon_soup.py": "kept: 100 % of the wall, 0 % of what it hides",
     # The answer is that of a blocking read.
     "readback.py": "8 of 8 masks are those of a blocking read",
+    # What a culled caster could shadow, no pixel shows.
+    "shadow_casters.py": "pixels that lose a shadow: 0 of the sun's, 0 of the lamp's",
     # Each eye sees past its own side of the pillar.
     "stereo.py": "a list of one eye would lose balls of the other: True",
     # The first ball is as wide as any, nearest, and on the same axis.

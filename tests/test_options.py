@@ -68,6 +68,12 @@ OTHERS: dict[str, tuple[Any, str]] = {
     "hierarchy": (np.int64(2), "hierarchy: Tiers(2)"),
     "statistics": (True, "statistics: true"),
     "lod": (hizvk.LodByError(0.5), "lod: Error { pixels: 0.5 }"),
+    "shadow": (
+        hizvk.DirectionalLight((0, -1, 0), ((-2, -3, -4), (5, 6, 7)), 0.0, 0.5),
+        "shadow: Some(DirectionalLight { direction: [0.0, -1.0, 0.0], "
+        "receivers_min: [-2.0, -3.0, -4.0], receivers_max: [5.0, 6.0, 7.0], "
+        "angular_radius: 0.0, filter_radius: 0.5 })",
+    ),
     "mask": (False, "mask: false"),
     "verdicts": (False, "verdicts: false"),
     "indices": (True, "indices: true"),

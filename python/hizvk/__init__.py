@@ -87,6 +87,7 @@ from .errors import (
     OutOfMemoryError,
 )
 from .explanation import Explanation, Verdict
+from .light import DirectionalLight
 from .lod import LodByDistance, LodByError, LodBySize
 from .mesh import Mesh
 from .mips import mip_texel, wgsl
@@ -133,6 +134,7 @@ __all__ = [
     "DepthImage",
     "Device",
     "DeviceLostError",
+    "DirectionalLight",
     "DrawTemplate",
     "Explanation",
     "HizError",

@@ -240,6 +240,14 @@ class Engine:
         camera: Camera,
         depths: str = ...,
     ) -> DepthImage: ...
+    def receiver_mask(
+        self,
+        depth: DepthImage,
+        light: Camera,
+        filter_radius: float,
+        reach_px: float,
+        slacks: tuple[float, float],
+    ) -> DepthImage: ...
     def renew(
         self, pyramid: Pyramid, depth: DepthImage, rectangle: tuple[int, int, int, int]
     ) -> None: ...

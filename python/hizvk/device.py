@@ -608,6 +608,109 @@ class Device:
         built = self._engine.pyramid(uploaded, stored, depths)
         return Pyramid(self, built, camera, source, depths=depths)
 
+    def receiver_mask(
+        self,
+        depth: DepthImage | npt.ArrayLike,
+        camera: Camera,
+        light_camera: Camera,
+        *,
+        kind: DepthKind | None = None,
+        filter_radius: float = 0.0,
+        reach_px: float = 0.5,
+        depth_slack: float = 2.0**-21,
+        depth_slack_abs: float = 0.0,
+    ) -> DepthImage:
+        """The farthest receivers that a camera sees, as a depth image of a light.
+
+        It is for spot lights and for the faces of point lights.
+        A pyramid of the result is what casters are culled by, as anything is:
+        ``device.cull(casters, light_camera, device.pyramid(mask))``.
+        A culled caster shadows nothing that the camera sees (``docs/shadows.md``).
+
+        Parameters
+        ----------
+        depth : DepthImage, or (height, width) array
+            The depth of all that receives shadows, with one sample per pixel.
+            Exactly far means background; a pixel without a valid depth keeps every caster.
+        camera : Camera
+            The camera that saw it.
+        light_camera : Camera
+            Of the shadow map, or with another size: the finer, the more is culled.
+        kind : {"ndc", "reversed_ndc", "z", "distance"}
+            What an array's numbers are; None beside a DepthImage.
+        filter_radius : float
+            How far from a point the lookup of its shadow reaches, in world units: the radius of the
+            filter's kernel, the diagonal of a texel of the shadow map, and the bias, added.
+        reach_px : float
+            How far from its pixel's centre a receiver may lie along each axis, at the pixel's
+            depth: a multiple of 1/256 from 0 to 16.
+            0.5 covers the whole pixel.
+        depth_slack, depth_slack_abs : float
+            How far depths may be off, relative to them and in units of NDC depth, 0 to 0.5.
+
+        Returns
+        -------
+        DepthImage
+            Of the light's camera.
+            A texel without a receiver is at the near plane.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+        LimitError, OutOfMemoryError
+            If the image is larger than the device allows.
+
+        Examples
+        --------
+        A camera and a spot light look at a wall at z = -10.
+        A box before the wall shadows it, and a box behind the wall does not.
+
+        >>> import numpy as np, hizvk
+        >>> device = hizvk.Device()
+        >>> view = {"fov_y_deg": 60, "near": 0.1}
+        >>> camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), size=(32, 32), **view)
+        >>> light = hizvk.Camera.look_at((3, 0, 0), (0, 0, -10), size=(64, 64), **view)
+        >>> wall = np.full((32, 32), 10.0, np.float32)
+        >>> mask = device.receiver_mask(wall, camera, light, kind="z", filter_radius=0.1)
+        >>> casters = device.instances(hizvk.Spheres([[2, 0, -5], [0, 0, -15]], [0.5, 0.5]))
+        >>> device.cull(casters, light, device.pyramid(mask)).mask
+        array([ True, False])
+        """
+        camera = _arguments.instance("camera", camera, Camera, "a Camera")
+        light_camera = _arguments.instance("light_camera", light_camera, Camera, "a Camera")
+        self._check_side(light_camera)
+        radius = _arguments.number("filter_radius", filter_radius, at_least=0.0, at_most=2.0**60)
+        reach = _arguments.number("reach_px", reach_px, at_least=0.0, at_most=16.0)
+        if reach * 256.0 != round(reach * 256.0):
+            raise ValueError(f"reach_px: expected a multiple of 1/256, got {reach}")
+        slacks = (
+            _arguments.number("depth_slack", depth_slack, at_least=0.0, at_most=0.5),
+            _arguments.number("depth_slack_abs", depth_slack_abs, at_least=0.0, at_most=0.5),
+        )
+        if isinstance(depth, DepthImage):
+            check_owner("depth", depth, self)
+            if kind is not None:
+                got = _arguments.describe(kind)
+                raise TypeError(f"kind: expected None beside a DepthImage, got {got}")
+            if camera != depth.camera:
+                raise ValueError(
+                    f"camera: expected that of the depth image, {depth.camera!r}, got {camera!r}"
+                )
+            image = depth._inner
+        else:
+            self._check_side(camera)
+            given = checked_samples("depth", depth, camera, kind, 1.0, None)
+            if isinstance(given, list) and len(given) != 1:
+                raise ValueError(
+                    f"depth: expected one sample per pixel, got {len(given)}: the farthest of them "
+                    "is not all that receives shadows"
+                )
+            one = given[0] if isinstance(given, list) else given
+            image = self._engine.upload_depth(*one, camera._inner, "receivers")
+        made = self._engine.receiver_mask(image, light_camera._inner, radius, reach, slacks)
+        return DepthImage(self, made, light_camera)
+
     @overload
     def cull(
         self,

@@ -17,6 +17,7 @@ import numpy as np
 from . import _arguments
 from ._types import Coverage, Emit, Fit, Order, Output, Placement, words
 from .errors import LimitError
+from .light import DirectionalLight, light_or_none
 from .lod import LodRule, lod_rule
 
 if TYPE_CHECKING:
@@ -313,6 +314,12 @@ class CullOptions:
     lod : LodByError, LodByDistance or LodBySize, optional
         Which level of detail of its mesh a kept instance is drawn with.
         None: the full mesh, LOD 0.
+    shadow : DirectionalLight, optional
+        The instances are shadow casters of this light, and kept is what may shadow something that
+        the camera sees.
+        The pyramid is then one of ``depths="receivers"``, and ``fit="volume"`` is refused.
+        At least 256 texels of finer levels may be read, whatever `descent` says.
+        None: kept is what the camera may see.
 
     Raises
     ------
@@ -347,6 +354,7 @@ class CullOptions:
     hierarchy: bool | int | None = field(default=None, metadata=_by(_hierarchy))
     statistics: bool = field(default=False, metadata=_by(_arguments.flag))
     lod: LodRule | None = field(default=None, metadata=_by(lod_rule))
+    shadow: DirectionalLight | None = field(default=None, metadata=_by(light_or_none))
 
     def __post_init__(self) -> None:
         _check_fields(self)
@@ -456,6 +464,7 @@ class OptionKeywords(TypedDict, total=False):
     hierarchy: bool | int | None
     statistics: bool
     lod: LodRule | None
+    shadow: DirectionalLight | None
 
 
 class CullKeywords(OptionKeywords, total=False):

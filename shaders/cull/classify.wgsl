@@ -87,41 +87,6 @@ fn surely_behind(bits: u32, z: Value, w: Value) -> bool {
     return can_occlude(d) && surely_above(z, t, w);
 }
 
-// Moves a walk on to the next sibling, or to that of the first parent that has one.
-// The walk is over the rectangle first..=last, and began at the texels t of the level `top`.
-// False: there is none, so it is over.
-fn next_texel(
-    top: u32, t: vec4<u32>, first: vec2<u32>, last: vec2<u32>,
-    level: ptr<function, u32>, place: ptr<function, vec2<u32>>,
-) -> bool {
-    loop {
-        let at = *place;
-        let end = last >> vec2<u32>(*level);
-        if *level == top {
-            if at.x < t.z {
-                (*place).x = at.x + 1u;
-                return true;
-            }
-            *place = vec2<u32>(t.x, at.y + 1u);
-            return at.y < t.w;
-        }
-        let up = levels_up(*level);
-        // The number of the last column, and row, among a parent's children.
-        let last_child = (1u << up) - 1u;
-        if (at.x & last_child) < last_child && at.x < end.x {
-            (*place).x = at.x + 1u;
-            return true;
-        }
-        if (at.y & last_child) < last_child && at.y < end.y {
-            *place = vec2<u32>(max(at.x & ~last_child, first.x >> *level), at.y + 1u);
-            return true;
-        }
-        *place = at >> vec2<u32>(up);
-        *level += up;
-    }
-    return false;
-}
-
 // True implies: no pixel of the rectangle first..=last shows anything of the volume.
 // False: a pixel may show some of it, or the budget has ended.
 //

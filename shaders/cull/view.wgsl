@@ -58,6 +58,25 @@ struct View {
     near_factor: f32,
     near_offset: f32,
     padding: u32,
+    // What follows is for shadow casters (`shadow.wgsl`), and 0 in other culls.
+    // How much each row changes along half of the light's unit direction.
+    half_sweeps: vec4<f32>,
+    // The most that each row changes per unit of length, with room for the growth's roundings.
+    steepness: vec4<f32>,
+    // Where light leaves the receivers' box: a coordinate per axis, about the reference point.
+    exits: vec3<f32>,
+    // At least the radius of the shadow map's filter.
+    filter_radius: f32,
+    // The way of light per unit along each axis, at least, with the sign of its direction.
+    // 0 on an axis along which it may never leave the box.
+    exit_rates: vec3<f32>,
+    // At least the tangent of the light's angular radius.
+    light_slope: f32,
+    // The magnitudes of the exits and of the filter's radius.
+    exit_size: f32,
+    // The coordinates of the light's direction, added.
+    light_size: f32,
+    padding_1: vec2<u32>,
 }
 
 // Bits of a column in `source_origin`.

@@ -19,6 +19,11 @@ fn exceeds_support(center: f32, half: vec3<f32>) -> bool {
     return center > support(half);
 }
 
+// How far it reaches from its centre along each axis of the world.
+fn reach_of(volume: Volume) -> vec3<f32> {
+    return abs(volume.half_axis_0) + abs(volume.half_axis_1) + abs(volume.half_axis_2);
+}
+
 // The square of a radius is raised by 32 EPS, and a sum of half axes as well.
 // At most 16 are lost of either.
 const RADIUS_FACTOR: f32 = 1.0 + 32.0 * EPS;

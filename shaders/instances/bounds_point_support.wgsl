@@ -8,6 +8,11 @@ struct Volume {
     size: f32,
 }
 
+// How far it reaches from its centre along each axis of the world.
+fn reach_of(volume: Volume) -> vec3<f32> {
+    return vec3<f32>(0.0);
+}
+
 // No point is farther from the centre than this.
 fn radius_of(volume: Volume) -> f32 {
     return 0.0;

@@ -37,6 +37,11 @@ fn load_volume(i: u32) -> Volume {
     return Volume(d_hi + d_lo, size_of(d_hi, AXES * radius), radius);
 }
 
+// How far it reaches from its centre along each axis of the world.
+fn reach_of(volume: Volume) -> vec3<f32> {
+    return vec3<f32>(volume.radius);
+}
+
 // No point is farther from the centre than this.
 fn radius_of(volume: Volume) -> f32 {
     return volume.radius;

@@ -40,3 +40,38 @@ fn levels_down(level: u32) -> u32 {
 fn levels_up(level: u32) -> u32 {
     return select(1u, first_stored, level == 0u);
 }
+
+// Moves a walk on to the next sibling, or to that of the first parent that has one.
+// The walk is over the rectangle first..=last, and began at the texels t of the level `top`.
+// False: there is none, so it is over.
+fn next_texel(
+    top: u32, t: vec4<u32>, first: vec2<u32>, last: vec2<u32>,
+    level: ptr<function, u32>, place: ptr<function, vec2<u32>>,
+) -> bool {
+    loop {
+        let at = *place;
+        let end = last >> vec2<u32>(*level);
+        if *level == top {
+            if at.x < t.z {
+                (*place).x = at.x + 1u;
+                return true;
+            }
+            *place = vec2<u32>(t.x, at.y + 1u);
+            return at.y < t.w;
+        }
+        let up = levels_up(*level);
+        // The number of the last column, and row, among a parent's children.
+        let last_child = (1u << up) - 1u;
+        if (at.x & last_child) < last_child && at.x < end.x {
+            (*place).x = at.x + 1u;
+            return true;
+        }
+        if (at.y & last_child) < last_child && at.y < end.y {
+            *place = vec2<u32>(max(at.x & ~last_child, first.x >> *level), at.y + 1u);
+            return true;
+        }
+        *place = at >> vec2<u32>(up);
+        *level += up;
+    }
+    return false;
+}

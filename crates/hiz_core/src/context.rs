@@ -38,6 +38,7 @@ use crate::output::views::{ViewsOutputs, VisibleViews};
 use crate::output::visible::Visible;
 use crate::pyramid::mips::{MipOptions, MipTexture};
 use crate::pyramid::mips_passes::record_mips;
+use crate::pyramid::receiver_mask::{ReceiverMask, ReceiverMaskOptions, record_receiver_mask};
 use crate::pyramid::reduce::record_reduce;
 use crate::pyramid::region::record_reduce_region;
 use crate::pyramid::resolve::{DepthResolve, ResolveOptions, record_resolve};
@@ -532,6 +533,45 @@ impl HizContext {
         resolve: &DepthResolve,
     ) -> Result<()> {
         record_resolve(&self.gpu, encoder, &depth.into(), camera, resolve)
+    }
+
+    /// Makes a receiver mask for the light's images of `size` pixels.
+    ///
+    /// # Errors
+    /// - [`Error::Invalid`] for a size of 0.
+    /// - [`Error::Limit`] for a size beyond the device's textures or buffers.
+    /// - [`Error::OutOfMemory`].
+    pub fn create_receiver_mask(&self, size: ImageSize) -> Result<ReceiverMask> {
+        ReceiverMask::new(&self.gpu, size)
+    }
+
+    /// Records the depth image of `light` that holds the farthest receivers which `camera` sees.
+    ///
+    /// It is for spot lights and the faces of point lights.
+    /// [`ReceiverMask::image`] is reduced with the light's camera, and casters are culled by that
+    /// pyramid as anything is.
+    /// A culled caster shadows no receiver in `depth`.
+    /// `docs/shadows.md` says what is promised.
+    ///
+    /// `depth` is as in [`record_reduce`](Self::record_reduce), with one sample per pixel.
+    /// A pixel of exactly far is background.
+    /// An invalid pixel (NaN, outside of 0..=1) keeps every caster.
+    ///
+    /// # Errors
+    /// - [`Error::Mismatch`] for sizes or devices that disagree and for a destroyed texture.
+    /// - [`Error::Invalid`] for options out of range, cameras that float32 cannot hold, and textures
+    ///   as in [`record_reduce`](Self::record_reduce).
+    /// - [`Error::OutOfMemory`].
+    pub fn record_receiver_mask<'a>(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        depth: impl Into<DepthSource<'a>>,
+        camera: &Camera,
+        light: &Camera,
+        mask: &ReceiverMask,
+        options: &ReceiverMaskOptions,
+    ) -> Result<()> {
+        record_receiver_mask(&self.gpu, encoder, &depth.into(), [camera, light], mask, options)
     }
 
     /// Records the reduction of a changed rectangle of a depth image into `pyramid`.

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use hiz_core::headless::{self, AdapterSummary, AmongSource, CullExtras};
 use hiz_core::{
     ConservativeDepthOptions, DepthEnd, DepthLoad, DrawOptions, FaceCull, InstanceOptions,
-    MeshData, OccluderOptions, Only, Outputs, PyramidOptions, Rasteriser, StoredLevels,
-    StoredOrder, ViewsOutputs,
+    MeshData, OccluderOptions, Only, Outputs, PyramidOptions, Rasteriser, ReceiverMaskOptions,
+    StoredLevels, StoredOrder, ViewsOutputs,
 };
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -276,6 +276,28 @@ impl Engine {
         self.0
             .run(py, |engine| engine.upload_samples_for(&samples, camera, depths))
             .map(|depth| DepthImage(Held::new(py, depth)))
+    }
+
+    /// The depth image of `light` that holds the farthest receivers in `depth`.
+    fn receiver_mask(
+        &self,
+        py: Python<'_>,
+        depth: &DepthImage,
+        light: &Camera,
+        filter_radius: f64,
+        reach_px: f64,
+        slacks: (f64, f64),
+    ) -> PyResult<DepthImage> {
+        let options = ReceiverMaskOptions {
+            filter_radius,
+            reach_px,
+            depth_slack: slacks.0,
+            depth_slack_abs: slacks.1,
+        };
+        let depth = depth.0.get(py)?;
+        self.0
+            .run(py, |engine| engine.receiver_mask(&depth, &light.0, &options))
+            .map(|mask| DepthImage(Held::new(py, mask)))
     }
 
     /// Renews a pyramid within the rectangle (x0, y0, x1, y1) of its depth image.

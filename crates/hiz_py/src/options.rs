@@ -3,8 +3,8 @@
 //! The struct expressions name every field, so that an option without its line does not compile.
 
 use hiz_core::{
-    Coverage, CullOptions, DrawTemplate, Fit, Footprint, Hierarchy, LodRule, MeshTable, MipDepths,
-    MipLookup, MipOptions, Order, Outputs,
+    Coverage, CullOptions, DirectionalLight, DrawTemplate, Fit, Footprint, Hierarchy, LodRule,
+    MeshTable, MipDepths, MipLookup, MipOptions, Order, Outputs,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -62,6 +62,7 @@ pub(crate) fn cull_options(given: &Bound<'_, PyAny>) -> PyResult<CullOptions> {
         hierarchy: hierarchy(&given.getattr("hierarchy")?)?,
         statistics: given.getattr("statistics")?.extract()?,
         lod: lod_rule(&given.getattr("lod")?)?,
+        shadow: light(&given.getattr("shadow")?)?,
     })
 }
 
@@ -75,6 +76,21 @@ fn hierarchy(given: &Bound<'_, PyAny>) -> PyResult<Hierarchy> {
         Ok(false) => Hierarchy::Never,
         Err(_) => Hierarchy::Tiers(given.extract()?),
     })
+}
+
+/// A `hizvk.DirectionalLight`, or None.
+fn light(given: &Bound<'_, PyAny>) -> PyResult<Option<DirectionalLight>> {
+    if given.is_none() {
+        return Ok(None);
+    }
+    let (receivers_min, receivers_max) = given.getattr("receivers")?.extract()?;
+    Ok(Some(DirectionalLight {
+        direction: given.getattr("direction")?.extract()?,
+        receivers_min,
+        receivers_max,
+        angular_radius: given.getattr("angular_radius_deg")?.extract::<f64>()?.to_radians(),
+        filter_radius: given.getattr("filter_radius")?.extract()?,
+    }))
 }
 
 /// Mip textures have level 0 here, since Python sees arrays alone.

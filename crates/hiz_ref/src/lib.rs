@@ -39,6 +39,7 @@
 //! - [`pixel_shift`] says how far two points are apart in the image, and [`coarsest_lod`] which
 //!   level of detail a rule allows.
 //!   Both are in float64 alone.
+//! - [`swept_side`] says exactly on which side of a plane a volume lies that is swept along a light.
 //!
 //! # How it decides
 //!
@@ -89,6 +90,7 @@ mod pixels;
 mod pyramid;
 mod scalar;
 mod search;
+mod shadow;
 mod unoccluded;
 mod view;
 mod volume;
@@ -98,6 +100,7 @@ pub use depth::{DepthBounds, DepthKind, DepthMeaning, depth_bounds, nearest_dept
 pub use lod::{LodRule, coarsest_lod, greatest_stretch, least_w, pixel_shift, radius, stretch_at};
 pub use pixels::{PixelTruth, pixel_truth};
 pub use pyramid::{Level, pyramid, sanitized_depth};
+pub use shadow::{SweptPlane, swept_side};
 pub use unoccluded::{
     is_before, is_inside, is_unoccluded, sanitized_nearest_depth, unoccluded_between,
 };

@@ -6,11 +6,12 @@ use crate::cull::no_depth::{NO_REDUCTION, bind_view};
 use crate::cull::options::{CullOptions, Order};
 use crate::cull::pipelines::{Candidates, CullKey, FramePass, cull_pipeline};
 use crate::cull::record::{Target, Tests, bound_planes, check_visible, check_written, pass_report};
+use crate::cull::shadow::check_no_shadow;
 use crate::cull::view_uniform::ViewUniform;
 use crate::error::{Error, Result};
 use crate::gpu::buffers::{check_alive, entry, made};
 use crate::gpu::device::Gpu;
-use crate::gpu::numbers::{Copy, UNIFORM_ALIGNMENT};
+use crate::gpu::numbers::{Copy, UNIFORM_BYTES};
 use crate::input::camera::Camera;
 use crate::input::tolerance::DepthTolerance;
 use crate::instances::Instances;
@@ -73,6 +74,7 @@ pub(crate) fn record_early(
     check_visible(gpu, "temporal", instances, &temporal.early)?;
     let set = Chosen::new(temporal.set_or_largest(set, instances), instances)?;
     check_order(options)?;
+    check_no_shadow(options, "an early pass")?;
     let view =
         ViewUniform::new(camera, instances.kind, NO_REDUCTION, options, DepthTolerance::NONE)?;
     let number = temporal.next_number();
@@ -202,11 +204,11 @@ fn record_numbers(
     frame: &FrameUniform,
 ) -> Result<()> {
     let (view, frame) = (bytemuck::bytes_of(view), bytemuck::bytes_of(frame));
-    let behind = UNIFORM_ALIGNMENT as usize;
+    let behind = UNIFORM_BYTES as usize;
     let mut staged = vec![0; behind + frame.len()];
     staged[..view.len()].copy_from_slice(view);
     staged[behind..].copy_from_slice(frame);
-    let of_frame = |target, size| Copy { from: UNIFORM_ALIGNMENT, target, to: 0, size };
+    let of_frame = |target, size| Copy { from: UNIFORM_BYTES, target, to: 0, size };
     let mut copies = vec![
         Copy { from: 0, target: &temporal.view, to: 0, size: view.len() as u64 },
         of_frame(&temporal.frame, frame.len() as u64),

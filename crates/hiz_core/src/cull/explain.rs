@@ -3,8 +3,9 @@
 use crate::cull::groups::group_key;
 use crate::cull::inputs::{CullInputs, PreparedView};
 use crate::cull::pipelines::{
-    CERTIFIED, CullKey, DepthStore, TWO_STORAGES, classify_constants, decision_module, layouts,
+    CullKey, Decision, DepthStore, TWO_STORAGES, classify_constants, decision_module, layouts,
 };
+use crate::cull::shadow::check_no_shadow;
 use crate::error::{Error, Result};
 use crate::gpu::buffers::entry;
 use crate::gpu::device::Gpu;
@@ -94,7 +95,7 @@ pub(crate) const TEXELS_NOTED: usize = 4096;
 
 /// The shader that explains one instance's verdict.
 pub(crate) fn explain_module(store: DepthStore, kind: BoundsKind) -> Source {
-    decision_module(store, kind, CERTIFIED, &[wgsl!("cull/explain")])
+    decision_module(store, kind, Decision::Seen.files(), &[wgsl!("cull/explain")])
 }
 
 /// The pipeline of the explanation.
@@ -121,6 +122,7 @@ pub(crate) fn record_explain(
     [target, readings]: [&wgpu::Buffer; 2],
 ) -> Result<()> {
     let instances = inputs.instances;
+    check_no_shadow(inputs.options, "an explanation")?;
     let piece = instances.pieces.iter().find(|p| p.range.contains(&index)).ok_or_else(|| {
         Error::invalid(
             "index",

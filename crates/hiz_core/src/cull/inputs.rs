@@ -6,7 +6,8 @@
 use crate::cull::among::Among;
 use crate::cull::groups::group_descent;
 use crate::cull::options::{Coverage, CullOptions, Fit};
-use crate::cull::pipelines::{CullKey, DepthStore};
+use crate::cull::pipelines::{CullKey, Decision, DepthStore};
+use crate::cull::shadow::{check_receivers, check_shadow_options};
 use crate::cull::view_uniform::{ViewUniform, packed};
 use crate::error::{Error, Result};
 use crate::gpu::buffers::entry;
@@ -129,7 +130,12 @@ impl PreparedView {
                 built.part.tolerance,
             )
         };
-        check_culled(pyramid.depths())?;
+        if options.shadow.is_some() {
+            check_receivers(pyramid.depths())?;
+        } else {
+            check_culled(pyramid.depths())?;
+        }
+        check_shadow_options(options)?;
         check_coverage(&built, options)?;
         Pyramid::check_source(gpu, &built)?;
         let atlas = match encoder.filter(|_| pyramid.wants_atlas(gpu, &built, instances.len())) {
@@ -147,11 +153,12 @@ impl PreparedView {
             chunks: if atlas.is_some() { 1 } else { pyramid.chunks.len() },
             sample_coverage: options.coverage == Coverage::Sample,
             footprint_log2: options.footprint.log2(),
-            descent: options.descent > 0,
+            descent: view.descent_budget > 0,
             fit_volume: options.fit == Fit::Volume,
             among: inputs.among.is_some(),
             nearest: pyramid.has_nearest(),
-            receivers: false,
+            receivers: options.shadow.is_some(),
+            decision: if options.shadow.is_some() { Decision::Shadow } else { Decision::Seen },
         };
         Ok(Self { built, atlas, view, key })
     }

@@ -9,6 +9,7 @@ use crate::cull::pipelines::{FramePass, cull_pipeline};
 use crate::cull::record::{
     Target, bound_planes, check_visible, check_written, pass_report, record_against_pyramid,
 };
+use crate::cull::shadow::check_no_shadow;
 use crate::error::{Error, Result};
 use crate::gpu::buffers::{entry, made};
 use crate::gpu::device::Gpu;
@@ -29,6 +30,7 @@ pub(crate) fn record_late(
     check_contexts(gpu, inputs)?;
     check_visible(gpu, "temporal", instances, &temporal.late)?;
     check_order(options)?;
+    check_no_shadow(options, "a late pass")?;
     check_guard(options)?;
     let early = temporal.followed(instances, camera, options)?;
     let frame = FrameUniform { early, ..FrameUniform::default() };

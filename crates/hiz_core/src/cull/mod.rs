@@ -13,8 +13,9 @@
 //!    visible before, and the late one tests all against the depth of that.
 //! 6. `pixels` counts the pixels of each instance, where that is asked for, and `approximate` culls
 //!    what shows in few of them.
-//! 7. `warm_up` does all of it once without workgroups, before the first frame.
-//! 8. Later, and only if they are read: `refine` completes the verdicts, `count` counts them, and
+//! 7. `shadow` has the numbers of a cull of shadow casters, whose volumes are swept along a light.
+//! 8. `warm_up` does all of it once without workgroups, before the first frame.
+//! 9. Later, and only if they are read: `refine` completes the verdicts, `count` counts them, and
 //!    `explain` repeats one test.
 //!
 //! This room records commands into an encoder; it never submits or waits.
@@ -38,6 +39,7 @@ pub(crate) mod pixels;
 pub(crate) mod record;
 #[cfg(feature = "headless")]
 pub(crate) mod refine;
+pub(crate) mod shadow;
 pub(crate) mod view_uniform;
 pub(crate) mod views;
 pub(crate) mod warm_up;

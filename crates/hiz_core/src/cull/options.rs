@@ -2,6 +2,7 @@
 
 use crate::cull::lod::LodRule;
 use crate::host::rounding::EPS;
+use crate::input::light::DirectionalLight;
 use crate::input::tolerance::DepthTolerance;
 
 /// In which order the indices of the kept instances are listed.
@@ -171,6 +172,11 @@ pub struct CullOptions {
     pub statistics: bool,
     /// Which level of detail of its mesh a kept instance is drawn with.
     pub lod: LodRule,
+    /// `Some`: the instances are shadow casters of this light, and kept is what may shadow something
+    /// that the camera sees.
+    /// The pyramid is then one of [`Depths::Receivers`](crate::Depths::Receivers).
+    /// `None`: kept is what the camera may see.
+    pub shadow: Option<DirectionalLight>,
 }
 
 impl CullOptions {
@@ -195,6 +201,7 @@ impl Default for CullOptions {
             hierarchy: Hierarchy::Auto,
             statistics: false,
             lod: LodRule::Finest,
+            shadow: None,
         }
     }
 }

@@ -30,6 +30,35 @@ pub(crate) struct CullKey {
     pub(crate) nearest: bool,
     /// Whether the pyramid leaves out background.
     pub(crate) receivers: bool,
+    /// What is decided about an instance.
+    pub(crate) decision: Decision,
+}
+
+/// What a cull decides about an instance: each is a `classify` of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Decision {
+    /// Whether it may be seen.
+    Seen,
+    /// Whether its shadow may be seen.
+    Shadow,
+}
+
+impl Decision {
+    /// The shader files that decide, by certificates; a yardstick replaces them.
+    pub(super) fn files(self) -> &'static [File] {
+        match self {
+            Self::Seen => {
+                &[wgsl!("cull/supporting_planes"), wgsl!("cull/unoccluded"), wgsl!("cull/classify")]
+            }
+            // The bounds' files use the types of the supporting planes, which are never tested.
+            Self::Shadow => &[
+                wgsl!("cull/supporting_planes"),
+                wgsl!("cull/unoccluded"),
+                wgsl!("cull/shadow"),
+                wgsl!("cull/shadow_classify"),
+            ],
+        }
+    }
 }
 
 impl CullKey {
@@ -48,6 +77,7 @@ impl CullKey {
             among: false,
             nearest: false,
             receivers: false,
+            decision: Decision::Seen,
         }
     }
 }
@@ -411,14 +441,15 @@ pub(crate) fn decision_module(
     ])
 }
 
-/// The files of the decision by certificates; a yardstick replaces them.
-pub(super) const CERTIFIED: &[File] =
-    &[wgsl!("cull/supporting_planes"), wgsl!("cull/unoccluded"), wgsl!("cull/classify")];
-
 /// The module of an entry point that does not write down which texels were read
 /// (`shaders/cull/unexplained.wgsl`).
-pub(crate) fn unexplained(store: DepthStore, kind: BoundsKind, entry: &[File]) -> Source {
-    decision_module(store, kind, CERTIFIED, &[&[wgsl!("cull/unexplained")], entry].concat())
+pub(crate) fn unexplained(
+    store: DepthStore,
+    kind: BoundsKind,
+    decision: Decision,
+    entry: &[File],
+) -> Source {
+    decision_module(store, kind, decision.files(), &[&[wgsl!("cull/unexplained")], entry].concat())
 }
 
 /// The files of the flat cull, which tests each instance by itself, without the decision.
@@ -437,29 +468,33 @@ pub(crate) fn flat_files(emit: EmitKey, pass: FramePass) -> Vec<File> {
 pub(crate) fn flat_module(
     store: DepthStore,
     kind: BoundsKind,
-    emit: EmitKey,
-    pass: FramePass,
+    decision: Decision,
+    (emit, pass): (EmitKey, FramePass),
 ) -> Source {
-    decision_module(store, kind, CERTIFIED, &flat_files(emit, pass))
+    decision_module(store, kind, decision.files(), &flat_files(emit, pass))
 }
 
 /// The shader of the cull of a tier's boxes: of all of them in the topmost tier, or of those that
 /// the survivors of the tier above hold.
-pub(crate) fn cull_boxes_module(store: DepthStore, pass: FramePass, is_top: bool) -> Source {
+pub(crate) fn cull_boxes_module(
+    store: DepthStore,
+    decision: Decision,
+    (pass, is_top): (FramePass, bool),
+) -> Source {
     let shared = [wgsl!("instances/tier"), wgsl!("instances/groups"), wgsl!("output/statistics")];
     let which = if is_top { wgsl!("cull/cull_groups") } else { wgsl!("cull/cull_children") };
     let entry = [&shared, pass.group_files(), &[wgsl!("cull/cull_box"), which]].concat();
-    unexplained(store, BoundsKind::Box, &entry)
+    unexplained(store, BoundsKind::Box, decision, &entry)
 }
 
 /// The shader of the cull of the surviving groups' members.
 pub(crate) fn cull_members_module(
     store: DepthStore,
     kind: BoundsKind,
-    emit: EmitKey,
-    pass: FramePass,
+    decision: Decision,
+    (emit, pass): (EmitKey, FramePass),
 ) -> Source {
-    members_module((store, kind), emit, pass, wgsl!("cull/cull_members"))
+    members_module((store, kind, decision), emit, pass, wgsl!("cull/cull_members"))
 }
 
 /// The shader that keeps the members of accepted groups.
@@ -469,11 +504,11 @@ pub(crate) fn accept_members_module(
     emit: EmitKey,
     pass: FramePass,
 ) -> Source {
-    members_module((store, kind), emit, pass, wgsl!("cull/accept_members"))
+    members_module((store, kind, Decision::Seen), emit, pass, wgsl!("cull/accept_members"))
 }
 
 fn members_module(
-    (store, kind): (DepthStore, BoundsKind),
+    (store, kind, decision): (DepthStore, BoundsKind, Decision),
     emit: EmitKey,
     pass: FramePass,
     entry: File,
@@ -486,7 +521,7 @@ fn members_module(
     ];
     let last = [wgsl!("cull/survivors"), entry];
     let files = [&shared[..], &emit.files(), pass.member_files(), &last].concat();
-    unexplained(store, kind, &files)
+    unexplained(store, kind, decision, &files)
 }
 
 /// The layouts of a cull's view, of its records and of what it writes.
@@ -528,7 +563,7 @@ pub(crate) fn cull_pipeline(
     key: &CullKey,
     report: &ReportKey,
 ) -> Result<wgpu::ComputePipeline> {
-    let module = flat_module(key.store, key.kind, report.emit, report.pass);
+    let module = flat_module(key.store, key.kind, key.decision, (report.emit, report.pass));
     flat_pipeline(gpu, "hiz.cull.pipeline", module, key, report)
 }
 
@@ -551,7 +586,7 @@ pub(crate) fn cull_boxes_pipeline(
     }
     gpu.compute_pipeline(&Compute {
         label: "hiz.cull_groups.pipeline",
-        source: cull_boxes_module(key.store, report.pass, is_top),
+        source: cull_boxes_module(key.store, key.decision, (report.pass, is_top)),
         entry_point: if is_top { "cull_groups" } else { "cull_children" },
         layouts: &layouts,
         constants: &constants,
@@ -564,7 +599,7 @@ pub(crate) fn cull_members_pipeline(
     key: &CullKey,
     report: &ReportKey,
 ) -> Result<wgpu::ComputePipeline> {
-    let module = cull_members_module(key.store, key.kind, report.emit, report.pass);
+    let module = cull_members_module(key.store, key.kind, key.decision, (report.emit, report.pass));
     members_pipeline(gpu, key, report, ("cull_members", module), &[])
 }
 

@@ -4,7 +4,10 @@
 //! all the same.
 
 use crate::cull::inputs::{BoundView, CullInputs, PreparedView};
-use crate::cull::pipelines::{CullKey, DepthStore, classify_constants, layouts, unexplained};
+use crate::cull::pipelines::{
+    CullKey, Decision, DepthStore, classify_constants, layouts, unexplained,
+};
+use crate::cull::shadow::check_no_shadow;
 use crate::error::Result;
 use crate::gpu::buffers::{check_alive, entry};
 use crate::gpu::depth_source::SourceKind;
@@ -46,7 +49,7 @@ pub(crate) fn pixels_module(store: DepthStore, kind: BoundsKind) -> Source {
     };
     let entry =
         [&row[..], &[wgsl!("instances/piece"), wgsl!("cull/pixels_planes"), wgsl!("cull/pixels")]];
-    unexplained(store, kind, &entry.concat())
+    unexplained(store, kind, Decision::Seen, &entry.concat())
 }
 
 fn pixels_pipeline(
@@ -96,6 +99,7 @@ impl PixelPass {
         if !visible.outputs().pixels {
             return Ok(None);
         }
+        check_no_shadow(inputs.options, "counts of pixels")?;
         let CullInputs { instances, pyramid, .. } = *inputs;
         let seen = PreparedView::new(gpu, inputs, None)?;
         let view = seen.bind(gpu, pyramid, false)?;

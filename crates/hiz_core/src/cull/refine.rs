@@ -9,7 +9,7 @@ use crate::cull::groups::is_grouped;
 use crate::cull::no_depth::{NO_REDUCTION, bind_view};
 use crate::cull::options::{Coverage, CullOptions};
 use crate::cull::pipelines::{
-    CullKey, NO_DEPTH, TWO_STORAGES, classify_constants, layouts, unexplained,
+    CullKey, Decision, NO_DEPTH, TWO_STORAGES, classify_constants, layouts, unexplained,
 };
 use crate::cull::view_uniform::ViewUniform;
 use crate::error::Result;
@@ -31,34 +31,29 @@ use crate::pyramid::Pyramid;
 pub(crate) const WORKGROUP: u32 = 64;
 
 /// The shader that writes the verdicts of the members of hidden groups.
-pub(crate) fn refine_module(kind: BoundsKind) -> Source {
+pub(crate) fn refine_module(kind: BoundsKind, decision: Decision) -> Source {
     let entry = [wgsl!("instances/piece"), wgsl!("instances/groups"), wgsl!("cull/refine")];
-    unexplained(NO_DEPTH, kind, &entry)
+    unexplained(NO_DEPTH, kind, decision, &entry)
 }
 
 /// The shader that finds the groups that lie within the view.
 pub(crate) fn refine_groups_module() -> Source {
     let entry = [wgsl!("instances/tier"), wgsl!("cull/refine_groups")];
-    unexplained(NO_DEPTH, BoundsKind::Box, &entry)
+    unexplained(NO_DEPTH, BoundsKind::Box, Decision::Seen, &entry)
 }
 
 /// The pipeline that refines members.
-fn refine_pipeline(
-    gpu: &Gpu,
-    kind: BoundsKind,
-    sample_coverage: bool,
-    among: bool,
-) -> Result<wgpu::ComputePipeline> {
-    let source = refine_module(kind);
-    without_depth(gpu, "hiz.refine.pipeline", source, "refine", (kind, sample_coverage, among))
+fn refine_pipeline(gpu: &Gpu, key: &CullKey) -> Result<wgpu::ComputePipeline> {
+    let source = refine_module(key.kind, key.decision);
+    without_depth(gpu, "hiz.refine.pipeline", source, "refine", key)
 }
 
 /// The pipeline that refines groups.
 /// It is only valid for area coverage.
 fn refine_groups_pipeline(gpu: &Gpu) -> Result<wgpu::ComputePipeline> {
     let label = "hiz.refine_groups.pipeline";
-    let kind = BoundsKind::Box;
-    without_depth(gpu, label, refine_groups_module(), "refine_groups", (kind, false, false))
+    let key = CullKey::without_depth(BoundsKind::Box, false);
+    without_depth(gpu, label, refine_groups_module(), "refine_groups", &key)
 }
 
 fn without_depth(
@@ -66,15 +61,14 @@ fn without_depth(
     label: &'static str,
     source: Source,
     entry_point: &'static str,
-    (kind, sample_coverage, among): (BoundsKind, bool, bool),
+    key: &CullKey,
 ) -> Result<wgpu::ComputePipeline> {
-    let key = CullKey { among, ..CullKey::without_depth(kind, sample_coverage) };
     gpu.compute_pipeline(&Compute {
         label,
         source,
         entry_point,
         layouts: &layouts(gpu, key.store, RECORD_BINDINGS, ("hiz.storage_layout", TWO_STORAGES))?,
-        constants: &classify_constants(&key),
+        constants: &classify_constants(key),
     })
 }
 
@@ -125,10 +119,13 @@ impl Refine for Refinement {
         let view = gpu.uniform("hiz.refine.view_uniform", &self.view)?;
         let view = bind_view(gpu, "hiz.refine.view", &self.pyramid.uniform, &view)?;
         let is_sample = self.options.coverage == Coverage::Sample;
-        let (of_groups, of_members) = (
-            refine_groups_pipeline(gpu)?,
-            refine_pipeline(gpu, instances.kind, is_sample, self.among.is_some())?,
-        );
+        let is_shadow = self.options.shadow.is_some();
+        let key = CullKey {
+            among: self.among.is_some(),
+            decision: if is_shadow { Decision::Shadow } else { Decision::Seen },
+            ..CullKey::without_depth(instances.kind, is_sample)
+        };
+        let (of_groups, of_members) = (refine_groups_pipeline(gpu)?, refine_pipeline(gpu, &key)?);
         let mut pass = stage_pass(encoder, "hiz.refine.pass", "refine");
         pass.set_bind_group(0, &view, &[]);
         for (p, (piece, output)) in instances.pieces.iter().zip(&self.visible.pieces).enumerate() {
@@ -144,7 +141,8 @@ impl Refine for Refinement {
                 ],
             )?;
             pass.set_bind_group(2, &verdicts, &[]);
-            if !is_sample {
+            // A caster within the view may still shadow no receiver.
+            if !is_sample && !is_shadow {
                 pass.set_pipeline(&of_groups);
                 pass.set_bind_group(1, &piece.group_bindings, &[]);
                 pass.dispatch_workgroups(piece.groups().div_ceil(WORKGROUP), 1, 1);

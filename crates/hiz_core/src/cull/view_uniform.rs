@@ -2,7 +2,9 @@
 
 use crate::cull::lod::LodNumbers;
 use crate::cull::options::{Coverage, CullOptions};
+use crate::cull::shadow::{ShadowNumbers, shadow_descent};
 use crate::error::{Error, Result};
+use crate::gpu::numbers::UNIFORM_BYTES;
 use crate::host::rounding::{EPS, round_up};
 use crate::input::bounds::BoundsKind;
 use crate::input::camera::Camera;
@@ -41,9 +43,10 @@ pub(crate) struct ViewUniform {
     pub(crate) near_factor: f32,
     pub(crate) near_offset: f32,
     pub(crate) padding: u32,
+    pub(crate) shadow: ShadowNumbers,
 }
 
-const _: () = assert!(size_of::<ViewUniform>() == 224);
+const _: () = assert!(size_of::<ViewUniform>() as u64 <= UNIFORM_BYTES);
 
 /// The default guard of points in area coverage, in pixels.
 ///
@@ -128,6 +131,10 @@ impl ViewUniform {
                 _ => error,
             })?;
         let LodNumbers { end: lod_end, needs: lod_needs } = LodNumbers::new(camera, &options.lod)?;
+        let shadow = match &options.shadow {
+            Some(light) => ShadowNumbers::new(light, &rows)?,
+            None => ShadowNumbers::NONE,
+        };
         let size = camera.size();
         let rows_of_all = [rows.x, rows.y, rows.z, rows.w];
         Ok(Self {
@@ -147,7 +154,7 @@ impl ViewUniform {
             size: [size.width as i32, size.height as i32],
             runtime_zero: 0,
             reduction,
-            descent_budget: options.descent,
+            descent_budget: shadow_descent(options),
             depth_offset,
             coordinate_limit: rows.coordinate_limit,
             lod_end,
@@ -156,6 +163,7 @@ impl ViewUniform {
             near_factor: 1.0,
             near_offset: 0.0,
             padding: 0,
+            shadow,
         }
         .with_near_slack(camera.convention(), NearSlack::NONE, options, tolerance))
     }

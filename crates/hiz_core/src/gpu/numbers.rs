@@ -16,8 +16,11 @@ use crate::gpu::buffers::write_mapped;
 use crate::gpu::device::Gpu;
 use crate::gpu::kept::Ring;
 
-/// Bytes of a staging buffer: two uniforms at offsets that every device allows.
-pub(crate) const STAGING_BYTES: u64 = 2 * UNIFORM_ALIGNMENT;
+/// Bytes of a staging buffer: two uniforms.
+pub(crate) const STAGING_BYTES: u64 = 2 * UNIFORM_BYTES;
+
+/// Room for a uniform, at an offset that every device allows.
+pub(crate) const UNIFORM_BYTES: u64 = 2 * UNIFORM_ALIGNMENT;
 
 /// An offset of uniforms that every device allows, in bytes.
 pub(crate) const UNIFORM_ALIGNMENT: u64 = 256;

@@ -3,12 +3,12 @@
 use crate::error::Result;
 use crate::gpu::device::Gpu;
 use crate::gpu::kept::KeptBindings;
-use crate::gpu::numbers::{Copy, Numbers, UNIFORM_ALIGNMENT};
+use crate::gpu::numbers::{Copy, Numbers, UNIFORM_BYTES};
 use crate::host::threads::Locked;
 
 /// How many parts a uniform has.
 pub(crate) const PARTS: usize = 2;
-const PART_BYTES: usize = UNIFORM_ALIGNMENT as usize;
+const PART_BYTES: usize = UNIFORM_BYTES as usize;
 
 /// How often the same contents are asked for in a row until they get a uniform of their own.
 /// That costs a bind group once, and saves each later recording the copy.
@@ -59,7 +59,7 @@ impl RecordedUniform {
 
     /// The bind groups over the first parts of the uniform, which get `contents`.
     ///
-    /// There are at most [`PARTS`] contents, of at most [`UNIFORM_ALIGNMENT`] bytes.
+    /// There are at most [`PARTS`] contents, of at most [`UNIFORM_BYTES`] each.
     /// `bind` makes the bind group around a part.
     pub(crate) fn bind(
         &self,

@@ -154,6 +154,26 @@ impl DepthImage {
         })
     }
 
+    /// An image that something else has made, without rounding.
+    pub(super) fn of_texture(
+        engine: &Engine,
+        texture: &wgpu::Texture,
+        camera: &Camera,
+    ) -> Result<Self> {
+        Ok(Self {
+            engine: engine.clone(),
+            texture: texture.clone(),
+            view: engine.context().gpu.view(texture)?,
+            camera: camera.clone(),
+            tolerance: DepthTolerance::NONE,
+            near_slack: NearSlack::NONE,
+            far_pixels: FarPixels::BackgroundApart,
+            samples: 1,
+            nearest: None,
+            drawn: None,
+        })
+    }
+
     /// Records the drawing of occluders, and submits it.
     fn record_occluders(
         &self,

@@ -72,6 +72,7 @@ mod pixels;
 mod process;
 mod ranges;
 pub(crate) mod readback;
+mod receiver_mask;
 mod renewal;
 mod samples;
 mod single;

@@ -12,6 +12,7 @@ pub(crate) mod depth_numbers;
 pub(crate) mod far_pixels;
 pub(crate) mod image;
 mod lens;
+pub(crate) mod light;
 pub(crate) mod mesh;
 pub(crate) mod near_slack;
 pub(crate) mod projection;

@@ -14,6 +14,7 @@
 //! 4. `atlas` copies all levels into one texture for large culls.
 //! 5. `mips` is a texture with mip levels, for shaders of the caller's own: `mips_plan` plans it,
 //!    `mips_bindings` holds what its passes bind, and `mips_passes` records them.
+//! 6. `receiver_mask` turns a camera's depth image into one of a light, for its shadow casters.
 //!
 //! Passes are recorded into the caller's encoder; nothing here submits, waits or reads back.
 
@@ -28,6 +29,7 @@ pub(crate) mod mips;
 pub(crate) mod mips_bindings;
 pub(crate) mod mips_passes;
 pub(crate) mod mips_plan;
+pub(crate) mod receiver_mask;
 pub(crate) mod reduce;
 pub(crate) mod region;
 pub(crate) mod resolve;

@@ -2,7 +2,9 @@
 
 use crate::cull::lod::LodRule;
 use crate::cull::no_depth::bind_view;
-use crate::cull::pipelines::{CullKey, NO_DEPTH, classify_constants, lod_constants, unexplained};
+use crate::cull::pipelines::{
+    CullKey, Decision, NO_DEPTH, classify_constants, lod_constants, unexplained,
+};
 use crate::error::Result;
 use crate::gpu::buffers::{STORAGE, entry};
 use crate::gpu::layouts::Binding;
@@ -38,7 +40,7 @@ pub struct LodCase {
 /// The shader that writes down LODs.
 pub(crate) fn choose_lods_module(kind: BoundsKind) -> Source {
     let entry = [wgsl!("instances/piece"), wgsl!("cull/lod"), wgsl!("testing/choose_lods")];
-    unexplained(NO_DEPTH, kind, &entry)
+    unexplained(NO_DEPTH, kind, Decision::Seen, &entry)
 }
 
 /// The LOD of each instance by the rule whose numbers `view` holds.

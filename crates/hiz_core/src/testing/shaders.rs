@@ -4,8 +4,8 @@ use crate::cull::among::among_order_module;
 use crate::cull::count::count_module;
 use crate::cull::explain::explain_module;
 use crate::cull::pipelines::{
-    BinKey, Candidates, DepthStore, EmitKey, FramePass, accept_members_module, cull_boxes_module,
-    cull_members_module, flat_module,
+    BinKey, Candidates, Decision, DepthStore, EmitKey, FramePass, accept_members_module,
+    cull_boxes_module, cull_members_module, flat_module,
 };
 use crate::cull::pixels::pixels_module;
 use crate::cull::refine::{refine_groups_module, refine_module};
@@ -23,6 +23,7 @@ use crate::output::cut::{cut_module, emit_cut_module};
 use crate::output::emit_passes;
 use crate::output::views::join_module;
 use crate::pyramid::mips_passes::mips_module;
+use crate::pyramid::receiver_mask::receiver_mask_module;
 use crate::pyramid::reduce::{EndFiles, blocks_module, coarse_module};
 use crate::pyramid::resolve::resolve_module;
 use crate::testing::lod::choose_lods_module;
@@ -86,6 +87,8 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("resolve Float".to_owned(), resolve_module(SourceKind::Float)),
         ("snippets".to_owned(), snippets()),
     ];
+    let mask = |source| (format!("receiver_mask {source:?}"), receiver_mask_module(source));
+    all.extend(SOURCES.into_iter().filter(|source| *source != SourceKind::Pair).map(mask));
     for source in SOURCES {
         // Mip textures read one image.
         if source != SourceKind::Pair {
@@ -113,7 +116,7 @@ pub(super) fn all() -> Vec<(String, Source)> {
     let passes = stores.clone().flat_map(|store| passes.map(|pass| (store, pass)));
     for (store, pass) in passes.chain([early]) {
         for (name, is_top) in [("cull_groups", true), ("cull_children", false)] {
-            let module = cull_boxes_module(store, pass, is_top);
+            let module = cull_boxes_module(store, Decision::Seen, (pass, is_top));
             all.push((format!("{name} {store:?} {pass:?}"), module));
         }
         let emits: &[_] = if pass == FramePass::Alone { &EMITS } else { &EMITS_OF_TWO };
@@ -121,12 +124,28 @@ pub(super) fn all() -> Vec<(String, Source)> {
             KINDS.into_iter().flat_map(|k| emits.iter().map(move |e| (k, *e)))
         {
             let named = |name: &str| format!("{name} {way} {store:?} {pass:?} {kind:?}");
-            all.push((named("cull"), flat_module(store, kind, emit, pass)));
-            all.push((named("cull_members"), cull_members_module(store, kind, emit, pass)));
+            let of = (emit, pass);
+            all.push((named("cull"), flat_module(store, kind, Decision::Seen, of)));
+            let members = cull_members_module(store, kind, Decision::Seen, of);
+            all.push((named("cull_members"), members));
             if matches!(pass, FramePass::Early(_)) {
                 continue;
             }
             all.push((named("accept_members"), accept_members_module(store, kind, emit, pass)));
+        }
+    }
+    // Culls of casters report as others do, so one way to emit stands for all.
+    let emit = (EMITS[0].1, FramePass::Alone);
+    for store in stores.clone() {
+        for (name, is_top) in [("cull_groups", true), ("cull_children", false)] {
+            let module = cull_boxes_module(store, Decision::Shadow, (FramePass::Alone, is_top));
+            all.push((format!("{name} of casters {store:?}"), module));
+        }
+        for kind in KINDS {
+            let named = |name: &str| format!("{name} of casters {store:?} {kind:?}");
+            all.push((named("cull"), flat_module(store, kind, Decision::Shadow, emit)));
+            let members = cull_members_module(store, kind, Decision::Shadow, emit);
+            all.push((named("cull_members"), members));
         }
     }
     for store in stores {
@@ -137,7 +156,11 @@ pub(super) fn all() -> Vec<(String, Source)> {
         #[cfg(feature = "yardstick")]
         all.push((format!("uncertified cull {store:?}"), uncertified_module(store)));
     }
-    all.extend(KINDS.map(|kind| (format!("refine {kind:?}"), refine_module(kind))));
+    for decision in [Decision::Seen, Decision::Shadow] {
+        let refined =
+            |kind| (format!("refine {decision:?} {kind:?}"), refine_module(kind, decision));
+        all.extend(KINDS.map(refined));
+    }
     all.extend(KINDS.map(|kind| (format!("choose_lods {kind:?}"), choose_lods_module(kind))));
     let from_buffer = |kind| (format!("from_buffer {kind:?}"), from_buffer_module(kind));
     all.extend(FROM_BUFFER_KINDS.map(from_buffer));
@@ -156,7 +179,7 @@ pub(in crate::testing) mod tests {
 
     /// The flat cull that is not one of two passes.
     fn cull_module(store: DepthStore, kind: BoundsKind, emit: EmitKey) -> Source {
-        flat_module(store, kind, emit, FramePass::Alone)
+        flat_module(store, kind, Decision::Seen, (emit, FramePass::Alone))
     }
 
     pub(in crate::testing) fn parse(source: &str) -> naga::Module {

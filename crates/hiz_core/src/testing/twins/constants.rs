@@ -9,7 +9,7 @@ use crate::cull::explain::{self, Stage};
 use crate::cull::groups::GROUPS_OF_RUN;
 use crate::cull::history::HISTORY_BEGIN;
 use crate::cull::lod::LodRule;
-use crate::cull::pipelines::{Candidates, CullKey, DepthStore, FramePass, ReportKey};
+use crate::cull::pipelines::{Candidates, CullKey, Decision, DepthStore, FramePass, ReportKey};
 use crate::cull::pipelines::{classify_constants, flat_module, report_constants};
 use crate::cull::pixels;
 use crate::cull::refine;
@@ -39,6 +39,7 @@ use crate::output::visible::VERDICT_MULTIPLE;
 use crate::pyramid::layout::{BLOCK_ALIGNMENT, BLOCK_LOG2, HEADERS, PIXELS};
 use crate::pyramid::levels::MAX_LEVELS;
 use crate::pyramid::mips_passes;
+use crate::pyramid::receiver_mask::{MASK_BLOCK_LOG2, MASK_SIDE};
 use crate::pyramid::reduce::{REDUCE_WORKGROUP, SHARED_LEVEL, TALL_SIDE};
 use crate::pyramid::resolve;
 use crate::testing::lod;
@@ -137,6 +138,7 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("instances/record_layout", "BEYOND_LIMITS_BITS", bits(BEYOND_LIMITS)),
         ("instances/update", "WORKGROUP", int(update::WORKGROUP)),
         ("cull/classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
+        ("cull/shadow_classify", "ABSENT_BELOW", f64::from(ABSENT_CENTER) / 2.0),
         ("output/compact", "SCATTER_WORKGROUP", int(SCATTER_WORKGROUP)),
         ("output/join", "WORKGROUP", int(views::WORKGROUP)),
         ("output/emit", "BLOCK_LOG2_WORDS", int(BLOCK_WORDS.ilog2())),
@@ -163,6 +165,10 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
         ("pyramid/pyramid_write", "SIDE_LOG2", int(TALL_SIDE.ilog2())),
         ("pyramid/pyramid_write", "SIDE", int(TALL_SIDE)),
         ("pyramid/pyramid_write", "SIDE_MASK", int(TALL_SIDE - 1)),
+        ("pyramid/receiver_mask", "SIDE", int(MASK_SIDE)),
+        ("pyramid/receiver_mask", "MASK_BLOCK_LOG2", int(MASK_BLOCK_LOG2)),
+        ("pyramid/receiver_mask", "EPS", EPS),
+        ("pyramid/receiver_mask", "ERROR_ULPS", ERROR_ULPS),
         ("pyramid/resolve", "WORKGROUP", int(resolve::WORKGROUP)),
         ("pyramid/texels", "LEAST_NORMAL", float(f32::MIN_POSITIVE)),
         ("pyramid/texels_atlas", "HEADERS", int(HEADERS)),
@@ -198,7 +204,20 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
     ),
     ("cull/pixels_planes", &["FACE_PLANES", "DEPTH_PLANES", "OUTLINE_PLACES", "NO_PLANE"]),
     ("cull/refine", &["REFINED"]),
+    ("cull/shadow", &["NO_FACE"]),
+    ("cull/shadow_classify", &["LEAST_W", "RECTANGLE_MARGIN", "WIDENING_ULPS"]),
     ("cull/unoccluded", &["HALF_PIXEL"]),
+    (
+        "pyramid/receiver_mask",
+        &[
+            "ERROR_FLOOR",
+            "ESTIMATE_MARGIN",
+            "INTERVAL_ULPS",
+            "HALF_PIXEL",
+            "WIDEST",
+            "FARTHEST_KEY",
+        ],
+    ),
     ("gpu/clock_check", &["LEFT", "RIGHT", "LEFT_AGAIN"]),
     ("cull/refine_groups", &["LAST_TEXEL", "WITHIN"]),
     (
@@ -415,6 +434,8 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
             "reduce_texture",
             [yardstick::TEXTURE_WORKGROUP_SIDE, yardstick::TEXTURE_WORKGROUP_SIDE, 1],
         ),
+        ("finish_receivers", [MASK_SIDE, MASK_SIDE, 1]),
+        ("scatter_receivers", [MASK_SIDE, MASK_SIDE, 1]),
         ("refine", line(refine::WORKGROUP)),
         ("refine_groups", line(refine::WORKGROUP)),
         ("replace_groups", line(update::WORKGROUP)),
@@ -458,6 +479,7 @@ fn a_cull_sets_every_override() {
             among: false,
             nearest: false,
             receivers: false,
+            decision: Decision::Seen,
         };
         let alone = EMITS.map(|emit| (emit, FramePass::Alone));
         let of_two = [FramePass::Early(Candidates::History), FramePass::Late]
@@ -474,7 +496,7 @@ fn a_cull_sets_every_override() {
             };
             let set = classify_constants(&key).into_iter().chain(report_constants(&report));
             let set: BTreeSet<String> = set.map(|(name, _)| name.to_owned()).collect();
-            let module = parse(&flat_module(store, kind, emit, pass).text());
+            let module = parse(&flat_module(store, kind, Decision::Seen, (emit, pass)).text());
             let declared: BTreeSet<String> =
                 module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
             assert_eq!(set, declared, "{kind:?} {way} {pass:?}");

@@ -25,6 +25,7 @@ use crate::pyramid::PyramidUniform;
 use crate::pyramid::layout::PYRAMID_CHUNKS;
 use crate::pyramid::levels::Level;
 use crate::pyramid::mips_bindings::{MipStepUniform, MipsUniform};
+use crate::pyramid::receiver_mask::MaskUniform;
 use crate::pyramid::resolve::{BandUniform, ResolvedUniform};
 use crate::pyramid::steps::StepUniform;
 use crate::testing::lod::LodCase;
@@ -54,6 +55,8 @@ const SHADER_ONLY_STRUCTS: &[&str] = &[
     "Slope",
     "SupportingPlane",
     "SupportingPlanes",
+    "Swept",
+    "Term",
     "Sure",
     "Tiling",
     "Value",
@@ -189,6 +192,15 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         twin!("Update", UpdateUniform {
             "count" = count, "texels" = texels, "number" = number, "padding" = padding,
         }),
+        twin!("ReceiverMask", MaskUniform {
+            "x" = rows, "y" = rows + 16, "z" = rows + 32, "w" = rows + 48, "scale" = rows + 64,
+            "x_size" = sizes, "y_size" = sizes + 16, "z_size" = sizes + 32, "w_size" = sizes + 48,
+            "scale_size" = sizes + 64, "growth" = growth, "camera_half_size" = camera_half_size,
+            "reach" = reach, "slack" = slack, "camera_size" = camera_size,
+            "light_size" = light_size, "origin" = origin, "slack_abs" = slack_abs,
+            "stride" = stride, "blocks" = blocks, "light_is_reversed" = light_is_reversed,
+            "padding" = padding,
+        }),
         twin!("View", ViewUniform {
             "x" = x, "y" = y, "z" = z, "w" = w, "magnitudes" = magnitudes,
             "constant_magnitudes" = constant_magnitudes, "eye_hi" = eye_hi, "z_slope" = z_slope,
@@ -200,6 +212,10 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
             "lod_needs" = lod_needs,
             "source_origin" = source_origin, "near_factor" = near_factor,
             "near_offset" = near_offset, "padding" = padding,
+            "half_sweeps" = shadow, "steepness" = shadow + 16, "exits" = shadow + 32,
+            "filter_radius" = shadow + 44, "exit_rates" = shadow + 48,
+            "light_slope" = shadow + 60, "exit_size" = shadow + 64, "light_size" = shadow + 68,
+            "padding_1" = shadow + 72,
         }),
         twin!("YardstickLevel", yardstick::PlainLevel {
             "offset" = offset, "stride" = stride, "width" = width, "height" = height,

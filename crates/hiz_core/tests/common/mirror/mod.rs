@@ -11,6 +11,7 @@ mod guesses;
 mod lod;
 mod loss;
 mod planes;
+mod shadow;
 mod volume;
 
 use hiz_core::{BoundsKind, CullOptions, ERROR_ULPS, Fit, Footprint};
@@ -24,6 +25,7 @@ use extent::Extent;
 pub(crate) use lod::{LodMirror, NEED_FACTOR, Need};
 pub(crate) use loss::{Losses, texel_loss};
 use planes::Projected;
+pub(crate) use shadow::ShadowMirror;
 use volume::Volume;
 
 const EPS: f32 = 1.0 / 8_388_608.0;
