@@ -13,6 +13,7 @@ const ONE_TO_THREE: &[f64] = &[1.0, 2.0, 3.0];
 
 /// The values that pipelines give each override.
 const VALUES: &[(&str, &[f64])] = &[
+    ("ABSENT", FLAG),
     ("AMONG", FLAG),
     ("APPEND", FLAG),
     ("BY_INDEX", FLAG),
@@ -36,6 +37,7 @@ const VALUES: &[(&str, &[f64])] = &[
     ("NEAREST", FLAG),
     ("ODD_X", FLAG),
     ("ODD_Y", FLAG),
+    ("ONE_SAMPLE", FLAG),
     ("RECEIVERS", FLAG),
     ("RECORD_WORDS", &[4.0, 5.0]),
     ("REGION", FLAG),
@@ -44,6 +46,7 @@ const VALUES: &[(&str, &[f64])] = &[
     ("SAMPLES", &[2.0, 4.0, 8.0]),
     ("SAMPLE_COVERAGE", FLAG),
     ("SHARED", FLAG),
+    ("SHOWN", FLAG),
     ("SOME", FLAG),
     ("SORTED", FLAG),
     ("STATISTICS", FLAG),
