@@ -46,15 +46,9 @@ def main() -> None:
 
     # The lamp: six cameras, each with the farthest receivers that it sees.
     faces = [
-        hizvk.Camera.look_at(
-            LAMP,
-            LAMP + axis,
-            up=(0, 0, 1) if axis[1] else (0, 1, 0),
-            fov_y_deg=90,
-            size=(256, 256),
-            near=0.1,
-        )
+        hizvk.Camera.look_at(LAMP, LAMP + axis, up=up, fov_y_deg=90, size=(256, 256), near=0.1)
         for axis in AXES
+        for up in [(0, 0, 1) if axis[1] else (0, 1, 0)]
     ]
     masks = [device.receiver_mask(depth, camera, face, filter_radius=0.05) for face in faces]
     seen = device.cull(casters, faces, [device.pyramid(mask) for mask in masks])

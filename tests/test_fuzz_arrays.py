@@ -80,6 +80,9 @@ ARRAYS = [
     ("Camera.from_opengl", "camera_from_world"),
     ("Camera.from_matrices", "clip_from_world"),
     ("Camera.resized", "size"),
+    ("Camera.project", "xyz"),
+    ("gather", "pixels"),
+    ("DirectionalLight", "direction"),
 ]
 
 DTYPES = [
@@ -263,7 +266,9 @@ def test_every_array_parameter_is_fuzzed() -> None:
         for parameter, values in table.bad.items()
         if any(isinstance(value, np.ndarray) and "got (" in text for value, _, text in values)
     }
-    objects = {"bounds", "camera", "instances", "pyramid", "occluders", "depth"}
+    objects = {"bounds", "points", "camera", "light_camera", "instances", "pyramid", "occluders"}
+    # An image to gather from may have any size.
+    objects |= {"depth", "image"}
     fuzzed = {parameter for _, parameter in ARRAYS}
     # Vectors and matrices of all cameras share one check each, so one of each is enough.
     assert {parameter for _, parameter in listed} - objects <= fuzzed | {
