@@ -14,6 +14,7 @@ import numpy.typing as npt
 from .options import CullOptions, Outputs
 
 __all__ = [
+    "ApproximateCulling",
     "Camera",
     "Counts",
     "Culling",
@@ -35,10 +36,12 @@ __all__ = [
     "__build__",
     "__version__",
     "adapters",
+    "add_colours",
     "after_fork",
     "before_fork",
     "check_bounds",
     "check_proxy",
+    "depth_of_points",
     "frustum_matrix",
     "let_go",
     "mip_cull",

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from .._arguments import Size
     from ..scenes.sunlit import Sunlit, SunView
 
-    Floats = npt.NDArray[np.float64]
-    Mask = npt.NDArray[np.bool_]
+    _Floats = npt.NDArray[np.float64]
+    _Mask = npt.NDArray[np.bool_]
 
 __all__ = ["Row", "measure", "table"]
 
@@ -120,7 +120,7 @@ def _view(
     )
 
 
-def _points(clip: Floats, image: Floats) -> tuple[Floats, Floats]:
+def _points(clip: _Floats, image: _Floats) -> tuple[_Floats, _Floats]:
     """The point that each pixel shows and its w; NaN and infinity for background."""
     height, width = image.shape
     column, row = np.meshgrid(
@@ -135,7 +135,7 @@ def _points(clip: Floats, image: Floats) -> tuple[Floats, Floats]:
     return points, np.where(np.isfinite(w), w, np.inf)
 
 
-def _needed(town: Sunlit, points: Floats, direction: Floats) -> Mask:
+def _needed(town: Sunlit, points: _Floats, direction: _Floats) -> _Mask:
     """Which casters stand between some point and the light."""
     needed = np.zeros(len(town.low), dtype=bool)
     for first in range(0, len(needed), AT_ONCE):
@@ -149,8 +149,8 @@ def _needed(town: Sunlit, points: Floats, direction: Floats) -> Mask:
 
 
 def _by_rectangle(
-    town: Sunlit, clip: Floats, distance: Floats, direction: Floats
-) -> tuple[Mask, Mask]:
+    town: Sunlit, clip: _Floats, distance: _Floats, direction: _Floats
+) -> tuple[_Mask, _Mask]:
     """Which swept volumes reach into the frustum, and which of them no depth hides."""
     height, width = distance.shape
     bits = (np.arange(8)[:, None] >> np.arange(3)) & 1
@@ -160,10 +160,10 @@ def _by_rectangle(
     hull = np.concatenate([corners, corners + length[:, None, None] * direction], 1)
     h = np.concatenate([hull, np.ones((*hull.shape[:2], 1))], 2) @ clip.T
     x, y, w = h[..., 0], h[..., 1], h[..., 3]
-    outside: Mask = np.asarray((w < NEAR).all(axis=1))
+    outside: _Mask = np.asarray((w < NEAR).all(axis=1))
     for of in (x, y):
         outside |= (of > w).all(axis=1) | (of < -w).all(axis=1)
-    inside: Mask = np.logical_not(outside)
+    inside: _Mask = np.logical_not(outside)
     behind = inside.copy()
     crossing = w.min(axis=1) <= NEAR
     columns = (x / np.maximum(w, 1e-9) + 1) / 2 * width
