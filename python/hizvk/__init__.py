@@ -116,6 +116,7 @@ from .tolerance import Tolerance
 from .views import ViewsResult
 
 if TYPE_CHECKING:
+    from .methods import PublishedTest
     from .recommendation import Recommendation, recommend
 
 __all__ = [
@@ -160,6 +161,7 @@ __all__ = [
     "Points",
     "Projected",
     "ProxyCheck",
+    "PublishedTest",
     "Pyramid",
     "Recommendation",
     "Spheres",
@@ -195,6 +197,7 @@ __all__ = [
 
 # Where the names are that load at their first use, because culling does not need them.
 _LATER = {
+    "PublishedTest": "methods",
     "recommend": "recommendation",
     "Recommendation": "recommendation",
 }
