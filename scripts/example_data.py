@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the files in examples/data: a labelled street in KITTI's format, and a town in CityJSON.
+"""Writes the files in examples/data: a street of KITTI, cameras of COLMAP, a town in CityJSON.
 
 The street's levels of occlusion are by rays in float64, which share nothing with the library.
 `tests/test_jobs.py` compares the files with what this script makes.
@@ -114,6 +114,46 @@ def street() -> dict[str, str]:
     return {
         "kitti_calib.txt": "\n".join(calibration) + "\n",
         "kitti_label.txt": "\n".join(lines) + "\n",
+    }
+
+
+# -- the garden wall -------------------------------------------------------------------------------
+
+
+def quaternion(turn: Floats) -> Floats:
+    """w, x, y, z of a matrix whose w is not 0."""
+    w = np.sqrt(1.0 + np.trace(turn)) / 2
+    x, y, z = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
+    return np.array([w, *np.array([x, y, z]) / (4 * w)])
+
+
+def wall_photographs() -> dict[str, str]:
+    """Ten posed photographs of a wall, five from each side: COLMAP's text files."""
+    cameras = [
+        "# Camera list with one line of data per camera:",
+        "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]",
+        "# Number of cameras: 1",
+        "1 PINHOLE 320 240 208.0 208.0 160.0 120.0",
+    ]
+    images = [
+        "# Image list with two lines of data per image:",
+        "#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME",
+        "#   POINTS2D[] as (X, Y, POINT3D_ID)",
+        "# Number of images: 10, mean observations per image: 0",
+    ]
+    for side, z in (("front", 7.0), ("back", -7.0)):
+        for k, x in enumerate((-6.0, -3.0, 0.1, 3.0, 6.0)):
+            eye = np.array([x, 1.0, z])
+            forward = -eye / np.linalg.norm(eye)
+            right = np.cross(forward, (0.0, 1.0, 0.0))
+            right /= np.linalg.norm(right)
+            turn = np.array([right, np.cross(forward, right), forward])  # right, down, forward
+            pose = [*quaternion(turn), *(-turn @ eye)]
+            numbers = " ".join(f"{n:.9f}" for n in pose)
+            images += [f"{len(images) // 2 - 1} {numbers} 1 {side}_{k}.jpg", ""]
+    return {
+        "colmap_cameras.txt": "\n".join(cameras) + "\n",
+        "colmap_images.txt": "\n".join(images) + "\n",
     }
 
 
@@ -234,7 +274,7 @@ def town() -> dict[str, str]:
 
 def files() -> dict[str, str]:
     """Every file of the folder, by name."""
-    return street() | town()
+    return street() | wall_photographs() | town()
 
 
 def main() -> int:
