@@ -195,6 +195,10 @@ HALF_SIZES: list[Bad] = [
     ("large", TypeError, "got str 'large'"),
     (None, TypeError, "got None"),
 ]
+PROGRESS: list[Bad] = [
+    ("bar", TypeError, "expected None, True, False or a function, got str 'bar'"),
+    (1, TypeError, "got int 1"),
+]
 BOUNDS: list[Bad] = [
     (
         np.zeros((2, 3)),
@@ -938,7 +942,7 @@ TABLES: dict[str, Table] = {
             "device": [(3, TypeError, "expected a Device or None, got int 3")],
             "options": OPTIONS_OBJECT,
             **OPTIONS,
-            "progress": [("bar", TypeError, "expected True, False or a function, got str 'bar'")],
+            "progress": PROGRESS,
         },
     ),
     "Camera.resized": Table(lambda _: (camera().resized, {"size": (3, 4)}), {"size": SIZE}),
