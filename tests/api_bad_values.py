@@ -195,6 +195,10 @@ HALF_SIZES: list[Bad] = [
     ("large", TypeError, "got str 'large'"),
     (None, TypeError, "got None"),
 ]
+PROGRESS: list[Bad] = [
+    ("bar", TypeError, "expected None, True, False or a function, got str 'bar'"),
+    (1, TypeError, "got int 1"),
+]
 BOUNDS: list[Bad] = [
     (
         np.zeros((2, 3)),
@@ -938,7 +942,7 @@ TABLES: dict[str, Table] = {
             "device": [(3, TypeError, "expected a Device or None, got int 3")],
             "options": OPTIONS_OBJECT,
             **OPTIONS,
-            "progress": [("bar", TypeError, "expected True, False or a function, got str 'bar'")],
+            "progress": PROGRESS,
         },
     ),
     "Camera.resized": Table(lambda _: (camera().resized, {"size": (3, 4)}), {"size": SIZE}),
@@ -1090,6 +1094,7 @@ TABLES: dict[str, Table] = {
             ],
             "max_triangles": LIMIT,
             "max_occluders": LIMIT,
+            "progress": PROGRESS,
         },
     ),
     "Device.pyramid": Table(
@@ -1372,6 +1377,7 @@ TABLES: dict[str, Table] = {
                     "expected a closed mesh whose triangles run consistently around, got 3 edges",
                 ),
             ],
+            "progress": PROGRESS,
         },
     ),
     "check_bounds": Table(
@@ -1397,6 +1403,7 @@ TABLES: dict[str, Table] = {
                     "vertices: expected float (V, 3), got (3, 2) float64",
                 ),
             ],
+            "progress": PROGRESS,
         },
     ),
     "Device.timed": Table(lambda device: (device.timed, {}), {}),
@@ -1613,6 +1620,7 @@ TABLES: dict[str, Table] = {
                 (0, ValueError, "in 1..10000, got int 0"),
                 (1.0, TypeError, "got float 1.0"),
             ],
+            "progress": PROGRESS,
         },
     ),
     "compare": Table(
@@ -1680,6 +1688,7 @@ TABLES: dict[str, Table] = {
                 ("volume", ValueError, 'expected one of "nearest", "pixel"'),
                 (0, TypeError, "got int 0"),
             ],
+            "progress": PROGRESS,
         },
     ),
     "reference.unoccluded": Table(
@@ -1695,6 +1704,7 @@ TABLES: dict[str, Table] = {
             "scale": SCALE,
             "invalid": INVALID,
             "coverage": COVERAGE,
+            "progress": PROGRESS,
         },
     ),
     "reference.pyramid": Table(
@@ -1780,6 +1790,7 @@ TABLES |= {
                 (0.0, ValueError, "above 0, got float 0.0"),
                 (INF, ValueError, "inf"),
             ],
+            "progress": PROGRESS,
         },
     ),
     "SplitMesh.triangle_mask": Table(
@@ -1800,6 +1811,7 @@ TABLES |= {
             "max_boxes": [(0, ValueError, "got int 0"), (True, TypeError, "got bool True")],
             "min_share": [*NUMBER, (1.5, ValueError, "at most 1, got float 1.5")],
             "margin": [*NUMBER, (-0.5, ValueError, "at least 0, got float -0.5")],
+            "progress": PROGRESS,
         },
     ),
     "inner_prisms": Table(
@@ -1812,6 +1824,7 @@ TABLES |= {
                 ((0, 0, 0), ValueError, "got tuple (0.0, 0.0, 0.0); turn the mesh for others"),
             ],
             "max_prisms": [(0, ValueError, "got int 0"), (1.0, TypeError, "got float 1.0")],
+            "progress": PROGRESS,
         },
     ),
     "select_occluders": Table(
@@ -1830,6 +1843,7 @@ TABLES |= {
                 (-1, ValueError, "got int -1"),
                 (100.0, TypeError, "got float 100.0"),
             ],
+            "progress": PROGRESS,
         },
     ),
 }
