@@ -430,6 +430,18 @@ ORTHO_NEAR: list[Bad] = [
 CLIP: list[Bad] = [*MATRIX, (None, ValueError, "got neither")]
 
 
+#: What `Pyramid.level` and `DepthImage.numpy` are asked for.
+WANTED_KIND: list[Bad] = [
+    ("depth", ValueError, 'expected one of "ndc", "reversed_ndc", "z", "distance", got str'),
+    (2, TypeError, "got int 2"),
+]
+
+
+def rendered(device: hizvk.Device) -> hizvk.DepthImage:
+    """A depth image of a triangle."""
+    return device.render_depth(device.occluders(TETRAHEDRON), camera())
+
+
 def spheres() -> hizvk.Spheres:
     return hizvk.Spheres(np.array([[0.0, 0.0, -5.0]]), 1.0)
 
@@ -1408,7 +1420,7 @@ TABLES: dict[str, Table] = {
     ),
     "Device.timed": Table(lambda device: (device.timed, {}), {}),
     "Device.wait": Table(lambda device: (device.wait, {}), {}),
-    "DepthImage.numpy": Table(lambda device: (device.wait, {}), {}),
+    "DepthImage.numpy": Table(lambda device: (rendered(device).numpy, {}), {"kind": WANTED_KIND}),
     "mip_texel": Table(
         lambda _: (hizvk.mip_texel, {"pixel": (0, 0), "level": 1, "size": (6, 8)}),
         {
@@ -1467,6 +1479,7 @@ TABLES: dict[str, Table] = {
                 ("nearest", ValueError, 'expected one of "farthest", got'),
                 (1, TypeError, "got int 1"),
             ],
+            "kind": WANTED_KIND,
         },
     ),
     "Pyramid.update": Table(
