@@ -61,7 +61,7 @@ _TABLES_KEPT = 4
 
 
 class Device:
-    """A Vulkan device with its queue and pipelines.
+    """A device of the GPU, or of a software driver, with its queue and pipelines.
 
     Parameters
     ----------
