@@ -195,6 +195,10 @@ HALF_SIZES: list[Bad] = [
     ("large", TypeError, "got str 'large'"),
     (None, TypeError, "got None"),
 ]
+PROGRESS: list[Bad] = [
+    ("bar", TypeError, "expected None, True, False or a function, got str 'bar'"),
+    (1, TypeError, "got int 1"),
+]
 BOUNDS: list[Bad] = [
     (
         np.zeros((2, 3)),
@@ -424,6 +428,18 @@ ORTHO_NEAR: list[Bad] = [
     (NAN, ValueError, "got float nan"),
 ]
 CLIP: list[Bad] = [*MATRIX, (None, ValueError, "got neither")]
+
+
+#: What `Pyramid.level` and `DepthImage.numpy` are asked for.
+WANTED_KIND: list[Bad] = [
+    ("depth", ValueError, 'expected one of "ndc", "reversed_ndc", "z", "distance", got str'),
+    (2, TypeError, "got int 2"),
+]
+
+
+def rendered(device: hizvk.Device) -> hizvk.DepthImage:
+    """A depth image of a triangle."""
+    return device.render_depth(device.occluders(TETRAHEDRON), camera())
 
 
 def spheres() -> hizvk.Spheres:
@@ -938,7 +954,7 @@ TABLES: dict[str, Table] = {
             "device": [(3, TypeError, "expected a Device or None, got int 3")],
             "options": OPTIONS_OBJECT,
             **OPTIONS,
-            "progress": [("bar", TypeError, "expected True, False or a function, got str 'bar'")],
+            "progress": PROGRESS,
         },
     ),
     "Camera.resized": Table(lambda _: (camera().resized, {"size": (3, 4)}), {"size": SIZE}),
@@ -1090,6 +1106,7 @@ TABLES: dict[str, Table] = {
             ],
             "max_triangles": LIMIT,
             "max_occluders": LIMIT,
+            "progress": PROGRESS,
         },
     ),
     "Device.pyramid": Table(
@@ -1372,6 +1389,7 @@ TABLES: dict[str, Table] = {
                     "expected a closed mesh whose triangles run consistently around, got 3 edges",
                 ),
             ],
+            "progress": PROGRESS,
         },
     ),
     "check_bounds": Table(
@@ -1397,11 +1415,12 @@ TABLES: dict[str, Table] = {
                     "vertices: expected float (V, 3), got (3, 2) float64",
                 ),
             ],
+            "progress": PROGRESS,
         },
     ),
     "Device.timed": Table(lambda device: (device.timed, {}), {}),
     "Device.wait": Table(lambda device: (device.wait, {}), {}),
-    "DepthImage.numpy": Table(lambda device: (device.wait, {}), {}),
+    "DepthImage.numpy": Table(lambda device: (rendered(device).numpy, {}), {"kind": WANTED_KIND}),
     "mip_texel": Table(
         lambda _: (hizvk.mip_texel, {"pixel": (0, 0), "level": 1, "size": (6, 8)}),
         {
@@ -1460,6 +1479,7 @@ TABLES: dict[str, Table] = {
                 ("nearest", ValueError, 'expected one of "farthest", got'),
                 (1, TypeError, "got int 1"),
             ],
+            "kind": WANTED_KIND,
         },
     ),
     "Pyramid.update": Table(
@@ -1613,6 +1633,7 @@ TABLES: dict[str, Table] = {
                 (0, ValueError, "in 1..10000, got int 0"),
                 (1.0, TypeError, "got float 1.0"),
             ],
+            "progress": PROGRESS,
         },
     ),
     "compare": Table(
@@ -1680,6 +1701,7 @@ TABLES: dict[str, Table] = {
                 ("volume", ValueError, 'expected one of "nearest", "pixel"'),
                 (0, TypeError, "got int 0"),
             ],
+            "progress": PROGRESS,
         },
     ),
     "reference.unoccluded": Table(
@@ -1695,6 +1717,7 @@ TABLES: dict[str, Table] = {
             "scale": SCALE,
             "invalid": INVALID,
             "coverage": COVERAGE,
+            "progress": PROGRESS,
         },
     ),
     "reference.pyramid": Table(
@@ -1780,6 +1803,7 @@ TABLES |= {
                 (0.0, ValueError, "above 0, got float 0.0"),
                 (INF, ValueError, "inf"),
             ],
+            "progress": PROGRESS,
         },
     ),
     "SplitMesh.triangle_mask": Table(
@@ -1800,6 +1824,7 @@ TABLES |= {
             "max_boxes": [(0, ValueError, "got int 0"), (True, TypeError, "got bool True")],
             "min_share": [*NUMBER, (1.5, ValueError, "at most 1, got float 1.5")],
             "margin": [*NUMBER, (-0.5, ValueError, "at least 0, got float -0.5")],
+            "progress": PROGRESS,
         },
     ),
     "inner_prisms": Table(
@@ -1812,6 +1837,7 @@ TABLES |= {
                 ((0, 0, 0), ValueError, "got tuple (0.0, 0.0, 0.0); turn the mesh for others"),
             ],
             "max_prisms": [(0, ValueError, "got int 0"), (1.0, TypeError, "got float 1.0")],
+            "progress": PROGRESS,
         },
     ),
     "select_occluders": Table(
@@ -1830,6 +1856,7 @@ TABLES |= {
                 (-1, ValueError, "got int -1"),
                 (100.0, TypeError, "got float 100.0"),
             ],
+            "progress": PROGRESS,
         },
     ),
 }
