@@ -116,6 +116,7 @@ from .views import ViewsResult
 
 if TYPE_CHECKING:
     from .recommendation import Recommendation, recommend
+    from .sweeping import Sweep, SweepInterrupted, cube, sweep, viewshed, visible_sets
 
 __all__ = [
     "ABSENT",
@@ -165,6 +166,8 @@ __all__ = [
     "SplitMesh",
     "StageTime",
     "StageTimes",
+    "Sweep",
+    "SweepInterrupted",
     "Temporal",
     "Tolerance",
     "UnoccludedComparison",
@@ -177,6 +180,7 @@ __all__ = [
     "colour_points",
     "compare",
     "compare_unoccluded",
+    "cube",
     "depth_from_points",
     "gather",
     "inner_boxes",
@@ -186,18 +190,34 @@ __all__ = [
     "reference",
     "select_occluders",
     "split_mesh",
+    "sweep",
+    "viewshed",
     "visible",
     "visible_fraction",
+    "visible_sets",
     "wgsl",
 ]
 
 
-def __getattr__(name: str) -> Any:
-    """`recommend` and `Recommendation`, loaded at their first use: culling does not need them."""
-    if name in ("recommend", "Recommendation"):
-        from . import recommendation as module
+#: Names that are loaded at their first use, with their packages: a cull does not need them.
+_LATER = {
+    "Recommendation": "recommendation",
+    "recommend": "recommendation",
+    "Sweep": "sweeping",
+    "SweepInterrupted": "sweeping",
+    "cube": "sweeping",
+    "sweep": "sweeping",
+    "viewshed": "sweeping",
+    "visible_sets": "sweeping",
+}
 
-        globals()[name] = getattr(module, name)
+
+def __getattr__(name: str) -> Any:
+    """The names that are loaded at their first use."""
+    if name in _LATER:
+        from importlib import import_module
+
+        globals()[name] = getattr(import_module(f"{__name__}.{_LATER[name]}"), name)
         return globals()[name]
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
