@@ -119,7 +119,7 @@ def test_import_loads_no_tools() -> None:
         [sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60
     )
     loaded = set(done.stdout.split())
-    tools = ("recommendation", "measuring", "bench", "demo", "scenes", "commands", "cli")
+    tools = ("recommendation", "measuring", "bench", "demo", "scenes", "show", "commands", "cli")
     strangers = {
         name
         for name in loaded
