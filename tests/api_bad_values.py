@@ -196,6 +196,10 @@ HALF_SIZES: list[Bad] = [
     ("large", TypeError, "got str 'large'"),
     (None, TypeError, "got None"),
 ]
+PROGRESS: list[Bad] = [
+    ("bar", TypeError, "expected None, True, False or a function, got str 'bar'"),
+    (1, TypeError, "got int 1"),
+]
 BOUNDS: list[Bad] = [
     (
         np.zeros((2, 3)),
@@ -972,7 +976,7 @@ TABLES: dict[str, Table] = {
             "device": [(3, TypeError, "expected a Device or None, got int 3")],
             "options": OPTIONS_OBJECT,
             **OPTIONS,
-            "progress": [("bar", TypeError, "expected True, False or a function, got str 'bar'")],
+            "progress": PROGRESS,
         },
     ),
     "Camera.resized": Table(lambda _: (camera().resized, {"size": (3, 4)}), {"size": SIZE}),
@@ -1124,6 +1128,7 @@ TABLES: dict[str, Table] = {
             ],
             "max_triangles": LIMIT,
             "max_occluders": LIMIT,
+            "progress": PROGRESS,
         },
     ),
     "Device.pyramid": Table(
@@ -1406,6 +1411,7 @@ TABLES: dict[str, Table] = {
                     "expected a closed mesh whose triangles run consistently around, got 3 edges",
                 ),
             ],
+            "progress": PROGRESS,
         },
     ),
     "check_bounds": Table(
@@ -1431,6 +1437,7 @@ TABLES: dict[str, Table] = {
                     "vertices: expected float (V, 3), got (3, 2) float64",
                 ),
             ],
+            "progress": PROGRESS,
         },
     ),
     "Device.timed": Table(lambda device: (device.timed, {}), {}),
@@ -1683,6 +1690,7 @@ TABLES: dict[str, Table] = {
                 (0, ValueError, "in 1..10000, got int 0"),
                 (1.0, TypeError, "got float 1.0"),
             ],
+            "progress": PROGRESS,
         },
     ),
     "compare": Table(
@@ -1750,6 +1758,7 @@ TABLES: dict[str, Table] = {
                 ("volume", ValueError, 'expected one of "nearest", "pixel"'),
                 (0, TypeError, "got int 0"),
             ],
+            "progress": PROGRESS,
         },
     ),
     "reference.unoccluded": Table(
@@ -1765,6 +1774,7 @@ TABLES: dict[str, Table] = {
             "scale": SCALE,
             "invalid": INVALID,
             "coverage": COVERAGE,
+            "progress": PROGRESS,
         },
     ),
     "reference.pyramid": Table(
@@ -1850,6 +1860,7 @@ TABLES |= {
                 (0.0, ValueError, "above 0, got float 0.0"),
                 (INF, ValueError, "inf"),
             ],
+            "progress": PROGRESS,
         },
     ),
     "SplitMesh.triangle_mask": Table(
@@ -1870,6 +1881,7 @@ TABLES |= {
             "max_boxes": [(0, ValueError, "got int 0"), (True, TypeError, "got bool True")],
             "min_share": [*NUMBER, (1.5, ValueError, "at most 1, got float 1.5")],
             "margin": [*NUMBER, (-0.5, ValueError, "at least 0, got float -0.5")],
+            "progress": PROGRESS,
         },
     ),
     "inner_prisms": Table(
@@ -1882,6 +1894,7 @@ TABLES |= {
                 ((0, 0, 0), ValueError, "got tuple (0.0, 0.0, 0.0); turn the mesh for others"),
             ],
             "max_prisms": [(0, ValueError, "got int 0"), (1.0, TypeError, "got float 1.0")],
+            "progress": PROGRESS,
         },
     ),
     "select_occluders": Table(
@@ -1900,6 +1913,7 @@ TABLES |= {
                 (-1, ValueError, "got int -1"),
                 (100.0, TypeError, "got float 100.0"),
             ],
+            "progress": PROGRESS,
         },
     ),
 }

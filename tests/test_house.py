@@ -119,7 +119,10 @@ def test_import_loads_no_tools() -> None:
         [sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60
     )
     loaded = set(done.stdout.split())
-    tools = ("recommendation", "measuring", "bench", "demo", "scenes", "show", "commands", "cli")
+    tools = (
+        "methods", "recommendation", "measuring", "bench", "demo", "scenes", "show", "commands",
+        "cli",
+    )  # fmt: skip
     strangers = {
         name
         for name in loaded
@@ -128,6 +131,17 @@ def test_import_loads_no_tools() -> None:
     }
     assert "hizvk.device" in loaded
     assert not strangers
+
+
+def test_nothing_uses_the_methods() -> None:
+    """The texts' algorithms stand beside the package: only its lazy names lead to them."""
+    users = {
+        name
+        for name, imported in graph(PYTHON).items()
+        if not name.startswith("hizvk.methods")
+        and any(module.startswith("hizvk.methods") for module in imported)
+    }
+    assert users <= {"hizvk"}
 
 
 def test_recommend_comes_when_it_is_asked_for() -> None:

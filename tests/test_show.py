@@ -21,6 +21,7 @@ import pytest
 
 import hizvk
 from hizvk.commands.figure import can_draw
+from hizvk.extras import install_line
 from hizvk.remembered import MOST_HELD
 from hizvk.show import colours, png, seen_plot, shapes
 from hizvk.show.lines import outlines
@@ -374,4 +375,5 @@ def test_without_matplotlib_the_message_has_the_line() -> None:
     done = subprocess.run(
         [sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60
     )
-    assert "python -m pip install 'matplotlib>=3.8'" in done.stdout
+    assert done.stdout.startswith("a figure needs matplotlib, which is not installed: ")
+    assert install_line("viz") in done.stdout

@@ -59,6 +59,7 @@ A bad argument raises a `TypeError` or `ValueError` that names the parameter.
 Everything that the device refuses is a `HizError`.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from . import reference
@@ -192,12 +193,17 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    """`recommend` and `Recommendation`, loaded at their first use: culling does not need them."""
-    if name in ("recommend", "Recommendation"):
-        from . import recommendation as module
+# Where the names are that load at their first use, because culling does not need them.
+_LATER = {
+    "recommend": "recommendation",
+    "Recommendation": "recommendation",
+}
 
-        globals()[name] = getattr(module, name)
+
+def __getattr__(name: str) -> Any:
+    """The names of `_LATER`, loaded at their first use."""
+    if name in _LATER:
+        globals()[name] = getattr(import_module(f".{_LATER[name]}", __name__), name)
         return globals()[name]
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 

@@ -119,7 +119,7 @@ def run(
         shown.close()
     plot = None
     if not figure.can_draw():
-        found.notes.append(f"left out: {figure.MISSING}")
+        found.notes.append(f"left out: {figure.missing()}")
     elif found.instance_counts and found.image_sizes:
         from . import plots
 

@@ -6,15 +6,9 @@ import io
 from typing import Any
 
 from ..commands.figure import can_draw, sheet
+from ..extras import install_line
 
 __all__ = ["figure"]
-
-#: What to do where it is not.
-MISSING = (
-    "a plot needs matplotlib, which is not installed; install it with: "
-    "python -m pip install 'matplotlib>=3.8' "
-    "(in a notebook: %pip install 'matplotlib>=3.8'), or hizvk with its extra: viz"
-)
 
 
 def figure(width: float, height: float) -> Any:
@@ -28,7 +22,10 @@ def figure(width: float, height: float) -> Any:
         If matplotlib is not installed; the text has the line that installs it.
     """
     if not can_draw():
-        raise ImportError(MISSING, name="matplotlib")
+        raise ImportError(
+            f"a figure needs matplotlib, which is not installed: {install_line('viz')}",
+            name="matplotlib",
+        )
     made = sheet(width, height)
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
