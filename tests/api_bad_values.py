@@ -4,6 +4,7 @@ Each function has a table: valid arguments, and for each parameter bad values wi
 a part of its text.
 """
 
+import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -432,6 +433,27 @@ ORTHO_NEAR: list[Bad] = [
 CLIP: list[Bad] = [*MATRIX, (None, ValueError, "got neither")]
 
 
+TEXT: list[Bad] = [(3, TypeError, "expected a text, got int 3"), (None, TypeError, "got None")]
+#: What figures and pages of results are asked for.
+DRAWN: BadValues = {
+    "bounds": [
+        (np.zeros((1, 3)), TypeError, "expected Spheres, Boxes, OrientedBoxes or Points, got"),
+        (
+            hizvk.Spheres(np.zeros((2, 3)), 1.0),
+            ValueError,
+            "expected those of the 1 instances that were tested, got 2",
+        ),
+    ],
+    "up": [
+        ("w", ValueError, 'expected one of "x", "y", "z", "-x", "-y", "-z", got str'),
+        ((0, 0, 1), TypeError, "got tuple"),
+    ],
+    "most": [
+        (0, ValueError, "expected an integer in 1..2147483647, got int 0"),
+        (10.0, TypeError, "got float 10.0"),
+    ],
+    "unit": TEXT,
+}
 #: What `Pyramid.level` and `DepthImage.numpy` are asked for.
 WANTED_KIND: list[Bad] = [
     ("depth", ValueError, 'expected one of "ndc", "reversed_ndc", "z", "distance", got str'),
@@ -1422,6 +1444,9 @@ TABLES: dict[str, Table] = {
     ),
     "Device.timed": Table(lambda device: (device.timed, {}), {}),
     "Device.wait": Table(lambda device: (device.wait, {}), {}),
+    "DepthImage.plot": Table(
+        lambda device: (rendered(device).plot, {}), {"kind": WANTED_KIND, "unit": TEXT}
+    ),
     "DepthImage.numpy": Table(lambda device: (rendered(device).numpy, {}), {"kind": WANTED_KIND}),
     "mip_texel": Table(
         lambda _: (hizvk.mip_texel, {"pixel": (0, 0), "level": 1, "size": (6, 8)}),
@@ -1484,6 +1509,17 @@ TABLES: dict[str, Table] = {
             "kind": WANTED_KIND,
         },
     ),
+    "Pyramid.plot": Table(
+        lambda device: (device.pyramid(np.ones((6, 8)), camera(), kind="z").plot, {}),
+        {
+            "end": [
+                ("nearest", ValueError, 'expected one of "farthest", got'),
+                (1, TypeError, "got int 1"),
+            ],
+            "kind": WANTED_KIND,
+            "unit": TEXT,
+        },
+    ),
     "Pyramid.update": Table(
         lambda device: (
             device.pyramid(np.ones((6, 8)), camera(), kind="z").update,
@@ -1537,6 +1573,27 @@ TABLES: dict[str, Table] = {
                 ("0", TypeError, "got str '0'"),
             ],
         },
+    ),
+    "CullResult.plot": Table(
+        lambda device: (device.cull(**cull_arguments(device)).plot, {}), DRAWN
+    ),
+    "CullResult.save_html": Table(
+        lambda device: (device.cull(**cull_arguments(device)).save_html, {"path": os.devnull}),
+        {
+            **DRAWN,
+            "path": [
+                (3.5, TypeError, "expected a path, got float 3.5"),
+                (None, TypeError, "got None"),
+            ],
+            "occluders": [
+                ("wall", TypeError, "expected a Mesh, a mesh of trimesh or Open3D"),
+                ([TETRAHEDRON, 3], TypeError, "got int 3"),
+            ],
+            "title": [(3, TypeError, "expected a text, got int 3")],
+        },
+    ),
+    "Explanation.plot": Table(
+        lambda device: (device.cull(**cull_arguments(device)).explain(0).plot, {}), {"unit": TEXT}
     ),
     "CullResult.explain": Table(
         lambda device: (device.cull(**cull_arguments(device)).explain, {"index": 0}),

@@ -127,6 +127,7 @@ def test_import_loads_no_tools() -> None:
         "bench",
         "demo",
         "scenes",
+        "show",
         "commands",
         "cli",
     )
