@@ -108,7 +108,7 @@ def run(
         "Intel's culler, which some targets are ratios to, is no part of this run: "
         "see the nanoseconds per instance"
     )
-    with Progress(True, f"{PROG}, {extent}", len(parts)) as shown:
+    with Progress(True, f"{PROG}, {extent}", len(parts), after_s=0.0) as shown:
         measured = Run(device, WORKLOADS[extent], seed, found, shown.show)
         for part in parts:
             found.load += _load()
