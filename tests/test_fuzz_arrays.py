@@ -83,6 +83,7 @@ ARRAYS = [
     ("Camera.project", "xyz"),
     ("gather", "pixels"),
     ("DirectionalLight", "direction"),
+    ("HierarchicalVisibility.render", "previous"),
 ]
 
 DTYPES = [

@@ -116,6 +116,7 @@ from .tolerance import Tolerance
 from .views import ViewsResult
 
 if TYPE_CHECKING:
+    from .methods import HierarchicalVisibility, HierarchyFrame
     from .recommendation import Recommendation, recommend
 
 __all__ = [
@@ -138,6 +139,8 @@ __all__ = [
     "DirectionalLight",
     "DrawTemplate",
     "Explanation",
+    "HierarchicalVisibility",
+    "HierarchyFrame",
     "HizError",
     "HizWarning",
     "InnerBoxes",
@@ -195,6 +198,8 @@ __all__ = [
 
 # Where the names are that load at their first use, because culling does not need them.
 _LATER = {
+    "HierarchicalVisibility": "methods",
+    "HierarchyFrame": "methods",
     "recommend": "recommendation",
     "Recommendation": "recommendation",
 }
