@@ -4,4 +4,24 @@ Nothing of the certified path uses them, and `import hizvk` does not load them.
 Their names are reachable from `hizvk`, too.
 """
 
-__all__: list[str] = []
+from .hierarchy import (
+    HIDDEN,
+    NODE_DTYPE,
+    NOT_VISITED,
+    OUTSIDE,
+    VISIBLE,
+    FlatFrame,
+    HierarchicalVisibility,
+    HierarchyFrame,
+)
+
+__all__ = [
+    "HIDDEN",
+    "NODE_DTYPE",
+    "NOT_VISITED",
+    "OUTSIDE",
+    "VISIBLE",
+    "FlatFrame",
+    "HierarchicalVisibility",
+    "HierarchyFrame",
+]

@@ -1,0 +1,3 @@
+//! The algorithms of the texts: conversions only.
+
+pub(crate) mod hierarchy;
