@@ -297,8 +297,8 @@ DEPTH_SLACK: list[Bad] = [
     ("a", TypeError, "got str 'a'"),
 ]
 FOOTPRINT: list[Bad] = [
-    (3, ValueError, "expected one of 2, 4, 8, got 3"),
-    (16, ValueError, "in 2..8"),
+    (3, ValueError, "expected one of 1, 2, 4, 8, got 3"),
+    (16, ValueError, "in 1..8"),
     (2.0, TypeError, "got float 2.0"),
 ]
 FIT: list[Bad] = [
@@ -2188,5 +2188,57 @@ TABLES |= {
     "HierarchicalVisibility.render_flat": Table(
         lambda _: (hierarchy().render_flat, {"camera": camera()}),
         {"camera": [(2, TypeError, "expected a Camera, got int 2")]},
+    ),
+}
+
+
+# --- published tests ---
+
+
+def published(device: hizvk.Device) -> dict[str, Any]:
+    """The valid arguments of a `PublishedTest`."""
+    pyramid = device.pyramid(np.ones((6, 8)), camera(), kind="z")
+    return {
+        "device": device,
+        "text": "arm",
+        "bounds": spheres(),
+        "camera": camera(),
+        "pyramid": pyramid,
+    }
+
+
+TABLES |= {
+    "PublishedTest": Table(
+        lambda device: (hizvk.PublishedTest, published(device)),
+        {
+            "device": [(None, TypeError, "expected a Device, got None")],
+            "text": [
+                ("greene", ValueError, 'expected one of "rakos", "arm", "darnell", "one_lookup"'),
+                (2010, TypeError, "got int 2010"),
+            ],
+            "bounds": [
+                (
+                    hizvk.Boxes([[0, 0, -2.0]], [[1, 1, -1.0]]),
+                    TypeError,
+                    "expected Spheres for 'arm', got Boxes",
+                ),
+                (hizvk.Spheres(np.zeros((0, 3)), 1.0), ValueError, "at least one, got none"),
+            ],
+            "camera": [
+                (None, TypeError, "expected a Camera, got None"),
+                (camera().resized((8, 8)), ValueError, "of the pyramid's size (6, 8), got"),
+                (
+                    hizvk.Camera.orthographic(
+                        (0, 0, 0), (0, 0, -1), height=2, size=(6, 8), near=0, far=9
+                    ),
+                    ValueError,
+                    "expected a perspective camera, got",
+                ),
+            ],
+            "pyramid": [(np.ones((6, 8)), TypeError, "expected a Pyramid, got (6, 8) float64")],
+        },
+    ),
+    "PublishedTest.run": Table(
+        lambda device: (hizvk.PublishedTest(**published(device)).run, {}), {}
     ),
 }

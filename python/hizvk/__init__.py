@@ -116,7 +116,7 @@ from .tolerance import Tolerance
 from .views import ViewsResult
 
 if TYPE_CHECKING:
-    from .methods import HierarchicalVisibility, HierarchyFrame
+    from .methods import HierarchicalVisibility, HierarchyFrame, PublishedTest
     from .recommendation import Recommendation, recommend
     from .sweeping import Sweep, SweepInterrupted, cube, sweep, viewshed, visible_sets
 
@@ -164,6 +164,7 @@ __all__ = [
     "Points",
     "Projected",
     "ProxyCheck",
+    "PublishedTest",
     "Pyramid",
     "Recommendation",
     "Spheres",
@@ -207,6 +208,7 @@ __all__ = [
 _LATER = {
     "HierarchicalVisibility": "methods",
     "HierarchyFrame": "methods",
+    "PublishedTest": "methods",
     "Recommendation": "recommendation",
     "recommend": "recommendation",
     "Sweep": "sweeping",

@@ -24,9 +24,11 @@ __all__ = [
     "HierarchicalVisibility",
     "Instances",
     "MeshTable",
+    "MethodLevels",
     "Occluders",
     "PassAnswer",
     "Pyramid",
+    "TextCull",
     "TwoPasses",
     "ViewsCulling",
     "Yardstick",
@@ -481,6 +483,32 @@ class ViewsCulling:
     def any_indices(self) -> npt.NDArray[np.uint32]: ...
     def any_draws(self) -> bytes: ...
     def view(self, view: int) -> Culling: ...
+
+@final
+class TextCull:
+    def __new__(
+        cls,
+        engine: Engine,
+        text: str,
+        bounds: npt.NDArray[np.float32],
+        camera: tuple[npt.NDArray[np.float32], float],
+        sizes: Sequence[tuple[int, int]],
+        texels: npt.NDArray[np.float32],
+    ) -> Self: ...
+    def run(self) -> None: ...
+    def mask(self) -> npt.NDArray[np.bool_]: ...
+
+@final
+class MethodLevels:
+    def __new__(
+        cls,
+        engine: Engine,
+        way: str,
+        shape: tuple[int, int],
+        images: Sequence[npt.NDArray[np.float32]],
+    ) -> Self: ...
+    def run(self) -> None: ...
+    def level(self, image: int, k: int) -> tuple[int, int, npt.NDArray[np.float32]]: ...
 
 @final
 class Yardstick:

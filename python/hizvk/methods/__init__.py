@@ -2,6 +2,10 @@
 
 Nothing of the certified path uses them, and `import hizvk` does not load them.
 Their names are reachable from `hizvk`, too.
+
+- `texts`: visibility tests as they were published; they hide what can be seen
+- `levels`: other ways to make a depth image's levels
+- `turitzin`: a table of the time that each of these ways takes
 """
 
 from .hierarchy import (
@@ -14,6 +18,8 @@ from .hierarchy import (
     HierarchicalVisibility,
     HierarchyFrame,
 )
+from .levels import MethodLevels
+from .texts import PublishedTest
 
 __all__ = [
     "HIDDEN",
@@ -24,4 +30,6 @@ __all__ = [
     "FlatFrame",
     "HierarchicalVisibility",
     "HierarchyFrame",
+    "MethodLevels",
+    "PublishedTest",
 ]

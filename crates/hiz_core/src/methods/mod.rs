@@ -5,3 +5,15 @@
 //! that.
 
 pub mod hierarchy;
+mod coarse_level;
+mod fragment_levels;
+mod texts;
+
+pub use coarse_level::{LevelWay, MethodLevels, SHAPES};
+#[cfg(feature = "testing")]
+pub(crate) use coarse_level::{TILE, coarse_level_module};
+#[cfg(feature = "testing")]
+pub(crate) use fragment_levels::fragment_levels_module;
+pub use texts::{Text, TextCamera, TextCull};
+#[cfg(feature = "testing")]
+pub(crate) use texts::{TextUniform, WORKGROUP as TEXT_WORKGROUP, texts_module};
