@@ -4,6 +4,7 @@ Each function has a table: valid arguments, and for each parameter bad values wi
 a part of its text.
 """
 
+import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -430,6 +431,39 @@ ORTHO_NEAR: list[Bad] = [
     (NAN, ValueError, "got float nan"),
 ]
 CLIP: list[Bad] = [*MATRIX, (None, ValueError, "got neither")]
+
+
+TEXT: list[Bad] = [(3, TypeError, "expected a text, got int 3"), (None, TypeError, "got None")]
+#: What figures and pages of results are asked for.
+DRAWN: BadValues = {
+    "bounds": [
+        (np.zeros((1, 3)), TypeError, "expected Spheres, Boxes, OrientedBoxes or Points, got"),
+        (
+            hizvk.Spheres(np.zeros((2, 3)), 1.0),
+            ValueError,
+            "expected those of the 1 instances that were tested, got 2",
+        ),
+    ],
+    "up": [
+        ("w", ValueError, 'expected one of "x", "y", "z", "-x", "-y", "-z", got str'),
+        ((0, 0, 1), TypeError, "got tuple"),
+    ],
+    "most": [
+        (0, ValueError, "expected an integer in 1..2147483647, got int 0"),
+        (10.0, TypeError, "got float 10.0"),
+    ],
+    "unit": TEXT,
+}
+#: What `Pyramid.level` and `DepthImage.numpy` are asked for.
+WANTED_KIND: list[Bad] = [
+    ("depth", ValueError, 'expected one of "ndc", "reversed_ndc", "z", "distance", got str'),
+    (2, TypeError, "got int 2"),
+]
+
+
+def rendered(device: hizvk.Device) -> hizvk.DepthImage:
+    """A depth image of a triangle."""
+    return device.render_depth(device.occluders(TETRAHEDRON), camera())
 
 
 def spheres() -> hizvk.Spheres:
@@ -1096,6 +1130,7 @@ TABLES: dict[str, Table] = {
             ],
             "max_triangles": LIMIT,
             "max_occluders": LIMIT,
+            "progress": PROGRESS,
         },
     ),
     "Device.pyramid": Table(
@@ -1378,6 +1413,7 @@ TABLES: dict[str, Table] = {
                     "expected a closed mesh whose triangles run consistently around, got 3 edges",
                 ),
             ],
+            "progress": PROGRESS,
         },
     ),
     "check_bounds": Table(
@@ -1403,11 +1439,15 @@ TABLES: dict[str, Table] = {
                     "vertices: expected float (V, 3), got (3, 2) float64",
                 ),
             ],
+            "progress": PROGRESS,
         },
     ),
     "Device.timed": Table(lambda device: (device.timed, {}), {}),
     "Device.wait": Table(lambda device: (device.wait, {}), {}),
-    "DepthImage.numpy": Table(lambda device: (device.wait, {}), {}),
+    "DepthImage.plot": Table(
+        lambda device: (rendered(device).plot, {}), {"kind": WANTED_KIND, "unit": TEXT}
+    ),
+    "DepthImage.numpy": Table(lambda device: (rendered(device).numpy, {}), {"kind": WANTED_KIND}),
     "mip_texel": Table(
         lambda _: (hizvk.mip_texel, {"pixel": (0, 0), "level": 1, "size": (6, 8)}),
         {
@@ -1466,6 +1506,18 @@ TABLES: dict[str, Table] = {
                 ("nearest", ValueError, 'expected one of "farthest", got'),
                 (1, TypeError, "got int 1"),
             ],
+            "kind": WANTED_KIND,
+        },
+    ),
+    "Pyramid.plot": Table(
+        lambda device: (device.pyramid(np.ones((6, 8)), camera(), kind="z").plot, {}),
+        {
+            "end": [
+                ("nearest", ValueError, 'expected one of "farthest", got'),
+                (1, TypeError, "got int 1"),
+            ],
+            "kind": WANTED_KIND,
+            "unit": TEXT,
         },
     ),
     "Pyramid.update": Table(
@@ -1521,6 +1573,27 @@ TABLES: dict[str, Table] = {
                 ("0", TypeError, "got str '0'"),
             ],
         },
+    ),
+    "CullResult.plot": Table(
+        lambda device: (device.cull(**cull_arguments(device)).plot, {}), DRAWN
+    ),
+    "CullResult.save_html": Table(
+        lambda device: (device.cull(**cull_arguments(device)).save_html, {"path": os.devnull}),
+        {
+            **DRAWN,
+            "path": [
+                (3.5, TypeError, "expected a path, got float 3.5"),
+                (None, TypeError, "got None"),
+            ],
+            "occluders": [
+                ("wall", TypeError, "expected a Mesh, a mesh of trimesh or Open3D"),
+                ([TETRAHEDRON, 3], TypeError, "got int 3"),
+            ],
+            "title": [(3, TypeError, "expected a text, got int 3")],
+        },
+    ),
+    "Explanation.plot": Table(
+        lambda device: (device.cull(**cull_arguments(device)).explain(0).plot, {}), {"unit": TEXT}
     ),
     "CullResult.explain": Table(
         lambda device: (device.cull(**cull_arguments(device)).explain, {"index": 0}),
@@ -1619,6 +1692,7 @@ TABLES: dict[str, Table] = {
                 (0, ValueError, "in 1..10000, got int 0"),
                 (1.0, TypeError, "got float 1.0"),
             ],
+            "progress": PROGRESS,
         },
     ),
     "compare": Table(
@@ -1686,6 +1760,7 @@ TABLES: dict[str, Table] = {
                 ("volume", ValueError, 'expected one of "nearest", "pixel"'),
                 (0, TypeError, "got int 0"),
             ],
+            "progress": PROGRESS,
         },
     ),
     "reference.unoccluded": Table(
@@ -1701,6 +1776,7 @@ TABLES: dict[str, Table] = {
             "scale": SCALE,
             "invalid": INVALID,
             "coverage": COVERAGE,
+            "progress": PROGRESS,
         },
     ),
     "reference.pyramid": Table(
@@ -1786,6 +1862,7 @@ TABLES |= {
                 (0.0, ValueError, "above 0, got float 0.0"),
                 (INF, ValueError, "inf"),
             ],
+            "progress": PROGRESS,
         },
     ),
     "SplitMesh.triangle_mask": Table(
@@ -1806,6 +1883,7 @@ TABLES |= {
             "max_boxes": [(0, ValueError, "got int 0"), (True, TypeError, "got bool True")],
             "min_share": [*NUMBER, (1.5, ValueError, "at most 1, got float 1.5")],
             "margin": [*NUMBER, (-0.5, ValueError, "at least 0, got float -0.5")],
+            "progress": PROGRESS,
         },
     ),
     "inner_prisms": Table(
@@ -1818,6 +1896,7 @@ TABLES |= {
                 ((0, 0, 0), ValueError, "got tuple (0.0, 0.0, 0.0); turn the mesh for others"),
             ],
             "max_prisms": [(0, ValueError, "got int 0"), (1.0, TypeError, "got float 1.0")],
+            "progress": PROGRESS,
         },
     ),
     "select_occluders": Table(
@@ -1836,6 +1915,7 @@ TABLES |= {
                 (-1, ValueError, "got int -1"),
                 (100.0, TypeError, "got float 100.0"),
             ],
+            "progress": PROGRESS,
         },
     ),
 }

@@ -120,12 +120,14 @@ def test_import_loads_no_tools() -> None:
     )
     loaded = set(done.stdout.split())
     tools = (
+        "methods",
         "recommendation",
         "sweeping",
         "measuring",
         "bench",
         "demo",
         "scenes",
+        "show",
         "commands",
         "cli",
     )
@@ -137,6 +139,17 @@ def test_import_loads_no_tools() -> None:
     }
     assert "hizvk.device" in loaded
     assert not strangers
+
+
+def test_nothing_uses_the_methods() -> None:
+    """The texts' algorithms stand beside the package: only its lazy names lead to them."""
+    users = {
+        name
+        for name, imported in graph(PYTHON).items()
+        if not name.startswith("hizvk.methods")
+        and any(module.startswith("hizvk.methods") for module in imported)
+    }
+    assert users <= {"hizvk"}
 
 
 def test_recommend_comes_when_it_is_asked_for() -> None:

@@ -14,8 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import hizvk
 from hizvk import progress
 from hizvk.progress import Progress
+from hizvk.scenes import box_mesh
 
 ERASED = "\r\x1b[K"
 
@@ -191,3 +193,101 @@ def test_other_values_are_refused() -> None:
             Progress(value, "a label")  # type: ignore[arg-type]
     with Progress(np.bool_(False), "a label"):  # type: ignore[arg-type]
         pass
+
+
+# -- the calls ------------------------------------------------------------------------------------
+
+
+def box(low: Any, high: Any) -> tuple[Any, Any]:
+    vertices, triangles = box_mesh([low], [high])
+    return vertices, triangles
+
+
+CAMERA = hizvk.Camera.look_at((0, 0, 9), (0, 0, 0), fov_y_deg=60, size=(18, 32), near=0.1)
+SPHERES = hizvk.Spheres(np.random.default_rng(3).uniform(-3, 3, (3000, 3)), 0.25)
+DEPTH = np.full(CAMERA.size, 9.0)
+BALLS = hizvk.Spheres(np.zeros((600, 3)), np.linspace(0.5, 2.0, 600))
+
+
+def many_boxes() -> tuple[Any, Any]:
+    low = np.random.default_rng(4).uniform(-1, 0.9, (100, 3))
+    return box_mesh(low, low + 0.2)
+
+
+CALLS: dict[str, tuple[Callable[..., Any], int]] = {
+    "classify": (
+        lambda **more: hizvk.reference.classify(SPHERES, CAMERA, DEPTH, kind="z", **more), 2,
+    ),
+    "unoccluded": (
+        lambda **more: hizvk.reference.unoccluded(SPHERES, CAMERA, DEPTH, kind="z", **more), 2,
+    ),
+    "check_proxy": (
+        lambda **more: hizvk.check_proxy(many_boxes(), box((-1, -1, -1), (1, 1, 1)), **more), 4,
+    ),
+    "check_bounds": (
+        lambda **more: hizvk.check_bounds(BALLS, [box((-1, -1, -1), (0, 0, 0))] * 600, **more), 2,
+    ),
+    "inner_boxes": (
+        lambda **more: hizvk.inner_boxes(*box((0, 0, 0), (1, 2, 3)), resolution=4, **more), 3,
+    ),
+    "inner_prisms": (
+        lambda **more: hizvk.inner_prisms(*box((0, 0, 0), (1, 2, 3)), up=(0, 0, 1), **more), 1,
+    ),
+    "split_mesh": (lambda **more: hizvk.split_mesh(*many_boxes(), cell=0.5, **more), 1),
+    "select_occluders": (lambda **more: hizvk.select_occluders([many_boxes()], **more), 4),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_a_watched_call_has_the_same_answer(name: str) -> None:
+    call, steps = CALLS[name]
+    told: list[Any] = []
+    watched = call(progress=lambda done, total: told.append((done, total)))
+    assert told == [(k + 1, steps) for k in range(steps)]
+    assert same(watched, call()), name
+
+
+def same(one: Any, other: Any) -> bool:
+    if isinstance(one, np.ndarray):
+        return bool(np.array_equal(one, other))
+    if hasattr(one, "__dict__"):
+        return type(one) is type(other) and same(vars(one), vars(other))
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
+    if isinstance(one, (list, tuple)):
+        return len(one) == len(other) and all(map(same, one, other))
+    return bool(one == other)
+
+
+def test_check_proxy_in_parts_finds_what_the_whole_finds() -> None:
+    mesh = box((-1, -1, -1), (1, 1, 1))
+    vertices, triangles = many_boxes()
+    high = vertices.reshape(-1, 8, 3).max(axis=1)
+    out = (high > 1.0).any(axis=1)
+    found = hizvk.check_proxy((vertices, triangles), mesh, progress=lambda done, total: None)
+    assert 0 < out.sum() < len(out)
+    assert np.unique(found.triangles // 12).tolist() == np.flatnonzero(out).tolist()
+    outside = (vertices > 1.0).any(axis=1)
+    assert found.vertices.tolist() == np.flatnonzero(outside).tolist()
+    assert found.protrusion == pytest.approx(vertices.max() - 1.0)
+
+
+def test_calls_on_a_device(device: hizvk.Device) -> None:
+    told: list[Any] = []
+
+    def tell(done: int, total: int | None) -> None:
+        told.append((done, total))
+
+    walls = device.occluders(*box((-1, -1, -1), (1, 1, 1)))
+    device.render_depth(walls, CAMERA, conservative=True, progress=tell)
+    assert told == [(1, 1)]
+    told.clear()
+    found = hizvk.recommend(
+        hizvk.Spheres(SPHERES.centers[:40], 0.25), CAMERA, occluders=walls, device=device,
+        repetitions=1, progress=tell,
+    )  # fmt: skip
+    totals = {total for _, total in told}
+    assert len(totals) == 1
+    assert [done for done, _ in told] == list(range(1, totals.pop() + 1))
+    # Each candidate was timed once more than asked for; then there is one check.
+    assert len(told) > 2 * len(found.candidates)

@@ -59,6 +59,7 @@ A bad argument raises a `TypeError` or `ValueError` that names the parameter.
 Everything that the device refuses is a `HizError`.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from . import reference
@@ -213,11 +214,9 @@ _LATER = {
 
 
 def __getattr__(name: str) -> Any:
-    """The names that are loaded at their first use."""
+    """The names of `_LATER`, loaded at their first use."""
     if name in _LATER:
-        from importlib import import_module
-
-        globals()[name] = getattr(import_module(f"{__name__}.{_LATER[name]}"), name)
+        globals()[name] = getattr(import_module(f".{_LATER[name]}", __name__), name)
         return globals()[name]
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 

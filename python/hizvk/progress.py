@@ -27,7 +27,7 @@ from ._processes import per_process
 if TYPE_CHECKING:
     from typing import Self
 
-__all__ = ["Progress", "ProgressLike"]
+__all__ = ["Progress", "ProgressLike", "check_progress"]
 
 _T = TypeVar("_T")
 
@@ -36,6 +36,8 @@ ProgressLike: TypeAlias = bool | Callable[[int, int | None], object] | None
 
 #: Seconds within which nothing is shown.
 QUIET_S: Final = 2.0
+#: Into how many parts a call without steps of its own is cut.
+MOST_PARTS: Final = 16
 #: Characters of the bar.
 WIDTH: Final = 30
 
@@ -85,13 +87,12 @@ class Progress:
         after_s: float = QUIET_S,
         stream: TextIO | None = None,
     ) -> None:
-        self._call = _checked(progress)
+        self._call = check_progress(progress)
         self._wanted: bool | None = False
         if self._call is None:
             self._wanted = None if progress is None else bool(progress)
         self.label, self.total, self.done, self.doing = label, total, 0, ""
         self._after_s, self._stream = after_s, stream
-        self._ended = threading.Event()
         self._thread: threading.Thread | None = None
 
     def __enter__(self) -> Self:
@@ -100,6 +101,7 @@ class Progress:
         self._token = _is_inside.set(True)
         if view is not None:
             view.begin(self)
+            self._ended = threading.Event()
             # Notebooks know by the context which cell an output belongs to.
             run = contextvars.copy_context().run
             self._thread = threading.Thread(target=run, args=(self._show, view), daemon=True)
@@ -116,6 +118,22 @@ class Progress:
     def show(self, doing: str) -> None:
         """Says what is being done now."""
         self.doing = doing
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether anything is shown, or a function is told."""
+        return self._call is not None or self._thread is not None
+
+    def parts(self, count: int, least: int) -> Iterator[slice]:
+        """Parts of `count` things, of about `least` or more; each is a step.
+
+        Parts cost a little more than the whole, so there is one where nobody watches.
+        """
+        number = min(max(count // least, 1), MOST_PARTS) if self.is_watched else 1
+        self.total = number
+        for k in range(number):
+            yield slice(count * k // number, count * (k + 1) // number)
+            self.step()
 
     def over(self, items: Iterable[_T]) -> Iterator[_T]:
         """The items, each counted as a step once the next one is asked for."""
@@ -275,7 +293,7 @@ class _Notebook:
             self._handle.update(shown, raw=True)
 
 
-def _checked(progress: object) -> Callable[[int, int | None], object] | None:
+def check_progress(progress: object) -> Callable[[int, int | None], object] | None:
     """The caller's function; None for True, False and None; a `TypeError` for anything else."""
     if progress is None or isinstance(progress, (bool, np.bool_)):
         return None

@@ -165,6 +165,9 @@ pub mod yardstick;
 #[cfg(feature = "testing")]
 pub mod testing;
 
+#[cfg(feature = "methods")]
+pub mod methods;
+
 pub use wgpu;
 
 pub use context::HizContext;

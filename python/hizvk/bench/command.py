@@ -139,11 +139,11 @@ def _left_out() -> list[str]:
     found = []
     if not embree.can_cast():
         found.append(
-            f"{embree.MISSING}; the truth is that of boxes before the rendered depth, so it says "
+            f"{embree.missing()}; the truth is that of boxes before the rendered depth, so it says "
             "nothing about the depth image"
         )
     if not figure.can_draw():
-        found.append(figure.MISSING)
+        found.append(figure.missing())
     return found
 
 
