@@ -7,7 +7,7 @@ A notebook calls ``_repr_html_`` or ``_repr_png_`` of the last value of a cell.
 from __future__ import annotations
 
 from os import PathLike
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from . import _arguments
 from ._types import DepthKind, Up, words
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from .mesh import MeshLike
     from .show.explained import Explained
     from .show.levels import Levels
+
+    #: Reads one level as depth of a kind.
+    _Read = Callable[[DepthKind | None], npt.NDArray[np.float32]]
 
 __all__ = ["PicturedDepth", "PicturedExplanation", "PicturedPyramid", "PicturedResult"]
 
@@ -50,10 +53,6 @@ def _unless_lost(make: Callable[[], Any]) -> Any:
         return make()
     except HizError:
         return None  # the notebook falls back to `repr`
-
-
-#: Reads one level as depth of a kind.
-_Read: TypeAlias = "Callable[[DepthKind | None], npt.NDArray[np.float32]]"
 
 
 def _levels(thing: Any, kind: DepthKind | None, unit: str, levels: dict[int, _Read]) -> Levels:

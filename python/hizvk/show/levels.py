@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from .._arguments import Size
-    from .colours import _Image, Scale
+    from .colours import Scale, _Image
 
     _Floats = npt.NDArray[np.float32]
 
