@@ -53,7 +53,8 @@ def depth_image(
     near_over_z = device.render_depth(occluders, camera).numpy()  # reversed Z without a far plane
     with np.errstate(divide="ignore"):
         centimetres = np.rint(NEAR * 100.0 / near_over_z)
-    return np.minimum(centimetres, 65535.0).astype(np.uint16)  # the sky is 65535
+    image: npt.NDArray[np.uint16] = np.minimum(centimetres, 65535.0).astype(np.uint16)
+    return image  # the sky is 65535
 
 
 def main() -> None:
@@ -69,7 +70,7 @@ def main() -> None:
     exactly = hizvk.CullOptions(coverage="sample", descent=4096, fit="volume")
     seen = device.cull(device.instances(boxes), camera, hiz, exactly, ["mask", "pixels"])
     fractions = seen.visible_fraction()
-    found = sum((fractions < end).astype(int) for end in LEVELS)
+    found = (fractions[:, None] < LEVELS).sum(axis=1)
     for name, level, fraction in zip(names, found, fractions, strict=True):
         print(f"{name:10} {fraction:4.0%} visible, occluded {level}")
     print(f"kept {seen.count} of {len(boxes)}; {(found == levels).sum()} levels as labelled")

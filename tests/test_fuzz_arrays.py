@@ -83,6 +83,11 @@ ARRAYS = [
     ("Camera.project", "xyz"),
     ("gather", "pixels"),
     ("DirectionalLight", "direction"),
+    ("cube", "eye"),
+    ("sweep", "groups"),
+    ("viewshed", "heights"),
+    ("viewshed", "cell_size"),
+    ("viewshed", "eye"),
 ]
 
 DTYPES = [

@@ -117,6 +117,7 @@ from .views import ViewsResult
 
 if TYPE_CHECKING:
     from .recommendation import Recommendation, recommend
+    from .sweeping import Sweep, SweepInterrupted, cube, sweep, viewshed, visible_sets
 
 __all__ = [
     "ABSENT",
@@ -166,6 +167,8 @@ __all__ = [
     "SplitMesh",
     "StageTime",
     "StageTimes",
+    "Sweep",
+    "SweepInterrupted",
     "Temporal",
     "Tolerance",
     "UnoccludedComparison",
@@ -178,6 +181,7 @@ __all__ = [
     "colour_points",
     "compare",
     "compare_unoccluded",
+    "cube",
     "depth_from_points",
     "gather",
     "inner_boxes",
@@ -187,16 +191,25 @@ __all__ = [
     "reference",
     "select_occluders",
     "split_mesh",
+    "sweep",
+    "viewshed",
     "visible",
     "visible_fraction",
+    "visible_sets",
     "wgsl",
 ]
 
 
-# Where the names are that load at their first use, because culling does not need them.
+#: Names that are loaded at their first use, with their packages: a cull does not need them.
 _LATER = {
-    "recommend": "recommendation",
     "Recommendation": "recommendation",
+    "recommend": "recommendation",
+    "Sweep": "sweeping",
+    "SweepInterrupted": "sweeping",
+    "cube": "sweeping",
+    "sweep": "sweeping",
+    "viewshed": "sweeping",
+    "visible_sets": "sweeping",
 }
 
 

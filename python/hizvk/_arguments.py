@@ -459,6 +459,13 @@ def choice(name: str, value: object, choices: Iterable[str]) -> str:
     raise _wrong_value(name, expected, value)
 
 
+def text(name: str, value: object) -> str:
+    """A text."""
+    if not isinstance(value, str):
+        raise _wrong_type(name, "a text", value)
+    return value
+
+
 def instance(name: str, value: object, wanted: type[T], expected: str) -> T:
     """An object of this class."""
     if isinstance(value, wanted):

@@ -13,6 +13,8 @@ from ._on_device import Allocated, OnDevice, check_owner
 from ._types import DepthEnd, words
 from .bounds import Bounds, are_points, as_arrays
 from .mesh import placed
+from .pictured import PicturedDepth, PicturedPyramid
+from .remembered import Remembered
 from .renewal import rectangle, replacement
 from .view_depth import converted
 
@@ -32,9 +34,12 @@ __all__ = ["DepthImage", "Instances", "Occluders", "Pyramid"]
 class Instances(Allocated[CoreInstances]):
     """Bounds on the device, ready to be tested; made by `Device.instances`."""
 
-    def __init__(self, device: Maker, inner: CoreInstances, *, points: bool) -> None:
+    def __init__(
+        self, device: Maker, inner: CoreInstances, *, points: bool, bounds: Bounds
+    ) -> None:
         super().__init__(device, inner)
         self._points = points
+        self._remembered: Remembered | None = Remembered(bounds)
 
     @property
     def kind(self) -> str:
@@ -45,6 +50,11 @@ class Instances(Allocated[CoreInstances]):
     def _are_sizeless(self) -> bool:
         """Whether sample coverage culls what can be seen of them, as it has no guard by default."""
         return self._points and self.kind != "points"
+
+    @property
+    def _known(self) -> tuple[bool, Remembered | None]:
+        """Whether they are without size, and their bounds if no update has changed them."""
+        return self._are_sizeless, self._remembered
 
     @property
     def num_pieces(self) -> int:
@@ -63,6 +73,9 @@ class Instances(Allocated[CoreInstances]):
         - 8 per instance for where it is stored; none with ``order="given"``.
         - 88 per group of 64.
         - 48 per instance in groups of which a part was updated.
+
+        The bounds that were uploaded stay alive besides, if they are at most 65,536: pictures show
+        them.
         """
         return self._inner.host_bytes()
 
@@ -123,6 +136,7 @@ class Instances(Allocated[CoreInstances]):
             raise ValueError(f"bounds: expected {expected}, got {len(bounds)}")
         strict = _arguments.flag("strict", strict)
         self._device._engine.update(self._inner, first, kind, arrays, strict)
+        self._remembered = None
         self._points = self._points and (len(bounds) == 0 or are_points(bounds))
 
     def __len__(self) -> int:
@@ -207,7 +221,7 @@ class _Seen:
         return self._camera.size
 
 
-class DepthImage(_Seen, OnDevice[CoreDepthImage]):
+class DepthImage(PicturedDepth, _Seen, OnDevice[CoreDepthImage]):
     """A depth image on the device; made by `Device.render_depth`."""
 
     def __init__(self, device: Maker, inner: CoreDepthImage, camera: Camera) -> None:
@@ -243,7 +257,7 @@ class DepthImage(_Seen, OnDevice[CoreDepthImage]):
         return f" {self.size[0]}x{self.size[1]} of kind {self.kind}"
 
 
-class Pyramid(_Seen, Allocated[CorePyramid]):
+class Pyramid(PicturedPyramid, _Seen, Allocated[CorePyramid]):
     """A depth pyramid on the device; made by `Device.pyramid`.
 
     On level ``k`` a texel holds the farthest depth of a block of ``2^k x 2^k`` pixels.

@@ -131,8 +131,7 @@ class RayView:
             return parallel
         constant_of_w = self._rows[3, 3]
         slope = float(self._rows[2, :3] @ self.forward)
-        rest = self._rows[2, :3] - slope * self.forward
-        if np.linalg.norm(rest) > OBLIQUE * max(float(np.linalg.norm(self._rows[2, :3])), 1.0):
+        if self._is_oblique():
             x, y = self._middles(ndc.shape, level)
             return _inverse_w(self._rows, x, y[:, None], ndc)
         for exact in (0.0, 1.0):
@@ -142,6 +141,25 @@ class RayView:
             z = (self._rows[2, 3] - slope * constant_of_w) / (ndc - slope)
         found: Doubles = np.where(ndc == slope, np.inf, z)
         return found
+
+    def depth_at(self, ndc: float, column: float, row: float) -> float:
+        """View depth of one NDC depth at a place of the image, in pixels."""
+        if self.is_parallel or not self._is_oblique():
+            return float(self.depth_of(np.array([[ndc]])).item())
+        height, width = self.size
+        x, y = np.array(2.0 * column / width - 1.0), np.array(1.0 - 2.0 * row / height)
+        return float(_inverse_w(self._rows, x, y, np.array(ndc)))
+
+    def _is_oblique(self) -> bool:
+        """Whether NDC depth depends on the pixel besides view depth."""
+        depth_row = self._rows[2, :3]
+        rest = depth_row - (depth_row @ self.forward) * self.forward
+        return bool(np.linalg.norm(rest) > OBLIQUE * max(float(np.linalg.norm(depth_row)), 1.0))
+
+    def clip_of(self, positions: Doubles) -> Doubles:
+        """``(N, 4)``: clip coordinates of ``(N, 3)`` world positions, with w in world units."""
+        clip: Doubles = (positions - self._origin) @ self._rows[:, :3].T + self._rows[:, 3]
+        return clip
 
     def ray_lengths(self) -> Doubles:
         """``(height, width)``: how far one goes along the ray of a pixel per unit of view depth."""
