@@ -14,6 +14,8 @@ embedded=(--no-default-features --features vulkan)
 check "clippy, a renderer's features" \
   cargo clippy -p hiz_core --lib "${embedded[@]}" "${LOCKED[@]}" -- -D warnings
 check "clippy, default features" cargo clippy -p hiz_core --lib "${LOCKED[@]}" -- -D warnings
+# A wheel's module has the feature `methods` without `testing`.
+check "clippy, a wheel's features" cargo clippy -p hiz_py --lib "${LOCKED[@]}" -- -D warnings
 # What waits for a device stays out of a renderer's build.
 embedded_tree() {
   local tree
@@ -33,6 +35,11 @@ if have shellcheck; then
   check "shellcheck" shellcheck scripts/*.sh .ci/run
 else
   printf 'shellcheck is not installed: the shell scripts were not checked\n'
+fi
+if have actionlint; then
+  check "workflows" actionlint
+else
+  printf 'actionlint is not installed: the workflows were not checked\n'
 fi
 
 checked

@@ -91,7 +91,9 @@ def public_callables() -> dict[str, Callable[..., Any]]:
             continue
         if name not in MADE_BY_THE_PACKAGE:
             found[name] = thing
-        for method, value in vars(thing).items():
+        inherited = [vars(base) for base in thing.__mro__ if base.__module__ == "hizvk.pictured"]
+        for method in {*vars(thing), *(key for keys in inherited for key in keys)}:
+            value = inspect.getattr_static(thing, method)
             if not method.startswith("_") and (
                 inspect.isfunction(value) or isinstance(value, classmethod)
             ):

@@ -86,6 +86,12 @@ ARRAYS = [
     ("Camera.project", "xyz"),
     ("gather", "pixels"),
     ("DirectionalLight", "direction"),
+    ("cube", "eye"),
+    ("sweep", "groups"),
+    ("viewshed", "heights"),
+    ("viewshed", "cell_size"),
+    ("viewshed", "eye"),
+    ("HierarchicalVisibility.render", "previous"),
 ]
 
 DTYPES = [

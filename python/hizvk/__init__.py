@@ -59,6 +59,7 @@ A bad argument raises a `TypeError` or `ValueError` that names the parameter.
 Everything that the device refuses is a `HizError`.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from . import reference
@@ -115,7 +116,9 @@ from .tolerance import Tolerance
 from .views import ViewsResult
 
 if TYPE_CHECKING:
+    from .methods import HierarchicalVisibility, HierarchyFrame, PublishedTest
     from .recommendation import Recommendation, recommend
+    from .sweeping import Sweep, SweepInterrupted, cube, sweep, viewshed, visible_sets
 
 __all__ = [
     "ABSENT",
@@ -137,6 +140,8 @@ __all__ = [
     "DirectionalLight",
     "DrawTemplate",
     "Explanation",
+    "HierarchicalVisibility",
+    "HierarchyFrame",
     "HizError",
     "HizWarning",
     "InnerBoxes",
@@ -159,12 +164,15 @@ __all__ = [
     "Points",
     "Projected",
     "ProxyCheck",
+    "PublishedTest",
     "Pyramid",
     "Recommendation",
     "Spheres",
     "SplitMesh",
     "StageTime",
     "StageTimes",
+    "Sweep",
+    "SweepInterrupted",
     "Temporal",
     "Tolerance",
     "UnoccludedComparison",
@@ -177,6 +185,7 @@ __all__ = [
     "colour_points",
     "compare",
     "compare_unoccluded",
+    "cube",
     "depth_from_points",
     "gather",
     "inner_boxes",
@@ -186,18 +195,35 @@ __all__ = [
     "reference",
     "select_occluders",
     "split_mesh",
+    "sweep",
+    "viewshed",
     "visible",
     "visible_fraction",
+    "visible_sets",
     "wgsl",
 ]
 
 
-def __getattr__(name: str) -> Any:
-    """`recommend` and `Recommendation`, loaded at their first use: culling does not need them."""
-    if name in ("recommend", "Recommendation"):
-        from . import recommendation as module
+#: Names that are loaded at their first use, with their packages: a cull does not need them.
+_LATER = {
+    "HierarchicalVisibility": "methods",
+    "HierarchyFrame": "methods",
+    "PublishedTest": "methods",
+    "Recommendation": "recommendation",
+    "recommend": "recommendation",
+    "Sweep": "sweeping",
+    "SweepInterrupted": "sweeping",
+    "cube": "sweeping",
+    "sweep": "sweeping",
+    "viewshed": "sweeping",
+    "visible_sets": "sweeping",
+}
 
-        globals()[name] = getattr(module, name)
+
+def __getattr__(name: str) -> Any:
+    """The names of `_LATER`, loaded at their first use."""
+    if name in _LATER:
+        globals()[name] = getattr(import_module(f".{_LATER[name]}", __name__), name)
         return globals()[name]
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 

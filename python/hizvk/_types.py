@@ -62,6 +62,10 @@ MipLookup: TypeAlias = Literal["normalized"] | Literal["edge_texel"]
 Sampling: TypeAlias = Literal["nearest"] | Literal["bilinear"]
 #: How the views of a point are weighted; see `colour_points`.
 ColourWeight: TypeAlias = Literal["equal"] | Literal["near"]
+#: Which world axis points up, or with a minus down; see `CullResult.plot`.
+Up: TypeAlias = (
+    Literal["x"] | Literal["y"] | Literal["z"] | Literal["-x"] | Literal["-y"] | Literal["-z"]
+)
 #: Which depth of the bounds a pixel of the oracle is compared with.
 OwnDepth: TypeAlias = Literal["nearest"] | Literal["pixel"]
 

@@ -61,7 +61,7 @@ _TABLES_KEPT = 4
 
 
 class Device:
-    """A Vulkan device with its queue and pipelines.
+    """A device of the GPU, or of a software driver, with its queue and pipelines.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ class Device:
             None if scales is None else _arguments.floats_or_scalar("scales", scales, len(bounds))
         )
         uploaded = self._engine.instances(kind, arrays, (strict, stored_order), ids, sizes)
-        return Instances(self, uploaded, points=are_points(bounds))
+        return Instances(self, uploaded, points=are_points(bounds), bounds=bounds)
 
     @overload
     def occluders(
@@ -840,9 +840,7 @@ class Device:
                 restriction,
                 not wait,
             )
-            return CullResult(
-                self, culling, Question(camera, pyramid, options, instances._are_sizeless)
-            )
+            return CullResult(self, culling, Question(camera, pyramid, options, *instances._known))
         cameras, pyramids = pairs(camera, pyramid, self)
         for number, (one, of) in enumerate(zip(cameras, pyramids, strict=True)):
             if one != of.camera:
@@ -868,7 +866,7 @@ class Device:
             not wait,
         )
         questions = [
-            Question(one, of, options, instances._are_sizeless)
+            Question(one, of, options, *instances._known)
             for one, of in zip(cameras, pyramids, strict=True)
         ]
         return ViewsResult(self, culled, questions)

@@ -162,6 +162,9 @@ pub mod headless;
 #[cfg(feature = "yardstick")]
 pub mod yardstick;
 
+#[cfg(feature = "methods")]
+pub mod methods;
+
 #[cfg(feature = "testing")]
 pub mod testing;
 

@@ -217,6 +217,48 @@ fn low_rooms_know_no_stage() {
     }
 }
 
+/// The modules outside of `methods/` that import it, and the sources that name its shaders.
+/// The lists of `testing/` name everything.
+fn uses_of_methods(texts: &BTreeMap<String, String>) -> Vec<String> {
+    let room = |module: &str| module.split("::").next().unwrap_or_default().to_owned();
+    let is_outside = |module: &str| !["methods", "testing"].contains(&room(module).as_str());
+    let imports = graph(texts)
+        .into_iter()
+        .filter(|(from, to)| is_outside(from) && to.iter().any(|to| room(to) == "methods"));
+    let mut found: Vec<String> = imports.map(|(from, _)| from).collect();
+    // `lib.rs` declares the room and exports nothing of it; its shaders have a folder of their own.
+    let named = |module: &str, code: &str| {
+        (module == "lib" && code.contains("methods::")) || code.contains("\"methods/")
+    };
+    found.extend(
+        texts
+            .iter()
+            .filter(|(module, text)| is_outside(module) && named(module, &code(text)))
+            .map(|(module, _)| module.clone()),
+    );
+    found
+}
+
+/// The texts' algorithms are beside the certified path, and nothing of it reaches them.
+#[test]
+fn nothing_uses_the_methods() {
+    let texts = texts();
+    assert!(texts.contains_key("methods"), "the room");
+    assert!(rooms(&texts["lib"]).ends_with(&["methods".to_owned(), "testing".to_owned()]));
+    assert_eq!(uses_of_methods(&texts), [""; 0]);
+    for (module, line) in [
+        ("cull::inputs", "use crate::methods;"),
+        ("headless::engine", "use crate::methods::Anything;"),
+        ("yardstick", "pub use crate::methods::Anything;"),
+        ("cull::pipelines", "const MAPS: File = wgsl!(\"methods/maps\");"),
+    ] {
+        assert_eq!(uses_of_methods(&with_line(module, line)), [module], "{line}");
+    }
+    let mut exported = texts;
+    exported.get_mut("lib").expect("the face").push_str("pub use methods::Anything;\n");
+    assert_eq!(uses_of_methods(&exported), ["lib"]);
+}
+
 /// A module with one more line among its imports.
 fn with_line(module: &str, line: &str) -> BTreeMap<String, String> {
     let mut texts = texts();
