@@ -45,6 +45,7 @@ ARRAYS = [
     ("Mesh", "vertices"),
     ("Mesh", "triangles"),
     ("Mesh", "transforms"),
+    ("Mesh.of", "mesh"),
     ("Mesh.of", "transforms"),
     ("Device.occluders", "vertices"),
     ("Device.occluders", "triangles"),

@@ -20,12 +20,21 @@ if TYPE_CHECKING:
     from ._arguments import FloatArray
     from .camera import Camera
 
-__all__ = ["DEPTH_KINDS", "DepthArray", "DepthKind", "checked_image"]
+__all__ = [
+    "DEPTH_KINDS",
+    "METRIC",
+    "DepthArray",
+    "DepthKind",
+    "checked_image",
+    "no_data_of",
+    "whole_numbers",
+]
 
 #: The kinds of depth that an array can hold; see `Device.pyramid`.
 DEPTH_KINDS = words(DepthKind)
 
-_METRIC = ("z", "distance")
+#: The kinds that have units.
+METRIC = ("z", "distance")
 
 #: What sensors and their files write where they saw nothing, by dtype.
 NO_DATA: dict[str, tuple[float, ...]] = {"uint16": (0.0, 65535.0), "float16": (65504.0,)}
@@ -78,14 +87,14 @@ def checked_image(
             "there is no default, a wrong guess hides things"
         )
     kind_: DepthKind = _arguments.choice("kind", kind, DEPTH_KINDS)  # type: ignore[assignment]
-    if kind_ not in _METRIC and kind_ != camera.depth_kind:
+    if kind_ not in METRIC and kind_ != camera.depth_kind:
         meaning = {"ndc": "0 near and 1 far", "reversed_ndc": "1 near and 0 far"}
         raise ValueError(
             f'kind: expected "{camera.depth_kind}" ({meaning[camera.depth_kind]}) for a camera '
             f'with reversed_z={camera.reversed_z}, got "{kind_}" ({meaning[kind_]})'
         )
     scale_ = _arguments.number("scale", scale, above=0.0)
-    if scale_ != 1.0 and kind_ not in _METRIC:
+    if scale_ != 1.0 and kind_ not in METRIC:
         raise ValueError(
             f'scale: expected 1 for the kind "{kind_}", got {scale_:g}; '
             'only "z" and "distance" have units'
@@ -123,7 +132,7 @@ def checked_image(
         # What is masked is "no data", whatever number lies there.
         image = np.where(mask, image.dtype.type(np.nan), image)
     moved = numbers_of("tolerance", tolerance)
-    no_data = _no_data(invalid, dtype)
+    no_data = no_data_of(invalid, dtype)
     return DepthArray(image, kind_, scale_, no_data, _rounding(dtype, kind_), moved)
 
 
@@ -138,7 +147,7 @@ def _rounding(dtype: np.dtype[Any], kind: DepthKind) -> Rounding:
         return "none"
     if dtype.itemsize == 2:
         return "half"
-    return "single" if kind in _METRIC else "none"
+    return "single" if kind in METRIC else "none"
 
 
 def _from_rows(name: str, rows: Sequence[Any]) -> Any:
@@ -183,7 +192,7 @@ def whole_numbers(name: str, array: Any, kind: object, invalid: object) -> npt.N
     Negative numbers are no depth in any kind.
     """
     is_wide = array.dtype.kind in "iu" and array.dtype.itemsize > 1 and array.dtype.name != "uint16"
-    if not is_wide or kind not in _METRIC or not array.size:
+    if not is_wide or kind not in METRIC or not array.size:
         return array  # type: ignore[no-any-return]
     if invalid is None and array.max() <= np.iinfo(np.uint16).max:
         return np.where(array < 0, 0, array).astype(np.uint16)
@@ -192,7 +201,7 @@ def whole_numbers(name: str, array: Any, kind: object, invalid: object) -> npt.N
 
 def _refuse_dtype(name: str, array: npt.NDArray[Any], kind: DepthKind) -> None:
     """Refuses truth values, whole numbers of 8 bits, and those of a kind that is not metric."""
-    metric = kind in _METRIC
+    metric = kind in METRIC
     if array.dtype.kind not in "iub" or (
         metric and array.dtype.kind != "b" and array.dtype.itemsize > 1
     ):
@@ -230,7 +239,7 @@ def _refuse_shape(name: str, array: npt.NDArray[Any], camera: Camera) -> None:
     raise ValueError(f"{name}: expected {expected} {size} (the camera's size), got {got}{hint}")
 
 
-def _no_data(invalid: object, dtype: np.dtype[Any]) -> tuple[float, ...]:
+def no_data_of(invalid: object, dtype: np.dtype[Any]) -> tuple[float, ...]:
     """The caller's values as `dtype` holds them, or for None the convention of the dtype."""
     if invalid is None:
         return NO_DATA.get(dtype.name, ())
