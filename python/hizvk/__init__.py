@@ -116,8 +116,9 @@ from .tolerance import Tolerance
 from .views import ViewsResult
 
 if TYPE_CHECKING:
-    from .methods import PublishedTest
+    from .methods import HierarchicalVisibility, HierarchyFrame, PublishedTest
     from .recommendation import Recommendation, recommend
+    from .sweeping import Sweep, SweepInterrupted, cube, sweep, viewshed, visible_sets
 
 __all__ = [
     "ABSENT",
@@ -139,6 +140,8 @@ __all__ = [
     "DirectionalLight",
     "DrawTemplate",
     "Explanation",
+    "HierarchicalVisibility",
+    "HierarchyFrame",
     "HizError",
     "HizWarning",
     "InnerBoxes",
@@ -168,6 +171,8 @@ __all__ = [
     "SplitMesh",
     "StageTime",
     "StageTimes",
+    "Sweep",
+    "SweepInterrupted",
     "Temporal",
     "Tolerance",
     "UnoccludedComparison",
@@ -180,6 +185,7 @@ __all__ = [
     "colour_points",
     "compare",
     "compare_unoccluded",
+    "cube",
     "depth_from_points",
     "gather",
     "inner_boxes",
@@ -189,17 +195,28 @@ __all__ = [
     "reference",
     "select_occluders",
     "split_mesh",
+    "sweep",
+    "viewshed",
     "visible",
     "visible_fraction",
+    "visible_sets",
     "wgsl",
 ]
 
 
-# Where the names are that load at their first use, because culling does not need them.
+#: Names that are loaded at their first use, with their packages: a cull does not need them.
 _LATER = {
+    "HierarchicalVisibility": "methods",
+    "HierarchyFrame": "methods",
     "PublishedTest": "methods",
-    "recommend": "recommendation",
     "Recommendation": "recommendation",
+    "recommend": "recommendation",
+    "Sweep": "sweeping",
+    "SweepInterrupted": "sweeping",
+    "cube": "sweeping",
+    "sweep": "sweeping",
+    "viewshed": "sweeping",
+    "visible_sets": "sweeping",
 }
 
 

@@ -21,6 +21,7 @@ __all__ = [
     "DepthImage",
     "Engine",
     "Explanation",
+    "HierarchicalVisibility",
     "Instances",
     "MeshTable",
     "MethodLevels",
@@ -566,3 +567,38 @@ class YardstickCull:
     def ms(self) -> float: ...
     def mask(self) -> npt.NDArray[np.bool_]: ...
     def device_bytes(self) -> int: ...
+
+_HierarchyNodes: TypeAlias = tuple[
+    npt.NDArray[np.float64],
+    npt.NDArray[np.float64],
+    npt.NDArray[np.int64],
+    npt.NDArray[np.uint32],
+    npt.NDArray[np.uint32],
+    npt.NDArray[np.uint64],
+]
+_HierarchyFrame: TypeAlias = tuple[
+    npt.NDArray[np.float32],
+    list[tuple[_Size, npt.NDArray[np.float32]]],
+    npt.NDArray[np.uint8],
+    npt.NDArray[np.uint32],
+    tuple[int, int, int, int, int, int, int],
+    tuple[int, int] | None,
+    float,
+]
+
+@final
+class HierarchicalVisibility:
+    def __new__(
+        cls,
+        meshes: Sequence[tuple[_Floats, npt.NDArray[np.uint32], _Floats | None]],
+        cull: str,
+        threshold: int,
+        deepest: int,
+    ) -> Self: ...
+    def nodes(self) -> _HierarchyNodes: ...
+    def num_triangles(self) -> int: ...
+    def num_meshlets(self) -> int: ...
+    def render(
+        self, camera: Camera, previous: npt.NDArray[np.uint32], count: bool
+    ) -> _HierarchyFrame: ...
+    def render_flat(self, camera: Camera) -> tuple[npt.NDArray[np.float32], int, int, float]: ...

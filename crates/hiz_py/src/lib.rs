@@ -42,6 +42,8 @@ mod _core {
     #[pymodule_export]
     use crate::meshes::MeshTable;
     #[pymodule_export]
+    use crate::methods::hierarchy::HierarchicalVisibility;
+    #[pymodule_export]
     use crate::methods::{MethodLevels, TextCull};
     #[pymodule_export]
     use crate::points::{add_colours, depth_of_points};

@@ -8,7 +8,28 @@ Their names are reachable from `hizvk`, too.
 - `turitzin`: a table of the time that each of these ways takes
 """
 
+from .hierarchy import (
+    HIDDEN,
+    NODE_DTYPE,
+    NOT_VISITED,
+    OUTSIDE,
+    VISIBLE,
+    FlatFrame,
+    HierarchicalVisibility,
+    HierarchyFrame,
+)
 from .levels import MethodLevels
 from .texts import PublishedTest
 
-__all__ = ["MethodLevels", "PublishedTest"]
+__all__ = [
+    "HIDDEN",
+    "NODE_DTYPE",
+    "NOT_VISITED",
+    "OUTSIDE",
+    "VISIBLE",
+    "FlatFrame",
+    "HierarchicalVisibility",
+    "HierarchyFrame",
+    "MethodLevels",
+    "PublishedTest",
+]

@@ -6,6 +6,7 @@
 
 mod coarse_level;
 mod fragment_levels;
+pub mod hierarchy;
 mod texts;
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! The algorithms of the texts, for comparisons; no certified call reaches them.
 
+pub(crate) mod hierarchy;
 mod levels;
 mod texts;
 
