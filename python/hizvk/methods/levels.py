@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
-__all__ = ["SHAPES", "LevelWay", "MethodLevels"]
+__all__ = ["SHAPES", "MethodLevels"]
 
 #: How the levels are made.
-LevelWay: TypeAlias = Literal["fragment", "atomic", "tree", "mips", "pyramid"]
+_LevelWay: TypeAlias = Literal["fragment", "atomic", "tree", "mips", "pyramid"]
 #: Width and height of the workgroups of atomic minima; each makes a texel of 16x16 pixels.
 SHAPES: Final = ((16, 16), (16, 8), (16, 4), (8, 8), (8, 4), (4, 4))
 
@@ -68,14 +68,14 @@ class MethodLevels:
     def __init__(
         self,
         device: Device,
-        way: LevelWay,
+        way: _LevelWay,
         images: Sequence[npt.NDArray[np.float32]],
         *,
         shape: tuple[int, int] = (16, 16),
         levels: tuple[int, int] = (1, 15),
     ) -> None:
         _arguments.instance("device", device, Device, "a Device")
-        _arguments.choice("way", way, get_args(LevelWay))
+        _arguments.choice("way", way, get_args(_LevelWay))
         if shape not in SHAPES:
             raise ValueError(f"shape: expected one of {SHAPES}, got {shape!r}")
         arrays = [
