@@ -116,6 +116,7 @@ from .tolerance import Tolerance
 from .views import ViewsResult
 
 if TYPE_CHECKING:
+    from .methods import BspTiling, MapResult, OcclusionMap, TiledCoverage
     from .recommendation import Recommendation, recommend
 
 __all__ = [
@@ -127,6 +128,7 @@ __all__ = [
     "ApproximateResult",
     "BoundsCheck",
     "Boxes",
+    "BspTiling",
     "Camera",
     "Comparison",
     "CullOptions",
@@ -147,11 +149,13 @@ __all__ = [
     "LodByDistance",
     "LodByError",
     "LodBySize",
+    "MapResult",
     "Mesh",
     "MeshLods",
     "NoAdapterError",
     "OccluderSelection",
     "Occluders",
+    "OcclusionMap",
     "OrientedBoxes",
     "OutOfMemoryError",
     "Outputs",
@@ -167,6 +171,7 @@ __all__ = [
     "StageTime",
     "StageTimes",
     "Temporal",
+    "TiledCoverage",
     "Tolerance",
     "UnoccludedComparison",
     "Verdict",
@@ -195,6 +200,10 @@ __all__ = [
 
 # Where the names are that load at their first use, because culling does not need them.
 _LATER = {
+    "BspTiling": "methods",
+    "TiledCoverage": "methods",
+    "MapResult": "methods",
+    "OcclusionMap": "methods",
     "recommend": "recommendation",
     "Recommendation": "recommendation",
 }

@@ -176,6 +176,16 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="instead: what is lost with fewer or simpler occluders; --occluders --help tells more",
     )
+    parser.add_argument(
+        "--maps",
+        action="store_true",
+        help="instead: hierarchical occlusion maps beside the cull; --maps --help tells more",
+    )
+    parser.add_argument(
+        "--tiling",
+        action="store_true",
+        help="instead: coverage bits in BSP order beside depth tiles; --tiling --help tells more",
+    )
     parser.add_argument("--instances", type=args.count, help="in every scene but the castle")
     parser.add_argument("--views", type=args.count, help="of every scene")
     parser.add_argument(
@@ -200,6 +210,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from . import occluders
 
         return occluders.main([each for each in arguments if each != "--occluders"])
+    if "--maps" in arguments:
+        from . import maps
+
+        return maps.main([each for each in arguments if each != "--maps"])
+    if "--tiling" in arguments:
+        from . import tiling
+
+        return tiling.main([each for each in arguments if each != "--tiling"])
     parsed = parser.parse_args(arguments)
     return args.execute(
         PROG,

@@ -4,4 +4,7 @@ Nothing of the certified path uses them, and `import hizvk` does not load them.
 Their names are reachable from `hizvk`, too.
 """
 
-__all__: list[str] = []
+from .occlusion_map import MapResult, OcclusionMap
+from .tiling import BspTiling, TiledCoverage
+
+__all__ = ["BspTiling", "MapResult", "OcclusionMap", "TiledCoverage"]

@@ -13,13 +13,15 @@
 //!
 //! The drawing is recorded into the caller's encoder; nothing here submits or reads back.
 
+#[cfg(feature = "methods")]
+pub(crate) mod copies;
 pub(crate) mod depth;
 mod device_meshes;
 pub(crate) mod device_raster;
 pub(crate) mod drawing;
 pub(crate) mod host_raster;
 mod meshlets;
-mod placement;
+pub(crate) mod placement;
 mod shapes;
 pub(crate) mod surface;
 pub(crate) mod uploaded;

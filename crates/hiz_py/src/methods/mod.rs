@@ -1,0 +1,4 @@
+//! The texts' own methods.
+
+pub(crate) mod maps;
+pub(crate) mod tiling;
