@@ -24,6 +24,9 @@ say "the adapter under test"
 # Always the whole workspace: a smaller selection has other features in some dependencies, so wgpu
 # would be compiled again.
 rust_tests() {
+  # A debug build of wgpu takes a backtrace at each lock where RUST_BACKTRACE is set.
+  # That is a tenth of the time of these tests. Panics keep their backtraces.
+  export RUST_LIB_BACKTRACE=0
   if have cargo-nextest; then
     cargo nextest run --workspace "${LOCKED[@]}" --no-fail-fast
   else

@@ -116,8 +116,17 @@ from .tolerance import Tolerance
 from .views import ViewsResult
 
 if TYPE_CHECKING:
-    from .methods import BspTiling, MapResult, OcclusionMap, TiledCoverage
+    from .methods import (
+        BspTiling,
+        HierarchicalVisibility,
+        HierarchyFrame,
+        MapResult,
+        OcclusionMap,
+        PublishedTest,
+        TiledCoverage,
+    )
     from .recommendation import Recommendation, recommend
+    from .sweeping import Sweep, SweepInterrupted, cube, sweep, viewshed, visible_sets
 
 __all__ = [
     "ABSENT",
@@ -140,6 +149,8 @@ __all__ = [
     "DirectionalLight",
     "DrawTemplate",
     "Explanation",
+    "HierarchicalVisibility",
+    "HierarchyFrame",
     "HizError",
     "HizWarning",
     "InnerBoxes",
@@ -164,12 +175,15 @@ __all__ = [
     "Points",
     "Projected",
     "ProxyCheck",
+    "PublishedTest",
     "Pyramid",
     "Recommendation",
     "Spheres",
     "SplitMesh",
     "StageTime",
     "StageTimes",
+    "Sweep",
+    "SweepInterrupted",
     "Temporal",
     "TiledCoverage",
     "Tolerance",
@@ -183,6 +197,7 @@ __all__ = [
     "colour_points",
     "compare",
     "compare_unoccluded",
+    "cube",
     "depth_from_points",
     "gather",
     "inner_boxes",
@@ -192,20 +207,32 @@ __all__ = [
     "reference",
     "select_occluders",
     "split_mesh",
+    "sweep",
+    "viewshed",
     "visible",
     "visible_fraction",
+    "visible_sets",
     "wgsl",
 ]
 
 
-# Where the names are that load at their first use, because culling does not need them.
+#: Names that are loaded at their first use, with their packages: a cull does not need them.
 _LATER = {
     "BspTiling": "methods",
-    "TiledCoverage": "methods",
+    "HierarchicalVisibility": "methods",
+    "HierarchyFrame": "methods",
     "MapResult": "methods",
     "OcclusionMap": "methods",
-    "recommend": "recommendation",
+    "PublishedTest": "methods",
+    "TiledCoverage": "methods",
     "Recommendation": "recommendation",
+    "recommend": "recommendation",
+    "Sweep": "sweeping",
+    "SweepInterrupted": "sweeping",
+    "cube": "sweeping",
+    "sweep": "sweeping",
+    "viewshed": "sweeping",
+    "visible_sets": "sweeping",
 }
 
 

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 __all__ = ["main"]
 
 #: The library that the Vulkan loader is, by `sys.platform`.
-LOADERS: Final = {"win32": "vulkan-1.dll", "darwin": "libvulkan.1.dylib"}
+#: On macOS there is none to look for, because Metal is used.
+LOADERS: Final = {"win32": "vulkan-1.dll"}
 LINUX_LOADER: Final = "libvulkan.so.1"
 #: Where the Vulkan loader looks for drivers on Linux, beside what the environment adds.
 DRIVER_FOLDERS: Final = (
@@ -42,7 +43,13 @@ DELEGATED: Final = {
     "bench": "measures speed and error on this machine",
 }
 
-INSTALL_HINT: Final = "apt install libvulkan1 mesa-vulkan-drivers"
+#: How to get a driver, by `sys.platform`.
+#: Twin: `INSTALL_HINT` in ``crates/hiz_core/src/headless/adapter.rs``.
+INSTALL_HINTS: Final = {
+    "win32": "install the driver of the GPU, which brings Vulkan and Direct3D 12",
+    "darwin": "Metal is part of macOS; use a session that may use the GPU",
+}
+LINUX_HINT: Final = "apt install libvulkan1 mesa-vulkan-drivers"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -106,7 +113,7 @@ def _info(as_json: bool) -> int:
     for adapter in told["adapters"]:
         print(f"  {hizvk.Adapter(**adapter)}")
     if not told["adapters"]:
-        print(f"  none: {INSTALL_HINT}")
+        print(f"  none: {_install_hint()}")
     return 0
 
 
@@ -127,17 +134,16 @@ def checks() -> list[DoctorCheck]:
             "package", True, f"hizvk {hizvk.__version__}, Python {platform.python_version()}"
         )
     ]
-    loader = LOADERS.get(sys.platform, LINUX_LOADER)
-    try:
-        ctypes.CDLL(loader)
-        found.append(DoctorCheck("vulkan loader", True, loader))
-    except OSError as error:
-        return [*found, DoctorCheck("vulkan loader", False, str(error), INSTALL_HINT)]
-    if sys.platform not in LOADERS:  # elsewhere drivers are not registered by files alone
+    if sys.platform != "darwin":
+        found.append(_loader())
+        if not found[-1].passed:
+            return found
+    # Elsewhere drivers are not registered by files alone.
+    if sys.platform not in ("darwin", "win32"):
         found.append(_drivers())
     adapters = hizvk.adapters()
     if not adapters:
-        return [*found, DoctorCheck("adapters", False, "none", INSTALL_HINT)]
+        return [*found, DoctorCheck("adapters", False, "none", _install_hint())]
     found.append(DoctorCheck("adapters", True, "; ".join(map(str, adapters))))
     try:
         device = hizvk.Device()
@@ -152,6 +158,22 @@ def checks() -> list[DoctorCheck]:
         )
     )
     return [*found, *(_try_culling(device, reversed_z) for reversed_z in (True, False))]
+
+
+def _install_hint() -> str:
+    return INSTALL_HINTS.get(sys.platform, LINUX_HINT)
+
+
+def _loader() -> DoctorCheck:
+    """Whether the Vulkan loader can be opened; on Windows Direct3D 12 can take its place."""
+    loader = LOADERS.get(sys.platform, LINUX_LOADER)
+    try:
+        ctypes.CDLL(loader)
+    except OSError as error:
+        if loader == LINUX_LOADER:
+            return DoctorCheck("vulkan loader", False, str(error), _install_hint())
+        return DoctorCheck("vulkan loader", True, f"no {loader}; Direct3D 12 is left")
+    return DoctorCheck("vulkan loader", True, loader)
 
 
 def _drivers() -> DoctorCheck:
@@ -171,7 +193,7 @@ def _drivers() -> DoctorCheck:
             "correct or unset VK_DRIVER_FILES",
         )
     if not files:
-        return DoctorCheck("vulkan drivers", False, "no driver description found", INSTALL_HINT)
+        return DoctorCheck("vulkan drivers", False, "no driver description found", LINUX_HINT)
     return DoctorCheck("vulkan drivers", True, ", ".join(files))
 
 

@@ -29,6 +29,7 @@ from .errors import LimitError
 from .hints import Question
 from .mesh import as_meshes
 from .options import Outputs, cull_options, cull_request
+from .progress import Progress, check_progress
 from .renewal import Source
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import CullResult
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     from .mesh import MeshLike
     from .methods import MapResult, OcclusionMap
     from .options import CullKeywords, CullOptions, MeshLods, OptionKeywords
+    from .progress import ProgressLike
     from .tolerance import Tolerance
     from .views import _AmongLike
 
@@ -60,7 +62,7 @@ _TABLES_KEPT = 4
 
 
 class Device:
-    """A Vulkan device with its queue and pipelines.
+    """A device of the GPU, or of a software driver, with its queue and pipelines.
 
     Parameters
     ----------
@@ -184,7 +186,7 @@ class Device:
             None if scales is None else _arguments.floats_or_scalar("scales", scales, len(bounds))
         )
         uploaded = self._engine.instances(kind, arrays, (strict, stored_order), ids, sizes)
-        return Instances(self, uploaded, points=are_points(bounds))
+        return Instances(self, uploaded, points=are_points(bounds), bounds=bounds)
 
     @overload
     def occluders(
@@ -218,10 +220,10 @@ class Device:
 
         Parameters
         ----------
-        vertices : (V, 3) float array; or a Mesh, a mesh of trimesh or Open3D, or a list of them
+        vertices : (V, 3) float array; or a Mesh, or a list of them
             World positions, or with `transforms` those of the mesh's own space.
-            Objects of other libraries are known by their ``vertices`` and ``faces`` (trimesh) or
-            ``triangles`` (Open3D).
+            A mesh of trimesh, Open3D or PyVista will do as a `Mesh` does (`Mesh.of`).
+            A scene of trimesh stands for its meshes, placed by its transforms.
             A list may also hold tuples ``(vertices, triangles)`` or
             ``(vertices, triangles, transforms)``.
         triangles : (T, 3) integer array
@@ -259,6 +261,7 @@ class Device:
         only: CullResult | PassResult | npt.ArrayLike | None = None,
         max_triangles: int | None = None,
         max_occluders: int | None = None,
+        progress: ProgressLike = None,
     ) -> DepthImage: ...
 
     @overload
@@ -286,6 +289,7 @@ class Device:
         only: CullResult | PassResult | npt.ArrayLike | None = None,
         max_triangles: int | None = None,
         max_occluders: int | None = None,
+        progress: ProgressLike = None,
     ) -> DepthImage | tuple[int, int, int, int] | None:
         """Renders occluders into a depth image that stays on the device.
 
@@ -356,6 +360,8 @@ class Device:
             Each occluder that is left out costs hiding, and hidden ones cost little time anyway.
         max_occluders : int, optional
             At most so many copies of meshes are drawn: those that are largest in the image.
+        progress : bool or function, optional
+            As everywhere (`hizvk.progress`), for `conservative`; the image is one step.
 
         Returns
         -------
@@ -384,6 +390,7 @@ class Device:
         conservative = _arguments.flag("conservative", conservative)
         refinement = _arguments.integer("refinement", refinement, low=0, high=8)
         _arguments.choice("rasteriser", rasteriser, words(Rasteriser))
+        check_progress(progress)
         drawing = Drawing(
             chosen("only", only, occluders),
             limit("max_triangles", max_triangles),
@@ -413,9 +420,11 @@ class Device:
                     "conservative: expected False beside rasteriser, only, max_triangles and "
                     "max_occluders, got True"
                 )
-            drawn = self._engine.render_depth_conservative(
-                occluders._inner, camera._inner, refinement
-            )
+            with Progress(progress, "conservative depth", 1) as steps:
+                drawn = self._engine.render_depth_conservative(
+                    occluders._inner, camera._inner, refinement
+                )
+                steps.step()
             return DepthImage(self, drawn, camera)
         drawn = self._engine.render_depth(occluders._inner, camera._inner, rasteriser, *drawing)
         return DepthImage(self, drawn, camera)
@@ -832,9 +841,7 @@ class Device:
                 restriction,
                 not wait,
             )
-            return CullResult(
-                self, culling, Question(camera, pyramid, options, instances._are_sizeless)
-            )
+            return CullResult(self, culling, Question(camera, pyramid, options, *instances._known))
         cameras, pyramids = pairs(camera, pyramid, self)
         for number, (one, of) in enumerate(zip(cameras, pyramids, strict=True)):
             if one != of.camera:
@@ -860,7 +867,7 @@ class Device:
             not wait,
         )
         questions = [
-            Question(one, of, options, instances._are_sizeless)
+            Question(one, of, options, *instances._known)
             for one, of in zip(cameras, pyramids, strict=True)
         ]
         return ViewsResult(self, culled, questions)

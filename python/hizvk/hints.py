@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ._core import Counts
     from .bounds import Bounds
     from .options import CullOptions
+    from .remembered import Remembered
     from .resources import Pyramid
 
 __all__ = ["Counted", "Question", "Tally", "posed_otherwise"]
@@ -92,6 +93,8 @@ class Question:
     options: CullOptions
     points: bool
     """Whether all bounds have size zero."""
+    remembered: Remembered | None = None
+    """What was tested, where the host still knows it; for pictures."""
 
     def hints(self, stats: Counted, bounds: Bounds | None = None) -> tuple[str, ...]:
         """What looks like a mistake, in whole sentences; empty if nothing does.

@@ -18,10 +18,10 @@ from ..bounds import Boxes
 from ..commands import arguments as args
 from ..commands import report
 from ..commands.page import Page
-from ..commands.progress import Progress
 from ..device import Device
 from ..mesh import Mesh
 from ..occluders import inner_boxes, inner_prisms, split_mesh
+from ..progress import Progress
 from ..scenes import box_mesh, village
 from ..scenes.boulders import boulders
 from ..scenes.hedge import hedge
@@ -179,16 +179,14 @@ def run(
     out.mkdir(parents=True, exist_ok=True)
     device = Device()
     found = Report(command=command, seed=seed, adapter=device.adapter)
-    steps = Progress(len(keys), f"{PROG}: {', '.join(keys)}")
-    try:
+    label = f"{PROG}: {', '.join(keys)}"
+    with Progress(True, label, len(keys), after_s=0.0) as steps:
         for key in keys:
             try:
                 found.scenes.append(_measure(device, key, castle, seed, instances, views))
             except catalogue.Missing as missing:
                 found.missing.append(str(missing))
             steps.step(key)
-    finally:
-        steps.close()
     found.seconds = time.perf_counter() - started
     report.write(out, found.as_data(), found.page())
     return found

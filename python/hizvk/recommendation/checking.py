@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from ..camera import Camera
     from ..depth import DepthArray
     from ..measuring.configuration import Configuration
+    from ..progress import Progress
     from ..resources import Occluders
 
 __all__ = ["CheckedCandidates", "Judge", "by_oracle", "by_rays", "hold"]
@@ -138,6 +139,7 @@ def hold(
     judge: Judge,
     *,
     every_ray: bool,
+    steps: Progress,
 ) -> CheckedCandidates:
     """Compares every candidate with what is visible.
 
@@ -158,6 +160,8 @@ def hold(
         With bare points and a guard among the candidates, what the guard keeps then counts as
         visible.
         Such points lie on what the image shows, and it knows the depth only at its pixels' centres.
+    steps : Progress
+        Told of each view of each kind of bounds.
     """
     found = CheckedCandidates(judge.method, [0] * len(chosen), [0] * len(chosen))
     random = np.random.default_rng(0)
@@ -194,6 +198,7 @@ def hold(
             for number in members:
                 found.hides[number] += int((visible & culled[number]).sum())
                 found.unclear[number] += int((open_ & culled[number]).sum()) if every_ray else 0
+            steps.step("checking")
     return found
 
 

@@ -12,12 +12,13 @@ from ..measuring.pareto import front
 from ..measuring.spread import spread
 from ..oneline import default_device
 from ..options import cull_options
+from ..progress import Progress, check_progress
 from ..resources import Instances
 from . import checking
 from .answer import Recommendation, notes_on
 from .arguments import alternatives_of, cameras_of, device_of, images_of, occluders_on, upload
 from .candidate import Candidate, choose
-from .timing import DepthSource, time_all
+from .timing import DepthSource, number_of_steps, time_all
 from .tried import promised
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from ..camera import Camera
     from ..mesh import MeshLike
     from ..options import CullOptions, OptionKeywords
+    from ..progress import ProgressLike
     from ..resources import Occluders
 
 __all__ = ["recommend"]
@@ -50,6 +52,7 @@ def recommend(
     max_ms: float | None = None,
     kept_within: float = 1.05,
     repetitions: int = 5,
+    progress: ProgressLike = None,
     **keywords: Unpack[OptionKeywords],
 ) -> Recommendation:
     """Measures configurations on the caller's scene, checks them there, and recommends one.
@@ -93,7 +96,7 @@ def recommend(
         depth does not hide stays unclear.
     cameras : Camera or sequence of Camera
         Typical views.
-    occluders : Occluders, Mesh, a mesh of trimesh or Open3D, or a sequence of meshes
+    occluders : Occluders, Mesh, a mesh of trimesh, Open3D or PyVista, or a sequence of meshes
         What hides.
         Then rendering is part of the time, and conservative depth images, small ones too, are among
         the candidates.
@@ -122,6 +125,8 @@ def recommend(
         the candidate that keeps least.
     repetitions : int
         How often each is timed, beside the first call.
+    progress : bool or function, optional
+        As everywhere (`hizvk.progress`); a step is a cull, a depth image or a check.
     **keywords
         Any field of `CullOptions`, in the place of that of `options`.
 
@@ -164,6 +169,7 @@ def recommend(
         max_ms = _arguments.number("max_ms", max_ms, above=0.0)
     kept_within = _arguments.number("kept_within", kept_within, at_least=1.0)
     repetitions = _arguments.integer("repetitions", repetitions, low=1, high=10_000)
+    check_progress(progress)
     if device is not None:
         _arguments.instance("device", device, Device, "a Device or None")
     images = None if depths is None else images_of(depths, views, kind, scale, invalid)
@@ -183,13 +189,17 @@ def recommend(
 
     chosen = promised(tuple(volumes), coverage, rendered=walls is not None, points=points)
     source = DepthSource(device, walls, views, images)
-    times = time_all(chosen, volumes, source, repetitions, options)
     every_ray = walls is not None and coverage == "area"
     if walls is not None and every_ray:
         judge = checking.by_rays(walls, views)
     else:
         judge = checking.by_oracle(source.full_image, views, coverage)
-    check = checking.hold(chosen, times.masks, alternatives, judge, every_ray=every_ray)
+    total = number_of_steps(chosen, views, repetitions) + len(alternatives) * len(views)
+    with Progress(progress, "trying candidates", total) as steps:
+        times = time_all(chosen, volumes, source, repetitions, options, steps)
+        check = checking.hold(
+            chosen, times.masks, alternatives, judge, every_ray=every_ray, steps=steps
+        )
     kept = [sum(int(mask.sum()) for mask in masks) for masks in times.masks]
     candidates = [
         Candidate(

@@ -23,9 +23,10 @@ if TYPE_CHECKING:
     from ..measuring.configuration import Configuration
     from ..measuring.spread import Spread
     from ..options import CullOptions
+    from ..progress import Progress
     from ..resources import DepthImage, Instances, Occluders, Pyramid
 
-__all__ = ["DepthSource", "Times", "time_all"]
+__all__ = ["DepthSource", "Times", "number_of_steps", "time_all"]
 
 #: A depth image that takes longer than this is not rendered again.
 SLOW_MS: Final = 200.0
@@ -120,12 +121,21 @@ class Times:
         return spread(self.cull[k] + self.read[k], plus=shared)
 
 
+def number_of_steps(
+    chosen: Sequence[Configuration], views: Sequence[Camera], repetitions: int
+) -> int:
+    """How many steps `time_all` takes: culls and depth images."""
+    once = len(chosen) + len({one.depth for one in chosen})
+    return once * len(views) * (repetitions + 1)
+
+
 def time_all(
     chosen: Sequence[Configuration],
     volumes: Mapping[str, Instances],
     source: DepthSource,
     repetitions: int,
     base: CullOptions,
+    steps: Progress,
 ) -> Times:
     """Times every candidate `repetitions` times on every view.
 
@@ -141,6 +151,7 @@ def time_all(
             made = source.pyramids(variants, k)
             for variant, (_, took) in made.items():
                 depth_ms[variant][repetition, k] = took
+                steps.step("timing")
             for turn in range(len(chosen)):
                 number = (turn + repetition * len(chosen) // rounds + k) % len(chosen)
                 one = chosen[number]
@@ -150,5 +161,6 @@ def time_all(
                 culling[number, repetition, k], reading[number, repetition, k] = both
                 if repetition == 0:
                     masks[number].append(mask)
+                steps.step("timing")
     counted = {variant: ms[1:] for variant, ms in depth_ms.items()}
     return Times(chosen, counted, culling[:, 1:], reading[:, 1:], masks)

@@ -4,6 +4,19 @@
 //! Nothing outside this room imports it, so no certified call reaches it; `tests/rooms.rs` checks
 //! that.
 
+mod coarse_level;
+mod fragment_levels;
+pub mod hierarchy;
 pub mod occlusion_map;
 mod seen;
+mod texts;
 pub mod tiling;
+
+pub use coarse_level::{LevelWay, MethodLevels, SHAPES};
+#[cfg(feature = "testing")]
+pub(crate) use coarse_level::{TILE, coarse_level_module};
+#[cfg(feature = "testing")]
+pub(crate) use fragment_levels::fragment_levels_module;
+pub use texts::{Text, TextCamera, TextCull};
+#[cfg(feature = "testing")]
+pub(crate) use texts::{TextUniform, WORKGROUP as TEXT_WORKGROUP, texts_module};
