@@ -116,7 +116,15 @@ from .tolerance import Tolerance
 from .views import ViewsResult
 
 if TYPE_CHECKING:
-    from .methods import HierarchicalVisibility, HierarchyFrame, PublishedTest
+    from .methods import (
+        BspTiling,
+        HierarchicalVisibility,
+        HierarchyFrame,
+        MapResult,
+        OcclusionMap,
+        PublishedTest,
+        TiledCoverage,
+    )
     from .recommendation import Recommendation, recommend
     from .sweeping import Sweep, SweepInterrupted, cube, sweep, viewshed, visible_sets
 
@@ -129,6 +137,7 @@ __all__ = [
     "ApproximateResult",
     "BoundsCheck",
     "Boxes",
+    "BspTiling",
     "Camera",
     "Comparison",
     "CullOptions",
@@ -151,11 +160,13 @@ __all__ = [
     "LodByDistance",
     "LodByError",
     "LodBySize",
+    "MapResult",
     "Mesh",
     "MeshLods",
     "NoAdapterError",
     "OccluderSelection",
     "Occluders",
+    "OcclusionMap",
     "OrientedBoxes",
     "OutOfMemoryError",
     "Outputs",
@@ -174,6 +185,7 @@ __all__ = [
     "Sweep",
     "SweepInterrupted",
     "Temporal",
+    "TiledCoverage",
     "Tolerance",
     "UnoccludedComparison",
     "Verdict",
@@ -206,9 +218,13 @@ __all__ = [
 
 #: Names that are loaded at their first use, with their packages: a cull does not need them.
 _LATER = {
+    "BspTiling": "methods",
     "HierarchicalVisibility": "methods",
     "HierarchyFrame": "methods",
+    "MapResult": "methods",
+    "OcclusionMap": "methods",
     "PublishedTest": "methods",
+    "TiledCoverage": "methods",
     "Recommendation": "recommendation",
     "recommend": "recommendation",
     "Sweep": "sweeping",
