@@ -104,7 +104,7 @@ def fill_depth(
 
 
 def _farthest_after(depth: npt.NDArray[Any], radius: int) -> npt.NDArray[Any]:
-    """The farthest depth of each row and the `radius` rows after it; windows double in each step."""
+    """The farthest depth of each row and the `radius` rows after it; windows double each time."""
     found = depth.copy(order="K")
     rows = 1
     while rows <= radius:
