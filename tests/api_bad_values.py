@@ -949,6 +949,30 @@ TABLES: dict[str, Table] = {
             "sampling": SAMPLING,
         },
     ),
+    "fill_depth": Table(
+        lambda _: (hizvk.fill_depth, {"depth": np.ones((6, 8)), "radius_px": 2, "kind": "z"}),
+        {
+            "depth": [
+                (np.ones(48), ValueError, "expected float (height, width), or whole numbers of 16"),
+                (np.ones((6, 8), np.uint8), TypeError, "got (6, 8) uint8"),
+                (np.ones((6, 8), bool), TypeError, "got (6, 8) bool"),
+                (np.full((6, 8), 2**60), ValueError, "which float64 cannot hold"),
+                ([[1.0, 2.0], [3.0]], ValueError, "no array"),
+                ("depth", TypeError, "got ndarray array('depth'"),
+                (None, TypeError, "got ndarray array(None"),
+            ],
+            "radius_px": [
+                (-1, ValueError, "expected an integer in 0..1024, got int -1"),
+                (1025, ValueError, "got int 1025"),
+                (2.0, TypeError, "got float 2.0"),
+            ],
+            "kind": [
+                ("ndc", ValueError, 'expected one of "z", "distance", got str \'ndc\''),
+                (None, TypeError, "got None"),
+            ],
+            "invalid": INVALID,
+        },
+    ),
     "depth_from_points": Table(
         lambda _: (
             hizvk.depth_from_points,
