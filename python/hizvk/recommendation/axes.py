@@ -30,6 +30,7 @@ FEW: Final = 64
 class Facts:
     """What there is to choose from."""
 
+    instances: int
     triangles: int | None
     """Of all copies of the occluders; None where depth is given."""
     selected: tuple[int, ...]
@@ -81,8 +82,10 @@ def _ends(best: Configuration, _: Facts) -> list[Configuration]:
     return [replace(best, depth=replace(best.depth, depths="both"))]
 
 
-def _hierarchy(best: Configuration, _: Facts) -> list[Configuration]:
-    return [replace(best, hierarchy=tiers) for tiers in (0, 1, 2, 3)]
+def _hierarchy(best: Configuration, facts: Facts) -> list[Configuration]:
+    # A box of tier t holds 64^t instances; fewer have no such tier.
+    tiers = [tier for tier in (1, 2, 3) if facts.instances > 64**tier]
+    return [replace(best, hierarchy=tier) for tier in [0, *tiers]] if tiers else []
 
 
 def _lod(best: Configuration, facts: Facts) -> list[Configuration]:

@@ -106,7 +106,7 @@ def recommend(
     max_triangles     a half, an eighth and a 32nd of the triangles are drawn, for plain depth
     select_occluders  the meshes that `select_occluders` keeps, also with a quarter of the triangles
     depths            a pyramid of both ends, so that groups that surely show need no test
-    hierarchy         flat, groups, and two or three tiers
+    hierarchy         flat, groups, and two or three tiers, as far as there are so many instances
     lod               the rules for levels of detail, if there are `meshes`
     ================  =============================================================================
 
@@ -244,7 +244,8 @@ def recommend(
     triangles = None if walls is None else walls.num_triangles
     selections = selections_of(occluders, triangles or 0)
     source.selections = {budget: device.occluders(some) for budget, (_, some) in selections.items()}
-    facts = Facts(triangles, tuple(selections), bare is not None, rules)
+    count = len(next(iter(volumes.values())))
+    facts = Facts(count, triangles, tuple(selections), bare is not None, rules)
     question = Question(
         alternatives=alternatives,
         volumes=volumes,
@@ -270,7 +271,7 @@ def recommend(
         best=picked,
         within_budget=within,
         candidates=tuple(candidates),
-        tested=len(next(iter(volumes.values()))) * len(views),
+        tested=count * len(views),
         adapter=str(device.adapter),
         check=check.words(),
         axes=search.axes(candidates),
