@@ -30,6 +30,8 @@ ARRAYS = [
     ("Spheres", "radii"),
     ("Boxes", "min"),
     ("Boxes", "max"),
+    ("Boxes.from_corners", "corners"),
+    ("OrientedBoxes.from_corners", "corners"),
     ("OrientedBoxes", "centers"),
     ("OrientedBoxes", "half_sizes"),
     ("OrientedBoxes", "rotations"),
@@ -43,6 +45,8 @@ ARRAYS = [
     ("Mesh", "vertices"),
     ("Mesh", "triangles"),
     ("Mesh", "transforms"),
+    ("Mesh.of", "mesh"),
+    ("Mesh.of", "transforms"),
     ("Device.occluders", "vertices"),
     ("Device.occluders", "triangles"),
     ("Device.occluders", "transforms"),
@@ -88,6 +92,7 @@ ARRAYS = [
     ("viewshed", "heights"),
     ("viewshed", "cell_size"),
     ("viewshed", "eye"),
+    ("HierarchicalVisibility.render", "previous"),
 ]
 
 DTYPES = [

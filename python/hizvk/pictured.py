@@ -19,13 +19,14 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-    from ._arguments import Size
     from ._types import DepthEnd
     from .bounds import Bounds
-    from .camera import Camera
     from .mesh import MeshLike
     from .show.explained import Explained
     from .show.levels import Levels
+
+    #: Reads one level as depth of a kind.
+    _Read = Callable[[DepthKind | None], npt.NDArray[np.float32]]
 
 __all__ = ["PicturedDepth", "PicturedExplanation", "PicturedPyramid", "PicturedResult"]
 
@@ -54,49 +55,36 @@ def _unless_lost(make: Callable[[], Any]) -> Any:
         return None  # the notebook falls back to `repr`
 
 
-class _HasCamera(_Shown):
-    """What belongs to a camera."""
+def _levels(thing: Any, kind: DepthKind | None, unit: str, levels: dict[int, _Read]) -> Levels:
+    """What is shown of a depth image or of a pyramid; None is view depth, if the camera says it."""
+    from .show.levels import Levels
+    from .view_depth import RayView
 
-    if TYPE_CHECKING:
-
-        @property
-        def camera(self) -> Camera:
-            """The camera."""
-
-        @property
-        def size(self) -> Size:
-            """Of its image."""
-
-    def _levels(
-        self,
-        kind: DepthKind | None,
-        unit: str,
-        levels: dict[int, Callable[[DepthKind | None], npt.NDArray[np.float32]]],
-    ) -> Levels:
-        from .show.levels import Levels
-        from .view_depth import RayView
-
-        unit = _arguments.text("unit", unit)
-        if kind is None and not RayView(self.camera).is_bare:
-            kind = "z"
-        made = [(k, read(kind)) for k, read in levels.items()]
-        what = {"z": "view depth z", "distance": "distance along the ray"}.get(
-            kind or "", "NDC depth"
-        )
-        is_metric = kind in ("z", "distance")
-        return Levels(repr(self).strip("<>"), self.size, made, what, unit if is_metric else "")
+    unit = _arguments.text("unit", unit)
+    if kind is None and not RayView(thing.camera).is_bare:
+        kind = "z"
+    made = [(k, read(kind)) for k, read in levels.items()]
+    what = {"z": "view depth z", "distance": "distance along the ray"}.get(kind or "", "NDC depth")
+    is_metric = kind in ("z", "distance")
+    return Levels(repr(thing).strip("<>"), thing.size, made, what, unit if is_metric else "")
 
 
-class PicturedDepth(_HasCamera):
+def _of_image(image: Any) -> dict[int, _Read]:
+    return {0: lambda kind: image.numpy(kind=kind)}
+
+
+def _of_pyramid(pyramid: Any, end: DepthEnd | None) -> dict[int, _Read]:
+    return {
+        k: lambda kind, k=k: pyramid.level(k, end, kind=kind)  # type: ignore[misc]
+        for k in (0, *pyramid.levels)
+    }
+
+
+class PicturedDepth(_Shown):
     """`DepthImage` as a picture."""
 
-    if TYPE_CHECKING:
-
-        def numpy(self, *, kind: DepthKind | None = None) -> npt.NDArray[np.float32]:
-            """As `DepthImage` has it."""
-
     def _picture(self) -> Levels:
-        return self._levels(None, "m", {0: lambda kind: self.numpy(kind=kind)})
+        return _levels(self, None, "m", _of_image(self))
 
     def plot(self, *, kind: DepthKind | None = None, unit: str = "m") -> Any:
         """Draws the image with a scale of its depth.
@@ -120,33 +108,14 @@ class PicturedDepth(_HasCamera):
         TypeError, ValueError
             They name the parameter, what it expects and what came.
         """
-        return self._levels(kind, unit, {0: lambda kind: self.numpy(kind=kind)}).plot()
+        return _levels(self, kind, unit, _of_image(self)).plot()
 
 
-class PicturedPyramid(_HasCamera):
+class PicturedPyramid(_Shown):
     """`Pyramid` as a picture."""
 
-    if TYPE_CHECKING:
-
-        @property
-        def levels(self) -> range:
-            """As `Pyramid` has it."""
-
-        def level(
-            self, k: int, end: DepthEnd | None = None, *, kind: DepthKind | None = None
-        ) -> npt.NDArray[np.float32]:
-            """As `Pyramid` has it."""
-
-    def _read(
-        self, end: DepthEnd | None
-    ) -> dict[int, Callable[[DepthKind | None], npt.NDArray[np.float32]]]:
-        return {
-            k: lambda kind, k=k: self.level(k, end, kind=kind)  # type: ignore[misc]
-            for k in (0, *self.levels)
-        }
-
     def _picture(self) -> Levels:
-        return self._levels(None, "m", self._read(None))
+        return _levels(self, None, "m", _of_pyramid(self, None))
 
     def plot(
         self, end: DepthEnd | None = None, *, kind: DepthKind | None = None, unit: str = "m"
@@ -185,7 +154,7 @@ class PicturedPyramid(_HasCamera):
         >>> hiz._repr_html_().count("<tr>")  # what a notebook shows: a line per level
         10
         """
-        return self._levels(kind, unit, self._read(end)).plot()
+        return _levels(self, kind, unit, _of_pyramid(self, end)).plot()
 
 
 class PicturedResult(_Shown):

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ._types import DepthEnd
     from .camera import Camera
 
-    Doubles = npt.NDArray[np.float64]
+    _Doubles = npt.NDArray[np.float64]
 
 __all__ = ["RayView", "converted"]
 
@@ -101,9 +101,9 @@ class RayView:
         inner: Any = camera._inner
         self.size = camera.size
         self.reversed_z = camera.reversed_z
-        self._rows: Doubles = np.array(inner.rows(), np.float64)
+        self._rows: _Doubles = np.array(inner.rows(), np.float64)
         #: The rows are about this point.
-        self._origin: Doubles = np.array(inner.origin(), np.float64)
+        self._origin: _Doubles = np.array(inner.origin(), np.float64)
         w_length = float(np.linalg.norm(self._rows[3, :3]))
         self.is_parallel = w_length == 0.0
         self.is_bare = self.is_parallel and not inner.is_posed()
@@ -113,8 +113,8 @@ class RayView:
                 -1.0 if self.reversed_z else 1.0
             )
             #: Unit vector along the view.
-            self.forward: Doubles = self._rows[2, :3] / self._slope
-            self.eye: Doubles | None = None
+            self.forward: _Doubles = self._rows[2, :3] / self._slope
+            self.eye: _Doubles | None = None
         else:
             self.forward = self._rows[3, :3]
             #: Where all rays start; None for parallel rays.
@@ -124,10 +124,10 @@ class RayView:
         self.right = _unit(self._rows[0, :3], self.forward)
         self.up = _unit(self._rows[1, :3], self.forward)
 
-    def depth_of(self, ndc: Doubles, level: int = 0) -> Doubles:
+    def depth_of(self, ndc: _Doubles, level: int = 0) -> _Doubles:
         """View depth of the NDC depths of one level, in world units."""
         if self.is_parallel:
-            parallel: Doubles = (ndc - self._rows[2, 3]) / self._slope
+            parallel: _Doubles = (ndc - self._rows[2, 3]) / self._slope
             return parallel
         constant_of_w = self._rows[3, 3]
         slope = float(self._rows[2, :3] @ self.forward)
@@ -139,7 +139,7 @@ class RayView:
         with np.errstate(divide="ignore"):
             # z_clip = slope * (w - constant_of_w) + rows[2, 3]; and the w row has length 1.
             z = (self._rows[2, 3] - slope * constant_of_w) / (ndc - slope)
-        found: Doubles = np.where(ndc == slope, np.inf, z)
+        found: _Doubles = np.where(ndc == slope, np.inf, z)
         return found
 
     def depth_at(self, ndc: float, column: float, row: float) -> float:
@@ -156,12 +156,12 @@ class RayView:
         rest = depth_row - (depth_row @ self.forward) * self.forward
         return bool(np.linalg.norm(rest) > OBLIQUE * max(float(np.linalg.norm(depth_row)), 1.0))
 
-    def clip_of(self, positions: Doubles) -> Doubles:
+    def clip_of(self, positions: _Doubles) -> _Doubles:
         """``(N, 4)``: clip coordinates of ``(N, 3)`` world positions, with w in world units."""
-        clip: Doubles = (positions - self._origin) @ self._rows[:, :3].T + self._rows[:, 3]
+        clip: _Doubles = (positions - self._origin) @ self._rows[:, :3].T + self._rows[:, 3]
         return clip
 
-    def ray_lengths(self) -> Doubles:
+    def ray_lengths(self) -> _Doubles:
         """``(height, width)``: how far one goes along the ray of a pixel per unit of view depth."""
         x, y = self._middles(self.size, 0)
         inverse = np.linalg.inv(self._rows[[0, 1, 3], :3])
@@ -169,10 +169,10 @@ class RayView:
             (inverse[axis, 0] * x + inverse[axis, 1] * y[:, None] + inverse[axis, 2]) ** 2
             for axis in range(3)
         ]
-        lengths: Doubles = np.sqrt(squares[0] + squares[1] + squares[2])
+        lengths: _Doubles = np.sqrt(squares[0] + squares[1] + squares[2])
         return lengths
 
-    def corners(self, reach: float) -> Doubles:
+    def corners(self, reach: float) -> _Doubles:
         """``(8, 3)``: the corners of the view volume, which ends at the view depth `reach`.
 
         The four of the near plane come first: left bottom, right bottom, right top, left top.
@@ -193,7 +193,7 @@ class RayView:
             found.append(np.linalg.solve(matrix, np.stack([x * z, y * z, z])).T + self.eye)
         return np.concatenate(found)
 
-    def _middles(self, shape: tuple[int, ...], level: int) -> tuple[Doubles, Doubles]:
+    def _middles(self, shape: tuple[int, ...], level: int) -> tuple[_Doubles, _Doubles]:
         """NDC of the middles of a level's columns and rows, within the image."""
         places = []
         for sides, pixels in zip(shape, self.size, strict=True):
@@ -203,16 +203,16 @@ class RayView:
         return places[1] - 1.0, 1.0 - places[0]
 
 
-def _inverse_w(rows: Doubles, x: Doubles, y: Doubles, ndc: Doubles) -> Doubles:
+def _inverse_w(rows: _Doubles, x: _Doubles, y: _Doubles, ndc: _Doubles) -> _Doubles:
     """The clip w of points at places of the image, by the inverse of the matrix."""
     a, b, c, d = np.linalg.inv(rows)[3]
     reciprocal = a * x + b * y + c * ndc + d
     with np.errstate(divide="ignore"):
-        w: Doubles = np.where(np.abs(reciprocal) < EXACT * abs(c), np.inf, 1.0 / reciprocal)
+        w: _Doubles = np.where(np.abs(reciprocal) < EXACT * abs(c), np.inf, 1.0 / reciprocal)
         return w
 
 
-def _unit(row: Doubles, forward: Doubles) -> Doubles:
+def _unit(row: _Doubles, forward: _Doubles) -> _Doubles:
     """The part of `row` at right angles to `forward`, as a unit vector."""
-    across: Doubles = row - (row @ forward) * forward
+    across: _Doubles = row - (row @ forward) * forward
     return across / np.linalg.norm(across)

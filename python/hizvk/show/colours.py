@@ -14,8 +14,8 @@ import numpy as np
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    Image = npt.NDArray[np.uint8]
-    Doubles = npt.NDArray[np.float64]
+    _Image = npt.NDArray[np.uint8]
+    _Doubles = npt.NDArray[np.float64]
 
 __all__ = [
     "BACKGROUND", "CLASS_COLOURS", "FRUSTUM", "INK", "MARK", "SKY", "Scale", "depth_table", "grey",
@@ -49,7 +49,7 @@ def rgb(colour: str) -> tuple[int, int, int]:
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
 
 
-def depth_table() -> Doubles:
+def depth_table() -> _Doubles:
     """``(256, 3)`` in 0..1: the colours of depth, from near (light) to far (dark)."""
     anchors = np.array([rgb(colour) for colour in reversed(VIRIDIS)]) / 255.0
     places = np.linspace(0.0, len(anchors) - 1.0, 256)
@@ -63,18 +63,18 @@ class Scale(NamedTuple):
     high: float
     is_logarithmic: bool
 
-    def places(self, depth: npt.NDArray[np.floating]) -> Doubles:
+    def places(self, depth: npt.NDArray[np.floating]) -> _Doubles:
         """0 for `low` to 1 for `high`, clipped; NaN for depth that is not finite."""
         with np.errstate(invalid="ignore", divide="ignore"):
             values = np.asarray(depth, np.float64)
             low, high = self.low, self.high
             if self.is_logarithmic:
                 values, low, high = np.log(values), float(np.log(low)), float(np.log(high))
-            shares: Doubles = np.clip((values - low) / (high - low), 0.0, 1.0)
+            shares: _Doubles = np.clip((values - low) / (high - low), 0.0, 1.0)
         shares[~np.isfinite(depth)] = np.nan
         return shares
 
-    def colours(self, depth: npt.NDArray[np.floating]) -> Image:
+    def colours(self, depth: npt.NDArray[np.floating]) -> _Image:
         """``(height, width, 3)``: depth in colours, and `SKY` where it is not finite."""
         places = self.places(depth)
         table = np.concatenate([np.rint(255.0 * depth_table()), [rgb(SKY)]]).astype(np.uint8)
@@ -95,7 +95,7 @@ def scale_of(depth: npt.NDArray[np.floating]) -> Scale:
     return Scale(low, high, False)
 
 
-def grey(depth: npt.NDArray[np.floating]) -> Image:
+def grey(depth: npt.NDArray[np.floating]) -> _Image:
     """``(height, width, 3)``: depth in dark greys, for what is drawn over it."""
     places = scale_of(depth).places(depth)
     shade = np.where(np.isnan(places), SKY_GREY, NEAR_GREY + (FAR_GREY - NEAR_GREY) * places)

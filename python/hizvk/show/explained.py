@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from ..camera import Camera
-    from .colours import Doubles, Image
+    from .colours import _Doubles, _Image
 
 __all__ = ["Explained", "explained_of"]
 
@@ -65,7 +65,7 @@ class Explained(NamedTuple):
     def _metric(self, depth: npt.NDArray[np.float32], level: int = 0) -> npt.NDArray[np.float32]:
         return converted(self.camera, depth, "z" if self._is_metric else None, level)
 
-    def _depths(self) -> Doubles:
+    def _depths(self) -> _Doubles:
         """``(T,)``: depths of the texels as they are shown."""
         if len(self.texels) == 0:
             return np.zeros(0)
@@ -277,7 +277,7 @@ def explained_of(told: Any, camera: Camera, depth: npt.NDArray[np.float32], unit
 
 
 def _frame(
-    image: Image,
+    image: _Image,
     box: tuple[int, int, int, int],
     origin: tuple[int, int],
     scale: float,

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from .._arguments import Size
-    from .colours import Image, Scale
+    from .colours import Scale, _Image
 
-    Floats = npt.NDArray[np.float32]
+    _Floats = npt.NDArray[np.float32]
 
 __all__ = ["Levels", "colour_bar"]
 
@@ -35,7 +35,7 @@ class Levels(NamedTuple):
     """What it is, such as ``Pyramid 90x160, 8 levels``."""
     size: Size
     """``(height, width)`` of level 0."""
-    levels: list[tuple[int, Floats]]
+    levels: list[tuple[int, _Floats]]
     """Number and depths of each level, level 0 first."""
     what: str
     """What the numbers are, such as ``view depth z``."""
@@ -62,7 +62,7 @@ class Levels(NamedTuple):
         if len(self.levels) == 1:
             return png(first)
         # A mip chain: half as tall each time; what is smaller than 2 pixels is left out.
-        rest: list[Image] = []
+        rest: list[_Image] = []
         for k, texels in self.levels[1:]:
             sides = round(tall / 2.0**k), round(wide / 2.0**k)
             if min(sides) < 2:
@@ -158,9 +158,9 @@ def colour_bar(sheet: Any, axes: Any, scale: Scale, label: str) -> None:
     bar.ax.invert_yaxis()  # near is light, and on top
 
 
-def _resized(image: Image, tall: int, wide: int) -> Image:
+def _resized(image: _Image, tall: int, wide: int) -> _Image:
     """The picture at another size, by its nearest pixels."""
     rows = ((np.arange(tall) + 0.5) * image.shape[0] / tall).astype(np.intp)
     columns = ((np.arange(wide) + 0.5) * image.shape[1] / wide).astype(np.intp)
-    resized: Image = image[rows][:, columns]
+    resized: _Image = image[rows][:, columns]
     return resized

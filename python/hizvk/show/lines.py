@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from ..view_depth import RayView
-    from .colours import Image
+    from .colours import _Image
     from .shapes import Shapes
 
-    Doubles = npt.NDArray[np.float64]
-    Indices = npt.NDArray[np.intp]
+    _Doubles = npt.NDArray[np.float64]
+    _Indices = npt.NDArray[np.intp]
 
 __all__ = ["draw", "outlines"]
 
@@ -26,7 +26,7 @@ SIDES: Final = 32
 BEYOND: Final = 2.0
 
 
-def outlines(view: RayView, shapes: Shapes) -> tuple[Doubles, Indices]:
+def outlines(view: RayView, shapes: Shapes) -> tuple[_Doubles, _Indices]:
     """The outlines of shapes in the image.
 
     Returns
@@ -42,7 +42,7 @@ def outlines(view: RayView, shapes: Shapes) -> tuple[Doubles, Indices]:
     return _in_image(view, starts, ends, owners)
 
 
-def _circles(view: RayView, shapes: Shapes) -> tuple[Doubles, Doubles, Indices]:
+def _circles(view: RayView, shapes: Shapes) -> tuple[_Doubles, _Doubles, _Indices]:
     """The circles in which rays touch spheres; a point stays one, from itself to itself."""
     round_ = np.flatnonzero(shapes.radii > 0.0)
     points = np.flatnonzero(shapes.radii == 0.0)
@@ -72,8 +72,8 @@ def _circles(view: RayView, shapes: Shapes) -> tuple[Doubles, Doubles, Indices]:
 
 
 def _in_image(
-    view: RayView, starts: Doubles, ends: Doubles, owners: Indices
-) -> tuple[Doubles, Indices]:
+    view: RayView, starts: _Doubles, ends: _Doubles, owners: _Indices
+) -> tuple[_Doubles, _Indices]:
     """Projects lines; what lies before the near plane or far beside the image is cut off."""
     first, last = view.clip_of(starts), view.clip_of(ends)
     limits = 1.0 + 2.0 * BEYOND
@@ -97,7 +97,7 @@ def _in_image(
     return pixels, owners[kept]
 
 
-def draw(image: Image, lines: Doubles, colour: tuple[int, int, int]) -> None:
+def draw(image: _Image, lines: _Doubles, colour: tuple[int, int, int]) -> None:
     """Draws lines, given as columns and rows, one pixel wide into a picture."""
     height, width = image.shape[:2]
     steps = np.ceil(np.abs(lines[:, 1] - lines[:, 0]).max(axis=1, initial=0.0)).astype(np.intp) + 1

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .seen import Seen
     from .shapes import Shapes
 
-    Doubles = npt.NDArray[np.float64]
+    _Doubles = npt.NDArray[np.float64]
 
 __all__ = ["UPS", "Above", "plot", "up_of"]
 
@@ -145,15 +145,15 @@ def _map(axis: Any, seen: Seen, shapes: Shapes, above: Above) -> None:
     axis.set_axisbelow(True)
 
 
-def _most_of(centers: Doubles) -> Doubles:
+def _most_of(centers: _Doubles) -> _Doubles:
     """``(2, 2)``: the corners of a rectangle around all but the outermost centres."""
     if len(centers) == 0:
         return np.zeros((0, 2))
-    ends: Doubles = np.quantile(centers, (TAIL, 1.0 - TAIL), axis=0)
+    ends: _Doubles = np.quantile(centers, (TAIL, 1.0 - TAIL), axis=0)
     return ends
 
 
-def _draw(axis: Any, lines: Doubles, one: int, width: float) -> None:
+def _draw(axis: Any, lines: _Doubles, one: int, width: float) -> None:
     """Draws lines of one class; lines of length 0 are dots."""
     from matplotlib.collections import LineCollection
 

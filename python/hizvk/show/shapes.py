@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
     from ..bounds import Bounds
 
-    Doubles = npt.NDArray[np.float64]
-    Indices = npt.NDArray[np.intp]
+    _Doubles = npt.NDArray[np.float64]
+    _Indices = npt.NDArray[np.intp]
 
 __all__ = ["CLASSES", "HIDDEN", "KEPT", "OUTSIDE", "Shapes", "box_edges", "chosen", "shapes_of"]
 
@@ -39,19 +39,19 @@ EDGES: Final = np.array(
 class Shapes(NamedTuple):
     """M instances that are drawn; ``boxes``, or else spheres, of radius 0 for points."""
 
-    indices: Indices
+    indices: _Indices
     """``(M,)``: their numbers."""
     classes: npt.NDArray[np.uint8]
     """``(M,)``: `KEPT`, `HIDDEN` or `OUTSIDE`."""
-    centers: Doubles
+    centers: _Doubles
     """``(M, 3)``: world positions."""
-    axes: Doubles | None
+    axes: _Doubles | None
     """``(M, 3, 3)``: of boxes the vector from the centre to the middle of a face, per axis."""
-    radii: Doubles
+    radii: _Doubles
     """``(M,)``: of spheres; of boxes that of the sphere around them."""
 
 
-def chosen(classes: npt.NDArray[np.uint8], most: int) -> Indices:
+def chosen(classes: npt.NDArray[np.uint8], most: int) -> _Indices:
     """At most `most` instances, evenly spread over the numbers of each class; ascending.
 
     Classes have their share of the instances, but no class gets less than `LEAST_SHARE` if it has
@@ -70,9 +70,9 @@ def chosen(classes: npt.NDArray[np.uint8], most: int) -> Indices:
     return np.sort(np.concatenate(found))
 
 
-def shapes_of(bounds: Bounds, classes: npt.NDArray[np.uint8], indices: Indices) -> Shapes:
+def shapes_of(bounds: Bounds, classes: npt.NDArray[np.uint8], indices: _Indices) -> Shapes:
     """The shapes of some instances; those that are not finite are left out."""
-    axes: Doubles | None = None
+    axes: _Doubles | None = None
     match bounds:
         case Boxes():
             low = np.asarray(bounds.min[indices], np.float64)
@@ -103,7 +103,7 @@ def shapes_of(bounds: Bounds, classes: npt.NDArray[np.uint8], indices: Indices) 
     )
 
 
-def box_edges(shapes: Shapes) -> tuple[Doubles, Doubles, Indices]:
+def box_edges(shapes: Shapes) -> tuple[_Doubles, _Doubles, _Indices]:
     """Both ends of the edges of boxes, ``(12 M, 3)`` each, and whose edges they are."""
     assert shapes.axes is not None
     corners = shapes.centers[:, None, :] + SIGNS @ shapes.axes

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from .seen import Seen
     from .shapes import Shapes
 
-    Doubles = npt.NDArray[np.float64]
+    _Doubles = npt.NDArray[np.float64]
 
 __all__ = ["page"]
 
@@ -125,12 +125,12 @@ def _row(number: int | None, colour: str, name: str, value: str) -> str:
     return f'<tr><td>{text}</td><td class="number">{escape(value)}</td></tr>'
 
 
-def _scene(seen: Seen, shapes: Shapes, view: RayView, up: str, origin: Doubles) -> dict[str, Any]:
+def _scene(seen: Seen, shapes: Shapes, view: RayView, up: str, origin: _Doubles) -> dict[str, Any]:
     """What the script reads; positions are relative to `origin`, so float32 holds them."""
     kind = "boxes"
     if shapes.axes is None:
         kind = "spheres" if shapes.radii.any() else "points"
-        sizes: Doubles = shapes.radii if kind == "spheres" else np.zeros(0)
+        sizes: _Doubles = shapes.radii if kind == "spheres" else np.zeros(0)
     else:
         sizes = shapes.axes
         halves = np.diagonal(sizes, axis1=1, axis2=2)
@@ -176,26 +176,26 @@ def _scene(seen: Seen, shapes: Shapes, view: RayView, up: str, origin: Doubles) 
     }
 
 
-def _middle(shapes: Shapes, view: RayView) -> Doubles:
+def _middle(shapes: Shapes, view: RayView) -> _Doubles:
     """The middle of most instances, or a point before the eye without any."""
     if len(shapes.centers):
         ends = np.quantile(shapes.centers, (TAIL, 1.0 - TAIL), axis=0)
-        middle: Doubles = ends.mean(axis=0)
+        middle: _Doubles = ends.mean(axis=0)
         return middle
-    ahead: Doubles = view.corners(1.0)[4:].mean(axis=0)
+    ahead: _Doubles = view.corners(1.0)[4:].mean(axis=0)
     return ahead
 
 
-def _reach(centers: Doubles, eye: Doubles) -> float:
+def _reach(centers: _Doubles, eye: _Doubles) -> float:
     """How far most instances and the eye are from the middle."""
     far = np.linalg.norm(centers, axis=1)
     most = float(np.quantile(far, 1.0 - TAIL)) if len(far) else 1.0
     return max(most, min(float(np.linalg.norm(eye)), 3.0 * most), 1e-6)
 
 
-def _occluders(meshes: list[Mesh] | None) -> tuple[Doubles, npt.NDArray[np.intp], int]:
+def _occluders(meshes: list[Mesh] | None) -> tuple[_Doubles, npt.NDArray[np.intp], int]:
     """Vertices and triangles of all places of all meshes, and how many triangles there are."""
-    parts: list[Doubles] = [np.zeros((0, 3, 3))]
+    parts: list[_Doubles] = [np.zeros((0, 3, 3))]
     total = 0
     for mesh in meshes or ():
         corners = np.asarray(mesh.vertices, np.float64)[mesh.triangles]
@@ -208,7 +208,7 @@ def _occluders(meshes: list[Mesh] | None) -> tuple[Doubles, npt.NDArray[np.intp]
     return vertices, triangles.reshape(-1, 3), total
 
 
-def _largest(triangles: Doubles) -> Doubles:
+def _largest(triangles: _Doubles) -> _Doubles:
     """At most `MOST_TRIANGLES` of them."""
     if len(triangles) <= MOST_TRIANGLES:
         return triangles
