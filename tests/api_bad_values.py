@@ -1821,6 +1821,19 @@ TABLES: dict[str, Table] = {
                 (0.9, ValueError, "at least 1, got float 0.9"),
                 (None, TypeError, "got None"),
             ],
+            "meshes": [
+                (3, TypeError, "expected a sequence of MeshLods or None, got int 3"),
+                ([], ValueError, "expected at least one MeshLods, got none"),
+            ],
+            "mesh_ids": [
+                ([0, 1], ValueError, "expected integer (1,), got (2,) int64"),
+                ([0.5], TypeError, "got (1,) float64"),
+            ],
+            "lods": [([hizvk.LodByError(1)], TypeError, "expected None without meshes")],
+            "max_seconds": [
+                (-1.0, ValueError, "at least 0, got float -1.0"),
+                ("10", TypeError, "got str '10'"),
+            ],
             "repetitions": [
                 (0, ValueError, "in 1..10000, got int 0"),
                 (1.0, TypeError, "got float 1.0"),
