@@ -88,6 +88,7 @@ ARRAYS = [
     ("viewshed", "heights"),
     ("viewshed", "cell_size"),
     ("viewshed", "eye"),
+    ("HierarchicalVisibility.render", "previous"),
 ]
 
 DTYPES = [

@@ -106,9 +106,11 @@ def sbom(**changes: Any) -> dict[str, Any]:
     return {"bomFormat": "CycloneDX", "specVersion": "1.5", "components": parts} | changes
 
 
+LOCK = tomllib.loads((ROOT / "Cargo.lock").read_text(encoding="utf-8"))["package"]
+
+
 def locked(name: str) -> str:
-    lock = tomllib.loads((ROOT / "Cargo.lock").read_text(encoding="utf-8"))
-    return next(str(one["version"]) for one in lock["package"] if one["name"] == name)
+    return next(str(one["version"]) for one in LOCK if one["name"] == name)
 
 
 def test_a_bill_of_materials_names_locked_crates_with_licences() -> None:
@@ -234,3 +236,33 @@ def test_other_backends_are_built_where_vulkan_is_not_there() -> None:
         'cfg(target_vendor = "apple")': ["metal"],
         "cfg(windows)": ["dx12"],
     }
+
+
+# -- the workflows ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["ci.yml", "wheels.yml"])
+def test_what_a_workflow_calls_is_there(name: str) -> None:
+    """actionlint knows GitHub's side; this is ours."""
+    text = (ROOT / ".github" / "workflows" / name).read_text(encoding="utf-8")
+    code = "\n".join(line.partition("#")[0] for line in text.splitlines())
+    for path in re.findall(r"(?:scripts|\.ci)/[\w.]+", code):
+        assert (ROOT / path).is_file(), path
+    targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE)
+    assert set(re.findall(r"run: make ([a-z-]+)", code)) <= set(targets)
+    # The compiler is not older than what the crates need.
+    least = tomllib.loads((ROOT / "Cargo.toml").read_text("utf-8"))["workspace"]["package"]
+    found = re.findall(r"rust:(\d+)\.(\d+)|rust-toolchain: \"(\d+)\.(\d+)\"", code)
+    assert found
+    for version in found:
+        numbers = [int(part) for part in version if part]
+        assert numbers >= [int(part) for part in least["rust-version"].split(".")]
+
+
+def test_every_push_runs_the_checks_and_each_day_the_second_driver() -> None:
+    text = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
+    events, jobs = text.split("\njobs:\n")
+    assert re.search(r"^  push:$", events, re.MULTILINE)
+    assert re.search(r"^    - cron: \"\d+ \d+ \* \* \*\"$", events, re.MULTILINE)
+    assert "bash .ci/run" in jobs.partition("\n  swiftshader:")[0]
+    assert "make test-swiftshader" in jobs.partition("\n  swiftshader:")[2]

@@ -20,7 +20,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+import documented
 import hizvk
+from hizvk.bench import sweeps as bench
 from hizvk.sweeping import blocks as handing
 from hizvk.sweeping import spool
 from hizvk.sweeping.workers import Answer, Block, Task
@@ -243,6 +245,24 @@ def test_a_cluster_that_sees_no_file(
     np.testing.assert_array_equal(seen.bits, packed(by_walls))
 
 
+@pytest.mark.parametrize("page", ["README.md", "docs/sweeps.md"])
+def test_the_lines_for_a_cluster_run(
+    client: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, page: str
+) -> None:
+    text = (Path(__file__).parents[1] / page).read_text(encoding="utf-8")
+    (lines,) = (
+        part for part in re.findall(r"```text\n(.*?)```", text, re.DOTALL) if "dask" in part
+    )
+    address = client.scheduler_info()["address"]
+    assert lines.count('"tcp://scheduler:8786"') == 1
+    monkeypatch.chdir(tmp_path)
+    exec(lines.replace("tcp://scheduler:8786", address), {})
+    seen = hizvk.Sweep.load("seen.npz")
+    assert seen.is_complete
+    # The wall hides some, and a view has a sixth of the directions.
+    assert 0 < seen.union().sum() < seen.num_instances
+
+
 def elsewhere(self: spool.Spool) -> spool.Spool:
     self._folder = tempfile.TemporaryDirectory()
     self.reference = spool.Reference(self._folder.name, "not here")
@@ -362,3 +382,13 @@ def test_a_bad_array_of_one_view_is_named(executor: int | None) -> None:
     images[13] = images[13][:, :-1]
     with pytest.raises(ValueError, match=r"depths\[13\]: .*expected float \(48, 64\)"):
         swept(depths=images, executor=executor)
+
+
+def test_the_bench_counts_what_the_page_shows() -> None:
+    """If this is red, run python -m hizvk.bench.sweeps --processes 2 and put the table there."""
+    if not documented.is_of_this_driver(documented.page("performance.md")):
+        pytest.skip("docs/sweeps.md was printed on another driver")
+    shown = documented.table(documented.page("sweeps.md"), "instances", "kept per view")
+    kept = {row["instances"]: row["kept per view"] for row in shown}
+    rows = bench.measure((1_000, 10_000), rounds=0)
+    assert [kept[f"{row.instances:,}"] for row in rows] == [f"{row.kept:,.1f}" for row in rows]

@@ -116,6 +116,7 @@ from .tolerance import Tolerance
 from .views import ViewsResult
 
 if TYPE_CHECKING:
+    from .methods import HierarchicalVisibility, HierarchyFrame, PublishedTest
     from .recommendation import Recommendation, recommend
     from .sweeping import Sweep, SweepInterrupted, cube, sweep, viewshed, visible_sets
 
@@ -139,6 +140,8 @@ __all__ = [
     "DirectionalLight",
     "DrawTemplate",
     "Explanation",
+    "HierarchicalVisibility",
+    "HierarchyFrame",
     "HizError",
     "HizWarning",
     "InnerBoxes",
@@ -161,6 +164,7 @@ __all__ = [
     "Points",
     "Projected",
     "ProxyCheck",
+    "PublishedTest",
     "Pyramid",
     "Recommendation",
     "Spheres",
@@ -202,6 +206,9 @@ __all__ = [
 
 #: Names that are loaded at their first use, with their packages: a cull does not need them.
 _LATER = {
+    "HierarchicalVisibility": "methods",
+    "HierarchyFrame": "methods",
+    "PublishedTest": "methods",
     "Recommendation": "recommendation",
     "recommend": "recommendation",
     "Sweep": "sweeping",

@@ -521,6 +521,31 @@ def mesh_ids(name: str, value: object, count: int) -> npt.NDArray[np.uint32]:
     return copied(name, array, np.uint32)
 
 
+def indices(name: str, value: object, count: int, what: str) -> npt.NDArray[np.uint32]:
+    """``(K,)`` numbers of some of `count` things, as uint32; any integer dtype comes in."""
+    expected = "integer (K,)"
+    if is_masked(value) or isinstance(value, (str, bytes)):
+        raise _wrong_type(name, expected, value)
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(
+            f"{name}: expected {expected}, got a sequence that is no array ({error})"
+        ) from None
+    if array.size == 0 and not hasattr(value, "dtype"):
+        array = array.astype(np.uint32)
+    if array.dtype.kind not in "iu":
+        raise TypeError(
+            f"{name}: expected {expected}, got {describe(array if array.ndim else value)}"
+        )
+    _check_shape(name, expected, array, ("K",))
+    array = copied(name, array, array.dtype.newbyteorder("="))
+    if array.size and not (int(array.min()) >= 0 and int(array.max()) < count):
+        wrong = int(array.min()) if array.min() < 0 else int(array.max())
+        raise ValueError(f"{name}: expected numbers of the {count} {what}, got {wrong}")
+    return copied(name, array, np.uint32)
+
+
 def triangles(name: str, value: object, vertex_count: int) -> npt.NDArray[np.uint32]:
     """``(T, 3)`` indices of vertices, as uint32; any integer dtype comes in."""
     expected = "integer (T, 3)"

@@ -21,11 +21,14 @@ __all__ = [
     "DepthImage",
     "Engine",
     "Explanation",
+    "HierarchicalVisibility",
     "Instances",
     "MeshTable",
+    "MethodLevels",
     "Occluders",
     "PassAnswer",
     "Pyramid",
+    "TextCull",
     "TwoPasses",
     "ViewsCulling",
     "Yardstick",
@@ -482,6 +485,32 @@ class ViewsCulling:
     def view(self, view: int) -> Culling: ...
 
 @final
+class TextCull:
+    def __new__(
+        cls,
+        engine: Engine,
+        text: str,
+        bounds: npt.NDArray[np.float32],
+        camera: tuple[npt.NDArray[np.float32], float],
+        sizes: Sequence[tuple[int, int]],
+        texels: npt.NDArray[np.float32],
+    ) -> Self: ...
+    def run(self) -> None: ...
+    def mask(self) -> npt.NDArray[np.bool_]: ...
+
+@final
+class MethodLevels:
+    def __new__(
+        cls,
+        engine: Engine,
+        way: str,
+        shape: tuple[int, int],
+        images: Sequence[npt.NDArray[np.float32]],
+    ) -> Self: ...
+    def run(self) -> None: ...
+    def level(self, image: int, k: int) -> tuple[int, int, npt.NDArray[np.float32]]: ...
+
+@final
 class Yardstick:
     def __new__(cls, engine: Engine) -> Self: ...
     @staticmethod
@@ -537,3 +566,38 @@ class YardstickCull:
     def ms(self) -> float: ...
     def mask(self) -> npt.NDArray[np.bool_]: ...
     def device_bytes(self) -> int: ...
+
+_HierarchyNodes: TypeAlias = tuple[
+    npt.NDArray[np.float64],
+    npt.NDArray[np.float64],
+    npt.NDArray[np.int64],
+    npt.NDArray[np.uint32],
+    npt.NDArray[np.uint32],
+    npt.NDArray[np.uint64],
+]
+_HierarchyFrame: TypeAlias = tuple[
+    npt.NDArray[np.float32],
+    list[tuple[_Size, npt.NDArray[np.float32]]],
+    npt.NDArray[np.uint8],
+    npt.NDArray[np.uint32],
+    tuple[int, int, int, int, int, int, int],
+    tuple[int, int] | None,
+    float,
+]
+
+@final
+class HierarchicalVisibility:
+    def __new__(
+        cls,
+        meshes: Sequence[tuple[_Floats, npt.NDArray[np.uint32], _Floats | None]],
+        cull: str,
+        threshold: int,
+        deepest: int,
+    ) -> Self: ...
+    def nodes(self) -> _HierarchyNodes: ...
+    def num_triangles(self) -> int: ...
+    def num_meshlets(self) -> int: ...
+    def render(
+        self, camera: Camera, previous: npt.NDArray[np.uint32], count: bool
+    ) -> _HierarchyFrame: ...
+    def render_flat(self, camera: Camera) -> tuple[npt.NDArray[np.float32], int, int, float]: ...

@@ -15,6 +15,7 @@ mod device;
 mod errors;
 mod held;
 mod meshes;
+mod methods;
 mod options;
 mod points;
 mod reference;
@@ -40,6 +41,10 @@ mod _core {
     use crate::held::{after_fork, before_fork, let_go};
     #[pymodule_export]
     use crate::meshes::MeshTable;
+    #[pymodule_export]
+    use crate::methods::hierarchy::HierarchicalVisibility;
+    #[pymodule_export]
+    use crate::methods::{MethodLevels, TextCull};
     #[pymodule_export]
     use crate::points::{add_colours, depth_of_points};
     #[pymodule_export]

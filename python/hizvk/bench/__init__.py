@@ -8,6 +8,8 @@
 - `rectangle`: the best rectangle test
 - `score`: false culls and hidden instances kept
 - `occluders`, `hiding`: ``--occluders``, what is lost with fewer or simpler occluders
+- `texts`, `texts_report`, `texts_plot`: ``--texts``, what published tests lose
+- `sweeps`: views per second of sweeps
 - `results`: the numbers as plain objects
 - `whole_way`: from meshes to a mask with both rasterisers, numpy and Embree
 - `report`, `plots`: report.json (its schema stands there), report.md, a picture per scene

@@ -171,6 +171,11 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="instead: what is lost with fewer or simpler occluders; --occluders --help tells more",
     )
+    parser.add_argument(
+        "--texts",
+        action="store_true",
+        help="instead: what published tests lose, and their time; --texts --help tells more",
+    )
     parser.add_argument("--instances", type=args.count, help="in every scene but the castle")
     parser.add_argument("--views", type=args.count, help="of every scene")
     parser.add_argument(
@@ -195,6 +200,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from . import occluders
 
         return occluders.main([each for each in arguments if each != "--occluders"])
+    if "--texts" in arguments:
+        from . import texts
+
+        return texts.main([each for each in arguments if each != "--texts"])
     parsed = parser.parse_args(arguments)
     return args.execute(
         PROG,

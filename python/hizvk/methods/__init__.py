@@ -2,6 +2,34 @@
 
 Nothing of the certified path uses them, and `import hizvk` does not load them.
 Their names are reachable from `hizvk`, too.
+
+- `texts`: visibility tests as they were published; they hide what can be seen
+- `levels`: other ways to make a depth image's levels
+- `turitzin`: a table of the time that each of these ways takes
 """
 
-__all__: list[str] = []
+from .hierarchy import (
+    HIDDEN,
+    NODE_DTYPE,
+    NOT_VISITED,
+    OUTSIDE,
+    VISIBLE,
+    FlatFrame,
+    HierarchicalVisibility,
+    HierarchyFrame,
+)
+from .levels import MethodLevels
+from .texts import PublishedTest
+
+__all__ = [
+    "HIDDEN",
+    "NODE_DTYPE",
+    "NOT_VISITED",
+    "OUTSIDE",
+    "VISIBLE",
+    "FlatFrame",
+    "HierarchicalVisibility",
+    "HierarchyFrame",
+    "MethodLevels",
+    "PublishedTest",
+]

@@ -15,6 +15,7 @@ The ray caster that checks a cull therefore starts from the same numbers as the 
 - `boulders`: lumps of thousands of triangles
 - `arm`: spheres among prisms, with rays of its own
 - `hedge`: where ranking occluders by size and distance fails
+- `gates`: where published tests go wrong
 - `houses`: `village`: turned houses with gable roofs
 - `doors`: doors that open and close and a bus that drives by
 - `embree`: Embree's ray caster

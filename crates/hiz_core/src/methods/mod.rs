@@ -3,3 +3,17 @@
 //! Each file opens with its source.
 //! Nothing outside this room imports it, so no certified call reaches it; `tests/rooms.rs` checks
 //! that.
+
+pub mod hierarchy;
+mod coarse_level;
+mod fragment_levels;
+mod texts;
+
+pub use coarse_level::{LevelWay, MethodLevels, SHAPES};
+#[cfg(feature = "testing")]
+pub(crate) use coarse_level::{TILE, coarse_level_module};
+#[cfg(feature = "testing")]
+pub(crate) use fragment_levels::fragment_levels_module;
+pub use texts::{Text, TextCamera, TextCull};
+#[cfg(feature = "testing")]
+pub(crate) use texts::{TextUniform, WORKGROUP as TEXT_WORKGROUP, texts_module};

@@ -475,6 +475,29 @@ impl Band {
         self.stale = stale;
     }
 
+    /// The farthest depth of a tile's pixels, those past the image's edge included; `None` where
+    /// it is known as a bound alone.
+    #[cfg(feature = "methods")]
+    pub(super) fn exact_farthest(&self, column: usize, row: usize) -> Option<f32> {
+        let tile = row * self.across + column;
+        let is_exact = matches!(self.states[tile], CLEAR | FULL | PIXELS);
+        is_exact.then_some(self.farthest[tile])
+    }
+
+    /// Nearness in row `y` of a tile, as it is now.
+    #[cfg(feature = "methods")]
+    pub(super) fn row_of_tile(&self, column: usize, row: usize, y: usize) -> [f32; SIDE] {
+        let tile = row * self.across + column;
+        match self.states[tile] {
+            PIXELS => {
+                let first = (row * SIDE + y) * self.stride + column * SIDE;
+                self.pixels[first..].as_chunks().0[0]
+            }
+            FULL => self.full_plane(tile).row(y),
+            state => row_of_layers(state, &self.layers[tile], y, self.image.fault),
+        }
+    }
+
     /// Writes the band's part of some rows of the image as NDC depth.
     ///
     /// `out` begins at the first of them, and they are `pitch` bytes apart.

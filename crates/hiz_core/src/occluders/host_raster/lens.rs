@@ -167,12 +167,12 @@ impl Lens {
 
 /// What the image shows of a box at most.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Extent {
+pub(crate) struct Extent {
     /// No point of the box is nearer than this.
-    pub(super) nearest: f32,
+    pub(crate) nearest: f32,
     /// The first and the last column, and the first and the last row.
-    pub(super) columns: (i32, i32),
-    pub(super) rows: (i32, i32),
+    pub(crate) columns: (i32, i32),
+    pub(crate) rows: (i32, i32),
 }
 
 /// What may show of a box; `None` if it is surely outside the view.
@@ -181,6 +181,21 @@ pub(super) struct Extent {
 /// A wrong answer would lose an occluder, not hide an instance.
 /// Its margins still cover the roundings, so that skipping hidden boxes changes no pixel.
 pub(super) fn extent(lens: &Lens, image: &Image, min: Vec3, max: Vec3) -> Option<Extent> {
+    extent_within(lens, image, min, max, |row, reach| {
+        row[0].abs() * reach[0] + row[1].abs() * reach[1] + row[2].abs() * reach[2]
+    })
+}
+
+/// [`extent`], where `terms` bounds the sizes of a row's first three terms anywhere in a box of
+/// this reach from the eye, however its vertices are computed.
+#[inline(always)]
+pub(super) fn extent_within(
+    lens: &Lens,
+    image: &Image,
+    min: Vec3,
+    max: Vec3,
+    terms: impl Fn(&[f32; 4], &[f32; 3]) -> f32,
+) -> Option<Extent> {
     #[expect(clippy::cast_possible_truncation, reason = "rounding to float32 is the point")]
     let at: [[f32; 8]; 3] = {
         let corners: [Vec3; 8] = std::array::from_fn(|i| sub(box_corner(min, max, i), lens.eye));
@@ -191,10 +206,7 @@ pub(super) fn extent(lens: &Lens, image: &Image, min: Vec3, max: Vec3) -> Option
     });
     // What the roundings of a row amount to at most, anywhere in the box.
     let reach = at.map(|v| v[0].abs().max(v[7].abs()));
-    let [ex, ey, en, ew] = lens.rows.map(|r| {
-        let terms = r[0].abs() * reach[0] + r[1].abs() * reach[1] + r[2].abs() * reach[2];
-        (terms + r[3].abs()) * ROW_MARGIN
-    });
+    let [ex, ey, en, ew] = lens.rows.map(|r| (terms(&r, &reach) + r[3].abs()) * ROW_MARGIN);
     let [x, y, n, w] = clip;
     let half = image.half.map(|h| h as f32 + 2.0 * UNITS as f32);
     // How many corners are outside of each plane, and how many need clipping.

@@ -36,6 +36,8 @@ mod band;
 mod edges;
 mod lanes;
 mod lens;
+#[cfg(feature = "methods")]
+pub(crate) mod one_by_one;
 pub(crate) mod planted_fault;
 mod tile;
 mod triangle;
@@ -119,6 +121,12 @@ impl Told {
     pub(crate) fn sort(&mut self) {
         self.shown.sort_unstable();
         self.hidden.sort_unstable();
+    }
+
+    /// The meshlets that were drawn.
+    #[cfg(feature = "methods")]
+    pub(crate) fn shown(&self) -> &[(u32, u32)] {
+        &self.shown
     }
 
     fn of(&self, meshlet: (u32, u32)) -> Last {
@@ -365,11 +373,27 @@ fn draw_meshlet(
     band: &mut Band,
     vertices: &mut Vertices,
 ) {
+    let rows = (band.top, band.bottom.min(image.height) - 1);
+    triangles_of(shapes, candidate, lens, faces, image, rows, vertices, |t| band.draw(t));
+}
+
+/// Hands out the triangles of a meshlet that may cover a centre in rows `rows.0..=rows.1`.
+#[expect(clippy::too_many_arguments, reason = "what one loop over triangles needs")]
+#[inline(always)]
+fn triangles_of(
+    shapes: &Shapes,
+    candidate: &Candidate,
+    lens: &Lens,
+    faces: FaceCull,
+    image: &Image,
+    rows: (i32, i32),
+    vertices: &mut Vertices,
+    mut out: impl FnMut(&Triangle),
+) {
     let meshlet = &shapes.meshlets[candidate.meshlet as usize];
     let mirrored = lens.mirrored && !is_planted!(image.fault, MirrorsIgnored);
     let faces = if mirrored { faces.reversed() } else { faces };
     vertices.project(&shapes.blocks, meshlet, lens, image);
-    let rows = (band.top, band.bottom.min(image.height) - 1);
     vertices.select(&shapes.blocks, meshlet, faces, image, rows);
     let side = |(first, last): (i32, i32)| i64::from(last - first + 1);
     let pixels = side(candidate.extent.columns) * side(candidate.extent.rows);
@@ -382,7 +406,7 @@ fn draw_meshlet(
         match projected {
             [Some(a), Some(b), Some(c)] => {
                 if let Some(triangle) = Triangle::new([a, b, c], faces, image) {
-                    band.draw(&triangle);
+                    out(&triangle);
                 }
             }
             _ => {
@@ -392,7 +416,7 @@ fn draw_meshlet(
                     clip: lens.exact_clip(positions[k], image),
                     projected: projected[k],
                 });
-                clipped(ends, faces, image, |triangle| band.draw(triangle));
+                clipped(ends, faces, image, &mut out);
             }
         }
     }

@@ -225,12 +225,12 @@ impl OccluderSurface {
         })
     }
 
-    pub(super) fn shapes(&self) -> &Shapes {
+    pub(crate) fn shapes(&self) -> &Shapes {
         &self.shapes
     }
 
     /// Where the copies stand now.
-    pub(super) fn placements(&self) -> Arc<Vec<Placement>> {
+    pub(crate) fn placements(&self) -> Arc<Vec<Placement>> {
         Arc::clone(&self.placements.lock())
     }
 
