@@ -197,7 +197,7 @@ class Explained(NamedTuple):
                 )
             )  # fmt: skip
             dark = [withStroke(linewidth=4.0, foreground="black")]
-            named = {"color": BOUNDS, "linewidth": 2.0, "path_effects": dark}
+            named: dict[str, Any] = {"color": BOUNDS, "linewidth": 2.0, "path_effects": dark}
             edges.insert(0, Line2D([], [], label="pixels of the bounds", **named))
             axis.legend(
                 handles=edges, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3,
