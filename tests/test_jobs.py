@@ -11,6 +11,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 import documented
@@ -122,6 +123,21 @@ def test_nothing_that_a_ray_sees_is_lost_in_the_town() -> None:
     assert not (shown & ~kept).any()
     # It culls: about half of the surfaces, which no ray finds.
     assert 0.3 < kept.mean() < 0.7
+
+
+def test_a_glb_file_hides_what_the_page_says(tmp_path: Path) -> None:
+    """The house of the page by way of a file, whose node turns and moves it."""
+    trimesh = pytest.importorskip("trimesh", reason="it writes and reads the file")
+    house = trimesh.creation.box(extents=(3.0, 4.0, 4.0))
+    place = np.array([[0.0, -1, 0, 0], [1, 0, 0, 1.5], [0, 0, 1, -10], [0, 0, 0, 1]])
+    scene = trimesh.Scene()
+    scene.add_geometry(house, transform=place)
+    scene.export(tmp_path / "house.glb")
+    read = trimesh.load(tmp_path / "house.glb", force="scene").to_mesh()
+    things = hizvk.Spheres([(0.0, 1.0, -16.0), (0.0, 5.0, -16.0), (9.0, 1.0, 0.0)], 0.5)
+    cameras = hizvk.cube((0.0, 1.7, 0.0), size=256, near=0.1)
+    seen = hizvk.sweep(things, cameras, occluders=read, conservative=True, groups=[0] * 6)
+    assert seen.mask(0).tolist() == [False, True, True]
 
 
 LESSON = ROOT / "examples" / "lesson.ipynb"
