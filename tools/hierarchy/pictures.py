@@ -104,7 +104,7 @@ def draw(made: Crowded, folder: Path) -> list[Path]:
         Without matplotlib.
     """
     if not figures.can_draw():
-        raise SystemExit(f"left out: {figures.MISSING}")
+        raise SystemExit(f"left out: {figures.missing()}")
     folder.mkdir(parents=True, exist_ok=True)
     view = made.views[0]
     scene = hizvk.HierarchicalVisibility(made.meshes)

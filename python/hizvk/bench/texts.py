@@ -17,10 +17,10 @@ import hizvk
 
 from ..commands import arguments as args
 from ..commands import figure, report
-from ..commands.progress import Progress
 from ..measuring.configuration import DESCENT, Configuration
 from ..measuring.spread import spread
 from ..measuring.stopwatch import cull
+from ..progress import Progress
 from ..scenes.gates import gates
 from ..scenes.truth import make_caster
 from . import catalogue
@@ -224,8 +224,8 @@ def run(
     out.mkdir(parents=True, exist_ok=True)
     device = hizvk.Device()
     found = Report(command=command, seed=seed, adapter=device.adapter)
-    steps = Progress(sum(views or VIEWS[key] for key in keys), f"{PROG}: {', '.join(keys)}")
-    try:
+    label, total = f"{PROG}: {', '.join(keys)}", sum(views or VIEWS[key] for key in keys)
+    with Progress(True, label, total, after_s=0.0) as steps:
         for key in keys:
             count = instances or INSTANCES.get(key, 1)
             try:
@@ -234,8 +234,6 @@ def run(
                 found.missing.append(str(missing))
                 continue
             found.scenes.append(measure(bench, size, repetitions, device, steps.step))
-    finally:
-        steps.close()
     found.seconds = time.perf_counter() - started
     page = found.page()
     if figure.can_draw() and found.scenes:
@@ -244,7 +242,7 @@ def run(
         draw(out / "texts.png", found)
         page.picture("visible lost against time", "texts.png")
     else:
-        found.missing.append(figure.MISSING)
+        found.missing.append(figure.missing())
     report.write(out, found.as_data(), page)
     return found
 
