@@ -12,7 +12,7 @@ import numpy.typing as npt
 import hizvk
 
 DATA = Path(__file__).parent / "data"
-SIZE, NEAR = (375, 1242), 0.1
+SIZE = (375, 1242)
 #: Visible fractions that end KITTI's levels: 0 is fully visible, 1 partly, 2 largely occluded.
 LEVELS = (0.95, 0.5, 1e-9)
 
@@ -24,7 +24,7 @@ def read_camera(path: Path) -> hizvk.Camera:
     k = p2[:, :3]
     pose = (np.eye(3), np.linalg.inv(k) @ p2[:, 3])
     return hizvk.Camera.from_opencv(
-        k, pixel_center="integer", camera_from_world=pose, size=SIZE, near=NEAR
+        k, pixel_center="integer", camera_from_world=pose, size=SIZE, near=0.1
     )
 
 
@@ -50,10 +50,8 @@ def depth_image(
     world_from_box[:, :3, :3] = boxes.rotations * boxes.half_sizes[:, None]
     world_from_box[:, :3, 3] = boxes.centers
     occluders = device.occluders(hizvk.Mesh(corners, triangles, world_from_box))
-    near_over_z = device.render_depth(occluders, camera).numpy()  # reversed Z without a far plane
-    with np.errstate(divide="ignore"):
-        centimetres = np.rint(NEAR * 100.0 / near_over_z)
-    image: npt.NDArray[np.uint16] = np.minimum(centimetres, 65535.0).astype(np.uint16)
+    z = device.render_depth(occluders, camera).numpy(kind="z")
+    image: npt.NDArray[np.uint16] = np.minimum(np.rint(100.0 * z), 65535.0).astype(np.uint16)
     return image  # the sky is 65535
 
 

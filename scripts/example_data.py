@@ -64,36 +64,48 @@ def corners_of(row: Floats) -> Floats:
     return local @ np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]]).T + (x, y, z)
 
 
-def entries(rows: list[Floats]) -> Floats:
-    """``(N, height, width)``: where each pixel's ray enters each box, inf where it misses."""
-    height, width = SIZE
-    v, u = np.mgrid[:height, :width]
+def entry(row: Floats) -> tuple[tuple[slice, slice], Floats]:
+    """The pixels around a box, and where each one's ray enters it: inf where it misses."""
+    height, width, length, *place, turn = row
+    at_image = corners_of(row) @ P2[:, :3].T + P2[:, 3]
+    pixels = at_image[:, :2] / at_image[:, 2:]
+    first = np.clip(np.floor(pixels.min(axis=0)) - 2, 0, (SIZE[1], SIZE[0])).astype(int)
+    last = np.clip(np.ceil(pixels.max(axis=0)) + 3, 0, (SIZE[1], SIZE[0])).astype(int)
+    part = slice(first[1], last[1]), slice(first[0], last[0])
+    v, u = np.mgrid[part]
     rays = np.stack([u, v, np.ones_like(u)], axis=-1) @ np.linalg.inv(P2[:, :3]).T
     eye = -np.linalg.inv(P2[:, :3]) @ P2[:, 3]
-    found = np.empty((len(rows), height, width))
-    for i, (h, w, length, *place, turn) in enumerate(rows):
-        cos, sin = np.cos(turn), np.sin(turn)
-        box_from_world = np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]])
-        low, high = np.array([-length / 2, -h, -w / 2]), np.array([length / 2, 0.0, w / 2])
-        local, start = rays @ box_from_world.T, box_from_world @ (eye - place)
-        with np.errstate(divide="ignore"):
-            at = np.stack([(low - start) / local, (high - start) / local])
-        enter, leave = at.min(axis=0).max(axis=-1), at.max(axis=0).min(axis=-1)
-        found[i] = np.where((enter < leave) & (enter > 0), enter, np.inf)
+    cos, sin = np.cos(turn), np.sin(turn)
+    box_from_world = np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]])
+    low = np.array([-length / 2, -height, -width / 2])
+    local, start = rays @ box_from_world.T, box_from_world @ (eye - place)
+    with np.errstate(divide="ignore"):
+        at = np.stack([(low - start) / local, (low * (-1, 0, -1) - start) / local])
+    enter, leave = at.min(axis=0).max(axis=-1), at.max(axis=0).min(axis=-1)
+    return part, np.where((enter < leave) & (enter > 0), enter, np.inf)
+
+
+def fractions(rows: list[Floats]) -> list[tuple[float, int]]:
+    """Of each box, the share of its pixels that it owns, and how many it would have alone."""
+    nearest = np.full(SIZE, np.inf)
+    for part, enter in (entry(row) for row in rows):
+        nearest[part] = np.minimum(nearest[part], enter)
+    found = []
+    for part, enter in (entry(row) for row in rows):
+        alone = np.isfinite(enter)
+        owned = (alone & (enter == nearest[part])).sum()
+        found.append((float(owned / max(alone.sum(), 1)), int(alone.sum())))
     return found
 
 
 def street() -> dict[str, str]:
     """Calibration and labels, as the files of KITTI's object benchmark."""
     things = objects(np.random.default_rng(8))
-    at = entries([row for _, row in things])
-    nearest = at.min(axis=0)
     lines = []
-    for (kind, row), own in zip(things, at, strict=True):
-        silhouette = np.isfinite(own)
-        if silhouette.sum() < 40:
+    seen = fractions([row for _, row in things])
+    for (kind, row), (fraction, alone) in zip(things, seen, strict=True):
+        if alone < 40:
             continue  # it lies outside of the image
-        fraction = (silhouette & (own == nearest)).sum() / silhouette.sum()
         level = sum(fraction < end for end in (0.95, 0.5, 1e-9))
         at_image = corners_of(row) @ P2[:, :3].T + P2[:, 3]
         pixels = at_image[:, :2] / at_image[:, 2:]

@@ -593,22 +593,13 @@ def test_what_is_no_mesh_is_told_so(device: hizvk.Device) -> None:
     class Points:  # trimesh.PointCloud has only vertices
         vertices = CORNERS
 
-    class Scene:
-        geometry: dict[str, Any] = {}  # noqa: RUF012
-
-        def dump(self) -> None: ...
-
     for value, text in (
         (
             Points(),
-            r"^vertices: expected a Mesh, a mesh of trimesh or Open3D, or a list of them "
+            r"^vertices: expected a Mesh, a mesh of trimesh, Open3D or PyVista, or a list of them "
             r".*got Points",
         ),
         ([Points()], r"^vertices\[0\]: expected a Mesh"),
-        (
-            Scene(),
-            r"of a trimesh scene pass scene\.to_mesh\(\), or scene\.dump\(concatenate=True\)",
-        ),
     ):
         with pytest.raises(TypeError, match=text):
             device.occluders(value)

@@ -17,7 +17,11 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("crates/*/README.md")])
+PAGES = sorted(
+    path
+    for pattern in ("*.md", "docs/*.md", "docs/jobs/*.md", "crates/*/README.md")
+    for path in ROOT.glob(pattern)
+)
 FENCE = re.compile(r"^```(?P<language>[^\n]*)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
 #: Languages that are shown and not run here.
 #: rustdoc runs `rust` (`crates/hiz_core/src/lib.rs`).

@@ -9,11 +9,18 @@ import io
 import json
 import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
+import documented
 import hizvk
+from documented import page
+from hizvk.scenes.embree import embree_scene
+from tools.jobs import cloud, driving, model
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT / "examples" / "data"
@@ -33,6 +40,88 @@ def test_the_data_are_what_their_script_makes() -> None:
     """If this is red, run scripts/example_data.py."""
     made = load(ROOT / "scripts" / "example_data.py").files()
     assert {path.name: path.read_text(encoding="utf-8") for path in DATA.iterdir()} == made
+
+
+JOBS = ("driving", "points", "models", "renderer", "class")
+
+
+def test_each_job_has_a_page_and_an_example() -> None:
+    """A page opens with whom it is for, and its first section is a first answer."""
+    assert sorted(path.stem for path in (ROOT / "docs" / "jobs").glob("*.md")) == sorted(JOBS)
+    for name in JOBS:
+        text = page(f"jobs/{name}.md")
+        assert re.match(r"# .+\n\nThis page is for ", text), name
+        assert re.findall(r"^## (.+)$", text, re.MULTILINE)[0] == "The first answer", name
+        assert "## Beside what is used today" in text, name
+        shown = re.findall(r"examples?[/ ]([\w.]+)", text)
+        there = [*ROOT.glob("examples/*"), *ROOT.glob("crates/hiz_core/examples/*")]
+        assert any(path.name in shown for path in there), name
+
+
+def test_the_renderer_is_as_long_as_its_page_says() -> None:
+    folder = ROOT / "crates" / "hiz_core" / "examples" / "drop_in"
+    for row in documented.table(page("jobs/renderer.md"), "file", "lines"):
+        text = (folder / row["file"].strip("`")).read_text(encoding="utf-8")
+        assert len(text.splitlines()) == int(row["lines"]) <= 100, row
+
+
+def columns(rows: list[dict[str, str]], names: Collection[str]) -> list[list[str]]:
+    """Some columns of a table, row by row."""
+    return [[row[name] for name in names] for row in rows]
+
+
+def is_comparable(name: str) -> bool:
+    """Whether counts of this driver and the page's have to agree."""
+    return documented.is_of_this_driver(page("bench.md")) and name != "Open3D, a ray per pixel"
+
+
+def test_the_page_of_boxes_has_todays_counts() -> None:
+    """If this is red, run ``python -m tools.jobs driving --write``."""
+    rows = documented.table(page("jobs/driving.md"), "way", "missed")
+    found = driving.accuracy(hizvk.Device())
+    assert [row[0] for row in found] == [row["way"] for row in rows]
+    # Nothing that shows is lost, on any driver; ways of the host are the same everywhere.
+    for row in found:
+        assert row[1] == "0" or row[0] == "corners, NumPy", row
+    shown = columns(rows, ("way", "missed", "kept in vain", "error of fraction"))
+    if is_comparable(""):
+        assert found == shown
+
+
+def test_the_page_of_points_has_todays_counts() -> None:
+    """If this is red, run ``python -m tools.jobs cloud --write``."""
+    pytest.importorskip("embreex", reason="the truth is cast by embreex")
+    rows = documented.table(page("jobs/points.md"), "way", "missed")
+    found = cloud.accuracy(hizvk.Device(), cloud.FEW)
+    assert found[-1][:2] == ["the same with conservative depth", "0"]
+    names = ("way", "missed", "of visible", "kept in vain", "of hidden")
+    if is_comparable(""):
+        assert found == columns(rows, names)
+
+
+@pytest.mark.slow
+def test_the_page_of_models_has_todays_counts() -> None:
+    """If this is red, run ``python -m tools.jobs model --write``."""
+    pytest.importorskip("embreex", reason="the truth is cast by embreex")
+    rows = documented.table(page("jobs/models.md"), "way", "found")
+    shown = {row[0]: row for row in columns(rows, ("way", "found", "missed", "kept in vain"))}
+    for row in model.accuracy(model.town(), model.MANY_RAYS):
+        if is_comparable(row[0]):
+            assert row == shown[row[0]]
+
+
+def test_nothing_that_a_ray_sees_is_lost_in_the_town() -> None:
+    """The conservative sweep of the page keeps all that rays see from its places."""
+    pytest.importorskip("embreex", reason="the truth is cast by embreex")
+    of = model.town()
+    origin = of.places.mean(axis=0)
+    scene = embree_scene([(of.vertices - origin, of.triangles)])
+    shown = model.seen_by_targets(of, scene, origin, 100)
+    kept = model.ways(of)["hizvk, conservative"]()
+    assert shown.any(axis=1).all()
+    assert not (shown & ~kept).any()
+    # It culls: about half of the surfaces, which no ray finds.
+    assert 0.3 < kept.mean() < 0.7
 
 
 LESSON = ROOT / "examples" / "lesson.ipynb"
@@ -79,7 +168,10 @@ def test_the_lesson_runs() -> None:
     assert set(wrong) == {"by hand", "hizvk", "with means"}
     assert wrong["hizvk"] == 0
     assert 0 < wrong["by hand"] < wrong["with means"]
-    assert [type(value) for value in shown] == [hizvk.Pyramid]
+    assert [type(each) for each in shown] == [hizvk.Pyramid, hizvk.CullResult, hizvk.Explanation]
+    for value in shown:
+        picture: Any = value
+        assert picture._repr_html_() or picture._repr_png_()
 
 
 @pytest.mark.slow

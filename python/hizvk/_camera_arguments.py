@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, TypedDict
 
 import numpy as np
 
-from . import _arguments, _rotations
+from . import _arguments, _rotations, foreign
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -153,6 +153,7 @@ def refuse_distortion(distortion: object) -> None:
     """Refuses distortion coefficients other than 0: such a camera is not linear."""
     if distortion is None:
         return
+    distortion = foreign.as_numpy("distortion", "None or zeros", distortion)
     coefficients = np.asarray(distortion)
     if coefficients.size > MOST_COEFFICIENTS:
         got = _arguments.describe(coefficients)

@@ -18,6 +18,10 @@ Rounding: TypeAlias = Literal["none"] | Literal["single"] | Literal["half"]
 PixelCenter: TypeAlias = Literal["integer"] | Literal["half"]
 #: Whether the scalar part of a quaternion comes first or last.
 QuaternionOrder: TypeAlias = Literal["wxyz"] | Literal["xyzw"]
+#: In which order the corners of a box come; see `OrientedBoxes.from_corners`.
+CornerOrder: TypeAlias = (
+    Literal["kitti"] | Literal["nuscenes"] | Literal["carla"] | Literal["open3d"]
+)
 #: How instances are stored on the device.
 StoredOrder: TypeAlias = Literal["morton"] | Literal["given"]
 #: Which faces of occluders are left out.

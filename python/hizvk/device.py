@@ -219,10 +219,10 @@ class Device:
 
         Parameters
         ----------
-        vertices : (V, 3) float array; or a Mesh, a mesh of trimesh or Open3D, or a list of them
+        vertices : (V, 3) float array; or a Mesh, or a list of them
             World positions, or with `transforms` those of the mesh's own space.
-            Objects of other libraries are known by their ``vertices`` and ``faces`` (trimesh) or
-            ``triangles`` (Open3D).
+            A mesh of trimesh, Open3D or PyVista will do as a `Mesh` does (`Mesh.of`).
+            A scene of trimesh stands for its meshes, placed by its transforms.
             A list may also hold tuples ``(vertices, triangles)`` or
             ``(vertices, triangles, transforms)``.
         triangles : (T, 3) integer array

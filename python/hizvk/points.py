@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from . import _arguments
+from . import _arguments, foreign
 from ._core import add_colours as core_add_colours
 from ._core import depth_of_points
 from ._types import ColourWeight, DepthKind, Sampling, words
@@ -171,8 +171,9 @@ def _view(
         raise TypeError(f"views: expected tuples (Camera, depth, image), got {got}")
     camera, depth, image = view
     _arguments.instance("views", camera, Camera, "a Camera first in each view")
-    array = np.asarray(image)
     expected = (*camera.size, 3)
+    image = foreign.as_numpy("views", f"uint8 or float images {expected}", image)
+    array = np.asarray(image)
     if array.dtype.kind not in "uf" or (array.dtype.kind == "u" and array.dtype.itemsize > 1):
         got = _arguments.describe(image)
         raise TypeError(f"views: expected uint8 or float images {expected}, got {got}")

@@ -16,12 +16,14 @@ from .table import best_ms, print_table
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["Job", "accuracy", "measure"]
+__all__ = ["FEW", "Job", "accuracy", "measure"]
 
 Floats = npt.NDArray[np.float64]
 SIZE = (480, 640)
 #: Points and depth may disagree by so much, in metres.
 ALLOWED = 0.01
+#: Points whose visibility is compared with rays.
+FEW = 20_000
 
 
 def relief(x: Floats, y: Floats) -> Floats:
@@ -171,12 +173,12 @@ def accuracy(device: hizvk.Device, count: int) -> list[list[str]]:
     of = job(device, count)
     truth = np.array(by_rays(of, embree_scene([(of.vertices, of.triangles)])))
     rows = []
-    for name, way in (
-        ("depth of one pixel, NumPy", lambda: by_numpy(of)),
-        ("hizvk.colour_points", lambda: by_hizvk(of, device, False)),
-        ("the same with conservative depth", lambda: by_hizvk(of, device, True)),
+    for name, masks in (
+        ("depth of one pixel, NumPy", by_numpy(of)),
+        ("hizvk.colour_points", by_hizvk(of, device, False)),
+        ("the same with conservative depth", by_hizvk(of, device, True)),
     ):
-        found = np.array(way())
+        found = np.array(masks)
         missed, vain = (truth & ~found).sum(), (found & ~truth).sum()
         rows.append([name, f"{missed:,}", f"{truth.sum():,}", f"{vain:,}", f"{(~truth).sum():,}"])
     return rows
@@ -185,7 +187,7 @@ def accuracy(device: hizvk.Device, count: int) -> list[list[str]]:
 def measure(device: hizvk.Device, rounds: int, counts: tuple[int, ...]) -> None:
     """Prints what is missed, and milliseconds per view."""
     head = ["way", "missed", "of visible", "kept in vain", "of hidden"]
-    print_table(head, accuracy(device, 20_000))
+    print_table(head, accuracy(device, FEW))
     columns = []
     for count in counts:
         of = job(device, count)

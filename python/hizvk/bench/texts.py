@@ -224,7 +224,8 @@ def run(
     out.mkdir(parents=True, exist_ok=True)
     device = hizvk.Device()
     found = Report(command=command, seed=seed, adapter=device.adapter)
-    label, total = f"{PROG}: {', '.join(keys)}", sum(views or VIEWS[key] for key in keys)
+    label = f"{PROG}: {', '.join(keys)}"
+    total = sum(views or VIEWS[key] for key in keys)
     with Progress(True, label, total, after_s=0.0) as steps:
         for key in keys:
             count = instances or INSTANCES.get(key, 1)

@@ -102,7 +102,7 @@ def check_proxy(
 
     Parameters
     ----------
-    proxy, mesh : Mesh, tuple, or a mesh of trimesh or Open3D
+    proxy, mesh : Mesh, tuple, or a mesh of trimesh, Open3D or PyVista
         A tuple is ``(vertices, triangles)``.
         Both are in the same coordinates, without transforms.
         The mesh is closed and consistently oriented: each of its edges runs as often one way as the
@@ -167,7 +167,7 @@ def check_bounds(
     ----------
     bounds : Spheres, Boxes, OrientedBoxes or Points
         The N volumes.
-    meshes : list of Mesh, of tuples, or of meshes of trimesh or Open3D; or one Mesh
+    meshes : list of Mesh, of tuples, or of meshes of trimesh, Open3D or PyVista; or one Mesh
         One for each instance, in order.
         A mesh with K transforms stands for K instances in a row.
         A tuple is ``(vertices, triangles)`` or ``(vertices, triangles, transforms)``.

@@ -214,7 +214,7 @@ def pyramid(depth: npt.ArrayLike, *, reversed_z: bool) -> list[npt.NDArray[np.fl
     TypeError, ValueError
         They name the parameter, what it expects and what came.
     """
-    image = _arguments.floats("depth", depth, ("height", "width"))
+    image = _arguments.floats("depth", depth, ("height", "width"), whole=False)
     if image.size == 0:
         raise ValueError(f"depth: expected at least one pixel, got {_arguments.describe(image)}")
     reversed_z = _arguments.flag("reversed_z", reversed_z)

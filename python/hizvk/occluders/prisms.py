@@ -76,7 +76,7 @@ def inner_prisms(
 
     Parameters
     ----------
-    vertices : (V, 3) float array; or a Mesh, a mesh of trimesh or Open3D
+    vertices : (V, 3) float array; or a Mesh, a mesh of trimesh, Open3D or PyVista
         World positions, or those of the mesh's own space.
     triangles : (T, 3) integer array, optional
         Indices of vertices; left out for meshes.

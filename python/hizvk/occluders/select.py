@@ -112,7 +112,7 @@ def select_occluders(
 
     Parameters
     ----------
-    meshes : list of Mesh, of tuples, or of meshes of trimesh or Open3D; or one Mesh
+    meshes : list of Mesh, of tuples, or of meshes of trimesh, Open3D or PyVista; or one Mesh
         A tuple is ``(vertices, triangles)`` or ``(vertices, triangles, transforms)``.
     min_size : float
         Part of the diagonal, 0 to 1; 0 drops only what has no area.

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from .. import _arguments
+from .. import _arguments, foreign
 from ..bounds import Boxes
 from ..mesh import A_MESH, Mesh, as_mesh
 from ..progress import Progress
@@ -152,7 +152,7 @@ def split_mesh(
 
     Parameters
     ----------
-    vertices : (V, 3) or (T, 3, 3) float array; or a Mesh, a mesh of trimesh or Open3D
+    vertices : (V, 3) or (T, 3, 3) float array; or a Mesh, a mesh of trimesh, Open3D or PyVista
         World positions; ``(T, 3, 3)`` holds the three corners of each triangle.
         A Mesh must have no transforms.
     triangles : (T, 3) integer array, optional
@@ -216,7 +216,8 @@ def _mesh_or_soup(vertices: Any, triangles: Any) -> tuple[FloatArray, npt.NDArra
     if triangles is not None:
         points = _arguments.floats("vertices", vertices, ("V", 3))
         return points, _arguments.triangles("triangles", triangles, len(points))
-    if hasattr(vertices, "vertices") or isinstance(vertices, tuple):
+    is_mesh = isinstance(vertices, tuple) or foreign.mesh_parts("vertices", vertices) is not None
+    if is_mesh or foreign.way_to_a_mesh(vertices):
         mesh = as_mesh("vertices", vertices, A_MESH)
         if mesh.transforms is not None:
             raise ValueError(f"vertices: expected a mesh without transforms, got {mesh!r}")

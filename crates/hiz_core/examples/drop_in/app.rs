@@ -78,7 +78,7 @@ impl App {
         let view = &self.picture.create_view(&Default::default());
         let depth = &self.depth.create_view(&Default::default());
         let (depth_slice, resolve_target, store) = (None, None, StoreOp::Store);
-        let load = if first { LoadOp::Clear(Color::default()) } else { LoadOp::Load };
+        let load = if first { LoadOp::Clear(Color::WHITE) } else { LoadOp::Load };
         let ops = Operations { load, store };
         let colour = RenderPassColorAttachment { view, depth_slice, resolve_target, ops };
         let load = if first { LoadOp::Clear(0.0) } else { LoadOp::Load };

@@ -4,9 +4,9 @@
 //! Nothing outside this room imports it, so no certified call reaches it; `tests/rooms.rs` checks
 //! that.
 
-pub mod hierarchy;
 mod coarse_level;
 mod fragment_levels;
+pub mod hierarchy;
 mod texts;
 
 pub use coarse_level::{LevelWay, MethodLevels, SHAPES};
