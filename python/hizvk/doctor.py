@@ -193,7 +193,8 @@ def _stage_times(device: hizvk.Device) -> DoctorCheck:
 
 def _extras() -> DoctorCheck:
     """Which of the optional packages are there."""
-    there, absent = [], []
+    there: list[tuple[str, str]] = []
+    absent: list[tuple[str, str]] = []
     for extra, packages in extras.PACKAGES.items():
         for package in packages:
             (there if importlib.util.find_spec(package) else absent).append((extra, package))
