@@ -50,6 +50,7 @@ ARRAYS = [
     ("Device.occluders", "vertices"),
     ("Device.occluders", "triangles"),
     ("Device.occluders", "transforms"),
+    ("Device.cull_map", "copies"),
     ("Device.pyramid", "depth"),
     ("Pyramid.update", "array"),
     ("LodByDistance", "thresholds"),

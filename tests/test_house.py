@@ -143,6 +143,20 @@ def test_a_cull_loads_no_tools() -> None:
     assert not strangers
 
 
+def test_nothing_uses_the_methods() -> None:
+    """The texts' algorithms stand beside the package: its lazy names and entries lead to them.
+
+    `Device.occlusion_map` and `Device.cull_map` are entries of their own, and the bench compares.
+    """
+    users = {
+        name
+        for name, imported in graph(PYTHON).items()
+        if not name.startswith(("hizvk.methods", "hizvk.bench"))
+        and any(module.startswith("hizvk.methods") for module in imported)
+    }
+    assert users <= {"hizvk", "hizvk.device"}
+
+
 def test_every_public_name_is_there_when_it_is_asked_for() -> None:
     code = (
         "import hizvk; names = [getattr(hizvk, name) for name in hizvk.__all__]; "

@@ -95,7 +95,15 @@ if TYPE_CHECKING:
     from .light import DirectionalLight
     from .lod import LodByDistance, LodByError, LodBySize
     from .mesh import Mesh
-    from .methods import HierarchicalVisibility, HierarchyFrame, PublishedTest
+    from .methods import (
+        BspTiling,
+        HierarchicalVisibility,
+        HierarchyFrame,
+        MapResult,
+        OcclusionMap,
+        PublishedTest,
+        TiledCoverage,
+    )
     from .mips import mip_texel, wgsl
     from .occluders import (
         InnerBoxes,
@@ -132,6 +140,7 @@ __all__ = [
     "ApproximateResult",
     "BoundsCheck",
     "Boxes",
+    "BspTiling",
     "Camera",
     "Comparison",
     "CullOptions",
@@ -154,11 +163,13 @@ __all__ = [
     "LodByDistance",
     "LodByError",
     "LodBySize",
+    "MapResult",
     "Mesh",
     "MeshLods",
     "NoAdapterError",
     "OccluderSelection",
     "Occluders",
+    "OcclusionMap",
     "OrientedBoxes",
     "OutOfMemoryError",
     "Outputs",
@@ -177,6 +188,7 @@ __all__ = [
     "Sweep",
     "SweepInterrupted",
     "Temporal",
+    "TiledCoverage",
     "Tolerance",
     "UnoccludedComparison",
     "Verdict",
@@ -217,6 +229,7 @@ _LATER = {
     "ApproximateResult": "approximate",
     "BoundsCheck": "check",
     "Boxes": "bounds",
+    "BspTiling": "methods",
     "Camera": "camera",
     "Comparison": "check",
     "CullOptions": "options",
@@ -236,11 +249,13 @@ _LATER = {
     "LodByDistance": "lod",
     "LodByError": "lod",
     "LodBySize": "lod",
+    "MapResult": "methods",
     "Mesh": "mesh",
     "MeshLods": "options",
     "NO_LOD": "result",
     "OccluderSelection": "occluders",
     "Occluders": "resources",
+    "OcclusionMap": "methods",
     "OrientedBoxes": "bounds",
     "Outputs": "options",
     "PIXELS_DTYPE": "pixels",
@@ -259,6 +274,7 @@ _LATER = {
     "Sweep": "sweeping",
     "SweepInterrupted": "sweeping",
     "Temporal": "temporal",
+    "TiledCoverage": "methods",
     "Tolerance": "tolerance",
     "UnoccludedComparison": "check",
     "Verdict": "explanation",
