@@ -20,11 +20,11 @@ from ..bounds import Boxes
 from ..commands import arguments as args
 from ..commands import figure, report
 from ..commands.page import Page
-from ..commands.progress import Progress
 from ..device import Device
 from ..explanation import Verdict
 from ..measuring.configuration import DESCENT
 from ..occluders import select_occluders
+from ..progress import Progress
 from ..scenes import embree
 from ..scenes.fence import PARTS, fence
 from ..scenes.truth import linear_depth, make_caster
@@ -162,12 +162,12 @@ def run(
     found = Report(command=command, seed=seed, adapter=device.adapter)
     if not embree.can_cast():
         found.missing.append(
-            f"{embree.MISSING}; what is seen is then that of boxes before the rendered depth"
+            f"{embree.missing()}; what is seen is then that of boxes before the rendered depth"
         )
     if not figure.can_draw():
-        found.missing.append(figure.MISSING)
-    steps = Progress(len(keys), f"{PROG}: {', '.join(keys)}")
-    try:
+        found.missing.append(figure.missing())
+    label = f"{PROG}: {', '.join(keys)}"
+    with Progress(True, label, len(keys), after_s=0.0) as steps:
         for key in keys:
             scene, meshes = _scene(key, instances, views or VIEWS, seed)
             found.scenes.append(_measure(device, key, scene, meshes, max_occluders))
@@ -179,8 +179,6 @@ def run(
                     drawing.maps(out, key, device, database, scene.views[0], found.scenes[-1].limit)
                 )
             steps.step(key)
-    finally:
-        steps.close()
     if figure.can_draw():
         from . import maps_pictures as drawing
 

@@ -19,9 +19,9 @@ from .._core import DepthTiles
 from ..commands import arguments as args
 from ..commands import report
 from ..commands.page import Page
-from ..commands.progress import Progress
 from ..device import Device
 from ..methods import BspTiling
+from ..progress import Progress
 from ..scenes import village
 from ..scenes.boulders import boulders
 from . import catalogue
@@ -183,8 +183,8 @@ def run(
     out.mkdir(parents=True, exist_ok=True)
     device = Device()
     found = Report(command, seed, size or SIZE, device.adapter)
-    steps = Progress(len(keys), f"{PROG}: {', '.join(keys)}")
-    try:
+    label = f"{PROG}: {', '.join(keys)}"
+    with Progress(True, label, len(keys), after_s=0.0) as steps:
         for key in keys:
             try:
                 scene = _scene(key, views or VIEWS, seed)
@@ -192,8 +192,6 @@ def run(
             except catalogue.Missing as missing:
                 found.missing.append(str(missing))
             steps.step(key)
-    finally:
-        steps.close()
     found.seconds = time.perf_counter() - started
     report.write(out, found.as_data(), found.page())
     return found
