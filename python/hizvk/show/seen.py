@@ -184,5 +184,5 @@ def _numbers(result: Any, classes: object) -> list[tuple[str, str]]:
     elif classes is None:
         rows.append(("in the list", f"{result.count:,}"))
     height, width = result._question.pyramid.size
-    rows.append(("depth image", f"{height} x {width} pixels"))
+    rows.append(("depth image", f"{height} x {width} px"))
     return rows

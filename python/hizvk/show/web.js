@@ -326,6 +326,8 @@ let isAsked = false;
 let lastWhole = 0; // milliseconds
 let whole; // the timer of the next whole picture
 const SMOOTH = 50;
+// So few instances are always all drawn.
+const FEW = 1000;
 
 // Draws every instance, or while the view moves one of `stride`.
 function draw(stride = 1) {
@@ -356,10 +358,13 @@ function draw(stride = 1) {
 function ask() {
   if (isAsked) return;
   isAsked = true;
-  const stride = Math.ceil(lastWhole / SMOOTH) || 1;
-  requestAnimationFrame(() => draw(stride));
   clearTimeout(whole);
-  if (stride > 1) whole = setTimeout(draw, 250);
+  const stride = count > FEW ? Math.ceil(lastWhole / SMOOTH) || 1 : 1;
+  requestAnimationFrame(() => {
+    draw(stride);
+    // Only now, for a hidden page may wait long for its next frame.
+    if (stride > 1) whole = setTimeout(draw, 250);
+  });
 }
 
 // -- mouse, touch, keys, address ------------------------------------------------------------------
