@@ -1,7 +1,7 @@
 """What a cull did, as one HTML page that turns and zooms in any browser, without a network.
 
 Two walls and the ground hide boxes on a plain.
-The page is written to the working directory, or to the path that is given.
+With a path, such as seen.html, the script writes the page there.
 `seen.plot()` and `hiz.plot()` draw figures, where matplotlib is installed; a notebook shows `seen`
 and `hiz` as they are.
 """
@@ -41,8 +41,9 @@ assert told.farthest_z is not None
 assert told.nearest_z is not None
 print(f"box 300 begins at {told.nearest_z:.1f} m, all before it ends at {told.farthest_z:.1f} m")
 
-page = Path(sys.argv[1] if len(sys.argv) > 1 else "seen.html")
-seen.save_html(page, occluders=walls, title="Boxes before and behind a wall")
-print(f"{page} has {page.stat().st_size // 1000} kB; open it in a browser")
+if len(sys.argv) > 1:
+    page = Path(sys.argv[1])
+    seen.save_html(page, occluders=walls, title="Boxes before and behind a wall")
+    print(f"{page} has {page.stat().st_size // 1000} kB; open it in a browser")
 stats = seen.stats
 print(f"white: {stats.kept} kept, red: {stats.occluded} culled")
