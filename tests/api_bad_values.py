@@ -462,6 +462,10 @@ def spheres() -> hizvk.Spheres:
     return hizvk.Spheres(np.array([[0.0, 0.0, -5.0]]), 1.0)
 
 
+def occlusion_map(device: hizvk.Device) -> hizvk.OcclusionMap:
+    return device.occlusion_map(device.occluders([TETRAHEDRON]), camera())
+
+
 def cull_arguments(device: hizvk.Device) -> dict[str, Any]:
     view = camera()
     pyramid = device.pyramid(np.ones((6, 8)), view, kind="z")
@@ -945,6 +949,30 @@ TABLES: dict[str, Table] = {
             "sampling": SAMPLING,
         },
     ),
+    "fill_depth": Table(
+        lambda _: (hizvk.fill_depth, {"depth": np.ones((6, 8)), "radius_px": 2, "kind": "z"}),
+        {
+            "depth": [
+                (np.ones(48), ValueError, "expected float (height, width), or whole numbers of 16"),
+                (np.ones((6, 8), np.uint8), TypeError, "got (6, 8) uint8"),
+                (np.ones((6, 8), bool), TypeError, "got (6, 8) bool"),
+                (np.full((6, 8), 2**60), ValueError, "which float64 cannot hold"),
+                ([[1.0, 2.0], [3.0]], ValueError, "no array"),
+                ("depth", TypeError, "got ndarray array('depth'"),
+                (None, TypeError, "got ndarray array(None"),
+            ],
+            "radius_px": [
+                (-1, ValueError, "expected an integer in 0..1024, got int -1"),
+                (1025, ValueError, "got int 1025"),
+                (2.0, TypeError, "got float 2.0"),
+            ],
+            "kind": [
+                ("ndc", ValueError, 'expected one of "z", "distance", got str \'ndc\''),
+                (None, TypeError, "got None"),
+            ],
+            "invalid": INVALID,
+        },
+    ),
     "depth_from_points": Table(
         lambda _: (
             hizvk.depth_from_points,
@@ -1255,6 +1283,84 @@ TABLES: dict[str, Table] = {
             "capacity": CAPACITY,
             "draw": DRAW,
             **OF_MESHES,
+        },
+    ),
+    "Device.occlusion_map": Table(
+        lambda device: (
+            device.occlusion_map,
+            {"occluders": device.occluders([TETRAHEDRON]), "camera": camera()},
+        ),
+        {
+            "occluders": [(TETRAHEDRON, TypeError, "expected Occluders of Device.occluders")],
+            "camera": [(None, TypeError, "expected a Camera, got None")],
+            "size": [
+                ((256, 255), ValueError, "expected powers of two up to 32768, got (256, 255)"),
+                (256, TypeError, "got int 256"),
+            ],
+            "least": [
+                (3, ValueError, "expected a power of two, got 3"),
+                (512, ValueError, "expected an integer in 1..256, got int 512"),
+            ],
+            "regions": [
+                (0, ValueError, "expected an integer in 1..256, got int 0"),
+                (24, ValueError, "expected a power of two, got 24"),
+            ],
+            "max_triangles": [(-1, ValueError, "got int -1")],
+            "max_occluders": [(0.5, TypeError, "got float 0.5")],
+        },
+    ),
+    "OcclusionMap.level": Table(
+        lambda device: (occlusion_map(device).level, {"level": 0}),
+        {"level": [(7, ValueError, "in -7..6, got int 7"), (0.0, TypeError, "got float 0.0")]},
+    ),
+    "OcclusionMap.opacity": Table(
+        lambda device: (occlusion_map(device).opacity, {"level": 0}),
+        {"level": [(-8, ValueError, "in -7..6, got int -8")]},
+    ),
+    "OcclusionMap.least_counts": Table(
+        lambda device: (occlusion_map(device).least_counts, {"negligible_px": 0}),
+        {"negligible_px": [(-1, ValueError, "got int -1"), (1.0, TypeError, "got float 1.0")]},
+    ),
+    "BspTiling": Table(
+        lambda device: (hizvk.BspTiling, {"occluders": device.occluders([TETRAHEDRON])}),
+        {
+            "occluders": [(TETRAHEDRON, TypeError, "expected Occluders of Device.occluders")],
+            "leaf": [(0, ValueError, "got int 0"), (0.5, TypeError, "got float 0.5")],
+            "most_parts": [
+                (0.5, ValueError, "got 0.5"),
+                ("all", TypeError, "got str 'all'"),
+                (NAN, ValueError, "got nan"),
+            ],
+        },
+    ),
+    "BspTiling.draw": Table(
+        lambda device: (
+            hizvk.BspTiling(device.occluders([TETRAHEDRON])).draw,
+            {"camera": camera()},
+        ),
+        {"camera": [(None, TypeError, "expected a Camera, got None")]},
+    ),
+    "Device.cull_map": Table(
+        lambda device: (
+            device.cull_map,
+            {"bounds": spheres(), "camera": camera(), "maps": occlusion_map(device)},
+        ),
+        {
+            "bounds": [(None, TypeError, "expected Spheres, Boxes, OrientedBoxes or Points")],
+            "camera": [
+                (None, TypeError, "expected a Camera, got None"),
+                (camera(far=9.0), ValueError, "expected the view of the maps"),
+            ],
+            "maps": [(None, TypeError, "expected an OcclusionMap of Device.occlusion_map")],
+            "negligible_px": [
+                (-1, ValueError, "expected an integer in 0..4294967295, got int -1"),
+                (0.5, TypeError, "got float 0.5"),
+            ],
+            "copies": [
+                ([0, 1, 2], ValueError, "expected integer (1,), got"),
+                ([0.5], TypeError, "expected integer (1,), got"),
+                ([-1], ValueError, "expected numbers of copies from 0 on, or hizvk.ABSENT, got -1"),
+            ],
         },
     ),
     "Device.cull_approximate": Table(
@@ -1613,7 +1719,11 @@ TABLES: dict[str, Table] = {
                 (None, TypeError, "got None"),
             ],
             "occluders": [
-                ("wall", TypeError, "expected a Mesh, a mesh of trimesh or Open3D"),
+                (
+                    "wall",
+                    TypeError,
+                    "expected a Mesh, a mesh of trimesh, Open3D or PyVista, or a list",
+                ),
                 ([TETRAHEDRON, 3], TypeError, "got int 3"),
             ],
             "title": [(3, TypeError, "expected a text, got int 3")],
@@ -1714,6 +1824,19 @@ TABLES: dict[str, Table] = {
             "kept_within": [
                 (0.9, ValueError, "at least 1, got float 0.9"),
                 (None, TypeError, "got None"),
+            ],
+            "meshes": [
+                (3, TypeError, "expected a sequence of MeshLods or None, got int 3"),
+                ([], ValueError, "expected at least one MeshLods, got none"),
+            ],
+            "mesh_ids": [
+                ([0, 1], ValueError, "expected integer (1,), got (2,) int64"),
+                ([0.5], TypeError, "got (1,) float64"),
+            ],
+            "lods": [([hizvk.LodByError(1)], TypeError, "expected None without meshes")],
+            "max_seconds": [
+                (-1.0, ValueError, "at least 0, got float -1.0"),
+                ("10", TypeError, "got str '10'"),
             ],
             "repetitions": [
                 (0, ValueError, "in 1..10000, got int 0"),
@@ -1833,6 +1956,7 @@ MADE_BY_THE_PACKAGE = {
 MADE_BY_THE_PACKAGE |= {"BoundsCheck", "Occluders", "ProxyCheck", "Pyramid", "Recommendation"}
 MADE_BY_THE_PACKAGE |= {"StageTime", "StageTimes", "ViewsResult"}
 MADE_BY_THE_PACKAGE |= {"ApproximateResult", "PassResult", "Temporal"}
+MADE_BY_THE_PACKAGE |= {"MapResult", "OcclusionMap", "TiledCoverage"}
 MADE_BY_THE_PACKAGE |= {"PointColours", "Projected", "HierarchyFrame"}
 MADE_BY_THE_PACKAGE |= {"InnerBoxes", "InnerPrisms", "OccluderSelection", "SplitMesh"}
 
@@ -1995,7 +2119,7 @@ RESUME: list[Bad] = [
     ("sweep.npz", TypeError, "expected a Sweep or None, got str 'sweep.npz'"),
 ]
 MESHES: list[Bad] = [
-    (3, TypeError, "expected a Mesh, a mesh of trimesh or Open3D, or a sequence of them"),
+    (3, TypeError, "expected a Mesh, a mesh of trimesh, Open3D or PyVista, or a sequence"),
     ([3], TypeError, "got int 3"),
 ]
 SIDE: list[Bad] = [(0, ValueError, "got int 0"), (64.0, TypeError, "got float 64.0")]
@@ -2142,7 +2266,7 @@ TABLES |= {
             "heights": [
                 (np.zeros(4), ValueError, "expected float (rows, columns), got (4,) float64"),
                 (np.zeros((1, 4)), ValueError, "expected at least 2 x 2 heights, got (1, 4)"),
-                (np.zeros((3, 4), dtype=int), TypeError, "got (3, 4) int64"),
+                (np.zeros((3, 4), dtype=bool), TypeError, "got (3, 4) bool"),
                 (np.full((3, 4), INF), ValueError, "expected finite heights, or NaN for no data"),
             ],
             "cell_size": [

@@ -91,7 +91,12 @@ def _wrong_cargo(words: list[str]) -> str | None:
         files = [
             path
             for place in places
-            for path in (place.parent.glob("*.rs") if place.name == "main.rs" else [place])
+            # A test's modules lie in a folder of its name.
+            for path in (
+                place.parent.glob("*.rs")
+                if place.name == "main.rs"
+                else [place, *place.with_suffix("").glob("*.rs")]
+            )
         ]
     else:
         return f"{kind}: expected --test, --example or --bin"
@@ -134,7 +139,10 @@ def _wrong_pytest(words: list[str]) -> str | None:
 
 def _wrong_python(words: list[str]) -> str | None:
     if words[0] == "-m":
-        return _wrong_options(("-m", words[1]), words[2:])
+        module, rest = words[1], words[2:]
+        # A first word without dashes is a command of its own.
+        commands = rest[:1] if rest and not rest[0].startswith("-") else []
+        return _wrong_options(("-m", module, *commands), rest[len(commands) :])
     return None if (ROOT / words[0]).is_file() else f"{words[0]}: no such file"
 
 

@@ -46,7 +46,7 @@ def describe(value: object) -> str:
         return f"{_shape_text(value.shape)} {value.dtype}"
     if value is None:
         return "None"
-    if hasattr(value, "__dlpack__"):
+    if hasattr(value, "__dlpack__") and not isinstance(value, (np.ndarray, np.generic)):
         return foreign.described(value)
     text = repr(value)
     if len(text) > 60:
@@ -525,8 +525,10 @@ def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
     return copied(name, array, np.bool_)
 
 
-def mesh_ids(name: str, value: object, count: int) -> npt.NDArray[np.uint32]:
-    """``(count,)`` mesh ids as uint32; any integer dtype comes in."""
+def mesh_ids(
+    name: str, value: object, count: int, what: str = "mesh ids"
+) -> npt.NDArray[np.uint32]:
+    """``(count,)`` mesh ids as uint32, or other numbers; any integer dtype comes in."""
     expected = f"integer ({count},)"
     if is_masked(value) or isinstance(value, (str, bytes)):
         raise _wrong_type(name, expected, value)
@@ -545,7 +547,7 @@ def mesh_ids(name: str, value: object, count: int) -> npt.NDArray[np.uint32]:
     _check_shape(name, expected, array, (count,))
     if array.size and not (int(array.min()) >= 0 and int(array.max()) < 2**32):
         wrong = int(array.min()) if array.min() < 0 else int(array.max())
-        raise ValueError(f"{name}: expected mesh ids from 0 on, or hizvk.ABSENT, got {wrong}")
+        raise ValueError(f"{name}: expected {what} from 0 on, or hizvk.ABSENT, got {wrong}")
     return copied(name, array, np.uint32)
 
 

@@ -15,10 +15,12 @@ from .options import CullOptions, Outputs
 
 __all__ = [
     "ApproximateCulling",
+    "BspTree",
     "Camera",
     "Counts",
     "Culling",
     "DepthImage",
+    "DepthTiles",
     "Engine",
     "Explanation",
     "HierarchicalVisibility",
@@ -26,9 +28,11 @@ __all__ = [
     "MeshTable",
     "MethodLevels",
     "Occluders",
+    "OcclusionMap",
     "PassAnswer",
     "Pyramid",
     "TextCull",
+    "Tiled",
     "TwoPasses",
     "ViewsCulling",
     "Yardstick",
@@ -456,6 +460,50 @@ class ApproximateCulling:
     def indices(self) -> npt.NDArray[np.uint32]: ...
     def pixels(self) -> npt.NDArray[np.uint32]: ...
     def negligible(self) -> npt.NDArray[np.bool_]: ...
+
+@final
+class OcclusionMap:
+    def __new__(
+        cls,
+        occluders: Occluders,
+        camera: Camera,
+        least: int,
+        regions: int,
+        max_triangles: int | None,
+        max_copies: int | None,
+    ) -> Self: ...
+    def num_levels(self) -> int: ...
+    def level(self, level: int) -> tuple[_Size, npt.NDArray[np.uint32]]: ...
+    def estimate(self) -> tuple[_Size, npt.NDArray[np.float64]]: ...
+    def least_counts(self, negligible_px: int) -> list[int]: ...
+    def chosen(self) -> npt.NDArray[np.uint32]: ...
+    def num_triangles(self) -> int: ...
+    def cull(
+        self,
+        kind: str,
+        arrays: Sequence[_Floats],
+        negligible_px: int,
+        never: npt.NDArray[np.bool_] | None,
+    ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.uint32], int]: ...
+
+@final
+class BspTree:
+    def __new__(cls, occluders: Occluders, leaf: int | None, most_parts: float) -> Self: ...
+    def numbers(self) -> tuple[int, int, int, int]: ...
+    def is_octree(self) -> bool: ...
+    def draw(self, occluders: Occluders, camera: Camera) -> Tiled: ...
+
+@final
+class Tiled:
+    def coverage(self) -> npt.NDArray[np.bool_]: ...
+    def numbers(self) -> tuple[int, int, int, int, int]: ...
+
+@final
+class DepthTiles:
+    def __new__(cls, size: _Size) -> Self: ...
+    def draw(self, occluders: Occluders, camera: Camera) -> None: ...
+    def coverage(self) -> npt.NDArray[np.bool_]: ...
+    def bytes(self) -> int: ...
 
 @final
 class TwoPasses:

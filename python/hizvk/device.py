@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from ._types import DepthKind, Levels, Output
     from .depth import DepthArray
     from .mesh import MeshLike
+    from .methods.occlusion_map import MapResult, OcclusionMap
     from .options import CullKeywords, CullOptions, MeshLods, OptionKeywords
     from .progress import ProgressLike
     from .tolerance import Tolerance
@@ -932,6 +933,106 @@ class Device:
             negligible,
         )
         return ApproximateResult(self, culling, negligible)
+
+    def occlusion_map(
+        self,
+        occluders: Occluders,
+        camera: Camera,
+        *,
+        size: Size = (256, 256),
+        least: int = 4,
+        regions: int = 64,
+        max_triangles: int | None = None,
+        max_occluders: int | None = None,
+    ) -> OcclusionMap:
+        """Makes hierarchical occlusion maps, for comparison with a pyramid; on all cores.
+
+        Nothing that they hide is certified: `cull_map` says what it may lose.
+        ``docs/methods.md`` compares both.
+
+        Of the occluders in the frustum the largest and nearest are drawn, as far as the limits go.
+        `select_occluders` makes a database of occluders out of all meshes, before any view.
+
+        Parameters
+        ----------
+        occluders : Occluders
+            Of this device.
+        camera : Camera
+            The view; its own image size does not matter.
+        size : (height, width)
+            Of the finest map: powers of two.
+        least : int
+            The shorter side of the coarsest map: a power of two.
+        regions : int
+            Regions along each side of the depth-estimation buffer: a power of two.
+        max_triangles : int, optional
+            At most so many triangles are drawn; None: all in the frustum.
+        max_occluders : int, optional
+            At most so many copies of meshes are drawn.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+
+        References
+        ----------
+        Zhang, Manocha, Hudson and Hoff, "Visibility culling using hierarchical occlusion maps"
+        (1997).
+        """
+        from .methods.occlusion_map import made
+
+        return made(
+            self,
+            occluders,
+            camera,
+            size=size,
+            least=least,
+            regions=regions,
+            max_triangles=max_triangles,
+            max_occluders=max_occluders,
+        )
+
+    def cull_map(
+        self,
+        bounds: Bounds,
+        camera: Camera,
+        maps: OcclusionMap,
+        *,
+        negligible_px: int = 0,
+        copies: npt.ArrayLike | None = None,
+    ) -> MapResult:
+        """Culls by hierarchical occlusion maps; what it culls is not certified.
+
+        An instance is culled if the maps cover its rectangle, and it lies behind the boxes of all
+        occluders in the regions that it meets.
+        With ``negligible_px=0`` no centre of the maps' pixels shows it.
+        A larger image may still show it beside an occluder, and holes that are called negligible
+        may show it, too.
+
+        Parameters
+        ----------
+        bounds : Spheres, Boxes, OrientedBoxes or Points
+            The bounds of the instances.
+            A sphere is tested as the box around it.
+        camera : Camera
+            The view of the maps, in any size.
+        maps : OcclusionMap
+            Of this device.
+        negligible_px : int
+            A hole of so many pixels of the finest map counts as covered, 0 to 2^32 - 1.
+        copies : (N,) integer array, optional
+            Which copy of an occluding mesh each instance is, or `hizvk.ABSENT`.
+            Those that the maps have drawn are kept without a test.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+        """
+        from .methods.occlusion_map import culled
+
+        return culled(self, bounds, camera, maps, negligible_px=negligible_px, copies=copies)
 
     def temporal(self, instances: Instances, *, early_capacity: int | None = None) -> Temporal:
         """Makes the two passes of a view, which draw each frame what was visible, then the rest.

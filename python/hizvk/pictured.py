@@ -14,7 +14,7 @@ from ._types import DepthKind, Up, words
 from .errors import HizError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     import numpy as np
     import numpy.typing as npt
@@ -215,7 +215,7 @@ class PicturedResult(_Shown):
         path: str | PathLike[str],
         bounds: Bounds | None = None,
         *,
-        occluders: MeshLike | list[MeshLike] | None = None,
+        occluders: MeshLike | Sequence[MeshLike] | None = None,
         up: Up | None = None,
         most: int = MOST,
         unit: str = "m",
@@ -231,7 +231,7 @@ class PicturedResult(_Shown):
             The file; what is there is replaced.
         bounds : Spheres, Boxes, OrientedBoxes or Points, optional
             As for `plot`.
-        occluders : Mesh, mesh of another library, or a list of them; optional
+        occluders : Mesh or list of them, also of another library; optional
             What hides things, to be shown as triangles; at most 40,000, the largest ones.
         up : {"x", "y", "z", "-x", "-y", "-z"}, optional
             As for `plot`.

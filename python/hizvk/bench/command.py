@@ -172,6 +172,16 @@ def _parser() -> argparse.ArgumentParser:
         help="instead: what is lost with fewer or simpler occluders; --occluders --help tells more",
     )
     parser.add_argument(
+        "--maps",
+        action="store_true",
+        help="instead: hierarchical occlusion maps beside the cull; --maps --help tells more",
+    )
+    parser.add_argument(
+        "--tiling",
+        action="store_true",
+        help="instead: coverage bits in BSP order beside depth tiles; --tiling --help tells more",
+    )
+    parser.add_argument(
         "--texts",
         action="store_true",
         help="instead: what published tests lose, and their time; --texts --help tells more",
@@ -200,6 +210,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from . import occluders
 
         return occluders.main([each for each in arguments if each != "--occluders"])
+    if "--maps" in arguments:
+        from . import maps
+
+        return maps.main([each for each in arguments if each != "--maps"])
+    if "--tiling" in arguments:
+        from . import tiling
+
+        return tiling.main([each for each in arguments if each != "--tiling"])
     if "--texts" in arguments:
         from . import texts
 

@@ -5,11 +5,12 @@ Source: Mike Turitzin, *Hierarchical Depth Buffers*, 2020.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 import numpy as np
 
 from .. import _arguments, _core
+from .._types import words
 from ..camera import Camera
 from ..device import Device
 
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
 __all__ = ["SHAPES", "MethodLevels"]
 
 #: How the levels are made.
-_LevelWay: TypeAlias = Literal["fragment", "atomic", "tree", "mips", "pyramid"]
+_LevelWay: TypeAlias = (
+    Literal["fragment"] | Literal["atomic"] | Literal["tree"] | Literal["mips"] | Literal["pyramid"]
+)
 #: Width and height of the workgroups of atomic minima; each makes a texel of 16x16 pixels.
 SHAPES: Final = ((16, 16), (16, 8), (16, 4), (8, 8), (8, 4), (4, 4))
 
@@ -75,7 +78,7 @@ class MethodLevels:
         levels: tuple[int, int] = (1, 15),
     ) -> None:
         _arguments.instance("device", device, Device, "a Device")
-        _arguments.choice("way", way, get_args(_LevelWay))
+        _arguments.choice("way", way, words(_LevelWay))
         if shape not in SHAPES:
             raise ValueError(f"shape: expected one of {SHAPES}, got {shape!r}")
         arrays = [

@@ -14,11 +14,12 @@ So what they lose is due to the test alone, and not to how their texts reduce de
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 import numpy as np
 
 from .. import _arguments, _core
+from .._types import words
 from ..bounds import Boxes, Spheres
 from ..camera import Camera
 from ..device import Device
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["PublishedTest"]
 
 #: A published test, by its author.
-_Text: TypeAlias = Literal["rakos", "arm", "darnell", "one_lookup"]
+_Text: TypeAlias = Literal["rakos"] | Literal["arm"] | Literal["darnell"] | Literal["one_lookup"]
 
 #: The bounds that each test takes.
 _TAKES: Final[dict[str, type[Boxes | Spheres]]] = {
@@ -92,7 +93,7 @@ class PublishedTest:
         self, device: Device, text: _Text, bounds: Boxes | Spheres, camera: Camera, pyramid: Pyramid
     ) -> None:
         _arguments.instance("device", device, Device, "a Device")
-        chosen = _arguments.choice("text", text, get_args(_Text))
+        chosen = _arguments.choice("text", text, words(_Text))
         wanted = _TAKES[chosen]
         _arguments.instance("bounds", bounds, wanted, f"{wanted.__name__} for {chosen!r}")
         _arguments.instance("camera", camera, Camera, "a Camera")

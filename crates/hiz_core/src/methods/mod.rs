@@ -7,7 +7,10 @@
 mod coarse_level;
 mod fragment_levels;
 pub mod hierarchy;
+pub mod occlusion_map;
+mod seen;
 mod texts;
+pub mod tiling;
 
 #[cfg(test)]
 pub(crate) use coarse_level::TILE;
