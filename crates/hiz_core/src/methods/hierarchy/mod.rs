@@ -1,9 +1,9 @@
-//! Hierarchical visibility: an octree of the scene is walked front to back against a pyramid of
-//! the depths that were drawn so far.
+//! Hierarchical visibility: an octree of the scene is walked front to back against a pyramid of the
+//! depths that were drawn so far.
 //!
 //! Source: Greene, Kass and Miller, *Hierarchical Z-buffer visibility*, SIGGRAPH 1993, sections 3.1
-//! (octree), 3.2 (pyramid) and 3.3 (coherence from frame to frame); as *Real-Time Rendering* (Moller
-//! and Haines 1999, the chapter on culling) tells it.
+//! (octree), 3.2 (pyramid) and 3.3 (coherence from frame to frame); as *Real-Time Rendering*
+//! (Moller and Haines 1999, the chapter on culling) tells it.
 //!
 //! 1. `tree`: an octree over meshlets.
 //!    Above `threshold` meshlets a node is split, down to a deepest level.
@@ -170,19 +170,22 @@ pub struct HierarchyNode {
 /// # let projection = Projection::Perspective { fov_y, near: 0.1, far: None, convention };
 /// # let camera = Camera::look_at(&pose, &projection, ImageSize::new(64, 64))?;
 ///
-/// // A wall that fills the view, and the same wall behind it.
-/// let wall = |z: f64| [-50.0, -50.0, z, 50.0, -50.0, z, -50.0, 50.0, z, 50.0, 50.0, z];
-/// let (front, behind) = (wall(-10.0), wall(-20.0));
-/// let meshes = [&front, &behind].map(|corners| MeshData {
-///     vertices: Floats::F64(corners),
-///     triangles: &[0, 1, 2, 2, 1, 3],
-///     transforms: None,
-/// });
+/// // A wall that fills the view, and 16 triangles in a row behind it.
+/// let wall = [-50.0, -50.0, -10.0, 50.0, -50.0, -10.0, -50.0, 50.0, -10.0, 50.0, 50.0, -10.0];
+/// let row: Vec<[f64; 9]> = (-8..8)
+///     .map(f64::from)
+///     .map(|x| [x, 0.0, -30.0, x + 1.0, 0.0, -30.0, x, 1.0, -30.0])
+///     .collect();
+/// let mesh = |corners, triangles| {
+///     MeshData { vertices: Floats::F64(corners), triangles, transforms: None }
+/// };
+/// let behind = row.iter().map(|corners| mesh(&corners[..], &[0, 1, 2][..]));
+/// let meshes: Vec<_> = std::iter::once(mesh(&wall, &[0, 1, 2, 2, 1, 3])).chain(behind).collect();
 /// let options = HierarchyOptions { threshold: 1, ..HierarchyOptions::default() };
 /// let scene = HierarchicalVisibility::new(&meshes, &OccluderOptions::default(), &options)?;
 /// let frame = scene.render(&camera, &[], false)?;
 /// assert_eq!(frame.counts.triangles_drawn, 2);
-/// assert_eq!(frame.counts.triangles_in_hidden_nodes, 2);
+/// assert_eq!(frame.counts.triangles_in_hidden_nodes, 16);
 /// # Ok::<(), hiz_core::Error>(())
 /// ```
 #[derive(Debug)]
@@ -281,7 +284,8 @@ impl HierarchicalVisibility {
 
     /// Draws what `camera` sees, front to back.
     ///
-    /// `previous` are nodes that are drawn first and untested: the visible leaves of the last frame.
+    /// `previous` are nodes that are drawn first and untested: the visible leaves of the last
+    /// frame.
     /// They change no pixel, and neither does their order.
     /// `count` asks for [`HierarchyFrame::centres`], which takes much longer than the frame.
     ///
