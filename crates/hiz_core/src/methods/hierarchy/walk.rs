@@ -3,9 +3,9 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use crate::methods::hierarchy::frame::{HierarchyCounts, NodeState};
 use crate::methods::hierarchy::tree::{Node, Tree};
 use crate::methods::hierarchy::z_pyramid::ZPyramid;
-use crate::methods::hierarchy::{HierarchyCounts, NodeState};
 use crate::occluders::host_raster::one_by_one::{Extent, Looks, OneByOne};
 use crate::occluders::shapes::Shapes;
 
