@@ -1,9 +1,9 @@
 # Every recipe is one script in scripts/, which says what it does and why.
 .DEFAULT_GOAL := help
-# Arguments of the viewer, such as ARGS='--scene arm'.
+# Arguments of the viewer or of gpu-check, such as ARGS='--scene arm' and ARGS=--quick.
 ARGS ?=
 .PHONY: help setup demo view bench-view test test-swiftshader soak lint bench bench-speed docs
-.PHONY: wheel package
+.PHONY: wheel package gpu-check
 
 help: ## This list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | \
@@ -35,6 +35,9 @@ bench: ## Measure speed and error of every configuration; leaves report and plot
 
 bench-speed: ## Measure times against yardsticks and targets; leaves report and plot in out/speed
 	@scripts/bench_speed.sh
+
+gpu-check: ## Doctor, tests, speed and demo on this machine's GPU; one report in out/gpu
+	@scripts/gpu_check.sh $(ARGS)
 
 bench-view: ## Whole frames with and without culling, as a table
 	@scripts/view.sh --bench $(ARGS)

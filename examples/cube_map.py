@@ -8,14 +8,7 @@ import numpy as np
 
 import hizvk
 
-FACES = {
-    "+x": ((1, 0, 0), (0, -1, 0)),
-    "-x": ((-1, 0, 0), (0, -1, 0)),
-    "+y": ((0, 1, 0), (0, 0, 1)),
-    "-y": ((0, -1, 0), (0, 0, -1)),
-    "+z": ((0, 0, 1), (0, -1, 0)),
-    "-z": ((0, 0, -1), (0, -1, 0)),
-}
+FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
 def room() -> tuple[np.ndarray, np.ndarray]:
@@ -41,10 +34,7 @@ def main() -> None:
     behind = random.uniform((-9, -1.5, -1.5), (-4, 1.5, 1.5), (400, 3))
     balls = device.instances(hizvk.Spheres(np.concatenate([within, corridor, behind]), 0.05))
 
-    cameras = [
-        hizvk.Camera.look_at((0, 0, 0), to, up=up, fov_y_deg=90, size=(256, 256), near=0.01)
-        for to, up in FACES.values()
-    ]
+    cameras = hizvk.cube((0, 0, 0), size=256, near=0.01)
     pyramids = [device.pyramid(device.render_depth(walls, camera)) for camera in cameras]
     seen = device.cull(balls, cameras, pyramids, descent=256)
     for name, count in zip(FACES, seen.counts, strict=True):

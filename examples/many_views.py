@@ -5,8 +5,6 @@ Balls stand inside of the house and around it.
 The union of the masks says what these views need; it says nothing about views between them.
 """
 
-import sys
-
 import numpy as np
 import numpy.typing as npt
 
@@ -15,11 +13,11 @@ import hizvk
 VIEWS, INSIDE, AROUND = 24, 100, 60
 
 
-def house() -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
-    """A closed box, 8 m wide and 4 m high: vertices, triangles."""
+def house() -> hizvk.Mesh:
+    """A closed box, 8 m wide and 4 m high."""
     sides = np.array([(x, y, z) for x in (-4, 4) for y in (0, 4) for z in (-4, 4)], np.float64)
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return sides, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
+    return hizvk.Mesh(sides, [t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
 
 
 def balls() -> hizvk.Spheres:
@@ -45,20 +43,16 @@ def path() -> list[hizvk.Camera]:
     ]
 
 
+def report(name: str, ever: npt.NDArray[np.bool_]) -> None:
+    """Says how many balls of each kind are seen."""
+    print(f"seen from {name}: {ever[:INSIDE].sum()} inside, {ever[INSIDE:].sum()} around")
+
+
 def main() -> None:
-    """Culls once per camera, and joins the masks."""
-    device = hizvk.Device()
-    walls = device.occluders(*house())
-    crowd = device.instances(balls())
-    ever = np.zeros(len(crowd), np.bool_)
-    for number, camera in enumerate(path(), start=1):
-        # Each view has a depth image of its own: what one view hides, another may see.
-        hiz = device.pyramid(device.render_depth(walls, camera))
-        seen = device.cull(crowd, camera, hiz, outputs=["mask"], descent=256)
-        ever |= seen.mask
-        print(f"\rview {number} of {VIEWS}: {ever.sum()} so far", end="", file=sys.stderr)
-    print(file=sys.stderr)
-    print(f"seen from {VIEWS} views: {ever[:INSIDE].sum()} inside, {ever[INSIDE:].sum()} around")
+    """Culls once per camera; executor=4 would do it in four processes."""
+    seen = hizvk.sweep(balls(), path(), occluders=house(), descent=256)
+    report("the first view", seen.mask(0))
+    report(f"{VIEWS} views", seen.union())
 
 
 if __name__ == "__main__":

@@ -36,5 +36,10 @@ if have shellcheck; then
 else
   printf 'shellcheck is not installed: the shell scripts were not checked\n'
 fi
+if have actionlint; then
+  check "workflows" actionlint
+else
+  printf 'actionlint is not installed: the workflows were not checked\n'
+fi
 
 checked

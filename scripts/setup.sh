@@ -117,6 +117,23 @@ window_packages() {
   fi
 }
 
+# What the test of a result's HTML page needs: about 120 MB are downloaded.
+# The test skips itself without it, so nothing ends here.
+browser_package() {
+  local name line
+  for name in chromium chromium-browser google-chrome; do
+    ! have "$name" || return 0
+  done
+  # What could not be installed once is not tried again.
+  [ ! -e "$STAMPS/browser" ] || return 0
+  touch "$STAMPS/browser"
+  line="apt-get update && apt-get install -y --no-install-recommends chromium"
+  if ! have apt-get || ! can_be_root || ! (apt_install chromium); then
+    printf 'note: the test of the HTML page is skipped without Chromium: %s\n' \
+      "sudo sh -c '$line'" >&2
+  fi
+}
+
 check_rust() {
   local wanted found
   wanted=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
@@ -192,6 +209,7 @@ system_packages
 make_venv
 mkdir -p "$STAMPS"
 window_packages
+browser_package
 for group in dev "$@"; do
   install_group "$group"
 done

@@ -5,7 +5,8 @@
 # - the certificates in every arithmetic that WGSL permits;
 # - the example's scenes with and without culling, by 1000 random cameras (HIZVK_SOAK_CAMERAS) each;
 # - the viewer's scenes with and without culling, 300 frames (HIZVK_VIEWER_FRAMES) each;
-# - 2000 processes each of Rust and Python that use a device and end.
+# - 2000 processes each of Rust and Python that use a device and end;
+# - every command of docs/sources.md.
 # The adversarial cases may be stopped at any time.
 # The next run with the same settings continues there.
 set -euo pipefail

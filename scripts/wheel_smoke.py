@@ -1,6 +1,7 @@
 """Tries an installed wheel for a few seconds: `wheel_smoke.py`.
 
 `wheel_smoke.py --no-driver` is for a machine without a device.
+`--advice` prints how to install the extras, and `--extras` uses them.
 """
 
 import sys
@@ -37,6 +38,17 @@ def with_driver() -> None:
     print(f"hizvk on {device.adapter}: one of two spheres is hidden, as it should be")
 
 
+def with_extras() -> None:
+    """The packages that the advice has installed are those that pictures and rays need."""
+    from hizvk.commands import figure
+    from hizvk.scenes import embree, mountains
+
+    assert figure.can_draw(), "expected matplotlib"
+    assert embree.can_cast(), "expected embreex"
+    scene = mountains(trees=10, views=1)
+    print(f"extras: {len(scene.views)} view of the mountains, which matplotlib ships")
+
+
 if __name__ == "__main__":
     assert "site-packages" in hizvk.__file__, (
         f"hizvk comes from {hizvk.__file__}, not from the wheel"
@@ -46,7 +58,13 @@ if __name__ == "__main__":
             f"hizvk._core.{name}: expected in a developer's module alone"
         )
     assert not _core.takes_planted_faults
-    if "--no-driver" in sys.argv[1:]:
+    if "--advice" in sys.argv[1:]:
+        from hizvk.extras import install_line
+
+        print(install_line("viz", "scene"))
+    elif "--extras" in sys.argv[1:]:
+        with_extras()
+    elif "--no-driver" in sys.argv[1:]:
         without_driver()
     else:
         with_driver()

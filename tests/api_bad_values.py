@@ -4,7 +4,10 @@ Each function has a table: valid arguments, and for each parameter bad values wi
 a part of its text.
 """
 
+import os
+import tempfile
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -166,11 +169,7 @@ def array_of(shape: str, *, wrong: tuple[int, ...]) -> list[Bad]:
     expected = f"expected float {shape}, got"
     return [
         (np.zeros(wrong), ValueError, f"{expected} {wrong} float64"),
-        (
-            np.zeros(wrong, dtype=np.int64),
-            TypeError,
-            f"{expected} {wrong} int64; convert it with .astype(np.float64)",
-        ),
+        (np.zeros(wrong, dtype=np.int64), ValueError, f"{expected} {wrong} int64"),
         (np.zeros(wrong, dtype=bool), TypeError, "bool"),
         (np.zeros(wrong, dtype=complex), TypeError, "complex128"),
         (np.zeros(wrong, dtype=object), TypeError, "object"),
@@ -185,15 +184,15 @@ def array_of(shape: str, *, wrong: tuple[int, ...]) -> list[Bad]:
 
 HALF_SIZES: list[Bad] = [
     (np.ones((3, 3)), ValueError, "expected float (2, 3), got (3, 3) float64"),
-    (
-        np.ones((2, 3), dtype=int),
-        TypeError,
-        "got (2, 3) int64; convert it with .astype(np.float64)",
-    ),
+    (np.ones((2, 3), dtype=complex), TypeError, "got (2, 3) complex128"),
     ((1.0, 2.0), ValueError, "expected float (3,) or one number, got (2,) float64"),
     ([[1.0, 2.0], [3.0]], ValueError, "no array"),
     ("large", TypeError, "got str 'large'"),
     (None, TypeError, "got None"),
+]
+PROGRESS: list[Bad] = [
+    ("bar", TypeError, "expected None, True, False or a function, got str 'bar'"),
+    (1, TypeError, "got int 1"),
 ]
 BOUNDS: list[Bad] = [
     (
@@ -209,18 +208,18 @@ CAMERA: list[Bad] = [
     (EYE4, TypeError, "got (4, 4) float64"),
 ]
 IMAGE: list[Bad] = [
-    (np.zeros((6, 8, 1)), ValueError, "[..., 0] is the image without its axis of channels"),
-    (np.zeros((1, 6, 8)), ValueError, "[0] is the image without its leading axis"),
+    (np.zeros((6, 9, 1)), ValueError, "got (6, 9, 1) float64"),
+    (np.zeros((1, 8, 6)), ValueError, "got (1, 8, 6) float64"),
     (np.zeros((8, 6)), ValueError, "expected float (6, 8) (the camera's size), got (8, 6) float64"),
     (np.zeros(48), ValueError, "got (48,) float64"),
-    (np.zeros((6, 8), dtype=np.int32), TypeError, "got (6, 8) int32"),
+    (np.zeros((6, 8), dtype=np.int8), TypeError, "got (6, 8) int8"),
     (np.zeros((6, 8, 3)), ValueError, "got (6, 8, 3) float64"),
     (np.zeros((3, 4)), ValueError, "goes with camera.resized("),
     (np.zeros((6, 8), dtype=np.uint8), TypeError, "got (6, 8) uint8"),
     (np.zeros((6, 8), dtype=bool), TypeError, "got (6, 8) bool"),
-    (np.ma.zeros((6, 8), dtype=np.int32), TypeError, "got (6, 8) int32"),
+    (np.ma.zeros((6, 8), dtype=np.uint8), TypeError, "got (6, 8) uint8"),
     (np.ma.zeros((8, 6)), ValueError, "got (8, 6) float64"),
-    (memoryview(np.zeros((6, 8), dtype=np.int32)), TypeError, "got (6, 8) int32"),
+    (memoryview(np.zeros((6, 8), dtype=np.int8)), TypeError, "got (6, 8) int8"),
     ("image", TypeError, "got str 'image'"),
 ]
 KIND: list[Bad] = [
@@ -290,8 +289,8 @@ DEPTH_SLACK: list[Bad] = [
     ("a", TypeError, "got str 'a'"),
 ]
 FOOTPRINT: list[Bad] = [
-    (3, ValueError, "expected one of 2, 4, 8, got 3"),
-    (16, ValueError, "in 2..8"),
+    (3, ValueError, "expected one of 1, 2, 4, 8, got 3"),
+    (16, ValueError, "in 1..8"),
     (2.0, TypeError, "got float 2.0"),
 ]
 FIT: list[Bad] = [
@@ -310,7 +309,7 @@ TRANSFORM_SLACK: list[Bad] = [
 ]
 VERTICES: list[Bad] = [
     (np.zeros((4, 2)), ValueError, "expected float (V, 3), got (4, 2) float64"),
-    (np.zeros((4, 3), dtype=int), TypeError, "got (4, 3) int64"),
+    (np.full((4, 3), 2**60), ValueError, "got (4, 3) int64 with 1152921504606846976 in it, which"),
     (
         np.full((4, 3), NAN),
         ValueError,
@@ -329,7 +328,7 @@ SINGLE_MESH: list[Bad] = [
     (
         None,
         TypeError,
-        "expected a Mesh, a mesh of trimesh or Open3D or a tuple (vertices, triangles), got None",
+        "or PyVista or a tuple (vertices, triangles), got None",
     ),
     (
         (np.zeros((3, 2)), [[0, 1, 2]]),
@@ -350,7 +349,7 @@ SINGLE_MESH: list[Bad] = [
 TRANSFORMS: list[Bad] = [
     (np.eye(3), ValueError, "expected float (4, 4), got (3, 3) float64"),
     (np.zeros((2, 4, 3)), ValueError, "expected float (K, 4, 4), got (2, 4, 3) float64"),
-    (np.eye(4, dtype=int), TypeError, "got (4, 4) int64"),
+    (np.eye(4, dtype=bool), TypeError, "got (4, 4) bool"),
     (np.eye(4) * NAN, ValueError, "NaN or infinite"),
     (TRANSPOSED_POSE, ValueError, "it looks transposed"),
     (
@@ -426,8 +425,45 @@ ORTHO_NEAR: list[Bad] = [
 CLIP: list[Bad] = [*MATRIX, (None, ValueError, "got neither")]
 
 
+TEXT: list[Bad] = [(3, TypeError, "expected a text, got int 3"), (None, TypeError, "got None")]
+#: What figures and pages of results are asked for.
+DRAWN: BadValues = {
+    "bounds": [
+        (np.zeros((1, 3)), TypeError, "expected Spheres, Boxes, OrientedBoxes or Points, got"),
+        (
+            hizvk.Spheres(np.zeros((2, 3)), 1.0),
+            ValueError,
+            "expected those of the 1 instances that were tested, got 2",
+        ),
+    ],
+    "up": [
+        ("w", ValueError, 'expected one of "x", "y", "z", "-x", "-y", "-z", got str'),
+        ((0, 0, 1), TypeError, "got tuple"),
+    ],
+    "most": [
+        (0, ValueError, "expected an integer in 1..2147483647, got int 0"),
+        (10.0, TypeError, "got float 10.0"),
+    ],
+    "unit": TEXT,
+}
+#: What `Pyramid.level` and `DepthImage.numpy` are asked for.
+WANTED_KIND: list[Bad] = [
+    ("depth", ValueError, 'expected one of "ndc", "reversed_ndc", "z", "distance", got str'),
+    (2, TypeError, "got int 2"),
+]
+
+
+def rendered(device: hizvk.Device) -> hizvk.DepthImage:
+    """A depth image of a triangle."""
+    return device.render_depth(device.occluders(TETRAHEDRON), camera())
+
+
 def spheres() -> hizvk.Spheres:
     return hizvk.Spheres(np.array([[0.0, 0.0, -5.0]]), 1.0)
+
+
+def occlusion_map(device: hizvk.Device) -> hizvk.OcclusionMap:
+    return device.occlusion_map(device.occluders([TETRAHEDRON]), camera())
 
 
 def cull_arguments(device: hizvk.Device) -> dict[str, Any]:
@@ -599,7 +635,7 @@ TABLES: dict[str, Table] = {
             "radii": [
                 (np.ones(3), ValueError, "expected float (2,) or one number, got (3,) float64"),
                 (np.ones((2, 1)), ValueError, "got (2, 1) float64"),
-                (np.ones(2, dtype=int), TypeError, "got (2,) int64"),
+                (np.ones(2, dtype=bool), TypeError, "got (2,) bool"),
                 ("1", TypeError, "got str '1'"),
                 (np.timedelta64(0, "s"), TypeError, "got timedelta64"),
                 (True, TypeError, "got bool True"),
@@ -612,6 +648,27 @@ TABLES: dict[str, Table] = {
     "Boxes": Table(
         lambda _: (hizvk.Boxes, {"min": np.zeros((2, 3)), "max": np.ones((2, 3))}),
         {"min": array_of("(N, 3)", wrong=(3, 100)), "max": array_of("(2, 3)", wrong=(3, 3))},
+    ),
+    "Boxes.from_corners": Table(
+        lambda _: (hizvk.Boxes.from_corners, {"corners": np.zeros((2, 8, 3))}),
+        {"corners": array_of("(N, 8, 3)", wrong=(2, 3))},
+    ),
+    "OrientedBoxes.from_corners": Table(
+        lambda _: (
+            hizvk.OrientedBoxes.from_corners,
+            {"corners": np.zeros((2, 8, 3)), "order": "kitti"},
+        ),
+        {
+            "corners": [
+                *array_of("(N, 8, 3)", wrong=(2, 3)),
+                (np.zeros((2, 3, 8)), ValueError, "pass corners.swapaxes(-1, -2)"),
+                (np.arange(24.0).reshape(1, 8, 3) ** 2, ValueError, "1 of 1 that are no box in it"),
+            ],
+            "order": [
+                ("waymo", ValueError, '"carla" (get_world_vertices) or "open3d"'),
+                (None, TypeError, "got None"),
+            ],
+        },
     ),
     "OrientedBoxes": Table(
         lambda _: (
@@ -892,6 +949,30 @@ TABLES: dict[str, Table] = {
             "sampling": SAMPLING,
         },
     ),
+    "fill_depth": Table(
+        lambda _: (hizvk.fill_depth, {"depth": np.ones((6, 8)), "radius_px": 2, "kind": "z"}),
+        {
+            "depth": [
+                (np.ones(48), ValueError, "expected float (height, width), or whole numbers of 16"),
+                (np.ones((6, 8), np.uint8), TypeError, "got (6, 8) uint8"),
+                (np.ones((6, 8), bool), TypeError, "got (6, 8) bool"),
+                (np.full((6, 8), 2**60), ValueError, "which float64 cannot hold"),
+                ([[1.0, 2.0], [3.0]], ValueError, "no array"),
+                ("depth", TypeError, "got ndarray array('depth'"),
+                (None, TypeError, "got ndarray array(None"),
+            ],
+            "radius_px": [
+                (-1, ValueError, "expected an integer in 0..1024, got int -1"),
+                (1025, ValueError, "got int 1025"),
+                (2.0, TypeError, "got float 2.0"),
+            ],
+            "kind": [
+                ("ndc", ValueError, 'expected one of "z", "distance", got str \'ndc\''),
+                (None, TypeError, "got None"),
+            ],
+            "invalid": INVALID,
+        },
+    ),
     "depth_from_points": Table(
         lambda _: (
             hizvk.depth_from_points,
@@ -938,7 +1019,7 @@ TABLES: dict[str, Table] = {
             "device": [(3, TypeError, "expected a Device or None, got int 3")],
             "options": OPTIONS_OBJECT,
             **OPTIONS,
-            "progress": [("bar", TypeError, "expected True, False or a function, got str 'bar'")],
+            "progress": PROGRESS,
         },
     ),
     "Camera.resized": Table(lambda _: (camera().resized, {"size": (3, 4)}), {"size": SIZE}),
@@ -948,6 +1029,20 @@ TABLES: dict[str, Table] = {
             {"vertices": np.zeros((3, 3)), "triangles": [[0, 1, 2]], "transforms": EYE4},
         ),
         {"vertices": VERTICES, "triangles": TRIANGLES, "transforms": TRANSFORMS},
+    ),
+    "Mesh.of": Table(
+        lambda _: (hizvk.Mesh.of, {"mesh": TETRAHEDRON, "transforms": EYE4}),
+        {
+            "mesh": [
+                (
+                    None,
+                    TypeError,
+                    "expected a Mesh, a mesh of trimesh, Open3D or PyVista, or a scene",
+                ),
+                (np.zeros((3, 3)), TypeError, "got (3, 3) float64"),
+            ],
+            "transforms": TRANSFORMS,
+        },
     ),
     "DrawTemplate": Table(
         lambda _: (hizvk.DrawTemplate, {"index_count": 36}),
@@ -1090,6 +1185,7 @@ TABLES: dict[str, Table] = {
             ],
             "max_triangles": LIMIT,
             "max_occluders": LIMIT,
+            "progress": PROGRESS,
         },
     ),
     "Device.pyramid": Table(
@@ -1187,6 +1283,84 @@ TABLES: dict[str, Table] = {
             "capacity": CAPACITY,
             "draw": DRAW,
             **OF_MESHES,
+        },
+    ),
+    "Device.occlusion_map": Table(
+        lambda device: (
+            device.occlusion_map,
+            {"occluders": device.occluders([TETRAHEDRON]), "camera": camera()},
+        ),
+        {
+            "occluders": [(TETRAHEDRON, TypeError, "expected Occluders of Device.occluders")],
+            "camera": [(None, TypeError, "expected a Camera, got None")],
+            "size": [
+                ((256, 255), ValueError, "expected powers of two up to 32768, got (256, 255)"),
+                (256, TypeError, "got int 256"),
+            ],
+            "least": [
+                (3, ValueError, "expected a power of two, got 3"),
+                (512, ValueError, "expected an integer in 1..256, got int 512"),
+            ],
+            "regions": [
+                (0, ValueError, "expected an integer in 1..256, got int 0"),
+                (24, ValueError, "expected a power of two, got 24"),
+            ],
+            "max_triangles": [(-1, ValueError, "got int -1")],
+            "max_occluders": [(0.5, TypeError, "got float 0.5")],
+        },
+    ),
+    "OcclusionMap.level": Table(
+        lambda device: (occlusion_map(device).level, {"level": 0}),
+        {"level": [(7, ValueError, "in -7..6, got int 7"), (0.0, TypeError, "got float 0.0")]},
+    ),
+    "OcclusionMap.opacity": Table(
+        lambda device: (occlusion_map(device).opacity, {"level": 0}),
+        {"level": [(-8, ValueError, "in -7..6, got int -8")]},
+    ),
+    "OcclusionMap.least_counts": Table(
+        lambda device: (occlusion_map(device).least_counts, {"negligible_px": 0}),
+        {"negligible_px": [(-1, ValueError, "got int -1"), (1.0, TypeError, "got float 1.0")]},
+    ),
+    "BspTiling": Table(
+        lambda device: (hizvk.BspTiling, {"occluders": device.occluders([TETRAHEDRON])}),
+        {
+            "occluders": [(TETRAHEDRON, TypeError, "expected Occluders of Device.occluders")],
+            "leaf": [(0, ValueError, "got int 0"), (0.5, TypeError, "got float 0.5")],
+            "most_parts": [
+                (0.5, ValueError, "got 0.5"),
+                ("all", TypeError, "got str 'all'"),
+                (NAN, ValueError, "got nan"),
+            ],
+        },
+    ),
+    "BspTiling.draw": Table(
+        lambda device: (
+            hizvk.BspTiling(device.occluders([TETRAHEDRON])).draw,
+            {"camera": camera()},
+        ),
+        {"camera": [(None, TypeError, "expected a Camera, got None")]},
+    ),
+    "Device.cull_map": Table(
+        lambda device: (
+            device.cull_map,
+            {"bounds": spheres(), "camera": camera(), "maps": occlusion_map(device)},
+        ),
+        {
+            "bounds": [(None, TypeError, "expected Spheres, Boxes, OrientedBoxes or Points")],
+            "camera": [
+                (None, TypeError, "expected a Camera, got None"),
+                (camera(far=9.0), ValueError, "expected the view of the maps"),
+            ],
+            "maps": [(None, TypeError, "expected an OcclusionMap of Device.occlusion_map")],
+            "negligible_px": [
+                (-1, ValueError, "expected an integer in 0..4294967295, got int -1"),
+                (0.5, TypeError, "got float 0.5"),
+            ],
+            "copies": [
+                ([0, 1, 2], ValueError, "expected integer (1,), got"),
+                ([0.5], TypeError, "expected integer (1,), got"),
+                ([-1], ValueError, "expected numbers of copies from 0 on, or hizvk.ABSENT, got -1"),
+            ],
         },
     ),
     "Device.cull_approximate": Table(
@@ -1372,6 +1546,7 @@ TABLES: dict[str, Table] = {
                     "expected a closed mesh whose triangles run consistently around, got 3 edges",
                 ),
             ],
+            "progress": PROGRESS,
         },
     ),
     "check_bounds": Table(
@@ -1382,7 +1557,7 @@ TABLES: dict[str, Table] = {
                 (
                     None,
                     TypeError,
-                    "expected a Mesh, a mesh of trimesh or Open3D, or a list of them",
+                    "expected a Mesh, a mesh of trimesh, Open3D or PyVista, or a list of them",
                 ),
                 ([], ValueError, "expected one for each of the 1 bounds, got 0"),
                 (
@@ -1397,11 +1572,15 @@ TABLES: dict[str, Table] = {
                     "vertices: expected float (V, 3), got (3, 2) float64",
                 ),
             ],
+            "progress": PROGRESS,
         },
     ),
     "Device.timed": Table(lambda device: (device.timed, {}), {}),
     "Device.wait": Table(lambda device: (device.wait, {}), {}),
-    "DepthImage.numpy": Table(lambda device: (device.wait, {}), {}),
+    "DepthImage.plot": Table(
+        lambda device: (rendered(device).plot, {}), {"kind": WANTED_KIND, "unit": TEXT}
+    ),
+    "DepthImage.numpy": Table(lambda device: (rendered(device).numpy, {}), {"kind": WANTED_KIND}),
     "mip_texel": Table(
         lambda _: (hizvk.mip_texel, {"pixel": (0, 0), "level": 1, "size": (6, 8)}),
         {
@@ -1460,6 +1639,18 @@ TABLES: dict[str, Table] = {
                 ("nearest", ValueError, 'expected one of "farthest", got'),
                 (1, TypeError, "got int 1"),
             ],
+            "kind": WANTED_KIND,
+        },
+    ),
+    "Pyramid.plot": Table(
+        lambda device: (device.pyramid(np.ones((6, 8)), camera(), kind="z").plot, {}),
+        {
+            "end": [
+                ("nearest", ValueError, 'expected one of "farthest", got'),
+                (1, TypeError, "got int 1"),
+            ],
+            "kind": WANTED_KIND,
+            "unit": TEXT,
         },
     ),
     "Pyramid.update": Table(
@@ -1515,6 +1706,31 @@ TABLES: dict[str, Table] = {
                 ("0", TypeError, "got str '0'"),
             ],
         },
+    ),
+    "CullResult.plot": Table(
+        lambda device: (device.cull(**cull_arguments(device)).plot, {}), DRAWN
+    ),
+    "CullResult.save_html": Table(
+        lambda device: (device.cull(**cull_arguments(device)).save_html, {"path": os.devnull}),
+        {
+            **DRAWN,
+            "path": [
+                (3.5, TypeError, "expected a path, got float 3.5"),
+                (None, TypeError, "got None"),
+            ],
+            "occluders": [
+                (
+                    "wall",
+                    TypeError,
+                    "expected a Mesh, a mesh of trimesh, Open3D or PyVista, or a list",
+                ),
+                ([TETRAHEDRON, 3], TypeError, "got int 3"),
+            ],
+            "title": [(3, TypeError, "expected a text, got int 3")],
+        },
+    ),
+    "Explanation.plot": Table(
+        lambda device: (device.cull(**cull_arguments(device)).explain(0).plot, {}), {"unit": TEXT}
     ),
     "CullResult.explain": Table(
         lambda device: (device.cull(**cull_arguments(device)).explain, {"index": 0}),
@@ -1609,10 +1825,24 @@ TABLES: dict[str, Table] = {
                 (0.9, ValueError, "at least 1, got float 0.9"),
                 (None, TypeError, "got None"),
             ],
+            "meshes": [
+                (3, TypeError, "expected a sequence of MeshLods or None, got int 3"),
+                ([], ValueError, "expected at least one MeshLods, got none"),
+            ],
+            "mesh_ids": [
+                ([0, 1], ValueError, "expected integer (1,), got (2,) int64"),
+                ([0.5], TypeError, "got (1,) float64"),
+            ],
+            "lods": [([hizvk.LodByError(1)], TypeError, "expected None without meshes")],
+            "max_seconds": [
+                (-1.0, ValueError, "at least 0, got float -1.0"),
+                ("10", TypeError, "got str '10'"),
+            ],
             "repetitions": [
                 (0, ValueError, "in 1..10000, got int 0"),
                 (1.0, TypeError, "got float 1.0"),
             ],
+            "progress": PROGRESS,
         },
     ),
     "compare": Table(
@@ -1680,6 +1910,7 @@ TABLES: dict[str, Table] = {
                 ("volume", ValueError, 'expected one of "nearest", "pixel"'),
                 (0, TypeError, "got int 0"),
             ],
+            "progress": PROGRESS,
         },
     ),
     "reference.unoccluded": Table(
@@ -1695,6 +1926,7 @@ TABLES: dict[str, Table] = {
             "scale": SCALE,
             "invalid": INVALID,
             "coverage": COVERAGE,
+            "progress": PROGRESS,
         },
     ),
     "reference.pyramid": Table(
@@ -1724,6 +1956,7 @@ MADE_BY_THE_PACKAGE = {
 MADE_BY_THE_PACKAGE |= {"BoundsCheck", "Occluders", "ProxyCheck", "Pyramid", "Recommendation"}
 MADE_BY_THE_PACKAGE |= {"StageTime", "StageTimes", "ViewsResult"}
 MADE_BY_THE_PACKAGE |= {"ApproximateResult", "PassResult", "Temporal"}
+MADE_BY_THE_PACKAGE |= {"MapResult", "OcclusionMap", "TiledCoverage"}
 MADE_BY_THE_PACKAGE |= {"PointColours", "Projected", "HierarchyFrame"}
 MADE_BY_THE_PACKAGE |= {"InnerBoxes", "InnerPrisms", "OccluderSelection", "SplitMesh"}
 
@@ -1771,7 +2004,7 @@ TABLES |= {
         {
             "vertices": [
                 (np.zeros((4, 2)), ValueError, "expected float (V, 3), got (4, 2) float64"),
-                (np.zeros((4, 3), dtype=int), TypeError, "got (4, 3) int64"),
+                (np.zeros((4, 3), dtype=bool), TypeError, "got (4, 3) bool"),
                 ("mesh", TypeError, "got str 'mesh'"),
             ],
             "triangles": TRIANGLES,
@@ -1780,6 +2013,7 @@ TABLES |= {
                 (0.0, ValueError, "above 0, got float 0.0"),
                 (INF, ValueError, "inf"),
             ],
+            "progress": PROGRESS,
         },
     ),
     "SplitMesh.triangle_mask": Table(
@@ -1800,6 +2034,7 @@ TABLES |= {
             "max_boxes": [(0, ValueError, "got int 0"), (True, TypeError, "got bool True")],
             "min_share": [*NUMBER, (1.5, ValueError, "at most 1, got float 1.5")],
             "margin": [*NUMBER, (-0.5, ValueError, "at least 0, got float -0.5")],
+            "progress": PROGRESS,
         },
     ),
     "inner_prisms": Table(
@@ -1812,13 +2047,18 @@ TABLES |= {
                 ((0, 0, 0), ValueError, "got tuple (0.0, 0.0, 0.0); turn the mesh for others"),
             ],
             "max_prisms": [(0, ValueError, "got int 0"), (1.0, TypeError, "got float 1.0")],
+            "progress": PROGRESS,
         },
     ),
     "select_occluders": Table(
         lambda _: (hizvk.select_occluders, {"meshes": [TETRAHEDRON]}),
         {
             "meshes": [
-                (None, TypeError, "expected a Mesh, a mesh of trimesh or Open3D, or a list"),
+                (
+                    None,
+                    TypeError,
+                    "expected a Mesh, a mesh of trimesh, Open3D or PyVista, or a list",
+                ),
                 ([(np.zeros((3, 2)), [[0, 1, 2]])], ValueError, "got (3, 2) float64"),
                 ([TETRAHEDRON, 3], TypeError, "got int 3"),
             ],
@@ -1830,10 +2070,233 @@ TABLES |= {
                 (-1, ValueError, "got int -1"),
                 (100.0, TypeError, "got float 100.0"),
             ],
+            "progress": PROGRESS,
         },
     ),
 }
 
+
+# --- sweeps ---
+
+
+def swept() -> hizvk.Sweep:
+    depth = np.ones((6, 8))
+    return hizvk.sweep(spheres(), [camera()], depths=[depth], kind="z")
+
+
+FACES: list[Bad] = [
+    ("sides", ValueError, 'expected one of "none", "back", "front", got str'),
+    (None, TypeError, "got None"),
+]
+ADAPTER: list[Bad] = [
+    (1.5, TypeError, "expected an adapter's index, a part of its name, or None, got float 1.5"),
+    (-1, ValueError, "in 0..2147483647, got int -1"),
+    (" ", ValueError, "got str ' '"),
+]
+EXECUTOR: list[Bad] = [
+    ("threads", TypeError, "expected None, a number of processes, a concurrent.futures.Executor"),
+    (0, ValueError, "expected an integer in 1..4096, got int 0"),
+    (True, TypeError, "got bool True"),
+]
+NO_LIGHT: list[Bad] = [
+    ("sun", TypeError, "got str 'sun'"),
+    (
+        hizvk.DirectionalLight((0, -1, 0), receivers=((-1, -1, -1), (1, 1, 1))),
+        ValueError,
+        "expected None in a sweep",
+    ),
+]
+SWEEP: BadValues = {
+    "executor": EXECUTOR,
+    "adapter": ADAPTER,
+    "progress": PROGRESS,
+    "options": OPTIONS_OBJECT,
+    **OPTIONS,
+    "shadow": NO_LIGHT,
+}
+BLOCK: list[Bad] = [(0, ValueError, "got int 0"), (1.0, TypeError, "got float 1.0")]
+RESUME: list[Bad] = [
+    ("sweep.npz", TypeError, "expected a Sweep or None, got str 'sweep.npz'"),
+]
+MESHES: list[Bad] = [
+    (3, TypeError, "expected a Mesh, a mesh of trimesh, Open3D or PyVista, or a sequence"),
+    ([3], TypeError, "got int 3"),
+]
+SIDE: list[Bad] = [(0, ValueError, "got int 0"), (64.0, TypeError, "got float 64.0")]
+
+TABLES |= {
+    "sweep": Table(
+        lambda _: (
+            hizvk.sweep,
+            {
+                "bounds": spheres(),
+                "cameras": [camera()],
+                "depths": [np.ones((6, 8))],
+                "kind": "z",
+            },
+        ),
+        {
+            "bounds": BOUNDS,
+            "cameras": [
+                (None, TypeError, "expected a sequence of Camera, got None"),
+                ([], ValueError, "got an empty one"),
+                ([camera(), 3], TypeError, "expected a Camera, got int 3"),
+            ],
+            "occluders": [("walls", TypeError, "expected exactly one of them, got both")],
+            "depths": [
+                (3, TypeError, "expected 1 arrays, one for each camera, or a function"),
+                ([], ValueError, "got 0"),
+                ([np.ones((8, 6))], ValueError, "expected float (6, 8) (the camera's size)"),
+            ],
+            "kind": KIND,
+            "scale": SCALE,
+            "invalid": INVALID,
+            "tolerance": TOLERANCE,
+            "cull": FACES,
+            "conservative": [*FLAG, (True, ValueError, "expected False beside depths")],
+            "size": [*SIZE, ((6, 8), ValueError, "expected None beside depths")],
+            "rasteriser": [
+                ("gpu", ValueError, 'expected one of "auto", "device", "host", got str'),
+                (None, TypeError, "got None"),
+            ],
+            "groups": [
+                ([0, 0], ValueError, "expected integer (1,), a number from 0 on"),
+                ([0.0], TypeError, "got (1,) float64"),
+                ([1], ValueError, "expected numbers in 0..0, got 1"),
+                ([-1], ValueError, "got -1"),
+            ],
+            "block": BLOCK,
+            "resume": RESUME,
+            **SWEEP,
+        },
+    ),
+    "Sweep.mask": Table(
+        lambda _: (swept().mask, {"view": 0}),
+        {
+            "view": [
+                (1, IndexError, "expected an integer in 0..0, got 1"),
+                ("0", TypeError, "got str '0'"),
+            ]
+        },
+    ),
+    "Sweep.visible_from": Table(
+        lambda _: (swept().visible_from, {"index": 0}),
+        {
+            "index": [
+                (-1, IndexError, "expected an integer in 0..0, got -1"),
+                (0.0, TypeError, "got float 0.0"),
+            ]
+        },
+    ),
+    "Sweep.union": Table(lambda _: (swept().union, {}), {}),
+    "Sweep.csr": Table(lambda _: (swept().csr, {}), {"scipy": FLAG}),
+    "Sweep.save": Table(
+        lambda _: (swept().save, {"path": Path(tempfile.gettempdir()) / "hizvk-test.npz"}),
+        {"path": [(3, TypeError, "expected a path, got int 3"), (None, TypeError, "got None")]},
+    ),
+    "Sweep.load": Table(
+        lambda _: (hizvk.Sweep.load, {"path": saved_sweep()}),
+        {
+            "path": [
+                (3, TypeError, "expected a path, got int 3"),
+                (__file__, ValueError, "expected a file of Sweep.save, got"),
+            ]
+        },
+    ),
+    "cube": Table(
+        lambda _: (hizvk.cube, {"eye": (0, 0, 0), "size": 8, "near": 0.1}),
+        {
+            "eye": VECTOR,
+            "size": SIDE,
+            "near": NEAR,
+            "far": FAR,
+            "seam_px": [
+                *NUMBER,
+                (-0.5, ValueError, "at least 0 and at most 2, got float -0.5"),
+                (3.0, ValueError, "got float 3.0"),
+            ],
+            "reversed_z": FLAG,
+        },
+    ),
+    "visible_sets": Table(
+        lambda _: (
+            hizvk.visible_sets,
+            {
+                "bounds": spheres(),
+                "cells": hizvk.Boxes(np.zeros((1, 3)), np.ones((1, 3))),
+                "occluders": TETRAHEDRON,
+                "samples": 1,
+                "size": 8,
+                "near": 0.1,
+            },
+        ),
+        {
+            "bounds": BOUNDS,
+            "cells": [
+                (spheres(), TypeError, "expected Boxes, got Spheres Spheres(1 of float64)"),
+                (
+                    hizvk.Boxes(np.zeros((0, 3)), np.zeros((0, 3))),
+                    ValueError,
+                    "expected at least one cell, got none",
+                ),
+                (
+                    hizvk.Boxes(np.ones((1, 3)), np.zeros((1, 3))),
+                    ValueError,
+                    "expected finite corners with min <= max, got cell 0",
+                ),
+            ],
+            "occluders": [*MESHES, (None, TypeError, "got None")],
+            "samples": [(0, ValueError, "in 1..64, got int 0"), (2.0, TypeError, "float 2.0")],
+            "size": SIDE,
+            "near": NEAR,
+            "far": FAR,
+            "cull": FACES,
+            "conservative": FLAG,
+            "block": BLOCK,
+            "resume": RESUME,
+            **SWEEP,
+        },
+    ),
+    "viewshed": Table(
+        lambda _: (
+            hizvk.viewshed,
+            {"heights": np.zeros((3, 4)), "cell_size": 1.0, "eye": (1, 1), "size": 8},
+        ),
+        {
+            "heights": [
+                (np.zeros(4), ValueError, "expected float (rows, columns), got (4,) float64"),
+                (np.zeros((1, 4)), ValueError, "expected at least 2 x 2 heights, got (1, 4)"),
+                (np.zeros((3, 4), dtype=bool), TypeError, "got (3, 4) bool"),
+                (np.full((3, 4), INF), ValueError, "expected finite heights, or NaN for no data"),
+            ],
+            "cell_size": [
+                *NUMBER,
+                (0.0, ValueError, "above 0, got float 0.0"),
+                ((1.0, 0.0), ValueError, "above 0, got float 0.0"),
+                ((1.0, 2.0, 3.0), ValueError, "expected (2,) finite numbers"),
+            ],
+            "eye": [
+                ((5, 1), ValueError, "expected a row in 0..2 and a column in 0..3, got 5, 1"),
+                ((1, 2, 3), ValueError, "expected (2,) finite numbers, got (3,)"),
+                (None, TypeError, "got None"),
+            ],
+            "eye_height": [*NUMBER, (0.0, ValueError, "above 0, got float 0.0")],
+            "target_height": [*NUMBER, (-1.0, ValueError, "at least 0, got float -1.0")],
+            "size": SIDE,
+            "conservative": FLAG,
+            **SWEEP,
+        },
+    ),
+}
+
+
+def saved_sweep() -> str:
+    path = Path(tempfile.gettempdir()) / "hizvk-test.npz"
+    swept().save(path)
+    return str(path)
+
+
+MADE_BY_THE_PACKAGE |= {"Sweep"}
 # --- the algorithms of the texts ---
 
 
@@ -1880,5 +2343,57 @@ TABLES |= {
     "HierarchicalVisibility.render_flat": Table(
         lambda _: (hierarchy().render_flat, {"camera": camera()}),
         {"camera": [(2, TypeError, "expected a Camera, got int 2")]},
+    ),
+}
+
+
+# --- published tests ---
+
+
+def published(device: hizvk.Device) -> dict[str, Any]:
+    """The valid arguments of a `PublishedTest`."""
+    pyramid = device.pyramid(np.ones((6, 8)), camera(), kind="z")
+    return {
+        "device": device,
+        "text": "arm",
+        "bounds": spheres(),
+        "camera": camera(),
+        "pyramid": pyramid,
+    }
+
+
+TABLES |= {
+    "PublishedTest": Table(
+        lambda device: (hizvk.PublishedTest, published(device)),
+        {
+            "device": [(None, TypeError, "expected a Device, got None")],
+            "text": [
+                ("greene", ValueError, 'expected one of "rakos", "arm", "darnell", "one_lookup"'),
+                (2010, TypeError, "got int 2010"),
+            ],
+            "bounds": [
+                (
+                    hizvk.Boxes([[0, 0, -2.0]], [[1, 1, -1.0]]),
+                    TypeError,
+                    "expected Spheres for 'arm', got Boxes",
+                ),
+                (hizvk.Spheres(np.zeros((0, 3)), 1.0), ValueError, "at least one, got none"),
+            ],
+            "camera": [
+                (None, TypeError, "expected a Camera, got None"),
+                (camera().resized((8, 8)), ValueError, "of the pyramid's size (6, 8), got"),
+                (
+                    hizvk.Camera.orthographic(
+                        (0, 0, 0), (0, 0, -1), height=2, size=(6, 8), near=0, far=9
+                    ),
+                    ValueError,
+                    "expected a perspective camera, got",
+                ),
+            ],
+            "pyramid": [(np.ones((6, 8)), TypeError, "expected a Pyramid, got (6, 8) float64")],
+        },
+    ),
+    "PublishedTest.run": Table(
+        lambda device: (hizvk.PublishedTest(**published(device)).run, {}), {}
     ),
 }

@@ -171,11 +171,11 @@ def test_a_buffer_means_what_its_dtype_does(device: hizvk.Device) -> None:
     saturated = np.full(SIZE, 65535, np.uint16)
     for value in (Picture(saturated), memoryview(saturated)):
         assert hizvk.visible(behind(2e5), camera(), depth=value, kind="z", device=device).all()  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match="int32"):
+    with pytest.raises(TypeError, match="uint8"):
         hizvk.visible(
             behind(80.0),
             camera(),
-            depth=Picture(saturated.astype(np.int32)),
+            depth=Picture(saturated.astype(np.uint8)),
             kind="z",
             device=device,
         )  # type: ignore[arg-type]
@@ -184,10 +184,7 @@ def test_a_buffer_means_what_its_dtype_does(device: hizvk.Device) -> None:
 @pytest.mark.parametrize(
     ("image", "fragment"),
     [
-        (np.ones(SIZE, np.int32), ".astype(np.float32)"),
-        (np.ones(SIZE, np.int64), ".astype(np.uint16)"),
-        (np.ones((*SIZE, 1)), "depth[..., 0]"),
-        (np.ones((1, *SIZE)), "depth[0]"),
+        (np.ones(SIZE, np.uint8), ".astype(np.float32)"),
         (np.ones((8, 12)), "camera.resized(depth.shape)"),
         (np.ones(SIZE[::-1]), "looks transposed"),
     ],
@@ -198,9 +195,6 @@ def test_a_message_proposes_what_works(
     """The call accepts what each message proposes."""
     ways: dict[str, Callable[[], tuple[Any, hizvk.Camera]]] = {
         ".astype(np.float32)": lambda: (image.astype(np.float32), camera()),
-        ".astype(np.uint16)": lambda: (image.astype(np.uint16), camera()),
-        "depth[..., 0]": lambda: (image[..., 0], camera()),
-        "depth[0]": lambda: (image[0], camera()),
         "camera.resized(depth.shape)": lambda: (image, camera().resized(image.shape)),
         "looks transposed": lambda: (image, camera().resized(image.shape)),
     }

@@ -91,7 +91,9 @@ def public_callables() -> dict[str, Callable[..., Any]]:
             continue
         if name not in MADE_BY_THE_PACKAGE:
             found[name] = thing
-        for method, value in vars(thing).items():
+        inherited = [vars(base) for base in thing.__mro__ if base.__module__ == "hizvk.pictured"]
+        for method in {*vars(thing), *(key for keys in inherited for key in keys)}:
+            value = inspect.getattr_static(thing, method)
             if not method.startswith("_") and (
                 inspect.isfunction(value) or isinstance(value, classmethod)
             ):
@@ -164,8 +166,8 @@ def test_a_rendered_image_has_its_camera_and_kind(device: hizvk.Device) -> None:
         (
             [np.zeros((3, 3))],
             TypeError,
-            "vertices[0]: expected a Mesh, a mesh of trimesh or Open3D, or a list of them when "
-            "triangles is left out",
+            "vertices[0]: expected a Mesh, a mesh of trimesh, Open3D or PyVista, or a list of them "
+            "when triangles is left out",
         ),
         (
             [(np.zeros((3, 2)), [[0, 1, 2]])],
@@ -194,7 +196,7 @@ def test_ndc_has_no_units_and_no_integers(device: hizvk.Device) -> None:
     with pytest.raises(ValueError, match='scale: expected 1 for the kind "reversed_ndc"'):
         device.pyramid(np.ones((6, 8)), camera(), kind="reversed_ndc", scale=0.5)
     with pytest.raises(
-        TypeError, match=r"depth: expected float \(height, width\), or uint16 for the kinds"
+        TypeError, match=r"depth: expected float \(height, width\), or whole numbers"
     ):
         device.pyramid(np.ones((6, 8), dtype=np.uint16), camera(), kind="reversed_ndc")
     with pytest.raises(

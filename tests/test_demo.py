@@ -1,7 +1,6 @@
 """The demo, its scenes, and its check, which has to find planted faults."""
 
 import dataclasses
-import io
 import json
 import sys
 from pathlib import Path
@@ -11,7 +10,6 @@ import pytest
 
 import hizvk
 from hizvk import cli, demo, scenes
-from hizvk.commands.progress import Progress
 from hizvk.demo import run as demo_run
 from hizvk.demo.run import Culled, cull_view
 from hizvk.scenes import truth
@@ -199,26 +197,6 @@ def test_an_unusable_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     (tmp_path / "file").write_text("")
     assert demo.main(["--out", str(tmp_path / "file")]) == 1
     assert capsys.readouterr().err.startswith("hizvk demo: ")
-
-
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
-
-
-def test_progress() -> None:
-    terminal, pipe = Terminal(), io.StringIO()
-    for stream in (terminal, pipe):
-        bar = Progress(4, "a label", stream)
-        bar.show("one")
-        bar.step("two")
-        bar.step("three")
-        bar.close()
-    assert pipe.getvalue() == "a label\n"
-    drawn = terminal.getvalue()
-    assert "[" + "-" * 30 + "] 0/4" in drawn
-    assert "[" + "#" * 15 + "-" * 15 + "] 2/4" in drawn
-    assert drawn.endswith("\r\x1b[K")
 
 
 # -- scenes ----------------------------------------------------------------------------------------

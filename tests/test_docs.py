@@ -17,11 +17,16 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("crates/*/README.md")])
+PAGES = sorted(
+    path
+    for pattern in ("*.md", "docs/*.md", "docs/jobs/*.md", "crates/*/README.md")
+    for path in ROOT.glob(pattern)
+)
 FENCE = re.compile(r"^```(?P<language>[^\n]*)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
 #: Languages that are shown and not run here.
-#: rustdoc runs `rust` (`crates/hiz_core/src/lib.rs`).
+#: rustdoc runs `rust` (`crates/hiz_core/src/lib.rs`), and cargo runs the files that are included.
 NOT_RUN = {"sh", "text", "rust", "toml", "wgsl", "json", "{eval-rst}", "{toctree}"}
+NOT_RUN |= {"{literalinclude}"}
 #: The pages whose Rust blocks rustdoc compiles and runs.
 BY_RUSTDOC = ("README.md", "docs/rust.md")
 

@@ -101,7 +101,7 @@ def test_rows_with_masks_are_masked(device: hizvk.Device) -> None:
 def test_listed_rows_are_refused_where_their_array_is(device: hizvk.Device) -> None:
     camera = hizvk.Camera.look_at((0, 0, 0), (0, 0, -1), fov_y_deg=60, size=(8, 8), near=0.1)
     behind = hizvk.Spheres([[0.0, 0.0, -20.0]], 1.0)
-    for dtype in (np.int64, np.int32, np.uint8, np.bool_):
+    for dtype in (np.int8, np.uint8, np.bool_):
         image = np.full(camera.size, 1, dtype)
         for form in (image, list(image), [list(row) for row in image]):
             with pytest.raises(TypeError, match=r"^depth: expected "):

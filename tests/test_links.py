@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("crates/*/README.md")])
+#: The pages of the site.
+DOCS = sorted([*ROOT.glob("docs/*.md"), *ROOT.glob("docs/jobs/*.md")])
+PAGES = sorted([*ROOT.glob("*.md"), *DOCS, *ROOT.glob("crates/*/README.md")])
 FENCE = re.compile(r"^```.*?^```$", re.DOTALL | re.MULTILINE)
 COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
@@ -61,15 +63,28 @@ def test_the_search_for_links_sees_them() -> None:
     assert any("#" in target for target in links(ROOT / "docs" / "troubleshooting.md"))
 
 
-def test_every_page_is_on_the_way() -> None:
-    """From docs/index.md each page can be reached."""
+def listed() -> list[str]:
+    """The patterns of pages in the toctrees of docs/index.md."""
     index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
     toctrees = re.findall(r"^```{toctree}$(.*?)^```$", index, re.DOTALL | re.MULTILINE)
-    listed = [
-        line for tree in toctrees for line in tree.split() if re.fullmatch(r"[a-z_]+\*?", line)
+    return [
+        line
+        for tree in toctrees
+        for line in tree.split()
+        if re.fullmatch(r"(jobs/)?[a-z_]+\*?", line)
     ]
-    for page in {page.stem for page in ROOT.glob("docs/*.md")} - {"index"}:
-        assert any(fnmatch(page, pattern) for pattern in listed), page
+
+
+def test_every_page_is_on_the_way() -> None:
+    """From docs/index.md each page can be reached, also by a link that says what it is for."""
+    index = ROOT / "docs" / "index.md"
+    targets = {target.partition("#")[0] for target in links(index)}
+    for page in DOCS:
+        name = page.relative_to(ROOT / "docs").with_suffix("").as_posix()
+        if name == "index":
+            continue
+        assert any(fnmatch(name, pattern) for pattern in listed()), name
+        assert f"{name}.md" in targets, name
 
 
 def test_pages_begin_with_a_heading_and_prose() -> None:
@@ -80,6 +95,20 @@ def test_pages_begin_with_a_heading_and_prose() -> None:
         first, _, rest = text.partition("\n")
         assert first.startswith("# "), page
         assert not rest.strip().startswith(others), page
+        paragraph = rest.strip().split("\n\n")[0]
+        assert len(paragraph.split()) >= 8, page
+
+
+def test_pages_of_the_site_say_what_they_are_for() -> None:
+    """The first paragraph says for whom or for what a page is, in a whole sentence."""
+    for page in DOCS:
+        text = COMMENT.sub("", page.read_text(encoding="utf-8")).strip()
+        paragraph = text.partition("\n")[2].strip().split("\n\n")[0]
+        if page.stem in ("architecture", "changelog", "contributing", "style"):
+            continue  # Sphinx takes the documents of these names, which are checked above
+        words = r"\b(for|says|states|tells|takes you|shows|has|keeps)\b"
+        assert re.search(words, paragraph), (page, paragraph)
+        assert paragraph.rstrip().endswith((".", ":")), page
 
 
 def test_files_that_are_named_exist() -> None:

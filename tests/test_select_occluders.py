@@ -16,6 +16,7 @@ from hizvk import cli
 from hizvk.bench import hiding, occluders
 from hizvk.bench.hiding import Groups, Limited, Ranked, Stage
 from hizvk.occluders import silhouettes
+from hizvk.progress import Progress
 from hizvk.scenes import View, box_mesh
 from hizvk.scenes.hedge import hedge
 
@@ -68,7 +69,7 @@ def test_silhouettes_are_those_of_points_tested_one_by_one() -> None:
     rng = np.random.default_rng(4)
     soup = rng.uniform(0.0, 10.0, (1, 3, 3)) + rng.uniform(0.0, 4.0, (12, 3, 3))
     mesh = hizvk.Mesh(soup.reshape(-1, 3), np.arange(36).reshape(-1, 3))
-    pieces = silhouettes.measured([mesh])
+    pieces = silhouettes.measured([mesh], Progress(False, "measuring"))
     low, high = soup.min(axis=(0, 1)), soup.max(axis=(0, 1))
     at = (np.arange(silhouettes.SAMPLES) + 0.5) / silhouettes.SAMPLES
     for axis in range(3):

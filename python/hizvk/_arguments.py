@@ -22,6 +22,7 @@ from typing import Any, ParamSpec, TypeAlias, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from . import foreign
 from .errors import OutOfMemoryError
 
 FloatArray: TypeAlias = npt.NDArray[np.float32] | npt.NDArray[np.float64]
@@ -45,6 +46,8 @@ def describe(value: object) -> str:
         return f"{_shape_text(value.shape)} {value.dtype}"
     if value is None:
         return "None"
+    if hasattr(value, "__dlpack__") and not isinstance(value, (np.ndarray, np.generic)):
+        return foreign.described(value)
     text = repr(value)
     if len(text) > 60:
         text = text[:57] + "..."
@@ -129,6 +132,7 @@ def _as_array(name: str, expected: str, value: object) -> npt.NDArray[Any]:
         raise TypeError(f"{name}: expected {expected}, got a masked array; {way}")
     if isinstance(value, (str, bytes)) or value is None:
         raise _wrong_type(name, expected, value)
+    value = foreign.as_numpy(name, expected, value)
     try:
         array = np.asarray(value)
     except ValueError as error:  # a ragged list
@@ -206,16 +210,24 @@ def _ready(name: str, array: npt.NDArray[Any]) -> FloatArray:
 
 
 def floats(
-    name: str, value: object, shape: Sequence[int | str], *, why: str = "", hint: str = ""
+    name: str,
+    value: object,
+    shape: Sequence[int | str],
+    *,
+    why: str = "",
+    hint: str = "",
+    whole: bool = True,
 ) -> FloatArray:
     """A float array of this shape (letters are free sides), converted only where it has to be.
 
     `why` follows the expected shape in a message.
     `hint` ends the message of a wrong shape for which no index makes it right.
+    With `whole` an array of whole numbers will do, if floats hold them exactly.
     """
     expected = f"float {_shape_text(shape)}{why}"
     array = _as_array(name, expected, value)
-    if array.dtype.kind != "f" or array.dtype.itemsize not in (2, 4, 8):
+    is_whole = whole and array.dtype.kind in "iu"
+    if not is_whole and (array.dtype.kind != "f" or array.dtype.itemsize not in (2, 4, 8)):
         got = describe(array if array.ndim else value)
         way = (
             "; convert it with .astype(np.float64)"
@@ -224,7 +236,20 @@ def floats(
         )
         raise TypeError(f"{name}: expected {expected}, got {got}{way}")
     _check_shape(name, expected, array, shape, hint)
-    return _ready(name, array)
+    return _exact(name, expected, array) if is_whole else _ready(name, array)
+
+
+def _exact(name: str, expected: str, array: npt.NDArray[Any]) -> FloatArray:
+    """Whole numbers as floats: float32 holds 16 bits exactly, float64 53."""
+    made = copied(name, array, np.float32 if array.dtype.itemsize <= 2 else np.float64)
+    if array.dtype.itemsize == 8 and array.size:
+        largest = max(abs(int(array.min())), abs(int(array.max())))
+        if largest > LARGEST_EXACT_INTEGER:
+            raise ValueError(
+                f"{name}: expected {expected}, got {describe(array)} with {largest} in it, "
+                "which float64 cannot hold"
+            )
+    return made
 
 
 def _is_real(value: object) -> bool:
@@ -241,7 +266,8 @@ def floats_or_scalar(name: str, value: object, count: int) -> FloatArray:
             return np.full(count, float(value), dtype=np.float64)  # type: ignore[arg-type]
         except OverflowError:
             raise _wrong_value(name, f"float ({count},) or one number", value) from None
-    if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind == "f":
+    value = foreign.as_numpy(name, f"float ({count},) or one number", value)
+    if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "fiu":
         return np.full(count, float(value), dtype=np.float64)
     return floats(name, value, (count,), why=" or one number")
 
@@ -459,6 +485,13 @@ def choice(name: str, value: object, choices: Iterable[str]) -> str:
     raise _wrong_value(name, expected, value)
 
 
+def text(name: str, value: object) -> str:
+    """A text."""
+    if not isinstance(value, str):
+        raise _wrong_type(name, "a text", value)
+    return value
+
+
 def instance(name: str, value: object, wanted: type[T], expected: str) -> T:
     """An object of this class."""
     if isinstance(value, wanted):
@@ -480,6 +513,7 @@ def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
         )
     if isinstance(value, (str, bytes)) or value is None:
         raise _wrong_type(name, expected, value)
+    value = foreign.as_numpy(name, expected, value)
     array = np.asarray(value)
     if array.size == 0 and not hasattr(value, "dtype"):
         array = array.astype(np.bool_)
@@ -491,11 +525,14 @@ def bools(name: str, value: object, count: int | None) -> npt.NDArray[np.bool_]:
     return copied(name, array, np.bool_)
 
 
-def mesh_ids(name: str, value: object, count: int) -> npt.NDArray[np.uint32]:
-    """``(count,)`` mesh ids as uint32; any integer dtype comes in."""
+def mesh_ids(
+    name: str, value: object, count: int, what: str = "mesh ids"
+) -> npt.NDArray[np.uint32]:
+    """``(count,)`` mesh ids as uint32, or other numbers; any integer dtype comes in."""
     expected = f"integer ({count},)"
     if is_masked(value) or isinstance(value, (str, bytes)):
         raise _wrong_type(name, expected, value)
+    value = foreign.as_numpy(name, expected, value)
     try:
         array = np.asarray(value)
     except ValueError as error:
@@ -510,7 +547,7 @@ def mesh_ids(name: str, value: object, count: int) -> npt.NDArray[np.uint32]:
     _check_shape(name, expected, array, (count,))
     if array.size and not (int(array.min()) >= 0 and int(array.max()) < 2**32):
         wrong = int(array.min()) if array.min() < 0 else int(array.max())
-        raise ValueError(f"{name}: expected mesh ids from 0 on, or hizvk.ABSENT, got {wrong}")
+        raise ValueError(f"{name}: expected {what} from 0 on, or hizvk.ABSENT, got {wrong}")
     return copied(name, array, np.uint32)
 
 
@@ -549,6 +586,7 @@ def triangles(name: str, value: object, vertex_count: int) -> npt.NDArray[np.uin
         )
     if isinstance(value, (str, bytes)) or value is None:
         raise _wrong_type(name, expected, value)
+    value = foreign.as_numpy(name, expected, value)
     try:
         array = np.asarray(value)
     except ValueError as error:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import warnings
 from typing import TYPE_CHECKING, Final, TypedDict
 
 import numpy as np
 
-from . import _arguments, _rotations
+from . import _arguments, _rotations, foreign
+from .errors import HizWarning
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -149,10 +151,25 @@ def intrinsics(k: object) -> npt.NDArray[np.float64]:
     return result
 
 
+def hint_at_size(k: npt.NDArray[np.float64], size: Size) -> None:
+    """Warns of a camera matrix that looks like that of a larger image."""
+    (cx, cy), (height, width) = k[:2, 2].tolist(), size
+    if cx > width and cy > height:
+        warnings.warn(
+            f"k, size: the principal point ({cx:g}, {cy:g}) lies below and beside the image of "
+            f"{size} pixels; if k belongs to a larger image, pass the size of that image, and take "
+            f"camera.resized({size})",
+            HizWarning,
+            # Over the constructor and its decorator to the caller.
+            stacklevel=4,
+        )
+
+
 def refuse_distortion(distortion: object) -> None:
     """Refuses distortion coefficients other than 0: such a camera is not linear."""
     if distortion is None:
         return
+    distortion = foreign.as_numpy("distortion", "None or zeros", distortion)
     coefficients = np.asarray(distortion)
     if coefficients.size > MOST_COEFFICIENTS:
         got = _arguments.describe(coefficients)

@@ -15,18 +15,24 @@ from .options import CullOptions, Outputs
 
 __all__ = [
     "ApproximateCulling",
+    "BspTree",
     "Camera",
     "Counts",
     "Culling",
     "DepthImage",
+    "DepthTiles",
     "Engine",
     "Explanation",
     "HierarchicalVisibility",
     "Instances",
     "MeshTable",
+    "MethodLevels",
     "Occluders",
+    "OcclusionMap",
     "PassAnswer",
     "Pyramid",
+    "TextCull",
+    "Tiled",
     "TwoPasses",
     "ViewsCulling",
     "Yardstick",
@@ -456,6 +462,50 @@ class ApproximateCulling:
     def negligible(self) -> npt.NDArray[np.bool_]: ...
 
 @final
+class OcclusionMap:
+    def __new__(
+        cls,
+        occluders: Occluders,
+        camera: Camera,
+        least: int,
+        regions: int,
+        max_triangles: int | None,
+        max_copies: int | None,
+    ) -> Self: ...
+    def num_levels(self) -> int: ...
+    def level(self, level: int) -> tuple[_Size, npt.NDArray[np.uint32]]: ...
+    def estimate(self) -> tuple[_Size, npt.NDArray[np.float64]]: ...
+    def least_counts(self, negligible_px: int) -> list[int]: ...
+    def chosen(self) -> npt.NDArray[np.uint32]: ...
+    def num_triangles(self) -> int: ...
+    def cull(
+        self,
+        kind: str,
+        arrays: Sequence[_Floats],
+        negligible_px: int,
+        never: npt.NDArray[np.bool_] | None,
+    ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.uint32], int]: ...
+
+@final
+class BspTree:
+    def __new__(cls, occluders: Occluders, leaf: int | None, most_parts: float) -> Self: ...
+    def numbers(self) -> tuple[int, int, int, int]: ...
+    def is_octree(self) -> bool: ...
+    def draw(self, occluders: Occluders, camera: Camera) -> Tiled: ...
+
+@final
+class Tiled:
+    def coverage(self) -> npt.NDArray[np.bool_]: ...
+    def numbers(self) -> tuple[int, int, int, int, int]: ...
+
+@final
+class DepthTiles:
+    def __new__(cls, size: _Size) -> Self: ...
+    def draw(self, occluders: Occluders, camera: Camera) -> None: ...
+    def coverage(self) -> npt.NDArray[np.bool_]: ...
+    def bytes(self) -> int: ...
+
+@final
 class TwoPasses:
     def __new__(cls, engine: Engine, instances: Instances, early_capacity: int | None) -> Self: ...
     def early(
@@ -481,6 +531,33 @@ class ViewsCulling:
     def any_indices(self) -> npt.NDArray[np.uint32]: ...
     def any_draws(self) -> bytes: ...
     def view(self, view: int) -> Culling: ...
+
+@final
+class TextCull:
+    def __new__(
+        cls,
+        engine: Engine,
+        text: str,
+        bounds: npt.NDArray[np.float32],
+        camera: tuple[npt.NDArray[np.float32], float],
+        sizes: Sequence[tuple[int, int]],
+        texels: npt.NDArray[np.float32],
+    ) -> Self: ...
+    def run(self) -> None: ...
+    def mask(self) -> npt.NDArray[np.bool_]: ...
+
+@final
+class MethodLevels:
+    def __new__(
+        cls,
+        engine: Engine,
+        way: str,
+        shape: tuple[int, int],
+        camera: Camera,
+        images: Sequence[npt.NDArray[np.float32]],
+    ) -> Self: ...
+    def run(self) -> None: ...
+    def level(self, image: int, k: int) -> tuple[int, int, npt.NDArray[np.float32]]: ...
 
 @final
 class Yardstick:

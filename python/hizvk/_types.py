@@ -18,6 +18,10 @@ Rounding: TypeAlias = Literal["none"] | Literal["single"] | Literal["half"]
 PixelCenter: TypeAlias = Literal["integer"] | Literal["half"]
 #: Whether the scalar part of a quaternion comes first or last.
 QuaternionOrder: TypeAlias = Literal["wxyz"] | Literal["xyzw"]
+#: In which order the corners of a box come; see `OrientedBoxes.from_corners`.
+CornerOrder: TypeAlias = (
+    Literal["kitti"] | Literal["nuscenes"] | Literal["carla"] | Literal["open3d"]
+)
 #: How instances are stored on the device.
 StoredOrder: TypeAlias = Literal["morton"] | Literal["given"]
 #: Which faces of occluders are left out.
@@ -58,6 +62,10 @@ MipLookup: TypeAlias = Literal["normalized"] | Literal["edge_texel"]
 Sampling: TypeAlias = Literal["nearest"] | Literal["bilinear"]
 #: How the views of a point are weighted; see `colour_points`.
 ColourWeight: TypeAlias = Literal["equal"] | Literal["near"]
+#: Which world axis points up, or with a minus down; see `CullResult.plot`.
+Up: TypeAlias = (
+    Literal["x"] | Literal["y"] | Literal["z"] | Literal["-x"] | Literal["-y"] | Literal["-z"]
+)
 #: Which depth of the bounds a pixel of the oracle is compared with.
 OwnDepth: TypeAlias = Literal["nearest"] | Literal["pixel"]
 

@@ -1,4 +1,4 @@
-"""The Vulkan adapters of this machine."""
+"""The adapters of this machine."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["Adapter", "adapters"]
 
 @dataclass(frozen=True)
 class Adapter:
-    """A Vulkan adapter: a GPU, or a software driver."""
+    """An adapter: a GPU, or a software driver, as one graphics interface offers it."""
 
     index: int
     """Its place in the list of `adapters`."""
@@ -23,7 +23,10 @@ class Adapter:
     driver_info: str
     """The driver's version."""
     backend: str
-    """The graphics interface, ``"vulkan"``."""
+    """The graphics interface: ``"vulkan"``; ``"metal"`` on macOS, and also ``"dx12"`` on Windows.
+
+    Tests run on Vulkan alone.
+    """
     device_type: str
     """``"discrete_gpu"``, ``"integrated_gpu"``, ``"virtual_gpu"``, ``"cpu"`` or ``"other"``."""
 
@@ -33,6 +36,6 @@ class Adapter:
 
 
 def adapters() -> list[Adapter]:
-    """The Vulkan adapters of this machine; an empty list without a Vulkan driver."""
+    """The adapters of this machine; an empty list without a driver."""
     with driver_is_asked():
         return [Adapter(*summary) for summary in found_adapters()]

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 
-from . import _arguments, _rotations
+from . import _arguments, _corners, _rotations
 
 if TYPE_CHECKING:
     from typing import Self
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from ._arguments import FloatArray
-    from ._types import QuaternionOrder
+    from ._types import CornerOrder, QuaternionOrder
 
 __all__ = ["Boxes", "OrientedBoxes", "Points", "Spheres"]
 
@@ -45,6 +45,10 @@ _OTHER_ROTATIONS = (
     "; angles, quaternions and matrices with a translation are taken by "
     "OrientedBoxes.from_yaw, .from_quaternions and .from_transforms"
 )
+
+
+#: The same for `OrientedBoxes.from_corners`.
+_KEYWORDS_OF_CORNERS: Final = {"order": f"expected {_corners.ORDERS}, got nothing; {_NO_DEFAULT}"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -111,6 +115,33 @@ class Boxes:
         low = _arguments.floats("min", min, ("N", 3))
         object.__setattr__(self, "min", low)
         object.__setattr__(self, "max", _arguments.floats("max", max, (len(low), 3)))
+
+    @classmethod
+    def from_corners(cls, corners: npt.ArrayLike) -> Self:
+        """The axis-aligned boxes around corners, in any order.
+
+        A turned box gets a larger one around it; `OrientedBoxes.from_corners` keeps it as it is.
+
+        Parameters
+        ----------
+        corners : (N, 8, 3) float array
+            World positions.
+            A corner that is NaN makes an invalid box: a cull keeps it and counts it.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+
+        Examples
+        --------
+        >>> import numpy as np, hizvk
+        >>> corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 2) for z in (0, 3)])
+        >>> hizvk.Boxes.from_corners([corners]).max.tolist()
+        [[1.0, 2.0, 3.0]]
+        """
+        checked = _arguments.floats("corners", corners, ("N", 8, 3), hint=_corners.hint(corners))
+        return cls(checked.min(axis=1), checked.max(axis=1))
 
     def __len__(self) -> int:
         return len(self.min)
@@ -297,6 +328,42 @@ class OrientedBoxes:
             centers = np.where(known[:, None], centers, np.nan)
         return cls(centers, _for_each("half_sizes", half_sizes, len(matrices)), matrices[:, :3, :3])
 
+    @classmethod
+    @_arguments.explained(_KEYWORDS_OF_CORNERS)
+    def from_corners(cls, corners: npt.ArrayLike, *, order: CornerOrder) -> Self:
+        """Boxes from their eight corners, in the order of a data set.
+
+        The box is a little larger than the corners where these are rounded, and contains them up to
+        the roundings of float64.
+
+        Parameters
+        ----------
+        corners : (N, 8, 3) float array
+            World positions.
+            A corner that is not finite makes an invalid box: a cull keeps it and counts it.
+        order : {"kitti", "nuscenes", "carla", "open3d"}
+            Where the corners lie along the box's axes x, y and z.
+            There is no default.
+
+            - ``"kitti"``: the development kit's ``computeBox3D``; the corners of the lower face
+              one after the other, then those of the upper face.
+            - ``"nuscenes"``: ``Box.corners().T``; the front face one after the other, then the
+              back face.
+            - ``"carla"``: ``BoundingBox.get_world_vertices``; x changes after four, y after two,
+              z after each.
+            - ``"open3d"``: ``OrientedBoundingBox.get_box_points``.
+
+            Other data sets share them: a ring of four and the ring opposite is ``"kitti"``, as
+            PyTorch3D has it.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came; also where the corners are not
+            those of a box in this order, with the order that they are in.
+        """
+        return cls(*_corners.boxes(corners, order))
+
     def __len__(self) -> int:
         return len(self.centers)
 
@@ -386,7 +453,15 @@ def as_arrays(name: str, bounds: object) -> tuple[str, tuple[FloatArray, ...]]:
         case Points():
             return "points", (bounds.positions,)
     got = _arguments.describe(bounds)
-    raise TypeError(f"{name}: expected Spheres, Boxes, OrientedBoxes or Points, got {got}")
+    ways = {
+        (3,): f"hizvk.Points({name})",
+        (6,): f"hizvk.Boxes({name}[:, :3], {name}[:, 3:])",
+        (8, 3): f"hizvk.Boxes.from_corners({name})",
+        (4, 4): f"hizvk.OrientedBoxes.from_transforms({name})",
+    }
+    way = ways.get((_sides(bounds) or ())[1:])
+    hint = f"; pass {way}, if that is what the numbers are" if way else ""
+    raise TypeError(f"{name}: expected Spheres, Boxes, OrientedBoxes or Points, got {got}{hint}")
 
 
 def are_points(bounds: Bounds) -> bool:

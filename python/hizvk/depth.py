@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from . import _arguments
+from . import _arguments, foreign
 from ._types import DepthKind, Rounding, words
 from .tolerance import numbers_of
 
@@ -20,12 +20,21 @@ if TYPE_CHECKING:
     from ._arguments import FloatArray
     from .camera import Camera
 
-__all__ = ["DEPTH_KINDS", "DepthArray", "DepthKind", "checked_image"]
+__all__ = [
+    "DEPTH_KINDS",
+    "METRIC",
+    "DepthArray",
+    "DepthKind",
+    "checked_image",
+    "no_data_of",
+    "whole_numbers",
+]
 
 #: The kinds of depth that an array can hold; see `Device.pyramid`.
 DEPTH_KINDS = words(DepthKind)
 
-_METRIC = ("z", "distance")
+#: The kinds that have units.
+METRIC = ("z", "distance")
 
 #: What sensors and their files write where they saw nothing, by dtype.
 NO_DATA: dict[str, tuple[float, ...]] = {"uint16": (0.0, 65535.0), "float16": (65504.0,)}
@@ -78,14 +87,14 @@ def checked_image(
             "there is no default, a wrong guess hides things"
         )
     kind_: DepthKind = _arguments.choice("kind", kind, DEPTH_KINDS)  # type: ignore[assignment]
-    if kind_ not in _METRIC and kind_ != camera.depth_kind:
+    if kind_ not in METRIC and kind_ != camera.depth_kind:
         meaning = {"ndc": "0 near and 1 far", "reversed_ndc": "1 near and 0 far"}
         raise ValueError(
             f'kind: expected "{camera.depth_kind}" ({meaning[camera.depth_kind]}) for a camera '
             f'with reversed_z={camera.reversed_z}, got "{kind_}" ({meaning[kind_]})'
         )
     scale_ = _arguments.number("scale", scale, above=0.0)
-    if scale_ != 1.0 and kind_ not in _METRIC:
+    if scale_ != 1.0 and kind_ not in METRIC:
         raise ValueError(
             f'scale: expected 1 for the kind "{kind_}", got {scale_:g}; '
             'only "z" and "distance" have units'
@@ -98,13 +107,17 @@ def checked_image(
         value = value.data
     elif not isinstance(value, (np.ndarray, list, tuple, str, bytes, type(None))):
         # An image of another library, or a buffer: its dtype counts as that of an array does.
-        array = np.asarray(value)
+        expected = f"float {camera.size} (the camera's size)"
+        array = np.asarray(foreign.as_numpy(name, expected, value))
         value = array if array.ndim else value
     elif isinstance(value, (list, tuple)):
         value = _from_rows(name, value)
     if isinstance(value, np.ndarray):
+        value = _without_channel(value, camera.size)
+        mask = None if mask is None else _without_channel(mask, camera.size)
         _refuse_dtype(name, value, kind_)
         _refuse_shape(name, value, camera)
+        value = whole_numbers(name, value, kind_, invalid)
     dtype = value.dtype if isinstance(value, np.ndarray) else np.dtype(np.float64)
     image: FloatArray | npt.NDArray[np.uint16]
     if dtype.kind in "uf" and dtype.itemsize == 2:
@@ -119,7 +132,7 @@ def checked_image(
         # What is masked is "no data", whatever number lies there.
         image = np.where(mask, image.dtype.type(np.nan), image)
     moved = numbers_of("tolerance", tolerance)
-    no_data = _no_data(invalid, dtype)
+    no_data = no_data_of(invalid, dtype)
     return DepthArray(image, kind_, scale_, no_data, _rounding(dtype, kind_), moved)
 
 
@@ -134,7 +147,7 @@ def _rounding(dtype: np.dtype[Any], kind: DepthKind) -> Rounding:
         return "none"
     if dtype.itemsize == 2:
         return "half"
-    return "single" if kind in _METRIC else "none"
+    return "single" if kind in METRIC else "none"
 
 
 def _from_rows(name: str, rows: Sequence[Any]) -> Any:
@@ -165,22 +178,48 @@ def _from_rows(name: str, rows: Sequence[Any]) -> Any:
     return array if has_a_dtype else rows
 
 
+def _without_channel(array: npt.NDArray[Any], size: tuple[int, int]) -> npt.NDArray[Any]:
+    """An image whose one channel has an axis of its own, last or first, without this axis."""
+    if array.shape == (*size, 1):
+        return array[..., 0]
+    return array[0] if array.shape == (1, *size) else array
+
+
+def whole_numbers(name: str, array: Any, kind: object, invalid: object) -> npt.NDArray[Any]:
+    """Wide whole numbers as uint16 if all fit, or else as float64; other arrays as they are.
+
+    Pillow reads a 16-bit image as int32 (its mode I), with a sensor's two numbers for "no data".
+    Negative numbers are no depth in any kind.
+    """
+    is_wide = array.dtype.kind in "iu" and array.dtype.itemsize > 1 and array.dtype.name != "uint16"
+    if not is_wide or kind not in METRIC or not array.size:
+        return array  # type: ignore[no-any-return]
+    if invalid is None and array.max() <= np.iinfo(np.uint16).max:
+        return np.where(array < 0, 0, array).astype(np.uint16)
+    return _arguments.floats(name, array, array.shape)
+
+
 def _refuse_dtype(name: str, array: npt.NDArray[Any], kind: DepthKind) -> None:
-    """Refuses whole numbers, except uint16 of a metric kind: sensors write those."""
-    metric = kind in _METRIC
+    """Refuses truth values, whole numbers of 8 bits, and those of a kind that is not metric."""
+    metric = kind in METRIC
     if array.dtype.kind not in "iub" or (
-        array.dtype.kind == "u" and array.dtype.itemsize == 2 and metric
+        metric and array.dtype.kind != "b" and array.dtype.itemsize > 1
     ):
         return
     hint = ""
-    if metric and array.dtype.kind != "b" and array.dtype.itemsize > 1:
+    if not metric and array.dtype.name == "uint16":
         hint = (
-            "; whole numbers of a 16-bit image (Pillow's mode I) become what they were by "
-            ".astype(np.uint16), others by .astype(np.float32)"
+            f"; the numbers of a 16-bit depth buffer become depth by {name} / 65535, which a cull "
+            "takes with depth_slack_abs=1 / 65535"
+        )
+    elif metric and array.dtype.kind != "b":
+        hint = (
+            "; an image of 8 bits is a picture of depth, not depth: read the file that has the "
+            "sensor's numbers, or pass .astype(np.float32) if these are in units of scale"
         )
     raise TypeError(
-        f'{name}: expected float (height, width), or uint16 for the kinds "z" and "distance", '
-        f'got {_arguments.describe(array)} of kind "{kind}"{hint}'
+        f"{name}: expected float (height, width), or whole numbers of 16 bits or more for the "
+        f'kinds "z" and "distance", got {_arguments.describe(array)} of kind "{kind}"{hint}'
     )
 
 
@@ -190,11 +229,7 @@ def _refuse_shape(name: str, array: npt.NDArray[Any], camera: Camera) -> None:
         return  # a single number is refused elsewhere
     expected = "uint16" if array.dtype.kind == "u" else "float"
     hint = ""
-    if array.ndim == 3 and array.shape[2] == 1:
-        hint = f"; {name}[..., 0] is the image without its axis of channels"
-    elif array.ndim == 3 and array.shape[0] == 1:
-        hint = f"; {name}[0] is the image without its leading axis"
-    elif array.ndim == 2 and 0 not in array.shape and max(array.shape) <= _arguments.LARGEST_SIDE:
+    if array.ndim == 2 and 0 not in array.shape and max(array.shape) <= _arguments.LARGEST_SIDE:
         hint = (
             f"; a smaller or larger image of the same view goes with camera.resized({name}.shape)"
         )
@@ -204,7 +239,7 @@ def _refuse_shape(name: str, array: npt.NDArray[Any], camera: Camera) -> None:
     raise ValueError(f"{name}: expected {expected} {size} (the camera's size), got {got}{hint}")
 
 
-def _no_data(invalid: object, dtype: np.dtype[Any]) -> tuple[float, ...]:
+def no_data_of(invalid: object, dtype: np.dtype[Any]) -> tuple[float, ...]:
     """The caller's values as `dtype` holds them, or for None the convention of the dtype."""
     if invalid is None:
         return NO_DATA.get(dtype.name, ())

@@ -29,6 +29,7 @@ from .errors import LimitError
 from .hints import Question
 from .mesh import as_meshes
 from .options import Outputs, cull_options, cull_request
+from .progress import Progress, check_progress
 from .renewal import Source
 from .resources import DepthImage, Instances, Occluders, Pyramid
 from .result import CullResult
@@ -48,7 +49,9 @@ if TYPE_CHECKING:
     from ._types import DepthKind, Levels, Output
     from .depth import DepthArray
     from .mesh import MeshLike
+    from .methods.occlusion_map import MapResult, OcclusionMap
     from .options import CullKeywords, CullOptions, MeshLods, OptionKeywords
+    from .progress import ProgressLike
     from .tolerance import Tolerance
     from .views import _AmongLike
 
@@ -59,7 +62,7 @@ _TABLES_KEPT = 4
 
 
 class Device:
-    """A Vulkan device with its queue and pipelines.
+    """A device of the GPU, or of a software driver, with its queue and pipelines.
 
     Parameters
     ----------
@@ -183,7 +186,7 @@ class Device:
             None if scales is None else _arguments.floats_or_scalar("scales", scales, len(bounds))
         )
         uploaded = self._engine.instances(kind, arrays, (strict, stored_order), ids, sizes)
-        return Instances(self, uploaded, points=are_points(bounds))
+        return Instances(self, uploaded, points=are_points(bounds), bounds=bounds)
 
     @overload
     def occluders(
@@ -217,10 +220,10 @@ class Device:
 
         Parameters
         ----------
-        vertices : (V, 3) float array; or a Mesh, a mesh of trimesh or Open3D, or a list of them
+        vertices : (V, 3) float array; or a Mesh, or a list of them
             World positions, or with `transforms` those of the mesh's own space.
-            Objects of other libraries are known by their ``vertices`` and ``faces`` (trimesh) or
-            ``triangles`` (Open3D).
+            A mesh of trimesh, Open3D or PyVista will do as a `Mesh` does (`Mesh.of`).
+            A scene of trimesh stands for its meshes, placed by its transforms.
             A list may also hold tuples ``(vertices, triangles)`` or
             ``(vertices, triangles, transforms)``.
         triangles : (T, 3) integer array
@@ -258,6 +261,7 @@ class Device:
         only: CullResult | PassResult | npt.ArrayLike | None = None,
         max_triangles: int | None = None,
         max_occluders: int | None = None,
+        progress: ProgressLike = None,
     ) -> DepthImage: ...
 
     @overload
@@ -285,6 +289,7 @@ class Device:
         only: CullResult | PassResult | npt.ArrayLike | None = None,
         max_triangles: int | None = None,
         max_occluders: int | None = None,
+        progress: ProgressLike = None,
     ) -> DepthImage | tuple[int, int, int, int] | None:
         """Renders occluders into a depth image that stays on the device.
 
@@ -355,6 +360,8 @@ class Device:
             Each occluder that is left out costs hiding, and hidden ones cost little time anyway.
         max_occluders : int, optional
             At most so many copies of meshes are drawn: those that are largest in the image.
+        progress : bool or function, optional
+            As everywhere (`hizvk.progress`), for `conservative`; the image is one step.
 
         Returns
         -------
@@ -383,6 +390,7 @@ class Device:
         conservative = _arguments.flag("conservative", conservative)
         refinement = _arguments.integer("refinement", refinement, low=0, high=8)
         _arguments.choice("rasteriser", rasteriser, words(Rasteriser))
+        check_progress(progress)
         drawing = Drawing(
             chosen("only", only, occluders),
             limit("max_triangles", max_triangles),
@@ -412,9 +420,11 @@ class Device:
                     "conservative: expected False beside rasteriser, only, max_triangles and "
                     "max_occluders, got True"
                 )
-            drawn = self._engine.render_depth_conservative(
-                occluders._inner, camera._inner, refinement
-            )
+            with Progress(progress, "conservative depth", 1) as steps:
+                drawn = self._engine.render_depth_conservative(
+                    occluders._inner, camera._inner, refinement
+                )
+                steps.step()
             return DepthImage(self, drawn, camera)
         drawn = self._engine.render_depth(occluders._inner, camera._inner, rasteriser, *drawing)
         return DepthImage(self, drawn, camera)
@@ -831,9 +841,7 @@ class Device:
                 restriction,
                 not wait,
             )
-            return CullResult(
-                self, culling, Question(camera, pyramid, options, instances._are_sizeless)
-            )
+            return CullResult(self, culling, Question(camera, pyramid, options, *instances._known))
         cameras, pyramids = pairs(camera, pyramid, self)
         for number, (one, of) in enumerate(zip(cameras, pyramids, strict=True)):
             if one != of.camera:
@@ -859,7 +867,7 @@ class Device:
             not wait,
         )
         questions = [
-            Question(one, of, options, instances._are_sizeless)
+            Question(one, of, options, *instances._known)
             for one, of in zip(cameras, pyramids, strict=True)
         ]
         return ViewsResult(self, culled, questions)
@@ -925,6 +933,106 @@ class Device:
             negligible,
         )
         return ApproximateResult(self, culling, negligible)
+
+    def occlusion_map(
+        self,
+        occluders: Occluders,
+        camera: Camera,
+        *,
+        size: Size = (256, 256),
+        least: int = 4,
+        regions: int = 64,
+        max_triangles: int | None = None,
+        max_occluders: int | None = None,
+    ) -> OcclusionMap:
+        """Makes hierarchical occlusion maps, for comparison with a pyramid; on all cores.
+
+        Nothing that they hide is certified: `cull_map` says what it may lose.
+        ``docs/methods.md`` compares both.
+
+        Of the occluders in the frustum the largest and nearest are drawn, as far as the limits go.
+        `select_occluders` makes a database of occluders out of all meshes, before any view.
+
+        Parameters
+        ----------
+        occluders : Occluders
+            Of this device.
+        camera : Camera
+            The view; its own image size does not matter.
+        size : (height, width)
+            Of the finest map: powers of two.
+        least : int
+            The shorter side of the coarsest map: a power of two.
+        regions : int
+            Regions along each side of the depth-estimation buffer: a power of two.
+        max_triangles : int, optional
+            At most so many triangles are drawn; None: all in the frustum.
+        max_occluders : int, optional
+            At most so many copies of meshes are drawn.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+
+        References
+        ----------
+        Zhang, Manocha, Hudson and Hoff, "Visibility culling using hierarchical occlusion maps"
+        (1997).
+        """
+        from .methods.occlusion_map import made
+
+        return made(
+            self,
+            occluders,
+            camera,
+            size=size,
+            least=least,
+            regions=regions,
+            max_triangles=max_triangles,
+            max_occluders=max_occluders,
+        )
+
+    def cull_map(
+        self,
+        bounds: Bounds,
+        camera: Camera,
+        maps: OcclusionMap,
+        *,
+        negligible_px: int = 0,
+        copies: npt.ArrayLike | None = None,
+    ) -> MapResult:
+        """Culls by hierarchical occlusion maps; what it culls is not certified.
+
+        An instance is culled if the maps cover its rectangle, and it lies behind the boxes of all
+        occluders in the regions that it meets.
+        With ``negligible_px=0`` no centre of the maps' pixels shows it.
+        A larger image may still show it beside an occluder, and holes that are called negligible
+        may show it, too.
+
+        Parameters
+        ----------
+        bounds : Spheres, Boxes, OrientedBoxes or Points
+            The bounds of the instances.
+            A sphere is tested as the box around it.
+        camera : Camera
+            The view of the maps, in any size.
+        maps : OcclusionMap
+            Of this device.
+        negligible_px : int
+            A hole of so many pixels of the finest map counts as covered, 0 to 2^32 - 1.
+        copies : (N,) integer array, optional
+            Which copy of an occluding mesh each instance is, or `hizvk.ABSENT`.
+            Those that the maps have drawn are kept without a test.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+        """
+        from .methods.occlusion_map import culled
+
+        return culled(self, bounds, camera, maps, negligible_px=negligible_px, copies=copies)
 
     def temporal(self, instances: Instances, *, early_capacity: int | None = None) -> Temporal:
         """Makes the two passes of a view, which draw each frame what was visible, then the rest.

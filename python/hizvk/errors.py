@@ -32,13 +32,13 @@ class HizWarning(UserWarning):
 
 
 class NoAdapterError(HizError):
-    """There is no Vulkan adapter, or none of the name that was asked for.
+    """There is no adapter, or none of the name that was asked for.
 
     Attributes
     ----------
     seen : tuple of str
         The adapters that were found, one line each.
-        It is empty if there is no Vulkan driver.
+        It is empty if there is no driver.
     hint : str
         What to do: how to choose one of those seen, or the line that installs a software driver.
     request : str

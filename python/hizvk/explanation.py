@@ -4,10 +4,19 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, ClassVar, Final, Protocol
+
+from .pictured import PicturedExplanation
 
 if TYPE_CHECKING:
+    from typing import Any
+
+    import numpy as np
+    import numpy.typing as npt
+
     from ._core import Explanation as CoreExplanation
+    from .camera import Camera
+    from .show.explained import Explained
 
 __all__ = ["Explanation", "Verdict", "explanation_of"]
 
@@ -40,8 +49,16 @@ class Verdict(enum.IntEnum):
     Only with a pyramid of both ends, ``Device.pyramid(depths="both")``; `VISIBLE` otherwise."""
 
 
+class _Levels(Protocol):
+    """The `Pyramid` of an explanation, as this module knows it."""
+
+    @property
+    def camera(self) -> Camera: ...
+    def level(self, k: int) -> npt.NDArray[np.float32]: ...
+
+
 @dataclass(frozen=True)
-class Explanation:
+class Explanation(PicturedExplanation):
     """How the verdict of one instance came about: the cull's test of it, run once more.
 
     A member of a group of 64 that was hidden as a whole was never tested by itself.
@@ -94,6 +111,22 @@ class Explanation:
     group: Explanation | None
     """For a member of a group that was hidden as a whole: the test of the box around the group.
     None for all others."""
+
+    #: What was read, for `plot`; it is no part of the value, and copies are without it.
+    _pyramid: ClassVar[_Levels | None] = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_pyramid"}
+
+    def _explained(self, unit: str) -> Explained:
+        if self._pyramid is None:
+            raise ValueError(
+                "the explanation has lost its pyramid: it was copied or pickled; "
+                "CullResult.explain gives one that can be drawn"
+            )
+        from .show.explained import explained_of
+
+        return explained_of(self, self._pyramid.camera, self._pyramid.level(0), unit)
 
     def __str__(self) -> str:
         lines = [f"instance {self.index}: {self.verdict.name.lower()} ({self.reason})"]
@@ -151,11 +184,11 @@ SHOWN_RUNS: Final = 12
 SHOWN_TEXELS: Final = 16
 
 
-def explanation_of(index: int, told: CoreExplanation) -> Explanation:
-    """The explanation of instance `index`, from what the compiled module tells."""
+def explanation_of(index: int, told: CoreExplanation, pyramid: _Levels) -> Explanation:
+    """The explanation of instance `index`, from what the compiled module tells of a pyramid."""
     rectangle = None if told.rectangle is None else tuple(told.rectangle)
     texels = told.texels
-    return Explanation(
+    made = Explanation(
         index=index,
         verdict=Verdict(told.verdict),
         reason=told.reason,
@@ -173,5 +206,7 @@ def explanation_of(index: int, told: CoreExplanation) -> Explanation:
         in_front_of=told.in_front_of,
         in_front_of_z=told.in_front_of_z,
         stale=told.stale,
-        group=None if told.group is None else explanation_of(index, told.group),
+        group=None if told.group is None else explanation_of(index, told.group, pyramid),
     )
+    object.__setattr__(made, "_pyramid", pyramid)
+    return made

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ._core import Counts
     from .bounds import Bounds
     from .options import CullOptions
+    from .remembered import Remembered
     from .resources import Pyramid
 
 __all__ = ["Counted", "Question", "Tally", "posed_otherwise"]
@@ -92,6 +93,8 @@ class Question:
     options: CullOptions
     points: bool
     """Whether all bounds have size zero."""
+    remembered: Remembered | None = None
+    """What was tested, where the host still knows it; for pictures."""
 
     def hints(self, stats: Counted, bounds: Bounds | None = None) -> tuple[str, ...]:
         """What looks like a mistake, in whole sentences; empty if nothing does.
@@ -150,8 +153,8 @@ class Question:
             return (
                 f"depth: {100.0 * known.mean():.1f} % of the pixels have a depth, hardly any of "
                 "them beside another, and empty ones are far, so next to nothing can be hidden; if "
-                'depth is missing there (a LiDAR, not the sky), "Sparse depth" in docs/guide.md '
-                "fills it, and says what that costs the promise",
+                "depth is missing there (a LiDAR, not the sky), hizvk.fill_depth fills it and "
+                "says what that costs the promise",
             )
         return ()
 

@@ -1,4 +1,4 @@
-"""Triangle meshes that hide things: `Mesh`, and meshes of trimesh and Open3D taken as one."""
+"""Triangle meshes that hide things: `Mesh`, and meshes of other libraries taken as one."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, TypeAlias
 
 import numpy as np
 
-from . import _arguments
+from . import _arguments, foreign
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -65,6 +65,51 @@ class Mesh:
         )
         object.__setattr__(self, "transforms", placed("transforms", transforms))
 
+    @classmethod
+    def of(cls, mesh: MeshLike, transforms: npt.ArrayLike | None = None) -> Mesh:
+        """A mesh of another library as a `Mesh`, with its numbers as they are.
+
+        Every parameter that takes a mesh takes these objects directly.
+        Use this where the numbers are wanted, or for a whole scene in one mesh.
+
+        Parameters
+        ----------
+        mesh : object
+            - trimesh: a ``Trimesh``, or a ``Scene``, whose meshes are placed by its graph.
+              What has no faces is left out.
+            - Open3D: a legacy ``TriangleMesh``, or one of ``o3d.t.geometry`` on the CPU.
+            - PyVista: a ``PolyData`` of triangles.
+              Others are refused with ``.triangulate()`` as the way out.
+        transforms : (K, 4, 4) or (4, 4) float array, optional
+            As of a `Mesh`.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+
+        Examples
+        --------
+        >>> import hizvk
+        >>> from types import SimpleNamespace
+        >>> loaded = SimpleNamespace(vertices=[[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces=[[0, 1, 2]])
+        >>> hizvk.Mesh.of(loaded)
+        Mesh(3 vertices, 1 triangles, 1 copies)
+        """
+        expected = f"{A_MESH}, or a scene of trimesh"
+        if foreign.scene_parts(mesh) is None:
+            one = as_mesh("mesh", mesh, expected)
+            return one if transforms is None else cls(one.vertices, one.triangles, transforms)
+        vertices, triangles, count = [np.empty((0, 3))], [np.empty((0, 3), np.uint32)], 0
+        for one in meshes_of("mesh", mesh, expected):
+            points = one.vertices.astype(np.float64)
+            assert one.transforms is not None
+            for matrix in one.transforms.astype(np.float64):
+                vertices.append(points @ matrix[:3, :3].T + matrix[:3, 3])
+                triangles.append(one.triangles + np.uint32(count))
+                count += len(points)
+        return cls(np.concatenate(vertices), np.concatenate(triangles), transforms)
+
     def __repr__(self) -> str:
         copies = 1 if self.transforms is None else len(self.transforms)
         return (
@@ -90,63 +135,90 @@ class _HasTriangles(Protocol):
     def triangles(self) -> Any: ...
 
 
+class _HasTensors(Protocol):
+    """What a mesh of Open3D's tensors has."""
+
+    @property
+    def vertex(self) -> Any: ...
+    @property
+    def triangle(self) -> Any: ...
+
+
+class _HasPoints(Protocol):
+    """What a surface of PyVista has."""
+
+    @property
+    def points(self) -> Any: ...
+    @property
+    def faces(self) -> Any: ...
+
+
+class _HasGeometry(Protocol):
+    """What a scene of trimesh has."""
+
+    @property
+    def geometry(self) -> Any: ...
+    @property
+    def graph(self) -> Any: ...
+
+
 #: A `Mesh`, or a mesh of another library, known by its attributes: no library has to be there.
-MeshLike: TypeAlias = _HasFaces | _HasTriangles
+MeshLike: TypeAlias = _HasFaces | _HasTriangles | _HasTensors | _HasPoints | _HasGeometry
+#: What `as_mesh` takes, for messages.
+A_MESH: Final = "a Mesh, a mesh of trimesh, Open3D or PyVista"
 
 
 def as_mesh(name: str, value: object, expected: str) -> Mesh:
     """A Mesh, a tuple of its arguments, or an object of another library that has its parts."""
     if isinstance(value, Mesh):
         return value
-    parts = value if isinstance(value, tuple) and 2 <= len(value) <= 3 else _parts(value)
+    is_tuple = isinstance(value, tuple) and 2 <= len(value) <= 3
+    parts = value if is_tuple else foreign.mesh_parts(name, value)
     if parts is None:
-        # A scene of trimesh holds meshes by name, and is not one itself.
-        is_scene = hasattr(value, "geometry") and hasattr(value, "dump")
-        hint = (
-            "; of a trimesh scene pass scene.to_mesh(), or scene.dump(concatenate=True)"
-            if is_scene
-            else ""
-        )
+        hint = foreign.way_to_a_mesh(value)
         raise TypeError(f"{name}: expected {expected}, got {_arguments.describe(value)}{hint}")
+    return _made(name, *parts)  # type: ignore[misc]
+
+
+def _made(name: str, *parts: Any) -> Mesh:
     try:
         return Mesh(*parts)
     except (TypeError, ValueError) as error:
         raise type(error)(f"{name}: {error}") from None
 
 
-def _parts(value: Any) -> tuple[Any, Any] | None:
-    """Vertices and triangles of a mesh of trimesh (`faces`) or Open3D (`triangles`), or None."""
-    vertices = getattr(value, "vertices", None)
-    for name in ("faces", "triangles"):
-        triangles = getattr(value, name, None)
-        if vertices is not None and triangles is not None:
-            return vertices, triangles
-    return None
-
-
-#: What `as_mesh` takes, for messages.
-A_MESH: Final = "a Mesh, a mesh of trimesh or Open3D"
-
-
 def meshes_of(name: str, value: object, expected: str) -> list[Mesh]:
-    """The meshes of a list, in which plain tuples are welcome, too; or the one mesh that came."""
-    if isinstance(value, Mesh) or _parts(value) is not None:
-        return [as_mesh(name, value, expected)]
-    if not isinstance(value, Sequence) or isinstance(value, (str, bytes)):
-        return [as_mesh(name, value, expected)]
-    return [as_mesh(f"{name}[{number}]", item, expected) for number, item in enumerate(value)]
+    """The meshes of a list, in which plain tuples are welcome, too; or the one mesh that came.
+
+    A scene of trimesh stands for its meshes.
+    """
+    scene = foreign.scene_parts(value)
+    if scene is not None:
+        return [_made(name, *parts) for parts in scene]
+    if isinstance(value, Sequence) and not isinstance(value, (str, bytes)):
+        found = []
+        for number, item in enumerate(value):
+            one = f"{name}[{number}]"
+            scene = foreign.scene_parts(item)
+            if scene is None:
+                found.append(as_mesh(one, item, expected))
+            else:
+                found += [_made(one, *parts) for parts in scene]
+        return found
+    return [as_mesh(name, value, expected)]
 
 
 def as_meshes(vertices: Any, triangles: Any, transforms: Any) -> list[Mesh]:
     """The meshes of either form of `Device.occluders`."""
     if triangles is not None:
         return [Mesh(vertices, triangles, transforms)]
-    parts = None if isinstance(vertices, Mesh) else _parts(vertices)
-    if transforms is not None and parts is not None:  # a mesh of another library has none
-        return [Mesh(*parts, transforms)]
     if transforms is not None:
-        raise TypeError(
-            "transforms: expected nothing beside a list of meshes, which have their own"
-        )
+        parts = None if isinstance(vertices, Mesh) else foreign.mesh_parts("vertices", vertices)
+        if parts is None:
+            raise TypeError(
+                "transforms: expected nothing beside a list of meshes, a Mesh or a scene, "
+                "which have their own"
+            )
+        return [Mesh(parts.vertices, parts.triangles, transforms)]
     expected = f"{A_MESH}, or a list of them when triangles is left out"
     return meshes_of("vertices", vertices, expected)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import _arguments, _core
+from . import _arguments, _core, foreign
 from ._types import MipDepths, MipLookup, words
 
 if TYPE_CHECKING:
@@ -79,6 +79,7 @@ def mip_texel(
 def _pixels(name: str, value: object, size: Size) -> npt.NDArray[np.int64]:
     """Rows and columns of pixels of an image."""
     expected = f"(..., 2) integers, rows below {size[0]} and columns below {size[1]}"
+    value = foreign.as_numpy(name, expected, value)
     try:
         array: npt.NDArray[Any] = np.asarray(value)
     except ValueError as error:

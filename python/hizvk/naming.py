@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import _arguments
+from . import _arguments, foreign
 from .result import CullResult
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ def named(
         )
     if isinstance(only, (str, bytes)):
         raise TypeError(f"{name}: expected {expected}, got {_arguments.describe(only)}")
+    only = foreign.as_numpy(name, expected, only)
     try:
         array = np.asarray(only)
     except ValueError as error:

@@ -117,7 +117,7 @@ def visible(
     TypeError, ValueError
         They name the parameter, what it expects and what came.
     NoAdapterError
-        Without a Vulkan driver.
+        Without a driver.
 
     Warns
     -----

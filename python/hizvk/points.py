@@ -6,12 +6,12 @@ What is added up afterwards is plain arithmetic.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sized
+from collections.abc import Iterable, Sized
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from . import _arguments
+from . import _arguments, foreign
 from ._core import add_colours as core_add_colours
 from ._core import depth_of_points
 from ._types import ColourWeight, DepthKind, Sampling, words
@@ -20,6 +20,7 @@ from .camera import Camera
 from .device import Device
 from .oneline import default_device
 from .options import Outputs, cull_options
+from .progress import Progress
 from .resources import DepthImage
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from .options import CullOptions, OptionKeywords
+    from .progress import ProgressLike
     from .tolerance import Tolerance
 
 __all__ = ["PointColours", "colour_points", "depth_from_points"]
@@ -67,7 +69,7 @@ def colour_points(
     weight: ColourWeight = "equal",
     device: Device | None = None,
     options: CullOptions | None = None,
-    progress: bool | Callable[[int, int | None], object] = False,
+    progress: ProgressLike = None,
     **keywords: Unpack[OptionKeywords],
 ) -> PointColours:
     """Colours each point from the images that see it.
@@ -97,10 +99,8 @@ def colour_points(
         None: the default device of `visible`.
     options : CullOptions, optional
         How the culls decide; None takes the defaults, which are a guard of half a pixel for points.
-    progress : bool or function
-        True shows a bar on the terminal.
-        A function is called after each view with the number of views done, and how many there are
-        or None.
+    progress : bool or function, optional
+        As everywhere (`hizvk.progress`); a step is a view.
     **keywords
         Any field of `CullOptions`, in the place of that of `options`.
 
@@ -143,7 +143,8 @@ def colour_points(
     meaning: dict[str, Any] = {
         "kind": kind, "scale": scale, "invalid": invalid, "tolerance": tolerance,
     }  # fmt: skip
-    with _Told(progress, len(views) if isinstance(views, Sized) else None) as told:
+    total = len(views) if isinstance(views, Sized) else None
+    with Progress(progress, "colouring points", total) as steps:
         for view in views:
             camera, depth, image = _view(view)
             if isinstance(depth, DepthImage):
@@ -155,7 +156,7 @@ def colour_points(
                 points.positions, seen.mask, camera._inner, image, sampling == "bilinear", weight,
                 colours, weights, counts,
             )  # fmt: skip
-            told.step()
+            steps.step()
     mean = colours.reshape(count, 3)
     np.divide(mean, weights[:, None], out=mean, where=weights[:, None] > 0.0)
     return PointColours(mean, counts, weights)
@@ -170,8 +171,9 @@ def _view(
         raise TypeError(f"views: expected tuples (Camera, depth, image), got {got}")
     camera, depth, image = view
     _arguments.instance("views", camera, Camera, "a Camera first in each view")
-    array = np.asarray(image)
     expected = (*camera.size, 3)
+    image = foreign.as_numpy("views", f"uint8 or float images {expected}", image)
+    array = np.asarray(image)
     if array.dtype.kind not in "uf" or (array.dtype.kind == "u" and array.dtype.itemsize > 1):
         got = _arguments.describe(image)
         raise TypeError(f"views: expected uint8 or float images {expected}, got {got}")
@@ -180,39 +182,6 @@ def _view(
         raise ValueError(f"views: expected images {expected} (the camera's size), got {got}")
     wanted = np.uint8 if array.dtype.kind == "u" else np.float32
     return camera, depth, np.require(array, wanted, ["C", "A"])
-
-
-class _Told:
-    """Says how many views are done: on the terminal, to the caller, or not at all."""
-
-    def __init__(
-        self, progress: bool | Callable[[int, int | None], object], total: int | None
-    ) -> None:
-        if not isinstance(progress, (bool, np.bool_)) and not callable(progress):
-            got = _arguments.describe(progress)
-            raise TypeError(f"progress: expected True, False or a function, got {got}")
-        self._total, self._done = total, 0
-        self._call = progress if callable(progress) else None
-        self._bar = None
-        if self._call is None and progress:
-            from .commands.progress import Progress  # loaded here: only this needs it
-
-            self._bar = Progress(max(total or 1, 1), "colouring points")
-
-    def __enter__(self) -> _Told:
-        return self
-
-    def step(self) -> None:
-        """Counts a view as done."""
-        self._done += 1
-        if self._call is not None:
-            self._call(self._done, self._total)
-        if self._bar is not None:
-            self._bar.step(f"view {self._done}")
-
-    def __exit__(self, *error: object) -> None:
-        if self._bar is not None:
-            self._bar.close()
 
 
 def depth_from_points(

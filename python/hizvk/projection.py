@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from . import _arguments
+from . import _arguments, foreign
 from ._types import Sampling, words
 
 if TYPE_CHECKING:
@@ -118,6 +118,7 @@ def gather(
     [25.0]
     """
     sampling = _arguments.choice("sampling", sampling, words(Sampling))  # type: ignore[assignment]
+    image = foreign.as_numpy("image", "(height, width) or (height, width, channels) numbers", image)
     array = np.asarray(image)
     if array.ndim not in (2, 3) or 0 in array.shape or array.dtype.kind not in "biuf":
         expected = "(height, width) or (height, width, channels) numbers"

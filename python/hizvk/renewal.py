@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from . import _arguments
+from . import _arguments, foreign
 from .samples import checked_samples
 
 if TYPE_CHECKING:
@@ -100,6 +100,7 @@ def _checked_shape(
         f"{source.dtype} (height, width{samples}) with 1 <= height <= {most[0]} and "
         f"1 <= width <= {most[1]}, which is what lies from row {begin[0]} and column {begin[1]} on"
     )
+    array = foreign.as_numpy("array", expected, array)
     if not isinstance(array, np.ndarray):
         raise TypeError(f"array: expected {expected}, got {_arguments.describe(array)}")
     if array.dtype.name != source.dtype:

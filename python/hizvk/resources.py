@@ -13,6 +13,8 @@ from ._on_device import Allocated, OnDevice, check_owner
 from ._types import DepthEnd, words
 from .bounds import Bounds, are_points, as_arrays
 from .mesh import placed
+from .pictured import PicturedDepth, PicturedPyramid
+from .remembered import Remembered
 from .renewal import rectangle, replacement
 
 if TYPE_CHECKING:
@@ -31,9 +33,12 @@ __all__ = ["DepthImage", "Instances", "Occluders", "Pyramid"]
 class Instances(Allocated[CoreInstances]):
     """Bounds on the device, ready to be tested; made by `Device.instances`."""
 
-    def __init__(self, device: Maker, inner: CoreInstances, *, points: bool) -> None:
+    def __init__(
+        self, device: Maker, inner: CoreInstances, *, points: bool, bounds: Bounds
+    ) -> None:
         super().__init__(device, inner)
         self._points = points
+        self._remembered: Remembered | None = Remembered(bounds)
 
     @property
     def kind(self) -> str:
@@ -44,6 +49,11 @@ class Instances(Allocated[CoreInstances]):
     def _are_sizeless(self) -> bool:
         """Whether sample coverage culls what can be seen of them, as it has no guard by default."""
         return self._points and self.kind != "points"
+
+    @property
+    def _known(self) -> tuple[bool, Remembered | None]:
+        """Whether they are without size, and their bounds if no update has changed them."""
+        return self._are_sizeless, self._remembered
 
     @property
     def num_pieces(self) -> int:
@@ -62,6 +72,9 @@ class Instances(Allocated[CoreInstances]):
         - 8 per instance for where it is stored; none with ``order="given"``.
         - 88 per group of 64.
         - 48 per instance in groups of which a part was updated.
+
+        The bounds that were uploaded stay alive besides, if they are at most 65,536: pictures show
+        them.
         """
         return self._inner.host_bytes()
 
@@ -122,6 +135,7 @@ class Instances(Allocated[CoreInstances]):
             raise ValueError(f"bounds: expected {expected}, got {len(bounds)}")
         strict = _arguments.flag("strict", strict)
         self._device._engine.update(self._inner, first, kind, arrays, strict)
+        self._remembered = None
         self._points = self._points and (len(bounds) == 0 or are_points(bounds))
 
     def __len__(self) -> int:
@@ -190,6 +204,15 @@ class Occluders(Allocated[CoreOccluders]):
         return f": {self.num_meshes} meshes, {self.num_triangles} triangles"
 
 
+def _converted(
+    camera: Camera, depth: npt.NDArray[np.float32], kind: DepthKind, level: int, end: DepthEnd
+) -> npt.NDArray[np.float32]:
+    """Depth of another kind than the camera's own."""
+    from .view_depth import converted  # culls need none of it
+
+    return converted(camera, depth, kind, level, end)
+
+
 class _Seen:
     """What belongs to one camera, and has the size of its image."""
 
@@ -206,7 +229,7 @@ class _Seen:
         return self._camera.size
 
 
-class DepthImage(_Seen, OnDevice[CoreDepthImage]):
+class DepthImage(PicturedDepth, _Seen, OnDevice[CoreDepthImage]):
     """A depth image on the device; made by `Device.render_depth`."""
 
     def __init__(self, device: Maker, inner: CoreDepthImage, camera: Camera) -> None:
@@ -223,15 +246,27 @@ class DepthImage(_Seen, OnDevice[CoreDepthImage]):
         """What drew it: ``"device"`` or ``"host"``; None for conservative and uploaded depth."""
         return self._inner.rasteriser()
 
-    def numpy(self) -> npt.NDArray[np.float32]:
-        """``(height, width)`` float32: the NDC depth, row 0 on top; a copy."""
-        return self._inner.read().reshape(self.size)
+    def numpy(self, *, kind: DepthKind | None = None) -> npt.NDArray[np.float32]:
+        """``(height, width)`` float32: the depth, row 0 on top; a copy.
+
+        Parameters
+        ----------
+        kind : {"ndc", "reversed_ndc", "z", "distance"}, optional
+            As for `Pyramid.level`; None: NDC, as `kind` says.
+
+        Raises
+        ------
+        TypeError, ValueError
+            They name the parameter, what it expects and what came.
+        """
+        depth = self._inner.read().reshape(self.size)
+        return depth if kind is None else _converted(self._camera, depth, kind, 0, "farthest")
 
     def _summary(self) -> str:
         return f" {self.size[0]}x{self.size[1]} of kind {self.kind}"
 
 
-class Pyramid(_Seen, Allocated[CorePyramid]):
+class Pyramid(PicturedPyramid, _Seen, Allocated[CorePyramid]):
     """A depth pyramid on the device; made by `Device.pyramid`.
 
     On level ``k`` a texel holds the farthest depth of a block of ``2^k x 2^k`` pixels.
@@ -270,8 +305,10 @@ class Pyramid(_Seen, Allocated[CorePyramid]):
         """Which depths of each block are stored, as ``depths=`` of `Device.pyramid` asked for."""
         return self._depths
 
-    def level(self, k: int, end: DepthEnd | None = None) -> npt.NDArray[np.float32]:
-        """Level `k` as a ``(height, width)`` float32 array of NDC depth, row 0 on top; a copy.
+    def level(
+        self, k: int, end: DepthEnd | None = None, *, kind: DepthKind | None = None
+    ) -> npt.NDArray[np.float32]:
+        """Level `k` as a ``(height, width)`` float32 array of depth, row 0 on top; a copy.
 
         Parameters
         ----------
@@ -282,15 +319,35 @@ class Pyramid(_Seen, Allocated[CorePyramid]):
             Level 0 has the pixels as that end counts them: "no data" is far in the farthest and
             near in the nearest.
             None: the farthest, or the nearest of a pyramid that has nothing else.
+        kind : {"ndc", "reversed_ndc", "z", "distance"}, optional
+            What the numbers are, as for `Device.pyramid`.
+            ``"z"`` and ``"distance"`` are in world units, infinite for an infinite far plane.
+            The distance of a texel bounds those of its pixels: none is farther, or for the nearest
+            end none is nearer.
+            They are computed in float64 and rounded to float32; no cull reads them.
+            None: NDC depth of the kind `Camera.depth_kind`, as culls read it.
 
         Raises
         ------
         TypeError
-            If `k` is no integer, or `end` no word.
+            If `k` is no integer, or `end` or `kind` no word.
         ValueError
-            If `end` is not stored (see `depths`).
+            If `end` is not stored (see `depths`), or if the camera does not say where view depth
+            starts: an orthographic one made from a bare matrix.
         IndexError
             If there is no such level, or it is not stored (see `levels`).
+
+        Examples
+        --------
+        >>> import numpy as np, hizvk
+        >>> device = hizvk.Device()
+        >>> camera = hizvk.Camera.look_at(
+        ...     (0, 0, 9), (0, 0, 0), fov_y_deg=60, size=(90, 160), near=0.125
+        ... )
+        >>> hiz = device.pyramid(np.full(camera.size, 2.0), camera, kind="z")
+        >>> texels = hiz.level(3)[0, 0], hiz.level(3, kind="z")[0, 0]
+        >>> [round(float(texel), 4) for texel in texels]
+        [0.0625, 2.0]
         """
         alone = self._depths if self._depths in words(DepthEnd) else None
         if end is None:
@@ -304,7 +361,8 @@ class Pyramid(_Seen, Allocated[CorePyramid]):
         if k > 0 and k not in self.levels:
             raise IndexError(f"k: expected 0 or a level that is stored, {self._stored()}, got {k}")
         size, texels = self._inner.read_level(k, end == "nearest")
-        return texels.reshape(size)
+        texels = texels.reshape(size)
+        return texels if kind is None else _converted(self._camera, texels, kind, k, end)
 
     def mips(
         self, *, depths: MipDepths = "farthest", lookup: MipLookup = "normalized"

@@ -18,6 +18,7 @@ from ._core import Culling as CoreCulling
 from ._processes import cached_property
 from .explanation import explanation_of
 from .options import MAX_LODS
+from .pictured import PicturedResult
 from .pixels import pixels_of, visible_fraction
 from .stats import CullStats
 from .timing import sum_of, table_of
@@ -83,7 +84,7 @@ def shared(array: npt.NDArray[np.generic]) -> Any:
     return shared
 
 
-class CullResult(Awaited[CoreCulling]):
+class CullResult(PicturedResult, Awaited[CoreCulling]):
     """The answer of `Device.cull`; reading any part of it waits for the device.
 
     It is made by `Device.cull` alone, and may be read from any thread.
@@ -340,7 +341,7 @@ class CullResult(Awaited[CoreCulling]):
                 f"an integer in 0..{count - 1}" if count else "nothing, for there are no instances"
             )
             raise IndexError(f"index: expected {expected}, got {index}") from None
-        return explanation_of(index, self._inner.explain(index))
+        return explanation_of(index, self._inner.explain(index), self._question.pyramid)
 
     def _summary(self) -> str:
         return f" of {len(self)} instances"

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _arguments
-from .depth import checked_image
+from . import _arguments, foreign
+from .depth import checked_image, whole_numbers
 
 if TYPE_CHECKING:
     from .camera import Camera
@@ -29,6 +29,7 @@ def checked_samples(
     tolerance: object = None,
 ) -> list[DepthArray]:
     """The image of each sample, as the engine takes them; one for an array without samples."""
+    value = foreign.as_numpy(name, "(height, width) or (height, width, samples)", value)
     if not isinstance(value, np.ndarray) or value.ndim != 3 or value.shape[2] == 1:
         return [checked_image(name, value, camera, kind, scale, invalid, tolerance)]
     if value.shape[:2] != camera.size:
@@ -40,5 +41,6 @@ def checked_samples(
             f"{name}: expected (height, width), or (height, width, samples) with {listed} or "
             f"{COUNTS[-1]} samples, got {_arguments.describe(value)}"
         )
+    value = whole_numbers(name, value, kind, invalid)  # of one dtype for all samples
     planes = (value[..., k] for k in range(value.shape[2]))
     return [checked_image(name, plane, camera, kind, scale, invalid, tolerance) for plane in planes]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import _arguments
+from . import _arguments, foreign
 from ._awaited import Awaited
 from ._core import ViewsCulling as CoreViews
 from ._on_device import check_owner
@@ -198,6 +198,7 @@ def among_of(
             f"among: expected {expected}, got a masked array; "
             "fill it first, with .filled(False) or (True)"
         )
+    among = foreign.as_numpy("among", expected, among)
     try:
         flags = np.asarray(among)
     except ValueError as error:

@@ -104,7 +104,7 @@ def draw(made: Crowded, folder: Path) -> list[Path]:
         Without matplotlib.
     """
     if not figures.can_draw():
-        raise SystemExit(f"left out: {figures.MISSING}")
+        raise SystemExit(f"left out: {figures.missing()}")
     folder.mkdir(parents=True, exist_ok=True)
     scene = hizvk.HierarchicalVisibility(made.meshes)
     frames = [(scene.render(view.camera(SIZE)), view) for view in made.views]

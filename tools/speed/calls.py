@@ -187,7 +187,7 @@ def _others(run: Run, scene: Town, depth: DepthImage, pyramid: Pyramid) -> None:
 
         ways |= {"Embree, one ray per pixel": pixels, "Embree, rays to 9 points of a box": points}
     else:
-        run.found.notes.append(f"left out: {embree.MISSING}")
+        run.found.notes.append(f"left out: {embree.missing()}")
     ms = in_turns(ways, SLOW_ROUNDS)
     run.found.timed("beside others", ms)
     for label in ways:

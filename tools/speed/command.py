@@ -12,7 +12,7 @@ import hizvk
 from hizvk import _core
 from hizvk.commands import arguments as args
 from hizvk.commands import figure
-from hizvk.commands.progress import Progress
+from hizvk.progress import Progress
 
 from . import (
     arrays,
@@ -108,18 +108,15 @@ def run(
         "Intel's culler, which some targets are ratios to, is no part of this run: "
         "see the nanoseconds per instance"
     )
-    shown = Progress(len(parts), f"{PROG}, {extent}")
-    measured = Run(device, WORKLOADS[extent], seed, found, shown.show)
-    try:
+    with Progress(True, f"{PROG}, {extent}", len(parts), after_s=0.0) as shown:
+        measured = Run(device, WORKLOADS[extent], seed, found, shown.show)
         for part in parts:
             found.load += _load()
             PARTS[part](measured)
             shown.step(part)
-    finally:
-        shown.close()
     plot = None
     if not figure.can_draw():
-        found.notes.append(f"left out: {figure.MISSING}")
+        found.notes.append(f"left out: {figure.missing()}")
     elif found.instance_counts and found.image_sizes:
         from . import plots
 

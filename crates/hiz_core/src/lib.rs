@@ -162,11 +162,11 @@ pub mod headless;
 #[cfg(feature = "yardstick")]
 pub mod yardstick;
 
-#[cfg(feature = "testing")]
-pub mod testing;
-
 #[cfg(feature = "methods")]
 pub mod methods;
+
+#[cfg(feature = "testing")]
+pub mod testing;
 
 pub use wgpu;
 

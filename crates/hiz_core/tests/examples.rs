@@ -1,7 +1,10 @@
-//! Runs the examples `simple`, `frames`, `every_way`, `particles`, `reflections` and `own_culling`;
-//! `tests/renderer.rs` runs the other renderer.
+//! Runs the examples `drop_in`, `simple`, `frames`, `every_way`, `particles`, `reflections` and
+//! `own_culling`; `tests/renderer.rs` runs the other renderer.
 
 mod common;
+#[path = "../examples/drop_in/main.rs"]
+#[allow(dead_code, reason = "the program's own device, and its report")]
+mod drop_in;
 #[path = "../examples/every_way.rs"]
 #[allow(dead_code, reason = "the program's own device, and its report")]
 mod every_way;
@@ -87,6 +90,33 @@ fn simple_draws_what_the_wall_does_not_hide() {
 #[test]
 fn simple_runs() {
     simple::main().unwrap();
+}
+
+/// The renderer and what culling adds to it are as short as their page says.
+#[test]
+fn drop_in_is_short() {
+    let of = |text: &str| text.lines().count();
+    assert!(of(include_str!("../examples/drop_in/app.rs")) <= 100);
+    assert!(of(include_str!("../examples/drop_in/culling.rs")) <= 100);
+}
+
+/// Few crates are drawn, and yet each pixel is that of a frame that draws all of them.
+#[test]
+fn drop_in_draws_the_picture_of_all_crates() {
+    let engine = engine();
+    let (device, queue) = (engine.device(), engine.queue());
+    let town = drop_in::culling::Town::new(device, queue).unwrap();
+    let ([all, culled], drawn) = drop_in::compare(&town, device, queue).unwrap();
+    assert!(all == culled, "pictures differ");
+    // Without any crate the picture is another one, so the crates that were drawn show in it.
+    let mut encoder = device.create_command_encoder(&Default::default());
+    let houses = drop_in::culling::HOUSES;
+    town.app.pass(&mut encoder, true).draw_indexed(0..14, 0, houses);
+    let houses = drop_in::read_picture(&town, device, queue, encoder.finish()).unwrap();
+    let shown = houses.chunks_exact(4).zip(all.chunks_exact(4)).filter(|(a, b)| a != b).count();
+    println!("{drawn} crates drawn, {shown} pixels show crates");
+    assert!(shown > 1000, "{shown} pixels");
+    assert!(drawn > 100 && drawn < drop_in::culling::CRATES / 10, "{drawn} drawn");
 }
 
 /// Two passes give depth and picture of all discs, bit for bit, and draw fewer.

@@ -44,6 +44,12 @@ mod _core {
     #[pymodule_export]
     use crate::methods::hierarchy::HierarchicalVisibility;
     #[pymodule_export]
+    use crate::methods::maps::OcclusionMap;
+    #[pymodule_export]
+    use crate::methods::tiling::{BspTree, DepthTiles, Tiled};
+    #[pymodule_export]
+    use crate::methods::{MethodLevels, TextCull};
+    #[pymodule_export]
     use crate::points::{add_colours, depth_of_points};
     #[pymodule_export]
     use crate::reference::{reference_classify, reference_pyramid, reference_unoccluded};

@@ -8,7 +8,11 @@
 - `rectangle`: the best rectangle test
 - `score`: false culls and hidden instances kept
 - `occluders`, `hiding`: ``--occluders``, what is lost with fewer or simpler occluders
+- `maps`, `maps_results`, `maps_pictures`: ``--maps``, hierarchical occlusion maps beside the cull
+- `texts`, `texts_report`, `texts_plot`: ``--texts``, what published tests lose
+- `sweeps`: views per second of sweeps
 - `results`: the numbers as plain objects
+- `tiling`: ``--tiling``, coverage bits in BSP order beside the tiles with depth
 - `whole_way`: from meshes to a mask with both rasterisers, numpy and Embree
 - `report`, `plots`: report.json (its schema stands there), report.md, a picture per scene
 """

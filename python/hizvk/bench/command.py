@@ -12,7 +12,7 @@ import hizvk
 
 from ..commands import arguments as args
 from ..commands import figure
-from ..commands.progress import Progress
+from ..progress import Progress
 from ..scenes import embree
 from . import catalogue, configurations, whole_way
 from .measure import measure
@@ -120,14 +120,9 @@ def run(
         except catalogue.Missing as missing:
             found.missing.append(str(missing))
             continue
-        steps = Progress(
-            len(bench.scene.views) + repetitions,
-            f"hizvk bench: {key}, {len(bench.scene):,} instances",
-        )
-        try:
+        label = f"hizvk bench: {key}, {len(bench.scene):,} instances"
+        with Progress(True, label, len(bench.scene.views) + repetitions, after_s=0.0) as steps:
             result = measure(bench, size, measured, repetitions, device, steps.step)
-        finally:
-            steps.close()
         found.scenes.append(result)
         if figure.can_draw():
             from . import plots as drawing
@@ -144,11 +139,11 @@ def _left_out() -> list[str]:
     found = []
     if not embree.can_cast():
         found.append(
-            f"{embree.MISSING}; the truth is that of boxes before the rendered depth, so it says "
+            f"{embree.missing()}; the truth is that of boxes before the rendered depth, so it says "
             "nothing about the depth image"
         )
     if not figure.can_draw():
-        found.append(figure.MISSING)
+        found.append(figure.missing())
     return found
 
 
@@ -176,6 +171,21 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="instead: what is lost with fewer or simpler occluders; --occluders --help tells more",
     )
+    parser.add_argument(
+        "--maps",
+        action="store_true",
+        help="instead: hierarchical occlusion maps beside the cull; --maps --help tells more",
+    )
+    parser.add_argument(
+        "--tiling",
+        action="store_true",
+        help="instead: coverage bits in BSP order beside depth tiles; --tiling --help tells more",
+    )
+    parser.add_argument(
+        "--texts",
+        action="store_true",
+        help="instead: what published tests lose, and their time; --texts --help tells more",
+    )
     parser.add_argument("--instances", type=args.count, help="in every scene but the castle")
     parser.add_argument("--views", type=args.count, help="of every scene")
     parser.add_argument(
@@ -200,6 +210,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from . import occluders
 
         return occluders.main([each for each in arguments if each != "--occluders"])
+    if "--maps" in arguments:
+        from . import maps
+
+        return maps.main([each for each in arguments if each != "--maps"])
+    if "--tiling" in arguments:
+        from . import tiling
+
+        return tiling.main([each for each in arguments if each != "--tiling"])
+    if "--texts" in arguments:
+        from . import texts
+
+        return texts.main([each for each in arguments if each != "--texts"])
     parsed = parser.parse_args(arguments)
     return args.execute(
         PROG,

@@ -18,10 +18,10 @@ from ..bounds import Boxes
 from ..commands import arguments as args
 from ..commands import report
 from ..commands.page import Page
-from ..commands.progress import Progress
 from ..device import Device
 from ..mesh import Mesh
 from ..occluders import inner_boxes, inner_prisms, split_mesh
+from ..progress import Progress
 from ..scenes import box_mesh, village
 from ..scenes.boulders import boulders
 from ..scenes.hedge import hedge
@@ -37,7 +37,16 @@ if TYPE_CHECKING:
     from ..adapter import Adapter
     from ..scenes import Scene
 
-__all__ = ["NAMES", "Report", "cuts", "main", "proxies", "run"]
+__all__ = [
+    "NAMES",
+    "Report",
+    "cuts",
+    "groups_of",
+    "made_with_groups",
+    "main",
+    "proxies",
+    "run",
+]
 
 PROG: Final = "hizvk bench --occluders"
 #: The scenes of this report; the first four are also the bench's.
@@ -170,16 +179,14 @@ def run(
     out.mkdir(parents=True, exist_ok=True)
     device = Device()
     found = Report(command=command, seed=seed, adapter=device.adapter)
-    steps = Progress(len(keys), f"{PROG}: {', '.join(keys)}")
-    try:
+    label = f"{PROG}: {', '.join(keys)}"
+    with Progress(True, label, len(keys), after_s=0.0) as steps:
         for key in keys:
             try:
                 found.scenes.append(_measure(device, key, castle, seed, instances, views))
             except catalogue.Missing as missing:
                 found.missing.append(str(missing))
             steps.step(key)
-    finally:
-        steps.close()
     found.seconds = time.perf_counter() - started
     report.write(out, found.as_data(), found.page())
     return found
@@ -194,7 +201,7 @@ def _measure(
     views: int | None,
 ) -> Found:
     things, eyes = instances or INSTANCES.get(key, 4_000), views or VIEWS.get(key, 4)
-    scene, groups, proxies = _made(key, things, eyes, seed, castle)
+    scene, groups, proxies = made_with_groups(key, things, eyes, seed, castle)
     stage = Stage(device, scene, groups, SIZE)
     return Found(
         key=key,
@@ -207,13 +214,13 @@ def _measure(
     )
 
 
-def _made(
+def made_with_groups(
     key: str, things: int, eyes: int, seed: int, castle: Path | None
 ) -> tuple[Scene, Groups, dict[str, Mesh]]:
     """A scene, its occluders in groups, and what may be drawn in their stead."""
     if key == "hedge":
         made = hedge(things, eyes, seed=seed)
-        return made.scene, _given(made.scene, made.offsets), {}
+        return made.scene, groups_of(made.scene, made.offsets), {}
     if key == "village":
         scene = village(36, things, eyes, seed=seed)
         prisms = inner_prisms(scene.vertices, scene.triangles, up=(0, 0, 1))
@@ -237,10 +244,10 @@ def _split(scene: Scene, cell: float) -> Groups:
 
 def _alike(scene: Scene, count: int) -> Groups:
     """The occluders in `count` objects of the same number of triangles."""
-    return _given(scene, np.linspace(0, len(scene.triangles), count + 1).astype(np.intp))
+    return groups_of(scene, np.linspace(0, len(scene.triangles), count + 1).astype(np.intp))
 
 
-def _given(scene: Scene, offsets: npt.NDArray[np.intp]) -> Groups:
+def groups_of(scene: Scene, offsets: npt.NDArray[np.intp]) -> Groups:
     """The occluders in objects as they come."""
     corners = scene.vertices[scene.triangles]
     low = np.minimum.reduceat(corners.min(axis=1), offsets[:-1])

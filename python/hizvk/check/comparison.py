@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .. import _arguments
+from .. import _arguments, foreign
 from . import reference
 
 if TYPE_CHECKING:
@@ -98,6 +98,7 @@ def compare(mask: npt.ArrayLike, truth: npt.ArrayLike) -> Comparison:
     ([1], [2], 1.0)
     """
     kept = _arguments.bools("mask", mask, None)
+    truth = foreign.as_numpy("truth", f"bool or uint8 ({len(kept)},)", truth)
     codes = np.asarray(truth)
     if isinstance(truth, np.ndarray) and codes.dtype == np.uint8:
         if codes.shape != kept.shape:

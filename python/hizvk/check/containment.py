@@ -11,7 +11,7 @@ They need no device, and are meant for tools and tests, not for every frame.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -20,14 +20,20 @@ from .._core import check_bounds as outside_of_bounds
 from .._core import check_proxy as outside_of_mesh
 from ..bounds import Bounds, as_arrays
 from ..mesh import A_MESH, as_mesh, meshes_of
+from ..progress import Progress
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
     from ..mesh import Mesh, MeshLike
+    from ..progress import ProgressLike
 
 __all__ = ["BoundsCheck", "ProxyCheck", "check_bounds", "check_proxy"]
+
+#: The least triangles of a proxy, and the least instances, that are checked in one step.
+PROXY_PART: Final = 256
+BOUNDS_PART: Final = 256
 
 _Pair: TypeAlias = tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]
 
@@ -72,7 +78,10 @@ class BoundsCheck:
 
 
 def check_proxy(
-    proxy: MeshLike | tuple[npt.ArrayLike, ...], mesh: MeshLike | tuple[npt.ArrayLike, ...]
+    proxy: MeshLike | tuple[npt.ArrayLike, ...],
+    mesh: MeshLike | tuple[npt.ArrayLike, ...],
+    *,
+    progress: ProgressLike = None,
 ) -> ProxyCheck:
     """Whether an occluder proxy may be rendered in place of its mesh.
 
@@ -93,11 +102,13 @@ def check_proxy(
 
     Parameters
     ----------
-    proxy, mesh : Mesh, tuple, or a mesh of trimesh or Open3D
+    proxy, mesh : Mesh, tuple, or a mesh of trimesh, Open3D or PyVista
         A tuple is ``(vertices, triangles)``.
         Both are in the same coordinates, without transforms.
         The mesh is closed and consistently oriented: each of its edges runs as often one way as the
         other, where equal positions count as one vertex.
+    progress : bool or function, optional
+        As everywhere (`hizvk.progress`); a step is a part of the proxy.
 
     Returns
     -------
@@ -118,19 +129,33 @@ def check_proxy(
     >>> hizvk.check_proxy(proxy, mesh).inside
     True
     """
-    found = outside_of_mesh(_unplaced("proxy", proxy), _unplaced("mesh", mesh))
-    triangles, witnesses, vertices, protrusion = found
+    points, faces = _unplaced("proxy", proxy)
+    whole = _unplaced("mesh", mesh)
+    triangles: list[int] = []
+    witnesses: list[list[float]] = []
+    vertices: set[int] = set()
+    protrusion = 0.0
+    with Progress(progress, "checking a proxy") as steps:
+        for part in steps.parts(len(faces), PROXY_PART):
+            found = outside_of_mesh((points, faces[part]), whole)
+            triangles += [part.start + number for number in found[0]]
+            witnesses += found[1]
+            vertices.update(found[2])
+            protrusion = max(protrusion, found[3])
     return ProxyCheck(
         inside=not triangles,
         triangles=np.array(triangles, dtype=np.intp),
         witnesses=np.array(witnesses, dtype=np.float64).reshape(-1, 3),
-        vertices=np.array(vertices, dtype=np.intp),
+        vertices=np.array(sorted(vertices), dtype=np.intp),
         protrusion=protrusion,
     )
 
 
 def check_bounds(
-    bounds: Bounds, meshes: MeshLike | Sequence[MeshLike | tuple[npt.ArrayLike, ...]]
+    bounds: Bounds,
+    meshes: MeshLike | Sequence[MeshLike | tuple[npt.ArrayLike, ...]],
+    *,
+    progress: ProgressLike = None,
 ) -> BoundsCheck:
     """Whether bounds contain what they bound.
 
@@ -142,10 +167,12 @@ def check_bounds(
     ----------
     bounds : Spheres, Boxes, OrientedBoxes or Points
         The N volumes.
-    meshes : list of Mesh, of tuples, or of meshes of trimesh or Open3D; or one Mesh
+    meshes : list of Mesh, of tuples, or of meshes of trimesh, Open3D or PyVista; or one Mesh
         One for each instance, in order.
         A mesh with K transforms stands for K instances in a row.
         A tuple is ``(vertices, triangles)`` or ``(vertices, triangles, transforms)``.
+    progress : bool or function, optional
+        As everywhere (`hizvk.progress`); a step is a part of the instances.
 
     Returns
     -------
@@ -173,8 +200,12 @@ def check_bounds(
         raise ValueError(
             f"meshes: expected one for each of the {len(bounds)} bounds, got {len(instances)}"
         )
-    stacked = np.stack(matrices) if matrices else np.empty((0, 4, 4))
-    outside = outside_of_bounds(kind, arrays, pairs, np.ascontiguousarray(stacked), instances)
+    stacked = np.ascontiguousarray(np.stack(matrices) if matrices else np.empty((0, 4, 4)))
+    outside = np.empty(len(instances))
+    with Progress(progress, "checking bounds") as steps:
+        for part in steps.parts(len(instances), BOUNDS_PART):
+            some = tuple(array[part] for array in arrays)
+            outside[part] = outside_of_bounds(kind, some, pairs, stacked, instances[part])
     offenders = np.flatnonzero(outside >= 0.0)
     return BoundsCheck(
         contained=outside < 0.0,

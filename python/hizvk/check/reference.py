@@ -17,6 +17,7 @@ from .._types import Coverage, OwnDepth, words
 from ..bounds import Bounds, as_arrays
 from ..camera import Camera
 from ..depth import checked_image
+from ..progress import Progress
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from .._types import DepthKind
+    from ..progress import ProgressLike
 
 __all__ = [
     "COVERED",
@@ -51,6 +53,10 @@ UNOCCLUDED: Final = 6
 """Surely shows as a whole: inside the view, and every pixel that it meets is farther."""
 
 
+#: The least instances that are decided in one step.
+PART: Final = 1024
+
+
 def classify(
     bounds: Bounds,
     camera: Camera,
@@ -61,6 +67,7 @@ def classify(
     invalid: Collection[float] | None = None,
     coverage: Coverage = "area",
     own_depth: OwnDepth = "nearest",
+    progress: ProgressLike = None,
 ) -> npt.NDArray[np.uint8]:
     """The truth about each instance.
 
@@ -83,6 +90,8 @@ def classify(
         ``"nearest"``: if it is nearer than all of them; ``fit="rectangle"`` culls no more than
         that.
         ``"pixel"``: if it is nearer than the part of them that it can show; for ``fit="volume"``.
+    progress : bool or function, optional
+        As everywhere (`hizvk.progress`); a step is a part of the instances.
 
     Returns
     -------
@@ -103,7 +112,12 @@ def classify(
     )
     # The image as given: the tolerance for half floats is not part of the truth.
     image = (checked.floats(), checked.kind, checked.scale, checked.invalid)
-    return reference_classify(bounds_kind, arrays, camera._inner, *image, *asked)
+    codes = np.empty(len(bounds), np.uint8)
+    with Progress(progress, "asking the oracle") as steps:
+        for part in steps.parts(len(bounds), PART):
+            some = tuple(array[part] for array in arrays)
+            codes[part] = reference_classify(bounds_kind, some, camera._inner, *image, *asked)
+    return codes
 
 
 def unoccluded(
@@ -115,6 +129,7 @@ def unoccluded(
     scale: float = 1.0,
     invalid: Collection[float] | None = None,
     coverage: Coverage = "area",
+    progress: ProgressLike = None,
 ) -> npt.NDArray[np.uint8]:
     """Whether all of each instance shows, with nothing of the image before any part.
 
@@ -140,6 +155,8 @@ def unoccluded(
         What its numbers are, as in `Device.pyramid`.
     coverage : "area" or "sample"
         Which part of a pixel is touched: its closed square, or its centre.
+    progress : bool or function, optional
+        As everywhere (`hizvk.progress`); a step is a part of the instances.
 
     Returns
     -------
@@ -169,7 +186,12 @@ def unoccluded(
     checked = checked_image("depth", depth, camera, kind, scale, invalid)
     asked = _arguments.choice("coverage", coverage, words(Coverage))
     image = (checked.floats(), checked.kind, checked.scale, checked.invalid)
-    return reference_unoccluded(bounds_kind, arrays, camera._inner, *image, asked)
+    codes = np.empty(len(bounds), np.uint8)
+    with Progress(progress, "asking the oracle") as steps:
+        for part in steps.parts(len(bounds), PART):
+            some = tuple(array[part] for array in arrays)
+            codes[part] = reference_unoccluded(bounds_kind, some, camera._inner, *image, asked)
+    return codes
 
 
 def pyramid(depth: npt.ArrayLike, *, reversed_z: bool) -> list[npt.NDArray[np.float32]]:
@@ -192,7 +214,7 @@ def pyramid(depth: npt.ArrayLike, *, reversed_z: bool) -> list[npt.NDArray[np.fl
     TypeError, ValueError
         They name the parameter, what it expects and what came.
     """
-    image = _arguments.floats("depth", depth, ("height", "width"))
+    image = _arguments.floats("depth", depth, ("height", "width"), whole=False)
     if image.size == 0:
         raise ValueError(f"depth: expected at least one pixel, got {_arguments.describe(image)}")
     reversed_z = _arguments.flag("reversed_z", reversed_z)

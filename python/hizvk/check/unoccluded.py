@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .. import _arguments
+from .. import _arguments, foreign
 from ..explanation import Verdict
 from . import reference
 
@@ -78,6 +78,8 @@ def compare_unoccluded(verdicts: npt.ArrayLike, truth: npt.ArrayLike) -> Unocclu
     >>> found.false_claims.tolist(), found.missed.tolist(), found.found_share
     ([], [1], 0.5)
     """
+    verdicts = foreign.as_numpy("verdicts", "uint8 (N,)", verdicts)
+    truth = foreign.as_numpy("truth", "bool or uint8 (N,)", truth)
     codes = np.asarray(verdicts)
     if codes.dtype != np.uint8 or codes.ndim != 1:
         kind = ValueError if codes.dtype == np.uint8 else TypeError

@@ -1,7 +1,6 @@
-"""What the commands share: arguments, the progress bar, reports as pages and JSON, figures.
+"""What the commands share: arguments, reports as pages and JSON, figures.
 
 - `arguments`: parsers with the common options; runs a command to its exit code
-- `progress`: the bar on the terminal
 - `page`: Markdown pages: headings, lists, tables, pictures
 - `report`: report.md and report.json; adapter and versions in words
 - `figure`: figures of matplotlib in one style

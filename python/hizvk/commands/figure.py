@@ -5,13 +5,17 @@ from __future__ import annotations
 import importlib.util
 from typing import TYPE_CHECKING, Any
 
+from ..extras import install_line
+
 if TYPE_CHECKING:
     from pathlib import Path
 
-__all__ = ["MISSING", "can_draw", "save", "sheet"]
+__all__ = ["can_draw", "missing", "save", "sheet"]
 
-#: What a report names as left out where it is not.
-MISSING = "plots (matplotlib is not installed: pip install matplotlib)"
+
+def missing() -> str:
+    """What a report names as left out without matplotlib, and how to get it."""
+    return f"plots (matplotlib is not installed: {install_line('viz')})"
 
 
 def can_draw() -> bool:
@@ -21,9 +25,12 @@ def can_draw() -> bool:
 
 def sheet(width: float, height: float, *, dpi: int = 100) -> Any:
     """An empty figure; `width` and `height` are in inches."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width, height), dpi=dpi, layout="constrained")
+    made = Figure(figsize=(width, height), dpi=dpi, layout="constrained")
+    FigureCanvasAgg(made)  # it can say where its texts lie
+    return made
 
 
 def save(figure: Any, title: str, path: Path) -> None:

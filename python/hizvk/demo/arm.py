@@ -18,7 +18,7 @@ import hizvk
 
 from ..commands import report
 from ..commands.page import Page
-from ..commands.progress import Progress
+from ..progress import Progress
 from ..scenes.arm import arm
 
 if TYPE_CHECKING:
@@ -142,13 +142,13 @@ def run_arm(
     started = time.perf_counter()
     out.mkdir(parents=True, exist_ok=True)
     scene = arm(views, seed=seed)
-    steps = Progress(views, f"hizvk demo: {views} views of {len(scene):,} spheres, into {out}")
+    label = f"hizvk demo: {views} views of {len(scene):,} spheres, into {out}"
     device = hizvk.Device()
     prisms = device.occluders(*scene.prism_mesh())
     spheres = device.instances(hizvk.Spheres(scene.centers, scene.radii))
     found = ArmReport(size=size, adapter=device.adapter)
     shown: list[tuple[str, str]] = []
-    try:
+    with Progress(True, label, views, after_s=0.0) as steps:
         for number, view in enumerate(scene.views):
             steps.step(f"view {number}")
             camera = view.camera(size).resized(OCCLUDER_SIZE)
@@ -166,8 +166,6 @@ def run_arm(
                 shown.append((name, f"View {number}, {view.name}"))
         found.seconds = time.perf_counter() - started
         report.write(out, found.as_data(), _page(found, scene, shown))
-    finally:
-        steps.close()
     return found
 
 

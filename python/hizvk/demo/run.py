@@ -11,8 +11,8 @@ import numpy as np
 import hizvk
 
 from .. import scenes
-from ..commands.progress import Progress
 from ..measuring.stopwatch import Stopwatch
+from ..progress import Progress
 from ..scenes import truth
 from .report import STAGES, Report, ViewReport
 
@@ -86,8 +86,8 @@ def run(
     """
     started = time.perf_counter()
     out.mkdir(parents=True, exist_ok=True)
-    steps = Progress(2 * views + 3, f"hizvk demo: {views} views of {trees:,} trees, into {out}")
-    try:
+    label = f"hizvk demo: {views} views of {trees:,} trees, into {out}"
+    with Progress(True, label, 2 * views + 3, after_s=0.0) as steps:
         steps.show("mountains and trees")
         scene = scenes.mountains(trees, views, seed=seed)
         steps.step("uploading")
@@ -131,8 +131,6 @@ def run(
         shown = _draw_best(out, best, scene, sight, caster, culled[best], found) + shown
         found.seconds = time.perf_counter() - started
         found.write(out, shown)
-    finally:
-        steps.close()
     return found
 
 

@@ -11,6 +11,7 @@ from .. import _arguments
 from ..bounds import Boxes
 from ..check import check_proxy
 from ..mesh import A_MESH, Mesh, as_mesh
+from ..progress import Progress
 from . import growth, voxels
 from .units import unit_scale
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from ..mesh import MeshLike
+    from ..progress import ProgressLike
 
 __all__ = ["InnerBoxes", "closed_mesh", "inner_boxes"]
 
@@ -64,6 +66,7 @@ def inner_boxes(
     max_boxes: int = 16,
     min_share: float = 0.01,
     margin: float = 0.0,
+    progress: ProgressLike = None,
 ) -> InnerBoxes:
     """Finds axis-aligned boxes inside of a closed mesh, to be rendered in its stead.
 
@@ -82,7 +85,7 @@ def inner_boxes(
 
     Parameters
     ----------
-    vertices : (V, 3) float array; or a Mesh, a mesh of trimesh or Open3D
+    vertices : (V, 3) float array; or a Mesh, a mesh of trimesh, Open3D or PyVista
         World positions, or those of the mesh's own space.
     triangles : (T, 3) integer array, optional
         Indices of vertices; left out for meshes.
@@ -95,6 +98,8 @@ def inner_boxes(
     margin : float
         World units by which each side of a box is moved inwards.
         Leave room where boxes and mesh are rounded differently, as by a renderer's float32.
+    progress : bool or function, optional
+        As everywhere (`hizvk.progress`).
 
     Raises
     ------
@@ -112,16 +117,26 @@ def inner_boxes(
     (InnerBoxes(2 boxes, 100 % of the volume), [[2.0, 2.0, 9.0], [4.0, 4.0, 2.0]])
     """
     mesh = closed_mesh(vertices, triangles)
-    steps = _arguments.integer("resolution", resolution, low=1, high=MOST_STEPS)
+    resolution = _arguments.integer("resolution", resolution, low=1, high=MOST_STEPS)
     most = _arguments.integer("max_boxes", max_boxes, low=1, high=2**20)
     least = _arguments.number("min_share", min_share, at_least=0.0, at_most=1.0)
     room = _arguments.number("margin", margin, at_least=0.0)
+    with Progress(progress, "finding inner boxes", 3) as steps:
+        return _boxes_in(mesh, resolution, most, least, room, steps)
+
+
+def _boxes_in(
+    mesh: Mesh, resolution: int, most: int, least: float, room: float, steps: Progress
+) -> InnerBoxes:
+    """What `inner_boxes` returns, of checked arguments, in three steps."""
     points = mesh.vertices.astype(np.float64)
     scale = unit_scale([points])
     corners = (scale * points)[mesh.triangles]
-    grid = voxels.planes_of(corners, steps)
+    grid = voxels.planes_of(corners, resolution)
     free = voxels.inside(corners, grid)
+    steps.step("growing boxes")
     found = growth.grow(free, grid, most, least)
+    steps.step("proving them")
     boxes = np.stack([grid.planes[k][found[:, :, k]] for k in range(3)], axis=-1) / scale
     boxes[:, 0] += room
     boxes[:, 1] -= room
@@ -131,6 +146,7 @@ def inner_boxes(
     found, boxes = found[thick], boxes[thick]
     outside = check_proxy(_box_mesh(boxes), mesh).triangles // (2 * len(SIDES))
     kept = np.setdiff1d(np.arange(len(boxes)), outside)
+    steps.step()
     return InnerBoxes(
         boxes=Boxes(boxes[kept, 0], boxes[kept, 1]),
         mesh=_box_mesh(boxes[kept]),
@@ -149,7 +165,7 @@ def closed_mesh(vertices: Any, triangles: Any) -> Mesh:
         mesh = Mesh(vertices, triangles)
     nothing = Mesh(np.empty((0, 3)), np.empty((0, 3), np.uint32))
     try:
-        check_proxy(nothing, mesh)
+        check_proxy(nothing, mesh, progress=False)
     except ValueError as error:
         text = str(error).removeprefix("mesh: ")
         raise ValueError(f"triangles: {text}; {WAY_OUT}") from None

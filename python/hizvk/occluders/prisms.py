@@ -14,6 +14,7 @@ import numpy as np
 from .. import _arguments
 from ..check import check_proxy
 from ..mesh import Mesh
+from ..progress import Progress
 from .inner import closed_mesh
 from .units import unit_scale
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from ..mesh import MeshLike
+    from ..progress import ProgressLike
 
 __all__ = ["InnerPrisms", "inner_prisms"]
 
@@ -59,6 +61,7 @@ def inner_prisms(
     *,
     up: npt.ArrayLike,
     max_prisms: int = 1024,
+    progress: ProgressLike = None,
 ) -> InnerPrisms:
     """Finds upright prisms inside of closed buildings, to be rendered in their stead.
 
@@ -73,7 +76,7 @@ def inner_prisms(
 
     Parameters
     ----------
-    vertices : (V, 3) float array; or a Mesh, a mesh of trimesh or Open3D
+    vertices : (V, 3) float array; or a Mesh, a mesh of trimesh, Open3D or PyVista
         World positions, or those of the mesh's own space.
     triangles : (T, 3) integer array, optional
         Indices of vertices; left out for meshes.
@@ -81,6 +84,8 @@ def inner_prisms(
         The direction of the walls, along an axis: (0, 0, 1) or (0, 1, 0), for example.
     max_prisms : int
         At most so many, the largest by volume.
+    progress : bool or function, optional
+        As everywhere (`hizvk.progress`); a step is a round of checks.
 
     Raises
     ------
@@ -109,18 +114,19 @@ def inner_prisms(
     heights = [floor.heights(points) for floor in floors]
     # The highest proven and the lowest open place among each floor's heights; -1: none.
     proven, open_ = [-1] * len(floors), [len(found) for found in heights]
-    while True:
-        asked = [k for k in range(len(floors)) if proven[k] + 1 < open_[k]]
-        if not asked:
-            break
-        tried = {k: (proven[k] + open_[k]) // 2 for k in asked}
-        prisms, owner = _joined([floors[k].prism(heights[k][tried[k]]) / scale for k in asked])
-        outside = {asked[k] for k in np.unique(owner[check_proxy(prisms, mesh).triangles])}
-        for k in asked:
-            if k in outside:
-                open_[k] = tried[k]
-            else:
-                proven[k] = tried[k]
+    # Each round halves what is between them.
+    rounds = max(open_, default=0).bit_length()
+    with Progress(progress, "finding inner prisms", rounds) as steps:
+        while asked := [k for k in range(len(floors)) if proven[k] + 1 < open_[k]]:
+            tried = {k: (proven[k] + open_[k]) // 2 for k in asked}
+            prisms, owner = _joined([floors[k].prism(heights[k][tried[k]]) / scale for k in asked])
+            outside = {asked[k] for k in np.unique(owner[check_proxy(prisms, mesh).triangles])}
+            for k in asked:
+                if k in outside:
+                    open_[k] = tried[k]
+                else:
+                    proven[k] = tried[k]
+            steps.step()
     found = [
         (floors[k].area * abs(heights[k][place] - floors[k].height), k)
         for k, place in enumerate(proven)

@@ -12,12 +12,13 @@ It is hidden behind others or seen as before; it only hides nothing itself.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 
 from .. import _arguments
 from ..mesh import A_MESH, meshes_of
+from ..progress import Progress
 from . import silhouettes
 
 if TYPE_CHECKING:
@@ -26,7 +27,12 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from ..mesh import MeshLike
+    from ..progress import ProgressLike
     from .silhouettes import Pieces
+
+    _Numbers: TypeAlias = tuple[
+        npt.NDArray[np.intp], npt.NDArray[np.float64], npt.NDArray[np.float64]
+    ]
 
 __all__ = ["OccluderSelection", "select_occluders"]
 
@@ -77,6 +83,7 @@ def select_occluders(
     max_density: float | None = 100.0,
     max_protrusion: float | None = 0.25,
     max_triangles: int | None = None,
+    progress: ProgressLike = None,
 ) -> OccluderSelection:
     """Drops the meshes that are poor occluders, whatever the view.
 
@@ -105,7 +112,7 @@ def select_occluders(
 
     Parameters
     ----------
-    meshes : list of Mesh, of tuples, or of meshes of trimesh or Open3D; or one Mesh
+    meshes : list of Mesh, of tuples, or of meshes of trimesh, Open3D or PyVista; or one Mesh
         A tuple is ``(vertices, triangles)`` or ``(vertices, triangles, transforms)``.
     min_size : float
         Part of the diagonal, 0 to 1; 0 drops only what has no area.
@@ -117,6 +124,8 @@ def select_occluders(
         0 or more; None drops nothing.
     max_triangles : int, optional
         The budget for all copies of all kept meshes; None: no limit.
+    progress : bool or function, optional
+        As everywhere (`hizvk.progress`); silhouettes take three steps, the rest one.
 
     Raises
     ------
@@ -146,7 +155,23 @@ def select_occluders(
     budget = None
     if max_triangles is not None:
         budget = _arguments.integer("max_triangles", max_triangles, low=0, high=2**62)
-    pieces, count = silhouettes.measured(given), len(given)
+    with Progress(progress, "selecting occluders", 4) as steps:
+        pieces = silhouettes.measured(given, steps)
+        reasons, numbers = _poor(pieces, len(given), least_size, least_fill, density, protrusion)
+        found = _within(budget, *numbers, reasons, pieces.scale)
+        steps.step()
+    return found
+
+
+def _poor(
+    pieces: Pieces,
+    count: int,
+    least_size: float,
+    least_fill: float,
+    density: float | None,
+    protrusion: float | None,
+) -> tuple[dict[int, str], _Numbers]:
+    """Why meshes are dropped before the budget; and triangles, area and fill of each."""
     unit = pieces.scale
     triangles = _summed(pieces, pieces.triangles, count).astype(np.intp)
     area = _summed(pieces, pieces.area, count)
@@ -183,7 +208,7 @@ def select_occluders(
             )
     if protrusion is not None:
         _drop_redundant(pieces, protrusion, reasons)
-    return _within(budget, triangles, area, fill, reasons, unit)
+    return reasons, (triangles, area, fill)
 
 
 def _summed(pieces: Pieces, values: npt.NDArray[np.generic], count: int) -> npt.NDArray[np.float64]:

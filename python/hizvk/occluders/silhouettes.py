@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from ..mesh import Mesh
+    from ..progress import Progress
 
 __all__ = ["Pieces", "measured"]
 
@@ -56,8 +57,11 @@ class Pieces:
         return found
 
 
-def measured(meshes: Sequence[Mesh]) -> Pieces:
-    """Boxes and silhouettes of all copies of all meshes; a mesh without triangles has no area."""
+def measured(meshes: Sequence[Mesh], steps: Progress) -> Pieces:
+    """Boxes and silhouettes of all copies of all meshes; a mesh without triangles has no area.
+
+    Each axis is a step.
+    """
     mesh: list[int] = []
     soups: list[npt.NDArray[np.float64]] = []
     drawn: list[int] = []
@@ -90,11 +94,12 @@ def measured(meshes: Sequence[Mesh]) -> Pieces:
         np.zeros(low.shape),
     )
     edge = high - low
-    steps = np.divide(SAMPLES, edge, out=np.zeros_like(edge), where=edge > 0.0)
-    unit = (corners - low[owner, None]) * steps[owner, None]
+    per_unit = np.divide(SAMPLES, edge, out=np.zeros_like(edge), where=edge > 0.0)
+    unit = (corners - low[owner, None]) * per_unit[owner, None]
     for axis, side in enumerate(pieces.sides.T):
         plan = unit[:, :, [(axis + 1) % 3, (axis + 2) % 3]]
         pieces.silhouette[:, axis] = side * _covered(plan, owner, len(soups))
+        steps.step()
     return pieces
 
 

@@ -18,15 +18,17 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from .. import _arguments
+from .. import _arguments, foreign
 from ..bounds import Boxes
 from ..mesh import A_MESH, Mesh, as_mesh
+from ..progress import Progress
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from .._arguments import FloatArray
     from ..mesh import MeshLike
+    from ..progress import ProgressLike
 
 __all__ = ["SplitMesh", "split_mesh"]
 
@@ -125,7 +127,11 @@ class SplitMesh:
 
 
 def split_mesh(
-    vertices: npt.ArrayLike | MeshLike, triangles: npt.ArrayLike | None = None, *, cell: float
+    vertices: npt.ArrayLike | MeshLike,
+    triangles: npt.ArrayLike | None = None,
+    *,
+    cell: float,
+    progress: ProgressLike = None,
 ) -> SplitMesh:
     """Cuts a mesh into groups of neighbouring triangles that fit a cube of side `cell`.
 
@@ -146,7 +152,7 @@ def split_mesh(
 
     Parameters
     ----------
-    vertices : (V, 3) or (T, 3, 3) float array; or a Mesh, a mesh of trimesh or Open3D
+    vertices : (V, 3) or (T, 3, 3) float array; or a Mesh, a mesh of trimesh, Open3D or PyVista
         World positions; ``(T, 3, 3)`` holds the three corners of each triangle.
         A Mesh must have no transforms.
     triangles : (T, 3) integer array, optional
@@ -155,6 +161,8 @@ def split_mesh(
         In world units, above 0.
         Smaller cells hide more and cost more bounds.
         Some 50 to 500 triangles to a group are a good start.
+    progress : bool or function, optional
+        As everywhere (`hizvk.progress`); the call is one step.
 
     Raises
     ------
@@ -172,6 +180,14 @@ def split_mesh(
     """
     side = _arguments.number("cell", cell, above=0.0)
     points, faces = _mesh_or_soup(vertices, triangles)
+    with Progress(progress, "splitting a mesh", 1) as steps:
+        split = _split(points, faces, side)
+        steps.step()
+    return split
+
+
+def _split(points: FloatArray, faces: npt.NDArray[np.uint32], side: float) -> SplitMesh:
+    """What `split_mesh` returns, of checked arguments."""
     a, b, c = (points[faces[:, k]] for k in range(3))
     low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
     # NaN passes through both.
@@ -200,7 +216,8 @@ def _mesh_or_soup(vertices: Any, triangles: Any) -> tuple[FloatArray, npt.NDArra
     if triangles is not None:
         points = _arguments.floats("vertices", vertices, ("V", 3))
         return points, _arguments.triangles("triangles", triangles, len(points))
-    if hasattr(vertices, "vertices") or isinstance(vertices, tuple):
+    is_mesh = isinstance(vertices, tuple) or foreign.mesh_parts("vertices", vertices) is not None
+    if is_mesh or foreign.way_to_a_mesh(vertices):
         mesh = as_mesh("vertices", vertices, A_MESH)
         if mesh.transforms is not None:
             raise ValueError(f"vertices: expected a mesh without transforms, got {mesh!r}")

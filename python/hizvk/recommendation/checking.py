@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from ..camera import Camera
     from ..depth import DepthArray
     from ..measuring.configuration import Configuration
+    from ..progress import Progress
     from ..resources import Occluders
 
 __all__ = ["CheckedCandidates", "Judge", "by_oracle", "by_rays", "hold"]
@@ -138,6 +139,7 @@ def hold(
     judge: Judge,
     *,
     every_ray: bool,
+    steps: Progress,
 ) -> CheckedCandidates:
     """Compares every candidate with what is visible.
 
@@ -158,19 +160,30 @@ def hold(
         With bare points and a guard among the candidates, what the guard keeps then counts as
         visible.
         Such points lie on what the image shows, and it knows the depth only at its pixels' centres.
+    steps : Progress
+        Told of each view of each kind of bounds.
     """
     found = CheckedCandidates(judge.method, [0] * len(chosen), [0] * len(chosen))
     random = np.random.default_rng(0)
-    for volume, bounds in alternatives.items():
+    for volume in alternatives:
         members = [number for number, one in enumerate(chosen) if one.volume == volume]
-        proven = [number for number in members if chosen[number].promises_rays] if every_ray else []
+        if not members:
+            continue
+        # Points beside volumes stand for these, so they may not hide what shows of a volume.
+        judged = _judged(volume, list(alternatives))
+        bounds = alternatives[judged]
+        proven = [
+            number
+            for number, one in enumerate(chosen)
+            if every_ray and one.volume == judged and one.promises_rays
+        ]
         points = bounds._points if isinstance(bounds, Instances) else are_points(bounds)
         for k in range(len(masks[members[0]])):
             culled = {number: ~masks[number][k] for number in members}
             by_some = np.logical_or.reduce(list(culled.values()))
             hidden = np.zeros_like(by_some)
             if proven:
-                hidden = np.logical_or.reduce([culled[number] for number in proven])
+                hidden = np.logical_or.reduce([~masks[number][k] for number in proven])
             visible, open_ = np.zeros_like(by_some), by_some & ~hidden
             if points and not every_ray and any(chosen[number].guard_px for number in members):
                 found.method = GUARD
@@ -194,7 +207,14 @@ def hold(
             for number in members:
                 found.hides[number] += int((visible & culled[number]).sum())
                 found.unclear[number] += int((open_ & culled[number]).sum()) if every_ray else 0
+            steps.step("checking")
     return found
+
+
+def _judged(volume: str, given: Sequence[str]) -> str:
+    """The kind of bounds by which candidates of a kind are checked."""
+    others = [name for name in given if name != "points"]
+    return others[0] if volume == "points" and others else volume
 
 
 def _pick(first: Mask, second: Mask, room: int, random: np.random.Generator) -> Indices:

@@ -14,7 +14,9 @@ The ray caster that checks a cull therefore starts from the same numbers as the 
 - `city`: a street-level city from a seed
 - `boulders`: lumps of thousands of triangles
 - `arm`: spheres among prisms, with rays of its own
+- `fence`: planks with knotholes
 - `hedge`: where ranking occluders by size and distance fails
+- `gates`: where published tests go wrong
 - `houses`: `village`: turned houses with gable roofs
 - `doors`: doors that open and close and a bus that drives by
 - `embree`: Embree's ray caster

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..extras import install_line
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -15,10 +17,12 @@ if TYPE_CHECKING:
 
     from .grid import Floats
 
-__all__ = ["MISSING", "can_cast", "embree_scene"]
+__all__ = ["can_cast", "embree_scene", "missing"]
 
-#: What a report names as left out where it is not installed.
-MISSING = "rays by Embree (embreex is not installed: pip install embreex)"
+
+def missing() -> str:
+    """What a report names as left out without `embreex`, and how to get it."""
+    return f"rays by Embree (embreex is not installed: {install_line('scene')})"
 
 
 def can_cast() -> bool:

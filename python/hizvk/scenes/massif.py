@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from ..extras import install_line
 from .grid import on_grid
 from .scene import Scene, View
 from .terrain import Terrain
@@ -21,9 +22,6 @@ __all__ = ["MAP_CORNER", "elevation", "mountains"]
 METRES_PER_DEGREE: Final = 111_200.0
 #: The south-west corner of the mountains, like an easting and northing of the map (UTM zone 16).
 MAP_CORNER: Final = (731_000.0, 4_036_000.0, 0.0)
-#: Installs what the demo uses: the packages of the extras `viz` and `scene` in pyproject.toml.
-#: They are named here because hizvk is on no index, so ``hizvk[viz]`` would not be found.
-INSTALL_LINE: Final = "pip install matplotlib embreex"
 
 #: The flight around the massif: kilometres east and north of the corner, metres above the ground.
 FLIGHT: Final = (
@@ -58,6 +56,7 @@ def elevation() -> Terrain:
     ImportError
         Without matplotlib or its sample data; the text says what to install.
     """
+    install = install_line("viz", "scene")
     try:
         from matplotlib.cbook import get_sample_data
 
@@ -67,11 +66,11 @@ def elevation() -> Terrain:
             degrees = float(data["dx"]), float(data["dy"])
             latitude = (float(data["ymin"]) + float(data["ymax"])) / 2.0
     except ImportError as error:
-        raise ImportError(f"the demo needs matplotlib: {INSTALL_LINE}") from error
+        raise ImportError(f"the demo needs matplotlib: {install}") from error
     except FileNotFoundError as error:
         raise ImportError(
             "this matplotlib comes without its sample data (jacksboro_fault_dem.npz), as the "
-            f"packages of some distributions do; in a virtual environment: {INSTALL_LINE}"
+            f"packages of some distributions do; in a virtual environment: {install}"
         ) from error
     east = degrees[0] * METRES_PER_DEGREE * float(np.cos(np.radians(latitude)))
     north = degrees[1] * METRES_PER_DEGREE

@@ -2,12 +2,17 @@
 
 use crate::error::Error;
 
-/// The environment variable that chooses an adapter: an index, or part of a name or driver.
+/// The environment variable that chooses an adapter: an index, or part of a name, driver or
+/// graphics API.
 pub const ADAPTER_VARIABLE: &str = "HIZVK_ADAPTER";
 
 /// How to get a driver: the advice if there is no adapter at all.
 pub const INSTALL_HINT: &str = if cfg!(all(feature = "vulkan", target_os = "linux")) {
     "A software Vulkan driver: apt install libvulkan1 mesa-vulkan-drivers"
+} else if cfg!(all(feature = "metal", target_vendor = "apple")) {
+    "Metal is part of macOS; use a session that may use the GPU"
+} else if cfg!(all(feature = "dx12", windows)) {
+    "Install the driver of the GPU, which brings Vulkan and Direct3D 12"
 } else {
     "Install the driver of a GPU"
 };
@@ -48,10 +53,16 @@ impl AdapterSummary {
         }
     }
 
-    /// The rank of the adapter; lower is better, and real GPUs come first.
-    pub(super) fn rank(&self) -> usize {
-        let order = ["discrete_gpu", "integrated_gpu", "virtual_gpu", "cpu"];
-        order.iter().position(|t| *t == self.device_type).unwrap_or(order.len())
+    /// The rank of the adapter; lower is better.
+    /// Real GPUs come first, and Vulkan comes before what stands in for it on the same GPU.
+    pub(super) fn rank(&self) -> (usize, usize) {
+        let place = |order: &[&str], of: &str| {
+            order.iter().position(|known| *known == of).unwrap_or(order.len())
+        };
+        (
+            place(&["discrete_gpu", "integrated_gpu", "virtual_gpu", "cpu"], &self.device_type),
+            place(&["vulkan", "metal", "dx12"], &self.backend),
+        )
     }
 
     pub(super) fn matches(&self, request: &str) -> bool {
@@ -60,7 +71,7 @@ impl AdapterSummary {
             return index == self.index;
         }
         let request = request.to_lowercase();
-        [&self.name, &self.driver, &self.driver_info]
+        [&self.name, &self.driver, &self.driver_info, &self.backend]
             .iter()
             .any(|text| text.to_lowercase().contains(&request))
     }
@@ -116,4 +127,50 @@ pub(super) fn enumerate() -> Vec<(AdapterSummary, wgpu::Adapter)> {
 /// The adapters of this machine that the built backends find; an empty list without a driver.
 pub fn adapters() -> Vec<AdapterSummary> {
     enumerate().into_iter().map(|(summary, _)| summary).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn adapter(index: usize, device_type: &str, backend: &str) -> AdapterSummary {
+        AdapterSummary {
+            index,
+            name: "an adapter".to_owned(),
+            driver: String::new(),
+            driver_info: String::new(),
+            backend: backend.to_owned(),
+            device_type: device_type.to_owned(),
+        }
+    }
+
+    #[test]
+    fn gpus_come_before_drivers_and_vulkan_before_its_stand_ins() {
+        // What a Windows machine may list: each GPU twice, and a software driver of each interface.
+        let mut found = [
+            adapter(0, "cpu", "vulkan"),
+            adapter(1, "other", "vulkan"),
+            adapter(2, "integrated_gpu", "dx12"),
+            adapter(3, "cpu", "dx12"),
+            adapter(4, "discrete_gpu", "dx12"),
+            adapter(5, "integrated_gpu", "vulkan"),
+            adapter(6, "discrete_gpu", "vulkan"),
+        ];
+        found.sort_by_key(|one| (one.rank(), one.index));
+        assert_eq!(found.map(|one| one.index), [6, 4, 5, 2, 0, 3, 1]);
+    }
+
+    #[test]
+    fn an_interface_can_be_asked_for() {
+        let wanted = adapter(4, "discrete_gpu", "dx12");
+        assert!(wanted.matches("dx12"));
+        assert!(wanted.matches("4"));
+        assert!(!wanted.matches("vulkan"));
+    }
+
+    #[test]
+    fn backends_have_the_names_that_are_ranked() {
+        let names = [wgpu::Backend::Vulkan, wgpu::Backend::Metal, wgpu::Backend::Dx12];
+        assert_eq!(names.map(|backend| backend.to_string()), ["vulkan", "metal", "dx12"]);
+    }
 }

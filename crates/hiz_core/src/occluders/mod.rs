@@ -13,6 +13,8 @@
 //!
 //! The drawing is recorded into the caller's encoder; nothing here submits or reads back.
 
+#[cfg(feature = "methods")]
+pub(crate) mod copies;
 pub(crate) mod depth;
 mod device_meshes;
 pub(crate) mod device_raster;

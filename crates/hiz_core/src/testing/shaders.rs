@@ -17,6 +17,8 @@ use crate::input::bounds::BoundsKind;
 use crate::instances::from_buffer::{FROM_BUFFER_KINDS, from_buffer_module};
 use crate::instances::tiers::form_tier_module;
 use crate::instances::update::update_module;
+#[cfg(feature = "methods")]
+use crate::methods::{coarse_level_module, fragment_levels_module, texts_module};
 use crate::occluders::device_raster::occluders_module;
 use crate::output::compact::{compact_module, copy_module};
 use crate::output::cut::{cut_module, emit_cut_module};
@@ -87,6 +89,12 @@ pub(super) fn all() -> Vec<(String, Source)> {
         ("resolve Float".to_owned(), resolve_module(SourceKind::Float)),
         ("snippets".to_owned(), snippets()),
     ];
+    #[cfg(feature = "methods")]
+    all.extend([
+        ("published tests".to_owned(), texts_module()),
+        ("one coarse level".to_owned(), coarse_level_module()),
+        ("fragment levels".to_owned(), fragment_levels_module()),
+    ]);
     let mask = |source| (format!("receiver_mask {source:?}"), receiver_mask_module(source));
     all.extend(SOURCES.into_iter().filter(|source| *source != SourceKind::Pair).map(mask));
     for source in SOURCES {

@@ -83,6 +83,20 @@ impl Band {
         }
     }
 
+    /// Bytes of its arrays.
+    #[cfg(feature = "methods")]
+    pub(super) fn bytes(&self) -> u64 {
+        let floats = [&self.farthest, &self.nearest, &self.cells, &self.first, &self.pixels];
+        let floats: usize = floats.iter().map(|list| size_of_val(&list[..])).sum();
+        let tiles = size_of_val(&self.states[..])
+            + size_of_val(&self.is_stale[..])
+            + size_of_val(&self.is_cell_stale[..])
+            + size_of_val(&self.risen[..])
+            + size_of_val(&self.layers[..]);
+        let lists = size_of_val(&self.stale[..]) + size_of_val(&self.rises[..]);
+        (floats + tiles + lists) as u64
+    }
+
     pub(super) fn clear(&mut self) {
         self.farthest.fill(0.0);
         self.nearest.fill(0.0);

@@ -40,6 +40,8 @@ mod lens;
 #[cfg(feature = "methods")]
 pub(crate) mod one_by_one;
 pub(crate) mod planted_fault;
+#[cfg(feature = "methods")]
+pub(crate) mod snapped;
 mod tile;
 mod triangle;
 mod vertices;
@@ -172,6 +174,12 @@ impl HostRaster {
     /// Makes the image far everywhere.
     pub(crate) fn clear(&mut self) {
         self.bands.iter_mut().for_each(Band::clear);
+    }
+
+    /// Bytes of the image.
+    #[cfg(feature = "methods")]
+    pub(crate) fn bytes(&self) -> u64 {
+        self.bands.iter().map(Band::bytes).sum()
     }
 
     /// Draws the copies of a scene, within the limits of `options`.

@@ -27,6 +27,7 @@ use crate::instances::records::{RECORDS_PER_ROW, TEXEL_BYTES};
 use crate::instances::update;
 use crate::instances::volume_record::{ABSENT_CENTER, BEYOND_LIMITS, LARGEST};
 use crate::instances::{from_buffer, tiers};
+use crate::methods;
 use crate::output::bins::BLOCK_WORDS;
 use crate::output::compact::SCATTER_WORKGROUP;
 use crate::output::cut::CUT_WORKGROUP;
@@ -60,6 +61,9 @@ fn twins() -> Vec<(&'static str, &'static str, f64)> {
     let rule = |r: &LodRule| int(r.code());
     let texels = |kind: BoundsKind| (kind.record_bytes() / TEXEL_BYTES) as f64;
     vec![
+        ("methods/coarse_level", "TILE", int(methods::TILE)),
+        ("methods/texts", "MAX_LEVELS", MAX_LEVELS as f64),
+        ("methods/texts", "WORKGROUP", int(methods::TEXT_WORKGROUP)),
         ("cull/among", "AMONG_OF_GROUP", GROUP as f64 / int(u32::BITS)),
         ("cull/among_layout", "AMONG_BITS", int(u32::BITS)),
         ("cull/among_layout", "AMONG_PER_ROW_LOG2", int(among::WORDS_PER_ROW.ilog2())),
@@ -263,6 +267,8 @@ const SHADER_ONLY: &[(&str, &[&str])] = &[
         ],
     ),
     ("instances/corners", &["HALF"]),
+    ("methods/coarse_level", &["TILE_PIXELS", "HALF_TILE", "QUARTER_TILE", "ONE_BITS"]),
+    ("methods/texts", &["HALF", "CORNERS", "PLANES", "SQUARE"]),
     ("instances/bounds_point_support", &["CANDIDATES", "OUTLINES"]),
     // One workgroup scans, however large it is.
     ("output/compact", &["LANES"]),
@@ -401,6 +407,12 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
     BTreeMap::from([
         ("accept_members", line(GROUP as u32)),
         ("among_order", line(among::WORKGROUP)),
+        ("atomic_16x16", [16, 16, 1]),
+        ("atomic_16x4", [16, 4, 1]),
+        ("atomic_16x8", [16, 8, 1]),
+        ("atomic_4x4", [4, 4, 1]),
+        ("atomic_8x4", [8, 4, 1]),
+        ("atomic_8x8", [8, 8, 1]),
         ("begin", line(1)),
         ("choose_lods", line(lod::LANES)),
         ("cut", line(CUT_WORKGROUP)),
@@ -416,10 +428,15 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("count", line(count::LANES)),
         ("count_of_pixels", line(pixels::WORKGROUP)),
         ("cull", line(GROUP as u32)),
+        ("cull_arm", line(methods::TEXT_WORKGROUP)),
         ("cull_children", line(CULL_WORKGROUP)),
+        ("cull_darnell", line(methods::TEXT_WORKGROUP)),
         ("cull_groups", line(CULL_WORKGROUP)),
         ("cull_members", line(GROUP as u32)),
+        ("cull_one_lookup", line(methods::TEXT_WORKGROUP)),
+        ("cull_rakos", line(methods::TEXT_WORKGROUP)),
         ("explain", line(1)),
+        ("farther_level", [0; 3]),
         ("form_tier", line(tiers::WORKGROUP)),
         ("join_views", line(views::WORKGROUP)),
         ("mip_blocks", line(mips_passes::WORKGROUP)),
@@ -446,6 +463,8 @@ fn workgroups() -> BTreeMap<&'static str, [u32; 3]> {
         ("scatter", line(SCATTER_WORKGROUP)),
         ("spin", line(clock_check::WORKGROUP)),
         ("take_bounds", line(from_buffer::WORKGROUP)),
+        ("tree", line(methods::TILE * methods::TILE)),
+        ("whole_image", [0; 3]),
     ])
 }
 

@@ -14,6 +14,7 @@ use crate::instances::from_buffer::FromBufferUniform;
 use crate::instances::piece::PieceUniform;
 use crate::instances::tiers::{FormUniform, TierUniform};
 use crate::instances::update::UpdateUniform;
+use crate::methods::TextUniform;
 use crate::output::bins::{BinRecord, EmitUniform, TotalRecord};
 use crate::output::counters::{CounterRecord, StatisticsRecord};
 use crate::output::draw::DrawIndexedIndirect;
@@ -36,6 +37,7 @@ use crate::yardstick::reduce as yardstick;
 /// Structs that only a shader has: they lie in no buffer.
 const SHADER_ONLY_STRUCTS: &[&str] = &[
     "Bin",
+    "BoxInView",
     "BoxTexels",
     "Corners",
     "Candidate",
@@ -187,6 +189,12 @@ fn struct_twins() -> Vec<(&'static str, Layout)> {
         }),
         twin!("Template", TemplateRecord {
             "count" = count, "first" = first, "base_vertex" = base_vertex, "padding" = padding,
+        }),
+        twin!("TextView", TextUniform {
+            "clip_from_world" = clip_from_world, "view_from_world" = view_from_world,
+            "clip_from_view" = clip_from_view, "planes" = planes, "eye" = eye, "up" = up,
+            "size" = size, "near" = near, "count" = count, "levels" = levels,
+            "num_levels" = num_levels,
         }),
         twin!("Total", TotalRecord { "demand" = demand, "written" = written }),
         twin!("Update", UpdateUniform {
